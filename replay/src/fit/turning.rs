@@ -71,6 +71,8 @@ struct Sample {
     known_rad_s2: [f64; 2],
     /// Angular acceleration of a unit sine of the gimbal's angle, rad/s^2.
     by_gimbal_rad_s2: f64,
+    /// Rate by which the body turns back for each rad/s of the gimbal.
+    turned_back: f64,
     burning: bool,
     begins: bool,
 }
@@ -227,7 +229,7 @@ impl Model<'_> {
                 let left = if axis == 0 { libm::cos(both[1][place].1) } else { 1.0 };
                 let mut mean_rad_s = 0.0;
                 for angle_rad in both[axis][place].0 {
-                    let driven_rad = values[GAIN] * angle_rad;
+                    let (driven_rad, before_rad) = (values[GAIN] * angle_rad, nozzle_rad);
                     nozzle_rad = nozzle_rad.clamp(driven_rad - half_rad, driven_rad + half_rad);
                     let turn = if sample.burning {
                         -sample.by_gimbal_rad_s2 * left * libm::sin(nozzle_rad + offset_rad)
@@ -237,7 +239,8 @@ impl Model<'_> {
                     let by_rad_s = (turn + sample.known_rad_s2[axis]) * part_s;
                     rate_rad_s += by_rad_s;
                     // As the simulated unit, which adds up the rates at the end of each millisecond.
-                    mean_rad_s += rate_rad_s / PARTS as f64;
+                    let turned_back_rad_s = sample.turned_back * (nozzle_rad - before_rad) / part_s;
+                    mean_rad_s += (rate_rad_s - turned_back_rad_s) / PARTS as f64;
                 }
                 sample.felt_rad_s[axis] - mean_rad_s
             });
@@ -285,7 +288,8 @@ fn samples(trace: &Trace, along: &Along, first: usize, begins_s: f64) -> Vec<Sam
         let to_s = frame.time_s - begins_s;
         let burning = to_s > -0.5 * burn.rise_s;
         let thrust_n = if burning { burn.mean_n(to_s - FRAME_S, to_s) } else { 0.0 };
-        let mass = mass_model.at(if burning { burn.burnt_kg(to_s - 0.5 * FRAME_S) } else { 0.0 });
+        let burnt_kg = if burning { burn.burnt_kg(to_s - 0.5 * FRAME_S) } else { 0.0 };
+        let (mass, motor_kg) = (mass_model.at(burnt_kg), curve.total_mass_kg() - burnt_kg);
         let in_body = |frame: &super::trace::Frame| {
             let state = &frame.estimate.state;
             state.world_from_body.inverse_transform_vector(&frame.estimate.velocity_through_air_m_s())
@@ -309,6 +313,7 @@ fn samples(trace: &Trace, along: &Along, first: usize, begins_s: f64) -> Vec<Sam
                 air.z / inertia - coupling * rate.y - damping * rate.z,
             ],
             by_gimbal_rad_s2: thrust_n * airframe.thrust_arm_m(mass.cg_station_m) / inertia,
+            turned_back: airframe.swinging_kg_m2(curve, motor_kg, mass.cg_station_m) / inertia,
             burning,
             begins: place == 0,
         }

@@ -184,8 +184,9 @@ fn every_plan_solved_again_is_the_flown_one() {
         .frames
         .iter()
         .filter(|frame| frame.output.phase == u32::from(Phase::Powered.index()))
+        .filter(|frame| frame.input.plan_ready)
         .map(|frame| frame.input.frame)
-        .filter(|frame| frame.is_multiple_of(40))
+        .step_by(4)
         .collect();
     for frame in powered {
         let report = explain(&recording, frame).unwrap();
@@ -233,9 +234,11 @@ fn every_command_answers_for_a_flight_from_apogee() {
     assert!(stdout.contains("recorded frames identical") && stdout.contains("vertical speed"), "{stdout}");
     // A plan in the middle of the burn.
     let recording = recording();
-    let in_burn = |frame: &&ComputerFrame| frame.output.phase == u32::from(Phase::Powered.index());
-    let burning: Vec<u64> = recording.frames.iter().filter(in_burn).map(|frame| frame.input.frame).collect();
-    let planning = burning[burning.len() / 2].next_multiple_of(10);
+    let planned = |frame: &&ComputerFrame| {
+        frame.output.phase == u32::from(Phase::Powered.index()) && frame.input.plan_ready
+    };
+    let planning: Vec<u64> = recording.frames.iter().filter(planned).map(|frame| frame.input.frame).collect();
+    let planning = planning[planning.len() / 2];
     let (code, stdout, _) = run(replay("verify", log).args(["--explain", &planning.to_string()]));
     assert!(code == 0 && stdout.contains("identical bit for bit") && stdout.contains("cold"), "{stdout}");
     let (code, _, stderr) = run(replay("refly", log).args(["--set", "powered.wieghts.theta=80"]));

@@ -97,8 +97,10 @@ fn an_unreadable_log_does_not_hide_the_others() {
 fn a_frame_is_shown_and_a_missing_frame_exits_2() {
     let recording = MK2.recording();
     let frames = &recording.frames;
-    let in_burn = |frame: &&ComputerFrame| frame.output.phase == u32::from(Phase::Powered.index());
-    let planning = frames.iter().filter(in_burn).nth(40).unwrap().input.frame.next_multiple_of(10);
+    let planned = |frame: &&ComputerFrame| {
+        frame.output.phase == u32::from(Phase::Powered.index()) && frame.input.plan_ready
+    };
+    let planning = frames.iter().filter(planned).nth(5).unwrap().input.frame;
     let planning = (recording.release_frame + planning).to_string();
     let (code, stdout, _) = run(replay("verify", &MK2.log).args(["--explain", &planning]));
     assert_eq!(code, 0);
@@ -125,12 +127,12 @@ fn a_frame_is_shown_and_a_missing_frame_exits_2() {
 fn val_judge_finds_no_better_plan_than_the_one_that_flew() {
     let recording = MK2.recording();
     let (_, frames) = recording.replayable_frames().unwrap();
-    let in_burn = |frame: &&ComputerFrame| {
+    let planned = |frame: &&ComputerFrame| {
         frame.output.phase == u32::from(Phase::Powered.index())
+            && frame.input.plan_ready
             && frame.output.level == u32::from(ControlLevel::Converged.index())
     };
-    let planning =
-        frames.iter().filter(in_burn).map(|frame| frame.input.frame).filter(|frame| frame % 10 == 0);
+    let planning = frames.iter().filter(planned).map(|frame| frame.input.frame);
     let mut same = 0;
     for frame in planning.skip(2).step_by(10).take(5) {
         let judged = replay::verify::explain::explain(&recording, recording.release_frame + frame)

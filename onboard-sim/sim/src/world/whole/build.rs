@@ -77,7 +77,6 @@ impl World {
             });
         }
         let limit_rad = airframe.gimbal.limit_rad();
-        let (length_m, diameter_m) = (motor.length_m(), motor.diameter_m());
         let gimbal = || Servo::new(&airframe.gimbal.servo, (-limit_rad, limit_rad), 0.0);
         let mut world = Self {
             shape: Shape::new(airframe, truth),
@@ -90,8 +89,7 @@ impl World {
             }),
             fin_links: fin_links_at(airframe, truth, airframe.fins.closed_rad()),
             gimbal_rates_rad_s: [[0.0; 2]; 2],
-            // A cylinder: L^2/12 + r^2/4.
-            swinging: (motor.total_mass_kg(), length_m * length_m / 12.0 + diameter_m * diameter_m / 16.0),
+            certified: motor.clone(),
             wires: core::array::from_fn(|surface| (surface, false)),
             parachute: Parachute::new(&airframe.parachute),
             air: AirHere::at(initial.position_m.z),

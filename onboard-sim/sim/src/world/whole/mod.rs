@@ -12,6 +12,7 @@ use flight::rules::verdict::Touchdown;
 use flight::vehicle::airframe::{Airframe, MassModel, MassProperties};
 use flight::vehicle::atmosphere::{Air, STANDARD_GRAVITY_M_S2};
 use flight::vehicle::rigid::RigidState;
+use flight::vehicle::thrust_curve::ThrustCurve;
 use nalgebra::{Rotation3, Vector3};
 
 pub use self::build::WorldError;
@@ -77,8 +78,8 @@ pub struct World {
     gimbal_links: [Linkage; 2],
     /// Rates of the gimbal over the step before and the last one, rad/s.
     gimbal_rates_rad_s: [[f64; 2]; 2],
-    /// Mass of the full landing motor, kg, and the square of its radius of gyration, m^2.
-    swinging: (f64, f64),
+    /// The landing motor as certified: its size and its full mass.
+    certified: ThrustCurve,
     fin_links: [Linkage; 4],
     /// The wire that each surface hangs on, gimbal first, and whether it moves the wrong way.
     wires: [(usize, bool); 6],
@@ -273,28 +274,22 @@ impl World {
 
     /// Centre of gravity: x its station, y and z its distance from the axis, m. A swinging motor takes it to the side.
     fn cg_m(&self) -> Vector3<f64> {
-        let aside_m = self.motor_below_pivot_m() * self.motor_kg() / self.mass.mass_kg;
+        let below_pivot_m = self.airframe.gimbal.pivot_station_m - self.airframe.mass.propellant_station_m;
+        let aside_m = below_pivot_m * self.motor_kg() / self.mass.mass_kg;
         let [pitch_rad, yaw_rad] = self.gimbal_rad();
         let aside = Vector3::new(0.0, -aside_m * libm::sin(yaw_rad), aside_m * libm::sin(pitch_rad));
         Vector3::new(self.mass.cg_station_m, 0.0, 0.0) + aside + Vector3::from(self.truth.cg_offset_m)
     }
 
-    /// How far the middle of the motor hangs below the gimbal's pivot, m.
-    fn motor_below_pivot_m(&self) -> f64 {
-        self.airframe.gimbal.pivot_station_m - self.airframe.mass.propellant_station_m
-    }
-
     /// Mass of the landing motor now, kg.
     fn motor_kg(&self) -> f64 {
-        self.swinging.0 - self.motor.burnt_kg(self.time_s())
+        self.certified.total_mass_kg() - self.motor.burnt_kg(self.time_s())
     }
 
-    /// The body turns back when the motor begins to swing and when it stops: their common angular momentum is kept. The
-    /// motor has `m (k^2 + l a)` of it for each rad/s, with the distances `l` from its middle up to the pivot and `a` up to
-    /// the centre of gravity of all.
+    /// The body turns back when the motor begins to swing and when it stops: their common angular momentum is kept.
     fn turn_back(&mut self) {
-        let arm_m = self.mass.cg_station_m - self.airframe.mass.propellant_station_m;
-        let swinging_kg_m2 = self.motor_kg() * (self.swinging.1 + self.motor_below_pivot_m() * arm_m);
+        let swinging_kg_m2 =
+            self.airframe.swinging_kg_m2(&self.certified, self.motor_kg(), self.mass.cg_station_m);
         let share = swinging_kg_m2 / (self.mass.pitch_inertia_kg_m2 * self.truth.inertia_scale);
         let [before_rad_s, now_rad_s] = self.gimbal_rates_rad_s;
         self.state.rate_rad_s.y -= share * (now_rad_s[0] - before_rad_s[0]);

@@ -27,7 +27,7 @@ impl Airborne {
     }
 
     fn with_faults(dispersion: &str, faults: &[&str]) -> Self {
-        let mut flight = load_flight("mk2").unwrap();
+        let mut flight = load_flight(flight::vehicles::mission::DEFAULT).unwrap();
         flight.recipe.dispersion = Dispersion::builtin(dispersion).unwrap();
         flight.recipe.faults = faults.iter().map(|fault| fault.parse().unwrap()).collect();
         let mut rocket = Vehicle::on_the_pad(&flight).unwrap();
