@@ -221,7 +221,7 @@ fn started(recipe: &Recipe, sortie: &Sortie) -> RecordedComputer {
 
 /// Flies the board to its end, and compares every command with the recorded one.
 fn commands_the_same(computer: Computer, frames: &[ComputerFrame]) -> Frames {
-    let (mut flight, mut board) = (Frames::new(computer), Recorded::sensing(frames));
+    let (mut flight, mut board) = (Frames::new(computer, 0), Recorded::sensing(frames));
     while flight.fly(&mut board).unwrap() {}
     assert_eq!((board.kept, board.commanded.len()), (frames.len() as u64, frames.len()), "no frame is lost");
     for (frame, commands) in frames.iter().zip(&board.commanded) {
