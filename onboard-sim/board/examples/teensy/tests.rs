@@ -18,7 +18,7 @@ use flight::vehicle::site::Site;
 use flight_log::again::RecordedComputer;
 use flight_log::frame::start_to_log;
 use prost::bytes::Buf;
-use protocol::records::computer_v1::ComputerStart;
+use protocol::records::computer_v1::{ComputerInput, ComputerStart};
 use sim::draw::draw;
 use sim::recipe::Recipe;
 use sim::world::sensors::{SensorTruth, Sensors};
@@ -36,13 +36,13 @@ fn val_datasheet_ms5611_worked_example() {
     assert_eq!((temperature, pressure_pa.floor()), (2007, 100_009.0));
 }
 
-/// The same coefficients and -10.00 degrees before the second order, put into the formulas of page 9 with fractions.
+/// The same coefficients and -10.00 degrees before the second order, put into the formulas of page 9.
 #[test]
 fn val_hand_ms5611_in_the_cold() {
     let [_, c1, c2, c3, c4, c5, c6, _] = PROM.map(f64::from);
     let (d1, d2) = (8_000_000.0, (c5 * 256.0 - 3_000.0 * 8_388_608.0 / c6).round());
     let difference = d2 - c5 * 256.0;
-    let temperature = 2000.0 + difference * c6 / 8_388_608.0;
+    let temperature = (2000.0 + difference * c6 / 8_388_608.0).floor();
     let cold = (temperature - 2000.0) * (temperature - 2000.0);
     let offset = c2 * 65_536.0 + c4 * difference / 128.0 - 2.5 * cold;
     let sensitivity = c1 * 32_768.0 + c3 * difference / 256.0 - 1.25 * cold;
@@ -149,7 +149,7 @@ fn val_datasheet_tf_luna() {
 fn val_hand_a_servo_s_pulse() {
     let surface = Surface { zero_us: 1500.0, us_per_rad: -600.0 };
     assert_eq!(surface.duty(0.0, 65_535), 32_735);
-    assert_eq!([-9.0, 9.0].map(|rad| surface.duty(rad, 65_535)), [45_828, 19_641], "2,100 and 900 us");
+    assert_eq!([-9.0, 9.0].map(|rad| surface.duty(rad, 65_535)), [45_829, 19_641], "2,100 and 900 us");
     assert_eq!(surface.duty(f64::NAN, 65_535), 0, "no pulse");
     assert!((surface.angle_rad(surface.duty(0.3, 65_535), 65_535) - 0.3).abs() < 1e-4);
 }
@@ -220,6 +220,8 @@ struct Bench {
     outputs: [bool; 5],
     pin_out: bool,
     requests: Vec<Request>,
+    /// Everything that was asked for, with the frame that heard it.
+    heard: Vec<(u64, Vec<Request>)>,
     posed: Option<(u64, Box<Planner>)>,
     log: Vec<u8>,
     slots: [Vec<u8>; 2],
@@ -249,6 +251,7 @@ impl Bench {
             outputs: [false; 5],
             pin_out: false,
             requests: Vec::new(),
+            heard: Vec::new(),
             posed: None,
             log: Vec::new(),
             slots: [Vec::new(), Vec::new()],
@@ -461,7 +464,12 @@ impl Chip for Device {
     }
 
     fn heard(&mut self) -> Heard {
-        let requests = core::mem::take(&mut self.bench.borrow_mut().requests);
+        let mut bench = self.bench.borrow_mut();
+        let requests = core::mem::take(&mut bench.requests);
+        if !requests.is_empty() {
+            let now = bench.frame;
+            bench.heard.push((now, requests.clone()));
+        }
         Heard { uplink: Uplink::NotNeeded, commander: None, people: None, requests }
     }
 
@@ -565,13 +573,18 @@ fn fly(resets_in: Option<Phase>) -> (Bench, ComputerStart) {
     (Rc::into_inner(bench).unwrap().into_inner(), begun)
 }
 
-/// The log is that of the flight computer: another one that gets its inputs decides and remembers the same. Returns the plans.
+/// The log is that of the flight computer: another one that gets its inputs, and hears what the crew has asked, decides and
+/// remembers the same. Returns the plans.
 fn verified(bench: &Bench, begun: &ComputerStart) -> usize {
     let (mut log, mut again, mut plans) =
         (bench.log.as_slice(), RecordedComputer::started(&mission(), begun), 0);
     while !log.is_empty() {
         let frame = ComputerFrame::decode_length_delimited(&mut log).unwrap();
-        let read = again.read(&frame.input).unwrap();
+        let number = frame.input.frame;
+        let heard = bench.heard.iter().find(|(at, _)| *at == number).map(|(_, requests)| requests.clone());
+        let unasked = ComputerInput { requests: Vec::new(), ..frame.input.clone() };
+        let read = again.read(&unasked).unwrap();
+        let read = read.hearing(Uplink::NotNeeded, None, heard.unwrap_or_default());
         let output = again.step(&read);
         assert_eq!(again.record(&read, &output), frame);
         plans += usize::from(frame.output.planned);
@@ -591,7 +604,7 @@ fn the_board_is_checked_armed_started_and_lands() {
 
 #[test]
 fn a_reset_in_the_fall_is_flown_through() {
-    let (bench, begun) = fly(Some(Phase::FinDescent));
+    let (bench, begun) = fly(Some(Phase::AeroDescent));
     let rest = bench.world.rest().unwrap();
     assert_eq!(rest.outcome, RestOutcome::Upright, "{rest:?}");
     assert!(bench.world.thrust_begins_s().is_some() && !bench.world.parachute_ejected());
