@@ -14,10 +14,10 @@ const READ_PROM: u8 = 0xA0;
 const CONVERT_PRESSURE: u8 = 0x48;
 const CONVERT_TEMPERATURE: u8 = 0x58;
 const CONVERSION_FRAMES: u8 = 2;
+const SILENT: Trouble = Trouble::Silent("barometer");
 
 /// A barometer that converts temperature and pressure in turn: a pressure every 20 ms.
-pub(crate) struct Barometer<B> {
-    bus: B,
+pub(crate) struct Barometer {
     prom: [u16; 8],
     /// The command of the conversion that runs, if any.
     converts: Option<u8>,
@@ -25,25 +25,25 @@ pub(crate) struct Barometer<B> {
     temperature_raw: u32,
 }
 
-impl<B: I2c> Barometer<B> {
-    pub(crate) fn start(mut bus: B, delay: &mut impl DelayNs) -> Result<Self, Trouble> {
-        let silent = |_bus| Trouble::Silent("barometer");
-        bus.write(ADDRESS, &[RESET]).map_err(silent)?;
+impl Barometer {
+    /// Reads its coefficients.
+    pub(crate) fn start(bus: &mut impl I2c, delay: &mut impl DelayNs) -> Result<Self, Trouble> {
+        bus.write(ADDRESS, &[RESET]).map_err(|_bus| SILENT)?;
         delay.delay_ms(3);
         let mut prom = [0; 8];
         for (word, command) in prom.iter_mut().zip((READ_PROM..).step_by(2)) {
             let mut bytes = [0; 2];
-            bus.write_read(ADDRESS, &[command], &mut bytes).map_err(silent)?;
+            bus.write_read(ADDRESS, &[command], &mut bytes).map_err(|_bus| SILENT)?;
             *word = u16::from_be_bytes(bytes);
         }
         if crc4(&prom) != prom[7] as u8 & 0xF {
             return Err(Trouble::BarometerMemory);
         }
-        Ok(Self { bus, prom, converts: None, frames: 0, temperature_raw: 0 })
+        Ok(Self { prom, converts: None, frames: 0, temperature_raw: 0 })
     }
 
     /// Called once a frame. The pressure, Pa, in the frame in which one is ready. A bus that has failed gives none, and is asked anew.
-    pub(crate) fn poll(&mut self) -> Option<f64> {
+    pub(crate) fn poll(&mut self, bus: &mut impl I2c) -> Option<f64> {
         self.frames += 1;
         if self.converts.is_some() && self.frames < CONVERSION_FRAMES {
             return None;
@@ -51,7 +51,7 @@ impl<B: I2c> Barometer<B> {
         self.frames = 0;
         let mut bytes = [0; 4];
         let ended = self.converts.take();
-        let read = ended.and_then(|_| self.bus.write_read(ADDRESS, &[READ_ADC], &mut bytes[1..]).ok());
+        let read = ended.and_then(|_| bus.write_read(ADDRESS, &[READ_ADC], &mut bytes[1..]).ok());
         // A sensor that was asked too early says 0.
         let raw = read.map(|()| u32::from_be_bytes(bytes)).filter(|raw| *raw > 0);
         let next = if ended == Some(CONVERT_TEMPERATURE) && raw.is_some() {
@@ -59,7 +59,7 @@ impl<B: I2c> Barometer<B> {
         } else {
             CONVERT_TEMPERATURE
         };
-        self.converts = self.bus.write(ADDRESS, &[next]).ok().map(|()| next);
+        self.converts = bus.write(ADDRESS, &[next]).ok().map(|()| next);
         if ended == Some(CONVERT_PRESSURE) {
             return Some(compensated(&self.prom, raw?, self.temperature_raw).1);
         }
@@ -77,8 +77,7 @@ pub(crate) fn compensated(prom: &[u16; 8], pressure_raw: u32, temperature_raw: u
     let mut sensitivity = (c1 << 15) + ((c3 * difference) >> 8);
     if temperature < 2000 {
         let cold = (temperature - 2000) * (temperature - 2000);
-        let very_cold =
-            if temperature < -1500 { (temperature + 1500) * (temperature + 1500) } else { 0 };
+        let very_cold = if temperature < -1500 { (temperature + 1500) * (temperature + 1500) } else { 0 };
         temperature -= (difference * difference) >> 31;
         offset -= 5 * cold / 2 + 7 * very_cold;
         sensitivity -= 5 * cold / 4 + 11 * very_cold / 2;

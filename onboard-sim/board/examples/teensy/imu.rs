@@ -17,9 +17,7 @@ const NAME: u8 = 0x47;
 const SETTINGS: [[u8; 2]; 4] = [[0x4E, 0x0F], [0x4F, 0x06], [0x50, 0x06], [0x52, 0x44]];
 const LSB_PER_G: f64 = 2048.0;
 const LSB_PER_DEG_S: f64 = 16.4;
-
-/// An inertial unit that measures.
-pub(crate) struct Imu<S>(S);
+const SILENT: Trouble = Trouble::Silent("inertial unit");
 
 /// One sample in the sensor's own axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,33 +26,32 @@ pub(crate) struct Sample {
     pub(crate) rate_rad_s: [f64; 3],
 }
 
-impl<S: SpiDevice> Imu<S> {
-    pub(crate) fn start(mut bus: S, delay: &mut impl DelayNs) -> Result<Self, Trouble> {
-        let mut found = [READ | WHO_AM_I, 0];
-        bus.write(&[DEVICE_CONFIG, 1]).map_err(|_bus| Trouble::Silent("inertial unit"))?;
-        delay.delay_ms(2);
-        bus.transfer_in_place(&mut found).map_err(|_bus| Trouble::Silent("inertial unit"))?;
-        if found[1] != NAME {
-            return Err(Trouble::AnotherImu(found[1]));
-        }
-        for setting in SETTINGS {
-            bus.write(&setting).map_err(|_bus| Trouble::Silent("inertial unit"))?;
-            delay.delay_ms(1);
-        }
-        // The gyro starts within 45 ms.
-        delay.delay_ms(50);
-        Ok(Self(bus))
+/// Sets it up.
+pub(crate) fn start(bus: &mut impl SpiDevice, delay: &mut impl DelayNs) -> Result<(), Trouble> {
+    let mut found = [READ | WHO_AM_I, 0];
+    bus.write(&[DEVICE_CONFIG, 1]).map_err(|_bus| SILENT)?;
+    delay.delay_ms(2);
+    bus.transfer_in_place(&mut found).map_err(|_bus| SILENT)?;
+    if found[1] != NAME {
+        return Err(Trouble::AnotherImu(found[1]));
     }
+    for setting in SETTINGS {
+        bus.write(&setting).map_err(|_bus| SILENT)?;
+        delay.delay_ms(1);
+    }
+    // The gyro starts within 45 ms.
+    delay.delay_ms(50);
+    Ok(())
+}
 
-    /// The newest sample; `None` if the bus has failed.
-    pub(crate) fn read(&mut self) -> Option<Sample> {
-        let mut bytes = [0; 13];
-        bytes[0] = READ | ACCEL_DATA_X1;
-        self.0.transfer_in_place(&mut bytes).ok()?;
-        let axis = |place: usize| f64::from(i16::from_be_bytes([bytes[place], bytes[place + 1]]));
-        Some(Sample {
-            specific_force_m_s2: [1, 3, 5].map(|place| axis(place) / LSB_PER_G * GRAVITY_M_S2),
-            rate_rad_s: [7, 9, 11].map(|place| (axis(place) / LSB_PER_DEG_S).to_radians()),
-        })
-    }
+/// The newest sample; `None` if the bus has failed.
+pub(crate) fn read(bus: &mut impl SpiDevice) -> Option<Sample> {
+    let mut bytes = [0; 13];
+    bytes[0] = READ | ACCEL_DATA_X1;
+    bus.transfer_in_place(&mut bytes).ok()?;
+    let axis = |place: usize| f64::from(i16::from_be_bytes([bytes[place], bytes[place + 1]]));
+    Some(Sample {
+        specific_force_m_s2: [1, 3, 5].map(|place| axis(place) / LSB_PER_G * GRAVITY_M_S2),
+        rate_rad_s: [7, 9, 11].map(|place| (axis(place) / LSB_PER_DEG_S).to_radians()),
+    })
 }

@@ -35,12 +35,15 @@ use flight::estimation::estimator::{GnssFix, ImuSample, Measurements};
 use flight::rules::arming::Uplink;
 use flight::rules::outputs::Line;
 use flight::vehicle::atmosphere::{Air, pressure_altitude_m};
+use flight::vehicle::site::Site;
 use flight_log::frame::LoggedInput;
 use nalgebra::Vector3;
 use prost::Message as _;
 use protocol::records::computer_v1::ComputerFrame;
 
-use self::saved::Beside;
+use self::barometer::Barometer;
+pub use self::saved::MOST_BYTES;
+use self::saved::{Kept, Zero};
 pub use self::servo::Surface;
 
 /// The types of buses and pins, as the chip's own crate names them.
@@ -84,7 +87,7 @@ pub trait Chip {
     /// Writes a record to one of two places (0 and 1) in a memory that outlasts a reset.
     fn save(&mut self, slot: usize, record: &[u8]);
 
-    /// Reads such a place; returns how many bytes were written to it.
+    /// Reads such a place, which has room for [`MOST_BYTES`]; returns how many bytes were written to it.
     fn load(&mut self, slot: usize, into: &mut [u8]) -> usize;
 }
 
@@ -164,22 +167,16 @@ const MOST_UART_BYTES: usize = 256;
 
 /// The board.
 pub struct TeensyBoard<W: Wiring> {
+    parts: Parts<W>,
     build: Build,
-    imu: imu::Imu<W::Imu>,
-    barometer: barometer::Barometer<W::Barometer>,
-    gnss: (W::Gnss, gnss::Parser),
-    lidar: (W::Lidar, lidar::Parser),
-    servos: [W::Servo; 6],
-    outputs: [W::Output; 5],
-    foot: W::Switch,
-    igniters: [W::Switch; 2],
-    booster: W::Switch,
-    pin: W::Switch,
-    chip: W::Chip,
-    site: flight::vehicle::site::Site,
+    barometer: Barometer,
+    gnss: gnss::Parser,
+    lidar: lidar::Parser,
+    site: Site,
     /// Where the centre of gravity is while the vehicle stands, world, m.
     stands_m: Vector3<f64>,
-    beside: Beside,
+    height: Zero,
+    place: Zero,
     frame: u64,
     released_at: u64,
     record: Vec<u8>,
@@ -190,12 +187,11 @@ pub struct TeensyBoard<W: Wiring> {
 /// # Errors
 /// A part does not answer, or is another one.
 pub fn start<W: Wiring>(
-    parts: Parts<W>,
+    mut parts: Parts<W>,
     build: Build,
     mut computer: Computer,
     delay: &mut impl DelayNs,
 ) -> Result<(Frames, TeensyBoard<W>), Trouble> {
-    let Parts { imu, barometer, gnss, lidar, servos, outputs, foot, igniters, booster, pin, mut chip } = parts;
     let mission = computer.pilot().mission();
     if mission.airframe.servos_tell {
         return Err(Trouble::ServosTell);
@@ -205,44 +201,40 @@ pub fn start<W: Wiring>(
         return Err(Trouble::Mirrored);
     }
     let (site, stands_m) = (mission.site, computer.pilot().estimator().estimate().state.position_m);
-    let imu = imu::Imu::start(imu, delay)?;
-    let barometer = barometer::Barometer::start(barometer, delay)?;
-    let kept = [0, 1].into_iter().filter_map(|slot| {
-        let mut bytes = [0; saved::MOST_BYTES];
-        let read = chip.load(slot, &mut bytes).min(bytes.len());
-        Beside::read(&bytes[..read])
+    imu::start(&mut parts.imu, delay)?;
+    let barometer = Barometer::start(&mut parts.barometer, delay)?;
+    let chip = &mut parts.chip;
+    let records = [0, 1].into_iter().filter_map(|slot| {
+        let mut bytes = [0; MOST_BYTES];
+        let read = chip.load(slot, &mut bytes);
+        Kept::read(bytes.get(..read)?)
     });
-    let newest = kept.max_by_key(|(_, saved)| saved.frame());
-    let (mut beside, mut frame) = (Beside::default(), 0);
-    if let Some((found, saved)) = newest {
-        let lost_s = chip.clock_s() - found.clock_s;
-        let back = saved.frame() + libm::round(lost_s.max(0.0) / FRAME_S) as u64;
-        computer.resume(&saved, flight_time_s(back));
+    let newest = records.max_by_key(|kept| kept.saved.frame());
+    let (mut height, mut place, mut frame) = (Zero::default(), Zero::default(), 0);
+    if let Some(kept) = newest {
+        let lost_s = (chip.clock_s() - kept.clock_s).max(0.0);
+        let back = kept.saved.frame() + libm::round(lost_s / FRAME_S) as u64;
+        computer.resume(&kept.saved, flight_time_s(back));
         // It is not resumed after too long a time.
         if computer.frame() > 0 {
-            (beside, frame) = (found, back);
+            (height, place, frame) = (kept.height, kept.place, back);
         }
     }
     let released_at = computer.released_at_s().map_or(0, |at_s| libm::round(at_s / FRAME_S) as u64);
+    let (gnss, lidar, record) = (gnss::Parser::NEW, lidar::Parser::NEW, Vec::with_capacity(4096));
     let board = TeensyBoard {
+        parts,
         build,
-        imu,
         barometer,
-        gnss: (gnss, gnss::Parser::NEW),
-        lidar: (lidar, lidar::Parser::NEW),
-        servos,
-        outputs,
-        foot,
-        igniters,
-        booster,
-        pin,
-        chip,
+        gnss,
+        lidar,
         site,
         stands_m,
-        beside,
+        height,
+        place,
         frame,
         released_at,
-        record: Vec::with_capacity(4096),
+        record,
     };
     Ok((Frames::new(computer, frame), board))
 }
@@ -250,49 +242,45 @@ pub fn start<W: Wiring>(
 /// What the timer calls every 5 ms. Returns `false` if the flight is over.
 pub fn tick<W: Wiring>(frames: &mut Frames, board: &mut TeensyBoard<W>) -> bool {
     let Ok(goes_on) = frames.fly(board);
-    board.beside.clock_s = board.chip.clock_s();
-    let saved = frames.computer().saved();
-    board.beside.write(&saved, &mut board.record);
-    board.chip.save((saved.frame() % 2) as usize, &board.record);
+    let (saved, clock_s) = (frames.computer().saved(), board.parts.chip.clock_s());
+    let slot = (saved.frame() % 2) as usize;
+    let kept = Kept { clock_s, height: board.height, place: board.place, saved };
+    if let Some(bytes) = kept.write(&mut [0; MOST_BYTES]) {
+        board.parts.chip.save(slot, bytes);
+    }
     goes_on
 }
 
 impl<W: Wiring> TeensyBoard<W> {
-    /// The chip, for its main context.
-    pub fn chip(&mut self) -> &mut W::Chip {
-        &mut self.chip
-    }
-
     fn measured(&mut self) -> Measurements {
         // The sensor watch takes what is no number for silence.
-        let (force, rate) = self
-            .imu
-            .read()
-            .map_or(([f64::NAN; 3], [f64::NAN; 3]), |read| (read.specific_force_m_s2, read.rate_rad_s));
+        const SILENT: imu::Sample =
+            imu::Sample { specific_force_m_s2: [f64::NAN; 3], rate_rad_s: [f64::NAN; 3] };
+        let (parts, axes) = (&mut self.parts, &self.build.body_from_imu);
+        let felt = imu::read(&mut parts.imu).unwrap_or(SILENT);
         let imu = ImuSample {
-            gyro_rad_s: turned(&self.build.body_from_imu, rate),
-            specific_force_m_s2: turned(&self.build.body_from_imu, force),
+            gyro_rad_s: turned(axes, felt.rate_rad_s),
+            specific_force_m_s2: turned(axes, felt.specific_force_m_s2),
         };
-        let height_m = self.barometer.poll().map(pressure_altitude_m);
-        let above_m = height_m.and_then(|height_m| {
-            let above_m = self.beside.height.from(ZERO_HEIGHTS, Vector3::repeat(height_m))?.z;
+        let height_m = self.barometer.poll(&mut parts.barometer).map(pressure_altitude_m);
+        let pressure_altitude_m = height_m.and_then(|height_m| {
+            let above_m = self.height.from(ZERO_HEIGHTS, Vector3::repeat(height_m))?.z;
             let standard_k = Air::at_geopotential_m(height_m - above_m).temperature_k;
             Some(self.stands_m.z + above_m * self.build.air_k / standard_k)
         });
         let (mut fix, mut lidar_range_m) = (None, None);
-        drain(&mut self.gnss.0, |byte| fix = self.gnss.1.take(byte).or(fix));
-        drain(&mut self.lidar.0, |byte| lidar_range_m = self.lidar.1.take(byte).or(lidar_range_m));
+        drain(&mut parts.gnss, |byte| fix = self.gnss.take(byte).or(fix));
+        drain(&mut parts.lidar, |byte| lidar_range_m = self.lidar.take(byte).or(lidar_range_m));
         let gnss = fix.and_then(|fix| self.located(&fix));
-        Measurements { imu, pressure_altitude_m: above_m, gnss, lidar_range_m }
+        Measurements { imu, pressure_altitude_m, gnss, lidar_range_m }
     }
 
     /// A fix on the flight computer's clock, relative to the pad: the vehicle stands where its mission says.
     fn located(&mut self, fix: &gnss::Fix) -> Option<GnssFix> {
         let (north_m, east_m) = self.site.place_m(fix.latitude_deg, fix.longitude_deg);
         let place_m = turned(&WORLD_FROM_NED, [north_m, east_m, -fix.height_m]);
-        let from_zero_m = self.beside.place.from(ZERO_FIXES, place_m)?;
         Some(GnssFix {
-            position_m: self.stands_m + from_zero_m,
+            position_m: self.stands_m + self.place.from(ZERO_FIXES, place_m)?,
             velocity_m_s: turned(&WORLD_FROM_NED, fix.velocity_ned_m_s),
             valid_at_s: flight_time_s(self.frame + 1 - self.released_at) - self.build.fix_age_s,
         })
@@ -305,7 +293,7 @@ impl<W: Wiring> Board for TeensyBoard<W> {
 
     fn sense(&mut self) -> Result<Option<LoggedInput>, Infallible> {
         let measured = self.measured();
-        let Heard { uplink, commander, people, requests } = self.chip.heard();
+        let Heard { uplink, commander, people, requests } = self.parts.chip.heard();
         // What cannot be read is: no contact, no igniter, no booster, pin in.
         let high = |switch: &mut W::Switch| switch.is_high().unwrap_or(false);
         let low = |switch: &mut W::Switch| switch.is_low().unwrap_or(false);
@@ -316,12 +304,12 @@ impl<W: Wiring> Board for TeensyBoard<W> {
             // Not read: the flight computer knows how fast these servos are.
             gimbal_rad: [0.0; 2],
             fins_rad: [0.0; 4],
-            contact: low(&mut self.foot),
-            igniter_continuity: self.igniters.iter_mut().all(high),
-            booster_attached: low(&mut self.booster),
-            pin_out: high(&mut self.pin),
-            battery_v: self.chip.battery_v(),
-            log: self.chip.log(),
+            contact: low(&mut self.parts.foot),
+            igniter_continuity: self.parts.igniters.iter_mut().all(high),
+            booster_attached: low(&mut self.parts.booster),
+            pin_out: high(&mut self.parts.pin),
+            battery_v: self.parts.chip.battery_v(),
+            log: self.parts.chip.log(),
             uplink,
             commander,
             people,
@@ -335,26 +323,28 @@ impl<W: Wiring> Board for TeensyBoard<W> {
     fn act(&mut self, commands: &Commands) -> Result<(), Infallible> {
         let Commands { gimbal_rad: [pitch, yaw], fins_rad: [one, two, three, four], outputs } = *commands;
         let angles_rad = [pitch, yaw, one, two, three, four];
-        for ((servo, surface), angle_rad) in self.servos.iter_mut().zip(&self.build.surfaces).zip(angles_rad) {
+        for ((servo, surface), angle_rad) in
+            self.parts.servos.iter_mut().zip(&self.build.surfaces).zip(angles_rad)
+        {
             // What fails is told again in the next frame.
             let _ = servo.set_duty_cycle(surface.duty(angle_rad, servo.max_duty_cycle()));
         }
-        for (output, line) in self.outputs.iter_mut().zip(LINES) {
+        for (output, line) in self.parts.outputs.iter_mut().zip(LINES) {
             let _ = output.set_state(PinState::from(outputs.is_on(line)));
         }
         Ok(())
     }
 
     fn pose(&mut self, posed: Box<Planner>) {
-        self.chip.pose(posed);
+        self.parts.chip.pose(posed);
     }
 
     fn solved(&mut self) -> Option<Box<Planner>> {
-        self.chip.solved()
+        self.parts.chip.solved()
     }
 
     fn tell(&mut self, news: &[CrewMessage]) {
-        self.chip.tell(news);
+        self.parts.chip.tell(news);
     }
 
     fn keep(&mut self, frame: &ComputerFrame) {
@@ -364,7 +354,7 @@ impl<W: Wiring> Board for TeensyBoard<W> {
         }
         self.record.clear();
         if frame.encode_length_delimited(&mut self.record).is_ok() {
-            self.chip.append(&self.record);
+            self.parts.chip.append(&self.record);
         }
     }
 }

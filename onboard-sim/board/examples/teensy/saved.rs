@@ -2,13 +2,12 @@
 //!
 //! Without the zeros a barometer that starts again in the air would say that the ground is there.
 
-use alloc::vec::Vec;
-
 use flight::computer::saved::Saved;
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
 /// What a sensor says where the vehicle stands: the mean of its first samples after power-up.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct Zero {
     samples: u32,
     mean: Vector3<f64>,
@@ -26,53 +25,33 @@ impl Zero {
     }
 }
 
-/// Longest record, bytes: checksum, clock, zeros, and the flight computer's record.
-pub(crate) const MOST_BYTES: usize = 4 + 8 + 2 * 28 + Saved::MOST_BYTES;
+/// Longest record with its checksum, bytes; the numbers beside the flight computer's record have 66.
+pub const MOST_BYTES: usize = 4 + 66 + Saved::MOST_BYTES;
 
-/// The clock at its writing, s, and the zeros of height and place.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) struct Beside {
+/// A record.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Kept {
+    /// The clock at its writing, s.
     pub(crate) clock_s: f64,
     pub(crate) height: Zero,
     pub(crate) place: Zero,
+    pub(crate) saved: Saved,
 }
 
-impl Beside {
-    /// Writes a record into a buffer that has room for [`MOST_BYTES`].
-    pub(crate) fn write(&self, saved: &Saved, into: &mut Vec<u8>) {
-        let mut room = [0; Saved::MOST_BYTES];
-        into.clear();
-        // Its own length excludes that it does not fit.
-        let Ok(written) = saved.write(&mut room) else { return };
-        into.extend([0; 4]);
-        into.extend(self.clock_s.to_le_bytes());
-        for Zero { samples, mean } in [self.height, self.place] {
-            into.extend(samples.to_le_bytes());
-            mean.iter().for_each(|axis| into.extend(axis.to_le_bytes()));
-        }
-        into.extend_from_slice(written);
-        let sum = crc32fast::hash(&into[4..]);
-        into[..4].copy_from_slice(&sum.to_le_bytes());
+impl Kept {
+    /// Its bytes; `None` if they do not fit, which their lengths exclude.
+    pub(crate) fn write<'a>(&self, into: &'a mut [u8; MOST_BYTES]) -> Option<&'a [u8]> {
+        let (sum, record) = into.split_first_chunk_mut()?;
+        let written = postcard::to_slice(self, record).ok()?;
+        *sum = crc32fast::hash(written).to_le_bytes();
+        let bytes = sum.len() + written.len();
+        into.get(..bytes)
     }
 
     /// A record that is whole.
-    pub(crate) fn read(bytes: &[u8]) -> Option<(Self, Saved)> {
-        let (sum, rest) = bytes.split_first_chunk()?;
-        if u32::from_le_bytes(*sum) != crc32fast::hash(rest) {
-            return None;
-        }
-        let (clock, mut rest) = rest.split_first_chunk()?;
-        let mut zero = || {
-            let (samples, axes) = rest.split_first_chunk()?;
-            let (axes, left) = axes.split_first_chunk::<24>()?;
-            rest = left;
-            let axis = |axis: usize, _| {
-                let bytes = axes.as_chunks::<8>().0[axis];
-                f64::from_le_bytes(bytes)
-            };
-            Some(Zero { samples: u32::from_le_bytes(*samples), mean: Vector3::from_fn(axis) })
-        };
-        let beside = Self { clock_s: f64::from_le_bytes(*clock), height: zero()?, place: zero()? };
-        Some((beside, Saved::read(rest).ok()?))
+    pub(crate) fn read(bytes: &[u8]) -> Option<Self> {
+        let (sum, record) = bytes.split_first_chunk()?;
+        let whole = u32::from_le_bytes(*sum) == crc32fast::hash(record);
+        if whole { postcard::from_bytes(record).ok() } else { None }
     }
 }

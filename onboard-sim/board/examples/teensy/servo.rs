@@ -1,7 +1,7 @@
 //! Servos that are told where to go by the width of a pulse, and tell nothing.
 
 /// Time between pulses, us: 333 Hz, which digital servos take.
-const PERIOD_US: f64 = 1e6 / 333.0;
+pub(crate) const PERIOD_US: f64 = 1e6 / 333.0;
 /// What no pulse leaves, us.
 const SHORTEST_US: f64 = 900.0;
 const LONGEST_US: f64 = 2100.0;
@@ -20,11 +20,5 @@ impl Surface {
     pub(crate) fn duty(&self, angle_rad: f64, most: u16) -> u16 {
         let pulse_us = (self.zero_us + self.us_per_rad * angle_rad).clamp(SHORTEST_US, LONGEST_US);
         libm::round(pulse_us / PERIOD_US * f64::from(most)) as u16
-    }
-
-    /// The angle for a duty, rad: what a test puts in the place of a servo.
-    #[cfg(test)]
-    pub(crate) fn angle_rad(&self, duty: u16, most: u16) -> f64 {
-        (f64::from(duty) / f64::from(most) * PERIOD_US - self.zero_us) / self.us_per_rad
     }
 }

@@ -14,7 +14,6 @@ use flight::computer::pad_check::CheckState;
 use flight::estimation::estimator::GRAVITY_M_S2;
 use flight::rules::phase::Phase;
 use flight::vehicle::mission::{Mission, StartPoint};
-use flight::vehicle::site::Site;
 use flight_log::again::RecordedComputer;
 use flight_log::frame::start_to_log;
 use prost::bytes::Buf;
@@ -66,7 +65,8 @@ fn val_datasheet_icm42688_scales() {
     let bench = Rc::new(RefCell::new(Bench::standing(&mission()).0));
     bench.borrow_mut().imu = Some([2048, -2048, 0, 1640, 0, -3280]);
     let mut device = Device { bench, which: 0 };
-    let read = imu::Imu::start(device.clone(), &mut device).unwrap().read().unwrap();
+    imu::start(&mut device.clone(), &mut device).unwrap();
+    let read = imu::read(&mut device).unwrap();
     assert_eq!(read.specific_force_m_s2, [GRAVITY_M_S2, -GRAVITY_M_S2, 0.0]);
     for (found, expected) in read.rate_rad_s.into_iter().zip([100.0_f64, 0.0, -200.0]) {
         assert!((found - expected.to_radians()).abs() < 1e-12, "{found}");
@@ -82,8 +82,7 @@ fn nav_pvt(place_1e7: [i32; 2], height_mm: i32, ned_mm_s: [i32; 3], fixed: bool)
     }
     let [latitude, longitude] = place_1e7;
     let [north, east, down] = ned_mm_s;
-    for (at, value) in
-        [(24, longitude), (28, latitude), (36, height_mm), (48, north), (52, east), (56, down)]
+    for (at, value) in [(24, longitude), (28, latitude), (36, height_mm), (48, north), (52, east), (56, down)]
     {
         frame[6 + at..10 + at].copy_from_slice(&value.to_le_bytes());
     }
@@ -144,6 +143,11 @@ fn val_datasheet_tf_luna() {
     assert_eq!(ranges(&[luna(300, 99), luna(300, 0xFFFF)].concat()), [0.0; 0], "a weak echo, a blinded one");
 }
 
+/// Where a servo goes with a duty of 65,535, rad.
+fn angle_rad(surface: &Surface, duty: u16) -> f64 {
+    (f64::from(duty) / 65_535.0 * servo::PERIOD_US - surface.zero_us) / surface.us_per_rad
+}
+
 /// 1,500 us of 3,003 us are 0.4995 of 65,535.
 #[test]
 fn val_hand_a_servo_s_pulse() {
@@ -151,23 +155,22 @@ fn val_hand_a_servo_s_pulse() {
     assert_eq!(surface.duty(0.0, 65_535), 32_735);
     assert_eq!([-9.0, 9.0].map(|rad| surface.duty(rad, 65_535)), [45_829, 19_641], "2,100 and 900 us");
     assert_eq!(surface.duty(f64::NAN, 65_535), 0, "no pulse");
-    assert!((surface.angle_rad(surface.duty(0.3, 65_535), 65_535) - 0.3).abs() < 1e-4);
+    assert!((angle_rad(&surface, surface.duty(0.3, 65_535)) - 0.3).abs() < 1e-4);
 }
 
 #[test]
 fn a_record_comes_back_whole_or_not_at_all() {
-    let mission = mission();
-    let beside = Beside { clock_s: 12.5, ..Beside::default() };
-    let (mut beside, saved, mut bytes) = (beside, at_power_up(&mission).saved(), Vec::new());
-    assert_eq!(beside.place.from(1, Vector3::new(1.0, -2.0, 3.5)), None);
-    beside.write(&saved, &mut bytes);
-    assert!(bytes.len() <= saved::MOST_BYTES);
-    assert_eq!(Beside::read(&bytes), Some((beside, saved)));
+    let (saved, mut place, mut room) = (at_power_up(&mission()).saved(), Zero::default(), [0; MOST_BYTES]);
+    assert_eq!(place.from(1, Vector3::new(1.0, -2.0, 3.5)), None);
+    assert_eq!(place.from(1, Vector3::new(3.0, -2.0, 3.5)), Some(Vector3::new(2.0, 0.0, 0.0)));
+    let kept = Kept { clock_s: 12.5, height: Zero::default(), place, saved };
+    let bytes = kept.write(&mut room).unwrap();
+    assert_eq!(Kept::read(bytes), Some(kept));
     for place in 0..bytes.len() {
-        assert_eq!(Beside::read(&bytes[..place]), None);
-        let mut broken = bytes.clone();
+        assert_eq!(Kept::read(&bytes[..place]), None);
+        let mut broken = bytes.to_vec();
         broken[place] ^= 1;
-        assert_eq!(Beside::read(&broken), None, "byte {place}");
+        assert_eq!(Kept::read(&broken), None, "byte {place}");
     }
 }
 
@@ -353,11 +356,7 @@ impl i2c::ErrorType for Device {
 }
 
 impl i2c::I2c for Device {
-    fn transaction(
-        &mut self,
-        address: u8,
-        operations: &mut [i2c::Operation<'_>],
-    ) -> Result<(), Infallible> {
+    fn transaction(&mut self, address: u8, operations: &mut [i2c::Operation<'_>]) -> Result<(), Infallible> {
         assert_eq!(address, 0x77);
         let mut bench = self.bench.borrow_mut();
         let i2c::Operation::Write(&[command]) = operations[0] else { panic!("a command first") };
@@ -408,7 +407,7 @@ impl SetDutyCycle for Device {
     fn set_duty_cycle(&mut self, duty: u16) -> Result<(), Infallible> {
         let Actuators { gimbal_rad, fins_rad, .. } = &mut self.bench.borrow_mut().actuators;
         let surfaces = gimbal_rad.iter_mut().chain(fins_rad).nth(self.which);
-        *surfaces.unwrap() = build().surfaces[self.which].angle_rad(duty, 65_535);
+        *surfaces.unwrap() = angle_rad(&build().surfaces[self.which], duty);
         Ok(())
     }
 }
