@@ -14,7 +14,7 @@ const READ_PROM: u8 = 0xA0;
 const CONVERT_PRESSURE: u8 = 0x48;
 const CONVERT_TEMPERATURE: u8 = 0x58;
 const CONVERSION_FRAMES: u8 = 2;
-const SILENT: Trouble = Trouble::Silent("barometer");
+const SILENT: Trouble = Trouble::Part("the barometer does not answer on its bus");
 
 /// A barometer that converts temperature and pressure in turn: a pressure every 20 ms.
 pub(crate) struct Barometer {
@@ -37,7 +37,7 @@ impl Barometer {
             *word = u16::from_be_bytes(bytes);
         }
         if crc4(&prom) != prom[7] as u8 & 0xF {
-            return Err(Trouble::BarometerMemory);
+            return Err(Trouble::Part("the checksum of the barometer's coefficients is wrong"));
         }
         Ok(Self { prom, converts: None, frames: 0, temperature_raw: 0 })
     }

@@ -17,14 +17,7 @@ const NAME: u8 = 0x47;
 const SETTINGS: [[u8; 2]; 4] = [[0x4E, 0x0F], [0x4F, 0x06], [0x50, 0x06], [0x52, 0x44]];
 const LSB_PER_G: f64 = 2048.0;
 const LSB_PER_DEG_S: f64 = 16.4;
-const SILENT: Trouble = Trouble::Silent("inertial unit");
-
-/// One sample in the sensor's own axes.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Sample {
-    pub(crate) specific_force_m_s2: [f64; 3],
-    pub(crate) rate_rad_s: [f64; 3],
-}
+const SILENT: Trouble = Trouble::Part("the inertial unit does not answer on its bus");
 
 /// Sets it up.
 pub(crate) fn start(bus: &mut impl SpiDevice, delay: &mut impl DelayNs) -> Result<(), Trouble> {
@@ -44,14 +37,12 @@ pub(crate) fn start(bus: &mut impl SpiDevice, delay: &mut impl DelayNs) -> Resul
     Ok(())
 }
 
-/// The newest sample; `None` if the bus has failed.
-pub(crate) fn read(bus: &mut impl SpiDevice) -> Option<Sample> {
+/// The newest sample in the unit's own axes: specific force, m/s^2, and rate, rad/s; `None` if the bus has failed.
+pub(crate) fn read(bus: &mut impl SpiDevice) -> Option<[[f64; 3]; 2]> {
     let mut bytes = [0; 13];
     bytes[0] = READ | ACCEL_DATA_X1;
     bus.transfer_in_place(&mut bytes).ok()?;
     let axis = |place: usize| f64::from(i16::from_be_bytes([bytes[place], bytes[place + 1]]));
-    Some(Sample {
-        specific_force_m_s2: [1, 3, 5].map(|place| axis(place) / LSB_PER_G * GRAVITY_M_S2),
-        rate_rad_s: [7, 9, 11].map(|place| (axis(place) / LSB_PER_DEG_S).to_radians()),
-    })
+    let force_m_s2 = [1, 3, 5].map(|place| axis(place) / LSB_PER_G * GRAVITY_M_S2);
+    Some([force_m_s2, [7, 9, 11].map(|place| (axis(place) / LSB_PER_DEG_S).to_radians())])
 }

@@ -15,6 +15,7 @@ mod saved;
 mod servo;
 #[cfg(test)]
 mod tests;
+mod uart;
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
@@ -27,12 +28,11 @@ use embedded_hal::i2c::I2c;
 use embedded_hal::pwm::SetDutyCycle;
 use embedded_hal::spi::SpiDevice;
 use embedded_io::{Read, ReadReady};
-use flight::computer::crew::{People, Request};
+use flight::computer::crew::People;
 use flight::computer::news::CrewMessage;
 use flight::computer::pilot::planner::Planner;
-use flight::computer::{Commander, Commands, Computer, FRAME_S, Input, LogState, flight_time_s};
+use flight::computer::{Commands, Computer, FRAME_S, Input, LogState, flight_time_s};
 use flight::estimation::estimator::{GnssFix, ImuSample, Measurements};
-use flight::rules::arming::Uplink;
 use flight::rules::outputs::Line;
 use flight::vehicle::atmosphere::{Air, pressure_altitude_m};
 use flight::vehicle::site::Site;
@@ -40,11 +40,13 @@ use flight_log::frame::LoggedInput;
 use nalgebra::Vector3;
 use prost::Message as _;
 use protocol::records::computer_v1::ComputerFrame;
+use vehicle_link::endpoint::UplinkState;
 
 use self::barometer::Barometer;
 pub use self::saved::MOST_BYTES;
 use self::saved::{Kept, Zero};
 pub use self::servo::Surface;
+use self::uart::Framer;
 
 /// The types of buses and pins, as the chip's own crate names them.
 pub trait Wiring {
@@ -66,8 +68,8 @@ pub trait Chip {
     /// What the main context has solved, once.
     fn solved(&mut self) -> Option<Box<Planner>>;
 
-    /// What the radio has heard since the last frame.
-    fn heard(&mut self) -> Heard;
+    /// What the radio has heard since the last frame: an endpoint's answer, as in `board::radio`.
+    fn heard(&mut self) -> UplinkState;
 
     /// Tells the crew.
     fn tell(&mut self, news: &[CrewMessage]);
@@ -89,15 +91,6 @@ pub trait Chip {
 
     /// Reads such a place, which has room for [`MOST_BYTES`]; returns how many bytes were written to it.
     fn load(&mut self, slot: usize, into: &mut [u8]) -> usize;
-}
-
-/// The crew, by the radio: see `board::radio`.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Heard {
-    pub uplink: Uplink,
-    pub commander: Option<Commander>,
-    pub people: Option<People>,
-    pub requests: Vec<Request>,
 }
 
 /// Everything that is wired to the chip.
@@ -142,6 +135,8 @@ pub struct Build {
     pub fix_age_s: f64,
     /// Temperature of the air at the pad, in the shade, K: warm air is taller. 3 K that are wrong make every height wrong by a hundredth.
     pub air_k: f64,
+    /// Two people arm and start it, and their asks count from a number that is another one at each boot.
+    pub people: Option<People>,
 }
 
 /// Why a board does not start.
@@ -151,27 +146,23 @@ pub enum Trouble {
     ServosTell,
     #[error("body_from_imu mirrors its axes; three different ones of a right-handed set are accepted")]
     Mirrored,
-    #[error("the {0} does not answer on its bus")]
-    Silent(&'static str),
+    #[error("{0}")]
+    Part(&'static str),
     #[error("the inertial unit calls itself {0:#04x}; 0x47, an ICM-42688-P, is accepted")]
     AnotherImu(u8),
-    #[error("the checksum of the barometer's coefficients is wrong")]
-    BarometerMemory,
 }
 
 /// Samples that make the zero of the height, one second, and of the place, two seconds.
 const ZERO_HEIGHTS: u32 = 50;
 const ZERO_FIXES: u32 = 10;
-/// Most bytes of a UART that a frame takes: 5 ms of 115,200 baud are 58.
-const MOST_UART_BYTES: usize = 256;
 
 /// The board.
 pub struct TeensyBoard<W: Wiring> {
     parts: Parts<W>,
     build: Build,
     barometer: Barometer,
-    gnss: gnss::Parser,
-    lidar: lidar::Parser,
+    gnss: Framer<{ gnss::FRAME_BYTES }>,
+    lidar: Framer<{ lidar::FRAME_BYTES }>,
     site: Site,
     /// Where the centre of gravity is while the vehicle stands, world, m.
     stands_m: Vector3<f64>,
@@ -221,7 +212,7 @@ pub fn start<W: Wiring>(
         }
     }
     let released_at = computer.released_at_s().map_or(0, |at_s| libm::round(at_s / FRAME_S) as u64);
-    let (gnss, lidar, record) = (gnss::Parser::NEW, lidar::Parser::NEW, Vec::with_capacity(4096));
+    let (gnss, lidar) = (Framer::new(gnss::HEAD), Framer::new(lidar::HEAD));
     let board = TeensyBoard {
         parts,
         build,
@@ -234,7 +225,7 @@ pub fn start<W: Wiring>(
         place,
         frame,
         released_at,
-        record,
+        record: Vec::with_capacity(4096),
     };
     Ok((Frames::new(computer, frame), board))
 }
@@ -253,24 +244,19 @@ pub fn tick<W: Wiring>(frames: &mut Frames, board: &mut TeensyBoard<W>) -> bool 
 
 impl<W: Wiring> TeensyBoard<W> {
     fn measured(&mut self) -> Measurements {
-        // The sensor watch takes what is no number for silence.
-        const SILENT: imu::Sample =
-            imu::Sample { specific_force_m_s2: [f64::NAN; 3], rate_rad_s: [f64::NAN; 3] };
         let (parts, axes) = (&mut self.parts, &self.build.body_from_imu);
-        let felt = imu::read(&mut parts.imu).unwrap_or(SILENT);
-        let imu = ImuSample {
-            gyro_rad_s: turned(axes, felt.rate_rad_s),
-            specific_force_m_s2: turned(axes, felt.specific_force_m_s2),
-        };
+        // The sensor watch takes what is no number for silence.
+        let [force_m_s2, rate_rad_s] = imu::read(&mut parts.imu).unwrap_or([[f64::NAN; 3]; 2]);
+        let imu =
+            ImuSample { gyro_rad_s: turned(axes, rate_rad_s), specific_force_m_s2: turned(axes, force_m_s2) };
         let height_m = self.barometer.poll(&mut parts.barometer).map(pressure_altitude_m);
         let pressure_altitude_m = height_m.and_then(|height_m| {
             let above_m = self.height.from(ZERO_HEIGHTS, Vector3::repeat(height_m))?.z;
             let standard_k = Air::at_geopotential_m(height_m - above_m).temperature_k;
             Some(self.stands_m.z + above_m * self.build.air_k / standard_k)
         });
-        let (mut fix, mut lidar_range_m) = (None, None);
-        drain(&mut parts.gnss, |byte| fix = self.gnss.take(byte).or(fix));
-        drain(&mut parts.lidar, |byte| lidar_range_m = self.lidar.take(byte).or(lidar_range_m));
+        let lidar_range_m = self.lidar.newest(&mut parts.lidar, lidar::range_m);
+        let fix = self.gnss.newest(&mut parts.gnss, gnss::fix);
         let gnss = fix.and_then(|fix| self.located(&fix));
         Measurements { imu, pressure_altitude_m, gnss, lidar_range_m }
     }
@@ -293,7 +279,7 @@ impl<W: Wiring> Board for TeensyBoard<W> {
 
     fn sense(&mut self) -> Result<Option<LoggedInput>, Infallible> {
         let measured = self.measured();
-        let Heard { uplink, commander, people, requests } = self.parts.chip.heard();
+        let UplinkState { uplink, commander, requests } = self.parts.chip.heard();
         // What cannot be read is: no contact, no igniter, no booster, pin in.
         let high = |switch: &mut W::Switch| switch.is_high().unwrap_or(false);
         let low = |switch: &mut W::Switch| switch.is_low().unwrap_or(false);
@@ -312,7 +298,7 @@ impl<W: Wiring> Board for TeensyBoard<W> {
             log: self.parts.chip.log(),
             uplink,
             commander,
-            people,
+            people: self.build.people,
             requests: &[],
             rehearsed: None,
             plan_ready: false,
@@ -356,17 +342,6 @@ impl<W: Wiring> Board for TeensyBoard<W> {
         if frame.encode_length_delimited(&mut self.record).is_ok() {
             self.parts.chip.append(&self.record);
         }
-    }
-}
-
-/// Takes what has arrived, and does not wait.
-fn drain<U: Read + ReadReady>(uart: &mut U, mut take: impl FnMut(u8)) {
-    let mut bytes = [0; 64];
-    let mut left = MOST_UART_BYTES;
-    while left > 0 && matches!(uart.read_ready(), Ok(true)) {
-        let Ok(read @ 1..) = uart.read(&mut bytes) else { return };
-        bytes[..read].iter().for_each(|byte| take(*byte));
-        left = left.saturating_sub(read);
     }
 }
 

@@ -9,9 +9,10 @@ use std::rc::Rc;
 
 use embedded_hal::{digital, i2c, pwm, spi};
 use flight::computer::FRAME_MS;
-use flight::computer::crew::Asked;
+use flight::computer::crew::{Asked, Request};
 use flight::computer::pad_check::CheckState;
 use flight::estimation::estimator::GRAVITY_M_S2;
+use flight::rules::arming::Uplink;
 use flight::rules::phase::Phase;
 use flight::vehicle::mission::{Mission, StartPoint};
 use flight_log::again::RecordedComputer;
@@ -66,9 +67,9 @@ fn val_datasheet_icm42688_scales() {
     bench.borrow_mut().imu = Some([2048, -2048, 0, 1640, 0, -3280]);
     let mut device = Device { bench, which: 0 };
     imu::start(&mut device.clone(), &mut device).unwrap();
-    let read = imu::read(&mut device).unwrap();
-    assert_eq!(read.specific_force_m_s2, [GRAVITY_M_S2, -GRAVITY_M_S2, 0.0]);
-    for (found, expected) in read.rate_rad_s.into_iter().zip([100.0_f64, 0.0, -200.0]) {
+    let [force_m_s2, rate_rad_s] = imu::read(&mut device).unwrap();
+    assert_eq!(force_m_s2, [GRAVITY_M_S2, -GRAVITY_M_S2, 0.0]);
+    for (found, expected) in rate_rad_s.into_iter().zip([100.0_f64, 0.0, -200.0]) {
         assert!((found - expected.to_radians()).abs() < 1e-12, "{found}");
     }
 }
@@ -92,8 +93,8 @@ fn nav_pvt(place_1e7: [i32; 2], height_mm: i32, ned_mm_s: [i32; 3], fixed: bool)
 }
 
 fn parsed(bytes: &[u8]) -> Vec<gnss::Fix> {
-    let mut parser = gnss::Parser::NEW;
-    bytes.iter().filter_map(|byte| parser.take(*byte)).collect()
+    let mut framer = Framer::new(gnss::HEAD);
+    bytes.iter().filter_map(|byte| framer.take(*byte).and_then(gnss::fix)).collect()
 }
 
 #[test]
@@ -127,8 +128,8 @@ fn luna(range_cm: u16, strength: u16) -> [u8; 9] {
 }
 
 fn ranges(bytes: &[u8]) -> Vec<f64> {
-    let mut parser = lidar::Parser::NEW;
-    bytes.iter().filter_map(|byte| parser.take(*byte)).collect()
+    let mut framer = Framer::new(lidar::HEAD);
+    bytes.iter().filter_map(|byte| framer.take(*byte).and_then(lidar::range_m)).collect()
 }
 
 #[test]
@@ -189,6 +190,7 @@ fn build() -> Build {
         }),
         fix_age_s: 0.12,
         air_k: AIR_K,
+        people: None,
     }
 }
 
@@ -462,14 +464,14 @@ impl Chip for Device {
         bench.posed.take_if(|(at, _)| now >= *at).map(|(_, planner)| planner)
     }
 
-    fn heard(&mut self) -> Heard {
+    fn heard(&mut self) -> UplinkState {
         let mut bench = self.bench.borrow_mut();
         let requests = core::mem::take(&mut bench.requests);
         if !requests.is_empty() {
             let now = bench.frame;
             bench.heard.push((now, requests.clone()));
         }
-        Heard { uplink: Uplink::NotNeeded, commander: None, people: None, requests }
+        UplinkState { uplink: Uplink::NotNeeded, commander: None, requests }
     }
 
     fn tell(&mut self, _: &[CrewMessage]) {}
