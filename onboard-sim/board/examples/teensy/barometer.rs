@@ -17,7 +17,8 @@ const CONVERSION_FRAMES: u8 = 2;
 const SILENT: Trouble = Trouble::Part("the barometer does not answer on its bus");
 
 /// A barometer that converts temperature and pressure in turn: a pressure every 20 ms.
-pub(crate) struct Barometer {
+#[derive(Debug)]
+pub struct Barometer {
     prom: [u16; 8],
     /// The command of the conversion that runs, if any.
     converts: Option<u8>,
@@ -54,11 +55,8 @@ impl Barometer {
         let read = ended.and_then(|_| bus.write_read(ADDRESS, &[READ_ADC], &mut bytes[1..]).ok());
         // A sensor that was asked too early says 0.
         let raw = read.map(|()| u32::from_be_bytes(bytes)).filter(|raw| *raw > 0);
-        let next = if ended == Some(CONVERT_TEMPERATURE) && raw.is_some() {
-            CONVERT_PRESSURE
-        } else {
-            CONVERT_TEMPERATURE
-        };
+        let pressure_next = ended == Some(CONVERT_TEMPERATURE) && raw.is_some();
+        let next = if pressure_next { CONVERT_PRESSURE } else { CONVERT_TEMPERATURE };
         self.converts = bus.write(ADDRESS, &[next]).ok().map(|()| next);
         if ended == Some(CONVERT_PRESSURE) {
             return Some(compensated(&self.prom, raw?, self.temperature_raw).1);
@@ -76,8 +74,7 @@ pub(crate) fn compensated(prom: &[u16; 8], pressure_raw: u32, temperature_raw: u
     let mut offset = (c2 << 16) + ((c4 * difference) >> 7);
     let mut sensitivity = (c1 << 15) + ((c3 * difference) >> 8);
     if temperature < 2000 {
-        let cold = (temperature - 2000) * (temperature - 2000);
-        let very_cold = if temperature < -1500 { (temperature + 1500) * (temperature + 1500) } else { 0 };
+        let [cold, very_cold] = [temperature - 2000, (temperature + 1500).min(0)].map(|below| below * below);
         temperature -= (difference * difference) >> 31;
         offset -= 5 * cold / 2 + 7 * very_cold;
         sensitivity -= 5 * cold / 4 + 11 * very_cold / 2;

@@ -18,7 +18,6 @@ mod tests;
 mod uart;
 
 use alloc::boxed::Box;
-use alloc::vec::Vec;
 use core::convert::Infallible;
 
 use board::port::{Board, Frames};
@@ -28,7 +27,6 @@ use embedded_hal::i2c::I2c;
 use embedded_hal::pwm::SetDutyCycle;
 use embedded_hal::spi::SpiDevice;
 use embedded_io::{Read, ReadReady};
-use flight::computer::crew::People;
 use flight::computer::news::CrewMessage;
 use flight::computer::pilot::planner::Planner;
 use flight::computer::{Commands, Computer, FRAME_S, Input, LogState, flight_time_s};
@@ -42,7 +40,7 @@ use prost::Message as _;
 use protocol::records::computer_v1::ComputerFrame;
 use vehicle_link::endpoint::UplinkState;
 
-use self::barometer::Barometer;
+pub use self::barometer::Barometer;
 pub use self::saved::MOST_BYTES;
 use self::saved::{Kept, Zero};
 pub use self::servo::Surface;
@@ -135,11 +133,9 @@ pub struct Build {
     pub fix_age_s: f64,
     /// Temperature of the air at the pad, in the shade, K: warm air is taller. 3 K that are wrong make every height wrong by a hundredth.
     pub air_k: f64,
-    /// Two people arm and start it, and their asks count from a number that is another one at each boot.
-    pub people: Option<People>,
 }
 
-/// Why a board does not start.
+/// Why a board or a part of it does not start.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Trouble {
     #[error("airframe: servos_tell is true, and these servos tell nothing; false is accepted")]
@@ -158,9 +154,11 @@ const ZERO_FIXES: u32 = 10;
 
 /// The board.
 pub struct TeensyBoard<W: Wiring> {
+    /// What did not start is silent: the flight computer arms nothing without it, and behind a reset in the air it does what is left.
+    pub imu: Result<(), Trouble>,
+    pub barometer: Result<Barometer, Trouble>,
     parts: Parts<W>,
     build: Build,
-    barometer: Barometer,
     gnss: Framer<{ gnss::FRAME_BYTES }>,
     lidar: Framer<{ lidar::FRAME_BYTES }>,
     site: Site,
@@ -170,13 +168,12 @@ pub struct TeensyBoard<W: Wiring> {
     place: Zero,
     frame: u64,
     released_at: u64,
-    record: Vec<u8>,
 }
 
 /// Starts board and frames at power-up, and goes on behind a reset. `computer` is one at power-up.
 ///
 /// # Errors
-/// A part does not answer, or is another one.
+/// The vehicle is built otherwise than this board needs it.
 pub fn start<W: Wiring>(
     mut parts: Parts<W>,
     build: Build,
@@ -192,17 +189,14 @@ pub fn start<W: Wiring>(
         return Err(Trouble::Mirrored);
     }
     let (site, stands_m) = (mission.site, computer.pilot().estimator().estimate().state.position_m);
-    imu::start(&mut parts.imu, delay)?;
-    let barometer = Barometer::start(&mut parts.barometer, delay)?;
-    let chip = &mut parts.chip;
+    let (imu, barometer) = (imu::start(&mut parts.imu, delay), Barometer::start(&mut parts.barometer, delay));
+    let (mut height, mut place, mut frame, chip) = (Zero::default(), Zero::default(), 0, &mut parts.chip);
     let records = [0, 1].into_iter().filter_map(|slot| {
         let mut bytes = [0; MOST_BYTES];
         let read = chip.load(slot, &mut bytes);
         Kept::read(bytes.get(..read)?)
     });
-    let newest = records.max_by_key(|kept| kept.saved.frame());
-    let (mut height, mut place, mut frame) = (Zero::default(), Zero::default(), 0);
-    if let Some(kept) = newest {
+    if let Some(kept) = records.max_by_key(|kept| kept.saved.frame()) {
         let lost_s = (chip.clock_s() - kept.clock_s).max(0.0);
         let back = kept.saved.frame() + libm::round(lost_s / FRAME_S) as u64;
         computer.resume(&kept.saved, flight_time_s(back));
@@ -214,9 +208,10 @@ pub fn start<W: Wiring>(
     let released_at = computer.released_at_s().map_or(0, |at_s| libm::round(at_s / FRAME_S) as u64);
     let (gnss, lidar) = (Framer::new(gnss::HEAD), Framer::new(lidar::HEAD));
     let board = TeensyBoard {
+        imu,
+        barometer,
         parts,
         build,
-        barometer,
         gnss,
         lidar,
         site,
@@ -225,7 +220,6 @@ pub fn start<W: Wiring>(
         place,
         frame,
         released_at,
-        record: Vec::with_capacity(4096),
     };
     Ok((Frames::new(computer, frame), board))
 }
@@ -234,10 +228,9 @@ pub fn start<W: Wiring>(
 pub fn tick<W: Wiring>(frames: &mut Frames, board: &mut TeensyBoard<W>) -> bool {
     let Ok(goes_on) = frames.fly(board);
     let (saved, clock_s) = (frames.computer().saved(), board.parts.chip.clock_s());
-    let slot = (saved.frame() % 2) as usize;
     let kept = Kept { clock_s, height: board.height, place: board.place, saved };
     if let Some(bytes) = kept.write(&mut [0; MOST_BYTES]) {
-        board.parts.chip.save(slot, bytes);
+        board.parts.chip.save((kept.saved.frame() % 2) as usize, bytes);
     }
     goes_on
 }
@@ -246,11 +239,12 @@ impl<W: Wiring> TeensyBoard<W> {
     fn measured(&mut self) -> Measurements {
         let (parts, axes) = (&mut self.parts, &self.build.body_from_imu);
         // The sensor watch takes what is no number for silence.
-        let [force_m_s2, rate_rad_s] = imu::read(&mut parts.imu).unwrap_or([[f64::NAN; 3]; 2]);
+        let felt = self.imu.as_ref().ok().and_then(|()| imu::read(&mut parts.imu));
+        let [force_m_s2, rate_rad_s] = felt.unwrap_or([[f64::NAN; 3]; 2]);
         let imu =
             ImuSample { gyro_rad_s: turned(axes, rate_rad_s), specific_force_m_s2: turned(axes, force_m_s2) };
-        let height_m = self.barometer.poll(&mut parts.barometer).map(pressure_altitude_m);
-        let pressure_altitude_m = height_m.and_then(|height_m| {
+        let pressure_pa = self.barometer.as_mut().ok().and_then(|driver| driver.poll(&mut parts.barometer));
+        let pressure_altitude_m = pressure_pa.map(pressure_altitude_m).and_then(|height_m| {
             let above_m = self.height.from(ZERO_HEIGHTS, Vector3::repeat(height_m))?.z;
             let standard_k = Air::at_geopotential_m(height_m - above_m).temperature_k;
             Some(self.stands_m.z + above_m * self.build.air_k / standard_k)
@@ -278,7 +272,6 @@ impl<W: Wiring> Board for TeensyBoard<W> {
     type Error = Infallible;
 
     fn sense(&mut self) -> Result<Option<LoggedInput>, Infallible> {
-        let measured = self.measured();
         let UplinkState { uplink, commander, requests } = self.parts.chip.heard();
         // What cannot be read is: no contact, no igniter, no booster, pin in.
         let high = |switch: &mut W::Switch| switch.is_high().unwrap_or(false);
@@ -286,7 +279,7 @@ impl<W: Wiring> Board for TeensyBoard<W> {
         let rest = Input {
             frame: 0,
             time_s: 0.0,
-            measured,
+            measured: self.measured(),
             // Not read: the flight computer knows how fast these servos are.
             gimbal_rad: [0.0; 2],
             fins_rad: [0.0; 4],
@@ -298,7 +291,8 @@ impl<W: Wiring> Board for TeensyBoard<W> {
             log: self.parts.chip.log(),
             uplink,
             commander,
-            people: self.build.people,
+            // `board::radio` knows no operators yet.
+            people: None,
             requests: &[],
             rehearsed: None,
             plan_ready: false,
@@ -309,9 +303,8 @@ impl<W: Wiring> Board for TeensyBoard<W> {
     fn act(&mut self, commands: &Commands) -> Result<(), Infallible> {
         let Commands { gimbal_rad: [pitch, yaw], fins_rad: [one, two, three, four], outputs } = *commands;
         let angles_rad = [pitch, yaw, one, two, three, four];
-        for ((servo, surface), angle_rad) in
-            self.parts.servos.iter_mut().zip(&self.build.surfaces).zip(angles_rad)
-        {
+        let surfaces = self.parts.servos.iter_mut().zip(&self.build.surfaces);
+        for ((servo, surface), angle_rad) in surfaces.zip(angles_rad) {
             // What fails is told again in the next frame.
             let _ = servo.set_duty_cycle(surface.duty(angle_rad, servo.max_duty_cycle()));
         }
@@ -338,10 +331,7 @@ impl<W: Wiring> Board for TeensyBoard<W> {
         if frame.output.released {
             self.released_at = self.frame;
         }
-        self.record.clear();
-        if frame.encode_length_delimited(&mut self.record).is_ok() {
-            self.parts.chip.append(&self.record);
-        }
+        self.parts.chip.append(&frame.encode_length_delimited_to_vec());
     }
 }
 

@@ -1,6 +1,5 @@
 //! The drivers against their data sheets, and the whole board flown: simulated devices with the real ones' registers, frames and
 //! pulses stand between it and a simulated world.
-#![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -68,9 +67,9 @@ fn val_datasheet_icm42688_scales() {
     let mut device = Device { bench, which: 0 };
     imu::start(&mut device.clone(), &mut device).unwrap();
     let [force_m_s2, rate_rad_s] = imu::read(&mut device).unwrap();
-    assert_eq!(force_m_s2, [GRAVITY_M_S2, -GRAVITY_M_S2, 0.0]);
-    for (found, expected) in rate_rad_s.into_iter().zip([100.0_f64, 0.0, -200.0]) {
-        assert!((found - expected.to_radians()).abs() < 1e-12, "{found}");
+    let expected = [GRAVITY_M_S2, -GRAVITY_M_S2, 0.0, 100.0_f64.to_radians(), 0.0, -200.0_f64.to_radians()];
+    for (found, expected) in force_m_s2.into_iter().chain(rate_rad_s).zip(expected) {
+        assert!((found - expected).abs() < 1e-12, "{found} {expected}");
     }
 }
 
@@ -190,7 +189,6 @@ fn build() -> Build {
         }),
         fix_age_s: 0.12,
         air_k: AIR_K,
-        people: None,
     }
 }
 
@@ -219,6 +217,8 @@ struct Bench {
     measured: Option<Measurements>,
     /// In the place of what the world gives: accelerometer and gyro, counts.
     imu: Option<[i16; 6]>,
+    imu_name: u8,
+    prom: [u16; 8],
     barometer: (u8, u64),
     uarts: [VecDeque<u8>; 2],
     actuators: Actuators,
@@ -243,6 +243,8 @@ impl Bench {
         // The board decides when the barometer measures.
         let mut params = recipe.dispersion.sensor_params;
         params.barometer.period_ms = FRAME_MS;
+        let mut prom = PROM;
+        prom[7] = u16::from(barometer::crc4(&PROM));
         let bench = Self {
             world,
             sensors: Sensors::new(&params, drawn.flight_seed, 1.0).unwrap(),
@@ -250,6 +252,8 @@ impl Bench {
             frame: 0,
             measured: None,
             imu: None,
+            imu_name: 0x47,
+            prom,
             barometer: (0, 0),
             uarts: [VecDeque::new(), VecDeque::new()],
             actuators: Actuators::NONE,
@@ -340,7 +344,7 @@ impl spi::SpiDevice for Device {
         for operation in operations {
             let spi::Operation::TransferInPlace(bytes) = operation else { continue };
             match bytes[0] {
-                0xF5 => bytes[1] = 0x47,
+                0xF5 => bytes[1] = self.bench.borrow().imu_name,
                 0x9F => {
                     let bench = self.bench.borrow();
                     let counts = bench.imu.unwrap_or_else(|| bench.imu_counts());
@@ -366,11 +370,9 @@ impl i2c::I2c for Device {
             bench.barometer = (command, frame);
         }
         if let Some(i2c::Operation::Read(into)) = operations.get_mut(1) {
-            let mut prom = PROM;
-            prom[7] = u16::from(barometer::crc4(&PROM));
             match command {
                 0 => into.copy_from_slice(&bench.barometer_raw().to_be_bytes()[1..]),
-                word => into.copy_from_slice(&prom[usize::from(word - 0xA0) / 2].to_be_bytes()),
+                word => into.copy_from_slice(&bench.prom[usize::from(word - 0xA0) / 2].to_be_bytes()),
             }
         }
         Ok(())
@@ -517,9 +519,9 @@ impl Wiring for Simulated {
     type Chip = Device;
 }
 
-fn switched_on(bench: &Rc<RefCell<Bench>>, computer: Computer) -> (Frames, TeensyBoard<Simulated>) {
+fn parts(bench: &Rc<RefCell<Bench>>) -> Parts<Simulated> {
     let device = |which| Device { bench: bench.clone(), which };
-    let parts = Parts {
+    Parts {
         imu: device(0),
         barometer: device(0),
         gnss: device(0),
@@ -531,8 +533,12 @@ fn switched_on(bench: &Rc<RefCell<Bench>>, computer: Computer) -> (Frames, Teens
         booster: device(3),
         pin: device(4),
         chip: device(0),
-    };
-    start(parts, build(), computer, &mut device(0)).unwrap()
+    }
+}
+
+fn switched_on(bench: &Rc<RefCell<Bench>>, computer: Computer) -> (Frames, TeensyBoard<Simulated>) {
+    let mut delay = Device { bench: bench.clone(), which: 0 };
+    start(parts(bench), build(), computer, &mut delay).unwrap()
 }
 
 /// What the crew does, one after the other.
@@ -613,30 +619,35 @@ fn a_reset_in_the_fall_is_flown_through() {
 }
 
 #[test]
-fn what_cannot_fly_does_not_start() {
+fn what_is_built_otherwise_does_not_start() {
     let refused = |change: &dyn Fn(&mut Mission, &mut Build)| {
         let (mut mission, mut build) = (mission(), build());
         change(&mut mission, &mut build);
         let (bench, computer) = Bench::standing(&mission);
-        let device = Device { bench: Rc::new(RefCell::new(bench)), which: 0 };
-        let all = || device.clone();
-        let parts = Parts::<Simulated> {
-            imu: all(),
-            barometer: all(),
-            gnss: all(),
-            lidar: all(),
-            servos: core::array::from_fn(|_| all()),
-            outputs: core::array::from_fn(|_| all()),
-            foot: all(),
-            igniters: [all(), all()],
-            booster: all(),
-            pin: all(),
-            chip: all(),
-        };
-        start(parts, build, computer, &mut all()).err()
+        let bench = Rc::new(RefCell::new(bench));
+        start(parts(&bench), build, computer, &mut Device { bench, which: 0 }).err()
     };
-    let tells = refused(&|mission, _| mission.airframe.servos_tell = true);
-    assert_eq!(tells, Some(Trouble::ServosTell));
-    let mirrored = refused(&|_, build| build.body_from_imu[2].1 = 1.0);
-    assert_eq!(mirrored, Some(Trouble::Mirrored));
+    assert_eq!(refused(&|_, _| ()), None);
+    assert_eq!(refused(&|mission, _| mission.airframe.servos_tell = true), Some(Trouble::ServosTell));
+    assert_eq!(refused(&|_, build| build.body_from_imu[2].1 = 1.0), Some(Trouble::Mirrored));
+}
+
+/// Nothing is armed without it, and in the air the board must not be lost with it.
+#[test]
+fn a_part_that_does_not_start_is_silent() {
+    let (mut bench, computer) = Bench::standing(&mission());
+    (bench.imu_name, bench.prom[3]) = (0xFF, 0);
+    bench.pin_out = true;
+    let bench = Rc::new(RefCell::new(bench));
+    let (mut frames, mut board) = switched_on(&bench, computer);
+    assert_eq!(board.imu, Err(Trouble::AnotherImu(0xFF)));
+    let said = board.barometer.as_ref().unwrap_err().to_string();
+    assert_eq!(said, "the checksum of the barometer's coefficients is wrong");
+    for _ in 0..1_000 {
+        bench.borrow_mut().advance();
+        assert!(tick(&mut frames, &mut board));
+        let measured = frames.computer().input().measured;
+        assert!(!measured.imu.is_plausible() && measured.pressure_altitude_m.is_none());
+    }
+    assert_eq!(frames.computer().mode().phase, Phase::Safe, "the self-test does not pass");
 }

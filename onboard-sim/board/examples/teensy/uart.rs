@@ -2,9 +2,6 @@
 
 use embedded_io::{Read, ReadReady};
 
-/// Most bytes that a frame of the flight computer takes: 5 ms of 115,200 baud are 58.
-const MOST_BYTES: usize = 256;
-
 /// Puts frames together that begin with the same bytes.
 pub(crate) struct Framer<const N: usize> {
     head: &'static [u8],
@@ -36,13 +33,12 @@ impl<const N: usize> Framer<N> {
         uart: &mut (impl Read + ReadReady),
         read: impl Fn(&[u8; N]) -> Option<T>,
     ) -> Option<T> {
-        let (mut bytes, mut left, mut newest) = ([0; 64], MOST_BYTES, None);
-        while left > 0 && matches!(uart.read_ready(), Ok(true)) {
+        let (mut bytes, mut newest) = ([0; 64], None);
+        while matches!(uart.read_ready(), Ok(true)) {
             let Ok(count @ 1..) = uart.read(&mut bytes) else { break };
             for byte in &bytes[..count] {
                 newest = self.take(*byte).and_then(&read).or(newest);
             }
-            left = left.saturating_sub(count);
         }
         newest
     }
