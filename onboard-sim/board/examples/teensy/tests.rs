@@ -240,9 +240,10 @@ impl Bench {
         let world =
             World::new(&mission.airframe, curve.as_ref(), &drawn.truth, &drawn.apogee, drawn.flight_seed);
         let world = world.unwrap().on_rail(mission.launched().unwrap(), &drawn.ascent);
-        // The board decides when the barometer measures.
+        // The board decides when the barometer measures, and a TF-Luna sees 0.2 to 8 m.
         let mut params = recipe.dispersion.sensor_params;
         params.barometer.period_ms = FRAME_MS;
+        (params.lidar.range_min_m, params.lidar.range_max_m) = (0.2, 8.0);
         let mut prom = PROM;
         prom[7] = u16::from(barometer::crc4(&PROM));
         let bench = Self {
