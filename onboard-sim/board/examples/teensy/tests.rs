@@ -218,6 +218,7 @@ struct Bench {
     /// In the place of what the world gives: accelerometer and gyro, counts.
     imu: Option<[i16; 6]>,
     imu_name: u8,
+    igniters: [bool; 2],
     prom: [u16; 8],
     barometer: (u8, u64),
     uarts: [VecDeque<u8>; 2],
@@ -254,6 +255,7 @@ impl Bench {
             measured: None,
             imu: None,
             imu_name: 0x47,
+            igniters: [true; 2],
             prom,
             barometer: (0, 0),
             uarts: [VecDeque::new(), VecDeque::new()],
@@ -438,7 +440,7 @@ impl InputPin for Device {
         let bench = self.bench.borrow();
         Ok(match self.which {
             0 => bench.world.touchdown().is_none(),
-            1 | 2 => true,
+            1 | 2 => bench.igniters[self.which - 1],
             3 => !bench.world.booster_attached(),
             _ => bench.pin_out,
         })
@@ -631,6 +633,19 @@ fn what_is_built_otherwise_does_not_start() {
     assert_eq!(refused(&|_, _| ()), None);
     assert_eq!(refused(&|mission, _| mission.airframe.servos_tell = true), Some(Trouble::ServosTell));
     assert_eq!(refused(&|_, build| build.body_from_imu[2].1 = 1.0), Some(Trouble::Mirrored));
+}
+
+/// Either of the two that is open counts.
+#[test]
+fn an_open_igniter_is_told() {
+    for igniters in [[true, true], [true, false], [false, true]] {
+        let (bench, computer) = Bench::standing(&mission());
+        let bench = Rc::new(RefCell::new(Bench { igniters, ..bench }));
+        let (mut frames, mut board) = switched_on(&bench, computer);
+        bench.borrow_mut().advance();
+        assert!(tick(&mut frames, &mut board));
+        assert_eq!(frames.computer().input().igniter_continuity, igniters == [true, true]);
+    }
 }
 
 /// Nothing is armed without it, and in the air the board must not be lost with it.
