@@ -51,16 +51,16 @@ pub trait Board {
 pub struct Frames {
     computer: Computer,
     frame: u64,
+    /// For the next frame, which keeps it.
     rehearsed: Option<Rehearsed>,
-    /// The rehearsal is in the log.
-    kept: bool,
 }
 
 impl Frames {
-    /// Before the first frame. A computer that was not released rehearses its landing now, which takes some seconds.
-    pub fn new(mut computer: Computer) -> Self {
+    /// Behind this frame: 0 at power-up, and for a computer that was [resumed](Computer::resume) the one that a clock gives which
+    /// ran through the reset. A computer that was not released rehearses its landing now, which takes some seconds.
+    pub fn new(mut computer: Computer, frame: u64) -> Self {
         let rehearsed = computer.rehearse();
-        Self { computer, frame: 0, rehearsed, kept: false }
+        Self { computer, frame, rehearsed }
     }
 
     /// The computer after the last frame.
@@ -75,11 +75,11 @@ impl Frames {
     pub fn fly<B: Board>(&mut self, board: &mut B) -> Result<bool, B::Error> {
         let Some(read) = board.sense()? else { return Ok(false) };
         self.frame += 1;
-        let solved = board.solved();
+        let (solved, rehearsed) = (board.solved(), self.rehearsed.take());
         let input = Input {
             frame: self.frame,
             time_s: flight_time_s(self.frame),
-            rehearsed: self.rehearsed.as_ref(),
+            rehearsed: rehearsed.as_ref(),
             plan_ready: solved.is_some(),
             ..read.input()
         };
@@ -92,8 +92,7 @@ impl Frames {
             board.pose(posed);
         }
         board.tell(&output.news);
-        board.keep(&frame_to_log(&input, &output, &self.computer, self.kept));
-        self.kept |= input.rehearsed.is_some();
+        board.keep(&frame_to_log(&input, &output, &self.computer, false));
         Ok(true)
     }
 }

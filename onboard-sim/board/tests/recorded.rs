@@ -2,7 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::cell::Cell;
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
 
 use board::port::{self, Frames};
@@ -164,7 +164,7 @@ fn every_frame_before_a_reset_is_answered_before_it() {
 struct Recorded<'f> {
     frames: std::slice::Iter<'f, ComputerFrame>,
     ready: bool,
-    to_main: Sender<Box<Planner>>,
+    to_main: SyncSender<Box<Planner>>,
     from_main: Receiver<Box<Planner>>,
     commanded: Vec<Commands>,
     kept: u64,
@@ -172,15 +172,17 @@ struct Recorded<'f> {
 
 impl<'f> Recorded<'f> {
     fn sensing(frames: &'f [ComputerFrame]) -> Self {
-        let ((to_main, posed), (solve, from_main)) = (channel::<Box<Planner>>(), channel());
-        thread::spawn(move || {
+        // There is never more than one.
+        let ((to_main, posed), (solve, from_main)) = (sync_channel::<Box<Planner>>(1), sync_channel(1));
+        let solves = move || {
             for mut planner in posed {
                 planner.solve();
                 if solve.send(planner).is_err() {
                     return;
                 }
             }
-        });
+        };
+        thread::Builder::new().name("main context".into()).spawn(solves).unwrap();
         Self { frames: frames.iter(), ready: false, to_main, from_main, commanded: Vec::new(), kept: 0 }
     }
 }
@@ -221,7 +223,7 @@ fn started(recipe: &Recipe, sortie: &Sortie) -> RecordedComputer {
 
 /// Flies the board to its end, and compares every command with the recorded one.
 fn commands_the_same(computer: Computer, frames: &[ComputerFrame]) -> Frames {
-    let (mut flight, mut board) = (Frames::new(computer), Recorded::sensing(frames));
+    let (mut flight, mut board) = (Frames::new(computer, 0), Recorded::sensing(frames));
     while flight.fly(&mut board).unwrap() {}
     assert_eq!((board.kept, board.commanded.len()), (frames.len() as u64, frames.len()), "no frame is lost");
     for (frame, commands) in frames.iter().zip(&board.commanded) {
