@@ -251,7 +251,7 @@ fn motor_to_log(pilot: &Pilot) -> Option<flight_v1::MotorEstimate> {
 mod tests {
     use super::*;
     use flight::computer::LogState;
-    use flight::computer::crew::People;
+    use flight::computer::crew::{Asked, People};
     use flight::estimation::estimator::{ImuSample, Measurements};
     use flight::rules::arming::PredictedLanding;
     use flight::rules::operator::{Name, Operator, Role};
@@ -294,6 +294,25 @@ mod tests {
             by,
             confirms,
         })
+    }
+
+    /// A new request has to be added to the list before this compiles and passes.
+    #[test]
+    fn every_request_has_its_number() {
+        let numbers = ASKED.map(|asked| match asked {
+            Asked::Arm => 0,
+            Asked::Disarm => 1,
+            Asked::Start => 2,
+            Asked::Hold => 3,
+            Asked::Abort => 4,
+            Asked::Tap => 5,
+            Asked::TakeCommand => 6,
+            Asked::Check => 7,
+            Asked::CheckStill => 8,
+            Asked::EndCheck => 9,
+            Asked::Seen => 10,
+        });
+        assert_eq!(numbers, core::array::from_fn(|number| number));
     }
 
     fn any_people() -> impl Strategy<Value = Option<People>> {

@@ -122,7 +122,7 @@ macro_rules! numbered {
 }
 
 /// Requests, by their number in the log.
-pub(crate) const ASKED: [Asked; 10] = [
+pub(crate) const ASKED: [Asked; 11] = [
     Asked::Arm,
     Asked::Disarm,
     Asked::Start,
@@ -133,6 +133,7 @@ pub(crate) const ASKED: [Asked; 10] = [
     Asked::Check,
     Asked::CheckStill,
     Asked::EndCheck,
+    Asked::Seen,
 ];
 const ENDINGS: [Ending; 5] =
     [Ending::Accepted, Ending::NotNow, Ending::Denied, Ending::Failed, Ending::Asked];

@@ -297,22 +297,17 @@ fn every_command_answers_about_every_mission() {
 }
 
 /// Limits that the flight keeps away from: changed by half they change no command. With this value each of them acts.
-const DO_NOT_ACT: [(&str, f64, &str); 7] = [
-    (
-        "powered.contact_quiet_s",
-        3.0,
-        "a nose that leans by less than what a foot may touch with is held as it is",
-    ),
+const DO_NOT_ACT: [(&str, f64, &str); 6] = [
     ("powered.homing.near_m", 100.0, "what lands farther out comes as near as its reach allows"),
     (
         "powered.landing_miss",
         1e-9,
         "every plan that converges ends in its box; the level is told and steers nothing",
     ),
-    ("powered.max_passes", 100.0, "no tick needs as much work"),
+    ("powered.latest_after_s", 0.1, "no plan ends so late"),
     ("powered.solver.max_iterations", 2.0, "no solve needs as many"),
-    ("powered.upright_lean_max_deg", 0.1, "at the end of a plan there is little velocity to be lost"),
     ("aim.disturbance_max_rad_s2", 0.1, "nothing turns the vehicle as hard"),
+    ("ignition.arm_before_s", 1.0, "it is armed when the fall is predicted, which is later"),
 ];
 
 /// The numbers of a section times a factor. Of the scales in a list it is their distance from 1 that is multiplied.

@@ -231,7 +231,7 @@ impl Pilot {
         self.planner.get_or_insert(planner);
     }
 
-    /// The landing that was taken over last, and its problem; none before the first, and while the next one is posed.
+    /// The landing that was taken over last, and its problem; none before the first, and once the next one is posed.
     pub fn landing_solved(&self) -> Option<LandingSolved> {
         let planner = self.planner.as_ref()?;
         let (estimate, Asked::Landing(burning)) = planner.posed.as_ref()? else { return None };
