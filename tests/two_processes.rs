@@ -105,7 +105,7 @@ fn both_report_a_flight_that_misses_its_limits() {
     let folder = tempfile::tempdir().unwrap();
     let mut station = Running::start(&mut auto_ground(folder.path(), &["udpin:127.0.0.1:0"]));
     let mut weak = vehicle(folder.path(), &[&station.udp_link()]);
-    let flight = Running::start(weak.args(["--fault", "weak-motor:0.6@0"]));
+    let flight = Running::start(weak.args(["--fault", "weak-motor:0.75@0"]));
     let (station, flight) = (station.wait(), flight.wait());
     assert_eq!(station.code, Some(3), "{}", station.output);
     assert_eq!(flight.code, Some(3), "{}", flight.output);

@@ -395,11 +395,11 @@ mod tests {
             frame: 7,
             gimbal_rad: vec![0.0; 2],
             fins_rad: vec![0.0; 4],
-            requests: vec![v1::Request { asked: 10, ..v1::Request::default() }],
+            requests: vec![v1::Request { asked: 11, ..v1::Request::default() }],
             ..v1::ComputerInput::default()
         };
         let error = input_from_log(&input).unwrap_err().to_string();
-        assert_eq!(error, "frame 7: asked 10 is unknown; this build knows 0 to 9");
+        assert_eq!(error, "frame 7: asked 11 is unknown; this build knows 0 to 10");
         let error = input_from_log(&v1::ComputerInput { gimbal_rad: vec![0.0], ..input }).unwrap_err();
         assert_eq!(error.to_string(), "frame 7: gimbal_rad has 1 values and should have 2");
     }

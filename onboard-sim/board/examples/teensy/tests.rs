@@ -17,7 +17,7 @@ use flight::vehicle::mission::{Mission, StartPoint};
 use flight_log::again::RecordedComputer;
 use flight_log::frame::start_to_log;
 use prost::bytes::Buf;
-use protocol::records::computer_v1::{ComputerInput, ComputerStart};
+use protocol::records::computer_v1::ComputerStart;
 use sim::draw::draw;
 use sim::recipe::Recipe;
 use sim::world::sensors::{SensorTruth, Sensors};
