@@ -453,7 +453,7 @@ fn print_origin(info: &Info, output: &mut impl Write) -> io::Result<()> {
     if !comparison.recorded {
         row(output, "build", "not recorded")?;
     } else if comparison.differences.is_empty() {
-        row(output, "build", &format!("this one: {}", listed(&info.build)))?;
+        row(output, "build", "this one")?;
     } else {
         let value = |value: &Option<String>| value.as_deref().map_or_else(|| "not noted".to_owned(), short);
         let differences = comparison.differences.iter().map(|difference| {

@@ -137,7 +137,10 @@ impl Computer {
         self.watch_the_taps();
         if let Some(flown) = &flown {
             self.pilot.decide(&mut self.table, flown, &self.sensors);
-            self.pilot.plan(self.table.mode(), flown);
+            // What a frame took over can be looked at behind it.
+            if !input.plan_ready {
+                self.pilot.plan(self.table.mode(), flown);
+            }
             let pointed = self.pilot.point(self.table.mode(), flown);
             self.take_over(pointed);
         } else {

@@ -129,6 +129,8 @@ impl PoweredGuidance {
         // Too low for any landing: upright brakes just as well. High above the ground it would stop the vehicle there.
         let too_low = !high && found.end_m_s() < HARD_M_S;
         let lands = outcome.status == Status::Converged && outcome.miss <= self.settings.landing_miss;
+        // Processors give the NaN of a broken plan different signs, and the report is in the digest.
+        let one_nan = |value: f64| if value.is_nan() { f64::NAN } else { value };
         self.report = PoweredReport {
             level: ControlLevel::of_plan(usable, self.left_s(time_s), too_low, lands),
             status: outcome.status,
@@ -136,13 +138,13 @@ impl PoweredGuidance {
             passes: search.workspace.passes(),
             posed_at_s,
             took_s,
-            kkt_stationarity: outcome.stationarity,
-            kkt_feasibility: outcome.feasibility,
-            cost: outcome.cost,
-            condition_miss: outcome.miss,
-            touchdown_in_s: found.left_s(time_s),
-            touchdown_m_s: found.end_m_s(),
-            largest_tilt_rad: found.largest_tilt_rad(),
+            kkt_stationarity: one_nan(outcome.stationarity),
+            kkt_feasibility: one_nan(outcome.feasibility),
+            cost: one_nan(outcome.cost),
+            condition_miss: one_nan(outcome.miss),
+            touchdown_in_s: one_nan(found.left_s(time_s)),
+            touchdown_m_s: one_nan(found.end_m_s()),
+            largest_tilt_rad: one_nan(found.largest_tilt_rad()),
         };
         if usable {
             core::mem::swap(&mut self.flown, found);
