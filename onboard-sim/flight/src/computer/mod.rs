@@ -137,10 +137,7 @@ impl Computer {
         self.watch_the_taps();
         if let Some(flown) = &flown {
             self.pilot.decide(&mut self.table, flown, &self.sensors);
-            // What a frame took over can be looked at behind it.
-            if !input.plan_ready {
-                self.pilot.plan(self.table.mode(), flown);
-            }
+            self.pilot.plan(self.table.mode(), flown, input.plan_ready);
             let pointed = self.pilot.point(self.table.mode(), flown);
             self.take_over(pointed);
         } else {

@@ -90,9 +90,10 @@ impl Pilot {
         self.fin_watch.update(&input.fins_rad, &self.fins_rad, self.model.mission.estimator.frame_s);
     }
 
-    /// Poses a landing in the first frame of the burn, and again ten frames after the last, or later if that one takes longer.
-    pub(in crate::computer) fn plan(&mut self, mode: &Mode, input: &Input<'_>) {
-        let due = input.frame >= self.plan_due && mode.phase.in_landing_burn();
+    /// Poses a landing in the first frame of the burn, and again ten frames after the last, or later if that one takes longer: not in
+    /// the frame that took it over, so that it can be looked at behind it.
+    pub(in crate::computer) fn plan(&mut self, mode: &Mode, input: &Input<'_>, took_over: bool) {
+        let due = !took_over && input.frame >= self.plan_due && mode.phase.in_landing_burn();
         let burning = self.burning(mode, input.time_s).filter(|_| due);
         if let Some((burning, estimate)) = burning.zip(self.estimate)
             && self.pose_landing(input.time_s, &estimate, burning)
