@@ -146,7 +146,9 @@ def input_of(time_s, plant, sample, contact):
     # Contact, continuity of the igniter, no booster, the pin is out; the log.
     flags = whole(7, contact) + whole(8, True) + whole(9, False) + whole(10, True)
     log = message(12, whole(1, True) + whole(2, 1 << 30))
-    return double(2, time_s) + message(3, measured) + doubles(5, (0.0, 0.0)) + doubles(6, fins) + flags + log
+    # What is posed is taken over within ten frames, five in the middle: about what a Cortex-M7 takes.
+    ready = whole(18, round(time_s / 0.005) % 10 == 5)
+    return double(2, time_s) + message(3, measured) + doubles(5, (0.0, 0.0)) + doubles(6, fins) + flags + log + ready
 
 
 def fly(computer, order, draw):

@@ -57,7 +57,11 @@ fn order(mission: &Mission, first: usize, draws: &[Draw]) -> Value {
         .collect();
     json!({
         "airframe": vehicles.join(format!("airframes/{}.toml", mission.name)),
-        "motor": vehicles.join("motors/AeroTech_H45.eng"),
+        "motor": vehicles.join(match mission.airframe.motor.as_str() {
+            "H45W" => "motors/AeroTech_H45.eng",
+            "HP-H45W" => "motors/AeroTech_HP-H45W.eng",
+            other => panic!("no file of {other} is named here"),
+        }),
         "site": { "latitude_deg": mission.site.latitude_deg, "longitude_deg": mission.site.longitude_deg },
         "mission": vehicles.join(format!("missions/{}.toml", mission.name)),
         "fins_closed_deg": mission.airframe.fins.closed_rad().to_degrees(),

@@ -289,7 +289,7 @@ mod tests {
             pilot.told(table, event, input.time_s).expect("an abort is never refused in the air");
         }
         pilot.decide(table, input, &SensorWatch::default());
-        pilot.plan(table.mode(), input);
+        pilot.plan(table.mode(), input, false);
         pilot.point(table.mode(), input).fins_rad
     }
 

@@ -46,15 +46,15 @@ fn the_charge_waits_for_the_fins_over_the_hatch_and_for_no_stuck_one() {
         rocket.run_until(|rocket| shut(rocket) < 0.3);
         if stuck {
             (0..4).for_each(|fin| {
-                rocket.vehicle.sortie.world_mut().inject(&sim::world::Fault::FinStuck { fin })
+                rocket.vehicle.sortie.world_mut().inject(&sim::world::Fault::FinStuck { fin });
             });
         }
         let since_s = rocket.time_s();
         assert_eq!(rocket.request(Asked::Abort).ending, Ending::Accepted);
         assert_eq!(rocket.phase(), Phase::Chute);
         assert_eq!(
-            rocket.computer().commands().fins_rad,
-            [std::f64::consts::FRAC_PI_2; 4],
+            rocket.computer().commands().fins_rad.map(f64::to_bits),
+            [std::f64::consts::FRAC_PI_2; 4].map(f64::to_bits),
             "in the same frame"
         );
         rocket.run_until(|rocket| rocket.computer().commands().outputs.is_on(Line::Parachute));

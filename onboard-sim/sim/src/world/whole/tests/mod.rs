@@ -183,11 +183,11 @@ fn val_hand_a_swinging_motor_turns_the_body_back() {
         let mut actuators = Actuators::default();
         actuators.gimbal_rad[axis] = 1.0;
         world.advance(&actuators, 30);
-        let inertia_kg_m2 = 0.294784 * (0.194 * 0.194 / 12.0 + 0.038 * 0.038 / 16.0 + 0.05 * 0.303);
+        let inertia_kg_m2 = 0.294_784 * (0.194 * 0.194 / 12.0 + 0.038 * 0.038 / 16.0 + 0.05 * 0.303);
         let expected_rad_s = -inertia_kg_m2 / 0.12 * airframe.gimbal.servo.rate_rad_s();
         let found_rad_s = world.state().rate_rad_s[axis + 1];
         assert!((found_rad_s / expected_rad_s - 1.0).abs() < 1e-6, "{axis}: {found_rad_s} {expected_rad_s}");
-        let aside_m = 0.294784 * 0.05 / 3.1 * libm::sin(world.gimbal_rad()[axis]);
+        let aside_m = 0.294_784 * 0.05 / 3.1 * libm::sin(world.gimbal_rad()[axis]);
         let expected_m = [Vector3::new(0.4, 0.0, aside_m), Vector3::new(0.4, -aside_m, 0.0)][axis];
         assert!((world.cg_m() - expected_m).norm() < 1e-9, "{axis}: {}", world.cg_m());
         // It has reached its stop, and nothing is left.
