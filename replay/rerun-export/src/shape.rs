@@ -42,7 +42,7 @@ impl RocketShape {
         Self {
             nose_x_m: (airframe.body.length_m - cg_station_m) as f32,
             tail_x_m: -cg_station_m as f32,
-            pivot_x_m: (airframe.gimbal.pivot_station_m - cg_station_m) as f32,
+            pivot_x_m: -cg_station_m as f32,
             foot_x_m: -airframe.above_feet_m(cg_station_m) as f32,
             radius_m: (airframe.body.diameter_m / 2.0) as f32,
         }
