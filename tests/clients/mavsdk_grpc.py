@@ -63,7 +63,7 @@ async def fly(drone):
     await within("found", first(drone.core.connection_state(), lambda state: state.is_connected))
     attitude = drone.telemetry.attitude_quaternion()
     await within("the attitude is upright", first(attitude, upright))
-    check("a parameter is read", await drone.param.get_param_float("NMPC_W_THETA") == 100)
+    check("a parameter is read", await drone.param.get_param_float("NMPC_W_THETA") == 200)
     everything = await within("all parameters", drone.param.get_all_params())
     check("all of them are floats", len(everything.float_params) > 20 and not everything.int_params)
     check("a takeoff is refused", await refused(drone.action.takeoff()))

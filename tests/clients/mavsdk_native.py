@@ -47,7 +47,7 @@ def main():
     until("the position is told", lambda: abs(telemetry.position_velocity_ned().position.down_m) < 5)
     check("the version is told", info.get_version() is not None)
     value = param.get_param_float("NMPC_W_THETA")
-    check(f"a parameter is read ({value})", value == 100)
+    check(f"a parameter is read ({value})", value == 200)
     param.set_param_float("RATE_FINS", 1.0)
     check("a parameter is set", param.get_param_float("RATE_FINS") == 1.0)
     everything = param.get_all_params()

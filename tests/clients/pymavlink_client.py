@@ -161,7 +161,7 @@ def parameters(ground):
     check(f"{len(values)} parameters, all REAL32", len(values) > 20 and "RATE_FLIGHT_STAT" in values)
     check("names have at most 16 bytes", max(map(len, values)) == 16)
     ground.link.mav.param_request_read_send(1, 1, b"NMPC_W_THETA", -1)
-    check("one by name", ground.message("PARAM_VALUE").param_value == 100)
+    check("one by name", ground.message("PARAM_VALUE").param_value == 200)
 
     def set_to(name, value, kind=mav.MAV_PARAM_TYPE_REAL32):
         ground.link.mav.param_set_send(1, 1, name.encode(), value, kind)

@@ -164,10 +164,10 @@ fn val_mavproxy_shows_arms_and_terminates() {
         writeln!(operator, "{words}").and_then(|()| operator.flush()).unwrap();
     };
     // If the file request were not declined, MAVProxy would take about 11 s more.
-    proxy.wait_for_line("Received 36 parameters");
+    proxy.wait_for_line("Received 34 parameters");
     types(&mut operator, "param show NMPC_W_THETA");
     let shown = proxy.wait_for_line("NMPC_W_THETA");
-    assert!(shown.contains("100"), "{shown}");
+    assert!(shown.contains("200"), "{shown}");
     types(&mut operator, "param set RATE_FINS 1");
     // MAVProxy sets parameters in the background, so the test asks until the vehicle's answer has arrived.
     let is_set = (0..1_000).any(|_| {
