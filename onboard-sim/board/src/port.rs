@@ -19,8 +19,8 @@ pub trait Board {
 
     /// Reads everything at the end of a frame, 5 ms after the last one, and does not wait: gyro and accelerometer in every frame,
     /// barometer, satellites and lidar if they have something new; gimbal and fins, which are not read if the airframe says
-    /// that their servos do not tell where they are. [`Input`] says what each value is; its number, its time, the rehearsal and whether a plan is ready are set by
-    /// [`Frames`]. `None`: the flight is over.
+    /// that their servos do not tell where they are. [`Input`] says what each value is; its number, its time, the rehearsal
+    /// and whether a plan is ready are set by [`Frames`]. `None`: the flight is over.
     ///
     /// # Errors
     /// A device without which nothing can be decided has failed.

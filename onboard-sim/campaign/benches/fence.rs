@@ -58,7 +58,7 @@ fn decisions(recipe: &Recipe, number: u64) -> ([u8; 32], bool) {
     let mut flight = Sortie::new(recipe, number).unwrap();
     let mut hash = Sha256::new();
     loop {
-        if let Some(output) = flight.step().output {
+        if let Some(output) = flight.step() {
             let commands = output.commands;
             for angle_rad in commands.gimbal_rad.iter().chain(&commands.fins_rad) {
                 hash.update(angle_rad.to_le_bytes());

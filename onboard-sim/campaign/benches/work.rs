@@ -63,7 +63,9 @@ fn passes(recipe: &Recipe, number: u64) -> (Vec<usize>, bool) {
     let mut flight = Sortie::new(recipe, number).unwrap();
     let mut passes = Vec::new();
     loop {
-        if flight.step().planned() && flight.computer().mode().phase == Phase::Powered {
+        if flight.step().is_some_and(|output| output.planned)
+            && flight.computer().mode().phase == Phase::Powered
+        {
             passes.push(flight.pilot().report().passes);
         }
         if !flight.goes_on() {

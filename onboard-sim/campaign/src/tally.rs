@@ -82,8 +82,8 @@ impl Tally {
 
     /// Flies one frame, which somebody watches.
     pub fn step_watched(&mut self, watch: &mut dyn Watch) -> bool {
-        let planned = self.flight.step_with(&Outside::NOBODY, watch).planned();
-        self.count(planned);
+        let decided = self.flight.step_with(&Outside::NOBODY, watch);
+        self.count(decided.is_some_and(|output| output.planned));
         self.flight.goes_on()
     }
 

@@ -45,7 +45,7 @@ fn flown(recipe: &Recipe, number: u64, battery: Option<f64>) -> (bool, Vec<Findi
     }
     let mut findings = Findings::default();
     while flight.goes_on() {
-        if flight.step().output.is_some() {
+        if flight.step().is_some() {
             findings.note(flight.computer());
         }
     }

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use campaign::motors::choice::{Choice, Limits, Obstacle, Refusal, StartHeight, Team, choose};
-use campaign::motors::frame::{Frame, start_height_m};
+use campaign::motors::frame::Frame;
 use campaign::motors::ranking::{Landing, Ranked, Request, rank};
 use campaign::motors::source::{self, Candidate, SourceError};
 use campaign::motors::table;
@@ -48,7 +48,7 @@ fn val_mk2_the_best_mass_and_height_are_those_of_the_mission() {
 fn val_vlr_drops_land_on_their_motors_from_their_height() {
     for (name, motor) in [("vlr", "F13-RCT"), ("vlr-f16", "F16-RCJ")] {
         let dropped = mission(name);
-        let from_m = start_height_m(&dropped);
+        let from_m = dropped.start_height_m();
         let frame = Frame::of(&dropped).unwrap();
         let curve = flight::vehicles::motors::builtin(motor).unwrap();
         let usual = limits(&dropped, &frame, &curve, [-0.2, 0.2]);

@@ -81,7 +81,7 @@ pub mod control {
 
     pub mod aim;
     pub mod fins;
-    pub(crate) mod silent;
+    pub(crate) mod servo;
 }
 
 pub mod rules {

@@ -60,7 +60,7 @@ fn flown(recipe: &Recipe, number: u64, every: u64) -> Result<Vec<LandingSolved>>
     // Other flights give other plans of their burns.
     let (mut planned, mut plans) = (number, Vec::new());
     while flight.goes_on() {
-        if flight.step().planned() {
+        if flight.step().is_some_and(|output| output.planned) {
             planned += 1;
             plans.extend(flight.pilot().landing_solved().filter(|_| planned.is_multiple_of(every)));
         }

@@ -45,17 +45,3 @@ pub struct Unwatched;
 impl Watch for Unwatched {
     fn decided(&mut self, _: &Input<'_>, _: &Output, _: &Computer) {}
 }
-
-/// The result of one frame.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Flown {
-    /// What the flight computer decided; `None` while it is dead.
-    pub output: Option<Output>,
-}
-
-impl Flown {
-    /// Whether the flight computer took over a plan of a landing.
-    pub fn planned(&self) -> bool {
-        self.output.as_ref().is_some_and(|output| output.planned)
-    }
-}

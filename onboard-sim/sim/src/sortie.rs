@@ -9,7 +9,7 @@ use crate::world::whole::WorldError;
 use crate::world::{Battery, World};
 use flight::computer::crew::{Asked, Request};
 use flight::computer::pilot::Pilot;
-use flight::computer::{Commands, Computer, FRAME_S, Input, Rehearsed, flight_time_s};
+use flight::computer::{Commands, Computer, FRAME_S, Input, Output, Rehearsed, flight_time_s};
 use flight::estimation::estimator::Measurements;
 use flight::guidance::powered::{ControlLevel, PoweredReport};
 use flight::rules::arming::PredictedLanding;
@@ -22,7 +22,7 @@ use crate::dispersion::Dispersion;
 use crate::draw::{Draw, draw, rail_upwind_m};
 use crate::fault::{Breakage, Injector};
 use crate::outcome::{Outcome, by_envelope};
-use crate::outside::{Flown, Outside, Unwatched, Watch};
+use crate::outside::{Outside, Unwatched, Watch};
 use crate::recipe::Recipe;
 use crate::surroundings::{Feedback, Surroundings, falling_as, world_at};
 
@@ -175,12 +175,12 @@ impl Sortie {
     }
 
     /// Flies one frame without a crew.
-    pub fn step(&mut self) -> Flown {
+    pub fn step(&mut self) -> Option<Output> {
         self.step_with(&Outside::NOBODY, &mut Unwatched)
     }
 
     /// Flies one frame.
-    pub fn step_with(&mut self, outside: &Outside<'_>, watch: &mut dyn Watch) -> Flown {
+    pub fn step_with(&mut self, outside: &Outside<'_>, watch: &mut dyn Watch) -> Option<Output> {
         for breakage in self.injector.due(self.surroundings.world.time_s(), self.computer.mode().phase) {
             self.break_down(&breakage);
         }
@@ -198,10 +198,10 @@ impl Sortie {
                 self.computer.restart(flight_time_s(self.frame));
                 self.plan_ready_at = None;
             }
-            return Flown { output: None };
+            return None;
         }
         // Without a sample there is no frame; what was commanded goes on.
-        let Some(measured) = measured else { return Flown { output: None } };
+        let measured = measured?;
         let abort = [Request::of_the_programme(Asked::Abort)];
         let aborting;
         let requests = if core::mem::take(&mut self.abort) {
@@ -242,7 +242,7 @@ impl Sortie {
         if output.released {
             self.begin();
         }
-        Flown { output: Some(output) }
+        Some(output)
     }
 
     fn command(&mut self, commands: &Commands) {
@@ -526,9 +526,9 @@ impl Rehearsal {
     fn step(&mut self) {
         let Self::Flying { flight, plans } = self else { return };
         for _ in 0..FRAMES_AT_ONCE {
-            let flown = flight.step();
+            let planned = flight.step().is_some_and(|output| output.planned);
             let powered = flight.computer().mode().phase == Phase::Powered;
-            if flown.planned() && powered && flight.world().touchdown().is_none() {
+            if planned && powered && flight.world().touchdown().is_none() {
                 plans[0] += 1;
                 plans[1] += u64::from(flight.computer().level() == ControlLevel::Converged);
             }

@@ -5,7 +5,7 @@ use crate::world::sensors::{
     NEARLY_EXACT, SensorFaults, SensorParamError, SensorTruth, Sensors, believed_start,
 };
 use crate::world::{Actuators, Battery, World};
-use flight::computer::{Commands, FRAME_MS, FRAME_S};
+use flight::computer::{Commands, FRAME_MS, FRAME_S, pad_check};
 use flight::estimation::estimator::{Measurements, StartUncertainty};
 use flight::rules::outputs::Line;
 use flight::rules::phase::Phase;
@@ -161,8 +161,7 @@ pub(crate) struct Feedback {
 
 /// Where gimbal and fins are, rad.
 pub(crate) fn surfaces_rad(world: &World) -> [f64; 6] {
-    let ([pitch, yaw], [one, two, three, four]) = (world.gimbal_feedback_rad(), world.fins_feedback_rad());
-    [pitch, yaw, one, two, three, four]
+    pad_check::surfaces_rad(world.gimbal_feedback_rad(), world.fins_feedback_rad())
 }
 
 // The world in which a flight begins.

@@ -10,7 +10,6 @@ use anyhow::Context as _;
 use campaign::hazard::Flights;
 use campaign::motors::card::{Card, Day, Order};
 use campaign::motors::choice::{StartHeight, Team};
-use campaign::motors::frame::start_height_m;
 use campaign::motors::ranking::{Ranked, Request, rank};
 use campaign::motors::source::{self, Candidate, Found};
 use campaign::motors::table;
@@ -324,7 +323,7 @@ impl Choices {
                 );
             }
         }
-        let own_m = start_height_m(mission);
+        let own_m = mission.start_height_m();
         // A drone can hang anywhere, so a drop begins where the mission says.
         let own =
             if mission.start.at == StartPoint::Drone { StartHeight::Exactly } else { StartHeight::AtMost };

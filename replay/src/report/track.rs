@@ -344,9 +344,10 @@ mod tests {
     #[test]
     fn val_hand_a_node_of_a_plan_is_a_state_over_the_ground() {
         let lean = 30.0_f64.to_radians();
-        let found = planned(&[7.0, -8.0, 9.0, 3.0, 4.0, -2.0, 0.0, lean, 0.3, 0.4]);
-        for (found, expected) in found.into_iter().zip([7.0, 8.0, 9.0, 5.0, -2.0, lean, 0.5]) {
-            assert!((found - expected).abs() < 1e-12, "{found}, not {expected}");
-        }
+        let [north, east, height_m, level_m_s, up_m_s, tilt_rad, rate] =
+            planned(&[7.0, -8.0, 9.0, 3.0, 4.0, -2.0, 0.0, lean, 0.3, 0.4]);
+        let exact = [north, east, height_m, level_m_s, up_m_s].map(f64::to_bits);
+        assert_eq!(exact, [7.0, 8.0, 9.0, 5.0, -2.0].map(f64::to_bits));
+        assert!((tilt_rad - lean).abs() < 1e-12 && (rate - 0.5).abs() < 1e-12, "{tilt_rad} {rate}");
     }
 }

@@ -28,6 +28,7 @@ use embedded_hal::pwm::SetDutyCycle;
 use embedded_hal::spi::SpiDevice;
 use embedded_io::{Read, ReadReady};
 use flight::computer::news::CrewMessage;
+use flight::computer::pad_check::surfaces_rad;
 use flight::computer::pilot::planner::Planner;
 use flight::computer::{Commands, Computer, FRAME_S, Input, LogState, flight_time_s};
 use flight::estimation::estimator::{GnssFix, ImuSample, Measurements};
@@ -301,8 +302,8 @@ impl<W: Wiring> Board for TeensyBoard<W> {
     }
 
     fn act(&mut self, commands: &Commands) -> Result<(), Infallible> {
-        let Commands { gimbal_rad: [pitch, yaw], fins_rad: [one, two, three, four], outputs } = *commands;
-        let angles_rad = [pitch, yaw, one, two, three, four];
+        let Commands { gimbal_rad, fins_rad, outputs } = *commands;
+        let angles_rad = surfaces_rad(gimbal_rad, fins_rad);
         let surfaces = self.parts.servos.iter_mut().zip(&self.build.surfaces);
         for ((servo, surface), angle_rad) in surfaces.zip(angles_rad) {
             // What fails is told again in the next frame.

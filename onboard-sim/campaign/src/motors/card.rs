@@ -8,7 +8,7 @@ use flight::vehicle::mission::StartPoint;
 use sim::recipe::Recipe;
 
 use super::choice::{Limits, Refusal, Team, choose};
-use super::frame::{Ballast, Changes, Frame, FrameError, changed, start_height_m};
+use super::frame::{Ballast, Changes, Frame, FrameError, changed};
 use super::ranking::{FlyError, Landing, Progress, RankError, fly};
 use super::sheet;
 use super::source::Candidate;
@@ -231,7 +231,7 @@ fn with_mass(recipe: &Recipe, mass: Mass) -> Result<Recipe, CardError> {
         motor: &mission.airframe.motor,
         keeps_lot: true,
         mass,
-        start_height_m: start_height_m(mission),
+        start_height_m: mission.start_height_m(),
     };
     let text = changed(&recipe.mission_toml, &changes)
         .map_err(|source| RankError::Text { origin: mission.name.clone(), source })?;

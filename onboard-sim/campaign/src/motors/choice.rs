@@ -12,7 +12,7 @@ use flight::vehicle::mission::StartPoint;
 use flight::vehicle::thrust_curve::ThrustCurve;
 use sim::recipe::Recipe;
 
-use super::frame::{Ballast, Frame, start_height_m};
+use super::frame::{Ballast, Frame};
 use super::window::{Fall, Onset, Window};
 use crate::statistics::golden_section;
 
@@ -209,7 +209,7 @@ pub struct Team {
 impl Team {
     /// With a start up to the mission's own height.
     pub fn new(recipe: Recipe, ballast_kg: [f64; 2]) -> Self {
-        let start = StartHeight::AtMost(start_height_m(&recipe.mission));
+        let start = StartHeight::AtMost(recipe.mission.start_height_m());
         Self { recipe, ballast_kg, start, tube_m: None }
     }
 

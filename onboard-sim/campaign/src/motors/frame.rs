@@ -144,8 +144,7 @@ impl Frame {
 
 /// About its middle, across the axis, kg m^2.
 fn rod_inertia_kg_m2(motor: &ThrustCurve) -> f64 {
-    let (length_m, diameter_m) = (motor.length_m(), motor.diameter_m());
-    motor.total_mass_kg() * (squared(length_m) / 12.0 + squared(diameter_m) / 16.0)
+    motor.total_mass_kg() * motor.gyration_m2()
 }
 
 fn squared(value: f64) -> f64 {
@@ -177,12 +176,6 @@ pub enum MissionTextError {
     Missing(&'static str),
     #[error("the mission cannot be written")]
     Write(#[from] toml::ser::Error),
-}
-
-/// Height of the centre of gravity above the pad at which a mission's flight begins, m: at apogee, or where a drone releases it.
-pub fn start_height_m(mission: &Mission) -> f64 {
-    let dropped = mission.drop.filter(|_| mission.start.at == StartPoint::Drone);
-    dropped.map_or(mission.start.height_m, |drop| drop.height_m)
 }
 
 /// The changed text of a mission. Its airframe is a table in it, and its motor a text, so it needs no other file.
@@ -338,13 +331,13 @@ mod tests {
                 motor: &mission.airframe.motor,
                 keeps_lot: true,
                 mass: mission.airframe.mass,
-                start_height_m: start_height_m(&mission),
+                start_height_m: mission.start_height_m(),
             };
             let again = changed(text, &changes).unwrap();
             assert_eq!(flight::vehicles::mission::from_toml(&again, name).unwrap(), mission);
             let moved = changed(&again, &Changes { start_height_m: 77.5, ..changes }).unwrap();
             let moved = flight::vehicles::mission::from_toml(&moved, name).unwrap();
-            assert!((start_height_m(&moved) - 77.5).abs() < 1e-12 && moved.airframe == mission.airframe);
+            assert!((moved.start_height_m() - 77.5).abs() < 1e-12 && moved.airframe == mission.airframe);
         }
     }
 

@@ -138,9 +138,10 @@ impl Card {
         let chute_m_s = libm::sqrt(2.0 * mass.loaded_kg * mission.gravity_m_s2 / lift_kg_m);
         let igniters = if airframe.igniter.scatter_scale < 1.0 { "every igniter" } else { "the igniter" };
         let motor = |curve: &ThrustCurve| {
-            let gone =
-                flight::vehicles::motors::status(curve.name()).filter(|(in_production, _)| !in_production);
-            let gone = gone.map_or_else(String::new, |(_, dated)| format!(", OUT OF PRODUCTION ({dated})"));
+            let gone = match flight::vehicles::motors::status(curve.name()) {
+                Some((false, dated)) => format!(", OUT OF PRODUCTION ({dated})"),
+                _ => String::new(),
+            };
             format!("{}, {:.0} N s{gone}", curve.name(), curve.total_impulse_n_s())
         };
         let burns = mission.lot.as_ref().filter(|lot| lot.burns > 0);

@@ -9,14 +9,15 @@ use alloc::format;
 use alloc::string::{String, ToString as _};
 use alloc::vec::Vec;
 
+use super::pad_check::{SURFACES, surfaces_rad};
 use super::{Computer, FRAME_S, Input};
+use crate::control::servo::{GIMBALS, ServoModel};
 use crate::estimation::estimator::{Estimate, Health};
 use crate::estimation::motor_estimate::MotorStage;
 use crate::estimation::sensor_watch::{BAROMETER_LOST_S, GNSS_LOST_S, LIDAR_LOST_S};
 use crate::guidance::powered::ControlLevel;
 use crate::rules::outputs::Line;
 use crate::rules::phase::{Latch, Phase};
-use crate::vehicle::airframe::{Airframe, Servo};
 
 /// Something that no flight shows as long as its vehicle does what it should.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -85,9 +86,6 @@ const RULES: [(Sign, f64); 24] = [
     (Sign::Latched, 0.0),
 ];
 
-/// Gimbal pitch and yaw, then four fins.
-const SURFACES: usize = 6;
-const GIMBALS: usize = 2;
 const SURFACE_NAMES: [&str; SURFACES] = ["gimbal pitch", "gimbal yaw", "fin 1", "fin 2", "fin 3", "fin 4"];
 
 /// Something that went wrong.
@@ -295,7 +293,7 @@ impl Watcher {
             frame: flown.frame.saturating_sub(1),
             missing: 0,
             gnss_since_boost: false,
-            surfaces: servos(airframe, flown),
+            surfaces: ServoModel::of_each(airframe, surfaces_rad(flown.gimbal_rad, flown.fins_rad)),
             boost_m_s: 0.0,
             ejected_s: None,
             parted_s: None,
@@ -311,7 +309,8 @@ impl Watcher {
         let (time_s, phase) = (flown.time_s, computer.mode().phase);
         if self.missing > 0 {
             // Nobody knows what was commanded or measured meanwhile.
-            self.surfaces = servos(&computer.pilot().mission().airframe, flown);
+            let at_rad = surfaces_rad(flown.gimbal_rad, flown.fins_rad);
+            self.surfaces = ServoModel::of_each(&computer.pilot().mission().airframe, at_rad);
         }
         if flown.measured.gnss.is_some() {
             self.gnss_since_boost = phase != Phase::Boost;
@@ -320,10 +319,10 @@ impl Watcher {
             self.boost_m_s += flown.measured.imu.specific_force_m_s2.x * FRAME_S;
         }
         let commands = computer.commands();
-        for (servo, command_rad) in
-            self.surfaces.iter_mut().zip(commands.gimbal_rad.into_iter().chain(commands.fins_rad))
-        {
-            servo.step(command_rad);
+        let told_rad = surfaces_rad(commands.gimbal_rad, commands.fins_rad);
+        for (servo, command_rad) in self.surfaces.iter_mut().zip(told_rad) {
+            servo.advance();
+            servo.take(command_rad);
         }
         for (line, since_s) in
             [(Line::Parachute, &mut self.ejected_s), (Line::Separation, &mut self.parted_s)]
@@ -410,7 +409,7 @@ fn seen_in_flight(
         },
         Sign::Surface(surface) => {
             let surface = usize::from(surface);
-            let at_rad = surfaces_rad(flown)[surface];
+            let at_rad = surfaces_rad(flown.gimbal_rad, flown.fins_rad)[surface];
             let away_rad = (at_rad - watcher.surfaces[surface].at_rad).abs();
             (away_rad > AWAY_RAD[usize::from(surface >= GIMBALS)])
                 .then(|| now(away_rad.to_degrees(), at_rad.to_degrees()))
@@ -480,53 +479,4 @@ fn latched(latch: Latch, sign: Sign) -> Option<&'static str> {
         Latch::Other => "ascent motor did not lift the vehicle off",
     };
     ((latch == Latch::Gate) == (sign == Sign::Gate)).then_some(words)
-}
-
-/// Where gimbal and fins are, rad.
-fn surfaces_rad(flown: &Input<'_>) -> [f64; SURFACES] {
-    let ([pitch, yaw], [a, b, c, d]) = (flown.gimbal_rad, flown.fins_rad);
-    [pitch, yaw, a, b, c, d]
-}
-
-/// A servo as its data describe it: a delay, then a rate.
-#[derive(Debug, Clone)]
-struct ServoModel {
-    /// The last commands, the oldest at `next`.
-    line_rad: [f64; LINE_FRAMES],
-    next: usize,
-    delay_frames: usize,
-    step_rad: f64,
-    at_rad: f64,
-}
-
-/// An airframe's servo delay is 0.1 s at most.
-const LINE_FRAMES: usize = 24;
-
-impl ServoModel {
-    fn new(servo: &Servo, at_rad: f64) -> Self {
-        Self {
-            line_rad: [at_rad; LINE_FRAMES],
-            next: 0,
-            delay_frames: (libm::round(servo.delay_s / FRAME_S) as usize).min(LINE_FRAMES - 1),
-            step_rad: servo.rate_rad_s() * FRAME_S,
-            at_rad,
-        }
-    }
-
-    /// Moves for a frame under the commands before it, and takes the next one.
-    fn step(&mut self, command_rad: f64) {
-        let delayed = (self.next + LINE_FRAMES - 1 - self.delay_frames) % LINE_FRAMES;
-        self.at_rad += (self.line_rad[delayed] - self.at_rad).clamp(-self.step_rad, self.step_rad);
-        self.line_rad[self.next] = command_rad;
-        self.next = (self.next + 1) % LINE_FRAMES;
-    }
-}
-
-/// Servos at rest where their surfaces are.
-fn servos(airframe: &Airframe, flown: &Input<'_>) -> [ServoModel; SURFACES] {
-    let at_rad = surfaces_rad(flown);
-    core::array::from_fn(|surface| {
-        let servo = if surface < GIMBALS { &airframe.gimbal.servo } else { &airframe.fins.servo };
-        ServoModel::new(servo, at_rad[surface])
-    })
 }

@@ -34,12 +34,12 @@ pub use self::crew::CrewMemory;
 use self::crew::{Answer, People, Request};
 use self::news::{CrewMessage, MotorWatch, Readiness, Severity};
 use self::pad::{ANSWERING_RAD, PadWatch, SelfTest};
-use self::pad_check::PadCheck;
+use self::pad_check::{PadCheck, SURFACES, surfaces_rad};
 use self::pilot::planner::Planner;
 use self::pilot::{Pilot, Pointed};
 pub use self::table::AbortEffect;
 use self::table::PhaseTable;
-use crate::control::silent::SilentServo;
+use crate::control::servo::ServoModel;
 use crate::estimation::estimator::{ImuSample, Measurements};
 use crate::estimation::sensor_watch::SensorWatch;
 use crate::guidance::powered::ControlLevel;
@@ -98,15 +98,15 @@ pub struct Computer {
     crew: CrewMemory,
     fins_answering: [bool; 4],
     pad_check: PadCheck,
-    /// Gimbal (pitch, yaw) and fins of a vehicle whose servos tell nothing.
-    silent: [SilentServo; 6],
+    /// The servos of a vehicle that tell nothing, from the first frame on.
+    silent: Option<[ServoModel; SURFACES]>,
     release: Option<Release>,
     level: ControlLevel,
 }
 
 impl Computer {
-    /// One frame. In the air: take over a plan that is ready, estimate, answer the crew, decide, pose the next plan, point. On the pad: answer the crew, and wait.
-    /// At the end, and nowhere else, the outputs follow from the mode that the frame ends in.
+    /// One frame. In the air: take over a plan that is ready, estimate, answer the crew, decide, pose the next plan, point. On
+    /// the pad: answer the crew, and wait. At the end, and nowhere else, the outputs follow from the mode that the frame ends in.
     pub fn step(&mut self, input: &Input<'_>) -> Output {
         let input = &self.with_silent_servos(input);
         self.table.begin(input.time_s);
@@ -166,12 +166,13 @@ impl Computer {
         if airframe.servos_tell {
             return *input;
         }
-        let Commands { gimbal_rad: [pitch, yaw], fins_rad: [one, two, three, four], .. } = self.commands;
-        let told_rad = [pitch, yaw, one, two, three, four];
-        let [pitch, yaw, one, two, three, four] = core::array::from_fn(|surface| {
-            let servo = if surface < 2 { &airframe.gimbal.servo } else { &airframe.fins.servo };
-            self.silent[surface].step(told_rad[surface], servo)
-        });
+        let told_rad = surfaces_rad(self.commands.gimbal_rad, self.commands.fins_rad);
+        let servos = self.silent.get_or_insert_with(|| ServoModel::of_each(airframe, told_rad));
+        for (servo, command_rad) in servos.iter_mut().zip(told_rad) {
+            servo.take(command_rad);
+            servo.advance();
+        }
+        let [pitch, yaw, one, two, three, four] = servos.each_ref().map(|servo| servo.at_rad);
         Input { gimbal_rad: [pitch, yaw], fins_rad: [one, two, three, four], ..*input }
     }
 

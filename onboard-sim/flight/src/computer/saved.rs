@@ -209,7 +209,7 @@ impl Computer {
             crew: CrewMemory::default(),
             fins_answering: [false; 4],
             pad_check: PadCheck::default(),
-            silent: Default::default(),
+            silent: None,
             release: None,
             level: ControlLevel::Idle,
         }

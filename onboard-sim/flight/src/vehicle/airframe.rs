@@ -91,10 +91,9 @@ impl Airframe {
     /// radius of gyration `k` and the distances `l` from its middle up to the pivot and `a` up to the centre of gravity of all. The
     /// body turns back by as much.
     pub fn swinging_kg_m2(&self, motor: &ThrustCurve, motor_kg: f64, cg_station_m: f64) -> f64 {
-        let (length_m, diameter_m) = (motor.length_m(), motor.diameter_m());
         let middle_m = self.mass.propellant_station_m;
-        let gyration_m2 = length_m * length_m / 12.0 + diameter_m * diameter_m / 16.0;
-        motor_kg * (gyration_m2 + (self.gimbal.pivot_station_m - middle_m) * (cg_station_m - middle_m))
+        motor_kg
+            * (motor.gyration_m2() + (self.gimbal.pivot_station_m - middle_m) * (cg_station_m - middle_m))
     }
 
     /// Angle at which the swinging motor touches the inside of the tube, rad: one of its rims, the one farther from the

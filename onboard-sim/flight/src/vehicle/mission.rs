@@ -291,6 +291,12 @@ impl Mission {
         self.launch.as_ref().filter(|_| self.start.at == StartPoint::Pad)
     }
 
+    /// Height of the centre of gravity above the pad at which its flight begins, m: at apogee, or where a drone releases it.
+    pub fn start_height_m(&self) -> f64 {
+        let dropped = self.drop.filter(|_| self.start.at == StartPoint::Drone);
+        dropped.map_or(self.start.height_m, |drop| drop.height_m)
+    }
+
     /// The prior of a motor with another curve than the expected one: nobody has burnt any of its lot.
     pub(crate) fn unknown_motor(&self) -> MotorPrior {
         let MotorPrior { impulse_sigma, burn_time_sigma, .. } = MotorPrior::default();

@@ -164,6 +164,11 @@ impl ThrustCurve {
         self.total_mass_kg
     }
 
+    /// The square of the casing's radius of gyration across its axis, m^2, taken as a full cylinder.
+    pub fn gyration_m2(&self) -> f64 {
+        self.length_m * self.length_m / 12.0 + self.diameter_m * self.diameter_m / 16.0
+    }
+
     /// The points, in order of time; at least two.
     pub fn points(&self) -> &[ThrustPoint] {
         &self.points

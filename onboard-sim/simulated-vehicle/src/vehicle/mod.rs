@@ -19,7 +19,7 @@ use flight_log::sortie::LastFrame;
 use protocol::log::computer_v1::ComputerFrame;
 use protocol::log::record::Record;
 use protocol::log::v1;
-use sim::outside::{Flown, Outside};
+use sim::outside::Outside;
 use sim::recipe::Recipe;
 use sim::sortie::{Radio, SetUpError, Sortie};
 pub use vehicle_link::vehicle::{BatteryFacts, Judged, MissionName, VehicleState};
@@ -148,7 +148,7 @@ impl Vehicle {
             people: self.people,
             requests,
         };
-        let Flown { output } = self.sortie.step_with(&outside, &mut self.last);
+        let output = self.sortie.step_with(&outside, &mut self.last);
         self.computer_frame = self.last.take();
         self.frames_decided += u64::from(self.computer_frame.is_some());
         let mut events = Vec::new();

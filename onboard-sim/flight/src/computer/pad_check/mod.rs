@@ -237,6 +237,11 @@ impl PadCheck {
 /// The surfaces: gimbal pitch and yaw, fins 1 to 4.
 pub const SURFACES: usize = 6;
 
+/// The surfaces in that order, rad.
+pub fn surfaces_rad([pitch, yaw]: [f64; 2], [one, two, three, four]: [f64; 4]) -> [f64; SURFACES] {
+    [pitch, yaw, one, two, three, four]
+}
+
 /// What was looked at. Values are SI: rad, s, rad/s, m/s^2, m, m/s, V, bytes; a switch is 1 or 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum Item {
@@ -484,9 +489,8 @@ impl Computer {
             self.end_check(&reason);
             return;
         }
-        let ([pitch_rad, yaw_rad], [one, two, three, four]) = (input.gimbal_rad, input.fins_rad);
         let seen = PadReadings {
-            surfaces_rad: [pitch_rad, yaw_rad, one, two, three, four],
+            surfaces_rad: surfaces_rad(input.gimbal_rad, input.fins_rad),
             measured: &input.measured,
             switches: PadSwitches {
                 igniter_continuity: self.input.igniter_continuity,

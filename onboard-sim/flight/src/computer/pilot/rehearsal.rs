@@ -13,7 +13,6 @@ use crate::computer::Rehearsed;
 use crate::estimation::estimator::Estimate;
 use crate::rules::arming::PredictedLanding;
 use crate::rules::verdict::{LandingVerdict, Limits};
-use crate::vehicle::mission::StartPoint;
 use crate::vehicle::rigid::RigidState;
 
 /// Time between looks for the ignition in the fall, s, and how many.
@@ -54,16 +53,13 @@ impl VehicleModel {
     fn lit(&self) -> Option<(Estimate, Burning)> {
         let (mission, mass, fins_m2) = (&self.mission, self.mass.at(0.0), self.largest_fin_drag_area_m2());
         let feet_m = self.feet_below_cg_m(&mass);
-        let from_m = match (mission.start.at, &mission.drop) {
-            (StartPoint::Drone, Some(drop)) => drop.height_m,
-            _ => mission.start.height_m,
-        };
         let exact = |state| Estimate::exact(0.0, state, Vector3::zeros(), Vector2::zeros());
         let density_kg_m3 = self.density_kg_m3(&exact(RigidState::upright(0.0)));
         let column = self.column(density_kg_m3, mission.soft_tilt_deg);
         let lit = (0..LOOKS).find_map(|look| {
             let after_s = f64::from(look) * LOOK_S;
-            let (height_m, vertical_m_s) = column.fallen(from_m - feet_m, 0.0, fins_m2, after_s);
+            let (height_m, vertical_m_s) =
+                column.fallen(mission.start_height_m() - feet_m, 0.0, fins_m2, after_s);
             let curve = &mission.motor_curve;
             let looked = mission.ignition.prediction(&column, curve, height_m, vertical_m_s, fins_m2);
             looked.overdue_s(looked.onset_height_m).map(|_| looked)

@@ -8,6 +8,7 @@
 mod build;
 mod riding;
 
+use flight::computer::pad_check::surfaces_rad;
 use flight::rules::verdict::Touchdown;
 use flight::vehicle::airframe::{Airframe, MassModel, MassProperties};
 use flight::vehicle::atmosphere::{Air, STANDARD_GRAVITY_M_S2};
@@ -237,11 +238,11 @@ impl World {
 
     /// What arrives at the servos, over wires that may be wrong: gimbal (pitch, yaw), fins 1 to 4, rad.
     fn wired_rad(&self, actuators: &Actuators) -> [f64; 6] {
-        let ([pitch, yaw], [one, two, three, four]) = (actuators.gimbal_rad, actuators.fins_rad);
+        let told_rad = surfaces_rad(actuators.gimbal_rad, actuators.fins_rad);
         let both_stops_rad = self.airframe.fins.closed_rad() + self.airframe.fins.open_rad();
         core::array::from_fn(|surface| {
             let (wire, reversed) = self.wires[surface];
-            let told_rad = [pitch, yaw, one, two, three, four][wire];
+            let told_rad = told_rad[wire];
             if reversed { if surface < 2 { -told_rad } else { both_stops_rad - told_rad } } else { told_rad }
         })
     }

@@ -147,7 +147,7 @@ fn asked_in(flight: &Sortie, asked: Asked, frames: usize) -> bool {
     let mut flight = flight.clone();
     let requests = [Request::of_the_programme(asked)];
     let outside = Outside { requests: &requests, ..Outside::NOBODY };
-    let answered = flight.step_with(&outside, &mut Unwatched).output.unwrap();
+    let answered = flight.step_with(&outside, &mut Unwatched).unwrap();
     let accepted = answered.answers[0].ending == Ending::Accepted;
     let lit = flight.world().booster_thrust_n() > 0.0;
     let mut outputs = answered.commands.outputs;
@@ -155,7 +155,7 @@ fn asked_in(flight: &Sortie, asked: Asked, frames: usize) -> bool {
         let lands_in_place = flight.computer().mode().interlocks.lands_in_place;
         let stopped = accepted && !(lands_in_place && asked == Asked::Abort);
         assert!(!(stopped && outputs.lights()), "{asked:?} at {:?}: {outputs:?}", flight.computer().mode());
-        outputs = flight.step().output.unwrap().commands.outputs;
+        outputs = flight.step().unwrap().commands.outputs;
     }
     // What had not lit does not light.
     let lights = flight.world().booster_thrust_n() > 0.0;
