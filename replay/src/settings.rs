@@ -102,18 +102,14 @@ pub fn settings_of_file(text: &str, origin: &str) -> Result<Vec<Setting>, Settin
     Ok(settings)
 }
 
-/// Every setting of a mission with those of its airframe; `origin` is used in messages only. A whole number is the same as
-/// with a decimal point.
+/// Every setting that a mission's text states; `origin` is used in messages only. A whole number is the same as with a decimal
+/// point.
 ///
 /// # Errors
 /// The text is not TOML.
 pub(crate) fn settings_of_mission(text: &str, origin: &str) -> Result<Vec<Setting>, SettingError> {
-    let mut table = parsed_table(text, origin)?;
-    expand_airframe(&mut table);
-    let mut settings = Vec::new();
-    collect_leaves("", &table, &mut |path, value| {
-        settings.push(Setting { path, value: as_whole(value), at_s: None });
-    });
+    let mut settings = settings_of_file(text, origin)?;
+    settings.iter_mut().for_each(|setting| setting.value = as_whole(&setting.value));
     Ok(settings)
 }
 
@@ -151,8 +147,6 @@ fn insert(table: &mut toml::Table, path: &str, value: toml::Value) {
     }
 }
 
-/// The section of the airframe.
-const AIRFRAME: &str = "airframe";
 /// The section of the random draw.
 const TRUTH: &str = "truth.";
 
@@ -182,9 +176,6 @@ pub fn mission_toml_with(mission_toml: &str, settings: &[Setting]) -> Result<Str
         return Ok(mission_toml.to_owned());
     }
     let mut table = parsed_table(mission_toml, "profile.toml")?;
-    if settings.iter().any(|setting| setting.path.starts_with("airframe.")) {
-        expand_airframe(&mut table);
-    }
     for setting in settings {
         insert(&mut table, &setting.path, as_whole(&setting.value));
     }
@@ -212,16 +203,6 @@ pub fn truth_with(truth: &Truth, settings: &[Setting]) -> Result<Truth, SettingE
     })
 }
 
-/// Replaces the name of a built-in airframe by its text.
-fn expand_airframe(table: &mut toml::Table) {
-    if let Some(name) = table.get(AIRFRAME).and_then(toml::Value::as_str)
-        && let Some(text) = flight::vehicles::airframe::builtin_toml(name)
-        && let Ok(airframe) = text.parse()
-    {
-        table.insert(AIRFRAME.to_owned(), toml::Value::Table(airframe));
-    }
-}
-
 /// A whole number of a range, `10.0`, as `10`: a key that takes whole numbers takes it, and so does one that takes all.
 fn as_whole(value: &toml::Value) -> toml::Value {
     let whole = value.as_float().map(|number| (number, libm::trunc(number) as i64));
@@ -229,12 +210,14 @@ fn as_whole(value: &toml::Value) -> toml::Value {
     same.map_or_else(|| value.clone(), |(_, whole)| toml::Value::Integer(whole))
 }
 
-/// Every key of the built-in missions, each with the text of its airframe, and of this table.
+/// Every key of the built-in missions and their controller, and of this table.
 fn known_keys(table: &toml::Table) -> BTreeSet<String> {
-    let built_in = flight::vehicles::mission::BUILTIN.iter().filter_map(|(_, text)| text.parse().ok());
+    let built_in = flight::vehicles::mission::BUILTIN.iter().filter_map(|(name, text)| {
+        let mission = flight::vehicles::mission::from_toml(text, name).ok()?;
+        toml::Table::try_from(mission).ok()
+    });
     let mut known = BTreeSet::new();
-    for mut table in built_in.chain([table.clone()]) {
-        expand_airframe(&mut table);
+    for table in built_in.chain([table.clone()]) {
         collect_leaves("", &table, &mut |path, _| _ = known.insert(path));
     }
     known

@@ -33,7 +33,7 @@ mod tests;
 use alloc::vec::Vec;
 use core::array::from_fn;
 use core::f64::consts::TAU;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use stages::{Condition, InputRange, Interval as _, Model, Settings};
 pub use stages::{Outcome, Start, Status};
 
@@ -53,7 +53,7 @@ pub const LANDING_MISS: f64 = 1e-3;
 const FIRST_BARRIER: f64 = 1e3;
 
 /// When a solve ends, and what a broken condition costs.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct SolverLimits {
     /// Largest number of Newton iterations of one solve.

@@ -41,7 +41,7 @@ pub fn draw(mission: &Mission, dispersion: &Dispersion, seed: u64, number: u64) 
     let impulse_scale =
         1.0 + sigma.impulse_share * chance.normal() + sigma.impulse_even_share * chance.even();
     let burn_time_scale = 1.0 + sigma.burn_time_share * chance.normal();
-    let scatter_scale = mission.airframe.igniter.scatter_scale;
+    let scatter_scale = mission.airframe.igniter_scatter();
     let ignition_delay_s = (nominal.ignition_delay_s
         + scatter_scale * sigma.ignition_delay_s * chance.normal()
         + scatter_scale * sigma.ignition_delay_even_s * chance.even())

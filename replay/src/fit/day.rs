@@ -136,7 +136,7 @@ pub fn learn(fits: &[Fit], ask: &DayAsk<'_>) -> Result<Learnt, LearnError> {
     let basis = Basis::of(&mission);
     let fits: Vec<Fit> = fits.iter().map(|fit| fit.over(&basis)).collect();
     let fits = fits.as_slice();
-    let scatter_scale = mission.airframe.igniter.scatter_scale;
+    let scatter_scale = mission.airframe.igniter_scatter();
     let both = |sigma: f64, even: f64| libm::sqrt(sigma * sigma + even * even / 3.0);
     let priors = [
         // The scale is per mass: the mass scatters in it.
@@ -429,7 +429,7 @@ fn dispersion_toml(
     // Impulse and burn time scatter as the mission's lot does.
     // A set's delays scatter around the nominal one; a lot with another mean gets its distance as scatter, too.
     let apart_s = delay.mean - Truth::default().ignition_delay_s;
-    let scatter_scale = mission.airframe.igniter.scatter_scale.max(1e-3);
+    let scatter_scale = mission.airframe.igniter_scatter().max(1e-3);
     set("ignition_delay_s", libm::hypot(delay.next_sigma(), apart_s) / scatter_scale);
     set("ignition_delay_even_s", 0.0);
     if let Some(drag_share) = drag_share {

@@ -185,36 +185,23 @@ pub enum MissionTextError {
 /// The text is no mission.
 pub fn changed(mission_toml: &str, changes: &Changes<'_>) -> Result<String, MissionTextError> {
     let mut mission: Table = mission_toml.parse()?;
-    let mut airframe: Table = match mission.remove("airframe") {
-        Some(Value::Table(table)) => table,
-        Some(Value::String(name)) => flight::vehicles::airframe::builtin_toml(&name)
-            .ok_or(MissionTextError::Missing("airframe of that name"))?
-            .parse()?,
-        _ => return Err(MissionTextError::Missing("airframe")),
-    };
-    let Mass {
-        loaded_kg,
-        loaded_cg_station_m,
-        loaded_pitch_inertia_kg_m2,
-        roll_inertia_kg_m2,
-        propellant_station_m,
-    } = changes.mass;
-    let mass = [
+    let airframe = mission.get_mut("airframe").and_then(Value::as_table_mut);
+    let airframe = airframe.ok_or(MissionTextError::Missing("airframe"))?;
+    let was = airframe.insert("motor".to_owned(), Value::String(changes.motor.to_owned()));
+    let mass = airframe.get_mut("mass").and_then(Value::as_table_mut);
+    let mass = mass.ok_or(MissionTextError::Missing("airframe.mass"))?;
+    if was.as_ref().and_then(Value::as_str) != Some(changes.motor) {
+        // It follows from the motor's length.
+        mass.remove("propellant_station_m");
+    }
+    let Mass { loaded_kg, loaded_cg_station_m, loaded_pitch_inertia_kg_m2, .. } = changes.mass;
+    for (key, value) in [
         ("loaded_kg", loaded_kg),
         ("loaded_cg_station_m", loaded_cg_station_m),
         ("loaded_pitch_inertia_kg_m2", loaded_pitch_inertia_kg_m2),
-        ("roll_inertia_kg_m2", roll_inertia_kg_m2),
-        ("propellant_station_m", propellant_station_m),
-    ];
-    let mass: Table = mass.into_iter().map(|(key, value)| (key.to_owned(), Value::Float(value))).collect();
-    let old = airframe.insert("mass".to_owned(), Value::Table(mass));
-    let middle_m = |mass: &Value| mass.get("propellant_station_m").and_then(Value::as_float);
-    let gimbal = airframe.get_mut("gimbal").and_then(|gimbal| gimbal.get_mut("pivot_station_m"));
-    if let (Some(Value::Float(pivot_m)), Some(was_m)) = (gimbal, old.as_ref().and_then(middle_m)) {
-        *pivot_m += propellant_station_m - was_m;
+    ] {
+        mass.insert(key.to_owned(), Value::Float(value));
     }
-    airframe.insert("motor".to_owned(), Value::String(changes.motor.to_owned()));
-    mission.insert("airframe".to_owned(), Value::Table(airframe));
     mission.insert("name".to_owned(), Value::String(changes.name.to_owned()));
     mission.insert("summary".to_owned(), Value::String(changes.summary.to_owned()));
     if changes.keeps_lot {

@@ -100,7 +100,7 @@ pub fn calibres(mission: &Mission, launch: &Launch) -> f64 {
         (propellant_kg, booster.propellant_station_m),
     ]);
     let pressure_m =
-        centre(&[booster.nose, booster.fins].map(|force| (force.slope_per_rad, force.station_m)));
+        centre(&[booster.nose, booster.fin_force].map(|force| (force.slope_per_rad, force.station_m)));
     (gravity_m - pressure_m) / body.diameter_m
 }
 

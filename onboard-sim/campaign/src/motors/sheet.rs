@@ -136,7 +136,7 @@ impl Card {
         let density_kg_m3 = Air::at_height_m(mission.pad_altitude_m).density_kg_m3;
         let lift_kg_m = density_kg_m3 * chute.drag_coefficient * chute.area_m2;
         let chute_m_s = libm::sqrt(2.0 * mass.loaded_kg * mission.gravity_m_s2 / lift_kg_m);
-        let igniters = if airframe.igniter.scatter_scale < 1.0 { "every igniter" } else { "the igniter" };
+        let igniters = if airframe.igniters > 1 { "every igniter" } else { "the igniter" };
         let motor = |curve: &ThrustCurve| {
             let gone = match flight::vehicles::motors::status(curve.name()) {
                 Some((false, dated)) => format!(", OUT OF PRODUCTION ({dated})"),

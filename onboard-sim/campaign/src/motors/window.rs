@@ -52,7 +52,7 @@ impl<'a> Onset<'a> {
             column: Column::of_mission(mission, mass_kg, density_kg_m3, 1.0, mission.soft_tilt_deg),
             curve,
             settings: IgnitionSettings { delay_s: 0.0, fixed_height_m: None, ..mission.ignition },
-            igniter_s: IGNITER_S * mission.airframe.igniter.scatter_scale,
+            igniter_s: IGNITER_S * mission.airframe.igniter_scatter(),
         }
     }
 

@@ -73,19 +73,21 @@ pub fn turn_to_aim_rad(world_from_body: &UnitQuaternion<f64>, nose_in_world: &Ve
 }
 
 /// Tuning of the gimbal loop.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct AimGains {
     /// Natural frequency of the closed loop, rad/s.
     pub natural_frequency_rad_s: f64,
     pub damping: f64,
     /// Time from a command to the motion it causes, s.
+    #[serde(default)]
     pub latency_s: f64,
     /// Time constant of the disturbance estimate, s.
     pub disturbance_time_s: f64,
     /// Limit of the disturbance estimate, rad/s^2.
     pub disturbance_max_rad_s2: f64,
     /// Play of the linkage that the command crosses at a reversal, degrees.
+    #[serde(default)]
     pub play_deg: f64,
 }
 

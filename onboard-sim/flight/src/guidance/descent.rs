@@ -8,7 +8,7 @@
 //! with it and the fins' moment does not.
 
 use nalgebra::Vector3;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use crate::control::aim::turn_to_aim_rad;
 use crate::vehicle::rigid::RigidState;
@@ -19,7 +19,7 @@ pub(crate) const LEAST_AIRSPEED_M_S: f64 = 12.0;
 const LEAST_ROLLING_AIRSPEED_M_S: f64 = 2.0;
 
 /// Settings of the steering.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct DescentGains {
     /// Largest commanded angle of attack, degrees.
@@ -27,6 +27,7 @@ pub struct DescentGains {
     /// Largest commanded angle of attack at ignition, because the gate needs the vehicle nearly upright, degrees.
     pub lean_at_ignition_deg: f64,
     /// Time before the ignition from which the lean is reduced, s.
+    #[serde(default)]
     pub lean_fades_s: f64,
     /// Least natural frequency of the attitude loop, rad/s.
     pub natural_frequency_rad_s: f64,

@@ -12,12 +12,14 @@ use crate::vehicle::burn::Burn;
 use crate::vehicle::thrust_curve::ThrustCurve;
 
 /// Settings of the choice.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct IgnitionSettings {
     /// Impulse of the weakest and the strongest motor to be landed, divided by the certified impulse.
+    #[serde(default)]
     pub impulse_scales: [f64; 2],
     /// Burn times of the shortest and the longest burn to be landed, divided by the certified burn time.
+    #[serde(default)]
     pub burn_time_scales: [f64; 2],
     /// Chosen place in the common band: 0 at its low end, 1 at its high end.
     pub place: f64,

@@ -15,6 +15,7 @@
 
 use core::array::from_fn;
 
+use crate::vehicle::atmosphere::Air;
 use crate::vehicle::burn::Burn;
 use crate::vehicle::mission::Mission;
 use serde::Serialize;
@@ -153,7 +154,7 @@ impl Column {
         }
         let carried_until_s = burn.falls_through_weight_s(self.mass_at_ignition_kg, self.gravity_m_s2);
         carried_until_s.filter(|end_s| *end_s > burning_s).is_some_and(|end_s| {
-            let [softest] = Falls::new(self, burn, burning_s, [end_s]).along(Way::Even, vertical_m_s, [1.0]);
+            let [softest] = Falls::new(self, burn, burning_s, [end_s]).along::<false>(Way::Even, vertical_m_s, [1.0]);
             softest.vertical_m_s > self.touchdown_m_s
         })
     }
@@ -210,6 +211,64 @@ impl Column {
     }
 }
 
+/// The landing that holds one tilt from ignition to touchdown, with half-open fins, on the expected motor.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct EvenLanding {
+    /// How long the thrust exceeds the weight, s; of a motor that never does, how long it burns.
+    pub carried_s: f64,
+    /// Speed at ignition, m/s: that of the fall from the mission's start, with open fins.
+    pub speed_m_s: f64,
+    /// Height of the ignition, m.
+    pub height_m: f64,
+    /// The tilt, rad; `None` if even upright the vehicle is still too fast at the ground.
+    pub tilt_rad: Option<f64>,
+}
+
+impl EvenLanding {
+    /// That of a mission's vehicle.
+    pub fn of(mission: &Mission) -> Self {
+        /// Beyond this the thrust carries nothing.
+        const MOST_TILT_RAD: f64 = 1.4;
+        /// Halvings of an interval: to a millimetre, and to a ten thousandth of a degree.
+        const HALVINGS: usize = 20;
+        let (airframe, curve) = (&mission.airframe, &mission.motor_curve);
+        let density_kg_m3 = Air::at_height_m(mission.pad_altitude_m).density_kg_m3;
+        let column = Column::of_mission(mission, airframe.mass.loaded_kg, density_kg_m3, 1.0, 0.0);
+        let burn = Burn::nominal(curve);
+        let carried_s = burn.falls_through_weight_s(column.mass_at_ignition_kg, column.gravity_m_s2);
+        let carried_s = carried_s.unwrap_or_else(|| curve.burn_time_s());
+        let half_m2 = airframe.fin_drag_area_m2(&[0.5 * airframe.fins.open_rad(); 4]);
+        let braked = |speed_m_s: f64, tilt_rad: f64| {
+            let soft = Braking { tilt_rad, fin_drag_area_m2: half_m2 };
+            let falls = Falls::new(&Column { soft, ..column }, &burn, 0.0, [carried_s]);
+            let [ended] = falls.along::<false>(Way::Even, -speed_m_s, [1.0]);
+            ended
+        };
+        let halved = |mut low: f64, mut high: f64, below: &dyn Fn(f64) -> bool| {
+            for _ in 0..HALVINGS {
+                let middle = 0.5 * (low + high);
+                *if below(middle) { &mut low } else { &mut high } = middle;
+            }
+            low
+        };
+        let tilt_rad = |speed_m_s: f64| {
+            let brakes = |tilt_rad: f64| braked(speed_m_s, tilt_rad).vertical_m_s > column.touchdown_m_s;
+            brakes(0.0).then(|| halved(0.0, MOST_TILT_RAD, &brakes))
+        };
+        let terminal_m_s = column.terminal_speed_m_s(airframe.fin_drag_area_m2(&[airframe.fins.open_rad(); 4]));
+        let start_m = mission.start_height_m();
+        let speed_m_s =
+            |height_m: f64| fall_ends_m_s(start_m - height_m, 0.0, terminal_m_s, column.gravity_m_s2);
+        // The higher the ignition, the slower the fall into it, and the lower it might be.
+        let height_m = halved(0.0, start_m, &|height_m| {
+            let speed_m_s = speed_m_s(height_m);
+            braked(speed_m_s, tilt_rad(speed_m_s).unwrap_or_default()).fallen_m > height_m
+        });
+        let speed_m_s = speed_m_s(height_m);
+        Self { carried_s, speed_m_s, height_m, tilt_rad: tilt_rad(speed_m_s) }
+    }
+}
+
 // A fall during the burn to a given end, and ways of braking it.
 
 /// Intervals of the burn ahead.
@@ -218,6 +277,10 @@ const INTERVALS: usize = 40;
 const MET_M_S: f64 = 1e-4;
 /// Largest number of falls tried for a way of braking; about six are usual.
 const MOST_FALLS: usize = 24;
+/// How many ways of braking and holding are tried: the last one is an eightieth from the hardest.
+const HOLDS_TRIED: usize = 12;
+/// A vehicle that is held ends this near to the touchdown speed, m/s: the last moments, upright, change it a little.
+const HELD_M_S: f64 = 0.3;
 /// A vehicle that moves upwards faster than this rises, m/s.
 const RISING_M_S: f64 = 0.05;
 
@@ -336,7 +399,7 @@ impl<const N: usize> Falls<N> {
     /// without rising before.
     fn heights_m(&self, vertical_m_s: f64) -> [[Option<f64>; N]; 3] {
         // All ways have the same two extremes.
-        let extremes = [0.0, 1.0].map(|parameter| self.along(Way::Even, vertical_m_s, [parameter; N]));
+        let extremes = [0.0, 1.0].map(|parameter| self.along::<false>(Way::Even, vertical_m_s, [parameter; N]));
         [Way::SoftFirst, Way::HardFirst, Way::Even].map(|way| self.heights_of_m(way, vertical_m_s, &extremes))
     }
 
@@ -344,7 +407,7 @@ impl<const N: usize> Falls<N> {
     /// twice is halved (the Illinois rule; Dowell and Jarratt, BIT 11, 1971).
     fn heights_of_m(&self, way: Way, vertical_m_s: f64, extremes: &[[Ended; N]; 2]) -> [Option<f64>; N] {
         let missed_m_s = |ended: &Ended| ended.vertical_m_s - self.touchdown_m_s;
-        let mut heights_m = [None; N];
+        let (mut heights_m, mut risen) = ([None; N], [false; N]);
         let mut one: [_; N] = from_fn(|i| (0.0, missed_m_s(&extremes[0][i])));
         // `other` is the newest point.
         let mut other: [_; N] = from_fn(|i| (1.0, missed_m_s(&extremes[1][i])));
@@ -361,7 +424,7 @@ impl<const N: usize> Falls<N> {
                     other[i].0
                 }
             });
-            let ended = self.along(way, vertical_m_s, parameters);
+            let ended = self.along::<false>(way, vertical_m_s, parameters);
             for i in 0..N {
                 if !sought[i] {
                     continue;
@@ -369,7 +432,8 @@ impl<const N: usize> Falls<N> {
                 let miss_m_s = missed_m_s(&ended[i]);
                 if miss_m_s.abs() < MET_M_S {
                     sought[i] = false;
-                    heights_m[i] = (ended[i].highest_m_s <= RISING_M_S).then_some(ended[i].fallen_m);
+                    risen[i] = ended[i].highest_m_s > RISING_M_S;
+                    heights_m[i] = (!risen[i]).then_some(ended[i].fallen_m);
                 } else if miss_m_s * other[i].1 < 0.0 {
                     one[i] = other[i];
                 } else {
@@ -378,11 +442,30 @@ impl<const N: usize> Falls<N> {
                 other[i] = (parameters[i], miss_m_s);
             }
         }
+        if matches!(way, Way::HardFirst) && risen.contains(&true) {
+            // It would rise. It may be braked evenly until it sinks as at touchdown, and then be held so by its tilt: as hard as
+            // the softest braking can hold.
+            let mut softly = [0.0; N];
+            let mut softer_by = 1.0;
+            for _ in 0..HOLDS_TRIED {
+                let held = self.along::<true>(way, vertical_m_s, softly);
+                softer_by *= 0.5;
+                for (i, ended) in held.iter().enumerate().filter(|(i, _)| risen[*i]) {
+                    let lands = missed_m_s(ended).abs() < HELD_M_S;
+                    let rises = ended.highest_m_s > RISING_M_S;
+                    if lands && !rises {
+                        heights_m[i] = Some(ended.fallen_m);
+                    }
+                    softly[i] = (softly[i] + if rises { softer_by } else { -softer_by }).max(0.0);
+                }
+            }
+        }
         heights_m
     }
 
-    /// The falls from a vertical velocity, each with its parameter of a way.
-    fn along(&self, way: Way, vertical_m_s: f64, parameters: [f64; N]) -> [Ended; N] {
+    /// The falls from a vertical velocity, each with its parameter of a way; if it `HOLDS`, no faster upwards than at touchdown
+    /// as far as the softest braking allows.
+    fn along<const HOLDS: bool>(&self, way: Way, vertical_m_s: f64, parameters: [f64; N]) -> [Ended; N] {
         // Every line is one operation on all falls, which the compiler makes one on vectors.
         let mixed = |share: &[f64; N], one: [f64; N], other: f64| -> [f64; N] {
             from_fn(|i| share[i] * one[i] + (1.0 - share[i]) * other)
@@ -405,10 +488,23 @@ impl<const N: usize> Falls<N> {
             };
             // Midpoint rule.
             let begins_m_s2 = acceleration(&speeds_m_s);
-            let midway_m_s = from_fn(|i| speeds_m_s[i] + 0.5 * self.step_s[i] * begins_m_s2[i]);
+            let mut midway_m_s = from_fn(|i| speeds_m_s[i] + 0.5 * self.step_s[i] * begins_m_s2[i]);
             let midway_m_s2 = acceleration(&midway_m_s);
+            let mut next_m_s: [f64; N] = from_fn(|i| speeds_m_s[i] + self.step_s[i] * midway_m_s2[i]);
+            if HOLDS {
+                let softest = mixed(leaning, [self.soft.thrust; N], self.upright.thrust);
+                next_m_s = from_fn(|i| {
+                    let after = |thrust: f64| {
+                        speeds_m_s[i] + self.step_s[i] * (thrust_m_s2[i] * thrust - self.gravity_m_s2)
+                    };
+                    let [least_m_s, most_m_s] = [after(softest[i]), after(self.hard.thrust)];
+                    let held = speeds_m_s[i] >= self.touchdown_m_s - MET_M_S || next_m_s[i] > self.touchdown_m_s;
+                    if held { self.touchdown_m_s.min(most_m_s).max(least_m_s) } else { next_m_s[i] }
+                });
+                midway_m_s = from_fn(|i| 0.5 * (speeds_m_s[i] + next_m_s[i]));
+            }
             fallen_m = from_fn(|i| fallen_m[i] - self.step_s[i] * midway_m_s[i]);
-            speeds_m_s = from_fn(|i| speeds_m_s[i] + self.step_s[i] * midway_m_s2[i]);
+            speeds_m_s = next_m_s;
             let higher = |one: f64, other: f64| if one > other { one } else { other };
             highest_m_s = from_fn(|i| higher(highest_m_s[i], speeds_m_s[i]));
         }

@@ -4,21 +4,21 @@
 //! the gimbal's pivot. The controller's model and the simulated truth use the same data.
 
 use alloc::string::String;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use crate::vehicle::fins::{FinModel, sin_cos_deg};
 use crate::vehicle::thrust_curve::ThrustCurve;
 
 /// A vehicle.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Airframe {
     /// Name of a built-in landing motor, or the text of its `.eng` or `.rse` file.
     pub motor: String,
-    /// How the landing motor is lit. A single igniter if absent.
-    #[serde(default)]
-    pub igniter: Igniter,
+    /// How many independent igniters light the landing motor, 1 to 3.
+    #[serde(default = "one")]
+    pub igniters: u32,
     /// The servos report where they are. If not, people must have seen them move before the vehicle is armed.
     pub servos_tell: bool,
     /// Masses and their positions.
@@ -103,6 +103,16 @@ impl Airframe {
         let (along_m, across_m) = (self.gimbal.pivot_station_m.max(above_m), 0.5 * motor.diameter_m());
         let reach_m = libm::hypot(along_m, across_m);
         libm::asin((0.5 * self.gimbal.inside_diameter_m / reach_m).min(1.0)) - libm::atan2(across_m, along_m)
+    }
+
+    /// Standard deviation of the earliest of the igniters' delays over that of one, if they are normal: sqrt(1 - 1 / pi) of two
+    /// (H. A. David and H. N. Nagaraja, Order Statistics, 3rd edition, table 4.9.1 has the rest).
+    pub fn igniter_scatter(&self) -> f64 {
+        match self.igniters {
+            0 | 1 => 1.0,
+            2 => 0.825_645,
+            _ => 0.747_975,
+        }
     }
 
     /// Height of a station above the feet when upright, m.
@@ -190,26 +200,14 @@ impl MassModel {
     }
 }
 
+fn one() -> u32 {
+    1
+}
+
 // The sections of an airframe, one struct each, with their accessors in SI and radians.
 
-/// How the landing motor is lit.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Igniter {
-    /// Scatter of the ignition delay, as a multiple of that of a single igniter. The earlier of two
-    /// independent ones has sqrt(1 - 1/pi) = 0.83 of it, if their delays are normal.
-    pub scatter_scale: f64,
-}
-
-impl Default for Igniter {
-    /// A single igniter.
-    fn default() -> Self {
-        Self { scatter_scale: 1.0 }
-    }
-}
-
 /// Masses with the landing motor full, and the place of the propellant.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Mass {
     /// Mass with the landing motor full, kg.
@@ -221,17 +219,19 @@ pub struct Mass {
     /// Moment of inertia about the roll axis, kg m^2; the propellant's part is neglected.
     pub roll_inertia_kg_m2: f64,
     /// Middle of the propellant, m above the nozzle.
+    #[serde(default)]
     pub propellant_station_m: f64,
 }
 
 /// The fuselage: a cylinder from the nozzle to the nose.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Body {
     /// Length from nozzle to nose, m.
     pub length_m: f64,
     pub diameter_m: f64,
     /// Reference area of the axial drag coefficient and of the fins' coefficients, m^2.
+    #[serde(default)]
     pub reference_area_m2: f64,
     /// Axial drag coefficient on the reference area.
     pub axial_drag_coefficient: f64,
@@ -240,7 +240,7 @@ pub struct Body {
 }
 
 /// The four fins and their servos. Opening angle from the body: 0 closed, 90 degrees deployed.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct FinData {
     /// Position of the hinges, m above the nozzle.
@@ -248,14 +248,17 @@ pub struct FinData {
     /// Length of a fin, m (the paper's L_f).
     pub length_m: f64,
     /// Width of a fin along the body's skin, m.
+    #[serde(default)]
     pub width_m: f64,
     /// Angle from the y axis to the middle of a closed fin, degrees: 45 is a quarter of the skin for each.
     pub from_y_deg: f64,
     /// Angle from a fin's middle to its hinge, towards the y axis, degrees: where an open fin stands, and why it has a lift.
     pub hinge_off_deg: f64,
     /// Drag coefficient of an open fin on the body's reference area (Eq. 2).
+    #[serde(default)]
     pub drag_coefficient: f64,
     /// Lift coefficient of an open fin on the body's reference area (Eq. 2).
+    #[serde(default)]
     pub lift_coefficient: f64,
     /// Opening angle at the closed stop, degrees.
     pub closed_deg: f64,
@@ -285,12 +288,13 @@ impl FinData {
 }
 
 /// The thrust-vectoring actuator: two axes with the same servo.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Gimbal {
     /// Mechanical stop on either side, degrees.
     pub limit_deg: f64,
     /// Where its two axes cross, m above the nozzle of the centred motor.
+    #[serde(default)]
     pub pivot_station_m: f64,
     /// Inside diameter of the tube in which the motor swings, m.
     pub inside_diameter_m: f64,
@@ -306,7 +310,7 @@ impl Gimbal {
 }
 
 /// A servo: a pure delay, then a rate limit, then play between its horn and its load.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Servo {
     /// Slew rate under load, degrees per second.
@@ -330,7 +334,7 @@ impl Servo {
 }
 
 /// Four legs, 90 degrees apart. Each has a spring and a damper along the vertical, and a foot with friction.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Legs {
     /// Station of the feet, m above the nozzle; negative.
@@ -356,7 +360,7 @@ pub struct Legs {
 /// A block above each foot that crushes at a nearly constant force, as foam does, and does not come back. The foot slides along
 /// the body's axis in a guide, which a force across jams a little: the foot gives way when the force along the axis exceeds
 /// `force_n` and `guide_share` times the force across.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Crush {
     /// Force along the body's axis that crushes the block, N.
@@ -372,7 +376,7 @@ pub struct Crush {
 }
 
 /// The recovery parachute, attached at the nose.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Parachute {
     /// Canopy area, m^2.
@@ -382,6 +386,7 @@ pub struct Parachute {
     /// Time from the command until the lines are taut, s.
     pub ejection_delay_s: f64,
     /// Distance through the air from taut lines to the fully open canopy, m.
+    #[serde(default)]
     pub inflation_distance_m: f64,
 }
 
@@ -413,8 +418,7 @@ fn validate(airframe: &Airframe) -> Check {
 }
 
 fn igniter(airframe: &Airframe) -> Check {
-    let scale = airframe.igniter.scatter_scale;
-    require((0.0..=3.0).contains(&scale), "igniter.scatter_scale", scale, "0 (no scatter) to 3")
+    require((1..=3).contains(&airframe.igniters), "igniters", f64::from(airframe.igniters), "1 to 3")
 }
 
 fn masses(airframe: &Airframe) -> Check {
@@ -644,16 +648,12 @@ mod tests {
     }
 
     #[test]
-    fn a_single_igniter_is_the_default_and_the_scatter_has_a_range() {
+    fn a_single_igniter_is_the_default_and_the_number_has_a_range() {
         let mut airframe = crate::vehicles::airframe::builtin("mk2").unwrap();
-        assert_eq!(airframe.igniter, Igniter { scatter_scale: 1.0 });
-        for (scale, ok) in
-            [(0.0, true), (0.5, true), (3.0, true), (-0.1, false), (3.1, false), (f64::NAN, false)]
-        {
-            airframe.igniter.scatter_scale = scale;
-            let checked = airframe.validate();
-            assert_eq!(checked.is_ok(), ok, "{scale}");
-            assert!(ok || checked.unwrap_err().key == "igniter.scatter_scale");
+        assert_eq!(airframe.igniters, 1);
+        for (igniters, ok) in [(0, false), (1, true), (3, true), (4, false)] {
+            airframe.igniters = igniters;
+            assert_eq!(airframe.validate().is_ok(), ok, "{igniters}");
         }
     }
 

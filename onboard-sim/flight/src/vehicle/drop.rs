@@ -1,6 +1,6 @@
 //! A start below a drone, as data.
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::airframe::BadValue;
 
@@ -9,7 +9,7 @@ use super::airframe::BadValue;
 pub const LOWEST_ARMED_M: f64 = 10.0;
 
 /// A vehicle that hangs tail-down below a drone, until the drone lets it go.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Drop {
     /// Height of the centre of gravity above the ground, m.

@@ -6,14 +6,14 @@
 use alloc::string::String;
 
 use nalgebra::{UnitQuaternion, Vector3};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::airframe::BadValue;
 use super::rigid::{RigidState, upright};
 use super::thrust_curve::ThrustCurve;
 
 /// A launch from a rail.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Launch {
     pub rail: Rail,
@@ -24,7 +24,7 @@ pub struct Launch {
 }
 
 /// The rail.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Rail {
     /// Travel until nothing guides the stack any more, m.
@@ -53,7 +53,7 @@ impl Rail {
 }
 
 /// The booster stage, and the air on the whole stack. Coefficients are on the reference area of the vehicle's body.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Booster {
     /// Name of a built-in motor, or the text of its `.eng` or `.rse` file.
@@ -69,29 +69,65 @@ pub struct Booster {
     pub cg_station_m: f64,
     /// Moment of inertia of that mass about a cross axis through its centre of gravity, kg m^2.
     pub pitch_inertia_kg_m2: f64,
+    #[serde(default)]
     pub roll_inertia_kg_m2: f64,
     /// Middle of the propellant, m.
+    #[serde(default)]
     pub propellant_station_m: f64,
     /// Axial drag coefficient of the whole stack, nose first.
     pub stack_drag_coefficient: f64,
     /// Of the nose.
     pub nose: NormalForce,
-    /// Of the booster's fins.
-    pub fins: NormalForce,
-    /// Distance from the axis at which the force on a fin acts, m.
+    pub fins: BoosterFins,
+    /// Of the booster's fins. The reader of the mission computes it.
+    #[serde(skip)]
+    pub fin_force: NormalForce,
+    /// Distance from the axis at which the force on a fin acts, m. The reader of the mission computes it.
+    #[serde(skip)]
     pub fin_radius_m: f64,
     /// Momentum that the separation charge gives the vehicle, N s.
     pub separation_impulse_n_s: f64,
 }
 
 /// A force across the axis in proportion to the angle of attack.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct NormalForce {
     /// Slope of the coefficient, 1/rad.
     pub slope_per_rad: f64,
     /// Where the force acts, m.
+    #[serde(default)]
     pub station_m: f64,
+}
+
+/// The booster's three fins: trapezoids.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct BoosterFins {
+    pub root_chord_m: f64,
+    pub tip_chord_m: f64,
+    /// From the skin to the tip, m.
+    pub span_m: f64,
+    /// How far the tip's leading edge lies below the root's, m.
+    pub sweep_m: f64,
+    /// Where the root ends, above the booster's lower end, m.
+    pub above_end_m: f64,
+}
+
+impl BoosterFins {
+    /// Force across the axis on a body of this diameter, m, whose lower end is at a station, m (J. S. and J. A. Barrowman, The
+    /// Theoretical Prediction of the Center of Pressure, 1966; with its interference of fins and body).
+    pub fn force(&self, diameter_m: f64, end_station_m: f64) -> NormalForce {
+        let Self { root_chord_m: root_m, tip_chord_m: tip_m, span_m, sweep_m, above_end_m } = *self;
+        let both_m = root_m + tip_m;
+        let middle_m = libm::hypot(span_m, sweep_m + 0.5 * (tip_m - root_m));
+        let (slender, span_share) = (2.0 * middle_m / both_m, span_m / diameter_m);
+        let interference = 1.0 + 0.5 * diameter_m / (span_m + 0.5 * diameter_m);
+        let slope_per_rad =
+            interference * 12.0 * span_share * span_share / (1.0 + libm::sqrt(1.0 + slender * slender));
+        let behind_m = sweep_m / 3.0 * (root_m + 2.0 * tip_m) / both_m + (both_m - root_m * tip_m / both_m) / 6.0;
+        NormalForce { slope_per_rad, station_m: end_station_m + above_end_m + root_m - behind_m }
+    }
 }
 
 impl Booster {
@@ -138,7 +174,7 @@ impl Launch {
         for (key, found) in [
             ("launch.booster.cg_station_m", booster.cg_station_m),
             ("launch.booster.propellant_station_m", booster.propellant_station_m),
-            ("launch.booster.fins.station_m", booster.fins.station_m),
+            ("launch.booster.fins", booster.fin_force.station_m),
         ] {
             within(
                 key,
@@ -157,7 +193,7 @@ impl Launch {
         for (key, found) in [
             ("launch.booster.stack_drag_coefficient", booster.stack_drag_coefficient),
             ("launch.booster.nose.slope_per_rad", booster.nose.slope_per_rad),
-            ("launch.booster.fins.slope_per_rad", booster.fins.slope_per_rad),
+            ("launch.booster.fins", booster.fin_force.slope_per_rad),
         ] {
             within(key, found, 0.0..=100.0, "0 to 100")?;
         }
@@ -192,9 +228,9 @@ mod tests {
         let mission = crate::vehicles::mission::builtin("mk2").unwrap().unwrap();
         let mut launch = mission.launch.unwrap();
         assert_eq!(launch.validate(), Ok(()));
-        launch.booster.fins.station_m = 0.1;
+        launch.booster.fin_force.station_m = 0.1;
         let error = launch.validate().unwrap_err().to_string();
-        let expected = "launch.booster.fins.station_m is 0.1; between launch.booster.length_m below the vehicle and 0 is accepted";
+        let expected = "launch.booster.fins is 0.1; between launch.booster.length_m below the vehicle and 0 is accepted";
         assert_eq!(error, expected);
     }
 }

@@ -12,7 +12,7 @@ use crate::estimation::motor_estimate::MotorPrior;
 use crate::vehicle::airframe::BadValue;
 
 /// The section `[lot]`.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Lot {
     /// The lot's name, as on the label.
@@ -55,7 +55,7 @@ impl Default for Burnt {
 }
 
 /// Temperatures of the propellant, degrees Celsius.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Temperature {
     /// Mean of the burns.
@@ -65,7 +65,7 @@ pub struct Temperature {
 }
 
 /// Weights of the day, to 5 g.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Weighed {
     /// The motor before the flight, kg.

@@ -4,7 +4,7 @@ use alloc::boxed::Box;
 use alloc::string::String;
 use alloc::vec::Vec;
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use crate::control::aim::AimGains;
 use crate::estimation::estimator::EstimatorConfig;
@@ -12,7 +12,7 @@ use crate::estimation::motor_estimate::MotorPrior;
 use crate::guidance::descent::DescentGains;
 use crate::guidance::ignition::IgnitionSettings;
 use crate::guidance::powered::PoweredSettings;
-use crate::vehicle::airframe::{Airframe, BadValue};
+use crate::vehicle::airframe::Airframe;
 use crate::vehicle::drop::Drop;
 use crate::vehicle::launch::Launch;
 use crate::vehicle::lot::{Expectation, Lot};
@@ -21,12 +21,8 @@ use crate::vehicle::thrust_curve::ThrustCurve;
 
 pub use nmpc::SolverLimits;
 
-/// Length of the countdown of a mission whose text does not say it, s: what all missions had before it was 10 s, so that their
-/// logs verify. The built-in ones say it.
-const COUNTDOWN_S: f64 = 5.0;
-
 /// Where a flight begins.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum StartPoint {
     /// On the pad, under its own ascent motor.
@@ -63,14 +59,13 @@ impl core::str::FromStr for StartPoint {
 pub struct UnknownStart;
 
 /// Where a mission starts, and the state at apogee, nose up, if it starts there.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Start {
     /// Where the flight begins: `pad` needs the section `launch`, `drone` the section `drop`.
     #[serde(default = "at_apogee")]
     pub at: StartPoint,
     /// Time from the crew's start command to the start, s, 0 to 600.
-    #[serde(default = "countdown_s")]
     pub countdown_s: f64,
     /// Height of the centre of gravity above the pad at apogee, m.
     pub height_m: f64,
@@ -85,7 +80,7 @@ pub struct Start {
 }
 
 /// What the exhaust is expected to take away of the drag while the motor burns, as fractions.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Exhaust {
     /// Of the body along its axis.
@@ -93,22 +88,7 @@ pub struct Exhaust {
     pub fin_loss: f64,
 }
 
-impl Exhaust {
-    /// Checks that no more than all of the drag goes, and that it does not more than double.
-    ///
-    /// # Errors
-    /// [`BadValue`] names the first key with a wrong value.
-    pub fn validate(&self) -> Result<(), BadValue> {
-        for (key, found) in [("exhaust.body_loss", self.body_loss), ("exhaust.fin_loss", self.fin_loss)] {
-            if !(-1.0..=1.0).contains(&found) {
-                return Err(BadValue { key, found, required: "-1 to 1" });
-            }
-        }
-        Ok(())
-    }
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct LegLimits {
     /// Largest vertical speed, m/s.
@@ -122,15 +102,15 @@ pub struct LegLimits {
 }
 
 /// Weights of a plan's running cost, per second; SI units and radians.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlanWeights {
     /// Distance from the landing point, 1/m^2.
+    #[serde(default)]
     pub x: f64,
     /// Leans, 1/rad^2.
     pub theta: f64,
     /// Rates of the leans, s^2/rad^2.
-    #[serde(default)]
     pub q: f64,
     /// Gimbal angles, 1/rad^2.
     pub delta: f64,
@@ -139,7 +119,7 @@ pub struct PlanWeights {
 }
 
 /// The box in which a plan ends.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct FinalBox {
     /// Largest lean in each level direction, degrees.
@@ -155,7 +135,7 @@ pub struct FinalBox {
 }
 
 /// Limits of the pad checks before arming.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ArmingLimits {
     /// Largest tilt from vertical, degrees.
@@ -185,10 +165,11 @@ impl Default for ArmingLimits {
 }
 
 /// Limits of the checks before ignition.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct GateLimits {
     /// Largest tilt from vertical, degrees.
+    #[serde(default)]
     pub tilt_max_deg: f64,
     /// Largest pitch rate, degrees per second.
     pub pitch_rate_max_deg_s: f64,
@@ -200,14 +181,18 @@ pub struct GateLimits {
     pub fence_radius_m: f64,
 }
 
-/// Everything that defines a flight, except random differences.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+/// Everything that defines a flight, except random differences. A club's file has what it measures or decides; the reader of the
+/// mission adds the controller.
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Mission {
     /// Short name for the command line.
     pub name: String,
     /// Description in one line.
     pub summary: String,
+    /// The keys of the file that are the controller's: with one of them the mission is not flown by the standard controller.
+    #[serde(skip)]
+    pub changed: Vec<String>,
     /// The vehicle.
     pub airframe: Airframe,
     /// The expected thrust curve of the landing motor: the certified one of the motor that the airframe names, or what the lot
@@ -246,8 +231,10 @@ pub struct Mission {
     /// This caution fades over this time before the thrust falls through the weight, s.
     pub caution_fades_s: f64,
     /// Largest tilt that the landing may use throughout, in the band of feasible heights before the ignition, degrees.
+    #[serde(default)]
     pub soft_tilt_deg: f64,
     /// The same for the fins' band after the ignition, degrees; the rest of the tilt is reserved for the planner.
+    #[serde(default)]
     pub fin_soft_tilt_deg: f64,
     /// How long before touchdown the vehicle is upright in that band, s.
     pub settle_s: f64,
@@ -276,6 +263,8 @@ pub struct Mission {
     pub arming: ArmingLimits,
     /// Limits of the checks before ignition.
     pub gate: GateLimits,
+    /// What the legs were designed for, all at once. Whether a landing counts is decided by what they bear.
+    #[serde(default)]
     pub leg_limits: LegLimits,
 }
 
@@ -315,25 +304,12 @@ impl Mission {
         let Expectation { impulse, burn_time, .. } = expected;
         let motor_kg = lot.weighed.motor_kg.unwrap_or_else(|| curve.total_mass_kg());
         self.motor_curve = curve.scaled(impulse.mean, burn_time.mean).weighing(motor_kg);
-        // The mission considers motors up to so many deviations of what was known before.
-        let narrowed = |[least, most]: [f64; 2], now: f64, before: f64| {
-            let by = if before > 0.0 { now / before } else { 1.0 };
-            [1.0 + (least - 1.0) * by, 1.0 + (most - 1.0) * by]
-        };
-        let (ignition, motor) = (&mut self.ignition, &mut self.motor);
-        let impulse_share = expected.impulse_per_mass_share();
-        ignition.impulse_scales = narrowed(ignition.impulse_scales, impulse_share, motor.impulse_sigma);
-        ignition.burn_time_scales =
-            narrowed(ignition.burn_time_scales, burn_time.share, motor.burn_time_sigma);
-        (motor.impulse_sigma, motor.burn_time_sigma) = (impulse_share, burn_time.share);
+        self.motor.impulse_sigma = expected.impulse_per_mass_share();
+        self.motor.burn_time_sigma = burn_time.share;
         self.expected = Some(Box::new(expected));
     }
 }
 
 fn at_apogee() -> StartPoint {
     StartPoint::Apogee
-}
-
-fn countdown_s() -> f64 {
-    COUNTDOWN_S
 }

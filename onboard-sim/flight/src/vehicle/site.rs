@@ -1,13 +1,13 @@
 //! The position of the pad on the Earth, for maps and for a satellite receiver's degrees. No decision depends on it.
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// The Earth's equatorial radius, m, and its first eccentricity squared (WGS 84).
 const EQUATORIAL_RADIUS_M: f64 = 6_378_137.0;
 const ECCENTRICITY_SQUARED: f64 = 6.694_379_990_14e-3;
 
 /// The position of a pad on the Earth.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Site {
     /// Latitude, degrees, north positive, -85 to 85, because close to a pole a path to the east circles the pole.
@@ -24,19 +24,6 @@ impl Default for Site {
 }
 
 impl Site {
-    /// The keys with a value outside their range, with the range and the value.
-    pub fn bad_value(&self) -> Option<(&'static str, f64, &'static str)> {
-        let Self { latitude_deg, longitude_deg } = *self;
-        [
-            ("site.latitude_deg", latitude_deg, 85.0, "-85 to 85"),
-            ("site.longitude_deg", longitude_deg, 180.0, "-180 to 180"),
-        ]
-        .into_iter()
-        // NaN is outside every range.
-        .find(|(_, found, most, _)| !(-most..=*most).contains(found))
-        .map(|(key, found, _, required)| (key, found, required))
-    }
-
     /// Latitude and longitude, degrees, of a place at a distance north and east of the pad, m. It uses the ellipsoid's
     /// curvature at the pad, which is accurate to a millimetre within a kilometre.
     pub fn at_deg(&self, north_m: f64, east_m: f64) -> (f64, f64) {

@@ -3,7 +3,7 @@
 use alloc::borrow::ToOwned as _;
 use alloc::string::{String, ToString as _};
 
-use super::ranges::BadValue;
+use super::mission::BadValue;
 
 /// Why a mission cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

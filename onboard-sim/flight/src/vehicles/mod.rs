@@ -13,5 +13,4 @@ pub mod airframe;
 pub mod file_error;
 pub mod mission;
 pub mod motors;
-mod ranges;
 pub mod thrust_curve;

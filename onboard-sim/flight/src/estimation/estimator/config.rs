@@ -2,7 +2,7 @@
 //! barometer, a single-frequency satellite receiver and a 12 m lidar.
 
 use nalgebra::Vector3;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use crate::vehicle::mission::StartPoint;
 
@@ -11,7 +11,7 @@ pub const GRAVITY_M_S2: f64 = crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 
 /// Noise of the sensors and other assumptions of the filter. Each value is a standard deviation unless its name says
 /// otherwise.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct EstimatorConfig {
     /// Length of one frame, s.
@@ -82,7 +82,7 @@ pub struct EstimatorConfig {
 }
 
 /// Largest standard deviations of a healthy estimate.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct HealthLimits {
     /// Velocity, any axis, m/s.
@@ -132,79 +132,6 @@ impl Default for EstimatorConfig {
     }
 }
 
-/// Why a value of the configuration is wrong.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[error("estimator: {field} is {found}, accepted is {accepted}")]
-pub struct EstimatorConfigError {
-    pub field: &'static str,
-    pub found: f64,
-    pub accepted: &'static str,
-}
-
-impl EstimatorConfig {
-    /// Checks every value.
-    ///
-    /// # Errors
-    /// The first value that is out of range.
-    pub fn validate(&self) -> Result<(), EstimatorConfigError> {
-        if !(0.001..=0.02).contains(&self.frame_s) {
-            let accepted = "0.001 to 0.02";
-            return Err(EstimatorConfigError { field: "frame_s", found: self.frame_s, accepted });
-        }
-        let sizes = [
-            ("gravity_m_s2", self.gravity_m_s2),
-            ("gyro_noise_deg_s_sqrt_hz", self.gyro_noise_deg_s_sqrt_hz),
-            ("accelerometer_noise_mg_sqrt_hz", self.accelerometer_noise_mg_sqrt_hz),
-            ("barometer_m", self.barometer_m),
-            ("gnss_horizontal_m", self.gnss_horizontal_m),
-            ("gnss_vertical_m", self.gnss_vertical_m),
-            ("gnss_velocity_m_s", self.gnss_velocity_m_s),
-            ("lidar_m", self.lidar_m),
-            ("gate_sigmas", self.gate_sigmas),
-            ("health.velocity_m_s", self.health.velocity_m_s),
-            ("health.height_m", self.health.height_m),
-            ("health.horizontal_m", self.health.horizontal_m),
-            ("health.tilt_deg", self.health.tilt_deg),
-        ];
-        for (field, found) in sizes {
-            if !(found.is_finite() && found > 0.0) {
-                return Err(EstimatorConfigError { field, found, accepted: "a finite number above 0" });
-            }
-        }
-        let walks = [
-            ("barometer_late_s", self.barometer_late_s),
-            ("lidar_late_s", self.lidar_late_s),
-            ("ground_slope_deg", self.ground_slope_deg),
-            ("mounting_deg", self.mounting_deg),
-            ("gnss_time_tag_s", self.gnss_time_tag_s),
-            ("barometer_suction", self.barometer_suction),
-            ("gnss_age_jitter_s", self.gnss_age_jitter_s),
-            ("burning_gyro_deg_s_sqrt_hz", self.burning_gyro_deg_s_sqrt_hz),
-            ("burning_gyro_bias_deg_s", self.burning_gyro_bias_deg_s),
-            ("burning_accelerometer_mg_sqrt_hz", self.burning_accelerometer_mg_sqrt_hz),
-            ("gyro_bias_walk_deg_s_sqrt_s", self.gyro_bias_walk_deg_s_sqrt_s),
-            ("accelerometer_bias_walk_mg_sqrt_s", self.accelerometer_bias_walk_mg_sqrt_s),
-            ("barometer_offset_walk_m_sqrt_s", self.barometer_offset_walk_m_sqrt_s),
-            ("barometer_ram_walk_sqrt_s", self.barometer_ram_walk_sqrt_s),
-            ("gnss_horizontal_walk_m_sqrt_s", self.gnss_horizontal_walk_m_sqrt_s),
-            ("gnss_vertical_walk_m_sqrt_s", self.gnss_vertical_walk_m_sqrt_s),
-            ("wind_walk_m_s_sqrt_s", self.wind_walk_m_s_sqrt_s),
-            ("wind_shear_exponent", self.wind_shear_exponent),
-            ("sideways_force_share", self.sideways_force_share),
-        ];
-        for (field, found) in walks {
-            if !(found.is_finite() && found >= 0.0) {
-                return Err(EstimatorConfigError { field, found, accepted: "a finite number not below 0" });
-            }
-        }
-        if !(1..=10).contains(&self.wind_passes) {
-            let (field, found) = ("wind_passes", f64::from(self.wind_passes));
-            return Err(EstimatorConfigError { field, found, accepted: "1 to 10" });
-        }
-        Ok(())
-    }
-}
-
 impl Default for HealthLimits {
     fn default() -> Self {
         Self { velocity_m_s: 0.5, height_m: 2.5, horizontal_m: 6.0, tilt_deg: 3.0 }
@@ -212,7 +139,7 @@ impl Default for HealthLimits {
 }
 
 /// Standard deviations of the initial state.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct StartUncertainty {
     /// Horizontal position, each axis, m.

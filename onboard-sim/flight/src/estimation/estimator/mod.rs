@@ -30,7 +30,7 @@ mod wind;
 use nalgebra::{Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
-pub use self::config::{EstimatorConfig, EstimatorConfigError, GRAVITY_M_S2, HealthLimits, StartUncertainty};
+pub use self::config::{EstimatorConfig, GRAVITY_M_S2, HealthLimits, StartUncertainty};
 pub use self::correction::{AidStatus, Aids};
 use self::covariance::{
     ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_LATE, BAROMETER_OFFSET, BAROMETER_RAM, BAROMETER_SUCTION,

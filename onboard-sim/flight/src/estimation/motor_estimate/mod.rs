@@ -15,7 +15,6 @@ mod tests;
 use nalgebra::{Matrix5, Vector2, Vector5};
 use serde::{Deserialize, Serialize};
 
-use crate::vehicle::airframe::BadValue;
 use crate::vehicle::burn::{Burn, Deviation};
 use crate::vehicle::thrust_curve::ThrustCurve;
 
@@ -91,35 +90,6 @@ impl Default for MotorPrior {
             shape_lasts_s: 1.0,
             exhaust_sigma: 0.0,
         }
-    }
-}
-
-impl MotorPrior {
-    /// Checks every value.
-    ///
-    /// # Errors
-    /// [`BadValue`] names the first key with a wrong value.
-    pub fn validate(&self) -> Result<(), BadValue> {
-        let sigmas = [
-            ("motor.impulse_sigma", self.impulse_sigma),
-            ("motor.burn_time_sigma", self.burn_time_sigma),
-            ("motor.air_sigma", self.air_sigma),
-            ("motor.accelerometer_m_s2", self.accelerometer_m_s2),
-            ("motor.roughness_share", self.roughness_share),
-            ("motor.shape_sigma", self.shape_sigma),
-            ("motor.exhaust_sigma", self.exhaust_sigma),
-        ];
-        for (key, found) in sigmas {
-            if !(found.is_finite() && found >= 0.0) {
-                return Err(BadValue { key, found, required: "a finite number not below 0" });
-            }
-        }
-        for (key, found) in [("motor.frame_s", self.frame_s), ("motor.shape_lasts_s", self.shape_lasts_s)] {
-            if !(found.is_finite() && found > 0.0) {
-                return Err(BadValue { key, found, required: "a finite number above 0" });
-            }
-        }
-        Ok(())
     }
 }
 

@@ -220,12 +220,13 @@ impl PoweredGuidance {
 
 /// Limits of the homing to the pad: a plan lands only as near as necessary, and diverts no farther than a moderate lean
 /// reaches.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Homing {
     /// Distance from the pad that counts as near enough, m.
     pub near_m: f64,
     /// Largest diversion of a plan, per squared second that is left, m/s^2.
+    #[serde(default)]
     pub reach_m_s2: f64,
 }
 

@@ -125,18 +125,21 @@ impl PoweredReport {
 }
 
 /// The settings of the landing burn.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct PoweredSettings {
     /// Largest length of a planned interval, s.
+    #[serde(default)]
     pub interval_s: f64,
     /// Weights of the plan.
     pub weights: PlanWeights,
     /// Size of the lean of the cold guesses, degrees.
     pub guess_lean_deg: f64,
     /// Largest lean of a plan in north and in west, degrees.
+    #[serde(default)]
     pub tilt_max_deg: f64,
     /// Largest planned gimbal angle on either side, degrees; the attitude loop has the rest of the travel.
+    #[serde(default)]
     pub gimbal_deg: f64,
     /// Choice of the landing point.
     pub homing: Homing,

@@ -1,20 +1,23 @@
 //! Missions, from TOML. Unknown keys are errors.
 //!
-//! A mission contains its airframe as a table, or names a built-in airframe.
+//! A file says what a club measures or decides. `controller.toml` has what is the same for every vehicle, [`controller`] what
+//! follows from it, and `defaults.toml` what a file may leave out. A file may state any of it.
 
+mod controller;
 mod validate;
 
 use alloc::borrow::ToOwned as _;
 use alloc::format;
-use alloc::string::String;
+use alloc::string::{String, ToString as _};
+use alloc::vec::Vec;
 
-use crate::estimation::estimator::EstimatorConfigError;
 use crate::vehicle::mission::Mission;
 use crate::vehicle::mission::StartPoint;
-use serde::Deserialize;
-use toml::Spanned;
+use serde::Deserialize as _;
+use toml::de::{DeTable, DeValue, Deserializer};
 
-use super::airframe;
+use self::controller::Formulas;
+pub(super) use self::validate::BadValue;
 use super::file_error::FileError;
 use super::motors::{self, MotorError};
 
@@ -38,14 +41,6 @@ pub enum MissionError {
     /// The text is not a mission, or a key holds a value outside its range.
     #[error(transparent)]
     File(#[from] FileError),
-    /// What the mission expects of the sensors is out of range.
-    #[error("{origin}")]
-    Estimator {
-        /// Where the text came from.
-        origin: String,
-        #[source]
-        source: EstimatorConfigError,
-    },
     /// The start needs a section that the mission does not have, or is not one of a mission.
     #[error("{origin}: start.at = \"{at}\" {problem}")]
     StartAt {
@@ -59,39 +54,84 @@ pub enum MissionError {
     Motor(#[from] MotorError),
 }
 
-/// Reads a mission and its landing motor; `origin` names the text in error messages.
+/// What is the same for every vehicle.
+const CONTROLLER: &str = include_str!("../../../vehicles/controller.toml");
+/// What a mission may leave out.
+const DEFAULTS: &str = include_str!("../../../vehicles/defaults.toml");
+
+/// Reads a mission and its motors, and gives its vehicle the controller; `origin` names the text in error messages.
 ///
 /// # Errors
 /// [`MissionError`] names the key and what would be accepted.
 pub fn from_toml(text: &str, origin: &str) -> Result<Mission, MissionError> {
-    let not_a_mission = |error: toml::de::Error| FileError::not_toml(origin, &error);
-    let mut mission: Mission = match with_the_named_airframe(text).map_err(not_a_mission)? {
-        Some(expanded) => toml::from_str(&expanded),
-        None => toml::from_str(text),
+    let not_a_mission = |mut error: toml::de::Error| {
+        error.set_input(Some(text));
+        FileError::not_toml(origin, &error)
+    };
+    let bad_value = |bad| FileError::bad_value(origin, bad);
+    let mut table = DeTable::parse(text).map_err(not_a_mission)?;
+    let (mut stated, mut changed) = (Vec::new(), Vec::new());
+    leaves("", table.get_ref(), &mut |key| stated.push(key));
+    for (defaults, are_ours) in [(CONTROLLER, true), (DEFAULTS, false)] {
+        let defaults = DeTable::parse(defaults).map_err(not_a_mission)?;
+        if are_ours {
+            leaves("", defaults.get_ref(), &mut |key| changed.extend(Some(key).filter(|key| stated.contains(key))));
+        }
+        fill(table.get_mut(), defaults.into_inner());
     }
-    .map_err(not_a_mission)?;
-    mission
-        .estimator
-        .validate()
-        .map_err(|source| MissionError::Estimator { origin: origin.to_owned(), source })?;
-    validate::validate(&mission).map_err(|bad| FileError::bad_value(origin, bad))?;
+    let mut mission = Mission::deserialize(Deserializer::from(table)).map_err(not_a_mission)?;
     check_start(&mission, origin)?;
     let own = mission.lot.as_ref().and_then(|lot| lot.curve.as_deref());
     let curve = motors::named(own.unwrap_or(&mission.airframe.motor))?;
+    let mut formulas = Formulas { stated: &stated, changed };
+    formulas.airframe(&mut mission.airframe, &curve);
+    if let Some(launch) = &mut mission.launch {
+        launch.booster.motor_curve = motors::named(&launch.booster.motor)?;
+        formulas.launch(launch, &mission.airframe);
+    }
+    validate::vehicle(&mission).map_err(bad_value)?;
     if let Some(lot) = &mission.lot {
-        let weights = lot.validate_weights(curve.total_mass_kg(), mission.airframe.mass.loaded_kg);
-        weights.map_err(|bad| FileError::bad_value(origin, bad.into()))?;
+        lot.validate_weights(curve.total_mass_kg(), mission.airframe.mass.loaded_kg)
+            .map_err(|bad| bad_value(bad.into()))?;
     }
     mission.expect(curve);
-    validate::room_to_swing(&mission).map_err(|bad| FileError::bad_value(origin, bad))?;
+    validate::room_to_swing(&mission).map_err(bad_value)?;
+    validate::numbers(&mission, &|key| stated.iter().any(|stated| stated == key)).map_err(bad_value)?;
+    formulas.controller(&mut mission);
+    mission.changed = formulas.changed;
+    validate::numbers(&mission, &|_| true).map_err(bad_value)?;
     for other in &mission.other_motors {
         let other = motors::named(other)?;
         mission.other_curves.extend([mission.motor_curve.towards(&other, 0.5), other]);
     }
-    if let Some(launch) = &mut mission.launch {
-        launch.booster.motor_curve = motors::named(&launch.booster.motor)?;
-    }
     Ok(mission)
+}
+
+/// Calls a function for the path of every value of a table.
+fn leaves(prefix: &str, table: &DeTable<'_>, found: &mut dyn FnMut(String)) {
+    for (key, value) in table {
+        let path = if prefix.is_empty() { key.get_ref().to_string() } else { format!("{prefix}.{}", key.get_ref()) };
+        match value.get_ref() {
+            DeValue::Table(inner) => leaves(&path, inner, found),
+            _ => found(path),
+        }
+    }
+}
+
+/// Puts what a table does not have into it. How a vehicle is launched or dropped is only filled in if it is.
+fn fill<'a>(table: &mut DeTable<'a>, defaults: DeTable<'a>) {
+    for (key, default) in defaults {
+        let optional = matches!(key.get_ref().as_ref(), "launch" | "drop");
+        match (table.get_mut(&key), default) {
+            (None, default) if !optional => _ = table.insert(key, default),
+            (Some(value), default) => {
+                if let (DeValue::Table(inner), DeValue::Table(default)) = (value.get_mut(), default.into_inner()) {
+                    fill(inner, default);
+                }
+            }
+            (None, _) => {}
+        }
+    }
 }
 
 /// Checks that the mission has what its start needs.
@@ -114,62 +154,4 @@ pub fn builtin(name: &str) -> Option<Result<Mission, MissionError>> {
 /// Whether a text is a mission rather than a [profile](super::profile): a mission names or contains an airframe.
 pub fn is_meant(text: &str) -> bool {
     toml::from_str::<toml::Table>(text).is_ok_and(|table| table.contains_key("airframe"))
-}
-
-/// The text with the named built-in airframe appended as a table; `None` if the text names no airframe.
-///
-/// The line with the name becomes empty, so the line numbers in error messages stay right.
-fn with_the_named_airframe(text: &str) -> Result<Option<String>, toml::de::Error> {
-    #[derive(Deserialize)]
-    struct Named {
-        #[serde(default)]
-        airframe: Option<Spanned<NameOrTable>>,
-    }
-    let Ok(Named { airframe: Some(found) }) = toml::from_str(text) else {
-        // The reader of the whole mission reports what is wrong with the text.
-        return Ok(None);
-    };
-    let span = found.span();
-    let NameOrTable::Name(name) = found.into_inner() else { return Ok(None) };
-    let Ok(airframe_toml) = airframe::known_toml(&name) else {
-        return Err(unknown_airframe(text));
-    };
-    let begins = text[..span.start].rfind('\n').map_or(0, |end| end + 1);
-    let ends = text[span.end..].find('\n').map_or(text.len(), |end| span.end + end);
-    let blank_lines = "\n".repeat(text[begins..ends].matches('\n').count());
-    let mut expanded = format!("{}{blank_lines}{}\n[airframe]\n", &text[..begins], &text[ends..]);
-    for line in airframe_toml.lines() {
-        match line.strip_prefix('[') {
-            Some(section) => expanded.extend(["[airframe.", section]),
-            None => expanded.push_str(line),
-        }
-        expanded.push('\n');
-    }
-    Ok(Some(expanded))
-}
-
-/// The name of an airframe, or any other value.
-#[derive(Deserialize)]
-#[serde(untagged)]
-enum NameOrTable {
-    Name(String),
-    Table(serde::de::IgnoredAny),
-}
-
-/// The parser's error, with line and column, for an unknown airframe name.
-fn unknown_airframe(text: &str) -> toml::de::Error {
-    #[derive(Debug, Deserialize)]
-    struct Named {
-        #[serde(rename = "airframe", deserialize_with = "known")]
-        _airframe: (),
-    }
-    fn known<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<(), D::Error> {
-        let name = String::deserialize(deserializer)?;
-        airframe::known_toml(&name).map_err(serde::de::Error::custom)?;
-        Ok(())
-    }
-    match toml::from_str::<Named>(text) {
-        Err(error) => error,
-        Ok(_) => serde::de::Error::custom("unknown airframe"),
-    }
 }

@@ -1,170 +1,148 @@
-//! Range checks of a parsed mission: one line for each key.
+//! Range checks of a parsed mission.
 
+use alloc::borrow::ToOwned as _;
 use alloc::format;
+use alloc::string::{String, ToString as _};
 
-use crate::control::aim::AimGains;
-use crate::guidance::descent::DescentGains;
-use crate::guidance::ignition::IgnitionSettings;
-use crate::guidance::powered::PoweredSettings;
+use toml::Value;
+
+use crate::vehicle::airframe::BadValue as BadAirframe;
 use crate::vehicle::lot::Lot;
-use crate::vehicle::mission::{LegLimits, Mission, Start};
+use crate::vehicle::mission::Mission;
 
-use super::super::ranges::{self, Check, angle_below_right, not_negative, positive, require, share};
+/// A value outside its range.
+pub(in crate::vehicles) struct BadValue {
+    /// The key, with its section.
+    pub(in crate::vehicles) key: String,
+    pub(in crate::vehicles) found: String,
+    /// The accepted range, in words.
+    pub(in crate::vehicles) required: &'static str,
+}
 
-/// Accepted altitudes of a pad, m: from the shore of the Dead Sea to above the highest road.
-const PAD_ALTITUDES_M: core::ops::RangeInclusive<f64> = -450.0..=6_000.0;
-
-/// All of the mission but its estimator's section, whose errors have a type of their own.
-pub(super) fn validate(mission: &Mission) -> Check {
-    require(!mission.name.trim().is_empty(), "name", "\"\"", "a name")?;
-    mission.airframe.validate()?;
-    mission.motor.validate()?;
-    mission.lot.as_deref().map_or(Ok(()), Lot::validate)?;
-    mission.exhaust.validate()?;
-    // From the Moon to twice the Earth.
-    require(
-        (1.0..=20.0).contains(&mission.gravity_m_s2),
-        "gravity_m_s2",
-        mission.gravity_m_s2,
-        "from 1 to 20",
-    )?;
-    require(
-        PAD_ALTITUDES_M.contains(&mission.pad_altitude_m),
-        "pad_altitude_m",
-        mission.pad_altitude_m,
-        "-450 to 6000",
-    )?;
-    if let Some((key, found, required)) = mission.site.bad_value() {
-        require(false, key, found, required)?;
+impl From<BadAirframe> for BadValue {
+    fn from(bad: BadAirframe) -> Self {
+        Self { key: bad.key.to_owned(), found: bad.found.to_string(), required: bad.required }
     }
+}
+
+type Check = Result<(), BadValue>;
+
+/// A range in words, its ends, and the keys that lie in it; a key of a section stands for all numbers of it that no row before
+/// names.
+type Range = (&'static str, f64, f64, &'static [&'static str]);
+
+/// Above 0.
+const LEAST: f64 = f64::MIN_POSITIVE;
+/// Below 90.
+const RIGHT: f64 = 89.999_999;
+
+#[rustfmt::skip]
+const RANGES: [Range; 19] = [
+    // From the Moon to twice the Earth.
+    ("from 1 to 20", 1.0, 20.0, &["gravity_m_s2", "estimator.gravity_m_s2"]),
+    // From the shore of the Dead Sea to above the highest road.
+    ("-450 to 6000", -450.0, 6_000.0, &["pad_altitude_m"]),
+    // Close to a pole a path to the east circles the pole.
+    ("-85 to 85", -85.0, 85.0, &["site.latitude_deg"]),
+    ("-180 to 180", -180.0, 180.0, &["site.longitude_deg"]),
     // The feet stand up to half a metre below the nozzle.
-    require(
-        (-1.0..=3.0).contains(&mission.lidar_ahead_of_feet_m),
-        "lidar_ahead_of_feet_m",
-        mission.lidar_ahead_of_feet_m,
-        "from -1 to 3",
-    )?;
-    hedges(mission)?;
-    start(&mission.start)?;
+    ("from -1 to 3", -1.0, 3.0, &["lidar_ahead_of_feet_m"]),
+    ("-1 to 1", -1.0, 1.0, &["exhaust"]),
+    ("0 to 600", 0.0, 600.0, &["start.countdown_s"]),
+    ("from 0 to 180", 0.0, 180.0, &["start.tilt_deg"]),
+    ("from 0 to 1", 0.0, 1.0, &["start.carried_share", "ignition.place"]),
+    ("from 0.001 to 1", 0.001, 1.0, &["powered.interval_s"]),
+    ("0.001 to 0.02", 0.001, 0.02, &["estimator.frame_s", "motor.frame_s"]),
+    // The loop remembers 24 frames.
+    ("from 0 to 0.1", 0.0, 0.1, &["aim.latency_s"]),
+    ("from 1 to 10", 1.0, 10.0, &["estimator.wind_passes"]),
+    ("from 1 to 1000", 1.0, 1_000.0, &["powered.max_solves", "powered.solver.max_iterations"]),
+    ("1 or more", 1.0, 1e6, &["powered.max_passes"]),
+    ("from -10 to 10", -10.0, 10.0, &["powered.final.u_min_m_s", "powered.final.u_max_m_s"]),
+    ("above 0 and below 90", LEAST, RIGHT, &["soft_tilt_deg", "fin_soft_tilt_deg", "descent.lean_max_deg",
+        "descent.lean_at_ignition_deg", "powered.tilt_max_deg", "powered.gimbal_deg", "powered.guess_lean_deg", "powered.upright_lean_max_deg"]),
+    ("a finite number above 0", LEAST, f64::MAX, &["caution_fades_s", "start.height_m", "descent.lean_fades_s",
+        "descent.natural_frequency_rad_s", "descent.damping", "descent.time_to_go_min_s", "ignition.impulse_scales", "ignition.burn_time_scales",
+        "ignition.fixed_height_m", "powered.homing.near_m", "powered.landing_miss", "powered.final", "powered.solver", "powered.weights.delta",
+        // Without a weight the fins of a plan are not unique.
+        "powered.weights.fins",
+        "aim.natural_frequency_rad_s", "aim.damping", "aim.disturbance_time_s", "motor.shape_lasts_s", "gate", "leg_limits",
+        "arming.tilt_max_deg", "arming.rotation_max_deg_s", "arming.speed_max_m_s", "estimator.gyro_noise_deg_s_sqrt_hz",
+        "estimator.accelerometer_noise_mg_sqrt_hz", "estimator.barometer_m", "estimator.gnss_horizontal_m", "estimator.gnss_vertical_m",
+        "estimator.gnss_velocity_m_s", "estimator.lidar_m", "estimator.gate_sigmas", "estimator.health"]),
+    ("a finite number, 0 or more", 0.0, f64::MAX, &["caution_sigmas", "settle_s", "start", "descent", "ignition", "powered", "aim", "motor",
+        "arming", "estimator"]),
+];
+
+/// The vehicle and its start: what the controller follows from.
+pub(super) fn vehicle(mission: &Mission) -> Check {
+    if mission.name.trim().is_empty() {
+        return Err(BadValue { key: "name".to_owned(), found: "\"\"".to_owned(), required: "a name" });
+    }
+    mission.airframe.validate().map_err(|bad| BadValue { key: format!("airframe.{}", bad.key), ..bad.into() })?;
+    mission.lot.as_deref().map_or(Ok(()), Lot::validate)?;
     if let Some(launch) = &mission.launch {
         launch.validate()?;
     }
-    if let Some(drop) = &mission.drop {
-        drop.validate()?;
-    }
-    descent(&mission.descent)?;
-    ignition(&mission.ignition)?;
-    powered(&mission.powered)?;
-    aim(&mission.aim)?;
-    ranges::arming(&mission.arming)?;
-    ranges::gate(&mission.gate)?;
-    legs(&mission.leg_limits)
+    mission.drop.map_or(Ok(()), |drop| drop.validate()).map_err(BadValue::from)
 }
 
 /// The motor does not touch the tube before the gimbal meets its stop.
 pub(super) fn room_to_swing(mission: &Mission) -> Check {
     let gimbal = &mission.airframe.gimbal;
     let free_rad = mission.airframe.gimbal_clearance_rad(&mission.motor_curve);
+    if gimbal.limit_rad() <= free_rad {
+        return Ok(());
+    }
     let motor = mission.motor_curve.name();
     let found = format!("{}, and {motor} touches the tube at {:.1}", gimbal.limit_deg, free_rad.to_degrees());
     let required = "an angle that gimbal.pivot_station_m and gimbal.inside_diameter_m leave free";
-    require(gimbal.limit_rad() <= free_rad, "gimbal.limit_deg", found, required)
+    Err(BadValue { key: "gimbal.limit_deg".to_owned(), found, required })
 }
 
-fn hedges(mission: &Mission) -> Check {
-    not_negative("caution_sigmas", mission.caution_sigmas)?;
-    positive("caution_fades_s", mission.caution_fades_s)?;
-    angle_below_right("soft_tilt_deg", mission.soft_tilt_deg)?;
-    angle_below_right("fin_soft_tilt_deg", mission.fin_soft_tilt_deg)?;
-    not_negative("settle_s", mission.settle_s)
-}
-
-fn start(start: &Start) -> Check {
-    require((0.0..=600.0).contains(&start.countdown_s), "start.countdown_s", start.countdown_s, "0 to 600")?;
-    positive("start.height_m", start.height_m)?;
-    not_negative("start.distance_m", start.distance_m)?;
-    not_negative("start.speed_m_s", start.speed_m_s)?;
-    share("start.carried_share", start.carried_share)?;
-    require((0.0..=180.0).contains(&start.tilt_deg), "start.tilt_deg", start.tilt_deg, "from 0 to 180")
-}
-
-fn descent(gains: &DescentGains) -> Check {
-    angle_below_right("descent.lean_max_deg", gains.lean_max_deg)?;
-    angle_below_right("descent.lean_at_ignition_deg", gains.lean_at_ignition_deg)?;
-    positive("descent.lean_fades_s", gains.lean_fades_s)?;
-    positive("descent.natural_frequency_rad_s", gains.natural_frequency_rad_s)?;
-    not_negative("descent.stiffness_m3", gains.stiffness_m3)?;
-    positive("descent.damping", gains.damping)?;
-    not_negative("descent.roll_decay_per_s", gains.roll_decay_per_s)?;
-    positive("descent.time_to_go_min_s", gains.time_to_go_min_s)
-}
-
-fn ignition(settings: &IgnitionSettings) -> Check {
-    for (key, [least, greatest]) in [
-        ("ignition.impulse_scales", settings.impulse_scales),
-        ("ignition.burn_time_scales", settings.burn_time_scales),
+/// All numbers of the mission that `looked_at` names, each in its range.
+pub(super) fn numbers(mission: &Mission, looked_at: &dyn Fn(&str) -> bool) -> Check {
+    let bad_text = |error: toml::ser::Error| BadValue {
+        key: "mission".to_owned(),
+        found: error.to_string(),
+        required: "values that a file can hold",
+    };
+    let table = Value::try_from(mission).map_err(bad_text)?;
+    each_number("", &table, &mut |key, found| {
+        let range = RANGES.iter().find_map(|(required, least, most, keys)| {
+            let holds = |of: &&str| key.strip_prefix(of).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
+            keys.iter().any(|of| holds(&of)).then_some((*required, *least..=*most))
+        });
+        match range {
+            Some((required, range)) if looked_at(key) && !range.contains(&found) => {
+                Err(BadValue { key: key.to_owned(), found: found.to_string(), required })
+            }
+            _ => Ok(()),
+        }
+    })?;
+    let end = &mission.powered.final_box;
+    for (key, [least, most]) in [
+        ("ignition.impulse_scales", mission.ignition.impulse_scales),
+        ("ignition.burn_time_scales", mission.ignition.burn_time_scales),
+        ("powered.final.u_min_m_s", [end.u_min_m_s, end.u_max_m_s]),
     ] {
-        let found = format!("[{least}, {greatest}]");
-        let ordered = least > 0.0 && least <= greatest && greatest.is_finite();
-        require(ordered, key, found, "two finite numbers above 0, the smaller one first")?;
+        if looked_at(key) && least > most {
+            let found = format!("[{least}, {most}]");
+            return Err(BadValue { key: key.to_owned(), found, required: "two numbers, the smaller one first" });
+        }
     }
-    share("ignition.place", settings.place)?;
-    not_negative("ignition.delay_s", settings.delay_s)?;
-    not_negative("ignition.arm_before_s", settings.arm_before_s)?;
-    settings.fixed_height_m.map_or(Ok(()), |height_m| positive("ignition.fixed_height_m", height_m))
+    Ok(())
 }
 
-fn powered(settings: &PoweredSettings) -> Check {
-    require(
-        (1e-3..=1.0).contains(&settings.interval_s),
-        "powered.interval_s",
-        settings.interval_s,
-        "from 0.001 to 1",
-    )?;
-    ranges::weights("powered", &settings.weights)?;
-    angle_below_right("powered.tilt_max_deg", settings.tilt_max_deg)?;
-    angle_below_right("powered.gimbal_deg", settings.gimbal_deg)?;
-    positive("powered.homing.near_m", settings.homing.near_m)?;
-    not_negative("powered.homing.reach_m_s2", settings.homing.reach_m_s2)?;
-    ranges::final_box("powered", &settings.final_box)?;
-    not_negative("powered.floor_rise_m_s", settings.floor_rise_m_s)?;
-    not_negative("powered.latest_after_s", settings.latest_after_s)?;
-    not_negative("powered.settled_s", settings.settled_s)?;
-    not_negative("powered.flown_out_s", settings.flown_out_s)?;
-    not_negative("powered.quiet_s", settings.quiet_s)?;
-    not_negative("powered.contact_quiet_s", settings.contact_quiet_s)?;
-    require(
-        (1..=100).contains(&settings.max_solves),
-        "powered.max_solves",
-        settings.max_solves,
-        "from 1 to 100",
-    )?;
-    require(
-        settings.max_passes.is_none_or(|passes| passes >= 1),
-        "powered.max_passes",
-        settings.max_passes.unwrap_or_default(),
-        "1 or more",
-    )?;
-    positive("powered.landing_miss", settings.landing_miss)?;
-    not_negative("powered.upright_decay_per_s", settings.upright_decay_per_s)?;
-    angle_below_right("powered.upright_lean_max_deg", settings.upright_lean_max_deg)?;
-    angle_below_right("powered.guess_lean_deg", settings.guess_lean_deg)?;
-    ranges::solver("powered", &settings.solver)
-}
-
-fn aim(gains: &AimGains) -> Check {
-    positive("aim.natural_frequency_rad_s", gains.natural_frequency_rad_s)?;
-    positive("aim.damping", gains.damping)?;
-    // The loop remembers 24 frames.
-    require((0.0..=0.1).contains(&gains.latency_s), "aim.latency_s", gains.latency_s, "from 0 to 0.1")?;
-    positive("aim.disturbance_time_s", gains.disturbance_time_s)?;
-    not_negative("aim.disturbance_max_rad_s2", gains.disturbance_max_rad_s2)?;
-    not_negative("aim.play_deg", gains.play_deg)
-}
-
-fn legs(limits: &LegLimits) -> Check {
-    positive("leg_limits.vertical_m_s", limits.vertical_m_s)?;
-    positive("leg_limits.lateral_m_s", limits.lateral_m_s)?;
-    positive("leg_limits.tilt_deg", limits.tilt_deg)?;
-    positive("leg_limits.rate_deg_s", limits.rate_deg_s)
+fn each_number(key: &str, value: &Value, look: &mut dyn FnMut(&str, f64) -> Check) -> Check {
+    match value {
+        Value::Table(table) => table.iter().try_for_each(|(name, value)| {
+            let key = if key.is_empty() { name.clone() } else { format!("{key}.{name}") };
+            each_number(&key, value, look)
+        }),
+        Value::Array(values) => values.iter().try_for_each(|value| each_number(key, value, look)),
+        Value::Float(number) => look(key, *number),
+        Value::Integer(number) => look(key, *number as f64),
+        _ => Ok(()),
+    }
 }

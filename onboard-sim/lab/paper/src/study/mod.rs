@@ -17,7 +17,6 @@ mod flown;
 mod objective;
 mod text;
 
-use flight::vehicles::airframe::AirframeError;
 use flight::vehicles::motors::MotorError;
 use paper::plane::dynamics::PlanarState;
 use sim::world::whole::WorldError;
@@ -97,8 +96,9 @@ pub(crate) fn experiments() -> Experiments {
 /// Why an experiment cannot be run.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum PaperError {
-    #[error(transparent)]
-    Airframe(#[from] AirframeError),
+    /// No built-in mission has this name.
+    #[error("no mission is named {0}")]
+    Airframe(&'static str),
     #[error(transparent)]
     Motor(#[from] MotorError),
     /// The vehicle's data are refused: a defect of the build.

@@ -285,7 +285,7 @@ impl Stack {
 
     /// Adds the forces of nose and fins.
     pub(crate) fn add_air(&self, load: &mut Load, flow: &Flow, cg_m: &Vector3<f64>, area_m2: f64) {
-        let Booster { nose, fins, fin_radius_m, .. } = &self.booster;
+        let Booster { nose, fin_force: fins, fin_radius_m, .. } = &self.booster;
         for NormalForce { slope_per_rad, station_m } in [nose, fins] {
             let place_m = Vector3::new(*station_m, 0.0, 0.0) - cg_m;
             let local = flow.velocity_m_s + flow.rate_rad_s.cross(&place_m);
