@@ -40,8 +40,8 @@ fn val_rocketpy_the_stack_has_its_masses_and_its_apogee() {
         (booster.roll_inertia_kg_m2, "/mass/booster_dry_with_casing/roll_inertia_kg_m2"),
         (booster.nose.slope_per_rad, "/aero/nose/cn_alpha_per_rad"),
         (booster.nose.station_m, "/aero/nose/cp_station_m"),
-        (booster.fins.slope_per_rad, "/aero/fins/cn_alpha_per_rad"),
-        (booster.fins.station_m, "/aero/fins/cp_station_m"),
+        (booster.fin_force.slope_per_rad, "/aero/fins/cn_alpha_per_rad"),
+        (booster.fin_force.station_m, "/aero/fins/cp_station_m"),
     ] {
         assert!((ours / number(path) - 1.0).abs() < 1e-3, "{path}: {}, ours is {ours}", number(path));
     }
