@@ -514,10 +514,10 @@ fn servo(servo: &Servo, [rate, delay, slop]: [&'static str; 3]) -> Check {
 fn recovery(airframe: &Airframe) -> Check {
     let (legs, parachute) = (&airframe.legs, &airframe.parachute);
     require(
-        legs.foot_station_m.is_finite() && legs.foot_station_m < 0.0,
+        legs.foot_station_m >= -airframe.body.length_m && legs.foot_station_m < 0.0,
         "legs.foot_station_m",
         legs.foot_station_m,
-        "a finite number below 0 (under the nozzle)",
+        "-body.length_m or more and below 0 (under the nozzle)",
     )?;
     positive("legs.foot_radius_m", legs.foot_radius_m)?;
     positive("legs.stiffness_n_m", legs.stiffness_n_m)?;
