@@ -59,6 +59,9 @@ impl Vehicle {
         airframe.mass.loaded_kg = 3.0;
         airframe.mass.loaded_cg_station_m = CG_STATION_M;
         airframe.mass.loaded_pitch_inertia_kg_m2 = 0.12;
+        let legs = &mut airframe.legs;
+        (legs.foot_station_m, legs.stiffness_n_m, legs.damping_n_s_m, legs.crush) =
+            (-0.06, 2_000.0, 45.0, None);
         let motor = flight::vehicles::motors::builtin(&airframe.motor)?;
         Ok(Self { airframe, motor })
     }
