@@ -147,6 +147,7 @@ pub struct PoweredSettings {
     #[serde(rename = "final")]
     pub final_box: FinalBox,
     /// Smallest height of the feet per second before touchdown, m/s.
+    #[serde(default)]
     pub floor_rise_m_s: f64,
     /// Latest end of a plan after the thrust has fallen through the weight, s.
     pub latest_after_s: f64,

@@ -96,11 +96,15 @@ impl Formulas<'_> {
         let mut of = |key: &str, place: &mut f64, value: f64| self.of_controller(key, place, value);
 
         // Room beyond the even tilt for a motor that is stronger.
-        let soft_deg = (tilt_rad.unwrap_or_default().to_degrees() + 8.0).clamp(38.0, 66.0);
+        let even_deg = tilt_rad.unwrap_or_default().to_degrees();
+        let soft_deg = (even_deg + 8.0).clamp(38.0, 66.0);
         of("soft_tilt_deg", &mut mission.soft_tilt_deg, soft_deg);
         of("fin_soft_tilt_deg", &mut mission.fin_soft_tilt_deg, soft_deg);
         let powered = &mut mission.powered;
-        // The planner's room beyond that.
+        // The more thrust there is, the faster an error of its time becomes one of height: a strong motor ends its plan higher.
+        let floor_m_s = (0.47 + 0.045 * (even_deg - 27.0)).clamp(0.47, 1.7);
+        of("powered.floor_rise_m_s", &mut powered.floor_rise_m_s, floor_m_s);
+        // The planner's room beyond the soft tilt.
         of("powered.tilt_max_deg", &mut powered.tilt_max_deg, (soft_deg + 10.0).max(45.0));
         // A lean moves a vehicle by g t^2. With four times as much one far from the pad hurries there, and 1 flight in 200 more
         // does not stop in time.
