@@ -293,7 +293,7 @@ fn a_lying_sensor_neither_lights_the_motor_nor_loses_the_parachute() {
             }
         }
     }
-    // Of 60 such flights 1 opens its parachute too late: the gate that is shut by an attitude shuts late.
+    // Of 60 such flights the parachute of 1 fills too late.
     assert!(hard.len() <= 1, "{hard:?}");
 }
 
