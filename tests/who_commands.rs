@@ -369,10 +369,9 @@ fn a_second_station_under_the_same_id_neither_commands_nor_keeps_a_countdown_ali
     let folder = tempfile::tempdir().unwrap();
     let of = concat!(env!("CARGO_MANIFEST_DIR"), "/../onboard-sim/flight/vehicles/missions/mk2.toml");
     let profile = std::fs::read_to_string(of).unwrap();
-    let countdown = profile.lines().find(|line| line.starts_with("countdown_s")).unwrap();
     // The second station joins within it, however busy the machine is.
-    std::fs::write(folder.path().join("slow.toml"), profile.replace(countdown, "countdown_s = 300.0"))
-        .unwrap();
+    let slow = profile.replace("[start]\n", "[start]\ncountdown_s = 300.0\n");
+    std::fs::write(folder.path().join("slow.toml"), slow).unwrap();
     let mut command = vehicle(folder.path(), &["udpin:127.0.0.1:0"]);
     let mut vehicle = Running::start(command.args(["--stay", "--profile", "slow.toml"]));
     let link = vehicle.udp_link();

@@ -215,12 +215,23 @@ fn a_card_is_of_the_mission_that_was_given_byte_for_byte() {
         let own = format!("{:.3} kg", recipe.mission.airframe.mass.loaded_kg);
         assert!(sheet.contains(&own) && sheet.contains("7e0c-2db5"), "{name}: {sheet}");
         assert!(!sheet.contains(['{', '}']), "a value is missing: {sheet}");
+        assert!(!sheet.contains("not the standard one"), "{sheet}");
         assert!(!sheet.contains("mk2") || *name == "mk2" || name.starts_with("mk2"), "{name}: {sheet}");
         if let Some(proposed) = &card.proposed {
             assert_ne!(proposed.mission.name, recipe.mission.name);
             assert!(sheet.contains("Proposal, not this card's vehicle"), "{sheet}");
         }
     }
+}
+
+#[test]
+fn a_card_says_which_keys_are_not_those_of_the_standard_controller() {
+    let mut recipe = Recipe::built_in("mini-f10", "none").unwrap();
+    recipe.mission.changed = ["powered.weights.theta", "soft_tilt_deg"].map(str::to_owned).to_vec();
+    let sheet = card_of(&recipe, Flights { survey: 1, of_widest: 1 }, [0.0, 0.0]).text();
+    let words = ["Controller", "not the standard one", "powered.weights.theta, soft_tilt_deg"];
+    let row = sheet.lines().find(|line| line.contains(words[0])).unwrap();
+    assert!(words.iter().all(|words| row.contains(words)), "{row}");
 }
 
 /// `hazard` on the mission that is written flies the flights of the card, from the pad.

@@ -269,6 +269,8 @@ pub struct ProfileFacts {
     pub name: Option<String>,
     /// Its one-line description, if it can be used.
     pub summary: Option<String>,
+    /// The keys with which it is not flown by the standard controller.
+    pub changed: Vec<String>,
     /// Why this build cannot use it, if so.
     pub problem: Option<String>,
 }
@@ -277,14 +279,21 @@ impl ProfileFacts {
     pub(super) fn of(head: &Head) -> Option<Self> {
         let parsed = match head.profile_toml.as_ref()? {
             Ok(text) => flight::vehicles::mission::from_toml(text, "profile.toml")
-                .map(|mission| (mission.name, mission.summary))
+                .map(|mission| (mission.name, mission.summary, mission.changed))
                 .map_err(|error| error.to_string()),
             Err(error) => Err(error.to_string()),
         };
         Some(match parsed {
-            Ok((name, summary)) => Self { name: Some(name), summary: Some(summary), problem: None },
-            Err(problem) => Self { name: None, summary: None, problem: Some(problem) },
+            Ok((name, summary, changed)) => {
+                Self { name: Some(name), summary: Some(summary), changed, problem: None }
+            }
+            Err(problem) => Self { name: None, summary: None, changed: Vec::new(), problem: Some(problem) },
         })
+    }
+
+    /// What flew it, if that is not the standard controller.
+    pub(crate) fn controller(&self) -> Option<String> {
+        (!self.changed.is_empty()).then(|| format!("not the standard one: {}", self.changed.join(", ")))
     }
 }
 
@@ -470,7 +479,9 @@ fn print_origin(info: &Info, output: &mut impl Write) -> io::Result<()> {
             _ => format!("cannot be used: {}", shown(profile.problem.as_deref().unwrap_or_default())),
         },
     };
-    row(output, "profile", &profile)
+    row(output, "profile", &profile)?;
+    let controller = info.profile.as_ref().and_then(ProfileFacts::controller);
+    controller.map_or(Ok(()), |controller| row(output, "controller", &controller))
 }
 
 /// When each phase began.

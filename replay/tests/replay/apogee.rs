@@ -48,7 +48,7 @@ fn timed_settings_change_the_commands_from_their_time_on() {
     assert!(report.commands_different > 100, "{}", report.commands_different);
     assert!(report.frames.iter().all(|frame| frame.time_s >= from_s || frame.recorded == frame.evaluated));
     // Another place in the band moves the ignition and nothing before it.
-    let report = evaluate(&recording, &settings(&["ignition.place=0.45"])).unwrap();
+    let report = evaluate(&recording, &settings(&["ignition.place=0.55"])).unwrap();
     let ignition = report.phases.iter().find(|phase| phase.phase == "IGNITION").unwrap();
     assert!(ignition.evaluated_s.unwrap() < ignition.recorded_s.unwrap(), "{ignition:?}");
     // The estimator's settings can be changed from the beginning only, not in flight.

@@ -81,7 +81,7 @@ fn a_key_that_a_profile_has_or_lacks_is_named() {
     use crate::flown::{FLIGHT, Recipe, mission_toml, write_log};
     let directory = tempfile::tempdir().unwrap();
     let whole = mission_toml();
-    let more = whole.replacen("[powered]", "[powered]\nfuture_key = 1.0", 1);
+    let more = whole.replacen("[start]", "[start]\nfuture_key = 1.0", 1);
     let fewer: String = whole.split_inclusive('\n').filter(|line| !line.starts_with("height_m")).collect();
     assert!(more != whole && fewer != whole);
     for (name, text, words) in

@@ -343,7 +343,7 @@ fn changed(prefix: &str, value: &toml::Value, factor: f64) -> Vec<Setting> {
 #[test]
 fn a_setting_of_the_landing_acts_or_the_answer_says_that_it_did_not() {
     let recipe = Recipe::built_in("mk3", "real").unwrap().starting_at(StartPoint::Pad).unwrap();
-    let mission: toml::Table = recipe.mission_toml.parse().unwrap();
+    let mission = toml::Table::try_from(&recipe.mission).unwrap();
     let flown = simulate_recipe(recipe, &[]);
     let recording = flown.recording();
     let of = |factor: f64| {

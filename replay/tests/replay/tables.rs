@@ -153,8 +153,8 @@ fn the_csv_holds_the_recorded_numbers_bit_for_bit() {
     }
     assert_eq!(count, recording.frames.len());
     assert!(read_text(&directory.join("events.csv")).contains("phase "));
-    // A head, the four limits of the envelope, and the six of Table 2.
-    assert_eq!(read_text(&directory.join("verdict_limits.csv")).lines().count(), 1 + 4 + 6);
+    // A head, the four limits of the envelope, what the legs bore, and the six of Table 2.
+    assert_eq!(read_text(&directory.join("verdict_limits.csv")).lines().count(), 1 + 4 + 2 + 6);
 }
 
 #[test]

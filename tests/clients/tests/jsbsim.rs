@@ -3,6 +3,8 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 #![expect(clippy::print_stdout, reason = "the touchdowns side by side, for the page of hardware in the loop")]
 
+use std::path::Path;
+
 use clients::{JSBSIM, file};
 use e2e::{Ended, Program, Running, program};
 use flight::estimation::estimator::StartUncertainty;
@@ -38,8 +40,8 @@ fn state(state: &RigidState) -> Value {
     })
 }
 
-/// The flights that JSBSim is to fly, numbered from `first`.
-fn order(mission: &Mission, first: usize, draws: &[Draw]) -> Value {
+/// The flights that JSBSim is to fly, numbered from `first`, with a vehicle of this file.
+fn order(mission: &Mission, airframe: &Path, first: usize, draws: &[Draw]) -> Value {
     let vehicles = file("../../onboard-sim/flight/vehicles");
     let flights: Vec<Value> = draws
         .iter()
@@ -56,7 +58,7 @@ fn order(mission: &Mission, first: usize, draws: &[Draw]) -> Value {
         })
         .collect();
     json!({
-        "airframe": vehicles.join(format!("airframes/{}.toml", mission.name)),
+        "airframe": airframe,
         "motor": vehicles.join(match mission.airframe.motor.as_str() {
             "H45W" => "motors/AeroTech_H45.eng",
             "HP-H45W" => "motors/AeroTech_HP-H45W.eng",
@@ -146,11 +148,13 @@ fn fly(mission: &Mission, wind_m_s: f64, flights: u64) -> Flown {
     let dispersion = day(wind_m_s);
     let draws: Vec<Draw> = (0..flights).map(|number| draw(mission, &dispersion, SEED, number)).collect();
     let folder = tempfile::tempdir().unwrap();
+    let airframe = folder.path().join("airframe.toml");
+    std::fs::write(&airframe, toml::to_string(&mission.airframe).unwrap()).unwrap();
     let mut theirs = Vec::new();
     // A few at a time, because a program under test has limited time.
     for few in draws.chunks(AT_ONCE) {
         let path = folder.path().join("order.json");
-        std::fs::write(&path, order(mission, theirs.len(), few).to_string()).unwrap();
+        std::fs::write(&path, order(mission, &airframe, theirs.len(), few).to_string()).unwrap();
         let mut bridge = JSBSIM.python();
         bridge.arg(file("jsbsim/world.py")).arg(program(Program::Board).get_program()).arg(&path);
         let Ended { code, output } = Running::to_end(&mut bridge);

@@ -155,6 +155,7 @@ impl Card {
             ("no rail", if_so(launch.is_none())),
             ("name", Some(mission.name.clone())),
             ("hash", Some(self.hash.clone())),
+            ("controller", Some(mission.changed.join(", ")).filter(|changed| !changed.is_empty())),
             ("ascent", launch.map(|launch| motor(&launch.booster.motor_curve))),
             ("landing", Some(motor(&mission.motor_curve))),
             ("both_n_s", Some(whole(self.rule.impulse_n_s))),

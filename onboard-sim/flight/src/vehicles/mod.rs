@@ -1,10 +1,10 @@
-//! Reads mission, airframe and motor files into the plain types of this crate.
+//! Reads mission and motor files into the plain types of this crate.
 //!
 //! Each module reads one kind of file and knows the built-in files by name. Its errors name the wrong key or line and
 //! the accepted values.
 //!
 //! * [`mission`]: missions, from TOML.
-//! * [`airframe`]: airframes, from TOML.
+//! * [`airframe`]: the airframes of the built-in missions.
 //! * [`motors`]: the built-in motors, by name.
 //! * [`thrust_curve`]: motor files, RASP (`.eng`) and RockSim (`.rse`).
 //! * [`file_error`]: why a mission cannot be used.

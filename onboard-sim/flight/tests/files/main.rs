@@ -1,7 +1,6 @@
 //! Good files are read into flight's types, and bad files give a helpful error.
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-mod airframe;
 mod mission;
 mod mk3_parts;
 mod motors;

@@ -25,7 +25,8 @@ impl Ground {
     }
 
     pub(super) fn is_over(&self, computer: &Computer) -> bool {
-        computer.is_over() || self.given_up
+        // The computer may be sure of the ground before the vehicle lies still.
+        (computer.is_over() && (self.contacts == 0 || self.judged.is_some())) || self.given_up
     }
 
     /// Looks at a rocket after a frame.

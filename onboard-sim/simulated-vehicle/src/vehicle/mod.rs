@@ -161,7 +161,7 @@ impl Vehicle {
             (released, answers) = (output.released, output.answers);
         }
         let flying = self.computer().released_at_s().is_some();
-        self.flown = flying && !released && !self.ground.is_over(self.sortie.computer());
+        self.flown = flying && !released && !self.computer().is_over() && !self.is_over();
         self.findings.note(self.sortie.computer());
         events.extend(self.events_of_the_simulation(released));
         VehicleStep { events, answers }

@@ -6,7 +6,7 @@ use flight::vehicles::mission::BUILTIN;
 
 use super::burn::View;
 use crate::compare::compared;
-use crate::info::{Info, print_info};
+use crate::info::{Info, ProfileFacts, print_info};
 use crate::log::{Clock, ClockTime};
 use crate::report::chart::{Chart, Line};
 use crate::report::html::{charts, escaped, paragraph, table};
@@ -44,12 +44,16 @@ pub(super) fn events(flight: &Flight) -> Option<String> {
     Some(format!("<details><summary>{} events</summary>\n{shown}</details>\n", events.len()))
 }
 
-/// What of the flown mission differs from the built-in one of its name.
+/// What of the flown mission differs from the built-in one of its name, and whether its controller is the standard one.
 pub(super) fn mission(flight: &Flight, info: &Info) -> Option<String> {
     let flown = flight.recording.profile_toml().ok()?;
-    let name = info.profile.as_ref().and_then(|profile| profile.name.as_deref()).unwrap_or_default();
+    let profile = info.profile.as_ref();
+    let name = profile.and_then(|profile| profile.name.as_deref()).unwrap_or_default();
+    let controller = profile.and_then(ProfileFacts::controller);
+    let controller =
+        controller.map_or_else(String::new, |controller| paragraph(&format!("Controller: {controller}.")));
     let Some((_, built_in)) = BUILTIN.iter().find(|(known, _)| *known == name) else {
-        return Some(paragraph(&format!("No mission {name} is built into this program.")));
+        return Some(controller + &paragraph(&format!("No mission {name} is built into this program.")));
     };
     let [built_in, flown] = [built_in, flown].map(|text| (name.to_owned(), text.to_owned()));
     let differences = compared(built_in, flown).ok()?.differences;
@@ -61,7 +65,7 @@ pub(super) fn mission(flight: &Flight, info: &Info) -> Option<String> {
         .into_iter()
         .map(|differs| vec![escaped(&differs.setting), words(differs.baseline), words(differs.other)])
         .collect();
-    Some(table(&["value", "built-in", "flown"], &rows))
+    Some(controller + &table(&["value", "built-in", "flown"], &rows))
 }
 
 /// A stage of the flight: its name, its class, and whether a phase belongs to it.

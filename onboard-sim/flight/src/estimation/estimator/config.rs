@@ -236,9 +236,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_file_changes_only_the_keys_it_has_and_a_value_out_of_range_is_named_in_the_error() {
+    fn a_file_changes_only_the_keys_it_has() {
         let config: EstimatorConfig = toml::from_str("lidar_m = 0.1\n[health]\ntilt_deg = 2.0").unwrap();
-        assert_eq!(config.validate(), Ok(()));
         let expected = EstimatorConfig {
             lidar_m: 0.1,
             health: HealthLimits { tilt_deg: 2.0, ..HealthLimits::default() },
@@ -246,18 +245,5 @@ mod tests {
         };
         assert_eq!(config, expected);
         assert!(toml::from_str::<EstimatorConfig>("lidar = 0.1").is_err());
-        let refused = |config: EstimatorConfig| config.validate().unwrap_err().to_string();
-        assert_eq!(
-            refused(EstimatorConfig { frame_s: 0.0, ..config }),
-            "estimator: frame_s is 0, accepted is 0.001 to 0.02"
-        );
-        assert_eq!(
-            refused(EstimatorConfig { lidar_m: f64::NAN, ..config }),
-            "estimator: lidar_m is NaN, accepted is a finite number above 0"
-        );
-        assert_eq!(
-            refused(EstimatorConfig { wind_walk_m_s_sqrt_s: -1.0, ..config }),
-            "estimator: wind_walk_m_s_sqrt_s is -1, accepted is a finite number not below 0"
-        );
     }
 }

@@ -11,9 +11,11 @@ use alloc::format;
 use alloc::string::{String, ToString as _};
 use alloc::vec::Vec;
 
-use crate::vehicle::mission::Mission;
-use crate::vehicle::mission::StartPoint;
+use core::ops::Range;
+
+use crate::vehicle::mission::{Mission, StartPoint};
 use serde::Deserialize as _;
+use toml::Spanned;
 use toml::de::{DeTable, DeValue, Deserializer};
 
 use self::controller::Formulas;
@@ -65,7 +67,8 @@ const DEFAULTS: &str = include_str!("../../../vehicles/defaults.toml");
 /// [`MissionError`] names the key and what would be accepted.
 pub fn from_toml(text: &str, origin: &str) -> Result<Mission, MissionError> {
     let not_a_mission = |mut error: toml::de::Error| {
-        error.set_input(Some(text));
+        // What such a section lacks is told by its name.
+        error.set_input(Some(text).filter(|_| error.span() != Some(NOWHERE)));
         FileError::not_toml(origin, &error)
     };
     let bad_value = |bad| FileError::bad_value(origin, bad);
@@ -75,7 +78,9 @@ pub fn from_toml(text: &str, origin: &str) -> Result<Mission, MissionError> {
     for (defaults, are_ours) in [(CONTROLLER, true), (DEFAULTS, false)] {
         let defaults = DeTable::parse(defaults).map_err(not_a_mission)?;
         if are_ours {
-            leaves("", defaults.get_ref(), &mut |key| changed.extend(Some(key).filter(|key| stated.contains(key))));
+            leaves("", defaults.get_ref(), &mut |key| {
+                changed.extend(Some(key).filter(|key| stated.contains(key)))
+            });
         }
         fill(table.get_mut(), defaults.into_inner());
     }
@@ -110,7 +115,8 @@ pub fn from_toml(text: &str, origin: &str) -> Result<Mission, MissionError> {
 /// Calls a function for the path of every value of a table.
 fn leaves(prefix: &str, table: &DeTable<'_>, found: &mut dyn FnMut(String)) {
     for (key, value) in table {
-        let path = if prefix.is_empty() { key.get_ref().to_string() } else { format!("{prefix}.{}", key.get_ref()) };
+        let path =
+            if prefix.is_empty() { key.get_ref().to_string() } else { format!("{prefix}.{}", key.get_ref()) };
         match value.get_ref() {
             DeValue::Table(inner) => leaves(&path, inner, found),
             _ => found(path),
@@ -118,18 +124,23 @@ fn leaves(prefix: &str, table: &DeTable<'_>, found: &mut dyn FnMut(String)) {
     }
 }
 
+/// Where in a text a section is that the text does not have.
+const NOWHERE: Range<usize> = usize::MAX..usize::MAX;
+
 /// Puts what a table does not have into it. How a vehicle is launched or dropped is only filled in if it is.
 fn fill<'a>(table: &mut DeTable<'a>, defaults: DeTable<'a>) {
     for (key, default) in defaults {
-        let optional = matches!(key.get_ref().as_ref(), "launch" | "drop");
-        match (table.get_mut(&key), default) {
-            (None, default) if !optional => _ = table.insert(key, default),
-            (Some(value), default) => {
-                if let (DeValue::Table(inner), DeValue::Table(default)) = (value.get_mut(), default.into_inner()) {
-                    fill(inner, default);
+        if matches!(key.get_ref().as_ref(), "launch" | "drop") && !table.contains_key(&key) {
+            continue;
+        }
+        match default.into_inner() {
+            DeValue::Table(default) => {
+                let section = || Spanned::new(NOWHERE, DeValue::Table(DeTable::new()));
+                if let DeValue::Table(section) = table.entry(key).or_insert_with(section).get_mut() {
+                    fill(section, default);
                 }
             }
-            (None, _) => {}
+            default => _ = table.entry(key).or_insert_with(|| Spanned::new(NOWHERE, default)),
         }
     }
 }

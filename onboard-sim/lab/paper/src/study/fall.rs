@@ -54,10 +54,14 @@ impl Vehicle {
     /// # Errors
     /// A built-in file is missing: a defect of the build.
     pub(crate) fn new() -> Result<Self, PaperError> {
-        let mut airframe = flight::vehicles::airframe::builtin("mk2-h53").ok_or(PaperError::Airframe("mk2-h53"))?;
+        let mut airframe =
+            flight::vehicles::airframe::builtin("mk2-h53").ok_or(PaperError::Airframe("mk2-h53"))?;
         airframe.mass.loaded_kg = 3.0;
         airframe.mass.loaded_cg_station_m = CG_STATION_M;
         airframe.mass.loaded_pitch_inertia_kg_m2 = 0.12;
+        let legs = &mut airframe.legs;
+        (legs.foot_station_m, legs.stiffness_n_m, legs.damping_n_s_m, legs.crush) =
+            (-0.06, 2_000.0, 45.0, None);
         let motor = flight::vehicles::motors::builtin(&airframe.motor)?;
         Ok(Self { airframe, motor })
     }

@@ -12,8 +12,8 @@ fn on_rail(tilt_deg: f64, truth: &Truth, ascent: &AscentTruth) -> World {
     let mission = flight::vehicles::mission::builtin("mk2").unwrap().unwrap();
     let mut launch: Launch = mission.launch.unwrap();
     launch.rail.tilt_deg = tilt_deg;
-    // With which RocketPy gave the numbers below.
-    launch.rail.length_m = 2.5;
+    // With which RocketPy gave the numbers below: the parts have 2 % more inertia than a mission estimates.
+    (launch.rail.length_m, launch.booster.roll_inertia_kg_m2) = (2.5, 0.000_984);
     let truth = Truth { gust_scale: 0.0, ..*truth };
     world("mk2", &truth, &RigidState::upright(1.0)).on_rail(&launch, ascent)
 }

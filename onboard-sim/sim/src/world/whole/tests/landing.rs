@@ -5,7 +5,7 @@ use crate::world::ground::RestOutcome;
 
 /// A world with the feet at a height, m, a velocity (x, z), m/s, a lean, rad, and a rate about body y, rad/s.
 fn approaching(height_m: f64, [x_m_s, z_m_s]: [f64; 2], lean_rad: f64, rate_rad_s: f64) -> World {
-    let airframe = flight::vehicles::airframe::builtin("mk2").unwrap();
+    let airframe = on_springs("mk2");
     let above_feet_m = airframe.above_feet_m(airframe.mass.loaded_cg_station_m);
     let mut state = leaning(height_m + above_feet_m, lean_rad, 0.0);
     state.velocity_m_s = Vector3::new(x_m_s, 0.0, z_m_s);
@@ -76,7 +76,7 @@ fn after_a_fall_from_height_the_body_hits_the_ground() {
 #[test]
 fn legs_bounce_without_damping() {
     let peak_m = |damping_n_s_m: f64| {
-        let mut airframe = flight::vehicles::airframe::builtin("mk2").unwrap();
+        let mut airframe = on_springs("mk2");
         airframe.legs.damping_n_s_m = damping_n_s_m;
         let motor = motors::builtin(&airframe.motor).unwrap();
         let truth = Truth { drag_scale: 0.0, ..Truth::default() };
