@@ -26,7 +26,7 @@ pub mod table;
 
 use alloc::boxed::Box;
 use alloc::format;
-use alloc::string::String;
+use alloc::string::{String, ToString as _};
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
@@ -42,13 +42,15 @@ use self::table::PhaseTable;
 use crate::control::servo::ServoModel;
 use crate::estimation::estimator::{ImuSample, Measurements};
 use crate::estimation::sensor_watch::SensorWatch;
+use crate::guidance::misfit::Misfit;
 use crate::guidance::powered::ControlLevel;
+use crate::guidance::vertical::EvenLanding;
 use crate::rules::arming::{PredictedLanding, Uplink};
 use crate::rules::operator::Operator;
 use crate::rules::outputs::{FlightProgress, Outputs};
 use crate::rules::phase::{Event, HOLD_LIMIT_S, Latch, Mode, Motor, Phase};
 use crate::rules::two_person::Station;
-use crate::vehicle::mission::ArmingLimits;
+use crate::vehicle::mission::{ArmingLimits, Mission};
 use crate::vehicle::rigid::RigidState;
 
 /// Frame length, ms.
@@ -383,6 +385,25 @@ pub struct Rehearsed {
     pub found: String,
     /// Its touchdown; `None` if it did not come down.
     pub landing: Option<PredictedLanding>,
+}
+
+impl Rehearsed {
+    /// What a rehearsal came to in which so many plans were made and converged. If it did not land, and motor and weight do not go
+    /// together, it says that.
+    pub fn new(
+        mission: &Mission,
+        warm: bool,
+        how: &str,
+        [plans, converged]: [u64; 2],
+        landing: Option<PredictedLanding>,
+    ) -> Self {
+        let misfit = if warm { None } else { Misfit::of(&EvenLanding::of(mission)) };
+        let found = match misfit {
+            Some(misfit) => misfit.to_string(),
+            None => format!("{how}, {converged} of {plans} plans converged"),
+        };
+        Self { warm, found, landing }
+    }
 }
 
 /// The station that armed the vehicle, and how long ago it was last heard, s.

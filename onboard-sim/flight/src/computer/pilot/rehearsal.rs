@@ -3,8 +3,6 @@
 //!
 //! It shows whether the planner works on this machine, and whether a landing is possible with this vehicle, motor and mission.
 
-use alloc::format;
-
 use nalgebra::{Vector2, Vector3};
 
 use super::planner::{Asked, Planner};
@@ -19,7 +17,7 @@ use crate::vehicle::rigid::RigidState;
 const LOOK_S: f64 = 0.1;
 const LOOKS: u32 = 200;
 /// More plans than the longest burn has.
-const MOST_PLANS: u32 = 200;
+const MOST_PLANS: u64 = 200;
 
 impl Planner {
     /// Rehearses the landing, with no plan flown. It takes some seconds on a board.
@@ -33,17 +31,15 @@ impl Planner {
             let (estimate, burning) = self.later(&estimate, &burning);
             let Some(lands) = self.fly_on() else { break };
             plans += 1;
-            converged += u32::from(lands);
+            converged += u64::from(lands);
             // Twice that time is the period of plans.
             flown = Some(self.later(&estimate, &burning));
         }
-        let limits = Limits::from(&self.model().mission.leg_limits);
-        let verdict = LandingVerdict::judge_plan(&limits, &self.end());
-        Rehearsed {
-            warm: converged > 0 && verdict.is_inside(),
-            found: format!("planned, {converged} of {plans} plans converged"),
-            landing: (plans > 0).then(|| PredictedLanding::from(&verdict)),
-        }
+        let mission = &self.model().mission;
+        let verdict = LandingVerdict::judge_plan(&Limits::from(&mission.leg_limits), &self.end());
+        let warm = converged > 0 && verdict.is_inside();
+        let landing = (plans > 0).then(|| PredictedLanding::from(&verdict));
+        Rehearsed::new(mission, warm, "planned", [plans, converged], landing)
     }
 }
 
