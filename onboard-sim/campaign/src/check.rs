@@ -3,11 +3,12 @@
 //!
 //! All but the last row are formulas on the expected motor in still air or in a steady wind. The last one flies.
 
-use core::fmt::{self, Write as _};
+use core::fmt;
 
 use flight::control::fins::{Allocation, OpeningRange};
+use flight::guidance::descent::LEAST_AIRSPEED_M_S;
 use flight::guidance::ignition::IgnitionSettings;
-use flight::guidance::misfit::Misfit;
+use flight::guidance::misfit::{MOST_TILT_RAD, misfit};
 use flight::guidance::vertical::{Column, EvenLanding};
 use flight::vehicle::airframe::{MassModel, MassProperties};
 use flight::vehicle::atmosphere::Air;
@@ -60,7 +61,7 @@ impl Least {
 const AT_FIRST: Least = Least(0.5, 1.0);
 /// Mean thrust over weight while the thrust exceeds the weight.
 const CARRIED: Least = Least(1.1, 1.3);
-/// Lean that lands the expected motor, degrees: with less a weak motor does not stop. [`Misfit`] has the most.
+/// Lean that lands the expected motor, degrees: with less a weak motor does not stop it. [`MOST_TILT_RAD`] is the most.
 const LEAN_DEG: Least = Least(0.0, 15.0);
 /// Width of the heights that suit every motor, over what two deviations of the igniter to either side cover.
 const BAND: Least = Least(0.5, 1.0);
@@ -88,16 +89,14 @@ const FLIGHTS: Least = Least(0.5, 0.9);
 const IGNITER_S: f64 = 0.05;
 /// Two deviations of the thrust's direction in that set, degrees.
 const MISALIGNED_DEG: f64 = 0.8;
-/// A side wind at the ignition, and the wind in which a fall drifts, m/s.
+/// A side wind at the ignition, m/s, and the wind in which a fall drifts.
 const SIDE_WIND_M_S: f64 = 8.0;
 const WIND_M_S: f64 = 5.0;
-/// The fins steer from this airspeed on, m/s.
-const STEERED_M_S: f64 = 12.0;
 /// Masses are tried in these steps, kg, up to this share of the mass more or less.
 const STEP_KG: f64 = 0.05;
 const MOST_SHARE: f64 = 0.4;
 /// Motors that are proposed.
-const PROPOSED: usize = 3;
+const PROPOSED: usize = 2;
 
 /// One question with its answer.
 #[derive(Debug, Clone, PartialEq)]
@@ -142,8 +141,7 @@ impl fmt::Display for Page {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(out, "{}", self.title)?;
         for Row { what, found, beside, verdict, change } in &self.rows {
-            let mut line = format!("{verdict:<6}{what:<11}{found:<33}");
-            write!(line, "{beside}")?;
+            let line = format!("{verdict:<6}{what:<11}{found:<34}{beside}");
             writeln!(out, "{}", line.trim_end())?;
             change.iter().try_for_each(|change| writeln!(out, "{:<17}-> {change}", ""))?;
         }
@@ -225,17 +223,16 @@ fn proposal(recipe: &Recipe, motors: &[Found], than: Verdict) -> Result<String, 
     let mut fit: Vec<_> = fit
         .filter_map(|motor| {
             let verdict = with(&motor.motor, &motor.curve, 0.0)?;
-            Some((motor.in_production == Some(false), verdict, motor.name()))
+            Some((motor.in_production == Some(false), verdict, motor.curve.name()))
         })
         .collect();
     fit.sort();
-    let fit = fit.into_iter().take(PROPOSED).map(|(gone, _, name)| if gone { name + " (old)" } else { name });
+    let fit = fit.into_iter().take(PROPOSED);
+    let fit =
+        fit.map(|(gone, _, name)| format!("on {name}{}", if gone { ", out of production" } else { "" }));
     let found: Vec<String> = mass.into_iter().chain(fit).collect();
-    Ok(if found.is_empty() {
-        "no mass and no motor of these lands it".to_owned()
-    } else {
-        found.join(", or ")
-    })
+    let none = || "no mass of it and no motor of these: another vehicle".to_owned();
+    Ok(if found.is_empty() { none() } else { found.join(", or ") })
 }
 
 fn flown(recipe: &Recipe, rows: &[Flown]) -> Row {
@@ -293,12 +290,12 @@ impl<'a> Vehicle<'a> {
 
     fn spare(&self) -> Row {
         const WHAT: &str = "impulse";
-        if let Some(misfit) = Misfit::of(&self.landing) {
-            return Row::new(WHAT, Verdict::No, misfit.to_string(), String::new());
+        if let Some(misfit) = misfit(&self.landing) {
+            return Row::new(WHAT, Verdict::No, misfit.to_owned(), String::new());
         }
         let tilt_deg = self.landing.tilt_rad.unwrap_or_default().to_degrees();
         let found = format!("lands with {tilt_deg:.0} deg of lean");
-        let beside = format!("{} to {:.0} deg", LEAN_DEG.1, Misfit::MOST_TILT_RAD.to_degrees());
+        let beside = format!("{} to {:.0} deg", LEAN_DEG.1, MOST_TILT_RAD.to_degrees());
         Row::new(WHAT, LEAN_DEG.judge(tilt_deg), found, beside)
     }
 
@@ -313,14 +310,9 @@ impl<'a> Vehicle<'a> {
             return Row::new("ignition", Verdict::No, "no height suits weak and strong".to_owned(), beside);
         };
         let (middle_m, width_m) = (0.5 * (common.low_m + common.high_m), common.high_m - common.low_m);
-        let motor_m = heights.band.map_or(0.0, |band| band.high_m - band.low_m - width_m);
-        let found = format!("at {middle_m:.0} m, {width_m:.1} m wide");
-        Row::new(
-            "ignition",
-            BAND.judge(width_m / asked_m),
-            found,
-            format!("{beside}, motor took {motor_m:.1}"),
-        )
+        let certified_m = heights.band.map_or(width_m, |band| band.high_m - band.low_m);
+        let found = format!("at {middle_m:.0} m: {width_m:.1} of {certified_m:.1} m suit all");
+        Row::new("ignition", BAND.judge(width_m / asked_m), found, beside)
     }
 
     /// Dynamic pressure at an airspeed, Pa.
@@ -353,9 +345,9 @@ impl<'a> Vehicle<'a> {
         ]
         .map(|moment_n_m| (moment_n_m / mass.pitch_inertia_kg_m2).to_degrees());
         let found = format!("turns it by {stop:.0} deg/s2");
-        let beside = format!("motor {motor:.0}, side wind {wind:.0} deg/s2");
+        let beside = format!("motor {motor:.0}, wind {wind:.0} deg/s2");
         Row::new("gimbal", GIMBAL.judge(stop / (motor + wind)), found, beside)
-            .or(|| "a wider gimbal.limit_deg, or the centre of gravity nearer to the nose".to_owned())
+            .or(|| "a wider gimbal.limit_deg, or the weight nearer to the nose".to_owned())
     }
 
     fn fins(&self) -> Row {
@@ -397,11 +389,11 @@ impl<'a> Vehicle<'a> {
         let EvenLanding { carried_s, speed_m_s, .. } = self.landing;
         let falls_s = self.falls_s(speed_m_s);
         let burn_m = self.mission.powered.homing.reach_m_s2 * carried_s * carried_s;
-        let steered_s = falls_s - self.falls_s(STEERED_M_S);
+        let steered_s = falls_s - self.falls_s(LEAST_AIRSPEED_M_S);
         let fall_m = if self.steers() && steered_s > 0.0 {
             // The mean of the squared speed: the integral of tanh^2 is t - tanh. A push one way and back is a quarter of a t^2.
             let terminal2 = self.terminal_m_s * self.terminal_m_s;
-            let gained_s = (speed_m_s - STEERED_M_S) / self.column.gravity_m_s2;
+            let gained_s = (speed_m_s - LEAST_AIRSPEED_M_S) / self.column.gravity_m_s2;
             let pressure_pa = self.pressure_pa(libm::sqrt(terminal2 * (1.0 - gained_s / steered_s)));
             let sin = libm::sin(self.mission.descent.lean_max_deg.to_radians());
             let push_n = pressure_pa * self.column.crossflow_area_m2 * sin * sin;
@@ -492,5 +484,83 @@ impl<'a> Vehicle<'a> {
         let beside = format!("{bound_m:.0} m, {how} in {WIND_M_S} m/s");
         Row::new("fence", FENCE.judge(fence_m / bound_m), format!("{fence_m:.0} m"), beside)
             .or(|| format!("gate.fence_radius_m of {:.0} m, or a lower start", libm::ceil(bound_m)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row_of(name: &str, change: impl FnOnce(&mut Mission), row: impl Fn(&Vehicle<'_>) -> Row) -> Row {
+        let mut mission = flight::vehicles::mission::builtin(name).unwrap().unwrap();
+        change(&mut mission);
+        row(&Vehicle::of(&mission))
+    }
+
+    /// 4 x 90 N over 0.06 m, less 3.5 kg of weight: (360 - 34) 0.06 / (0.5 x 3.5) = 11.2 m2/s2. 6.0 m/s is in the mission.
+    #[test]
+    fn val_hand_legs_and_parachute_of_mk3() {
+        let legs = row_of("mk3", |_| {}, Vehicle::legs);
+        assert_eq!((legs.found.as_str(), legs.verdict), ("3.3 m/s into the blocks", Verdict::Ok));
+        let parachute = row_of("mk3", |_| {}, Vehicle::parachute);
+        assert!(parachute.found.starts_with("6.0 m/s, "), "{parachute:?}");
+    }
+
+    /// Feet at 0.4 m are 0.283 m from the axis between two of them; as high is 45 degrees.
+    #[test]
+    fn val_hand_feet_fall_over_where_the_weight_stands_above_the_line_between_two() {
+        let feet = |radius_m: f64| {
+            let change = |mission: &mut Mission| mission.airframe.legs.foot_radius_m = radius_m;
+            row_of("mk2", change, Vehicle::feet)
+        };
+        let narrow = feet(0.1);
+        assert_eq!(narrow.verdict, Verdict::No);
+        let words = narrow.change.unwrap();
+        let asked_m: f64 = words.split(' ').nth(1).unwrap().parse().unwrap();
+        assert!(
+            feet(asked_m - 0.02).verdict == Verdict::Tight && feet(asked_m + 0.01).verdict == Verdict::Ok,
+            "{words}"
+        );
+    }
+
+    /// What is proposed is what the legs are asked for.
+    #[test]
+    fn legs_that_do_not_bear_it_are_told_with_the_stroke_that_would() {
+        let legs = |force_n: f64, stroke_m: f64| {
+            let change = |mission: &mut Mission| {
+                let crush = mission.airframe.legs.crush.as_mut().unwrap();
+                (crush.force_n, crush.stroke_m) = (force_n, stroke_m);
+            };
+            row_of("mk3", change, Vehicle::legs)
+        };
+        let weak = legs(10.0, 0.06);
+        assert_eq!(weak.verdict, Verdict::No);
+        assert!(weak.change.unwrap().contains("crush.force_n"));
+        let short = legs(90.0, 0.01);
+        assert_eq!(short.verdict, Verdict::No);
+        let stroke_mm: f64 = short.change.unwrap().split(' ').nth(3).unwrap().parse().unwrap();
+        assert_eq!(legs(90.0, 1e-3 * (stroke_mm + 0.5)).verdict, Verdict::Ok);
+        let none = row_of("mk3", |mission| mission.airframe.legs.crush = None, Vehicle::legs);
+        assert!(none.verdict == Verdict::Tight && none.change.unwrap().contains("[airframe.legs.crush]"));
+    }
+
+    #[test]
+    fn a_fence_inside_of_which_it_may_not_come_down_is_not_ok() {
+        let fence = row_of("mk3", |mission| mission.gate.fence_radius_m = 20.0, Vehicle::fence);
+        assert!(fence.verdict > Verdict::Ok && fence.change.unwrap().contains("fence_radius_m of "));
+    }
+
+    #[test]
+    fn fins_without_an_arm_are_no_fault() {
+        let fins = row_of("vlr", |_| {}, Vehicle::fins);
+        assert!(fins.verdict == Verdict::Ok && fins.found.starts_with("do not steer"), "{fins:?}");
+    }
+
+    #[test]
+    fn what_is_no_number_is_not_ok() {
+        assert_eq!(
+            [f64::NAN, 0.0, 1.0, 2.0].map(|value| Least(1.0, 2.0).judge(value)),
+            [Verdict::Tight, Verdict::No, Verdict::Tight, Verdict::Ok]
+        );
     }
 }

@@ -539,12 +539,17 @@ impl Rehearsal {
         if flight.goes_on() {
             return;
         }
+        let [plans, converged] = *plans;
         let outcome = flight.outcome();
         let how = outcome.failure.map_or("landed", |failure| failure.name());
         let legs = &flight.mission().leg_limits;
         let landing = outcome.touchdown.map(|contact| PredictedLanding::from(&by_envelope(legs, &contact)));
-        let warm = outcome.landing.stands && plans[1] > 0;
-        let rehearsed = Rehearsed::new(flight.mission(), warm, how, *plans, landing);
+        let rehearsed = Rehearsed {
+            warm: outcome.landing.stands && converged > 0,
+            found: format!("{how}, {converged} of {plans} plans converged"),
+            landing,
+        };
+        let rehearsed = rehearsed.explained(flight.mission());
         let report = *flight.pilot().report();
         *self = Self::Over(Box::new((rehearsed, report)));
     }

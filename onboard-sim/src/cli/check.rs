@@ -39,6 +39,10 @@ pub(crate) fn run(arguments: &CheckArguments) -> anyhow::Result<ExitCode> {
     for path in &arguments.from {
         motors.extend(source::read(path)?);
     }
+    for broken in motors.iter().filter_map(|found| found.as_ref().err()) {
+        let source::Unusable { name, origin, reason } = broken;
+        writeln!(std::io::stderr(), "{name} cannot be used: {origin}: {reason}")?;
+    }
     let (flights, show) = (arguments.flights, show_flights());
     let told = |done| show(done, flights as usize);
     let page = on_threads(arguments.jobs, || Ok(check(&recipe, &motors, flights, &told)?))?;

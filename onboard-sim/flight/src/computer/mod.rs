@@ -24,9 +24,10 @@ pub mod pilot;
 pub mod saved;
 pub mod table;
 
+use alloc::borrow::ToOwned as _;
 use alloc::boxed::Box;
 use alloc::format;
-use alloc::string::{String, ToString as _};
+use alloc::string::String;
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
@@ -42,7 +43,7 @@ use self::table::PhaseTable;
 use crate::control::servo::ServoModel;
 use crate::estimation::estimator::{ImuSample, Measurements};
 use crate::estimation::sensor_watch::SensorWatch;
-use crate::guidance::misfit::Misfit;
+use crate::guidance::misfit::misfit;
 use crate::guidance::powered::ControlLevel;
 use crate::guidance::vertical::EvenLanding;
 use crate::rules::arming::{PredictedLanding, Uplink};
@@ -388,21 +389,11 @@ pub struct Rehearsed {
 }
 
 impl Rehearsed {
-    /// What a rehearsal came to in which so many plans were made and converged. If it did not land, and motor and weight do not go
-    /// together, it says that.
-    pub fn new(
-        mission: &Mission,
-        warm: bool,
-        how: &str,
-        [plans, converged]: [u64; 2],
-        landing: Option<PredictedLanding>,
-    ) -> Self {
-        let misfit = if warm { None } else { Misfit::of(&EvenLanding::of(mission)) };
-        let found = match misfit {
-            Some(misfit) => misfit.to_string(),
-            None => format!("{how}, {converged} of {plans} plans converged"),
-        };
-        Self { warm, found, landing }
+    /// It did not land, and motor and weight do not go together: it says that instead.
+    #[must_use]
+    pub fn explained(self, mission: &Mission) -> Self {
+        let misfit = if self.warm { None } else { misfit(&EvenLanding::of(mission)) };
+        Self { found: misfit.map_or(self.found, str::to_owned), ..self }
     }
 }
 

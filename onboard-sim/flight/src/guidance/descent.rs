@@ -14,7 +14,7 @@ use crate::control::aim::turn_to_aim_rad;
 use crate::vehicle::rigid::RigidState;
 
 /// Below this airspeed the fins are too weak for steering, m/s.
-pub(crate) const LEAST_AIRSPEED_M_S: f64 = 12.0;
+pub const LEAST_AIRSPEED_M_S: f64 = 12.0;
 /// Below this airspeed they are too weak even to control the roll, m/s.
 const LEAST_ROLLING_AIRSPEED_M_S: f64 = 2.0;
 

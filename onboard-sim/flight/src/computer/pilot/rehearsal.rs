@@ -3,6 +3,8 @@
 //!
 //! It shows whether the planner works on this machine, and whether a landing is possible with this vehicle, motor and mission.
 
+use alloc::format;
+
 use nalgebra::{Vector2, Vector3};
 
 use super::planner::{Asked, Planner};
@@ -17,7 +19,7 @@ use crate::vehicle::rigid::RigidState;
 const LOOK_S: f64 = 0.1;
 const LOOKS: u32 = 200;
 /// More plans than the longest burn has.
-const MOST_PLANS: u64 = 200;
+const MOST_PLANS: u32 = 200;
 
 impl Planner {
     /// Rehearses the landing, with no plan flown. It takes some seconds on a board.
@@ -31,15 +33,18 @@ impl Planner {
             let (estimate, burning) = self.later(&estimate, &burning);
             let Some(lands) = self.fly_on() else { break };
             plans += 1;
-            converged += u64::from(lands);
+            converged += u32::from(lands);
             // Twice that time is the period of plans.
             flown = Some(self.later(&estimate, &burning));
         }
         let mission = &self.model().mission;
         let verdict = LandingVerdict::judge_plan(&Limits::from(&mission.leg_limits), &self.end());
-        let warm = converged > 0 && verdict.is_inside();
-        let landing = (plans > 0).then(|| PredictedLanding::from(&verdict));
-        Rehearsed::new(mission, warm, "planned", [plans, converged], landing)
+        let rehearsed = Rehearsed {
+            warm: converged > 0 && verdict.is_inside(),
+            found: format!("planned, {converged} of {plans} plans converged"),
+            landing: (plans > 0).then(|| PredictedLanding::from(&verdict)),
+        };
+        rehearsed.explained(mission)
     }
 }
 
@@ -73,6 +78,22 @@ mod tests {
     use super::*;
     use crate::computer::Computer;
     use crate::vehicles::mission::{BUILTIN, builtin};
+
+    /// The parachute of a vehicle that no height lands is no answer for a builder.
+    #[test]
+    fn a_vehicle_that_does_not_go_with_its_motor_is_told_so() {
+        let (name, text) = BUILTIN[1];
+        for (kg, words) in [("5.0", "too heavy for its motor"), ("2.2", "too light for its motor")] {
+            let text = text.replace("loaded_kg = 3.7", &format!("loaded_kg = {kg}"));
+            let mission = crate::vehicles::mission::from_toml(&text, name).unwrap();
+            let found = String::from("ended, 0 of 0 plans converged");
+            let rehearsed = Rehearsed { warm: false, found, landing: None };
+            let explained = rehearsed.clone().explained(&mission);
+            assert!(explained.found.starts_with(words), "{explained:?}");
+            let landed = Rehearsed { warm: true, ..rehearsed };
+            assert_eq!(landed.clone().explained(&mission), landed);
+        }
+    }
 
     /// Every mission that can be flown can be armed on a board, and the rehearsal leaves no memory.
     #[test]
