@@ -549,9 +549,8 @@ impl Rehearsal {
             found: format!("{how}, {converged} of {plans} plans converged"),
             landing,
         };
-        let rehearsed = rehearsed.explained(flight.mission());
         let report = *flight.pilot().report();
-        *self = Self::Over(Box::new((rehearsed, report)));
+        *self = Self::Over(Box::new((rehearsed.explained(flight.mission()), report)));
     }
 
     fn over(&self) -> Option<&(Rehearsed, PoweredReport)> {

@@ -249,6 +249,6 @@ mod tests {
         assert_eq!(again.motor_curve, flight::vehicles::motors::named(motor).unwrap());
         let long = motor.replace("29 93", "38 900");
         let error = changed(&recipe, &long, &mass).unwrap_err().to_string();
-        assert!(error.contains("gimbal.limit_deg"), "{error}");
+        assert!(error.contains("airframe.mass.propellant_station_m = 0.45"), "{error}");
     }
 }

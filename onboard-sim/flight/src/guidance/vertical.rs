@@ -154,8 +154,7 @@ impl Column {
         }
         let carried_until_s = burn.falls_through_weight_s(self.mass_at_ignition_kg, self.gravity_m_s2);
         carried_until_s.filter(|end_s| *end_s > burning_s).is_some_and(|end_s| {
-            let [softest] =
-                Falls::new(self, burn, burning_s, [end_s]).along::<false>(Way::Even, vertical_m_s, [1.0]);
+            let [softest] = Falls::new(self, burn, burning_s, [end_s]).along::<false>(Way::Even, vertical_m_s, [1.0]);
             softest.vertical_m_s > self.touchdown_m_s
         })
     }
@@ -256,8 +255,7 @@ impl EvenLanding {
             let brakes = |tilt_rad: f64| braked(speed_m_s, tilt_rad).vertical_m_s > column.touchdown_m_s;
             brakes(0.0).then(|| halved(0.0, MOST_TILT_RAD, &brakes))
         };
-        let terminal_m_s =
-            column.terminal_speed_m_s(airframe.fin_drag_area_m2(&[airframe.fins.open_rad(); 4]));
+        let terminal_m_s = column.terminal_speed_m_s(airframe.fin_drag_area_m2(&[airframe.fins.open_rad(); 4]));
         let start_m = mission.start_height_m();
         let speed_m_s =
             |height_m: f64| fall_ends_m_s(start_m - height_m, 0.0, terminal_m_s, column.gravity_m_s2);
@@ -401,8 +399,7 @@ impl<const N: usize> Falls<N> {
     /// without rising before.
     fn heights_m(&self, vertical_m_s: f64) -> [[Option<f64>; N]; 3] {
         // All ways have the same two extremes.
-        let extremes =
-            [0.0, 1.0].map(|parameter| self.along::<false>(Way::Even, vertical_m_s, [parameter; N]));
+        let extremes = [0.0, 1.0].map(|parameter| self.along::<false>(Way::Even, vertical_m_s, [parameter; N]));
         [Way::SoftFirst, Way::HardFirst, Way::Even].map(|way| self.heights_of_m(way, vertical_m_s, &extremes))
     }
 
@@ -501,8 +498,7 @@ impl<const N: usize> Falls<N> {
                         speeds_m_s[i] + self.step_s[i] * (thrust_m_s2[i] * thrust - self.gravity_m_s2)
                     };
                     let [least_m_s, most_m_s] = [after(softest[i]), after(self.hard.thrust)];
-                    let held =
-                        speeds_m_s[i] >= self.touchdown_m_s - MET_M_S || next_m_s[i] > self.touchdown_m_s;
+                    let held = speeds_m_s[i] >= self.touchdown_m_s - MET_M_S || next_m_s[i] > self.touchdown_m_s;
                     if held { self.touchdown_m_s.min(most_m_s).max(least_m_s) } else { next_m_s[i] }
                 });
                 midway_m_s = from_fn(|i| 0.5 * (speeds_m_s[i] + next_m_s[i]));

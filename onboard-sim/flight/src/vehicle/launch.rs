@@ -125,8 +125,7 @@ impl BoosterFins {
         let interference = 1.0 + 0.5 * diameter_m / (span_m + 0.5 * diameter_m);
         let slope_per_rad =
             interference * 12.0 * span_share * span_share / (1.0 + libm::sqrt(1.0 + slender * slender));
-        let behind_m =
-            sweep_m / 3.0 * (root_m + 2.0 * tip_m) / both_m + (both_m - root_m * tip_m / both_m) / 6.0;
+        let behind_m = sweep_m / 3.0 * (root_m + 2.0 * tip_m) / both_m + (both_m - root_m * tip_m / both_m) / 6.0;
         NormalForce { slope_per_rad, station_m: end_station_m + above_end_m + root_m - behind_m }
     }
 }
@@ -231,8 +230,7 @@ mod tests {
         assert_eq!(launch.validate(), Ok(()));
         launch.booster.fin_force.station_m = 0.1;
         let error = launch.validate().unwrap_err().to_string();
-        let expected =
-            "launch.booster.fins is 0.1; between launch.booster.length_m below the vehicle and 0 is accepted";
+        let expected = "launch.booster.fins is 0.1; between launch.booster.length_m below the vehicle and 0 is accepted";
         assert_eq!(error, expected);
     }
 }

@@ -75,9 +75,7 @@ pub fn from_toml(text: &str, origin: &str) -> Result<Mission, MissionError> {
     for (defaults, are_ours) in [(CONTROLLER, true), (DEFAULTS, false)] {
         let defaults = DeTable::parse(defaults).map_err(not_a_mission)?;
         if are_ours {
-            leaves("", defaults.get_ref(), &mut |key| {
-                changed.extend(Some(key).filter(|key| stated.contains(key)))
-            });
+            leaves("", defaults.get_ref(), &mut |key| changed.extend(Some(key).filter(|key| stated.contains(key))));
         }
         fill(table.get_mut(), defaults.into_inner());
     }
@@ -112,8 +110,7 @@ pub fn from_toml(text: &str, origin: &str) -> Result<Mission, MissionError> {
 /// Calls a function for the path of every value of a table.
 fn leaves(prefix: &str, table: &DeTable<'_>, found: &mut dyn FnMut(String)) {
     for (key, value) in table {
-        let path =
-            if prefix.is_empty() { key.get_ref().to_string() } else { format!("{prefix}.{}", key.get_ref()) };
+        let path = if prefix.is_empty() { key.get_ref().to_string() } else { format!("{prefix}.{}", key.get_ref()) };
         match value.get_ref() {
             DeValue::Table(inner) => leaves(&path, inner, found),
             _ => found(path),
@@ -128,9 +125,7 @@ fn fill<'a>(table: &mut DeTable<'a>, defaults: DeTable<'a>) {
         match (table.get_mut(&key), default) {
             (None, default) if !optional => _ = table.insert(key, default),
             (Some(value), default) => {
-                if let (DeValue::Table(inner), DeValue::Table(default)) =
-                    (value.get_mut(), default.into_inner())
-                {
+                if let (DeValue::Table(inner), DeValue::Table(default)) = (value.get_mut(), default.into_inner()) {
                     fill(inner, default);
                 }
             }

@@ -79,10 +79,7 @@ pub(super) fn vehicle(mission: &Mission) -> Check {
     if mission.name.trim().is_empty() {
         return Err(BadValue { key: "name".to_owned(), found: "\"\"".to_owned(), required: "a name" });
     }
-    mission
-        .airframe
-        .validate()
-        .map_err(|bad| BadValue { key: format!("airframe.{}", bad.key), ..bad.into() })?;
+    mission.airframe.validate().map_err(|bad| BadValue { key: format!("airframe.{}", bad.key), ..bad.into() })?;
     mission.lot.as_deref().map_or(Ok(()), Lot::validate)?;
     if let Some(launch) = &mission.launch {
         launch.validate()?;
@@ -113,8 +110,7 @@ pub(super) fn numbers(mission: &Mission, looked_at: &dyn Fn(&str) -> bool) -> Ch
     let table = Value::try_from(mission).map_err(bad_text)?;
     each_number("", &table, &mut |key, found| {
         let range = RANGES.iter().find_map(|(required, least, most, keys)| {
-            let holds =
-                |of: &&str| key.strip_prefix(of).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
+            let holds = |of: &&str| key.strip_prefix(of).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
             keys.iter().any(|of| holds(&of)).then_some((*required, *least..=*most))
         });
         match range {
@@ -132,11 +128,7 @@ pub(super) fn numbers(mission: &Mission, looked_at: &dyn Fn(&str) -> bool) -> Ch
     ] {
         if looked_at(key) && least > most {
             let found = format!("[{least}, {most}]");
-            return Err(BadValue {
-                key: key.to_owned(),
-                found,
-                required: "two numbers, the smaller one first",
-            });
+            return Err(BadValue { key: key.to_owned(), found, required: "two numbers, the smaller one first" });
         }
     }
     Ok(())
