@@ -5,6 +5,7 @@ pub(crate) mod campaign;
 pub(crate) mod fly;
 pub(crate) mod hazard;
 pub(crate) mod motors;
+pub(crate) mod new;
 mod single;
 
 use std::io::Write as _;
