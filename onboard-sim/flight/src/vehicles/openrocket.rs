@@ -13,8 +13,6 @@ pub struct Simulated {
     pub roll_inertia_kg_m2: Option<f64>,
     /// The body's cross section where it is widest, unless the design says otherwise.
     pub reference_area_m2: Option<f64>,
-    /// Nose first, on the reference area.
-    pub drag_coefficient: Option<f64>,
 }
 
 /// Reads the first row of an exported flight, in whatever units and order its columns are.
@@ -29,14 +27,13 @@ pub fn read(text: &str) -> Result<Simulated, TableError> {
         ("longitudinal moment of inertia", "kg m2"),
         ("rotational moment of inertia", "kg m2"),
         ("reference area", "m2"),
-        ("drag coefficient", ""),
     ];
     if let Some((_, line)) = text.lines().zip(1..).find(|(line, _)| line.contains("STAGE_SEPARATION")) {
         let required = "simulate the landing vehicle alone, without its booster";
         return Err(TableError::bad(line, "the event", "STAGE_SEPARATION", required));
     }
     let first = table::rows(text, &wanted, 2)?.next().transpose()?;
-    let Some((_, [_, Some(mass_kg), cg, pitch, roll, area, drag])) = first else {
+    let Some((_, [_, Some(mass_kg), cg, pitch, roll, area])) = first else {
         return Err(TableError::bad(
             text.lines().count(),
             "the table",
@@ -50,7 +47,6 @@ pub fn read(text: &str) -> Result<Simulated, TableError> {
         pitch_inertia_kg_m2: pitch,
         roll_inertia_kg_m2: roll,
         reference_area_m2: area,
-        drag_coefficient: drag,
     })
 }
 
@@ -81,7 +77,6 @@ mod tests {
         let diameter_m = (found.reference_area_m2.unwrap() * 4.0 / core::f64::consts::PI).sqrt();
         assert!((diameter_m - 0.14).abs() < 0.000_5, "{diameter_m}");
         assert_eq!((found.pitch_inertia_kg_m2, found.roll_inertia_kg_m2), (Some(39.48), Some(0.127_67)));
-        assert_eq!(found.drag_coefficient, Some(0.713_5));
     }
 
     #[test]

@@ -5,7 +5,7 @@
 
 use alloc::borrow::ToOwned as _;
 use alloc::format;
-use alloc::string::{String, ToString as _};
+use alloc::string::String;
 use alloc::vec::Vec;
 
 /// Units by what they measure, each with its factor to the first of them, which is that of the SI.
@@ -20,26 +20,20 @@ const UNITS: [&[(&str, f64)]; 6] = [
     &[("n", 1.0), ("kn", 1e3), ("lbf", 4.448_221_62), ("kgf", 9.806_65), ("gf", 9.806_65e-3)],
 ];
 
-/// Why a table cannot be used.
+/// Why a table cannot be used: a header, a unit or a value is wrong.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum TableError {
-    /// No line names the columns.
-    #[error("no line names the columns {wanted}, each with its unit, as in time_s or Time (s)")]
-    NoHeader { wanted: String },
-    /// A value or a unit is wrong.
-    #[error("line {line}: {column} is '{found}'; {required}")]
-    Bad {
-        /// Line, from 1.
-        line: usize,
-        column: &'static str,
-        found: String,
-        required: String,
-    },
+#[error("line {line}: {column} is '{found}'; {required}")]
+pub struct TableError {
+    /// Line, from 1.
+    line: usize,
+    column: &'static str,
+    found: String,
+    required: String,
 }
 
 impl TableError {
     pub(super) fn bad(line: usize, column: &'static str, found: &str, required: &str) -> Self {
-        Self::Bad { line, column, found: found.chars().take(40).collect(), required: required.to_owned() }
+        Self { line, column, found: found.chars().take(40).collect(), required: required.to_owned() }
     }
 }
 
@@ -56,8 +50,7 @@ pub fn factor(si: &str, unit: &str) -> Result<f64, String> {
     if si == unit || si.is_empty() {
         return Ok(1.0);
     }
-    let known = UNITS.iter().find(|kind| kind.iter().any(|(name, factor)| *name == si && *factor >= 1.0));
-    let known = known.copied().unwrap_or_default();
+    let known = UNITS.iter().find(|kind| kind[0].0 == si).copied().unwrap_or_default();
     known.iter().find(|(name, _)| *name == unit).map(|(_, factor)| *factor).ok_or_else(|| {
         let names = known.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
         format!("{} is accepted", if names.is_empty() { si } else { format!("a unit of {names}") })
@@ -83,7 +76,9 @@ pub fn rows<'a, const N: usize>(
     });
     let (separator, names, places, number) = header.ok_or_else(|| {
         let wanted = wanted[..needed].iter().map(|(name, _)| *name).collect::<Vec<_>>().join(" and ");
-        TableError::NoHeader { wanted }
+        let required =
+            format!("a line that names {wanted}, each with its unit, as time_s or Time (s), is needed");
+        TableError::bad(1, "the header", text.lines().next().unwrap_or_default(), &required)
     })?;
     let mut factors = [1.0; N];
     for ((place, (column, si)), into) in places.iter().zip(wanted).zip(&mut factors) {
@@ -97,12 +92,8 @@ pub fn rows<'a, const N: usize>(
         for (k, (column, _)) in wanted.iter().enumerate() {
             let field = places[k].and_then(|place| fields.get(place)).map_or("", |field| field.trim());
             // Where a comma does not separate, it is a decimal point.
-            let value = field
-                .trim_matches('"')
-                .replace(',', ".")
-                .parse()
-                .ok()
-                .filter(|value: &f64| value.is_finite());
+            let value = field.trim_matches('"').replace(',', ".").parse::<f64>();
+            let value = value.ok().filter(|value| value.is_finite());
             if k < needed && value.is_none() {
                 return Err(TableError::bad(number, column, field, "a finite number is accepted"));
             }
@@ -120,7 +111,7 @@ fn named(field: &str) -> (String, &str) {
         None => field.rsplit_once('_'),
     }
     .unwrap_or((field, ""));
-    (name.trim().to_lowercase().to_string(), unit)
+    (name.trim().to_lowercase(), unit)
 }
 
 #[cfg(test)]
@@ -169,7 +160,7 @@ mod tests {
         for (text, wrong) in [
             (
                 "t,f\n1,2\n",
-                "no line names the columns time and thrust, each with its unit, as in time_s or Time (s)",
+                "line 1: the header is 't,f'; a line that names time and thrust, each with its unit, as time_s or Time (s), is needed",
             ),
             ("time_s,thrust_kg\n", "line 1: thrust is 'kg'; a unit of n, kn, lbf, kgf, gf is accepted"),
             ("time,thrust\n", "line 1: time is ''; a unit of s, ms, min is accepted"),

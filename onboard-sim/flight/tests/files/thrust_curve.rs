@@ -47,7 +47,7 @@ fn the_error_for_a_bad_file_names_line_and_field() {
         (rasp("T 38 200 0.1 0.3 M"), "line 1: delays is '0.1'; whole seconds as in 6-10-14, P or 0"),
         (rasp("T 3.8 20 0 0.1 0.3 M\n1 50\n3 0"), "line 1: diameter is '3.8 mm'; 5 to 500 mm"),
         (rasp("T 1.5 8 0 0.1 0.3 M\n1 50\n3 0"), "line 1: diameter is '1.5 mm'; 5 to 500 mm"),
-        (rasp("T 38 7.9 0 0.1 0.3 M\n1 50\n3 0"), "line 1: length is '7.9 mm'; 10 to 10,000 mm"),
+        (rasp("T 38 7.9 0 0.1 0.3 M\n1 50\n3 0"), "line 1: total mass is '0.3 kg in 38 x 8 mm'"),
         (rasp("T 38 20.0 0 0.1 0.3 M\n1 50\n3 0"), "line 1: total mass is '0.3 kg in 38 x 20 mm'"),
         (
             rasp("T 38 200 0 0.1 0.3 M\n2 0\n3.5 50\n5 0"),

@@ -14,8 +14,6 @@ const EXHAUST_M_S: core::ops::RangeInclusive<f64> = 100.0..=50_000.0;
 const DENSEST_KG_M3: f64 = 10_000.0;
 /// Diameters of motors, m: 6 to 161 mm (thrustcurve.org). Many have one of 24 to 54 mm, which are 0.9 to 2.1 inches.
 const DIAMETERS_M: core::ops::RangeInclusive<f64> = 0.005..=0.5;
-/// Lengths of motors, m: 26 to 1829 mm, and one file of 9122 mm (thrustcurve.org).
-const LENGTHS_M: core::ops::RangeInclusive<f64> = 0.01..=10.0;
 /// The latest first thrust, s: up to 0.36 in thrustcurve.org.
 const BEGINS_S: f64 = 1.0;
 
@@ -32,13 +30,9 @@ pub(super) fn check(curve: &ThrustCurve, line: usize) -> Result<(), ThrustCurveE
         ));
     }
     let (diameter_m, length_m) = (curve.diameter_m(), curve.length_m());
-    for (field, size_m, accepted, required) in [
-        ("diameter", diameter_m, DIAMETERS_M, "5 to 500 mm are accepted"),
-        ("length", length_m, LENGTHS_M, "10 to 10,000 mm are accepted"),
-    ] {
-        if !accepted.contains(&size_m) {
-            return Err(bad(line, field, &format!("{:?} mm", libm::round(1e6 * size_m) / 1e3), required));
-        }
+    if !DIAMETERS_M.contains(&diameter_m) {
+        let found = format!("{:?} mm", libm::round(1e6 * diameter_m) / 1e3);
+        return Err(bad(line, "diameter", &found, "5 to 500 mm are accepted"));
     }
     let begins_s = curve.points().iter().find(|point| point.thrust_n > 0.0).map_or(0.0, |point| point.time_s);
     if begins_s > BEGINS_S {
