@@ -71,6 +71,13 @@ enum Command {
         #[arg(long)]
         passphrase: bool,
     },
+    /// Write a mission file for a rocket of one's own.
+    ///
+    /// On a terminal it asks for what a club measures, one question a line. With --like or --from it does not ask.
+    #[command(
+        after_help = "Examples:\n  onboard-sim new ours\n  onboard-sim new ours --from openrocket.csv --length 0.7 --motor stand.csv \\\n    --motor-data ours 38 200 0.19 0.365"
+    )]
+    New(cli::new::NewArguments),
     /// List the built-in profiles, or print one as a file to start from.
     #[command(after_help = "Example: onboard-sim profiles --show mk3")]
     Profiles {
@@ -104,6 +111,7 @@ fn run(arguments: Arguments) -> anyhow::Result<ExitCode> {
         Command::Card(arguments) => cli::card::run(&arguments),
         Command::Hazard(arguments) => cli::hazard::run(&arguments),
         Command::Keygen { file, passphrase } => make_key(&file, passphrase),
+        Command::New(arguments) => cli::new::run(&arguments),
         Command::Profiles { show } => profiles(show.as_deref()),
         Command::Fly(arguments) => cli::fly::run(arguments),
         Command::Manual { shell } => manual(Arguments::command(), shell),

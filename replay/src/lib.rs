@@ -149,7 +149,7 @@ enum Command {
     /// gets an interval: GO (exit code 0) if the probability of a rate below the limit is at most the risk that is taken,
     /// NO-GO (exit code 1) if not.
     #[command(
-        after_help = "Examples:\n  replay fit flight.mcap --write-mission better.toml\n  replay fit stand.csv --motor H45W\n  replay fit fits.json --mission mk3 --day day --flights 1000"
+        after_help = "Examples:\n  replay fit flight.mcap --write ours.toml\n  replay fit stand.csv --motor H45W\n  replay fit fits.json --mission mk3 --day day --flights 1000"
     )]
     Fit(fit::Args),
     /// Prints a shell's completions.

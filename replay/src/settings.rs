@@ -166,21 +166,38 @@ pub fn mission_with(mission_toml: &str, settings: &[Setting]) -> Result<Mission,
     })
 }
 
-/// The text of a mission with other settings, whose names are not checked.
+/// The text of a mission with other settings, whose names are not checked; comments and order stay.
 ///
 /// # Errors
 /// The text is not TOML.
 pub fn mission_toml_with(mission_toml: &str, settings: &[Setting]) -> Result<String, SettingError> {
-    if settings.is_empty() {
-        // Without settings the text stays the same, byte for byte.
-        return Ok(mission_toml.to_owned());
+    let settings: Vec<_> = settings.iter().map(|setting| (setting.clone(), String::new())).collect();
+    mission_toml_with_reasons(mission_toml, &settings)
+}
+
+/// As [`mission_toml_with`], with a comment behind each line that is changed.
+pub(crate) fn mission_toml_with_reasons(
+    mission_toml: &str,
+    settings: &[(Setting, String)],
+) -> Result<String, SettingError> {
+    let wrong = |reason| SettingError::Toml { origin: "profile.toml".to_owned(), reason };
+    let not_toml = |error: toml_edit::TomlError| wrong(error.to_string());
+    let mut document: toml_edit::DocumentMut = mission_toml.parse().map_err(not_toml)?;
+    for (Setting { path, value, .. }, comment) in settings {
+        let mut value: toml_edit::Value = as_whole(value).to_string().parse().map_err(not_toml)?;
+        if !comment.is_empty() {
+            value.decor_mut().set_suffix(format!(" # {comment}"));
+        }
+        let (sections, key) = path.rsplit_once('.').unwrap_or(("", path));
+        let mut table: &mut dyn toml_edit::TableLike = document.as_table_mut();
+        for section in sections.split('.').filter(|section| !section.is_empty()) {
+            let inner = table.entry(section).or_insert_with(toml_edit::table);
+            let no_section = || wrong(format!("{path}: {section} is no section"));
+            table = inner.as_table_like_mut().ok_or_else(no_section)?;
+        }
+        *table.entry(key).or_insert(toml_edit::Item::None) = value.into();
     }
-    let mut table = parsed_table(mission_toml, "profile.toml")?;
-    for setting in settings {
-        insert(&mut table, &setting.path, as_whole(&setting.value));
-    }
-    toml::to_string(&table)
-        .map_err(|error| SettingError::Toml { origin: "profile.toml".to_owned(), reason: error.to_string() })
+    Ok(document.to_string())
 }
 
 /// The random draw with other settings: those of the section `truth`. Other settings are ignored.

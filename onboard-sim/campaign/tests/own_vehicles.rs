@@ -2,6 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
 
 use campaign::attainable::best_height_m;
+use campaign::check::{Verdict, check};
 use campaign::row::Row;
 use campaign::tally;
 use flight::vehicle::thrust_curve::ThrustCurve;
@@ -123,10 +124,14 @@ fence_radius_m = 120.0
     )
 }
 
+fn recipe(text: &str, set: &str, seed: u64) -> Recipe {
+    let set = (set, Dispersion::builtin_toml(set).unwrap());
+    Recipe { seed, ..Recipe::from_texts(("drawn", text), set).unwrap() }
+}
+
 /// How many stand, and how many perfect information lands, of a vehicle's flights in a set of dispersions.
 fn flown(text: &str, set: &str, seed: u64, flights: u64) -> (u64, u64) {
-    let recipe = Recipe::from_texts(("drawn", text), (set, Dispersion::builtin_toml(set).unwrap())).unwrap();
-    let recipe = Recipe { seed, ..recipe };
+    let recipe = recipe(text, set, seed);
     let rows: Vec<Row> = (0..flights).into_par_iter().map(|number| tally::fly(&recipe, number).unwrap()).collect();
     let stand = rows.iter().filter(|row| row.landing().stands).count() as u64;
     let windows: Vec<_> = rows.iter().filter_map(Row::attainable).collect();
@@ -144,26 +149,18 @@ fn table() {
         if let Ok(folder) = std::env::var("FOLDER") {
             std::fs::write(format!("{folder}/{vehicle}.toml"), &text).unwrap();
         }
-        let mission = match flight::vehicles::mission::from_toml(&text, "drawn") {
-            Ok(mission) => mission,
-            Err(error) => {
-                println!("{vehicle} {error}");
-                continue;
-            }
-        };
-        let even = flight::guidance::vertical::EvenLanding::of(&mission);
-        let tilt_deg = even.tilt_rad.map_or(-1.0, f64::to_degrees);
-        let airframe = &mission.airframe;
-        let starts = if mission.drop.is_some() { "drone" } else { "apogee" };
-        print!(
-            "{vehicle:3} {:8} {:.2} kg {starts} {:3.0} m tilt {tilt_deg:5.1} tc {:.2} v0 {:.1} h {:.1} gimbal {:.1} arm {:.2}",
-            airframe.motor, airframe.mass.loaded_kg, mission.start_height_m(), even.carried_s, even.speed_m_s, even.height_m,
-            airframe.gimbal.limit_deg, (airframe.fins.station_m - airframe.mass.loaded_cg_station_m) / airframe.body.length_m,
-        );
+        let recipe = recipe(&text, "field", 7001);
+        let page = check(&recipe, &[], 0, &|_| ()).unwrap();
+        let rows: Vec<String> = page.rows.iter().filter(|row| row.verdict > Verdict::Ok).map(|row| format!("{} {} ({} / {})", row.what, row.verdict, row.found, row.beside)).collect();
+        print!("{vehicle:3} {} {}", page.verdict(), page.title);
+        if page.verdict() == Verdict::No && number("NO", 1) == 0 {
+            println!(" {}", rows.join("; "));
+            continue;
+        }
         for set in ["field", "real"] {
             let (stand, attainable) = flown(&text, set, 7001, flights);
             print!(" | {set} {stand}/{attainable}");
         }
-        println!();
+        println!(" {}", rows.join("; "));
     }
 }

@@ -6,6 +6,7 @@ pub(crate) mod card;
 pub(crate) mod check;
 pub(crate) mod fly;
 pub(crate) mod hazard;
+pub(crate) mod new;
 mod single;
 
 use std::io::Write as _;

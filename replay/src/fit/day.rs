@@ -567,7 +567,7 @@ pub fn print_learn(learnt: &Learnt, output: &mut impl Write) -> io::Result<()> {
 pub(super) struct Arguments {
     /// Learn the motor lot, the airframe and the site, and write mission.toml and dispersion.toml of the next day into this
     /// directory, for `onboard-sim campaign`. Existing files are kept.
-    #[arg(long, value_name = "DIR", conflicts_with = "write_mission")]
+    #[arg(long, value_name = "DIR", conflicts_with = "write")]
     day: Option<PathBuf>,
     /// Simulate this many flights of the next day for the landing rate, and GO or NO-GO; a thousand take some minutes.
     #[arg(long, value_name = "N")]

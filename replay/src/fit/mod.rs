@@ -28,7 +28,6 @@ mod turning;
 mod wind;
 
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -39,15 +38,17 @@ use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use self::along::{ACCELEROMETER_SCALE_SIGMA, Along};
-pub use self::burn::{StandError, fit_stand, read_stand};
+pub use self::burn::{StandError, fit_stand};
 use self::calibration::{Calibration, Table};
 use self::day::Learnt;
 use self::least_squares::{Prior, Solution};
 pub use self::trace::{Frame, Trace, TraceError};
 use self::turning::Turning;
-use crate::cli::{Outcome, answer, refuse_existing, say, warn_of_damage, write_new};
+use crate::cli::{Outcome, answer, say, warn_of_damage};
+use crate::info::utc;
+use crate::output::{Destination, Overwrite, write_whole};
 use crate::print::{counted, print_json, shown};
-use crate::settings::{Setting, SettingError, mission_toml_with, mission_with};
+use crate::settings::{Setting, SettingError, mission_toml_with_reasons, mission_with};
 
 /// 97.5 % point of the normal distribution.
 pub const Z_95: f64 = 1.959_963_984_540_054;
@@ -371,29 +372,38 @@ fn gimbal(fit: &mut Fit, turning: Result<Turning, String>) {
     }
 }
 
-/// The text of a mission with what a fit found, each change with its interval in a comment at the top.
+/// The text of a mission with what a fit found of its vehicle: comments and order stay, and a changed line says from which flight
+/// it is. `flown` is the mission that the fit's scales are over, and `flight` its name and day.
 ///
 /// # Errors
 /// The mission's text is none, or a value that was found is outside the range of its key.
-pub fn patched(mission_toml: &str, fit: &Fit) -> Result<String, SettingError> {
+pub fn patched(mission_toml: &str, flown: &Mission, fit: &Fit, flight: &str) -> Result<String, SettingError> {
     let mission = mission_with(mission_toml, &[])?;
-    let airframe = &mission.airframe;
-    let mut changes: Vec<(&str, f64, &Parameter)> = Vec::new();
-    let mut change = |path, value: &dyn Fn(f64) -> f64, name: &str| {
-        if let Some(found) = fit.get(name) {
-            changes.push((path, value(found.value), found));
-        }
+    let effective = toml::Value::try_from(&mission)
+        .map_err(|error| SettingError::Toml { origin: mission.name.clone(), reason: error.to_string() })?;
+    let airframe = &flown.airframe;
+    let mut settings: Vec<(Setting, String)> = Vec::new();
+    let mut change = |path: &str, value: &dyn Fn(f64) -> f64, name: &str| {
+        let Some(found) = fit.get(name) else { return };
+        let [value, low, high] = [found.value, found.low, found.high].map(value);
+        let sigma = (high - low) / (2.0 * Z_95);
+        let was = path.split('.').try_fold(&effective, |table, section| table.get(section));
+        let was = was.map_or_else(|| "not stated".to_owned(), ToString::to_string);
+        let reason = format!("{flight}, 95 % {} to {} (was {was})", digits(low, sigma), digits(high, sigma));
+        let value = toml::Value::Float(digits(value, 1e-2 * sigma).parse().unwrap_or(value));
+        settings.push((Setting { path: path.to_owned(), value, at_s: None }, reason));
     };
-    // Where the two cannot be told apart, both have the scale of the sum.
+    // Scales are per mass. Where the two cannot be told apart, both have the scale of the sum.
+    let per_mass = mission.airframe.mass.loaded_kg / airframe.mass.loaded_kg;
     let apart = ["body_drag_scale", "fin_drag_scale"].iter().all(|name| fit.get(name).is_some());
     let (body, fins) =
         if apart { ("body_drag_scale", "fin_drag_scale") } else { ("drag_scale", "drag_scale") };
     let (along, open) = (airframe.body.axial_drag_coefficient, airframe.fins.drag_coefficient);
-    change("airframe.body.axial_drag_coefficient", &|scale| along * scale, body);
-    change("airframe.fins.drag_coefficient", &|scale| open * scale, fins);
+    change("airframe.body.axial_drag_coefficient", &|scale| along * scale * per_mass, body);
+    change("airframe.fins.drag_coefficient", &|scale| open * scale * per_mass, fins);
     let legs_m2 = airframe.legs.drag_area_m2;
     if legs_m2 > 0.0 {
-        change("airframe.legs.drag_area_m2", &|scale| legs_m2 * scale, body);
+        change("airframe.legs.drag_area_m2", &|scale| legs_m2 * scale * per_mass, body);
     }
     change("airframe.gimbal.servo.delay_s", &|delay_s| delay_s, "gimbal_delay");
     change("airframe.gimbal.servo.rate_deg_s", &|rate_deg_s| rate_deg_s, "gimbal_rate");
@@ -405,21 +415,9 @@ pub fn patched(mission_toml: &str, fit: &Fit) -> Result<String, SettingError> {
     change("estimator.gnss_horizontal_m", &|noise| noise, "gnss_horizontal_noise");
     change("estimator.gnss_vertical_m", &|noise| noise, "gnss_vertical_noise");
     change("estimator.lidar_m", &|noise| noise, "lidar_noise");
-    let setting = |(path, value, _): &(&str, f64, &Parameter)| Setting {
-        path: (*path).to_owned(),
-        value: toml::Value::Float(*value),
-        at_s: None,
-    };
-    let settings: Vec<Setting> = changes.iter().map(setting).collect();
-    let text = mission_toml_with(mission_toml, &settings)?;
+    let text = mission_toml_with_reasons(mission_toml, &settings)?;
     mission_with(&text, &[])?;
-    let mut head = format!("# {} with what was found in {}:\n", fit.mission, one_line(&fit.source));
-    for (path, value, found) in changes {
-        let Parameter { name, low, high, unit, .. } = found;
-        // Writing to a String cannot fail.
-        let _ = writeln!(head, "# {path} = {value:.6}, from {name} {low:.6} to {high:.6} {unit} (95 %)");
-    }
-    Ok(head + &text)
+    Ok(text)
 }
 
 /// Text for a comment: without line breaks and control characters.
@@ -583,9 +581,10 @@ pub(crate) struct Args {
     /// The motor that a table is compared with: a built-in one, or a .eng or .rse file.
     #[arg(long, value_name = "NAME|FILE")]
     motor: Option<String>,
-    /// Write the mission of the only log, with what was found of its vehicle. An existing file is kept.
-    #[arg(long, value_name = "FILE")]
-    write_mission: Option<PathBuf>,
+    /// Put what was found in the only log into this mission's file; its comments stay. If there is no such file, it gets the
+    /// mission that was flown.
+    #[arg(long, value_name = "FILE.toml")]
+    write: Option<PathBuf>,
     #[command(flatten)]
     day: day::Arguments,
     /// Answer in JSON.
@@ -601,8 +600,8 @@ struct Earlier {
 
 impl Args {
     pub(crate) fn run(self) -> Result<Outcome> {
-        if self.write_mission.is_some() && (self.files.len() != 1 || !is_log(&self.files[0])) {
-            bail!("--write-mission takes the log of one flight: its mission is changed");
+        if self.write.is_some() && (self.files.len() != 1 || !is_log(&self.files[0])) {
+            bail!("--write takes the log of one flight: its mission is changed");
         }
         if let Some(motor) = &self.motor
             && !self.files.iter().any(|file| ends_in(file, "csv"))
@@ -610,9 +609,6 @@ impl Args {
             bail!(
                 "--motor {motor}: only a table of a test stand (CSV) is compared with a motor; a log has its own"
             );
-        }
-        if let Some(path) = &self.write_mission {
-            refuse_existing(path)?;
         }
         self.day.check()?;
         let (mut fits, mut refused, mut flown) = (Vec::new(), false, None);
@@ -654,19 +650,40 @@ impl Args {
             let motor = self.motor.as_deref().with_context(|| {
                 format!("{name}: --motor is missing: a table is compared with the motor's certified curve")
             })?;
-            let rows = read_stand(&read()?).with_context(|| name.clone())?;
+            let rows = flight::vehicles::thrust_curve::read_stand(&read()?).with_context(|| name.clone())?;
             return Ok(vec![fit_stand(&name, &rows, &curve_of(motor)?).context(name)?]);
         }
         let trace = Trace::open(file)?;
         let found = fit(&trace);
-        if let Some(path) = &self.write_mission {
-            let text = patched(&trace.mission_toml, &found).context("the mission with what was found")?;
-            write_new(path, &text)?;
-            say(&format!("{}: --profile of `onboard-sim fly` and `campaign` takes it", path.display()));
+        if let Some(path) = &self.write {
+            write_into(path, file, &trace, &found)?;
         }
         flown.get_or_insert(trace.mission_toml);
         Ok(vec![found])
     }
+}
+
+/// Puts what was found in a log into a mission's file.
+fn write_into(path: &Path, log: &Path, trace: &Trace, found: &Fit) -> Result<()> {
+    let name = path.display();
+    let text = match std::fs::read_to_string(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => trace.mission_toml.clone(),
+        read => read.with_context(|| format!("{name}: cannot be read"))?,
+    };
+    let own = flight::vehicles::mission::from_toml(&text, &name.to_string())?.name;
+    if own != found.mission {
+        bail!("{name}: is the mission of {own}, and the log is of {}", found.mission);
+    }
+    let flight = log.file_stem().unwrap_or_default().to_string_lossy();
+    let day = trace.last_ns.map_or_else(String::new, |last_ns| {
+        format!(", {}", utc(last_ns).split('T').next().unwrap_or_default())
+    });
+    let flight = one_line(&format!("flight {flight}{day}"));
+    let text = patched(&text, &trace.mission, found, &flight).context("the mission with what was found")?;
+    let destination = Destination { path, overwrite: Overwrite::Always };
+    write_whole(destination, log, |file| file.write_all(text.as_bytes()))?;
+    say(&format!("{name}: --profile of `onboard-sim fly`, `campaign` and `card` takes it"));
+    Ok(())
 }
 
 /// Leaves out what is there already under another name.

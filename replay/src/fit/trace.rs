@@ -55,6 +55,8 @@ pub struct Trace {
     pub landed: Option<bool>,
     /// Tells what was recorded from any other flight.
     pub content: Option<u64>,
+    /// When the log ends, ns of Unix time.
+    pub last_ns: Option<u64>,
 }
 
 /// Why nothing can be learnt from a log.
@@ -91,7 +93,8 @@ impl Trace {
     pub fn new(name: &str, mission: Mission, mission_toml: &str) -> Self {
         let mission_toml = mission_toml.to_owned();
         let name = name.to_owned();
-        Self { name, mission, mission_toml, frames: Vec::new(), damage: None, landed: None, content: None }
+        let frames = Vec::new();
+        Self { name, mission, mission_toml, frames, damage: None, landed: None, content: None, last_ns: None }
     }
 
     /// Adds a frame; one with numbers that are not finite is left out.
@@ -205,7 +208,8 @@ impl Trace {
             None => Err(TraceError::NoFrames { name, found }),
             Some(trace) => {
                 let damage = log.damage().map(ToString::to_string);
-                Ok(Self { damage, landed, content: Some(digest(naming.iter().map(Vec::as_slice))), ..trace })
+                let content = Some(digest(naming.iter().map(Vec::as_slice)));
+                Ok(Self { damage, landed, content, last_ns: log.last_log_time_ns(), ..trace })
             }
         }
     }

@@ -606,7 +606,7 @@ fn size_text(bytes: u64) -> String {
 }
 
 /// To the millisecond.
-fn utc(unix_ns: u64) -> String {
+pub(crate) fn utc(unix_ns: u64) -> String {
     const MILLISECOND_NS: u64 = 1_000_000;
     OffsetDateTime::from_unix_timestamp_nanos(i128::from(unix_ns - unix_ns % MILLISECOND_NS))
         .ok()

@@ -140,21 +140,37 @@ fn val_simulation_the_gimbals_feedback_shows_its_delay_and_rate() {
 }
 
 #[test]
-fn the_mission_with_what_was_found_can_be_loaded_and_is_not_overwritten() {
+fn what_was_found_goes_into_the_missions_file() {
     let directory = tempfile::tempdir().unwrap();
-    let patch = directory.path().join("patch.toml");
+    let path = directory.path().join("ours.toml");
     let log = LANDED.log.to_str().unwrap();
-    let write = ["--write-mission", patch.to_str().unwrap()];
+    let write = ["--write", path.to_str().unwrap()];
+    // Without a file, the flown mission; then that file again, which has got heavier and a remark.
     let (found, _) = fits(&[[log].as_slice(), &write].concat());
-    let text = std::fs::read_to_string(&patch).unwrap();
-    let mission = flight::vehicles::mission::from_toml(&text, "patch").unwrap();
-    let delay_s = mission.airframe.gimbal.servo.delay_s;
-    assert!((delay_s - found[0].get("gimbal_delay").unwrap().value).abs() < 1e-9, "{delay_s}");
-    assert!(text.starts_with("# mk2 with what was found in"), "{text}");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let mission = flight::vehicles::mission::from_toml(&text, "ours").unwrap();
+    let delay = found[0].get("gimbal_delay").unwrap();
+    assert!((mission.airframe.gimbal.servo.delay_s - delay.value).abs() < 0.01 * delay.sigma);
+    let line = text.lines().find(|line| line.starts_with("delay_s = ")).unwrap();
+    let stem = LANDED.log.file_stem().unwrap().to_str().unwrap();
+    assert!(line.contains(&format!(" # flight {stem}, ")) && line.ends_with(" (was 0.02)"), "{line}");
+    assert!(line.contains(", 95 % 0.01") || line.contains(", 95 % 0.02"), "{line}");
+    let loaded_kg = mission.airframe.mass.loaded_kg;
+    let heavier = text.replace(&format!("loaded_kg = {loaded_kg:?}"), "# weighed\nloaded_kg = 3.3");
+    assert_ne!(heavier, text);
+    std::fs::write(&path, &heavier).unwrap();
+    fits(&[[log].as_slice(), &write].concat());
+    let again = std::fs::read_to_string(&path).unwrap();
+    let heavy = flight::vehicles::mission::from_toml(&again, "ours").unwrap();
+    assert!(again.contains("# weighed\nloaded_kg = 3.3\n"), "{again}");
+    // Drag is per mass: as much more of it.
+    let [before, after] = [mission, heavy]
+        .map(|mission| mission.airframe.body.axial_drag_coefficient / mission.airframe.mass.loaded_kg);
+    assert!((after / before - 1.0).abs() < 1e-3, "{before} {after}");
+    // Another vehicle's file stays as it is.
+    std::fs::write(&path, heavier.replace("name = \"mk2\"", "name = \"other\"")).unwrap();
     let (code, _, stderr) = asked(&[[log].as_slice(), &write].concat());
-    assert_eq!(code, 2);
-    assert!(stderr.contains("exists already"), "{stderr}");
-    assert_eq!(std::fs::read_to_string(&patch).unwrap(), text);
+    assert!(code == 2 && stderr.contains("is the mission of other, and the log is of mk2"), "{stderr}");
 }
 
 #[test]

@@ -6,11 +6,14 @@
 //! * [`mission`]: missions, from TOML.
 //! * [`airframe`]: the airframes of the built-in missions.
 //! * [`motors`]: the built-in motors, by name.
-//! * [`thrust_curve`]: motor files, RASP (`.eng`) and RockSim (`.rse`).
+//! * [`thrust_curve`]: motor files, RASP (`.eng`) and RockSim (`.rse`), and tables of a test stand.
+//! * [`openrocket`]: a vehicle as OpenRocket simulates it. [`table`]: tables whose columns say their units.
 //! * [`file_error`]: why a mission cannot be used.
 
 pub mod airframe;
 pub mod file_error;
 pub mod mission;
 pub mod motors;
+pub mod openrocket;
+pub mod table;
 pub mod thrust_curve;

@@ -1,7 +1,8 @@
 use proptest::prelude::*;
 
 use flight::vehicle::thrust_curve::ThrustCurve;
-use flight::vehicles::thrust_curve::{from_file_text, from_rasp, from_rocksim};
+use flight::vehicles::openrocket;
+use flight::vehicles::thrust_curve::{from_file_text, from_rasp, from_rocksim, from_stand};
 
 /// A trapezium of 120 N s: 1 s up to 40 N, 2 s level, 1 s down.
 const TRAPEZIUM: &str = "; a comment\r\nT40 38 200 6-10 0.12 0.3 Some Maker\n1 40 ; inline\n3 40\n4 0\n;\n";
@@ -43,6 +44,15 @@ fn the_error_for_a_bad_file_names_line_and_field() {
     for (found, expected) in [
         (rasp("; nothing"), "the motor's header is missing; a header is: name, diameter in mm"),
         (rasp("T 38 x 0 0.1 0.2 M"), "line 1: length is 'x'; a number, 0 or more, is accepted"),
+        (rasp("T 38 200 0.1 0.3 M"), "line 1: delays is '0.1'; whole seconds as in 6-10-14, P or 0"),
+        (rasp("T 3.8 20 0 0.1 0.3 M\n1 50\n3 0"), "line 1: diameter is '3.8 mm'; 5 to 500 mm"),
+        (rasp("T 1.5 8 0 0.1 0.3 M\n1 50\n3 0"), "line 1: diameter is '1.5 mm'; 5 to 500 mm"),
+        (rasp("T 38 7.9 0 0.1 0.3 M\n1 50\n3 0"), "line 1: total mass is '0.3 kg in 38 x 8 mm'"),
+        (rasp("T 38 20.0 0 0.1 0.3 M\n1 50\n3 0"), "line 1: total mass is '0.3 kg in 38 x 20 mm'"),
+        (
+            rasp("T 38 200 0 0.1 0.3 M\n2 0\n3.5 50\n5 0"),
+            "line 1: the first thrust is 'at 3.5 s'; a curve begins",
+        ),
         (rasp("T 38 1"), "line 1: the header is 'T 38 1'; a header is: name"),
         (rasp("T 38 1 0 0.2 0.1 M"), "line 1: propellant mass is '0.2 kg of 0.1 kg'; above 0 and below"),
         (rasp("T 1 1 0 1 2 M\n1 5\n1 4"), "line 3: time is '1'; times must increase"),
@@ -65,5 +75,12 @@ proptest! {
     fn any_text_is_answered(text in "\\PC*") {
         let _ = from_rasp(&text).is_ok();
         let _ = from_rocksim(&text).is_ok();
+        let _ = openrocket::read(&text).is_ok() || openrocket::read(&format!("time_s,mass_g\n{text}")).is_ok();
+    }
+
+    #[test]
+    fn any_table_of_a_stand_is_answered(rows in prop::collection::vec((-1e3..1e3_f64, -1e6..1e6_f64), 0..60)) {
+        let lines: String = rows.iter().map(|(time, thrust)| format!("{time}\t{thrust}\n")).collect();
+        let _ = from_stand("T 38 200 P 0.1 0.3", &format!("time_s\tthrust_n\n{lines}")).is_ok();
     }
 }

@@ -1,8 +1,9 @@
-//! Motor files in the two formats that hobbyists use: RASP (`.eng`) and `RockSim` (`.rse`).
+//! Motor files in the two formats that hobbyists use, RASP (`.eng`) and `RockSim` (`.rse`), and tables of a test stand.
 
 mod plausible;
 mod rasp;
 mod rocksim;
+mod stand;
 
 use alloc::borrow::ToOwned as _;
 use alloc::format;
@@ -12,6 +13,8 @@ use alloc::vec::Vec;
 use crate::vehicle::thrust_curve::{MotorData, ThrustCurve, ThrustPoint};
 
 pub use self::rasp::to_rasp;
+pub use self::stand::{from_stand, read_stand};
+use super::table::TableError;
 
 /// Why a motor file cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -36,6 +39,9 @@ pub enum ThrustCurveError {
     /// The file name has no known ending.
     #[error("motor file '{file_name}': names that end in .eng (RASP) and .rse (RockSim) are accepted")]
     UnknownFormat { file_name: String },
+    /// The table of a test stand is wrong.
+    #[error(transparent)]
+    Table(#[from] TableError),
     /// The text is not XML.
     #[error("not XML: {0}")]
     Xml(String),

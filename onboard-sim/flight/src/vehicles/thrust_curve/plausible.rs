@@ -1,4 +1,4 @@
-//! Finds masses and sizes in the wrong unit: a motor with grams in the place of kilograms parses, but cannot exist.
+//! Finds masses, sizes and times in the wrong unit or place: a motor with grams in the place of kilograms parses, but cannot exist.
 
 use alloc::format;
 use core::f64::consts::PI;
@@ -12,6 +12,10 @@ use super::{ThrustCurveError, bad};
 const EXHAUST_M_S: core::ops::RangeInclusive<f64> = 100.0..=50_000.0;
 /// Highest mass over volume of the casing, kg/m^3: that of steel is 7,900, the highest in thrustcurve.org 4,900.
 const DENSEST_KG_M3: f64 = 10_000.0;
+/// Diameters of motors, m: 6 to 161 mm (thrustcurve.org). Many have one of 24 to 54 mm, which are 0.9 to 2.1 inches.
+const DIAMETERS_M: core::ops::RangeInclusive<f64> = 0.005..=0.5;
+/// The latest first thrust, s: up to 0.36 in thrustcurve.org.
+const BEGINS_S: f64 = 1.0;
 
 /// Checks a motor whose masses and size are on this line of its file.
 pub(super) fn check(curve: &ThrustCurve, line: usize) -> Result<(), ThrustCurveError> {
@@ -26,6 +30,15 @@ pub(super) fn check(curve: &ThrustCurve, line: usize) -> Result<(), ThrustCurveE
         ));
     }
     let (diameter_m, length_m) = (curve.diameter_m(), curve.length_m());
+    if !DIAMETERS_M.contains(&diameter_m) {
+        let found = format!("{:?} mm", libm::round(1e6 * diameter_m) / 1e3);
+        return Err(bad(line, "diameter", &found, "5 to 500 mm are accepted"));
+    }
+    let begins_s = curve.points().iter().find(|point| point.thrust_n > 0.0).map_or(0.0, |point| point.time_s);
+    if begins_s > BEGINS_S {
+        let required = "a curve begins with the thrust, within 1 s; cut off what was recorded before";
+        return Err(bad(line, "the first thrust", &format!("at {begins_s} s"), required));
+    }
     let volume_m3 = 0.25 * PI * diameter_m * diameter_m * length_m;
     if total_kg > DENSEST_KG_M3 * volume_m3 {
         return Err(bad(

@@ -86,7 +86,11 @@ fn parse_header(line: &str, number: usize) -> Result<MotorData, ThrustCurveError
     let name = word()?.to_owned();
     let diameter_m = not_negative(number, "diameter", word()?)? / 1000.0;
     let length_m = not_negative(number, "length", word()?)? / 1000.0;
-    word()?;
+    let delays = word()?;
+    // Without them the masses stand one place too far to the left.
+    if delays.parse().is_ok_and(|number: f64| number > 0.0 && number < 1.0) {
+        return Err(bad(number, "delays", delays, "whole seconds as in 6-10-14, P or 0 are accepted"));
+    }
     let propellant_mass_kg = not_negative(number, "propellant mass", word()?)?;
     let total_mass_kg = not_negative(number, "total mass", word()?)?;
     check_masses(number, propellant_mass_kg, total_mass_kg)?;

@@ -1,0 +1,442 @@
+//! A mission file for a rocket of one's own: what a club measures, each with its unit and how it is measured. What is not told is
+//! another mission's, scaled.
+
+use std::collections::BTreeMap;
+use std::f64::consts::PI;
+use std::fmt::Write as _;
+use std::io::{BufRead as _, IsTerminal as _, Write as _};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::{Context as _, bail, ensure};
+use flight::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
+use flight::vehicle::mission::Mission;
+use flight::vehicle::thrust_curve::ThrustCurve;
+use flight::vehicles::{mission, motors, openrocket, table, thrust_curve};
+use toml::Value;
+
+use super::{refuse_loss, text_of, write_file};
+
+const MASS: &str = "airframe.mass.loaded_kg";
+const LENGTH: &str = "airframe.body.length_m";
+const DIAMETER: &str = "airframe.body.diameter_m";
+const MOTOR: &str = "airframe.motor";
+const START: &str = "start.at";
+
+#[derive(clap::Args)]
+pub(crate) struct NewArguments {
+    /// The vehicle's name: NAME.toml is written.
+    name: String,
+    /// Mission that has what is not told, scaled by mass, length and diameter: built-in or TOML file [default: mk3].
+    #[arg(long, value_name = "NAME|FILE")]
+    like: Option<String>,
+    /// OpenRocket's export of a simulated flight (CSV) of the landing vehicle alone, without its booster: its first row has mass,
+    /// centre of gravity, inertias and cross section, in any units. Its drag is that of a flight nose first, and is not used.
+    #[arg(long, value_name = "FILE")]
+    from: Option<PathBuf>,
+    /// Length from the nozzle exit to the tip of the nose, m: OpenRocket counts from the nose.
+    #[arg(long, value_name = "M")]
+    length: Option<f64>,
+    /// Landing motor: a built-in one, a .eng or .rse file, or a test stand's table (.csv with columns such as time_s, thrust_n).
+    #[arg(long, value_name = "NAME|FILE")]
+    motor: Option<String>,
+    /// What a test stand's table does not say of its motor.
+    #[arg(long, num_args = 5, requires = "motor", value_names = ["NAME", "DIAMETER_MM", "LENGTH_MM", "PROPELLANT_KG", "TOTAL_KG"])]
+    motor_data: Option<Vec<String>>,
+    /// The file [default: NAME.toml].
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Replace an existing file.
+    #[arg(long)]
+    force: bool,
+}
+
+/// Shows a question, and gives what is typed.
+type Ask<'a> = &'a mut dyn FnMut(&str) -> anyhow::Result<String>;
+
+pub(crate) fn run(arguments: &NewArguments) -> anyhow::Result<ExitCode> {
+    let path = arguments.out.clone().unwrap_or_else(|| format!("{}.toml", arguments.name).into());
+    refuse_loss(&path, arguments.force)?;
+    let (mut stdin, mut stderr) = (std::io::stdin().lock(), std::io::stderr());
+    let terminal = stdin.is_terminal();
+    let mut ask = |question: &str| {
+        ensure!(terminal, "there is no terminal on which to ask for it");
+        write!(std::io::stderr(), "{question}: ")?;
+        let mut line = String::new();
+        ensure!(stdin.read_line(&mut line)? > 0, "the answers end at: {question}");
+        Ok(line.trim().to_owned())
+    };
+    let nothing_given = arguments.like.is_none() && arguments.from.is_none();
+    if nothing_given && !terminal {
+        writeln!(stderr, "no terminal on which to ask: what is not told is {}'s", mission::DEFAULT)?;
+    }
+    let text = made(arguments, nothing_given && terminal, &mut ask, &path.display().to_string())?;
+    write_file(&path, arguments.force, |file| file.write_all(text.as_bytes()))?;
+    writeln!(stderr, "{}: --profile of `onboard-sim fly`, `campaign` and `card` takes it", path.display())?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The text of the mission, which can be loaded; asks for everything if `asks`, else only for what must be told.
+fn made(arguments: &NewArguments, asks: bool, ask: Ask<'_>, path: &str) -> anyhow::Result<String> {
+    let NewArguments { name, like, from, length, motor, motor_data, .. } = arguments;
+    let mut draft = Draft::like(like.as_deref().unwrap_or(mission::DEFAULT))?;
+    draft.put("name", Value::String(name.clone()), "chosen");
+    draft.put("summary", Value::String(format!("A vehicle like {}", draft.like.name)), "chosen");
+    if let Some(length_m) = length {
+        draft.put(LENGTH, Value::Float(*length_m), "--length");
+    }
+    if let Some(file) = from {
+        draft.simulated(file, ask)?;
+    }
+    if let Some(motor) = motor {
+        draft.motor(motor, motor_data.as_ref(), ask)?;
+    }
+    let mut questions: Vec<Key> = keys().filter(|key| asks && key.place.is_some()).collect();
+    questions.sort_by_key(|key| key.place);
+    for key in questions {
+        let drone = draft.told.get(START).is_some_and(|(at, _)| at.as_str() == Some("drone"));
+        let idle = if drone { "start.height_m" } else { "drop.height_m" };
+        if key.path != idle && !draft.told.contains_key(key.path) {
+            draft.ask(&key, ask)?;
+        }
+    }
+    let text = draft.text()?;
+    mission::from_toml(&text, path)?;
+    Ok(text)
+}
+
+/// A key of a mission that a club measures or decides.
+struct Key {
+    path: &'static str,
+    unit: &'static str,
+    /// What it is, and how it is measured.
+    how: &'static str,
+    /// Powers of mass, length and diameter by which it is scaled.
+    powers: Vec<f64>,
+    /// Among the questions.
+    place: Option<u32>,
+}
+
+/// All of them, in the order of the file.
+fn keys() -> impl Iterator<Item = Key> {
+    include_str!("keys.txt").lines().filter(|line| !line.starts_with('#')).filter_map(|line| {
+        let mut fields = line.split(';').map(str::trim);
+        Some(Key {
+            path: fields.next()?,
+            unit: fields.next()?,
+            how: fields.next()?,
+            powers: fields.next()?.split_whitespace().filter_map(|power| power.parse().ok()).collect(),
+            place: fields.next()?.parse().ok(),
+        })
+    })
+}
+
+/// A mission in the making.
+struct Draft {
+    like: Mission,
+    /// What the other mission states.
+    stated: toml::Table,
+    motor: ThrustCurve,
+    /// What is told, and by what.
+    told: BTreeMap<&'static str, (Value, String)>,
+}
+
+impl Draft {
+    fn like(name: &str) -> anyhow::Result<Self> {
+        let text = text_of(name, mission::BUILTIN, "mission")?;
+        let like = mission::from_toml(&text, name)?;
+        let motor = like.motor_curve.clone();
+        Ok(Self { like, stated: text.parse()?, motor, told: BTreeMap::new() })
+    }
+
+    fn put(&mut self, path: &'static str, value: Value, by: &str) {
+        self.told.insert(path, (value, by.to_owned()));
+    }
+
+    /// What stands at a key, and where it comes from.
+    fn value(&self, key: &Key) -> Option<(Value, String)> {
+        if let Some(told) = self.told.get(key.path) {
+            return Some(told.clone());
+        }
+        let (section, leaf) = key.path.rsplit_once('.').unwrap_or(("", key.path));
+        let sections = section.split('.').filter(|name| !name.is_empty());
+        let table = sections.fold(Some(&self.stated), |table, name| table?.get(name)?.as_table());
+        let value = table?.get(leaf)?;
+        let by = format!("{}'s", self.like.name);
+        let scale: f64 =
+            self.scales().iter().zip(&key.powers).map(|(scale, power)| libm::pow(*scale, *power)).product();
+        Some(match value.as_float().or(value.as_integer().map(|whole| whole as f64)) {
+            Some(number) if key.path == "airframe.gimbal.limit_deg" && number > self.free_deg() => {
+                (Value::Float(self.free_deg()), "as far as the motor can swing in its tube".to_owned())
+            }
+            Some(number) if (scale - 1.0).abs() > 1e-9 => (rounded(number * scale), by + ", scaled"),
+            _ => (value.clone(), by),
+        })
+    }
+
+    /// Mass, length and diameter, over the other vehicle's.
+    fn scales(&self) -> [f64; 3] {
+        let (mass, body) = (&self.like.airframe.mass, &self.like.airframe.body);
+        [(MASS, mass.loaded_kg), (LENGTH, body.length_m), (DIAMETER, body.diameter_m)].map(|(path, like)| {
+            self.told.get(path).and_then(|(value, _)| value.as_float()).map_or(1.0, |number| number / like)
+        })
+    }
+
+    /// How far the motor can swing before it touches the tube, degrees.
+    fn free_deg(&self) -> f64 {
+        let mut airframe = self.like.airframe.clone();
+        airframe.gimbal.pivot_station_m = 0.5 * self.motor.length_m();
+        airframe.gimbal.inside_diameter_m *= self.scales()[2];
+        libm::floor(10.0 * airframe.gimbal_clearance_rad(&self.motor).to_degrees()) / 10.0
+    }
+
+    /// Takes what OpenRocket says of the vehicle.
+    fn simulated(&mut self, file: &Path, ask: Ask<'_>) -> anyhow::Result<()> {
+        let name = file.display().to_string();
+        let found = openrocket::read(&read(file)?).with_context(|| name.clone())?;
+        if let Some(length) = keys().find(|key| key.path == LENGTH && !self.told.contains_key(LENGTH)) {
+            self.ask(&length, ask).context("--length is missing: OpenRocket counts from the nose")?;
+        }
+        let length_m = self.scales()[1] * self.like.airframe.body.length_m;
+        for (path, number) in [
+            (MASS, Some(found.mass_kg)),
+            ("airframe.mass.loaded_cg_station_m", found.cg_below_nose_m.map(|below_m| length_m - below_m)),
+            ("airframe.mass.loaded_pitch_inertia_kg_m2", found.pitch_inertia_kg_m2),
+            ("airframe.mass.roll_inertia_kg_m2", found.roll_inertia_kg_m2),
+            (DIAMETER, found.reference_area_m2.map(|area_m2| libm::sqrt(4.0 * area_m2 / PI))),
+        ] {
+            number.into_iter().for_each(|number| self.put(path, rounded(number), &name));
+        }
+        Ok(())
+    }
+
+    /// Takes a motor: a name, or a file's, whose text goes into the mission.
+    fn motor(&mut self, motor: &str, data: Option<&Vec<String>>, ask: Ask<'_>) -> anyhow::Result<()> {
+        const DATA: [&str; 5] =
+            ["name", "diameter, mm", "length, mm", "mass of its propellant, kg", "mass with propellant, kg"];
+        let (text, curve) = match motors::builtin(motor) {
+            Ok(curve) => (motor.to_owned(), curve),
+            Err(unknown) => {
+                let text = read(Path::new(motor)).context(unknown)?;
+                let ending = motor.rsplit('.').next().unwrap_or_default();
+                let curve = if ["csv", "tsv", "txt"].iter().any(|table| ending.eq_ignore_ascii_case(table)) {
+                    let asked =
+                        || DATA.map(|what| ask(&format!("Motor on the stand, {what}"))).into_iter().collect();
+                    let data = data.cloned().map_or_else(asked, Ok).context("--motor-data is missing")?;
+                    let mut head: Vec<_> =
+                        data.iter().map(|word| word.replace(char::is_whitespace, "_")).collect();
+                    // A RASP file has the delays there.
+                    head.insert(3, "P".to_owned());
+                    thrust_curve::from_stand(&head.join(" "), &text)
+                } else {
+                    thrust_curve::from_file_text(motor, &text)
+                };
+                let curve = curve.with_context(|| motor.to_owned())?;
+                (thrust_curve::to_rasp(&curve), curve)
+            }
+        };
+        self.motor = curve;
+        self.put(MOTOR, Value::String(text), motor);
+        // Nobody has said what else this motor may turn out to be.
+        self.stated.remove("other_motors");
+        Ok(())
+    }
+
+    /// Asks for a value, until there is one that can be taken.
+    fn ask(&mut self, key: &Key, ask: Ask<'_>) -> anyhow::Result<()> {
+        let default =
+            self.value(key).map(|(value, _)| value.as_str().map_or_else(|| value.to_string(), str::to_owned));
+        let default = default.unwrap_or_else(|| self.like.start.at.name().to_owned());
+        let unit = if key.unit.is_empty() { String::new() } else { format!(", {}", key.unit) };
+        let mut question = format!("{}{unit} [{default}]", key.how);
+        loop {
+            let answer = ask(&question)?;
+            let taken = match key.path {
+                _ if answer.is_empty() => Ok(()),
+                MOTOR => self.motor(&answer, None, ask),
+                START => {
+                    self.put(START, Value::String(answer), "told");
+                    Ok(())
+                }
+                path => number(&answer, key.unit, self.scales()[0] * self.like.airframe.mass.loaded_kg)
+                    .map(|number| self.put(path, number, "told")),
+            };
+            let Err(error) = taken else { return Ok(()) };
+            question = format!("{error:#}\n{}{unit} [{default}]", key.how);
+        }
+    }
+
+    fn text(&self) -> anyhow::Result<String> {
+        let mut text = "# What a club measures or decides of its vehicle. Each comment says what it is and how it is measured, and in \
+            brackets\n# the unit and where the value comes from. Stations are heights above the nozzle exit when upright.\n"
+            .to_owned();
+        let mut section = "";
+        for key in keys() {
+            let Some((value, by)) = self.value(&key) else { continue };
+            let (of, leaf) = key.path.rsplit_once('.').unwrap_or(("", key.path));
+            if of != section {
+                write!(text, "\n[{of}]\n")?;
+                section = of;
+            }
+            let unit = if key.unit.is_empty() { String::new() } else { format!("{}; ", key.unit) };
+            writeln!(text, "# {} ({unit}{by})\n{leaf} = {value}", key.how)?;
+        }
+        Ok(text)
+    }
+}
+
+/// Four digits of a number.
+fn rounded(number: f64) -> Value {
+    Value::Float(format!("{number:.3e}").parse().unwrap_or(number))
+}
+
+/// A file's text; what is not UTF-8 is read as Latin-1, in which some programs export.
+fn read(path: &Path) -> anyhow::Result<String> {
+    let bytes = std::fs::read(path).with_context(|| format!("{}: cannot be read", path.display()))?;
+    Ok(String::from_utf8(bytes)
+        .unwrap_or_else(|error| error.as_bytes().iter().copied().map(char::from).collect()))
+}
+
+/// A number in a unit: of an answer that has the number alone, or another unit behind it, or for an inertia what was measured of
+/// a vehicle of this mass that swings on two wires.
+fn number(answer: &str, unit: &str, mass_kg: f64) -> anyhow::Result<Value> {
+    let float = |text: &str| text.parse::<f64>().with_context(|| format!("'{text}' is no number"));
+    let words: Vec<&str> = answer.split_whitespace().collect();
+    Ok(match words[..] {
+        [number] => Value::Float(float(number)?),
+        [number, other] => rounded(float(number)? * table::factor(unit, other).map_err(anyhow::Error::msg)?),
+        // m g T^2 d^2 / (16 pi^2 L)
+        [ten_swings_s, length_m, apart_m] if unit == "kg m2" => {
+            let swing = 0.1 * float(ten_swings_s)? * float(apart_m)? / (4.0 * PI);
+            rounded(mass_kg * STANDARD_GRAVITY_M_S2 * swing * swing / float(length_m)?)
+        }
+        _ => bail!("'{answer}': a number in {unit}, or a number and its unit, is accepted"),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn arguments(words: &[&str]) -> NewArguments {
+        #[derive(clap::Parser)]
+        struct Only {
+            #[command(flatten)]
+            new: NewArguments,
+        }
+        <Only as clap::Parser>::parse_from([&["new"], words].concat()).new
+    }
+
+    /// The text, and what was asked.
+    fn asked(words: &[&str], answers: &str) -> (anyhow::Result<String>, String) {
+        let (mut shown, mut lines) = (String::new(), answers.lines());
+        let mut ask = |question: &str| {
+            shown += question;
+            lines.next().map(str::to_owned).context("no more answers")
+        };
+        let made = made(&arguments(words), true, &mut ask, "ours.toml");
+        (made, shown)
+    }
+
+    fn told(words: &[&str]) -> anyhow::Result<String> {
+        made(&arguments(words), false, &mut |_| bail!("no terminal"), "ours.toml")
+    }
+
+    fn stated_keys(table: &toml::Table, prefix: &str, into: &mut Vec<String>) {
+        for (name, value) in table {
+            match value {
+                Value::Table(inner) => stated_keys(inner, &format!("{prefix}{name}."), into),
+                _ => into.push(format!("{prefix}{name}")),
+            }
+        }
+    }
+
+    #[test]
+    fn every_built_in_mission_comes_out_as_it_is() {
+        for (like, text) in mission::BUILTIN {
+            let mut stated = Vec::new();
+            stated_keys(&text.parse().unwrap(), "", &mut stated);
+            for key in &stated {
+                assert!(keys().any(|row| row.path == key), "{like}: {key} is not in the table");
+            }
+            let made = mission::from_toml(&told(&["ours", "--like", like]).unwrap(), "ours").unwrap();
+            assert!(made.changed.is_empty(), "{:?}", made.changed);
+            let built_in = mission::from_toml(text, like).unwrap();
+            assert_eq!(
+                Mission { name: built_in.name.clone(), summary: built_in.summary.clone(), ..made },
+                built_in
+            );
+        }
+    }
+
+    /// MK3.md, "What a builder measures": ten swings of mk3 on wires of 1 m, 0.4 m apart, take 19.3 s.
+    #[test]
+    fn val_hand_answers_are_scaled_converted_and_swung() {
+        let answers = "4100 g\n0.8\n\nhalf\n0.4\n20.1 1 0.4\n\nHP-H45W\n130 mm\n\n8\ndrone\n140\n\n";
+        let (text, shown) = asked(&["ours"], answers);
+        let text = text.unwrap();
+        let ours = mission::from_toml(&text, "ours").unwrap();
+        let Mission { airframe, drop, start, changed, .. } = &ours;
+        assert!(changed.is_empty(), "{changed:?}");
+        assert!(
+            (airframe.mass.loaded_kg - 4.1).abs() < 1e-12 && (airframe.fins.length_m - 0.13).abs() < 1e-12
+        );
+        assert!((airframe.fins.station_m - 0.72).abs() < 1e-12, "0.63 of 0.7 m is 0.72 of 0.8 m");
+        assert!((airframe.parachute.area_m2 - 2.05 * 4.1 / 3.7).abs() < 1e-3);
+        let inertia_kg_m2 = 4.1 * 9.806_65 * 2.01 * 2.01 * 0.16 / (16.0 * PI * PI);
+        assert!((airframe.mass.loaded_pitch_inertia_kg_m2 - inertia_kg_m2).abs() < 1e-4, "{inertia_kg_m2}");
+        let mk3 = number("19.3 1 0.4", "kg m2", 3.7).unwrap().as_float().unwrap();
+        assert!((mk3 - 0.137).abs() < 5e-4, "{mk3}");
+        assert_eq!((start.at.name(), drop.map(|drop| drop.height_m)), ("drone", Some(140.0)));
+        assert!(
+            shown.contains("edge of a ruler, m [0.3943]'half' is no number: invalid float literal\nCentre"),
+            "{shown}"
+        );
+        assert!(text.contains("kitchen scale (kg; told)\nloaded_kg = 4.1\n"), "{text}");
+        assert!(text.contains("(m; mk3's, scaled)\nstation_m = 0.72\n"), "{text}");
+        assert_eq!(asked(&["ours"], "3.7\n").0.unwrap_err().to_string(), "no more answers");
+    }
+
+    #[test]
+    fn openrocket_and_a_stand_fill_a_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let (sim, stand) = (folder.path().join("sim.csv"), folder.path().join("stand.csv"));
+        // As some programs for Windows write it: in Latin-1.
+        let row = "# Time (s),Mass (g),Longitudinal moment of inertia (kg\u{b7}m\u{b2}),CG location (cm),Reference area (cm\u{b2}),Drag \
+            coefficient ()\n0,3500,0.13,38,43.0,0.61\n";
+        std::fs::write(&sim, row.chars().map(|letter| letter as u8).collect::<Vec<_>>()).unwrap();
+        let burn: String = (0..800).map(|row| f64::from(row) * 0.01).fold(
+            "time_s,thrust_lbf\n".to_owned(),
+            |text, time_s| {
+                let thrust_n = if (1.0..7.0).contains(&time_s) { 55.0 } else { 0.0 };
+                text + &format!("{time_s:.2},{:.3}\n", thrust_n / 4.448_22)
+            },
+        );
+        std::fs::write(&stand, burn).unwrap();
+        let (sim, stand) = (sim.to_str().unwrap(), stand.to_str().unwrap());
+        let burnt = ["ours", "--from", sim, "--motor", stand];
+        let error = |more: &[&str]| told(&[&burnt, more].concat()).unwrap_err().to_string();
+        assert!(error(&[]).starts_with("--length is missing"));
+        assert!(error(&["--length", "0.72"]).contains("--motor-data is missing"));
+        let data = ["--length", "0.72", "--motor-data", "club 38", "38", "210", "0.19", "0.37"];
+        let text = told(&[burnt.as_slice(), &data].concat()).unwrap();
+        let ours = mission::from_toml(&text, "ours").unwrap();
+        let mass = &ours.airframe.mass;
+        assert!(
+            (mass.loaded_kg - 3.5).abs() < 1e-12 && (mass.loaded_cg_station_m - 0.34).abs() < 1e-9,
+            "{mass:?}"
+        );
+        assert!((ours.airframe.body.diameter_m - 0.074).abs() < 1e-4);
+        assert_eq!(ours.motor_curve.name(), "club_38");
+        assert!((ours.motor_curve.total_impulse_n_s() - 330.0).abs() < 1.0);
+        assert!(ours.changed.is_empty() && ours.other_motors.is_empty());
+        assert!(text.contains(&format!("(kg; {sim})\nloaded_kg = 3.5\n")), "{text}");
+        // A motor that is too long for mk3's gimbal swings less.
+        let long = ["--length", "0.72", "--motor-data", "club", "38", "260", "0.19", "0.37"];
+        let text = told(&[burnt.as_slice(), &long].concat()).unwrap();
+        assert!(text.contains("as far as the motor can swing in its tube)\nlimit_deg = 7."), "{text}");
+        // What cannot be flown is not written.
+        let bad = told(&["ours", "--like", "mk3", "--length", "0"]).unwrap_err().to_string();
+        assert!(bad.starts_with("ours.toml: airframe."), "{bad}");
+    }
+}
