@@ -30,7 +30,7 @@ const ELSEWHERE: [(&str, &str, &str); 28] = [
     ("ENGINEER.md", "parallel ", "needs GNU parallel; tests/clients/tests/cluster.rs runs it"),
     ("ENGINEER.md", "onboard-sim campaign merge part-*", "needs the parts of both lines above"),
     ("ENGINEER.md", "npm ", "installs from the network"),
-    ("ENGINEER.md", "onboard-sim motors --mission mini-f10 --from node_modules", "needs what npm installs"),
+    ("ENGINEER.md", "onboard-sim check mini-f10 --from node_modules", "needs what npm installs"),
     ("ENGINEER.md", "pip ", "installs from the network"),
     ("ENGINEER.md", "python3 ", "needs what pip installs; tests/clients/tests/log_readers.rs runs it"),
     ("ENGINEER.md", "ground ", "tests/demo.rs flies it"),
@@ -83,7 +83,7 @@ const SAID: [(&str, &str); 16] = [
     ("replay fit fits.json --mission mk3 --flights", "GO"),
     ("replay verify logs --baseline baseline.json --accept", "new"),
     ("replay verify logs --baseline baseline.json   ", "same"),
-    ("onboard-sim motors --mission mini-f10 ", "scatter"),
+    ("onboard-sim check mini-f10 ", "flights stand"),
 ];
 
 /// The lines of a page's blocks that hold commands, without the languages of other programs.

@@ -41,21 +41,18 @@ enum Command {
         after_help = "Example: onboard-sim campaign --profile mk3 --dispersion real --flights 1000 --out mk3-real"
     )]
     Campaign(cli::campaign::CampaignArguments),
-    /// Rank motors by how well a mission's airframe lands on them, each with its best mass and height of the start.
+    /// Say whether the vehicle of a mission will land, and what to change if not: one page, before anything is built.
     ///
-    /// Each motor gets the ballast and the height of the start with which one ignition height suits the largest scatter of
-    /// impulse, burn time and ignition delay; `scatter` is that as a multiple of what the mission plans for (1 and more is
-    /// good). The best ones are then flown.
-    #[command(after_help = cli::motors::MOTORS_EXAMPLE)]
-    Motors(cli::motors::MotorsArguments),
+    /// Exit codes: 0 ok or tight; 1 no, or an error; 2 usage.
+    #[command(after_help = "Example: onboard-sim check mk3")]
+    Check(cli::check::CheckArguments),
     /// Write the sheet that a team takes to the field, and the mission to load; refused for what cannot land.
     ///
     /// The folder gets card.html and card.txt (the same sheet: its front is for the range safety officer, its back for whoever
-    /// prepares the vehicle), mission.toml (the mission that was given, byte for byte), and proposal.toml if another mass or motor
-    /// stands more scatter. In each wind every way in which a flight can end is flown 100 times, and the farthest ones 400 times: some
-    /// minutes.
-    #[command(after_help = cli::motors::CARD_EXAMPLE)]
-    Card(cli::motors::CardArguments),
+    /// prepares the vehicle) and mission.toml (the mission that was given, byte for byte). In each wind every way in which a flight
+    /// can end is flown 100 times, and the farthest ones 400 times: some minutes.
+    #[command(after_help = "Example: onboard-sim card --mission mini-f10 --wind-from 270 --out card")]
+    Card(cli::card::CardArguments),
     /// Show where a vehicle comes down, in each way that a flight can end: how near people may stand.
     ///
     /// Landed or not, aborted in each part of the flight, without its landing motor, with its booster, lifted off by itself,
@@ -103,8 +100,8 @@ fn main() -> ExitCode {
 fn run(arguments: Arguments) -> anyhow::Result<ExitCode> {
     match arguments.command {
         Command::Campaign(arguments) => cli::campaign::run(&arguments),
-        Command::Motors(arguments) => cli::motors::motors(&arguments),
-        Command::Card(arguments) => cli::motors::card(&arguments),
+        Command::Check(arguments) => cli::check::run(&arguments),
+        Command::Card(arguments) => cli::card::run(&arguments),
         Command::Hazard(arguments) => cli::hazard::run(&arguments),
         Command::Keygen { file, passphrase } => make_key(&file, passphrase),
         Command::Profiles { show } => profiles(show.as_deref()),

@@ -7,13 +7,15 @@
 //! * [`statistics`], [`summary`]: percentiles, texts and pictures from the rows; [`figure`] draws.
 //! * [`attainable`]: whether a flight could have been landed with perfect information.
 //! * [`hazard`]: where a flight comes down in each way that it can end.
-//! * [`motors`]: which motor an airframe lands on, and the landing card.
+//! * [`check`]: whether a vehicle that is not built yet will land, and what to change.
+//! * [`motors`]: another motor in an airframe, and the landing card.
 //! * [`scenario`]: faults, and the expected outcome of a flight with them.
 //!
 //! A flight depends only on its recipe and its number. So a campaign can be divided into shards, stopped, continued and
 //! run on any number of threads with the same results.
 
 pub mod attainable;
+pub mod check;
 pub mod figure;
 pub mod hazard;
 pub mod motors;

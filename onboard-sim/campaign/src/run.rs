@@ -10,6 +10,7 @@ use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
+use sim::recipe::Recipe;
 use sim::sortie::SetUpError;
 
 use crate::figure::FigureError;
@@ -94,7 +95,7 @@ pub fn run(
     let total = Mutex::new(Progress { of, ..Progress::default() });
     let fly_chunk = |chunk: &u64| -> Result<(), RunError> {
         let fly = |number| {
-            let row = fly_caught(order, number)?;
+            let row = fly_caught(&order.recipe, number)?;
             // Only `progress` can panic with the lock held, and then the counts are still valid.
             let mut total = total.lock().unwrap_or_else(PoisonError::into_inner);
             total.flown += 1;
@@ -111,8 +112,17 @@ pub fn run(
     Ok(total.into_inner().unwrap_or_else(PoisonError::into_inner))
 }
 
-fn fly_caught(order: &Order, number: u64) -> Result<Row, RunError> {
-    match catch_unwind(AssertUnwindSafe(|| tally::fly(&order.recipe, number))) {
+/// Flies flights 0 to `flights` of a recipe, those of a campaign with it, and keeps their rows. `done` gets how many are flown.
+///
+/// # Errors
+/// The first flight that cannot be set up or panics.
+pub fn fly(recipe: &Recipe, flights: u64, done: &(dyn Fn(usize) + Sync)) -> Result<Vec<Row>, RunError> {
+    let numbers: Vec<u64> = (0..flights).collect();
+    in_parallel(&numbers, |number| fly_caught(recipe, *number), done).into_iter().collect()
+}
+
+fn fly_caught(recipe: &Recipe, number: u64) -> Result<Row, RunError> {
+    match catch_unwind(AssertUnwindSafe(|| tally::fly(recipe, number))) {
         Ok(row) => row.map_err(|source| RunError::Fly { number, source }),
         Err(panic) => Err(RunError::Panic { number, message: words(panic.as_ref()) }),
     }

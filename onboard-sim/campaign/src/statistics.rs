@@ -1,4 +1,4 @@
-//! The statistics of a campaign's summary, and the search for a least value.
+//! The statistics of a campaign's summary.
 
 use core::fmt;
 
@@ -124,33 +124,6 @@ pub fn rank_correlation(pairs: &[(f64, f64)]) -> f64 {
     if spread > 0.0 { sum(&one, &two) / spread } else { 0.0 }
 }
 
-/// The argument of the least value between two ends that so many evaluations of the golden section find.
-///
-/// # Errors
-/// The first error of an evaluation.
-pub(crate) fn golden_section<E>(
-    [mut low, mut high]: [f64; 2],
-    evaluations: usize,
-    mut value_at: impl FnMut(f64) -> Result<f64, E>,
-) -> Result<f64, E> {
-    const GOLDEN: f64 = 0.618_033_988_749_895;
-    let inner = |low: f64, high: f64| [high - GOLDEN * (high - low), low + GOLDEN * (high - low)];
-    let [left, right] = inner(low, high);
-    let (mut left, mut right) = ((left, value_at(left)?), (right, value_at(right)?));
-    for _ in 2..evaluations {
-        if left.1 <= right.1 {
-            (high, right) = (right.0, left);
-            let at = inner(low, high)[0];
-            left = (at, value_at(at)?);
-        } else {
-            (low, left) = (left.0, right);
-            let at = inner(low, high)[1];
-            right = (at, value_at(at)?);
-        }
-    }
-    Ok(if left.1 <= right.1 { left.0 } else { right.0 })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -174,14 +147,6 @@ mod tests {
         assert_eq!(quantile(&values, 0.25), Some(1.75));
         assert_eq!(quantile(&values, 1.0), Some(4.0));
         assert_eq!(quantile(&[], 0.5), None);
-    }
-
-    /// 25 evaluations leave 10 * 0.618^24 = 1e-4 of the interval.
-    #[test]
-    fn the_golden_section_finds_the_least_value() {
-        let at = golden_section([0.0, 10.0], 25, |x: f64| Ok::<_, ()>((x - 3.0).abs())).unwrap();
-        assert!((at - 3.0).abs() < 1e-4, "{at}");
-        assert_eq!(golden_section([0.0, 1.0], 9, |_| Err("no flight")), Err("no flight"));
     }
 
     /// Ranks 1 2 3 4 5 against 2 1 4 3 5: 1 - 6 * 4 / (5 * 24) = 0.8.

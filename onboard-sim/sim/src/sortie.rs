@@ -550,7 +550,7 @@ impl Rehearsal {
             landing,
         };
         let report = *flight.pilot().report();
-        *self = Self::Over(Box::new((rehearsed, report)));
+        *self = Self::Over(Box::new((rehearsed.explained(flight.mission()), report)));
     }
 
     fn over(&self) -> Option<&(Rehearsed, PoweredReport)> {

@@ -14,7 +14,7 @@ use sim::dispersion::{self, may_be_kinder};
 use sim::recipe::Recipe;
 
 use super::fly::WIND_MAX_M_S;
-use super::{Stopwatch, in_wind, mission_text, on_threads, recipe, refuse_loss, write_file};
+use super::{in_wind, mission_text, on_threads, recipe, refuse_loss, show_flights, write_file};
 
 /// Flights of each kind that the picture shows.
 const SHOWN: u64 = 30;
@@ -65,9 +65,7 @@ pub(crate) fn run(arguments: &HazardArguments) -> anyhow::Result<ExitCode> {
     let mission = &recipes[0].mission;
     let ways = Way::of(mission);
     let flights = Flights { survey: arguments.flights, of_widest: arguments.hazard_flights };
-    let stopwatch = Stopwatch::start();
-    let told = |done, of| stopwatch.show(done, of, "flights");
-    let impacts = on_threads(arguments.jobs, || Ok(hazard::studies(&recipes, flights, &told)?))?;
+    let impacts = on_threads(arguments.jobs, || Ok(hazard::studies(&recipes, flights, &show_flights())?))?;
     let rule = Rule::of(mission);
     let study =
         Study { arguments, mission: &mission.name, start: mission.start.at, ways: &ways, impacts: &impacts };

@@ -2,15 +2,15 @@
 //! the files that they write: each is complete or absent, and replaces an existing one only on request.
 
 pub(crate) mod campaign;
+pub(crate) mod card;
+pub(crate) mod check;
 pub(crate) mod fly;
 pub(crate) mod hazard;
-pub(crate) mod motors;
 mod single;
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use ::campaign::motors::ranking::Progress;
 use ::campaign::run::threads;
 use ::campaign::stopwatch::Stopwatch;
 use anyhow::Context as _;
@@ -62,13 +62,10 @@ fn in_wind(recipe: &Recipe, wind_m_s: f64) -> anyhow::Result<Recipe> {
     Ok(Recipe { dispersion, dispersion_name, dispersion_toml, ..recipe.clone() })
 }
 
-/// Shows how far a ranking or a card is, which looks at motors and flies.
-fn show_progress() -> impl Fn(Progress) + Sync {
+/// Shows how many flights are flown, of how many.
+fn show_flights() -> impl Fn(usize, usize) + Sync {
     let stopwatch = Stopwatch::start();
-    move |progress| match progress {
-        Progress::Motors(done, of) => stopwatch.show(done, of, "motors"),
-        Progress::Flights(done, of) => stopwatch.show(done, of, "flights"),
-    }
+    move |done, of| stopwatch.show(done, of, "flights")
 }
 
 /// An existing file is replaced only on request; a pipe or a device has no content that could be lost.

@@ -1,17 +1,18 @@
-//! The airframe without its landing motor and with another one, and the text of a mission with another motor, mass and
-//! height of the start.
+//! The airframe without its landing motor, and a mission with another motor or mass.
 //!
 //! A motor is a rod of even mass on the axis that begins at the nozzle: its casing stays, its propellant burns in its
-//! middle. Ballast is a point on the axis. So a heavier or longer motor moves mass, centre of gravity and inertia together.
+//! middle. Ballast is a point at the centre of gravity of the rest. So a heavier or longer motor moves mass, centre of gravity
+//! and inertia together.
 
-use flight::vehicle::airframe::{Airframe, BadValue, Mass, MassModel};
+use flight::vehicle::airframe::Mass;
 use flight::vehicle::mission::Mission;
-use flight::vehicle::mission::StartPoint;
 use flight::vehicle::thrust_curve::ThrustCurve;
-use toml::{Table, Value};
+use flight::vehicles::mission::MissionError;
+use sim::recipe::Recipe;
+use toml_edit::{DocumentMut, Item, TomlError, value};
 
-/// Why a mission's airframe cannot be taken apart.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+/// Why a mission's airframe cannot be taken apart, or put together with other parts.
+#[derive(Debug, thiserror::Error)]
 pub enum FrameError {
     /// The motor is heavier than the vehicle.
     #[error(
@@ -24,24 +25,21 @@ pub enum FrameError {
          the centre of gravity, is accepted"
     )]
     Inertia { found: f64, motors: f64 },
+    #[error("the mission is not TOML")]
+    Text(#[from] TomlError),
+    /// The vehicle would not be sound.
+    #[error(transparent)]
+    Mission(#[from] MissionError),
 }
 
 /// An airframe without its motor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frame {
-    loaded: Airframe,
+    loaded: Mass,
     own_motor: ThrustCurve,
     mass_kg: f64,
     cg_station_m: f64,
     pitch_inertia_kg_m2: f64,
-}
-
-/// Mass that is added at a place on the axis; below zero it is taken out there.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Ballast {
-    pub mass_kg: f64,
-    /// Height above the nozzle, m.
-    pub station_m: f64,
 }
 
 impl Frame {
@@ -66,79 +64,33 @@ impl Frame {
         if left_kg_m2 <= 0.0 {
             return Err(FrameError::Inertia { found: mass.loaded_pitch_inertia_kg_m2, motors });
         }
-        Ok(Self {
-            loaded: mission.airframe.clone(),
-            own_motor: motor.clone(),
-            mass_kg,
-            cg_station_m,
-            pitch_inertia_kg_m2: left_kg_m2,
-        })
+        let (loaded, own_motor) = (*mass, motor.clone());
+        Ok(Self { loaded, own_motor, mass_kg, cg_station_m, pitch_inertia_kg_m2: left_kg_m2 })
     }
 
-    /// Mass without the motor, kg.
-    pub fn mass_kg(&self) -> f64 {
-        self.mass_kg
-    }
-
-    /// Centre of gravity without the motor, m above the nozzle.
-    pub fn cg_station_m(&self) -> f64 {
-        self.cg_station_m
-    }
-
-    /// Diameter of the motor's tube, m: that of the mission's own motor. Thinner motors fit with an adapter, whose mass is
-    /// not counted.
-    pub fn tube_m(&self) -> f64 {
-        self.own_motor.diameter_m()
-    }
-
-    /// Masses with a motor and ballast.
-    ///
-    /// # Errors
-    /// The vehicle would not be sound: its centre of gravity below its propellant, say.
-    pub fn with(&self, motor: &ThrustCurve, ballast: Ballast) -> Result<Mass, BadValue> {
-        if *motor == self.own_motor && ballast.mass_kg == 0.0 {
+    /// Masses with a motor and so much ballast, kg; below zero it is taken out.
+    pub fn with(&self, motor: &ThrustCurve, ballast_kg: f64) -> Mass {
+        let is_own = *motor == self.own_motor;
+        if is_own && ballast_kg == 0.0 {
             // To the bit.
-            return Ok(self.loaded.mass);
+            return self.loaded;
         }
-        let motor_cg_m = if *motor == self.own_motor {
-            self.loaded.mass.propellant_station_m
-        } else {
-            0.5 * motor.length_m()
-        };
+        let motor_cg_m = if is_own { self.loaded.propellant_station_m } else { 0.5 * motor.length_m() };
         let parts = [
-            (self.mass_kg, self.cg_station_m, self.pitch_inertia_kg_m2),
+            (self.mass_kg + ballast_kg, self.cg_station_m, self.pitch_inertia_kg_m2),
             (motor.total_mass_kg(), motor_cg_m, rod_inertia_kg_m2(motor)),
-            (ballast.mass_kg, ballast.station_m, 0.0),
         ];
         let loaded_kg: f64 = parts.iter().map(|(mass_kg, ..)| mass_kg).sum();
         let cg_m = parts.iter().map(|(mass_kg, at_m, _)| mass_kg * at_m).sum::<f64>() / loaded_kg;
         let inertia_kg_m2 =
             parts.iter().map(|(mass_kg, at_m, own)| own + mass_kg * squared(at_m - cg_m)).sum();
-        let mass = Mass {
+        Mass {
             loaded_kg,
             loaded_cg_station_m: cg_m,
             loaded_pitch_inertia_kg_m2: inertia_kg_m2,
-            roll_inertia_kg_m2: self.loaded.mass.roll_inertia_kg_m2,
             propellant_station_m: motor_cg_m,
-        };
-        let mut airframe = Airframe { mass, ..self.loaded.clone() };
-        // The ring is moved with the motor's middle.
-        airframe.gimbal.pivot_station_m += motor_cg_m - self.loaded.mass.propellant_station_m;
-        airframe.validate()?;
-        if airframe.gimbal.limit_rad() > airframe.gimbal_clearance_rad(motor) {
-            let required = "less, or the motor touches the tube: a shorter or thinner motor";
-            return Err(BadValue { key: "gimbal.limit_deg", found: airframe.gimbal.limit_deg, required });
+            ..self.loaded
         }
-        let propellant_kg = motor.propellant_mass_kg();
-        let burnt_out = MassModel::new(&mass, propellant_kg).at(propellant_kg);
-        if burnt_out.pitch_inertia_kg_m2 <= 0.0 || burnt_out.mass_kg <= 0.0 {
-            return Err(BadValue {
-                key: "pitch inertia without propellant, kg m2,",
-                found: burnt_out.pitch_inertia_kg_m2,
-                required: "above 0",
-            });
-        }
-        Ok(mass)
     }
 }
 
@@ -151,80 +103,36 @@ fn squared(value: f64) -> f64 {
     value * value
 }
 
-/// What is different.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Changes<'a> {
-    /// Name of the new mission.
-    pub name: &'a str,
-    /// Its description in one line.
-    pub summary: &'a str,
-    /// Name of a built-in motor, or the text of a motor file.
-    pub motor: &'a str,
-    /// Whether the motor is the one whose lot, and other motors of that name, the mission may know.
-    pub keeps_lot: bool,
-    pub mass: Mass,
-    /// Height of the centre of gravity above the pad at which the flight begins, m.
-    pub start_height_m: f64,
-}
-
-/// Why a text cannot be changed.
-#[derive(Debug, thiserror::Error)]
-pub enum MissionTextError {
-    #[error("the mission is not TOML")]
-    Parse(#[from] toml::de::Error),
-    #[error("the mission has no {0}; a text that is flown has one")]
-    Missing(&'static str),
-    #[error("the mission cannot be written")]
-    Write(#[from] toml::ser::Error),
-}
-
-/// The changed text of a mission. Its airframe is a table in it, and its motor a text, so it needs no other file.
-/// Comments are lost.
+/// A recipe with another mass, and with another motor if `motor`, a built-in name or the text of a motor file, is not the mission's.
 ///
 /// # Errors
-/// The text is no mission.
-pub fn changed(mission_toml: &str, changes: &Changes<'_>) -> Result<String, MissionTextError> {
-    let mut mission: Table = mission_toml.parse()?;
-    let airframe = mission.get_mut("airframe").and_then(Value::as_table_mut);
-    let airframe = airframe.ok_or(MissionTextError::Missing("airframe"))?;
-    let was = airframe.insert("motor".to_owned(), Value::String(changes.motor.to_owned()));
-    let mass = airframe.get_mut("mass").and_then(Value::as_table_mut);
-    let mass = mass.ok_or(MissionTextError::Missing("airframe.mass"))?;
-    if was.as_ref().and_then(Value::as_str) != Some(changes.motor) {
-        // It follows from the motor's length.
-        mass.remove("propellant_station_m");
-    }
-    let Mass { loaded_kg, loaded_cg_station_m, loaded_pitch_inertia_kg_m2, .. } = changes.mass;
-    for (key, value) in [
-        ("loaded_kg", loaded_kg),
-        ("loaded_cg_station_m", loaded_cg_station_m),
-        ("loaded_pitch_inertia_kg_m2", loaded_pitch_inertia_kg_m2),
+/// The reader of missions refuses the vehicle.
+pub fn changed(recipe: &Recipe, motor: &str, mass: &Mass) -> Result<Recipe, FrameError> {
+    let mut text: DocumentMut = recipe.mission_toml.parse()?;
+    let airframe = &mut text["airframe"];
+    for (key, found) in [
+        ("loaded_kg", mass.loaded_kg),
+        ("loaded_cg_station_m", mass.loaded_cg_station_m),
+        ("loaded_pitch_inertia_kg_m2", mass.loaded_pitch_inertia_kg_m2),
     ] {
-        mass.insert(key.to_owned(), Value::Float(value));
+        airframe["mass"][key] = value(found);
     }
-    mission.insert("name".to_owned(), Value::String(changes.name.to_owned()));
-    mission.insert("summary".to_owned(), Value::String(changes.summary.to_owned()));
-    if changes.keeps_lot {
+    let take = |item: Option<&mut Item>, key| {
+        item.and_then(Item::as_table_like_mut).and_then(|table| table.remove(key))
+    };
+    if motor == recipe.mission.airframe.motor {
         // A weight of the day would replace the mass above.
-        let lot = mission.get_mut("lot").and_then(Value::as_table_mut);
-        let weighed = lot.and_then(|lot| lot.get_mut("weighed")).and_then(Value::as_table_mut);
-        weighed.and_then(|weighed| weighed.remove("vehicle_kg"));
+        take(text.get_mut("lot").and_then(|lot| lot.get_mut("weighed")), "vehicle_kg");
     } else {
-        mission.remove("lot");
-        mission.remove("other_motors");
+        airframe["motor"] = value(motor);
+        // It follows from the motor's length.
+        take(airframe.get_mut("mass"), "propellant_station_m");
+        text.remove("lot");
+        text.remove("other_motors");
     }
-    let at = mission.get("start").and_then(|start| start.get("at")).and_then(Value::as_str);
-    let section = if at == Some(StartPoint::Drone.name()) { "drop" } else { "start" };
-    let start = mission.get_mut(section).and_then(Value::as_table_mut);
-    let start = start.ok_or(MissionTextError::Missing(section))?;
-    start.insert("height_m".to_owned(), Value::Float(changes.start_height_m));
-    Ok(toml::to_string_pretty(&mission)?)
-}
-
-/// A name for a mission of its parts: letters, digits, `.` and `-`.
-pub fn name_of(mission: &str, motor: &str) -> String {
-    let plain = |c: char| if c.is_ascii_alphanumeric() || c == '.' { c.to_ascii_lowercase() } else { '-' };
-    format!("{mission} {motor}").chars().map(plain).collect()
+    let mission_toml = text.to_string();
+    let mission = flight::vehicles::mission::from_toml(&mission_toml, &recipe.mission.name)?;
+    Ok(Recipe { mission, mission_toml, ..recipe.clone() })
 }
 
 #[cfg(test)]
@@ -264,16 +172,16 @@ mod tests {
     }
 
     /// 0.5 kg of motor at 0.1 m leave 2.5 kg at (1.5 - 0.05) / 2.5 m with 0.2 - 0.5 (0.04 / 12 + 0.0016 / 16) - 0.5 * 0.16
-    /// - 2.5 * 0.0064 kg m2. A motor of 1 kg and 0.4 m and 0.5 kg at 0.7 m make 4 kg at (1.45 + 0.2 + 0.35) / 4 m.
+    /// - 2.5 * 0.0064 kg m2. A motor of 1 kg and 0.4 m and 0.5 kg at 0.58 m make 4 kg at (1.45 + 0.2 + 0.29) / 4 m.
     #[test]
     fn val_hand_another_motor_moves_mass_centre_of_gravity_and_inertia() {
         let frame = Frame::of(&mission()).unwrap();
-        assert!((frame.mass_kg() - 2.5).abs() < 1e-12 && (frame.cg_station_m() - 0.58).abs() < 1e-12);
+        assert!((frame.mass_kg - 2.5).abs() < 1e-12 && (frame.cg_station_m - 0.58).abs() < 1e-12);
         assert!((frame.pitch_inertia_kg_m2 - 0.102_283_333).abs() < 1e-8, "{frame:?}");
-        let mass = frame.with(&motor(1.0, 0.4), Ballast { mass_kg: 0.5, station_m: 0.7 }).unwrap();
-        assert!((mass.loaded_kg - 4.0).abs() < 1e-12 && (mass.loaded_cg_station_m - 0.5).abs() < 1e-12);
-        // 0.102283 + 2.5 * 0.0064 + (0.16 / 12 + 0.0001) + 0.09 + 0.5 * 0.04
-        assert!((mass.loaded_pitch_inertia_kg_m2 - 0.241_716_667).abs() < 1e-8, "{mass:?}");
+        let mass = frame.with(&motor(1.0, 0.4), 0.5);
+        assert!((mass.loaded_kg - 4.0).abs() < 1e-12 && (mass.loaded_cg_station_m - 0.485).abs() < 1e-12);
+        // 0.102283 + 3 * 0.009025 + (0.16 / 12 + 0.0001) + 0.081225
+        assert!((mass.loaded_pitch_inertia_kg_m2 - 0.224_016_667).abs() < 1e-8, "{mass:?}");
         assert!((mass.propellant_station_m - 0.2).abs() < 1e-15);
     }
 
@@ -282,10 +190,8 @@ mod tests {
         for (name, _) in flight::vehicles::mission::BUILTIN {
             let mission = flight::vehicles::mission::builtin(name).unwrap().unwrap();
             let frame = Frame::of(&mission).unwrap();
-            let none = Ballast { mass_kg: 0.0, station_m: 0.4 };
-            assert_eq!(frame.with(&mission.motor_curve, none).unwrap(), mission.airframe.mass, "{name}");
-            let some = Ballast { mass_kg: 1e-9, station_m: frame.cg_station_m() };
-            let nearly = frame.with(&mission.motor_curve, some).unwrap();
+            assert_eq!(frame.with(&mission.motor_curve, 0.0), mission.airframe.mass, "{name}");
+            let nearly = frame.with(&mission.motor_curve, 1e-9);
             let apart = nearly.loaded_pitch_inertia_kg_m2 - mission.airframe.mass.loaded_pitch_inertia_kg_m2;
             assert!(apart.abs() < 1e-8, "{name}: {apart}");
         }
@@ -300,32 +206,21 @@ mod tests {
         let mut thin = mission();
         thin.airframe.mass.loaded_pitch_inertia_kg_m2 = 0.01;
         assert!(Frame::of(&thin).unwrap_err().to_string().contains("kg_m2 is 0.01; more than 0.0817"));
-        let frame = Frame::of(&mission()).unwrap();
-        let heavy = frame.with(&motor(30.0, 0.6), Ballast { mass_kg: 0.0, station_m: 0.4 });
-        assert!(heavy.is_ok_and(|mass| mass.loaded_cg_station_m < 0.33), "nearly all of it is motor");
-        let wide = frame.with(&motor(0.5, 1.0), Ballast { mass_kg: 0.0, station_m: 0.4 });
-        assert_eq!(wide.unwrap_err().key, "gimbal.limit_deg");
-        let tail = frame.with(&motor(0.5, 0.2), Ballast { mass_kg: 40.0, station_m: 0.0 });
-        assert_eq!(tail.unwrap_err().key, "mass.propellant_station_m");
+    }
+
+    fn recipe(name: &str, more: &str) -> Recipe {
+        let recipe = Recipe::built_in(name, "none").unwrap();
+        let text = recipe.mission_toml.clone() + more;
+        Recipe::from_texts((name, &text), ("none", &recipe.dispersion_toml)).unwrap()
     }
 
     #[test]
     fn a_text_with_the_same_values_is_the_same_mission() {
-        for (name, text) in flight::vehicles::mission::BUILTIN {
-            let mission = flight::vehicles::mission::from_toml(text, name).unwrap();
-            let changes = Changes {
-                name: &mission.name,
-                summary: &mission.summary,
-                motor: &mission.airframe.motor,
-                keeps_lot: true,
-                mass: mission.airframe.mass,
-                start_height_m: mission.start_height_m(),
-            };
-            let again = changed(text, &changes).unwrap();
-            assert_eq!(flight::vehicles::mission::from_toml(&again, name).unwrap(), mission);
-            let moved = changed(&again, &Changes { start_height_m: 77.5, ..changes }).unwrap();
-            let moved = flight::vehicles::mission::from_toml(&moved, name).unwrap();
-            assert!((moved.start_height_m() - 77.5).abs() < 1e-12 && moved.airframe == mission.airframe);
+        for (name, _) in flight::vehicles::mission::BUILTIN {
+            let recipe = recipe(name, "");
+            let airframe = &recipe.mission.airframe;
+            let again = changed(&recipe, &airframe.motor, &airframe.mass).unwrap();
+            assert_eq!(again.mission, recipe.mission);
         }
     }
 
@@ -333,46 +228,28 @@ mod tests {
     /// nothing of it.
     #[test]
     fn a_lot_and_the_other_motors_of_its_name_stay_with_a_motor() {
-        let (name, text) = flight::vehicles::mission::BUILTIN[1];
         let lot = "name = \"2609\"\nburns = 3\nimpulse = { mean = 1.02 }\nweighed = { vehicle_kg = 3.65 }";
-        let text = format!("{text}\n[lot]\n{lot}\n");
-        let mission = flight::vehicles::mission::from_toml(&text, name).unwrap();
-        let mass = Mass { loaded_kg: 3.75, ..mission.airframe.mass };
-        let changes = Changes {
-            name: "x",
-            summary: "y",
-            motor: &mission.airframe.motor,
-            keeps_lot: true,
-            mass,
-            start_height_m: 300.0,
-        };
-        let read =
-            |changes| flight::vehicles::mission::from_toml(&changed(&text, changes).unwrap(), "x").unwrap();
-        let kept = read(&changes);
-        assert_eq!((&kept.motor_curve, kept.airframe.mass), (&mission.motor_curve, mass));
-        let other = read(&Changes { motor: "G33", keeps_lot: false, ..changes });
+        let recipe = recipe("mk3", &format!("\n[lot]\n{lot}\n"));
+        let mass = Mass { loaded_kg: 3.75, ..recipe.mission.airframe.mass };
+        let read = |motor: &str| changed(&recipe, motor, &mass).unwrap().mission;
+        let kept = read(&recipe.mission.airframe.motor);
+        assert_eq!((&kept.motor_curve, kept.airframe.mass), (&recipe.mission.motor_curve, mass));
+        let other = read("G33");
         assert!(other.lot.is_none() && other.motor_burns() == 0);
         assert!(kept.other_motors == ["H45W"] && other.other_curves.is_empty());
         assert_eq!(other.motor_curve, flight::vehicles::motors::named("G33").unwrap());
     }
 
     #[test]
-    fn the_text_of_a_motor_file_stays_in_the_mission() {
-        let (name, text) = flight::vehicles::mission::BUILTIN[0];
-        let mission = flight::vehicles::mission::from_toml(text, name).unwrap();
+    fn the_text_of_a_motor_file_stays_in_the_mission_and_what_is_not_sound_is_refused() {
+        let recipe = recipe("mk3", "");
         let motor = "; it's \"quoted\" \\ and 'so'\nX1 29 93 4-6-8 0.04 0.08 A B\n0.5 30\n2 0\n";
-        let changes = Changes {
-            name: "x",
-            summary: "y",
-            motor,
-            keeps_lot: false,
-            mass: mission.airframe.mass,
-            start_height_m: 100.0,
-        };
-        let again = flight::vehicles::mission::from_toml(&changed(text, &changes).unwrap(), "x").unwrap();
+        let mass = recipe.mission.airframe.mass;
+        let again = changed(&recipe, motor, &mass).unwrap().mission;
         assert_eq!(again.airframe.motor, motor);
         assert_eq!(again.motor_curve, flight::vehicles::motors::named(motor).unwrap());
-        assert_eq!(name_of("mk2", "A B/3.5"), "mk2-a-b-3.5");
-        assert!(changed("name = 3", &changes).unwrap_err().to_string().contains("no airframe"));
+        let long = motor.replace("29 93", "38 900");
+        let error = changed(&recipe, &long, &mass).unwrap_err().to_string();
+        assert!(error.contains("airframe.mass.propellant_station_m = 0.45"), "{error}");
     }
 }

@@ -274,7 +274,7 @@ impl Card {
                 rows("Set before the flight", words_of("set", values)),
                 Section { title: "Check", content: Content::Checks(words_of("checks", values).concat()) },
             ],
-            notes: vec![self.proposed(), self.sources(winds)],
+            notes: vec![self.sources(winds)],
         }
     }
 
@@ -294,27 +294,6 @@ impl Card {
                 let landed = own.map_or_else(String::new, ToString::to_string);
                 format!("fewer than nine of ten stand undamaged in the least wind: {landed}")
             }
-        }
-    }
-
-    /// Another mass or motor, which is another mission.
-    fn proposed(&self) -> String {
-        match (&self.proposal, &self.proposed) {
-            (Ok(landing), Some(proposed)) => format!(
-                "Proposal, not this card's vehicle: {:.3} kg ({:+.3} kg at {:.0} mm) with {} from {:.0} m stands {:.2} times the scatter that the mission \
-                 plans for. It is proposal.toml, mission {}, and needs a card of its own.",
-                landing.choice.mass.loaded_kg,
-                landing.choice.ballast.mass_kg,
-                1e3 * landing.choice.ballast.station_m,
-                landing.candidate.name(),
-                landing.choice.start_height_m,
-                landing.choice.window.scatter,
-                proposed.mission.name
-            ),
-            (Ok(_), None) => {
-                "Proposal: none; no mass within the ballast stands more scatter of its motor.".to_owned()
-            }
-            (Err(refusal), _) => format!("Proposal: none; {refusal}."),
         }
     }
 }

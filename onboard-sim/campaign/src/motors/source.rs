@@ -13,8 +13,6 @@ use serde_json::value::RawValue;
 /// A motor to choose from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
-    /// The file, with the line in a list; `built in` for a built-in motor.
-    pub origin: String,
     /// What a mission's `airframe.motor` says: the name of a built-in motor, or the text of its file.
     pub motor: String,
     /// Its data.
@@ -73,7 +71,6 @@ const ENDINGS: [&str; 3] = ["eng", "rse", "json"];
 pub fn built_in() -> Vec<Found> {
     let found = flight::vehicles::motors::names().map(|name| match flight::vehicles::motors::builtin(name) {
         Ok(curve) => Ok(Candidate {
-            origin: "built in".to_owned(),
             motor: name.to_owned(),
             curve,
             in_production: flight::vehicles::motors::status(name).map(|(in_production, _)| in_production),
@@ -133,12 +130,12 @@ fn one(path: &Path, text: &str) -> Found {
     let text = text.trim_start_matches('\u{feff}');
     let curve = flight::vehicles::thrust_curve::from_file_text(&origin, text).map_err(|error| Unusable {
         name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
-        origin: origin.clone(),
+        origin,
         reason: error.to_string(),
     })?;
     // A mission takes a text without a line break for a name.
     let motor = format!("{}\n", text.trim_end());
-    Ok(Candidate { origin, motor, curve, in_production: None })
+    Ok(Candidate { motor, curve, in_production: None })
 }
 
 /// Why a text is not a list of motors.
@@ -200,7 +197,7 @@ fn of_entry(text: &str, origin: &str) -> Found {
     let motor = to_rasp(&candidate);
     let curve = from_rasp(&motor).map_err(|error| unusable(&name, without_line(&error)))?;
     let in_production = entry.availability.map(|availability| availability != "OOP");
-    Ok(Candidate { origin: origin.to_owned(), motor, curve, in_production })
+    Ok(Candidate { motor, curve, in_production })
 }
 
 fn motor(entry: &Entry) -> Result<ThrustCurve, String> {

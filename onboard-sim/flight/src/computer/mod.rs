@@ -24,6 +24,7 @@ pub mod pilot;
 pub mod saved;
 pub mod table;
 
+use alloc::borrow::ToOwned as _;
 use alloc::boxed::Box;
 use alloc::format;
 use alloc::string::String;
@@ -42,13 +43,15 @@ use self::table::PhaseTable;
 use crate::control::servo::ServoModel;
 use crate::estimation::estimator::{ImuSample, Measurements};
 use crate::estimation::sensor_watch::SensorWatch;
+use crate::guidance::misfit::misfit;
 use crate::guidance::powered::ControlLevel;
+use crate::guidance::vertical::EvenLanding;
 use crate::rules::arming::{PredictedLanding, Uplink};
 use crate::rules::operator::Operator;
 use crate::rules::outputs::{FlightProgress, Outputs};
 use crate::rules::phase::{Event, HOLD_LIMIT_S, Latch, Mode, Motor, Phase};
 use crate::rules::two_person::Station;
-use crate::vehicle::mission::ArmingLimits;
+use crate::vehicle::mission::{ArmingLimits, Mission};
 use crate::vehicle::rigid::RigidState;
 
 /// Frame length, ms.
@@ -383,6 +386,15 @@ pub struct Rehearsed {
     pub found: String,
     /// Its touchdown; `None` if it did not come down.
     pub landing: Option<PredictedLanding>,
+}
+
+impl Rehearsed {
+    /// It did not land, and motor and weight do not go together: it says that instead.
+    #[must_use]
+    pub fn explained(self, mission: &Mission) -> Self {
+        let misfit = if self.warm { None } else { misfit(&EvenLanding::of(mission)) };
+        Self { found: misfit.map_or(self.found, str::to_owned), ..self }
+    }
 }
 
 /// The station that armed the vehicle, and how long ago it was last heard, s.

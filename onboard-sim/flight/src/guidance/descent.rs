@@ -14,7 +14,7 @@ use crate::control::aim::turn_to_aim_rad;
 use crate::vehicle::rigid::RigidState;
 
 /// Below this airspeed the fins are too weak for steering, m/s.
-pub(crate) const LEAST_AIRSPEED_M_S: f64 = 12.0;
+pub const LEAST_AIRSPEED_M_S: f64 = 12.0;
 /// Below this airspeed they are too weak even to control the roll, m/s.
 const LEAST_ROLLING_AIRSPEED_M_S: f64 = 2.0;
 
@@ -54,8 +54,7 @@ pub struct DescentSituation {
     pub drag_area_m2: f64,
     /// Drag area of the body across its axis, m^2.
     pub crossflow_area_m2: f64,
-    /// Drag area of the fins, m^2, times their distance ahead of the centre of gravity, m, less that of the legs times their
-    /// distance behind it: this turns the nose back into the wind, m^3.
+    /// [`Airframe::restoring_m3`](crate::vehicle::airframe::Airframe::restoring_m3).
     pub restoring_m3: f64,
     /// Distance of the body's middle behind the centre of gravity, m. The crossflow acts there and turns the nose away
     /// from the wind.

@@ -130,7 +130,7 @@ pub fn arming_checks(limits: &ArmingLimits, input: &ArmingInput) -> Vec<Check> {
             name: "controller warm",
             passed: input.controller_warm,
             found: input.controller_found.clone(),
-            required: "a converged rehearsal".to_owned(),
+            required: "a rehearsal that lands".to_owned(),
         },
         predicted_landing(input.predicted_landing.as_ref()),
         uplink(input.uplink),

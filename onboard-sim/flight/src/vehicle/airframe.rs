@@ -82,6 +82,13 @@ impl Airframe {
         each_m2 * openings_rad.iter().map(|opening| libm::sin(*opening)).sum::<f64>()
     }
 
+    /// Drag area of the fins, m^2, times their distance ahead of a centre of gravity, m, less that of the legs times their distance
+    /// behind it: this turns the nose back into the wind in a tail-first fall, m^3.
+    pub fn restoring_m3(&self, fin_drag_area_m2: f64, cg_station_m: f64) -> f64 {
+        fin_drag_area_m2 * (self.fins.station_m - cg_station_m)
+            - self.legs.drag_area_m2 * (cg_station_m - self.legs.drag_station_m)
+    }
+
     /// Arm of the thrust about a centre of gravity at a station, m: the motor swings about its pivot.
     pub fn thrust_arm_m(&self, cg_station_m: f64) -> f64 {
         cg_station_m - self.gimbal.pivot_station_m

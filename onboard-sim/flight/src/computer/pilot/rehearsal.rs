@@ -37,13 +37,14 @@ impl Planner {
             // Twice that time is the period of plans.
             flown = Some(self.later(&estimate, &burning));
         }
-        let limits = Limits::from(&self.model().mission.leg_limits);
-        let verdict = LandingVerdict::judge_plan(&limits, &self.end());
-        Rehearsed {
+        let mission = &self.model().mission;
+        let verdict = LandingVerdict::judge_plan(&Limits::from(&mission.leg_limits), &self.end());
+        let rehearsed = Rehearsed {
             warm: converged > 0 && verdict.is_inside(),
             found: format!("planned, {converged} of {plans} plans converged"),
             landing: (plans > 0).then(|| PredictedLanding::from(&verdict)),
-        }
+        };
+        rehearsed.explained(mission)
     }
 }
 
@@ -77,6 +78,22 @@ mod tests {
     use super::*;
     use crate::computer::Computer;
     use crate::vehicles::mission::{BUILTIN, builtin};
+
+    /// The parachute of a vehicle that no height lands is no answer for a builder.
+    #[test]
+    fn a_vehicle_that_does_not_go_with_its_motor_is_told_so() {
+        let (name, text) = BUILTIN[1];
+        for (kg, words) in [("5.0", "too heavy for its motor"), ("2.2", "too light for its motor")] {
+            let text = text.replace("loaded_kg = 3.7", &format!("loaded_kg = {kg}"));
+            let mission = crate::vehicles::mission::from_toml(&text, name).unwrap();
+            let found = String::from("ended, 0 of 0 plans converged");
+            let rehearsed = Rehearsed { warm: false, found, landing: None };
+            let explained = rehearsed.clone().explained(&mission);
+            assert!(explained.found.starts_with(words), "{explained:?}");
+            let landed = Rehearsed { warm: true, ..rehearsed };
+            assert_eq!(landed.clone().explained(&mission), landed);
+        }
+    }
 
     /// Every mission that can be flown can be armed on a board, and the rehearsal leaves no memory.
     #[test]

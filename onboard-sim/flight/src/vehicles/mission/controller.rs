@@ -154,7 +154,9 @@ impl Formulas<'_> {
         let scales = around(2.0, motor.burn_time_sigma);
         self.of_controller("ignition.burn_time_scales", &mut ignition.burn_time_scales, scales);
         let intervals = libm::ceil((carried_s + powered.latest_after_s) / powered.interval_s).min(60.0);
-        let passes = (76.0 * intervals).max(2_200.0) as usize;
+        // Above that a plan takes more than the 40 million instructions for which a Cortex-M7 has 100 ms
+        // (onboard-sim/board/README.md).
+        let passes = (76.0 * intervals).clamp(2_200.0, 2_890.0) as usize;
         self.of_controller("powered.max_passes", &mut powered.max_passes, Some(passes));
 
         // What is put in for the vehicle's sake.

@@ -1,0 +1,92 @@
+//! `onboard-sim card`: the page that a team takes to the field.
+
+use std::io::Write as _;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use campaign::hazard::Flights;
+use campaign::motors::card::{Card, Day, Order};
+use clap::Args;
+use protocol::mission::MissionHash;
+use sim::dispersion;
+
+use super::hazard::check_winds;
+use super::{in_wind, on_threads, recipe, refuse_loss, show_flights, write_folder};
+
+/// The files of a card.
+const FILES: [&str; 3] = ["card.html", "card.txt", "mission.toml"];
+/// Most flights of a card.
+const CARD_FLIGHTS_MAX: u64 = 10_000;
+
+#[derive(Args)]
+pub(crate) struct CardArguments {
+    /// Built-in mission or TOML file.
+    #[arg(long, default_value = flight::vehicles::mission::DEFAULT, value_name = "NAME|FILE")]
+    mission: String,
+    /// Built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh, wild) or TOML file.
+    #[arg(long, default_value = dispersion::DEFAULT, value_name = "NAME|FILE")]
+    dispersion: String,
+    /// Seed of everything random.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Flights at the same time; the results do not depend on it.
+    #[arg(long, value_name = "N")]
+    jobs: Option<usize>,
+    /// Mean winds 10 m above the ground, m/s, each with a radius and a rate of its own.
+    #[arg(long = "wind", value_delimiter = ',', default_value = "0,3,6,10", value_name = "M/S,...")]
+    winds: Vec<f64>,
+    /// Where the wind of the day comes from, degrees clockwise from north: the plan has north up and the line downwind. By default
+    /// downwind is up.
+    #[arg(long, value_name = "DEG", value_parser = degrees)]
+    wind_from: Option<f64>,
+    /// Flights in each wind of every way in which a flight can end. Fewer than 100 give neither a rate nor a radius.
+    #[arg(long, default_value_t = 100, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=CARD_FLIGHTS_MAX))]
+    flights: u64,
+    /// Flights in each wind of the ways that come down farthest. Below 368 the interval has no upper end.
+    #[arg(long, default_value_t = 400, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=CARD_FLIGHTS_MAX))]
+    hazard_flights: u64,
+    /// Folder of the card.
+    #[arg(long, default_value = "card", value_name = "DIR")]
+    out: PathBuf,
+    /// Replace existing files.
+    #[arg(long)]
+    force: bool,
+}
+
+pub(crate) fn run(arguments: &CardArguments) -> anyhow::Result<ExitCode> {
+    check_winds(&arguments.winds)?;
+    for name in FILES {
+        refuse_loss(&arguments.out.join(name), arguments.force)?;
+    }
+    let recipe = recipe(&arguments.mission, None, &arguments.dispersion, arguments.seed)?;
+    let mut winds_m_s = arguments.winds.clone();
+    winds_m_s.sort_by(f64::total_cmp);
+    winds_m_s.dedup();
+    let days = winds_m_s
+        .into_iter()
+        .map(|wind_m_s| Ok(Day { wind_m_s, recipe: in_wind(&recipe, wind_m_s)? }))
+        .collect::<anyhow::Result<Vec<_>>>()?;
+    let order = Order {
+        recipe: &recipe,
+        hash: &MissionHash::of(&recipe.mission_toml).to_string(),
+        winds: &days,
+        flights: Flights {
+            survey: arguments.flights,
+            of_widest: arguments.hazard_flights.max(arguments.flights),
+        },
+        wind_from_deg: arguments.wind_from,
+    };
+    let card = on_threads(arguments.jobs, || Ok(Card::new(&order, &show_flights())?))?;
+    let [html, text, mission_file] = FILES;
+    let page = card.text();
+    let files = [(html, card.html()), (text, page.clone()), (mission_file, card.recipe.mission_toml)];
+    write_folder(&arguments.out, &files, arguments.force)?;
+    writeln!(std::io::stdout().lock(), "{page}card {}", arguments.out.join(html).display())?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// A direction.
+fn degrees(text: &str) -> Result<f64, String> {
+    let degrees = text.parse().ok().filter(|degrees| (0.0..=360.0).contains(degrees));
+    degrees.ok_or_else(|| format!("`{text}` is not a direction of 0 to 360 degrees"))
+}
