@@ -217,7 +217,7 @@ fn a_card_is_of_the_mission_that_was_given_byte_for_byte() {
 fn a_card_says_which_keys_are_not_those_of_the_standard_controller() {
     let mut recipe = Recipe::built_in("mini-f10", "none").unwrap();
     recipe.mission.changed = ["powered.weights.theta", "soft_tilt_deg"].map(str::to_owned).to_vec();
-    let sheet = card_of(&recipe, Flights { survey: 1, of_widest: 1 }, [0.0, 0.0]).text();
+    let sheet = card_of(&recipe, Flights { survey: 1, of_widest: 1 }).text();
     let words = ["Controller", "not the standard one", "powered.weights.theta, soft_tilt_deg"];
     let row = sheet.lines().find(|line| line.contains(words[0])).unwrap();
     assert!(words.iter().all(|words| row.contains(words)), "{row}");
