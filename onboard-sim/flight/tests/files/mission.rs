@@ -66,7 +66,7 @@ fn a_stated_key_of_the_controller_is_flown_and_named_and_what_is_measured_is_not
     }
 }
 
-/// What a flight computer was started with can be read from what it says.
+/// Another program can be given all that is flown.
 #[test]
 fn an_effective_mission_read_again_is_the_same_and_states_all_of_the_controller() {
     for (name, _) in BUILTIN {
