@@ -54,7 +54,7 @@ fn a_check_answers_with_its_worst_word_and_names_motors_that_cannot_be_used() {
     fs::write(directory.path().join("weak.toml"), mk3.replace("force_n = 90.0", "force_n = 10.0")).unwrap();
     let weak = run(directory.path(), &["check", "weak.toml"]);
     assert_eq!(weak.status.code(), Some(1));
-    assert!(stderr(&weak).contains("airframe.legs.crush.force_n is 10"), "{}", stderr(&weak));
+    assert!(stderr(&weak).contains("airframe.legs.crush.force_n = 10: must"), "{}", stderr(&weak));
 }
 
 #[test]

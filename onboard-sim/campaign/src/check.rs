@@ -72,7 +72,7 @@ const GIMBAL: Least = Least(1.0, 1.5);
 const FINS: Least = Least(0.0, 1.0);
 /// Distance that fall and burn can make good over the drift. With less it lands beside the pad.
 const REACH: Least = Least(0.0, 1.0);
-/// Vertical speed that the legs take, m/s. Landings of `real` have up to 1.5.
+/// Vertical speed that the legs take, m/s. Legs with blocks are designed for 1.5.
 const LEGS_M_S: Least = Least(EXPECTED_M_S, 2.0);
 const EXPECTED_M_S: f64 = 1.5;
 /// Tilt about two feet from which it falls over, degrees.
