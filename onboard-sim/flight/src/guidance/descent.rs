@@ -36,6 +36,9 @@ pub struct DescentGains {
     #[serde(default)]
     pub stiffness_m3: f64,
     pub damping: f64,
+    /// Whether the fins open in the fall. In a short one they brake little, and turn the vehicle into the wind.
+    #[serde(default)]
+    pub opens_fins: bool,
     /// Decay rate of the roll rate, 1/s.
     pub roll_decay_per_s: f64,
     /// Lower limit of the time to go in the steering law, s.
@@ -169,6 +172,7 @@ mod tests {
             natural_frequency_rad_s: 3.0,
             stiffness_m3: 0.0,
             damping: 0.8,
+            opens_fins: true,
             roll_decay_per_s: 3.0,
             time_to_go_min_s: 2.5,
         }

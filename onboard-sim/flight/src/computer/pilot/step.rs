@@ -488,6 +488,7 @@ impl Pilot {
                 phase if phase.before_apogee() => [fins.closed_rad(); 4],
                 // On the ground they stay where they are: no servo needs to move there.
                 Phase::Touchdown | Phase::Safed => self.fins_rad,
+                Phase::Deploy if !self.model.mission.descent.opens_fins => [fins.control_min_rad(); 4],
                 _ => [fins.open_rad(); 4],
             };
         }
@@ -508,6 +509,8 @@ impl Pilot {
         let (moments, drag_area_m2, min_rad) = if burning {
             // During the burn the gimbal turns the vehicle; the fins brake and stop it from rolling.
             (Vector3::new(demand.moment_n_m.x, 0.0, 0.0), self.fin_share * largest_m2, fins.closed_rad())
+        } else if !self.model.mission.descent.opens_fins {
+            return [fins.control_min_rad(); 4];
         } else if !lies_across_the_air(estimate) {
             (demand.moment_n_m, largest_m2, fins.control_min_rad())
         } else {

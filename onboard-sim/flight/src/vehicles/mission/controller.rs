@@ -146,6 +146,9 @@ impl Formulas<'_> {
         let tilt_max_deg = if mission.start.at == StartPoint::Drone { 35.0 } else { 20.0 };
         of("gate.tilt_max_deg", &mut mission.gate.tilt_max_deg, tilt_max_deg);
 
+        // In a short fall fins ahead of the centre of gravity brake little, and turn the vehicle into a wind that is as fast.
+        let opens_fins = speed_m_s > 18.0 || arm_m < 0.03 * airframe.body.length_m;
+        self.of_controller("descent.opens_fins", &mut mission.descent.opens_fins, opens_fins);
         // Motors within so many deviations of what is expected of them.
         let around = |sigmas: f64, sigma: f64| [1.0 - sigmas * sigma, 1.0 + sigmas * sigma];
         let ignition = &mut mission.ignition;
