@@ -159,9 +159,9 @@ impl Draft {
             return Some(told.clone());
         }
         let (section, leaf) = key.path.rsplit_once('.').unwrap_or(("", key.path));
-        let sections = section.split('.').filter(|name| !name.is_empty());
-        let table = sections.fold(Some(&self.stated), |table, name| table?.get(name)?.as_table());
-        let value = table?.get(leaf)?;
+        let mut sections = section.split('.').filter(|name| !name.is_empty());
+        let table = sections.try_fold(&self.stated, |table, name| table.get(name)?.as_table())?;
+        let value = table.get(leaf)?;
         let by = format!("{}'s", self.like.name);
         let scale: f64 =
             self.scales().iter().zip(&key.powers).map(|(scale, power)| libm::pow(*scale, *power)).product();
@@ -205,7 +205,9 @@ impl Draft {
             ("airframe.mass.roll_inertia_kg_m2", found.roll_inertia_kg_m2),
             (DIAMETER, found.reference_area_m2.map(|area_m2| libm::sqrt(4.0 * area_m2 / PI))),
         ] {
-            number.into_iter().for_each(|number| self.put(path, rounded(number), &name));
+            if let Some(number) = number {
+                self.put(path, rounded(number), &name);
+            }
         }
         Ok(())
     }

@@ -57,6 +57,9 @@ pub fn factor(si: &str, unit: &str) -> Result<f64, String> {
     })
 }
 
+/// A line, and the numbers in it.
+pub type Row<const N: usize> = (usize, [Option<f64>; N]);
+
 /// The rows of a table, each with its line: of every wanted column (its name in small letters, its unit of the SI) the number in
 /// that unit, if there is one. The first `needed` columns must be there.
 ///
@@ -66,7 +69,7 @@ pub fn rows<'a, const N: usize>(
     text: &'a str,
     wanted: &'a [(&'static str, &str); N],
     needed: usize,
-) -> Result<impl Iterator<Item = Result<(usize, [Option<f64>; N]), TableError>> + 'a, TableError> {
+) -> Result<impl Iterator<Item = Result<Row<N>, TableError>> + 'a, TableError> {
     let mut lines = text.lines().zip(1..);
     let header = lines.find_map(|(line, number)| {
         let separator = [';', '\t', ','].into_iter().find(|separator| line.contains(*separator))?;
@@ -120,7 +123,7 @@ mod tests {
 
     const WANTED: [(&str, &str); 3] = [("time", "s"), ("thrust", "n"), ("mass", "kg")];
 
-    fn read(text: &str) -> Result<Vec<(usize, [Option<f64>; 3])>, TableError> {
+    fn read(text: &str) -> Result<Vec<Row<3>>, TableError> {
         rows(text, &WANTED, 2)?.collect()
     }
 
