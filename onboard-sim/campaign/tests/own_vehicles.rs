@@ -35,7 +35,8 @@ fn drawn(number: u64) -> String {
         }
     };
     let drone = rng.random_range(0..3) == 0;
-    let height_m = if drone { [30.0, 100.0][rng.random_range(0..2)] } else { [100.0, 300.0][rng.random_range(0..2)] };
+    let height_m =
+        if drone { [30.0, 100.0][rng.random_range(0..2)] } else { [100.0, 300.0][rng.random_range(0..2)] };
     let steers = rng.random_range(0..4) > 0;
     body(rng, (motor, &curve), mass_kg, drone.then_some(height_m), height_m, steers)
 }
@@ -57,7 +58,8 @@ fn body(
     let pitch_kg_m2 = mass_kg * length_m * length_m / 12.0 * of([0.95, 1.3]);
     let feet_m = 0.1 * size;
     let radius_m = (cg_m + feet_m) * of([0.85, 1.1]);
-    let roll_kg_m2 = mass_kg * (0.5 * diameter_m * diameter_m / 4.0 + 0.12 * radius_m * radius_m * of([0.3, 0.6]));
+    let roll_kg_m2 =
+        mass_kg * (0.5 * diameter_m * diameter_m / 4.0 + 0.12 * radius_m * radius_m * of([0.3, 0.6]));
     let fin_station_m = if steers { length_m * of([0.85, 0.93]) } else { cg_m + length_m * of([0.01, 0.06]) };
     let fin_length_m = 0.11 * size * of([0.9, 1.3]);
     let inside_m = diameter_m - 0.002;
@@ -127,7 +129,8 @@ fence_radius_m = 120.0
 fn flown(text: &str, set: &str, seed: u64, flights: u64) -> (u64, u64) {
     let recipe = Recipe::from_texts(("drawn", text), (set, Dispersion::builtin_toml(set).unwrap())).unwrap();
     let recipe = Recipe { seed, ..recipe };
-    let rows: Vec<Row> = (0..flights).into_par_iter().map(|number| tally::fly(&recipe, number).unwrap()).collect();
+    let rows: Vec<Row> =
+        (0..flights).into_par_iter().map(|number| tally::fly(&recipe, number).unwrap()).collect();
     let stand = rows.iter().filter(|row| row.landing().stands).count() as u64;
     let windows: Vec<_> = rows.iter().filter_map(Row::attainable).collect();
     (stand, best_height_m(&windows).map_or(0, |(_, lands)| lands))
@@ -157,8 +160,14 @@ fn table() {
         let starts = if mission.drop.is_some() { "drone" } else { "apogee" };
         print!(
             "{vehicle:3} {:8} {:.2} kg {starts} {:3.0} m tilt {tilt_deg:5.1} tc {:.2} v0 {:.1} h {:.1} gimbal {:.1} arm {:.2}",
-            airframe.motor, airframe.mass.loaded_kg, mission.start_height_m(), even.carried_s, even.speed_m_s, even.height_m,
-            airframe.gimbal.limit_deg, (airframe.fins.station_m - airframe.mass.loaded_cg_station_m) / airframe.body.length_m,
+            airframe.motor,
+            airframe.mass.loaded_kg,
+            mission.start_height_m(),
+            even.carried_s,
+            even.speed_m_s,
+            even.height_m,
+            airframe.gimbal.limit_deg,
+            (airframe.fins.station_m - airframe.mass.loaded_cg_station_m) / airframe.body.length_m,
         );
         for set in ["field", "real"] {
             let (stand, attainable) = flown(&text, set, 7001, flights);
