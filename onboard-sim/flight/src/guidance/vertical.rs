@@ -234,7 +234,11 @@ impl EvenLanding {
         const HALVINGS: usize = 20;
         let (airframe, curve) = (&mission.airframe, &mission.motor_curve);
         let density_kg_m3 = Air::at_height_m(mission.pad_altitude_m).density_kg_m3;
-        let column = Column::of_mission(mission, airframe.mass.loaded_kg, density_kg_m3, 1.0, 0.0);
+        // Gently: the controller's own touchdown follows from this.
+        let column = Column {
+            touchdown_m_s: -0.2,
+            ..Column::of_mission(mission, airframe.mass.loaded_kg, density_kg_m3, 1.0, 0.0)
+        };
         let burn = Burn::nominal(curve);
         let carried_s = burn.falls_through_weight_s(column.mass_at_ignition_kg, column.gravity_m_s2);
         let carried_s = carried_s.unwrap_or_else(|| curve.burn_time_s());

@@ -125,8 +125,10 @@ pub struct FinalBox {
     /// Largest lean in each level direction, degrees.
     pub pitch_error_deg: f64,
     /// Lowest vertical velocity, m/s.
+    #[serde(default)]
     pub u_min_m_s: f64,
     /// Highest vertical velocity, m/s.
+    #[serde(default)]
     pub u_max_m_s: f64,
     /// Largest lateral speed in each level direction, m/s.
     pub w_m_s: f64,

@@ -102,8 +102,12 @@ impl Formulas<'_> {
         of("fin_soft_tilt_deg", &mut mission.fin_soft_tilt_deg, soft_deg);
         let powered = &mut mission.powered;
         // The more thrust there is, the faster an error of its time becomes one of height: a strong motor ends its plan higher.
-        let floor_m_s = (0.47 + 0.045 * (even_deg - 27.0)).clamp(0.47, 1.7);
+        let floor_m_s = (0.47 + 0.045 * (even_deg - 27.0)).clamp(0.47, 1.2);
         of("powered.floor_rise_m_s", &mut powered.floor_rise_m_s, floor_m_s);
+        // It sinks no faster than the floor at its end, less a tenth of a metre per second for the last interval.
+        let end = &mut powered.final_box;
+        of("powered.final.u_min_m_s", &mut end.u_min_m_s, 0.11 - floor_m_s);
+        of("powered.final.u_max_m_s", &mut end.u_max_m_s, -0.05 - 0.35 * (floor_m_s - 0.47));
         // The planner's room beyond the soft tilt.
         of("powered.tilt_max_deg", &mut powered.tilt_max_deg, (soft_deg + 10.0).max(45.0));
         // A lean moves a vehicle by g t^2. With four times as much one far from the pad hurries there, and 1 flight in 200 more
