@@ -39,6 +39,8 @@ pub struct IgnitionPrediction {
     pub band: Option<Band>,
     /// Heights from which all considered motors land, m.
     pub common: Option<Band>,
+    /// From the highest of their low ends to the lowest of their high ends, m; the latter may lie below the former.
+    pub nearest: Option<Band>,
     /// The chosen height at which thrust should begin, m.
     pub chosen_m: Option<f64>,
     /// Height at which thrust would begin if commanded now, m.
@@ -105,18 +107,21 @@ impl IgnitionSettings {
             .and_then(|certified| bands.iter().try_fold(certified, |common, band| common.and(&(*band)?)));
         // If no height suits all motors, the middle between the highest low end and the lowest high end is closest to
         // all of them.
-        let chosen_m = self.fixed_height_m.or_else(|| {
-            let nearest = bands.iter().flatten().fold(certified?, |nearest, band| Band {
+        let nearest = certified.map(|certified| {
+            bands.iter().flatten().fold(certified, |nearest, band| Band {
                 low_m: nearest.low_m.max(band.low_m),
                 high_m: nearest.high_m.min(band.high_m),
-            });
-            Some(nearest.low_m + self.place * (nearest.high_m - nearest.low_m))
+            })
         });
+        let chosen_m = self
+            .fixed_height_m
+            .or_else(|| nearest.map(|nearest| nearest.low_m + self.place * (nearest.high_m - nearest.low_m)));
         let command_in_s =
             chosen_m.map(|chosen_m| (onset_height_m - chosen_m) / (-onset_vertical_m_s).max(1.0));
         IgnitionPrediction {
             band: certified,
             common,
+            nearest,
             chosen_m,
             onset_height_m,
             onset_vertical_m_s,
