@@ -10,7 +10,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context as _, bail, ensure};
 use flight::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
-use flight::vehicle::mission::{Mission, StartPoint};
+use flight::vehicle::mission::Mission;
 use flight::vehicle::thrust_curve::ThrustCurve;
 use flight::vehicles::{mission, motors, openrocket, table, thrust_curve};
 use toml::Value;
@@ -246,58 +246,48 @@ impl Draft {
 
     /// Asks for a value, until there is one that can be taken; one that is far from what was expected is asked for twice.
     fn ask(&mut self, key: &Key, ask: Ask<'_>) -> anyhow::Result<()> {
+        let number_of = |draft: &Self| draft.value(key)?.0.as_float();
+        let (expected, mut doubt) = (number_of(self), String::new());
         let unit = match key.unit {
             _ if key.path == MOTOR => {
-                format!("; built in: {}", motors::names().collect::<Vec<_>>().join(", "))
+                "; built in: ".to_owned() + &motors::names().collect::<Vec<_>>().join(", ")
             }
             "" => String::new(),
             unit => format!(", {unit}"),
         };
-        let expected = self.value(key).and_then(|(value, _)| value.as_float());
-        let mut doubt = String::new();
         loop {
-            let shown = match self.value(key) {
-                Some((Value::String(text), _)) => text.lines().next().unwrap_or_default().to_owned(),
-                Some((value, _)) => value.to_string(),
-                None => self.like.start.at.name().to_owned(),
-            };
+            let default = self.value(key).map_or(self.like.start.at.name().into(), |(value, _)| value);
+            let shown = default.as_str().map_or(default.to_string(), |text| text.lines().take(1).collect());
             let answer = ask(&format!("{doubt}{}{unit} [{shown}]", key.how))?;
-            if answer.is_empty() {
-                return Ok(());
-            }
             let before = self.told.clone();
             let taken = match key.path {
+                _ if answer.is_empty() => return Ok(()),
                 MOTOR => self.motor(&answer, None, ask),
-                START => answer.to_lowercase().parse::<StartPoint>().map_err(Into::into).map(|at| {
-                    self.put(START, Value::String(at.name().to_owned()), "told");
-                }),
+                START => Ok(self.put(START, Value::String(answer.to_lowercase()), "told")),
                 path => number(&answer, key.unit, self.scales()[0] * self.like.airframe.mass.loaded_kg)
                     .map(|number| self.put(path, number, "told")),
             };
-            if let Err(error) = taken.and_then(|()| self.refused(key)) {
-                self.told = before;
-                doubt = format!("{error:#}\n");
-                continue;
-            }
-            let told = self.told.get(key.path).and_then(|(value, _)| value.as_float());
-            match expected.zip(told) {
-                Some((expected, told))
-                    if !(0.25..=4.0).contains(&(told / expected))
-                        && self.told.get(key.path) != before.get(key.path) =>
+            doubt = match (taken.and_then(|()| self.refused(key)), expected.zip(number_of(self))) {
+                (Err(error), _) => {
+                    self.told = before;
+                    format!("{error:#}\n")
+                }
+                (Ok(()), Some((expected, told)))
+                    if !(0.25..=4.0).contains(&(told / expected)) && default.as_float() != Some(told) =>
                 {
-                    doubt =
-                        format!("{told} is far from the {expected} of a vehicle like this; Enter takes it\n");
+                    format!("{told} is far from the {expected} of a vehicle like this; Enter takes it\n")
                 }
                 _ => return Ok(()),
-            }
+            };
         }
     }
 
     /// An error if a mission cannot hold what stands at this key.
     fn refused(&self, key: &Key) -> anyhow::Result<()> {
-        let stated = format!("{} = ", key.path.trim_start_matches("airframe."));
-        let error = mission::from_toml(&self.text()?, "not taken").err();
-        error.filter(|error| error.to_string().contains(&stated)).map_or(Ok(()), |error| Err(error.into()))
+        let leaf = key.path.rsplit('.').next().unwrap_or_default();
+        let error = mission::from_toml(&self.text()?, "not taken").err().map(|error| error.to_string());
+        let error = error.filter(|error| error.contains(&format!("{leaf} = ")));
+        error.map_or(Ok(()), |error| bail!("{}", error.trim().lines().last().unwrap_or_default().to_owned()))
     }
 
     fn text(&self) -> anyhow::Result<String> {
@@ -337,16 +327,15 @@ fn number(answer: &str, unit: &str, mass_kg: f64) -> anyhow::Result<Value> {
     let float = |text: &str| {
         text.replace(',', ".").parse::<f64>().ok().with_context(|| format!("'{text}' is no number"))
     };
-    let words: Vec<&str> = answer.split_whitespace().collect();
-    Ok(match words[..] {
-        [number] => Value::Float(float(number)?),
-        [number, other] => rounded(float(number)? * table::factor(unit, other).map_err(anyhow::Error::msg)?),
+    let (first, other) = answer.split_once(char::is_whitespace).unwrap_or((answer, unit));
+    Ok(match other.split_whitespace().collect::<Vec<_>>()[..] {
         // m g T^2 d^2 / (16 pi^2 L)
-        [ten_swings_s, length_m, apart_m] if unit == "kg m2" => {
-            let swing = 0.1 * float(ten_swings_s)? * float(apart_m)? / (4.0 * PI);
+        [length_m, apart_m] if unit == "kg m2" && float(length_m).is_ok() => {
+            let swing = 0.1 * float(first)? * float(apart_m)? / (4.0 * PI);
             rounded(mass_kg * STANDARD_GRAVITY_M_S2 * swing * swing / float(length_m)?)
         }
-        _ => bail!("'{answer}': a number in {unit}, or a number and its unit, is accepted"),
+        _ if other == unit => Value::Float(float(first)?),
+        _ => rounded(float(first)? * table::factor(unit, other).map_err(anyhow::Error::msg)?),
     })
 }
 
@@ -432,7 +421,10 @@ mod tests {
                 "40 is far from the 0.3943 of a vehicle like this; Enter takes it\n",
             ),
             ("edge of a ruler, m [40.0]", "Pitch"),
-            ("apogee or drone [apogee]", "not a start: pad, apogee or drone is accepted\n"),
+            (
+                "apogee or drone [apogee]",
+                "unknown variant `above`, expected one of `pad`, `apogee`, `drone`\n",
+            ),
         ] {
             assert!(shown.contains(&format!("{question}{answer}")), "{question}{answer}: {shown}");
         }
