@@ -67,7 +67,7 @@ const ELSEWHERE: [(&str, &str, &str); 28] = [
 ];
 
 /// What the pages say that a line answers: how the line begins, and words of its answer.
-const SAID: [(&str, &str); 16] = [
+const SAID: [(&str, &str); 20] = [
     ("onboard-sim fly --start pad --fault separation-fails@0", "DOWN UNDER THE PARACHUTE"),
     ("onboard-sim campaign --only 17", "attainable_low_m"),
     ("replay info flight.mcap", "verdict"),
@@ -84,6 +84,10 @@ const SAID: [(&str, &str); 16] = [
     ("replay verify logs --baseline baseline.json --accept", "new"),
     ("replay verify logs --baseline baseline.json   ", "same"),
     ("onboard-sim check mini-f10 ", "flights stand"),
+    ("onboard-sim new drawn", "`onboard-sim check drawn.toml` says whether it will land"),
+    ("onboard-sim check drawn.toml", "drawn: 1.900 kg on G33"),
+    ("replay fit first.mcap --write drawn.toml", "drawn.toml"),
+    ("onboard-sim card --mission drawn.toml", "drawn-card/card.html"),
 ];
 
 /// The lines of a page's blocks that hold commands, without the languages of other programs.

@@ -73,7 +73,7 @@ enum Command {
     },
     /// Write a mission file for a rocket of one's own.
     ///
-    /// On a terminal it asks for what a club measures, one question a line. With --like or --from it does not ask.
+    /// On a terminal it asks for what a club measures, one question a line. With --like it does not ask.
     #[command(
         after_help = "Examples:\n  onboard-sim new ours\n  onboard-sim new ours --from openrocket.csv --length 0.7 --motor stand.csv \\\n    --motor-data ours 38 200 0.19 0.365"
     )]

@@ -25,7 +25,7 @@ use simulated_vehicle::fly::{
 use simulated_vehicle::vehicle::{RocketFlight, VehicleEvent};
 use tokio::sync::watch;
 
-use super::text_of;
+use super::{in_wind, text_of};
 
 /// The strongest mean wind that can be requested, m/s.
 pub(super) const WIND_MAX_M_S: f64 = 30.0;
@@ -147,9 +147,7 @@ impl FlyArguments {
                 (0.0..=WIND_MAX_M_S).contains(&wind_m_s),
                 "--wind {wind_m_s}: must be 0 to {WIND_MAX_M_S} m/s"
             );
-            recipe.dispersion_toml = with_wind(&recipe.dispersion_toml, wind_m_s);
-            recipe.dispersion_name = format!("{} with {wind_m_s} m/s of wind", recipe.dispersion_name);
-            recipe.dispersion = Dispersion::from_toml(&recipe.dispersion_toml, &recipe.dispersion_name)?;
+            recipe = in_wind(&recipe, wind_m_s)?;
         }
         recipe.faults.clone_from(&self.faults);
         Ok(RocketFlight { recipe, number: self.flight })

@@ -66,13 +66,13 @@ pub(crate) fn run(arguments: &NewArguments) -> anyhow::Result<ExitCode> {
         ensure!(stdin.read_line(&mut line)? > 0, "the answers end at: {question}");
         Ok(line.trim().to_owned())
     };
-    let nothing_given = arguments.like.is_none() && arguments.from.is_none();
-    if nothing_given && !terminal {
+    let asks = arguments.like.is_none();
+    if asks && !terminal {
         writeln!(stderr, "no terminal on which to ask: what is not told is {}'s", mission::DEFAULT)?;
     }
-    let text = made(arguments, nothing_given && terminal, &mut ask, &path.display().to_string())?;
+    let text = made(arguments, asks && terminal, &mut ask, &path.display().to_string())?;
     write_file(&path, arguments.force, |file| file.write_all(text.as_bytes()))?;
-    writeln!(stderr, "{}: --profile of `onboard-sim fly`, `campaign` and `card` takes it", path.display())?;
+    writeln!(stderr, "{0} is written; `onboard-sim check {0}` says whether it will land", path.display())?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -244,28 +244,50 @@ impl Draft {
         Ok(())
     }
 
-    /// Asks for a value, until there is one that can be taken.
+    /// Asks for a value, until there is one that can be taken; one that is far from what was expected is asked for twice.
     fn ask(&mut self, key: &Key, ask: Ask<'_>) -> anyhow::Result<()> {
-        let default =
-            self.value(key).map(|(value, _)| value.as_str().map_or_else(|| value.to_string(), str::to_owned));
-        let default = default.unwrap_or_else(|| self.like.start.at.name().to_owned());
-        let unit = if key.unit.is_empty() { String::new() } else { format!(", {}", key.unit) };
-        let mut question = format!("{}{unit} [{default}]", key.how);
+        let number_of = |draft: &Self| draft.value(key)?.0.as_float();
+        let (expected, mut doubt) = (number_of(self), String::new());
+        let unit = match key.unit {
+            _ if key.path == MOTOR => {
+                "; built in: ".to_owned() + &motors::names().collect::<Vec<_>>().join(", ")
+            }
+            "" => String::new(),
+            unit => format!(", {unit}"),
+        };
         loop {
-            let answer = ask(&question)?;
+            let default = self.value(key).map_or(self.like.start.at.name().into(), |(value, _)| value);
+            let shown = default.as_str().map_or(default.to_string(), |text| text.lines().take(1).collect());
+            let answer = ask(&format!("{doubt}{}{unit} [{shown}]", key.how))?;
+            let before = self.told.clone();
             let taken = match key.path {
-                _ if answer.is_empty() => Ok(()),
+                _ if answer.is_empty() => return Ok(()),
                 MOTOR => self.motor(&answer, None, ask),
-                START => {
-                    self.put(START, Value::String(answer), "told");
-                    Ok(())
-                }
+                START => Ok(self.put(START, Value::String(answer.to_lowercase()), "told")),
                 path => number(&answer, key.unit, self.scales()[0] * self.like.airframe.mass.loaded_kg)
                     .map(|number| self.put(path, number, "told")),
             };
-            let Err(error) = taken else { return Ok(()) };
-            question = format!("{error:#}\n{}{unit} [{default}]", key.how);
+            doubt = match (taken.and_then(|()| self.refused(key)), expected.zip(number_of(self))) {
+                (Err(error), _) => {
+                    self.told = before;
+                    format!("{error:#}\n")
+                }
+                (Ok(()), Some((expected, told)))
+                    if !(0.25..=4.0).contains(&(told / expected)) && default.as_float() != Some(told) =>
+                {
+                    format!("{told} is far from the {expected} of a vehicle like this; Enter takes it\n")
+                }
+                _ => return Ok(()),
+            };
         }
+    }
+
+    /// An error if a mission cannot hold what stands at this key.
+    fn refused(&self, key: &Key) -> anyhow::Result<()> {
+        let leaf = key.path.rsplit('.').next().unwrap_or_default();
+        let error = mission::from_toml(&self.text()?, "not taken").err().map(|error| error.to_string());
+        let error = error.filter(|error| error.contains(&format!("{leaf} = ")));
+        error.map_or(Ok(()), |error| bail!("{}", error.trim().lines().last().unwrap_or_default().to_owned()))
     }
 
     fn text(&self) -> anyhow::Result<String> {
@@ -302,17 +324,18 @@ fn read(path: &Path) -> anyhow::Result<String> {
 /// A number in a unit: of an answer that has the number alone, or another unit behind it, or for an inertia what was measured of
 /// a vehicle of this mass that swings on two wires.
 fn number(answer: &str, unit: &str, mass_kg: f64) -> anyhow::Result<Value> {
-    let float = |text: &str| text.parse::<f64>().with_context(|| format!("'{text}' is no number"));
-    let words: Vec<&str> = answer.split_whitespace().collect();
-    Ok(match words[..] {
-        [number] => Value::Float(float(number)?),
-        [number, other] => rounded(float(number)? * table::factor(unit, other).map_err(anyhow::Error::msg)?),
+    let float = |text: &str| {
+        text.replace(',', ".").parse::<f64>().ok().with_context(|| format!("'{text}' is no number"))
+    };
+    let (first, other) = answer.split_once(char::is_whitespace).unwrap_or((answer, unit));
+    Ok(match other.split_whitespace().collect::<Vec<_>>()[..] {
         // m g T^2 d^2 / (16 pi^2 L)
-        [ten_swings_s, length_m, apart_m] if unit == "kg m2" => {
-            let swing = 0.1 * float(ten_swings_s)? * float(apart_m)? / (4.0 * PI);
+        [length_m, apart_m] if unit == "kg m2" && float(length_m).is_ok() => {
+            let swing = 0.1 * float(first)? * float(apart_m)? / (4.0 * PI);
             rounded(mass_kg * STANDARD_GRAVITY_M_S2 * swing * swing / float(length_m)?)
         }
-        _ => bail!("'{answer}': a number in {unit}, or a number and its unit, is accepted"),
+        _ if other == unit => Value::Float(float(first)?),
+        _ => rounded(float(first)? * table::factor(unit, other).map_err(anyhow::Error::msg)?),
     })
 }
 
@@ -374,7 +397,7 @@ mod tests {
     /// MK3.md, "What a builder measures": ten swings of mk3 on wires of 1 m, 0.4 m apart, take 19.3 s.
     #[test]
     fn val_hand_answers_are_scaled_converted_and_swung() {
-        let answers = "4100 g\n0.8\n\nhalf\n0.4\n20.1 1 0.4\n\nHP-H45W\n130 mm\n\n8\ndrone\n140\n\n";
+        let answers = "HP-H45W\n4100 g\n80 m\n0,8\n\nhalf\n40\n0.4\n20.1 1 0.4\n1 kg m2\n\n130 mm\n\n8\nabove\nDrone\n140\n\n";
         let (text, shown) = asked(&["ours"], answers);
         let text = text.unwrap();
         let ours = mission::from_toml(&text, "ours").unwrap();
@@ -390,10 +413,21 @@ mod tests {
         let mk3 = number("19.3 1 0.4", "kg m2", 3.7).unwrap().as_float().unwrap();
         assert!((mk3 - 0.137).abs() < 5e-4, "{mk3}");
         assert_eq!((start.at.name(), drop.map(|drop| drop.height_m)), ("drone", Some(140.0)));
-        assert!(
-            shown.contains("edge of a ruler, m [0.3943]'half' is no number: invalid float literal\nCentre"),
-            "{shown}"
-        );
+        for (question, answer) in [
+            ("nose: tape, m [0.7]", "not taken: airframe.body.length_m = 80: must be above 0 to 3\n"),
+            ("edge of a ruler, m [0.3943]", "'half' is no number\n"),
+            (
+                "edge of a ruler, m [0.3943]",
+                "40 is far from the 0.3943 of a vehicle like this; Enter takes it\n",
+            ),
+            ("edge of a ruler, m [40.0]", "Pitch"),
+            (
+                "apogee or drone [apogee]",
+                "unknown variant `above`, expected one of `pad`, `apogee`, `drone`\n",
+            ),
+        ] {
+            assert!(shown.contains(&format!("{question}{answer}")), "{question}{answer}: {shown}");
+        }
         assert!(text.contains("kitchen scale (kg; told)\nloaded_kg = 4.1\n"), "{text}");
         assert!(text.contains("(m; mk3's, scaled)\nstation_m = 0.72\n"), "{text}");
         assert_eq!(asked(&["ours"], "3.7\n").0.unwrap_err().to_string(), "no more answers");

@@ -444,7 +444,8 @@ fn masses(airframe: &Airframe) -> Check {
 
 fn shape(airframe: &Airframe) -> Check {
     let (body, fins) = (&airframe.body, &airframe.fins);
-    positive("body.length_m", body.length_m)?;
+    let length_m = body.length_m;
+    require(length_m > 0.0 && length_m <= 3.0, "body.length_m", length_m, "above 0 to 3")?;
     positive("body.diameter_m", body.diameter_m)?;
     positive("body.reference_area_m2", body.reference_area_m2)?;
     not_negative("body.axial_drag_coefficient", body.axial_drag_coefficient)?;

@@ -79,7 +79,7 @@ pub fn from_toml(text: &str, origin: &str) -> Result<Mission, MissionError> {
         let defaults = DeTable::parse(defaults).map_err(not_a_mission)?;
         if are_ours {
             leaves("", defaults.get_ref(), &mut |key| {
-                changed.extend(Some(key).filter(|key| stated.contains(key)))
+                changed.extend(Some(key).filter(|key| stated.contains(key)));
             });
         }
         fill(table.get_mut(), defaults.into_inner());
