@@ -334,7 +334,10 @@ impl<'a> Vehicle<'a> {
         let found = if width_m < 0.0 {
             format!("at {middle_m:.0} m: {:.1} m between weak and strong", -width_m)
         } else {
-            format!("at {middle_m:.0} m: {width_m:.1} of {:.1} m suit all", certified.high_m - certified.low_m)
+            format!(
+                "at {middle_m:.0} m: {width_m:.1} of {:.1} m suit all",
+                certified.high_m - certified.low_m
+            )
         };
         Row::new("ignition", BAND.judge(width_m / asked_m), found, beside)
     }
@@ -392,7 +395,8 @@ impl<'a> Vehicle<'a> {
                     .or(|| "hinges near the nose, or let go lower".to_owned());
             }
             let fins_m2 = airframe.fin_drag_area_m2(&[fins.open_rad(); 4]);
-            let turned_deg_s2 = (self.in_the_wind_n_m(&mass, fins_m2) / mass.pitch_inertia_kg_m2).to_degrees();
+            let turned_deg_s2 =
+                (self.in_the_wind_n_m(&mass, fins_m2) / mass.pitch_inertia_kg_m2).to_degrees();
             let beside = format!("wind turns it by {turned_deg_s2:.0} deg/s2");
             return Row::new("fins", TURNED_DEG_S2.judge(-turned_deg_s2), found, beside)
                 .or(|| "the centre of gravity in the middle of the body".to_owned());
