@@ -36,7 +36,8 @@ fn drawn(number: u64) -> String {
         }
     };
     let drone = rng.random_range(0..3) == 0;
-    let height_m = if drone { [30.0, 100.0][rng.random_range(0..2)] } else { [100.0, 300.0][rng.random_range(0..2)] };
+    let height_m =
+        if drone { [30.0, 100.0][rng.random_range(0..2)] } else { [100.0, 300.0][rng.random_range(0..2)] };
     let steers = rng.random_range(0..4) > 0;
     body(rng, (motor, &curve), mass_kg, drone.then_some(height_m), height_m, steers)
 }
@@ -58,7 +59,8 @@ fn body(
     let pitch_kg_m2 = mass_kg * length_m * length_m / 12.0 * of([0.95, 1.3]);
     let feet_m = 0.1 * size;
     let radius_m = (cg_m + feet_m) * of([0.85, 1.1]);
-    let roll_kg_m2 = mass_kg * (0.5 * diameter_m * diameter_m / 4.0 + 0.12 * radius_m * radius_m * of([0.3, 0.6]));
+    let roll_kg_m2 =
+        mass_kg * (0.5 * diameter_m * diameter_m / 4.0 + 0.12 * radius_m * radius_m * of([0.3, 0.6]));
     let fin_station_m = if steers { length_m * of([0.85, 0.93]) } else { cg_m + length_m * of([0.01, 0.06]) };
     let fin_length_m = 0.11 * size * of([0.9, 1.3]);
     let inside_m = diameter_m - 0.002;
@@ -132,7 +134,8 @@ fn recipe(text: &str, set: &str, seed: u64) -> Recipe {
 /// How many stand, and how many perfect information lands, of a vehicle's flights in a set of dispersions.
 fn flown(text: &str, set: &str, seed: u64, flights: u64) -> (u64, u64) {
     let recipe = recipe(text, set, seed);
-    let rows: Vec<Row> = (0..flights).into_par_iter().map(|number| tally::fly(&recipe, number).unwrap()).collect();
+    let rows: Vec<Row> =
+        (0..flights).into_par_iter().map(|number| tally::fly(&recipe, number).unwrap()).collect();
     let stand = rows.iter().filter(|row| row.landing().stands).count() as u64;
     let windows: Vec<_> = rows.iter().filter_map(Row::attainable).collect();
     (stand, best_height_m(&windows).map_or(0, |(_, lands)| lands))
@@ -151,7 +154,12 @@ fn table() {
         }
         let recipe = recipe(&text, "field", 7001);
         let page = check(&recipe, &[], 0, &|_| ()).unwrap();
-        let rows: Vec<String> = page.rows.iter().filter(|row| row.verdict > Verdict::Ok).map(|row| format!("{} {} ({} / {})", row.what, row.verdict, row.found, row.beside)).collect();
+        let rows: Vec<String> = page
+            .rows
+            .iter()
+            .filter(|row| row.verdict > Verdict::Ok)
+            .map(|row| format!("{} {} ({} / {})", row.what, row.verdict, row.found, row.beside))
+            .collect();
         print!("{vehicle:3} {} {}", page.verdict(), page.title);
         if page.verdict() == Verdict::No && number("NO", 1) == 0 {
             println!(" {}", rows.join("; "));

@@ -72,7 +72,11 @@ pub(crate) fn run(arguments: &NewArguments) -> anyhow::Result<ExitCode> {
     }
     let text = made(arguments, nothing_given && terminal, &mut ask, &path.display().to_string())?;
     write_file(&path, arguments.force, |file| file.write_all(text.as_bytes()))?;
-    writeln!(stderr, "{}: --profile of `onboard-sim fly`, `campaign` and `card` takes it", path.display())?;
+    writeln!(
+        stderr,
+        "{}: `onboard-sim check`, `card --mission` and `fly --profile` take it",
+        path.display()
+    )?;
     Ok(ExitCode::SUCCESS)
 }
 
