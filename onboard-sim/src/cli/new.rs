@@ -72,11 +72,7 @@ pub(crate) fn run(arguments: &NewArguments) -> anyhow::Result<ExitCode> {
     }
     let text = made(arguments, nothing_given && terminal, &mut ask, &path.display().to_string())?;
     write_file(&path, arguments.force, |file| file.write_all(text.as_bytes()))?;
-    writeln!(
-        stderr,
-        "{}: `onboard-sim check`, `card --mission` and `fly --profile` take it",
-        path.display()
-    )?;
+    writeln!(stderr, "{}: for `onboard-sim check`, `card --mission` and `fly --profile`", path.display())?;
     Ok(ExitCode::SUCCESS)
 }
 
