@@ -38,7 +38,7 @@ fn an_impossible_landing_is_refused_with_the_reason() {
     let listed = Running::to_end(program(Program::OnboardSim).args(["profiles", "--show", "mk2"]));
     let height = listed.output.lines().find(|line| line.starts_with("height_m = ")).unwrap();
     // Far below the band of heights from which the motor stops it.
-    std::fs::write(folder.path().join("low.toml"), listed.output.replace(height, "height_m = 30.0")).unwrap();
+    std::fs::write(folder.path().join("low.toml"), listed.output.replace(height, "height_m = 10.0")).unwrap();
     let arguments = ["--profile", "low.toml", "--start", "apogee"];
     let refused = Running::to_end(program(Program::Ground).args(arguments).current_dir(folder.path()));
     assert_eq!(refused.code, Some(4), "{}", refused.output);
