@@ -263,7 +263,7 @@ impl Draft {
             let taken = match key.path {
                 _ if answer.is_empty() => return Ok(()),
                 MOTOR => self.motor(&answer, None, ask),
-                START => Ok(self.put(START, Value::String(answer.to_lowercase()), "told")),
+                START => Ok(Value::String(answer.to_lowercase())).map(|at| self.put(START, at, "told")),
                 path => number(&answer, key.unit, self.scales()[0] * self.like.airframe.mass.loaded_kg)
                     .map(|number| self.put(path, number, "told")),
             };

@@ -115,7 +115,7 @@ pub(super) fn numbers(mission: &Mission, looked_at: &dyn Fn(&str) -> bool) -> Ch
         let range = RANGES.iter().find_map(|(required, least, most, keys)| {
             let holds =
                 |of: &&str| key.strip_prefix(of).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
-            keys.iter().any(|of| holds(of)).then_some((*required, *least..=*most))
+            keys.iter().any(holds).then_some((*required, *least..=*most))
         });
         match range {
             Some((required, range)) if looked_at(key) && !range.contains(&found) => {
