@@ -109,7 +109,9 @@ pub fn settings_of_file(text: &str, origin: &str) -> Result<Vec<Setting>, Settin
 /// The text is not TOML.
 pub(crate) fn settings_of_mission(text: &str, origin: &str) -> Result<Vec<Setting>, SettingError> {
     let mut settings = settings_of_file(text, origin)?;
-    settings.iter_mut().for_each(|setting| setting.value = as_whole(&setting.value));
+    for setting in &mut settings {
+        setting.value = as_whole(&setting.value);
+    }
     Ok(settings)
 }
 

@@ -80,7 +80,7 @@ proptest! {
 
     #[test]
     fn any_table_of_a_stand_is_answered(rows in prop::collection::vec((-1e3..1e3_f64, -1e6..1e6_f64), 0..60)) {
-        let lines: String = rows.iter().map(|(time, thrust)| format!("{time}\t{thrust}\n")).collect();
-        let _ = from_stand("T 38 200 P 0.1 0.3", &format!("time_s\tthrust_n\n{lines}")).is_ok();
+        let lines: Vec<String> = rows.into_iter().map(|(time, thrust)| format!("{time}\t{thrust}")).collect();
+        let _ = from_stand("T 38 200 P 0.1 0.3", &format!("time_s\tthrust_n\n{}", lines.join("\n"))).is_ok();
     }
 }
