@@ -75,7 +75,7 @@ enum Command {
     ///
     /// On a terminal it asks for what a club measures, one question a line. With --like it does not ask.
     #[command(
-        after_help = "Examples:\n  onboard-sim new ours\n  onboard-sim new ours --from openrocket.csv --length 0.7 --motor stand.csv --motor-data ours 38 200 0.19 0.365"
+        after_help = "Examples:\n  onboard-sim new ours\n  onboard-sim new ours --from openrocket.csv --length 0.7\n  onboard-sim new ours --motor stand.csv --motor-data ours 38 200 0.19 0.365"
     )]
     New(cli::new::NewArguments),
     /// List the built-in profiles, or print one as a file to start from.
