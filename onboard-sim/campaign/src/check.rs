@@ -10,7 +10,7 @@ use flight::guidance::descent::LEAST_AIRSPEED_M_S;
 use flight::guidance::ignition::IgnitionSettings;
 use flight::guidance::misfit::{MOST_TILT_RAD, misfit};
 use flight::guidance::vertical::{Column, EvenLanding};
-use flight::vehicle::airframe::{MassModel, MassProperties};
+use flight::vehicle::airframe::{Airframe, MassModel, MassProperties};
 use flight::vehicle::atmosphere::Air;
 use flight::vehicle::burn::Burn;
 use flight::vehicle::fins::{PITCH, YAW};
@@ -286,7 +286,7 @@ impl<'a> Vehicle<'a> {
 
     /// Whether it is steered, bears its landing and has a parachute and a fence.
     fn stands(&self) -> Vec<Row> {
-        vec![
+        let rows = [
             self.gimbal(),
             self.fins(),
             self.reach(),
@@ -294,7 +294,8 @@ impl<'a> Vehicle<'a> {
             self.feet(),
             self.parachute(),
             self.fence(),
-        ]
+        ];
+        self.inertia().into_iter().chain(rows).collect()
     }
 
     fn thrust(&self) -> Row {
@@ -497,6 +498,19 @@ impl<'a> Vehicle<'a> {
         })
     }
 
+    /// A row only if an inertia is not that of such a vehicle: one in another unit makes a vehicle that tumbles.
+    fn inertia(&self) -> Option<Row> {
+        let Airframe { mass, body, legs, .. } = &self.mission.airframe;
+        let gyration_m = |inertia_kg_m2: f64| libm::sqrt(inertia_kg_m2 / mass.loaded_kg);
+        let [pitch_m, roll_m] = [mass.loaded_pitch_inertia_kg_m2, mass.roll_inertia_kg_m2].map(gyration_m);
+        // A rod has 0.29 of its length, the built-in vehicles 0.27 to 0.31; a tube has its radius, and legs reach their feet.
+        let is_such = (0.15..0.45).contains(&(pitch_m / body.length_m))
+            && (0.3 * body.diameter_m..0.6 * legs.foot_radius_m).contains(&roll_m);
+        let found = format!("radii of {:.0} and {:.0} mm", 1e3 * pitch_m, 1e3 * roll_m);
+        let row = Row::new("inertia", Verdict::No, found, "of gyration, pitch and roll".to_owned());
+        (!is_such).then(|| row.or(|| "measure it again, in kg m2".to_owned()))
+    }
+
     /// Speed under the canopy, m/s, with the motor not lit.
     fn canopy_m_s(&self, area_m2: f64) -> f64 {
         let lift_kg_m =
@@ -544,6 +558,19 @@ mod tests {
         let mut mission = flight::vehicles::mission::builtin(name).unwrap().unwrap();
         change(&mut mission);
         Vehicle::of(&mission).stands().into_iter().find(|row| row.what == what).unwrap()
+    }
+
+    /// In kg cm2, in g m2, and as it is.
+    #[test]
+    fn an_inertia_in_another_unit_is_found() {
+        for (scale, wrong) in [(1e4, true), (1e3, true), (1.0, false), (1e-3, true)] {
+            let mut mission = flight::vehicles::mission::builtin("mk3").unwrap().unwrap();
+            mission.airframe.mass.roll_inertia_kg_m2 *= scale;
+            assert_eq!(Vehicle::of(&mission).inertia().is_some(), wrong, "roll {scale}");
+            mission = flight::vehicles::mission::builtin("mk3").unwrap().unwrap();
+            mission.airframe.mass.loaded_pitch_inertia_kg_m2 *= scale;
+            assert_eq!(Vehicle::of(&mission).inertia().is_some(), wrong, "pitch {scale}");
+        }
     }
 
     /// 4 x 90 N over 0.06 m, less 3.5 kg of weight: (360 - 34) 0.06 / (0.5 x 3.5) = 11.2 m2/s2. 6.0 m/s is in the mission.
