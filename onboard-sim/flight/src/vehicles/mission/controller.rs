@@ -102,7 +102,7 @@ impl Formulas<'_> {
         of("fin_soft_tilt_deg", &mut mission.fin_soft_tilt_deg, soft_deg);
         let powered = &mut mission.powered;
         // The more thrust there is, the faster an error of its time becomes one of height: a strong motor ends its plan higher.
-        let floor_m_s = (0.47 + 0.06 * (even_deg - 34.0)).clamp(0.47, 1.2);
+        let floor_m_s = (0.47 + 0.045 * (even_deg - 27.0)).clamp(0.47, 1.2);
         of("powered.floor_rise_m_s", &mut powered.floor_rise_m_s, floor_m_s);
         // It sinks no faster than the floor at its end, less a tenth of a metre per second for the last interval.
         let end = &mut powered.final_box;
