@@ -6,9 +6,8 @@
 use core::fmt;
 
 use flight::control::fins::{Allocation, OpeningRange};
-use flight::guidance::descent::LEAST_AIRSPEED_M_S;
+use flight::guidance::descent::{LEAST_AIRSPEED_M_S, SHORT_FALL_M_S};
 use flight::guidance::ignition::IgnitionSettings;
-use flight::guidance::misfit::{MOST_TILT_RAD, misfit};
 use flight::guidance::vertical::{Column, EvenLanding};
 use flight::vehicle::airframe::{Airframe, MassModel, MassProperties};
 use flight::vehicle::atmosphere::Air;
@@ -66,7 +65,7 @@ const CARRIED: Least = Least(1.1, 1.3);
 /// to correct. `mk3` has 1.2, `vlr-f15` 1.3, and of drawn vehicles with 2.3 a third stood.
 const AT_LAST: Least = Least(-2.15, -1.35);
 const ENDS_S: f64 = 0.3;
-/// Lean that lands the expected motor, degrees: with less a weak motor does not stop it. [`MOST_TILT_RAD`] is the most.
+/// Lean that lands the expected motor, degrees: with less a weak motor does not stop it. [`EvenLanding::MOST_TILT_RAD`] is the most.
 const LEAN_DEG: Least = Least(0.0, 15.0);
 /// Width of the heights that suit every motor, over what two deviations of the igniter to either side cover. Below zero no height
 /// suits all.
@@ -78,8 +77,6 @@ const STEERED: Least = Least(1.0, 6.4);
 /// Angular acceleration by a side wind of a vehicle whose fins do not steer, degrees/s2, as a limit from above. With 80 to 200 half of
 /// the drawn vehicles ended under the parachute, with 13 or less none.
 const TURNED_DEG_S2: Least = Least(f64::NEG_INFINITY, -40.0);
-/// Speed at the ignition, m/s, up to which a fall is short.
-const SHORT_M_S: f64 = 18.0;
 /// Moment of the fins over that which holds their largest lean. With less they lean less.
 const FINS: Least = Least(0.0, 1.0);
 /// Distance that fall and burn can make good over the drift. With less it lands beside the pad.
@@ -274,8 +271,7 @@ impl<'a> Vehicle<'a> {
             burn: Burn::nominal(curve),
             mass: MassModel::new(&airframe.mass, curve.propellant_mass_kg()),
             column,
-            terminal_m_s: column
-                .terminal_speed_m_s(airframe.fin_drag_area_m2(&[airframe.fins.open_rad(); 4])),
+            terminal_m_s: column.terminal_speed_m_s(airframe.open_fin_drag_area_m2()),
         }
     }
 
@@ -312,12 +308,12 @@ impl<'a> Vehicle<'a> {
 
     fn spare(&self) -> Row {
         const WHAT: &str = "impulse";
-        if let Some(misfit) = misfit(&self.landing) {
+        if let Some(misfit) = self.landing.misfit() {
             return Row::new(WHAT, Verdict::No, misfit.to_owned(), String::new());
         }
         let tilt_deg = self.landing.tilt_rad.unwrap_or_default().to_degrees();
         let found = format!("lands with {tilt_deg:.0} deg of lean");
-        let beside = format!("{} to {:.0} deg", LEAN_DEG.1, MOST_TILT_RAD.to_degrees());
+        let beside = format!("{} to {:.0} deg", LEAN_DEG.1, EvenLanding::MOST_TILT_RAD.to_degrees());
         Row::new(WHAT, LEAN_DEG.judge(tilt_deg), found, beside)
     }
 
@@ -388,14 +384,14 @@ impl<'a> Vehicle<'a> {
     fn fins(&self) -> Row {
         let (airframe, descent, mass) = (&self.mission.airframe, &self.mission.descent, self.mass.at(0.0));
         let (fins, arm_m) = (&airframe.fins, airframe.fins.station_m - mass.cg_station_m);
-        if !self.steers() {
+        if !descent.steers() {
             let found = format!("do not steer: {arm_m:.2} m of arm");
-            if self.landing.speed_m_s > SHORT_M_S {
+            if self.landing.speed_m_s > SHORT_FALL_M_S {
                 let beside = "they do not hold it upright".to_owned();
                 return Row::new("fins", Verdict::Tight, found, beside)
                     .or(|| "hinges near the nose, or let go lower".to_owned());
             }
-            let fins_m2 = airframe.fin_drag_area_m2(&[fins.open_rad(); 4]);
+            let fins_m2 = airframe.open_fin_drag_area_m2();
             let turned_deg_s2 =
                 (self.in_the_wind_n_m(&mass, fins_m2) / mass.pitch_inertia_kg_m2).to_degrees();
             let beside = format!("wind turns it by {turned_deg_s2:.0} deg/s2");
@@ -425,10 +421,6 @@ impl<'a> Vehicle<'a> {
             .or(|| "longer fins, or hinges nearer to the nose".to_owned())
     }
 
-    fn steers(&self) -> bool {
-        self.mission.descent.stiffness_m3 > 0.0
-    }
-
     /// Time of a fall from rest with open fins to a speed, s: `V_t tanh(g t / V_t)` is the speed after `t`.
     fn falls_s(&self, speed_m_s: f64) -> f64 {
         let share = (speed_m_s / self.terminal_m_s).min(1.0 - 1e-9);
@@ -440,7 +432,7 @@ impl<'a> Vehicle<'a> {
         let falls_s = self.falls_s(speed_m_s);
         let burn_m = self.mission.powered.homing.reach_m_s2 * carried_s * carried_s;
         let steered_s = falls_s - self.falls_s(LEAST_AIRSPEED_M_S);
-        let fall_m = if self.steers() && steered_s > 0.0 {
+        let fall_m = if self.mission.descent.steers() && steered_s > 0.0 {
             // The mean of the squared speed: the integral of tanh^2 is t - tanh. A push one way and back is a quarter of a t^2.
             let terminal2 = self.terminal_m_s * self.terminal_m_s;
             let gained_s = (speed_m_s - LEAST_AIRSPEED_M_S) / self.column.gravity_m_s2;

@@ -65,12 +65,10 @@ pub mod guidance {
     //!
     //! * [`descent`] steers by the fins before ignition.
     //! * [`vertical`] computes the band of heights from which a landing exists, [`ignition`] when to light the motor.
-    //! * [`misfit`] says whether a vehicle weighs what its motor can land.
     //! * [`powered`] plans and flies the landing burn.
 
     pub mod descent;
     pub mod ignition;
-    pub mod misfit;
     pub mod powered;
     pub mod vertical;
 }

@@ -43,7 +43,6 @@ use self::table::PhaseTable;
 use crate::control::servo::ServoModel;
 use crate::estimation::estimator::{ImuSample, Measurements};
 use crate::estimation::sensor_watch::SensorWatch;
-use crate::guidance::misfit::misfit;
 use crate::guidance::powered::ControlLevel;
 use crate::guidance::vertical::EvenLanding;
 use crate::rules::arming::{PredictedLanding, Uplink};
@@ -392,7 +391,7 @@ impl Rehearsed {
     /// It did not land, and motor and weight do not go together: it says that instead.
     #[must_use]
     pub fn explained(self, mission: &Mission) -> Self {
-        let misfit = if self.warm { None } else { misfit(&EvenLanding::of(mission)) };
+        let misfit = if self.warm { None } else { EvenLanding::of(mission).misfit() };
         Self { found: misfit.map_or(self.found, str::to_owned), ..self }
     }
 }

@@ -15,6 +15,8 @@ use crate::vehicle::rigid::RigidState;
 
 /// Below this airspeed the fins are too weak for steering, m/s.
 pub const LEAST_AIRSPEED_M_S: f64 = 12.0;
+/// A fall to less than this speed is short, m/s: fins brake little in it, and the wind is as fast as half of it.
+pub const SHORT_FALL_M_S: f64 = 18.0;
 /// Below this airspeed they are too weak even to control the roll, m/s.
 const LEAST_ROLLING_AIRSPEED_M_S: f64 = 2.0;
 
@@ -77,6 +79,11 @@ pub struct DescentDemand {
 }
 
 impl DescentGains {
+    /// Whether the fins have an arm to steer by. Without one they only act against roll.
+    pub fn steers(&self) -> bool {
+        self.stiffness_m3 > 0.0
+    }
+
     /// The horizontal acceleration wanted, m/s^2, in the world.
     fn steering_m_s2(&self, state: &RigidState, situation: &DescentSituation) -> Vector3<f64> {
         let time_s = situation.time_to_go_s.unwrap_or(0.0).max(self.time_to_go_min_s);

@@ -191,7 +191,7 @@ impl Column {
         let airframe = &mission.airframe;
         let body = &airframe.body;
         let scaled = |area_m2: f64| air_scale * area_m2;
-        let open_fins_m2 = airframe.fin_drag_area_m2(&[airframe.fins.open_rad(); 4]);
+        let open_fins_m2 = airframe.open_fin_drag_area_m2();
         let final_box = &mission.powered.final_box;
         Self {
             mass_at_ignition_kg,
@@ -229,7 +229,7 @@ impl EvenLanding {
     /// That of a mission's vehicle.
     pub fn of(mission: &Mission) -> Self {
         /// Beyond this the thrust carries nothing.
-        const MOST_TILT_RAD: f64 = 1.4;
+        const LIMIT_RAD: f64 = 1.4;
         /// Halvings of an interval: to a millimetre, and to a ten thousandth of a degree.
         const HALVINGS: usize = 20;
         let (airframe, curve) = (&mission.airframe, &mission.motor_curve);
@@ -258,10 +258,9 @@ impl EvenLanding {
         };
         let tilt_rad = |speed_m_s: f64| {
             let brakes = |tilt_rad: f64| braked(speed_m_s, tilt_rad).vertical_m_s > column.touchdown_m_s;
-            brakes(0.0).then(|| halved(0.0, MOST_TILT_RAD, &brakes))
+            brakes(0.0).then(|| halved(0.0, LIMIT_RAD, &brakes))
         };
-        let terminal_m_s =
-            column.terminal_speed_m_s(airframe.fin_drag_area_m2(&[airframe.fins.open_rad(); 4]));
+        let terminal_m_s = column.terminal_speed_m_s(airframe.open_fin_drag_area_m2());
         let start_m = mission.start_height_m();
         let speed_m_s =
             |height_m: f64| fall_ends_m_s(start_m - height_m, 0.0, terminal_m_s, column.gravity_m_s2);
@@ -273,6 +272,21 @@ impl EvenLanding {
         let speed_m_s = speed_m_s(height_m);
         Self { carried_s, speed_m_s, height_m, tilt_rad: tilt_rad(speed_m_s) }
     }
+
+    /// From this tilt on, rad, a vehicle that throws away thrust all the way down has nothing left for a motor that is stronger: 62
+    /// degrees.
+    pub const MOST_TILT_RAD: f64 = 1.082;
+
+    /// Why no height lands the vehicle, in a builder's words; `None` if some may.
+    pub fn misfit(&self) -> Option<&'static str> {
+        match self.tilt_rad {
+            None => Some("too heavy for its motor: the thrust does not stop it"),
+            Some(tilt_rad) if tilt_rad > Self::MOST_TILT_RAD => {
+                Some("too light for its motor: no height lands it")
+            }
+            Some(_) => None,
+        }
+    }
 }
 
 // A fall during the burn to a given end, and ways of braking it.
@@ -283,7 +297,8 @@ const INTERVALS: usize = 40;
 const MET_M_S: f64 = 1e-4;
 /// Largest number of falls tried for a way of braking; about six are usual.
 const MOST_FALLS: usize = 24;
-/// How many ways of braking and holding are tried: the last one is an eightieth from the hardest.
+/// How many ways of braking and holding are tried: the last two differ by a four thousandth of the burn. With seven a landing was
+/// often missed, because the speed at which the thrust falls must be met to a quarter of a metre per second.
 const HOLDS_TRIED: usize = 12;
 /// A vehicle that is held ends this near to the touchdown speed, m/s: the last moments, upright, change it a little.
 const HELD_M_S: f64 = 0.3;
@@ -450,8 +465,8 @@ impl<const N: usize> Falls<N> {
             }
         }
         if matches!(way, Way::HardFirst) && risen.contains(&true) {
-            // It would rise. It may be braked evenly until it sinks as at touchdown, and then be held so by its tilt: as hard as
-            // the softest braking can hold.
+            // It would rise. It may instead be held by its tilt once it sinks as at touchdown: braked hard before that for as long
+            // as the softest braking can still hold it.
             let mut softly = [0.0; N];
             let mut softer_by = 1.0;
             for _ in 0..HOLDS_TRIED {

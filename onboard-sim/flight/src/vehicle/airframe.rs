@@ -89,6 +89,11 @@ impl Airframe {
             - self.legs.drag_area_m2 * (cg_station_m - self.legs.drag_station_m)
     }
 
+    /// The same with the fins at their open stop, m^2.
+    pub fn open_fin_drag_area_m2(&self) -> f64 {
+        self.fin_drag_area_m2(&[self.fins.open_rad(); 4])
+    }
+
     /// Arm of the thrust about a centre of gravity at a station, m: the motor swings about its pivot.
     pub fn thrust_arm_m(&self, cg_station_m: f64) -> f64 {
         cg_station_m - self.gimbal.pivot_station_m

@@ -152,7 +152,7 @@ impl Pilot {
         let estimate = self.estimate.as_ref()?;
         let (known, state) = (&self.model, &estimate.state);
         let column = known.column(known.density_kg_m3(estimate), known.mission.soft_tilt_deg);
-        let fins_m2 = known.motor.air_scale() * known.largest_fin_drag_area_m2();
+        let fins_m2 = known.motor.air_scale() * known.airframe().open_fin_drag_area_m2();
         let terminal_m_s = column.terminal_speed_m_s(fins_m2);
         let height_m = state.position_m.z - known.feet_below_cg_m(&known.mass.at(0.0));
         Some(fall_ends_m_s(height_m, state.velocity_m_s.z, terminal_m_s, known.mission.gravity_m_s2))

@@ -52,7 +52,8 @@ impl VehicleModel {
     /// The vehicle as its motor takes thrust, at time zero, after a fall with open fins in still air; `None` if no height suits the
     /// motor.
     fn lit(&self) -> Option<(Estimate, Burning)> {
-        let (mission, mass, fins_m2) = (&self.mission, self.mass.at(0.0), self.largest_fin_drag_area_m2());
+        let (mission, mass, fins_m2) =
+            (&self.mission, self.mass.at(0.0), self.airframe().open_fin_drag_area_m2());
         let feet_m = self.feet_below_cg_m(&mass);
         let exact = |state| Estimate::exact(0.0, state, Vector3::zeros(), Vector2::zeros());
         let density_kg_m3 = self.density_kg_m3(&exact(RigidState::upright(0.0)));

@@ -492,7 +492,7 @@ impl Pilot {
                 _ => [fins.open_rad(); 4],
             };
         }
-        let largest_m2 = self.model.largest_fin_drag_area_m2();
+        let largest_m2 = self.model.airframe().open_fin_drag_area_m2();
         let fins_m2 = self.model.fin_drag_area_m2(&self.fins_rad);
         let situation = DescentSituation {
             mass_kg: mass.mass_kg,

@@ -93,10 +93,6 @@ impl VehicleModel {
         self.airframe().fin_drag_area_m2(fins_rad)
     }
 
-    pub(super) fn largest_fin_drag_area_m2(&self) -> f64 {
-        self.fin_drag_area_m2(&[self.airframe().fins.open_rad(); 4])
-    }
-
     /// Time since the landing motor's thrust began, s.
     pub(super) fn burning_s(&self, time_s: f64) -> Option<f64> {
         self.motor.ignition_s().map(|ignition_s| (time_s - ignition_s).max(0.0))
@@ -149,7 +145,7 @@ impl VehicleModel {
         let density_kg_m3 = Air::at_height_m(self.mission.pad_altitude_m).density_kg_m3;
         let burning =
             Burning { burning_s: 0.0, mass: self.mass.at(0.0), density_kg_m3, lands_in_place: false };
-        let fins_m2 = self.largest_fin_drag_area_m2();
+        let fins_m2 = self.airframe().open_fin_drag_area_m2();
         let situation = self.powered_situation(&estimate, &burning, self.burn(), fins_m2);
         PoweredGuidance::with_room(self.mission.powered, &state, &situation)
     }
@@ -229,7 +225,7 @@ impl VehicleModel {
             let burn = self.doubted_burn(burning.burning_s, -caution_sigmas * share);
             band(&burn).is_some_and(|band| band.place(height_m) >= 0.0).then_some(burn)
         });
-        let fins_m2 = self.largest_fin_drag_area_m2();
+        let fins_m2 = self.airframe().open_fin_drag_area_m2();
         PoweredSituation {
             high,
             ..self.powered_situation(estimate, burning, weaker.unwrap_or(estimated), fins_m2)

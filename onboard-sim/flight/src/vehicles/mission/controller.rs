@@ -9,6 +9,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use core::f64::consts::PI;
 
+use crate::guidance::descent::SHORT_FALL_M_S;
 use crate::guidance::vertical::EvenLanding;
 use crate::vehicle::airframe::Airframe;
 use crate::vehicle::launch::Launch;
@@ -22,7 +23,7 @@ pub(super) struct Formulas<'a> {
 }
 
 impl Formulas<'_> {
-    fn states(&self, key: &str) -> bool {
+    pub(super) fn states(&self, key: &str) -> bool {
         self.stated.iter().any(|stated| stated == key)
     }
 
@@ -128,7 +129,7 @@ impl Formulas<'_> {
         let descent = &mut mission.descent;
         of("descent.lean_fades_s", &mut descent.lean_fades_s, fades_s.clamp(1.0, 3.0));
         let arm_m = fins.station_m - airframe.mass.loaded_cg_station_m;
-        let fins_m2 = airframe.fin_drag_area_m2(&[fins.open_rad(); 4]);
+        let fins_m2 = airframe.open_fin_drag_area_m2();
         let steers = arm_m >= 0.1 * airframe.body.length_m;
         // Legs that drag by 0.010 m2 more or less than the airframe's leave mk3 50 degrees and 6 dB of margin.
         let stiffness_m3 = if steers { 0.69 * fins_m2 * arm_m } else { 0.0 };
@@ -151,7 +152,7 @@ impl Formulas<'_> {
         of("gate.tilt_max_deg", &mut mission.gate.tilt_max_deg, tilt_max_deg);
 
         // In a short fall fins ahead of the centre of gravity brake little, and turn the vehicle into a wind that is as fast.
-        let opens_fins = speed_m_s > 18.0 || arm_m < 0.03 * airframe.body.length_m;
+        let opens_fins = speed_m_s > SHORT_FALL_M_S || arm_m < 0.03 * airframe.body.length_m;
         self.of_controller("descent.opens_fins", &mut mission.descent.opens_fins, opens_fins);
         // Motors within so many deviations of what is expected of them.
         let around = |sigmas: f64, sigma: f64| [1.0 - sigmas * sigma, 1.0 + sigmas * sigma];
@@ -166,7 +167,7 @@ impl Formulas<'_> {
         let passes = (76.0 * intervals).clamp(2_200.0, 2_890.0) as usize;
         self.of_controller("powered.max_passes", &mut powered.max_passes, Some(passes));
 
-        // What is put in for the vehicle's sake.
+        // What legs are designed for, if their file does not say it: those with blocks bear more.
         let designed = match legs.crush {
             Some(_) => LegLimits { vertical_m_s: 1.5, lateral_m_s: 0.7, tilt_deg: 10.0, rate_deg_s: 60.0 },
             None => LegLimits { vertical_m_s: 1.0, lateral_m_s: 0.7, tilt_deg: 10.0, rate_deg_s: 30.0 },

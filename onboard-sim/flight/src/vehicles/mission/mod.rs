@@ -101,7 +101,7 @@ pub fn from_toml(text: &str, origin: &str) -> Result<Mission, MissionError> {
     }
     mission.expect(curve);
     validate::room_to_swing(&mission).map_err(bad_value)?;
-    validate::numbers(&mission, &|key| stated.iter().any(|stated| stated == key)).map_err(bad_value)?;
+    validate::numbers(&mission, &|key| formulas.states(key)).map_err(bad_value)?;
     formulas.controller(&mut mission);
     mission.changed = formulas.changed;
     validate::numbers(&mission, &|_| true).map_err(bad_value)?;
@@ -162,7 +162,7 @@ pub fn builtin(name: &str) -> Option<Result<Mission, MissionError>> {
     BUILTIN.iter().find(|(known, _)| *known == name).map(|(name, text)| from_toml(text, name))
 }
 
-/// Whether a text is a mission rather than a [profile](super::profile): a mission names or contains an airframe.
+/// Whether a text is a mission and not a set of dispersions: a mission contains an airframe.
 pub fn is_meant(text: &str) -> bool {
     toml::from_str::<toml::Table>(text).is_ok_and(|table| table.contains_key("airframe"))
 }
