@@ -1,4 +1,4 @@
-//! Feeds hostile input to every decoder of this crate; the fuzz targets (`fuzz/`) and the tests call it.
+//! Feeds hostile input to every decoder of `protocol`; the fuzz targets and its tests call it.
 //!
 //! Each function accepts any bytes and panics only if a decoder breaks a promise. It corrects checksums, so that the
 //! code behind the checksum is reached as well.
@@ -7,22 +7,22 @@ use std::io::Cursor;
 use std::sync::LazyLock;
 use std::time::Duration;
 
-use crate::command::{CommandAnswer, CommandRequest, CommandSender};
-use crate::dialect::MavMessage;
-use crate::frame::{Encoder, Frame, Framer};
-use crate::ftp::download::Download;
-use crate::ftp::server::{NoFiles, Server};
-use crate::ftp::{FileRequest, Packet};
-use crate::hub::{Hub, LinkEvent, Received};
-use crate::identity::{Address, GROUND};
-use crate::link_stats::LinkStats;
-use crate::log::reader::LogReader;
-use crate::log::record::{Event, EventLevel, Record};
-use crate::log::v1::OperatorAction;
-use crate::log::writer::{LogHeader, LogWriteError, LogWriter};
-use crate::parameter::ParamRequest;
-use crate::signing::{Key, Memory, Signing};
-use crate::text::{Reassembler, printable};
+use protocol::command::{CommandAnswer, CommandRequest, CommandSender};
+use protocol::dialect::MavMessage;
+use protocol::frame::{Encoder, Frame, Framer};
+use protocol::ftp::download::Download;
+use protocol::ftp::server::{NoFiles, Server};
+use protocol::ftp::{FileRequest, Packet};
+use protocol::hub::{Hub, LinkEvent, Received};
+use protocol::identity::{Address, GROUND};
+use protocol::link_stats::LinkStats;
+use protocol::log::reader::LogReader;
+use protocol::log::record::{Event, EventLevel, Record};
+use protocol::log::v1::OperatorAction;
+use protocol::log::writer::{LogHeader, LogWriteError, LogWriter};
+use protocol::parameter::ParamRequest;
+use protocol::signing::{Key, Memory, Signing};
+use protocol::text::{Reassembler, printable};
 
 /// Builds a frame from these bytes: message id (low byte, then high), source, payload. Returns `None` for an id
 /// outside the dialect.
