@@ -284,8 +284,6 @@ fn report_unsent(model: &mut Model, request: Request, now: Duration) {
         Request::Choose(_) => "no vehicle is chosen",
         Request::RangeTest => "no range test",
         Request::WithoutLog | Request::Untested => "nothing goes on",
-        Request::Download => "no download",
-        Request::Parameters => return,
     };
     let is_abort = request == Request::Command(CommandKind::Abort);
     // Stays in the alarm line of every page until there is a station again.

@@ -271,7 +271,6 @@ async fn start(
         book: None,
         again: Again::default(),
         report: None,
-        download: None,
         place_failed: false,
         report_at: Duration::ZERO,
         next_log: next_log.signed_with(book_key),
