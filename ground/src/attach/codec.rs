@@ -206,11 +206,11 @@ mod tests {
 
     #[test]
     fn a_checklist_survives_the_round_trip() {
-        use crate::model::{ChecklistEntry, Signature};
+        use crate::model::{ChecklistEntry, Mark, Signature};
         let mut list = crate::model::parse_checklist(include_str!("../../checklist-example.toml")).unwrap();
         let signature = Signature { by: "Ann".to_owned(), unix_s: 7, found: Some(1.5), role: None };
-        list.apply(&ChecklistEntry::Signed { step: 0, signature: signature.clone() });
-        list.apply(&ChecklistEntry::Voided { step: 1, signature });
+        list.apply(&ChecklistEntry::Marked { step: 0, mark: Mark::Signed(signature.clone()) });
+        list.apply(&ChecklistEntry::Marked { step: 1, mark: Mark::Voided(signature) });
         let told = ToScreen::Msg(Msg::Checklist(Box::new(list)));
         assert_eq!(back(&told, Duration::ZERO).0, told);
     }
