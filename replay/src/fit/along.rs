@@ -73,7 +73,6 @@ struct Sample {
 #[derive(Debug, Clone)]
 pub(super) struct Along {
     pub(super) solution: Solution,
-    pub(super) priors: Vec<Prior>,
     /// Fraction of the air force that is the body's, on average over the fall.
     pub(super) body_share: f64,
     /// Standard deviation of the wind along the vertical, m/s.
@@ -329,7 +328,7 @@ impl<'a> Series<'a> {
         commanded_s: f64,
         mut priors: Vec<Prior>,
         updraught_m_s: f64,
-    ) -> Result<(Solution, Vec<Prior>, f64), String> {
+    ) -> Result<(Solution, f64), String> {
         let mission = &self.trace.mission;
         let lit_s = thrust_seen_s(&self.samples[self.fallen..], commanded_s, self.loaded_kg, mission)
             .ok_or("no thrust was seen after the igniter was fired")?;
@@ -354,11 +353,11 @@ impl<'a> Series<'a> {
             solve_from(&start, &priors, residuals)
         });
         let mut solution = solved.min_by(|one, other| one.cost.total_cmp(&other.cost)).ok_or(NOT_SOLVED)?;
-        inflate(&mut solution, &priors, residuals, BLOCK);
+        inflate(&mut solution, residuals, BLOCK);
         let seen_s =
             self.samples.last().map_or(0.0, |last| last.end_s - commanded_s - solution.values[DELAY]);
         self.is_of_the_curve(&solution.values)?;
-        Ok((solution, priors, seen_s))
+        Ok((solution, seen_s))
     }
 
     /// Whether the model's thrust is the one that was felt; an error says where it is not.
@@ -404,9 +403,8 @@ pub(super) fn fit_along(trace: &Trace, thrust_along: &dyn Fn(f64) -> f64) -> Res
     let speed_share =
         at_ignition.sigmas.velocity_m_s.z / at_ignition.state.velocity_m_s.norm().max(SLOWEST_M_S);
     let commanded_s = series.commanded_s;
-    let found = |solution, priors, burn_seen_s| Along {
+    let found = |solution, burn_seen_s| Along {
         solution,
-        priors,
         body_share,
         updraught_m_s,
         commanded_s,
@@ -418,13 +416,13 @@ pub(super) fn fit_along(trace: &Trace, thrust_along: &dyn Fn(f64) -> f64) -> Res
         Some(at_s) => series.burn(at_s, priors.clone(), updraught_m_s),
     };
     match burnt {
-        Ok((solution, priors, seen_s)) => Ok(found(solution, priors, Ok(seen_s))),
+        Ok((solution, seen_s)) => Ok(found(solution, Ok(seen_s))),
         Err(reason) => {
             let whitener = series.noises(series.fallen, updraught_m_s);
             let residuals = |values: &[f64]| whitener.apply(&series.missed_in_fall(values));
             let mut solution = solve(&priors, residuals).ok_or(NOT_SOLVED)?;
-            inflate(&mut solution, &priors, residuals, BLOCK);
-            Ok(found(solution, priors, Err(reason)))
+            inflate(&mut solution, residuals, BLOCK);
+            Ok(found(solution, Err(reason)))
         }
     }
 }

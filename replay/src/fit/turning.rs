@@ -48,20 +48,10 @@ pub(super) const LINK_RAD: f64 = 0.017_453;
 const FOLLOWS_RAD: f64 = 0.008_727;
 const NOT_SOLVED: &str = "the model of the gimbal does not fit the rotation";
 
-/// What was found across the nose.
-#[derive(Debug, Clone)]
-pub(super) struct Turning {
-    pub(super) solution: Solution,
-    pub(super) priors: Vec<Prior>,
-}
-
-impl Turning {
-    /// Play of servo and linkage together, and its standard deviation, rad.
-    pub(super) fn play_rad(&self) -> (f64, f64) {
-        let Solution { values, covariance, .. } = &self.solution;
-        let variance = covariance[(PLAY, PLAY)] + covariance[(LINK, LINK)] + 2.0 * covariance[(PLAY, LINK)];
-        (values[PLAY].max(0.0) + values[LINK].max(0.0), libm::sqrt(variance))
-    }
+/// Play of servo and linkage together, and its standard deviation, rad.
+pub(super) fn play_rad(Solution { values, covariance, .. }: &Solution) -> (f64, f64) {
+    let variance = covariance[(PLAY, PLAY)] + covariance[(LINK, LINK)] + 2.0 * covariance[(PLAY, LINK)];
+    (values[PLAY].max(0.0) + values[LINK].max(0.0), libm::sqrt(variance))
 }
 
 /// A frame of the burn.
@@ -78,7 +68,7 @@ struct Sample {
 }
 
 /// Fits the gimbal over the burn; an error is the reason why it cannot be.
-pub(super) fn fit_turning(trace: &Trace, along: &Along) -> Result<Turning, String> {
+pub(super) fn fit_turning(trace: &Trace, along: &Along) -> Result<Solution, String> {
     along.burn_seen_s.clone()?;
     let begins_s = along.begins_s().ok_or("the motor was not lit")?;
     let frames = falling(trace);
@@ -134,7 +124,7 @@ pub(super) fn fit_turning(trace: &Trace, along: &Along) -> Result<Turning, Strin
     }
     let mut solution = solve_from(&values, &priors, whitened(rest)).ok_or(NOT_SOLVED)?;
     model.is_a_servo(&solution.values, &reported_rad)?;
-    inflate(&mut solution, &priors, whitened(rest), BLOCK);
+    inflate(&mut solution, whitened(rest), BLOCK);
     for (place, wider) in LACKING {
         solution.covariance.row_mut(place).scale_mut(wider);
         solution.covariance.column_mut(place).scale_mut(wider);
@@ -143,7 +133,7 @@ pub(super) fn fit_turning(trace: &Trace, along: &Along) -> Result<Turning, Strin
     let of_thrust = along.solution.covariance[(IMPULSE, IMPULSE)]
         / (along.solution.values[IMPULSE] * along.solution.values[IMPULSE]);
     solution.covariance[(GAIN, GAIN)] += of_thrust * solution.values[GAIN] * solution.values[GAIN];
-    Ok(Turning { solution, priors: priors.to_vec() })
+    Ok(solution)
 }
 
 /// The process of the rotation that the model does not explain.
