@@ -76,7 +76,7 @@ pub(super) fn shape_sigmas(rms: f64) -> [f64; SHAPE_TERMS] {
 pub(super) fn shape_rows(first: usize) -> [Row; SHAPE_TERMS] {
     const NAMES: [&str; SHAPE_TERMS] =
         ["thrust_shape_1", "thrust_shape_2", "thrust_shape_3", "thrust_shape_4", "thrust_shape_5"];
-    core::array::from_fn(|k| (first + k, NAMES[k], "", 1.0))
+    core::array::from_fn(|k| (first + k, NAMES[k], ""))
 }
 
 /// Fewest rows with thrust.
@@ -161,16 +161,13 @@ pub(super) fn fit_stand(source: &str, rows: &[(f64, f64)], curve: &ThrustCurve) 
     };
     let mut fit = Fit::of(source, "", curve.name(), basis);
     let reason = "the table does not show it";
-    fit.take(
-        &solution,
-        reason,
-        &[
-            (IMPULSE, "thrust_scale", "", 1.0),
-            (BURN_TIME, "burn_time_scale", "", 1.0),
-            (BEGIN, "ignition_delay", "s", 1.0),
-            (TARE, "tare", "N", 1.0),
-        ],
-    );
+    let rows = [
+        (IMPULSE, "thrust_scale", ""),
+        (BURN_TIME, "burn_time_scale", ""),
+        (BEGIN, "ignition_delay", "s"),
+        (TARE, "tare", "N"),
+    ];
+    fit.take(&solution, reason, &rows);
     fit.take(&solution, reason, &shape_rows(SHAPE));
     fit.lacks("drag_scale, gimbal, wind, sensors", "a test stand does not fly");
     Ok(fit)

@@ -26,7 +26,7 @@ use sim::world::truth::Truth;
 use statrs::distribution::{Beta, Binomial, ContinuousCDF as _, DiscreteCDF as _};
 
 use super::lot::{Prediction, Trial, burnt, draw_next, predict};
-use super::{Basis, Fit, Pooled, Z_95, pooled};
+use super::{Basis, Fit, Parameter, Pooled, Z_95, pooled};
 use crate::cli::{in_pool, refuse_existing, say, text_of, write_new};
 use crate::print::{counted, shown};
 use crate::settings::{Setting, mission_toml_with, mission_with};
@@ -398,82 +398,53 @@ fn lot_toml(lot: &toml::Table) -> String {
 /// # Errors
 /// The output failed.
 pub fn print_learn(learnt: &Learnt, output: &mut impl Write) -> io::Result<()> {
-    let Learnt { mission, motor, set, sources, .. } = learnt;
-    let logs = counted(sources.len() as u64, "fit");
-    writeln!(
-        output,
-        "next day: {} with {} after {logs}, prior {}",
-        shown(mission),
-        shown(motor),
-        shown(set)
-    )?;
+    let [mission, motor, set] = [&learnt.mission, &learnt.motor, &learnt.set].map(|text| shown(text));
+    let fits = counted(learnt.sources.len() as u64, "fit");
+    writeln!(output, "next day: {mission} with {motor} after {fits}, prior {set}")?;
     writeln!(
         output,
         "lot                  burns      mean   95 % interval       next burn +-   before any burn +-"
     )?;
-    for lot in &learnt.lots {
-        let interval = format!("{:.4} to {:.4}", lot.low, lot.high);
+    for LotReport { name, unit, burns, mean, low, high, next_sigma, prior_sigma, .. } in &learnt.lots {
+        let interval = format!("{low:.4} to {high:.4}");
         let text = format!(
-            "  {:<18} {:>5}  {:>8.4}   {interval:<18}  {:>12.4}   {:>17.4} {}",
-            lot.name, lot.burns, lot.mean, lot.next_sigma, lot.prior_sigma, lot.unit
+            "  {name:<18} {burns:>5}  {mean:>8.4}   {interval:<18}  {next_sigma:>12.4}   {prior_sigma:>17.4} {unit}"
         );
         writeln!(output, "{}", text.trim_end())?;
     }
-    for pooled in &learnt.airframe {
-        let mean = &pooled.mean;
-        let text = format!(
-            "airframe  {:<16} {:.4}, {:.4} to {:.4} {}",
-            shown(&mean.name),
-            mean.value,
-            mean.low,
-            mean.high,
-            mean.unit
-        );
+    for Pooled { mean: Parameter { name, unit, value, low, high, .. }, .. } in &learnt.airframe {
+        let text = format!("airframe  {:<16} {value:.4}, {low:.4} to {high:.4} {unit}", shown(name));
         writeln!(output, "{}", text.trim_end())?;
     }
-    write!(output, "{}", learnt.lot_toml)?;
     let [low, high] = learnt.wind_m_s;
-    writeln!(output, "site      wind {low:.1} to {high:.1} m/s")?;
+    writeln!(output, "{}site      wind {low:.1} to {high:.1} m/s", learnt.lot_toml)?;
     let Some(found) = &learnt.prediction else { return Ok(()) };
+    let percent = |shares: [f64; 3]| shares.map(|share| 100.0 * share);
+    let [rate, low, high] = percent([found.rate, found.low, found.high]);
+    let flights = counted(learnt.flights as u64, "simulated flight");
     writeln!(
         output,
-        "rate      {:.1} %, 95 % interval {:.1} to {:.1} %, from {} in {}",
-        100.0 * found.rate,
-        100.0 * found.low,
-        100.0 * found.high,
-        counted(learnt.flights as u64, "simulated flight"),
-        shown(set)
+        "rate      {rate:.1} %, 95 % interval {low:.1} to {high:.1} %, from {flights} in {set}"
     )?;
-    if let Some(pulled) = &learnt.pulled {
+    if let Some(Pulled { worth, rate, low, high }) = learnt.pulled {
         let Outcomes { landed, of } = learnt.flown;
+        let [rate, low, high] = percent([rate, low, high]);
         writeln!(
             output,
-            "flown     {landed} of {of} landed: with the simulation worth {:.0} flights {:.1} %, 95 % interval {:.1} to {:.1} %",
-            pulled.worth,
-            100.0 * pulled.rate,
-            100.0 * pulled.low,
-            100.0 * pulled.high
+            "flown     {landed} of {of} landed: with the simulation worth {worth:.0} flights {rate:.1} %, 95 % interval {low:.1} to {high:.1} %"
         )?;
     }
-    writeln!(
-        output,
-        "risk      {:.1} % that the rate is below {:.0} %; {:.0} % is taken",
-        100.0 * found.risk,
-        100.0 * learnt.limit,
-        100.0 * learnt.risk
-    )?;
-    match (learnt.go == Some(true), may_be_kinder(set)) {
+    let [risk, limit, taken] = percent([found.risk, learnt.limit, learnt.risk]);
+    writeln!(output, "risk      {risk:.1} % that the rate is below {limit:.0} %; {taken:.0} % is taken")?;
+    let answer = match (learnt.go == Some(true), may_be_kinder(&learnt.set)) {
+        (true, false) => "GO".to_owned(),
+        (true, true) => format!("GO in {set} only, which may be kinder than {DEFAULT}"),
         (false, _) if found.risk <= learnt.risk => {
-            writeln!(
-                output,
-                "NO-GO: the flights so far speak against a rate of {:.0} %",
-                100.0 * learnt.limit
-            )
+            format!("NO-GO: the flights so far speak against a rate of {limit:.0} %")
         }
-        (false, _) => writeln!(output, "NO-GO"),
-        (true, false) => writeln!(output, "GO"),
-        (true, true) => writeln!(output, "GO in {} only, which may be kinder than {DEFAULT}", shown(set)),
-    }
+        (false, _) => "NO-GO".to_owned(),
+    };
+    writeln!(output, "{answer}")
 }
 
 /// What is asked of the next day.
@@ -552,7 +523,6 @@ impl Arguments {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fit::Parameter;
 
     fn fit(source: &str, mission: &str, motor: &str, found: Vec<Parameter>) -> Fit {
         let basis = Basis { impulse_n_s: 1.0, burn_time_s: 1.0, drag_area_m2: 1.0, loaded_kg: 1.0 };

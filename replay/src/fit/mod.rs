@@ -34,6 +34,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, Result, bail};
 use flight::vehicle::mission::Mission;
 use flight::vehicle::thrust_curve::ThrustCurve;
+use flight::vehicles::motors;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
@@ -43,7 +44,7 @@ use self::calibration::{Calibration, Table};
 use self::day::Learnt;
 use self::least_squares::Solution;
 pub use self::trace::{Frame, Trace, TraceError};
-use crate::cli::{Outcome, answer, say, warn_of_damage};
+use crate::cli::{Outcome, answer, say, text_of, warn_of_damage};
 use crate::info::utc;
 use crate::output::{Destination, Overwrite, write_whole};
 use crate::print::{counted, print_json, shown};
@@ -203,9 +204,10 @@ impl Fit {
 
     /// Takes parameters of a solution, each as found or, with the reason, as not found.
     fn take(&mut self, solution: &Solution, reason: &str, rows: &[Row]) {
-        for &(place, name, unit, scale) in rows {
+        for &(place, name, unit) in rows {
             let sigma = libm::sqrt(solution.covariance[(place, place)]);
             if sigma < FOUND * solution.priors[place].sigma {
+                let scale = if unit.starts_with("deg") { 1.0_f64.to_degrees() } else { 1.0 };
                 self.found.push(Parameter::normal(name, unit, scale * solution.values[place], scale * sigma));
             } else {
                 self.lacks(name, reason);
@@ -214,8 +216,8 @@ impl Fit {
     }
 }
 
-/// A parameter: its place in a solution, its name, its unit, and the factor to that unit.
-type Row = (usize, &'static str, &'static str, f64);
+/// A parameter: its place in a solution, which is in SI, its name, and its unit.
+type Row = (usize, &'static str, &'static str);
 
 /// Fits everything that a flight tells.
 pub fn fit(trace: &Trace) -> Fit {
@@ -284,8 +286,11 @@ fn drag(fit: &mut Fit, along: &Along) {
     let (total, sigma) = along.drag();
     fit.found.push(Parameter::normal("drag_scale", "", total, sigma));
     let reason = "the openings of the fins changed too little to tell their drag from the body's: drag_scale is the sum";
-    let rows = [(along::BODY, "body_drag_scale", "", 1.0), (along::FINS, "fin_drag_scale", "", 1.0)];
-    fit.take(&along.solution, reason, &rows);
+    fit.take(
+        &along.solution,
+        reason,
+        &[(along::BODY, "body_drag_scale", ""), (along::FINS, "fin_drag_scale", "")],
+    );
     fit.found.push(Parameter::normal("updraught_rms", "m/s", along.updraught_m_s, 0.3 * along.updraught_m_s));
 }
 
@@ -301,32 +306,25 @@ fn motor(fit: &mut Fit, along: &Along) {
     let mut with_scale = solution.clone();
     with_scale.covariance[(along::IMPULSE, along::IMPULSE)] +=
         libm::pow(ACCELEROMETER_SCALE_SIGMA * solution.values[along::IMPULSE], 2.0);
-    fit.take(
-        &with_scale,
-        "too little of the burn was seen before the contact",
-        &[
-            (along::IMPULSE, "thrust_scale", "", 1.0),
-            (along::BURN_TIME, "burn_time_scale", "", 1.0),
-            (along::DELAY, "ignition_delay", "s", 1.0),
-        ],
-    );
+    let scales = [(along::IMPULSE, "thrust_scale", ""), (along::BURN_TIME, "burn_time_scale", "")];
+    let short = "too little of the burn was seen before the contact";
+    fit.take(&with_scale, short, &scales);
+    fit.take(solution, short, &[(along::DELAY, "ignition_delay", "s")]);
     let reason = "this term of the shape is too small, or too much like an error of burn time and drag";
     fit.take(solution, reason, &burn::shape_rows(along::SHAPE));
     let reason = "while the motor burns the drag is too small a part of the force";
-    let rows =
-        [(along::BODY_LOSS, "exhaust_body_loss", "", 1.0), (along::FIN_LOSS, "exhaust_fin_loss", "", 1.0)];
+    let rows = [(along::BODY_LOSS, "exhaust_body_loss", ""), (along::FIN_LOSS, "exhaust_fin_loss", "")];
     fit.take(solution, reason, &rows);
 }
 
 fn gimbal(fit: &mut Fit, turning: Result<Solution, String>) {
     const PLAY: &str = "gimbal_play";
-    const DEG: f64 = 1.0_f64.to_degrees();
     const ROWS: [Row; 5] = [
-        (turning::DELAY, "gimbal_delay", "s", 1.0),
-        (turning::RATE, "gimbal_rate", "deg/s", DEG),
-        (turning::GAIN, "gimbal_gain", "", 1.0),
-        (turning::PITCH, "gimbal_pitch_offset", "deg", DEG),
-        (turning::YAW, "gimbal_yaw_offset", "deg", DEG),
+        (turning::DELAY, "gimbal_delay", "s"),
+        (turning::RATE, "gimbal_rate", "deg/s"),
+        (turning::GAIN, "gimbal_gain", ""),
+        (turning::PITCH, "gimbal_pitch_offset", "deg"),
+        (turning::YAW, "gimbal_yaw_offset", "deg"),
     ];
     let turning = match turning {
         Ok(turning) => turning,
@@ -573,11 +571,13 @@ struct Earlier {
 
 impl Args {
     pub(crate) fn run(self) -> Result<Outcome> {
-        if self.write.is_some() && (self.files.len() != 1 || !is_log(&self.files[0])) {
+        if self.write.is_some()
+            && (self.files.len() != 1 || ["csv", "json"].contains(&ending(&self.files[0]).as_str()))
+        {
             bail!("--write takes the log of one flight: its mission is changed");
         }
         if let Some(motor) = &self.motor
-            && !self.files.iter().any(|file| ends_in(file, "csv"))
+            && !self.files.iter().any(|file| ending(file) == "csv")
         {
             bail!(
                 "--motor {motor}: only a table of a test stand (CSV) is compared with a motor; a log has its own"
@@ -614,12 +614,12 @@ impl Args {
     fn one(&self, file: &Path, flown: &mut Option<String>) -> Result<Vec<Fit>> {
         let name = file.display().to_string();
         let read = || std::fs::read_to_string(file).with_context(|| format!("{name}: cannot be read"));
-        if ends_in(file, "json") {
+        if ending(file) == "json" {
             let earlier: Earlier = serde_json::from_str(&read()?)
                 .with_context(|| format!("{name}: is no answer of `replay fit --json`"))?;
             return Ok(earlier.fits);
         }
-        if ends_in(file, "csv") {
+        if ending(file) == "csv" {
             let motor = self.motor.as_deref().with_context(|| {
                 format!("{name}: --motor is missing: a table is compared with the motor's certified curve")
             })?;
@@ -673,22 +673,16 @@ fn once_each(fits: &mut Vec<Fit>) {
     });
 }
 
-fn is_log(file: &Path) -> bool {
-    !ends_in(file, "csv") && !ends_in(file, "json")
-}
-
-fn ends_in(file: &Path, wanted: &str) -> bool {
-    file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case(wanted))
+/// What a file's name ends in: json, csv, or anything else for a log.
+fn ending(file: &Path) -> String {
+    file.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase()
 }
 
 fn curve_of(motor: &str) -> Result<ThrustCurve> {
-    if flight::vehicles::motors::names().any(|known| known == motor) {
-        return Ok(flight::vehicles::motors::builtin(motor)?);
+    if let Ok(curve) = motors::builtin(motor) {
+        return Ok(curve);
     }
-    let text = std::fs::read_to_string(motor).with_context(|| {
-        let known = flight::vehicles::motors::names().collect::<Vec<_>>().join(", ");
-        format!("'{motor}' is neither a built-in motor ({known}) nor a readable file")
-    })?;
+    let text = text_of(motor, motors::BUILTIN, "motor")?;
     flight::vehicles::thrust_curve::from_file_text(motor, &text).with_context(|| motor.to_owned())
 }
 

@@ -8,9 +8,12 @@ use flight::computer::Input;
 use flight::estimation::estimator::{Estimate, Measurements};
 use flight::rules::outputs::Line;
 use flight::rules::phase::Phase;
+use flight::vehicle::airframe::MassModel;
+use flight::vehicle::atmosphere::Air;
 use flight::vehicle::mission::Mission;
 use flight_log::frame::{commands_from_log, input_from_log, phase_of};
 use flight_log::logged::{At, Logged, RecordError};
+use nalgebra::Vector3;
 use protocol::log::computer_v1::ComputerFrame;
 use protocol::log::flight_v1 as v1;
 
@@ -37,6 +40,29 @@ pub struct Frame {
     pub phase: Phase,
     /// The flight computer's estimate at the end of the frame, and the standard deviations with it.
     pub estimate: Estimate,
+}
+
+impl Frame {
+    /// Velocity through the air in body axes, m/s.
+    pub(super) fn through_air_m_s(&self) -> Vector3<f64> {
+        let Estimate { state, .. } = &self.estimate;
+        state.world_from_body.inverse_transform_vector(&self.estimate.velocity_through_air_m_s())
+    }
+
+    /// Rotation rate without the gyro's bias, rad/s.
+    pub(super) fn rate_rad_s(&self) -> Vector3<f64> {
+        self.measured.imu.gyro_rad_s - self.estimate.gyro_bias_rad_s
+    }
+
+    /// Specific force without the accelerometer's bias, m/s^2.
+    pub(super) fn force_m_s2(&self) -> Vector3<f64> {
+        self.measured.imu.specific_force_m_s2 - self.estimate.accelerometer_bias_m_s2
+    }
+
+    /// Openings of the fins on average since the frame before, rad.
+    pub(super) fn fins_since_rad(&self, before: &Self) -> [f64; 4] {
+        core::array::from_fn(|fin| 0.5 * (before.fins_rad[fin] + self.fins_rad[fin]))
+    }
 }
 
 /// A flight as its log has it.
@@ -91,6 +117,16 @@ impl Trace {
         let (name, mission_toml) = (name.to_owned(), mission_toml.to_owned());
         let frames = Vec::new();
         Self { name, mission, mission_toml, frames, damage: None, landed: None, content: None, last_ns: None }
+    }
+
+    /// Density of the air around a frame, kg/m^3.
+    pub(super) fn density_kg_m3(&self, frame: &Frame) -> f64 {
+        Air::at_height_m(frame.estimate.state.position_m.z + self.mission.pad_altitude_m).density_kg_m3
+    }
+
+    /// The vehicle's mass over its burn, by the mission's data.
+    pub(super) fn mass_model(&self) -> MassModel {
+        MassModel::new(&self.mission.airframe.mass, self.mission.motor_curve.propellant_mass_kg())
     }
 
     /// Adds a frame; one with numbers that are not finite is left out.
