@@ -3,14 +3,14 @@
 
 use std::path::Path;
 
+use avionics::log::frame::{commands_from_log, input_from_log, phase_of};
+use avionics::log::logged::{At, Logged as _};
 use flight::computer::Commands;
 use flight::computer::Input;
 use flight::estimation::estimator::{Estimate, Measurements};
 use flight::rules::outputs::Line;
 use flight::rules::phase::Phase;
 use flight::vehicle::mission::Mission;
-use flight_log::frame::{commands_from_log, input_from_log, phase_of};
-use flight_log::logged::{At, Logged as _};
 use protocol::log::computer_v1::ComputerFrame;
 
 use crate::digest::digest;

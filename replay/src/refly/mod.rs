@@ -19,10 +19,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result};
+use avionics::log::frame::phase_of;
 use flight::computer::FRAME_S;
 use flight::rules::phase::Phase;
-use flight_log::frame::phase_of;
-use flight_log::sortie;
 use prost::Message as _;
 use protocol::log::computer_v1::{ComputerFrame, ComputerInput, ComputerOutput};
 use protocol::log::record::{Event, EventLevel, Record};
@@ -31,6 +30,7 @@ use protocol::log::writer::LogHeader;
 use serde::Serialize;
 use sim::draw::draw;
 use sim::sortie::SetUpError;
+use sim::wire::record;
 
 use self::rerun::Rerun;
 use crate::cli::{Answer, Outcome, give, warn_of_what_is_missing};

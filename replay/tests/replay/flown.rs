@@ -4,7 +4,6 @@ use std::fs::File;
 use std::io::Read as _;
 use std::sync::LazyLock;
 
-use flight_log::sortie::{self, LastFrame, campaign_header};
 use protocol::log::computer_v1::{ComputerFrame, ComputerStart};
 use protocol::log::flight_v1::PilotTiming;
 use protocol::log::record::{Direction, Event, EventLevel, RawFrame, Record};
@@ -15,6 +14,7 @@ use replay::verify::{VerifyReport, verify_log};
 use sim::outside::Outside;
 use sim::recipe::Recipe as FlightRecipe;
 use sim::sortie::Sortie;
+use sim::wire::record::{self, LastFrame, campaign_header};
 
 pub(crate) const MISSION: &str = "mk2";
 const FRAMES: usize = 68;

@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 use std::sync::LazyLock;
 
-use campaign::tally::Tally;
-use flight_log::sortie::{self, LastFrame};
+use onboard_sim::tally::Tally;
 use protocol::log::record::Record;
 use protocol::log::writer::LogWriter;
 use sim::recipe::Recipe;
+use sim::wire::record::{self, LastFrame};
 use tempfile::TempDir;
 
 const NUMBER: u64 = 3;

@@ -1,9 +1,9 @@
 //! The estimate: what its sensors said, and how far it was from the truth; vibration.
 
+use avionics::log::frame::phase_of;
+use avionics::log::logged::state_from_log;
 use flight::estimation::estimator::AidStatus;
 use flight::rules::phase::Phase;
-use flight_log::frame::phase_of;
-use flight_log::logged::state_from_log;
 use nalgebra::Vector3;
 use protocol::log::computer_v1::ComputerFrame;
 
