@@ -1,8 +1,9 @@
 //! Tests the report of a flight: well-formed, self-contained and complete.
 
 use flight::vehicle::mission::StartPoint;
+use replay::cli::Answer as _;
 use replay::log::Recording;
-use replay::refly::{ReflyOptions, print_refly, refly};
+use replay::refly::{ReflyOptions, refly};
 use replay::report::{report, report_with};
 use replay::verify::explain::explain;
 
@@ -116,10 +117,8 @@ fn a_poor_log_has_a_page_that_says_what_is_missing() {
 /// A log with telemetry only, as it comes from a ground station's `.tlog`.
 #[test]
 fn telemetry_alone_makes_a_page() {
-    let (tlog, log) = (WITH_FRAMES.beside("page.tlog"), WITH_FRAMES.beside("page.mcap"));
-    let open = || replay::log::FlightLog::open(&WITH_FRAMES.log);
-    replay::export::export_tlog(&open, None, &tlog).unwrap();
-    replay::log::import_tlog(&tlog, &log).unwrap();
+    let log = WITH_FRAMES.beside("page.mcap");
+    replay::log::import_tlog(&crate::simulated::tlog(&WITH_FRAMES, "page.tlog"), &log).unwrap();
     let page = report(&log).unwrap().html;
     check(&page);
     assert!(page.contains("From the telemetry of a ground station") && page.contains("STANDS UNDAMAGED"));
@@ -217,9 +216,7 @@ fn the_worst_plans_are_named_alike() {
     let flown = refly(&recording, &ReflyOptions::default()).unwrap();
     let worst = &flown.worst_plans;
     assert!((1..=3).contains(&worst.len()) && worst.is_sorted_by(|a, b| a.price >= b.price), "{worst:?}");
-    let mut text = Vec::new();
-    print_refly(&flown, &mut text).unwrap();
-    let (text, page) = (String::from_utf8(text).unwrap(), report(&DISPERSED.log).unwrap().html);
+    let (text, page) = (flown.sentences().join("\n"), report(&DISPERSED.log).unwrap().html);
     for plan in worst {
         let words = format!("frame {} (T+{:.2} s): {} at node", plan.frame, plan.time_s, plan.condition);
         assert!(page.contains(&format!("Worst: {words}")), "{words}");
