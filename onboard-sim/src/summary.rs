@@ -204,7 +204,7 @@ pub(crate) fn failures(rows: &[Row]) -> Vec<Failures> {
 /// The numbers in a column.
 pub(crate) fn numbers<'a>(rows: &'a [Row], name: &str) -> impl Iterator<Item = f64> + use<'a> {
     let column = column(name);
-    rows.iter().filter_map(move |row| (column?.value)(row).number())
+    rows.iter().filter_map(move |row| (column?.value)(row).as_f64())
 }
 
 fn distribution(rows: &[Row], name: &'static str) -> Option<Distribution> {
