@@ -6,7 +6,7 @@ use std::path::Path;
 use avionics::log::frame::{commands_from_log, input_from_log, phase_of};
 use avionics::log::logged::{At, Logged as _};
 use flight::computer::Commands;
-use flight::computer::Input;
+use flight::computer::KeptInput;
 use flight::estimation::estimator::{Estimate, Measurements};
 use flight::rules::outputs::Line;
 use flight::rules::phase::Phase;
@@ -100,7 +100,7 @@ impl Trace {
     /// Adds a frame; one with numbers that are not finite is left out.
     pub fn push(
         &mut self,
-        input: &Input<'_>,
+        input: &KeptInput,
         commands: &Commands,
         phase: Phase,
         estimate: &Estimate,

@@ -32,7 +32,7 @@ use embedded_io::{Read, ReadReady};
 use flight::computer::news::CrewMessage;
 use flight::computer::pad_check::surfaces_rad;
 use flight::computer::pilot::planner::Planner;
-use flight::computer::{Commands, Computer, FRAME_S, Input, LogState, flight_time_s};
+use flight::computer::{Commands, Computer, FRAME_S, KeptInput, LogState, flight_time_s};
 use flight::estimation::estimator::{GnssFix, ImuSample, Measurements};
 use flight::rules::outputs::Line;
 use flight::vehicle::atmosphere::{Air, pressure_altitude_m};
@@ -277,7 +277,7 @@ impl<W: Wiring> Board for TeensyBoard<W> {
         // What cannot be read is: no contact, no igniter, no booster, pin in.
         let high = |switch: &mut W::Switch| switch.is_high().unwrap_or(false);
         let low = |switch: &mut W::Switch| switch.is_low().unwrap_or(false);
-        let rest = Input {
+        let kept = KeptInput {
             frame: 0,
             time_s: 0.0,
             measured: self.measured(),
@@ -294,11 +294,8 @@ impl<W: Wiring> Board for TeensyBoard<W> {
             commander,
             // `avionics::board::radio` knows no operators yet.
             people: None,
-            requests: &[],
-            rehearsed: None,
-            plan_ready: false,
         };
-        Ok(Some(LoggedInput::new(rest, requests, None)))
+        Ok(Some(LoggedInput { kept, requests, rehearsed: None, plan_ready: false }))
     }
 
     fn act(&mut self, commands: &Commands) -> Result<(), Infallible> {

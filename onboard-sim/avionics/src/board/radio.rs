@@ -8,7 +8,7 @@ use crate::log::frame::LoggedInput;
 use crate::log::logged::Logged;
 use flight::computer::findings::Findings;
 use flight::computer::news::CrewMessage;
-use flight::computer::{Computer, Input, Output};
+use flight::computer::{Computer, Input, KeptInput, Output};
 use flight::rules::outputs::Line;
 use flight::vehicle::mission::Mission;
 use protocol::frame::Framer;
@@ -72,7 +72,7 @@ impl Crewed {
     /// A frame's input, with what the crew has asked for.
     pub(crate) fn hear(&self, input: LoggedInput) -> LoggedInput {
         let UplinkState { uplink, commander, requests } = self.heard.clone();
-        input.hearing(uplink, commander, requests)
+        LoggedInput { kept: KeptInput { uplink, commander, ..input.kept }, requests, ..input }
     }
 
     /// Speaks with the ground after a frame; returns what the next one is told and asked. Never inline: what it keeps on the stack

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::news::Severity;
 use super::table::PhaseTable;
-use super::{Commander, Computer, Input};
+use super::{Commander, Computer, KeptInput};
 use crate::rules::arming;
 use crate::rules::arming::{Check, Uplink};
 use crate::rules::operator::Operator;
@@ -414,7 +414,7 @@ impl Computer {
     }
 
     /// Holds the countdown if the station that armed the vehicle has fallen silent, or hears nothing of the vehicle.
-    pub(super) fn watch_the_commander(&mut self, input: &Input<'_>) {
+    pub(super) fn watch_the_commander(&mut self, input: &KeptInput) {
         let Some(Commander { station, age_s, by, deaf }) = input.commander else { return };
         // An age that is not a number is no sign of life.
         let is_heard = age_s <= UPLINK_SILENT_S;

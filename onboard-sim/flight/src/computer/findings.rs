@@ -10,7 +10,7 @@ use alloc::string::{String, ToString as _};
 use alloc::vec::Vec;
 
 use super::pad_check::{SURFACES, surfaces_rad};
-use super::{Computer, FRAME_S, Input};
+use super::{Computer, FRAME_S, KeptInput};
 use crate::control::servo::{GIMBALS, ServoModel};
 use crate::estimation::estimator::{Estimate, Health};
 use crate::estimation::motor_estimate::MotorStage;
@@ -287,7 +287,7 @@ struct Watcher {
 }
 
 impl Watcher {
-    fn new(computer: &Computer, flown: &Input<'_>) -> Self {
+    fn new(computer: &Computer, flown: &KeptInput) -> Self {
         let airframe = &computer.pilot().mission().airframe;
         Self {
             frame: flown.frame.saturating_sub(1),
@@ -303,7 +303,7 @@ impl Watcher {
         }
     }
 
-    fn take(&mut self, computer: &Computer, flown: &Input<'_>, estimate: &Estimate) {
+    fn take(&mut self, computer: &Computer, flown: &KeptInput, estimate: &Estimate) {
         self.missing = flown.frame.saturating_sub(self.frame + 1);
         self.frame = flown.frame;
         let (time_s, phase) = (flown.time_s, computer.mode().phase);
@@ -339,7 +339,7 @@ impl Watcher {
     }
 
     /// Whether a sign shows in this frame.
-    fn seen(&self, sign: Sign, computer: &Computer, flown: &Input<'_>, estimate: &Estimate) -> Option<Seen> {
+    fn seen(&self, sign: Sign, computer: &Computer, flown: &KeptInput, estimate: &Estimate) -> Option<Seen> {
         let (phase, time_s) = (computer.mode().phase, flown.time_s);
         let pilot = computer.pilot();
         let mission = pilot.mission();
@@ -375,7 +375,7 @@ fn seen_in_flight(
     watcher: &Watcher,
     sign: Sign,
     computer: &Computer,
-    flown: &Input<'_>,
+    flown: &KeptInput,
     estimate: &Estimate,
 ) -> Option<Seen> {
     let (pilot, mode, time_s) = (computer.pilot(), computer.mode(), flown.time_s);

@@ -20,7 +20,7 @@ use self::sweep::{Still, Sweep};
 use super::crew::{Answer, Asked, Ending, People};
 use super::news::Severity;
 use super::pad::SelfTest;
-use super::{Computer, Input};
+use super::{Computer, KeptInput};
 use crate::estimation::estimator::Measurements;
 use crate::rules::arming::SEERS;
 use crate::rules::operator::Operator;
@@ -480,7 +480,7 @@ impl Computer {
     }
 
     /// One frame of a running check. It ends here at the latest, whatever has happened in this frame.
-    pub(super) fn check_itself(&mut self, input: &Input<'_>) {
+    pub(super) fn check_itself(&mut self, input: &KeptInput) {
         if !self.pad_check.is_running() {
             return;
         }

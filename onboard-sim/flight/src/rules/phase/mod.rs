@@ -179,22 +179,6 @@ impl Mode {
         }
     }
 
-    /// The same mode on a clock that is ahead by this much, s.
-    #[must_use]
-    pub fn on_clock_ahead_by(&self, ahead_s: f64) -> Self {
-        Self {
-            entered_at_s: self.entered_at_s + ahead_s,
-            countdown_end_s: self.countdown_end_s.map(|end_s| end_s + ahead_s),
-            hold: self.hold.map(|hold| Hold { at_s: hold.at_s + ahead_s, ..hold }),
-            motor: match self.motor {
-                Motor::BurntOut { at_s } => Motor::BurntOut { at_s: at_s + ahead_s },
-                motor => motor,
-            },
-            aborted_before_s: self.aborted_before_s.map(|at_s| at_s + ahead_s),
-            ..*self
-        }
-    }
-
     /// Time left of the running countdown, s, never negative; `None` without a countdown.
     pub fn countdown_remaining_s(&self, time_s: f64) -> Option<f64> {
         self.countdown_end_s.map(|end_s| (end_s - time_s).max(0.0))
