@@ -8,7 +8,7 @@ use avionics::log::logged::{At, Logged as _};
 use flight::computer::Commands;
 use flight::computer::KeptInput;
 use flight::estimation::estimator::{Estimate, Measurements};
-use flight::rules::outputs::Line;
+use flight::rules::outputs::PyroOutput;
 use flight::rules::phase::Phase;
 use flight::vehicle::mission::Mission;
 use protocol::log::computer_v1::ComputerFrame;
@@ -132,8 +132,8 @@ impl Trace {
             fins_rad: input.fins_rad,
             gimbal_reported_rad,
             gimbal_rad: commands.gimbal_rad,
-            ignite: commands.outputs.is_on(Line::LandingIgniter),
-            parachute: commands.outputs.is_on(Line::Parachute),
+            ignite: commands.outputs.is_on(PyroOutput::LandingIgniter),
+            parachute: commands.outputs.is_on(PyroOutput::Parachute),
             contact: input.contact,
             booster_attached: input.booster_attached,
             phase,

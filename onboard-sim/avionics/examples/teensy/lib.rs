@@ -34,7 +34,7 @@ use flight::computer::pad_check::surfaces_rad;
 use flight::computer::pilot::planner::Planner;
 use flight::computer::{Commands, Computer, FRAME_S, KeptInput, LogState, flight_time_s};
 use flight::estimation::estimator::{GnssFix, ImuSample, Measurements};
-use flight::rules::outputs::Line;
+use flight::rules::outputs::PyroOutput;
 use flight::vehicle::atmosphere::{Air, pressure_altitude_m};
 use flight::vehicle::site::Site;
 use nalgebra::Vector3;
@@ -114,8 +114,13 @@ pub struct Parts<W: Wiring> {
 }
 
 /// What each output switches: both igniters of the landing motor, that of the ascent motor, separation and parachute.
-pub const LINES: [Line; 5] =
-    [Line::LandingIgniter, Line::LandingIgniter, Line::AscentIgniter, Line::Separation, Line::Parachute];
+pub const LINES: [PyroOutput; 5] = [
+    PyroOutput::LandingIgniter,
+    PyroOutput::LandingIgniter,
+    PyroOutput::AscentIgniter,
+    PyroOutput::Separation,
+    PyroOutput::Parachute,
+];
 
 /// Axes from other ones: for each, which of the others it lies on, and whether along it (1) or against it (-1).
 pub type Axes = [(usize, f64); 3];

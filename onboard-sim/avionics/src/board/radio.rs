@@ -9,7 +9,7 @@ use crate::log::logged::Logged;
 use flight::computer::findings::Findings;
 use flight::computer::news::CrewMessage;
 use flight::computer::{Computer, Input, KeptInput, Output};
-use flight::rules::outputs::Line;
+use flight::rules::outputs::PyroOutput;
 use flight::vehicle::mission::Mission;
 use protocol::frame::Framer;
 
@@ -86,7 +86,7 @@ impl Crewed {
         radio: &mut impl Radio,
     ) -> stream::Heard {
         self.findings.note(computer);
-        self.parachute_ejected |= output.commands.outputs.is_on(Line::Parachute);
+        self.parachute_ejected |= output.commands.outputs.is_on(PyroOutput::Parachute);
         let flown = VehicleState {
             computer,
             time_s: input.time_s,

@@ -8,7 +8,7 @@ use flight::computer::pilot::Pilot;
 use flight::computer::{Commands, Computer, Input, KeptInput, Output, Rehearsed};
 use flight::estimation::estimator::AidStatus;
 use flight::guidance::powered::ControlLevel;
-use flight::rules::outputs::{Line, Outputs};
+use flight::rules::outputs::{Outputs, PyroOutput};
 use flight::rules::phase::Phase;
 use flight::vehicle::mission::StartPoint;
 use protocol::records::computer_v1 as v1;
@@ -103,16 +103,16 @@ pub fn output_to_log(output: &Output, computer: &Computer) -> v1::ComputerOutput
     v1::ComputerOutput {
         gimbal_rad: gimbal_rad.to_vec(),
         fins_rad: fins_rad.to_vec(),
-        ignite: outputs.is_on(Line::LandingIgniter),
-        parachute: outputs.is_on(Line::Parachute),
+        ignite: outputs.is_on(PyroOutput::LandingIgniter),
+        parachute: outputs.is_on(PyroOutput::Parachute),
         released: *released,
         planned: *planned,
         phase: u32::from(computer.mode().phase.index()),
         level: u32::from(computer.level().index()),
         over: computer.is_over(),
         answers: answers.iter().map(|answer| answer.ending.to_log()).collect(),
-        ignite_booster: outputs.is_on(Line::AscentIgniter),
-        separate_booster: outputs.is_on(Line::Separation),
+        ignite_booster: outputs.is_on(PyroOutput::AscentIgniter),
+        separate_booster: outputs.is_on(PyroOutput::Separation),
     }
 }
 
@@ -125,10 +125,10 @@ pub fn commands_from_log(output: &v1::ComputerOutput, frame: u64) -> Result<Comm
         gimbal_rad: Logged::from_log(&output.gimbal_rad, At { frame, field: "gimbal_rad" })?,
         fins_rad: Logged::from_log(&output.fins_rad, At { frame, field: "fins_rad" })?,
         outputs: Outputs::of(|line| match line {
-            Line::LandingIgniter => output.ignite,
-            Line::Parachute => output.parachute,
-            Line::AscentIgniter => output.ignite_booster,
-            Line::Separation => output.separate_booster,
+            PyroOutput::LandingIgniter => output.ignite,
+            PyroOutput::Parachute => output.parachute,
+            PyroOutput::AscentIgniter => output.ignite_booster,
+            PyroOutput::Separation => output.separate_booster,
         }),
     })
 }

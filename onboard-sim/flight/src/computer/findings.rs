@@ -9,14 +9,14 @@ use alloc::format;
 use alloc::string::{String, ToString as _};
 use alloc::vec::Vec;
 
-use super::pad_check::{SURFACES, surfaces_rad};
+use super::pad_check::{SURFACE_NAMES, SURFACES, surfaces_rad};
 use super::{Computer, FRAME_S, KeptInput};
 use crate::control::servo::{GIMBALS, ServoModel};
 use crate::estimation::estimator::{Estimate, Health};
 use crate::estimation::motor_estimate::MotorStage;
 use crate::estimation::sensor_watch::{BAROMETER_LOST_S, GNSS_LOST_S, LIDAR_LOST_S};
 use crate::guidance::powered::ControlLevel;
-use crate::rules::outputs::Line;
+use crate::rules::outputs::PyroOutput;
 use crate::rules::phase::{Latch, Phase};
 
 /// Something that no flight shows as long as its vehicle does what it should.
@@ -85,8 +85,6 @@ const RULES: [(Sign, f64); 24] = [
     (Sign::Gate, 0.0),
     (Sign::Latched, 0.0),
 ];
-
-const SURFACE_NAMES: [&str; SURFACES] = ["gimbal pitch", "gimbal yaw", "fin 1", "fin 2", "fin 3", "fin 4"];
 
 /// Something that went wrong.
 #[derive(Debug, Clone, PartialEq)]
@@ -324,10 +322,10 @@ impl Watcher {
             servo.advance();
             servo.take(command_rad);
         }
-        for (line, since_s) in
-            [(Line::Parachute, &mut self.ejected_s), (Line::Separation, &mut self.parted_s)]
+        for (output, since_s) in
+            [(PyroOutput::Parachute, &mut self.ejected_s), (PyroOutput::Separation, &mut self.parted_s)]
         {
-            if commands.outputs.is_on(line) {
+            if commands.outputs.is_on(output) {
                 since_s.get_or_insert(time_s);
             }
         }
