@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 
 pub use clocks::{Clock, ClockTime, ClockTimeError, Clocks, Moment, MomentError};
 use flights::InFlight;
-pub use flights::{Cut, Flights, FrameOrder, FrameRanges, Gap, LoggedFlight};
+pub use flights::{Cut, Flights, FrameOrder, Gap, LoggedFlight};
 pub use head::{AttachmentFacts, BuildComparison, BuildDifference, Head};
 use mcap::records::{Record as McapRecord, op};
 use protocol::log::reader::{Damage, LogChannel, LogItem, LogReader, parse_record};
@@ -29,9 +29,9 @@ pub(crate) use record::{frame_descriptor, misread_frame};
 pub use recording::{Recording, RecordingError};
 pub use tlog::{ImportError, ImportedTlog, import_tlog};
 pub(crate) use tlog::{is_tlog, open_log};
-use verdict::contradiction;
+pub(crate) use verdict::frame_of;
+use verdict::{Found, Verdicts, contradiction, heard_message};
 pub use verdict::{VerdictFacts, VerdictLimit};
-pub(crate) use verdict::{Verdicts, frame_of, heard_message};
 
 use crate::output::{Destination, NewFile, WriteError};
 
@@ -53,7 +53,11 @@ pub struct FlightLog<R: Read> {
     head: Head,
     /// Whether a record was found that only flight logs have.
     recognised: bool,
+    first_log_time_ns: Option<u64>,
     last_log_time_ns: Option<u64>,
+    flights: Flights,
+    clocks: Clocks,
+    verdicts: Verdicts,
     /// Its times need not be in order.
     may_go_back: bool,
     in_flight: InFlight,
@@ -112,7 +116,11 @@ impl<R: Read> FlightLog<R> {
             reader: LogReader::new(Cursor::new(start).chain(input)),
             head: Head::default(),
             recognised: false,
+            first_log_time_ns: None,
             last_log_time_ns: None,
+            flights: Flights::default(),
+            clocks: Clocks::default(),
+            verdicts: Verdicts::default(),
             may_go_back: false,
             in_flight: InFlight::default(),
             contradiction: None,
@@ -164,6 +172,26 @@ impl<R: Read> FlightLog<R> {
         self.last_log_time_ns
     }
 
+    /// The flights so far.
+    pub fn flights(&self) -> &Flights {
+        &self.flights
+    }
+
+    /// How its clocks differ, as far as it was read.
+    pub fn clocks(&self) -> Clocks {
+        self.clocks
+    }
+
+    /// Its landing verdict, recorded or heard, as far as it was read.
+    pub(crate) fn verdict(&self) -> Option<Found> {
+        self.verdicts.found()
+    }
+
+    /// So long after the first entry, s.
+    pub fn since_first_s(&self, log_time_ns: u64) -> f64 {
+        log_time_ns.saturating_sub(self.first_log_time_ns.unwrap_or(log_time_ns)) as f64 / 1e9
+    }
+
     /// The next entry.
     ///
     /// # Errors
@@ -201,7 +229,13 @@ impl<R: Read> FlightLog<R> {
                     }
                     self.in_flight.place(&mut entry);
                     self.last_log_time_ns = self.last_log_time_ns.max(Some(log_time_ns));
-                    return Ok(Some(StampedEntry { channel_id, log_time_ns, sequence, data, entry }));
+                    self.first_log_time_ns.get_or_insert(log_time_ns);
+                    let stamped = StampedEntry { channel_id, log_time_ns, sequence, data, entry };
+                    let message = heard_message(self.reader.channel(channel_id), &stamped);
+                    self.flights.note(&stamped);
+                    self.clocks.note(&stamped, message.as_ref(), self.since_first_s(log_time_ns));
+                    self.verdicts.note(&stamped, message.as_ref());
+                    return Ok(Some(stamped));
                 }
                 Some(item) => self.head.take(item),
             }
@@ -331,9 +365,7 @@ impl NewLog {
 /// Facts from a file's summary.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SummaryFacts {
-    /// Messages in the file.
-    pub message_count: u64,
-    /// Of these, frames of the flight computer.
+    /// Frames of the flight computer in the file.
     pub frames: u64,
     /// Time of the last message, ns since the Unix epoch.
     pub last_log_time_ns: u64,
@@ -362,7 +394,6 @@ pub fn summary_of(path: &Path) -> Option<SummaryFacts> {
     let stats = stats?;
     let counts = stats.channel_message_counts.iter().filter(|(id, _)| frame_channels.contains(id));
     Some(SummaryFacts {
-        message_count: stats.message_count,
         frames: counts.map(|(_, count)| *count).fold(0, u64::saturating_add),
         last_log_time_ns: stats.message_end_time,
     })

@@ -44,7 +44,7 @@ use serde::Serialize;
 use crate::cli::{Answer, Outcome, give, say, warn_of_cut, warn_of_damage};
 use crate::controller::FrameError;
 use crate::log::{
-    BuildComparison, Cut, Entry, FlightLog, Flights, Head, LogError, LoggedFlight, Recording, VerdictFacts,
+    BuildComparison, Cut, Entry, FlightLog, Head, LogError, LoggedFlight, Recording, VerdictFacts,
 };
 use crate::print::counted;
 
@@ -116,12 +116,11 @@ pub fn verify_log<R: Read>(
     log: &mut FlightLog<R>,
     whole_head: impl Fn() -> Result<Head, LogError>,
 ) -> Result<Vec<VerifyReport>, LogError> {
-    let mut flights = Flights::default();
     let mut computers: Vec<FlightVerifier> = Vec::new();
     // An unreadable record before the first flight may have been its beginning.
     let mut unreadable = None;
     while let Some(stamped) = log.next_entry()? {
-        if flights.note(&stamped) {
+        if log.flights().found().len() > computers.len() {
             computers.push(FlightVerifier::new(!computers.is_empty(), unreadable.take()));
         }
         let Some(computer) = computers.last_mut() else {
@@ -138,7 +137,7 @@ pub fn verify_log<R: Read>(
     let of = computers.len();
     let report = |(place, computer): (usize, FlightVerifier)| {
         let flight = (of > 1).then_some(FlightPlace { number: place + 1, of });
-        computer.into_report(log, flight, flights.found().get(place).and_then(LoggedFlight::cut))
+        computer.into_report(log, flight, log.flights().found().get(place).and_then(LoggedFlight::cut))
     };
     Ok(computers.into_iter().enumerate().map(report).collect())
 }
@@ -434,7 +433,8 @@ impl Divergence {
         for FieldDifference { path, recorded, recomputed, ulps } in self.fields.iter().take(FIELDS_SHOWN) {
             lines.push(format!("  {path}"));
             for (name, FieldValue { value, bits }) in [("recorded", recorded), ("recomputed", recomputed)] {
-                lines.push(format!("    {name:<10}  {value:<24}  {}", bits.as_deref().unwrap_or_default()));
+                let line = format!("    {name:<10}  {value:<24}  {}", bits.as_deref().unwrap_or_default());
+                lines.push(line.trim_end().to_owned());
             }
             lines.extend(ulps.map(|ulps| format!("    apart       {ulps} ULP")));
         }
