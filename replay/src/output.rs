@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use tempfile::NamedTempFile;
+use tempfile::{NamedTempFile, TempPath};
 
 /// What to do with an existing file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -80,14 +80,9 @@ pub fn write_whole(
 pub struct NewFile {
     path: PathBuf,
     overwrite: Overwrite,
-    place: Place,
-}
-
-#[derive(Debug)]
-enum Place {
-    Beside(NamedTempFile),
-    /// A pipe or a device has no content that could be lost.
-    Device(File),
+    file: File,
+    /// Its name until it is complete; a pipe or a device has no content that could be lost.
+    unfinished: Option<TempPath>,
 }
 
 impl NewFile {
@@ -104,18 +99,15 @@ impl NewFile {
             let words = "it is the file that is being read, and never overwritten";
             return Err(io::Error::new(io::ErrorKind::AlreadyExists, words));
         }
-        let place = match std::fs::metadata(path) {
-            Ok(found) if !found.is_file() && !found.is_dir() => {
-                Place::Device(File::options().write(true).open(path)?)
-            }
-            _ => {
-                if overwrite == Overwrite::Never && path.symlink_metadata().is_ok() {
-                    return Err(exists());
-                }
-                Place::Beside(beside(path)?)
-            }
-        };
-        Ok(Self { path: path.to_owned(), overwrite, place })
+        if std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
+            let file = File::options().write(true).open(path)?;
+            return Ok(Self { path: path.to_owned(), overwrite, file, unfinished: None });
+        }
+        if overwrite == Overwrite::Never && path.symlink_metadata().is_ok() {
+            return Err(exists());
+        }
+        let (file, unfinished) = beside(path)?.into_parts();
+        Ok(Self { path: path.to_owned(), overwrite, file, unfinished: Some(unfinished) })
     }
 
     /// The final name of the file.
@@ -128,43 +120,34 @@ impl NewFile {
     /// # Errors
     /// It could not be written to the disk, or a file has appeared there in the meantime that may not be replaced.
     pub fn commit(self) -> Result<(), WriteError> {
-        let Self { path, overwrite, place } = self;
-        let Place::Beside(file) = place else {
-            return Ok(());
-        };
+        let Self { path, overwrite, file, unfinished } = self;
+        let Some(unfinished) = unfinished else { return Ok(()) };
         let failed = WriteError::at(&path);
-        file.as_file().sync_all().map_err(&failed)?;
+        file.sync_all().map_err(&failed)?;
         let persisted = match overwrite {
-            Overwrite::Always => file.persist(&path),
-            Overwrite::Never => file.persist_noclobber(&path),
+            Overwrite::Always => unfinished.persist(&path),
+            Overwrite::Never => unfinished.persist_noclobber(&path),
         };
-        persisted.map(|_| ()).map_err(|error| match error.error.kind() {
+        persisted.map_err(|error| match error.error.kind() {
             io::ErrorKind::AlreadyExists => failed(exists()),
             _ => failed(error.error),
         })
-    }
-
-    fn file(&mut self) -> &mut File {
-        match &mut self.place {
-            Place::Beside(file) => file.as_file_mut(),
-            Place::Device(file) => file,
-        }
     }
 }
 
 impl Write for NewFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.file().write(bytes)
+        self.file.write(bytes)
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        self.file().flush()
+        self.file.flush()
     }
 }
 
 impl Seek for NewFile {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        self.file().seek(to)
+        self.file.seek(to)
     }
 }
 

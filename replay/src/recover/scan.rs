@@ -75,6 +75,8 @@ pub(crate) struct Contents {
 /// chunks and its count only if it is whole. Its own index is not used: bytes that were lost have shifted it.
 #[derive(Debug, Default)]
 pub(crate) struct WriterReport {
+    /// Who wrote it, from the head of the file.
+    pub(crate) library: String,
     pub(crate) schemas: BTreeMap<u16, (SchemaHeader, Vec<u8>)>,
     pub(crate) channels: BTreeMap<u16, Channel>,
     /// Where each chunk began, its length and its name.
@@ -356,7 +358,12 @@ impl Contents {
             })
             .map(|()| true),
             op::HEADER | op::SCHEMA | op::CHANNEL | op::MESSAGE | op::METADATA | op::ATTACHMENT => {
-                self.note_time(&parse_record(opcode, body)?);
+                let record = parse_record(opcode, body)?;
+                self.note_time(&record);
+                if let Record::Header(header) = record {
+                    self.told.library = header.library;
+                    return Ok(false);
+                }
                 Ok(true)
             }
             _ => Ok(false),

@@ -18,7 +18,7 @@ mod rerun;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, Result};
+use anyhow::Result;
 use flight::computer::FRAME_S;
 use flight::rules::phase::Phase;
 use flight_log::frame::phase_of;
@@ -42,20 +42,6 @@ use crate::print::{counted, verdict_table};
 use crate::settings::{Setting, SettingArguments, SettingError, mission_with, truth_with};
 use crate::worst_plans::BrokenPlan;
 
-/// Where to begin.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub enum StartAt {
-    /// The first frame of the landing.
-    #[default]
-    Landing,
-    /// Its number in the log.
-    Frame(u64),
-    /// The first frame at or after this vehicle time, s.
-    Time(f64),
-    /// The frame after the one that entered this phase.
-    Phase(Phase),
-}
-
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct StartState {
     /// The first frame flown again, by its number in the log.
@@ -72,8 +58,9 @@ pub struct StartState {
 /// Options of a re-flown flight.
 #[derive(Debug, Clone, Default)]
 pub struct ReflyOptions {
-    /// Where to begin.
-    pub start: StartAt,
+    /// Where to begin: at the frame, at the first one of that time, or at the one after the one that entered the phase. `None`:
+    /// at the landing's first frame.
+    pub start: Option<Moment>,
     /// Settings of controller and plant; timed ones change the controller only.
     pub settings: Vec<Setting>,
     /// Additional settings of the plant only.
@@ -206,7 +193,7 @@ pub fn refly_flight(
     refuse_misplaced(options)?;
     let (_, frames) = recording.recorded_frames()?;
     let mut rerun = Rerun::of(recording, &FaultChanges::default())?;
-    let place = find(recording, frames, &options.start)?;
+    let place = find(recording, frames, options.start)?;
     let first_frame = frames[place].input.frame;
     rerun = rerun.fly_before(first_frame);
     let reached = reached(recording, &rerun, &frames[..place]);
@@ -350,60 +337,70 @@ fn change(
 /// The plant takes settings of the airframe and of the draw, from the beginning; the controller takes all but those of the
 /// draw and of its estimator.
 fn refuse_misplaced(options: &ReflyOptions) -> Result<(), ReflyError> {
-    let refused = |settings: &[Setting], is_wrong: fn(&Setting) -> bool, belongs| {
-        let wrong = settings.iter().find(|setting| is_wrong(setting));
-        wrong.map_or(Ok(()), |wrong| Err(ReflyError::Misplaced { setting: wrong.to_string(), belongs }))
-    };
-    let (plant, controller) = (&options.plant_settings, &options.settings);
-    refused(
-        plant,
-        |setting| setting.at_s.is_some(),
-        "the plant's settings hold from the beginning; only the controller's can change in flight",
-    )?;
-    refused(
-        plant,
-        |setting| !(setting.path.starts_with("truth.") || setting.path.starts_with("airframe")),
-        "the plant has airframe.* and truth.*; everything else is the controller's (--set)",
-    )?;
-    refused(
-        controller,
-        |setting| setting.path.starts_with("truth."),
-        "the random draw belongs to the plant alone (--plant)",
-    )?;
-    refused(
-        controller,
-        |setting| setting.path.starts_with("estimator."),
-        "the estimator is set up at apogee; evaluate takes it",
-    )
+    let refused: [(&[Setting], fn(&Setting) -> bool, &'static str); 4] = [
+        (
+            &options.plant_settings,
+            |setting| setting.at_s.is_some(),
+            "the plant's settings hold from the beginning; only the controller's can change in flight",
+        ),
+        (
+            &options.plant_settings,
+            |setting| !(setting.path.starts_with("truth.") || setting.path.starts_with("airframe")),
+            "the plant has airframe.* and truth.*; everything else is the controller's (--set)",
+        ),
+        (
+            &options.settings,
+            |setting| setting.path.starts_with("truth."),
+            "the random draw belongs to the plant alone (--plant)",
+        ),
+        (
+            &options.settings,
+            |setting| setting.path.starts_with("estimator."),
+            "the estimator is set up at apogee; evaluate takes it",
+        ),
+    ];
+    let mut misplaced = refused.into_iter().filter_map(|(settings, is_wrong, belongs)| {
+        let setting = settings.iter().find(|setting| is_wrong(setting))?.to_string();
+        Some(ReflyError::Misplaced { setting, belongs })
+    });
+    misplaced.next().map_or(Ok(()), Err)
 }
 
 /// The index of the frame to start with. For a phase it is the frame after the one that entered it, because changes
 /// cannot act earlier.
-fn find(recording: &Recording, frames: &[ComputerFrame], start: &StartAt) -> Result<usize, ReflyError> {
+fn find(recording: &Recording, frames: &[ComputerFrame], start: Option<Moment>) -> Result<usize, ReflyError> {
     let logged = |frame: &ComputerFrame| recording.release_frame + frame.input.frame;
     let in_phase = |wanted: &dyn Fn(Phase) -> bool| {
         let entered = frames.iter().position(|frame| phase_of(&frame.output).is_some_and(wanted))?;
         Some(entered + 1).filter(|place| *place < frames.len())
     };
-    let [first, last] = [frames.first(), frames.last()].map(|frame| frame.map_or(0, logged));
     let (found, reason) = match start {
-        StartAt::Landing => (
+        None => (
             in_phase(&Phase::is_landing),
             "no frame of a landing to start from; a frame, a time or a phase names another moment".to_owned(),
         ),
-        StartAt::Frame(number) => (
-            frames.iter().position(|frame| logged(frame) == *number),
-            format!("no frame {number}; there are {first} to {last}"),
-        ),
-        StartAt::Time(time_s) => (
-            frames.iter().position(|frame| frame.input.time_s >= *time_s),
-            format!(
-                "no frame at or after {time_s} s; the last is at {:.3} s",
-                frames.last().map_or(0.0, |frame| frame.input.time_s)
+        Some(Moment::Frame(number)) => {
+            let [first, last] = [frames.first(), frames.last()].map(|frame| frame.map_or(0, logged));
+            (
+                frames.iter().position(|frame| logged(frame) == number),
+                format!("no frame {number}; there are {first} to {last}"),
+            )
+        }
+        Some(Moment::Time(time)) => match recording.clocks.convert(time, Clock::Flight) {
+            Some(ClockTime { time_s, .. }) => (
+                frames.iter().position(|frame| frame.input.time_s >= time_s),
+                format!(
+                    "no frame at or after {time_s} s; the last is at {:.3} s",
+                    frames.last().map_or(0.0, |frame| frame.input.time_s)
+                ),
             ),
-        ),
-        StartAt::Phase(phase) => {
-            (in_phase(&|found| found == *phase), format!("no frame in phase {}", phase.name()))
+            None => (
+                None,
+                format!("does not say when T+0 was on the clock of {time}; give the time as T+SECONDS"),
+            ),
+        },
+        Some(Moment::Phase(phase)) => {
+            (in_phase(&|found| found == phase), format!("no frame in phase {}", phase.name()))
         }
     };
     found.ok_or_else(|| ReflyError::Refused { name: recording.name.clone(), reason })
@@ -569,15 +566,9 @@ pub(crate) struct Args {
 impl Args {
     pub(crate) fn run(self) -> Result<Outcome> {
         let recording = Recording::open(&self.file)?;
-        let start = match self.at {
-            Some(Moment::Frame(frame)) => StartAt::Frame(frame),
-            Some(Moment::Time(time)) => StartAt::Time(flight_time_s(&recording, time)?),
-            Some(Moment::Phase(phase)) => StartAt::Phase(phase),
-            None => StartAt::Landing,
-        };
         warn_of_what_is_missing(&recording);
         let options = ReflyOptions {
-            start,
+            start: self.at,
             settings: self.settings.all()?,
             plant_settings: self.plant,
             seed: self.seed,
@@ -590,12 +581,4 @@ impl Args {
         }
         give(&report, self.json)
     }
-}
-
-fn flight_time_s(recording: &Recording, time: ClockTime) -> Result<f64> {
-    let converted = recording.clocks.convert(time, Clock::Flight);
-    let name = &recording.name;
-    converted.map(|time| time.time_s).with_context(|| {
-        format!("--at {time}: {name} does not say when its T+0 was on that clock; give the time as T+SECONDS")
-    })
 }

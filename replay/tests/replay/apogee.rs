@@ -6,8 +6,8 @@ use protocol::log::computer_v1::{ComputerFrame, Request};
 use protocol::log::record::Record;
 use protocol::log::writer::{LogHeader, LogWriter};
 use replay::evaluate::{EvaluateError, evaluate};
-use replay::log::Recording;
-use replay::refly::{ReflyOptions, StartAt, refly, refly_flight, write_log};
+use replay::log::{Clock, ClockTime, Moment, Recording};
+use replay::refly::{ReflyOptions, refly, refly_flight, write_log};
 use replay::verify::explain::explain;
 use replay::verify::{Verification, verify};
 
@@ -73,11 +73,11 @@ fn a_setting_that_the_flight_computer_does_not_have_is_refused() {
 fn without_changes_the_flight_is_the_same_bit_for_bit() {
     let recording = recording();
     let starts = [
-        StartAt::Landing,
-        StartAt::Frame(1),
-        StartAt::Time(5.0),
-        StartAt::Phase(Phase::AeroDescent),
-        StartAt::Phase(Phase::Powered),
+        None,
+        Some(Moment::Frame(1)),
+        Some(Moment::Time(ClockTime { clock: Clock::Flight, time_s: 5.0 })),
+        Some(Moment::Phase(Phase::AeroDescent)),
+        Some(Moment::Phase(Phase::Powered)),
     ];
     for start in starts {
         let (report, flown) =
@@ -106,7 +106,7 @@ fn another_wind_and_motor_change_the_verdict() {
     assert!(report.margin.unwrap() < 0.0);
     // Wind and motor change from the burn on; the controller knows of neither.
     for given in ["truth.wind_m_s=14", "airframe.motor=G33"] {
-        let options = ReflyOptions { start: StartAt::Phase(Phase::Powered), ..with_plant(&[given]) };
+        let options = ReflyOptions { start: Some(Moment::Phase(Phase::Powered)), ..with_plant(&[given]) };
         let report = refly(&recording, &options).unwrap();
         assert_eq!(report.reached.first_different, None);
         assert!(report.gimbal_difference_max_rad > 0.0, "{given}");
@@ -121,9 +121,12 @@ fn a_flight_that_cannot_be_flown_again_is_refused_with_the_reason() {
     let refusal = |start| {
         refly(&recording, &ReflyOptions { start, ..ReflyOptions::default() }).unwrap_err().to_string()
     };
-    assert!(refusal(StartAt::Frame(99_999)).contains("no frame 99999; there are 1 to"));
-    assert!(refusal(StartAt::Time(1e6)).contains("the last is at"));
-    assert!(refusal(StartAt::Phase(Phase::Chute)).contains("no frame in phase CHUTE"));
+    assert!(refusal(Some(Moment::Frame(99_999))).contains("no frame 99999; there are 1 to"));
+    assert!(
+        refusal(Some(Moment::Time(ClockTime { clock: Clock::Flight, time_s: 1e6 })))
+            .contains("the last is at")
+    );
+    assert!(refusal(Some(Moment::Phase(Phase::Chute))).contains("no frame in phase CHUTE"));
     let refused = |options: &ReflyOptions| refly(&recording, options).unwrap_err().to_string();
     assert!(refused(&with(&["powered.gimball_deg=3"])).contains("`powered.gimbal_deg`"));
     assert!(refused(&with_plant(&["truth.wind=3"])).contains("`truth.wind_m_s`"));
@@ -160,7 +163,10 @@ fn a_flight_flown_again_is_a_log_that_verifies() {
         ("same.mcap", ReflyOptions::default()),
         ("weights.mcap", with(&["powered.weights.theta=200", "powered.gimbal_deg=4.0@9"])),
         ("weak.mcap", with_plant(&["truth.impulse_scale=0.9"])),
-        ("early.mcap", ReflyOptions { start: StartAt::Frame(1), ..with(&["ignition.fixed_height_m=40.0"]) }),
+        (
+            "early.mcap",
+            ReflyOptions { start: Some(Moment::Frame(1)), ..with(&["ignition.fixed_height_m=40.0"]) },
+        ),
     ] {
         let (_, flown) = refly_flight(&recording, &options).unwrap();
         let path = LANDED.beside(name);

@@ -9,8 +9,8 @@ use protocol::log::record::Record;
 use protocol::log::writer::{LogHeader, LogWriter};
 use replay::compare::{Align, Flown, Tolerances, compare};
 use replay::evaluate::evaluate;
-use replay::log::Recording;
-use replay::refly::{ReflyOptions, StartAt, refly};
+use replay::log::{Moment, Recording};
+use replay::refly::{ReflyOptions, refly};
 use replay::report::report;
 use replay::verify::explain::explain;
 
@@ -318,7 +318,7 @@ proptest! {
         let gimbal_rad = |frame: &replay::evaluate::EvaluatedFrame| frame.evaluated.gimbal_rad.clone();
         prop_assert!(evaluated.frames.iter().flat_map(gimbal_rad).all(f64::is_finite));
         prop_assert_eq!(explain(&recording, 20).unwrap().frame, 20);
-        for start in [StartAt::Landing, StartAt::Frame(12)] {
+        for start in [None, Some(Moment::Frame(12))] {
             let options = ReflyOptions { start, ..ReflyOptions::default() };
             if let Ok(report) = refly(&recording, &options) {
                 prop_assert!(report.frames > 0);

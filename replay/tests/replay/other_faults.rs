@@ -1,7 +1,7 @@
 //! Tests counterfactuals: a flight flown again with other faults is the flight that had those faults.
 
-use replay::log::Recording;
-use replay::refly::{FaultChanges, ReflyOptions, StartAt, refly_flight, write_log};
+use replay::log::{Moment, Recording};
+use replay::refly::{FaultChanges, ReflyOptions, refly_flight, write_log};
 use replay::verify::{Verification, verify};
 
 use crate::command_line::{replay, run};
@@ -23,7 +23,7 @@ fn the_same_flight_with_and_without_a_fault() {
     let broken = from_apogee::fly(&FAULTS);
     let (healthy, broken) = (Recording::open(&LANDED.log).unwrap(), Recording::open(&broken.log).unwrap());
     assert_ne!(healthy.verdict, broken.verdict);
-    for start in [StartAt::Landing, StartAt::Frame(1)] {
+    for start in [None, Some(Moment::Frame(1))] {
         let without = ReflyOptions { start: start.clone(), ..changed(&[], &["weak-motor", "gnss-out@5"]) };
         let (report, flown) = refly_flight(&broken, &without).unwrap();
         assert_eq!(flown.verdict, healthy.verdict, "{start:?}");
