@@ -36,34 +36,9 @@ pub enum EvaluateError {
     /// A recorded frame cannot be executed again.
     #[error(transparent)]
     Frame(#[from] FrameError),
-    /// A timed setting of the estimator, which is set up only once.
-    #[error("{setting}: the estimator's configuration holds from the beginning and cannot change in flight")]
-    TimedEstimator { setting: String },
-    /// A setting whose time comes after the last frame.
-    #[error("{setting}: takes effect after the end of {name}, whose last frame is at T+{last_s:.3} s")]
-    AfterTheEnd {
-        setting: String,
-        /// The file.
-        name: String,
-        /// Time of the last frame, s.
-        last_s: f64,
-    },
-    /// A setting that the controller does not have.
-    #[error(
-        "{path} is not a setting of the controller: on recorded inputs it changes nothing; use refly to fly with it"
-    )]
-    NotTheControllers {
-        /// The setting.
-        path: String,
-    },
-    /// A setting that would change the times of the frames.
-    #[error("{path} cannot be changed on recorded inputs: there is one input every {recorded_s} s")]
-    SampleTime {
-        /// The setting.
-        path: &'static str,
-        /// The recorded value, s.
-        recorded_s: f64,
-    },
+    /// A setting that the controller does not have, or that cannot be changed on recorded inputs.
+    #[error("{setting}: {why}")]
+    Refused { setting: String, why: String },
 }
 
 /// A frame: the recorded decision, and the decision with other settings.
@@ -142,12 +117,12 @@ pub fn evaluate(recording: &Recording, settings: &[Setting]) -> Result<EvaluateR
     let frames = side_by_side(recording, settings)?;
     let last_s = frames.0.last().map_or(0.0, |frame| frame.time_s);
     match settings.iter().find(|setting| setting.at_s.is_some_and(|at_s| at_s > last_s)) {
-        Some(late) => Err(EvaluateError::AfterTheEnd {
-            setting: late.to_string(),
-            name: recording.name.clone(),
-            last_s,
-        }),
         None => Ok(summarise(recording, settings, frames)),
+        Some(late) => {
+            let name = &recording.name;
+            let why = format!("takes effect after the end of {name}, whose last frame is at T+{last_s:.3} s");
+            Err(EvaluateError::Refused { setting: late.to_string(), why })
+        }
     }
 }
 
@@ -180,19 +155,23 @@ fn side_by_side(recording: &Recording, settings: &[Setting]) -> Result<Evaluated
 
 /// Refuses settings that the flight computer does not have, or that cannot change on recorded inputs.
 fn refuse(settings: &[Setting], recorded_s: f64) -> Result<(), EvaluateError> {
-    for setting in settings {
-        let path = &setting.path;
+    let why_not = |Setting { path, at_s, .. }: &Setting| {
         if NOT_THE_PILOTS.iter().any(|section| path.starts_with(section)) {
-            return Err(EvaluateError::NotTheControllers { path: path.clone() });
+            let words = "not a setting of the controller: on recorded inputs it changes nothing; use refly to fly with it";
+            Some(words.to_owned())
+        } else if path == FRAME {
+            Some(format!("cannot be changed on recorded inputs: there is one input every {recorded_s} s"))
+        } else if at_s.is_some() && path.starts_with("estimator.") {
+            let words = "the estimator's configuration holds from the beginning and cannot change in flight";
+            Some(words.to_owned())
+        } else {
+            None
         }
-        if path == FRAME {
-            return Err(EvaluateError::SampleTime { path: FRAME, recorded_s });
-        }
-        if setting.at_s.is_some() && path.starts_with("estimator.") {
-            return Err(EvaluateError::TimedEstimator { setting: setting.to_string() });
-        }
+    };
+    match settings.iter().find_map(|setting| Some((setting, why_not(setting)?))) {
+        None => Ok(()),
+        Some((setting, why)) => Err(EvaluateError::Refused { setting: setting.to_string(), why }),
     }
-    Ok(())
 }
 
 /// The largest difference of two commands' angles, rad.

@@ -14,6 +14,8 @@ use clap::Args;
 use flight::vehicle::mission::Mission;
 use sim::world::Truth;
 
+use crate::print::nearest;
+
 /// A value for one key of the mission.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Setting {
@@ -248,10 +250,7 @@ fn refusal(reason: &str, settings: &[Setting], known: &BTreeSet<String>) -> Sett
     let (true, Some(Setting { path: given, .. })) = (reason.contains("unknown field"), unknown) else {
         return SettingError::Mission { settings: listed(settings), reason: reason.to_owned() };
     };
-    let nearest = known.iter().max_by(|a, b| {
-        strsim::jaro_winkler(given, a).total_cmp(&strsim::jaro_winkler(given, b)).then_with(|| b.cmp(a))
-    });
-    SettingError::Unknown { given: given.clone(), nearest: nearest.cloned().unwrap_or_default() }
+    SettingError::Unknown { given: given.clone(), nearest: nearest(given, known.iter()) }
 }
 
 /// A controller's settings over a flight: those of the beginning, and changes at given times.

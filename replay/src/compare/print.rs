@@ -13,7 +13,6 @@ impl Answer for Comparison {
     fn sentences(&self) -> Vec<String> {
         let aligned = match self.align {
             Align::Ignition => "ignition",
-            Align::Touchdown => "touchdown",
             Align::Time => "vehicle time",
         };
         let mut lines = vec![

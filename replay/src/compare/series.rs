@@ -6,7 +6,6 @@ use std::path::Path;
 use flight::rules::phase::Phase;
 use serde::Serialize;
 
-use super::CompareError;
 use crate::log::{Cut, FlightLog, LogError, RecordingError, VerdictFacts};
 use crate::table::{Cell, FLIGHT_TIME_S, Kind, TableReader, TableShape};
 
@@ -83,8 +82,8 @@ pub struct Flown {
     pub(super) words: BTreeMap<String, BTreeMap<String, usize>>,
     /// The log has what the vehicle decided, not only what was heard of it.
     pub has_frames: bool,
-    /// Events to align on.
-    pub anchors: Anchors,
+    /// Ignition of the landing motor, vehicle time, s.
+    pub ignition_s: Option<f64>,
     /// The landing verdict.
     pub verdict: Option<VerdictFacts>,
     /// Why the log could not be read to its end, if so.
@@ -159,16 +158,12 @@ impl Flown {
                 Stopped::TooLong => RecordingError::TooLong { name: name.clone(), kind: "numbers" },
             })?;
         log.flights().refuse_several(&name)?;
-        let verdict = log.verdict().as_ref().map(VerdictFacts::found);
         let lit = |signal: &str| {
             let lit = |phase: f64| Phase::from_index(phase as u8).is_some_and(Phase::in_landing_burn);
             let series = signals.get(signal)?;
             series.times_s.iter().zip(&series.values).find(|(_, phase)| lit(**phase)).map(|(at_s, _)| *at_s)
         };
-        let anchors = Anchors {
-            ignition_s: lit("computer_frame.output.phase").or_else(|| lit("telemetry.phase")),
-            touchdown_s: verdict.as_ref().map(|verdict| verdict.time_s),
-        };
+        let ignition_s = lit("computer_frame.output.phase").or_else(|| lit("telemetry.phase"));
         // Its limits and its times stand beside the signals.
         signals.retain(|name, _| !name.starts_with("verdict."));
         Ok(Self {
@@ -177,8 +172,8 @@ impl Flown {
             over_the_air,
             words,
             has_frames: !log.flights().found().is_empty(),
-            anchors,
-            verdict,
+            ignition_s,
+            verdict: log.verdict().as_ref().map(VerdictFacts::found),
             damage: log.damage().map(ToString::to_string),
             cut: log.flights().cut(),
             out_of_order,
@@ -228,41 +223,20 @@ fn time_of(shape: &TableShape, cells: &[Cell]) -> Option<f64> {
 pub enum Align {
     /// Ignition of the landing motor.
     Ignition,
-    /// Touchdown, from the verdict.
-    Touchdown,
     /// Vehicle time itself.
     Time,
 }
 
-/// The moments of a flight to align on, vehicle time, s.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Anchors {
-    /// Ignition of the landing motor.
-    pub ignition_s: Option<f64>,
-    pub touchdown_s: Option<f64>,
-}
-
 impl Align {
-    /// What to add to the other flight's times, s.
-    pub(super) fn shift_s(self, baseline: &Flown, other: &Flown) -> Result<f64, CompareError> {
-        let (event, anchor): (_, fn(&Anchors) -> Option<f64>) = match self {
-            Self::Time => return Ok(0.0),
-            Self::Ignition => ("ignition", |anchors| anchors.ignition_s),
-            Self::Touchdown => ("touchdown", |anchors| anchors.touchdown_s),
-        };
-        let of = |flown: &Flown| {
-            anchor(&flown.anchors).ok_or(CompareError::NoAnchor { name: flown.name.clone(), event })
-        };
-        Ok(of(baseline)? - of(other)?)
-    }
-
-    /// On ignition if both flights have one, else on time. What went over the air has the vehicle's own time.
-    pub fn best_for(baseline: &Flown, other: &Flown) -> Self {
-        if baseline.only_one_has_frames(other) {
-            return Self::Time;
+    /// On ignition if both flights have one, else on time; and what to add to the other flight's times, s. What went over the
+    /// air has the vehicle's own time.
+    pub(super) fn of(baseline: &Flown, other: &Flown) -> (Self, f64) {
+        match (baseline.ignition_s, other.ignition_s) {
+            (Some(ours_s), Some(theirs_s)) if !baseline.only_one_has_frames(other) => {
+                (Self::Ignition, ours_s - theirs_s)
+            }
+            _ => (Self::Time, 0.0),
         }
-        let both = baseline.anchors.ignition_s.is_some() && other.anchors.ignition_s.is_some();
-        if both { Self::Ignition } else { Self::Time }
     }
 }
 

@@ -19,6 +19,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::{Flown, Series};
+use crate::print::{counted, nearest};
 
 /// How much one signal may differ, in its own unit.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize)]
@@ -35,8 +36,10 @@ pub struct Tolerance {
 #[serde(deny_unknown_fields)]
 pub struct Tolerances {
     verdict: Option<bool>,
-    missing: Option<usize>,
-    added: Option<usize>,
+    #[serde(default)]
+    missing: usize,
+    #[serde(default)]
+    added: usize,
     #[serde(default)]
     damaged: bool,
     #[serde(default)]
@@ -102,16 +105,12 @@ impl Tolerances {
     }
 
     pub(super) fn count_failures(&self, missing: usize, added: usize) -> Vec<String> {
-        let exceeded =
-            |count: usize, limit: Option<usize>| Some(limit.unwrap_or(0)).filter(|limit| count > *limit);
-        let mut failures = Vec::new();
-        if let Some(limit) = exceeded(missing, self.missing) {
-            failures.push(format!("{} missing (tolerated {limit})", signals_are(missing)));
-        }
-        if let Some(limit) = exceeded(added, self.added) {
-            failures.push(format!("{} added (tolerated {limit})", signals_are(added)));
-        }
-        failures
+        let words = |(word, count, limit): (&str, usize, usize)| {
+            let signals = counted(count as u64, "signal");
+            (count > limit).then(|| format!("{signals} {word} (tolerated {limit})"))
+        };
+        let both = [("missing", missing, self.missing), ("added", added, self.added)];
+        both.into_iter().filter_map(words).collect()
     }
 
     /// Parts of the flights that were not compared because of damage or a missing end.
@@ -145,18 +144,11 @@ impl Tolerances {
             if signals.clone().any(|signal| fits(given, signal)) {
                 continue;
             }
-            let nearest = signals
-                .clone()
-                .max_by(|a, b| strsim::jaro_winkler(given, a).total_cmp(&strsim::jaro_winkler(given, b)));
-            let nearest = nearest.cloned().unwrap_or_default();
+            let nearest = nearest(given, signals.clone());
             return Err(ToleranceError::Unknown { given: given.clone(), nearest });
         }
         Ok(())
     }
-}
-
-fn signals_are(count: usize) -> String {
-    if count == 1 { "1 signal is".to_owned() } else { format!("{count} signals are") }
 }
 
 /// A `*` at the end matches any rest.

@@ -302,6 +302,9 @@ mod tests {
         for number in [0.1, -0.0, 1e300, f64::MIN_POSITIVE, 3.0] {
             assert_eq!(text_of(&Cell::Float(number)).parse::<f64>().unwrap().to_bits(), number.to_bits());
         }
-        assert_eq!((text_of(&Cell::Float(f64::NAN)), text_of(&Cell::Absent)), ("NaN".to_owned(), String::new()));
+        assert_eq!(
+            (text_of(&Cell::Float(f64::NAN)), text_of(&Cell::Absent)),
+            ("NaN".to_owned(), String::new())
+        );
     }
 }

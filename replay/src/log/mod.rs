@@ -12,17 +12,16 @@ mod tlog;
 mod verdict;
 
 use std::fs::File;
-use std::io::{self, BufReader, BufWriter, Chain, Cursor, Read, Seek as _, SeekFrom};
-use std::path::{Path, PathBuf};
+use std::io::{BufReader, Chain, Cursor, Read, Seek as _, SeekFrom};
+use std::path::Path;
 
-pub use clocks::{Clock, ClockTime, ClockTimeError, Clocks, Moment, MomentError};
+pub use clocks::{Clock, ClockTime, Clocks, Moment, MomentError};
 use flights::InFlight;
 pub use flights::{Cut, Flights, FrameOrder, Gap, LoggedFlight};
 pub use head::{AttachmentFacts, BuildComparison, BuildDifference, Head};
 use mcap::records::{Record as McapRecord, op};
 use protocol::log::reader::{Damage, LogChannel, LogItem, LogReader, parse_record};
-use protocol::log::record::{Record, TOPIC_COMPUTER_FRAME, TOPIC_RAW_RX, TOPIC_TELEMETRY, TOPIC_VERDICT};
-use protocol::log::writer::{LogHeader, LogWriter};
+use protocol::log::record::{TOPIC_COMPUTER_FRAME, TOPIC_RAW_RX, TOPIC_TELEMETRY, TOPIC_VERDICT};
 use protocol::text::printable;
 pub use record::{Entry, LoggedFrame, StampedEntry};
 pub(crate) use record::{frame_descriptor, misread_frame};
@@ -32,8 +31,6 @@ pub(crate) use tlog::{is_tlog, open_log};
 pub(crate) use verdict::frame_of;
 use verdict::{Found, Verdicts, contradiction, heard_message};
 pub use verdict::{VerdictFacts, VerdictLimit};
-
-use crate::output::{Destination, NewFile, WriteError};
 
 /// First bytes of every MCAP file.
 const MCAP_MAGIC: [u8; 8] = [0x89, b'M', b'C', b'A', b'P', b'0', b'\r', b'\n'];
@@ -330,36 +327,6 @@ fn listed(topics: &[String]) -> String {
         shown.push(format!("{} more", topics.len() - TOPICS_SHOWN));
     }
     format!("the topics {}", shown.join(", "))
-}
-
-/// A log being written; see [`NewFile`].
-pub(crate) struct NewLog {
-    path: PathBuf,
-    writer: LogWriter<BufWriter<NewFile>>,
-}
-
-impl NewLog {
-    pub(crate) fn create(
-        destination: Destination,
-        input: &Path,
-        header: &LogHeader,
-    ) -> Result<Self, WriteError> {
-        let path = destination.path.to_owned();
-        let file = BufWriter::new(NewFile::create(destination, input)?);
-        let writer = LogWriter::new(file, header).map_err(io::Error::other).map_err(WriteError::at(&path))?;
-        Ok(Self { path, writer })
-    }
-
-    pub(crate) fn write(&mut self, record: &Record, time_ns: u64) -> Result<(), WriteError> {
-        let written = self.writer.write(record, time_ns).map_err(io::Error::other);
-        written.map_err(WriteError::at(&self.path))
-    }
-
-    pub(crate) fn finish(self) -> Result<(), WriteError> {
-        let file = self.writer.finish().map_err(io::Error::other);
-        let file = file.and_then(|file| file.into_inner().map_err(io::IntoInnerError::into_error));
-        file.map_err(WriteError::at(&self.path))?.commit()
-    }
 }
 
 /// Facts from a file's summary.

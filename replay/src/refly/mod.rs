@@ -16,6 +16,7 @@
 mod rerun;
 
 use std::collections::BTreeMap;
+use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
@@ -27,7 +28,7 @@ use prost::Message as _;
 use protocol::log::computer_v1::{ComputerFrame, ComputerInput, ComputerOutput};
 use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::v1;
-use protocol::log::writer::LogHeader;
+use protocol::log::writer::{LogHeader, LogWriter};
 use serde::Serialize;
 use sim::draw::draw;
 use sim::sortie::SetUpError;
@@ -36,8 +37,8 @@ use self::rerun::Rerun;
 use crate::cli::{Answer, Outcome, give, warn_of_what_is_missing};
 use crate::controller::{LoggedComputer, SETTINGS_IN_FLIGHT, phase_name};
 use crate::log::VerdictFacts;
-use crate::log::{Clock, ClockTime, Moment, NewLog, Recording, RecordingError};
-use crate::output::{Destination, Overwrite, WriteError};
+use crate::log::{Clock, ClockTime, Moment, Recording, RecordingError};
+use crate::output::{Destination, Overwrite, WriteError, write_whole};
 use crate::print::{counted, verdict_table};
 use crate::settings::{Setting, SettingArguments, SettingError, mission_with, truth_with};
 use crate::worst_plans::BrokenPlan;
@@ -90,24 +91,16 @@ pub enum ReflyError {
     #[error(transparent)]
     Setting(#[from] SettingError),
     /// The log does not say how its flight was flown, this build does not know it, the requested start is not in it, or a fault cannot
-    /// be added or left out.
-    #[error("{name}: {reason}")]
+    /// be added or left out. Or a setting belongs to the controller and not to the plant, or the other way round.
+    #[error("{of}: {reason}")]
     Refused {
-        /// The file.
-        name: String,
-        /// What is missing or unknown, and what the log has.
+        /// The file, or the setting.
+        of: String,
         reason: String,
     },
     /// The flight cannot be set up, or its world cannot be changed this way.
     #[error(transparent)]
     Flight(#[from] SetUpError),
-    /// A setting of the controller given to the plant, or the other way round, or one that does not change in flight.
-    #[error("{setting}: {belongs}")]
-    Misplaced {
-        setting: String,
-        /// Where it belongs.
-        belongs: &'static str,
-    },
 }
 
 /// How the re-flown frames before the start compare with the record.
@@ -361,7 +354,7 @@ fn refuse_misplaced(options: &ReflyOptions) -> Result<(), ReflyError> {
     ];
     let mut misplaced = refused.into_iter().filter_map(|(settings, is_wrong, belongs)| {
         let setting = settings.iter().find(|setting| is_wrong(setting))?.to_string();
-        Some(ReflyError::Misplaced { setting, belongs })
+        Some(ReflyError::Refused { of: setting, reason: belongs.to_owned() })
     });
     misplaced.next().map_or(Ok(()), Err)
 }
@@ -403,7 +396,7 @@ fn find(recording: &Recording, frames: &[ComputerFrame], start: Option<Moment>) 
             (in_phase(&|found| found == phase), format!("no frame in phase {}", phase.name()))
         }
     };
-    found.ok_or_else(|| ReflyError::Refused { name: recording.name.clone(), reason })
+    found.ok_or_else(|| ReflyError::Refused { of: recording.name.clone(), reason })
 }
 
 /// The smallest distance to a limit as a fraction of it; see [`ReflyReport::margin`].
@@ -431,11 +424,13 @@ pub fn write_log<'a>(
         profile_toml: recording.profile_toml().ok().map(str::to_owned),
         scenario_toml: recording.head.scenario_toml.clone(),
     };
-    let mut log = NewLog::create(destination.into(), Path::new(&recording.name), &header)?;
-    for (time_s, record) in &flight.records {
-        log.write(record, (time_s * 1e9) as u64)?;
-    }
-    log.finish()
+    write_whole(destination.into(), Path::new(&recording.name), |file| {
+        let mut log = LogWriter::new(BufWriter::new(file), &header).map_err(io::Error::other)?;
+        for (time_s, record) in &flight.records {
+            log.write(record, (time_s * 1e9) as u64).map_err(io::Error::other)?;
+        }
+        log.finish().map_err(io::Error::other)?.flush()
+    })
 }
 
 /// Facts about the run of a re-flown flight.

@@ -44,7 +44,7 @@ use serde::Serialize;
 use crate::cli::{Answer, Outcome, give, say, warn_of_cut, warn_of_damage};
 use crate::controller::FrameError;
 use crate::log::{
-    BuildComparison, Cut, Entry, FlightLog, Head, LogError, LoggedFlight, Recording, VerdictFacts,
+    BuildComparison, Cut, Entry, FlightLog, Gap, Head, LogError, LoggedFlight, Recording, VerdictFacts,
 };
 use crate::print::counted;
 
@@ -170,32 +170,21 @@ pub enum Obstacle {
     #[error("it has no attachment profile.toml, and without the profile the controller cannot be built")]
     NoProfile,
     /// This build cannot use the profile in the log.
-    #[error("its profile cannot be used by this build: {reason}")]
-    ProfileUnreadable {
-        /// What is wrong with the profile.
-        reason: String,
-    },
-    /// The log does not begin with the first frame.
+    #[error("its profile cannot be used by this build: {0}")]
+    ProfileUnreadable(String),
+    /// The log does not begin with the first frame, but with this one.
     #[error(
-        "it begins with frame {first}, and the frames before it are missing: what the flight computer remembered then is unknown"
+        "it begins with frame {0}, and the frames before it are missing: what the flight computer remembered then is unknown"
     )]
-    BeginningMissing {
-        /// The first frame in the log.
-        first: u64,
-    },
+    BeginningMissing(u64),
     /// Frames are missing.
     #[error(
-        "after frame {after} comes frame {before}: what the flight computer remembered there is unknown, and nothing behind the gap was compared"
+        "after frame {} comes frame {}: what the flight computer remembered there is unknown, and nothing behind the gap was compared",
+        .0.after, .0.before
     )]
-    Gap {
-        /// The last frame before the gap.
-        after: u64,
-        /// The first frame after the gap.
-        before: u64,
-    },
-    /// A record cannot be read.
-    #[error("a record cannot be read: {reason}")]
-    Unreadable { reason: String },
+    Gap(Gap),
+    #[error("a record cannot be read: {0}")]
+    Unreadable(String),
     /// A flight computer was released, and none of its frames follow.
     #[error("it has a record /computer/start and no frame of the flight computer behind it")]
     NoFrames,
@@ -203,11 +192,8 @@ pub enum Obstacle {
     #[error("it has frames of the flight computer and no record /computer/start before them to begin from")]
     NoStart,
     /// The log's contents are of another version.
-    #[error("it says that its contents have version {found}; this build reads {SCHEMA_VERSION}")]
-    Schema {
-        /// What the log says.
-        found: String,
-    },
+    #[error("it says that its contents have version {0}; this build reads {SCHEMA_VERSION}")]
+    Schema(String),
     /// A frame cannot be given to this build's flight computer.
     #[error("{0}")]
     Frame(#[from] FrameError),

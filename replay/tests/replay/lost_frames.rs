@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 
 use replay::evaluate::evaluate;
 use replay::info::{GradeLevel, info};
-use replay::log::Recording;
+use replay::log::{Gap, Recording};
 use replay::recover::recover;
 use replay::refly::{ReflyOptions, refly};
 use replay::report::report;
@@ -43,7 +43,7 @@ fn verify_ends_at_the_loss() {
     let (after, before, _) = around_the_loss(&recording);
     let report = only(verify(&RECOVERED).unwrap());
     assert_eq!(report.outcome, Verification::NotReplayable, "{report:?}");
-    assert_eq!(report.obstacle, Some(Obstacle::Gap { after, before }));
+    assert_eq!(report.obstacle, Some(Obstacle::Gap(Gap { after, before })));
     assert_eq!((report.first_divergence, report.frames_identical), (None, after));
 }
 

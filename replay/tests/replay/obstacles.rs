@@ -7,7 +7,7 @@ use prost::Message as _;
 use protocol::log::computer_v1::ComputerFrame;
 use replay::evaluate::evaluate;
 use replay::info::{GradeLevel, Info, info, info_of};
-use replay::log::{FlightLog, Recording};
+use replay::log::{FlightLog, Gap, Recording};
 use replay::verify::{Obstacle, Verification, verify};
 
 use crate::flown::{FLIGHT, MISSION, Recipe, WHOLE, only, verify_bytes, verify_frames, write_log};
@@ -62,7 +62,7 @@ fn lossy(frames: &[ComputerFrame], kept: impl Fn(u64) -> bool) -> (tempfile::Tem
 fn a_log_without_its_first_frames_is_refused() {
     let (_directory, path) = lossy(&FLIGHT.frames[..5], |frame| frame > 2);
     let report = only(verify(&path).unwrap());
-    assert_eq!(report.obstacle, Some(Obstacle::BeginningMissing { first: 3 }));
+    assert_eq!(report.obstacle, Some(Obstacle::BeginningMissing(3)));
     assert_eq!((report.outcome, report.frames_compared), (Verification::NotReplayable, 0));
 }
 
@@ -72,7 +72,7 @@ fn frames_before_a_gap_are_compared() {
     let kept = |frame| !(5..7).contains(&frame);
     let (_directory, path) = lossy(&frames, kept);
     let report = only(verify(&path).unwrap());
-    assert_eq!(report.obstacle, Some(Obstacle::Gap { after: 4, before: 7 }));
+    assert_eq!(report.obstacle, Some(Obstacle::Gap(Gap { after: 4, before: 7 })));
     assert_eq!((report.outcome, report.frames_identical), (Verification::NotReplayable, 4));
 
     let info = info(&path).unwrap();
