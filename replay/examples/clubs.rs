@@ -9,13 +9,11 @@
 use std::io::Write as _;
 
 use anyhow::Context as _;
-use campaign::run::in_parallel;
 use flight::vehicle::lot::Posterior;
-use rand::SeedableRng as _;
-use rand_chacha::ChaCha12Rng;
+use onboard_sim::run::in_parallel;
 use replay::fit::day::{Outcomes, is_go};
-use replay::fit::lot::{Chance, Trial, burnt, draw_next, predict};
-use sim::draw::{Draw, draw};
+use replay::fit::lot::{Trial, burnt, draw_lot, draw_next, predict};
+use sim::draw::{Chance, Draw, draw};
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
 use sim::world::truth::Truth;
@@ -48,7 +46,7 @@ struct World(Vec<(Motor, bool)>);
 impl World {
     fn flown(mission: &str, set: &str, flights: u64, seed: u64) -> anyhow::Result<Self> {
         let recipe = Recipe { seed, ..Recipe::built_in(mission, set)? };
-        let mut chance = Chance(ChaCha12Rng::seed_from_u64(seed));
+        let mut chance = Chance::of(seed, 0);
         let mut motor = || [0, 1, 2].map(|i: usize| nominal()[i] + FLOWN[i] * chance.normal());
         let motors: Vec<(u64, Motor)> = (0..flights).map(|number| (number, motor())).collect();
         let one = |(number, motor): &(u64, Motor)| -> anyhow::Result<bool> {
@@ -78,9 +76,9 @@ impl World {
 
 /// A club's true rate of the next day, and for each limit whether it has a GO.
 fn club(number: u64, simulated: &World, own: &World) -> anyhow::Result<(f64, [bool; LIMITS.len()])> {
-    let mut chance = Chance(ChaCha12Rng::seed_from_u64(9_000_000 + number));
+    let mut chance = Chance::of(9_000_000 + number, 0);
     let priors = [0, 1, 2].map(|i: usize| Posterior::prior(nominal()[i], PRIOR[i]));
-    let lot = priors.map(|prior| chance.lot(&prior));
+    let lot = priors.map(|prior| draw_lot(&prior, &mut chance));
     let burn = |chance: &mut Chance| lot.map(|(mean, sigma)| mean + sigma * chance.normal());
     let missed = MISSED.map(|sigma| sigma * chance.normal());
     let burns: [Motor; BURNS] = std::array::from_fn(|_| burn(&mut chance));

@@ -26,10 +26,9 @@ fn flown(recipe: &Recipe, number: u64) -> anyhow::Result<(Trace, Sortie)> {
     let mut trace = Trace::new(&format!("flight {number}"), recipe.mission.clone(), &recipe.mission_toml);
     loop {
         flight.step();
-        let reported_rad = flight.world().gimbal_feedback_rad();
         let computer = flight.computer();
         if let (Some(input), Some(estimate)) = (computer.flown(), flight.pilot().estimate()) {
-            trace.push(&input, computer.commands(), computer.mode().phase, estimate, reported_rad);
+            trace.push(&input, computer.commands(), computer.mode().phase, estimate);
         }
         if !flight.goes_on() {
             return Ok((trace, flight));

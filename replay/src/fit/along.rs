@@ -14,7 +14,6 @@
 use flight::computer::FRAME_S;
 use flight::estimation::estimator::VehicleNow;
 use flight::vehicle::airframe::{MassModel, MassProperties};
-use flight::vehicle::atmosphere::Air;
 use flight::vehicle::mission::Mission;
 use nalgebra::{Matrix2, Vector2};
 use sim::world::wind::gusts::GustScales;
@@ -73,7 +72,6 @@ struct Sample {
 #[derive(Debug, Clone)]
 pub(super) struct Along {
     pub(super) solution: Solution,
-    pub(super) priors: Vec<Prior>,
     /// Fraction of the air force that is the body's, on average over the fall.
     pub(super) body_share: f64,
     /// Standard deviation of the wind along the vertical, m/s.
@@ -147,13 +145,20 @@ pub(super) fn commanded_s(trace: &Trace) -> Option<f64> {
     trace.frames.iter().find(|frame| frame.ignite && !frame.booster_attached).map(|frame| frame.time_s)
 }
 
+/// The frames of the fall, and those from the igniter's firing on.
+pub(super) fn fall_and_burn(trace: &Trace) -> (&[Frame], &[Frame]) {
+    let lit_s = commanded_s(trace).unwrap_or(f64::INFINITY);
+    let frames = falling(trace);
+    frames.split_at(frames.partition_point(|frame| frame.time_s <= lit_s))
+}
+
 /// Whether a frame follows another without a gap.
 pub(super) fn follows(before: &Frame, frame: &Frame) -> bool {
     frame.time_s - before.time_s < 1.5 * FRAME_S
 }
 
 fn samples(
-    mission: &Mission,
+    trace: &Trace,
     mass: &MassProperties,
     frames: &[Frame],
     thrust_along: &dyn Fn(f64) -> f64,
@@ -163,20 +168,15 @@ fn samples(
     let sampled = pairs.map(|(before, frame)| {
         let near = follows(before, frame) && before.time_s < frame.time_s;
         let before = if near { before } else { frame };
-        let in_body = |frame: &Frame| {
-            let state = &frame.estimate.state;
-            state.world_from_body.inverse_transform_vector(&frame.estimate.velocity_through_air_m_s())
-        };
-        let through_air = 0.5 * (in_body(before) + in_body(frame));
-        let fins_rad = core::array::from_fn(|fin| 0.5 * (before.fins_rad[fin] + frame.fins_rad[fin]));
+        let through_air = 0.5 * (before.through_air_m_s() + frame.through_air_m_s());
         let state = &frame.estimate.state;
-        let height_m = state.position_m.z;
-        let density = Air::at_height_m(height_m + mission.pad_altitude_m).density_kg_m3;
-        let vehicle = VehicleNow::of(&mission.airframe, mass, density, fins_rad, false, 0.0);
+        let fins_rad = frame.fins_since_rad(before);
+        let density = trace.density_kg_m3(frame);
+        let vehicle = VehicleNow::of(&trace.mission.airframe, mass, density, fins_rad, false, 0.0);
         let body = VehicleNow { fin_drag_area_m2: 0.0, fin_lift_area_m2: Vector2::zeros(), ..vehicle };
         let fins =
             VehicleNow { body_drag_area_m2: 0.0, leg_drag_area_m2: 0.0, crossflow_area_m2: 0.0, ..vehicle };
-        let rate = frame.measured.imu.gyro_rad_s - frame.estimate.gyro_bias_rad_s;
+        let rate = frame.rate_rad_s();
         let up = state.world_from_body.inverse_transform_vector(&nalgebra::Vector3::z());
         let in_updraught = |m_s: f64| vehicle.air_force_n(&(through_air - up * m_s), &rate).x;
         Sample {
@@ -186,7 +186,8 @@ fn samples(
             fins_n: fins.air_force_n(&through_air, &rate).x,
             by_updraught: 0.5 * (in_updraught(1.0) - in_updraught(-1.0)),
             // The length does not depend on the wind.
-            way: near.then(|| through_air.norm() * FRAME_S / GustScales::at(height_m, 0.0).vertical_m),
+            way: near
+                .then(|| through_air.norm() * FRAME_S / GustScales::at(state.position_m.z, 0.0).vertical_m),
             thrust_along: thrust_along(frame.time_s),
         }
     });
@@ -243,10 +244,9 @@ impl<'a> Series<'a> {
     fn new(trace: &'a Trace, thrust_along: &dyn Fn(f64) -> f64) -> Result<Self, &'static str> {
         let commanded_s = commanded_s(trace);
         let frames = falling(trace);
-        let mission = &trace.mission;
-        let mass_model = MassModel::new(&mission.airframe.mass, mission.motor_curve.propellant_mass_kg());
+        let mass_model = trace.mass_model();
         let loaded = mass_model.at(0.0);
-        let samples = samples(mission, &loaded, frames, thrust_along);
+        let samples = samples(trace, &loaded, frames, thrust_along);
         let fallen = samples.partition_point(|sample| commanded_s.is_none_or(|at_s| sample.end_s <= at_s));
         if fallen < FEWEST_FRAMES {
             return Err("the flight has less than half a second of free fall");
@@ -329,7 +329,7 @@ impl<'a> Series<'a> {
         commanded_s: f64,
         mut priors: Vec<Prior>,
         updraught_m_s: f64,
-    ) -> Result<(Solution, Vec<Prior>, f64), String> {
+    ) -> Result<(Solution, f64), String> {
         let mission = &self.trace.mission;
         let lit_s = thrust_seen_s(&self.samples[self.fallen..], commanded_s, self.loaded_kg, mission)
             .ok_or("no thrust was seen after the igniter was fired")?;
@@ -354,11 +354,11 @@ impl<'a> Series<'a> {
             solve_from(&start, &priors, residuals)
         });
         let mut solution = solved.min_by(|one, other| one.cost.total_cmp(&other.cost)).ok_or(NOT_SOLVED)?;
-        inflate(&mut solution, &priors, residuals, BLOCK);
+        inflate(&mut solution, residuals, BLOCK);
         let seen_s =
             self.samples.last().map_or(0.0, |last| last.end_s - commanded_s - solution.values[DELAY]);
         self.is_of_the_curve(&solution.values)?;
-        Ok((solution, priors, seen_s))
+        Ok((solution, seen_s))
     }
 
     /// Whether the model's thrust is the one that was felt; an error says where it is not.
@@ -404,9 +404,8 @@ pub(super) fn fit_along(trace: &Trace, thrust_along: &dyn Fn(f64) -> f64) -> Res
     let speed_share =
         at_ignition.sigmas.velocity_m_s.z / at_ignition.state.velocity_m_s.norm().max(SLOWEST_M_S);
     let commanded_s = series.commanded_s;
-    let found = |solution, priors, burn_seen_s| Along {
+    let found = |solution, burn_seen_s| Along {
         solution,
-        priors,
         body_share,
         updraught_m_s,
         commanded_s,
@@ -418,13 +417,13 @@ pub(super) fn fit_along(trace: &Trace, thrust_along: &dyn Fn(f64) -> f64) -> Res
         Some(at_s) => series.burn(at_s, priors.clone(), updraught_m_s),
     };
     match burnt {
-        Ok((solution, priors, seen_s)) => Ok(found(solution, priors, Ok(seen_s))),
+        Ok((solution, seen_s)) => Ok(found(solution, Ok(seen_s))),
         Err(reason) => {
             let whitener = series.noises(series.fallen, updraught_m_s);
             let residuals = |values: &[f64]| whitener.apply(&series.missed_in_fall(values));
             let mut solution = solve(&priors, residuals).ok_or(NOT_SOLVED)?;
-            inflate(&mut solution, &priors, residuals, BLOCK);
-            Ok(found(solution, priors, Err(reason)))
+            inflate(&mut solution, residuals, BLOCK);
+            Ok(found(solution, Err(reason)))
         }
     }
 }

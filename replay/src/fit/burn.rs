@@ -10,11 +10,12 @@
 
 use core::f64::consts::PI;
 
+use anyhow::{Context as _, Result, bail};
 use flight::vehicle::thrust_curve::ThrustCurve;
 
 use super::along::white_variance;
 use super::least_squares::{Prior, inflate, solve_from};
-use super::{Basis, Fit, Named};
+use super::{Basis, Fit, Row};
 
 /// Terms of the shape. Five follow a deviation that turns around four times in a burn; faster ones change neither speed
 /// nor height at the ground.
@@ -71,6 +72,13 @@ pub(super) fn shape_sigmas(rms: f64) -> [f64; SHAPE_TERMS] {
     terms.map(|term| rms * term / whole)
 }
 
+/// The terms of the shape, from a place in a solution on.
+pub(super) fn shape_rows(first: usize) -> [Row; SHAPE_TERMS] {
+    const NAMES: [&str; SHAPE_TERMS] =
+        ["thrust_shape_1", "thrust_shape_2", "thrust_shape_3", "thrust_shape_4", "thrust_shape_5"];
+    core::array::from_fn(|k| (first + k, NAMES[k], ""))
+}
+
 /// Fewest rows with thrust.
 const FEWEST: usize = 20;
 /// Blocks over which residuals may be correlated: a stand rings at some ten hertz.
@@ -84,23 +92,18 @@ const BURN_TIME: usize = 2;
 const BEGIN: usize = 3;
 const SHAPE: usize = 4;
 
-/// Why a burn on a test stand cannot be fitted.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{0}")]
-pub struct StandError(String);
-
 /// Fits a burn; times count from the ignition command.
 ///
 /// # Errors
 /// The table has too little thrust.
-pub fn fit_stand(source: &str, rows: &[(f64, f64)], curve: &ThrustCurve) -> Result<Fit, StandError> {
+pub(super) fn fit_stand(source: &str, rows: &[(f64, f64)], curve: &ThrustCurve) -> Result<Fit> {
     let peak_n = rows.iter().map(|row| row.1).fold(f64::NEG_INFINITY, f64::max);
     let burning: Vec<usize> = (0..rows.len()).filter(|row| rows[*row].1 > 0.1 * peak_n).collect();
     let (Some(first), Some(last)) = (burning.first().copied(), burning.last().copied()) else {
-        return Err(StandError("has no thrust".to_owned()));
+        bail!("has no thrust");
     };
     if burning.len() < FEWEST || peak_n <= 0.0 {
-        return Err(StandError(format!("has fewer than {FEWEST} rows with thrust")));
+        bail!("has fewer than {FEWEST} rows with thrust");
     }
     // A tenth of the burn before and after tells the tare.
     let lasted_s = rows[last].0 - rows[first].0;
@@ -141,15 +144,14 @@ pub fn fit_stand(source: &str, rows: &[(f64, f64)], curve: &ThrustCurve) -> Resu
     let lasts_s = curve.falls_through_s(0.1 * curve.peak_thrust_n()).unwrap_or(curve.burn_time_s());
     start[BURN_TIME] = (lasted_s / lasts_s).clamp(0.2, 5.0);
     if (start[IMPULSE] - 1.0).abs() > 0.3 || (start[BURN_TIME] - 1.0).abs() > 0.4 {
-        return Err(StandError(format!(
+        bail!(
             "gives {impulse_n_s:.1} N s in {lasted_s:.2} s, and {} has {:.1} N s in {lasts_s:.2} s: another motor, or another unit",
             curve.name(),
             curve.total_impulse_n_s()
-        )));
+        );
     }
-    let unsolved = || StandError("does not fit the curve".to_owned());
-    let mut solution = solve_from(&start, &priors, residuals).ok_or_else(unsolved)?;
-    inflate(&mut solution, &priors, residuals, rows.len().div_ceil(BLOCKS));
+    let mut solution = solve_from(&start, &priors, residuals).context("does not fit the curve")?;
+    inflate(&mut solution, residuals, rows.len().div_ceil(BLOCKS));
     solution.covariance[(IMPULSE, IMPULSE)] += libm::pow(CALIBRATION_SIGMA * solution.values[IMPULSE], 2.0);
     let basis = Basis {
         impulse_n_s: curve.total_impulse_n_s(),
@@ -159,18 +161,14 @@ pub fn fit_stand(source: &str, rows: &[(f64, f64)], curve: &ThrustCurve) -> Resu
     };
     let mut fit = Fit::of(source, "", curve.name(), basis);
     let reason = "the table does not show it";
-    for (place, name, unit) in [
+    let rows = [
         (IMPULSE, "thrust_scale", ""),
         (BURN_TIME, "burn_time_scale", ""),
         (BEGIN, "ignition_delay", "s"),
         (TARE, "tare", "N"),
-    ] {
-        fit.take(&solution, &priors, place, &Named { name, unit, scale: 1.0, reason });
-    }
-    for k in 0..SHAPE_TERMS {
-        let name = format!("thrust_shape_{}", k + 1);
-        fit.take(&solution, &priors, SHAPE + k, &Named { name: &name, unit: "", scale: 1.0, reason });
-    }
+    ];
+    fit.take(&solution, reason, &rows);
+    fit.take(&solution, reason, &shape_rows(SHAPE));
     fit.lacks("drag_scale, gimbal, wind, sensors", "a test stand does not fly");
     Ok(fit)
 }

@@ -1,8 +1,8 @@
 //! What all flights so far tell of a motor lot, an airframe and a site, and what the next flight may expect of them.
 //!
-//! * [`posterior`]: a lot's mean and scatter, from the prior of a set of dispersions and the burns so far.
-//! * [`rate`]: the landing rate with its interval, from simulated flights with motors of the posterior.
-//! * [`day`]: the mission and the set of dispersions of the day, as files.
+//! * [`Posterior`]: a lot's mean and scatter, from the prior of a set of dispersions and the burns so far.
+//! * [`predict`]: the landing rate with its interval, from simulated flights with motors of the posterior.
+//! * [`Day`]: the mission and the set of dispersions of the day, as files.
 //!
 //! Everything is per mass of the mission's data, as the fits are: the vehicle is taken as weighed, and its mass does not
 //! scatter beside its thrust.
@@ -13,64 +13,23 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use anyhow::{Context as _, Result, bail, ensure};
-use campaign::run::in_parallel;
-use campaign::stopwatch::Stopwatch;
 use clap::Args;
 use flight::vehicle::lot::{Burnt, Posterior};
 use flight::vehicle::mission::Mission;
-use rand::SeedableRng as _;
-use rand_chacha::ChaCha12Rng;
+use onboard_sim::progress::Progress;
+use onboard_sim::run::in_parallel;
 use serde::Serialize;
-use sim::dispersion::{DEFAULT, Dispersion, DispersionError, may_be_kinder};
-use sim::draw::{Draw, draw};
+use sim::dispersion::{DEFAULT, Dispersion, may_be_kinder};
+use sim::draw::{Chance, Draw, draw};
 use sim::sortie::{SetUpError, Sortie};
 use sim::world::truth::Truth;
 use statrs::distribution::{Beta, Binomial, ContinuousCDF as _, DiscreteCDF as _};
 
-use super::lot::{Chance, Prediction, Trial, burnt, draw_next, predict};
-use super::{Basis, Fit, Pooled, Z_95, pooled};
+use super::lot::{Prediction, Trial, burnt, draw_next, predict};
+use super::{Basis, Fit, Parameter, Pooled, Z_95, pooled};
 use crate::cli::{in_pool, refuse_existing, say, text_of, write_new};
 use crate::print::{counted, shown};
-use crate::settings::{Setting, SettingError, mission_toml_with, mission_with};
-
-/// What is asked.
-#[derive(Debug, Clone)]
-pub struct DayAsk<'a> {
-    pub mission_toml: &'a str,
-    /// Name and text of the set of dispersions that is the prior.
-    pub set: (&'a str, &'a str),
-    /// Simulated flights of the day; `None`: it is not flown, and has no rate.
-    pub flights: Option<usize>,
-    pub seed: u64,
-    /// The landing rate that the club wants, and the risk of flying below it that it takes.
-    pub limit: f64,
-    pub risk: f64,
-}
-
-/// Why nothing can be learnt.
-#[derive(Debug, thiserror::Error)]
-pub enum LearnError {
-    /// No fit has a burn.
-    #[error("no burn was found in {0} fits: a lot is learnt from burns")]
-    NoBurn(usize),
-    /// A fit is of another vehicle or motor than the mission.
-    #[error(
-        "{source_name} is of {found}, and the mission of {known}: one vehicle and one motor are learnt at a time"
-    )]
-    Other { source_name: String, found: String, known: String },
-    /// The mission, or a value that was learnt for it.
-    #[error(transparent)]
-    Setting(#[from] SettingError),
-    /// The set of dispersions.
-    #[error(transparent)]
-    Dispersion(#[from] DispersionError),
-    /// What was learnt cannot be written as a file.
-    #[error("{0}")]
-    Day(String),
-    /// A flight cannot be simulated.
-    #[error(transparent)]
-    SetUp(#[from] SetUpError),
-}
+use crate::settings::{Setting, mission_toml_with, mission_with};
 
 /// A lot's property before the next burn.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -124,13 +83,10 @@ pub struct Learnt {
 const PROPERTIES: [(&str, &str); 3] =
     [("thrust_scale", ""), ("burn_time_scale", ""), ("ignition_delay", "s")];
 
-/// Learns from fits, and flies the day.
-///
-/// # Errors
-/// [`LearnError`] says what is wrong with the fits, the mission or the set.
-pub fn learn(fits: &[Fit], ask: &DayAsk<'_>) -> Result<Learnt, LearnError> {
-    let set = Dispersion::from_toml(ask.set.1, ask.set.0)?;
-    let (before, lot) = unburnt(ask.mission_toml)?;
+/// Learns from fits for a mission, from the prior that a set of dispersions is, and flies the day.
+fn learn(fits: &[Fit], ask: &Arguments, mission_toml: &str, set_toml: &str) -> Result<Learnt> {
+    let set = Dispersion::from_toml(set_toml, &ask.prior)?;
+    let (before, lot) = unburnt(mission_toml)?;
     let mission = mission_with(&before, &[])?;
     one_vehicle(fits, [&mission.name, mission.motor_curve.name()])?;
     let basis = Basis::of(&mission);
@@ -152,9 +108,7 @@ pub fn learn(fits: &[Fit], ask: &DayAsk<'_>) -> Result<Learnt, LearnError> {
     // A lot counts its burns once: those of which both are known.
     let whole = |fit: &&Fit| PROPERTIES[..2].iter().all(|(name, _)| fit.get(name).is_some());
     let burns: Vec<&Fit> = fits.iter().filter(whole).collect();
-    if burns.is_empty() {
-        return Err(LearnError::NoBurn(fits.len()));
-    }
+    ensure!(!burns.is_empty(), "no burn was found in {} fits: a lot is learnt from burns", fits.len());
     let of = |fits: &[&Fit], name: &str| {
         let found: Vec<_> = fits.iter().filter_map(|fit| fit.get(name)).collect();
         let common = found.iter().filter_map(|found| found.systematic).fold(0.0, f64::max);
@@ -171,11 +125,10 @@ pub fn learn(fits: &[Fit], ask: &DayAsk<'_>) -> Result<Learnt, LearnError> {
     let sources: Vec<String> = fits.iter().map(|fit| fit.source.clone()).collect();
     let motor = mission.motor_curve.name();
     let lot = with_burns(lot, motor, burns.len(), [&values[0].1, &values[1].1])?;
-    let day = Day::of(ask, &before, &lot, &lots, &airframe, wind_m_s, &sources)?;
-    let trials = ask.flights.map(|flights| fly(ask, flights, &lots, &day)).transpose()?;
+    let day = Day::of([&before, set_toml], &ask.prior, &lot, &lots, &airframe, wind_m_s, &sources)?;
+    let trials = ask.flights.map(|flights| fly(ask.seed, flights, &lots, &day)).transpose()?;
     let prediction = trials.as_ref().map(|trials| {
-        predict(&lots, trials, ask.limit, ask.seed)
-            .ok_or_else(|| LearnError::Day("no flight was simulated: --flights is 0".to_owned()))
+        predict(&lots, trials, ask.limit, ask.seed).context("no flight was simulated: --flights is 0")
     });
     let prediction = prediction.transpose()?;
     let flown = Outcomes::of(fits);
@@ -195,7 +148,7 @@ pub fn learn(fits: &[Fit], ask: &DayAsk<'_>) -> Result<Learnt, LearnError> {
     Ok(Learnt {
         mission: mission.name.clone(),
         motor: motor.to_owned(),
-        set: ask.set.0.to_owned(),
+        set: ask.prior.clone(),
         sources,
         lots: reports.collect(),
         lot_toml: lot_toml(&lot),
@@ -276,16 +229,14 @@ impl Pulled {
 }
 
 /// Refuses fits of other vehicles and motors than the mission's, by their names; a test stand has no vehicle.
-fn one_vehicle(fits: &[Fit], known: [&str; 2]) -> Result<(), LearnError> {
+fn one_vehicle(fits: &[Fit], known: [&str; 2]) -> Result<()> {
     for fit in fits {
         for (found, known) in [&fit.mission, &fit.motor].into_iter().zip(known) {
-            if !found.is_empty() && found != known {
-                return Err(LearnError::Other {
-                    source_name: fit.source.clone(),
-                    found: found.clone(),
-                    known: known.to_owned(),
-                });
-            }
+            ensure!(
+                found.is_empty() || found == known,
+                "{} is of {found}, and the mission of {known}: one vehicle and one motor are learnt at a time",
+                fit.source
+            );
         }
     }
     Ok(())
@@ -323,12 +274,12 @@ fn wind(fits: &[Fit], set: &Dispersion) -> [f64; 2] {
 }
 
 /// Flies the day's flights.
-fn fly(ask: &DayAsk<'_>, flights: usize, lots: &[Posterior], day: &Day) -> Result<Vec<Trial>, LearnError> {
-    let mut chance = Chance(ChaCha12Rng::seed_from_u64(ask.seed));
+fn fly(seed: u64, flights: usize, lots: &[Posterior], day: &Day) -> Result<Vec<Trial>> {
+    let mut chance = Chance::of(seed, 0);
     let motors: Vec<(u64, Vec<f64>)> =
         (0..flights as u64).map(|number| (number, draw_next(lots, &mut chance))).collect();
     let one = |(number, motor): &(u64, Vec<f64>)| -> Result<bool, SetUpError> {
-        let drawn = draw(&day.mission, &day.dispersion, ask.seed, *number);
+        let drawn = draw(&day.mission, &day.dispersion, seed, *number);
         let truth = Truth {
             // The day's mission has the lot's means already.
             impulse_scale: (motor[0] / lots[0].mean).clamp(0.1, 10.0),
@@ -341,7 +292,7 @@ fn fly(ask: &DayAsk<'_>, flights: usize, lots: &[Posterior], day: &Day) -> Resul
         let draw = Draw { truth, ..drawn };
         Ok(Sortie::drawn_as(&day.mission, &day.dispersion, &draw)?.run().landing.stands)
     };
-    let stopwatch = Stopwatch::start();
+    let stopwatch = Progress::start();
     let landed = in_parallel(&motors, one, &|done| stopwatch.show(done, flights, "flights"));
     let trials =
         motors.into_iter().zip(landed).map(|((_, drawn), landed)| Ok(Trial { drawn, landed: landed? }));
@@ -358,57 +309,54 @@ pub struct Day {
 }
 
 impl Day {
-    pub(super) fn of(
-        ask: &DayAsk<'_>,
-        before_toml: &str,
+    fn of(
+        [before_toml, set_toml]: [&str; 2],
+        set: &str,
         lot: &toml::Table,
         lots: &[Posterior],
         airframe: &[Pooled],
         wind_m_s: [f64; 2],
         sources: &[String],
-    ) -> Result<Self, LearnError> {
-        let [_, _, delay] = lots else {
-            return Err(LearnError::Day("a lot has thrust, burn time and delay".to_owned()));
-        };
+    ) -> Result<Self> {
+        let [_, _, delay] = lots else { bail!("a lot has thrust, burn time and delay") };
         let mission = mission_with(before_toml, &[])?;
         let drag = airframe.iter().find(|pooled| pooled.mean.name == "drag_scale").map(|pooled| &pooled.mean);
         let drag_scale = drag.map_or(1.0, |mean| mean.value);
         let (body, fins) = (&mission.airframe.body, &mission.airframe.fins);
         let float = |value: f64| toml::Value::Float(value);
-        let set = |path: &str, value: toml::Value| Setting { path: path.to_owned(), value, at_s: None };
         let settings = [
-            set("lot", toml::Value::Table(lot.clone())),
-            set("airframe.body.axial_drag_coefficient", float(body.axial_drag_coefficient * drag_scale)),
-            set(
-                "airframe.body.crossflow_drag_coefficient",
-                float(body.crossflow_drag_coefficient * drag_scale),
-            ),
-            set("airframe.fins.drag_coefficient", float(fins.drag_coefficient * drag_scale)),
-            set("airframe.fins.lift_coefficient", float(fins.lift_coefficient * drag_scale)),
-            set("airframe.legs.drag_area_m2", float(mission.airframe.legs.drag_area_m2 * drag_scale)),
-            set("ignition.delay_s", float(delay.mean)),
+            ("lot", toml::Value::Table(lot.clone())),
+            ("airframe.body.axial_drag_coefficient", float(body.axial_drag_coefficient * drag_scale)),
+            ("airframe.body.crossflow_drag_coefficient", float(body.crossflow_drag_coefficient * drag_scale)),
+            ("airframe.fins.drag_coefficient", float(fins.drag_coefficient * drag_scale)),
+            ("airframe.fins.lift_coefficient", float(fins.lift_coefficient * drag_scale)),
+            ("airframe.legs.drag_area_m2", float(mission.airframe.legs.drag_area_m2 * drag_scale)),
+            ("ignition.delay_s", float(delay.mean)),
         ];
-        let head = head("The mission", ask, sources);
-        let mission_toml = head + &mission_toml_with(before_toml, &settings)?;
+        let settings = settings.map(|(path, value)| Setting { path: path.to_owned(), value, at_s: None });
+        let mission_toml = head("The mission", set, sources) + &mission_toml_with(before_toml, &settings)?;
         let mission = mission_with(&mission_toml, &[])?;
-        let dispersion_toml = dispersion_toml(
-            ask,
-            &mission,
-            delay,
-            drag.map(|mean| mean.sigma / mean.value),
-            wind_m_s,
-            sources,
-        )
-        .map_err(LearnError::Day)?;
+        let mut table: toml::Table = set_toml.parse().with_context(|| set.to_owned())?;
+        let mut change = |key: &str, value: toml::Value| table.insert(key.to_owned(), value);
+        // Impulse and burn time scatter as the mission's lot does.
+        // A set's delays scatter around the nominal one; a lot with another mean gets its distance as scatter, too.
+        let apart_s = delay.mean - Truth::default().ignition_delay_s;
+        let scatter_scale = mission.airframe.igniter_scatter().max(1e-3);
+        change("ignition_delay_s", float(libm::hypot(delay.next_sigma(), apart_s) / scatter_scale));
+        change("ignition_delay_even_s", float(0.0));
+        if let Some(mean) = drag {
+            change("drag_share", float(mean.sigma / mean.value));
+        }
+        change("wind_m_s", toml::Value::Array(wind_m_s.map(float).to_vec()));
+        let dispersion_toml = head("The dispersions", set, sources) + &toml::to_string(&table)?;
         // Read as the campaign reads it.
         let dispersion = Dispersion::from_toml(&dispersion_toml, "the day's set")?;
         Ok(Self { mission, mission_toml, dispersion, dispersion_toml })
     }
 }
 
-fn head(what: &str, ask: &DayAsk<'_>, sources: &[String]) -> String {
-    let mut head =
-        format!("# {what} of the next flight, after {} with the prior {}:\n", sources.len(), ask.set.0);
+fn head(what: &str, set: &str, sources: &[String]) -> String {
+    let mut head = format!("# {what} of the next flight, after {} with the prior {set}:\n", sources.len());
     for source in sources {
         // Writing to a String cannot fail.
         let _ = writeln!(head, "# {}", protocol::text::printable(source.as_bytes()));
@@ -416,60 +364,27 @@ fn head(what: &str, ask: &DayAsk<'_>, sources: &[String]) -> String {
     head
 }
 
-fn dispersion_toml(
-    ask: &DayAsk<'_>,
-    mission: &Mission,
-    delay: &Posterior,
-    drag_share: Option<f64>,
-    wind_m_s: [f64; 2],
-    sources: &[String],
-) -> Result<String, String> {
-    let mut table: toml::Table = ask.set.1.parse().map_err(|error| format!("{}: {error}", ask.set.0))?;
-    let mut set = |key: &str, value: f64| table.insert(key.to_owned(), toml::Value::Float(value));
-    // Impulse and burn time scatter as the mission's lot does.
-    // A set's delays scatter around the nominal one; a lot with another mean gets its distance as scatter, too.
-    let apart_s = delay.mean - Truth::default().ignition_delay_s;
-    let scatter_scale = mission.airframe.igniter_scatter().max(1e-3);
-    set("ignition_delay_s", libm::hypot(delay.next_sigma(), apart_s) / scatter_scale);
-    set("ignition_delay_even_s", 0.0);
-    if let Some(drag_share) = drag_share {
-        set("drag_share", drag_share);
-    }
-    table.insert("wind_m_s".to_owned(), toml::Value::Array(wind_m_s.map(toml::Value::Float).to_vec()));
-    let text = toml::to_string(&table).map_err(|error| error.to_string())?;
-    Ok(head("The dispersions", ask, sources) + &text)
-}
-
 /// The mission without what it knows of burns and of a day, and its `[lot]`: scales are over its curve, and the next day has
 /// weights and temperatures of its own.
-fn unburnt(mission_toml: &str) -> Result<(String, toml::Table), LearnError> {
-    let mut mission: toml::Table = mission_toml.parse().map_err(day_error)?;
+fn unburnt(mission_toml: &str) -> Result<(String, toml::Table)> {
+    let mut mission: toml::Table = mission_toml.parse()?;
     let Some(toml::Value::Table(lot)) = mission.get_mut("lot") else {
         return Ok((mission_toml.to_owned(), toml::Table::new()));
     };
     lot.retain(|key, _| key == "name" || key == "curve");
     lot.insert("burns".to_owned(), toml::Value::Integer(0));
     let lot = lot.clone();
-    Ok((toml::to_string(&mission).map_err(day_error)?, lot))
+    Ok((toml::to_string(&mission)?, lot))
 }
 
 /// A lot with its burns; without a name it is named after its motor.
-fn with_burns(
-    mut lot: toml::Table,
-    motor: &str,
-    burns: usize,
-    burnt: [&Burnt; 2],
-) -> Result<toml::Table, LearnError> {
+fn with_burns(mut lot: toml::Table, motor: &str, burns: usize, burnt: [&Burnt; 2]) -> Result<toml::Table> {
     lot.entry("name").or_insert_with(|| toml::Value::String(motor.to_owned()));
-    lot.insert("burns".to_owned(), toml::Value::try_from(burns).map_err(day_error)?);
+    lot.insert("burns".to_owned(), toml::Value::try_from(burns)?);
     for (name, burnt) in ["impulse", "burn_time"].into_iter().zip(burnt) {
-        lot.insert(name.to_owned(), toml::Value::try_from(burnt).map_err(day_error)?);
+        lot.insert(name.to_owned(), toml::Value::try_from(burnt)?);
     }
     Ok(lot)
-}
-
-fn day_error(error: impl std::error::Error) -> LearnError {
-    LearnError::Day(error.to_string())
 }
 
 /// The section as text, each property in a line of its own.
@@ -483,82 +398,53 @@ fn lot_toml(lot: &toml::Table) -> String {
 /// # Errors
 /// The output failed.
 pub fn print_learn(learnt: &Learnt, output: &mut impl Write) -> io::Result<()> {
-    let Learnt { mission, motor, set, sources, .. } = learnt;
-    let logs = counted(sources.len() as u64, "fit");
-    writeln!(
-        output,
-        "next day: {} with {} after {logs}, prior {}",
-        shown(mission),
-        shown(motor),
-        shown(set)
-    )?;
+    let [mission, motor, set] = [&learnt.mission, &learnt.motor, &learnt.set].map(|text| shown(text));
+    let fits = counted(learnt.sources.len() as u64, "fit");
+    writeln!(output, "next day: {mission} with {motor} after {fits}, prior {set}")?;
     writeln!(
         output,
         "lot                  burns      mean   95 % interval       next burn +-   before any burn +-"
     )?;
-    for lot in &learnt.lots {
-        let interval = format!("{:.4} to {:.4}", lot.low, lot.high);
+    for LotReport { name, unit, burns, mean, low, high, next_sigma, prior_sigma, .. } in &learnt.lots {
+        let interval = format!("{low:.4} to {high:.4}");
         let text = format!(
-            "  {:<18} {:>5}  {:>8.4}   {interval:<18}  {:>12.4}   {:>17.4} {}",
-            lot.name, lot.burns, lot.mean, lot.next_sigma, lot.prior_sigma, lot.unit
+            "  {name:<18} {burns:>5}  {mean:>8.4}   {interval:<18}  {next_sigma:>12.4}   {prior_sigma:>17.4} {unit}"
         );
         writeln!(output, "{}", text.trim_end())?;
     }
-    for pooled in &learnt.airframe {
-        let mean = &pooled.mean;
-        let text = format!(
-            "airframe  {:<16} {:.4}, {:.4} to {:.4} {}",
-            shown(&mean.name),
-            mean.value,
-            mean.low,
-            mean.high,
-            mean.unit
-        );
+    for Pooled { mean: Parameter { name, unit, value, low, high, .. }, .. } in &learnt.airframe {
+        let text = format!("airframe  {:<16} {value:.4}, {low:.4} to {high:.4} {unit}", shown(name));
         writeln!(output, "{}", text.trim_end())?;
     }
-    write!(output, "{}", learnt.lot_toml)?;
     let [low, high] = learnt.wind_m_s;
-    writeln!(output, "site      wind {low:.1} to {high:.1} m/s")?;
+    writeln!(output, "{}site      wind {low:.1} to {high:.1} m/s", learnt.lot_toml)?;
     let Some(found) = &learnt.prediction else { return Ok(()) };
+    let percent = |shares: [f64; 3]| shares.map(|share| 100.0 * share);
+    let [rate, low, high] = percent([found.rate, found.low, found.high]);
+    let flights = counted(learnt.flights as u64, "simulated flight");
     writeln!(
         output,
-        "rate      {:.1} %, 95 % interval {:.1} to {:.1} %, from {} in {}",
-        100.0 * found.rate,
-        100.0 * found.low,
-        100.0 * found.high,
-        counted(learnt.flights as u64, "simulated flight"),
-        shown(set)
+        "rate      {rate:.1} %, 95 % interval {low:.1} to {high:.1} %, from {flights} in {set}"
     )?;
-    if let Some(pulled) = &learnt.pulled {
+    if let Some(Pulled { worth, rate, low, high }) = learnt.pulled {
         let Outcomes { landed, of } = learnt.flown;
+        let [rate, low, high] = percent([rate, low, high]);
         writeln!(
             output,
-            "flown     {landed} of {of} landed: with the simulation worth {:.0} flights {:.1} %, 95 % interval {:.1} to {:.1} %",
-            pulled.worth,
-            100.0 * pulled.rate,
-            100.0 * pulled.low,
-            100.0 * pulled.high
+            "flown     {landed} of {of} landed: with the simulation worth {worth:.0} flights {rate:.1} %, 95 % interval {low:.1} to {high:.1} %"
         )?;
     }
-    writeln!(
-        output,
-        "risk      {:.1} % that the rate is below {:.0} %; {:.0} % is taken",
-        100.0 * found.risk,
-        100.0 * learnt.limit,
-        100.0 * learnt.risk
-    )?;
-    match (learnt.go == Some(true), may_be_kinder(set)) {
+    let [risk, limit, taken] = percent([found.risk, learnt.limit, learnt.risk]);
+    writeln!(output, "risk      {risk:.1} % that the rate is below {limit:.0} %; {taken:.0} % is taken")?;
+    let answer = match (learnt.go == Some(true), may_be_kinder(&learnt.set)) {
+        (true, false) => "GO".to_owned(),
+        (true, true) => format!("GO in {set} only, which may be kinder than {DEFAULT}"),
         (false, _) if found.risk <= learnt.risk => {
-            writeln!(
-                output,
-                "NO-GO: the flights so far speak against a rate of {:.0} %",
-                100.0 * learnt.limit
-            )
+            format!("NO-GO: the flights so far speak against a rate of {limit:.0} %")
         }
-        (false, _) => writeln!(output, "NO-GO"),
-        (true, false) => writeln!(output, "GO"),
-        (true, true) => writeln!(output, "GO in {} only, which may be kinder than {DEFAULT}", shown(set)),
-    }
+        (false, _) => "NO-GO".to_owned(),
+    };
+    writeln!(output, "{answer}")
 }
 
 /// What is asked of the next day.
@@ -620,15 +506,7 @@ impl Arguments {
         if let Some(flights) = self.flights {
             say(&format!("simulates {flights} flights of the day; a thousand take some minutes"));
         }
-        let ask = DayAsk {
-            mission_toml: &mission_toml,
-            set: (&self.prior, &set),
-            flights: self.flights,
-            seed: self.seed,
-            limit: self.limit,
-            risk: self.risk,
-        };
-        let learnt = in_pool(self.jobs, || learn(fits, &ask))??;
+        let learnt = in_pool(self.jobs, || learn(fits, self, &mission_toml, &set))??;
         if let Some(directory) = &self.day {
             let name = directory.display();
             std::fs::create_dir_all(directory).with_context(|| format!("{name}: cannot be made"))?;
@@ -645,7 +523,6 @@ impl Arguments {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fit::Parameter;
 
     fn fit(source: &str, mission: &str, motor: &str, found: Vec<Parameter>) -> Fit {
         let basis = Basis { impulse_n_s: 1.0, burn_time_s: 1.0, drag_area_m2: 1.0, loaded_kg: 1.0 };

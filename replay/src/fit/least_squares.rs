@@ -18,6 +18,8 @@ pub(super) struct Solution {
     pub(super) values: Vec<f64>,
     /// Of the posterior, from data and prior.
     pub(super) covariance: DMatrix<f64>,
+    /// What was known before.
+    pub(super) priors: Vec<Prior>,
     /// Sum of squares of whitened residuals and prior.
     pub(super) cost: f64,
 }
@@ -88,7 +90,7 @@ pub(super) fn solve_from(
         }
     }
     let covariance = information.cholesky()?.inverse();
-    Some(Solution { values, covariance, cost })
+    Some(Solution { values, covariance, priors: priors.to_vec(), cost })
 }
 
 /// Widens a solution where its residuals say that the model is wrong.
@@ -97,14 +99,10 @@ pub(super) fn solve_from(
 /// How hard they do push is summed over blocks of neighbours, within which they may be correlated (the sandwich covariance:
 /// H. White, Econometrica 50, 1982; K.-Y. Liang and S. Zeger, Biometrika 73, 1986). Where that gives a larger deviation, it
 /// counts; the correction for few blocks is the usual one.
-pub(super) fn inflate(
-    solution: &mut Solution,
-    priors: &[Prior],
-    residuals: impl Fn(&[f64]) -> Vec<f64>,
-    block: usize,
-) {
-    let now = residuals(&solution.values);
-    let jacobian = derivatives(&solution.values, priors, &residuals, now.len());
+pub(super) fn inflate(solution: &mut Solution, residuals: impl Fn(&[f64]) -> Vec<f64>, block: usize) {
+    let Solution { values, priors, .. } = &*solution;
+    let now = residuals(values);
+    let jacobian = derivatives(values, priors, &residuals, now.len());
     let count = priors.len();
     let mut pushed = DMatrix::zeros(count, count);
     let mut blocks = 0_u32;
@@ -286,7 +284,7 @@ mod tests {
         let residuals = |mean: &[f64]| samples.iter().map(|sample| mean[0] - sample).collect::<Vec<_>>();
         let mut found = solve(&prior, residuals).unwrap();
         assert!((found.covariance[(0, 0)] - 1.0 / 40.0).abs() < 1e-9);
-        inflate(&mut found, &prior, residuals, 2);
+        inflate(&mut found, residuals, 2);
         assert!((found.covariance[(0, 0)] - 20.0 / 19.0 / 20.0).abs() < 1e-9, "{:?}", found.covariance);
     }
 

@@ -3,13 +3,10 @@
 //! The next value of a posterior has a Student t distribution. The errors of the fits count as scatter: they are a tenth of it
 //! and widen it by half a per cent. What all fits of a vehicle may have in common is no scatter: it widens the mean by itself.
 
-use core::f64::consts::TAU;
-
 use flight::vehicle::lot::{Burnt, Posterior};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
-use rand::{Rng as _, SeedableRng as _};
-use rand_chacha::ChaCha12Rng;
 use serde::Serialize;
+use sim::draw::Chance;
 
 /// What burns with these values had, if all may be wrong by `common` in the same direction.
 pub fn burnt(values: &[f64], common: f64) -> Burnt {
@@ -19,26 +16,11 @@ pub fn burnt(values: &[f64], common: f64) -> Burnt {
     Burnt { mean, scatter: libm::sqrt(squares / (count - 1.0).max(1.0)), common }
 }
 
-/// Random numbers on `libm`, the same on every machine.
-pub struct Chance(pub ChaCha12Rng);
-
-impl Chance {
-    /// Uniform in [0, 1).
-    pub fn unit(&mut self) -> f64 {
-        (self.0.next_u64() >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    /// Standard normal.
-    pub fn normal(&mut self) -> f64 {
-        libm::sqrt(-2.0 * libm::log(1.0 - self.unit())) * libm::cos(TAU * self.unit())
-    }
-
-    /// A mean and a standard deviation that a lot may have.
-    pub fn lot(&mut self, lot: &Posterior) -> (f64, f64) {
-        let chi_squared: f64 = (0..lot.freedom).map(|_| libm::pow(self.normal(), 2.0)).sum();
-        let sigma = libm::sqrt(lot.squares / chi_squared.max(1e-9));
-        (lot.mean + libm::hypot(sigma / libm::sqrt(lot.worth), lot.common) * self.normal(), sigma)
-    }
+/// A mean and a standard deviation that a lot may have.
+pub fn draw_lot(lot: &Posterior, chance: &mut Chance) -> (f64, f64) {
+    let chi_squared: f64 = (0..lot.freedom).map(|_| libm::pow(chance.normal(), 2.0)).sum();
+    let sigma = libm::sqrt(lot.squares / chi_squared.max(1e-9));
+    (lot.mean + libm::hypot(sigma / libm::sqrt(lot.worth), lot.common) * chance.normal(), sigma)
 }
 
 /// Lots that are drawn from the posterior: the ends of the interval are then known to a tenth of its width.
@@ -76,7 +58,7 @@ pub struct Prediction {
 /// Draws a flight's motor from the lots.
 pub fn draw_next(lots: &[Posterior], chance: &mut Chance) -> Vec<f64> {
     let next = lots.iter().map(|lot| {
-        let (mean, sigma) = chance.lot(lot);
+        let (mean, sigma) = draw_lot(lot, chance);
         mean + sigma * chance.normal()
     });
     next.collect()
@@ -88,13 +70,13 @@ pub fn predict(lots: &[Posterior], trials: &[Trial], limit: f64, seed: u64) -> O
         return None;
     }
     let surface = Surface::fit(lots, trials)?;
-    let mut chance = Chance(ChaCha12Rng::seed_from_u64(seed));
+    let mut chance = Chance::of(seed, 0);
     let burns = burns(lots.len());
     let (mut motor, mut room) = (vec![0.0; lots.len()], Vec::new());
     let mut rates = (0..DRAWS)
         .map(|_| {
             let coefficients = surface.draw(&mut chance)?;
-            let possible: Vec<(f64, f64)> = lots.iter().map(|lot| chance.lot(lot)).collect();
+            let possible: Vec<(f64, f64)> = lots.iter().map(|lot| draw_lot(lot, &mut chance)).collect();
             let mut rate = 0.0;
             for (burn, weight) in &burns {
                 for (value, ((mean, sigma), apart)) in motor.iter_mut().zip(possible.iter().zip(burn)) {
@@ -259,7 +241,6 @@ impl Fitted {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand_chacha::ChaCha12Rng;
 
     #[test]
     fn val_hand_what_burns_had() {
@@ -272,12 +253,12 @@ mod tests {
     /// Draws of a mean and a scatter, and then of a value, have the next value's variance.
     #[test]
     fn val_student_draws() {
-        let mut chance = Chance(ChaCha12Rng::seed_from_u64(1));
+        let mut chance = Chance::of(1, 0);
         let lot =
             Posterior::prior(0.0, 1.0).with(8, &burnt(&[0.3, -0.2, 0.1, 0.5, -0.6, 0.2, 0.1, -0.4], 0.0));
         let count = 20_000;
         let squares = (0..count).map(|_| {
-            let (mean, sigma) = chance.lot(&lot);
+            let (mean, sigma) = draw_lot(&lot, &mut chance);
             libm::pow(mean + sigma * chance.normal() - lot.mean, 2.0)
         });
         let found = libm::sqrt(squares.sum::<f64>() / f64::from(count));
@@ -320,8 +301,8 @@ mod tests {
         const FLOWN: u32 = 4000;
         let priors = [Posterior::prior(1.0, 0.025), Posterior::prior(1.0, 0.04)];
         let holds = |club: u64| {
-            let mut chance = Chance(ChaCha12Rng::seed_from_u64(1000 + club));
-            let truth = priors.map(|prior| chance.lot(&prior));
+            let mut chance = Chance::of(1000 + club, 0);
+            let truth = priors.map(|prior| draw_lot(&prior, &mut chance));
             let burn = |chance: &mut Chance| truth.map(|(mean, sigma)| mean + sigma * chance.normal());
             let burns: Vec<[f64; 2]> = (0..5).map(|_| burn(&mut chance)).collect();
             let lots = [0, 1].map(|i| {
@@ -364,7 +345,7 @@ mod tests {
         let lots = [Posterior::prior(1.0, 0.02)];
         assert_eq!(predict(&lots, &[], 0.9, 1), None);
         let found = |flights| {
-            let mut chance = Chance(ChaCha12Rng::seed_from_u64(3));
+            let mut chance = Chance::of(3, 0);
             let trials: Vec<Trial> =
                 (0..flights).map(|_| Trial { drawn: draw_next(&lots, &mut chance), landed: true }).collect();
             predict(&lots, &trials, 0.9, 1).unwrap()
@@ -380,7 +361,7 @@ mod tests {
     fn val_simulation_the_surface_of_many_flights_is_found() {
         const TRUE: [f64; 3] = [2.0, 1.5, -0.7];
         let lots = [Posterior::prior(1.0, 0.03)];
-        let mut chance = Chance(ChaCha12Rng::seed_from_u64(5));
+        let mut chance = Chance::of(5, 0);
         let trials: Vec<Trial> = (0..20_000)
             .map(|_| {
                 let u = chance.normal();

@@ -6,14 +6,14 @@
 //! In reading order:
 //!
 //! * [`trace`]: a flight's frames.
-//! * [`along`]: drag and thrust along the nose. [`burn`] is the model of the thrust.
-//! * [`turning`]: the gimbal, from the rotation while the motor burns. [`servo`] and [`air_moment`] are its models.
+//! * [`along`]: drag and thrust along the nose. [`burn`] is the model of the thrust, and of a burn on a test stand.
+//! * [`turning`]: the gimbal, from the rotation while the motor burns. [`servo`] is its model.
 //! * [`wind`]: the mean wind, from the force across the nose.
 //! * [`sensors`]: noises and biases.
 //! * [`calibration`]: by how much the intervals are wider than the noise says.
-//! * [`stand`]: a burn on a test stand.
-//! * [`pooled`](mod@pooled): several flights together. [`patch`]: the mission with what was found.
-//! * [`least_squares`] and [`whiten`]: most likely values, where the noise is a slow disturbance.
+//! * [`pooled`]: several flights together. [`patched`]: the mission with what was found.
+//! * [`lot`] and [`day`]: what all flights so far tell of the next one.
+//! * [`least_squares`]: most likely values, where the noise is a slow disturbance.
 
 mod along;
 mod burn;
@@ -34,17 +34,17 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, Result, bail};
 use flight::vehicle::mission::Mission;
 use flight::vehicle::thrust_curve::ThrustCurve;
+use flight::vehicles::motors;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use self::along::{ACCELEROMETER_SCALE_SIGMA, Along};
-pub use self::burn::{StandError, fit_stand};
+use self::burn::fit_stand;
 use self::calibration::{Calibration, Table};
 use self::day::Learnt;
-use self::least_squares::{Prior, Solution};
+use self::least_squares::Solution;
 pub use self::trace::{Frame, Trace, TraceError};
-use self::turning::Turning;
-use crate::cli::{Outcome, answer, say, warn_of_damage};
+use crate::cli::{Outcome, answer, say, text_of, warn_of_damage};
 use crate::info::utc;
 use crate::output::{Destination, Overwrite, write_whole};
 use crate::print::{counted, print_json, shown};
@@ -71,7 +71,7 @@ pub struct Parameter {
     pub high: f64,
     /// The part of `sigma` that the models lack, from flights with a known truth: a vehicle's flights have it in common.
     /// `None`: not calibrated, the interval is that of the noise alone.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub systematic: Option<f64>,
 }
 
@@ -100,7 +100,7 @@ pub struct NotFound {
 }
 
 /// The data that the scales of a fit are over, so that fits over other data can be put together.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Basis {
     pub impulse_n_s: f64,
     pub burn_time_s: f64,
@@ -124,7 +124,7 @@ impl Basis {
 }
 
 /// What one flight tells.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Fit {
     /// The log.
     pub source: String,
@@ -137,10 +137,8 @@ pub struct Fit {
     pub found: Vec<Parameter>,
     pub not_found: Vec<NotFound>,
     /// Fraction of the air force in this fall that is the body's by the mission's data: `drag_scale` is that of the sum.
-    #[serde(default)]
     pub body_share: Option<f64>,
     /// What intervals were widened by; `None`: they are those of the noise alone.
-    #[serde(default)]
     pub calibration: Option<Calibration>,
     /// Parameters whose interval is that of the noise alone.
     #[serde(default)]
@@ -148,30 +146,16 @@ pub struct Fit {
     /// Why the log could not be read to its end, if so.
     pub damage: Option<String>,
     /// Whether the flight landed; `None` of a test stand, and of a log that does not say.
-    #[serde(default)]
     pub landed: Option<bool>,
     /// Names what was recorded: one flight is one flight, under however many names.
-    #[serde(default)]
     pub content: Option<String>,
 }
 
 impl Fit {
     /// A fit that has found nothing yet.
     fn of(source: &str, mission: &str, motor: &str, basis: Basis) -> Self {
-        Self {
-            source: source.to_owned(),
-            mission: mission.to_owned(),
-            motor: motor.to_owned(),
-            basis,
-            found: Vec::new(),
-            not_found: Vec::new(),
-            body_share: None,
-            calibration: None,
-            not_calibrated: Vec::new(),
-            damage: None,
-            landed: None,
-            content: None,
-        }
+        let [source, mission, motor] = [source, mission, motor].map(str::to_owned);
+        Self { source, mission, motor, basis, ..Self::default() }
     }
 
     /// The same fit over other data: every scale times what the data differ by.
@@ -218,25 +202,22 @@ impl Fit {
         self.not_found.push(NotFound { name: name.to_owned(), reason: reason.to_owned() });
     }
 
-    /// Takes a parameter of a solution, as found or as not found.
-    fn take(&mut self, solution: &Solution, priors: &[Prior], place: usize, as_named: &Named<'_>) {
-        let Named { name, unit, scale, reason } = *as_named;
-        let sigma = libm::sqrt(solution.covariance[(place, place)]);
-        if sigma < FOUND * priors[place].sigma {
-            self.found.push(Parameter::normal(name, unit, scale * solution.values[place], scale * sigma));
-        } else {
-            self.lacks(name, reason);
+    /// Takes parameters of a solution, each as found or, with the reason, as not found.
+    fn take(&mut self, solution: &Solution, reason: &str, rows: &[Row]) {
+        for &(place, name, unit) in rows {
+            let sigma = libm::sqrt(solution.covariance[(place, place)]);
+            if sigma < FOUND * solution.priors[place].sigma {
+                let scale = if unit.starts_with("deg") { 1.0_f64.to_degrees() } else { 1.0 };
+                self.found.push(Parameter::normal(name, unit, scale * solution.values[place], scale * sigma));
+            } else {
+                self.lacks(name, reason);
+            }
         }
     }
 }
 
-/// How a parameter is called, in which unit, and why it may not be found.
-struct Named<'a> {
-    name: &'a str,
-    unit: &'a str,
-    scale: f64,
-    reason: &'a str,
-}
+/// A parameter: its place in a solution, which is in SI, its name, and its unit.
+type Row = (usize, &'static str, &'static str);
 
 /// Fits everything that a flight tells.
 pub fn fit(trace: &Trace) -> Fit {
@@ -287,7 +268,7 @@ pub fn uncalibrated(trace: &Trace) -> Fit {
 }
 
 /// Both directions, each with what the other found: the thrust turns the vehicle, and the turned nozzle loses some of it.
-fn along_and_turning(trace: &Trace) -> Result<(Along, Result<Turning, String>), &'static str> {
+fn along_and_turning(trace: &Trace) -> Result<(Along, Result<Solution, String>), &'static str> {
     let gimbal = &trace.mission.airframe.gimbal;
     let frames = &trace.frames;
     // The command that is obeyed at a time, late by the servo's delay.
@@ -302,17 +283,19 @@ fn along_and_turning(trace: &Trace) -> Result<(Along, Result<Turning, String>), 
 }
 
 fn drag(fit: &mut Fit, along: &Along) {
-    let Along { solution, priors, .. } = along;
     let (total, sigma) = along.drag();
     fit.found.push(Parameter::normal("drag_scale", "", total, sigma));
-    for (place, name) in [(along::BODY, "body_drag_scale"), (along::FINS, "fin_drag_scale")] {
-        let reason = "the openings of the fins changed too little to tell their drag from the body's: drag_scale is the sum";
-        fit.take(solution, priors, place, &Named { name, unit: "", scale: 1.0, reason });
-    }
+    let reason = "the openings of the fins changed too little to tell their drag from the body's: drag_scale is the sum";
+    fit.take(
+        &along.solution,
+        reason,
+        &[(along::BODY, "body_drag_scale", ""), (along::FINS, "fin_drag_scale", "")],
+    );
     fit.found.push(Parameter::normal("updraught_rms", "m/s", along.updraught_m_s, 0.3 * along.updraught_m_s));
 }
 
 fn motor(fit: &mut Fit, along: &Along) {
+    let Along { solution, .. } = along;
     if let Err(reason) = &along.burn_seen_s {
         for name in ["thrust_scale", "burn_time_scale", "ignition_delay", "thrust_shape", "exhaust_body_loss"]
         {
@@ -320,51 +303,39 @@ fn motor(fit: &mut Fit, along: &Along) {
         }
         return;
     }
-    let Along { solution, priors, .. } = along;
-    let short = "too little of the burn was seen before the contact";
     let mut with_scale = solution.clone();
     with_scale.covariance[(along::IMPULSE, along::IMPULSE)] +=
         libm::pow(ACCELEROMETER_SCALE_SIGMA * solution.values[along::IMPULSE], 2.0);
-    for (place, name, unit) in [
-        (along::IMPULSE, "thrust_scale", ""),
-        (along::BURN_TIME, "burn_time_scale", ""),
-        (along::DELAY, "ignition_delay", "s"),
-    ] {
-        fit.take(&with_scale, priors, place, &Named { name, unit, scale: 1.0, reason: short });
-    }
-    for k in 0..burn::SHAPE_TERMS {
-        let name = format!("thrust_shape_{}", k + 1);
-        let reason = "this term of the shape is too small, or too much like an error of burn time and drag";
-        let named = Named { name: &name, unit: "", scale: 1.0, reason };
-        fit.take(solution, priors, along::SHAPE + k, &named);
-    }
-    for (place, name) in [(along::BODY_LOSS, "exhaust_body_loss"), (along::FIN_LOSS, "exhaust_fin_loss")] {
-        let reason = "while the motor burns the drag is too small a part of the force";
-        fit.take(solution, priors, place, &Named { name, unit: "", scale: 1.0, reason });
-    }
+    let scales = [(along::IMPULSE, "thrust_scale", ""), (along::BURN_TIME, "burn_time_scale", "")];
+    let short = "too little of the burn was seen before the contact";
+    fit.take(&with_scale, short, &scales);
+    fit.take(solution, short, &[(along::DELAY, "ignition_delay", "s")]);
+    let reason = "this term of the shape is too small, or too much like an error of burn time and drag";
+    fit.take(solution, reason, &burn::shape_rows(along::SHAPE));
+    let reason = "while the motor burns the drag is too small a part of the force";
+    let rows = [(along::BODY_LOSS, "exhaust_body_loss", ""), (along::FIN_LOSS, "exhaust_fin_loss", "")];
+    fit.take(solution, reason, &rows);
 }
 
-fn gimbal(fit: &mut Fit, turning: Result<Turning, String>) {
+fn gimbal(fit: &mut Fit, turning: Result<Solution, String>) {
     const PLAY: &str = "gimbal_play";
-    let names = [
-        (turning::DELAY, "gimbal_delay", "s", 1.0),
-        (turning::RATE, "gimbal_rate", "deg/s", 1.0_f64.to_degrees()),
-        (turning::GAIN, "gimbal_gain", "", 1.0),
-        (turning::PITCH, "gimbal_pitch_offset", "deg", 1.0_f64.to_degrees()),
-        (turning::YAW, "gimbal_yaw_offset", "deg", 1.0_f64.to_degrees()),
+    const ROWS: [Row; 5] = [
+        (turning::DELAY, "gimbal_delay", "s"),
+        (turning::RATE, "gimbal_rate", "deg/s"),
+        (turning::GAIN, "gimbal_gain", ""),
+        (turning::PITCH, "gimbal_pitch_offset", "deg"),
+        (turning::YAW, "gimbal_yaw_offset", "deg"),
     ];
     let turning = match turning {
         Ok(turning) => turning,
         Err(reason) => {
-            names.iter().map(|one| one.1).chain([PLAY]).for_each(|name| fit.lacks(name, &reason));
+            ROWS.iter().map(|row| row.1).chain([PLAY]).for_each(|name| fit.lacks(name, &reason));
             return;
         }
     };
     let reason = "its commands changed too little";
-    for (place, name, unit, scale) in names {
-        fit.take(&turning.solution, &turning.priors, place, &Named { name, unit, scale, reason });
-    }
-    let (play_rad, sigma_rad) = turning.play_rad();
+    fit.take(&turning, reason, &ROWS);
+    let (play_rad, sigma_rad) = turning::play_rad(&turning);
     if sigma_rad < FOUND * turning::LINK_RAD {
         fit.found.push(Parameter::normal(PLAY, "deg", play_rad.to_degrees(), sigma_rad.to_degrees()));
     } else {
@@ -381,40 +352,40 @@ pub fn patched(mission_toml: &str, flown: &Mission, fit: &Fit, flight: &str) -> 
     let mission = mission_with(mission_toml, &[])?;
     let effective = toml::Value::try_from(&mission)
         .map_err(|error| SettingError::Toml { origin: mission.name.clone(), reason: error.to_string() })?;
-    let airframe = &flown.airframe;
-    let mut settings: Vec<(Setting, String)> = Vec::new();
-    let mut change = |path: &str, value: &dyn Fn(f64) -> f64, name: &str| {
-        let Some(found) = fit.get(name) else { return };
-        let [value, low, high] = [found.value, found.low, found.high].map(value);
-        let sigma = (high - low) / (2.0 * Z_95);
-        let was = path.split('.').try_fold(&effective, |table, section| table.get(section));
-        let was = was.map_or_else(|| "not stated".to_owned(), ToString::to_string);
-        let reason = format!("{flight}, 95 % {} to {} (was {was})", digits(low, sigma), digits(high, sigma));
-        let value = toml::Value::Float(digits(value, 1e-2 * sigma).parse().unwrap_or(value));
-        settings.push((Setting { path: path.to_owned(), value, at_s: None }, reason));
-    };
     // Scales are per mass. Where the two cannot be told apart, both have the scale of the sum.
+    let airframe = &flown.airframe;
     let per_mass = mission.airframe.mass.loaded_kg / airframe.mass.loaded_kg;
     let apart = ["body_drag_scale", "fin_drag_scale"].iter().all(|name| fit.get(name).is_some());
-    let (body, fins) =
-        if apart { ("body_drag_scale", "fin_drag_scale") } else { ("drag_scale", "drag_scale") };
-    let (along, open) = (airframe.body.axial_drag_coefficient, airframe.fins.drag_coefficient);
-    change("airframe.body.axial_drag_coefficient", &|scale| along * scale * per_mass, body);
-    change("airframe.fins.drag_coefficient", &|scale| open * scale * per_mass, fins);
-    let legs_m2 = airframe.legs.drag_area_m2;
-    if legs_m2 > 0.0 {
-        change("airframe.legs.drag_area_m2", &|scale| legs_m2 * scale * per_mass, body);
-    }
-    change("airframe.gimbal.servo.delay_s", &|delay_s| delay_s, "gimbal_delay");
-    change("airframe.gimbal.servo.rate_deg_s", &|rate_deg_s| rate_deg_s, "gimbal_rate");
-    change("airframe.gimbal.servo.slop_deg", &|play_deg| play_deg.max(0.0), "gimbal_play");
-    change("estimator.gyro_noise_deg_s_sqrt_hz", &|noise| noise, "gyro_noise");
-    change("estimator.accelerometer_noise_mg_sqrt_hz", &|noise| noise, "accelerometer_noise");
-    change("estimator.barometer_m", &|noise| noise, "barometer_noise");
-    change("estimator.gnss_velocity_m_s", &|noise| noise, "gnss_velocity_noise");
-    change("estimator.gnss_horizontal_m", &|noise| noise, "gnss_horizontal_noise");
-    change("estimator.gnss_vertical_m", &|noise| noise, "gnss_vertical_noise");
-    change("estimator.lidar_m", &|noise| noise, "lidar_noise");
+    let [body, fins] = if apart { ["body_drag_scale", "fin_drag_scale"] } else { ["drag_scale"; 2] };
+    let rows = [
+        ("airframe.body.axial_drag_coefficient", body, airframe.body.axial_drag_coefficient * per_mass),
+        ("airframe.fins.drag_coefficient", fins, airframe.fins.drag_coefficient * per_mass),
+        ("airframe.legs.drag_area_m2", body, airframe.legs.drag_area_m2 * per_mass),
+        ("airframe.gimbal.servo.delay_s", "gimbal_delay", 1.0),
+        ("airframe.gimbal.servo.rate_deg_s", "gimbal_rate", 1.0),
+        ("airframe.gimbal.servo.slop_deg", "gimbal_play", 1.0),
+        ("estimator.gyro_noise_deg_s_sqrt_hz", "gyro_noise", 1.0),
+        ("estimator.accelerometer_noise_mg_sqrt_hz", "accelerometer_noise", 1.0),
+        ("estimator.barometer_m", "barometer_noise", 1.0),
+        ("estimator.gnss_velocity_m_s", "gnss_velocity_noise", 1.0),
+        ("estimator.gnss_horizontal_m", "gnss_horizontal_noise", 1.0),
+        ("estimator.gnss_vertical_m", "gnss_vertical_noise", 1.0),
+        ("estimator.lidar_m", "lidar_noise", 1.0),
+    ];
+    let settings =
+        rows.into_iter().filter(|(.., factor)| *factor > 0.0).filter_map(|(path, name, factor)| {
+            let found = fit.get(name)?;
+            let [value, low, high] =
+                [found.value, found.low, found.high].map(|number| (factor * number).max(0.0));
+            let sigma = (high - low) / (2.0 * Z_95);
+            let was = path.split('.').try_fold(&effective, |table, section| table.get(section));
+            let was = was.map_or_else(|| "not stated".to_owned(), ToString::to_string);
+            let reason =
+                format!("{flight}, 95 % {} to {} (was {was})", digits(low, sigma), digits(high, sigma));
+            let value = toml::Value::Float(digits(value, 1e-2 * sigma).parse().unwrap_or(value));
+            Some((Setting { path: path.to_owned(), value, at_s: None }, reason))
+        });
+    let settings: Vec<(Setting, String)> = settings.collect();
     let text = mission_toml_with_reasons(mission_toml, &settings)?;
     mission_with(&text, &[])?;
     Ok(text)
@@ -600,11 +571,13 @@ struct Earlier {
 
 impl Args {
     pub(crate) fn run(self) -> Result<Outcome> {
-        if self.write.is_some() && (self.files.len() != 1 || !is_log(&self.files[0])) {
+        if self.write.is_some()
+            && (self.files.len() != 1 || ["csv", "json"].contains(&ending(&self.files[0]).as_str()))
+        {
             bail!("--write takes the log of one flight: its mission is changed");
         }
         if let Some(motor) = &self.motor
-            && !self.files.iter().any(|file| ends_in(file, "csv"))
+            && !self.files.iter().any(|file| ending(file) == "csv")
         {
             bail!(
                 "--motor {motor}: only a table of a test stand (CSV) is compared with a motor; a log has its own"
@@ -641,12 +614,12 @@ impl Args {
     fn one(&self, file: &Path, flown: &mut Option<String>) -> Result<Vec<Fit>> {
         let name = file.display().to_string();
         let read = || std::fs::read_to_string(file).with_context(|| format!("{name}: cannot be read"));
-        if ends_in(file, "json") {
+        if ending(file) == "json" {
             let earlier: Earlier = serde_json::from_str(&read()?)
                 .with_context(|| format!("{name}: is no answer of `replay fit --json`"))?;
             return Ok(earlier.fits);
         }
-        if ends_in(file, "csv") {
+        if ending(file) == "csv" {
             let motor = self.motor.as_deref().with_context(|| {
                 format!("{name}: --motor is missing: a table is compared with the motor's certified curve")
             })?;
@@ -700,22 +673,16 @@ fn once_each(fits: &mut Vec<Fit>) {
     });
 }
 
-fn is_log(file: &Path) -> bool {
-    !ends_in(file, "csv") && !ends_in(file, "json")
-}
-
-fn ends_in(file: &Path, wanted: &str) -> bool {
-    file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case(wanted))
+/// What a file's name ends in: json, csv, or anything else for a log.
+fn ending(file: &Path) -> String {
+    file.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase()
 }
 
 fn curve_of(motor: &str) -> Result<ThrustCurve> {
-    if flight::vehicles::motors::names().any(|known| known == motor) {
-        return Ok(flight::vehicles::motors::builtin(motor)?);
+    if let Ok(curve) = motors::builtin(motor) {
+        return Ok(curve);
     }
-    let text = std::fs::read_to_string(motor).with_context(|| {
-        let known = flight::vehicles::motors::names().collect::<Vec<_>>().join(", ");
-        format!("'{motor}' is neither a built-in motor ({known}) nor a readable file")
-    })?;
+    let text = text_of(motor, motors::BUILTIN, "motor")?;
     flight::vehicles::thrust_curve::from_file_text(motor, &text).with_context(|| motor.to_owned())
 }
 

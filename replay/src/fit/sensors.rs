@@ -6,7 +6,7 @@ use flight::estimation::estimator::GRAVITY_M_S2;
 use nalgebra::Vector3;
 
 use super::Parameter;
-use super::along::{commanded_s, falling, follows};
+use super::along::{fall_and_burn, falling, follows};
 use super::trace::{Frame, Trace};
 
 /// Fewer differences than this leave a noise uncertain by a third.
@@ -52,10 +52,7 @@ fn unbroken(frames: &[Frame]) -> impl Iterator<Item = &[Frame]> {
 
 /// The noises of a flight's sensors.
 pub(super) fn noises(trace: &Trace) -> Vec<Parameter> {
-    let frames = falling(trace);
-    let lit_s = commanded_s(trace).unwrap_or(f64::INFINITY);
-    let fall = &frames[..frames.partition_point(|frame| frame.time_s <= lit_s)];
-    let burn = &frames[fall.len()..];
+    let (fall, burn) = fall_and_burn(trace);
     let mut found = Vec::new();
     let root_hz = libm::sqrt(FRAME_S);
     let milli_g = 1e-3 * GRAVITY_M_S2;
@@ -76,32 +73,25 @@ pub(super) fn noises(trace: &Trace) -> Vec<Parameter> {
         }
         found.extend(noise(name, unit, scale, &differences));
     }
-    found.extend(of_slow_sensors(frames));
+    found.extend(of_slow_sensors(falling(trace)));
     found
 }
 
 /// The biases, as the flight computer has them when the motor is lit.
 pub(super) fn biases(trace: &Trace) -> Vec<Parameter> {
-    let frames = falling(trace);
-    let lit_s = commanded_s(trace).unwrap_or(f64::INFINITY);
-    let fall = &frames[..frames.partition_point(|frame| frame.time_s <= lit_s)];
-    let to_deg = 1.0_f64.to_degrees();
-    let milli_g = 1e-3 * GRAVITY_M_S2;
+    let (fall, burn) = fall_and_burn(trace);
+    let Some(Frame { estimate, .. }) = fall.last().or(burn.last()) else { return Vec::new() };
+    let sigmas = &estimate.sigmas;
     let mut found = Vec::new();
-    let last = fall.last().or(frames.last());
-    if let Some(Frame { estimate, .. }) = last {
-        let axes = ["x", "y", "z"];
-        for (axis, name) in axes.into_iter().enumerate() {
-            let (value, sigma) = (estimate.gyro_bias_rad_s[axis], estimate.sigmas.gyro_bias_rad_s[axis]);
-            let name = format!("gyro_bias_{name}");
-            found.push(Parameter::normal(&name, "deg/s", to_deg * value, to_deg * sigma));
-        }
-        for (axis, name) in axes.into_iter().enumerate() {
-            let (value, sigma) =
-                (estimate.accelerometer_bias_m_s2[axis], estimate.sigmas.accelerometer_bias_m_s2[axis]);
-            let name = format!("accelerometer_bias_{name}");
-            found.push(Parameter::normal(&name, "mg", value / milli_g, sigma / milli_g));
-        }
+    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+        let [value, sigma] =
+            [estimate.gyro_bias_rad_s, sigmas.gyro_bias_rad_s].map(|of| of[axis].to_degrees());
+        found.push(Parameter::normal(&format!("gyro_bias_{name}"), "deg/s", value, sigma));
+    }
+    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+        let [value, sigma] = [estimate.accelerometer_bias_m_s2, sigmas.accelerometer_bias_m_s2]
+            .map(|of| of[axis] / (1e-3 * GRAVITY_M_S2));
+        found.push(Parameter::normal(&format!("accelerometer_bias_{name}"), "mg", value, sigma));
     }
     found
 }
@@ -167,8 +157,7 @@ fn of_slow_sensors(frames: &[Frame]) -> Vec<Parameter> {
 
 fn frame_acceleration(part: &[Frame], place: usize) -> Vector3<f64> {
     part.get(place).map_or_else(Vector3::zeros, |frame| {
-        let felt = frame.measured.imu.specific_force_m_s2 - frame.estimate.accelerometer_bias_m_s2;
-        frame.estimate.state.world_from_body * felt - Vector3::z() * GRAVITY_M_S2
+        frame.estimate.state.world_from_body * frame.force_m_s2() - Vector3::z() * GRAVITY_M_S2
     })
 }
 

@@ -3,18 +3,21 @@
 
 use std::path::Path;
 
+use avionics::log::frame::{commands_from_log, input_from_log, phase_of};
+use avionics::log::logged::{At, Logged, RecordError};
 use flight::computer::Commands;
-use flight::computer::Input;
+use flight::computer::KeptInput;
 use flight::estimation::estimator::{Estimate, Measurements};
-use flight::rules::outputs::Line;
+use flight::rules::outputs::PyroOutput;
 use flight::rules::phase::Phase;
+use flight::vehicle::airframe::MassModel;
+use flight::vehicle::atmosphere::Air;
 use flight::vehicle::mission::Mission;
-use flight_log::frame::{commands_from_log, input_from_log, phase_of};
-use flight_log::logged::{At, Logged as _};
+use nalgebra::Vector3;
 use protocol::log::computer_v1::ComputerFrame;
+use protocol::log::flight_v1 as v1;
 
-use crate::digest::digest;
-use crate::log::{Entry, FlightLog, LogError, RecordingError};
+use crate::log::{Recording, RecordingError};
 
 /// One frame of the flight computer.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,6 +40,29 @@ pub struct Frame {
     pub phase: Phase,
     /// The flight computer's estimate at the end of the frame, and the standard deviations with it.
     pub estimate: Estimate,
+}
+
+impl Frame {
+    /// Velocity through the air in body axes, m/s.
+    pub(super) fn through_air_m_s(&self) -> Vector3<f64> {
+        let Estimate { state, .. } = &self.estimate;
+        state.world_from_body.inverse_transform_vector(&self.estimate.velocity_through_air_m_s())
+    }
+
+    /// Rotation rate without the gyro's bias, rad/s.
+    pub(super) fn rate_rad_s(&self) -> Vector3<f64> {
+        self.measured.imu.gyro_rad_s - self.estimate.gyro_bias_rad_s
+    }
+
+    /// Specific force without the accelerometer's bias, m/s^2.
+    pub(super) fn force_m_s2(&self) -> Vector3<f64> {
+        self.measured.imu.specific_force_m_s2 - self.estimate.accelerometer_bias_m_s2
+    }
+
+    /// Openings of the fins on average since the frame before, rad.
+    pub(super) fn fins_since_rad(&self, before: &Self) -> [f64; 4] {
+        core::array::from_fn(|fin| 0.5 * (before.fins_rad[fin] + self.fins_rad[fin]))
+    }
 }
 
 /// A flight as its log has it.
@@ -62,10 +88,7 @@ pub struct Trace {
 /// Why nothing can be learnt from a log.
 #[derive(Debug, thiserror::Error)]
 pub enum TraceError {
-    /// It cannot be read, or is no flight log.
-    #[error(transparent)]
-    Log(#[from] LogError),
-    /// It holds too much, several flights, or no usable mission.
+    /// It cannot be read, is no flight log, or holds too much, several flights, or no usable mission.
     #[error(transparent)]
     Recording(#[from] RecordingError),
     /// It has no frames with an inertial unit.
@@ -91,49 +114,42 @@ pub enum TraceError {
 impl Trace {
     /// A flight without frames yet.
     pub fn new(name: &str, mission: Mission, mission_toml: &str) -> Self {
-        let mission_toml = mission_toml.to_owned();
-        let name = name.to_owned();
+        let (name, mission_toml) = (name.to_owned(), mission_toml.to_owned());
         let frames = Vec::new();
         Self { name, mission, mission_toml, frames, damage: None, landed: None, content: None, last_ns: None }
     }
 
+    /// Density of the air around a frame, kg/m^3.
+    pub(super) fn density_kg_m3(&self, frame: &Frame) -> f64 {
+        Air::at_height_m(frame.estimate.state.position_m.z + self.mission.pad_altitude_m).density_kg_m3
+    }
+
+    /// The vehicle's mass over its burn, by the mission's data.
+    pub(super) fn mass_model(&self) -> MassModel {
+        MassModel::new(&self.mission.airframe.mass, self.mission.motor_curve.propellant_mass_kg())
+    }
+
     /// Adds a frame; one with numbers that are not finite is left out.
-    pub fn push(
-        &mut self,
-        input: &Input<'_>,
-        commands: &Commands,
-        phase: Phase,
-        estimate: &Estimate,
-        gimbal_reported_rad: [f64; 2],
-    ) {
-        let measured = input.measured;
-        let numbers = [&measured.imu.gyro_rad_s, &measured.imu.specific_force_m_s2];
-        let sound = estimate.state.is_finite()
-            && estimate.wind_m_s.iter().all(|wind| wind.is_finite())
-            && numbers.iter().all(|vector| vector.iter().all(|value| value.is_finite()))
-            && input
-                .fins_rad
-                .iter()
-                .chain(&commands.gimbal_rad)
-                .chain(&gimbal_reported_rad)
-                .all(|angle| angle.is_finite())
-            && input.time_s.is_finite()
-            && measured.gnss.is_none_or(|fix| {
-                fix.position_m.iter().chain(fix.velocity_m_s.iter()).all(|value| value.is_finite())
-                    && fix.valid_at_s.is_finite()
-            });
-        let later = self.frames.last().is_none_or(|last| last.time_s < input.time_s);
-        if !(sound && later) {
+    pub fn push(&mut self, input: &KeptInput, commands: &Commands, phase: Phase, estimate: &Estimate) {
+        let KeptInput { time_s, measured, gimbal_rad, fins_rad, .. } = *input;
+        let fix = measured.gnss.as_ref().map(|fix| [&fix.position_m, &fix.velocity_m_s]);
+        let vectors = [measured.imu.gyro_rad_s, measured.imu.specific_force_m_s2];
+        let numbers = vectors.iter().chain(fix.into_iter().flatten()).flat_map(|vector| vector.iter());
+        let angles = fins_rad.iter().chain(&commands.gimbal_rad).chain(&gimbal_rad);
+        let times = measured.gnss.as_ref().map(|fix| &fix.valid_at_s).into_iter().chain([&time_s]);
+        let mut numbers = numbers.chain(&estimate.wind_m_s).chain(angles).chain(times);
+        let sound = estimate.state.is_finite() && numbers.all(|number| number.is_finite());
+        if !sound || self.frames.last().is_some_and(|last| last.time_s >= time_s) {
             return;
         }
         self.frames.push(Frame {
-            time_s: input.time_s,
+            time_s,
             measured,
-            fins_rad: input.fins_rad,
-            gimbal_reported_rad,
+            fins_rad,
+            gimbal_reported_rad: gimbal_rad,
             gimbal_rad: commands.gimbal_rad,
-            ignite: commands.outputs.is_on(Line::LandingIgniter),
-            parachute: commands.outputs.is_on(Line::Parachute),
+            ignite: commands.outputs.is_on(PyroOutput::LandingIgniter),
+            parachute: commands.outputs.is_on(PyroOutput::Parachute),
             contact: input.contact,
             booster_attached: input.booster_attached,
             phase,
@@ -146,83 +162,51 @@ impl Trace {
     /// # Errors
     /// [`TraceError`] says what the log lacks.
     pub fn open(path: &Path) -> Result<Self, TraceError> {
-        Self::read(&mut FlightLog::open(path)?)
+        Self::of(&Recording::open(path)?)
     }
 
-    /// Reads a vehicle's log to its end.
+    /// What a recorded flight gives.
     ///
     /// # Errors
     /// As [`open`](Self::open).
-    pub fn read<R: std::io::Read>(log: &mut FlightLog<R>) -> Result<Self, TraceError> {
-        /// Two hours of frames: no flight is that long.
-        const FRAMES_MAX: usize = 1_440_000;
-        /// The noise of so many frames is that of no other flight.
+    pub fn of(recording: &Recording) -> Result<Self, TraceError> {
+        /// What is remembered after so many frames of noise is remembered in no other flight.
         const NAMING_FRAMES: usize = 100;
-        let name = log.name().to_owned();
-        let unknown = |reason: String| TraceError::Unknown { name: name.clone(), reason };
-        let mut trace: Option<Self> = None;
-        let mut waiting = None;
-        let (mut telemetry, mut flights) = (false, 0_usize);
-        let (mut landed, mut naming) = (None, Vec::new());
-        while let Some(stamped) = log.next_entry()? {
-            if naming.len() < NAMING_FRAMES && matches!(stamped.entry, Entry::ComputerFrame(_)) {
-                naming.push(stamped.data);
-            }
-            match stamped.entry {
-                Entry::Verdict(verdict) => landed = Some(verdict.landing.stands),
-                Entry::Telemetry(_) => telemetry = true,
-                Entry::ComputerStart(start) => flights += usize::from(start.released),
-                Entry::ComputerFrame(frame) => waiting = frame.in_flight(),
-                Entry::Estimate(estimate) => {
-                    let Some(ComputerFrame { input, output, .. }) = waiting.take() else { continue };
-                    let number = input.frame;
-                    let read = input_from_log(&input).map_err(|error| unknown(error.to_string()))?;
-                    let commands =
-                        commands_from_log(&output, number).map_err(|error| unknown(error.to_string()))?;
-                    let phase =
-                        phase_of(&output).ok_or_else(|| unknown(format!("frame {number}: unknown phase")))?;
-                    let read = read.input();
-                    let input = read.since(0);
-                    let estimate = Estimate::from_log(&estimate, At { frame: number, field: "estimate" })
-                        .map_err(|error| unknown(error.to_string()))?;
-                    if trace.is_none() {
-                        let (mission, text) = mission_of(log)?;
-                        trace = Some(Self::new(&name, mission, &text));
-                    }
-                    if let Some(trace) = &mut trace {
-                        trace.push(&input, &commands, phase, &estimate, read.gimbal_rad);
-                        if trace.frames.len() > FRAMES_MAX {
-                            let kind = "frames of the flight computer";
-                            return Err(RecordingError::TooLong { name: name.clone(), kind }.into());
-                        }
-                    }
-                }
-                _ => {}
-            }
+        let name = recording.name.clone();
+        let found =
+            if recording.telemetry.is_empty() { "none of either" } else { "it is a ground station's" };
+        if recording.estimates.is_empty() {
+            return Err(TraceError::NoFrames { name, found });
         }
-        if flights > 1 {
-            return Err(RecordingError::SeveralFlights { name, flights }.into());
+        let text = recording.profile_toml()?;
+        let mission = flight::vehicles::mission::from_toml(text, "profile.toml").map_err(|error| {
+            RecordingError::ProfileUnusable { name: name.clone(), reason: error.to_string() }
+        })?;
+        let mut trace = Self {
+            damage: recording.damage.clone(),
+            landed: recording.verdict.as_ref().map(|verdict| verdict.landing.stands),
+            content: recording.frames.iter().take(NAMING_FRAMES).next_back().map(|frame| frame.state_digest),
+            last_ns: recording.last_ns,
+            ..Self::new(&name, mission, text)
+        };
+        for (place, estimate) in &recording.estimates {
+            let Some(frame) = recording.frames.get(*place) else { continue };
+            let unknown = |reason: String| TraceError::Unknown { name: name.clone(), reason };
+            trace.take(frame, estimate).map_err(unknown)?;
         }
-        let found = if telemetry { "it is a ground station's" } else { "none of either" };
-        match trace.filter(|trace| !trace.frames.is_empty()) {
-            None => Err(TraceError::NoFrames { name, found }),
-            Some(trace) => {
-                let damage = log.damage().map(ToString::to_string);
-                let content = Some(digest(naming.iter().map(Vec::as_slice)));
-                Ok(Self { damage, landed, content, last_ns: log.last_log_time_ns(), ..trace })
-            }
-        }
+        if trace.frames.is_empty() { Err(TraceError::NoFrames { name, found }) } else { Ok(trace) }
     }
-}
 
-fn mission_of<R: std::io::Read>(log: &FlightLog<R>) -> Result<(Mission, String), RecordingError> {
-    let name = log.name().to_owned();
-    match &log.head().profile_toml {
-        None => Err(RecordingError::NoProfile { name }),
-        Some(Err(error)) => Err(RecordingError::ProfileUnusable { name, reason: error.to_string() }),
-        Some(Ok(text)) => match flight::vehicles::mission::from_toml(text, "profile.toml") {
-            Ok(mission) => Ok((mission, text.clone())),
-            Err(error) => Err(RecordingError::ProfileUnusable { name, reason: error.to_string() }),
-        },
+    /// Adds a recorded frame; an error names what this build does not know.
+    fn take(&mut self, frame: &ComputerFrame, estimate: &v1::Estimate) -> Result<(), String> {
+        let ComputerFrame { input, output, .. } = frame;
+        let number = input.frame;
+        let words = |error: RecordError| error.to_string();
+        let input = input_from_log(input).map_err(words)?;
+        let commands = commands_from_log(output, number).map_err(words)?;
+        let phase = phase_of(output).ok_or_else(|| format!("frame {number}: unknown phase"))?;
+        let estimate = Logged::from_log(estimate, At { frame: number, field: "estimate" }).map_err(words)?;
+        self.push(&input.input(), &commands, phase, &estimate);
+        Ok(())
     }
 }

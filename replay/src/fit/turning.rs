@@ -10,8 +10,7 @@
 //! nozzle: gain and misalignment are those of the whole.
 
 use flight::computer::FRAME_S;
-use flight::vehicle::airframe::{Airframe, MassModel};
-use flight::vehicle::atmosphere::Air;
+use flight::vehicle::airframe::Airframe;
 use flight::vehicle::fins::ROLL;
 use nalgebra::{Matrix2, Vector2, Vector3};
 
@@ -48,20 +47,10 @@ pub(super) const LINK_RAD: f64 = 0.017_453;
 const FOLLOWS_RAD: f64 = 0.008_727;
 const NOT_SOLVED: &str = "the model of the gimbal does not fit the rotation";
 
-/// What was found across the nose.
-#[derive(Debug, Clone)]
-pub(super) struct Turning {
-    pub(super) solution: Solution,
-    pub(super) priors: Vec<Prior>,
-}
-
-impl Turning {
-    /// Play of servo and linkage together, and its standard deviation, rad.
-    pub(super) fn play_rad(&self) -> (f64, f64) {
-        let Solution { values, covariance, .. } = &self.solution;
-        let variance = covariance[(PLAY, PLAY)] + covariance[(LINK, LINK)] + 2.0 * covariance[(PLAY, LINK)];
-        (values[PLAY].max(0.0) + values[LINK].max(0.0), libm::sqrt(variance))
-    }
+/// Play of servo and linkage together, and its standard deviation, rad.
+pub(super) fn play_rad(Solution { values, covariance, .. }: &Solution) -> (f64, f64) {
+    let variance = covariance[(PLAY, PLAY)] + covariance[(LINK, LINK)] + 2.0 * covariance[(PLAY, LINK)];
+    (values[PLAY].max(0.0) + values[LINK].max(0.0), libm::sqrt(variance))
 }
 
 /// A frame of the burn.
@@ -78,7 +67,7 @@ struct Sample {
 }
 
 /// Fits the gimbal over the burn; an error is the reason why it cannot be.
-pub(super) fn fit_turning(trace: &Trace, along: &Along) -> Result<Turning, String> {
+pub(super) fn fit_turning(trace: &Trace, along: &Along) -> Result<Solution, String> {
     along.burn_seen_s.clone()?;
     let begins_s = along.begins_s().ok_or("the motor was not lit")?;
     let frames = falling(trace);
@@ -134,7 +123,7 @@ pub(super) fn fit_turning(trace: &Trace, along: &Along) -> Result<Turning, Strin
     }
     let mut solution = solve_from(&values, &priors, whitened(rest)).ok_or(NOT_SOLVED)?;
     model.is_a_servo(&solution.values, &reported_rad)?;
-    inflate(&mut solution, &priors, whitened(rest), BLOCK);
+    inflate(&mut solution, whitened(rest), BLOCK);
     for (place, wider) in LACKING {
         solution.covariance.row_mut(place).scale_mut(wider);
         solution.covariance.column_mut(place).scale_mut(wider);
@@ -143,7 +132,7 @@ pub(super) fn fit_turning(trace: &Trace, along: &Along) -> Result<Turning, Strin
     let of_thrust = along.solution.covariance[(IMPULSE, IMPULSE)]
         / (along.solution.values[IMPULSE] * along.solution.values[IMPULSE]);
     solution.covariance[(GAIN, GAIN)] += of_thrust * solution.values[GAIN] * solution.values[GAIN];
-    Ok(Turning { solution, priors: priors.to_vec() })
+    Ok(solution)
 }
 
 /// The process of the rotation that the model does not explain.
@@ -278,7 +267,7 @@ fn samples(trace: &Trace, along: &Along, first: usize, begins_s: f64) -> Vec<Sam
     let mission = &trace.mission;
     let airframe = &mission.airframe;
     let curve = &mission.motor_curve;
-    let mass_model = MassModel::new(&airframe.mass, curve.propellant_mass_kg());
+    let mass_model = trace.mass_model();
     let burn = along.burn(trace);
     let flow_kg_n_s = curve.propellant_mass_kg() / (curve.total_impulse_n_s() * burn.impulse_scale);
     let frames = falling(trace);
@@ -290,15 +279,10 @@ fn samples(trace: &Trace, along: &Along, first: usize, begins_s: f64) -> Vec<Sam
         let thrust_n = if burning { burn.mean_n(to_s - FRAME_S, to_s) } else { 0.0 };
         let burnt_kg = if burning { burn.burnt_kg(to_s - 0.5 * FRAME_S) } else { 0.0 };
         let (mass, motor_kg) = (mass_model.at(burnt_kg), curve.total_mass_kg() - burnt_kg);
-        let in_body = |frame: &super::trace::Frame| {
-            let state = &frame.estimate.state;
-            state.world_from_body.inverse_transform_vector(&frame.estimate.velocity_through_air_m_s())
-        };
-        let through_air = 0.5 * (in_body(before) + in_body(frame));
-        let rate: Vector3<f64> = frame.measured.imu.gyro_rad_s - frame.estimate.gyro_bias_rad_s;
-        let fins_rad = core::array::from_fn(|fin| 0.5 * (before.fins_rad[fin] + frame.fins_rad[fin]));
-        let density =
-            Air::at_height_m(frame.estimate.state.position_m.z + mission.pad_altitude_m).density_kg_m3;
+        let through_air = 0.5 * (before.through_air_m_s() + frame.through_air_m_s());
+        let rate = frame.rate_rad_s();
+        let fins_rad = frame.fins_since_rad(before);
+        let density = trace.density_kg_m3(frame);
         // What was found along the nose holds for the fins across it, too.
         let air = along.solution.values[FINS]
             * air_moment_n_m(airframe, mass.cg_station_m, density, &through_air, &rate, &fins_rad);

@@ -7,14 +7,12 @@
 
 use flight::computer::FRAME_S;
 use flight::estimation::estimator::VehicleNow;
-use flight::vehicle::airframe::MassModel;
-use flight::vehicle::atmosphere::Air;
 use nalgebra::{Matrix2, Vector2, Vector3};
 use sim::world::wind::gusts::GustScales;
 use sim::world::wind::{EXPONENT, REFERENCE_HEIGHT_M};
 
 use super::Parameter;
-use super::along::{Along, commanded_s, falling};
+use super::along::{Along, fall_and_burn};
 use super::least_squares::{NoiseStep, Whitener};
 use super::least_squares::{Prior, solve};
 use super::trace::{Frame, Trace};
@@ -45,9 +43,7 @@ const LACKING: f64 = 1.1;
 
 /// The mean wind 10 m above the ground, towards world x and y, m/s; an error is the reason why there is none.
 pub(super) fn fit_wind(trace: &Trace, along: &Along) -> Result<Vec<Parameter>, &'static str> {
-    let frames = falling(trace);
-    let lit_s = along.commanded_s.unwrap_or(f64::INFINITY);
-    let fall = &frames[..frames.partition_point(|frame| frame.time_s <= lit_s)];
+    let (fall, _) = fall_and_burn(trace);
     let samples: Vec<Sample> = fall
         .chunks_exact(FRAMES)
         .filter(|chunk| chunk[0].estimate.state.velocity_m_s.norm() > SLOWEST_M_S)
@@ -106,11 +102,9 @@ pub(super) fn is_one_wind(trace: &Trace) -> Result<(), String> {
     /// `wild` flights with more the drag was off by 13 to 30 %.
     const GUSTS_M_S: f64 = 1.0;
     const GUSTS_SHARE: f64 = 0.1;
-    let lit_s = commanded_s(trace).unwrap_or(f64::INFINITY);
-    let fast =
-        |frame: &&Frame| frame.time_s <= lit_s && frame.estimate.state.velocity_m_s.norm() > SLOWEST_M_S;
-    let winds: Vec<Vector2<f64>> =
-        falling(trace).iter().filter(fast).map(|frame| frame.estimate.wind_m_s).collect();
+    let (fall, _) = fall_and_burn(trace);
+    let fast = |frame: &&Frame| frame.estimate.state.velocity_m_s.norm() > SLOWEST_M_S;
+    let winds: Vec<Vector2<f64>> = fall.iter().filter(fast).map(|frame| frame.estimate.wind_m_s).collect();
     let count = winds.len().max(1) as f64;
     let mean = winds.iter().sum::<Vector2<f64>>() / count;
     let rms_m_s = libm::sqrt(winds.iter().map(|wind| (wind - mean).norm_squared()).sum::<f64>() / count);
@@ -144,33 +138,21 @@ fn gusts(samples: &[Sample], at_20_ft_m_s: f64) -> Whitener {
 
 /// The wind over some frames; `None` if the force tells none.
 fn sample(trace: &Trace, along: &Along, frames: &[Frame]) -> Option<Sample> {
-    let mission = &trace.mission;
-    let mass = MassModel::new(&mission.airframe.mass, mission.motor_curve.propellant_mass_kg()).at(0.0);
+    let mass = trace.mass_model().at(0.0);
     let middle = &frames[frames.len() / 2];
-    let density = Air::at_height_m(middle.estimate.state.position_m.z + mission.pad_altitude_m).density_kg_m3;
-    let (total, _) = along.drag();
-    let of = |frame: &Frame| {
-        let vehicle = VehicleNow::of(&mission.airframe, &mass, density * total, frame.fins_rad, false, 0.0);
-        (vehicle, frame.measured.imu.gyro_rad_s - frame.estimate.gyro_bias_rad_s)
-    };
+    let density = trace.density_kg_m3(middle) * along.drag().0;
     let felt_at = |frame: &Frame, wind_m_s: Vector2<f64>| -> Vector2<f64> {
-        let (vehicle, rate) = of(frame);
+        let vehicle = VehicleNow::of(&trace.mission.airframe, &mass, density, frame.fins_rad, false, 0.0);
         let state = &frame.estimate.state;
         let through_air =
             state.world_from_body.inverse_transform_vector(&(state.velocity_m_s - wind_m_s.push(0.0)));
-        vehicle.air_force_n(&through_air, &rate).yz() / mass.mass_kg
+        vehicle.air_force_n(&through_air, &frame.rate_rad_s()).yz() / mass.mass_kg
     };
+    let count = frames.len() as f64;
     let mean = |wind_m_s: Vector2<f64>| -> Vector2<f64> {
-        frames.iter().map(|frame| felt_at(frame, wind_m_s)).sum::<Vector2<f64>>() / frames.len() as f64
+        frames.iter().map(|frame| felt_at(frame, wind_m_s)).sum::<Vector2<f64>>() / count
     };
-    let felt: Vector2<f64> = frames
-        .iter()
-        .map(|frame| {
-            let imu = &frame.measured.imu;
-            (imu.specific_force_m_s2 - frame.estimate.accelerometer_bias_m_s2).yz()
-        })
-        .sum::<Vector2<f64>>()
-        / frames.len() as f64;
+    let felt = frames.iter().map(|frame| frame.force_m_s2().yz()).sum::<Vector2<f64>>() / count;
     let mut wind_m_s = middle.estimate.wind_m_s;
     let mut slope = Matrix2::zeros();
     for _ in 0..8 {

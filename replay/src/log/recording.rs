@@ -95,6 +95,8 @@ pub struct Recording {
     pub frames_unbroken: usize,
     /// Solve times of planning frames, in file order; empty for a flight simulated without a clock.
     pub timings: Vec<flight_v1::PilotTiming>,
+    /// The flight computer's estimates in flight, each with the place of its frame in `frames`.
+    pub estimates: Vec<(usize, flight_v1::Estimate)>,
     /// Its simulated world, in file order.
     pub world: Vec<flight_v1::TruthSample>,
     /// The values that a ground station knew, in file order.
@@ -107,6 +109,8 @@ pub struct Recording {
     pub verdict_heard: bool,
     /// How the clocks of the log differ.
     pub clocks: Clocks,
+    /// When the log ends, ns of Unix time.
+    pub last_ns: Option<u64>,
     /// Why the log could not be read to its end, if so.
     pub damage: Option<String>,
     /// Where the record ends, if that is before the end of the flight.
@@ -160,8 +164,11 @@ impl Recording {
                     }
                 }
                 Entry::ComputerStart(start) => recording.from_power_up |= !start.released,
-                Entry::Estimate(_) | Entry::Verdict(_) | Entry::RawFrame | Entry::Operator | Entry::Other => {
+                Entry::Estimate(estimate) => {
+                    let place = recording.frames.len().checked_sub(1);
+                    recording.estimates.extend(place.map(|place| (place, *estimate)));
                 }
+                Entry::Verdict(_) | Entry::RawFrame | Entry::Operator | Entry::Other => {}
             }
             recording.check_length()?;
         }
@@ -173,6 +180,7 @@ impl Recording {
             recording.verdict = Some(found.verdict);
         }
         recording.head = log.head().clone();
+        recording.last_ns = log.last_log_time_ns();
         recording.damage = log.damage().map(ToString::to_string);
         recording.frames_unbroken = frames_lost.unwrap_or(recording.frames.len());
         Ok(recording)
@@ -182,6 +190,7 @@ impl Recording {
         let kinds = [
             ("frames of the flight computer", self.frames.len()),
             ("timings of the flight computer", self.timings.len()),
+            ("estimates of the flight computer", self.estimates.len()),
             ("records of the world", self.world.len()),
             ("records of telemetry", self.telemetry.len()),
             ("events", self.events.len()),

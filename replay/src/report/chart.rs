@@ -1,6 +1,6 @@
 //! A line chart as SVG, in the colours of the page.
 
-use campaign::figure::{self, Panel, Span, ends, plotted_px, sized_lines_svg};
+use onboard_sim::figure::{Line, Panel, ends, plotted_px, sized_lines_svg};
 
 use super::html::escaped;
 
@@ -35,35 +35,19 @@ const THEME: [(&str, &str); 14] = [
     ("xmlns=\"http://www.w3.org/2000/svg\"", ""),
 ];
 
-/// A line of a chart.
-#[derive(Clone)]
-pub(super) struct Line {
-    /// Its name in the legend; empty for none.
-    pub(super) name: &'static str,
-    /// `a` to `d`, or `thin`.
-    pub(super) class: &'static str,
-    pub(super) points: Vec<(f64, f64)>,
+/// A line of the figure. Its class is `a` to `d`, or `thin`; an empty name is not in the legend.
+pub(super) fn line(name: &str, class: &str, points: Vec<(f64, f64)>) -> Line {
+    let colour = CLASSES.iter().position(|known| *known == class).unwrap_or(0);
+    Line { name: name.to_owned(), colour, dashed: false, points }
 }
 
+/// A picture: a panel of the figure, and how it stands on the page.
 #[derive(Clone, Default)]
 pub(super) struct Chart {
     pub(super) title: String,
-    pub(super) x_label: &'static str,
-    pub(super) y_label: &'static str,
-    pub(super) lines: Vec<Line>,
-    /// Horizontal limits.
-    pub(super) limits: Vec<f64>,
-    /// Places with their labels.
-    pub(super) places: Vec<(f64, f64, &'static str)>,
-    /// Vertical marks and their labels.
-    pub(super) marks: Vec<(f64, &'static str)>,
-    /// Where each finding began.
-    pub(super) signs: Vec<f64>,
-    pub(super) spans: Vec<Span>,
+    pub(super) panel: Panel,
     /// Whether the x axis is no time: a path may turn back on it.
     pub(super) own_x: bool,
-    /// Whether both axes have the same scale.
-    pub(super) equal_scales: bool,
     /// Whether the chart takes the whole width of the page.
     pub(super) full: bool,
 }
@@ -72,7 +56,7 @@ impl Chart {
     /// The chart, or nothing if there is no point to draw.
     pub(super) fn svg(&self) -> String {
         let spread = |axis: fn(&(f64, f64)) -> f64| {
-            let points = self.lines.iter().flat_map(|line| &line.points);
+            let points = self.panel.lines.iter().flat_map(|line| &line.points);
             let finite = points.filter(|(x, y)| x.is_finite() && y.is_finite()).map(axis);
             let ends =
                 finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), value| (a.min(value), b.max(value)));
@@ -80,36 +64,26 @@ impl Chart {
         };
         let ((width, _), (height, largest)) = (spread(|point| point.0), spread(|point| point.1));
         let says_nothing = height <= NOTHING * largest;
-        if !(width.is_finite() && height.is_finite()) || (says_nothing && !self.equal_scales) {
+        if !(width.is_finite() && height.is_finite()) || (says_nothing && !self.panel.equal_scales) {
             return String::new();
         }
         // A path in equal scales that is taller than wide gets a tall picture.
-        let (class, size_px) = match (self.equal_scales, self.full) {
+        let (class, size_px) = match (self.panel.equal_scales, self.full) {
             (true, true) if height > width => ("tall", (WIDTH_PX, TALL_PX)),
             (true, true) => ("full", (2 * WIDTH_PX, 2 * HEIGHT_PX)),
             (true, false) => ("square", (WIDTH_PX, 2 * HEIGHT_PX)),
             (false, true) => ("full", (2 * WIDTH_PX, HEIGHT_PX)),
             (false, false) => ("", (WIDTH_PX, HEIGHT_PX)),
         };
-        let panel = Panel {
-            x_label: self.x_label.to_owned(),
-            y_label: self.y_label.to_owned(),
-            lines: self.lines.iter().flat_map(|line| self.pieces(line)).collect(),
-            limits: self.limits.clone(),
-            marks: self.marks.iter().map(|(at, name)| (*at, (*name).to_owned())).collect(),
-            signs: self.signs.iter().zip(1..).map(|(at, number)| (*at, format!("{number}"))).collect(),
-            spans: self.spans.clone(),
-            places: self.places.iter().map(|(x, y, name)| (*x, *y, (*name).to_owned())).collect(),
-            equal_scales: self.equal_scales,
-            ..Panel::default()
-        };
+        let lines = self.panel.lines.iter().flat_map(|line| self.pieces(line)).collect();
+        let panel = Panel { lines, ..self.panel.clone() };
         let measured = ends(&panel, size_px);
         let Ok(svg) = sized_lines_svg(&self.title, &[panel], 1, None, size_px) else {
             return String::new();
         };
         let svg = THEME.into_iter().fold(svg, |svg, (written, shown)| svg.replace(written, shown));
         // What the reader's pointer needs to tell times and values from pixels.
-        let over_time = if self.own_x || self.equal_scales { None } else { measured };
+        let over_time = if self.own_x || self.panel.equal_scales { None } else { measured };
         let scales = over_time.map_or_else(String::new, |[x, y]| {
             let [left, top, right, bottom] = plotted_px(size_px);
             format!(
@@ -124,21 +98,20 @@ impl Chart {
     }
 
     /// The pieces of a line: nothing is known at a gap, and between samples that are much further apart than usual.
-    fn pieces(&self, line: &Line) -> Vec<figure::Line> {
-        let far =
-            if self.equal_scales || self.own_x { f64::INFINITY } else { usual_gap(&line.points) * FAR_GAPS };
-        let colour = CLASSES.iter().position(|class| *class == line.class).unwrap_or(0);
+    fn pieces(&self, line: &Line) -> Vec<Line> {
+        let is_path = self.panel.equal_scales || self.own_x;
+        let far = if is_path { f64::INFINITY } else { usual_gap(&line.points) * FAR_GAPS };
         let points = thinned(&line.points);
         let is_joined =
             |a: &(f64, f64), b: &(f64, f64)| b.0 - a.0 <= far && a.1.is_finite() && b.1.is_finite();
         let known = |piece: &&[(f64, f64)]| piece[0].0.is_finite() && piece[0].1.is_finite();
-        let line = |piece: &[(f64, f64)]| {
+        let piece = |piece: &[(f64, f64)]| {
             let mut points = piece.to_vec();
             // A line of no length, which its round ends show as a dot.
             points.extend(piece.first().filter(|_| piece.len() == 1));
-            figure::Line { name: line.name.to_owned(), colour, dashed: false, points }
+            Line { name: line.name.clone(), points, ..*line }
         };
-        points.chunk_by(is_joined).filter(known).map(line).collect()
+        points.chunk_by(is_joined).filter(known).map(piece).collect()
     }
 }
 
@@ -174,7 +147,8 @@ mod tests {
     use super::*;
 
     fn with_line(points: Vec<(f64, f64)>) -> Chart {
-        Chart { lines: vec![Line { name: "", class: "a", points }], ..Chart::default() }
+        let panel = Panel { lines: vec![line("", "a", points)], ..Panel::default() };
+        Chart { panel, ..Chart::default() }
     }
 
     #[test]
@@ -192,7 +166,9 @@ mod tests {
     #[test]
     fn a_steep_path_in_one_scale_is_a_tall_picture() {
         let path = |height_m: f64| {
-            Chart { equal_scales: true, full: true, ..with_line(vec![(0.0, 0.0), (10.0, height_m)]) }.svg()
+            let mut chart = with_line(vec![(0.0, 0.0), (10.0, height_m)]);
+            (chart.panel.equal_scales, chart.full) = (true, true);
+            chart.svg()
         };
         assert!(path(110.0).starts_with("<figure class=\"tall\""));
         assert!(path(5.0).starts_with("<figure class=\"full\""));

@@ -2,19 +2,18 @@
 //!
 //! The plans are not in the log, so the flight computer is run again on its inputs, bit for bit, to get them.
 
-use campaign::figure::Span;
+use avionics::log::frame::phase_of;
+use avionics::log::logged::state_from_log;
 use flight::computer::pilot::{FRAMES_PER_PLAN, Pilot};
 use flight::estimation::estimator::{AidStatus, Estimate};
 use flight::guidance::powered::Plan;
 use flight::rules::phase::Phase;
 use flight::vehicle::rigid::RigidState;
-use flight_log::frame::phase_of;
-use flight_log::logged::state_from_log;
+use onboard_sim::figure::Span;
 use protocol::log::computer_v1::ComputerFrame;
 use protocol::log::flight_v1::TruthSample;
 use protocol::log::v1::Telemetry;
 
-use super::chart::{Chart, Line};
 use crate::controller::new_plan;
 use crate::findings;
 use crate::info::{Info, PhaseSpan};
@@ -73,7 +72,7 @@ pub(super) struct Flight {
     pub(super) pilot: Option<Pilot>,
     /// At the planning frames.
     pub(super) thoughts: Vec<Thought>,
-    /// Of each aid the test ratios of its measurements.
+    /// Of each aid the test ratios of its measurements, up to 3.
     pub(super) test_ratios: [Series; 4],
     pub(super) worst_plans: Vec<BrokenPlan>,
     /// Where the track comes from, in a sentence; `None` if there is none.
@@ -85,8 +84,8 @@ pub(super) struct Flight {
     pub(super) touchdown_s: Option<f64>,
     /// T+0 on the clock of the track, s; `None` if the log does not connect the two.
     zero_s: Option<f64>,
-    /// Where the findings begin, T+, s.
-    signs: Vec<f64>,
+    /// Where the findings begin, T+, s, with their numbers.
+    pub(super) signs: Vec<(f64, String)>,
     pub(super) spans: Vec<Span>,
 }
 
@@ -102,7 +101,7 @@ impl Flight {
             let solved = pilot.landing_solved().filter(|_| plans(&frame));
             broken.extend(solved.and_then(|solved| BrokenPlan::of(number, time_s, &solved)));
             for ((_, aid), ratios) in named_aids(pilot).iter().zip(&mut test_ratios) {
-                ratios.extend(aid.fresh.then_some((time_s, aid.test_ratio)));
+                ratios.extend(aid.fresh.then_some((time_s, aid.test_ratio.min(3.0))));
             }
             if recorded.input.frame.is_multiple_of(FRAMES_PER_PLAN) || frame.output.planned {
                 thoughts.push(Thought::of(pilot, &frame));
@@ -121,12 +120,13 @@ impl Flight {
         let heard_zero_s = || Some(clocks.flight_zero_s? - clocks.telemetry_zero_s?);
         let zero_s = if source == Some(HEARD) { heard_zero_s() } else { Some(0.0) };
         let signs = info.findings.iter().flatten().map(|finding| finding.since_s);
+        let signs = signs.filter(|since_s| since_s.is_finite()).zip(1..);
         Self {
             ignition_s: ignited.or_else(|| track.iter().find(burning).map(|sample| sample.time_s)),
             touchdown_s: recording.contact_s(),
             worst_plans: worst(broken),
             zero_s,
-            signs: signs.filter(|since_s| since_s.is_finite()).collect(),
+            signs: signs.map(|(since_s, number)| (since_s, number.to_string())).collect(),
             spans: spans(info, zero_s.unwrap_or(0.0)),
             recording,
             pilot,
@@ -142,6 +142,11 @@ impl Flight {
         time_s - self.zero_s.unwrap_or(0.0)
     }
 
+    /// The vehicle time of a place on the report's axes, s.
+    pub(super) fn time_s(&self, axis_s: f64) -> f64 {
+        axis_s + self.zero_s.unwrap_or(0.0)
+    }
+
     /// The name of the time axis.
     pub(super) fn axis_name(&self) -> &'static str {
         if self.zero_s.is_some() { "T+, s" } else { "s of the station's clock" }
@@ -154,23 +159,6 @@ impl Flight {
             Part::Burn => from_s.is_none_or(|from_s| from_s - 1.0 <= time_s) && time_s <= until_s + 1.0,
             Part::Air => time_s <= until_s,
             Part::Whole => true,
-        }
-    }
-
-    /// Lines over a part of the time, with what happened and what went wrong.
-    pub(super) fn over_time(&self, part: Part, title: &str, mut lines: Vec<Line>) -> Chart {
-        for line in &mut lines {
-            line.points.retain(|(at_s, _)| self.has(part, at_s + self.zero_s.unwrap_or(0.0)));
-        }
-        let mark = |at_s: Option<f64>, name| Some((self.axis_s(at_s?), name));
-        let marks = [mark(self.ignition_s, "ignition"), mark(self.touchdown_s, "touchdown")];
-        Chart {
-            title: title.to_owned(),
-            x_label: self.axis_name(),
-            lines,
-            marks: marks.into_iter().flatten().collect(),
-            signs: self.signs.clone(),
-            ..Chart::default()
         }
     }
 
@@ -309,7 +297,7 @@ fn state_of(state: &RigidState, height_m: f64) -> State {
 }
 
 /// The state at a node of a plan.
-pub(super) fn planned(node: &nmpc::State) -> State {
+pub(super) fn planned(node: &ocp::landing::State) -> State {
     let [north, west, height_m, north_m_s, west_m_s, up_m_s, p, r, p_rate, r_rate] = node;
     let ((sin_p, cos_p), (sin_r, cos_r)) = (libm::sincos(*p), libm::sincos(*r));
     let tilt_rad = libm::atan2(libm::hypot(sin_p, cos_p * sin_r), cos_p * cos_r);

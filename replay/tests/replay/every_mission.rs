@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
 
+use avionics::log::frame::phase_of;
 use flight::rules::phase::Phase;
 use flight::vehicle::mission::StartPoint;
 use flight::vehicles::mission::BUILTIN;
-use flight_log::frame::phase_of;
 use protocol::log::computer_v1::ComputerFrame;
 use replay::cli::Answer as _;
 use replay::evaluate::{EvaluateError, evaluate};

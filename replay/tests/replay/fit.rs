@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 
 use proptest::prelude::*;
 use replay::fit::{Fit, Trace, fit};
-use replay::log::FlightLog;
+use replay::log::{FlightLog, Recording};
 use sim::draw::draw;
 use sim::recipe::Recipe;
 
@@ -223,7 +223,8 @@ proptest! {
             *byte ^= 1 << bit;
         }
         if let Ok(mut log) = FlightLog::read("test.mcap".to_owned(), Cursor::new(bytes))
-            && let Ok(trace) = Trace::read(&mut log)
+            && let Ok(recording) = Recording::read(&mut log)
+            && let Ok(trace) = Trace::of(&recording)
         {
             prop_assert!(fit(&trace).found.iter().all(|found| found.value.is_finite()));
         }

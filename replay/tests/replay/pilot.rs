@@ -3,12 +3,12 @@
 use std::io::{Cursor, Read as _, Seek as _};
 use std::sync::LazyLock;
 
-use flight::computer::{Computer, Input, LogState};
+use avionics::log::frame::frame_to_log;
+use avionics::log::logged::Logged as _;
+use flight::computer::{Computer, Input, KeptInput, LogState};
 use flight::estimation::estimator::{ImuSample, Measurements};
 use flight::rules::arming::Uplink;
 use flight::vehicle::rigid::RigidState;
-use flight_log::frame::frame_to_log;
-use flight_log::logged::Logged as _;
 use nalgebra::{UnitQuaternion, Vector3};
 use protocol::log::computer_v1::{ComputerFrame, ComputerStart};
 use protocol::log::record::Record;
@@ -59,7 +59,7 @@ static FALL: LazyLock<Fall> = LazyLock::new(|| {
             pressure_altitude_m: frame.is_multiple_of(4).then_some(falling_m),
             ..Measurements::of_imu(imu)
         };
-        let input = Input {
+        let kept = KeptInput {
             frame,
             time_s,
             measured,
@@ -74,10 +74,8 @@ static FALL: LazyLock<Fall> = LazyLock::new(|| {
             uplink: Uplink::NotNeeded,
             commander: None,
             people: None,
-            requests: &[],
-            rehearsed: None,
-            plan_ready: frame % 10 == 5,
         };
+        let input = Input { kept, requests: &[], rehearsed: None, plan_ready: frame % 10 == 5 };
         let output = computer.step(&input);
         frames.push(frame_to_log(&input, &output, &computer, false));
     }

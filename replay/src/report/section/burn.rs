@@ -2,10 +2,11 @@
 
 use flight::guidance::powered::{ControlLevel, Plan};
 use flight::vehicle::mission::Mission;
+use onboard_sim::figure::Panel;
 
 use super::pictures::gimbal_deg;
 use super::{COMPONENTS, DEGREES, rms_and_max};
-use crate::report::chart::{Chart, Line};
+use crate::report::chart::{Chart, line};
 use crate::report::html::{charts, paragraph, table};
 use crate::report::track::{Flight, Part, Sample, Series, State, Thought, planned, planned_at};
 
@@ -31,7 +32,7 @@ const VIEWS: [View; 2] = [
 
 /// The flights' paths to their landings, each with its name and class, in both views; of a single flight with its plans.
 pub(super) fn paths(flights: &[(&'static str, &'static str, &Flight)]) -> String {
-    let picture = |(title, [x_label, y_label], see): View| {
+    let picture = |(title, labels, see): View| {
         let shown = |flight: &Flight| -> Series {
             let part = |sample: &&Sample| {
                 [Part::Burn, Part::Air].iter().all(|part| flight.has(*part, sample.time_s))
@@ -46,19 +47,13 @@ pub(super) fn paths(flights: &[(&'static str, &'static str, &Flight)]) -> String
                 let above = plan.states().iter().map(planned).take_while(|state| state[2] >= -GROUND_M);
                 above.map(|state| see(&state)).chain([(f64::NAN, f64::NAN)]).collect()
             };
-            Line { name: "planned", class: "thin", points: drawn.flat_map(path).collect() }
+            line("planned", "thin", drawn.flat_map(path).collect())
         });
-        let flown = flights.iter().map(|(name, class, flight)| Line { name, class, points: shown(flight) });
-        Chart {
-            title: title.to_owned(),
-            x_label,
-            y_label,
-            lines: plans.chain(flown).collect(),
-            equal_scales: true,
-            full: true,
-            ..Chart::default()
-        }
-        .svg()
+        let flown = flights.iter().map(|(name, class, flight)| line(name, class, shown(flight)));
+        let [x_label, y_label] = labels.map(str::to_owned);
+        let lines = plans.chain(flown).collect();
+        let panel = Panel { x_label, y_label, lines, equal_scales: true, ..Panel::default() };
+        Chart { title: title.to_owned(), panel, full: true, own_x: true }.svg()
     };
     charts(&VIEWS.map(picture))
 }

@@ -1,14 +1,15 @@
 //! The estimate: what its sensors said, and how far it was from the truth; vibration.
 
+use avionics::log::frame::phase_of;
+use avionics::log::logged::state_from_log;
 use flight::estimation::estimator::AidStatus;
 use flight::rules::phase::Phase;
-use flight_log::frame::phase_of;
-use flight_log::logged::state_from_log;
 use nalgebra::Vector3;
+use onboard_sim::figure::Panel;
 use protocol::log::computer_v1::ComputerFrame;
 
 use super::rms_and_max;
-use crate::report::chart::{Chart, Line};
+use crate::report::chart::{Chart, line};
 use crate::report::html::{paragraph, table};
 use crate::report::track::{Flight, Part, Thought, named_aids};
 
@@ -61,19 +62,16 @@ const SEGMENT: usize = 256;
 
 /// What the inertial unit felt along the nose, over frequency.
 pub(super) fn vibration(flight: &Flight) -> Chart {
-    let line = |name, class, belongs: fn(Phase) -> bool| {
+    let felt = |name, class, belongs: fn(Phase) -> bool| {
         let frames = flight.recording.frames.iter();
         let frames = frames.filter(|frame| phase_of(&frame.output).is_some_and(belongs));
-        let felt = |frame: &ComputerFrame| Some(frame.input.measured.imu.specific_force_m_s2.x);
-        Line { name, class, points: spectrum(&frames.filter_map(felt).collect::<Vec<f64>>()) }
+        let felt = |frame: &ComputerFrame| frame.input.measured.imu.specific_force_m_s2.x;
+        line(name, class, spectrum(&frames.map(felt).collect::<Vec<f64>>()))
     };
-    Chart {
-        title: "Specific force along the nose, m/s^2 per sqrt(Hz)".to_owned(),
-        x_label: "Hz",
-        lines: vec![line("descent", "a", Phase::in_descent), line("burn", "b", Phase::in_landing_burn)],
-        own_x: true,
-        ..Chart::default()
-    }
+    let lines = vec![felt("descent", "a", Phase::in_descent), felt("burn", "b", Phase::in_landing_burn)];
+    let panel = Panel { x_label: "Hz".to_owned(), lines, ..Panel::default() };
+    let title = "Specific force along the nose, m/s^2 per sqrt(Hz)".to_owned();
+    Chart { title, panel, own_x: true, full: false }
 }
 
 /// Amplitude spectral density by Welch's method: half overlapping segments under a Hann window, without their means. Hz, and

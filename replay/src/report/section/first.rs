@@ -1,6 +1,7 @@
 //! The first screen: how the flight ended, what went wrong, the whole flight, its place and its limits.
 
 use flight::rules::verdict::Landing;
+use onboard_sim::figure::Panel;
 
 use crate::findings::{FindingFacts, over};
 use crate::info::{Info, rounded};
@@ -10,16 +11,19 @@ use crate::report::chart::Chart;
 use crate::report::html::{escaped, paragraph, table};
 use crate::report::track::Flight;
 
+use super::pictures::Picture;
 use super::whole::{FROM_ABOVE, view};
 
-pub(super) fn html(flight: &Flight, info: &Info, pictures: &[(&str, Chart)]) -> String {
+pub(super) fn html(flight: &Flight, info: &Info, pictures: &[Picture<'_>]) -> String {
     let mut html = verdict(info);
     html += "<div class=\"first\">\n<div>\n";
     html += &findings(flight, info);
     html += &limits(info);
     html += "</div>\n<div class=\"charts\">\n";
-    for (_, chart) in pictures.iter().filter(|(section, _)| *section == "first") {
-        html += &Chart { spans: flight.spans.clone(), marks: Vec::new(), ..chart.clone() }.svg();
+    for picture in pictures.iter().filter(|picture| picture.section == "first") {
+        let panel = &picture.chart.panel;
+        let panel = Panel { spans: flight.spans.clone(), marks: Vec::new(), ..panel.clone() };
+        html += &Chart { panel, ..picture.chart.clone() }.svg();
     }
     html += &view(flight, FROM_ABOVE, true);
     html += "</div>\n</div>\n";

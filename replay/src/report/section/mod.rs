@@ -41,8 +41,8 @@ pub(super) fn all(flight: &Flight, info: &Info) -> Vec<Section> {
         ("log", "Log", whole::described(info)),
     ];
     let section = |(id, title, words): (&'static str, &'static str, String)| {
-        let here = pictures.iter().filter(|(section, _)| *section == id && id != "first");
-        let drawn: Vec<String> = here.map(|(_, chart)| chart.svg()).collect();
+        let here = pictures.iter().filter(|picture| picture.section == id && id != "first");
+        let drawn: Vec<String> = here.map(|picture| picture.chart.svg()).collect();
         let html = words + &charts(&drawn);
         let html = if html.is_empty() { paragraph("The log has no records for this.") } else { html };
         Section { id, title, html }

@@ -1,9 +1,11 @@
 //! Two flights in the same pictures.
 
+use onboard_sim::figure::Panel;
+
 use super::burn::paths;
 use super::pictures;
 use crate::info::Info;
-use crate::report::chart::{Chart, Line};
+use crate::report::chart::{Chart, line};
 use crate::report::html::{charts, paragraph, table};
 use crate::report::track::Flight;
 
@@ -22,16 +24,13 @@ pub(in crate::report) fn html(flights: [LogFacts<'_>; 2]) -> String {
     let axis = a.axis_name();
     let named = NAMES.into_iter().zip([a, b]).map(|((name, class), flight)| (name, class, flight));
     // What flew is the first line of a picture of the burn.
-    let beside =
-        pictures::all(a).into_iter().zip(pictures::all(b)).filter(|((section, _), _)| *section == "burn");
-    let both = beside.map(|((_, a), (_, b))| {
-        let flown = [a, b].map(|chart| (chart.title, chart.lines.into_iter().next()));
-        let [(title, a), (_, b)] = flown;
-        let lines = NAMES.into_iter().zip([a, b]);
-        let lines =
-            lines.filter_map(|((name, class), line)| Some(Line { name, class, points: line?.points }));
-        let title = format!("Both: {title}");
-        Chart { title, x_label: axis, lines: lines.collect(), ..Chart::default() }.svg()
+    let pairs = pictures::all(a).into_iter().zip(pictures::all(b));
+    let both = pairs.filter(|(picture, _)| picture.section == "burn").map(|(a, b)| {
+        let flown = NAMES.iter().zip([&a, &b]).filter_map(|((name, class), picture)| {
+            Some(line(name, class, picture.chart.panel.lines.first()?.points.clone()))
+        });
+        let panel = Panel { x_label: axis.to_owned(), lines: flown.collect(), ..Panel::default() };
+        Chart { title: format!("Both: {}", a.chart.title), panel, ..Chart::default() }.svg()
     });
     table(&["", "log", "ending"], &rows.collect::<Vec<_>>())
         + &paragraph(&format!("Each flight has its own {axis}."))

@@ -3,13 +3,14 @@
 use flight::computer::pilot::Pilot;
 use flight::rules::phase::Phase;
 use flight::vehicles::mission::BUILTIN;
+use onboard_sim::figure::Panel;
 
 use super::burn::View;
 use crate::cli::Answer as _;
 use crate::compare::compared;
 use crate::info::{Info, ProfileFacts};
 use crate::log::{Clock, ClockTime};
-use crate::report::chart::{Chart, Line};
+use crate::report::chart::{Chart, line};
 use crate::report::html::{charts, escaped, paragraph, table};
 use crate::report::track::{Flight, Part, Sample};
 
@@ -84,28 +85,25 @@ const SIDES: [View; 2] = [
 ];
 
 /// The flown path, its stages and its main moments; a ground track has equal scales.
-pub(super) fn view(flight: &Flight, (title, [x_label, y_label], see): View, equal_scales: bool) -> String {
+pub(super) fn view(flight: &Flight, (title, labels, see): View, equal_scales: bool) -> String {
     let flown = || flight.track.iter().filter(|sample| flight.has(Part::Air, sample.time_s));
     let lines = STAGES.iter().map(|(name, class, belongs)| {
         // Another stage ends a line.
         let point = |sample: &Sample| {
             if sample.phase.is_some_and(belongs) { see(&sample.state) } else { (f64::NAN, f64::NAN) }
         };
-        Line { name, class, points: flown().map(point).collect() }
+        line(name, class, flown().map(point).collect())
     });
     let lines = lines.filter(|line| line.points.iter().any(|point| point.0.is_finite()));
     let places = moments(flight).into_iter().filter(|(_, _, drawn)| *drawn);
-    Chart {
-        title: title.to_owned(),
-        x_label,
-        y_label,
-        lines: lines.collect(),
-        places: places.map(|(name, sample, _)| (see(&sample.state).0, see(&sample.state).1, name)).collect(),
-        own_x: true,
-        equal_scales,
-        ..Chart::default()
-    }
-    .svg()
+    let place = |(name, sample, _): (&str, &Sample, bool)| {
+        let (x, y) = see(&sample.state);
+        (x, y, name.to_owned())
+    };
+    let [x_label, y_label] = labels.map(str::to_owned);
+    let (lines, places) = (lines.collect(), places.map(place).collect());
+    let panel = Panel { x_label, y_label, lines, places, equal_scales, ..Panel::default() };
+    Chart { title: title.to_owned(), panel, own_x: true, full: false }.svg()
 }
 
 pub(super) fn moments_and_views(flight: &Flight) -> String {

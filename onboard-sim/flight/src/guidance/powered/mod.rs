@@ -1,6 +1,6 @@
 //! Phase 2: from ignition to touchdown on a motor that cannot be throttled.
 //!
-//! A tick poses a landing for the [NMPC](nmpc): gimbal, fins and final time at once, from the plan that is flown. It is
+//! A tick poses a landing for the [NMPC](ocp::landing): gimbal, fins and final time at once, from the plan that is flown. It is
 //! [searched](Search) apart from the frames, and flown from the frame on in which it is ready.
 //! The nose may lean in any direction. The plan contains the thrust curve as estimated by
 //! [`Burn`](crate::vehicle::burn::Burn), the burning mass, the drag of body and fins, a floor above the ground, and a free
@@ -15,7 +15,8 @@ mod search;
 mod situation;
 
 use nalgebra::Vector3;
-use nmpc::{Outcome, SolverLimits, Status};
+use ocp::landing::SolverLimits;
+use ocp::{Outcome, Status};
 use serde::{Deserialize, Serialize};
 
 pub use self::plan::Plan;
@@ -68,12 +69,12 @@ impl PoweredGuidance {
         planned.flown.clear();
         planned.plan(&mut search, state, situation);
         planned.flown.clear();
-        (Self { settings, report: PoweredReport::idle(), ..planned }, search)
+        (Self { settings, report: PoweredReport::default(), ..planned }, search)
     }
 
     /// Guidance without a plan.
     pub fn new(settings: PoweredSettings) -> Self {
-        Self { settings, report: PoweredReport::idle(), flown: Plan::default() }
+        Self { settings, report: PoweredReport::default(), flown: Plan::default() }
     }
 
     /// Plans from time zero, and takes the plan over at once.
@@ -121,7 +122,7 @@ impl PoweredGuidance {
         let took_s = time_s - posed_at_s;
         let Some(outcome) = outcome else {
             let level = ControlLevel::Stabiliser;
-            self.report = PoweredReport { level, posed_at_s, took_s, ..PoweredReport::idle() };
+            self.report = PoweredReport { level, posed_at_s, took_s, ..PoweredReport::default() };
             return;
         };
         let found = &mut search.found;

@@ -1,0 +1,572 @@
+//! Figures as SVG, drawn with `plotters`: the best kept plotting crate that writes SVG without fonts, images or a browser
+//! (three small crates, 6 s of a build); ticks, axes and escaping are its own. The pictures of a flight's report are the
+//! same panels, with other colours.
+
+use plotters::backend::SVGBackend;
+use plotters::chart::{ChartBuilder, ChartContext};
+use plotters::coord::Shift;
+use plotters::coord::cartesian::Cartesian2d;
+use plotters::coord::types::RangedCoordf64;
+use plotters::drawing::{DrawingArea, IntoDrawingArea as _};
+use plotters::element::{Circle, Cross, EmptyElement, PathElement, Rectangle, Text};
+use plotters::series::{DashedLineSeries, LineSeries};
+use plotters::style::{BLACK, Color as _, IntoFont as _, RGBColor, ShapeStyle, TRANSPARENT, WHITE};
+
+/// A figure cannot be drawn: its axes are not finite, or too small for their labels.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("cannot draw the figure '{title}': {reason}")]
+pub struct FigureError {
+    title: String,
+    reason: String,
+}
+
+/// Okabe and Ito's colours that differ for every kind of colour vision, and in grey; and a grey.
+const COLOURS: [RGBColor; 6] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(0, 0, 0),
+    FAINT,
+];
+const FAINT: RGBColor = RGBColor(130, 130, 130);
+/// Grounds of spans under thrust, and of spans that fall.
+const SHADES: [RGBColor; 2] = [RGBColor(253, 235, 208), RGBColor(232, 236, 245)];
+/// Of a limit.
+const RED: RGBColor = RGBColor(179, 38, 30);
+
+/// Font and size, px, of titles and of everything else.
+const TITLE_FONT: (&str, i32) = ("sans-serif", 18);
+const FONT: (&str, i32) = ("sans-serif", 13);
+
+/// Height of the title, px.
+const TITLE_PX: u32 = 34;
+
+type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+type Drawn<T = ()> = Result<T, Box<dyn std::error::Error>>;
+
+/// The SVG of what a function draws on a white ground of this size, px, below a title.
+fn drawn(
+    title: &str,
+    size_px: (u32, u32),
+    draw: impl FnOnce(&Area<'_>) -> Drawn,
+) -> Result<String, FigureError> {
+    let mut svg = String::new();
+    let (width_px, height_px) = size_px;
+    let all = || -> Drawn {
+        let root = SVGBackend::with_string(&mut svg, (width_px, TITLE_PX + height_px)).into_drawing_area();
+        root.fill(&WHITE)?;
+        draw(&root.titled(title, TITLE_FONT)?)?;
+        root.present()?;
+        Ok(())
+    };
+    all().map_err(|error| FigureError { title: title.to_owned(), reason: error.to_string() })?;
+    Ok(svg)
+}
+
+/// Room for margins, ticks and names: beside and below the axes, px.
+const ROOM_PX: (u32, u32) = (24 + 62, 24 + 42);
+
+/// Axes over two ranges, with ticks and names.
+fn axes<'a, 'b>(
+    area: &'a Area<'b>,
+    [x, y]: [(f64, f64); 2],
+    [x_label, y_label]: [&str; 2],
+) -> Drawn<Chart<'a, 'b>> {
+    if ![x.0, x.1, y.0, y.1].iter().all(|end| end.is_finite()) {
+        return Err("an axis is not finite".into());
+    }
+    let mut chart = ChartBuilder::on(area)
+        .margin(12)
+        .x_label_area_size(42)
+        .y_label_area_size(62)
+        .build_cartesian_2d(x.0..x.1, y.0..y.1)?;
+    chart
+        .configure_mesh()
+        .x_labels(7)
+        .y_labels(8)
+        .x_label_formatter(&number(x))
+        .y_label_formatter(&number(y))
+        .label_style(FONT)
+        .axis_desc_style(FONT)
+        .x_desc(x_label)
+        .y_desc(y_label)
+        .light_line_style(TRANSPARENT)
+        .bold_line_style(RGBColor(222, 222, 222))
+        .draw()?;
+    Ok(chart)
+}
+
+/// Writes a tick with the decimals that its axis needs.
+fn number((from, to): (f64, f64)) -> impl Fn(&f64) -> String {
+    let decimals = (1.0 - libm::floor(libm::log10((to - from) / 2.0))).clamp(0.0, 6.0) as usize;
+    move |value| {
+        let text = format!("{value:.decimals$}");
+        let short = if decimals > 0 { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+        if short == "-0" { "0".to_owned() } else { short.to_owned() }
+    }
+}
+
+/// Width of a letter and of a sample with the room around it, px. SVG does not tell how wide a text is.
+const LETTER_PX: i32 = 7;
+const SAMPLE_PX: i32 = 26;
+const GAP_PX: i32 = 18;
+const LEFT_PX: i32 = 16;
+const ROW_PX: i32 = 24;
+/// Letters of a name that count.
+const LONGEST: i32 = 1000;
+
+/// Names at their places.
+struct Legend {
+    names: Vec<String>,
+    /// Left end and middle of each name's sample, px.
+    places: Vec<(i32, i32)>,
+}
+
+impl Legend {
+    /// Names in rows of a width, px.
+    fn new(names: Vec<String>, width_px: u32) -> Self {
+        let (mut left_px, mut row) = (LEFT_PX, 0);
+        let mut place = |name: &String| {
+            let letters = i32::try_from(name.chars().count()).unwrap_or(LONGEST).min(LONGEST);
+            let entry_px = SAMPLE_PX + LETTER_PX * letters + GAP_PX;
+            if left_px > LEFT_PX && left_px + entry_px > width_px.cast_signed() {
+                (left_px, row) = (LEFT_PX, row + 1);
+            }
+            let place = (left_px, row * ROW_PX + ROW_PX / 2);
+            left_px += entry_px;
+            place
+        };
+        let places = names.iter().map(&mut place).collect();
+        Self { names, places }
+    }
+
+    /// Height of all rows, px.
+    fn height_px(&self) -> u32 {
+        let last = self.places.last().map_or(0, |(_, middle)| middle + ROW_PX / 2);
+        last as u32 + ROW_PX as u32 / 2
+    }
+
+    /// Draws every name behind what `sample` draws for it from a place, px.
+    fn draw(&self, area: &Area<'_>, mut sample: impl FnMut(&Area<'_>, usize, (i32, i32)) -> Drawn) -> Drawn {
+        for (entry, (name, (left, middle))) in self.names.iter().zip(&self.places).enumerate() {
+            sample(area, entry, (*left, *middle))?;
+            area.draw(&Text::new(name.clone(), (left + SAMPLE_PX, middle - 7), FONT))?;
+        }
+        Ok(())
+    }
+}
+
+/// Length of the dashes and of the gaps, px.
+const DASH_PX: (i32, i32) = (8, 5);
+/// Room beside the outermost points, of the extent.
+const ROOM: f64 = 0.06;
+
+/// A curve.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Line {
+    /// In the legend; curves of one name share their entry.
+    pub name: String,
+    /// Which colour, counted from 0.
+    pub colour: usize,
+    pub dashed: bool,
+    /// In the panel's own units.
+    pub points: Vec<(f64, f64)>,
+}
+
+/// A span of `x` with its name, behind the curves.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Span {
+    pub from: f64,
+    pub to: f64,
+    pub name: String,
+    /// Its ground: 0 warm, 1 cool; `None` has none.
+    pub shade: Option<usize>,
+}
+
+/// One pair of axes.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Panel {
+    pub x_label: String,
+    pub y_label: String,
+    pub lines: Vec<Line>,
+    /// Crosses, each with the colour of a curve.
+    pub crosses: Vec<(f64, f64, usize)>,
+    /// Values of `y`.
+    pub limits: Vec<f64>,
+    /// Values of `x`, with their names.
+    pub marks: Vec<(f64, String)>,
+    /// Values of `x` where something went wrong, with their numbers.
+    pub signs: Vec<(f64, String)>,
+    pub spans: Vec<Span>,
+    /// Points with their names.
+    pub places: Vec<(f64, f64, String)>,
+    /// Both axes have one scale.
+    pub equal_scales: bool,
+}
+
+/// The plotted area of a lone panel of a size, px: left, top, right, bottom.
+pub fn plotted_px((width_px, height_px): (u32, u32)) -> [u32; 4] {
+    [12 + 62, TITLE_PX + 12, width_px.saturating_sub(12), TITLE_PX + height_px.saturating_sub(12 + 42)]
+}
+
+/// Panels of a size, px, in rows of `columns`, below a title. `cross_name` says what the crosses are.
+///
+/// # Errors
+/// A panel has no finite point, or is too small.
+pub fn sized_lines_svg(
+    title: &str,
+    panels: &[Panel],
+    columns: usize,
+    cross_name: Option<&str>,
+    (panel_width_px, panel_height_px): (u32, u32),
+) -> Result<String, FigureError> {
+    let rows = panels.len().div_ceil(columns.max(1));
+    let (width_px, panels_px) = (columns as u32 * panel_width_px, rows as u32 * panel_height_px);
+    let mut named: Vec<&Line> = Vec::new();
+    for line in panels.iter().flat_map(|panel| &panel.lines).filter(|line| !line.name.is_empty()) {
+        if !named.iter().any(|known| known.name == line.name) {
+            named.push(line);
+        }
+    }
+    let names = named.iter().map(|line| line.name.clone()).chain(cross_name.map(str::to_owned));
+    let legend = Legend::new(names.collect(), width_px);
+    drawn(title, (width_px, panels_px + legend.height_px()), |root| {
+        let (upper, lower) = root.split_vertically(panels_px);
+        for (area, panel) in upper.split_evenly((rows, columns)).iter().zip(panels) {
+            draw_panel(area, panel)?;
+        }
+        legend.draw(&lower, |area, entry, place| draw_sample(area, named.get(entry).copied(), place))
+    })
+}
+
+/// The ends of a panel's axes; `None` without a finite point.
+pub fn ends(panel: &Panel, (width_px, height_px): (u32, u32)) -> Option<[(f64, f64); 2]> {
+    let points = || {
+        let of_lines = panel.lines.iter().flat_map(|line| line.points.iter().copied());
+        of_lines.chain(panel.crosses.iter().map(|(x, y, _)| (*x, *y)))
+    };
+    let x = extent(points().map(|point| point.0))?;
+    let mut ends = [x, extent(points().map(|point| point.1).chain(panel.limits.iter().copied()))?];
+    if panel.equal_scales {
+        equalise(&mut ends, [width_px.saturating_sub(ROOM_PX.0), height_px.saturating_sub(ROOM_PX.1)]);
+    }
+    Some(ends)
+}
+
+fn draw_panel(area: &Area<'_>, panel: &Panel) -> Drawn {
+    let [x, y] = ends(panel, area.dim_in_pixel()).ok_or("no finite point")?;
+    let mut chart = axes(area, [x, y], [&panel.x_label, &panel.y_label])?;
+    let width_px = f64::from(area.dim_in_pixel().0.saturating_sub(ROOM_PX.0));
+    for span in &panel.spans {
+        let (from, to) = (span.from.clamp(x.0, x.1), span.to.clamp(x.0, x.1));
+        if let Some(shade) = span.shade {
+            let ground = SHADES[shade % SHADES.len()].mix(0.6).filled();
+            chart.draw_series([Rectangle::new([(from, y.0), (to, y.1)], ground)])?;
+        }
+        let letters = (to - from) / (x.1 - x.0) * width_px / f64::from(LETTER_PX + 1);
+        if letters > span.name.chars().count() as f64 {
+            let name = Text::new(span.name.clone(), (4, -16), FONT);
+            chart.draw_series([EmptyElement::at((from, y.0)) + name])?;
+        }
+    }
+    let across = panel.limits.iter().map(|limit| PathElement::new([(x.0, *limit), (x.1, *limit)], RED));
+    chart.draw_series(across)?;
+    let marks = || panel.marks.iter().filter(|(at, _)| (x.0..=x.1).contains(at));
+    chart.draw_series(marks().map(|(at, _)| PathElement::new([(*at, y.0), (*at, y.1)], FAINT)))?;
+    chart.draw_series(
+        marks().map(|(at, name)| EmptyElement::at((*at, y.1)) + Text::new(name.clone(), (3, 2), FONT)),
+    )?;
+    let signs = || panel.signs.iter().filter(|(at, _)| (x.0..=x.1).contains(at));
+    chart.draw_series(signs().map(|(at, _)| PathElement::new([(*at, y.0), (*at, y.1)], RED)))?;
+    chart.draw_series(signs().map(|(at, number)| {
+        let label = Text::new(number.clone(), (3, 16), FONT.into_font().color(&RED));
+        EmptyElement::at((*at, y.1)) + label
+    }))?;
+    chart.draw_series(panel.places.iter().map(|(x, y, name)| {
+        let named = EmptyElement::at((*x, *y)) + Circle::new((0, 0), 3, BLACK.filled());
+        named + Text::new(name.clone(), (6, -14), FONT)
+    }))?;
+    for line in &panel.lines {
+        let points = line.points.iter().copied();
+        if line.dashed {
+            let (dash_px, gap_px) = DASH_PX;
+            chart.draw_series(DashedLineSeries::new(points, dash_px, gap_px, style(line.colour)))?;
+        } else {
+            chart.draw_series(LineSeries::new(points, style(line.colour)))?;
+        }
+    }
+    let crosses = panel.crosses.iter().map(|(x, y, colour)| Cross::new((*x, *y), 5, style(*colour)));
+    chart.draw_series(crosses)?;
+    Ok(())
+}
+
+/// A piece of a curve, or a cross.
+fn draw_sample(area: &Area<'_>, line: Option<&Line>, (left, middle): (i32, i32)) -> Drawn {
+    let Some(line) = line else {
+        area.draw(&Cross::new((left + 10, middle), 5, BLACK.stroke_width(2)))?;
+        return Ok(());
+    };
+    let pieces = if line.dashed { vec![(0, 8), (12, 20)] } else { vec![(0, 20)] };
+    for (from, to) in pieces {
+        area.draw(&PathElement::new([(left + from, middle), (left + to, middle)], style(line.colour)))?;
+    }
+    Ok(())
+}
+
+fn style(colour: usize) -> ShapeStyle {
+    COLOURS[colour % COLOURS.len()].stroke_width(2)
+}
+
+/// Least and most with some room; `None` without a finite value.
+fn extent(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    let (least, most) = values
+        .filter(|value| value.is_finite())
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), value| (least.min(value), most.max(value)));
+    let room = if most > least { ROOM * (most - least) } else { 0.5 };
+    (least <= most).then_some((least - room, most + room))
+}
+
+/// Widens the axis that has more pixels a unit until both have the same.
+fn equalise(ends: &mut [(f64, f64); 2], size_px: [u32; 2]) {
+    let scale = |place: usize| f64::from(size_px[place].max(1)) / (ends[place].1 - ends[place].0);
+    let wanted = scale(0).min(scale(1));
+    for ((from, to), pixels) in ends.iter_mut().zip(size_px) {
+        let (middle, half) = (0.5 * (*from + *to), 0.5 * f64::from(pixels.max(1)) / wanted);
+        (*from, *to) = (middle - half, middle + half);
+    }
+}
+
+/// Side of the square of places, px: of one of several, and of one alone.
+const SIDE_PX: u32 = 400;
+const LONE_SIDE_PX: u32 = 620;
+/// Corners of a circle.
+const CORNERS: u32 = 180;
+
+/// What to draw: places about the pad, m.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Places<'a> {
+    /// Names of the axes, to the right and up.
+    pub labels: [&'a str; 2],
+    /// Names of the kinds of places, and of the radii.
+    pub kinds: &'a [&'a str],
+    pub radii: &'a [&'a str],
+    /// Name of an arrow up from the pad, if there is one.
+    pub arrow: Option<&'a str>,
+    pub panels: &'a [PlacesPanel],
+}
+
+/// One square of places.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlacesPanel {
+    pub title: String,
+    /// Of each kind, to the right and up.
+    pub places: Vec<Vec<[f64; 2]>>,
+    /// About the pad.
+    pub radii_m: Vec<f64>,
+}
+
+/// Panels of places as SVG, two in a row, both axes at one scale.
+///
+/// # Errors
+/// A radius is too small.
+pub fn places_svg(title: &str, places: &Places<'_>) -> Result<String, FigureError> {
+    let Places { kinds, radii, arrow, panels, .. } = places;
+    let columns = panels.len().clamp(1, 2);
+    let rows = panels.len().div_ceil(columns).max(1);
+    let side_px = if panels.len() > 1 { SIDE_PX } else { LONE_SIDE_PX };
+    let title_px = if panels.iter().any(|panel| !panel.title.is_empty()) { TITLE_PX } else { 0 };
+    let panel_px = (side_px + ROOM_PX.0, title_px + side_px + ROOM_PX.1);
+    let (width_px, panels_px) = (columns as u32 * panel_px.0, rows as u32 * panel_px.1);
+    let names = kinds.iter().chain(*radii).chain(arrow).map(|name| (*name).to_owned());
+    let legend = Legend::new(names.collect(), width_px);
+    drawn(title, (width_px, panels_px + legend.height_px()), |root| -> Drawn {
+        let (upper, lower) = root.split_vertically(panels_px);
+        for (area, panel) in upper.split_evenly((rows, columns)).iter().zip(*panels) {
+            let area =
+                if panel.title.is_empty() { area.clone() } else { area.titled(&panel.title, TITLE_FONT)? };
+            draw_places(&area, places, panel)?;
+        }
+        legend.draw(&lower, |area, entry, (left, middle)| {
+            match entry.checked_sub(kinds.len()) {
+                None => area.draw(&(EmptyElement::at((left + 10, middle)) + mark(entry)))?,
+                Some(radius) if radius < radii.len() => {
+                    area.draw(&PathElement::new([(left, middle), (left + 20, middle)], line(radius)))?;
+                }
+                Some(_) => {
+                    let arrow = [(10, 9), (10, -9), (6, -3), (10, -9), (14, -3)];
+                    area.draw(&PathElement::new(arrow.map(|(x, y)| (left + x, middle + y)), line(0)))?;
+                }
+            }
+            Ok(())
+        })
+    })
+}
+
+fn draw_places(area: &Area<'_>, Places { labels, arrow, .. }: &Places<'_>, panel: &PlacesPanel) -> Drawn {
+    let radii_m = || panel.radii_m.iter().copied().enumerate().filter(|(_, radius_m)| radius_m.is_finite());
+    let of_places = panel.places.iter().flatten().flatten().map(|m| m.abs()).filter(|m| m.is_finite());
+    let far_m = 1.05 * of_places.chain(radii_m().map(|(_, radius_m)| radius_m)).fold(1.0, f64::max);
+    let mut chart = axes(area, [(-far_m, far_m); 2], *labels)?;
+    for (kind, places) in panel.places.iter().enumerate() {
+        let finite = places.iter().filter(|place| place.iter().all(|m| m.is_finite()));
+        chart.draw_series(finite.map(|[x, y]| EmptyElement::at((*x, *y)) + mark(kind)))?;
+    }
+    for (place, radius_m) in radii_m() {
+        let corner = |k: u32| {
+            let (sin, cos) = libm::sincos(core::f64::consts::TAU * f64::from(k) / f64::from(CORNERS));
+            (radius_m * cos, radius_m * sin)
+        };
+        chart.draw_series([PathElement::new((0..=CORNERS).map(corner).collect::<Vec<_>>(), line(place))])?;
+    }
+    if arrow.is_some() {
+        let tip_m = radii_m().map(|(_, radius_m)| radius_m).next().unwrap_or(far_m);
+        let (back_m, aside_m) = (tip_m - 0.05 * far_m, 0.025 * far_m);
+        let arrow = [(0.0, 0.0), (0.0, tip_m), (-aside_m, back_m), (0.0, tip_m), (aside_m, back_m)];
+        chart.draw_series([PathElement::new(arrow, line(0))])?;
+    }
+    chart.draw_series([Cross::new((0.0, 0.0), 6, BLACK.stroke_width(2))])?;
+    Ok(())
+}
+
+/// The mark of a kind: no meaning is in a colour alone.
+fn mark(kind: usize) -> PathElement<(i32, i32)> {
+    const SHAPES: [&[(i32, i32)]; 4] = [
+        &[(-3, -3), (3, -3), (3, 3), (-3, 3), (-3, -3)],
+        &[(-4, -4), (4, 4), (0, 0), (-4, 4), (4, -4)],
+        &[(0, -4), (4, 3), (-4, 3), (0, -4)],
+        &[(-5, 0), (5, 0), (0, 0), (0, -5), (0, 5)],
+    ];
+    PathElement::new(SHAPES[kind % SHAPES.len()], COLOURS[kind % COLOURS.len()].stroke_width(1))
+}
+
+/// The first is bold, the next thin.
+fn line(radius: usize) -> ShapeStyle {
+    BLACK.stroke_width(if radius == 0 { 2 } else { 1 })
+}
+
+/// Size of the axes' area of bars, px.
+const BARS_PX: (u32, u32) = (720, 500);
+
+/// A bar: from its left to its right end, and its height.
+pub type Bar = ([f64; 2], f64);
+
+/// Bars, and perhaps a value of `x` that is marked, with its name.
+///
+/// # Errors
+/// A bar is not finite.
+pub fn bars_svg(
+    title: &str,
+    labels: [&str; 2],
+    bars: &[Bar],
+    mark: Option<(&str, f64)>,
+) -> Result<String, FigureError> {
+    let (width_px, height_px) = BARS_PX;
+    let legend = Legend::new(mark.iter().map(|(name, _)| (*name).to_owned()).collect(), width_px);
+    drawn(title, (width_px, height_px + legend.height_px()), |root| -> Drawn {
+        let (upper, lower) = root.split_vertically(height_px);
+        let of_mark = mark.map(|(_, value)| value);
+        let x = extent(bars.iter().flat_map(|(x, _)| *x).chain(of_mark)).unwrap_or((0.0, 1.0));
+        let most = bars.iter().map(|(_, height)| *height).fold(0.0, f64::max);
+        let most = if most > 0.0 { most } else { 1.0 };
+        let mut chart = axes(&upper, [x, (0.0, most)], labels)?;
+        chart.draw_series(bars.iter().map(|([left, right], height)| {
+            Rectangle::new([(*left, 0.0), (*right, *height)], COLOURS[0].mix(0.7).filled())
+        }))?;
+        chart.draw_series(of_mark.map(|at| PathElement::new([(at, 0.0), (at, most)], style(1))))?;
+        legend.draw(&lower, |area, _, (left, middle)| {
+            area.draw(&PathElement::new([(left, middle), (left + 20, middle)], style(1)))?;
+            Ok(())
+        })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_have_the_decimals_of_their_axis() {
+        assert_eq!(number((0.0, 5.0))(&2.5), "2.5");
+        assert_eq!(number((0.0, 5.0))(&-0.0), "0");
+        assert_eq!(number((0.0, 300.0))(&120.0), "120");
+        assert_eq!(number((-0.02, 0.02))(&0.005), "0.005");
+    }
+
+    fn panel(points: Vec<(f64, f64)>) -> Panel {
+        let line = Line { name: "a < b".to_owned(), colour: 0, dashed: false, points };
+        let (x_label, y_label) = ("time, s".to_owned(), "height, m".to_owned());
+        Panel { x_label, y_label, lines: vec![line], crosses: vec![(0.5, 0.5, 0)], ..Panel::default() }
+    }
+
+    #[test]
+    fn a_figure_names_its_axes_and_curves_and_a_curve_without_points_is_refused() {
+        let panels = [panel(vec![(0.0, 0.0), (1.0, 2.0)]), panel(vec![(0.0, 1.0), (1.0, 1.0)])];
+        let svg = sized_lines_svg("Fig. 0", &panels, 2, Some("paper"), BARS_PX).unwrap();
+        for text in ["Fig. 0", "time, s", "height, m", "a &lt; b", "paper"] {
+            assert!(svg.contains(text), "{text}");
+        }
+        assert_eq!(svg.matches("a &lt; b").count(), 1);
+        let empty = Panel { crosses: vec![], ..panel(vec![(f64::NAN, 1.0)]) };
+        let error = sized_lines_svg("Fig. 0", &[empty], 1, None, BARS_PX).unwrap_err();
+        assert_eq!(error.to_string(), "cannot draw the figure 'Fig. 0': no finite point");
+    }
+
+    #[test]
+    fn every_bar_is_drawn_and_the_mark_is_named() {
+        let bars = [([0.0, 1.0], 2.0), ([1.0, 3.0], 1.0)];
+        let svg = bars_svg("T", ["speed, m/s", "flights"], &bars, Some(("limit", 2.0))).unwrap();
+        for text in ["speed, m/s", "flights", "limit"] {
+            assert!(svg.contains(text), "{text}");
+        }
+        assert!(bars_svg("", ["", ""], &[([0.0, f64::INFINITY], 1.0)], None).is_ok());
+        assert!(bars_svg("", ["", ""], &[], None).is_ok());
+    }
+
+    /// 10 by 110 in a picture that is twice as wide as high: the width becomes 220.
+    #[test]
+    fn both_axes_have_one_scale() {
+        let mut ends = [(0.0, 10.0), (0.0, 110.0)];
+        equalise(&mut ends, [200, 100]);
+        assert_eq!(ends, [(-105.0, 115.0), (0.0, 110.0)]);
+    }
+
+    #[test]
+    fn limits_marks_and_places_are_drawn_with_their_names() {
+        let panel = Panel {
+            limits: vec![7.5],
+            marks: vec![(0.5, "ignition".to_owned()), (9.0, "outside".to_owned())],
+            places: vec![(0.2, 0.3, "apogee".to_owned())],
+            ..panel(vec![(0.0, 0.0), (1.0, 2.0)])
+        };
+        let svg = sized_lines_svg("T", &[panel], 1, None, BARS_PX).unwrap();
+        assert!(svg.contains("ignition") && svg.contains("apogee") && !svg.contains("outside"), "{svg}");
+        assert_eq!(svg.matches("#B3261E").count(), 1);
+    }
+
+    #[test]
+    fn every_wind_has_a_panel_and_the_legend_names_every_mark_and_line() {
+        let panel = |title: &str, keep_out_m| PlacesPanel {
+            title: title.to_owned(),
+            places: vec![vec![[1.0, 2.0], [3.0, f64::NAN]], vec![[-40.0, 5.0]]],
+            radii_m: vec![keep_out_m, 61.0],
+        };
+        let panels = [panel("0 m/s", 150.0), panel("3 m/s", 310.0), panel("6 m/s", f64::NAN)];
+        let places = Places {
+            labels: ["across the wind, m", "downwind, m"],
+            kinds: &["as planned", "a < b"],
+            radii: &["nobody within", "NAR"],
+            arrow: Some("with the wind"),
+            panels: &panels,
+        };
+        let svg = places_svg("mk2", &places).unwrap();
+        for text in
+            ["as planned", "a &lt; b", "nobody within", "NAR", "with the wind", "0 m/s", "3 m/s", "6 m/s"]
+        {
+            assert_eq!(svg.matches(text).count(), 1, "{text}");
+        }
+        assert_eq!(svg.matches("downwind, m").count(), 3, "one wind a panel");
+        assert!(places_svg("", &Places { panels: &[], ..places }).is_ok());
+    }
+}

@@ -1,0 +1,698 @@
+//! Where a vehicle comes down, in each way that a flight can end: what says how near people may stand.
+//!
+//! Each flight is flown as it is drawn. On its way copies of it are aborted, each at a moment drawn evenly from one part of
+//! that very flight. The ways with a fault are flights of their own with the same draws.
+
+use core::fmt;
+
+use flight::computer::{AbortEffect, FRAME_MS};
+use flight::rules::outputs::PyroOutput;
+use flight::rules::phase::Phase;
+use flight::rules::verdict::Landing;
+use flight::vehicle::atmosphere::Air;
+use flight::vehicle::launch::Launch;
+use flight::vehicle::mission::Mission;
+use flight::vehicle::mission::StartPoint;
+use flight::vehicle::thrust_curve::ThrustCurve;
+use nalgebra::Vector3;
+use sim::draw::{Chance, draw};
+use sim::fault::TimedFault;
+use sim::recipe::{Recipe, RecipeError};
+use sim::sortie::{SetUpError, Sortie};
+use sim::world::ground::RestOutcome;
+use sim::world::wind::Wind;
+use sim::world::{Actuators, Fault};
+use statrs::distribution::{Binomial, DiscreteCDF as _};
+
+use crate::run::in_parallel;
+use crate::statistics::Landings;
+
+/// The share of the flights that a radius has to hold.
+const HELD: f64 = 0.99;
+/// Each end of a 95 % interval.
+const TAIL: f64 = 0.025;
+/// A flight that is still in the air after this is given up, s; it counts as infinitely far.
+const LONGEST_S: f64 = 900.0;
+/// What still moves this long after the first contact stays where it is, s.
+const SLIDES_S: f64 = 5.0;
+/// Any number that no other draw uses.
+const OF_HAZARD: u64 = 0x4a2a_0000_0000_0005;
+
+/// A way in which a flight can end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Way {
+    AsPlanned,
+    /// Aborted in the boost or in the coast: the parachute opens at apogee, the longest way under it.
+    AbortInAscent,
+    /// Aborted at apogee, of a flight that begins there.
+    ParachuteFromApogee,
+    /// Aborted in the descent, with room for the parachute.
+    AbortInDescent,
+    /// Aborted before the ignition, too low for the parachute: it burns or hits the ground.
+    AbortTooLow,
+    /// Aborted under the landing motor.
+    AbortUnderThrust,
+    NoLight,
+    NoSeparation,
+    /// A disarmed vehicle lifts off.
+    Uncommanded,
+    /// The booster parts. No fin opens, no parachute, and no motor lights.
+    Ballistic,
+    /// Nothing happens any more after the lift-off, as with a dead flight computer.
+    BallisticWithBooster,
+    /// The booster without its own parachute: along its axis or tumbling across it, whichever carries it farther.
+    Booster,
+}
+
+impl Way {
+    pub const ALL: [Self; 12] = [
+        Self::AsPlanned,
+        Self::AbortInAscent,
+        Self::ParachuteFromApogee,
+        Self::AbortInDescent,
+        Self::AbortTooLow,
+        Self::AbortUnderThrust,
+        Self::NoLight,
+        Self::NoSeparation,
+        Self::Uncommanded,
+        Self::Ballistic,
+        Self::BallisticWithBooster,
+        Self::Booster,
+    ];
+
+    /// The ways that a mission's flights can end.
+    pub fn of(mission: &Mission) -> Vec<Self> {
+        let start = mission.start.at;
+        Self::ALL
+            .into_iter()
+            .filter(|way| match way {
+                Self::AbortInAscent
+                | Self::NoSeparation
+                | Self::Uncommanded
+                | Self::BallisticWithBooster
+                | Self::Booster => start == StartPoint::Pad,
+                Self::ParachuteFromApogee => start == StartPoint::Apogee,
+                _ => true,
+            })
+            .collect()
+    }
+
+    /// The words of a table.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::AsPlanned => "as planned",
+            Self::AbortInAscent => "aborted in boost, coast",
+            Self::ParachuteFromApogee => "parachute from apogee",
+            Self::AbortInDescent => "aborted in the descent",
+            Self::AbortTooLow => "aborted below commit",
+            Self::AbortUnderThrust => "aborted under thrust",
+            Self::NoLight => "landing motor not lit",
+            Self::NoSeparation => "booster stays on",
+            Self::Uncommanded => "uncommanded lift-off",
+            Self::Ballistic => "ballistic",
+            Self::BallisticWithBooster => "ballistic, with booster",
+            Self::Booster => "spent booster, ballistic",
+        }
+    }
+
+    /// The faults that make a flight end so; `None` for what happens to the flight as planned.
+    fn faults(self) -> Option<&'static [&'static str]> {
+        match self {
+            Self::NoLight => Some(&["no-light@0"]),
+            Self::NoSeparation => Some(&["separation-fails@0"]),
+            Self::Ballistic => Some(&[
+                "no-light@0",
+                "parachute-fails@0",
+                "fin-stuck:0@0",
+                "fin-stuck:1@0",
+                "fin-stuck:2@0",
+                "fin-stuck:3@0",
+            ]),
+            Self::BallisticWithBooster => Some(&["separation-fails@0", "parachute-fails@0"]),
+            _ => None,
+        }
+    }
+
+    /// What a flight as planned tells of it is told at apogee.
+    fn is_over_at_apogee(self) -> bool {
+        matches!(self, Self::AbortInAscent | Self::ParachuteFromApogee | Self::Booster)
+    }
+
+    /// The abort of a flight at this moment would end it so.
+    fn aborts(self, phase: Phase, effect: AbortEffect) -> bool {
+        match self {
+            Self::AbortInAscent => effect == AbortEffect::ChuteAtApogee,
+            Self::ParachuteFromApogee => phase == Phase::Deploy,
+            Self::AbortInDescent => effect == AbortEffect::ChuteNow,
+            Self::AbortTooLow => {
+                let falls = matches!(phase, Phase::Deploy | Phase::AeroDescent | Phase::LandArmed);
+                falls && matches!(effect, AbortEffect::Burn | AbortEffect::Impact { .. })
+            }
+            Self::AbortUnderThrust => {
+                phase == Phase::Powered
+                    && matches!(effect, AbortEffect::LandInPlace | AbortEffect::LandUpright)
+            }
+            _ => false,
+        }
+    }
+}
+
+/// Where a flight came down.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Impact {
+    pub way: Way,
+    /// Number of the flight.
+    pub number: u64,
+    /// Place from the pad, m along world x and y; `None` if it was still in the air after a quarter of an hour.
+    pub place_m: Option<[f64; 2]>,
+    /// Where the wind of this flight blows to, from world x towards y.
+    pub downwind_rad: f64,
+    pub landing: Landing,
+    pub course: Course,
+}
+
+/// What else a flight tells that people on the ground ask for.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Course {
+    /// Greatest height of the centre of gravity above the pad, m.
+    pub highest_m: f64,
+    /// Speed at the end of the rail, m/s; of a flight that is looked at from its rail on.
+    pub rail_m_s: Option<f64>,
+    /// Lowest height of the feet in the fall from which an abort would still have opened the parachute, m.
+    pub chute_down_to_m: Option<f64>,
+    /// Height of the feet when the landing motor got its current, m.
+    pub lit_at_m: Option<f64>,
+    /// From the ejection of the parachute to the ground, s.
+    pub canopy_s: Option<f64>,
+    /// It does not stand at the end: it tipped over, or its body struck the ground.
+    pub lies: bool,
+    /// Where the stack stood, m, and its speed a frame ago, m/s, while it is on its rail.
+    on_rail: Option<(Vector3<f64>, f64)>,
+}
+
+impl Course {
+    fn note(&mut self, flight: &Sortie) {
+        let (world, computer) = (flight.world(), flight.computer());
+        let (state, phase) = (world.state(), computer.mode().phase);
+        self.highest_m = self.highest_m.max(state.position_m.z);
+        self.lies = world.rest().is_some_and(|rest| rest.outcome != RestOutcome::Upright);
+        let ejected_s = world.parachute_ejected_s();
+        let down_s = world.touchdown().map(|touchdown| touchdown.time_s);
+        self.canopy_s = down_s.zip(ejected_s).map(|(down_s, ejected_s)| down_s - ejected_s);
+        if world.thrust_begins_s().is_some() {
+            self.lit_at_m.get_or_insert(world.height_m());
+        }
+        if !phase.before_apogee() && computer.abort_effect() == AbortEffect::ChuteNow {
+            self.chute_down_to_m = Some(world.height_m());
+        }
+        if let Some(launch) = flight.mission().launched().filter(|_| world.booster_attached()) {
+            let speed_m_s = libm::sqrt(state.velocity_m_s.norm_squared());
+            let (stood_m, last_m_s) = *self.on_rail.get_or_insert((state.position_m, speed_m_s));
+            let travelled_m = libm::sqrt((state.position_m - stood_m).norm_squared());
+            if travelled_m < launch.rail.length_m {
+                self.on_rail = Some((stood_m, speed_m_s));
+            } else {
+                self.rail_m_s.get_or_insert(last_m_s);
+            }
+        }
+    }
+}
+
+impl Impact {
+    /// Distance from the pad, m.
+    pub fn distance_m(&self) -> f64 {
+        self.place_m.map_or(f64::INFINITY, |[x_m, y_m]| libm::hypot(x_m, y_m))
+    }
+
+    /// Place from the pad, m downwind and, left of that, across the wind.
+    pub fn in_wind_m(&self) -> Option<[f64; 2]> {
+        let [x_m, y_m] = self.place_m?;
+        let (sin, cos) = libm::sincos(self.downwind_rad);
+        Some([x_m * cos + y_m * sin, y_m * cos - x_m * sin])
+    }
+}
+
+/// A radius about the pad, m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Radius {
+    pub flights: usize,
+    /// The least radius that holds 99 % of these flights.
+    pub holds_m: f64,
+    /// Ends of the 95 % interval of the radius that holds 99 % of all flights there could be. Fewer than 368 flights have
+    /// no upper end.
+    pub low_m: f64,
+    pub high_m: Option<f64>,
+    pub farthest_m: f64,
+}
+
+impl Radius {
+    /// The radius of distances, m; `None` without any. The ends are order statistics: how many of n flights come down inside
+    /// the true radius is binomial (W. J. Conover, Practical Nonparametric Statistics, section 3.2), for any
+    /// distribution of the distances.
+    pub fn of(mut distances_m: Vec<f64>) -> Option<Self> {
+        distances_m.sort_by(f64::total_cmp);
+        let (flights, farthest_m) = (distances_m.len(), *distances_m.last()?);
+        let inside = Binomial::new(HELD, flights as u64).ok()?;
+        // The k-th nearest is beyond the true radius with the probability that fewer than k are inside of it.
+        let fewer_than = |k: usize| k.checked_sub(1).map_or(0.0, |most| inside.cdf(most as u64));
+        let lowest = (1..=flights).rev().find(|k| fewer_than(*k) <= TAIL);
+        let highest = (1..=flights).find(|k| fewer_than(*k) >= 1.0 - TAIL);
+        let held = libm::ceil(HELD * flights as f64 - 1e-9) as usize;
+        Some(Self {
+            flights,
+            holds_m: distances_m[held.max(1) - 1],
+            low_m: lowest.map_or(0.0, |k| distances_m[k - 1]),
+            high_m: highest.map(|k| distances_m[k - 1]),
+            farthest_m,
+        })
+    }
+
+    /// The radius of one way, of many ways' impacts.
+    pub fn of_way(impacts: &[Impact], way: Way) -> Option<Self> {
+        Self::of(impacts.iter().filter(|impact| impact.way == way).map(Impact::distance_m).collect())
+    }
+
+    /// The radius outside of which people may stand as far as these flights tell: the upper end, or the farthest.
+    pub fn outside_m(&self) -> f64 {
+        self.high_m.map_or(self.farthest_m, |high_m| high_m.max(self.holds_m))
+    }
+}
+
+/// How many flights are flown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Flights {
+    /// Of every way.
+    pub survey: u64,
+    /// Of the ways that reached nearly as far as the farthest.
+    pub of_widest: u64,
+}
+
+/// A way of which the farthest flight of the survey comes down at this share of the farthest of all is one of the widest.
+const NEARLY: f64 = 0.9;
+
+/// [`study`] of each recipe. `done` gets how many flights of all are flown, of about how many.
+///
+/// # Errors
+/// A flight cannot be set up.
+pub fn studies(
+    recipes: &[Recipe],
+    flights: Flights,
+    done: &(dyn Fn(usize, usize) + Sync),
+) -> Result<Vec<Vec<Impact>>, HazardError> {
+    let mut before = 0;
+    let of_each = recipes.iter().enumerate().map(|(place, recipe)| {
+        let left = recipes.len() - place;
+        let impacts = study(recipe, flights, &|flown, of| done(before + flown, before + left * of))?;
+        before += impacts.len();
+        Ok(impacts)
+    });
+    of_each.collect()
+}
+
+/// Flies every way of a recipe's mission, and the widest ones as often as is asked. `done` gets how many flights are flown,
+/// of how many: before the widest ways are known, of one of them.
+///
+/// # Errors
+/// A flight cannot be set up.
+pub fn study(
+    recipe: &Recipe,
+    flights: Flights,
+    done: &(dyn Fn(usize, usize) + Sync),
+) -> Result<Vec<Impact>, HazardError> {
+    let Flights { survey, of_widest } = Flights { survey: flights.survey.min(flights.of_widest), ..flights };
+    let ways = Way::of(&recipe.mission);
+    let (surveyed, more) = (survey as usize * ways.len(), (of_widest - survey) as usize);
+    let fly_some = |ways: &[Way], numbers: core::ops::Range<u64>, told: &(dyn Fn(usize) + Sync)| {
+        let numbers: Vec<u64> = numbers.collect();
+        let flown =
+            in_parallel(&numbers, |number| fly(recipe, ways, *number), &|flown| told(flown * ways.len()));
+        let flown = numbers
+            .iter()
+            .zip(flown)
+            .map(|(number, flown)| flown.map_err(|source| HazardError::Flight { number: *number, source }));
+        Ok::<_, HazardError>(flown.collect::<Result<Vec<_>, _>>()?.concat())
+    };
+    done(0, surveyed + more);
+    let mut impacts = fly_some(&ways, 0..survey, &|flown| done(flown, surveyed + more))?;
+    let farthest_m = |way: Way| Radius::of_way(&impacts, way).map_or(0.0, |radius| radius.farthest_m);
+    let widest_m = ways.iter().map(|way| farthest_m(*way)).fold(0.0, f64::max);
+    let widest: Vec<Way> = ways.into_iter().filter(|way| farthest_m(*way) >= NEARLY * widest_m).collect();
+    let of = surveyed + more * widest.len();
+    impacts.extend(fly_some(&widest, survey..of_widest, &|flown| done(surveyed + flown, of))?);
+    Ok(impacts)
+}
+
+/// The radius outside of which people may stand as far as flights tell: the widest of all ways, with its way; `None` without
+/// flights.
+pub fn widest(impacts: &[Impact]) -> Option<(Way, Radius)> {
+    let radii = Way::ALL.into_iter().filter_map(|way| Some((way, Radius::of_way(impacts, way)?)));
+    // Of ways that reach alike far the one with an upper end.
+    let key = |radius: &Radius| (radius.outside_m(), radius.high_m.is_some());
+    radii.max_by(|one, two| {
+        let ((one_m, one_ends), (two_m, two_ends)) = (key(&one.1), key(&two.1));
+        one_m.total_cmp(&two_m).then(one_ends.cmp(&two_ends))
+    })
+}
+
+/// Nobody stands within this, m: the larger one of flights and rule, rounded up to ten metres.
+pub fn keep_out_m(radius: &Radius, rule: &Rule) -> f64 {
+    10.0 * libm::ceil(radius.outside_m().max(rule.distance_m()) / 10.0)
+}
+
+/// Why there is no hazard area.
+#[derive(Debug, thiserror::Error)]
+pub enum HazardError {
+    /// A flight cannot be set up.
+    #[error("flight {number}")]
+    Flight {
+        number: u64,
+        #[source]
+        source: SetUpError,
+    },
+    /// The mission has not what its start needs.
+    #[error(transparent)]
+    Recipe(#[from] RecipeError),
+}
+
+/// Flies flight `number` of a recipe in some ways.
+///
+/// # Errors
+/// The flight cannot be set up.
+pub fn fly(recipe: &Recipe, ways: &[Way], number: u64) -> Result<Vec<Impact>, SetUpError> {
+    let mut impacts = Vec::with_capacity(ways.len());
+    let drawn = draw(&recipe.mission, &recipe.dispersion, recipe.seed, number);
+    let downwind_rad = drawn.truth.wind_towards_rad;
+    let mut add = |way: Way, (place_m, course), landing| {
+        impacts.push(Impact { way, number, place_m, downwind_rad, landing, course });
+    };
+    let (alone, beside): (Vec<Way>, Vec<Way>) =
+        ways.iter().partition(|way| way.faults().is_some() || **way == Way::Uncommanded);
+    if !beside.is_empty() {
+        let mut branches: Vec<Branch> = beside.iter().map(|way| Branch::new(*way)).collect();
+        let mut chance = Chance::of(recipe.seed ^ OF_HAZARD, number);
+        let mut flight = Sortie::new(recipe, number)?;
+        let (mut attached, mut booster) = (flight.world().booster_attached(), None);
+        let to_the_ground = beside.iter().any(|way| !way.is_over_at_apogee());
+        let planned = come_down(&mut flight, |flight| {
+            let computer = flight.computer();
+            let (phase, effect) = (computer.mode().phase, computer.abort_effect());
+            for branch in branches.iter_mut().filter(|branch| branch.way.aborts(phase, effect)) {
+                branch.take(flight, &mut chance);
+            }
+            if attached && !flight.world().booster_attached() {
+                booster = spent_booster_m(flight);
+            }
+            attached = flight.world().booster_attached();
+            to_the_ground || phase.before_apogee() || phase == Phase::Deploy
+        });
+        for branch in branches {
+            match (branch.way, branch.aborted) {
+                (Way::AsPlanned, _) => add(Way::AsPlanned, planned, flight.outcome().landing),
+                (Way::Booster, _) => {
+                    if let Some(place_m) = booster {
+                        add(Way::Booster, (Some(place_m), Course::default()), Landing::default());
+                    }
+                }
+                (way, Some(mut aborted)) => {
+                    aborted.abort();
+                    let down = come_down(&mut aborted, |_| true);
+                    add(way, down, aborted.outcome().landing);
+                }
+                // This flight had no such part.
+                (_, None) => {}
+            }
+        }
+    }
+    for way in alone {
+        let mut flight = match way.faults() {
+            Some(faults) => {
+                let faults: Vec<TimedFault> = faults.iter().filter_map(|fault| fault.parse().ok()).collect();
+                Sortie::new(&Recipe { faults, ..recipe.clone() }, number)?
+            }
+            None => uncommanded(recipe, number)?,
+        };
+        let down = come_down(&mut flight, |_| true);
+        add(way, down, flight.outcome().landing);
+    }
+    let place_of = |way: Way| ways.iter().position(|known| *known == way);
+    impacts.sort_by_key(|impact| place_of(impact.way));
+    Ok(impacts)
+}
+
+/// How the flights as planned landed.
+pub fn landed_as_planned(impacts: &[Impact]) -> Landings {
+    let planned = impacts.iter().filter(|impact| impact.way == Way::AsPlanned);
+    Landings::of(planned.map(|impact| impact.landing))
+}
+
+/// A copy of a flight, to be aborted.
+struct Branch {
+    way: Way,
+    aborted: Option<Box<Sortie>>,
+    frames: u64,
+}
+
+impl Branch {
+    fn new(way: Way) -> Self {
+        Self { way, aborted: None, frames: 0 }
+    }
+
+    /// Keeps this frame or the one that is kept, so that each is as likely (J. S. Vitter, Random Sampling with a Reservoir,
+    /// 1985). At apogee the first one stays.
+    fn take(&mut self, flight: &Sortie, chance: &mut Chance) {
+        self.frames += 1;
+        let first = self.way == Way::ParachuteFromApogee;
+        let kept = if first { self.frames == 1 } else { chance.unit() * (self.frames as f64) < 1.0 };
+        if kept {
+            self.aborted = Some(Box::new(flight.clone()));
+        }
+    }
+}
+
+/// Flies until the vehicle lies still, and looks at every frame before it is flown, which says whether to go on. Where it
+/// lies, m, and how it came there.
+fn come_down(flight: &mut Sortie, mut look: impl FnMut(&Sortie) -> bool) -> (Option<[f64; 2]>, Course) {
+    let mut course = Course::default();
+    let goes_on = |flight: &Sortie| {
+        let world = flight.world();
+        let slides = world.touchdown().is_none_or(|touchdown| world.time_s() < touchdown.time_s + SLIDES_S);
+        world.rest().is_none() && slides && world.time_s() < LONGEST_S && world.state().is_finite()
+    };
+    while goes_on(flight) && look(flight) {
+        course.note(flight);
+        if flight.computer().commands().outputs.is_on(PyroOutput::Parachute) {
+            // The computer has nothing to decide any more: its commands stay as they are.
+            let last = *flight.computer().commands();
+            flight.step();
+            if *flight.computer().commands() == last {
+                let held =
+                    Actuators { gimbal_rad: last.gimbal_rad, fins_rad: last.fins_rad, ..Actuators::NONE };
+                while goes_on(flight) {
+                    course.note(flight);
+                    flight.world_mut().advance(&held, FRAME_MS as usize);
+                }
+            }
+        } else {
+            flight.step();
+        }
+    }
+    let place_m = flight.world().state().position_m;
+    let down = flight.world().touchdown().is_some() && flight.world().state().is_finite();
+    course.note(flight);
+    (down.then_some([place_m.x, place_m.y]), course)
+}
+
+/// A vehicle that stands on its pad, disarmed, when its ascent motor lights.
+fn uncommanded(recipe: &Recipe, number: u64) -> Result<Sortie, SetUpError> {
+    /// The self-test is over by then, s.
+    const READY_S: f64 = 60.0;
+    let mut flight = Sortie::on_the_pad(recipe, number)?.without_rehearsal();
+    while flight.computer().mode().phase == Phase::Safe && flight.world().time_s() < READY_S {
+        flight.step();
+    }
+    flight.world_mut().inject(&Fault::AscentSelfLights);
+    Ok(flight)
+}
+
+/// Where the booster of a flight comes down that has just been separated, m; without a parachute, as a point mass in the mean
+/// wind. `None` without a booster.
+fn spent_booster_m(flight: &Sortie) -> Option<[f64; 2]> {
+    let (mission, world) = (flight.mission(), flight.world());
+    let booster = &mission.launch.as_ref()?.booster;
+    let (body, state) = (&mission.airframe.body, world.state());
+    let (nose, mass_kg) = (state.nose_in_world(), booster.dry_kg);
+    // The charge pushed the two apart.
+    let apart_m_s = booster.separation_impulse_n_s * (1.0 / world.mass().mass_kg + 1.0 / mass_kg);
+    let truth = world.truth();
+    let wind = Wind::new(truth.wind_m_s, truth.wind_towards_rad, 0.0, 0)
+        .over_height(truth.wind_exponent, truth.wind_veer_rad_m);
+    let along_m2 = booster.stack_drag_coefficient * body.reference_area_m2;
+    let across_m2 = body.crossflow_drag_coefficient * body.diameter_m * booster.length_m;
+    let fallen = [along_m2, across_m2].map(|drag_area_m2| {
+        let velocity_m_s = state.velocity_m_s - nose * apart_m_s;
+        fallen_m(state.position_m, velocity_m_s, drag_area_m2 / mass_kg, mission.gravity_m_s2, &wind)
+    });
+    fallen.into_iter().max_by(|one, two| libm::hypot(one[0], one[1]).total_cmp(&libm::hypot(two[0], two[1])))
+}
+
+/// Where a point mass with a drag area for each kilogram, m^2/kg, comes down, m.
+fn fallen_m(
+    mut place_m: Vector3<f64>,
+    mut velocity_m_s: Vector3<f64>,
+    drag_area_m2_kg: f64,
+    gravity_m_s2: f64,
+    wind: &Wind,
+) -> [f64; 2] {
+    const STEP_S: f64 = 0.005;
+    while place_m.z > 0.0 {
+        let air_m_s = velocity_m_s - wind.mean_m_s(place_m.z);
+        let density_kg_m3 = Air::at_height_m(place_m.z).density_kg_m3;
+        let speed_m_s = libm::sqrt(air_m_s.norm_squared());
+        let acceleration =
+            air_m_s * (-0.5 * density_kg_m3 * drag_area_m2_kg * speed_m_s) - Vector3::z() * gravity_m_s2;
+        place_m += velocity_m_s * STEP_S + acceleration * (0.5 * STEP_S * STEP_S);
+        velocity_m_s += acceleration * STEP_S;
+    }
+    [place_m.x, place_m.y]
+}
+
+/// What a national association asks for, for any result of the flights.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rule {
+    /// Least distance of people from the pad, feet.
+    pub feet: f64,
+    /// Total impulse of all motors, N s.
+    pub impulse_n_s: f64,
+    /// More than one motor.
+    pub complex: bool,
+    /// The model rocket code holds, and not that of high power.
+    pub model: bool,
+}
+
+impl Rule {
+    /// Where the distances stand.
+    pub const SOURCE: &str = "NAR High Power Rocket Safety Code (August 2012), minimum distance table; NAR Model Rocket Safety \
+        Code, rule 5; both as tabled on lunar.org/wp/?p=98";
+
+    /// The rule for a mission with all its motors. A model rocket has up to 160 N s, 125 g of propellant and 1,500 g.
+    pub fn of(mission: &Mission) -> Self {
+        let booster = mission.launched();
+        let booster = booster.map(|launch| &launch.booster);
+        let motors = || {
+            [Some(&mission.motor_curve), booster.map(|booster| &booster.motor_curve)].into_iter().flatten()
+        };
+        let impulse_n_s: f64 = motors().map(ThrustCurve::total_impulse_n_s).sum();
+        let propellant_kg: f64 = motors().map(ThrustCurve::propellant_mass_kg).sum();
+        let mass_kg = lift_off_kg(mission, mission.launched());
+        let model = impulse_n_s <= 160.0 && propellant_kg <= 0.125 && mass_kg <= 1.5;
+        let complex = booster.is_some();
+        let feet = if model {
+            if impulse_n_s <= 20.0 { 15.0 } else { 30.0 }
+        } else {
+            high_power_ft(impulse_n_s, complex)
+        };
+        Self { feet, impulse_n_s, complex, model }
+    }
+
+    /// The distance, m.
+    pub fn distance_m(&self) -> f64 {
+        0.3048 * self.feet
+    }
+}
+
+/// Mass of a mission's vehicle with its booster, if it has one, kg.
+pub fn lift_off_kg(mission: &Mission, launch: Option<&Launch>) -> f64 {
+    let booster = launch.map(|launch| &launch.booster);
+    let booster_kg = booster.map_or(0.0, |booster| booster.dry_kg + booster.motor_curve.propellant_mass_kg());
+    mission.airframe.mass.loaded_kg + booster_kg
+}
+
+/// Least distance of people by the total impulse, N s, feet.
+fn high_power_ft(impulse_n_s: f64, complex: bool) -> f64 {
+    /// Up to this impulse, N s: the distance from a rocket with one motor, and from one with more, feet.
+    const TABLE: [(f64, [f64; 2]); 6] = [
+        (1_280.0, [100.0, 200.0]),
+        (2_560.0, [200.0, 300.0]),
+        (5_120.0, [300.0, 500.0]),
+        (10_240.0, [500.0, 1_000.0]),
+        (20_480.0, [1_000.0, 1_500.0]),
+        (f64::INFINITY, [1_500.0, 2_000.0]),
+    ];
+    let row = TABLE
+        .iter()
+        .find(|(most_n_s, _)| impulse_n_s <= *most_n_s)
+        .map_or([f64::INFINITY; 2], |(_, feet)| *feet);
+    row[usize::from(complex)]
+}
+
+impl fmt::Display for Rule {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let motors = if self.complex { "two motors, a complex rocket" } else { "one motor" };
+        let code = if self.model { "model rocket" } else { "high power" };
+        write!(
+            f,
+            "{:.0} m ({:.0} ft): NAR, {code}, {:.0} N s, {motors}",
+            libm::ceil(self.distance_m()),
+            self.feet,
+            self.impulse_n_s
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 0.99^367 = 0.02501 and 0.99^368 = 0.02476: 368 flights are the fewest of which the farthest is an upper end. Of 400
+    /// flights fewer than 393 are inside with a probability of 0.0507, fewer than 392 with 0.0206.
+    #[test]
+    fn val_binomial_the_interval_of_a_radius() {
+        let distances = |count: u32| (1..=count).map(f64::from).collect::<Vec<f64>>();
+        assert_eq!(Radius::of(distances(367)).unwrap().high_m, None);
+        assert_eq!(Radius::of(distances(368)).unwrap().high_m, Some(368.0));
+        let radius = Radius::of(distances(400)).unwrap();
+        assert_eq!((radius.flights, radius.holds_m, radius.farthest_m), (400, 396.0, 400.0));
+        assert_eq!((radius.low_m, radius.high_m), (392.0, Some(400.0)));
+        assert_eq!(Radius::of(vec![]), None);
+        // A flight that never came down is inside no radius.
+        assert!(Radius::of(vec![1.0, f64::INFINITY]).unwrap().outside_m().is_infinite());
+    }
+
+    /// 80 m high at 10 m/s: sqrt(160 / 9.80665) = 4.0392 s. With much drag it drifts with the wind: 10 m/s, and a sink of
+    /// sqrt(2 * 9.80665 / 1.225) = 4.0 m/s for 1 m^2/kg.
+    #[test]
+    fn val_hand_a_point_mass_falls_and_drifts() {
+        let start_m = Vector3::new(3.0, -2.0, 80.0);
+        let calm = Wind::new(0.0, 0.0, 0.0, 0);
+        let [x_m, y_m] = fallen_m(start_m, Vector3::new(10.0, 0.0, 0.0), 0.0, 9.80665, &calm);
+        assert!((x_m - 43.39).abs() < 0.1 && (y_m + 2.0).abs() < 1e-9, "{x_m} {y_m}");
+        let even = Wind::new(10.0, 0.0, 0.0, 0).over_height(0.0, 0.0);
+        let [x_m, _] = fallen_m(start_m, Vector3::zeros(), 1.0, 9.80665, &even);
+        assert!((x_m - 203.0).abs() < 6.0, "{x_m}");
+    }
+
+    #[test]
+    fn val_nar_distances_by_impulse() {
+        for (impulse_n_s, one, several) in [
+            (160.0, 100.0, 200.0),
+            (1_280.0, 100.0, 200.0),
+            (1_280.01, 200.0, 300.0),
+            (5_000.0, 300.0, 500.0),
+            (10_000.0, 500.0, 1_000.0),
+            (20_000.0, 1_000.0, 1_500.0),
+            (40_000.0, 1_500.0, 2_000.0),
+        ] {
+            let found = [false, true].map(|complex| high_power_ft(impulse_n_s, complex));
+            assert!(
+                (found[0] - one).abs() < 1e-9 && (found[1] - several).abs() < 1e-9,
+                "{impulse_n_s} {found:?}"
+            );
+        }
+        let of = |name: &str| flight::vehicles::mission::builtin(name).unwrap().unwrap();
+        let mut mk2 = of("mk2");
+        assert_eq!((Rule::of(&mk2).feet, Rule::of(&mk2).complex), (100.0, false));
+        mk2.start.at = StartPoint::Pad;
+        assert_eq!((Rule::of(&mk2).feet, Rule::of(&mk2).complex), (200.0, true));
+        assert_eq!((Rule::of(&of("mini-f10")).feet, Rule::of(&of("mini-f10")).model), (30.0, true));
+    }
+}

@@ -1,0 +1,311 @@
+//! A campaign's directory: what its results depend on, and a row for each flight that is flown.
+//!
+//! Rows are appended as the flights end, and sorted when all are flown. A stopped campaign continues with the flights that have no
+//! whole line. A directory belongs to one campaign; another one is refused.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+use flight::vehicle::mission::LegLimits;
+use serde::{Deserialize, Serialize};
+use sha2::Digest as _;
+use sim::recipe::Recipe;
+
+use crate::files::{WriteError, write_folder};
+use crate::row::Row;
+use crate::summary::{PICTURES, Summary, pictures, to_markdown};
+
+const MANIFEST: &str = "manifest.json";
+const MISSION: &str = "mission.toml";
+const DISPERSION: &str = "dispersion.toml";
+const FLIGHTS: &str = "flights.csv";
+
+/// Everything that the results in a directory depend on.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Manifest {
+    /// Name of the mission.
+    pub mission: String,
+    /// Digest of its text.
+    pub mission_sha256: String,
+    /// Name of the dispersions.
+    pub dispersion: String,
+    /// Digest of their text.
+    pub dispersion_sha256: String,
+    pub seed: u64,
+    /// Flights of the whole campaign; they are numbered from 0.
+    pub flights: u64,
+    /// Faults, as written on a command line.
+    pub faults: Vec<String>,
+    /// The program.
+    pub build: String,
+    /// Which part of the campaign.
+    pub shard: Shard,
+}
+
+impl Manifest {
+    /// Of so many flights of a recipe; `build` names the program.
+    pub fn of(recipe: &Recipe, flights: u64, build: &str, shard: Shard) -> Self {
+        Self {
+            mission: recipe.mission.name.clone(),
+            mission_sha256: sha256(&recipe.mission_toml),
+            dispersion: recipe.dispersion_name.clone(),
+            dispersion_sha256: sha256(&recipe.dispersion_toml),
+            seed: recipe.seed,
+            flights,
+            faults: recipe.faults.iter().map(ToString::to_string).collect(),
+            build: build.to_owned(),
+            shard,
+        }
+    }
+
+    fn read(directory: &Path) -> Result<Self, StoreError> {
+        let path = directory.join(MANIFEST);
+        let text = fs::read(&path).map_err(unreadable(&path))?;
+        serde_json::from_slice(&text).map_err(|error| StoreError::content(&path, error))
+    }
+
+    /// Refuses a directory with another manifest, and names the first difference.
+    fn refuse_other(&self, directory: &Path, other: &Self) -> Result<(), StoreError> {
+        let [here, there] = [self, other].map(|manifest| serde_json::to_value(manifest).unwrap_or_default());
+        let differs = here.as_object().into_iter().flatten().find(|(key, here)| there[*key] != **here);
+        differs.map_or(Ok(()), |(key, here)| {
+            let difference = format!("its {key} is {}, this run's is {here}", there[key]);
+            Err(StoreError::OtherCampaign { path: directory.to_owned(), difference })
+        })
+    }
+}
+
+/// Part `index` of `count`, counted from 1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Shard {
+    /// The number of the part, from 1.
+    pub index: u64,
+    /// The number of parts.
+    pub count: u64,
+}
+
+impl Shard {
+    /// The whole campaign as one part.
+    pub const WHOLE: Self = Self { index: 1, count: 1 };
+
+    /// Whether a flight belongs to this part.
+    pub fn has(self, number: u64) -> bool {
+        number % self.count + 1 == self.index
+    }
+}
+
+impl core::str::FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        text.split_once('/')
+            .and_then(|(index, count)| Some(Self { index: index.parse().ok()?, count: count.parse().ok()? }))
+            .filter(|shard| (1..=shard.count).contains(&shard.index))
+            .ok_or_else(|| format!("shard `{text}` is not I/N with 1 <= I <= N"))
+    }
+}
+
+impl core::fmt::Display for Shard {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "{}/{}", self.index, self.count)
+    }
+}
+
+/// SHA-256 as lower-case hexadecimal digits.
+pub fn sha256(bytes: impl AsRef<[u8]>) -> String {
+    sha2::Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Why a directory cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum StoreError {
+    #[error("{}", path.display())]
+    Read {
+        path: PathBuf,
+        #[source]
+        source: io::Error,
+    },
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    /// A file has the wrong content.
+    #[error("{}: {message}", path.display())]
+    Content { path: PathBuf, message: String },
+    #[error("{} holds other results: {difference}; give another directory", path.display())]
+    OtherCampaign { path: PathBuf, difference: String },
+    /// A new campaign would overwrite an existing file.
+    #[error("{} already exists and belongs to no campaign; give another directory", .0.display())]
+    Foreign(PathBuf),
+    #[error("{} is in use by another process", .0.display())]
+    InUse(PathBuf),
+    #[error("flight {0} is in none of the directories; fly the missing ones first")]
+    Missing(u64),
+    #[error("{} has another result for flight {number} than a part before it", path.display())]
+    Contradiction { path: PathBuf, number: u64 },
+}
+
+impl StoreError {
+    fn content(path: &Path, error: impl ToString) -> Self {
+        Self::Content { path: path.to_owned(), message: error.to_string() }
+    }
+}
+
+fn unreadable(path: &Path) -> impl FnOnce(io::Error) -> StoreError {
+    let path = path.to_owned();
+    move |source| StoreError::Read { path, source }
+}
+
+/// A directory in use by this process.
+#[derive(Debug)]
+pub struct Store {
+    path: PathBuf,
+    manifest: Manifest,
+    /// The rows so far, by their flights' numbers, and the file that has them.
+    rows: Mutex<(BTreeMap<u64, Row>, csv::Writer<File>)>,
+    /// Locked as long as the directory is in use.
+    _lock: File,
+}
+
+impl Store {
+    /// Creates a directory for a campaign, or opens one that was created for the same campaign.
+    ///
+    /// # Errors
+    /// The directory was created for another campaign, is in use, or cannot be read or written.
+    pub fn open(path: &Path, recipe: &Recipe, manifest: Manifest) -> Result<Self, StoreError> {
+        fs::create_dir_all(path).map_err(unreadable(path))?;
+        let lock = File::create(path.join("lock")).map_err(unreadable(path))?;
+        lock.try_lock().map_err(|_held| StoreError::InUse(path.to_owned()))?;
+        if path.join(MANIFEST).exists() {
+            manifest.refuse_other(path, &Manifest::read(path)?)?;
+        } else {
+            refuse_foreign(path)?;
+            let text =
+                serde_json::to_vec_pretty(&manifest).map_err(|error| StoreError::content(path, error))?;
+            write_folder(path, vec![(MANIFEST, text)], true)?;
+        }
+        let rows = read_rows(path)?;
+        let texts = [(MISSION, &recipe.mission_toml), (DISPERSION, &recipe.dispersion_toml)];
+        let mut files = texts.map(|(name, text)| (name, text.clone().into_bytes())).to_vec();
+        files.push((FLIGHTS, to_csv(&rows)?));
+        write_folder(path, files, true)?;
+        let file = path.join(FLIGHTS);
+        let file = File::options().append(true).open(&file).map_err(unreadable(&file))?;
+        let writer = csv::WriterBuilder::new().has_headers(rows.is_empty()).from_writer(file);
+        Ok(Self { path: path.to_owned(), manifest, rows: Mutex::new((rows, writer)), _lock: lock })
+    }
+
+    /// The numbers of the flights that are not flown yet.
+    pub fn missing(&self) -> Vec<u64> {
+        let (rows, _) = &*self.rows.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_missing = |number: &u64| self.manifest.shard.has(*number) && !rows.contains_key(number);
+        (0..self.manifest.flights).filter(is_missing).collect()
+    }
+
+    /// Writes the row of a flight.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn add(&self, row: Row) -> Result<(), StoreError> {
+        let (rows, writer) = &mut *self.rows.lock().unwrap_or_else(PoisonError::into_inner);
+        let written = writer.serialize(&row).and_then(|()| Ok(writer.flush()?));
+        written.map_err(|error| StoreError::content(&self.path.join(FLIGHTS), error))?;
+        rows.insert(row.number, row);
+        Ok(())
+    }
+
+    /// Writes the rows in the order of their numbers, the summary and the pictures.
+    ///
+    /// # Errors
+    /// A file cannot be written.
+    pub fn publish(self, legs: &LegLimits) -> Result<Summary, StoreError> {
+        let (rows, _) = self.rows.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let table = to_csv(&rows)?;
+        let rows: Vec<Row> = rows.into_values().collect();
+        let summary = Summary::new(&self.manifest, &rows);
+        let json = serde_json::to_vec_pretty(&summary);
+        let json = json.map_err(|error| StoreError::content(&self.path.join("summary.json"), error))?;
+        let markdown = to_markdown(&summary).into_bytes();
+        let mut files = vec![(FLIGHTS, table), ("summary.json", json), ("summary.md", markdown)];
+        for ((name, _), picture) in PICTURES.iter().zip(pictures(&rows, legs)) {
+            let picture = picture.map_err(|error| StoreError::content(&self.path.join(name), error))?;
+            files.push((name, picture.into_bytes()));
+        }
+        write_folder(&self.path, files, true)?;
+        Ok(summary)
+    }
+}
+
+/// Refuses a directory with files of these names but without a manifest, because no campaign wrote them.
+fn refuse_foreign(directory: &Path) -> Result<(), StoreError> {
+    let pictures = PICTURES.iter().map(|(name, _)| *name);
+    let names = [MISSION, DISPERSION, FLIGHTS, "summary.json", "summary.md", "cost.json"];
+    let mut paths = names.into_iter().chain(pictures).map(|name| directory.join(name));
+    let found = paths.find(|path| path.symlink_metadata().is_ok());
+    found.map_or(Ok(()), |path| Err(StoreError::Foreign(path)))
+}
+
+/// The rows in a directory, but for a last line that was cut.
+fn read_rows(directory: &Path) -> Result<BTreeMap<u64, Row>, StoreError> {
+    let path = directory.join(FLIGHTS);
+    let bytes = match fs::read(&path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
+        read => read.map_err(unreadable(&path))?,
+    };
+    let whole = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1);
+    let rows = csv::Reader::from_reader(&bytes[..whole]).into_deserialize();
+    let rows = rows.map(|row: csv::Result<Row>| row.map(|row| (row.number, row)));
+    rows.collect::<Result<_, _>>().map_err(|error| StoreError::content(&path, error))
+}
+
+/// With a header, if there is a row.
+fn to_csv(rows: &BTreeMap<u64, Row>) -> Result<Vec<u8>, StoreError> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    let written = rows.values().try_for_each(|row| writer.serialize(row));
+    written.map_err(|error| StoreError::content(Path::new(FLIGHTS), error))?;
+    writer.into_inner().map_err(|error| StoreError::content(Path::new(FLIGHTS), error))
+}
+
+/// Merges the parts of a campaign into one directory.
+///
+/// # Errors
+/// The parts belong to different campaigns, contradict each other, or some flights are missing.
+pub fn merge(parts: &[PathBuf], out: &Path) -> Result<Summary, StoreError> {
+    let first = parts.first().ok_or(StoreError::Missing(0))?;
+    let manifest =
+        |part: &Path| Manifest::read(part).map(|manifest| Manifest { shard: Shard::WHOLE, ..manifest });
+    let whole = manifest(first)?;
+    let mut rows = BTreeMap::new();
+    for part in parts {
+        whole.refuse_other(part, &manifest(part)?)?;
+        for (number, row) in read_rows(part)? {
+            if rows.insert(number, row.clone()).is_some_and(|known| known != row) {
+                return Err(StoreError::Contradiction { path: part.clone(), number });
+            }
+        }
+    }
+    if let Some(number) = (0..whole.flights).find(|number| !rows.contains_key(number)) {
+        return Err(StoreError::Missing(number));
+    }
+    let read = |name: &str| {
+        let path = first.join(name);
+        fs::read_to_string(&path).map_err(unreadable(&path))
+    };
+    let (mission, dispersion) = (read(MISSION)?, read(DISPERSION)?);
+    let recipe = Recipe::from_texts((MISSION, &mission), (&whole.dispersion, &dispersion));
+    let recipe = recipe.map_err(|error| StoreError::content(first, error))?;
+    let store = Store::open(out, &recipe, whole)?;
+    rows.into_values().try_for_each(|row| store.add(row))?;
+    store.publish(&recipe.mission.leg_limits)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn val_fips_180_4_abc() {
+        assert_eq!(sha256("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+    }
+}

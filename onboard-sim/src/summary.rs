@@ -1,0 +1,443 @@
+//! The summary of a campaign, as data, plain text and Markdown, and its pictures.
+//!
+//! It does not depend on a clock, a thread or a machine, so it is the same however the campaign was run.
+
+use core::cmp::Reverse;
+use core::fmt::{self, Write};
+use std::collections::BTreeMap;
+
+use flight::rules::verdict::Landing;
+use flight::vehicle::mission::LegLimits;
+use serde::Serialize;
+
+use crate::attainable::{Window, best_height_m};
+use crate::figure::{Bar, FigureError, Places, PlacesPanel, bars_svg, places_svg};
+use crate::row::{COLUMNS, Row};
+use crate::statistics::{Landings, Share, quantile, rank_correlation, sorted};
+use crate::store::{Manifest, Shard};
+
+/// Columns whose percentiles are in the summary.
+const TOLD: [&str; 14] = [
+    "touchdown_vertical_m_s",
+    "touchdown_lateral_m_s",
+    "touchdown_tilt_deg",
+    "touchdown_rate_deg_s",
+    "leg_use",
+    "chosen_onset_height_m",
+    "onset_height_m",
+    "burn_time_at_contact_s",
+    "gimbal_saturation_share",
+    "error_vertical_m_s",
+    "error_lateral_m_s",
+    "error_height_m",
+    "error_nose_deg",
+    "flight_time_s",
+];
+
+/// A campaign's summary.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Summary {
+    /// The manifest of the campaign.
+    pub manifest: Manifest,
+    /// How the flights landed.
+    #[serde(flatten)]
+    pub landings: Landings,
+    /// What perfect information lands; `None` if it lands no flight.
+    pub attainable: Option<Attainable>,
+    /// Why the others did not, the most frequent reason first.
+    pub failures: Vec<Failures>,
+    /// Ignitions while a check of the gate failed. This must be zero.
+    pub ignitions_outside_gate: u64,
+    /// Plans by control level, and the work of the solver.
+    pub plans: Plans,
+    pub distributions: Vec<Distribution>,
+    /// Drawn quantities, beginning with the one that costs most landings.
+    pub sensitivity: Vec<Sensitivity>,
+}
+
+/// What perfect information lands, with one command height for all flights (see [`crate::attainable`]).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Attainable {
+    /// Height of the feet at the command from which it lands most flights, m.
+    pub command_height_m: f64,
+    /// Flights that it lands.
+    pub attainable: Share,
+    /// Of these, the flights that stand undamaged.
+    pub landed: Share,
+    /// Flights that landed although they are not attainable from that height. Their controller chose another height for
+    /// each flight.
+    pub landed_from_another_height: u64,
+    /// Flights that landed although they are not attainable from any height. The bound leaves out wind and place, so
+    /// there can be a few.
+    pub landed_beyond: u64,
+}
+
+impl Attainable {
+    fn of(rows: &[Row]) -> Option<Self> {
+        let windows: Vec<Window> = rows.iter().filter_map(Row::attainable).collect();
+        let (command_height_m, _) = best_height_m(&windows)?;
+        let is = |row: &Row| row.attainable().is_some_and(|window| window.contains(command_height_m));
+        let count = |is: &dyn Fn(&Row) -> bool| rows.iter().filter(|row| is(row)).count() as u64;
+        let attainable = count(&is);
+        Some(Self {
+            command_height_m,
+            attainable: Share::new(attainable, rows.len() as u64),
+            landed: Share::new(count(&|row| row.stands && is(row)), attainable),
+            landed_from_another_height: count(&|row| row.stands && !is(row) && row.attainable().is_some()),
+            landed_beyond: count(&|row| row.stands && row.attainable().is_none()),
+        })
+    }
+}
+
+/// A reason and the number of flights with it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Failures {
+    pub reason: String,
+    /// The number of flights.
+    pub flights: u64,
+}
+
+/// All flights' plans.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct Plans {
+    pub converged: u64,
+    pub best_feasible: u64,
+    /// The previous plan, shifted.
+    pub shifted: u64,
+    pub stabiliser: u64,
+    pub solver_iterations: u64,
+    /// Solves that did not converge.
+    pub solver_failures: u64,
+}
+
+/// Percentiles of a column.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Distribution {
+    /// The column, with its unit.
+    pub column: &'static str,
+    /// Flights that have a value.
+    pub flights: u64,
+    pub least: f64,
+    /// 5th percentile.
+    pub p5: f64,
+    /// 25th percentile.
+    pub p25: f64,
+    /// Median.
+    pub p50: f64,
+    /// 75th percentile.
+    pub p75: f64,
+    /// 95th percentile.
+    pub p95: f64,
+    /// 99th percentile.
+    pub p99: f64,
+    pub greatest: f64,
+}
+
+/// How many landings a drawn quantity costs.
+///
+/// A flight's deviation is the distance of its draw from the nominal value, or the draw itself where more is worse
+/// (wind, distance and motion at apogee). The median deviation divides the flights into an inner and an outer half.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Sensitivity {
+    /// The quantity, with its unit.
+    pub column: &'static str,
+    pub median_deviation: f64,
+    /// Fraction of the inner half that stands undamaged.
+    pub inner: Share,
+    /// The same fraction of the outer half.
+    pub outer: Share,
+    /// Spearman's rank correlation between the deviation and the largest fraction of the legs' design envelope used at contact.
+    pub rank_correlation: f64,
+}
+
+impl Sensitivity {
+    /// How much smaller the fraction of landings is in the outer half than in the inner half.
+    pub fn cost(&self) -> f64 {
+        self.inner.share - self.outer.share
+    }
+
+    /// The 95 % interval of the cost: Newcombe's, from the Wilson intervals of both halves (Statistics in Medicine 17, 873-890,
+    /// method 10).
+    pub fn cost_interval(&self) -> [f64; 2] {
+        let Self { inner, outer, .. } = self;
+        let down = libm::hypot(inner.share - inner.low, outer.high - outer.share);
+        let up = libm::hypot(inner.high - inner.share, outer.share - outer.low);
+        [self.cost() - down, self.cost() + up]
+    }
+}
+
+impl Summary {
+    /// The summary of rows in any order.
+    pub fn new(manifest: &Manifest, rows: &[Row]) -> Self {
+        let count = |is: fn(&Row) -> bool| rows.iter().filter(|row| is(row)).count() as u64;
+        let sum = |read: fn(&Row) -> u64| rows.iter().map(read).sum();
+        Self {
+            manifest: manifest.clone(),
+            landings: Landings::of(rows.iter().map(Row::landing)),
+            attainable: Attainable::of(rows),
+            failures: failures(rows),
+            ignitions_outside_gate: count(|row| row.ignition_outside_gate),
+            plans: Plans {
+                converged: sum(|row| row.plans_converged),
+                best_feasible: sum(|row| row.plans_best_feasible),
+                shifted: sum(|row| row.plans_shifted),
+                stabiliser: sum(|row| row.plans_stabiliser),
+                solver_iterations: sum(|row| row.solver_iterations),
+                solver_failures: sum(|row| row.solver_failures),
+            },
+            distributions: TOLD.iter().filter_map(|name| distribution(rows, name)).collect(),
+            sensitivity: sensitivity(rows),
+        }
+    }
+}
+
+pub(crate) fn failures(rows: &[Row]) -> Vec<Failures> {
+    let mut found = BTreeMap::new();
+    for row in rows.iter().filter(|row| !row.failure.is_empty()) {
+        *found.entry(&row.failure).or_default() += 1;
+    }
+    let found = found.into_iter().map(|(reason, flights)| Failures { reason: reason.clone(), flights });
+    let mut found: Vec<Failures> = found.collect();
+    found.sort_by_key(|failures| Reverse(failures.flights));
+    found
+}
+
+/// The numbers in a column.
+pub(crate) fn numbers<'a>(rows: &'a [Row], name: &str) -> impl Iterator<Item = f64> + use<'a> {
+    let column = COLUMNS.iter().find(|column| column.name == name);
+    rows.iter().filter_map(move |row| (column?.value)(row).as_f64())
+}
+
+fn distribution(rows: &[Row], name: &'static str) -> Option<Distribution> {
+    let values = sorted(numbers(rows, name));
+    let at = |share| quantile(&values, share);
+    Some(Distribution {
+        column: name,
+        flights: values.len() as u64,
+        least: at(0.0)?,
+        p5: at(0.05)?,
+        p25: at(0.25)?,
+        p50: at(0.5)?,
+        p75: at(0.75)?,
+        p95: at(0.95)?,
+        p99: at(0.99)?,
+        greatest: at(1.0)?,
+    })
+}
+
+fn sensitivity(rows: &[Row]) -> Vec<Sensitivity> {
+    let to = |(name, nominal): &(&'static str, Option<f64>)| {
+        let drawn = numbers(rows, name);
+        sensitivity_to(
+            rows,
+            name,
+            drawn.map(|value| nominal.map_or(value, |nominal| (value - nominal).abs())),
+        )
+    };
+    let mut found: Vec<Sensitivity> = Row::DRAWN.iter().filter_map(to).collect();
+    found.sort_by(|one, two| {
+        let cost = two.cost().total_cmp(&one.cost());
+        cost.then_with(|| two.rank_correlation.total_cmp(&one.rank_correlation))
+    });
+    found
+}
+
+/// `None` for a quantity that does not vary.
+fn sensitivity_to(
+    rows: &[Row],
+    column: &'static str,
+    deviations: impl Iterator<Item = f64>,
+) -> Option<Sensitivity> {
+    let flights: Vec<(f64, &Row)> = deviations.zip(rows).collect();
+    let order = sorted(flights.iter().map(|(deviation, _)| *deviation));
+    let median = quantile(&order, 0.5)?;
+    if order.first()?.to_bits() == order.last()?.to_bits() {
+        return None;
+    }
+    let half = |outer: bool| {
+        let mine = || flights.iter().filter(|(deviation, _)| (*deviation > median) == outer);
+        Share::new(mine().filter(|(_, row)| row.stands).count() as u64, mine().count() as u64)
+    };
+    let pairs: Vec<_> =
+        flights.iter().filter_map(|(deviation, row)| Some((*deviation, row.leg_use?))).collect();
+    Some(Sensitivity {
+        column,
+        median_deviation: median,
+        inner: half(false),
+        outer: half(true),
+        rank_correlation: rank_correlation(&pairs),
+    })
+}
+
+/// The summary as plain text.
+pub fn to_text(summary: &Summary) -> String {
+    let mut out = String::new();
+    // Writing to a String cannot fail.
+    let _ = write_text(summary, &mut out);
+    out
+}
+
+/// The summary as Markdown: its text, and links to the pictures in the same directory.
+pub fn to_markdown(summary: &Summary) -> String {
+    let pictures = PICTURES.map(|(name, title)| format!("![{title}]({name})\n")).concat();
+    let Manifest { mission, build, .. } = &summary.manifest;
+    format!("# {mission}\n\nProgram `{build}`.\n\n```\n{}```\n\n## Pictures\n\n{pictures}", to_text(summary))
+}
+
+/// What attainable means.
+const ATTAINABLE: &str = "attainable: perfect information lands it with the legs. The command height
+is the same for all flights; once the thrust begins, motor, mass and drag are
+known, and fins and tilt are a throttle. Wind, place and attitude are left out";
+
+fn what(manifest: &Manifest) -> String {
+    let mut what =
+        format!("{}, dispersion {}, seed {}", manifest.mission, manifest.dispersion, manifest.seed);
+    if manifest.shard != Shard::WHOLE {
+        what = format!("{what}, shard {}", manifest.shard);
+    }
+    if !manifest.faults.is_empty() {
+        what = format!("{what}, faults {}", manifest.faults.join(" "));
+    }
+    what
+}
+
+/// What fits into 80 columns; the summary has the other percentiles.
+fn write_distributions(summary: &Summary, out: &mut String) -> fmt::Result {
+    let heading = ["least", "5 %", "50 %", "95 %", "greatest"];
+    writeln!(out, "{:<30}{}", "", heading.map(|name| format!("{name:>10}")).concat())?;
+    summary.distributions.iter().try_for_each(|found| {
+        let Distribution { column, least, p5, p50, p95, greatest, .. } = found;
+        writeln!(out, "{column:<30}{least:>10.3}{p5:>10.3}{p50:>10.3}{p95:>10.3}{greatest:>10.3}")
+    })
+}
+
+/// The quantities whose cost the number of flights can tell from nothing.
+fn write_sensitivities(summary: &Summary, out: &mut String) -> fmt::Result {
+    let Summary { sensitivity, landings, .. } = summary;
+    let told = || sensitivity.iter().filter(|found| found.cost_interval()[0] > 0.0);
+    if told().next().is_none() {
+        return writeln!(out, "\nwhat costs landings: {} flights do not tell", landings.stands.of);
+    }
+    writeln!(
+        out,
+        "\nwhat costs landings, with 95 % intervals: the half nearest the nominal value (of\nwind and the state at apogee the \
+         lower half) against the other half. Of {} quantities\none in forty stands here by chance",
+        sensitivity.len()
+    )?;
+    let heading = ["deviation", "inner %", "outer %", "cost %", "from %", "to %"];
+    writeln!(out, "{:<30}{}", "", heading.map(|name| format!("{name:>8}")).concat())?;
+    told().try_for_each(|found| {
+        let [low, high] = found.cost_interval();
+        let percents = [found.inner.share, found.outer.share, found.cost(), low, high];
+        let percents = percents.map(|share| format!("{:>8.1}", 100.0 * share)).concat();
+        writeln!(out, "{:<30}{:>8.4}{percents}", found.column, found.median_deviation)
+    })
+}
+
+fn write_text(summary: &Summary, out: &mut String) -> fmt::Result {
+    let Landings { stands, envelope, .. } = &summary.landings;
+    let (of, inside) = (stands.of, envelope.count);
+    writeln!(
+        out,
+        "{} of {of} flights stand undamaged, {inside} touch down inside their envelope.",
+        stands.count
+    )?;
+    writeln!(out, "{}", what(&summary.manifest))?;
+    for (word, share) in Landing::WORDS.iter().zip(summary.landings.shares()) {
+        writeln!(out, "{word:<38}  {share}")?;
+    }
+    if let Some(attainable) = &summary.attainable {
+        let Attainable { command_height_m, attainable, landed, landed_from_another_height, landed_beyond } =
+            attainable;
+        writeln!(out, "attainable, ignition command at {command_height_m:.1} m  {attainable}")?;
+        write!(out, "landed of attainable  {landed}")?;
+        if landed_from_another_height + landed_beyond > 0 {
+            write!(
+                out,
+                "; besides, {landed_from_another_height} landed from another height, and {landed_beyond} beyond what is attainable"
+            )?;
+        }
+        writeln!(out, "\n({ATTAINABLE})")?;
+    }
+    writeln!(out, "ignitions outside the gate: {}", summary.ignitions_outside_gate)?;
+    if !summary.failures.is_empty() {
+        writeln!(out, "\nwhy not:")?;
+        for failure in &summary.failures {
+            writeln!(out, "{:>6}  {}", failure.flights, failure.reason)?;
+        }
+    }
+    let Plans { converged, best_feasible, shifted, stabiliser, solver_iterations, solver_failures } =
+        summary.plans;
+    writeln!(
+        out,
+        "\nplans: {converged} converged, {best_feasible} best feasible, {shifted} shifted, {stabiliser} upright law;\n\
+         {solver_iterations} iterations, {solver_failures} solves not converged\n"
+    )?;
+    write_distributions(summary, out)?;
+    write_sensitivities(summary, out)
+}
+
+/// Bars of a histogram.
+const BARS: usize = 40;
+/// Values beyond this fraction at each end go into the last bar, so that one crash does not hide the rest.
+const TAIL_SHARE: f64 = 0.005;
+
+/// File names and titles of the pictures.
+pub const PICTURES: [(&str, &str); 4] = [
+    ("touchdown.svg", "Where they touched down"),
+    ("vertical-speed.svg", "Vertical speed at contact"),
+    ("ignition-height.svg", "Height at the first thrust"),
+    ("tilt.svg", "Tilt at contact"),
+];
+
+/// Every picture, in the order of [`PICTURES`].
+pub fn pictures(rows: &[Row], legs: &LegLimits) -> [Result<String, FigureError>; 4] {
+    let [scatter, speed, height, tilt] = PICTURES.map(|(_, title)| title);
+    let places = |is: fn(&Row) -> bool| {
+        let rows = rows.iter().filter(|row| is(row));
+        rows.filter_map(|row| Some([row.touchdown_x_m?, row.touchdown_y_m?])).collect()
+    };
+    let touchdowns = PlacesPanel {
+        title: String::new(),
+        places: vec![
+            places(|row| !row.stands),
+            places(|row| row.stands && !row.envelope),
+            places(|row| row.stands && row.envelope),
+        ],
+        radii_m: Vec::new(),
+    };
+    let touchdowns = Places {
+        labels: ["world x, m from the pad", "world y, m from the pad"],
+        kinds: &["damaged", "stands, outside the envelope", "stands, inside"],
+        radii: &[],
+        arrow: None,
+        panels: &[touchdowns],
+    };
+    let values = |column| sorted(numbers(rows, column).map(f64::abs));
+    [
+        places_svg(scatter, &touchdowns),
+        histogram(&values("touchdown_vertical_m_s"), speed, "vertical speed, m/s", Some(legs.vertical_m_s)),
+        histogram(&values("onset_height_m"), height, "height of the feet, m", None),
+        histogram(&values("touchdown_tilt_deg"), tilt, "tilt, degrees", Some(legs.tilt_deg)),
+    ]
+}
+
+fn histogram(values: &[f64], title: &str, label: &str, limit: Option<f64>) -> Result<String, FigureError> {
+    let tail = libm::floor(TAIL_SHARE * values.len() as f64) as usize;
+    let mark = limit.map(|limit| ("design envelope of the legs", limit));
+    let (Some(from), Some(to)) = (values.get(tail), values.iter().rev().nth(tail)) else {
+        return bars_svg(&format!("{title}: no flight has one"), [label, "flights"], &[], mark);
+    };
+    let width = if to > from { (to - from) / BARS as f64 } else { 1.0 };
+    let mut counts = [0_u32; BARS];
+    for value in values {
+        let place = (value.clamp(*from, *to) - from) / width;
+        counts[(place as usize).min(BARS - 1)] += 1;
+    }
+    let bar = |(place, count): (usize, &u32)| {
+        let left = from + width * place as f64;
+        ([left, left + width], f64::from(*count))
+    };
+    let bars: Vec<Bar> = counts.iter().enumerate().filter(|(_, count)| **count > 0).map(bar).collect();
+    bars_svg(title, [label, "flights"], &bars, mark)
+}

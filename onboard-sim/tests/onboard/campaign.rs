@@ -1,0 +1,150 @@
+//! A campaign's results do not depend on how it was run.
+#![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
+
+use std::fs;
+use std::path::Path;
+
+use flight::rules::verdict::Landing;
+use onboard_sim::row::Row;
+use onboard_sim::run::{run, threads};
+use onboard_sim::store::{Manifest, Shard, Store, StoreError, merge};
+use onboard_sim::summary::PICTURES;
+use sim::dispersion;
+use sim::recipe::Recipe;
+
+const FLIGHTS: u64 = 13;
+
+/// Flights from a low height, which are quick to simulate.
+fn recipe(seed: u64) -> Recipe {
+    let (name, text) = flight::vehicles::mission::BUILTIN[0];
+    let low = text.replace("height_m = 300.0", "height_m = 60.0");
+    Recipe { seed, ..Recipe::from_texts((name, &low), dispersion::BUILTIN[2]).unwrap() }
+}
+
+fn open(out: &Path, recipe: &Recipe, build: &str, shard: Shard) -> Result<Store, StoreError> {
+    Store::open(out, recipe, Manifest::of(recipe, FLIGHTS, build, shard))
+}
+
+/// How many flights were flown.
+fn fly(recipe: &Recipe, shard: Shard, jobs: usize, out: &Path) -> u64 {
+    let store = open(out, recipe, "test", shard).unwrap();
+    let flown = threads(Some(jobs)).unwrap().install(|| run(recipe, &store, &|_| ()).unwrap().flown);
+    store.publish(&recipe.mission.leg_limits).unwrap();
+    flown
+}
+
+fn assert_same(one: &Path, two: &Path) {
+    let pictures = PICTURES.iter().map(|(name, _)| *name);
+    for file in ["flights.csv", "summary.json", "summary.md"].into_iter().chain(pictures) {
+        assert!(fs::read(one.join(file)).unwrap() == fs::read(two.join(file)).unwrap(), "{file} differs");
+    }
+}
+
+#[test]
+fn the_results_do_not_depend_on_threads_shards_or_a_stop() {
+    let root = tempfile::tempdir().unwrap();
+    let at = |name: &str| root.path().join(name);
+    let recipe = recipe(1);
+    assert_eq!(fly(&recipe, Shard::WHOLE, 1, &at("one")), FLIGHTS);
+    assert_eq!(fly(&recipe, Shard::WHOLE, 3, &at("killed")), FLIGHTS);
+    assert_same(&at("one"), &at("killed"));
+
+    let parts = [at("part-1"), at("part-2")];
+    let shards = (1..=2).map(|index| Shard { index, count: 2 });
+    let flown: u64 = shards.zip(&parts).map(|(shard, part)| fly(&recipe, shard, 1, part)).sum();
+    assert_eq!(flown, FLIGHTS);
+    merge(&parts, &at("merged")).unwrap();
+    assert_same(&at("one"), &at("merged"));
+
+    // As a killed campaign leaves it: some flights in the order in which they ended, and a part of a line.
+    let csv = fs::read_to_string(at("one").join("flights.csv")).unwrap();
+    let lines: Vec<&str> = csv.split_inclusive('\n').collect();
+    let cut = lines[4].trim_end();
+    fs::write(at("killed").join("flights.csv"), [lines[0], lines[8], lines[3], cut].concat()).unwrap();
+    assert_eq!(fly(&recipe, Shard::WHOLE, 2, &at("killed")), FLIGHTS - 2);
+    assert_same(&at("one"), &at("killed"));
+    assert_eq!(fly(&recipe, Shard::WHOLE, 2, &at("killed")), 0);
+
+    let error = merge(&parts[..1], &at("half")).unwrap_err();
+    assert_eq!(error.to_string(), "flight 1 is in none of the directories; fly the missing ones first");
+    fly(&self::recipe(2), Shard { index: 2, count: 2 }, 1, &at("other"));
+    let error = merge(&[at("part-1"), at("other")], &at("both")).unwrap_err().to_string();
+    assert!(error.ends_with("its seed is 2, this run's is 1; give another directory"), "{error}");
+    let forged = csv.replace(",true,", ",false,");
+    fs::write(at("part-1").join("flights.csv"), forged).unwrap();
+    let error = merge(&[at("one"), at("part-1")], &at("forged")).unwrap_err();
+    assert!(matches!(error, StoreError::Contradiction { number: 0, .. }), "{error}");
+
+    read_them(&at("one"));
+}
+
+/// The formats that other programs read.
+fn read_them(out: &Path) {
+    let rows = csv::Reader::from_path(out.join("flights.csv")).unwrap().into_deserialize();
+    let rows: Vec<Row> = rows.collect::<Result<_, _>>().unwrap();
+    assert!(rows.iter().map(|row| row.number).eq(0..FLIGHTS));
+    assert!(rows.iter().all(|row| row.touchdown_vertical_m_s.is_some_and(f64::is_finite)));
+    let summary: serde_json::Value =
+        serde_json::from_slice(&fs::read(out.join("summary.json")).unwrap()).unwrap();
+    for word in Landing::COLUMNS {
+        assert_eq!(summary[word]["of"], FLIGHTS, "{word}");
+    }
+    assert_eq!(summary["attainable"]["attainable"]["of"], FLIGHTS);
+    assert_eq!(summary["attainable"]["landed"]["of"], summary["attainable"]["attainable"]["count"]);
+    for (file, title) in PICTURES {
+        let text = fs::read_to_string(out.join(file)).unwrap();
+        let picture = roxmltree::Document::parse(&text).unwrap();
+        assert!(picture.root_element().attribute("width").is_some(), "{file}");
+        assert!(picture.descendants().any(|node| node.text().map(str::trim) == Some(title)), "{file}");
+        assert!(!text.contains("NaN") && !text.contains("inf"), "{file}");
+    }
+}
+
+#[test]
+fn a_directory_of_another_campaign_or_in_use_is_refused_with_the_reason() {
+    let root = tempfile::tempdir().unwrap();
+    let own = recipe(1);
+    let store = open(root.path(), &own, "test", Shard::WHOLE).unwrap();
+    let again = open(root.path(), &own, "test", Shard::WHOLE).unwrap_err();
+    assert!(matches!(again, StoreError::InUse { .. }), "{again}");
+    drop(store);
+    let half = Shard { index: 1, count: 2 };
+    for (recipe, build, shard, difference) in [
+        (&recipe(2), "test", Shard::WHOLE, "its seed is 1, this run's is 2"),
+        (&own, "other", Shard::WHOLE, "its build is \"test\", this run's is \"other\""),
+        (&own, "test", half, r#"its shard is {"count":1,"index":1}, this run's is {"count":2,"index":1}"#),
+    ] {
+        let error = open(root.path(), recipe, build, shard).unwrap_err().to_string();
+        let holds = format!("{} holds other results: {difference}", root.path().display());
+        assert_eq!(error, format!("{holds}; give another directory"));
+    }
+    let mut heavier = own.clone();
+    heavier.mission_toml.push('\n');
+    let error = open(root.path(), &heavier, "test", Shard::WHOLE).unwrap_err().to_string();
+    assert!(error.contains("its mission_sha256 is "), "{error}");
+}
+
+/// A directory with files of the same names from another program.
+#[test]
+fn files_that_no_campaign_wrote_are_never_overwritten() {
+    for name in ["mission.toml", "flights.csv", "summary.md", PICTURES[0].0] {
+        let root = tempfile::tempdir().unwrap();
+        let path = root.path().join(name);
+        fs::write(&path, "notes").unwrap();
+        let refused = open(root.path(), &recipe(1), "test", Shard::WHOLE);
+        assert!(matches!(refused, Err(StoreError::Foreign(_))), "{name}");
+        assert_eq!(fs::read_to_string(&path).unwrap(), "notes", "{name}");
+    }
+}
+
+#[test]
+fn a_flight_is_in_one_shard() {
+    let shards: Vec<Shard> = ["1/3", "2/3", "3/3"].iter().map(|text| text.parse().unwrap()).collect();
+    for number in 0..20 {
+        assert_eq!(shards.iter().filter(|shard| shard.has(number)).count(), 1);
+    }
+    for wrong in ["", "0/2", "3/2", "1", "a/b", "1/0"] {
+        let error = wrong.parse::<Shard>().unwrap_err();
+        assert_eq!(error, format!("shard `{wrong}` is not I/N with 1 <= I <= N"));
+    }
+}
