@@ -21,8 +21,7 @@ use crate::cli::{Answer, Outcome, give};
 use crate::log::{Clock, ClockTime, Entry, FlightLog, LogError, Moment};
 use crate::output::{Destination, Overwrite, WriteError};
 use crate::print::counted;
-use crate::recover::scan::Records;
-use crate::recover::write::{Kept, Rescue};
+use crate::recover::{Kept, Records, Rescue};
 
 /// A record of these says nothing without those before it.
 const CHAINED: [&str; 4] = [TOPIC_COMPUTER_START, TOPIC_COMPUTER_FRAME, TOPIC_BOOK, TOPIC_BOOK_HEAD];

@@ -322,42 +322,32 @@ impl EvaluatedFrame {
 /// Every frame of an evaluation as CSV.
 fn csv_of(report: &EvaluateReport) -> Result<String> {
     let mut csv = csv::Writer::from_writer(Vec::new());
-    let angles = |name: &str, angles: &[f64]| -> Vec<String> {
-        // A single angle has no index in its name.
-        if angles.len() == 1 {
-            vec![name.to_owned()]
-        } else {
-            (0..angles.len()).map(|k| format!("{name}_{k}")).collect()
-        }
-    };
-    let mut columns = vec!["frame".to_owned(), "time_s".to_owned()];
-    for (side, Decided { gimbal_rad, fins_rad, .. }) in report
-        .frames
-        .first()
-        .into_iter()
-        .flat_map(|first| [("recorded", &first.recorded), ("evaluated", &first.evaluated)])
+    for (place, EvaluatedFrame { frame, time_s, recorded, evaluated, .. }) in report.frames.iter().enumerate()
     {
-        columns.extend(["phase", "level", "cost", "iterations"].map(|name| format!("{side}_{name}")));
-        columns.extend(angles(&format!("{side}_gimbal_rad"), gimbal_rad));
-        columns.extend((0..fins_rad.len()).map(|fin| format!("{side}_fins_rad_{fin}")));
-    }
-    csv.write_record(columns)?;
-    for frame in &report.frames {
-        let mut cells = vec![frame.frame.to_string(), format!("{:?}", frame.time_s)];
-        for Decided { gimbal_rad, fins_rad, phase, level, cost, iterations, .. } in
-            [&frame.recorded, &frame.evaluated]
-        {
-            cells.extend([
-                (*phase).to_owned(),
-                (*level).to_owned(),
-                format!("{cost:?}"),
-                iterations.to_string(),
-            ]);
-            cells.extend(gimbal_rad.iter().chain(fins_rad).map(|angle| format!("{angle:?}")));
+        if place == 0 {
+            let frame = ["frame", "time_s"].map(str::to_owned).to_vec();
+            csv.write_record([frame, recorded.columns("recorded"), evaluated.columns("evaluated")].concat())?;
         }
-        csv.write_record(cells)?;
+        let frame = vec![frame.to_string(), format!("{time_s:?}")];
+        csv.write_record([frame, recorded.cells(), evaluated.cells()].concat())?;
     }
     Ok(String::from_utf8(csv.into_inner()?)?)
+}
+
+impl Decided {
+    fn columns(&self, side: &str) -> Vec<String> {
+        let words = ["phase", "level", "cost", "iterations"].map(|name| format!("{side}_{name}"));
+        let gimbal = (0..self.gimbal_rad.len()).map(|axis| format!("{side}_gimbal_rad_{axis}"));
+        let fins = (0..self.fins_rad.len()).map(|fin| format!("{side}_fins_rad_{fin}"));
+        words.into_iter().chain(gimbal).chain(fins).collect()
+    }
+
+    fn cells(&self) -> Vec<String> {
+        let Self { gimbal_rad, fins_rad, phase, level, cost, iterations, .. } = self;
+        let words = [(*phase).to_owned(), (*level).to_owned(), format!("{cost:?}"), iterations.to_string()];
+        let angles = gimbal_rad.iter().chain(fins_rad).map(|angle| format!("{angle:?}"));
+        words.into_iter().chain(angles).collect()
+    }
 }
 
 fn yes_no(answer: Option<bool>) -> &'static str {

@@ -136,21 +136,6 @@ fn collect_leaves(prefix: &str, table: &toml::Table, take: &mut impl FnMut(Strin
     }
 }
 
-/// Puts a value at a path and creates the sections on the way.
-fn insert(table: &mut toml::Table, path: &str, value: toml::Value) {
-    match path.split_once('.') {
-        None => {
-            table.insert(path.to_owned(), value);
-        }
-        Some((section, rest)) => {
-            let inner = table.entry(section).or_insert_with(|| toml::Value::Table(toml::Table::new()));
-            if let toml::Value::Table(inner) = inner {
-                insert(inner, rest, value);
-            }
-        }
-    }
-}
-
 /// The section of the random draw.
 const TRUTH: &str = "truth.";
 
@@ -215,7 +200,7 @@ pub fn truth_with(truth: &Truth, settings: &[Setting]) -> Result<Truth, SettingE
     let of_truth =
         settings.iter().filter_map(|setting| Some((setting.path.strip_prefix(TRUTH)?, &setting.value)));
     for (key, value) in of_truth {
-        insert(&mut table, key, value.clone());
+        table.insert(key.to_owned(), value.clone());
     }
     table.try_into().map_err(|error: toml::de::Error| {
         let known = recorded.keys().map(|key| format!("{TRUTH}{key}")).collect();

@@ -15,14 +15,15 @@ use serde::Serialize;
 use time::OffsetDateTime;
 use time::format_description::well_known::Rfc3339;
 
-use crate::cli::{Answer, Outcome, give, say, warn_of_cut, warn_of_damage};
+use crate::cli::{Answer, Outcome, give_each, warn_of_cut, warn_of_damage};
 use crate::cut::CUT_FROM;
 use crate::findings::{self, FindingFacts};
 use crate::log::{
     AttachmentFacts, BuildComparison, Clocks, Cut, Entry, FlightLog, Head, LogError, Recording, StampedEntry,
-    SummaryFacts, VerdictFacts, VerdictLimit, summary_of,
+    VerdictFacts, VerdictLimit,
 };
 use crate::print::counted;
+use crate::recover::{SummaryFacts, summary_of};
 
 /// Describes a log file.
 ///
@@ -597,28 +598,15 @@ pub(crate) struct Args {
 
 impl Args {
     pub(crate) fn run(self) -> Result<Outcome> {
-        let (mut described, mut refused) = (Vec::new(), false);
-        for file in &self.files {
-            match description(file) {
-                Ok(info) => described.push(info),
-                Err(error) if self.files.len() == 1 => return Err(error.into()),
-                // One unreadable log must not hide the others.
-                Err(error) => {
-                    refused = true;
-                    say(&format!("{:#}", anyhow::Error::from(error)));
-                }
-            }
-        }
-        match described.as_slice() {
-            [only] if self.files.len() == 1 => give(only, self.json)?,
-            _ => give(&described, self.json)?,
-        };
-        // On a terminal the description has said it already.
+        // On a terminal the description says it already.
         let said = !self.json && std::io::stdout().is_terminal();
-        for info in described.iter().filter(|_| !said) {
-            info.completeness.warn(&info.file);
-        }
-        Ok(if refused { Outcome::NotAll } else { Outcome::Given })
+        give_each(&self.files, self.json, |file| {
+            let info = description(file)?;
+            if !said {
+                info.completeness.warn(&info.file);
+            }
+            Ok(vec![info])
+        })
     }
 }
 

@@ -12,15 +12,14 @@ mod tlog;
 mod verdict;
 
 use std::fs::File;
-use std::io::{BufReader, Chain, Cursor, Read, Seek as _, SeekFrom};
+use std::io::{BufReader, Chain, Cursor, Read};
 use std::path::Path;
 
 pub use clocks::{Clock, ClockTime, Clocks, Moment, MomentError};
 use flights::InFlight;
 pub use flights::{Cut, Flights, FrameOrder, Gap, LoggedFlight};
 pub use head::{AttachmentFacts, BuildComparison, BuildDifference, Head};
-use mcap::records::{Record as McapRecord, op};
-use protocol::log::reader::{Damage, LogChannel, LogItem, LogReader, parse_record};
+use protocol::log::reader::{Damage, LogChannel, LogItem, LogReader};
 use protocol::log::record::{TOPIC_COMPUTER_FRAME, TOPIC_RAW_RX, TOPIC_TELEMETRY, TOPIC_VERDICT};
 use protocol::text::printable;
 pub use record::{Entry, LoggedFrame, StampedEntry};
@@ -39,9 +38,6 @@ const BUFFER_BYTES: usize = 1 << 20;
 
 /// A record may come this long after later ones, ns: writers of several threads do so. Beyond it, a log is not in order.
 pub(crate) const IN_ORDER_NS: u64 = 1_000_000_000;
-
-/// The summary of a log of many hours has some megabytes.
-const SUMMARY_LIMIT_BYTES: u64 = 64 << 20;
 
 /// A log being read.
 pub struct FlightLog<R: Read> {
@@ -327,61 +323,4 @@ fn listed(topics: &[String]) -> String {
         shown.push(format!("{} more", topics.len() - TOPICS_SHOWN));
     }
     format!("the topics {}", shown.join(", "))
-}
-
-/// Facts from a file's summary.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct SummaryFacts {
-    /// Frames of the flight computer in the file.
-    pub frames: u64,
-    /// Time of the last message, ns since the Unix epoch.
-    pub last_log_time_ns: u64,
-}
-
-/// Reads the summary at the end of a file, if possible.
-pub fn summary_of(path: &Path) -> Option<SummaryFacts> {
-    let section = summary_section(path)?;
-    let (mut frame_channels, mut stats) = (Vec::new(), None);
-    let mut rest = section.as_slice();
-    while let Some((opcode, behind)) = rest.split_first()
-        && let Some((length, behind)) = behind.split_first_chunk()
-    {
-        let (body, behind) = behind.split_at_checked(usize::try_from(u64::from_le_bytes(*length)).ok()?)?;
-        match parse_record(*opcode, body).ok()? {
-            McapRecord::Channel(channel) if channel.topic == TOPIC_COMPUTER_FRAME => {
-                frame_channels.push(channel.id);
-            }
-            McapRecord::Statistics(found) => stats = Some(found),
-            // A hole in a file is an endless row of such records.
-            McapRecord::Unknown { opcode: 0, .. } => return None,
-            _ => {}
-        }
-        rest = behind;
-    }
-    let stats = stats?;
-    let counts = stats.channel_message_counts.iter().filter(|(id, _)| frame_channels.contains(id));
-    Some(SummaryFacts {
-        frames: counts.map(|(_, count)| *count).fold(0, u64::saturating_add),
-        last_log_time_ns: stats.message_end_time,
-    })
-}
-
-/// The bytes between the end mark of the data and the footer; `None` if there are none, or more than any log has.
-fn summary_section(path: &Path) -> Option<Vec<u8>> {
-    /// The footer with its head, and the magic.
-    const END_BYTES: usize = 9 + 20 + 8;
-    let mut file = File::open(path).ok()?;
-    let end = file.metadata().ok()?.len().checked_sub(END_BYTES as u64)?;
-    file.seek(SeekFrom::Start(end)).ok()?;
-    let mut footer = [0; END_BYTES];
-    file.read_exact(&mut footer).ok()?;
-    if footer[0] != op::FOOTER || !footer.ends_with(&MCAP_MAGIC) {
-        return None;
-    }
-    let start = u64::from_le_bytes(*footer.get(9..)?.first_chunk()?);
-    let length = end.checked_sub(start).filter(|length| start > 0 && *length <= SUMMARY_LIMIT_BYTES)?;
-    file.seek(SeekFrom::Start(start)).ok()?;
-    let mut section = vec![0; usize::try_from(length).ok()?];
-    file.read_exact(&mut section).ok()?;
-    Some(section)
 }

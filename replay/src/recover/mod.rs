@@ -5,8 +5,8 @@
 //! the summary is whole. The report lists what is lost, and so does the recovered log itself ([`METADATA_RECOVERY`]). Nothing is
 //! invented: a message is kept unchanged or not at all. A log that is not in order of time is sorted.
 
-pub(crate) mod scan;
-pub(crate) mod write;
+mod scan;
+mod write;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -14,9 +14,11 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use mcap::records::Metadata;
 use protocol::log::record::{METADATA_RECOVERY, RECOVERY_FAULT_ENTRY};
-use scan::{ChunkName, Contents, Good, Records};
+pub(crate) use scan::Records;
+use scan::{ChunkName, Contents, Good};
+pub use scan::{SummaryFacts, summary_of};
 use serde::Serialize;
-use write::Rescue;
+pub(crate) use write::{Kept, Rescue};
 
 use crate::cli::{Answer, Outcome, give};
 use crate::log::{IN_ORDER_NS, LogError, is_tlog};
@@ -88,11 +90,6 @@ pub struct Recovery {
 }
 
 impl Recovery {
-    /// Whether the log was whole.
-    pub fn was_whole(&self) -> bool {
-        self.fault().is_none()
-    }
-
     /// What the recovered log says of itself.
     fn about(&self) -> Metadata {
         let lost = self.lost.iter().map(|lost| {
@@ -168,7 +165,8 @@ pub fn recover<'a>(input: &Path, output: impl Into<Destination<'a>>) -> Result<R
     recovery.records_about = kept.records_about;
     recovery.undecodable = kept.undecodable;
     recovery.kept_s = Some(last_ns.saturating_sub(first_ns) as f64 / 1e9);
-    recovery.messages_lost = contents.told.messages.map(|told| told.saturating_sub(kept.messages));
+    let told = contents.told.statistics.as_ref();
+    recovery.messages_lost = told.map(|told| told.message_count.saturating_sub(kept.messages));
     // With every message kept, a chunk that is not there is one whose head was changed.
     let all = recovery.messages_lost == Some(0);
     let missing = if all { Vec::new() } else { missing_chunks(&contents.told.chunks, &contents.good) };

@@ -15,8 +15,9 @@ use super::{FlightPlace, Obstacle, Verification, VerifyReport};
 use crate::controller::LoggedComputer;
 use crate::log::{
     Cut, Entry, FlightLog, FrameOrder, Gap, Head, LogError, LoggedFrame, Recording, StampedEntry,
-    VerdictFacts, misread_frame, summary_of,
+    VerdictFacts, misread_frame,
 };
+use crate::recover::summary_of;
 use crate::refly::{ReflyOptions, refly};
 
 /// One flight being verified.

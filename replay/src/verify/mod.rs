@@ -41,7 +41,7 @@ use protocol::log::reader::Damage;
 use protocol::log::record::{SCHEMA_VERSION, TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START, TOPIC_VERDICT};
 use serde::Serialize;
 
-use crate::cli::{Answer, Outcome, give, say, warn_of_cut, warn_of_damage};
+use crate::cli::{Answer, Outcome, give_each, say, warn_of_cut, warn_of_damage};
 use crate::controller::FrameError;
 use crate::log::{
     BuildComparison, Cut, Entry, FlightLog, Gap, Head, LogError, LoggedFlight, Recording, VerdictFacts,
@@ -494,34 +494,19 @@ impl Args {
         for file in &self.files {
             if file.is_dir() { files.extend(baseline::logs_of(file)?) } else { files.push(file.clone()) }
         }
-        let (mut reports, mut outcome) = (Vec::new(), Outcome::Given);
-        for file in &files {
+        give_each(&files, self.json, |file| {
             #[expect(clippy::disallowed_methods, reason = "tells the user how fast it was; decides nothing")]
             let started = Instant::now();
-            match if self.strict { verify_strictly(file) } else { verify(file) } {
-                Ok(found) => {
-                    let took = started.elapsed();
-                    for report in &found {
-                        warn_of_damage(&report.file, report.damage.as_deref());
-                        warn_of_cut(&report.file, report.cut.as_ref());
-                        warn_of_build(report);
-                    }
-                    say_speed(&found, took);
-                    reports.extend(found);
-                }
-                Err(error) if files.len() == 1 => return Err(error.into()),
-                // One unreadable log must not hide the results of the others.
-                Err(error) => {
-                    say(&format!("{:#}", anyhow::Error::from(error)));
-                    outcome = Outcome::NotAll;
-                }
+            let found = if self.strict { verify_strictly(file)? } else { verify(file)? };
+            let took = started.elapsed();
+            for report in &found {
+                warn_of_damage(&report.file, report.damage.as_deref());
+                warn_of_cut(&report.file, report.cut.as_ref());
+                warn_of_build(report);
             }
-        }
-        let given = match reports.as_slice() {
-            [report] if files.len() == 1 => give(report, self.json)?,
-            _ => give(&reports, self.json)?,
-        };
-        Ok(given.or_worse(outcome))
+            say_speed(&found, took);
+            Ok(found)
+        })
     }
 }
 
