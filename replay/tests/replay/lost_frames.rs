@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 
 use replay::evaluate::evaluate;
 use replay::info::{GradeLevel, info};
-use replay::log::{Gap, Recording};
+use replay::log::{Gap, Recording, RecordingError};
 use replay::recover::recover;
 use replay::refly::{ReflyOptions, refly};
 use replay::report::report;
@@ -103,6 +103,6 @@ fn without_its_first_frames_nothing_is_run_again() {
     let mut recording = Recording::open(&LANDED.log).unwrap();
     recording.frames.drain(..100);
     recording.frames_unbroken = 0;
-    let refusal = evaluate(&recording, &[]).unwrap_err().to_string();
-    assert!(refusal.contains("begins with frame 101"), "{refusal}");
+    let refusal = recording.replayable_frames().unwrap_err();
+    assert!(matches!(refusal, RecordingError::BeginningLost { first: 101, .. }), "{refusal}");
 }
