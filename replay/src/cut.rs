@@ -19,7 +19,7 @@ use serde::Serialize;
 
 use crate::cli::{Answer, Outcome, give};
 use crate::log::{Clock, ClockTime, Entry, FlightLog, LogError, Moment};
-use crate::output::{Destination, Overwrite, WriteError};
+use crate::output::{Destination, WriteError};
 use crate::print::counted;
 use crate::recover::{Kept, Records, Rescue};
 
@@ -239,7 +239,7 @@ pub(crate) struct Args {
 
 impl Args {
     pub(crate) fn run(self) -> Result<Outcome> {
-        let destination = Destination { path: &self.output, overwrite: Overwrite::if_forced(self.force) };
+        let destination = Destination { path: &self.output, force: self.force };
         let wanted = Wanted { from: self.from, until: self.until, topics: self.topics };
         give(&cut(&self.file, &wanted, destination)?, self.json)
     }

@@ -106,43 +106,28 @@ impl EvaluateReport {
     }
 }
 
-/// Every frame, and how many of them this build decides differently with nothing changed.
-type Evaluated = (Vec<EvaluatedFrame>, usize);
-
-/// Evaluates a recorded flight under other settings.
+/// Evaluates a recorded flight under other settings: two flight computers run on every frame. The recorded decision comes from
+/// the record; what the record leaves out (cost and iterations of a plan) comes from `then`, which runs with the recorded
+/// settings.
 ///
 /// # Errors
 /// See [`EvaluateError`].
 pub fn evaluate(recording: &Recording, settings: &[Setting]) -> Result<EvaluateReport, EvaluateError> {
-    let frames = side_by_side(recording, settings)?;
-    let last_s = frames.0.last().map_or(0.0, |frame| frame.time_s);
-    match settings.iter().find(|setting| setting.at_s.is_some_and(|at_s| at_s > last_s)) {
-        None => Ok(summarise(recording, settings, frames)),
-        Some(late) => {
-            let name = &recording.name;
-            let why = format!("takes effect after the end of {name}, whose last frame is at T+{last_s:.3} s");
-            Err(EvaluateError::Refused { setting: late.to_string(), why })
-        }
-    }
-}
-
-/// Runs two flight computers on every frame. The recorded decision comes from the record; what the record leaves out
-/// (cost and iterations of a plan) comes from `then`, which runs with the recorded settings.
-fn side_by_side(recording: &Recording, settings: &[Setting]) -> Result<Evaluated, EvaluateError> {
-    let (start, frames) = recording.replayable_frames()?;
+    let (start, recorded) = recording.replayable_frames()?;
     let toml = recording.profile_toml()?;
     let run = &recording.head.run;
     let mut then = LoggedComputer::recorded(toml, start, run, &[])?;
-    refuse(settings, then.pilot().mission().estimator.frame_s)?;
+    let last_s = recorded.last().map_or(0.0, |frame| frame.input.time_s);
+    refuse(settings, &recording.name, then.pilot().mission().estimator.frame_s, last_s)?;
     let mut now = LoggedComputer::recorded(toml, start, run, settings)?;
-    let mut evaluated = Vec::with_capacity(frames.len());
+    let mut frames = Vec::with_capacity(recorded.len());
     let mut unchanged_different = 0;
-    for frame in frames {
+    for frame in recorded {
         let unchanged = then.run_again(frame)?;
         let again = now.run_again(frame)?;
         let recorded = then.decided(frame);
         unchanged_different += usize::from(then.decided(&unchanged) != recorded);
-        evaluated.push(EvaluatedFrame {
+        frames.push(EvaluatedFrame {
             frame: recording.release_frame + frame.input.frame,
             time_s: frame.input.time_s,
             phase: phase_name(&frame.output),
@@ -150,23 +135,25 @@ fn side_by_side(recording: &Recording, settings: &[Setting]) -> Result<Evaluated
             evaluated: now.decided(&again),
         });
     }
-    Ok((evaluated, unchanged_different))
+    Ok(summarise(recording, settings, frames, unchanged_different))
 }
 
 /// Refuses settings that the flight computer does not have, or that cannot change on recorded inputs.
-fn refuse(settings: &[Setting], recorded_s: f64) -> Result<(), EvaluateError> {
+fn refuse(settings: &[Setting], name: &str, recorded_s: f64, last_s: f64) -> Result<(), EvaluateError> {
     let why_not = |Setting { path, at_s, .. }: &Setting| {
-        if NOT_THE_PILOTS.iter().any(|section| path.starts_with(section)) {
-            let words = "not a setting of the controller: on recorded inputs it changes nothing; use refly to fly with it";
-            Some(words.to_owned())
+        let why = if NOT_THE_PILOTS.iter().any(|section| path.starts_with(section)) {
+            "not a setting of the controller: on recorded inputs it changes nothing; use refly to fly with it"
+                .to_owned()
         } else if path == FRAME {
-            Some(format!("cannot be changed on recorded inputs: there is one input every {recorded_s} s"))
+            format!("cannot be changed on recorded inputs: there is one input every {recorded_s} s")
         } else if at_s.is_some() && path.starts_with("estimator.") {
-            let words = "the estimator's configuration holds from the beginning and cannot change in flight";
-            Some(words.to_owned())
+            "the estimator's configuration holds from the beginning and cannot change in flight".to_owned()
+        } else if at_s.is_some_and(|at_s| at_s > last_s) {
+            format!("takes effect after the end of {name}, whose last frame is at T+{last_s:.3} s")
         } else {
-            None
-        }
+            return None;
+        };
+        Some(why)
     };
     match settings.iter().find_map(|setting| Some((setting, why_not(setting)?))) {
         None => Ok(()),
@@ -182,39 +169,30 @@ fn apart_rad(a: &[f64], b: &[f64]) -> f64 {
 fn summarise(
     recording: &Recording,
     settings: &[Setting],
-    (frames, unchanged_different): Evaluated,
+    frames: Vec<EvaluatedFrame>,
+    unchanged_different: usize,
 ) -> EvaluateReport {
-    let difference_rad =
-        |frame: &EvaluatedFrame| apart_rad(&frame.recorded.gimbal_rad, &frame.evaluated.gimbal_rad);
-    let landing: Vec<&EvaluatedFrame> = frames
-        .iter()
-        .filter(|frame| matches!(frame.phase, "LAND_ARMED" | "IGNITION" | "POWERED" | "TOUCHDOWN"))
-        .collect();
-    let squares: f64 = landing.iter().map(|frame| difference_rad(frame) * difference_rad(frame)).sum();
-    let largest = frames.iter().max_by(|a, b| difference_rad(a).total_cmp(&difference_rad(b)));
-    let count =
-        |differs: &dyn Fn(&EvaluatedFrame) -> bool| frames.iter().filter(|frame| differs(frame)).count();
-    let bits = |angles: &[f64]| angles.iter().map(|angle| angle.to_bits()).collect::<Vec<_>>();
+    let apart = |frame: &EvaluatedFrame| apart_rad(&frame.recorded.gimbal_rad, &frame.evaluated.gimbal_rad);
+    let lands = |phase: &str| matches!(phase, "LAND_ARMED" | "IGNITION" | "POWERED" | "TOUCHDOWN");
+    let landing: Vec<f64> = frames.iter().filter(|frame| lands(frame.phase)).map(apart).collect();
+    let squares: f64 = landing.iter().map(|apart_rad| apart_rad * apart_rad).sum();
+    let largest = frames.iter().max_by(|a, b| apart(a).total_cmp(&apart(b)));
+    let count = |differs: &dyn Fn(&Decided, &Decided) -> bool| {
+        frames.iter().filter(|frame| differs(&frame.recorded, &frame.evaluated)).count()
+    };
+    let bits = |decided: &Decided| decided.gimbal_rad.iter().map(|angle| angle.to_bits()).collect::<Vec<_>>();
     let fins_rad = |frame: &EvaluatedFrame| apart_rad(&frame.recorded.fins_rad, &frame.evaluated.fins_rad);
     EvaluateReport {
         kind: "open loop: the controller alone on recorded inputs",
         file: recording.name.clone(),
         settings: settings.iter().map(ToString::to_string).collect(),
         unchanged_different,
-        commands_different: count(&|frame| {
-            bits(&frame.recorded.gimbal_rad) != bits(&frame.evaluated.gimbal_rad)
-        }),
-        gimbal_difference_rms_rad: if landing.is_empty() {
-            0.0
-        } else {
-            libm::sqrt(squares / landing.len() as f64)
-        },
-        gimbal_difference_max_rad: largest.map_or(0.0, difference_rad),
-        gimbal_difference_max_frame: largest
-            .filter(|frame| difference_rad(frame) > 0.0)
-            .map(|frame| frame.frame),
+        commands_different: count(&|recorded, evaluated| bits(recorded) != bits(evaluated)),
+        gimbal_difference_rms_rad: libm::sqrt(squares / landing.len().max(1) as f64),
+        gimbal_difference_max_rad: largest.map_or(0.0, apart),
+        gimbal_difference_max_frame: largest.filter(|frame| apart(frame) > 0.0).map(|frame| frame.frame),
         fins_difference_max_rad: frames.iter().map(fins_rad).fold(0.0, f64::max),
-        levels_different: count(&|frame| frame.recorded.level != frame.evaluated.level),
+        levels_different: count(&|recorded, evaluated| recorded.level != evaluated.level),
         phases: phases(&frames),
         frames_compared: frames.len(),
         frames,

@@ -118,18 +118,15 @@ impl Tolerances {
         let mut failures = Vec::new();
         for Flown { name, damage, cut, out_of_order, .. } in flights {
             if *out_of_order > 0 {
-                failures
-                    .push(format!("{name}: {out_of_order} numbers are out of order and were not compared"));
+                let words = format!("{name}: {out_of_order} numbers are out of order and were not compared");
+                failures.push(words);
             }
-            if self.damaged {
-                continue;
-            }
+            let damage = damage.as_ref().filter(|_| !self.damaged);
             failures.extend(
-                damage
-                    .as_ref()
-                    .map(|damage| format!("{name} is damaged: {damage}; nothing after that was compared")),
+                damage.map(|damage| format!("{name} is damaged: {damage}; nothing after that was compared")),
             );
-            failures.extend(cut.as_ref().map(|cut| format!("{name} is of an INCOMPLETE flight: it {cut}")));
+            let cut = cut.as_ref().filter(|_| !self.damaged);
+            failures.extend(cut.map(|cut| format!("{name} is of an INCOMPLETE flight: it {cut}")));
         }
         failures.dedup();
         failures
@@ -140,14 +137,10 @@ impl Tolerances {
         &self,
         signals: &(impl Iterator<Item = &'a String> + Clone),
     ) -> Result<(), ToleranceError> {
-        for given in self.signals.keys() {
-            if signals.clone().any(|signal| fits(given, signal)) {
-                continue;
-            }
-            let nearest = nearest(given, signals.clone());
-            return Err(ToleranceError::Unknown { given: given.clone(), nearest });
-        }
-        Ok(())
+        let is_unknown = |given: &&String| !signals.clone().any(|signal| fits(given, signal));
+        self.signals.keys().find(is_unknown).map_or(Ok(()), |given| {
+            Err(ToleranceError::Unknown { given: given.clone(), nearest: nearest(given, signals.clone()) })
+        })
     }
 }
 

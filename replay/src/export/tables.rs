@@ -68,7 +68,7 @@ pub fn export_tables<'a, R: Read>(
     let mut whole: Vec<(ExportedFile, NewFile)> = finished.collect::<Result<_, ExportError>>()?;
     if !whole.is_empty() {
         let path = directory.path.join(DICTIONARY);
-        let destination = Destination { path: &path, overwrite: directory.overwrite };
+        let destination = Destination { path: &path, force: directory.force };
         let file = NewFile::create(destination, &input)?;
         let (written, rows) = dictionary(file, reader.shapes()).map_err(WriteError::at(&path))?;
         whole.push((ExportedFile { path, rows, columns: DICTIONARY_COLUMNS.len() }, written));
@@ -83,7 +83,7 @@ pub fn export_tables<'a, R: Read>(
 
 fn create(
     format: TableFormat,
-    Destination { path: directory, overwrite }: Destination,
+    Destination { path: directory, force }: Destination,
     input: &Path,
     shape: &TableShape,
 ) -> Result<(ExportedFile, Table), ExportError> {
@@ -94,7 +94,7 @@ fn create(
     // The directory is created with the first table, so that a file that is not a flight log leaves nothing behind.
     std::fs::create_dir_all(directory).map_err(WriteError::at(directory))?;
     let path = directory.join(format!("{}.{suffix}", shape.name));
-    let file = NewFile::create(Destination { path: &path, overwrite }, input)?;
+    let file = NewFile::create(Destination { path: &path, force }, input)?;
     let table = match format {
         TableFormat::Csv => {
             let mut csv = csv::Writer::from_writer(file);

@@ -158,7 +158,7 @@ impl Grade {
 
     /// The grade of a log whose frames can be executed again up to the first loss.
     fn of_replayable_frames(frames: &FrameFacts, mission: &str) -> Self {
-        let FrameFacts { first, last, restarts, lost, first_lost, repeated, .. } = frames;
+        let FrameFacts { first, last, lost, first_lost, repeated, .. } = frames;
         let level = GradeLevel::BitExact;
         let reason = match first_lost {
             Some(Gap { after: 0, before }) => {
@@ -175,16 +175,9 @@ impl Grade {
             None if *repeated > 0 => format!(
                 "frames {first} to {last} of the flight computer up to the first that is there twice; mission {mission}"
             ),
-            None => {
-                let restarted = match restarts {
-                    0 => String::new(),
-                    1 => ", restarted once".to_owned(),
-                    times => format!(", restarted {times} times"),
-                };
-                format!(
-                    "frames {first} to {last} of the flight computer{restarted}, its start and its mission {mission}"
-                )
-            }
+            None => format!(
+                "frames {first} to {last} of the flight computer, its start and its mission {mission}"
+            ),
         };
         Self { level, reason }
     }

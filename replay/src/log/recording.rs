@@ -187,16 +187,10 @@ impl Recording {
     }
 
     fn check_length(&self) -> Result<(), RecordingError> {
-        let kinds = [
-            ("frames of the flight computer", self.frames.len()),
-            ("timings of the flight computer", self.timings.len()),
-            ("estimates of the flight computer", self.estimates.len()),
-            ("records of the world", self.world.len()),
-            ("records of telemetry", self.telemetry.len()),
-            ("events", self.events.len()),
-        ];
-        match kinds.into_iter().find(|(_, count)| *count > RECORDS_MAX) {
-            Some((kind, _)) => Err(RecordingError::TooLong { name: self.name.clone(), kind }),
+        let Self { frames, timings, world, telemetry, events, .. } = self;
+        let lengths = [frames.len(), timings.len(), world.len(), telemetry.len(), events.len()];
+        match lengths.into_iter().max().filter(|most| *most > RECORDS_MAX) {
+            Some(_) => Err(RecordingError::TooLong { name: self.name.clone(), kind: "records of a kind" }),
             None => Ok(()),
         }
     }

@@ -38,7 +38,7 @@ use crate::cli::{Answer, Outcome, give, warn_of_what_is_missing};
 use crate::controller::{LoggedComputer, SETTINGS_IN_FLIGHT, phase_name};
 use crate::log::VerdictFacts;
 use crate::log::{Clock, ClockTime, Moment, Recording, RecordingError};
-use crate::output::{Destination, Overwrite, WriteError, write_whole};
+use crate::output::{Destination, WriteError, write_whole};
 use crate::print::{counted, verdict_table};
 use crate::settings::{Setting, SettingArguments, SettingError, mission_with, truth_with};
 use crate::worst_plans::BrokenPlan;
@@ -571,7 +571,7 @@ impl Args {
         };
         let (report, flight) = refly_flight(&recording, &options)?;
         if let Some(path) = &self.log {
-            let destination = Destination { path, overwrite: Overwrite::if_forced(self.force) };
+            let destination = Destination { path, force: self.force };
             write_log(destination, &recording, &flight)?;
         }
         give(&report, self.json)

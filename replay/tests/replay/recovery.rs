@@ -10,7 +10,7 @@ use proptest::test_runner::TestRunner;
 use protocol::log::reader::Damage;
 use replay::info::info;
 use replay::log::{FlightLog, Recording};
-use replay::output::{Destination, Overwrite};
+use replay::output::Destination;
 use replay::recover::recover;
 use replay::verify::{Verification, verify};
 
@@ -135,7 +135,7 @@ fn a_log_cut_at_any_byte_behind_its_chunks_keeps_every_message() {
         let messages = Held::read(&input).facts();
         for cut in (chunks_end..bytes.len()).step_by(step) {
             std::fs::write(&input, &bytes[..cut]).unwrap();
-            let destination = Destination { path: &output, overwrite: Overwrite::Always };
+            let destination = Destination { path: &output, force: true };
             let recovery = recover(&input, destination).unwrap();
             assert_eq!(Held::read(&output).facts(), messages, "cut at {cut}: {recovery:?}");
             assert_eq!((recovery.changed, recovery.messages_lost), (false, None), "{cut}");

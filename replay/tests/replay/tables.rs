@@ -28,13 +28,13 @@ fn flown(flight: &Simulated) -> Flown {
 fn a_flight_equals_itself_in_every_signal() {
     let a = flown(&MK2);
     let mut b = a.clone();
-    for (shift_s, align) in [(0.0, Align::Ignition), (3.0, Align::Ignition)] {
+    for shift_s in [0.0, 3.0] {
         for series in b.signals.values_mut() {
             series.times_s.iter_mut().for_each(|time_s| *time_s += shift_s);
         }
         b.ignition_s = b.ignition_s.map(|at_s| at_s + shift_s);
         let found = compare(&a, &b, &Tolerances::default()).unwrap();
-        assert_eq!((found.align, found.shift_s.to_bits()), (align, (-shift_s).to_bits()));
+        assert!(found.align == Align::Ignition && (found.shift_s + shift_s).abs() < 1e-9, "{found:?}");
         assert!(found.failures.is_empty() && found.missing.is_empty() && found.added.is_empty());
         assert!(found.signals.len() > 50 && found.signals.iter().all(|signal| signal.samples > 0));
         assert!(found.signals.iter().all(|signal| signal.max < 1e-6), "{found:?}");

@@ -9,7 +9,7 @@ use protocol::log::flight_v1;
 use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::v1;
 use protocol::log::writer::{LogHeader, LogWriter};
-use replay::output::{Destination, Overwrite};
+use replay::output::Destination;
 use sim::outside::Outside;
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
@@ -61,7 +61,7 @@ pub(crate) fn write_log(path: &Path, with_truth: bool) {
 
 /// A recording that may be replaced.
 pub(crate) fn forced(path: &Path) -> Destination<'_> {
-    Destination { path, overwrite: Overwrite::Always }
+    Destination { path, force: true }
 }
 
 /// A place in a log's third chunk, where it may be cut.
