@@ -8,6 +8,9 @@ use rerun::datatypes::{Rgba32, UVec3D, Vec3D};
 /// Number of edges of a circle.
 const SEGMENTS: u32 = 32;
 
+/// Where the nose begins, over the length.
+const NOSE_BASE: f32 = 0.78;
+
 /// Number of rings along the nose.
 const NOSE_RINGS: u8 = 8;
 
@@ -20,15 +23,13 @@ const METAL: Rgba32 = Rgba32::from_rgb(120, 126, 134);
 #[expect(clippy::struct_field_names, reason = "each name ends in its unit")]
 pub(crate) struct RocketShape {
     /// Front end of the body, m.
-    pub(crate) nose_x_m: f32,
+    nose_x_m: f32,
     /// Rear end of the body, m.
-    pub(crate) tail_x_m: f32,
-    /// Where the nozzle turns, m.
-    pub(crate) pivot_x_m: f32,
+    tail_x_m: f32,
     /// Where the feet are, m.
-    pub(crate) foot_x_m: f32,
+    foot_x_m: f32,
     /// Radius of the body, m.
-    pub(crate) radius_m: f32,
+    radius_m: f32,
 }
 
 /// Length of the nozzle's bell, in radii of the body.
@@ -42,21 +43,14 @@ impl RocketShape {
         Self {
             nose_x_m: (airframe.body.length_m - cg_station_m) as f32,
             tail_x_m: -cg_station_m as f32,
-            pivot_x_m: -cg_station_m as f32,
             foot_x_m: -airframe.above_feet_m(cg_station_m) as f32,
             radius_m: (airframe.body.diameter_m / 2.0) as f32,
         }
     }
 
-    /// For logs without this data: one metre long.
+    /// For logs without this data: one metre long, its feet clear of the bell.
     pub(crate) fn unknown() -> Self {
-        Self {
-            nose_x_m: 0.5,
-            tail_x_m: -0.5,
-            pivot_x_m: -0.5,
-            foot_x_m: below_the_bell_m(-0.5, -0.5, 0.05),
-            radius_m: 0.05,
-        }
+        Self { nose_x_m: 0.5, tail_x_m: -0.5, foot_x_m: -0.584, radius_m: 0.05 }
     }
 
     /// Length of the body, m.
@@ -65,42 +59,40 @@ impl RocketShape {
     }
 
     /// Length of the nozzle's bell, m.
-    pub(crate) fn bell_m(&self) -> f32 {
+    fn bell_m(&self) -> f32 {
         BELL_RADII * self.radius_m
     }
 
     pub(crate) fn body(&self) -> Mesh3D {
-        let nose_base_x_m = self.nose_x_m - 0.22 * self.length_m();
+        let along = |part: f32| self.tail_x_m + part * self.length_m();
         let cylinder = [
-            (self.tail_x_m, 0.0, METAL),
-            (self.tail_x_m, 1.0, WHITE),
-            (self.tail_x_m + 0.55 * self.length_m(), 1.0, WHITE),
-            (self.tail_x_m + 0.55 * self.length_m(), 1.0, BAND),
-            (self.tail_x_m + 0.62 * self.length_m(), 1.0, BAND),
-            (self.tail_x_m + 0.62 * self.length_m(), 1.0, WHITE),
-            (nose_base_x_m, 1.0, WHITE),
+            (along(0.0), 0.0, METAL),
+            (along(0.0), 1.0, WHITE),
+            (along(0.55), 1.0, WHITE),
+            (along(0.55), 1.0, BAND),
+            (along(0.62), 1.0, BAND),
+            (along(0.62), 1.0, WHITE),
+            (along(NOSE_BASE), 1.0, WHITE),
         ];
-        let nose = (1..=NOSE_RINGS).map(|ring| {
-            let along = f32::from(ring) / f32::from(NOSE_RINGS);
-            (nose_base_x_m + along * (self.nose_x_m - nose_base_x_m), (1.0 - along * along).sqrt(), BAND)
+        let nose = (0..=NOSE_RINGS).map(|ring| {
+            let part = f32::from(ring) / f32::from(NOSE_RINGS);
+            (along(NOSE_BASE + part * (1.0 - NOSE_BASE)), (1.0 - part * part).sqrt(), BAND)
         });
-        let rings: Vec<Ring> = cylinder
-            .into_iter()
-            .chain([(nose_base_x_m, 1.0, BAND)])
-            .chain(nose)
-            .map(|(x_m, part, color)| Ring { x_m, radius_m: part * self.radius_m, color })
-            .collect();
-        body_of_revolution(&rings)
+        self.of_rings(cylinder.into_iter().chain(nose))
     }
 
-    /// The bell of the nozzle, seen from its pivot.
+    /// The bell of the nozzle, at the tail.
     pub(crate) fn bell(&self) -> Mesh3D {
-        let ring = |along: f32, part: f32| Ring {
-            x_m: -along * self.bell_m(),
-            radius_m: part * self.radius_m,
-            color: METAL,
-        };
-        body_of_revolution(&[ring(1.0, 0.0), ring(1.0, 0.75), ring(0.5, 0.6), ring(0.0, 0.3), ring(0.0, 0.0)])
+        let rings = [(1.0, 0.0), (1.0, 0.75), (0.5, 0.6), (0.0, 0.3), (0.0, 0.0)];
+        self.of_rings(
+            rings.into_iter().map(|(along, part)| (self.tail_x_m - along * self.bell_m(), part, METAL)),
+        )
+    }
+
+    /// The surface through rings: place, m, radius over the body's, and colour.
+    fn of_rings(&self, rings: impl Iterator<Item = (f32, f32, Rgba32)>) -> Mesh3D {
+        let ring = |(x_m, part, color)| Ring { x_m, radius_m: part * self.radius_m, color };
+        body_of_revolution(&rings.map(ring).collect::<Vec<_>>())
     }
 
     /// Four legs from the body to the ground.
@@ -116,11 +108,6 @@ impl RocketShape {
         });
         LineStrips3D::new(strips).with_colors([METAL]).with_radii([0.1 * self.radius_m])
     }
-}
-
-/// Position of the feet of a rocket without data about its legs, m: clear of the bell.
-fn below_the_bell_m(tail_x_m: f32, pivot_x_m: f32, radius_m: f32) -> f32 {
-    tail_x_m.min(pivot_x_m) - 1.4 * BELL_RADII * radius_m
 }
 
 /// A ring about the x axis.
@@ -185,11 +172,10 @@ mod tests {
 
     #[test]
     fn its_meshes_are_sound() {
-        for shape in [RocketShape::unknown()] {
-            for mesh in [shape.body(), shape.bell()] {
-                mesh.sanity_check().unwrap();
-                assert!(mesh.num_triangles() > 100);
-            }
+        let shape = RocketShape::unknown();
+        for mesh in [shape.body(), shape.bell()] {
+            mesh.sanity_check().unwrap();
+            assert!(mesh.num_triangles() > 100);
         }
     }
 }

@@ -44,7 +44,7 @@ fn info_and_report_say_which_keys_are_not_those_of_the_standard_controller() {
         let row = "controller  not the standard one: powered.weights.theta, soft_tilt_deg\n";
         assert_eq!(said.contains(row), !is_standard, "{said}");
         assert_eq!(said.contains("not the standard one"), !is_standard, "{said}");
-        let page = replay::report::report(&log).unwrap().html;
+        let page = replay::report::report(&log, None).unwrap().html;
         let words = "Controller: not the standard one: powered.weights.theta, soft_tilt_deg.";
         assert_eq!(page.contains(words), !is_standard);
     }

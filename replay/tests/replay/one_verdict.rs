@@ -13,7 +13,7 @@ fn said_alike(log: &std::path::Path) -> String {
     let ending = info(log).unwrap().ending.unwrap();
     let (code, stdout, _) = run(&mut replay("info", log));
     assert!(code == 0 && stdout.contains(&format!("verdict     {ending}")), "{ending}: {stdout}");
-    let page = report(log).unwrap().html;
+    let page = report(log, None).unwrap().html;
     assert!(page.contains(&format!("\">{ending}</p>")), "{ending}");
     ending
 }

@@ -3,7 +3,7 @@
 use flight::vehicle::mission::StartPoint;
 use replay::log::Recording;
 use replay::refly::{ReflyOptions, print_refly, refly};
-use replay::report::{report, report_with};
+use replay::report::report;
 use replay::verify::explain::explain;
 
 use crate::flown::{FLIGHT, Recipe, WHOLE, write_log};
@@ -34,10 +34,10 @@ fn check(page: &str) {
 #[test]
 fn the_report_says_the_verdict_first_and_then_why() {
     for log in [&LANDED.log, &MK2.log, &DISPERSED.log, &WITH_FRAMES.log] {
-        says_the_verdict_first_and_then_why(&report(log).unwrap().html);
+        says_the_verdict_first_and_then_why(&report(log, None).unwrap().html);
     }
     let recipe = sim::recipe::Recipe::built_in("mk3", "none").unwrap();
-    says_the_verdict_first_and_then_why(&report(&from_apogee::fly_recipe(&recipe).log).unwrap().html);
+    says_the_verdict_first_and_then_why(&report(&from_apogee::fly_recipe(&recipe).log, None).unwrap().html);
 }
 
 fn says_the_verdict_first_and_then_why(page: &str) {
@@ -93,7 +93,7 @@ fn a_poor_log_has_a_page_that_says_what_is_missing() {
     let page_of = |name: &str, bytes: &[u8]| {
         let path = directory.path().join(name);
         std::fs::write(&path, bytes).unwrap();
-        let page = report(&path).unwrap().html;
+        let page = report(&path, None).unwrap().html;
         check(&page);
         page
     };
@@ -110,7 +110,7 @@ fn a_poor_log_has_a_page_that_says_what_is_missing() {
     assert!(page.contains("has no positions of the vehicle"));
     let path = directory.path().join("no.mcap");
     std::fs::write(&path, b"something else").unwrap();
-    assert!(report(&path).is_err());
+    assert!(report(&path, None).is_err());
 }
 
 /// A log with telemetry only, as it comes from a ground station's `.tlog`.
@@ -120,7 +120,7 @@ fn telemetry_alone_makes_a_page() {
     let open = || replay::log::FlightLog::open(&WITH_FRAMES.log);
     replay::export::export_tlog(&open, None, &tlog).unwrap();
     replay::log::import_tlog(&tlog, &log).unwrap();
-    let page = report(&log).unwrap().html;
+    let page = report(&log, None).unwrap().html;
     check(&page);
     assert!(page.contains("From the telemetry of a ground station") && page.contains("STANDS UNDAMAGED"));
 }
@@ -137,7 +137,7 @@ fn from_the_pad() -> from_apogee::Logged {
 /// From the pad: the path shows the ascent with its moments, and stays above the ground.
 #[test]
 fn the_report_of_a_flight_from_the_pad_shows_the_ascent() {
-    let page = report(&from_the_pad().log).unwrap().html;
+    let page = report(&from_the_pad().log, None).unwrap().html;
     check(&page);
     let whole = page.split("The whole flight</h2>").nth(1).unwrap();
     let whole = whole.split("<h2").next().unwrap();
@@ -160,7 +160,7 @@ fn the_report_of_a_flight_from_the_pad_shows_the_ascent() {
 #[test]
 fn errors_of_the_estimate_count_in_every_direction_and_only_in_the_air() {
     let recording = Recording::open(&LANDED.log).unwrap();
-    let page = report(&LANDED.log).unwrap().html;
+    let page = report(&LANDED.log, None).unwrap().html;
     let section = page.split("Estimator error</h2>").nth(1).unwrap().split("<h2").next().unwrap();
     for row in
         ["position north, m", "position east, m", "position, distance, m", "direction of the nose, deg"]
@@ -181,7 +181,7 @@ fn errors_of_the_estimate_count_in_every_direction_and_only_in_the_air() {
 /// Two flights in the same pictures: both are named, and every picture has a line of each.
 #[test]
 fn a_report_with_another_log_draws_both_flights() {
-    let page = report_with(&MK2.log, &DISPERSED.log).unwrap().html;
+    let page = report(&MK2.log, Some(&DISPERSED.log)).unwrap().html;
     check(&page);
     let both = page.split("<h2").find(|section| section.contains(">Two flights</h2>")).unwrap();
     for words in ["The landing from above", "Both: height, m", "Both: Gimbal yaw, deg", "STANDS UNDAMAGED"] {
@@ -190,13 +190,13 @@ fn a_report_with_another_log_draws_both_flights() {
     for figure in both.split("<figure").skip(1) {
         assert!(figure.contains("class=\"l a\"") && figure.contains("class=\"l b\""), "{figure}");
     }
-    check(&report_with(&MK2.log, &LANDED.log).unwrap().html);
+    check(&report(&MK2.log, Some(&LANDED.log)).unwrap().html);
 }
 
 /// The first screen names the cause with its number, links to where more of it stands, and says what the flight is without it.
 #[test]
 fn the_report_of_a_broken_flight_names_its_cause_first() {
-    let page = report(&from_apogee::fly(&["gimbal-jams:4@powered"]).log).unwrap().html;
+    let page = report(&from_apogee::fly(&["gimbal-jams:4@powered"]).log, None).unwrap().html;
     check(&page);
     assert!(
         page.contains(
@@ -219,7 +219,7 @@ fn the_worst_plans_are_named_alike() {
     assert!((1..=3).contains(&worst.len()) && worst.is_sorted_by(|a, b| a.price >= b.price), "{worst:?}");
     let mut text = Vec::new();
     print_refly(&flown, &mut text).unwrap();
-    let (text, page) = (String::from_utf8(text).unwrap(), report(&DISPERSED.log).unwrap().html);
+    let (text, page) = (String::from_utf8(text).unwrap(), report(&DISPERSED.log, None).unwrap().html);
     for plan in worst {
         let words = format!("frame {} (T+{:.2} s): {} at node", plan.frame, plan.time_s, plan.condition);
         assert!(page.contains(&format!("Worst: {words}")), "{words}");

@@ -1,7 +1,6 @@
 //! The estimate: what its sensors said, and how far it was from the truth; vibration.
 
 use campaign::figure::Panel;
-use flight::estimation::estimator::AidStatus;
 use flight::rules::phase::Phase;
 use flight_log::frame::phase_of;
 use flight_log::logged::state_from_log;
@@ -11,12 +10,18 @@ use protocol::log::computer_v1::ComputerFrame;
 use super::rms_and_max;
 use crate::report::chart::{Chart, line};
 use crate::report::html::{paragraph, table};
-use crate::report::track::{Flight, Part, Thought, named_aids};
+use crate::report::track::{Flight, Part, Thought};
 
 pub(super) fn aids(flight: &Flight) -> Option<String> {
-    let row =
-        |(name, aid): (&str, AidStatus)| vec![name.to_owned(), aid.used.to_string(), aid.refused.to_string()];
-    Some(table(&["measurement", "#used", "#refused"], &named_aids(flight.pilot.as_ref()?).map(row)))
+    let aids = flight.pilot.as_ref()?.estimator().aids();
+    let rows = [
+        ("barometer", aids.barometer),
+        ("GNSS velocity", aids.gnss_velocity),
+        ("GNSS position", aids.gnss_position),
+        ("lidar", aids.lidar),
+    ];
+    let rows = rows.map(|(name, aid)| vec![name.to_owned(), aid.used.to_string(), aid.refused.to_string()]);
+    Some(table(&["measurement", "#used", "#refused"], &rows))
 }
 
 /// The rows of the errors.
