@@ -2,7 +2,6 @@
 
 mod abort;
 mod architecture;
-mod board;
 mod crew;
 mod demo;
 mod download;

@@ -166,7 +166,7 @@ struct Rate {
 }
 
 fn rates() -> Vec<Rate> {
-    let text = page("onboard-sim/campaign/landing_rates.csv");
+    let text = page("onboard-sim/landing_rates.csv");
     let rows = text.lines().filter(|line| !line.starts_with('#')).skip(1);
     rows.map(|row| {
         let cells: Vec<&str> = row.split(',').collect();

@@ -17,8 +17,8 @@ const PAGES: [&str; 9] = [
     "CONTRIBUTING.md",
     "ground/README.md",
     "ground/packaging/README.md",
-    "onboard-sim/board/README.md",
-    "onboard-sim/lab/paper/benches/peers/README.md",
+    "onboard-sim/lab/cortex-m7/README.md",
+    "onboard-sim/lab/peers/README.md",
     "tests/README.md",
 ];
 
@@ -57,12 +57,12 @@ const ELSEWHERE: [(&str, &str, &str); 28] = [
     ("ground/packaging/README.md", "ground attach", "tests/first_flight.rs runs it"),
     ("ground/packaging/README.md", "ground stop", "tests/first_flight.rs runs it"),
     ("ground/packaging/README.md", "ground/packaging/build", "needs containers of Debian for two processors"),
-    ("onboard-sim/board/README.md", "onboard-sim/board/emulate", "needs QEMU and cross compilers"),
     (
-        "onboard-sim/lab/paper/benches/peers/README.md",
-        "onboard-sim/lab/paper/benches/peers/run",
-        "installs peers",
+        "onboard-sim/lab/cortex-m7/README.md",
+        "onboard-sim/lab/cortex-m7/emulate",
+        "needs QEMU and cross compilers",
     ),
+    ("onboard-sim/lab/peers/README.md", "onboard-sim/lab/peers/run", "installs peers"),
     ("tests/README.md", "cargo bench", "lasts two hours"),
 ];
 

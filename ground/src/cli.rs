@@ -10,7 +10,7 @@ use protocol::dialect::TdPhase;
 use protocol::identity::{Address, GROUND, VEHICLE};
 use protocol::transport::LinkAddress;
 use serde::Deserialize;
-use simulated_vehicle::fly::StartPoint;
+use sim::wire::fly::StartPoint;
 
 use crate::demo::Speed;
 use crate::exit;
@@ -18,7 +18,7 @@ use crate::model::words;
 use crate::view::theme::Palette;
 
 /// The profile that the demonstration flies by default.
-const DEMO_PROFILE: &str = simulated_vehicle::fly::DEFAULT_MISSION;
+const DEMO_PROFILE: &str = sim::wire::fly::DEFAULT_MISSION;
 const DEMO_SEED: u64 = 1;
 
 /// Terminal ground station for a rocket that lands on its own thrust.
@@ -68,7 +68,7 @@ pub struct ConfigArgs {
 }
 
 /// Who acts.
-#[derive(Debug, Clone, Args)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Args)]
 pub struct OperatorArgs {
     /// Who sits at this screen, for the log. Default: the user and the terminal, or the address of the SSH client.
     #[arg(long, value_name = "NAME", value_parser = NonEmptyStringValueParser::new())]
@@ -76,7 +76,7 @@ pub struct OperatorArgs {
 }
 
 /// The socket of a station.
-#[derive(Debug, Clone, Args)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Args)]
 pub struct SocketArgs {
     /// Socket between a station and its screens. Default: one socket per station; `ground status` lists them.
     #[arg(long, value_name = "PATH")]
@@ -84,7 +84,7 @@ pub struct SocketArgs {
 }
 
 /// The links to the vehicle, and whose frames they carry.
-#[derive(Debug, Clone, Args)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Args)]
 pub struct LinkArgs {
     /// Link to a vehicle: udpin:ADDRESS:PORT, udpout:HOST:PORT, tcpin:ADDRESS:PORT, tcpout:HOST:PORT or
     /// serial:DEVICE:BAUD; may be given more than once for several links to the same vehicle.
@@ -113,17 +113,14 @@ pub struct LinkArgs {
     pub operator: OperatorArgs,
 }
 
-/// What holds the links, with or without a screen.
-#[derive(Debug, Clone, Args)]
-pub struct StationArgs {
+/// The flags of a station that are keys of its settings file, too.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Parser)]
+pub struct Flags {
     #[command(flatten)]
     pub link: LinkArgs,
 
     #[command(flatten)]
     pub socket: SocketArgs,
-
-    #[command(flatten)]
-    pub config: ConfigArgs,
 
     /// The mission that the vehicle should fly (built-in name or file): arming is refused if it flies another one.
     #[arg(long, value_name = "NAME|FILE")]
@@ -144,6 +141,16 @@ pub struct StationArgs {
     /// Default: with --connect the name of the log with this extension; the demonstration writes none.
     #[arg(long, value_name = "FILE|none")]
     pub tlog: Option<LogChoice>,
+}
+
+/// What holds the links, with or without a screen.
+#[derive(Debug, Clone, Args)]
+pub struct StationArgs {
+    #[command(flatten)]
+    pub flags: Flags,
+
+    #[command(flatten)]
+    pub config: ConfigArgs,
 
     /// Demonstration: built-in mission or profile, or TOML file. Default: mk3.
     #[arg(long, value_name = "NAME|FILE", conflicts_with = "connect")]
@@ -184,7 +191,7 @@ pub enum Command {
     /// Fetch the log that the vehicle has written itself, over --connect, when it is disarmed on the ground.
     ///
     /// The log is checked, and an existing one is not overwritten. What has arrived is kept: the same command goes on with
-    /// it. In a station that holds the link, the key L does the same.
+    /// it. A station that holds a serial line has to end first.
     #[command(
         after_help = "Example: ground download --connect serial:/dev/ttyUSB0:57600 --key touchdown.key --to logs"
     )]
@@ -255,7 +262,7 @@ pub struct DownloadArgs {
 /// What can be done with the settings.
 #[derive(Debug, Clone, PartialEq, Eq, Subcommand)]
 pub enum ConfigCommand {
-    /// Check the settings and print them as a table.
+    /// Check the settings.
     #[command(after_help = "Examples:\n  ground config check\n  ground config check field.toml")]
     Check {
         /// The file. Default: the usual one.
@@ -300,21 +307,21 @@ impl StationArgs {
             start: self.start,
             seed: self.seed.unwrap_or(DEMO_SEED),
             speed: self.speed.unwrap_or(Speed::Factor(1.0)),
-            counts_down_quickly: self.profile.is_none() && self.mission.is_none(),
+            counts_down_quickly: self.profile.is_none() && self.flags.mission.is_none(),
         }
     }
 
     /// Whether the flags describe a demonstration, so that links in the settings do not apply.
     pub fn describes_demonstration(&self) -> bool {
         self.profile.is_some()
-            || (self.start.is_some() && self.mission.is_none())
+            || (self.start.is_some() && self.flags.mission.is_none())
             || self.seed.is_some()
             || self.speed.is_some()
     }
 
     /// Whether the automatic mode starts the flight.
     pub fn starts_by_itself(&self, interactive: bool) -> bool {
-        self.auto || (self.link.connect.is_empty() && !interactive)
+        self.auto || (self.flags.link.connect.is_empty() && !interactive)
     }
 }
 

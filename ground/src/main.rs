@@ -4,13 +4,13 @@ use std::io::Write as _;
 use std::panic::AssertUnwindSafe;
 use std::process::ExitCode;
 
-use clap::Parser as _;
+use clap::CommandFactory as _;
 use ground::cli::Cli;
 use ground::exit::Exit;
 
 fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
-        Ok(cli) => cli,
+    let given = match Cli::command().try_get_matches() {
+        Ok(given) => given,
         Err(message) => {
             // Help and version are printed here, too. A failure to print them is ignored.
             let _ = message.print();
@@ -18,7 +18,7 @@ fn main() -> ExitCode {
         }
     };
     // While it unwound, the panic has printed its message, restored the terminal and finished the log.
-    let ended = std::panic::catch_unwind(AssertUnwindSafe(|| ground::app::run(cli)));
+    let ended = std::panic::catch_unwind(AssertUnwindSafe(|| ground::app::run(&given)));
     match ended {
         Ok(Ok(exit)) => code(exit),
         Ok(Err(error)) => {

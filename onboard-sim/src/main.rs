@@ -10,7 +10,7 @@ use anyhow::Context as _;
 use clap::{CommandFactory as _, Parser, Subcommand};
 use protocol::key_file::KeyFile;
 use protocol::signing::Key;
-use simulated_vehicle::fly::load_flight;
+use sim::wire::fly::load_flight;
 
 /// Flies the landing controller against a simulated vehicle and streams MAVLink 2.
 #[derive(Parser)]

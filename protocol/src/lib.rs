@@ -21,8 +21,7 @@
 //! * [`motion`]: where a vehicle is and how it turns, from its messages; `told`: all of it as a record of the log;
 //! * [`book`]: who did what, with a signed hash over all of it;
 //! * [`records`]: the records of the flight log, generated;
-//! * [`log`]: the flight log;
-//! * [`hostile`]: hostile input for tests and fuzzing.
+//! * [`log`]: the flight log.
 //!
 //! # On a flight computer
 //!
@@ -81,8 +80,6 @@ pub mod dialect;
 pub mod duplicate;
 pub mod frame;
 pub mod ftp;
-#[cfg(feature = "std")]
-pub mod hostile;
 pub mod hub;
 pub mod identity;
 #[cfg(feature = "transport")]

@@ -1,7 +1,9 @@
 //! Runs the fuzz targets for a bounded time with proptest. `PROPTEST_CASES` sets how many cases.
 
 use proptest::prelude::*;
-use protocol::hostile;
+
+#[path = "../fuzz/hostile.rs"]
+pub mod hostile;
 
 /// Bytes in the format that the fuzz targets parse: lengths, and message ids that exist.
 fn pieces() -> impl Strategy<Value = Vec<u8>> {

@@ -9,8 +9,8 @@
 use std::io::Write as _;
 
 use anyhow::Context as _;
-use campaign::run::in_parallel;
 use flight::vehicle::lot::Posterior;
+use onboard_sim::run::in_parallel;
 use replay::fit::day::{Outcomes, is_go};
 use replay::fit::lot::{Trial, burnt, draw_lot, draw_next, predict};
 use sim::draw::{Chance, Draw, draw};

@@ -5,7 +5,7 @@ use std::num::NonZeroUsize;
 use std::path::Path;
 
 use anyhow::{Context as _, Result, ensure};
-use campaign::run::threads;
+use onboard_sim::run::threads;
 
 use crate::log::{Cut, Gap, Recording};
 use crate::output::write_whole;

@@ -2,15 +2,15 @@
 
 use std::collections::BTreeMap;
 
+pub use avionics::log::again::FrameError;
+use avionics::log::again::{RecordedComputer, mission_flown};
+use avionics::log::frame::{LoggedInput, level_of, phase_of, start_to_log};
 use flight::computer::pilot::Pilot;
 use flight::computer::{Computer, Output};
 use flight::guidance::powered::{ControlLevel, Plan};
 use flight::rules::phase::Phase;
 use flight::vehicle::mission::Mission;
-pub use flight_log::again::FrameError;
-use flight_log::again::{RecordedComputer, mission_flown};
-use flight_log::frame::{LoggedInput, level_of, phase_of, start_to_log};
-use nmpc::Status;
+use ocp::Status;
 use protocol::log::computer_v1::{ComputerFrame, ComputerOutput, ComputerStart};
 use serde::Serialize;
 

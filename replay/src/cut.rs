@@ -10,8 +10,8 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
+use avionics::log::frame::phase_of;
 use flight::rules::phase::Phase;
-use flight_log::frame::phase_of;
 use mcap::records::Metadata;
 use protocol::log::record::{
     METADATA_RUN, TOPIC_BOOK, TOPIC_BOOK_HEAD, TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START,

@@ -2,7 +2,7 @@
 
 use flight::guidance::powered::LandingSolved;
 use judge::Score;
-use nmpc::LANDING_MISS;
+use ocp::landing::LANDING_MISS;
 use serde::Serialize;
 
 /// Most plans that are named.

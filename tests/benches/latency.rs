@@ -18,8 +18,8 @@ use ground::update::{Action, Msg, update};
 use protocol::dialect::MavMessage;
 use protocol::identity::{GROUND, VEHICLE};
 use protocol::transport::LinkAddress;
-use simulated_vehicle::fly::{FlyOptions, OnTheWire, Speed, fly_observed, load_flight};
-use simulated_vehicle::vehicle::VehicleEvent;
+use sim::wire::fly::{FlyOptions, OnTheWire, Speed, fly_observed, load_flight};
+use sim::wire::vehicle::VehicleEvent;
 use tokio::sync::watch;
 
 type Failure = Box<dyn std::error::Error + Send + Sync>;

@@ -7,7 +7,6 @@ use std::sync::OnceLock;
 /// One of the project's programs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Program {
-    Board,
     Ground,
     OnboardSim,
     Replay,
@@ -16,7 +15,6 @@ pub enum Program {
 /// A command that runs the program. The first call builds all programs.
 pub fn program(program: Program) -> Command {
     let name = match program {
-        Program::Board => "board",
         Program::Ground => "ground",
         Program::OnboardSim => "onboard-sim",
         Program::Replay => "replay",

@@ -16,9 +16,8 @@ use e2e::{
     expect_landing, keygen, program, vehicle,
 };
 use protocol::dialect::{MavCmd, TdPhase};
-use protocol::frame::Encoder;
-use protocol::hostile::frame_of;
-use protocol::identity::{GROUND, VEHICLE};
+use protocol::frame::{Encoder, Frame};
+use protocol::identity::{Address, GROUND, VEHICLE};
 use protocol::signing::{Key, Memory, Signing};
 
 const DEFAULT_COUNT: u64 = 60_000;
@@ -31,6 +30,14 @@ fn datagrams_wanted() -> u64 {
         .ok()
         .and_then(|count| count.parse().ok())
         .unwrap_or(DEFAULT_COUNT)
+}
+
+/// A frame of these bytes: message id (low byte, then high), source, payload; `None` for an id outside the dialect.
+fn frame_of(bytes: &[u8]) -> Option<Frame> {
+    let [low, high, system_id, component_id, payload @ ..] = bytes else { return None };
+    let source = Address { system_id: *system_id, component_id: *component_id };
+    Encoder::new(source)
+        .encode_payload(u32::from(u16::from_le_bytes([*low, *high])), &payload[..payload.len().min(255)])
 }
 
 /// A hostile datagram; `number` selects its kind.

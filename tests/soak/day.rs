@@ -12,9 +12,9 @@ use ground::update::{Msg, update};
 use protocol::dialect::{HEARTBEAT_DATA, MavMessage, TdLanding};
 use protocol::frame::Encoder;
 use protocol::identity::GROUND;
-use simulated_vehicle::endpoint::{VehicleEndpoint, VehicleKind, step};
-use simulated_vehicle::fly::load_flight;
-use simulated_vehicle::vehicle::Vehicle;
+use sim::wire::endpoint::{VehicleEndpoint, VehicleKind, step};
+use sim::wire::fly::load_flight;
+use sim::wire::vehicle::Vehicle;
 
 use crate::footprint::GROWTH_MAX_BYTES;
 use crate::{Failure, say};

@@ -16,8 +16,8 @@ use super::output::{Lines, Output, print};
 use super::replaying::Again;
 use super::server::read_one;
 use super::stations;
-use crate::attach::codec::{decode_to_screen, encode_to_station};
-use crate::attach::{Hello, ToScreen, ToStation, VERSION, socket};
+use crate::attach::codec::{CodecError, decode_to_screen, encode_to_station};
+use crate::attach::{Hello, ToScreen, ToStation, socket};
 use crate::config::Config;
 use crate::exit;
 use crate::exit::Exit;
@@ -96,10 +96,10 @@ pub async fn session(
             () = clock.sleep_until(chord_at) => update(&mut model, Msg::ScreenTick, times.theirs(clock.now())),
             told = link.told.recv(), if look_again_at.is_none() => {
                 match &told {
-                    Some((ToScreen::Msg(msg), _)) => output.mark_message(msg, &model),
+                    Some(Ok((ToScreen::Msg(msg), _))) => output.mark_message(msg, &model),
                     _ => output.mark_changed(),
                 }
-                if let Some((told, at)) = told {
+                if let Some(Ok((told, at))) = told {
                     times.heard(at, clock.now());
                     take(&mut model, told, at, viewer)
                 } else {
@@ -181,26 +181,15 @@ async fn take_history(
     let silent = format!("the station does not answer: it hangs or is stopped{}", asked.unwrap_or_default());
     loop {
         let told = timeout(ANSWERS_WITHIN, link.told.recv()).await.with_context(|| silent.clone())?;
-        let Some((told, at)) = told else { return Ok(()) };
+        let Some(told) = told else { return Ok(()) };
+        let (told, at) = told.context("the station")?;
         times.heard(at, clock.now());
         let live = told == ToScreen::Live;
-        check_version(&told)?;
         take(model, told, at, viewer);
         if live {
             return Ok(());
         }
     }
-}
-
-fn check_version(told: &ToScreen) -> anyhow::Result<()> {
-    if let ToScreen::Hello(hello) = told {
-        let (ours, theirs) = (VERSION, hello.version);
-        anyhow::ensure!(
-            ours == theirs,
-            "the station has version {theirs}, this screen has {ours}; update the older one"
-        );
-    }
-    Ok(())
 }
 
 /// Connects to the station of this machine.
@@ -284,8 +273,6 @@ fn report_unsent(model: &mut Model, request: Request, now: Duration) {
         Request::Choose(_) => "no vehicle is chosen",
         Request::RangeTest => "no range test",
         Request::WithoutLog | Request::Untested => "nothing goes on",
-        Request::Download => "no download",
-        Request::Parameters => return,
     };
     let is_abort = request == Request::Command(CommandKind::Abort);
     // Stays in the alarm line of every page until there is a station again.
@@ -346,8 +333,11 @@ impl Times {
     }
 }
 
+/// What a station tells, and when it told it.
+type Told = Result<(ToScreen, Duration), CodecError>;
+
 struct StationConnection {
-    told: mpsc::Receiver<(ToScreen, Duration)>,
+    told: mpsc::Receiver<Told>,
     write: OwnedWriteHalf,
 }
 
@@ -366,12 +356,13 @@ impl StationConnection {
 }
 
 /// Decodes what a station tells, until it ends or makes no sense.
-fn listen(mut read: impl AsyncRead + Unpin + Send + 'static) -> mpsc::Receiver<(ToScreen, Duration)> {
+fn listen(mut read: impl AsyncRead + Unpin + Send + 'static) -> mpsc::Receiver<Told> {
     let (tell, told) = mpsc::channel(WAITING_MAX);
     tokio::spawn(async move {
         while let Some(bytes) = read_one(&mut read).await {
-            let Ok(told) = decode_to_screen(&bytes) else { return };
-            if tell.send(told).await.is_err() {
+            let told = decode_to_screen(&bytes);
+            let makes_sense = told.is_ok();
+            if tell.send(told).await.is_err() || !makes_sense {
                 return;
             }
         }

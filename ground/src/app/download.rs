@@ -1,170 +1,27 @@
-//! Fetches the vehicle's own log (MAVLink FTP) and keeps it on disk.
-//!
-//! `protocol::ftp::download` decides what to ask for. The whole log is read again by a thread of its own, so that neither the
-//! link nor the crew waits for it.
+//! `ground download`: fetches the vehicle's own log (MAVLink FTP) over a link of its own. It sends no heartbeat: nothing that it
+//! does may look like a station that watches over the vehicle. `protocol::ftp::download` decides what to ask for.
 
 use std::fs::File;
 use std::io;
 use std::io::{IsTerminal as _, Read as _, Seek as _, Write as _};
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
 use anyhow::Context as _;
-use protocol::dialect::MavMessage;
-use protocol::frame::Frame;
 use protocol::ftp::download::{Download, DownloadEvent, Progress};
 use protocol::ftp::{Packet, crc};
-use protocol::identity::Address;
 use tokio::time::{MissedTickBehavior, interval};
 
 use super::KeyRing;
 use super::clock::{Clock, LogTime, Signals};
 use super::output::print;
-use super::programs::in_a_thread;
 use super::wire::Wire;
 use crate::cli::DownloadArgs;
 use crate::exit::Exit;
 use crate::update::Msg;
 
-/// A download that is running.
-pub(super) struct Downloading {
-    download: Download,
-    us: Address,
-    vehicle: Address,
-    folder: PathBuf,
-    /// What has arrived, until it is whole.
-    kept: Option<Kept>,
-    /// The thread that gives it its name.
-    finishing: Option<Receiver<anyhow::Result<PathBuf>>>,
-    /// Tenths of the file that were reported.
-    tenths: u32,
-}
-
-/// What a download has to say.
-#[derive(Debug)]
-pub(super) enum DownloadReport {
-    /// How far it is.
-    Progress(String),
-    /// The log is here.
-    Done(PathBuf),
-    Failed(anyhow::Error),
-}
-
-impl Downloading {
-    /// Begins with the file of this name, or with the newest. The time makes its requests differ from those of an earlier
-    /// download.
-    pub(super) fn begin(
-        name: Option<&str>,
-        folder: PathBuf,
-        (us, vehicle): (Address, Address),
-        unix_ns: u64,
-    ) -> Self {
-        // Another number every millisecond.
-        let first_sequence = (unix_ns >> 20) as u16;
-        Self {
-            download: Download::new(name, first_sequence),
-            us,
-            vehicle,
-            folder,
-            kept: None,
-            finishing: None,
-            tenths: 0,
-        }
-    }
-
-    pub(super) fn progress(&self) -> Option<Progress> {
-        self.download.progress()
-    }
-
-    /// Takes a frame of the vehicle.
-    ///
-    /// # Errors
-    /// The log is here already, or its files cannot be made.
-    pub(super) fn take(&mut self, frame: &Frame, now: Duration) -> anyhow::Result<()> {
-        let Some((target, packet)) = Packet::answer_in(frame) else { return Ok(()) };
-        if target != self.us || frame.source() != self.vehicle {
-            return Ok(());
-        }
-        match self.download.take(&packet, now) {
-            Some(DownloadEvent::Opened { crc }) => self.open(crc)?,
-            Some(DownloadEvent::Data(data)) => {
-                if let Some(kept) = &mut self.kept {
-                    kept.file.write_all(&data)?;
-                }
-            }
-            None => {}
-        }
-        Ok(())
-    }
-
-    /// Goes on: what to send, and what there is to say.
-    pub(super) fn poll(&mut self, now: Duration) -> (Vec<MavMessage>, Option<DownloadReport>) {
-        let packets = self.download.poll(now);
-        let messages = packets.iter().map(|packet| packet.message(self.vehicle)).collect();
-        let report = self.go_on().unwrap_or_else(|error| Some(DownloadReport::Failed(error)));
-        (messages, report)
-    }
-
-    /// Stops, for a program that ends: what is whole gets its name.
-    pub(super) fn stop(self) {
-        let _ = self.finishing.map(|finishing| finishing.recv());
-    }
-
-    fn go_on(&mut self) -> anyhow::Result<Option<DownloadReport>> {
-        let ended = self.download.ended().transpose()?;
-        if let Some(Ok(finished)) = self.finishing.as_ref().map(Receiver::try_recv) {
-            return finished.map(|path| Some(DownloadReport::Done(path)));
-        }
-        if ended.is_some()
-            && let Some(kept) = self.kept.take()
-        {
-            self.finishing = Some(in_a_thread("download", || kept.finish())?);
-        }
-        Ok(self.next_tenth().map(DownloadReport::Progress))
-    }
-
-    /// The vehicle has opened its file: goes on with what is here of it.
-    fn open(&mut self, crc: u32) -> anyhow::Result<()> {
-        let name = self.download.name().unwrap_or_default();
-        let (kept, bytes) = Kept::open(&self.folder, self.vehicle.system_id, name, crc)?;
-        self.kept = Some(kept);
-        self.download.resume(bytes);
-        Ok(())
-    }
-
-    /// A report at the beginning and at every tenth of the file.
-    fn next_tenth(&mut self) -> Option<String> {
-        let progress = self.progress()?;
-        let tenth = 1 + (10 * u64::from(progress.bytes) / u64::from(progress.len.max(1))) as u32;
-        (tenth > self.tenths).then(|| {
-            self.tenths = tenth;
-            format!("log {}: {}", self.download.name().unwrap_or_default(), in_words(&progress))
-        })
-    }
-}
-
-/// As in `1.20 of 10.00 MB, 3.6 kB/s, 41 min left`.
-pub(super) fn in_words(progress: &Progress) -> String {
-    let megabytes = |bytes: u32| f64::from(bytes) / 1e6;
-    let left = match progress.left_s {
-        None => String::new(),
-        Some(left_s) if left_s >= 90.0 => format!(", {:.0} min left", left_s / 60.0),
-        Some(left_s) => format!(", {left_s:.0} s left"),
-    };
-    format!(
-        "{:.2} of {:.2} MB, {:.1} kB/s{left}",
-        megabytes(progress.bytes),
-        megabytes(progress.len),
-        progress.bytes_s / 1000.0
-    )
-}
-
-// `ground download`: fetches the log over a link of its own. It sends no heartbeat: nothing that it does may look like a
-// station that watches over the vehicle.
-
 const TICK: Duration = Duration::from_millis(20);
-/// How often the progress is printed: on a terminal in place, otherwise as lines at every tenth.
+/// How often the progress is shown in place on a terminal.
 const SHOW_EVERY: Duration = Duration::from_millis(500);
 
 /// Fetches the log over this program's own link.
@@ -173,24 +30,23 @@ const SHOW_EVERY: Duration = Duration::from_millis(500);
 /// The link cannot be opened, the vehicle refuses, or a file cannot be written.
 pub(in crate::app) async fn run_download(args: &DownloadArgs) -> anyhow::Result<Exit> {
     let DownloadArgs { name, to, link, .. } = args;
-    let addresses = (link.us(), link.vehicle());
-    anyhow::ensure!(
-        !link.connect.is_empty(),
-        "no link to a vehicle: give --connect. In a station that holds the link, the key L fetches the log"
-    );
+    let (us, vehicle) = (link.us(), link.vehicle());
+    anyhow::ensure!(!link.connect.is_empty(), "no link to a vehicle: give --connect");
     let KeyRing { key, .. } = KeyRing::open(link)?;
     let clock = Clock::start();
-    let mut wire = Wire::open(addresses, link.connect.clone(), key, clock, None, LogTime::Run(clock)).await?;
-    let mut downloading = Downloading::begin(name.as_deref(), to.clone(), addresses, clock.start_unix_ns());
+    let log_time = LogTime::Run(clock);
+    let mut wire = Wire::open((us, vehicle), link.connect.clone(), key, clock, None, log_time).await?;
+    // Another number every millisecond: its requests differ from those of an earlier download.
+    let mut download = Download::new(name.as_deref(), (clock.start_unix_ns() >> 20) as u16);
+    let mut kept: Option<Kept> = None;
     let mut signals = Signals::listen()?;
     let mut ticks = interval(TICK);
     ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
-    let mut shown = Shown { in_place: std::io::stderr().is_terminal(), at: Duration::ZERO, len: 0 };
+    let mut shown = Shown { in_place: io::stderr().is_terminal(), at: Duration::ZERO, tenths: 0 };
     loop {
         let msgs = tokio::select! {
             biased;
             signal = signals.next() => {
-                downloading.stop();
                 shown.end();
                 anyhow::bail!("stopped by {signal}; the same command goes on with what is here");
             }
@@ -199,58 +55,82 @@ pub(in crate::app) async fn run_download(args: &DownloadArgs) -> anyhow::Result<
         };
         let now = clock.now();
         for msg in msgs {
-            if let Msg::Frame(frame) = msg {
-                downloading.take(&frame, now)?;
+            let Msg::Frame(frame) = msg else { continue };
+            let Some((target, packet)) = Packet::answer_in(&frame) else { continue };
+            if target != us || frame.source() != vehicle {
+                continue;
+            }
+            match download.take(&packet, now) {
+                Some(DownloadEvent::Opened { crc }) => {
+                    let name = download.name().unwrap_or_default();
+                    let (opened, bytes) = Kept::open(to, vehicle.system_id, name, crc)?;
+                    kept = Some(opened);
+                    download.resume(bytes);
+                }
+                Some(DownloadEvent::Data(data)) => {
+                    if let Some(kept) = &mut kept {
+                        kept.file.write_all(&data)?;
+                    }
+                }
+                None => {}
             }
         }
-        let (messages, report) = downloading.poll(now);
-        for message in &messages {
-            wire.send(message, 0);
+        for packet in download.poll(now) {
+            wire.send(&packet.message(vehicle), 0);
         }
-        match report {
-            Some(DownloadReport::Done(path)) => {
-                shown.end();
-                wire.save_timestamps();
-                print(format!("log {}\n", path.display()).as_bytes())?;
-                return Ok(Exit::Landed);
-            }
-            Some(DownloadReport::Failed(error)) => {
-                shown.end();
-                return Err(error);
-            }
-            Some(DownloadReport::Progress(words)) if !shown.in_place => {
-                // Nobody may read it.
-                let _ = writeln!(std::io::stderr(), "{words}");
-            }
-            Some(DownloadReport::Progress(_)) | None => {}
-        }
-        if shown.in_place && now >= shown.at + SHOW_EVERY {
-            shown.at = now;
-            let words =
-                downloading.progress().map_or_else(|| "asking the vehicle".to_owned(), |p| in_words(&p));
-            shown.replace(&words);
+        shown.show(&download, now);
+        if let Some(ended) = download.ended() {
+            shown.end();
+            ended?;
+            let path = kept.context("the vehicle's log has no content")?.finish()?;
+            wire.save_timestamps();
+            print(format!("log {}\n", path.display()).as_bytes())?;
+            return Ok(Exit::Landed);
         }
     }
 }
 
-/// The progress on standard error. If nobody reads it, the download goes on.
+/// The progress on standard error: on a terminal in place, otherwise a line at every tenth. If nobody reads it, the download goes
+/// on.
 struct Shown {
     in_place: bool,
     at: Duration,
-    len: usize,
+    tenths: u64,
 }
 
 impl Shown {
-    fn replace(&mut self, words: &str) {
-        let _ = write!(std::io::stderr(), "\r{words:<width$}", width = self.len);
-        self.len = words.len();
-    }
-
-    fn end(&mut self) {
-        if std::mem::take(&mut self.len) > 0 {
-            let _ = writeln!(std::io::stderr());
+    fn show(&mut self, download: &Download, now: Duration) {
+        let progress = download.progress();
+        let words = progress.as_ref().map_or_else(|| "asking the vehicle".to_owned(), in_words);
+        let tenths = progress.map_or(0, |p| 1 + 10 * u64::from(p.bytes) / u64::from(p.len.max(1)));
+        if self.in_place && now >= self.at + SHOW_EVERY {
+            self.at = now;
+            // Erase in line (ECMA-48, 8.3.41).
+            let _ = write!(io::stderr(), "\r{words}\x1b[K");
+        } else if !self.in_place && tenths > self.tenths {
+            self.tenths = tenths;
+            let name = download.name().unwrap_or_default();
+            let _ = writeln!(io::stderr(), "log {name}: {words}");
         }
     }
+
+    fn end(&self) {
+        if self.in_place && !self.at.is_zero() {
+            let _ = writeln!(io::stderr());
+        }
+    }
+}
+
+/// As in `1.20 of 10.00 MB, 3.6 kB/s, 41 min left`.
+fn in_words(progress: &Progress) -> String {
+    let megabytes = |bytes: u32| f64::from(bytes) / 1e6;
+    let left = match progress.left_s {
+        None => String::new(),
+        Some(left_s) if left_s >= 90.0 => format!(", {:.0} min left", left_s / 60.0),
+        Some(left_s) => format!(", {left_s:.0} s left"),
+    };
+    let (here, whole) = (megabytes(progress.bytes), megabytes(progress.len));
+    format!("{here:.2} of {whole:.2} MB, {:.1} kB/s{left}", progress.bytes_s / 1000.0)
 }
 
 // The files of a download: the beginning of the log that has arrived, with the checksum of the whole in its name

@@ -550,7 +550,7 @@ mod checklist_tests {
         std::fs::write(&path, include_str!("../../checklist-example.toml")).unwrap();
         let now = 1_800_000_000;
         let signature = Signature { by: "Ann".to_owned(), unix_s: now, ..Signature::default() };
-        let entry = ChecklistEntry::Signed { step: 2, signature: signature.clone() };
+        let entry = ChecklistEntry::Marked { step: 2, mark: Mark::Signed(signature.clone()) };
         let (list, mut kept, told) = open_checklist(&path, now).unwrap();
         assert!(!list.is_touched() && told.is_empty());
         let another = || open_checklist(&path, now).map(|_| ()).unwrap_err().to_string();

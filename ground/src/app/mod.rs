@@ -22,7 +22,7 @@ use std::io::IsTerminal as _;
 use std::time::Duration;
 
 use anyhow::Context as _;
-use clap::CommandFactory as _;
+use clap::{ArgMatches, CommandFactory as _, FromArgMatches as _};
 use protocol::book::BookKey;
 use protocol::crew_file::CrewFile;
 use protocol::dialect::TdRole;
@@ -32,7 +32,7 @@ use protocol::log::writer::LogHeader;
 use protocol::mission::MissionHash;
 use protocol::signing::Signing;
 use protocol::transport::LinkAddress;
-use simulated_vehicle::fly::load_flight;
+use sim::wire::fly::load_flight;
 
 use crate::attach::OPERATOR_MAX;
 use crate::cli::{Cli, Command, ConfigArgs, ConfigCommand, LinkArgs, LogChoice, Seconds, StationArgs};
@@ -68,7 +68,9 @@ struct Duty {
 ///
 /// # Errors
 /// A socket, a file or the terminal failed, or the profile is wrong.
-pub fn run(cli: Cli) -> anyhow::Result<Exit> {
+pub fn run(given: &ArgMatches) -> anyhow::Result<Exit> {
+    let cli = Cli::from_arg_matches(given)?;
+    let given = given.subcommand().map_or(given, |(_, given)| given);
     let dumb = std::env::var_os("TERM").is_none_or(|term| term.is_empty() || term == "dumb");
     let interactive = std::io::stdout().is_terminal() && !cli.headless && !dumb;
     let load = |args: &ConfigArgs| Config::load(args.config.as_deref());
@@ -81,14 +83,15 @@ pub fn run(cli: Cli) -> anyhow::Result<Exit> {
         Some(Command::Status { json }) => runtime.block_on(stations::list(json)),
         Some(Command::Stop { force, socket }) => {
             let config = Config::load(None)?;
-            let (socket, who) = (socket.socket.or(config.socket), config.operator);
+            let (socket, who) =
+                (socket.socket.or(config.flags.socket.socket), config.flags.link.operator.operator);
             runtime.block_on(stations::stop(socket.as_deref(), force, operator(who.as_deref())))
         }
         Some(Command::Attach(args)) => {
             let config = load(&args.config)?;
             let (socket, who) = (
-                args.socket.socket.or(config.socket.clone()),
-                args.operator.operator.or(config.operator.clone()),
+                args.socket.socket.or(config.flags.socket.socket.clone()),
+                args.operator.operator.or(config.flags.link.operator.operator.clone()),
             );
             let viewer = Viewer {
                 // Nobody can command without keys.
@@ -100,13 +103,12 @@ pub fn run(cli: Cli) -> anyhow::Result<Exit> {
             runtime.block_on(attached::session(socket.as_deref(), &viewer, &config, interactive))
         }
         Some(Command::Download(mut args)) => {
-            load(&args.config)?.fill_link(&mut args.link);
+            load(&args.config)?.fill_link(&mut args.link, given)?;
             runtime.block_on(download::run_download(&args))
         }
         Some(Command::Daemon { mut station }) => {
             let config = load(&station.config)?;
-            config.fill_connect(&mut station);
-            config.fill(&mut station);
+            config.fill(&mut station, given, true)?;
             let duty = Duty { is_daemon: true, interactive: false, time_limit: None };
             runtime.block_on(Box::pin(session(&station, &config, duty)))
         }
@@ -115,11 +117,11 @@ pub fn run(cli: Cli) -> anyhow::Result<Exit> {
             let config = load(&station.config)?;
             if let Some(path) = &cli.replay {
                 // It shows the vehicle in the log, not the one in the settings.
-                let vehicle = station.link.vehicle_sysid.map(|_| station.link.vehicle());
+                let vehicle = station.flags.link.vehicle_sysid.map(|_| station.flags.link.vehicle());
                 let replay = replaying::session(path, vehicle, cli.from, &config, interactive);
                 return runtime.block_on(replay);
             }
-            config.fill(&mut station);
+            config.fill(&mut station, given, false)?;
             let time_limit = cli.timeout_s.map(|Seconds(limit)| limit);
             let duty = Duty { is_daemon: false, interactive, time_limit };
             runtime.block_on(Box::pin(session(&station, &config, duty)))
@@ -129,8 +131,8 @@ pub fn run(cli: Cli) -> anyhow::Result<Exit> {
 
 async fn session(args: &StationArgs, config: &Config, duty: Duty) -> anyhow::Result<Exit> {
     let clock = Clock::start();
-    let demo_options = match &args.link.connect[..] {
-        [] => Some(DemoOptions::load(&args.demonstration(), args.link.vehicle().system_id)?),
+    let demo_options = match &args.flags.link.connect[..] {
+        [] => Some(DemoOptions::load(&args.demonstration(), args.flags.link.vehicle().system_id)?),
         _ => None,
     };
     let header = match &demo_options {
@@ -141,9 +143,9 @@ async fn session(args: &StationArgs, config: &Config, duty: Duty) -> anyhow::Res
             ..LogHeader::default()
         },
     };
-    let tlog = args.tlog.as_ref();
+    let tlog = args.flags.tlog.as_ref();
     let tlog = if tlog.is_none() && demo_options.is_some() { Some(&LogChoice::None) } else { tlog };
-    let recorder = open_log(args.log.as_ref(), tlog, &header)?;
+    let recorder = open_log(args.flags.log.as_ref(), tlog, &header)?;
     let log_guard = LogGuard::new(recorder);
     let next_log = NextLog::new(args, header, log_guard.log());
     let (mut station, mut model, mut wire) =
@@ -180,7 +182,7 @@ async fn start(
 ) -> anyhow::Result<(Station, Model, Wire)> {
     let Duty { is_daemon, interactive, time_limit } = duty;
     let recorder = next_log.present();
-    let link = &args.link;
+    let link = &args.flags.link;
     // The demonstration uses any free port, so that it can run beside a real ground station.
     let mut endpoints = link.connect.clone();
     if endpoints.is_empty() {
@@ -188,8 +190,9 @@ async fn start(
     }
     let KeyRing { key, owner, book_key, roles } = KeyRing::open(link)?;
     let start_unix_s = clock.start_unix_ns() / 1_000_000_000;
-    let checklist = args.checklist.as_deref().map(|path| open_checklist(path, start_unix_s)).transpose()?;
-    let mission = args.mission.as_deref().map(load_flight).transpose()?;
+    let checklist =
+        args.flags.checklist.as_deref().map(|path| open_checklist(path, start_unix_s)).transpose()?;
+    let mission = args.flags.mission.as_deref().map(load_flight).transpose()?;
     let vehicle_clock = demo_options.as_ref().map(|_| LogClock::new());
     let log_time = vehicle_clock.clone().map_or(LogTime::Run(clock), LogTime::Vehicle);
     let opened =
@@ -207,7 +210,6 @@ async fn start(
     };
     let auto = if is_daemon { args.auto } else { args.starts_by_itself(interactive) };
     let links: Vec<String> = wire.endpoints().map(LinkAddress::to_string).collect();
-    let [pad, here] = config.places();
     let mut model = Model::new(Settings {
         // With several links, each has its own.
         link_capacity_bytes_s: wire.capacity_bytes_s(),
@@ -227,8 +229,8 @@ async fn start(
         start: args.start.filter(|_| mission.is_some()).map(|start| start.name().to_owned()),
         mission: mission.map(|mission| MissionHash::of(&mission.recipe.mission_toml)),
         crew_roles: roles,
-        pad,
-        here,
+        pad: config.pad,
+        here: config.here,
         start_unix_s,
         demonstration: demo.is_some(),
         auto,
@@ -239,7 +241,7 @@ async fn start(
         time_limit: time_limit.or(auto.then_some(AUTO_TIME_LIMIT)),
         ..Settings::on_screen(links.join(" and "))
     });
-    let renamed = other_name(args.log.as_ref(), recorder.as_ref().map(Recorder::path));
+    let renamed = other_name(args.flags.log.as_ref(), recorder.as_ref().map(Recorder::path));
     announce(&mut model, auto, renamed, clock.now());
     let signatures = checklist.map(|(list, file, told)| {
         model.checklist = Some(list);
@@ -260,7 +262,7 @@ async fn start(
         log_space: SpaceWatch::default(),
         demo,
         output,
-        socket: args.socket.socket.clone(),
+        socket: args.flags.socket.socket.clone(),
         server,
         screens: Vec::new(),
         alarm_command: config.alarm_command.clone(),
@@ -269,7 +271,6 @@ async fn start(
         book: None,
         again: Again::default(),
         report: None,
-        download: None,
         place_failed: false,
         report_at: Duration::ZERO,
         next_log: next_log.signed_with(book_key),
@@ -330,7 +331,7 @@ async fn serve(
         return Ok(None);
     }
     let first_screen = if interactive { 2 } else { 1 };
-    match Server::open(args.socket.socket.as_deref(), hello(model), first_screen).await {
+    match Server::open(args.flags.socket.socket.as_deref(), hello(model), first_screen).await {
         Ok(server) => Ok(Some(server)),
         Err(error) if is_daemon => Err(error),
         // It has its own screen or lines, so it can run without the socket.
@@ -364,14 +365,12 @@ pub fn print_config(command: &ConfigCommand) -> anyhow::Result<Exit> {
     match command {
         ConfigCommand::Example => print(EXAMPLE.as_bytes())?,
         ConfigCommand::Check { file } => {
-            let config = Config::load(file.as_deref())?;
-            let file = file.clone().or_else(usual_path);
-            let said = match file {
-                Some(path) if path.exists() => format!("{}: valid", path.display()),
-                Some(path) => format!("{}: no such file; these are the defaults", path.display()),
-                None => "no settings file; these are the defaults".to_owned(),
+            Config::load(file.as_deref())?;
+            let said = match file.clone().or_else(usual_path).filter(|path| path.exists()) {
+                Some(path) => format!("{}: valid\n", path.display()),
+                None => "no settings file: the defaults of `ground config example` hold\n".to_owned(),
             };
-            print(format!("{said}\n\n{}", config.table()).as_bytes())?;
+            print(said.as_bytes())?;
         }
     }
     Ok(Exit::Landed)

@@ -45,7 +45,7 @@ pub(super) struct NextLog {
 
 impl NextLog {
     pub(super) fn new(args: &StationArgs, header: LogHeader, guarded: GuardedLog) -> Self {
-        let names = (args.log.clone(), args.tlog.clone());
+        let names = (args.flags.log.clone(), args.flags.tlog.clone());
         Self { names, header, book_key: None, guarded, not_before: Duration::ZERO, ending: None }
     }
 
@@ -188,7 +188,7 @@ mod tests {
         runtime.block_on(async {
             let clock = Clock::start();
             let header = LogHeader { start_unix_ns: clock.start_unix_ns(), ..LogHeader::default() };
-            let guard = LogGuard::new(open_log(args.log.as_ref(), None, &header).unwrap());
+            let guard = LogGuard::new(open_log(args.flags.log.as_ref(), None, &header).unwrap());
             let duty = Duty { is_daemon: true, interactive: false, time_limit: None };
             let next_log = NextLog::new(&args, header, guard.log());
             let config = Config::default();

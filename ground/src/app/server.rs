@@ -13,8 +13,9 @@ use tokio::net::UnixStream;
 use tokio::net::unix::{OwnedReadHalf, OwnedWriteHalf};
 use tokio::sync::{broadcast, mpsc, oneshot};
 
+use super::output::absolute;
 use crate::attach::codec::{decode_to_station, encode_to_screen, length};
-use crate::attach::{Hello, ToScreen, ToStation, VERSION, socket};
+use crate::attach::{Hello, ToScreen, ToStation, socket};
 use crate::model::{Model, Seat, Settings};
 use crate::update::Msg;
 
@@ -171,15 +172,10 @@ impl Drop for Server {
     }
 }
 
-/// The first message to a screen.
+/// The first message to a screen, which may run in another folder.
 pub(super) fn hello(model: &Model) -> Hello {
     let log_path = model.settings.log_path.as_deref().map(absolute);
-    Hello { version: VERSION, screen: 0, station: Settings { log_path, ..model.settings.clone() } }
-}
-
-/// An attached screen may run in another folder.
-fn absolute(path: &str) -> String {
-    std::path::absolute(path).map_or_else(|_| path.to_owned(), |path| path.display().to_string())
+    Hello { screen: 0, station: Settings { log_path, ..model.settings.clone() } }
 }
 
 impl Shared {
@@ -217,10 +213,10 @@ async fn receive(stream: UnixStream, shared: Arc<Shared>, ask: mpsc::Sender<Serv
             }
         }
         Ok(_) => {}
-        // Perhaps a screen of another version, so send it our version.
+        // Perhaps a screen of another version: every message has ours.
         Err(_) => {
-            let ours = ToScreen::Hello(Box::new(Hello { version: VERSION, ..Hello::default() }));
-            let _ = write.write_all(&encode_to_screen(&ours, Duration::ZERO).unwrap_or_default()).await;
+            let ours = encode_to_screen(&ToScreen::Live, Duration::ZERO);
+            let _ = write.write_all(&ours.unwrap_or_default()).await;
         }
     }
 }

@@ -11,7 +11,6 @@ use protocol::log::v1::OperatorAction;
 use tokio::time::{MissedTickBehavior, interval};
 
 use super::clock::{Clock, LogTime, Signals};
-use super::download::{DownloadReport, Downloading};
 use super::files::{SignatureFile, SpaceWatch, StationBook};
 use super::next_log::NextLog;
 use super::output::{Lines, Output};
@@ -52,8 +51,6 @@ pub(super) struct Station {
     pub(super) again: Again,
     /// The report that is being written.
     pub(super) report: Option<programs::Writing>,
-    /// The vehicle's own log, while it is fetched.
-    pub(super) download: Option<Downloading>,
     /// Who did what; `None` without a log.
     pub(super) book: Option<StationBook>,
     /// Where the signatures of the checklist are kept; `None` without a checklist.
@@ -141,8 +138,7 @@ impl Station {
             let mut next = Next::Go;
             let woken = wire.note_awake();
             let report = if self.is_report_due(&msgs) { wire.report() } else { Vec::new() };
-            let fetched = self.go_on_fetching(&msgs, boot_of(model), wire);
-            for msg in woken.into_iter().chain(report).chain(msgs).chain(fetched) {
+            for msg in woken.into_iter().chain(report).chain(msgs) {
                 let msg = match msg {
                     Msg::Terminate("SIGHUP" | screen::GONE) if self.outlives_its_screen() => {
                         self.lose_screen(Lines::closed(), model).await;
@@ -346,7 +342,6 @@ impl Station {
                 }
                 Action::ReplayFlight => self.again.begin(model, now),
                 Action::WriteReport => self.write_report(model, now),
-                Action::FetchLog => self.fetch_log(model, now),
                 Action::MovePin(out) => self.demo.iter().for_each(|demo| demo.move_pin(out)),
                 // Only attached screens send requests.
                 Action::Request(_) => {}
@@ -380,48 +375,6 @@ impl Station {
             Some(Err(why)) => model.warn(now, format!("no report: {why}")),
             None => {}
         }
-    }
-
-    /// Begins to fetch the vehicle's own log, beside the station's.
-    fn fetch_log(&mut self, model: &mut Model, now: Duration) {
-        if self.download.is_some() {
-            model.info(now, "the vehicle's log is being fetched already");
-            return;
-        }
-        let folder = self.recorder.as_ref().and_then(|recorder| recorder.path().parent());
-        let folder = folder.map(std::path::Path::to_owned).unwrap_or_default();
-        let addresses = (model.settings.us, model.settings.vehicle);
-        self.download = Some(Downloading::begin(None, folder, addresses, self.clock.unix_ns()));
-    }
-
-    /// Gives what was heard to the download, and sends what it asks for.
-    fn go_on_fetching(&mut self, msgs: &[Msg], boot: u32, wire: &mut Wire) -> Option<Msg> {
-        let now = self.clock.now();
-        let download = self.download.as_mut()?;
-        let taken = msgs.iter().try_for_each(|msg| match msg {
-            Msg::Frame(frame) => download.take(frame, now),
-            _ => Ok(()),
-        });
-        let report = match taken {
-            Ok(()) => {
-                let (messages, report) = download.poll(now);
-                for message in &messages {
-                    wire.send(message, boot);
-                }
-                report
-            }
-            Err(error) => Some(DownloadReport::Failed(error)),
-        };
-        if !matches!(report, Some(DownloadReport::Progress(_)) | None) {
-            self.download = None;
-        }
-        report.map(|report| {
-            Msg::Download(match report {
-                DownloadReport::Progress(words) => Ok(words),
-                DownloadReport::Done(path) => Ok(format!("the vehicle's log is here: {}", path.display())),
-                DownloadReport::Failed(error) => Err(format!("{error:#}")),
-            })
-        })
     }
 
     /// Writes a file beside the log. A failure is reported once.
@@ -548,9 +501,6 @@ impl Station {
         tokio::task::yield_now().await;
         if self.output.screen.take().is_none() {
             self.output.lines.show(model);
-        }
-        if let Some(download) = self.download {
-            download.stop();
         }
         if let Some(demo) = self.demo {
             demo.stop().await;

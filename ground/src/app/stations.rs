@@ -15,7 +15,7 @@ use super::output::{absolute, print};
 use super::server::read_one;
 use super::station::Attached;
 use crate::attach::codec::{decode_to_screen, encode_to_station};
-use crate::attach::{StationStatus, ToScreen, ToStation, VERSION, socket};
+use crate::attach::{StationStatus, ToScreen, ToStation, socket};
 use crate::exit::Exit;
 use crate::model::{Model, Seat, why_not_stop, words};
 
@@ -95,9 +95,6 @@ pub(super) async fn stations() -> io::Result<Vec<Found>> {
     for path in socket::sockets()? {
         let status = match ask(&path, &ToStation::Status).await {
             Ok(ToScreen::Status(status)) => Ok(status),
-            Ok(ToScreen::Hello(hello)) => {
-                Err(format!("it has version {}, this program has {VERSION}", hello.version))
-            }
             Ok(_) => Err("unexpected answer".to_owned()),
             Err(error) if matches!(error.kind(), ErrorKind::ConnectionRefused | ErrorKind::NotFound) => {
                 // The station is gone. If its socket cannot be removed, it is skipped again next time.

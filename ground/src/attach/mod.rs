@@ -14,17 +14,14 @@ use crate::update::Msg;
 
 // What a station and its screens say to each other.
 
-/// The version of the encoding. A screen of another version is refused with an explanation.
-pub const VERSION: u32 = 12;
+/// The version of the encoding. A program of another version is refused with an explanation.
+pub const VERSION: u32 = 13;
 /// The longest name of an operator, in characters.
 pub(crate) const OPERATOR_MAX: usize = 40;
 
 /// What the station is; the first message to a screen.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Hello {
-    /// It stands before the rest: a program of another version reads it too.
-    #[serde(skip)]
-    pub version: u32,
     /// The number that the station has given to this screen.
     pub screen: u32,
     /// The settings of the station, without what is its own screen's.
@@ -46,8 +43,7 @@ pub enum ToScreen {
         /// The reason, or where the log is.
         words: String,
     },
-    // Encoded apart, with its version before it. Last, because the others are numbered without it.
-    #[serde(skip)]
+    /// The first message to a screen.
     Hello(Box<Hello>),
 }
 

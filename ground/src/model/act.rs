@@ -6,7 +6,6 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use protocol::dialect::TdPhase;
 use serde::Deserialize;
 
 use super::{
@@ -45,8 +44,6 @@ pub enum Act {
     ReplayFlight,
     /// Write the report of the flight.
     Report,
-    /// Fetch the vehicle's own log.
-    Download,
     /// Move the pin of the demonstration's vehicle.
     MovePin,
     /// Open the dialog that signs the chosen step of the checklist.
@@ -56,10 +53,8 @@ pub enum Act {
     Show(Page),
     Hold,
     Follow,
-    Filter,
     Palette,
     NextTheme,
-    AskParameters,
     Redraw,
     Quit,
 }
@@ -77,7 +72,7 @@ const fn define(act: Act, name: &'static str, usual: char, words: &'static str) 
 }
 
 /// Every action; the most important first.
-pub const DEFINITIONS: [Definition; 41] = [
+pub const DEFINITIONS: [Definition; 37] = [
     define(Act::Arm, "arm", 'A', "arm: then type ARM and Enter within 10 s"),
     define(Act::Start, "start", 'S', "start the countdown: then type START and Enter within 10 s"),
     define(Act::Disarm, "disarm", 'D', "disarm: then Enter within 5 s"),
@@ -98,9 +93,8 @@ pub const DEFINITIONS: [Definition; 41] = [
     define(Act::Show(Page::Review), "review", '4', "page: verdict, limits, greatest values"),
     define(Act::Show(Page::Link), "link", '5', "page: link rates and the age of every message"),
     define(Act::Show(Page::Messages), "texts", '6', "page: events and messages"),
-    define(Act::Show(Page::Parameters), "parameters", '7', "page: parameters of the vehicle"),
-    define(Act::Show(Page::Log), "log", '8', "page: the recording"),
-    define(Act::Show(Page::Alarms), "alarms", '9', "page: every alarm"),
+    define(Act::Show(Page::Log), "log", '7', "page: the recording"),
+    define(Act::Show(Page::Alarms), "alarms", '8', "page: every alarm"),
     define(Act::Show(Page::Path), "path", 'p', "page: the flight from two sides and from above"),
     define(Act::Show(Page::Find), "find", 'f', "page: where to look for the vehicle, and the way there"),
     define(
@@ -114,14 +108,11 @@ pub const DEFINITIONS: [Definition; 41] = [
     define(Act::Show(Page::Help), "help", '?', "page: the keys that work now"),
     define(Act::Hold, "hold", 'h', "hold this page, or follow the flight again"),
     define(Act::Follow, "follow", '0', "follow the flight again (Esc does too)"),
-    define(Act::Filter, "filter", '/', "show only events, messages or parameters with a text"),
     define(Act::Palette, "palette", ':', "list every action; type a part of its words"),
     define(Act::NextTheme, "theme", 'c', "colours: dark, light for sunlight, 16, none, contrast"),
     define(Act::ReplayFlight, "replay", 'R', "the flight just flown, again on this screen; q ends it"),
     define(Act::Report, "report", 'W', "write the report of the flight beside the log"),
-    define(Act::Download, "download", 'L', "fetch the vehicle's own log; disarmed on the ground"),
     define(Act::MovePin, "pin", 'I', "demonstration: put the vehicle's pin in, or pull it, by hand"),
-    define(Act::AskParameters, "ask", 'r', "ask the vehicle for its parameters again"),
     Definition { act: Act::Redraw, name: "redraw", usual: Key::CtrlL, words: "draw the screen again" },
     define(Act::Quit, "quit", 'q', "quit; while it is not over: then type QUIT and Enter"),
 ];
@@ -130,12 +121,6 @@ pub const DEFINITIONS: [Definition; 41] = [
 fn flown_here(model: &Model) -> bool {
     let is_live = model.settings.role != Role::Replaying;
     is_live && model.outcome.started && model.settings.log_path.is_some() && !model.is_at_risk()
-}
-
-/// Whether the vehicle is down and nothing is at risk: it may have a log to offer.
-fn is_down(model: &Model) -> bool {
-    let phase = model.vehicle.phase_now();
-    !model.is_at_risk() && matches!(phase, Some(TdPhase::TD_PHASE_TOUCHDOWN | TdPhase::TD_PHASE_SAFED))
 }
 
 impl Act {
@@ -158,23 +143,15 @@ impl Act {
             Self::Check | Self::CheckStill => acts && why_not_check(model, now).is_none(),
             Self::Acknowledge => !model.alarms.list().is_empty() && model.settings.role != Role::Replaying,
             Self::Follow => model.pages.held.is_some(),
-            Self::AskParameters => model.page() == Page::Parameters && model.settings.role != Role::Replaying,
             Self::Checklist => model.checklist.is_some(),
             Self::ReplayFlight => flown_here(model),
             Self::Report => commands && flown_here(model),
-            Self::Download => commands && is_down(model),
             Self::MovePin => {
                 let is_ours = model.settings.demonstration && model.settings.role == Role::Station;
                 is_ours && !model.vehicle.in_flight() && model.vehicle.interlocks().is_some()
             }
             Self::SignStep | Self::VoidStep => commands && model.checklist.is_some(),
-            Self::Show(_)
-            | Self::Hold
-            | Self::Filter
-            | Self::Palette
-            | Self::NextTheme
-            | Self::Redraw
-            | Self::Quit => true,
+            Self::Show(_) | Self::Hold | Self::Palette | Self::NextTheme | Self::Redraw | Self::Quit => true,
         }
     }
 
@@ -224,7 +201,6 @@ impl Act {
                     | Self::Show(_)
                     | Self::Hold
                     | Self::Follow
-                    | Self::Filter
                     | Self::Palette
                     | Self::NextTheme
                     | Self::Redraw

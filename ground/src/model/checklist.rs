@@ -13,6 +13,7 @@ use sha2::{Digest as _, Sha256};
 use super::{
     FlownMission, Model, is_flight,
     quantity::{self, Quantity},
+    words,
 };
 
 /// The most steps of a checklist.
@@ -128,7 +129,7 @@ mod role_words {
 
     #[expect(clippy::ref_option, clippy::trivially_copy_pass_by_ref, reason = "serde gives the field itself")]
     pub(super) fn serialize<S: Serializer>(role: &Option<TdRole>, to: S) -> Result<S::Ok, S::Error> {
-        to.serialize_str(role.map_or("", role_word))
+        to.serialize_str(&role.map_or_else(String::new, role_word))
     }
 
     pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Option<TdRole>, D::Error> {
@@ -140,15 +141,11 @@ mod role_words {
 }
 
 /// A change of a checklist, for the file that keeps it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum ChecklistEntry {
-    Signed {
+    Marked {
         step: usize,
-        signature: Signature,
-    },
-    Voided {
-        step: usize,
-        signature: Signature,
+        mark: Mark,
     },
     /// The vehicle has left the pad: every step is open for the next flight.
     Flown {
@@ -160,19 +157,14 @@ impl Checklist {
     /// Applies a change. Returns false if there is no such step.
     pub fn apply(&mut self, entry: &ChecklistEntry) -> bool {
         match entry {
-            ChecklistEntry::Signed { step, signature } => self.mark(*step, Mark::Signed(signature.clone())),
-            ChecklistEntry::Voided { step, signature } => self.mark(*step, Mark::Voided(signature.clone())),
+            ChecklistEntry::Marked { step, mark } => {
+                self.steps.get_mut(*step).map(|step| step.mark = mark.clone()).is_some()
+            }
             ChecklistEntry::Flown { .. } => {
-                for step in &mut self.steps {
-                    step.mark = Mark::Open;
-                }
+                self.steps.iter_mut().for_each(|step| step.mark = Mark::Open);
                 true
             }
         }
-    }
-
-    fn mark(&mut self, step: usize, mark: Mark) -> bool {
-        self.steps.get_mut(step).map(|step| step.mark = mark).is_some()
     }
 
     pub fn is_touched(&self) -> bool {
@@ -273,8 +265,8 @@ impl Model {
 
 // Reads a checklist (TOML) and the list of its signatures, and writes one signature as text.
 //
-// The signatures are in a file of their own that only grows: one `[[entry]]` for each change, so that nothing that was
-// signed is ever lost, and an entry that was cut off by a crash hides no other.
+// The signatures are in a file of their own that only grows: one line of JSON for each change, so that nothing that was
+// signed is ever lost. A line begins with a line break, so one that a crash has cut off hides no other.
 
 /// A signature older than this, when the station starts, no longer counts: it was for another day.
 pub const SIGNED_FOR_S: u64 = 12 * 3_600;
@@ -282,10 +274,6 @@ pub const SIGNED_FOR_S: u64 = 12 * 3_600;
 const AHEAD_MAX_S: u64 = 600;
 /// Bytes of a checklist's hash.
 const HASH_BYTES: usize = 8;
-/// What every entry of the list of signatures begins with.
-const ENTRY: &str = "[[entry]]";
-/// The last line of every entry.
-const END: &str = "\nwhole = true\n";
 
 /// Why a checklist cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -296,15 +284,6 @@ pub enum ChecklistError {
     StepCount(usize),
     #[error("step {number}: {why}")]
     Step { number: usize, why: String },
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum RoleName {
-    RangeSafety,
-    Flight,
-    Pad,
-    Anybody,
 }
 
 /// The file as it is written.
@@ -321,7 +300,7 @@ struct Written {
 #[serde(deny_unknown_fields)]
 struct WrittenStep {
     words: String,
-    signs: RoleName,
+    signs: String,
     value: Option<String>,
     least: Option<f64>,
     most: Option<f64>,
@@ -378,38 +357,17 @@ impl WrittenStep {
                 Some(Limits { quantity, least, most })
             }
         };
-        let role = match self.signs {
-            RoleName::RangeSafety => Some(TdRole::TD_ROLE_RANGE_SAFETY),
-            RoleName::Flight => Some(TdRole::TD_ROLE_FLIGHT),
-            RoleName::Pad => Some(TdRole::TD_ROLE_PAD),
-            RoleName::Anybody => None,
-        };
+        let role = role_of(&self.signs).filter(|role| *role != TdRole::TD_ROLE_OBSERVER);
+        if role.is_none() && self.signs != "anybody" {
+            let signs = &self.signs;
+            return Err(format!("signs: `{signs}`; give range-safety, flight, pad or anybody"));
+        }
         Ok(Step { words: printable(&self.words), role, value, mark: Mark::Open })
     }
 }
 
 fn quantity_names() -> String {
     quantity::ALL.iter().map(|quantity| quantity.name).collect::<Vec<_>>().join(", ")
-}
-
-/// An entry of the list of signatures.
-#[derive(Debug, Deserialize, Serialize)]
-struct WrittenEntry {
-    checklist: String,
-    unix_s: u64,
-    what: What,
-    step: Option<usize>,
-    by: Option<String>,
-    role: Option<String>,
-    found: Option<f64>,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "kebab-case")]
-enum What {
-    Signed,
-    Voided,
-    Flown,
 }
 
 /// What a list of signatures holds for a checklist.
@@ -426,78 +384,39 @@ pub struct Remembered {
 /// Reads a list of signatures for a checklist of this hash.
 pub fn remembered(list: &str, hash: &str, now_unix_s: u64) -> Remembered {
     let mut found = Remembered::default();
-    for part in list.split(ENTRY).skip(1) {
-        // An entry that a crash cut off lacks its last line.
-        let whole = part.split_once(END).map(|(entry, _)| entry);
-        let Some(entry) = whole.and_then(|entry| toml::from_str::<WrittenEntry>(entry).ok()) else {
+    for line in list.lines().filter(|line| !line.is_empty()) {
+        let Ok((of, mut entry)) = serde_json::from_str::<(String, ChecklistEntry)>(line) else {
             found.broken += 1;
             continue;
         };
-        if entry.checklist != hash {
+        if of != hash {
             continue;
         }
-        let age_s = now_unix_s.saturating_sub(entry.unix_s);
-        let counts = age_s <= SIGNED_FOR_S && entry.unix_s <= now_unix_s + AHEAD_MAX_S;
-        match entry.read() {
-            None => found.broken += 1,
-            Some(ChecklistEntry::Signed { .. }) if !counts => found.outdated += 1,
-            Some(entry) => found.entries.push(entry),
+        if let ChecklistEntry::Marked { mark, .. } = &mut entry
+            && let Mark::Signed(signature) | Mark::Voided(signature) = mark
+        {
+            signature.by = printable(&signature.by);
+        }
+        if let ChecklistEntry::Marked { mark: Mark::Signed(Signature { unix_s, .. }), .. } = &entry
+            && !(now_unix_s.saturating_sub(SIGNED_FOR_S)..=now_unix_s + AHEAD_MAX_S).contains(unix_s)
+        {
+            found.outdated += 1;
+        } else {
+            found.entries.push(entry);
         }
     }
     found
 }
 
-impl WrittenEntry {
-    fn read(self) -> Option<ChecklistEntry> {
-        let signature = Signature {
-            by: printable(&self.by.unwrap_or_default()),
-            role: self.role.as_deref().and_then(role_of),
-            unix_s: self.unix_s,
-            found: self.found,
-        };
-        let step = self.step.and_then(|number| number.checked_sub(1));
-        match self.what {
-            What::Flown => Some(ChecklistEntry::Flown { unix_s: self.unix_s }),
-            What::Signed => Some(ChecklistEntry::Signed { step: step?, signature }),
-            What::Voided => Some(ChecklistEntry::Voided { step: step?, signature }),
-        }
-    }
-}
-
-/// The text of an entry, to be added at the end of the list.
+/// The line of an entry, to be added at the end of the list.
 pub fn entry_text(hash: &str, entry: &ChecklistEntry) -> String {
-    let (what, unix_s, signed) = match entry {
-        ChecklistEntry::Signed { step, signature } => {
-            (What::Signed, signature.unix_s, Some((step, signature)))
-        }
-        ChecklistEntry::Voided { step, signature } => {
-            (What::Voided, signature.unix_s, Some((step, signature)))
-        }
-        ChecklistEntry::Flown { unix_s } => (What::Flown, *unix_s, None),
-    };
-    let (step, signature) = signed.unzip();
-    let entry = WrittenEntry {
-        checklist: hash.to_owned(),
-        unix_s,
-        what,
-        step: step.map(|step| step + 1),
-        by: signature.map(|signature| signature.by.clone()),
-        role: signature.and_then(|signature| signature.role).map(|role| role_word(role).to_owned()),
-        found: signature.and_then(|signature| signature.found).filter(|found| found.is_finite()),
-    };
-    // Numbers and texts are always TOML.
-    let text = toml::to_string(&entry).unwrap_or_default();
-    format!("\n{ENTRY}\n{}{END}", text.trim_end())
+    // Numbers and texts are always JSON.
+    format!("\n{}\n", serde_json::to_string(&(hash, entry)).unwrap_or_default())
 }
 
 /// As in the crew file.
-pub fn role_word(role: TdRole) -> &'static str {
-    match role {
-        TdRole::TD_ROLE_OBSERVER => "observer",
-        TdRole::TD_ROLE_RANGE_SAFETY => "range-safety",
-        TdRole::TD_ROLE_FLIGHT => "flight",
-        TdRole::TD_ROLE_PAD => "pad",
-    }
+fn role_word(role: TdRole) -> String {
+    words::lower_case(&role, "TD_ROLE_").replace(' ', "-")
 }
 
 fn role_of(word: &str) -> Option<TdRole> {
@@ -547,7 +466,7 @@ mod tests {
             unix_s,
             found: Some(7.25),
         };
-        ChecklistEntry::Signed { step, signature }
+        ChecklistEntry::Marked { step, mark: Mark::Signed(signature) }
     }
 
     #[test]
@@ -575,14 +494,14 @@ mod tests {
             let found = remembered(&list, "hash", 100);
             assert!(found.entries.len() >= 2, "{end}: {found:?}");
             assert!(
-                found.entries.iter().all(|entry| matches!(entry, ChecklistEntry::Signed { step: 0, .. }))
+                found.entries.iter().all(|entry| matches!(entry, ChecklistEntry::Marked { step: 0, .. }))
             );
         }
     }
 
     proptest! {
         #[test]
-        fn no_text_causes_a_panic(text in ".*", list in "(\\[\\[entry\\]\\]\n)?.*") {
+        fn no_text_causes_a_panic(text in ".*", list in "(\\[\"hash\",)?.*") {
             let _ = parse_checklist(&text);
             let _ = remembered(&list, "hash", 100);
         }

@@ -241,7 +241,6 @@ pub struct Model {
     pub alarms: Alarms,
     pub pages: Pages,
     pub history: History,
-    pub parameters: Parameters,
     /// The checklist of the mission, as the station keeps it; `None` without one.
     pub checklist: Option<Checklist>,
     /// Why a step was not signed or voided, and when.
@@ -385,12 +384,8 @@ pub enum Request {
     Command(CommandKind),
     /// The crew has seen this alarm.
     Acknowledge(AlarmKind),
-    /// Ask the vehicle for its parameters.
-    Parameters,
     /// Write the report of the flight.
     Report,
-    /// Fetch the vehicle's own log.
-    Download,
     /// Begin the radio range test.
     RangeTest,
     /// Show and command this boot, of several vehicles under one id.
@@ -432,8 +427,6 @@ pub enum Action {
     ReplayFlight,
     /// Write the report of the flight.
     WriteReport,
-    /// Fetch the vehicle's own log.
-    FetchLog,
     /// Move the pin of the demonstration's vehicle: out, or in.
     MovePin(bool),
     /// Enter this into the book.

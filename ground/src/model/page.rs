@@ -23,7 +23,6 @@ pub enum Page {
     Link,
     /// The event list.
     Messages,
-    Parameters,
     /// The state of the recording.
     Log,
     /// Every alarm, to be acknowledged one by one.
@@ -42,36 +41,27 @@ pub enum Page {
 }
 
 impl Page {
-    /// The pages with a digit, in that order.
-    pub const NUMBERED: [Self; 9] = [
+    /// Every page that a key shows: those with a digit in that order, then those with a letter or a mark.
+    pub const ALL: [Self; 14] = [
         Self::Pad,
         Self::Descent,
         Self::Landing,
         Self::Review,
         Self::Link,
         Self::Messages,
-        Self::Parameters,
         Self::Log,
         Self::Alarms,
+        Self::Path,
+        Self::Find,
+        Self::Checks,
+        Self::Values,
+        Self::Plot,
+        Self::Help,
     ];
-    /// The pages with a letter or a mark.
-    pub const LETTERED: [Self; 6] =
-        [Self::Path, Self::Find, Self::Checks, Self::Values, Self::Plot, Self::Help];
-
     /// The page whose key shows this one: ascent and descent share one.
     #[must_use]
     pub fn keyed(self) -> Self {
         if self == Self::Ascent { Self::Descent } else { self }
-    }
-
-    /// Every page that a key shows.
-    pub fn all() -> impl Iterator<Item = Self> {
-        Self::NUMBERED.into_iter().chain(Self::LETTERED)
-    }
-
-    /// Whether it lists what a filter can narrow down.
-    pub fn has_filter(self) -> bool {
-        matches!(self, Self::Messages | Self::Parameters | Self::Link)
     }
 
     /// The name shown at the bottom of the screen.
@@ -84,7 +74,6 @@ impl Page {
             Self::Review => "Review",
             Self::Link => "Link",
             Self::Messages => "Texts",
-            Self::Parameters => "Params",
             Self::Log => "Log",
             Self::Alarms => "Alarms",
             Self::Path => "Path",
@@ -122,8 +111,6 @@ pub struct Pages {
     pub chosen: Option<AlarmKind>,
     /// What the plot page shows.
     pub plotted: &'static Quantity,
-    /// Only lines with this text are listed; empty for all.
-    pub filter: String,
     /// Whether the Pad page lists the checklist instead of the arming checks.
     pub checklist: bool,
     /// The chosen step of the checklist; `None` for the first that is open.
@@ -135,8 +122,6 @@ pub struct Pages {
 /// A text that is being typed; the keys go to it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum TextEntry {
-    /// The filter of the shown list.
-    Filter,
     /// A time or a phase to jump to in a replay.
     Jump {
         typed: String,
@@ -157,7 +142,6 @@ impl Default for Pages {
             scroll: 0,
             chosen: None,
             plotted: &quantity::ALL[0],
-            filter: String::new(),
             checklist: false,
             step: None,
             entry: None,
@@ -174,11 +158,6 @@ impl Pages {
             Some(Page::Descent) if of_phase == Page::Ascent => Page::Ascent,
             held => held.unwrap_or(of_phase),
         }
-    }
-
-    /// Whether a line of a list passes the filter.
-    pub fn lets_pass(&self, text: &str) -> bool {
-        self.filter.is_empty() || text.to_lowercase().contains(&self.filter.to_lowercase())
     }
 
     /// Holds a page; `None` follows the flight again.

@@ -115,7 +115,6 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
             }
             return;
         }
-        MavMessage::PARAM_VALUE(data) => return model.parameters.take(data),
         MavMessage::TD_BOOK_KEPT(data) => return vehicle_changes::on_kept(model, data),
         MavMessage::TD_UPLINK(data) => return on_uplink(model, data, now),
         MavMessage::TIMESYNC(data) => return on_timesync(model, data, frame.source(), now),

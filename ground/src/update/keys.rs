@@ -8,7 +8,7 @@
 
 use std::time::Duration;
 
-use protocol::dialect::{MavMessage, PARAM_REQUEST_LIST_DATA, TdAct, TdInterlock};
+use protocol::dialect::{TdAct, TdInterlock};
 use protocol::log::record::EventLevel;
 
 use super::{Action, Request, commands, on_request, pad};
@@ -350,7 +350,6 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
         }
         Act::ReplayFlight => update::replay_flight(model, now),
         Act::Report => update::write_report(model, now),
-        Act::Download => update::fetch_log(model, now),
         Act::MovePin if act.works(model, now) => {
             let is_out = model
                 .vehicle
@@ -367,23 +366,12 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
         Act::SignStep => pad::open_sign_dialog(model, false, now),
         Act::VoidStep => pad::open_sign_dialog(model, true, now),
         Act::Show(Page::Help) if shown == Page::Help => model.pages.hold(None),
-        Act::Show(page) => {
-            model.pages.hold(Some(page));
-            if page == Page::Parameters && !model.parameters.asked && model.playing.is_none() {
-                ask_parameters(model);
-            }
-        }
+        Act::Show(page) => model.pages.hold(Some(page)),
         Act::Hold if model.pages.held.is_some() => model.pages.hold(None),
         Act::Hold => model.pages.hold(Some(shown)),
-        Act::Follow => {
-            model.pages.filter.clear();
-            model.pages.hold(None);
-        }
-        Act::Filter => open_filter(model),
+        Act::Follow => model.pages.hold(None),
         Act::Palette => open_palette(model),
         Act::NextTheme => model.outbox.push(Action::NextTheme),
-        Act::AskParameters if shown == Page::Parameters && model.playing.is_none() => ask_parameters(model),
-        Act::AskParameters => {}
         Act::Redraw => model.outbox.push(Action::Redraw),
         Act::Quit => quit(model, now),
     }
@@ -443,24 +431,13 @@ fn choose_quantity(model: &mut Model, up: bool) {
     model.pages.plotted = &quantity::ALL[next];
 }
 
-/// Scrolls up by this many lines; down if negative. Events are listed from the newest line, parameters and link
-/// values from the first.
+/// Scrolls up by this many lines; down if negative. Events are listed from the newest line, link values from
+/// the first.
 fn scroll(model: &mut Model, up: i32) {
-    let away = if matches!(model.page(), Page::Parameters | Page::Link) { -up } else { up };
+    let away = if model.page() == Page::Link { -up } else { up };
     let lines = i32::try_from(model.pages.scroll).unwrap_or(SCROLL_MAX);
     let scrolled = lines.saturating_add(away).clamp(0, SCROLL_MAX);
     model.pages.scroll = usize::try_from(scrolled).unwrap_or(0);
-}
-
-pub(super) fn ask_parameters(model: &mut Model) {
-    model.parameters.asked = true;
-    if model.settings.role == Role::Attached {
-        return model.outbox.push(Action::Request(Request::Parameters));
-    }
-    model.outbox.push(Action::send(MavMessage::PARAM_REQUEST_LIST(PARAM_REQUEST_LIST_DATA {
-        target_system: model.settings.vehicle.system_id,
-        target_component: model.settings.vehicle.component_id,
-    })));
 }
 
 /// Every step of a command is complete.
@@ -616,18 +593,10 @@ fn quit(model: &mut Model, now: Duration) {
     }
 }
 
-// The keys while a text is typed: a filter of a list, or a part of an action's words in the palette.
+// The keys while a part of an action's words is typed in the palette.
 
 /// The longest text.
 const TYPED_MAX: usize = 30;
-
-/// Opens the filter of the shown list; on a page without one, of the events.
-pub(super) fn open_filter(model: &mut Model) {
-    if !model.page().has_filter() {
-        model.pages.hold(Some(Page::Messages));
-    }
-    model.pages.entry = Some(TextEntry::Filter);
-}
 
 pub(super) fn open_palette(model: &mut Model) {
     model.pages.entry = Some(TextEntry::Palette { typed: String::new(), chosen: 0 });
@@ -638,19 +607,8 @@ pub(super) fn on_entry_key(model: &mut Model, key: Key, now: Duration) {
     match model.pages.entry.take() {
         // Only a replay asks where to jump, and takes those keys itself.
         None | Some(TextEntry::Jump { .. }) => {}
-        Some(TextEntry::Filter) => on_filter_key(model, key),
         Some(TextEntry::Palette { typed, chosen }) => on_palette_key(model, (typed, chosen), key, now),
     }
-}
-
-fn on_filter_key(model: &mut Model, key: Key) {
-    match key {
-        Key::Enter => return,
-        Key::Escape => return model.pages.filter.clear(),
-        _ => edit(&mut model.pages.filter, key),
-    }
-    model.pages.scroll = 0;
-    model.pages.entry = Some(TextEntry::Filter);
 }
 
 fn on_palette_key(model: &mut Model, (mut typed, mut chosen): (String, usize), key: Key, now: Duration) {

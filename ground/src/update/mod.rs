@@ -53,8 +53,6 @@ pub enum Msg {
     Checklist(Box<Checklist>),
     /// The report of the flight is here, or is not because of this.
     Report(Result<String, String>),
-    /// How far the vehicle's own log is, or why it is not fetched.
-    Download(Result<String, String>),
     /// The last place of the vehicle, kept from before this run of the station.
     Place(Box<LastPlace>),
     /// The station has signed the end of its book.
@@ -166,8 +164,6 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
         Msg::Checklist(list) => model.checklist = Some(*list),
         Msg::Report(Ok(path)) => model.info(now, format!("the report is written: {path}")),
         Msg::Report(Err(why)) => model.warn(now, format!("the report is not written: {why}")),
-        Msg::Download(Ok(words)) => model.info(now, words),
-        Msg::Download(Err(why)) => model.warn(now, format!("the vehicle's log is not fetched: {why}")),
         Msg::Place(place) => model.place = Some(*place),
         Msg::Unfinished(kept) => model.take_unfinished(*kept, now),
         Msg::Book { head, is_signed } => {
@@ -246,9 +242,7 @@ fn on_request(model: &mut Model, request: Request, by: Seat, now: Duration) {
     match request {
         Request::Command(kind) => keys::command(model, kind, &by, now),
         Request::Acknowledge(kind) => keys::acknowledge(model, kind, now),
-        Request::Parameters => keys::ask_parameters(model),
         Request::Report => write_report(model, now),
-        Request::Download => fetch_log(model, now),
         Request::Choose(boot) => vehicle_changes::choose(model, boot, &by, now),
         Request::RangeTest => pad::begin_range_test(model, by, now),
         Request::WithoutLog => keys::without_log(model, &by, now),
@@ -321,7 +315,7 @@ fn on_log_begins(model: &mut Model, log: String, tlog: Option<String>, now: Dura
     model.outcome.started = false;
 }
 
-// After the flight: the flight again on this screen, its report, and the log that the vehicle has written itself.
+// After the flight: the flight again on this screen, and its report.
 
 /// Why neither is possible now.
 fn why_nothing_flown(model: &Model) -> Option<&'static str> {
@@ -355,26 +349,6 @@ pub(super) fn write_report(model: &mut Model, now: Duration) {
         None => {
             model.info(now, "the report is being written");
             model.outbox.push(Action::WriteReport);
-        }
-    }
-}
-
-/// Has the vehicle's own log fetched, by the station. Whether it gives it out is the vehicle's decision; this one only
-/// spares a vehicle in flight the question.
-pub(super) fn fetch_log(model: &mut Model, now: Duration) {
-    let why = match model.settings.role {
-        Role::Replaying => Some("this is a replay"),
-        Role::Watching => Some("this screen only watches"),
-        _ if model.is_at_risk() => Some("the vehicle is armed or in flight"),
-        _ if model.vehicle.heartbeat.is_none() => Some("no vehicle has been heard"),
-        _ => None,
-    };
-    match (why, model.settings.role) {
-        (Some(why), _) => model.info(now, format!("no download: {why}")),
-        (None, Role::Attached) => model.outbox.push(Action::Request(Request::Download)),
-        (None, _) => {
-            model.info(now, "the vehicle is asked for its log");
-            model.outbox.push(Action::FetchLog);
         }
     }
 }

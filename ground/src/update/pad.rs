@@ -45,12 +45,8 @@ pub(super) fn sign(model: &mut Model, (step, void): (usize, bool), by: &Seat, no
     match signature(model, (step, void), by, now) {
         Ok(signature) => {
             model.sign_refused = None;
-            let entry = if void {
-                ChecklistEntry::Voided { step, signature: signature.clone() }
-            } else {
-                ChecklistEntry::Signed { step, signature: signature.clone() }
-            };
-            change_checklist(model, entry);
+            let mark = if void { Mark::Voided(signature.clone()) } else { Mark::Signed(signature.clone()) };
+            change_checklist(model, ChecklistEntry::Marked { step, mark });
             let verb = if void { "voided" } else { "signed" };
             let text = signature_words(model, step, &signature, verb, by);
             model.record_operator(now, verb, by, &text);

@@ -9,8 +9,8 @@ use protocol::log::record::EventLevel;
 use super::{Action, commands, pad};
 use crate::model::{
     Approach, CommandKind, Danger, Ending, Extremes, FlightSoFar, FlownMission, FlownPath, History, KeepAway,
-    Model, Parameters, RestOfWord, Role, Sample, Seat, Speaker, Unfinished, Uplink, Vehicle, Verdict,
-    hold_words, is_aborted, is_flight, is_on_pad, latch_words, words,
+    Model, RestOfWord, Role, Sample, Seat, Speaker, Unfinished, Uplink, Vehicle, Verdict, hold_words,
+    is_aborted, is_flight, is_on_pad, latch_words, words,
 };
 
 /// The part of the vehicle's state whose changes are reported.
@@ -148,7 +148,6 @@ fn on_shown(model: &mut Model, reset: Option<&'static str>, now: Duration) {
     model.warn(now, text);
     model.outcome = FlightSoFar { error: model.outcome.error.take(), ..FlightSoFar::default() };
     model.history = History::default();
-    model.parameters = Parameters::default();
     model.link.uplink = Uplink::default();
     model.link.round_trip = None;
     // It has its time to report what it hears.

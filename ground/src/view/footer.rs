@@ -155,7 +155,7 @@ fn timeline(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line<
 // The keys that count now, and the pages.
 
 /// The keys come in this order.
-const KEYS: [Act; 17] = [
+const KEYS: [Act; 14] = [
     Act::Tap,
     Act::HoldCountdown,
     Act::Acknowledge,
@@ -165,14 +165,11 @@ const KEYS: [Act; 17] = [
     Act::TakeCommand,
     Act::ReplayFlight,
     Act::Report,
-    Act::Download,
     Act::SignStep,
     Act::VoidStep,
     Act::Check,
     Act::RangeTest,
     Act::Checklist,
-    Act::Filter,
-    Act::AskParameters,
 ];
 /// At least this many columns are for the keys, if every page need not be named.
 const KEY_COLUMNS: u16 = 34;
@@ -220,11 +217,12 @@ fn pages(model: &Model, theme: Theme, room: u16) -> Line<'static> {
         }
     };
     let is_shown = |page: &Page| *page == shown.keyed();
-    let needed: usize =
-        more.width() + word.len() + Page::all().filter(is_shown).map(|page| of(page).width()).sum::<usize>();
+    let needed: usize = more.width()
+        + word.len()
+        + Page::ALL.into_iter().filter(is_shown).map(|page| of(page).width()).sum::<usize>();
     let mut left = usize::from(room).saturating_sub(needed);
     let mut spans: Vec<Span> = Vec::new();
-    for page in Page::all() {
+    for page in Page::ALL {
         let span = of(page);
         if is_shown(&page) {
             spans.push(span);

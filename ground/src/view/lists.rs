@@ -6,7 +6,7 @@ use protocol::log::record::EventLevel;
 use ratatui::text::{Line, Span};
 
 use super::{CUT_MARK, TextRole, Theme, fixed};
-use crate::model::{Act, Event, Mark, Model, Step, StepState, TextEntry, role_name};
+use crate::model::{Act, Mark, Model, Step, StepState, role_name};
 
 /// Columns before the text of an event: time, speaker and mark.
 const TIME_COLUMNS: usize = 7;
@@ -22,7 +22,7 @@ const STEPS_FROM_ROWS: usize = 6;
 /// The newest events, oldest first, in this many lines of this width. Long texts wrap, because the end of a refusal
 /// is its reason.
 pub fn events(model: &Model, theme: Theme, columns: usize, rows: usize) -> Vec<Line<'static>> {
-    let mut events = chosen(model, |_| true, theme, columns, rows);
+    let mut events = chosen(model, theme, columns, rows);
     let before = model.events.total() - events.len() as u64;
     let begins = |place: &usize| {
         let fits = events[*place..].iter().map(Vec::len).sum::<usize>() <= rows;
@@ -32,21 +32,13 @@ pub fn events(model: &Model, theme: Theme, columns: usize, rows: usize) -> Vec<L
     newest_lines(shown, columns, rows)
 }
 
-/// The same of those that the crew's filter lets pass, by their text or their speaker.
-pub fn filtered(model: &Model, theme: Theme, columns: usize, rows: usize) -> Vec<Line<'static>> {
-    let pages = &model.pages;
-    let passes = |event: &Event| pages.lets_pass(&event.text) || pages.lets_pass(event.speaker.name());
-    newest_lines(chosen(model, passes, theme, columns, rows), columns, rows)
+/// All of them.
+pub fn every(model: &Model, theme: Theme, columns: usize, rows: usize) -> Vec<Line<'static>> {
+    newest_lines(chosen(model, theme, columns, rows), columns, rows)
 }
 
 /// The lines of each of the newest events.
-fn chosen(
-    model: &Model,
-    passes: impl Fn(&Event) -> bool,
-    theme: Theme,
-    columns: usize,
-    rows: usize,
-) -> Vec<Vec<Line<'static>>> {
+fn chosen(model: &Model, theme: Theme, columns: usize, rows: usize) -> Vec<Vec<Line<'static>>> {
     // In a narrow panel the speaker is left out.
     let is_narrow = columns < NARROW_COLUMNS;
     let before = if is_narrow { TIME_COLUMNS + 3 } else { BEFORE_TEXT };
@@ -54,7 +46,6 @@ fn chosen(
     model
         .events
         .newest(rows)
-        .filter(|event| passes(event))
         .map(|event| {
             let role = match event.level {
                 EventLevel::Info => TextRole::Plain,
@@ -240,23 +231,6 @@ fn signer(by: &str) -> &str {
 /// Hours and minutes of the day, UTC.
 fn clock(unix_s: u64) -> String {
     format!("{:02}:{:02} UTC", unix_s / 3_600 % 24, unix_s / 60 % 60)
-}
-
-// The line of the filter, above a list that it narrows down.
-
-/// `None` without a filter.
-pub fn filter_line(model: &Model, theme: Theme) -> Option<Line<'static>> {
-    let typing = model.pages.entry == Some(TextEntry::Filter);
-    let filter = &model.pages.filter;
-    if filter.is_empty() && !typing {
-        return None;
-    }
-    let (cursor, keys) =
-        if typing { ("_", "Enter keeps it, Esc lists all") } else { ("", "FILTERED; Esc lists all") };
-    Some(Line::from(vec![
-        theme.key(format!(" /{filter}{cursor}")),
-        theme.span(format!("   {keys}"), TextRole::Caution),
-    ]))
 }
 
 #[cfg(test)]

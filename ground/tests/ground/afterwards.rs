@@ -78,34 +78,6 @@ fn replay_and_report_wait_for_the_end_of_a_flight() {
 }
 
 #[test]
-fn the_vehicle_s_log_is_fetched_by_the_station_and_never_asked_for_in_flight() {
-    let fetches = |rig: &mut Rig| {
-        rig.actions.clear();
-        rig.key(Key::Char('L'));
-        let asked = |action: &Action| matches!(action, Action::FetchLog | Action::Request(Request::Download));
-        rig.actions.iter().filter(|action| asked(action)).cloned().collect::<Vec<_>>()
-    };
-    for (role, expected) in [
-        (Role::Station, vec![Action::FetchLog]),
-        (Role::Attached, vec![Action::Request(Request::Download)]),
-        (Role::Watching, vec![]),
-    ] {
-        let mut rig = falling(role);
-        assert_eq!(fetches(&mut rig), []);
-        rig.phase = TdPhase::TD_PHASE_SAFED;
-        rig.run(1.0);
-        assert_eq!(fetches(&mut rig), expected, "{role:?}");
-    }
-    let mut rig = falling(Role::Station);
-    fetches(&mut rig);
-    assert!(rig.events().contains("no download: the vehicle is armed or in flight"), "{}", rig.events());
-    rig.msg(Msg::Download(Ok("log flight.mcap: 1.00 of 2.00 MB".to_owned())));
-    rig.msg(Msg::Download(Err("no answer".to_owned())));
-    assert!(rig.events().contains("1.00 of 2.00 MB"), "{}", rig.events());
-    assert!(rig.events().contains("the vehicle's log is not fetched: no answer"), "{}", rig.events());
-}
-
-#[test]
 fn an_attached_screen_replays_itself_and_asks_the_station_for_the_report() {
     for (role, report) in
         [(Role::Attached, vec![Action::Request(Request::Report)]), (Role::Watching, Vec::new())]

@@ -276,9 +276,9 @@ fn alarms_are_listed_and_acknowledged_one_by_one() {
     rig.run(0.1);
     rig.checks_failed = TdCheck::TD_CHECK_LOG_SPACE.bits();
     rig.run(2.0);
-    rig.key(Key::Char('9'));
+    rig.key(Key::Char('8'));
     let screen = rig.screen(80, 24);
-    assert!(screen.contains("[9Alarms]") && screen.contains("2 of 2 not seen"), "{screen}");
+    assert!(screen.contains("[8Alarms]") && screen.contains("2 of 2 not seen"), "{screen}");
     assert!(
         screen.contains(" ALARM        VEHICLE LOG") && screen.contains(">ALARM        NO LIGHT"),
         "{screen}"

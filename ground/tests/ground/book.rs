@@ -114,7 +114,7 @@ fn the_vehicle_is_told_the_end_until_it_confirms_it() {
     rig.hear(&MavMessage::TD_BOOK_KEPT(kept));
     rig.run(5.0);
     assert!(heads(&mut rig).is_empty());
-    rig.key(Key::Char('8'));
+    rig.key(Key::Char('7'));
     let screen = rig.screen(80, 24);
     assert!(screen.contains("1 entries, head") && screen.contains("signed; 1 at the vehicle"), "{screen}");
     // A vehicle that was switched on again has a new log.

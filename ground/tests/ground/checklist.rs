@@ -95,7 +95,7 @@ fn a_step_is_signed_on_the_pad_page_with_a_key_and_enter() {
     let kept = rig
         .actions
         .iter()
-        .filter(|action| matches!(action, Action::KeepChecklist(ChecklistEntry::Signed { step: 0, .. })));
+        .filter(|action| matches!(action, Action::KeepChecklist(ChecklistEntry::Marked { step: 0, .. })));
     assert_eq!(kept.count(), 1);
     let booked = rig.actions.iter().any(|action| match action {
         Action::Enter(line) => {

@@ -10,9 +10,9 @@ use ground::update::{Action, Msg, update};
 use ground::view::top_lines::readiness;
 use protocol::frame::{Encoder, Frame};
 use protocol::identity::GROUND;
-use simulated_vehicle::endpoint::{VehicleEndpoint, VehicleKind, step};
-use simulated_vehicle::fly::load_flight;
-use simulated_vehicle::vehicle::Vehicle;
+use sim::wire::endpoint::{VehicleEndpoint, VehicleKind, step};
+use sim::wire::fly::load_flight;
+use sim::wire::vehicle::Vehicle;
 
 use crate::rig::settings;
 

@@ -1,9 +1,9 @@
-//! The palette, the filter, plotted numbers, and keys of the crew's choice.
+//! The palette, plotted numbers, and keys of the crew's choice.
 
 use std::collections::BTreeMap;
 
 use ground::key::Key;
-use ground::model::{Act, Bindings, DEFINITIONS, Does, Page, Prompt, palette_entries, quantity};
+use ground::model::{Bindings, DEFINITIONS, Does, Page, Prompt, palette_entries, quantity};
 use ground::update::{Action, Msg};
 use proptest::prelude::*;
 
@@ -91,10 +91,10 @@ fn the_palette_only_tells_how_to_abort() {
 
 /// Whatever is open or chosen, Ctrl-X and Enter abort.
 #[test]
-fn the_abort_works_in_the_palette_and_in_the_filter() {
-    for opened in [typed(":"), typed("/pin"), typed(":arm"), typed("t")] {
+fn the_abort_works_in_the_palette() {
+    for opened in [typed(":"), typed(":arm"), typed("t")] {
         let mut settings = settings(false, true);
-        settings.keys = chosen(&[("theme", "m"), ("path", "M"), ("filter", "/")]);
+        settings.keys = chosen(&[("theme", "m"), ("path", "M")]);
         let mut rig = Rig::new(settings);
         rig.run(1.0);
         rig.keys(&opened);
@@ -146,25 +146,6 @@ fn other_keys_open_the_same_ladder() {
 }
 
 #[test]
-fn the_filter_shows_only_what_fits() {
-    let mut rig = on_the_pad();
-    rig.text("igniter is open");
-    rig.text("battery is full");
-    rig.keys(&typed("/IGNIT"));
-    let screen = rig.screen(80, 24);
-    assert!(screen.contains("[6Texts]") && screen.contains("/IGNIT_"), "{screen}");
-    let list = |screen: &str| screen.lines().skip(4).take(17).collect::<Vec<_>>().join("\n");
-    assert!(list(&screen).contains("igniter is open") && !list(&screen).contains("disarmed"), "{screen}");
-    rig.key(Key::Enter);
-    let screen = rig.screen(80, 24);
-    assert!(screen.contains("FILTERED; Esc lists all") && !list(&screen).contains("disarmed"), "{screen}");
-    rig.key(Key::Char('5'));
-    assert!(rig.screen(80, 24).contains("FILTERED"), "the ages of messages are filtered too");
-    rig.keys(&[Key::Escape, Key::Char('6')]);
-    assert!(list(&rig.screen(80, 24)).contains("disarmed"));
-}
-
-#[test]
 fn any_number_can_be_plotted() {
     let mut rig = descending();
     for quantity in &quantity::ALL {
@@ -205,7 +186,6 @@ fn help_shows_only_the_keys_that_work_now() {
         !screen.contains("type ARM") && screen.contains("type START") && screen.contains("disarm:"),
         "{screen}"
     );
-    assert!(!Act::AskParameters.works(&rig.model, rig.now));
 }
 
 /// Pasted text does nothing through the palette, and a marked paste closes it.

@@ -12,9 +12,9 @@ use ground::update::{Msg, update};
 use ground::view::status_lines;
 use protocol::dialect::{TdChute, TdPhase};
 use protocol::frame::Frame;
-use simulated_vehicle::endpoint::{VehicleEndpoint, VehicleKind, step};
-use simulated_vehicle::fly::load_flight;
-use simulated_vehicle::vehicle::Vehicle;
+use sim::wire::endpoint::{VehicleEndpoint, VehicleKind, step};
+use sim::wire::fly::load_flight;
+use sim::wire::vehicle::Vehicle;
 
 use crate::rig::settings;
 

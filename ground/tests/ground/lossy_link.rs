@@ -10,8 +10,8 @@ use protocol::command::CommandRequest;
 use protocol::dialect::MavCmd;
 use protocol::frame::{Encoder, Frame};
 use protocol::identity::GROUND;
-use simulated_vehicle::endpoint::{VehicleEndpoint, VehicleKind, step};
-use simulated_vehicle::fly::{StartPoint, load_flight};
+use sim::wire::endpoint::{VehicleEndpoint, VehicleKind, step};
+use sim::wire::fly::{StartPoint, load_flight};
 
 use crate::rig::settings;
 

@@ -169,7 +169,7 @@ fn settings_are_checked_and_a_wrong_key_is_named() {
     };
     let right = check("connect = [\"udpin:0.0.0.0:14550\"]\nbell = false\n");
     assert_eq!(right.status.code(), Some(0));
-    assert!(out(&right).contains("valid") && out(&right).contains("14550"));
+    assert!(out(&right).contains("valid"));
     let wrong = check("bel = false\n");
     assert_eq!(wrong.status.code(), Some(1));
     assert!(err(&wrong).contains("ground.toml") && err(&wrong).contains("bel"), "{}", err(&wrong));

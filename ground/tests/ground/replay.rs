@@ -158,7 +158,7 @@ fn the_links_figures_are_the_recorded_ones() {
         (figures.rx_frames_s - 1.0).abs() < 0.2 && (figures.rx_bytes_s - 21.0).abs() < 5.0,
         "{figures:?}"
     );
-    player.on_key(Key::Char('8'));
+    player.on_key(Key::Char('7'));
     let mut terminal = ratatui::Terminal::new(ratatui::backend::TestBackend::new(80, 24)).unwrap();
     let now = player.position();
     terminal

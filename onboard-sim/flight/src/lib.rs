@@ -13,7 +13,7 @@
 //! * [`rules`] decides what the vehicle may do: phases, checks and limits.
 //! * [`computer`] is the flight computer: one frame, from sensor samples to commands.
 //!
-//! The crate `vehicles` reads the files that describe a vehicle, and the crate [`nmpc`] solves the landing problem.
+//! The crate `vehicles` reads the files that describe a vehicle, and the crate [`ocp`] solves the landing problem.
 //!
 //! Units are SI and radians; names carry units and frames. The frames are those of [`vehicle::rigid`].
 #![cfg_attr(not(test), no_std)]

@@ -8,10 +8,10 @@
 use std::io::Write as _;
 
 use anyhow::{Context as _, Result};
-use campaign::run::in_parallel;
-use campaign::statistics::quantile;
 use flight::guidance::powered::LandingSolved;
 use judge::{Judgement, Score};
+use onboard_sim::run::in_parallel;
+use onboard_sim::statistics::quantile;
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
 

@@ -1,9 +1,9 @@
-//! The landing in space, written from the equations in the documentation of [`nmpc`]: dynamics of an interval for any
+//! The landing in space, written from the equations in the documentation of [`ocp::landing`]: dynamics of an interval for any
 //! kind of number, running cost, and conditions.
 
 use nalgebra::{SMatrix, SVector, Vector3};
-use nmpc::{INPUTS, Problem, STATES};
 use num_dual::{DualNum, DualNumCopy, HyperDual64};
+use ocp::landing::{INPUTS, Problem, STATES};
 
 /// States and inputs of a node, one after the other.
 pub(crate) const BOTH: usize = STATES + INPUTS;

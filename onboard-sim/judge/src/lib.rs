@@ -1,11 +1,11 @@
 //! This crate solves the landing in space a second time, to judge the plans that flew.
 //!
-//! It shares with the solver that flies ([`nmpc::solve`]) the data of a problem, and no function: dynamics, cost and
+//! It shares with the solver that flies ([`ocp::landing::solve`]) the data of a problem, and no function: dynamics, cost and
 //! conditions (`landing`) are written again from their documentation, and their derivatives are those of hyper-dual numbers.
 //! The method is another one (`sqp`): sequential quadratic programming, whose subproblems Clarabel solves. It takes about a
 //! second where the flying solver takes a millisecond.
 //!
-//! As in flight a condition on a state is an exact penalty at the price [`terminal_penalty`](nmpc::SolverLimits), so a
+//! As in flight a condition on a state is an exact penalty at the price [`terminal_penalty`](ocp::landing::SolverLimits), so a
 //! problem without a landing has an answer as well, and of two plans the one with the lower [`Score::merit`] is better.
 
 mod landing;
@@ -13,7 +13,7 @@ mod sqp;
 
 use std::f64::consts::PI;
 
-use nmpc::{INPUTS, Problem, STATES, State};
+use ocp::landing::{INPUTS, Problem, STATES, State};
 
 use self::landing::{Node, Range, after, cost_at, ranges};
 use self::sqp::Search;

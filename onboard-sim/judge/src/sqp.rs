@@ -13,7 +13,7 @@ use std::f64::consts::TAU;
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver as _, SupportedConeT};
 use nalgebra::{SMatrix, SVector, SymmetricEigen};
-use nmpc::{INPUTS, Problem, STATES};
+use ocp::landing::{INPUTS, Problem, STATES};
 
 use crate::landing::{BOTH, Column, Node, Range, Tangent, after, cost_at, ranges};
 use crate::scored;

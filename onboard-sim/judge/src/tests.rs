@@ -1,7 +1,7 @@
 use super::*;
 use crate::landing::{Column, Tangent};
-use nmpc::SolverLimits;
-use nmpc::{Drag, End, Push, Weights, Workspace};
+use ocp::landing::SolverLimits;
+use ocp::landing::{Drag, End, Push, Weights, Workspace};
 
 const GRAVITY_M_S2: f64 = 9.806_65;
 
@@ -47,7 +47,7 @@ fn val_flying_solver_agrees_with_the_judges_own_guesses() {
         let mut model = problem(thrust_over_weight);
         model.initial[4] += sideways_m_s;
         let mut workspace = Workspace::default();
-        nmpc::solve(&mut workspace, &model, None);
+        ocp::landing::solve(&mut workspace, &model, None);
         let flown = score(&model, workspace.states(), workspace.inputs());
         let judged = solve(&model, None);
         let case = format!("{thrust_over_weight} {sideways_m_s}: {flown:?} {:?}", judged.score);
@@ -67,7 +67,7 @@ fn val_flying_solver_agrees_with_the_judges_own_guesses() {
 fn a_given_optimum_is_left_as_it_is() {
     let model = problem(1.8);
     let mut workspace = Workspace::default();
-    let outcome = nmpc::solve(&mut workspace, &model, None);
+    let outcome = ocp::landing::solve(&mut workspace, &model, None);
     let search = Search::of(&model);
     let given = nodes(&model, workspace.states(), workspace.inputs()).unwrap();
     let end = search.descend(given);

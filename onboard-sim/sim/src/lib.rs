@@ -1,6 +1,6 @@
 //! This crate simulates one flight: a world, a flight computer, faults and random differences.
 //!
-//! It has no clock, no network and no statistics. The live vehicle, a campaign and a replay all use it, so all three
+//! But for `wire` it has no clock and no network. The live vehicle, a campaign and a replay all use it, so all three
 //! fly the same flight.
 //!
 //! * [`world`]: the simulated truth.
@@ -12,6 +12,7 @@
 //! * `surroundings`: everything of it but its flight computer.
 //! * [`outside`]: the input from the crew and the ground in one frame.
 //! * [`outcome`]: how the flight ended, judged.
+//! * [`wire`] (feature `wire`): the flight with its clock, its MAVLink links and its log.
 
 pub mod dispersion;
 pub mod draw;
@@ -21,4 +22,6 @@ pub mod outside;
 pub mod recipe;
 pub mod sortie;
 mod surroundings;
+#[cfg(feature = "wire")]
+pub mod wire;
 pub mod world;

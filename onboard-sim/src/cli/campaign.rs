@@ -7,12 +7,12 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::Context as _;
-use campaign::run::{self, Progress};
-use campaign::scenario::{Expected, Scenario};
-use campaign::store::{Order, Shard, Store, merge};
-use campaign::summary::to_text;
 use clap::{Args, Subcommand};
 use flight::vehicle::mission::StartPoint;
+use onboard_sim::run::{self, Progress};
+use onboard_sim::scenario::{Expected, Scenario};
+use onboard_sim::store::{Order, Shard, Store, merge};
+use onboard_sim::summary::to_text;
 use protocol::log::build::build_info;
 use serde_json::json;
 use sha2::Digest as _;

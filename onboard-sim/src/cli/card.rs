@@ -4,9 +4,9 @@ use std::io::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use campaign::hazard::Flights;
-use campaign::motors::card::{Card, Day, Order};
 use clap::Args;
+use onboard_sim::hazard::Flights;
+use onboard_sim::motors::card::{Card, Day, Order};
 use protocol::mission::MissionHash;
 use sim::dispersion;
 

@@ -4,9 +4,9 @@ use std::io::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use campaign::check::{Verdict, check};
-use campaign::motors::source;
 use clap::Args;
+use onboard_sim::check::{Verdict, check};
+use onboard_sim::motors::source;
 
 use super::{on_threads, recipe, show_flights};
 

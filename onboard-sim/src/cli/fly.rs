@@ -19,10 +19,8 @@ use rustix::process::getpgrp;
 use rustix::termios::tcgetpgrp;
 use sim::dispersion::{self, Dispersion};
 use sim::fault::{TimedFault, how_to_write};
-use simulated_vehicle::fly::{
-    FlightEnd, FlightSummary, FlyOptions, OnTheWire, Speed, fly_observed, load_flight,
-};
-use simulated_vehicle::vehicle::{RocketFlight, VehicleEvent};
+use sim::wire::fly::{FlightEnd, FlightSummary, FlyOptions, OnTheWire, Speed, fly_observed, load_flight};
+use sim::wire::vehicle::{RocketFlight, VehicleEvent};
 use tokio::sync::watch;
 
 use super::{in_wind, text_of};

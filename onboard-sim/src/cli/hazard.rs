@@ -4,12 +4,12 @@ use std::io::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use campaign::figure::{Places, PlacesPanel, places_svg};
-use campaign::hazard::{self, Flights, Impact, Radius, Rule, Way, keep_out_m, landed_as_planned, widest};
-use campaign::statistics::Landings;
 use clap::Args;
 use flight::rules::verdict::Landing;
 use flight::vehicle::mission::StartPoint;
+use onboard_sim::figure::{Places, PlacesPanel, places_svg};
+use onboard_sim::hazard::{self, Flights, Impact, Radius, Rule, Way, keep_out_m, landed_as_planned, widest};
+use onboard_sim::statistics::Landings;
 use sim::dispersion::{self, may_be_kinder};
 use sim::recipe::Recipe;
 

@@ -12,10 +12,10 @@ mod single;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use ::campaign::run::threads;
-use ::campaign::stopwatch::Stopwatch;
 use anyhow::Context as _;
 use flight::vehicle::mission::StartPoint;
+use onboard_sim::run::threads;
+use onboard_sim::stopwatch::Stopwatch;
 use sim::dispersion::{self, Dispersion};
 use sim::recipe::{self, Recipe};
 use tempfile::NamedTempFile;

@@ -5,13 +5,13 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use anyhow::Context as _;
-use campaign::row::{COLUMNS, Row, Value};
-use campaign::scenario::Expected;
-use campaign::tally::Tally;
-use flight_log::sortie::{self, LastFrame};
+use onboard_sim::row::{COLUMNS, Row, Value};
+use onboard_sim::scenario::Expected;
+use onboard_sim::tally::Tally;
 use protocol::log::record::Record;
 use protocol::log::recorder::Recorder;
 use sim::recipe::Recipe;
+use sim::wire::record::{self, LastFrame};
 
 /// Flies it and prints its row, one column on each line.
 ///
@@ -56,15 +56,15 @@ fn print_row(row: &Row, out: &mut impl std::io::Write) -> std::io::Result<()> {
 }
 
 fn fly_logged(recipe: &Recipe, number: u64, tally: &mut Tally, path: &Path) -> anyhow::Result<()> {
-    let recorder = Recorder::create(path, &sortie::campaign_header(recipe, number))?;
-    recorder.record(Record::ComputerStart(Box::new(sortie::start(tally.flight()))), 0);
+    let recorder = Recorder::create(path, &record::campaign_header(recipe, number))?;
+    recorder.record(Record::ComputerStart(Box::new(record::start(tally.flight()))), 0);
     let mut last = LastFrame::default();
     let mut phase = tally.flight().computer().mode().phase;
     loop {
         let goes_on = tally.step_watched(&mut last);
         let flight = tally.flight();
-        let time_ns = sortie::time_ns(flight);
-        for record in sortie::frame_and_phase(flight, &mut last, phase) {
+        let time_ns = record::time_ns(flight);
+        for record in record::frame_and_phase(flight, &mut last, phase) {
             recorder.record(record, time_ns);
         }
         phase = flight.computer().mode().phase;
@@ -73,8 +73,8 @@ fn fly_logged(recipe: &Recipe, number: u64, tally: &mut Tally, path: &Path) -> a
         }
     }
     let flight = tally.flight();
-    if let Some(verdict) = sortie::verdict(flight) {
-        recorder.record(Record::LandingVerdict(Box::new(verdict)), sortie::time_ns(flight));
+    if let Some(verdict) = record::verdict(flight) {
+        recorder.record(Record::LandingVerdict(Box::new(verdict)), record::time_ns(flight));
     }
     recorder.finish().context("the flight is over, but its log is incomplete")?;
     Ok(())

@@ -1,4 +1,4 @@
 //! Passes frames with a correct checksum and any content through every decoder.
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| protocol::hostile::frames(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| protocol_fuzz::frames(data));

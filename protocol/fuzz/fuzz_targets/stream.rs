@@ -1,4 +1,4 @@
 //! Frames a stream of any bytes in any pieces.
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| protocol::hostile::stream(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| protocol_fuzz::stream(data));

@@ -4,7 +4,7 @@ use std::io;
 use std::io::{BufWriter, Write as _};
 use std::path::Path;
 
-use board::stream::{Answer, Begin, Frame, put};
+use avionics::board::stream::{Answer, Begin, Frame, put};
 use protocol::log::computer_v1::{ComputerFrame, ComputerStart};
 
 use crate::controller::SETTINGS_IN_FLIGHT;

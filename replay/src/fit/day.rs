@@ -13,11 +13,11 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use anyhow::{Context as _, Result, bail, ensure};
-use campaign::run::in_parallel;
-use campaign::stopwatch::Stopwatch;
 use clap::Args;
 use flight::vehicle::lot::{Burnt, Posterior};
 use flight::vehicle::mission::Mission;
+use onboard_sim::run::in_parallel;
+use onboard_sim::stopwatch::Stopwatch;
 use serde::Serialize;
 use sim::dispersion::{DEFAULT, Dispersion, may_be_kinder};
 use sim::draw::{Chance, Draw, draw};

@@ -3,6 +3,8 @@
 
 use std::path::Path;
 
+use avionics::log::frame::{commands_from_log, input_from_log, phase_of};
+use avionics::log::logged::{At, Logged, RecordError};
 use flight::computer::Commands;
 use flight::computer::Input;
 use flight::estimation::estimator::{Estimate, Measurements};
@@ -11,8 +13,6 @@ use flight::rules::phase::Phase;
 use flight::vehicle::airframe::MassModel;
 use flight::vehicle::atmosphere::Air;
 use flight::vehicle::mission::Mission;
-use flight_log::frame::{commands_from_log, input_from_log, phase_of};
-use flight_log::logged::{At, Logged, RecordError};
 use nalgebra::Vector3;
 use protocol::log::computer_v1::ComputerFrame;
 use protocol::log::flight_v1 as v1;

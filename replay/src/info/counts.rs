@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use campaign::statistics::quantile;
+use avionics::log::frame::accepts_abort;
 use flight::rules::phase::Phase;
-use flight_log::frame::accepts_abort;
+use onboard_sim::statistics::quantile;
 use protocol::dialect::TdInterlock;
 use protocol::log::flight_v1::PilotTiming;
 use protocol::log::reader::LogChannel;

@@ -8,9 +8,9 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
+use avionics::log::frame::phase_of;
 use flight::computer::FRAME_S;
 use flight::rules::phase::Phase;
-use flight_log::frame::phase_of;
 use serde::Serialize;
 
 use super::{Clock, ClockTime, Entry, StampedEntry};

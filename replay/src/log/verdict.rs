@@ -1,7 +1,6 @@
 //! The landing verdict of a log: recorded by the vehicle, or heard by a ground station.
 
 use flight::rules::verdict::{FlightEnding, Landing, LandingVerdict, Limits, Touchdown, UNDER_PARACHUTE};
-use flight_log::sortie::limits_to_log;
 use protocol::dialect::{
     MavMessage, TD_LANDING_VERDICT_DATA, TD_TOUCHDOWN_LIMITS_DATA, TdInterlock, TdLanding, TdPhase,
 };
@@ -9,6 +8,7 @@ use protocol::frame::{Frame, Framer};
 use protocol::log::reader::LogChannel;
 use protocol::log::record::TOPIC_RAW_RX;
 use protocol::log::v1;
+use sim::wire::record::limits_to_log;
 
 use serde::Serialize;
 

@@ -20,10 +20,9 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result};
+use avionics::log::frame::phase_of;
 use flight::computer::FRAME_S;
 use flight::rules::phase::Phase;
-use flight_log::frame::phase_of;
-use flight_log::sortie;
 use prost::Message as _;
 use protocol::log::computer_v1::{ComputerFrame, ComputerInput, ComputerOutput};
 use protocol::log::record::{Event, EventLevel, Record};
@@ -32,6 +31,7 @@ use protocol::log::writer::LogHeader;
 use serde::Serialize;
 use sim::draw::draw;
 use sim::sortie::SetUpError;
+use sim::wire::record;
 
 use self::rerun::Rerun;
 use crate::cli::{Outcome, answer, warn_of_what_is_missing};
@@ -233,7 +233,7 @@ pub fn refly_flight(
     rerun.records.push((rerun.flight.frame() as f64 * FRAME_S, Record::Event(began)));
     rerun = rerun.fly_before(u64::MAX);
 
-    let verdict = sortie::verdict(&rerun.flight);
+    let verdict = record::verdict(&rerun.flight);
     let end_s = rerun.flight.frame() as f64 * FRAME_S;
     let last = verdict.clone().map(|verdict| (end_s, Record::LandingVerdict(Box::new(verdict))));
     rerun.records.extend(last);

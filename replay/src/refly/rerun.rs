@@ -1,16 +1,16 @@
 //! A recorded flight, flown again frame by frame from the facts in its log.
 
+use avionics::log::frame::accepts_abort;
+use avionics::log::logged::{state_from_log, vector_from_log};
 use flight::computer::{Computer, FRAME_S, Input, Output};
 use flight::vehicle::mission::Mission;
-use flight_log::frame::accepts_abort;
-use flight_log::logged::{state_from_log, vector_from_log};
-use flight_log::sortie::{self as sortie_log, LastFrame};
 use protocol::log::computer_v1::{ComputerFrame, ComputerStart};
 use protocol::log::record::Record;
 use sim::fault::{Breakage, FaultError, TimedFault};
 use sim::outside::{Outside, Watch};
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
+use sim::wire::record::{self as sortie_log, LastFrame};
 
 use super::{FaultChanges, ReflyError};
 use crate::controller::LoggedComputer;

@@ -1,6 +1,6 @@
 //! A line chart as SVG, in the colours of the page.
 
-use campaign::figure::{Line, Panel, ends, plotted_px, sized_lines_svg};
+use onboard_sim::figure::{Line, Panel, ends, plotted_px, sized_lines_svg};
 
 use super::html::escaped;
 

@@ -2,14 +2,14 @@
 //!
 //! The plans are not in the log, so the flight computer is run again on its inputs, bit for bit, to get them.
 
-use campaign::figure::Span;
+use avionics::log::frame::phase_of;
+use avionics::log::logged::state_from_log;
 use flight::computer::pilot::{FRAMES_PER_PLAN, Pilot};
 use flight::estimation::estimator::Estimate;
 use flight::guidance::powered::Plan;
 use flight::rules::phase::Phase;
 use flight::vehicle::rigid::RigidState;
-use flight_log::frame::phase_of;
-use flight_log::logged::state_from_log;
+use onboard_sim::figure::Span;
 use protocol::log::computer_v1::ComputerFrame;
 use protocol::log::flight_v1::{self as v1, TruthSample};
 use protocol::log::v1::Telemetry;
@@ -300,7 +300,7 @@ fn state_of(state: &RigidState, height_m: f64) -> State {
 }
 
 /// The state at a node of a plan.
-pub(super) fn planned(node: &nmpc::State) -> State {
+pub(super) fn planned(node: &ocp::landing::State) -> State {
     let [north, west, height_m, north_m_s, west_m_s, up_m_s, p, r, p_rate, r_rate] = node;
     let ((sin_p, cos_p), (sin_r, cos_r)) = (libm::sincos(*p), libm::sincos(*r));
     let tilt_rad = libm::atan2(libm::hypot(sin_p, cos_p * sin_r), cos_p * cos_r);

@@ -9,7 +9,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail, ensure};
-use campaign::run::in_parallel;
+use onboard_sim::run::in_parallel;
 use serde::{Deserialize, Serialize};
 
 use super::{Obstacle, Verification, VerifyReport, verify};

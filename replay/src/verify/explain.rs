@@ -8,12 +8,13 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use anyhow::{Context as _, Result};
-use campaign::run::in_parallel;
-use campaign::stopwatch::Stopwatch;
+use avionics::log::frame::level_of;
 use flight::guidance::powered::{ControlLevel, LandingSolved};
-use flight_log::frame::level_of;
 use judge::{Judgement, Score};
-use nmpc::{Outcome as SolveOutcome, State};
+use ocp::Outcome as SolveOutcome;
+use ocp::landing::State;
+use onboard_sim::run::in_parallel;
+use onboard_sim::stopwatch::Stopwatch;
 use prost::Message as _;
 use protocol::log::computer_v1::ComputerFrame;
 use serde::Serialize;
@@ -116,7 +117,7 @@ pub struct FrameReport {
     pub judged: Option<Judged>,
     /// The nearest frame that plans a landing: this frame if it does, `None` if no frame does.
     pub nearest_planned: Option<u64>,
-    /// The plan: time from the frame, s, and state at each node ([`nmpc::State`]).
+    /// The plan: time from the frame, s, and state at each node ([`ocp::landing::State`]).
     pub path: Vec<(f64, State)>,
 }
 
@@ -206,8 +207,8 @@ pub fn explain_all(recording: &Recording) -> Result<Vec<FrameReport>, ExplainErr
 
 fn judged(solved: &LandingSolved) -> Judged {
     let LandingSolved { problem, outcome, plan } = solved;
-    let mut workspace = nmpc::Workspace::default();
-    let cold: SolveOutcome = nmpc::solve(&mut workspace, problem, None);
+    let mut workspace = ocp::landing::Workspace::default();
+    let cold: SolveOutcome = ocp::landing::solve(&mut workspace, problem, None);
     let (states, inputs) = (plan.states(), plan.inputs());
     let Judgement { converged, iterations, score, states: found, inputs: found_inputs } =
         judge::solve(problem, Some((states, inputs)));
@@ -247,10 +248,10 @@ fn facts(
     status: &'static str,
     iterations: usize,
     score: &Score,
-    (states, inputs): (&[State], &[[f64; nmpc::INPUTS]]),
+    (states, inputs): (&[State], &[[f64; ocp::landing::INPUTS]]),
 ) -> PlanFacts {
-    let [north, west, fins] = inputs.first().copied().unwrap_or([f64::NAN; nmpc::INPUTS]);
-    let end = states.last().copied().unwrap_or([f64::NAN; nmpc::STATES]);
+    let [north, west, fins] = inputs.first().copied().unwrap_or([f64::NAN; ocp::landing::INPUTS]);
+    let end = states.last().copied().unwrap_or([f64::NAN; ocp::landing::STATES]);
     PlanFacts {
         status,
         iterations,

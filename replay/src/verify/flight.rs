@@ -3,7 +3,7 @@
 use std::io::Read;
 use std::path::Path;
 
-use flight_log::frame::thought_to_log;
+use avionics::log::frame::thought_to_log;
 use protocol::log::computer_v1::ComputerStart;
 use protocol::log::record::{TOPIC_ESTIMATE, TOPIC_EVENTS, TOPIC_PILOT_TIMING, TOPIC_TRUTH_SAMPLE};
 use serde::Serialize;

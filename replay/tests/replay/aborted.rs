@@ -1,7 +1,7 @@
 //! Tests that flights with an abort under thrust are executed again from their logs like any other.
 
+use avionics::log::frame::accepts_abort;
 use flight::rules::phase::Phase;
-use flight_log::frame::accepts_abort;
 use replay::log::Recording;
 use replay::refly::{ReflyOptions, StartAt, refly_flight};
 use replay::verify::{Verification, verify};

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use avionics::log::frame::phase_of;
 use flight::rules::phase::Phase;
 use flight::vehicle::mission::StartPoint;
 use flight::vehicles::mission::BUILTIN;
-use flight_log::frame::phase_of;
 use protocol::log::computer_v1::ComputerFrame;
 use replay::evaluate::{EvaluateError, evaluate, print_evaluate};
 use replay::info::info;

@@ -4,7 +4,6 @@ use std::fs::File;
 use std::io::Read as _;
 use std::sync::LazyLock;
 
-use flight_log::sortie::{self, LastFrame, campaign_header};
 use protocol::log::computer_v1::{ComputerFrame, ComputerStart};
 use protocol::log::flight_v1::PilotTiming;
 use protocol::log::record::{Direction, Event, EventLevel, RawFrame, Record};
@@ -15,6 +14,7 @@ use replay::verify::{VerifyReport, verify_log};
 use sim::outside::Outside;
 use sim::recipe::Recipe as FlightRecipe;
 use sim::sortie::Sortie;
+use sim::wire::record::{self, LastFrame, campaign_header};
 
 pub(crate) const MISSION: &str = "mk2";
 const FRAMES: usize = 68;
@@ -37,12 +37,12 @@ pub(crate) struct Flight {
 pub(crate) static FLIGHT: LazyLock<Flight> = LazyLock::new(|| {
     let recipe = FlightRecipe::built_in(MISSION, "field").unwrap();
     let mut flight = Sortie::new(&recipe, NUMBER).unwrap();
-    let start = sortie::start(&flight);
+    let start = record::start(&flight);
     let (mut frames, mut thoughts, mut last) = (Vec::new(), Vec::new(), LastFrame::default());
     while frames.len() < FRAMES {
         flight.step_with(&Outside::NOBODY, &mut last);
         frames.push(*last.take().unwrap());
-        let beside = sortie::thought_and_truth(&flight).into_iter();
+        let beside = record::thought_and_truth(&flight).into_iter();
         thoughts.extend(beside.filter(|record| matches!(record, Record::Estimate(_))));
     }
     let limit = |name: &str| v1::LimitResult {

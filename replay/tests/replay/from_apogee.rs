@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 use std::sync::LazyLock;
 
-use campaign::tally::Tally;
-use flight_log::sortie::{self, LastFrame};
+use onboard_sim::tally::Tally;
 use protocol::log::record::Record;
 use protocol::log::writer::LogWriter;
 use sim::recipe::Recipe;
+use sim::wire::record::{self, LastFrame};
 use tempfile::TempDir;
 
 const NUMBER: u64 = 3;
@@ -33,22 +33,22 @@ pub(crate) fn fly_recipe(recipe: &Recipe) -> Logged {
     let log = directory.path().join("apogee.mcap");
     let mut tally = Tally::new(recipe, NUMBER).unwrap();
     let file = std::fs::File::create(&log).unwrap();
-    let mut writer = LogWriter::new(file, &sortie::campaign_header(recipe, NUMBER)).unwrap();
-    writer.write(&Record::ComputerStart(Box::new(sortie::start(tally.flight()))), 0).unwrap();
+    let mut writer = LogWriter::new(file, &record::campaign_header(recipe, NUMBER)).unwrap();
+    writer.write(&Record::ComputerStart(Box::new(record::start(tally.flight()))), 0).unwrap();
     let mut last = LastFrame::default();
     let mut phase = tally.flight().computer().mode().phase;
     loop {
         let goes_on = tally.step_watched(&mut last);
-        for record in sortie::frame_and_phase(tally.flight(), &mut last, phase) {
-            writer.write(&record, sortie::time_ns(tally.flight())).unwrap();
+        for record in record::frame_and_phase(tally.flight(), &mut last, phase) {
+            writer.write(&record, record::time_ns(tally.flight())).unwrap();
         }
         phase = tally.flight().computer().mode().phase;
         if !goes_on {
             break;
         }
     }
-    let verdict = Box::new(sortie::verdict(tally.flight()).unwrap());
-    writer.write(&Record::LandingVerdict(verdict), sortie::time_ns(tally.flight())).unwrap();
+    let verdict = Box::new(record::verdict(tally.flight()).unwrap());
+    writer.write(&Record::LandingVerdict(verdict), record::time_ns(tally.flight())).unwrap();
     writer.finish().unwrap();
     Logged { directory, log, landed: tally.row().stands }
 }

@@ -17,7 +17,7 @@ use replay::log::Recording;
 use replay::refly::{ReflyOptions, refly};
 use replay::verify::{Obstacle, Verification, VerifyReport, verify};
 use sim::recipe::Recipe;
-use simulated_vehicle::vehicle::{RocketFlight, Vehicle, VehicleEvent};
+use sim::wire::vehicle::{RocketFlight, Vehicle, VehicleEvent};
 use tempfile::TempDir;
 
 /// More frames than any flight has.
@@ -77,7 +77,7 @@ fn vehicle(start: StartPoint, faults: &[&str]) -> (Vehicle, LogHeader) {
     let faults = faults.iter().map(|fault| fault.parse().unwrap()).collect();
     let name = if start == StartPoint::Pad { "mk3" } else { "mk2" };
     let recipe = Recipe { faults, ..Recipe::built_in(name, "field").unwrap().starting_at(start).unwrap() };
-    let header = flight_log::sortie::header("test", &recipe, 0, 0);
+    let header = sim::wire::record::header("test", &recipe, 0, 0);
     (Vehicle::on_the_pad(&RocketFlight { recipe, number: 0 }).unwrap(), header)
 }
 

@@ -3,12 +3,12 @@
 use std::io::{Cursor, Read as _, Seek as _};
 use std::sync::LazyLock;
 
+use avionics::log::frame::frame_to_log;
+use avionics::log::logged::Logged as _;
 use flight::computer::{Computer, Input, LogState};
 use flight::estimation::estimator::{ImuSample, Measurements};
 use flight::rules::arming::Uplink;
 use flight::vehicle::rigid::RigidState;
-use flight_log::frame::frame_to_log;
-use flight_log::logged::Logged as _;
 use nalgebra::{UnitQuaternion, Vector3};
 use protocol::log::computer_v1::{ComputerFrame, ComputerStart};
 use protocol::log::record::Record;

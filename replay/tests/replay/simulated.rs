@@ -8,8 +8,8 @@ use protocol::log::recorder::Recorder;
 use protocol::transport::LinkAddress;
 use replay::log::Recording;
 use sim::recipe::Recipe;
-use simulated_vehicle::fly::{FlyOptions, OnTheWire, Speed, fly, load_flight};
-use simulated_vehicle::vehicle::RocketFlight;
+use sim::wire::fly::{FlyOptions, OnTheWire, Speed, fly, load_flight};
+use sim::wire::vehicle::RocketFlight;
 use tempfile::TempDir;
 use tokio::sync::watch;
 

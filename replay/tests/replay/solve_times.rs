@@ -1,6 +1,6 @@
 //! Tests the solve times of a flown rocket: they are recorded beside the frames from which they follow, and are not compared.
 
-use campaign::statistics::quantile;
+use onboard_sim::statistics::quantile;
 use replay::info::info;
 use replay::log::Recording;
 use replay::report::report;

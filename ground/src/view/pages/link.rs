@@ -10,7 +10,7 @@ use ratatui::text::{Line, Span};
 use super::window;
 use crate::model::{LinkReport, LinkState, Model, STALE_AFTER, refusal};
 use crate::view::status_lines::{link_line, percent};
-use crate::view::{STALE_MARK, TextRole, Theme, lists, seconds};
+use crate::view::{STALE_MARK, TextRole, Theme, seconds};
 
 /// A loss above this share is marked.
 const LOSS_MARKED: f64 = 0.05;
@@ -48,7 +48,6 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize, rows: u
         format!(" Age and rate of what the vehicle says; {STALE_MARK} older than {}", seconds(STALE_AFTER)),
         TextRole::Title,
     ));
-    lines.extend(lists::filter_line(model, theme));
     lines.extend(message_lines(model, theme, now, columns));
     // Scrolling up goes towards the first line.
     let start = lines.len().saturating_sub(rows).min(model.pages.scroll);
@@ -230,6 +229,5 @@ fn messages(model: &Model, now: Duration) -> Vec<(&'static str, Option<MessageFi
         .iter()
         .map(|name| (*name, figures(*name)))
         .chain(others.map(|(name, figures)| (*name, Some(*figures))))
-        .filter(|(name, _)| model.pages.lets_pass(name))
         .collect()
 }

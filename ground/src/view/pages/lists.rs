@@ -7,7 +7,7 @@ use ratatui::text::Line;
 use super::window;
 use crate::model::{ABORT_WORDS, Act, DEFINITIONS, Model, Role};
 use crate::view::status_lines::{AlarmState, alarm_state, cut};
-use crate::view::{TextRole, Theme, lists, seconds, shortest};
+use crate::view::{TextRole, Theme, lists, seconds};
 
 /// Columns of `ended alarm: ` and shorter words.
 const WORD_COLUMNS: usize = 13;
@@ -65,7 +65,7 @@ const EVERY_LINE: usize = 4_000;
 
 /// The newest events, or older ones when scrolled back.
 pub fn messages_lines(model: &Model, theme: Theme, columns: usize, rows: usize) -> Vec<Line<'static>> {
-    let all = lists::filtered(model, theme, columns, EVERY_LINE);
+    let all = lists::every(model, theme, columns, EVERY_LINE);
     let room = rows.saturating_sub(1);
     let back = model.pages.scroll.min(all.len().saturating_sub(room));
     let start = all.len().saturating_sub(room + back);
@@ -73,43 +73,8 @@ pub fn messages_lines(model: &Model, theme: Theme, columns: usize, rows: usize) 
     let mut lines = window(all, start, room);
     let place = if back == 0 { String::new() } else { format!(", {back} below") };
     let text = format!(" {} events, {count} lines{place}; Up and Down scroll", model.events.total());
-    let head = lists::filter_line(model, theme);
-    lines.insert(0, head.unwrap_or_else(|| theme.line(text, TextRole::Label)));
+    lines.insert(0, theme.line(text, TextRole::Label));
     lines
-}
-
-// The parameters page: the vehicle's parameters by name.
-
-/// How many are known, then one parameter per line.
-pub fn parameters_lines(model: &Model, theme: Theme, rows: usize) -> Vec<Line<'static>> {
-    let parameters = &model.parameters;
-    let of = parameters.count.map_or_else(|| "?".to_owned(), |count| count.to_string());
-    let state = if parameters.is_empty() && parameters.asked {
-        " requested; no answer yet".to_owned()
-    } else if parameters.is_empty() {
-        " not requested yet".to_owned()
-    } else {
-        format!(" {} of {of} known", parameters.len())
-    };
-    let head = Line::from(vec![
-        theme.plain(state),
-        theme.key("   r"),
-        theme.label(" asks the vehicle again; read-only here"),
-    ]);
-    let head = lists::filter_line(model, theme).unwrap_or(head);
-    let list: Vec<Line> = parameters
-        .iter()
-        .filter(|(name, _)| model.pages.lets_pass(name))
-        .map(|(name, value)| {
-            Line::from(vec![
-                theme.label(format!("  {name:<18}")),
-                theme.plain(format!("{:>14}", shortest(value))),
-            ])
-        })
-        .collect();
-    // Scrolling up goes towards the first line.
-    let start = list.len().saturating_sub(rows.saturating_sub(1)).min(model.pages.scroll);
-    std::iter::once(head).chain(window(list, start, rows.saturating_sub(1))).collect()
 }
 
 // The log page: whether the flight is recorded, and where.

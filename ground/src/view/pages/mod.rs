@@ -53,7 +53,6 @@ pub fn lines(model: &Model, page: Page, theme: Theme, now: Duration, area: Rect)
         Page::Review => landing::review_lines(model, theme, now, columns),
         Page::Link => link::lines(model, theme, now, columns, rows),
         Page::Messages => lists::messages_lines(model, theme, columns, rows),
-        Page::Parameters => lists::parameters_lines(model, theme, rows),
         Page::Log => lists::log_lines(model, theme, now),
         Page::Alarms => lists::alarms_lines(model, theme, now, columns, rows),
         Page::Find => checks::find_lines(model, theme, now),

@@ -19,7 +19,7 @@ use crate::vehicle::lot::{Expectation, Lot};
 use crate::vehicle::site::Site;
 use crate::vehicle::thrust_curve::ThrustCurve;
 
-pub use nmpc::SolverLimits;
+pub use ocp::landing::SolverLimits;
 
 /// Where a flight begins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]

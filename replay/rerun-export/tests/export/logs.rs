@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use flight::guidance::powered::ControlLevel;
 use flight::rules::phase::Phase;
-use flight_log::sortie::{LastFrame, frame_and_phase, header, start, time_ns};
 use protocol::log::computer_v1::ComputerFrame;
 use protocol::log::flight_v1;
 use protocol::log::record::{Event, EventLevel, Record};
@@ -14,6 +13,7 @@ use replay::output::{Destination, Overwrite};
 use sim::outside::Outside;
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
+use sim::wire::record::{LastFrame, frame_and_phase, header, start, time_ns};
 
 pub(crate) const START_UNIX_NS: u64 = 1_760_000_000_000_000_000;
 pub(crate) const FRAMES: u64 = 4;

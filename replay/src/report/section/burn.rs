@@ -1,8 +1,8 @@
 //! The landing burn: its path, motor, plans and actuators.
 
-use campaign::figure::Panel;
 use flight::guidance::powered::{ControlLevel, Plan};
 use flight::vehicle::mission::Mission;
+use onboard_sim::figure::Panel;
 
 use super::pictures::gimbal_deg;
 use super::{COMPONENTS, DEGREES, rms_and_max};

@@ -1,10 +1,10 @@
 //! The estimate: what its sensors said, and how far it was from the truth; vibration.
 
-use campaign::figure::Panel;
+use avionics::log::frame::phase_of;
+use avionics::log::logged::state_from_log;
 use flight::rules::phase::Phase;
-use flight_log::frame::phase_of;
-use flight_log::logged::state_from_log;
 use nalgebra::Vector3;
+use onboard_sim::figure::Panel;
 use protocol::log::computer_v1::ComputerFrame;
 
 use super::rms_and_max;

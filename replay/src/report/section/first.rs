@@ -1,7 +1,7 @@
 //! The first screen: how the flight ended, what went wrong, the whole flight, its place and its limits.
 
-use campaign::figure::Panel;
 use flight::rules::verdict::Landing;
+use onboard_sim::figure::Panel;
 
 use crate::findings::{FindingFacts, over};
 use crate::info::{Info, rounded};

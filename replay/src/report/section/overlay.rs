@@ -1,6 +1,6 @@
 //! Two flights in the same pictures.
 
-use campaign::figure::Panel;
+use onboard_sim::figure::Panel;
 
 use super::burn::paths;
 use super::pictures;

@@ -1,8 +1,8 @@
 //! Every picture over time, by section.
 
-use campaign::figure::Panel;
 use flight::computer::pilot::Pilot;
 use flight::estimation::estimator::Estimate;
+use onboard_sim::figure::Panel;
 use protocol::log::flight_v1::{AidStatus, Measurements, TruthSample, Vector3};
 
 use super::burn::{AHEAD_S, tracking_errors};

@@ -1,9 +1,9 @@
 //! The whole flight: its moments, its path, its events, its mission, and what the log holds.
 
-use campaign::figure::Panel;
 use flight::computer::pilot::Pilot;
 use flight::rules::phase::Phase;
 use flight::vehicles::mission::BUILTIN;
+use onboard_sim::figure::Panel;
 
 use super::burn::View;
 use crate::compare::compared;

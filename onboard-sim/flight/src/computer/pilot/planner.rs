@@ -7,7 +7,7 @@
 use alloc::boxed::Box;
 
 use nalgebra::{UnitQuaternion, Vector3};
-use nmpc::{Outcome, Status};
+use ocp::{Outcome, Status};
 
 use super::vehicle_model::{Burning, VehicleModel};
 use super::{Pilot, Prediction};

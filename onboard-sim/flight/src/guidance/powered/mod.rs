@@ -1,6 +1,6 @@
 //! Phase 2: from ignition to touchdown on a motor that cannot be throttled.
 //!
-//! A tick poses a landing for the [NMPC](nmpc): gimbal, fins and final time at once, from the plan that is flown. It is
+//! A tick poses a landing for the [NMPC](ocp::landing): gimbal, fins and final time at once, from the plan that is flown. It is
 //! [searched](Search) apart from the frames, and flown from the frame on in which it is ready.
 //! The nose may lean in any direction. The plan contains the thrust curve as estimated by
 //! [`Burn`](crate::vehicle::burn::Burn), the burning mass, the drag of body and fins, a floor above the ground, and a free
@@ -15,7 +15,8 @@ mod search;
 mod situation;
 
 use nalgebra::Vector3;
-use nmpc::{Outcome, SolverLimits, Status};
+use ocp::landing::SolverLimits;
+use ocp::{Outcome, Status};
 use serde::{Deserialize, Serialize};
 
 pub use self::plan::Plan;

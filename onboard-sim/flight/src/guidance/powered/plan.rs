@@ -4,7 +4,8 @@ use alloc::vec::Vec;
 use serde::Serialize;
 
 use nalgebra::Vector3;
-use nmpc::{INPUTS, Nose, Problem, STATES, Start, State, Workspace, last_multipliers};
+use ocp::Start;
+use ocp::landing::{INPUTS, Nose, Problem, STATES, State, Workspace, last_multipliers};
 
 use super::PoweredSettings;
 use crate::control::aim::Aim;
@@ -40,7 +41,7 @@ impl Plan {
         self.step_s
     }
 
-    /// The states at its nodes, over the ground ([`nmpc::State`]): one more than intervals.
+    /// The states at its nodes, over the ground ([`ocp::landing::State`]): one more than intervals.
     pub fn states(&self) -> &[State] {
         &self.states
     }

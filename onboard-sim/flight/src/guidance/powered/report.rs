@@ -1,6 +1,7 @@
 //! What the landing burn is set to and what it reports: its settings in a mission, and the report of a tick.
 
-use nmpc::{SolverLimits, Status};
+use ocp::Status;
+use ocp::landing::SolverLimits;
 use serde::{Deserialize, Serialize};
 
 use super::Homing;
@@ -163,7 +164,7 @@ pub struct PoweredSettings {
     /// Largest number of final times tried in a tick.
     pub max_solves: u32,
     /// Largest number of passes of the solver over an interval in a tick, over all its guesses and final times
-    /// (`stages::Workspace::allow`): the best plan until then stands, and the next tick goes on from it. Without it there is
+    /// (`ocp::Workspace::allow`): the best plan until then stands, and the next tick goes on from it. Without it there is
     /// no bound.
     #[serde(default)]
     pub max_passes: Option<usize>,

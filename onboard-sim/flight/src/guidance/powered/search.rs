@@ -2,7 +2,8 @@
 
 use alloc::vec::Vec;
 
-use nmpc::{Drag, End, Outcome, Problem, Push, State, Weights, Workspace};
+use ocp::Outcome;
+use ocp::landing::{Drag, End, Problem, Push, State, Weights, Workspace};
 
 use super::plan::Plan;
 use super::{PoweredSettings, PoweredSituation, here_m};
@@ -113,7 +114,7 @@ impl Search {
         let is_warm = self.warm.take_last(&self.from, intervals, problem.end.settled_nodes);
         let warm = is_warm.then(|| self.warm.start());
         self.workspace.allow(settings.max_passes);
-        let mut best = nmpc::solve(&mut self.workspace, &problem, warm.as_ref());
+        let mut best = ocp::landing::solve(&mut self.workspace, &problem, warm.as_ref());
         self.found.read(&self.workspace, &problem, time_s);
 
         let mut iterations = best.iterations;
@@ -124,7 +125,7 @@ impl Search {
             }
             let mut lagrangian = |at_s: f64| {
                 stretch(&mut problem, at_s);
-                nmpc::lagrangian(&mut self.workspace, &problem, &self.found.start())
+                ocp::landing::lagrangian(&mut self.workspace, &problem, &self.found.start())
             };
             let slope = lagrangian(final_time_s + DIFFERENCE_S) - lagrangian(final_time_s - DIFFERENCE_S);
             let to_s = if slope > 0.0 { final_time_s - step_s } else { final_time_s + step_s };
@@ -133,7 +134,7 @@ impl Search {
                 break;
             }
             stretch(&mut problem, to_s);
-            let outcome = nmpc::solve(&mut self.workspace, &problem, Some(&self.found.start()));
+            let outcome = ocp::landing::solve(&mut self.workspace, &problem, Some(&self.found.start()));
             iterations += outcome.iterations;
             if outcome.merit < best.merit {
                 self.trial.read(&self.workspace, &problem, time_s);

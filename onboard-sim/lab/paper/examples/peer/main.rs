@@ -40,12 +40,12 @@ use std::str::FromStr;
 
 use anyhow::{Context, Result, bail, ensure};
 use clock::{best_of, thread_ns};
+use ocp::{Model, Outcome, Start};
 use one_guess::OneGuess;
 use paper::plane::dynamics::PlanarState;
 use paper::plane::{Problem, Solution, Workspace, best_touchdown_speed_m_s, solve};
 use paper::problem::{self, HORIZON, TOUCHDOWN_SPEED_MAX_M_S};
 use space::Space;
-use stages::{Model, Outcome, Start};
 
 /// Number of runs that are averaged, and of repeats, when the layers of an iteration are timed.
 const RUNS: u32 = 50;
@@ -102,7 +102,7 @@ impl Peer {
                     "0" | "1" => {
                         let index = usize::from(which == "1");
                         let guess = OneGuess { problem: &problem, index };
-                        Ok(timed(&guess, &mut stages::Workspace::default(), None)?.1)
+                        Ok(timed(&guess, &mut ocp::Workspace::default(), None)?.1)
                     }
                     _ => bail!("guess '{which}': both, 0 or 1"),
                 }
@@ -181,7 +181,7 @@ impl Peer {
 /// Solves twice, the second time with the buffers of the first; the second outcome, and the answer that tells it.
 fn timed<M: Model<NX, NU>, const NX: usize, const NU: usize>(
     model: &M,
-    workspace: &mut stages::Workspace<M, NX, NU>,
+    workspace: &mut ocp::Workspace<M, NX, NU>,
     start: Option<&Start<'_, NX, NU>>,
 ) -> Result<(Outcome, String)> {
     workspace.solve(black_box(model), start);

@@ -1,7 +1,7 @@
 //! The landing problem with one of its cold guesses alone, as a public solver gets it.
 
+use ocp::{Condition, InputRange, Model, Settings};
 use paper::plane::Problem;
-use stages::{Condition, InputRange, Model, Settings};
 
 /// A problem whose cold solve starts from its guess `index` only.
 pub(crate) struct OneGuess<'a> {

@@ -8,8 +8,8 @@ use std::hint::black_box;
 use std::rc::Rc;
 
 use anyhow::{Result, ensure};
+use ocp::{Condition, InputRange, Interval as _, Intervals, Model, Settings, Workspace};
 use paper::plane::{Problem, Solution};
-use stages::{Condition, InputRange, Interval as _, Intervals, Model, Settings, Workspace};
 
 use crate::clock::best_of;
 use crate::one_guess::as_in_the_problem;

@@ -3,9 +3,9 @@
 //! The vehicle is the one of the solver's own tests: 1.2 kg, a thrust that falls to the weight in 3.8 s, a light wind.
 
 use anyhow::{Result, ensure};
-use nmpc::{
-    Drag, End, INPUTS, Problem, Push, STATES, SolverLimits, Start, State, Weights, Workspace,
-    last_multipliers,
+use ocp::Start;
+use ocp::landing::{
+    Drag, End, INPUTS, Problem, Push, STATES, SolverLimits, State, Weights, Workspace, last_multipliers,
 };
 
 use crate::timed;

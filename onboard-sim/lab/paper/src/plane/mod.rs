@@ -8,7 +8,7 @@
 //! * [`dynamics`]: the planar equations of motion and their integrator.
 //! * `intervals`: the dynamics of all intervals with exact first and second derivatives, in vector registers.
 //!
-//! The solver is the crate [`stages`], whose page has the formulation, the steps and the references. Gauss-Newton Hessians
+//! The solver is the crate [`ocp`], whose page has the formulation, the steps and the references. Gauss-Newton Hessians
 //! do not work here: the multiplier of the end height is large, so the curvature of the dynamics counts, and full
 //! Gauss-Newton steps diverge from tilted starts.
 
@@ -17,7 +17,7 @@ mod intervals;
 pub mod problem;
 
 pub use self::problem::{FinalBox, Problem, SolverLimits, best_touchdown_speed_m_s};
-pub use stages::{Outcome, Start, Status};
+pub use ocp::{Outcome, Start, Status};
 
 use crate::plane::dynamics::PlanarState;
 
@@ -25,7 +25,7 @@ use crate::plane::dynamics::PlanarState;
 pub const LANDING_MISS: f64 = 1e-3;
 
 /// The buffers of a solve. The result does not depend on them.
-pub type Workspace = stages::Workspace<Problem, 6, 1>;
+pub type Workspace = ocp::Workspace<Problem, 6, 1>;
 
 /// The outcome of a solve, its path and its multipliers.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,7 +3,7 @@
 use core::array::from_fn;
 use core::f64::consts::{FRAC_PI_2, PI};
 
-use stages::{Condition, InputRange, Model, Settings};
+use ocp::{Condition, InputRange, Model, Settings};
 
 use crate::plane::LANDING_MISS;
 use crate::plane::dynamics::{PlanarModel, PlanarState};

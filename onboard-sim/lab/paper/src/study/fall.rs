@@ -6,11 +6,11 @@
 
 use core::f64::consts::FRAC_PI_2;
 
-use campaign::run::in_parallel;
 use flight::vehicle::airframe::Airframe;
 use flight::vehicle::rigid::RigidState;
 use flight::vehicle::thrust_curve::ThrustCurve;
 use nalgebra::{UnitQuaternion, Vector3};
+use onboard_sim::run::in_parallel;
 use sim::world::balance::Balance;
 use sim::world::{Actuators, Truth, World};
 

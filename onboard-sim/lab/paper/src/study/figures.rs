@@ -8,7 +8,7 @@ use core::f64::consts::FRAC_PI_2;
 use super::fall::{ANGLES_DEG, Fate, OPENINGS_DEG, Stability, TILTS_DEG};
 use super::fall::{Moment, Vehicle};
 use super::{PaperError, Row, Sample, Table};
-use campaign::figure::{CellAxis, Cells, Line, Panel, cells_svg, lines_svg};
+use onboard_sim::figure::{CellAxis, Cells, Line, Panel, cells_svg, lines_svg};
 
 /// Pitch and yaw at the start of Fig. 5, degrees.
 const FIG_5_START_DEG: [f64; 2] = [2.0, 1.0];

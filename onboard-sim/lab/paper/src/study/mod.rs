@@ -21,10 +21,10 @@ use flight::vehicles::motors::MotorError;
 use paper::plane::dynamics::PlanarState;
 use sim::world::whole::WorldError;
 
-use campaign::figure::FigureError;
 pub(crate) use cases::{Case, Table};
 pub(crate) use flown::{AsPrinted, as_printed};
 pub(crate) use objective::Objective;
+use onboard_sim::figure::FigureError;
 pub(crate) use text::{write_stability, write_tables};
 
 /// One experiment: the paper's result and ours.

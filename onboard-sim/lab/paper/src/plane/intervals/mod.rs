@@ -67,7 +67,7 @@ impl Blocks {
     }
 }
 
-impl stages::Intervals<6, 1> for Blocks {
+impl ocp::Intervals<6, 1> for Blocks {
     /// Nothing depends on x and z.
     const INTEGRALS: usize = 2;
 

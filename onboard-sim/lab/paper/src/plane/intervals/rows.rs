@@ -1,8 +1,8 @@
 //! One interval's derivatives, as the sweeps use them, and the value function.
 #![expect(clippy::inline_always, reason = "fixed-size kernels of a few dozen instructions")]
 
+use ocp::{Curvature, Feedback, Stage, Value};
 use pulp::{Scalar, Simd};
-use stages::{Curvature, Feedback, Stage, Value};
 
 use super::lanes::{Four, LANES, Lanes};
 use super::{Block, D, DIRECTIONS, pair};
@@ -65,7 +65,7 @@ fn rest([_, _, rest @ ..]: &[f64; 6]) -> Lanes {
     Lanes(*rest)
 }
 
-impl stages::Interval<6, 1> for Rows<'_> {
+impl ocp::Interval<6, 1> for Rows<'_> {
     type Value = Split;
 
     #[inline(always)]

@@ -1,6 +1,6 @@
+use ocp::{Dense, Feedback, Hessian, Interval, Intervals, Stage, Value};
 use proptest::prelude::*;
 use pulp::{Scalar, Simd, WithSimd};
-use stages::{Dense, Feedback, Hessian, Interval, Intervals, Stage, Value};
 
 use super::*;
 use crate::plane::dynamics::PlanarState;
@@ -208,7 +208,7 @@ proptest! {
 }
 
 /// Compares the intervals in this machine's widest vectors with those in plain vectors. The sweeps are compared in
-/// `stages`.
+/// `ocp`.
 #[test]
 fn the_width_of_the_vectors_does_not_change_any_bit() {
     const COUNT: usize = 50;

@@ -1,0 +1,342 @@
+//! An example: the flight computer's board as a student club would wire it, around a Teensy 4.1. Nobody has flown it.
+//!
+//! Everything here is written for the traits of `embedded-hal` and `embedded-io`, so that it runs on a desk, too: `tests.rs` puts
+//! simulated devices in the place of the real ones. What a program for the chip adds is a [`Wiring`], a [`Chip`], an entry and a heap
+//! (`../../src/m7.rs`), and a timer that calls [`tick`] every 5 ms. `README.md` has pins and parts.
+#![cfg_attr(not(test), no_std)]
+
+extern crate alloc;
+
+mod barometer;
+mod gnss;
+mod imu;
+mod lidar;
+mod saved;
+mod servo;
+#[cfg(test)]
+mod tests;
+mod uart;
+
+use alloc::boxed::Box;
+use core::convert::Infallible;
+
+use avionics::board::port::{Board, Frames};
+use avionics::link::endpoint::UplinkState;
+use avionics::log::frame::LoggedInput;
+use embedded_hal::delay::DelayNs;
+use embedded_hal::digital::{InputPin, OutputPin, PinState};
+use embedded_hal::i2c::I2c;
+use embedded_hal::pwm::SetDutyCycle;
+use embedded_hal::spi::SpiDevice;
+use embedded_io::{Read, ReadReady};
+use flight::computer::news::CrewMessage;
+use flight::computer::pad_check::surfaces_rad;
+use flight::computer::pilot::planner::Planner;
+use flight::computer::{Commands, Computer, FRAME_S, Input, LogState, flight_time_s};
+use flight::estimation::estimator::{GnssFix, ImuSample, Measurements};
+use flight::rules::outputs::Line;
+use flight::vehicle::atmosphere::{Air, pressure_altitude_m};
+use flight::vehicle::site::Site;
+use nalgebra::Vector3;
+use prost::Message as _;
+use protocol::records::computer_v1::ComputerFrame;
+
+pub use self::barometer::Barometer;
+pub use self::saved::MOST_BYTES;
+use self::saved::{Kept, Zero};
+pub use self::servo::Surface;
+use self::uart::Framer;
+
+/// The types of buses and pins, as the chip's own crate names them.
+pub trait Wiring {
+    type Imu: SpiDevice;
+    type Barometer: I2c;
+    type Gnss: Read + ReadReady;
+    type Lidar: Read + ReadReady;
+    type Servo: SetDutyCycle;
+    type Output: OutputPin;
+    type Switch: InputPin;
+    type Chip: Chip;
+}
+
+/// What the chip offers besides its buses and pins. Nothing of it waits.
+pub trait Chip {
+    /// Sends to the main context what it has to solve.
+    fn pose(&mut self, posed: Box<Planner>);
+
+    /// What the main context has solved, once.
+    fn solved(&mut self) -> Option<Box<Planner>>;
+
+    /// What the radio has heard since the last frame: an endpoint's answer, as in `avionics::board::radio`.
+    fn heard(&mut self) -> UplinkState;
+
+    /// Tells the crew.
+    fn tell(&mut self, news: &[CrewMessage]);
+
+    /// Puts a record into the ring from which the main context writes the log.
+    fn append(&mut self, record: &[u8]);
+
+    /// Whether the ring has never been full, and the space behind it.
+    fn log(&self) -> LogState;
+
+    /// Voltage of the battery, V, if it is measured.
+    fn battery_v(&mut self) -> Option<f64>;
+
+    /// A clock that runs through a reset and never goes back, s.
+    fn clock_s(&mut self) -> f64;
+
+    /// Writes a record to one of two places (0 and 1) in a memory that outlasts a reset.
+    fn save(&mut self, slot: usize, record: &[u8]);
+
+    /// Reads such a place, which has room for [`MOST_BYTES`]; returns how many bytes were written to it.
+    fn load(&mut self, slot: usize, into: &mut [u8]) -> usize;
+}
+
+/// Everything that is wired to the chip.
+pub struct Parts<W: Wiring> {
+    pub imu: W::Imu,
+    pub barometer: W::Barometer,
+    pub gnss: W::Gnss,
+    pub lidar: W::Lidar,
+    /// Gimbal pitch and yaw, fins 1 to 4.
+    pub servos: [W::Servo; 6],
+    /// As in [`LINES`]: high switches the current on.
+    pub outputs: [W::Output; 5],
+    /// To ground while a foot touches the ground.
+    pub foot: W::Switch,
+    /// High if current can flow through the landing motor's igniter, one for each.
+    pub igniters: [W::Switch; 2],
+    /// To ground through the booster.
+    pub booster: W::Switch,
+    /// To ground while the safety pin is in.
+    pub pin: W::Switch,
+    pub chip: W::Chip,
+}
+
+/// What each output switches: both igniters of the landing motor, that of the ascent motor, separation and parachute.
+pub const LINES: [Line; 5] =
+    [Line::LandingIgniter, Line::LandingIgniter, Line::AscentIgniter, Line::Separation, Line::Parachute];
+
+/// Axes from other ones: for each, which of the others it lies on, and whether along it (1) or against it (-1).
+pub type Axes = [(usize, f64); 3];
+
+/// World axes (north, west, up) from those of a satellite receiver (north, east, down).
+pub const WORLD_FROM_NED: Axes = [(0, 1.0), (1, -1.0), (2, -1.0)];
+
+/// How this vehicle was built.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Build {
+    /// Body axes from those that are printed on the inertial unit.
+    pub body_from_imu: Axes,
+    /// Gimbal pitch and yaw, fins 1 to 4.
+    pub surfaces: [Surface; 6],
+    /// Age of a fix when its last byte arrives, s.
+    pub fix_age_s: f64,
+    /// Temperature of the air at the pad, in the shade, K: warm air is taller. 3 K that are wrong make every height wrong by a hundredth.
+    pub air_k: f64,
+}
+
+/// Why a board or a part of it does not start.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Trouble {
+    #[error("airframe: servos_tell is true, and these servos tell nothing; false is accepted")]
+    ServosTell,
+    #[error("body_from_imu mirrors its axes; three different ones of a right-handed set are accepted")]
+    Mirrored,
+    #[error("{0}")]
+    Part(&'static str),
+    #[error("the inertial unit calls itself {0:#04x}; 0x47, an ICM-42688-P, is accepted")]
+    AnotherImu(u8),
+}
+
+/// Samples that make the zero of the height, one second, and of the place, two seconds.
+const ZERO_HEIGHTS: u32 = 50;
+const ZERO_FIXES: u32 = 10;
+
+/// The board.
+pub struct TeensyBoard<W: Wiring> {
+    /// What did not start is silent: the flight computer arms nothing without it, and behind a reset in the air it does what is left.
+    pub imu: Result<(), Trouble>,
+    pub barometer: Result<Barometer, Trouble>,
+    parts: Parts<W>,
+    build: Build,
+    gnss: Framer<{ gnss::FRAME_BYTES }>,
+    lidar: Framer<{ lidar::FRAME_BYTES }>,
+    site: Site,
+    /// Where the centre of gravity is while the vehicle stands, world, m.
+    stands_m: Vector3<f64>,
+    height: Zero,
+    place: Zero,
+    frame: u64,
+    released_at: u64,
+}
+
+/// Starts board and frames at power-up, and goes on behind a reset. `computer` is one at power-up.
+///
+/// # Errors
+/// The vehicle is built otherwise than this board needs it.
+pub fn start<W: Wiring>(
+    mut parts: Parts<W>,
+    build: Build,
+    mut computer: Computer,
+    delay: &mut impl DelayNs,
+) -> Result<(Frames, TeensyBoard<W>), Trouble> {
+    let mission = computer.pilot().mission();
+    if mission.airframe.servos_tell {
+        return Err(Trouble::ServosTell);
+    }
+    let [x, y, z] = build.body_from_imu.map(|(axis, sign)| Vector3::ith(axis, sign));
+    if x.cross(&y) != z {
+        return Err(Trouble::Mirrored);
+    }
+    let (site, stands_m) = (mission.site, computer.pilot().estimator().estimate().state.position_m);
+    let (imu, barometer) = (imu::start(&mut parts.imu, delay), Barometer::start(&mut parts.barometer, delay));
+    let (mut height, mut place, mut frame, chip) = (Zero::default(), Zero::default(), 0, &mut parts.chip);
+    let records = [0, 1].into_iter().filter_map(|slot| {
+        let mut bytes = [0; MOST_BYTES];
+        let read = chip.load(slot, &mut bytes);
+        Kept::read(bytes.get(..read)?)
+    });
+    if let Some(kept) = records.max_by_key(|kept| kept.saved.frame()) {
+        let lost_s = (chip.clock_s() - kept.clock_s).max(0.0);
+        let back = kept.saved.frame() + libm::round(lost_s / FRAME_S) as u64;
+        computer.resume(&kept.saved, flight_time_s(back));
+        // It is not resumed after too long a time.
+        if computer.frame() > 0 {
+            (height, place, frame) = (kept.height, kept.place, back);
+        }
+    }
+    let released_at = computer.released_at_s().map_or(0, |at_s| libm::round(at_s / FRAME_S) as u64);
+    let (gnss, lidar) = (Framer::new(gnss::HEAD), Framer::new(lidar::HEAD));
+    let board = TeensyBoard {
+        imu,
+        barometer,
+        parts,
+        build,
+        gnss,
+        lidar,
+        site,
+        stands_m,
+        height,
+        place,
+        frame,
+        released_at,
+    };
+    Ok((Frames::new(computer, frame), board))
+}
+
+/// What the timer calls every 5 ms. Returns `false` if the flight is over.
+pub fn tick<W: Wiring>(frames: &mut Frames, board: &mut TeensyBoard<W>) -> bool {
+    let Ok(goes_on) = frames.fly(board);
+    let (saved, clock_s) = (frames.computer().saved(), board.parts.chip.clock_s());
+    let kept = Kept { clock_s, height: board.height, place: board.place, saved };
+    if let Some(bytes) = kept.write(&mut [0; MOST_BYTES]) {
+        board.parts.chip.save((kept.saved.frame() % 2) as usize, bytes);
+    }
+    goes_on
+}
+
+impl<W: Wiring> TeensyBoard<W> {
+    fn measured(&mut self) -> Measurements {
+        let (parts, axes) = (&mut self.parts, &self.build.body_from_imu);
+        // The sensor watch takes what is no number for silence.
+        let felt = self.imu.as_ref().ok().and_then(|()| imu::read(&mut parts.imu));
+        let [force_m_s2, rate_rad_s] = felt.unwrap_or([[f64::NAN; 3]; 2]);
+        let imu =
+            ImuSample { gyro_rad_s: turned(axes, rate_rad_s), specific_force_m_s2: turned(axes, force_m_s2) };
+        let pressure_pa = self.barometer.as_mut().ok().and_then(|driver| driver.poll(&mut parts.barometer));
+        let pressure_altitude_m = pressure_pa.map(pressure_altitude_m).and_then(|height_m| {
+            let above_m = self.height.from(ZERO_HEIGHTS, Vector3::repeat(height_m))?.z;
+            let standard_k = Air::at_geopotential_m(height_m - above_m).temperature_k;
+            Some(self.stands_m.z + above_m * self.build.air_k / standard_k)
+        });
+        let lidar_range_m = self.lidar.newest(&mut parts.lidar, lidar::range_m);
+        let fix = self.gnss.newest(&mut parts.gnss, gnss::fix);
+        let gnss = fix.and_then(|fix| self.located(&fix));
+        Measurements { imu, pressure_altitude_m, gnss, lidar_range_m }
+    }
+
+    /// A fix on the flight computer's clock, relative to the pad: the vehicle stands where its mission says.
+    fn located(&mut self, fix: &gnss::Fix) -> Option<GnssFix> {
+        let (north_m, east_m) = self.site.place_m(fix.latitude_deg, fix.longitude_deg);
+        let place_m = turned(&WORLD_FROM_NED, [north_m, east_m, -fix.height_m]);
+        Some(GnssFix {
+            position_m: self.stands_m + self.place.from(ZERO_FIXES, place_m)?,
+            velocity_m_s: turned(&WORLD_FROM_NED, fix.velocity_ned_m_s),
+            valid_at_s: flight_time_s(self.frame + 1 - self.released_at) - self.build.fix_age_s,
+        })
+    }
+}
+
+impl<W: Wiring> Board for TeensyBoard<W> {
+    /// A sensor that has failed is silent, which the flight computer knows how to fly with; ending the frames would help nobody.
+    type Error = Infallible;
+
+    fn sense(&mut self) -> Result<Option<LoggedInput>, Infallible> {
+        let UplinkState { uplink, commander, requests } = self.parts.chip.heard();
+        // What cannot be read is: no contact, no igniter, no booster, pin in.
+        let high = |switch: &mut W::Switch| switch.is_high().unwrap_or(false);
+        let low = |switch: &mut W::Switch| switch.is_low().unwrap_or(false);
+        let rest = Input {
+            frame: 0,
+            time_s: 0.0,
+            measured: self.measured(),
+            // Not read: the flight computer knows how fast these servos are.
+            gimbal_rad: [0.0; 2],
+            fins_rad: [0.0; 4],
+            contact: low(&mut self.parts.foot),
+            igniter_continuity: self.parts.igniters.iter_mut().all(high),
+            booster_attached: low(&mut self.parts.booster),
+            pin_out: high(&mut self.parts.pin),
+            battery_v: self.parts.chip.battery_v(),
+            log: self.parts.chip.log(),
+            uplink,
+            commander,
+            // `avionics::board::radio` knows no operators yet.
+            people: None,
+            requests: &[],
+            rehearsed: None,
+            plan_ready: false,
+        };
+        Ok(Some(LoggedInput::new(rest, requests, None)))
+    }
+
+    fn act(&mut self, commands: &Commands) -> Result<(), Infallible> {
+        let Commands { gimbal_rad, fins_rad, outputs } = *commands;
+        let angles_rad = surfaces_rad(gimbal_rad, fins_rad);
+        let surfaces = self.parts.servos.iter_mut().zip(&self.build.surfaces);
+        for ((servo, surface), angle_rad) in surfaces.zip(angles_rad) {
+            // What fails is told again in the next frame.
+            let _ = servo.set_duty_cycle(surface.duty(angle_rad, servo.max_duty_cycle()));
+        }
+        for (output, line) in self.parts.outputs.iter_mut().zip(LINES) {
+            let _ = output.set_state(PinState::from(outputs.is_on(line)));
+        }
+        Ok(())
+    }
+
+    fn pose(&mut self, posed: Box<Planner>) {
+        self.parts.chip.pose(posed);
+    }
+
+    fn solved(&mut self) -> Option<Box<Planner>> {
+        self.parts.chip.solved()
+    }
+
+    fn tell(&mut self, news: &[CrewMessage]) {
+        self.parts.chip.tell(news);
+    }
+
+    fn keep(&mut self, frame: &ComputerFrame) {
+        self.frame = frame.input.frame;
+        if frame.output.released {
+            self.released_at = self.frame;
+        }
+        self.parts.chip.append(&frame.encode_length_delimited_to_vec());
+    }
+}
+
+/// A vector in other axes: the only place where a sensor's axes become those of body or world.
+fn turned(axes: &Axes, vector: [f64; 3]) -> Vector3<f64> {
+    Vector3::from(axes.map(|(axis, sign)| sign * vector[axis]))
+}

@@ -1,0 +1,661 @@
+//! The drivers against their data sheets, and the whole board flown: simulated devices with the real ones' registers, frames and
+//! pulses stand between it and a simulated world.
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::convert::Infallible;
+use std::rc::Rc;
+
+use avionics::log::again::RecordedComputer;
+use avionics::log::frame::start_to_log;
+use embedded_hal::{digital, i2c, pwm, spi};
+use flight::computer::FRAME_MS;
+use flight::computer::crew::{Asked, Request};
+use flight::computer::pad_check::CheckState;
+use flight::estimation::estimator::GRAVITY_M_S2;
+use flight::rules::arming::Uplink;
+use flight::rules::phase::Phase;
+use flight::vehicle::mission::{Mission, StartPoint};
+use prost::bytes::Buf;
+use protocol::records::computer_v1::ComputerStart;
+use sim::draw::draw;
+use sim::recipe::Recipe;
+use sim::world::sensors::{SensorTruth, Sensors};
+use sim::world::{Actuators, RestOutcome, World};
+
+use super::*;
+
+/// The coefficients of the MS5611's data sheet (page 8), with the checksum that belongs to them.
+const PROM: [u16; 8] = [0, 40_127, 36_924, 23_317, 23_282, 33_464, 28_312, 0];
+const TEMPERATURE_RAW: u32 = 8_569_150;
+
+#[test]
+fn val_datasheet_ms5611_worked_example() {
+    let (temperature, pressure_pa) = barometer::compensated(&PROM, 9_085_466, TEMPERATURE_RAW);
+    assert_eq!((temperature, pressure_pa.floor()), (2007, 100_009.0));
+}
+
+/// The same coefficients and -10.00 degrees before the second order, put into the formulas of page 9.
+#[test]
+fn val_hand_ms5611_in_the_cold() {
+    let [_, c1, c2, c3, c4, c5, c6, _] = PROM.map(f64::from);
+    let (d1, d2) = (8_000_000.0, (c5 * 256.0 - 3_000.0 * 8_388_608.0 / c6).round());
+    let difference = d2 - c5 * 256.0;
+    let temperature = (2000.0 + difference * c6 / 8_388_608.0).floor();
+    let cold = (temperature - 2000.0) * (temperature - 2000.0);
+    let offset = c2 * 65_536.0 + c4 * difference / 128.0 - 2.5 * cold;
+    let sensitivity = c1 * 32_768.0 + c3 * difference / 256.0 - 1.25 * cold;
+    let expected_pa = (d1 * sensitivity / 2_097_152.0 - offset) / 32_768.0;
+    let (found, found_pa) = barometer::compensated(&PROM, d1 as u32, d2 as u32);
+    assert!((found as f64 - (temperature - difference * difference / 2_147_483_648.0)).abs() <= 1.0);
+    assert!((found_pa - expected_pa).abs() < 0.01, "{found_pa} {expected_pa}");
+}
+
+/// AN520, its example.
+#[test]
+fn val_datasheet_ms5611_checksum() {
+    let prom = [0x3132, 0x3334, 0x3536, 0x3738, 0x3940, 0x4142, 0x4344, 0x4500];
+    assert_eq!(barometer::crc4(&prom), 0xB);
+    assert_eq!(barometer::crc4(&[0x3132, 0x3334, 0x3536, 0x3738, 0x3940, 0x4142, 0x4344, 0x450B]), 0xB);
+}
+
+/// 1 g are 2,048 counts and 100 deg/s are 1,640, high byte first.
+#[test]
+fn val_datasheet_icm42688_scales() {
+    let bench = Rc::new(RefCell::new(Bench::standing(&mission()).0));
+    bench.borrow_mut().imu = Some([2048, -2048, 0, 1640, 0, -3280]);
+    let mut device = Device { bench, which: 0 };
+    imu::start(&mut device.clone(), &mut device).unwrap();
+    let [force_m_s2, rate_rad_s] = imu::read(&mut device).unwrap();
+    let expected = [GRAVITY_M_S2, -GRAVITY_M_S2, 0.0, 100.0_f64.to_radians(), 0.0, -200.0_f64.to_radians()];
+    for (found, expected) in force_m_s2.into_iter().chain(rate_rad_s).zip(expected) {
+        assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+    }
+}
+
+/// A frame of NAV-PVT, in 3D if `fixed`.
+fn nav_pvt(place_1e7: [i32; 2], height_mm: i32, ned_mm_s: [i32; 3], fixed: bool) -> Vec<u8> {
+    let mut frame = vec![0; 98];
+    frame[..6].copy_from_slice(&[0xB5, 0x62, 0x01, 0x07, 92, 0]);
+    if fixed {
+        (frame[6 + 20], frame[6 + 21]) = (3, 1);
+    }
+    let [latitude, longitude] = place_1e7;
+    let [north, east, down] = ned_mm_s;
+    for (at, value) in [(24, longitude), (28, latitude), (36, height_mm), (48, north), (52, east), (56, down)]
+    {
+        frame[6 + at..10 + at].copy_from_slice(&value.to_le_bytes());
+    }
+    let sum = gnss::checksum(&frame[2..]);
+    frame.extend(sum);
+    frame
+}
+
+fn parsed(bytes: &[u8]) -> Vec<gnss::Fix> {
+    let mut framer = Framer::new(gnss::HEAD);
+    bytes.iter().filter_map(|byte| framer.take(*byte).and_then(gnss::fix)).collect()
+}
+
+#[test]
+fn val_datasheet_nav_pvt() {
+    // UBX-CFG-RATE for 5 Hz as its maker prints it, with its checksum.
+    let rate = [0x06, 0x08, 0x06, 0x00, 0xC8, 0x00, 0x01, 0x00, 0x01, 0x00];
+    assert_eq!(gnss::checksum(&rate), [0xDE, 0x6A]);
+    let frame = nav_pvt([353_470_000, -1_178_090_000], 612_345, [1_500, -250, -30_000], true);
+    assert_eq!(frame.len(), 100);
+    let expected = gnss::Fix {
+        latitude_deg: 353_470_000.0 * 1e-7,
+        longitude_deg: -1_178_090_000.0 * 1e-7,
+        height_m: 612_345.0 * 1e-3,
+        velocity_ned_m_s: [1.5, -0.25, -30.0],
+    };
+    let noise = [0xB5, 0xB5, 0x62, 0x01, 0x35, b'$', b'G', 0xB5];
+    assert_eq!(parsed(&[&noise, &frame[..], &frame].concat()), [expected, expected]);
+    for place in 0..frame.len() {
+        let mut broken = frame.clone();
+        broken[place] ^= 0x04;
+        assert_eq!(parsed(&broken), [], "byte {place}");
+    }
+    assert_eq!(parsed(&nav_pvt([353_470_000, -1_178_090_000], 612_345, [0; 3], false)), [], "no fix");
+}
+
+fn luna(range_cm: u16, strength: u16) -> [u8; 9] {
+    let [[low, high], [weak, strong]] = [range_cm, strength].map(u16::to_le_bytes);
+    let mut frame = [0x59, 0x59, low, high, weak, strong, 0x20, 0x09, 0];
+    frame[8] = frame.iter().fold(0, |sum, byte| sum.wrapping_add(*byte));
+    frame
+}
+
+fn ranges(bytes: &[u8]) -> Vec<f64> {
+    let mut framer = Framer::new(lidar::HEAD);
+    bytes.iter().filter_map(|byte| framer.take(*byte).and_then(lidar::range_m)).collect()
+}
+
+#[test]
+fn val_datasheet_tf_luna() {
+    // 0x59 + 0x59 + 0x2C + 0x01 + 0xE8 + 0x03 + 0x20 + 0x09 = 0x1F3.
+    let frame = [0x59, 0x59, 0x2C, 0x01, 0xE8, 0x03, 0x20, 0x09, 0xF3];
+    assert_eq!(frame, luna(300, 1000));
+    assert_eq!(ranges(&[&[1, 0x59, 7], &frame[..], &frame].concat()), [3.0, 3.0]);
+    let mut wrong = frame;
+    wrong[8] ^= 1;
+    assert_eq!(ranges(&wrong), [0.0; 0], "a wrong checksum");
+    assert_eq!(ranges(&[luna(300, 99), luna(300, 0xFFFF)].concat()), [0.0; 0], "a weak echo, a blinded one");
+}
+
+/// Where a servo goes with a duty of 65,535, rad.
+fn angle_rad(surface: &Surface, duty: u16) -> f64 {
+    (f64::from(duty) / 65_535.0 * servo::PERIOD_US - surface.zero_us) / surface.us_per_rad
+}
+
+/// 1,500 us of 3,003 us are 0.4995 of 65,535.
+#[test]
+fn val_hand_a_servo_s_pulse() {
+    let surface = Surface { zero_us: 1500.0, us_per_rad: -600.0 };
+    assert_eq!(surface.duty(0.0, 65_535), 32_735);
+    assert_eq!([-9.0, 9.0].map(|rad| surface.duty(rad, 65_535)), [45_829, 19_641], "2,100 and 900 us");
+    assert_eq!(surface.duty(f64::NAN, 65_535), 0, "no pulse");
+    assert!((angle_rad(&surface, surface.duty(0.3, 65_535)) - 0.3).abs() < 1e-4);
+}
+
+#[test]
+fn a_record_comes_back_whole_or_not_at_all() {
+    let (saved, mut place, mut room) = (at_power_up(&mission()).saved(), Zero::default(), [0; MOST_BYTES]);
+    assert_eq!(place.from(1, Vector3::new(1.0, -2.0, 3.5)), None);
+    assert_eq!(place.from(1, Vector3::new(3.0, -2.0, 3.5)), Some(Vector3::new(2.0, 0.0, 0.0)));
+    let kept = Kept { clock_s: 12.5, height: Zero::default(), place, saved };
+    let bytes = kept.write(&mut room).unwrap();
+    assert_eq!(Kept::read(bytes), Some(kept));
+    for place in 0..bytes.len() {
+        assert_eq!(Kept::read(&bytes[..place]), None);
+        let mut broken = bytes.to_vec();
+        broken[place] ^= 1;
+        assert_eq!(Kept::read(&broken), None, "byte {place}");
+    }
+}
+
+/// Where the pad is, above the sea, m, and its air: 10 K warmer than the standard's there.
+const PAD_M: f64 = 600.0;
+const AIR_K: f64 = 288.15 - 0.0065 * PAD_M + 10.0;
+
+fn build() -> Build {
+    Build {
+        // The unit's y points to the nose, its x to body y, and its z against body z.
+        body_from_imu: [(1, 1.0), (0, 1.0), (2, -1.0)],
+        surfaces: core::array::from_fn(|surface| match surface {
+            0 | 1 => Surface { zero_us: 1500.0, us_per_rad: 2000.0 },
+            2 | 4 => Surface { zero_us: 950.0, us_per_rad: 550.0 },
+            _ => Surface { zero_us: 2050.0, us_per_rad: -550.0 },
+        }),
+        fix_age_s: 0.12,
+        air_k: AIR_K,
+    }
+}
+
+fn recipe() -> Recipe {
+    Recipe::built_in("mk3", "field").unwrap().starting_at(StartPoint::Pad).unwrap()
+}
+
+fn mission() -> Mission {
+    let mut mission = recipe().mission;
+    mission.airframe.servos_tell = false;
+    mission
+}
+
+/// It believes that its rail stands as the drawing says.
+fn at_power_up(mission: &Mission) -> Computer {
+    let cg_station_m = mission.airframe.mass.loaded_cg_station_m;
+    Computer::at_power_up(mission, &mission.launched().unwrap().standing(cg_station_m))
+}
+
+/// A world, and what the devices on the board's wires know of it.
+struct Bench {
+    world: World,
+    sensors: Sensors,
+    site: Site,
+    frame: u64,
+    measured: Option<Measurements>,
+    /// In the place of what the world gives: accelerometer and gyro, counts.
+    imu: Option<[i16; 6]>,
+    imu_name: u8,
+    igniters: [bool; 2],
+    prom: [u16; 8],
+    barometer: (u8, u64),
+    uarts: [VecDeque<u8>; 2],
+    actuators: Actuators,
+    outputs: [bool; 5],
+    pin_out: bool,
+    requests: Vec<Request>,
+    posed: Option<(u64, Box<Planner>)>,
+    log: Vec<u8>,
+    slots: [Vec<u8>; 2],
+}
+
+impl Bench {
+    fn standing(mission: &Mission) -> (Self, Computer) {
+        let recipe = recipe();
+        let drawn = draw(mission, &recipe.dispersion, recipe.seed, 0);
+        let curve = drawn.truth.curve(mission).unwrap();
+        let world =
+            World::new(&mission.airframe, curve.as_ref(), &drawn.truth, &drawn.apogee, drawn.flight_seed);
+        let world = world.unwrap().on_rail(mission.launched().unwrap(), &drawn.ascent);
+        // The board decides when the barometer measures, and a TF-Luna sees 0.2 to 8 m.
+        let mut params = recipe.dispersion.sensor_params;
+        params.barometer.period_ms = FRAME_MS;
+        (params.lidar.range_min_m, params.lidar.range_max_m) = (0.2, 8.0);
+        let mut prom = PROM;
+        prom[7] = u16::from(barometer::crc4(&PROM));
+        let bench = Self {
+            world,
+            sensors: Sensors::new(&params, drawn.flight_seed, 1.0).unwrap(),
+            site: mission.site,
+            frame: 0,
+            measured: None,
+            imu: None,
+            imu_name: 0x47,
+            igniters: [true; 2],
+            prom,
+            barometer: (0, 0),
+            uarts: [VecDeque::new(), VecDeque::new()],
+            actuators: Actuators::NONE,
+            outputs: [false; 5],
+            pin_out: false,
+            requests: Vec::new(),
+            posed: None,
+            log: Vec::new(),
+            slots: [Vec::new(), Vec::new()],
+        };
+        (bench, at_power_up(mission))
+    }
+
+    /// The world moves for a frame.
+    fn advance(&mut self) {
+        let [first, second, ignite_booster, separate, parachute] = self.outputs;
+        self.actuators =
+            Actuators { ignite: first || second, ignite_booster, separate, parachute, ..self.actuators };
+        self.frame += 1;
+        for _ in 0..FRAME_MS {
+            self.world.step(&self.actuators);
+            if let Some(measured) = self.sensors.observe(&SensorTruth::of(&self.world)) {
+                self.measured = Some(measured);
+            }
+        }
+        let Measurements { gnss, lidar_range_m, .. } = self.measured.unwrap();
+        if let Some(GnssFix { position_m, velocity_m_s, .. }) = gnss {
+            let (latitude_deg, longitude_deg) = self.site.at_deg(position_m.x, -position_m.y);
+            let place_1e7 = [latitude_deg, longitude_deg].map(|deg| (deg * 1e7).round() as i32);
+            let ned_m_s = [velocity_m_s.x, -velocity_m_s.y, -velocity_m_s.z];
+            let ned_mm_s = ned_m_s.map(|part_m_s| (part_m_s * 1e3).round() as i32);
+            let height_mm = ((position_m.z + PAD_M) * 1e3).round() as i32;
+            self.uarts[0].extend(nav_pvt(place_1e7, height_mm, ned_mm_s, true));
+        }
+        if let Some(range_m) = lidar_range_m {
+            self.uarts[1].extend(luna((range_m * 100.0).round() as u16, 1000));
+        }
+    }
+
+    /// Counts of accelerometer and gyro, in the unit's own axes.
+    fn imu_counts(&self) -> [i16; 6] {
+        let imu = self.measured.unwrap().imu;
+        let mut counts = [0; 6];
+        for (body, (axis, sign)) in build().body_from_imu.into_iter().enumerate() {
+            let force = sign * imu.specific_force_m_s2[body] / GRAVITY_M_S2 * 2048.0;
+            let rate = sign * imu.gyro_rad_s[body].to_degrees() * 16.4;
+            // A cast saturates, as the sensor does.
+            (counts[axis], counts[3 + axis]) = (force.round() as i16, rate.round() as i16);
+        }
+        counts
+    }
+
+    /// What the barometer's converter says now.
+    fn barometer_raw(&self) -> u32 {
+        let (command, since) = self.barometer;
+        // 9.04 ms: two frames.
+        if self.frame < since + 2 {
+            return 0;
+        }
+        if command == 0x58 {
+            return TEMPERATURE_RAW;
+        }
+        let standard_k = Air::at_geopotential_m(PAD_M).temperature_k;
+        let above_m = self.measured.unwrap().pressure_altitude_m.unwrap() * standard_k / AIR_K;
+        let pressure_pa = Air::at_geopotential_m(PAD_M + above_m).pressure_pa;
+        // The pressure is a straight line over the counts.
+        let at = |raw| barometer::compensated(&PROM, raw, TEMPERATURE_RAW).1;
+        let (low, high) = (8_000_000, 9_000_000);
+        let slope = (at(high) - at(low)) / f64::from(high - low);
+        (f64::from(low) + (pressure_pa - at(low)) / slope).round() as u32
+    }
+}
+
+/// Every device and pin of the bench, by its number.
+#[derive(Clone)]
+struct Device {
+    bench: Rc<RefCell<Bench>>,
+    which: usize,
+}
+
+impl spi::ErrorType for Device {
+    type Error = Infallible;
+}
+
+impl spi::SpiDevice for Device {
+    fn transaction(&mut self, operations: &mut [spi::Operation<'_, u8>]) -> Result<(), Infallible> {
+        for operation in operations {
+            let spi::Operation::TransferInPlace(bytes) = operation else { continue };
+            match bytes[0] {
+                0xF5 => bytes[1] = self.bench.borrow().imu_name,
+                0x9F => {
+                    let bench = self.bench.borrow();
+                    let counts = bench.imu.unwrap_or_else(|| bench.imu_counts());
+                    bytes[1..].copy_from_slice(&counts.map(i16::to_be_bytes).concat());
+                }
+                register => panic!("read of register {register:#x}"),
+            }
+        }
+        Ok(())
+    }
+}
+
+impl i2c::ErrorType for Device {
+    type Error = Infallible;
+}
+
+impl i2c::I2c for Device {
+    fn transaction(&mut self, address: u8, operations: &mut [i2c::Operation<'_>]) -> Result<(), Infallible> {
+        assert_eq!(address, 0x77);
+        let mut bench = self.bench.borrow_mut();
+        let i2c::Operation::Write(&[command]) = operations[0] else { panic!("a command first") };
+        if let (0x48 | 0x58, frame) = (command, bench.frame) {
+            bench.barometer = (command, frame);
+        }
+        if let Some(i2c::Operation::Read(into)) = operations.get_mut(1) {
+            match command {
+                0 => into.copy_from_slice(&bench.barometer_raw().to_be_bytes()[1..]),
+                word => into.copy_from_slice(&bench.prom[usize::from(word - 0xA0) / 2].to_be_bytes()),
+            }
+        }
+        Ok(())
+    }
+}
+
+impl embedded_io::ErrorType for Device {
+    type Error = Infallible;
+}
+
+impl Read for Device {
+    fn read(&mut self, into: &mut [u8]) -> Result<usize, Infallible> {
+        let waiting = &mut self.bench.borrow_mut().uarts[self.which];
+        let count = into.len().min(waiting.len());
+        assert!(count > 0, "it would wait");
+        waiting.copy_to_slice(&mut into[..count]);
+        Ok(count)
+    }
+}
+
+impl ReadReady for Device {
+    fn read_ready(&mut self) -> Result<bool, Infallible> {
+        Ok(!self.bench.borrow().uarts[self.which].is_empty())
+    }
+}
+
+impl pwm::ErrorType for Device {
+    type Error = Infallible;
+}
+
+impl SetDutyCycle for Device {
+    fn max_duty_cycle(&self) -> u16 {
+        65_535
+    }
+
+    fn set_duty_cycle(&mut self, duty: u16) -> Result<(), Infallible> {
+        let Actuators { gimbal_rad, fins_rad, .. } = &mut self.bench.borrow_mut().actuators;
+        let surfaces = gimbal_rad.iter_mut().chain(fins_rad).nth(self.which);
+        *surfaces.unwrap() = angle_rad(&build().surfaces[self.which], duty);
+        Ok(())
+    }
+}
+
+impl digital::ErrorType for Device {
+    type Error = Infallible;
+}
+
+impl OutputPin for Device {
+    fn set_low(&mut self) -> Result<(), Infallible> {
+        self.bench.borrow_mut().outputs[self.which] = false;
+        Ok(())
+    }
+
+    fn set_high(&mut self) -> Result<(), Infallible> {
+        self.bench.borrow_mut().outputs[self.which] = true;
+        Ok(())
+    }
+}
+
+impl InputPin for Device {
+    fn is_high(&mut self) -> Result<bool, Infallible> {
+        let bench = self.bench.borrow();
+        Ok(match self.which {
+            0 => bench.world.touchdown().is_none(),
+            1 | 2 => bench.igniters[self.which - 1],
+            3 => !bench.world.booster_attached(),
+            _ => bench.pin_out,
+        })
+    }
+
+    fn is_low(&mut self) -> Result<bool, Infallible> {
+        self.is_high().map(|high| !high)
+    }
+}
+
+impl DelayNs for Device {
+    fn delay_ns(&mut self, _: u32) {}
+}
+
+impl Chip for Device {
+    /// Solved as late as by a Cortex-M7.
+    fn pose(&mut self, mut posed: Box<Planner>) {
+        posed.solve();
+        let mut bench = self.bench.borrow_mut();
+        bench.posed = Some((bench.frame + posed.frames_on_a_board(), posed));
+    }
+
+    fn solved(&mut self) -> Option<Box<Planner>> {
+        let mut bench = self.bench.borrow_mut();
+        let now = bench.frame;
+        bench.posed.take_if(|(at, _)| now >= *at).map(|(_, planner)| planner)
+    }
+
+    fn heard(&mut self) -> UplinkState {
+        let mut bench = self.bench.borrow_mut();
+        let requests = core::mem::take(&mut bench.requests);
+        UplinkState { uplink: Uplink::NotNeeded, commander: None, requests }
+    }
+
+    fn tell(&mut self, _: &[CrewMessage]) {}
+
+    fn append(&mut self, record: &[u8]) {
+        self.bench.borrow_mut().log.extend_from_slice(record);
+    }
+
+    fn log(&self) -> LogState {
+        LogState { running: true, space_bytes: 1 << 34 }
+    }
+
+    fn battery_v(&mut self) -> Option<f64> {
+        None
+    }
+
+    fn clock_s(&mut self) -> f64 {
+        // Nobody sets it to zero at power-up.
+        1e6 + flight_time_s(self.bench.borrow().frame)
+    }
+
+    fn save(&mut self, slot: usize, record: &[u8]) {
+        self.bench.borrow_mut().slots[slot] = record.to_vec();
+    }
+
+    fn load(&mut self, slot: usize, into: &mut [u8]) -> usize {
+        let slot = &self.bench.borrow().slots[slot];
+        into[..slot.len()].copy_from_slice(slot);
+        slot.len()
+    }
+}
+
+struct Simulated;
+
+impl Wiring for Simulated {
+    type Imu = Device;
+    type Barometer = Device;
+    type Gnss = Device;
+    type Lidar = Device;
+    type Servo = Device;
+    type Output = Device;
+    type Switch = Device;
+    type Chip = Device;
+}
+
+fn parts(bench: &Rc<RefCell<Bench>>) -> Parts<Simulated> {
+    let device = |which| Device { bench: bench.clone(), which };
+    Parts {
+        imu: device(0),
+        barometer: device(0),
+        gnss: device(0),
+        lidar: device(1),
+        servos: core::array::from_fn(device),
+        outputs: core::array::from_fn(device),
+        foot: device(0),
+        igniters: [device(1), device(2)],
+        booster: device(3),
+        pin: device(4),
+        chip: device(0),
+    }
+}
+
+fn switched_on(bench: &Rc<RefCell<Bench>>, computer: Computer) -> (Frames, TeensyBoard<Simulated>) {
+    let mut delay = Device { bench: bench.clone(), which: 0 };
+    start(parts(bench), build(), computer, &mut delay).unwrap()
+}
+
+/// What the crew does, one after the other.
+const CREW: [Asked; 5] = [Asked::Check, Asked::Seen, Asked::Seen, Asked::Arm, Asked::Start];
+/// Frames between what it does, and before.
+const CREW_WAITS: u64 = 20;
+const CREW_COMES: u64 = 1_000;
+
+/// Flies from power-up until the vehicle is at rest. The board loses its power for 0.1 s half a second after the beginning of a phase.
+fn fly(resets_in: Option<Phase>) -> (Bench, ComputerStart) {
+    let (bench, computer) = Bench::standing(&mission());
+    let (bench, begun) = (Rc::new(RefCell::new(bench)), start_to_log(&computer));
+    let (mut frames, mut board) = switched_on(&bench, computer);
+    let (mut crew, mut resets, mut next) = (CREW.into_iter(), resets_in, CREW_COMES);
+    while bench.borrow().world.rest().is_none() {
+        bench.borrow_mut().advance();
+        let now = bench.borrow().frame;
+        assert!(now < 40_000, "{:?}", frames.computer().mode());
+        bench.borrow_mut().pin_out = now > CREW_COMES / 2;
+        let checks = frames.computer().pad_check().state() == CheckState::Running;
+        if now >= next && !checks {
+            next = now + CREW_WAITS;
+            bench.borrow_mut().requests.extend(crew.next().map(Request::of_the_programme));
+        }
+        assert!(tick(&mut frames, &mut board));
+        let mode = frames.computer().mode();
+        if resets == Some(mode.phase) && flight_time_s(now) > mode.entered_at_s + 0.5 {
+            resets = None;
+            let mut dead = bench.borrow_mut();
+            (dead.outputs, dead.posed) = ([false; 5], None);
+            (0..20).for_each(|_| dead.advance());
+            dead.uarts = [VecDeque::new(), VecDeque::new()];
+            drop(dead);
+            (frames, board) = switched_on(&bench, at_power_up(&mission()));
+        }
+    }
+    assert_eq!((crew.next(), resets), (None, None));
+    drop((frames, board));
+    (Rc::into_inner(bench).unwrap().into_inner(), begun)
+}
+
+/// The log is that of the flight computer: another one that gets its inputs, and hears what the crew has asked, decides and
+/// remembers the same. Returns the plans.
+fn verified(bench: &Bench, begun: &ComputerStart) -> usize {
+    let (mut log, mut again, mut plans) =
+        (bench.log.as_slice(), RecordedComputer::started(&mission(), begun), 0);
+    while !log.is_empty() {
+        let frame = ComputerFrame::decode_length_delimited(&mut log).unwrap();
+        let read = again.read(&frame.input).unwrap();
+        let output = again.step(&read);
+        assert_eq!(again.record(&read, &output), frame);
+        plans += usize::from(frame.output.planned);
+    }
+    plans
+}
+
+#[test]
+fn the_board_is_checked_armed_started_and_lands() {
+    let (bench, begun) = fly(None);
+    let rest = bench.world.rest().unwrap();
+    assert_eq!(rest.outcome, RestOutcome::Upright, "{rest:?}");
+    assert!(bench.world.thrust_begins_s().is_some() && !bench.world.parachute_ejected());
+    let plans = verified(&bench, &begun);
+    assert!(plans > 20, "{plans}");
+}
+
+#[test]
+fn a_reset_in_the_fall_is_flown_through() {
+    let (bench, begun) = fly(Some(Phase::AeroDescent));
+    let rest = bench.world.rest().unwrap();
+    assert_eq!(rest.outcome, RestOutcome::Upright, "{rest:?}");
+    assert!(bench.world.thrust_begins_s().is_some() && !bench.world.parachute_ejected());
+    assert!(verified(&bench, &begun) > 20);
+}
+
+#[test]
+fn what_is_built_otherwise_does_not_start() {
+    let refused = |change: &dyn Fn(&mut Mission, &mut Build)| {
+        let (mut mission, mut build) = (mission(), build());
+        change(&mut mission, &mut build);
+        let (bench, computer) = Bench::standing(&mission);
+        let bench = Rc::new(RefCell::new(bench));
+        start(parts(&bench), build, computer, &mut Device { bench, which: 0 }).err()
+    };
+    assert_eq!(refused(&|_, _| ()), None);
+    assert_eq!(refused(&|mission, _| mission.airframe.servos_tell = true), Some(Trouble::ServosTell));
+    assert_eq!(refused(&|_, build| build.body_from_imu[2].1 = 1.0), Some(Trouble::Mirrored));
+}
+
+/// Either of the two that is open counts.
+#[test]
+fn an_open_igniter_is_told() {
+    for igniters in [[true, true], [true, false], [false, true]] {
+        let (bench, computer) = Bench::standing(&mission());
+        let bench = Rc::new(RefCell::new(Bench { igniters, ..bench }));
+        let (mut frames, mut board) = switched_on(&bench, computer);
+        bench.borrow_mut().advance();
+        assert!(tick(&mut frames, &mut board));
+        assert_eq!(frames.computer().input().igniter_continuity, igniters == [true, true]);
+    }
+}
+
+/// Nothing is armed without it, and in the air the board must not be lost with it.
+#[test]
+fn a_part_that_does_not_start_is_silent() {
+    let (mut bench, computer) = Bench::standing(&mission());
+    (bench.imu_name, bench.prom[3]) = (0xFF, 0);
+    bench.pin_out = true;
+    let bench = Rc::new(RefCell::new(bench));
+    let (mut frames, mut board) = switched_on(&bench, computer);
+    assert_eq!(board.imu, Err(Trouble::AnotherImu(0xFF)));
+    let said = board.barometer.as_ref().unwrap_err().to_string();
+    assert_eq!(said, "the checksum of the barometer's coefficients is wrong");
+    for _ in 0..1_000 {
+        bench.borrow_mut().advance();
+        assert!(tick(&mut frames, &mut board));
+        let measured = frames.computer().input().measured;
+        assert!(!measured.imu.is_plausible() && measured.pressure_altitude_m.is_none());
+    }
+    let checks = frames.computer().arming_checks();
+    for (name, found) in [("gyro", "gyro silent for 5.0 s"), ("barometer", "barometer silent for 5.0 s")] {
+        assert!(checks.iter().any(|check| check.name == name && !check.passed && check.found == found));
+    }
+}

@@ -1,0 +1,509 @@
+//! A lane: links that carry the same frames, their budget, and the queue of what waits for room on them.
+//!
+//! All links begin in one lane, so that a ground station that hears several of them can recognise copies by their
+//! sequence numbers. A link with different message intervals gets its own lane with its own sequence numbers.
+
+use alloc::boxed::Box;
+use alloc::collections::VecDeque;
+use alloc::vec;
+use alloc::vec::Vec;
+
+use protocol::command::CommandAnswer;
+use protocol::dialect::MavMessage;
+use protocol::frame::{Encoder, Frame};
+use protocol::hub::line::{SHARE, slowed};
+use protocol::identity::{Address, NETWORK_BUDGET_BYTES_S};
+
+use super::questions::FileService;
+use super::{Context, MAX_REQUESTED, Outgoing};
+use crate::link::stations::MAX_STATIONS;
+use crate::link::streams::{Due, SLOW_UPLINK_HZ, Streams, WINDOW_S, is_slow, kept_free_bytes, share_bytes_s};
+use crate::link::vehicle::VehicleState;
+use crate::link::{parameters, telemetry};
+
+/// Most answers that may wait, and most texts. More are dropped; a station that needs an answer asks again.
+const MAX_WAITING: usize = 32;
+/// The longest frame with a piece of a file, without its signature.
+const PIECE_FRAME_LEN: usize = protocol::ftp::packet::PAYLOAD_LEN + 12;
+/// Shortest interval between answers to a repeated abort, s.
+const ABORT_ANSWERED_S: f64 = 0.09;
+/// The same on a line slower than a radio, s.
+const SLOW_ABORT_ANSWERED_S: f64 = 0.3;
+/// Bytes per second of files over a link that carries at least a network's telemetry: 15 % of the slowest Wi-Fi (802.11b,
+/// 11 Mbit/s). A smaller budget may be that of a radio somewhere on the way; files then use what telemetry leaves of it.
+const NETWORK_FILES_BYTES_S: f64 = 200_000.0;
+/// A piece of a file that would hold a line for longer than this is not sent, s.
+const LINE_HOLDS_S: f64 = 0.3;
+
+/// An answer in the queue.
+#[derive(Debug, Clone)]
+pub(super) enum Answer {
+    Message(Box<MavMessage>),
+    Command(CommandAnswer),
+}
+
+impl From<MavMessage> for Answer {
+    fn from(message: MavMessage) -> Self {
+        Self::Message(Box::new(message))
+    }
+}
+
+/// Links that carry the same frames.
+#[derive(Clone)]
+pub(super) struct Lane {
+    pub(super) links: Vec<usize>,
+    pub(super) streams: Streams,
+    encoder: Encoder,
+    signature_len: usize,
+    sent: Window,
+    /// Telemetry of the last [`BRIEFLY_S`] seconds.
+    telemetry_briefly: Window,
+    /// Answers and texts of the last [`BRIEFLY_S`] seconds.
+    answers_briefly: Window,
+    answered: Window,
+    /// Texts of the last second.
+    said: Window,
+    /// Uplink reports (TD_UPLINK) that are not yet sent.
+    uplinks: VecDeque<MavMessage>,
+    /// Answers to aborts, at most one for each station.
+    aborts: VecDeque<CommandAnswer>,
+    abort_answered_s: f64,
+    texts: VecDeque<Answer>,
+    answers: VecDeque<Answer>,
+    /// Requested messages; they are sent after all vital messages.
+    requested: VecDeque<MavMessage>,
+    /// The next parameter of a requested list; `None` when the list has been sent.
+    next_parameter: Option<u16>,
+    /// When the next piece of a file may be sent: they are spread evenly, as the link carries them.
+    piece_due_s: f64,
+    /// The budget that the lane was given, bytes per second; a radio may leave less of it.
+    granted_bytes_s: u32,
+    radio: Radio,
+    /// When a line slower than a radio has sent what it was given. What is not vital waits for that, so that nothing queues
+    /// behind it.
+    line_free_at_s: f64,
+    /// When the next uplink reports go over such a line.
+    uplinks_at_s: f64,
+}
+
+impl Lane {
+    /// Sets the sender's address.
+    pub(super) fn speak_as(&mut self, us: Address) {
+        self.encoder = Encoder::new(us);
+    }
+
+    pub(super) fn new(links: Vec<usize>, streams: Streams, encoder: Encoder, signature_len: usize) -> Self {
+        let mut lane = Self {
+            links,
+            streams,
+            encoder,
+            signature_len,
+            sent: Window::of(WINDOW_S),
+            telemetry_briefly: Window::of(BRIEFLY_S),
+            answers_briefly: Window::of(BRIEFLY_S),
+            answered: Window::of(WINDOW_S),
+            said: Window::of(WINDOW_S),
+            uplinks: VecDeque::new(),
+            aborts: VecDeque::new(),
+            abort_answered_s: f64::NEG_INFINITY,
+            texts: VecDeque::new(),
+            answers: VecDeque::new(),
+            requested: VecDeque::new(),
+            next_parameter: None,
+            piece_due_s: 0.0,
+            granted_bytes_s: 0,
+            radio: Radio::default(),
+            line_free_at_s: 0.0,
+            uplinks_at_s: 0.0,
+        };
+        let capacity_bytes_s = lane.streams.capacity_bytes_s();
+        lane.set_capacity(capacity_bytes_s);
+        lane
+    }
+
+    pub(super) fn set_capacity(&mut self, granted_bytes_s: u32) {
+        self.granted_bytes_s = granted_bytes_s;
+        self.share_with_the_radio();
+    }
+
+    /// Takes a radio's report about its buffer.
+    pub(super) fn on_radio(&mut self, free_percent: u8, now_s: f64) {
+        self.radio.hear(free_percent, now_s);
+        self.share_with_the_radio();
+    }
+
+    /// Uses what the radio leaves of the budget.
+    fn share_with_the_radio(&mut self) {
+        let capacity_bytes_s = (self.radio.share() * f64::from(self.granted_bytes_s)) as u32;
+        self.streams.set_capacity(capacity_bytes_s);
+        // The reserve of a slow line is in what its budget leaves of its baud rate.
+        let reserve = if is_slow(capacity_bytes_s) { kept_free_bytes(self.signature_len) } else { 0 };
+        self.sent.set_limit(capacity_bytes_s as usize + reserve);
+        self.telemetry_briefly.set_limit(telemetry_briefly_bytes(capacity_bytes_s));
+        self.answers_briefly.set_limit(answers_briefly_bytes(capacity_bytes_s));
+        self.answered.set_limit(share_bytes_s(capacity_bytes_s));
+        self.said.set_limit(share_bytes_s(capacity_bytes_s));
+    }
+
+    /// A copy of this lane for one of its links, with its history and queue.
+    pub(super) fn of_its_own(&mut self, link: usize) -> Self {
+        self.links.retain(|other| *other != link);
+        Self { links: vec![link], ..self.clone() }
+    }
+
+    /// Queues an answer to an abort, unless one is already waiting.
+    pub(super) fn answer_abort(&mut self, answer: CommandAnswer) {
+        if !self.aborts.contains(&answer) && self.aborts.len() < MAX_WAITING {
+            self.aborts.push_back(answer);
+        }
+    }
+
+    /// Queues an uplink report; it replaces an older one that is not yet sent.
+    pub(super) fn tell_of_uplink(&mut self, message: MavMessage) {
+        self.uplinks.truncate(MAX_STATIONS - 1);
+        self.uplinks.push_front(message);
+    }
+
+    pub(super) fn answer(&mut self, answer: Answer) {
+        if self.answers.len() < MAX_WAITING {
+            self.answers.push_back(answer);
+        }
+    }
+
+    pub(super) fn say(&mut self, chunk: MavMessage) {
+        if self.texts.len() < MAX_WAITING {
+            self.texts.push_back(chunk.into());
+        }
+    }
+
+    /// Queues requested messages; returns whether there was room in the queue. Otherwise they are dropped, and the
+    /// station has to ask again.
+    pub(super) fn request(&mut self, messages: Vec<MavMessage>) -> bool {
+        let fits = self.requested.len() + messages.len() <= MAX_REQUESTED;
+        if fits {
+            self.requested.extend(messages);
+        }
+        fits
+    }
+
+    /// Sends every parameter from the first one, also if an earlier list is not finished.
+    pub(super) fn list_parameters(&mut self) {
+        self.next_parameter = Some(0);
+    }
+
+    /// The frames to send now: vital messages first, then answers, then texts (in the fall after telemetry), then telemetry by
+    /// importance, then requested messages, then pieces of files. The budget holds in every second.
+    pub(super) fn poll(
+        &mut self,
+        context: &Context,
+        vehicle: &VehicleState<'_>,
+        files: &mut FileService,
+    ) -> Vec<Outgoing> {
+        let now_s = context.now_s;
+        if self.radio.is_outdated(now_s) {
+            self.radio = Radio::default();
+            self.share_with_the_radio();
+        }
+        let slow = is_slow(self.streams.capacity_bytes_s());
+        self.sent.move_to(now_s);
+        self.telemetry_briefly.move_to(now_s);
+        self.answers_briefly.move_to(now_s);
+        self.answered.move_to(now_s);
+        self.said.move_to(now_s);
+        let mut frames = Vec::new();
+        let due = self.streams.due(now_s, files.is_busy(&self.links, now_s));
+        for due in due.iter().filter(|due| due.vital) {
+            if due.frame_len > self.sent.room() {
+                break;
+            }
+            self.send(due, context, vehicle, &mut frames);
+        }
+        let answered_every_s = if slow { SLOW_ABORT_ANSWERED_S } else { ABORT_ANSWERED_S };
+        if now_s - self.abort_answered_s >= answered_every_s
+            && let Some(answer) = self.aborts.front().copied()
+            && let Some(frame) = self.encode(&Answer::Command(answer), self.sent.room())
+        {
+            self.put(frame, now_s, &mut frames);
+            self.abort_answered_s = now_s;
+            self.aborts.pop_front();
+        }
+        while (!slow || now_s >= self.uplinks_at_s)
+            && self.is_line_free(now_s)
+            && let Some(message) = self.uplinks.front().cloned()
+        {
+            let Some(frame) = self.encode(&message.into(), self.room()) else { break };
+            self.put(frame, now_s, &mut frames);
+            self.uplinks.pop_front();
+            if self.uplinks.is_empty() {
+                self.uplinks_at_s = now_s + 0.9 / SLOW_UPLINK_HZ;
+            }
+        }
+        while self.is_line_free(now_s)
+            && let Some(answer) = self.answers.front().cloned()
+        {
+            let room = self.room_for_answers().min(self.answered.room());
+            let Some(frame) = self.encode(&answer, room) else { break };
+            self.answered.take(self.len_of(&frame), now_s);
+            self.answers_briefly.take(self.len_of(&frame), now_s);
+            self.put(frame, now_s, &mut frames);
+            self.answers.pop_front();
+        }
+        let falls = vehicle.phase().in_descent() || vehicle.phase().in_landing_burn();
+        if !falls {
+            self.send_texts(now_s, &mut frames);
+        }
+        for due in due.iter().filter(|due| !due.vital) {
+            // The check uses the longest form of the message, so that no frame is built for nothing. Less important
+            // messages do not overtake it.
+            if due.frame_len > self.room_for_telemetry() || !self.is_line_free(now_s) {
+                break;
+            }
+            self.send(due, context, vehicle, &mut frames);
+        }
+        // In the fall the place of the vehicle does not wait for words.
+        if falls {
+            self.send_texts(now_s, &mut frames);
+        }
+        while self.requested.len() < MAX_REQUESTED
+            && let Some(answer) = files.next_answer(&self.links)
+        {
+            self.requested.push_back(answer);
+        }
+        let longest = if slow { 0 } else { self.streams.longest_frame_len() };
+        while self.is_line_free(now_s)
+            && let Some(message) = self.next_requested(vehicle)
+        {
+            // Some room is also kept free for telemetry that falls due in the meantime.
+            let room = self.room_for_telemetry().saturating_sub(longest);
+            let Some(frame) = self.encode(&message.into(), room) else { break };
+            self.telemetry_briefly.take(self.len_of(&frame), now_s);
+            self.put(frame, now_s, &mut frames);
+            if self.requested.pop_front().is_none() {
+                self.next_parameter = self.next_parameter.map(|place| place + 1);
+            }
+        }
+        self.send_pieces(now_s, files, &mut frames);
+        frames.into_iter().map(|frame| Outgoing { frame, links: self.links.clone() }).collect()
+    }
+
+    /// Sends texts within their share.
+    fn send_texts(&mut self, now_s: f64, frames: &mut Vec<Frame>) {
+        while self.is_line_free(now_s)
+            && let Some(chunk) = self.texts.front().cloned()
+        {
+            let room = self.room_for_answers().min(self.said.room());
+            let Some(frame) = self.encode(&chunk, room) else { break };
+            self.said.take(self.len_of(&frame), now_s);
+            self.answers_briefly.take(self.len_of(&frame), now_s);
+            self.put(frame, now_s, frames);
+            self.texts.pop_front();
+        }
+    }
+
+    /// Sends pieces of files in all the room that is left, evenly spread.
+    fn send_pieces(&mut self, now_s: f64, files: &mut FileService, frames: &mut Vec<Frame>) {
+        let longest = PIECE_FRAME_LEN + self.signature_len;
+        let has_own_room = self.granted_bytes_s >= NETWORK_BUDGET_BYTES_S;
+        let bytes_s =
+            if has_own_room { NETWORK_FILES_BYTES_S } else { f64::from(self.streams.capacity_bytes_s()) };
+        let spacing_s = longest as f64 / bytes_s;
+        if self.line_takes_s(longest) > LINE_HOLDS_S {
+            return;
+        }
+        // A poll that comes late is caught up with, a pause is not.
+        self.piece_due_s = self.piece_due_s.max(now_s - spacing_s);
+        while now_s >= self.piece_due_s
+            && self.is_line_free(now_s)
+            && (has_own_room || self.room() >= longest)
+            && let Some(message) = files.next_piece(&self.links, now_s)
+        {
+            let frame = self.encoder.encode(&message);
+            self.piece_due_s += spacing_s;
+            if has_own_room { frames.push(frame) } else { self.put(frame, now_s, frames) }
+        }
+    }
+
+    /// Room for messages that are not vital. Some of the budget is kept free so that vital messages never wait.
+    fn room(&self) -> usize {
+        self.sent.room().saturating_sub(kept_free_bytes(self.signature_len))
+    }
+
+    fn room_for_answers(&self) -> usize {
+        self.room().min(self.answers_briefly.room())
+    }
+
+    fn room_for_telemetry(&self) -> usize {
+        self.room().min(self.telemetry_briefly.room())
+    }
+
+    fn send(&mut self, due: &Due, context: &Context, vehicle: &VehicleState<'_>, frames: &mut Vec<Frame>) {
+        if let Some(message) = telemetry::message(due.message_id, vehicle, context.identity) {
+            let frame = self.encoder.encode(&message);
+            // Vital messages do not count as recent telemetry: a change of phase must not delay a position.
+            if !due.vital {
+                self.telemetry_briefly.take(self.len_of(&frame), context.now_s);
+            }
+            self.put(frame, context.now_s, frames);
+        }
+        self.streams.on_sent(due.message_id, context.now_s);
+    }
+
+    /// The next requested message: single messages first, then the list of parameters.
+    fn next_requested(&mut self, vehicle: &VehicleState<'_>) -> Option<MavMessage> {
+        if let Some(message) = self.requested.front() {
+            return Some(message.clone());
+        }
+        self.next_parameter = self.next_parameter.filter(|place| *place < parameters::COUNT);
+        self.next_parameter
+            .map(|place| parameters::value(place, &self.streams, &vehicle.mission().powered.weights))
+    }
+
+    /// The frame, if it is not longer than this; a frame that is not sent uses no sequence number.
+    fn encode(&mut self, answer: &Answer, room: usize) -> Option<Frame> {
+        let mut encoder = self.encoder.clone();
+        let frame = match answer {
+            Answer::Message(message) => encoder.encode(message),
+            // The dialect always has COMMAND_ACK.
+            Answer::Command(answer) => answer.encode(&mut encoder)?,
+        };
+        if self.len_of(&frame) > room {
+            return None;
+        }
+        self.encoder = encoder;
+        Some(frame)
+    }
+
+    fn len_of(&self, frame: &Frame) -> usize {
+        frame.as_bytes().len() + self.signature_len
+    }
+
+    /// How long these bytes hold the line, s. Only a line slower than a radio is held.
+    fn line_takes_s(&self, bytes: usize) -> f64 {
+        let capacity_bytes_s = self.streams.capacity_bytes_s();
+        if is_slow(capacity_bytes_s) { bytes as f64 * SHARE / f64::from(capacity_bytes_s) } else { 0.0 }
+    }
+
+    fn is_line_free(&self, now_s: f64) -> bool {
+        now_s >= self.line_free_at_s - 1e-9
+    }
+
+    fn put(&mut self, frame: Frame, now_s: f64, frames: &mut Vec<Frame>) {
+        let bytes = self.len_of(&frame);
+        self.sent.take(bytes, now_s);
+        self.line_free_at_s = self.line_free_at_s.max(now_s) + self.line_takes_s(bytes);
+        frames.push(frame);
+    }
+}
+
+// Tracks how much a link has carried recently and how much room it has left.
+
+/// In any fifth of a second telemetry may take 22 % of the budget of one second, and answers and texts a sixth of it.
+/// Otherwise a burst could spend the whole budget, and even vital messages would wait.
+pub(super) const BRIEFLY_S: f64 = 0.2;
+
+/// The share of telemetry, bytes. Over a slow line frames go one by one, so that there are no bursts.
+pub(super) fn telemetry_briefly_bytes(capacity_bytes_s: u32) -> usize {
+    if is_slow(capacity_bytes_s) { usize::MAX } else { capacity_bytes_s as usize * 22 / 100 }
+}
+
+/// The share of answers and texts, bytes.
+pub(super) fn answers_briefly_bytes(capacity_bytes_s: u32) -> usize {
+    if is_slow(capacity_bytes_s) { usize::MAX } else { capacity_bytes_s as usize / 6 }
+}
+
+/// A radio that has not reported for this long has no say any more, s.
+const RADIO_REPORT_HOLDS_S: f64 = 10.0;
+
+/// What a radio leaves of the budget: less while its buffer is full (RADIO_STATUS).
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Radio {
+    share: f64,
+    reported_s: Option<f64>,
+}
+
+impl Default for Radio {
+    fn default() -> Self {
+        Self { share: 1.0, reported_s: None }
+    }
+}
+
+impl Radio {
+    pub(super) fn share(self) -> f64 {
+        self.share
+    }
+
+    /// Takes a report: how much of its buffer is free, percent.
+    pub(super) fn hear(&mut self, free_percent: u8, now_s: f64) {
+        *self = Self { share: slowed(self.share, free_percent), reported_s: Some(now_s) };
+    }
+
+    pub(super) fn is_outdated(self, now_s: f64) -> bool {
+        self.reported_s.is_some_and(|at_s| now_s - at_s > RADIO_REPORT_HOLDS_S)
+    }
+}
+
+/// The bytes sent in a sliding window of time.
+#[derive(Debug, Clone)]
+pub(super) struct Window {
+    span_s: f64,
+    limit: usize,
+    sent: VecDeque<(f64, usize)>,
+    bytes: usize,
+}
+
+impl Window {
+    /// A window of this length; it has no room until it gets a limit.
+    pub(super) fn of(span_s: f64) -> Self {
+        Self { span_s, limit: 0, sent: VecDeque::new(), bytes: 0 }
+    }
+
+    /// Sets the most bytes in any window from now on.
+    pub(super) fn set_limit(&mut self, limit: usize) {
+        self.limit = limit;
+    }
+
+    /// Drops bytes that were sent before the window.
+    pub(super) fn move_to(&mut self, now_s: f64) {
+        // Times are multiples of a frame; rounding must not keep an entry one frame too long.
+        while let Some((sent_s, bytes)) = self.sent.front()
+            && now_s - sent_s >= self.span_s - 1e-9
+        {
+            self.bytes -= bytes;
+            self.sent.pop_front();
+        }
+    }
+
+    /// Bytes that may still be sent now.
+    pub(super) fn room(&self) -> usize {
+        self.limit.saturating_sub(self.bytes)
+    }
+
+    /// Notes bytes sent now.
+    pub(super) fn take(&mut self, bytes: usize, now_s: f64) {
+        self.sent.push_back((now_s, bytes));
+        self.bytes += bytes;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::link::streams::WINDOW_S;
+
+    #[test]
+    fn sent_bytes_count_for_a_second_and_no_longer() {
+        let mut window = Window::of(WINDOW_S);
+        assert_eq!(window.room(), 0);
+        window.set_limit(100);
+        window.take(60, 0.0);
+        window.take(40, 0.5);
+        window.move_to(1.0);
+        assert_eq!(window.room(), 0);
+        window.move_to(WINDOW_S);
+        assert_eq!(window.room(), 60);
+        window.set_limit(30);
+        assert_eq!(window.room(), 0);
+        window.move_to(0.5 + WINDOW_S);
+        assert_eq!(window.room(), 30);
+    }
+}

@@ -1,0 +1,407 @@
+//! The messages of our dialect that every vehicle sends: flight status, controller, verdict, crew, check on the pad,
+//! and what went wrong.
+
+use flight::computer::AbortEffect;
+use flight::computer::crew::People;
+use flight::computer::findings::Findings;
+use flight::computer::pad_check::{CheckState, Finding, PadCheck, Verdict};
+use flight::computer::pilot::planner::PLAN_WITHIN_S;
+use flight::rules::operator::{Operator, Role};
+use flight::rules::phase::{HoldCause, Latch, Mode, MotorStatus, Phase};
+use flight::rules::two_person::Act;
+use flight::rules::verdict::LandingVerdict;
+use flight::vehicle::mission::StartPoint;
+use mavlink::types::CharArray;
+use num_traits::FromPrimitive as _;
+use protocol::dialect::{
+    MavMessage, TD_CONTROLLER_DATA, TD_CREW_DATA, TD_FINDING_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA,
+    TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_MISSION_DATA, TD_OPERATOR_DATA, TD_PAD_CHECK_DATA,
+    TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, TdAbortEffect, TdAct,
+    TdCheck, TdControlLevel, TdHold, TdInterlock, TdLanding, TdLatch, TdLimit, TdMotor, TdPadCheckItem,
+    TdPadCheckState, TdPadCheckVerdict, TdPhase, TdRole, TdSolverStatus, TdStart, TdVehicleFlag,
+};
+
+use super::{boot_ms, centidegrees, centimetres, characters};
+use crate::link::vehicle::{Identity, VehicleKind, VehicleState, bits, violations};
+
+pub(super) fn flight_status(state: &VehicleState<'_>, identity: Identity) -> MavMessage {
+    let (mode, time_s) = (state.mode(), state.time_s);
+    let countdown_s = mode.countdown_remaining_s(time_s);
+    let seconds = countdown_s.or_else(|| state.since_zero_s().map(|since_s| -since_s));
+    let held = mode.held(time_s);
+    let last_hold_s = state.computer.last_hold_s().filter(|_| mode.countdown_end_s.is_some());
+    let (abort_effect, abort_impact_m_s) = td_abort_effect(state.computer.abort_effect());
+    MavMessage::TD_FLIGHT_STATUS(TD_FLIGHT_STATUS_DATA {
+        time_boot_ms: boot_ms(time_s),
+        countdown_ms: seconds.map_or(i32::MAX, |s| libm::round(1000.0 * s) as i32),
+        interlocks: interlocks(mode),
+        checks_failed: TdCheck::from_bits_truncate(state.checks_failed()),
+        approach_wait_s: mode.approach_wait_s(time_s).map_or(u16::MAX, |s| libm::ceil(s) as u16),
+        motor: td_motor(mode.motor_status(time_s)),
+        hold: match held {
+            None => TdHold::TD_HOLD_NONE,
+            Some((HoldCause::UplinkSilent, _)) => TdHold::TD_HOLD_UPLINK_SILENT,
+            Some((HoldCause::Commanded, _)) => TdHold::TD_HOLD_COMMANDED,
+            Some((HoldCause::TapOverdue, _)) => TdHold::TD_HOLD_TAP_OVERDUE,
+            Some((HoldCause::StationDeaf, _)) => TdHold::TD_HOLD_STATION_DEAF,
+            Some((HoldCause::CheckFailed, _)) => TdHold::TD_HOLD_CHECK_FAILED,
+        },
+        hold_left_s: held.map_or(0, |(_, left_s)| libm::ceil(left_s) as u8),
+        phase: td_phase(mode.phase),
+        abort_effect,
+        abort_impact_m_s,
+        boot_number: identity.boot_number,
+        vehicle_uid: identity.uid,
+        vehicle_flags: match identity.kind {
+            VehicleKind::Simulated => TdVehicleFlag::TD_VEHICLE_FLAG_SIMULATED,
+            VehicleKind::Real => TdVehicleFlag::empty(),
+        },
+        latch: td_latch(state.computer.latch()),
+        last_hold_ds: last_hold_s.map_or(0, |s| libm::ceil(10.0 * s) as u8),
+    })
+}
+
+/// What an abort would do, and the speed of the impact it leads to, m/s, or zero.
+fn td_abort_effect(effect: AbortEffect) -> (TdAbortEffect, u8) {
+    match effect {
+        AbortEffect::None => (TdAbortEffect::TD_ABORT_EFFECT_NONE, 0),
+        AbortEffect::SafeOnPad => (TdAbortEffect::TD_ABORT_EFFECT_SAFE_ON_PAD, 0),
+        AbortEffect::ChuteAtApogee => (TdAbortEffect::TD_ABORT_EFFECT_CHUTE_AT_APOGEE, 0),
+        AbortEffect::ChuteNow => (TdAbortEffect::TD_ABORT_EFFECT_CHUTE_NOW, 0),
+        AbortEffect::Burn => (TdAbortEffect::TD_ABORT_EFFECT_BURN, 0),
+        AbortEffect::Impact { m_s } => (TdAbortEffect::TD_ABORT_EFFECT_IMPACT, m_s),
+        AbortEffect::LandInPlace => (TdAbortEffect::TD_ABORT_EFFECT_LAND_IN_PLACE, 0),
+        AbortEffect::LandUpright => (TdAbortEffect::TD_ABORT_EFFECT_LAND_UPRIGHT, 0),
+    }
+}
+
+fn interlocks(mode: &Mode) -> TdInterlock {
+    let locks = mode.interlocks;
+    let mut bits = TdInterlock::empty();
+    bits.set(TdInterlock::TD_INTERLOCK_PIN_OUT, locks.pin_out);
+    bits.set(TdInterlock::TD_INTERLOCK_ARMED, locks.armed);
+    bits.set(TdInterlock::TD_INTERLOCK_MOTOR_INHIBITED, locks.landing_motor_inhibited);
+    bits.set(TdInterlock::TD_INTERLOCK_ABORT_LATCHED, locks.abort_latched);
+    bits.set(TdInterlock::TD_INTERLOCK_NO_LIGHT, locks.no_light_latched);
+    bits.set(TdInterlock::TD_INTERLOCK_PIN_DUE, mode.aborted_before_s.is_some());
+    bits
+}
+
+fn td_latch(latch: Option<Latch>) -> TdLatch {
+    match latch {
+        None => TdLatch::TD_LATCH_NONE,
+        Some(Latch::Commanded) => TdLatch::TD_LATCH_COMMANDED,
+        Some(Latch::UncommandedLiftOff) => TdLatch::TD_LATCH_UNCOMMANDED_LIFTOFF,
+        Some(Latch::UncommandedRelease) => TdLatch::TD_LATCH_UNCOMMANDED_RELEASE,
+        Some(Latch::NoSeparation) => TdLatch::TD_LATCH_NO_SEPARATION,
+        Some(Latch::Gate) => TdLatch::TD_LATCH_GATE,
+        Some(Latch::NoLight) => TdLatch::TD_LATCH_NO_LIGHT,
+        Some(Latch::Other) => TdLatch::TD_LATCH_OTHER,
+    }
+}
+
+fn td_motor(status: MotorStatus) -> TdMotor {
+    match status {
+        MotorStatus::PinIn => TdMotor::TD_MOTOR_PIN_IN,
+        MotorStatus::Live => TdMotor::TD_MOTOR_LIVE,
+        MotorStatus::Burning => TdMotor::TD_MOTOR_BURNING,
+        MotorStatus::Hot => TdMotor::TD_MOTOR_HOT,
+        MotorStatus::Burnt => TdMotor::TD_MOTOR_BURNT,
+    }
+}
+
+/// A phase as it is sent.
+pub fn td_phase(phase: Phase) -> TdPhase {
+    match phase {
+        Phase::Safe => TdPhase::TD_PHASE_SAFE,
+        Phase::PadIdle => TdPhase::TD_PHASE_PAD_IDLE,
+        Phase::PadArmed => TdPhase::TD_PHASE_PAD_ARMED,
+        Phase::Boost => TdPhase::TD_PHASE_BOOST,
+        Phase::Coast => TdPhase::TD_PHASE_COAST,
+        Phase::Deploy => TdPhase::TD_PHASE_DEPLOY,
+        Phase::AeroDescent => TdPhase::TD_PHASE_AERO_DESCENT,
+        Phase::LandArmed => TdPhase::TD_PHASE_LAND_ARMED,
+        Phase::Ignition => TdPhase::TD_PHASE_IGNITION,
+        Phase::Powered => TdPhase::TD_PHASE_POWERED,
+        Phase::Touchdown => TdPhase::TD_PHASE_TOUCHDOWN,
+        Phase::Safed => TdPhase::TD_PHASE_SAFED,
+        Phase::Chute => TdPhase::TD_PHASE_CHUTE,
+    }
+}
+
+pub(super) fn fins(state: &VehicleState<'_>) -> MavMessage {
+    MavMessage::TD_FINS(TD_FINS_DATA {
+        time_boot_ms: boot_ms(state.time_s),
+        commanded: state.computer.commands().fins_rad.map(centidegrees),
+        measured: state.input().fins_rad.map(centidegrees),
+    })
+}
+
+pub(super) fn gimbal(state: &VehicleState<'_>) -> MavMessage {
+    let [pitch_commanded, yaw_commanded] = state.computer.commands().gimbal_rad.map(centidegrees);
+    let [pitch_measured, yaw_measured] = state.input().gimbal_rad.map(centidegrees);
+    MavMessage::TD_GIMBAL(TD_GIMBAL_DATA {
+        time_boot_ms: boot_ms(state.time_s),
+        pitch_commanded,
+        pitch_measured,
+        yaw_commanded,
+        yaw_measured,
+    })
+}
+
+pub(super) fn controller(state: &VehicleState<'_>) -> Option<MavMessage> {
+    let (tick, level, report) = state.controller()?;
+    let solve_time_s = state.solve_time_s();
+    let thrust_scale = state.airborne().map_or(1.0, |_| state.computer.pilot().scales()[0]);
+    let microseconds = |s: f64| libm::round(1e6 * s);
+    Some(MavMessage::TD_CONTROLLER(TD_CONTROLLER_DATA {
+        time_boot_ms: boot_ms(state.time_s),
+        tick: tick as u32,
+        cost: report.cost as f32,
+        kkt_stationarity: report.kkt_stationarity as f32,
+        kkt_feasibility: report.kkt_feasibility as f32,
+        thrust_scale: thrust_scale as f32,
+        solve_time_us: microseconds(solve_time_s) as u32,
+        deadline_margin_us: microseconds(PLAN_WITHIN_S - solve_time_s) as i32,
+        iterations: u16::try_from(report.iterations).unwrap_or(u16::MAX),
+        level: td_level(level),
+        solver_status: td_status(report.status),
+    }))
+}
+
+fn td_level(level: flight::guidance::powered::ControlLevel) -> TdControlLevel {
+    use flight::guidance::powered::ControlLevel as L;
+    match level {
+        L::Idle => TdControlLevel::TD_CONTROL_LEVEL_IDLE,
+        L::Rehearsal => TdControlLevel::TD_CONTROL_LEVEL_REHEARSAL,
+        L::Converged => TdControlLevel::TD_CONTROL_LEVEL_CONVERGED,
+        L::BestFeasible => TdControlLevel::TD_CONTROL_LEVEL_BEST_FEASIBLE,
+        L::ShiftedPlan => TdControlLevel::TD_CONTROL_LEVEL_SHIFTED_PLAN,
+        L::Stabiliser => TdControlLevel::TD_CONTROL_LEVEL_STABILISER,
+    }
+}
+
+fn td_status(status: ocp::Status) -> TdSolverStatus {
+    use ocp::Status as S;
+    match status {
+        S::NotRun => TdSolverStatus::TD_SOLVER_STATUS_NOT_RUN,
+        S::Converged => TdSolverStatus::TD_SOLVER_STATUS_CONVERGED,
+        S::IterationLimit => TdSolverStatus::TD_SOLVER_STATUS_ITERATION_LIMIT,
+        S::Stalled => TdSolverStatus::TD_SOLVER_STATUS_STALLED,
+        S::SubproblemFailed => TdSolverStatus::TD_SOLVER_STATUS_SUBPROBLEM_FAILED,
+        S::NotFinite => TdSolverStatus::TD_SOLVER_STATUS_BAD_INPUT,
+        S::WorkLimit => TdSolverStatus::TD_SOLVER_STATUS_WORK_LIMIT,
+    }
+}
+
+pub(super) fn touchdown_prediction(state: &VehicleState<'_>) -> Option<MavMessage> {
+    let planned = state.planned()?;
+    let end = planned.end(state.mission().powered.landing_miss);
+    let violated = violations(&LandingVerdict::judge_plan(&state.limits(), &end));
+    Some(MavMessage::TD_TOUCHDOWN_PREDICTION(TD_TOUCHDOWN_PREDICTION_DATA {
+        time_boot_ms: boot_ms(state.time_s),
+        time_to_go_ms: libm::round(1000.0 * planned.time_to_go_s) as i32,
+        distance_m: end.distance_m as f32,
+        height_m: end.height_m as f32,
+        vertical_m_s: end.vertical_m_s as f32,
+        lateral_m_s: end.lateral_m_s as f32,
+        tilt_rad: end.tilt_rad as f32,
+        rate_rad_s: end.rate_rad_s as f32,
+        limits_violated: TdLimit::from_bits_truncate(violated),
+    }))
+}
+
+pub(super) fn predicted_path(state: &VehicleState<'_>) -> Option<MavMessage> {
+    let (points_m, count) = state.planned()?.path_from_the_east();
+    Some(MavMessage::TD_PREDICTED_PATH(TD_PREDICTED_PATH_DATA {
+        time_boot_ms: boot_ms(state.time_s),
+        x: points_m.map(|(north_m, _)| centimetres(north_m)),
+        altitude: points_m.map(|(_, up_m)| centimetres(up_m)),
+        count: count as u8,
+    }))
+}
+
+pub(super) fn landing_verdict(state: &VehicleState<'_>) -> Option<MavMessage> {
+    let judged = state.judged.as_ref()?;
+    let at = &judged.touchdown;
+    let violated = violations(&LandingVerdict::judge(&state.limits(), at));
+    let landing = judged.landing.flags().into_iter();
+    Some(MavMessage::TD_LANDING_VERDICT(TD_LANDING_VERDICT_DATA {
+        time_boot_ms: boot_ms(state.time_s),
+        contact_ms: boot_ms(judged.time_s),
+        distance_m: at.distance_m as f32,
+        vertical_m_s: at.vertical_m_s as f32,
+        lateral_m_s: at.lateral_m_s as f32,
+        tilt_rad: at.tilt_rad as f32,
+        rate_rad_s: at.rate_rad_s as f32,
+        limits_violated: TdLimit::from_bits_truncate(violated),
+        landing: TdLanding::from_bits_truncate(bits(landing) as u8),
+    }))
+}
+
+pub(super) fn touchdown_limits(state: &VehicleState<'_>) -> MavMessage {
+    let limits = state.limits();
+    MavMessage::TD_TOUCHDOWN_LIMITS(TD_TOUCHDOWN_LIMITS_DATA {
+        vertical_m_s: limits.vertical_m_s as f32,
+        lateral_m_s: limits.lateral_m_s as f32,
+        tilt_rad: limits.tilt_rad as f32,
+        rate_rad_s: limits.rate_rad_s as f32,
+        fence_m: state.mission().gate.fence_radius_m as f32,
+        gimbal_limit_rad: state.mission().airframe.gimbal.limit_rad() as f32,
+    })
+}
+
+// Who commands, what is asked, and which mission flies.
+
+pub(super) fn mission(state: &VehicleState<'_>) -> MavMessage {
+    let name = characters(&state.name.name);
+    let start = match state.name.start {
+        None => TdStart::TD_START_UNKNOWN,
+        Some(StartPoint::Pad) => TdStart::TD_START_PAD,
+        Some(StartPoint::Apogee) => TdStart::TD_START_APOGEE,
+        Some(StartPoint::Drone) => TdStart::TD_START_DRONE,
+    };
+    MavMessage::TD_MISSION(TD_MISSION_DATA {
+        hash: state.name.hash.0,
+        name,
+        start,
+        motor_burns: state.name.motor_burns,
+    })
+}
+
+pub(super) fn crew(state: &VehicleState<'_>) -> Option<MavMessage> {
+    let people = state.input().people?;
+    let crew = state.computer.crew();
+    let (ask, tap) = (crew.two_person.waiting(state.time_s), crew.two_person.tapping());
+    let commander = state.input().commander;
+    let ms = |left_s: f64| (1000.0 * left_s).clamp(0.0, f64::from(u16::MAX)) as u16;
+    let number = |operator: Option<Operator>| operator.map_or(0, |operator| operator.number);
+    Some(MavMessage::TD_CREW(TD_CREW_DATA {
+        time_boot_ms: boot_ms(state.time_s),
+        ask_number: ask.map_or(0, |ask| ask.number),
+        ask_left_ms: ask.map_or(0, |ask| ms(ask.left_s(state.time_s))),
+        tap_left_ms: tap.map_or(0, |tap| ms(tap.left_s(state.time_s))),
+        people: match people {
+            People::One => 1,
+            People::Two { .. } => 2,
+        },
+        act: match ask.map(|ask| ask.act) {
+            None => TdAct::TD_ACT_NONE,
+            Some(Act::Arm) => TdAct::TD_ACT_ARM,
+            Some(Act::Start) => TdAct::TD_ACT_START,
+        },
+        asked_by: number(ask.map(|ask| ask.by)),
+        tapped_by: number(tap.map(|tap| tap.by)),
+        commanded_by: number(commander.and_then(|commander| commander.by)),
+        commanding_system: commander.map_or(0, |commander| commander.station.system),
+        commanding_component: commander.map_or(0, |commander| commander.station.component),
+        held_by: number(crew.held_by),
+    }))
+}
+
+/// Operators per second.
+const TURNS_PER_S: f64 = 0.5;
+
+/// Each operator in turn.
+pub(super) fn operator(state: &VehicleState<'_>) -> Option<MavMessage> {
+    state.input().people?;
+    let count = state.operators.len().max(1);
+    let operator = state.operators.get((TURNS_PER_S * state.time_s) as usize % count)?;
+    let role = match operator.role {
+        Role::Observer => TdRole::TD_ROLE_OBSERVER,
+        Role::RangeSafety => TdRole::TD_ROLE_RANGE_SAFETY,
+        Role::Flight => TdRole::TD_ROLE_FLIGHT,
+        Role::Pad => TdRole::TD_ROLE_PAD,
+    };
+    Some(MavMessage::TD_OPERATOR(TD_OPERATOR_DATA {
+        number: operator.number,
+        role,
+        name: CharArray::new(*operator.name.bytes()),
+    }))
+}
+
+/// What went wrong in the flight: the finding at this place, or that there is none.
+pub(crate) fn finding(findings: &Findings, place: usize, time_s: f64) -> MavMessage {
+    let found = findings.as_found();
+    let mut data = TD_FINDING_DATA {
+        time_boot_ms: boot_ms(time_s),
+        found: u8::try_from(found.len()).unwrap_or(u8::MAX),
+        ..TD_FINDING_DATA::default()
+    };
+    if let Some(finding) = found.get(place) {
+        (data.since_s, data.held_s) = (finding.since_s as f32, finding.held_s as f32);
+        data.place = u8::try_from(place).unwrap_or(u8::MAX);
+        data.text = characters(&finding.words());
+    }
+    MavMessage::TD_FINDING(data)
+}
+
+// The last check of the vehicle on its pad, value by value.
+
+/// The value at this place, or how the check stands while nothing has been found.
+pub(crate) fn pad_check(check: &PadCheck, place: usize, time_s: f64) -> MavMessage {
+    let findings = check.findings();
+    let mut data = TD_PAD_CHECK_DATA {
+        time_boot_ms: boot_ms(time_s),
+        value: f32::NAN,
+        least: f32::NAN,
+        most: f32::NAN,
+        run: check.run(),
+        state: match check.state() {
+            CheckState::NotRun => TdPadCheckState::TD_PAD_CHECK_STATE_NOT_RUN,
+            CheckState::Running => TdPadCheckState::TD_PAD_CHECK_STATE_RUNNING,
+            CheckState::Passed => TdPadCheckState::TD_PAD_CHECK_STATE_PASSED,
+            CheckState::Failed => TdPadCheckState::TD_PAD_CHECK_STATE_FAILED,
+            CheckState::Stopped => TdPadCheckState::TD_PAD_CHECK_STATE_STOPPED,
+        },
+        progress: check.progress_percent(),
+        found: u8::try_from(findings.len()).unwrap_or(u8::MAX),
+        asked_by: check.by().map_or(0, |by| by.number),
+        ..TD_PAD_CHECK_DATA::default()
+    };
+    if let Some(Finding { item, value, least, most, verdict }) = findings.get(place).copied()
+        && let Some(item) = TdPadCheckItem::from_u8(item.number())
+    {
+        (data.value, data.least, data.most) = (value as f32, least as f32, most as f32);
+        (data.item, data.place) = (item, u8::try_from(place).unwrap_or(u8::MAX));
+        data.verdict = match verdict {
+            Verdict::NotJudged => TdPadCheckVerdict::TD_PAD_CHECK_VERDICT_NOT_JUDGED,
+            Verdict::Ok => TdPadCheckVerdict::TD_PAD_CHECK_VERDICT_OK,
+            Verdict::NotOk => TdPadCheckVerdict::TD_PAD_CHECK_VERDICT_NOT_OK,
+        };
+    }
+    MavMessage::TD_PAD_CHECK(data)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_an_impact_is_sent_with_its_speed() {
+        let told = [
+            (AbortEffect::None, 0, 0),
+            (AbortEffect::SafeOnPad, 1, 0),
+            (AbortEffect::ChuteAtApogee, 2, 0),
+            (AbortEffect::ChuteNow, 3, 0),
+            (AbortEffect::LandUpright, 5, 0),
+            (AbortEffect::LandInPlace, 6, 0),
+            (AbortEffect::Burn, 7, 0),
+            (AbortEffect::Impact { m_s: 41 }, 8, 41),
+        ];
+        for (effect, number, m_s) in told {
+            let (td_effect, td_m_s) = td_abort_effect(effect);
+            assert_eq!((td_effect as u32, td_m_s), (number, m_s), "{effect:?}");
+        }
+    }
+
+    #[test]
+    fn phases_and_levels_have_the_same_numbers_on_the_wire_and_in_flight() {
+        for phase in Phase::ALL {
+            assert_eq!(td_phase(phase) as u32, u32::from(phase.index()));
+        }
+        for level in flight::guidance::powered::ControlLevel::ALL {
+            assert_eq!(td_level(level) as u32, u32::from(level.index()));
+        }
+    }
+}

@@ -1,0 +1,406 @@
+//! The flight computer's frames as log records, and back, bit for bit.
+
+use alloc::borrow::ToOwned as _;
+use alloc::vec::Vec;
+
+use flight::computer::crew::{Asked, Ending, Request};
+use flight::computer::pilot::Pilot;
+use flight::computer::{Commander, Commands, Computer, Input, Output, Rehearsed};
+use flight::estimation::estimator::AidStatus;
+use flight::guidance::powered::ControlLevel;
+use flight::rules::arming::Uplink;
+use flight::rules::outputs::{Line, Outputs};
+use flight::rules::phase::Phase;
+use flight::vehicle::mission::StartPoint;
+use protocol::records::computer_v1 as v1;
+use protocol::records::flight_v1;
+
+use crate::log::logged::{At, Logged, RecordError};
+
+/// A frame's input that owns its lists: read from a log, or by a board.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LoggedInput {
+    requests: Vec<Request>,
+    rehearsed: Option<Rehearsed>,
+    rest: Input<'static>,
+}
+
+impl LoggedInput {
+    /// `rest` is everything but requests and rehearsal.
+    pub fn new(rest: Input<'static>, requests: Vec<Request>, rehearsed: Option<Rehearsed>) -> Self {
+        Self { requests, rehearsed, rest }
+    }
+
+    /// The input, as the flight computer takes it.
+    pub fn input(&self) -> Input<'_> {
+        Input { requests: &self.requests, rehearsed: self.rehearsed.as_ref(), ..self.rest }
+    }
+
+    /// The same input with what a board has heard itself.
+    #[must_use]
+    pub fn hearing(self, uplink: Uplink, commander: Option<Commander>, requests: Vec<Request>) -> Self {
+        Self { requests, rest: Input { uplink, commander, ..self.rest }, ..self }
+    }
+}
+
+/// A computer as it is now: at power-up or at its release, before its first frame there.
+pub fn start_to_log(computer: &Computer) -> v1::ComputerStart {
+    let mission = computer.pilot().mission();
+    let released = computer.released_at_s().is_some();
+    let estimate = computer.pilot().estimator().estimate();
+    let stood = released && mission.start.at == StartPoint::Pad;
+    v1::ComputerStart {
+        frame: if released { computer.frame() } else { 0 },
+        believed: estimate.state.to_log(),
+        gyro_bias_rad_s: stood.then(|| estimate.gyro_bias_rad_s.to_log()),
+        rail_m: mission.launched().map(|launch| launch.rail.foot_m().to_log()),
+        released,
+        aborted_before_s: computer.mode().aborted_before_s,
+    }
+}
+
+/// A whole frame as a record; `computer` has just flown it. The result of the rehearsal is recorded in one frame only:
+/// `rehearsed_before` says that an earlier frame has it.
+pub fn frame_to_log(
+    input: &Input<'_>,
+    output: &Output,
+    computer: &Computer,
+    rehearsed_before: bool,
+) -> v1::ComputerFrame {
+    let mut input = input_to_log(input);
+    if rehearsed_before {
+        input.rehearsed = None;
+    }
+    v1::ComputerFrame { input, output: output_to_log(output, computer), state_digest: computer.digest() }
+}
+
+fn input_to_log(input: &Input<'_>) -> v1::ComputerInput {
+    let &Input {
+        frame,
+        time_s,
+        ref measured,
+        gimbal_rad,
+        fins_rad,
+        contact,
+        igniter_continuity,
+        booster_attached,
+        pin_out,
+        battery_v,
+        log,
+        uplink,
+        ref commander,
+        people,
+        requests,
+        rehearsed,
+        plan_ready,
+    } = input;
+    v1::ComputerInput {
+        frame,
+        time_s,
+        measured: measured.to_log(),
+        gimbal_rad: gimbal_rad.to_vec(),
+        fins_rad: fins_rad.to_vec(),
+        contact,
+        igniter_continuity,
+        booster_attached,
+        pin_out,
+        battery_v,
+        log: log.to_log(),
+        uplink: uplink.to_log(),
+        commander: commander.to_log(),
+        people: people.to_log(),
+        requests: requests.iter().map(Logged::to_log).collect(),
+        rehearsed: rehearsed.map(Logged::to_log),
+        plan_ready,
+    }
+}
+
+/// A recorded input.
+///
+/// # Errors
+/// This build does not know some value of it.
+pub fn input_from_log(input: &v1::ComputerInput) -> Result<LoggedInput, RecordError> {
+    let frame = input.frame;
+    let at = |field| At { frame, field };
+    let rest = Input {
+        frame,
+        time_s: input.time_s,
+        measured: Logged::from_log(&input.measured, at("measured"))?,
+        gimbal_rad: Logged::from_log(&input.gimbal_rad, at("gimbal_rad"))?,
+        fins_rad: Logged::from_log(&input.fins_rad, at("fins_rad"))?,
+        contact: input.contact,
+        igniter_continuity: input.igniter_continuity,
+        booster_attached: input.booster_attached,
+        pin_out: input.pin_out,
+        battery_v: input.battery_v,
+        log: Logged::from_log(&input.log, at("log"))?,
+        uplink: Logged::from_log(&input.uplink, at("uplink"))?,
+        commander: Logged::from_log(&input.commander, at("commander"))?,
+        people: Logged::from_log(&input.people, at("people"))?,
+        requests: &[],
+        rehearsed: None,
+        plan_ready: input.plan_ready,
+    };
+    let requests = input.requests.iter().map(|request| Logged::from_log(request, at("request")));
+    let rehearsed = Logged::from_log(&input.rehearsed, at("rehearsed"))?;
+    Ok(LoggedInput { requests: requests.collect::<Result<_, _>>()?, rehearsed, rest })
+}
+
+/// Whether a frame accepted an abort.
+pub fn accepts_abort(frame: &v1::ComputerFrame) -> bool {
+    let (abort, accepted) = (Asked::Abort.to_log(), Ending::Accepted.to_log());
+    let mut answered = frame.input.requests.iter().zip(&frame.output.answers);
+    answered.any(|(request, answer)| request.asked == abort && *answer == accepted)
+}
+
+/// A frame's output as a record; `computer` has just flown it.
+pub fn output_to_log(output: &Output, computer: &Computer) -> v1::ComputerOutput {
+    let Output { commands, released, answers, news: _, planned } = output;
+    let &Commands { gimbal_rad, fins_rad, outputs } = commands;
+    v1::ComputerOutput {
+        gimbal_rad: gimbal_rad.to_vec(),
+        fins_rad: fins_rad.to_vec(),
+        ignite: outputs.is_on(Line::LandingIgniter),
+        parachute: outputs.is_on(Line::Parachute),
+        released: *released,
+        planned: *planned,
+        phase: u32::from(computer.mode().phase.index()),
+        level: u32::from(computer.level().index()),
+        over: computer.is_over(),
+        answers: answers.iter().map(|answer| answer.ending.to_log()).collect(),
+        ignite_booster: outputs.is_on(Line::AscentIgniter),
+        separate_booster: outputs.is_on(Line::Separation),
+    }
+}
+
+/// The commands of a recorded frame.
+///
+/// # Errors
+/// A list has the wrong length.
+pub fn commands_from_log(output: &v1::ComputerOutput, frame: u64) -> Result<Commands, RecordError> {
+    Ok(Commands {
+        gimbal_rad: Logged::from_log(&output.gimbal_rad, At { frame, field: "gimbal_rad" })?,
+        fins_rad: Logged::from_log(&output.fins_rad, At { frame, field: "fins_rad" })?,
+        outputs: Outputs::of(|line| match line {
+            Line::LandingIgniter => output.ignite,
+            Line::Parachute => output.parachute,
+            Line::AscentIgniter => output.ignite_booster,
+            Line::Separation => output.separate_booster,
+        }),
+    })
+}
+
+/// The control level of a recorded frame; `None` if this build does not know it.
+pub fn level_of(output: &v1::ComputerOutput) -> Option<ControlLevel> {
+    u8::try_from(output.level).ok().and_then(ControlLevel::from_index)
+}
+
+/// The phase after a recorded frame; `None` if this build does not know it.
+pub fn phase_of(output: &v1::ComputerOutput) -> Option<Phase> {
+    u8::try_from(output.phase).ok().and_then(Phase::from_index)
+}
+
+/// What the pilot thought after a frame: its estimate, with the motor's. `None` before it has one.
+pub fn thought_to_log(pilot: &Pilot) -> Option<flight_v1::Estimate> {
+    let estimate = pilot.estimate()?;
+    let aids = pilot.estimator().aids();
+    Some(flight_v1::Estimate {
+        motor: motor_to_log(pilot),
+        barometer: aid_to_log(&aids.barometer),
+        gnss_velocity: aid_to_log(&aids.gnss_velocity),
+        gnss_position: aid_to_log(&aids.gnss_position),
+        lidar: aid_to_log(&aids.lidar),
+        wind: aid_to_log(&aids.wind),
+        ..estimate.to_log()
+    })
+}
+
+/// The status of an aid that measured in this frame.
+fn aid_to_log(status: &AidStatus) -> Option<flight_v1::AidStatus> {
+    let &AidStatus { innovation, test_ratio, used, refused, refused_in_a_row, fresh } = status;
+    fresh.then_some(flight_v1::AidStatus { innovation, test_ratio, used, refused, refused_in_a_row })
+}
+
+/// The motor's estimate as a record; none before ignition.
+fn motor_to_log(pilot: &Pilot) -> Option<flight_v1::MotorEstimate> {
+    let motor = pilot.motor();
+    let ignition_s = motor.ignition_s()?;
+    let [
+        impulse_scale_sigma,
+        burn_time_scale_sigma,
+        ignition_sigma_s,
+        air_scale_sigma,
+        shape_deviation_sigma,
+    ] = motor.sigmas();
+    Some(flight_v1::MotorEstimate {
+        impulse_scale: motor.impulse_scale(),
+        burn_time_scale: motor.burn_time_stretch(),
+        ignition_s,
+        air_scale: motor.air_scale(),
+        shape_deviation: motor.shape_deviation(),
+        impulse_scale_sigma,
+        burn_time_scale_sigma,
+        ignition_sigma_s,
+        air_scale_sigma,
+        shape_deviation_sigma,
+        other_curve: pilot.other_curve().map(str::to_owned),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flight::computer::LogState;
+    use flight::computer::crew::{Asked, People};
+    use flight::estimation::estimator::{ImuSample, Measurements};
+    use flight::rules::arming::PredictedLanding;
+    use flight::rules::operator::{Name, Operator, Role};
+    use flight::rules::two_person::Station;
+    use nalgebra::Vector3;
+    use proptest::prelude::*;
+    use prost::Message as _;
+
+    use crate::log::logged::ASKED;
+    use crate::log::logged::tests::any_bits;
+
+    fn any_uplink() -> impl Strategy<Value = Uplink> {
+        prop_oneof![
+            Just(Uplink::NotNeeded),
+            Just(Uplink::NeverHeard),
+            any_bits().prop_map(|age_s| Uplink::Heard { age_s }),
+        ]
+    }
+
+    fn any_operator() -> impl Strategy<Value = Operator> {
+        let any = (any::<u8>(), 0..Role::ALL.len(), any::<String>());
+        any.prop_map(|(number, role, name)| Operator {
+            number,
+            role: Role::ALL[role],
+            name: Name::new(&name),
+        })
+    }
+
+    fn any_station() -> impl Strategy<Value = Station> {
+        any::<(u8, u8, u32)>().prop_map(|(system, component, number)| Station { system, component, number })
+    }
+
+    fn any_request() -> impl Strategy<Value = Request> {
+        let by = prop::option::of(any_operator());
+        let any = (0..ASKED.len(), any_uplink(), prop::option::of(any_station()), by, any::<Option<u16>>());
+        any.prop_map(|(asked, uplink, station, by, confirms)| Request {
+            asked: ASKED[asked],
+            uplink,
+            station,
+            by,
+            confirms,
+        })
+    }
+
+    /// A new request has to be added to the list before this compiles and passes.
+    #[test]
+    fn every_request_has_its_number() {
+        let numbers = ASKED.map(|asked| match asked {
+            Asked::Arm => 0,
+            Asked::Disarm => 1,
+            Asked::Start => 2,
+            Asked::Hold => 3,
+            Asked::Abort => 4,
+            Asked::Tap => 5,
+            Asked::TakeCommand => 6,
+            Asked::Check => 7,
+            Asked::CheckStill => 8,
+            Asked::EndCheck => 9,
+            Asked::Seen => 10,
+        });
+        assert_eq!(numbers, core::array::from_fn(|number| number));
+    }
+
+    fn any_people() -> impl Strategy<Value = Option<People>> {
+        prop_oneof![
+            Just(None),
+            Just(Some(People::One)),
+            any::<u16>().prop_map(|first_ask| Some(People::Two { first_ask })),
+        ]
+    }
+
+    proptest! {
+        #[test]
+        fn an_input_survives_the_log_bit_for_bit(
+            frame: u64,
+            numbers in prop::collection::vec(any_bits(), 18),
+            flags: [bool; 9],
+            space_bytes: u64,
+            uplink in any_uplink(),
+            commander in prop::option::of((any_station(), prop::option::of(any_operator()))),
+            people in any_people(),
+            requests in prop::collection::vec(any_request(), 0..4),
+            rehearsed: Option<(bool, String, Option<(bool, String)>)>,
+        ) {
+            let number = |place: usize| numbers[place];
+            let measured = Measurements {
+                imu: ImuSample {
+                    gyro_rad_s: Vector3::new(number(0), number(1), number(2)),
+                    specific_force_m_s2: Vector3::new(number(3), number(4), number(5)),
+                },
+                pressure_altitude_m: flags[0].then_some(number(6)),
+                gnss: None,
+                lidar_range_m: flags[5].then_some(number(7)),
+            };
+            let rehearsed = rehearsed.map(|(warm, found, landing)| Rehearsed {
+                warm,
+                found,
+                landing: landing.map(|(lands, found)| PredictedLanding { lands, found }),
+            });
+            let input = Input {
+                frame,
+                time_s: number(9),
+                measured,
+                gimbal_rad: [number(10), number(11)],
+                fins_rad: [12, 13, 14, 15].map(number),
+                contact: flags[1],
+                igniter_continuity: flags[2],
+                pin_out: flags[3],
+                battery_v: flags[7].then_some(number(17)),
+                log: LogState { running: flags[4], space_bytes },
+                uplink,
+                commander: commander.map(|(station, by)| Commander {
+                    station,
+                    age_s: number(16),
+                    by,
+                    deaf: flags[1],
+                }),
+                people,
+                requests: &requests,
+                rehearsed: rehearsed.as_ref(),
+                booster_attached: flags[6],
+                plan_ready: flags[8],
+            };
+            let bytes = input_to_log(&input).encode_to_vec();
+            let read = input_from_log(&v1::ComputerInput::decode(bytes.as_slice()).unwrap()).unwrap();
+            // Compared as bytes as well, because a NaN never equals itself.
+            prop_assert_eq!(input_to_log(&read.input()).encode_to_vec(), bytes);
+            prop_assert_eq!(read.rehearsed, rehearsed);
+            prop_assert_eq!(read.requests.len(), requests.len());
+            let asked = |requests: &[Request]| {
+                let asked = |request: &Request| (request.asked, request.station, request.by, request.confirms);
+                requests.iter().map(asked).collect::<Vec<_>>()
+            };
+            prop_assert_eq!(asked(&read.requests), asked(&requests));
+        }
+    }
+
+    #[test]
+    fn an_unknown_value_is_refused_with_the_number_of_its_frame() {
+        let input = v1::ComputerInput {
+            frame: 7,
+            gimbal_rad: vec![0.0; 2],
+            fins_rad: vec![0.0; 4],
+            requests: vec![v1::Request { asked: 11, ..v1::Request::default() }],
+            ..v1::ComputerInput::default()
+        };
+        let error = input_from_log(&input).unwrap_err().to_string();
+        assert_eq!(error, "frame 7: asked 11 is unknown; this build knows 0 to 10");
+        let error = input_from_log(&v1::ComputerInput { gimbal_rad: vec![0.0], ..input }).unwrap_err();
+        assert_eq!(error.to_string(), "frame 7: gimbal_rad has 1 values and should have 2");
+    }
+}

@@ -1,0 +1,376 @@
+//! A simulated flight as a stream: the answers are what was recorded, and what is wrong with a stream is said.
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+use std::cell::Cell;
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::thread;
+
+use avionics::board::port::{self, Frames};
+use avionics::board::radio::Radio;
+use avionics::board::recorded::{Board, FlyError, VehicleKind, Watch};
+use avionics::board::stream::{Answer, Begin, Frame, LONGEST_BYTES, OnTheAir, Reader, put};
+use avionics::log::again::RecordedComputer;
+use avionics::log::frame::{LoggedInput, input_from_log};
+use flight::computer::crew::{Asked, Request};
+use flight::computer::news::CrewMessage;
+use flight::computer::pilot::planner::Planner;
+use flight::computer::{Commands, Computer};
+use flight::rules::outputs::Line;
+use protocol::dialect::{MavMessage, MavModeFlag, TdVehicleFlag};
+use protocol::frame::Framer;
+use protocol::records::computer_v1::ComputerFrame;
+use sim::outside::Outside;
+use sim::recipe::Recipe;
+use sim::sortie::Sortie;
+use sim::wire::record::LastFrame;
+
+/// More than the messages of a frame need, bytes, with the parts that they are put together from: 1,073 at ignition, when the
+/// gate says every number that it has looked at.
+const NEWS_BYTES_MAX: u64 = 2048;
+
+/// What a board answers to bytes that arrive a few at a time, as a serial line gives them.
+fn fly(bytes: &[u8]) -> (Board, Vec<Answer>, Result<(), FlyError>) {
+    let (mut board, mut out, mut flown) = (Board::new(VehicleKind::Simulated), Vec::new(), Ok(()));
+    for arrived in bytes.chunks(61) {
+        flown = board.take(arrived, &mut (), &mut (), &mut |bytes: &[u8]| out.extend_from_slice(bytes));
+        if flown.is_err() {
+            break;
+        }
+    }
+    let mut reader = Reader::default();
+    reader.push(&out);
+    let answers = std::iter::from_fn(|| reader.next_record()).collect();
+    (board, answers, flown)
+}
+
+fn recipe() -> Recipe {
+    Recipe::built_in("mk2", "field").unwrap()
+}
+
+fn begin(sortie: &Sortie) -> Begin {
+    Begin {
+        toml: recipe().mission_toml,
+        start: sim::wire::record::start(sortie),
+        on_the_air: None,
+        flight: 7,
+    }
+}
+
+/// A flight's frames.
+fn flown(sortie: &mut Sortie) -> Vec<ComputerFrame> {
+    let (mut frames, mut last) = (Vec::new(), LastFrame::default());
+    while sortie.goes_on() {
+        sortie.step_with(&Outside::NOBODY, &mut last);
+        frames.push(*last.take().unwrap());
+    }
+    frames
+}
+
+fn answer_to(frame: &ComputerFrame) -> Answer {
+    Answer {
+        frame: frame.input.frame,
+        output: frame.output.clone(),
+        state_digest: frame.state_digest,
+        heard: None,
+    }
+}
+
+fn asked(frame: &ComputerFrame, begin: Option<Begin>) -> Frame {
+    Frame { input: frame.input.clone(), begin }
+}
+
+fn bytes_of(frames: impl IntoIterator<Item = Frame>) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    for frame in frames {
+        put(&frame, &mut bytes);
+    }
+    bytes
+}
+
+#[test]
+fn a_flight_through_a_stream_is_answered_as_it_was_flown_bit_for_bit() {
+    let mut sortie = Sortie::new(&recipe(), 0).unwrap();
+    let mut begin = Some(begin(&sortie));
+    let frames = flown(&mut sortie);
+    let bytes = bytes_of(frames.iter().map(|frame| asked(frame, begin.take())));
+    let (board, answers, flown) = fly(&bytes);
+    flown.unwrap();
+    assert_eq!((board.frames(), board.reader().broken()), (frames.len() as u64, 0));
+    assert_eq!(answers.len(), frames.len());
+    for (answer, frame) in answers.iter().zip(&frames) {
+        assert_eq!(prost::Message::encode_to_vec(answer), prost::Message::encode_to_vec(&answer_to(frame)));
+    }
+}
+
+/// Every frame is asked twice, with the flight's beginning, and comes through noise and with broken copies.
+#[test]
+fn a_bad_wire_changes_no_answer() {
+    let mut sortie = Sortie::new(&recipe(), 0).unwrap();
+    let begin = begin(&sortie);
+    let frames: Vec<_> = flown(&mut sortie).into_iter().take(300).collect();
+    let mut bytes = b"noise before the first frame".to_vec();
+    bytes.push(0);
+    for frame in &frames {
+        let whole = bytes_of([asked(frame, Some(begin.clone()))]);
+        for place in [3, whole.len() / 2] {
+            let mut flipped = whole.clone();
+            flipped[place] ^= if flipped[place] == 0x10 { 0x20 } else { 0x10 };
+            let lost: Vec<u8> = [&whole[..place], &whole[place + 1..]].concat();
+            bytes.extend(flipped);
+            bytes.extend(lost);
+        }
+        bytes.extend([whole.as_slice(), &whole].concat());
+    }
+    let (board, answers, flown) = fly(&bytes);
+    flown.unwrap();
+    assert_eq!(board.frames(), 300);
+    assert_eq!(board.reader().broken(), 1 + 4 * 300);
+    let expected: Vec<Answer> =
+        frames.iter().flat_map(|frame| [answer_to(frame), answer_to(frame)]).collect();
+    assert_eq!(answers, expected);
+}
+
+/// How many answers were given when the computer was reset before a frame.
+struct Resets<'a> {
+    answered: &'a Cell<usize>,
+    found: Vec<(u64, usize)>,
+}
+
+impl Watch for Resets<'_> {
+    fn reset(&mut self, before: u64) {
+        self.found.push((before, self.answered.get()));
+    }
+}
+
+/// A reset loses what has not left the machine.
+#[test]
+fn every_frame_before_a_reset_is_answered_before_it() {
+    let mut sortie = Sortie::new(&recipe(), 0).unwrap();
+    let mut begin = Some(begin(&sortie));
+    let mut frames = flown(&mut sortie);
+    frames.truncate(200);
+    frames.drain(100..120);
+    let bytes = bytes_of(frames.iter().map(|frame| asked(frame, begin.take())));
+    let answered = Cell::new(0);
+    let mut resets = Resets { answered: &answered, found: Vec::new() };
+    Board::new(VehicleKind::Simulated)
+        .take(&bytes, &mut (), &mut resets, &mut |_: &[u8]| answered.set(answered.get() + 1))
+        .unwrap();
+    assert_eq!(resets.found, [(frames[100].input.frame, 100)]);
+}
+
+/// A board whose main context is a thread. It senses what was recorded, has a plan in the frame in which the recorded computer had it,
+/// and notes its commands.
+struct Recorded<'f> {
+    frames: std::slice::Iter<'f, ComputerFrame>,
+    ready: bool,
+    to_main: SyncSender<Box<Planner>>,
+    from_main: Receiver<Box<Planner>>,
+    commanded: Vec<Commands>,
+    kept: u64,
+}
+
+impl<'f> Recorded<'f> {
+    fn sensing(frames: &'f [ComputerFrame]) -> Self {
+        // There is never more than one.
+        let ((to_main, posed), (solve, from_main)) = (sync_channel::<Box<Planner>>(1), sync_channel(1));
+        let solves = move || {
+            for mut planner in posed {
+                planner.solve();
+                if solve.send(planner).is_err() {
+                    return;
+                }
+            }
+        };
+        thread::Builder::new().name("main context".into()).spawn(solves).unwrap();
+        Self { frames: frames.iter(), ready: false, to_main, from_main, commanded: Vec::new(), kept: 0 }
+    }
+}
+
+impl port::Board for Recorded<'_> {
+    type Error = core::convert::Infallible;
+
+    fn sense(&mut self) -> Result<Option<LoggedInput>, Self::Error> {
+        let Some(frame) = self.frames.next() else { return Ok(None) };
+        self.ready = frame.input.plan_ready;
+        Ok(Some(input_from_log(&frame.input).unwrap()))
+    }
+
+    fn act(&mut self, commands: &Commands) -> Result<(), Self::Error> {
+        self.commanded.push(*commands);
+        Ok(())
+    }
+
+    fn pose(&mut self, posed: Box<Planner>) {
+        self.to_main.send(posed).unwrap();
+    }
+
+    fn solved(&mut self) -> Option<Box<Planner>> {
+        self.ready.then(|| self.from_main.recv().unwrap())
+    }
+
+    fn tell(&mut self, _: &[CrewMessage]) {}
+
+    fn keep(&mut self, frame: &ComputerFrame) {
+        self.kept += 1;
+        assert_eq!(frame.input.frame, self.kept);
+    }
+}
+
+fn started(recipe: &Recipe, sortie: &Sortie) -> RecordedComputer {
+    RecordedComputer::started(&recipe.mission, &sim::wire::record::start(sortie))
+}
+
+/// Flies the board to its end, and compares every command with the recorded one.
+fn commands_the_same(computer: Computer, frames: &[ComputerFrame]) -> Frames {
+    let (mut flight, mut board) = (Frames::new(computer, 0), Recorded::sensing(frames));
+    while flight.fly(&mut board).unwrap() {}
+    assert_eq!((board.kept, board.commanded.len()), (frames.len() as u64, frames.len()), "no frame is lost");
+    for (frame, commands) in frames.iter().zip(&board.commanded) {
+        let (recorded, number) = (&frame.output, frame.input.frame);
+        let bits = |angles: &[f64]| angles.iter().map(|angle| angle.to_bits()).collect::<Vec<_>>();
+        assert_eq!(bits(&commands.gimbal_rad), bits(&recorded.gimbal_rad), "frame {number}");
+        assert_eq!(bits(&commands.fins_rad), bits(&recorded.fins_rad), "frame {number}");
+        let lines = [Line::LandingIgniter, Line::Parachute, Line::AscentIgniter, Line::Separation];
+        let recorded =
+            [recorded.ignite, recorded.parachute, recorded.ignite_booster, recorded.separate_booster];
+        assert_eq!(lines.map(|line| commands.outputs.is_on(line)), recorded, "frame {number}");
+    }
+    flight
+}
+
+/// However late the plans are, a board whose main context plans decides what the simulator has decided with plans as late.
+#[test]
+fn a_board_that_senses_the_same_commands_the_same() {
+    for slower in [1, 4] {
+        let mut sortie = Sortie::new(&recipe(), 0).unwrap().planning_slower(slower);
+        let computer = started(&recipe(), &sortie).computer().clone();
+        let frames = flown(&mut sortie);
+        let ready = frames.iter().filter(|frame| frame.input.plan_ready).count();
+        assert!(ready > 20, "{ready} plans and predictions, {slower} times as late");
+        let flight = commands_the_same(computer, &frames);
+        assert_eq!(flight.computer().digest(), frames.last().unwrap().state_digest);
+    }
+}
+
+/// From power-up: it rehearses by itself, its crew arms and starts it, and it lands. The world is moved by a computer that decides the
+/// same in every frame.
+#[test]
+fn a_board_rehearses_arms_and_lands() {
+    let mut sortie = Sortie::on_the_pad(&recipe(), 0).unwrap();
+    let computer = started(&recipe(), &sortie).computer().clone();
+    let (mut frames, mut last, mut armed) = (Vec::new(), LastFrame::default(), false);
+    let asks = |asked| [Request::of_the_programme(asked)];
+    let (arm, start) = (asks(Asked::Arm), asks(Asked::Start));
+    // The simulated rehearsal is over after some seconds.
+    while sortie.goes_on() || sortie.computer().released_at_s().is_none() {
+        let requests: &[Request] = match sortie.frame() {
+            4_000 => &arm,
+            4_010 => &start,
+            _ => &[],
+        };
+        sortie.step_with(&Outside { requests, ..Outside::NOBODY }, &mut last);
+        let mut frame = *last.take().unwrap();
+        // A board has no simulated world.
+        frame.input.rehearsed = None;
+        frames.push(frame);
+        armed |= sortie.computer().mode().interlocks.armed;
+        assert!(frames.len() < 40_000);
+    }
+    assert!(armed && sortie.outcome().landing.stands, "{:?}", sortie.outcome());
+    let flight = commands_the_same(computer, &frames);
+    let rehearsed = flight.computer().rehearsed().unwrap();
+    assert!(rehearsed.warm, "{rehearsed:?}");
+    assert_eq!(flight.computer().mode().phase, sortie.computer().mode().phase);
+}
+
+/// On a board the heap is for set-up. In flight there are only the lists of a frame's news, which go with the frame. vlr wants
+/// more intervals in flight than on the ground.
+#[test]
+fn in_flight_only_news_allocate() {
+    for mission in ["mk2", "mk3", "vlr"] {
+        let recipe = Recipe::built_in(mission, "field").unwrap();
+        let mut sortie = Sortie::new(&recipe, 0).unwrap();
+        let mut computer = started(&recipe, &sortie);
+        let mut frames_with_news = 0;
+        for recorded in &flown(&mut sortie) {
+            let (mut news, frame) = (0, recorded.input.frame);
+            let read = computer.read(&recorded.input).unwrap();
+            let allocated = allocation_counter::measure(|| news = computer.step(&read).news.len());
+            if news == 0 {
+                assert_eq!(allocated.count_total, 0, "{mission}, frame {frame}: {allocated:?}");
+            } else {
+                frames_with_news += 1;
+                assert!(allocated.bytes_max < NEWS_BYTES_MAX, "{mission}, frame {frame}: {allocated:?}");
+            }
+            assert_eq!(allocated.bytes_current, 0, "{mission}, frame {frame}: {allocated:?}");
+        }
+        assert!(frames_with_news > 3, "apogee, ignition, touchdown: {mission}, {frames_with_news}");
+    }
+}
+
+#[test]
+fn what_is_wrong_with_a_stream_is_said() {
+    let sortie = Sortie::new(&recipe(), 0).unwrap();
+    let begin = begin(&sortie);
+    let said = |frame: Frame| fly(&bytes_of([frame])).2.unwrap_err().to_string();
+    let first = |begin: Begin| Frame { begin: Some(begin), ..Frame::default() };
+
+    assert_eq!(said(Frame { begin: None, ..first(begin.clone()) }), "the first record must say what to fly");
+    let unknown = Begin { toml: "luck = 1".to_owned(), ..begin.clone() };
+    assert!(said(first(unknown)).starts_with("the first record: mission: "));
+    assert_eq!(said(first(begin.clone())), "frame 0: gimbal_rad has 0 values and should have 2");
+
+    let mut cut = bytes_of([first(begin)]);
+    cut.pop();
+    let (board, answers, _) = fly(&cut);
+    assert_eq!((board.reader().missing_its_end(), answers.len()), (cut.len(), 0));
+    let (board, _, flown) = fly(&vec![1; 2 * LONGEST_BYTES]);
+    assert!(flown.is_ok() && board.reader().missing_its_end() <= LONGEST_BYTES + 61, "memory is bounded");
+    assert!(board.reader().broken() > 0);
+}
+
+/// Keeps what is sent.
+#[derive(Default)]
+struct Sent(Vec<u8>);
+
+impl Radio for Sent {
+    fn read(&mut self, _: &mut [u8]) -> usize {
+        0
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        self.0.extend_from_slice(bytes);
+    }
+}
+
+/// A station acts by itself only on a vehicle that says in both places that it is simulated.
+#[test]
+fn a_board_tells_its_crew_whether_it_is_real() {
+    let mut sortie = Sortie::new(&recipe(), 0).unwrap();
+    let on_the_air =
+        OnTheAir { mission: "mk2".to_owned(), system_id: 1, boot_number: 7, ..OnTheAir::default() };
+    let on_the_air = OnTheAir { budget_bytes_s: 20_000, ..on_the_air };
+    let mut begin = Some(Begin { on_the_air: Some(on_the_air), ..begin(&sortie) });
+    let mut frames = flown(&mut sortie);
+    frames.truncate(400);
+    let bytes = bytes_of(frames.iter().map(|frame| asked(frame, begin.take())));
+    for (kind, marked) in [(VehicleKind::Real, false), (VehicleKind::Simulated, true)] {
+        let mut radio = Sent::default();
+        Board::new(kind).take(&bytes, &mut radio, &mut (), &mut |_: &[u8]| ()).unwrap();
+        let mut framer = Framer::new();
+        framer.push(&radio.0);
+        let said: Vec<bool> = core::iter::from_fn(|| framer.next_frame())
+            .filter_map(|frame| match frame.decode() {
+                Ok(MavMessage::HEARTBEAT(beat)) => {
+                    Some(beat.base_mode.contains(MavModeFlag::MAV_MODE_FLAG_HIL_ENABLED))
+                }
+                Ok(MavMessage::TD_FLIGHT_STATUS(status)) => {
+                    Some(status.vehicle_flags.contains(TdVehicleFlag::TD_VEHICLE_FLAG_SIMULATED))
+                }
+                _ => None,
+            })
+            .collect();
+        assert!(said.len() > 4 && said.iter().all(|said| *said == marked), "{kind:?}: {said:?}");
+    }
+}

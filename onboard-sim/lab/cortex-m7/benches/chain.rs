@@ -1,0 +1,133 @@
+//! The whole chain with an emulated Cortex-M7, flown from the ordinary screen: armed, started, landed; and aborted in
+//! its descent.
+//!
+//! It types into `onboard-sim/lab/cortex-m7/emulate chain`, the command that a person uses. It is no test of `cargo test`: it
+//! takes QEMU, the programs of `emulate build` and some minutes of real time. Without them it says NOT RUN and why.
+//!
+//! `cargo bench -p board --bench chain`, or `onboard-sim/lab/cortex-m7/emulate test`.
+
+use std::io::Write as _;
+use std::path::Path;
+use std::process::Command;
+use std::time::Duration;
+
+use e2e::{Terminal, Window};
+use ground::exit::Exit;
+
+type Failure = Box<dyn std::error::Error + Send + Sync>;
+
+const SIZE: (u16, u16) = (100, 40);
+/// A flight of mk2 takes a minute and a half, after up to half a minute on the pad, and its motor is hot for another one. A
+/// machine without a free processor core takes several times as long.
+const FLIGHT_LIMIT: Duration = Duration::from_mins(10);
+/// A key is answered within this time.
+const ASKS_WITHIN: Duration = Duration::from_secs(5);
+
+/// The status of `emulate ready` when something that `emulate chain` needs is not there.
+const NOT_HERE: i32 = 2;
+
+fn main() -> Result<(), Failure> {
+    let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../.."));
+    let ready = emulate(root, &["ready"]).output()?;
+    if ready.status.code() == Some(NOT_HERE) {
+        let why = String::from_utf8_lossy(&ready.stderr);
+        return say(&format!("NOT RUN: {}", why.trim()));
+    }
+    if !ready.status.success() {
+        return Err(String::from_utf8_lossy(&ready.stderr).into());
+    }
+    land(root)?;
+    abort(root)
+}
+
+fn emulate(root: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(root.join("onboard-sim/lab/cortex-m7/emulate"));
+    command.args(arguments).current_dir(root);
+    command
+}
+
+/// A flight that is armed and started by hand.
+fn started(root: &Path) -> Terminal {
+    let settings = root.join("target/board/chain-settings");
+    let mut chain = emulate(root, &["chain"]);
+    chain.env("XDG_RUNTIME_DIR", &settings).env("XDG_CONFIG_HOME", &settings);
+    let mut terminal = Terminal::start(&chain, SIZE, false);
+    terminal.wait_for("every arming check passes");
+    terminal.type_until(b"AARM\r", " ARMED ");
+    terminal.type_until(b"SSTART\r", "START  commanded");
+    terminal
+}
+
+fn land(root: &Path) -> Result<(), Failure> {
+    let mut terminal = started(root);
+    let shown = ["Rising", "Falling", "Landing", "On the ground"];
+    for phase in shown {
+        wait(&terminal, phase)?;
+    }
+    // A chip sends no verdict on its landing.
+    let report = end(&mut terminal, Exit::NotSeen)?;
+    expect(&report, "LANDED")?;
+    say("armed, started and landed from the screen:")?;
+    say(&report)
+}
+
+/// With room for the parachute an abort opens it, and the landing motor is inhibited.
+fn abort(root: &Path) -> Result<(), Failure> {
+    let mut terminal = started(root);
+    wait(&terminal, "Falling")?;
+    terminal.type_bytes(b"\x18\r");
+    let seen = |window: &Window| {
+        window
+            .row_with(" ABORT  commanded ")
+            .filter(|facts| facts.contains("acknowledged accepted  observed yes"))
+    };
+    terminal.wait_within(FLIGHT_LIMIT, seen).ok_or_else(|| missing(&terminal, "an abort that was seen"))?;
+    wait(&terminal, "Parachute")?;
+    wait(&terminal, "On the ground")?;
+    let report = end(&mut terminal, Exit::RefusedOrAborted)?;
+    expect(&report, "ABORTED")?;
+    say("aborted in the descent, down under the parachute:")?;
+    say(&report)
+}
+
+fn wait(terminal: &Terminal, words: &str) -> Result<(), Failure> {
+    let shown = terminal.wait_within(FLIGHT_LIMIT, |window| window.shows(words).then_some(()));
+    shown.ok_or_else(|| missing(terminal, words).into())
+}
+
+fn missing(terminal: &Terminal, what: &str) -> String {
+    format!("no {what} on:\n{}", terminal.window().rows().join("\n"))
+}
+
+/// Ends the screen, and with it the chain; what the script says then. A station does not end at one key before it has heard
+/// that its vehicle is disarmed.
+fn end(terminal: &mut Terminal, expected: Exit) -> Result<String, Failure> {
+    wait(terminal, "disarmed")?;
+    let before = terminal.window().bytes().len();
+    terminal.type_bytes(b"q");
+    // While people must keep away the station goes on without its screen, and Ctrl-C ends it.
+    let asks = |window: &Window| window.shows("QUIT too early").then_some(());
+    if terminal.wait_within(ASKS_WITHIN, asks).is_some() {
+        terminal.type_by_hand(b"quit\r");
+        wait(terminal, "so the station continues")?;
+        terminal.type_bytes(b"\x03");
+    }
+    let code = terminal.wait_for_end();
+    let window = terminal.window();
+    let report = String::from_utf8_lossy(&window.bytes()[before..]).into_owned();
+    if code == Some(expected as i32) {
+        Ok(report)
+    } else {
+        Err(format!("ended with {code:?}:\n{report}").into())
+    }
+}
+
+fn expect(report: &str, words: &str) -> Result<(), Failure> {
+    if report.contains(words) { Ok(()) } else { Err(format!("no {words} in:\n{report}").into()) }
+}
+
+fn say(line: &str) -> Result<(), Failure> {
+    let mut out = std::io::stdout().lock();
+    writeln!(out, "{line}")?;
+    Ok(out.flush()?)
+}

@@ -1,0 +1,163 @@
+//! The program of a board, as a process: it speaks MAVLink itself, over a serial radio, with the ordinary ground station, and
+//! decides every frame of a simulated world, which is another process. `benches/chain.rs` does the same with the image of a
+//! Cortex-M7.
+#![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
+
+use std::fs::File;
+use std::io::{Read, Write};
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::thread::{Builder, JoinHandle};
+use std::time::Duration;
+
+use e2e::{
+    Ended, Program, Random, Running, SerialLine, Signal, Terminal, auto_ground, expect_identical_replay,
+    program,
+};
+use nix::sys::stat::Mode;
+use nix::unistd::mkfifo;
+
+/// World and board of one flight, and the board's radio.
+struct Chain {
+    world: Running,
+    board: Running,
+    radio: SerialLine,
+}
+
+impl Chain {
+    fn start(folder: &Path) -> Self {
+        let radio = SerialLine::new(57_600);
+        for pipe in ["frames", "answers"] {
+            mkfifo(&folder.join(pipe), Mode::S_IRUSR | Mode::S_IWUSR).unwrap();
+        }
+        // The shell opens the pipes in the order in which the world opens them.
+        let mut board = Command::new("sh");
+        board.args(["-c", "exec \"$0\" fly --radio \"$1\" <frames >answers"]);
+        board.arg(env!("CARGO_BIN_EXE_board")).arg(&radio.near).current_dir(folder);
+        let board = Running::start(&mut board);
+        let mut world = program(Program::OnboardSim);
+        world.args(["fly", "--profile", "mk2", "--start", "pad", "--speed", "4", "--board", "."]);
+        let world = Running::start(world.args(["--log", "vehicle.mcap"]).current_dir(folder));
+        Self { world, board, radio }
+    }
+
+    /// Waits for the end of the world, and of the board, which ends with it. Returns the world's.
+    fn wait(self) -> Ended {
+        let (world, board) = (self.world.wait(), self.board.wait());
+        assert_eq!(board.code, Some(0), "{}\n{}", board.output, world.output);
+        world
+    }
+}
+
+#[test]
+fn a_board_with_a_radio_of_its_own_is_armed_started_and_lands() {
+    let folder = tempfile::tempdir().unwrap();
+    let chain = Chain::start(folder.path());
+    let mut ground = Running::start(&mut auto_ground(folder.path(), &[&chain.radio.far_link()]));
+    for phase in ["PAD_ARMED", "BOOST", "AERO_DESCENT", "POWERED", "TOUCHDOWN"] {
+        ground.wait_for_line(phase);
+    }
+    let world = chain.wait();
+    assert_eq!(world.code, Some(0), "{}", world.output);
+    assert!(world.output.contains("STANDS UNDAMAGED"), "{}", world.output);
+    expect_identical_replay(folder.path(), "vehicle.mcap");
+}
+
+#[test]
+fn an_abort_from_the_screen_opens_the_parachute_of_a_board() {
+    let folder = tempfile::tempdir().unwrap();
+    let chain = Chain::start(folder.path());
+    let mut ground = program(Program::Ground);
+    ground.args(["--connect", &chain.radio.far_link(), "--log", "ground.mcap"]).current_dir(folder.path());
+    ground.env("XDG_RUNTIME_DIR", folder.path()).env("XDG_CONFIG_HOME", folder.path());
+    let mut screen = Terminal::start(&ground, (100, 40), false);
+    screen.wait_for("every arming check passes");
+    // A busy machine may leave the radio silent for a second, which holds the countdown: then the crew starts anew.
+    let falls = |screen: &Terminal| {
+        screen.wait_within(Duration::from_secs(30), |window| window.shows("Falling").then_some(())).is_some()
+    };
+    let flown = (0..3).any(|_| {
+        screen.type_until(b"AARM\r", " ARMED ");
+        screen.type_until(b"SSTART\r", "START  commanded");
+        falls(&screen)
+    });
+    assert!(flown, "{}", screen.window().rows().join("\n"));
+    screen.type_bytes(b"\x18\r");
+    screen.wait_for("Parachute");
+    screen.wait_for("On the ground");
+    let world = chain.wait();
+    assert_eq!(world.code, Some(4), "{}", world.output);
+    for words in ["ABORTED", "parachute deployed"] {
+        assert!(world.output.contains(words), "no {words} in:\n{}", world.output);
+    }
+    assert!(!world.output.contains("IGNITION"), "{}", world.output);
+    expect_identical_replay(folder.path(), "vehicle.mcap");
+}
+
+/// What carries the frames loses bytes and changes them: nothing of the flight changes.
+#[test]
+fn a_bad_wire_to_a_board_changes_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    for pipe in ["frames", "answers"] {
+        mkfifo(&folder.path().join(pipe), Mode::S_IRUSR | Mode::S_IWUSR).unwrap();
+    }
+    let mut world = program(Program::OnboardSim);
+    world.args([
+        "fly",
+        "--start",
+        "drone",
+        "--profile",
+        "vlr",
+        "--speed",
+        "max",
+        "--board",
+        ".",
+        "--log",
+        "log.mcap",
+    ]);
+    let mut world = Running::start(world.current_dir(folder.path()));
+    // Opened in the order in which the world opens them.
+    let from_world = File::open(folder.path().join("frames")).unwrap();
+    let to_world = File::options().write(true).open(folder.path().join("answers")).unwrap();
+    let mut board = Command::new(env!("CARGO_BIN_EXE_board"));
+    let mut board = board.arg("fly").stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+    let ways = [
+        worsened(from_world, board.stdin.take().unwrap(), 1),
+        worsened(board.stdout.take().unwrap(), to_world, 2),
+    ];
+    // Nobody arms it: it stands on its pad.
+    world.wait_for_line("phase SAFE to PAD_IDLE");
+    world.signal(Signal::SIGTERM);
+    let world = world.wait();
+    assert_eq!(world.code, Some(5), "{}", world.output);
+    let worse: u64 = ways.map(|way| way.join().unwrap()).iter().sum();
+    assert!(worse > 3, "{worse} bytes were lost or changed");
+    board.wait().unwrap();
+    expect_identical_replay(folder.path(), "log.mcap");
+}
+
+/// Carries bytes in a thread; one in ten thousand is lost, and one is changed. Returns how many.
+fn worsened(
+    mut from: impl Read + Send + 'static,
+    mut to: impl Write + Send + 'static,
+    seed: u64,
+) -> JoinHandle<u64> {
+    let carries = move || {
+        let (mut random, mut bytes, mut worse) = (Random(seed), [0; 4096], 0);
+        while let Ok(read @ 1..) = from.read(&mut bytes) {
+            let carried = bytes[..read].iter().filter_map(|byte| match random.next() % 10_000 {
+                0 => None,
+                1 => Some(byte ^ 0x55),
+                _ => Some(*byte),
+            });
+            let carried: Vec<u8> = carried.collect();
+            let differs = bytes[..read].iter().zip(&carried).any(|(before, after)| before != after);
+            worse += u64::from(differs);
+            if to.write_all(&carried).is_err() {
+                break;
+            }
+        }
+        worse
+    };
+    Builder::new().name("bad wire".to_owned()).spawn(carries).unwrap()
+}

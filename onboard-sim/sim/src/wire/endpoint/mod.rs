@@ -1,0 +1,39 @@
+//! A frame of the simulated vehicle and of its end of MAVLink.
+
+pub use avionics::link::endpoint::{Outgoing, Path, UplinkState, VehicleEndpoint, gives_out_its_log};
+pub use avionics::link::vehicle::VehicleKind;
+use flight::computer::crew::{Answer, Request};
+
+use crate::wire::vehicle::{Vehicle, VehicleEvent, VehicleStep};
+
+/// Steps the vehicle by one frame with the requests from the links and from its own programme. Returns the events and
+/// the answers to its own programme. Answers to the links come out of [`VehicleEndpoint::poll`].
+pub fn step(
+    endpoint: &mut VehicleEndpoint,
+    vehicle: &mut Vehicle,
+    own: &[Request],
+) -> (Vec<VehicleEvent>, Vec<Answer>) {
+    let UplinkState { uplink, commander, mut requests } = endpoint.heard(vehicle.time_s());
+    vehicle.set_uplink(uplink, commander);
+    requests.extend_from_slice(own);
+    let VehicleStep { events, mut answers } = vehicle.step(&requests);
+    let to_itself = answers.split_off((requests.len() - own.len()).min(answers.len()));
+    endpoint.on_answers(&answers, &vehicle.state());
+    for event in &events {
+        tell(endpoint, event);
+    }
+    (events, to_itself)
+}
+
+/// Tells the stations what the vehicle reports. A new phase is seen by [`VehicleEndpoint::poll`], like every other change of
+/// the vehicle's mode.
+fn tell(endpoint: &mut VehicleEndpoint, event: &VehicleEvent) {
+    match event {
+        VehicleEvent::Text { severity, text } => endpoint.say(*severity, text),
+        VehicleEvent::Verdict => endpoint.tell_of_verdict(),
+        VehicleEvent::PhaseChanged { .. } | VehicleEvent::Planned { .. } => {}
+    }
+}
+
+#[cfg(test)]
+mod tests;

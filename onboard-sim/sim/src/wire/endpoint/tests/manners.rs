@@ -1,0 +1,554 @@
+//! Tests what other ground stations ask every vehicle, what they get without asking, and what stations tell the vehicle.
+
+use protocol::dialect::{
+    ATTITUDE_DATA, AUTOPILOT_VERSION_DATA, BATTERY_STATUS_DATA, CURRENT_MODE_DATA, GLOBAL_POSITION_INT_DATA,
+    GPS_RAW_INT_DATA, HOME_POSITION_DATA, LOCAL_POSITION_NED_DATA, LOG_ENTRY_DATA, MISSION_ACK_DATA,
+    MISSION_COUNT_DATA, MavMissionResult, MavParamError, MavProtocolCapability, ParamAck, SYS_STATUS_DATA,
+    SYSTEM_TIME_DATA, TD_BOOK_HEAD_DATA, TD_BOOK_KEPT_DATA, VFR_HUD_DATA,
+};
+use protocol::identity::NETWORK_BUDGET_BYTES_S;
+use protocol::mission::MissionHash;
+
+use avionics::link::vehicle::Identity;
+
+use super::*;
+
+const SIMULATED: Identity = Identity { kind: VehicleKind::Simulated, boot_number: 0, uid: 5 };
+
+impl Wire {
+    /// The answer to a question with these bytes.
+    fn question(&mut self, message_id: u32, payload: &[u8]) -> Vec<Frame> {
+        let frame = self.ground.encode_payload(message_id, payload).unwrap();
+        self.endpoint.on_frame(0, &frame, &self.vehicle.state());
+        self.run(0.3)
+    }
+}
+
+fn find<T>(frames: &[Frame], of: impl Fn(MavMessage) -> Option<T>) -> Option<T> {
+    frames.iter().filter_map(|frame| frame.decode().ok()).find_map(of)
+}
+
+#[test]
+fn mission_fence_and_rally_lists_are_empty_and_other_types_are_unsupported() {
+    let mut wire = Wire::new();
+    for mission_type in 0..3u8 {
+        let sent = wire.question(43, &[1, 1, mission_type]);
+        let list = find(&sent, |message| match message {
+            MavMessage::MISSION_COUNT(list) => Some(list),
+            _ => None,
+        })
+        .unwrap();
+        assert_eq!((list.count, list.mission_type as u8), (0, mission_type));
+        assert_eq!((list.target_system, list.target_component), (255, 190));
+    }
+    let sent = wire.question(43, &[1, 1, 77]);
+    assert_eq!((count(&sent, MISSION_COUNT_DATA::ID), count(&sent, MISSION_ACK_DATA::ID)), (0, 1));
+    // For somebody else.
+    let sent = wire.question(43, &[2, 1, 0]);
+    assert_eq!((count(&sent, MISSION_COUNT_DATA::ID), count(&sent, MISSION_ACK_DATA::ID)), (0, 0));
+}
+
+#[test]
+fn nothing_can_be_put_into_a_list_and_clearing_one_is_done() {
+    let item = |mission_type: u8| {
+        let mut bytes = [0; 38];
+        bytes[32..34].copy_from_slice(&[1, 1]);
+        bytes[37] = mission_type;
+        bytes.to_vec()
+    };
+    let mut wire = Wire::new();
+    for (message_id, payload, result, mission_type) in [
+        (44, vec![3, 0, 1, 1, 1], MavMissionResult::MAV_MISSION_UNSUPPORTED, 1),
+        (44, vec![0, 0, 1, 1, 2], MavMissionResult::MAV_MISSION_ACCEPTED, 2),
+        (45, vec![1, 1, 1], MavMissionResult::MAV_MISSION_ACCEPTED, 1),
+        (38, vec![0, 0, 2, 0, 1, 1, 0], MavMissionResult::MAV_MISSION_UNSUPPORTED, 0),
+        (40, vec![0, 0, 1, 1, 0], MavMissionResult::MAV_MISSION_INVALID_SEQUENCE, 0),
+        (51, vec![4, 0, 1, 1, 2], MavMissionResult::MAV_MISSION_INVALID_SEQUENCE, 2),
+        (39, item(0), MavMissionResult::MAV_MISSION_UNSUPPORTED, 0),
+        (73, item(2), MavMissionResult::MAV_MISSION_UNSUPPORTED, 2),
+    ] {
+        let sent = wire.question(message_id, &payload);
+        let answer = find(&sent, |message| match message {
+            MavMessage::MISSION_ACK(answer) => Some(answer),
+            _ => None,
+        })
+        .unwrap_or_else(|| panic!("message {message_id} is answered"));
+        assert_eq!(
+            (answer.mavtype, answer.mission_type as u8),
+            (result, mission_type),
+            "message {message_id}"
+        );
+        assert_eq!((answer.target_system, answer.target_component), (255, 190));
+    }
+}
+
+#[test]
+fn the_list_of_logs_on_board_is_empty() {
+    let mut wire = Wire::new();
+    let sent = wire.question(117, &[0, 0, 0xFF, 0xFF, 1, 1]);
+    let entry = find(&sent, |message| match message {
+        MavMessage::LOG_ENTRY(entry) => Some(entry),
+        _ => None,
+    });
+    assert_eq!(entry, Some(LOG_ENTRY_DATA::default()));
+    let sent = wire.question(119, &[7, 0, 0, 0, 90, 0, 0, 0, 3, 0, 1, 1]);
+    let data = find(&sent, |message| match message {
+        MavMessage::LOG_DATA(data) => Some((data.ofs, data.id, data.count)),
+        _ => None,
+    });
+    assert_eq!(data, Some((7, 3, 0)));
+}
+
+#[test]
+fn data_for_maps_and_instruments_is_sent_on_request_and_as_a_stream() {
+    for message_id in [
+        ATTITUDE_DATA::ID,
+        GLOBAL_POSITION_INT_DATA::ID,
+        HOME_POSITION_DATA::ID,
+        GPS_RAW_INT_DATA::ID,
+        SYSTEM_TIME_DATA::ID,
+    ] {
+        let mut wire = Wire::new();
+        assert_eq!(count(&wire.run(2.0), message_id), 0, "message {message_id} is off until asked for");
+        let request = CommandRequest {
+            source: GROUND,
+            target: VEHICLE,
+            command: 512,
+            params: [message_id as f32, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            confirmation: 0,
+        };
+        wire.endpoint.on_command(0, (&request, None), &wire.vehicle.state());
+        assert_eq!(count(&wire.run(0.5), message_id), 1, "message {message_id}");
+        assert_eq!(wire.ask(511, message_id as f32, 1e6).0, 0);
+        assert!((4..=6).contains(&count(&wire.run(5.0), message_id)), "message {message_id} at 1 Hz");
+    }
+}
+
+#[test]
+fn home_is_the_pad_and_the_compass_shows_where_the_belly_points() {
+    let mut wire = Wire::new();
+    let request =
+        CommandRequest { source: GROUND, target: VEHICLE, command: 410, params: [0.0; 7], confirmation: 0 };
+    wire.endpoint.on_command(0, (&request, None), &wire.vehicle.state());
+    let sent = wire.run(1.5);
+    let home = find(&sent, |message| match message {
+        MavMessage::HOME_POSITION(home) => Some((home.latitude, home.longitude, home.altitude)),
+        _ => None,
+    });
+    let site = wire.vehicle.state().mission().site;
+    assert_eq!(home, Some(((1e7 * site.latitude_deg) as i32, (1e7 * site.longitude_deg).round() as i32, 0)));
+    // Released in the plane north of the pad, nose up: heading north.
+    let heading = find(&sent, |message| match message {
+        MavMessage::VFR_HUD(hud) => Some(hud.heading),
+        _ => None,
+    });
+    assert_eq!(heading, Some(0));
+    let mut flight = crate::wire::fly::load_flight("mk2").unwrap();
+    flight.recipe.mission.pad_altitude_m = 510.0;
+    let vehicle = Vehicle::on_the_pad(&flight).unwrap();
+    let high = avionics::link::telemetry::message(VFR_HUD_DATA::ID, &vehicle.state(), SIMULATED);
+    let above_sea = matches!(&high, Some(MavMessage::VFR_HUD(hud)) if (hud.alt - 510.0).abs() < 1e-3);
+    assert!(above_sea, "above mean sea level: {high:?}");
+}
+
+#[test]
+fn a_forced_disarm_disarms_on_the_pad_and_in_the_countdown_and_aborts_in_flight() {
+    for code in [21196.0, 2989.0] {
+        let mut wire = Wire::new();
+        assert_eq!(wire.ask(400, 1.0, 0.0).0, 0);
+        assert_eq!(wire.ask(400, 0.0, code).0, 0);
+        assert!(!wire.vehicle.mode().interlocks.armed && !wire.vehicle.aborted(), "on the pad");
+        assert_eq!(wire.ask(400, 1.0, 0.0).0, 0, "nothing is latched");
+        assert_eq!(wire.ask(300, 0.0, 0.0).0, 0);
+        wire.run(1.0);
+        assert_eq!(wire.ask(400, 0.0, code).0, 0);
+        let mode = wire.vehicle.mode();
+        assert!(!mode.interlocks.armed && mode.countdown_end_s.is_none() && !wire.vehicle.aborted());
+        assert_eq!(wire.ask(400, 1.0, 0.0).0, 0);
+        assert_eq!(wire.ask(300, 0.0, 0.0).0, 0);
+        wire.run(wire.vehicle.computer().countdown_s() + 1.0);
+        assert!(!wire.vehicle.phase().on_pad());
+        assert_eq!(
+            wire.ask(400, 0.0, 0.0).0,
+            MavResult::MAV_RESULT_DENIED as u8,
+            "unforced it stays refused"
+        );
+        assert!(!wire.vehicle.aborted());
+        assert_eq!(wire.ask(400, 0.0, code).0, 0);
+        assert!(wire.vehicle.aborted(), "in flight it is an abort");
+    }
+}
+
+/// Clients find out in this way what a vehicle can do.
+impl Wire {
+    /// A command of the station with this number; returns the answers.
+    fn numbered(&mut self, param1: f32, number: u32) -> Vec<CommandAnswer> {
+        let command = COMMAND_LONG_DATA {
+            param1,
+            param2: number as f32,
+            command: MavCmd::MAV_CMD_COMPONENT_ARM_DISARM,
+            target_system: 1,
+            target_component: 1,
+            ..COMMAND_LONG_DATA::default()
+        };
+        let frame = self.ground.encode(&MavMessage::COMMAND_LONG(command));
+        self.endpoint.on_frame(0, &frame, &self.vehicle.state());
+        self.run(0.1).iter().filter_map(CommandAnswer::from_frame).collect()
+    }
+}
+
+#[test]
+fn a_repeated_arming_is_answered_again_and_arms_nothing_that_was_disarmed_or_aborted_since() {
+    let mut wire = Wire::new();
+    wire.beats = true;
+    wire.run(1.0);
+    let told = |answers: Vec<CommandAnswer>| {
+        answers.iter().map(|answer| (answer.result, answer.detail)).collect::<Vec<_>>()
+    };
+    assert_eq!(told(wire.numbered(1.0, 70_000)), [(0, 70_000)]);
+    assert_eq!(told(wire.numbered(1.0, 70_000)), [(0, 70_000)]);
+    assert!(wire.vehicle.mode().interlocks.armed);
+    assert_eq!(told(wire.numbered(0.0, 70_001)), [(0, 70_001)]);
+    assert_eq!(told(wire.numbered(1.0, 70_000)), [(0, 70_000)], "it was done");
+    assert!(!wire.vehicle.mode().interlocks.armed);
+    assert_eq!(told(wire.numbered(1.0, 70_002)), [(0, 70_002)], "another one");
+    assert!(wire.vehicle.mode().interlocks.armed);
+    assert_eq!(wire.ask(185, 1.0, 0.0).0, 0);
+    for number in [70_000, 70_002] {
+        wire.numbered(1.0, number);
+        assert!(!wire.vehicle.mode().interlocks.armed);
+    }
+}
+
+#[test]
+fn a_radio_s_report_from_another_address_thins_nothing() {
+    let mut wire = Wire::new();
+    let report = MavMessage::RADIO_STATUS(protocol::dialect::RADIO_STATUS_DATA::default());
+    let before = wire.run(10.0).len();
+    let sent: usize = (0..10)
+        .map(|_| {
+            let full = wire.ground.encode(&report);
+            wire.endpoint.on_frame(0, &full, &wire.vehicle.state());
+            wire.run(1.0).len()
+        })
+        .sum();
+    assert!(sent + 5 > before, "{sent} of {before} frames");
+}
+
+#[test]
+fn every_command_of_a_flood_is_answered_or_refused_and_no_flood_of_aborts_grows_without_end() {
+    let mut wire = Wire::new();
+    for system_id in 2..=254 {
+        for component_id in [1, 190] {
+            let mut sender = Encoder::new(Address { system_id, component_id });
+            let abort = COMMAND_LONG_DATA {
+                param1: 1.0,
+                command: MavCmd::MAV_CMD_DO_FLIGHTTERMINATION,
+                ..COMMAND_LONG_DATA::default()
+            };
+            let frame = sender.encode(&MavMessage::COMMAND_LONG(abort));
+            wire.endpoint.on_frame(0, &frame, &wire.vehicle.state());
+        }
+    }
+    let heard = wire.endpoint.heard(wire.vehicle.time_s());
+    assert_eq!(heard.requests.len(), 64);
+    wire.run(0.1);
+    assert!(wire.vehicle.mode().interlocks.abort_latched);
+}
+
+#[test]
+fn twenty_unknown_commands_at_ten_a_second_are_each_answered() {
+    let mut wire = Wire::new();
+    let mut answers = Vec::new();
+    for command in 30_000..30_020 {
+        let params = [0.0; 7];
+        let request = CommandRequest { source: GROUND, target: VEHICLE, command, params, confirmation: 0 };
+        wire.endpoint.on_command(0, (&request, None), &wire.vehicle.state());
+        answers.extend(wire.run(0.1).iter().filter_map(CommandAnswer::from_frame));
+    }
+    answers.extend(wire.run(0.5).iter().filter_map(CommandAnswer::from_frame));
+    let answers: Vec<_> = answers.iter().map(|answer| (answer.command, answer.result)).collect();
+    let unsupported = MavResult::MAV_RESULT_UNSUPPORTED as u8;
+    assert_eq!(answers, (30_000..30_020).map(|command| (command, unsupported)).collect::<Vec<_>>());
+}
+
+#[test]
+fn what_cannot_be_cancelled_is_answered() {
+    let mut wire = Wire::new();
+    for (command, ours) in [(400_u16, true), (54_002, true), (400, false)] {
+        let [low, high] = command.to_le_bytes();
+        let sent = wire.question(80, &[low, high, if ours { 1 } else { 2 }, 1]);
+        let answers: Vec<_> = sent.iter().filter_map(CommandAnswer::from_frame).collect();
+        assert_eq!(answers.len(), usize::from(ours));
+        assert!(
+            answers.iter().all(
+                |answer| (answer.command, answer.result) == (command, MavResult::MAV_RESULT_DENIED as u8)
+            )
+        );
+    }
+}
+
+/// A verdict before the landing, a message of crews without a crew, one that nobody knows.
+#[test]
+fn a_message_without_content_is_refused_for_now_and_an_unknown_one_for_ever() {
+    let mut wire = Wire::new();
+    for (message_id, result) in [
+        (TD_LANDING_VERDICT_DATA::ID, MavResult::MAV_RESULT_TEMPORARILY_REJECTED),
+        (protocol::dialect::TD_CREW_DATA::ID, MavResult::MAV_RESULT_UNSUPPORTED),
+        (9_999, MavResult::MAV_RESULT_UNSUPPORTED),
+    ] {
+        assert_eq!(wire.ask(512, message_id as f32, 0.0).0, result as u8, "message {message_id}");
+    }
+}
+
+#[test]
+fn the_version_announces_files_and_has_an_id_and_a_hash() {
+    let mut wire = Wire::new();
+    wire.endpoint = VehicleEndpoint::new(VehicleKind::Simulated).known_as(77);
+    assert_eq!(wire.ask(520, 1.0, 0.0).0, 0);
+    let sent = wire.run(1.0);
+    let version = find(&sent, |message| match message {
+        MavMessage::AUTOPILOT_VERSION(version) => Some(version),
+        _ => None,
+    });
+    // It may have come with the answer.
+    let now = avionics::link::telemetry::message(
+        AUTOPILOT_VERSION_DATA::ID,
+        &wire.vehicle.state(),
+        Identity { uid: 77, ..SIMULATED },
+    );
+    let Some(MavMessage::AUTOPILOT_VERSION(now)) = now else { panic!("it always has content") };
+    assert!(version.is_none_or(|version| version == now));
+    assert!(now.capabilities.contains(MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_FTP));
+    assert_eq!(now.uid & 0xFFFF_FFFF, 77);
+    assert_ne!((now.uid, now.flight_custom_version), (77, [0; 8]));
+}
+
+#[test]
+fn there_are_no_extended_parameters_and_every_question_is_answered() {
+    let mut wire = Wire::new();
+    let mut read = [0; 20];
+    read[..4].copy_from_slice(&[0xFF, 0xFF, 1, 1]);
+    read[4..8].copy_from_slice(b"NAME");
+    for question in [(320, &read[..]), (321, &[1, 1])] {
+        let sent = wire.question(question.0, question.1);
+        let error = find(&sent, |message| match message {
+            MavMessage::PARAM_ERROR(error) => Some((error.error, error.target_system, error.param_index)),
+            _ => None,
+        });
+        assert_eq!(error, Some((MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST, 255, -1)));
+    }
+    let mut set = [0; 147];
+    set[..6].copy_from_slice(&[1, 1, b'N', b'A', b'M', b'E']);
+    let sent = wire.question(323, &set);
+    let answer = find(&sent, |message| match message {
+        MavMessage::PARAM_EXT_ACK(answer) => Some((answer.param_result, answer.param_id)),
+        _ => None,
+    });
+    let (result, id) = answer.expect("an answer");
+    assert_eq!(result, ParamAck::PARAM_ACK_FAILED);
+    assert_eq!(id.to_str(), Ok("NAME"));
+    assert!(texts(&wire.run(1.0)).is_empty(), "no words about it");
+}
+
+// Tests what a standard ground station gets without asking.
+
+const OF_EVERY_VEHICLE: [u32; 7] = [
+    ATTITUDE_DATA::ID,
+    GLOBAL_POSITION_INT_DATA::ID,
+    GPS_RAW_INT_DATA::ID,
+    HOME_POSITION_DATA::ID,
+    SYS_STATUS_DATA::ID,
+    VFR_HUD_DATA::ID,
+    CURRENT_MODE_DATA::ID,
+];
+
+#[test]
+fn over_a_network_a_standard_station_sees_attitude_position_battery_and_mode_every_second() {
+    let mut wire = Wire {
+        endpoint: VehicleEndpoint::new(VehicleKind::Simulated).over_links(&[NETWORK_BUDGET_BYTES_S]),
+        ..Wire::new()
+    };
+    let sent = wire.run(10.0);
+    for message_id in OF_EVERY_VEHICLE {
+        let found = count(&sent, message_id);
+        assert!(found >= 9, "{found} of message {message_id} in 10 s");
+    }
+    // More than asked for may be asked for.
+    let attitude = ATTITUDE_DATA::ID as f32;
+    assert_eq!(wire.ask(511, attitude, 20_000.0).0, MavResult::MAV_RESULT_ACCEPTED as u8);
+}
+
+#[test]
+fn over_a_radio_a_standard_station_gets_what_it_asks_for_and_the_fast_messages_give_way() {
+    for (endpoint, signature_len) in [
+        (VehicleEndpoint::new(VehicleKind::Simulated), 0),
+        (VehicleEndpoint::sending_signed(VehicleKind::Simulated), SIGNATURE_LEN),
+    ] {
+        let mut wire = Wire { endpoint, ..Wire::new() };
+        let before = count(&wire.run(10.0), ATTITUDE_QUATERNION_DATA::ID);
+        for message_id in OF_EVERY_VEHICLE {
+            let result = wire.ask(511, message_id as f32, 1e6).0;
+            assert_eq!(result, MavResult::MAV_RESULT_ACCEPTED as u8, "message {message_id}");
+        }
+        wire.run(2.0);
+        let sent = wire.run(10.0);
+        for message_id in OF_EVERY_VEHICLE {
+            assert!((9..=11).contains(&count(&sent, message_id)), "message {message_id} at 1 Hz");
+        }
+        let attitudes = count(&sent, ATTITUDE_QUATERNION_DATA::ID);
+        assert!((29..before).contains(&attitudes), "{attitudes} attitudes in 10 s after {before}");
+        let bytes: usize = sent.iter().map(|frame| frame.as_bytes().len() + signature_len).sum();
+        assert!(bytes <= 10 * RADIO_BUDGET_BYTES_S as usize, "{bytes} B in 10 s");
+        for message_id in OF_EVERY_VEHICLE {
+            assert_eq!(wire.ask(511, message_id as f32, 0.0).0, 0);
+        }
+        let again = count(&wire.run(10.0), ATTITUDE_QUATERNION_DATA::ID);
+        assert!(again.abs_diff(before) <= 1, "{again} again, {before} before");
+    }
+}
+
+#[test]
+fn the_rates_of_every_kind_of_link_fit_it() {
+    for kind in [Streams::new, Streams::signed, Streams::with_crew] {
+        for capacity_bytes_s in [384, 768, 1_536, RADIO_BUDGET_BYTES_S, 4_608, NETWORK_BUDGET_BYTES_S] {
+            let mut streams = kind();
+            streams.set_capacity(capacity_bytes_s);
+            let words = format!("{:.0} of {capacity_bytes_s} B/s", streams.bytes_s());
+            assert!(streams.fit(), "{words}");
+            let rate = |message_id| streams.rate_hz(message_id);
+            let position = rate(LOCAL_POSITION_NED_DATA::ID);
+            assert!(rate(HEARTBEAT_DATA::ID) >= 1.0 && rate(TD_FLIGHT_STATUS_DATA::ID) >= 1.0, "{words}");
+            assert!(position >= 0.45, "{words}: {position} Hz");
+            if capacity_bytes_s >= NETWORK_BUDGET_BYTES_S {
+                assert!(OF_EVERY_VEHICLE.iter().all(|id| rate(*id) >= 1.0), "{words}");
+                assert!(rate(BATTERY_STATUS_DATA::ID) >= 1.0);
+            }
+        }
+    }
+}
+
+// What stations tell the vehicle about themselves: the end of their book, and the mission that they expect.
+
+const ARM: u16 = 400;
+
+fn tell(wire: &mut Wire, head: TD_BOOK_HEAD_DATA) -> Vec<TD_BOOK_KEPT_DATA> {
+    let frame = wire.ground.encode(&MavMessage::TD_BOOK_HEAD(head));
+    wire.endpoint.on_frame(0, &frame, &wire.vehicle.state());
+    let sent = wire.run(0.5);
+    let kept = sent.iter().filter_map(|frame| match frame.decode() {
+        Ok(MavMessage::TD_BOOK_KEPT(kept)) => Some(kept),
+        _ => None,
+    });
+    kept.collect()
+}
+
+#[test]
+fn the_end_of_a_book_is_confirmed_to_the_station_that_sent_it() {
+    let mut wire = Wire::new();
+    let head = TD_BOOK_HEAD_DATA {
+        book: 77,
+        entries: 5,
+        target_system: 1,
+        target_component: 1,
+        ..TD_BOOK_HEAD_DATA::default()
+    };
+    let kept = tell(&mut wire, head.clone());
+    let [kept] = &kept[..] else { panic!("{kept:?}") };
+    assert_eq!((kept.book, kept.entries), (77, 5));
+    assert_eq!((kept.target_system, kept.target_component), (GROUND.system_id, GROUND.component_id));
+    assert!(
+        tell(&mut wire, TD_BOOK_HEAD_DATA { target_system: 2, ..head }).is_empty(),
+        "for another vehicle"
+    );
+}
+
+/// A flood of ends takes no more of the link than any other requests.
+#[test]
+fn a_flood_of_ends_is_answered_within_the_budget() {
+    let mut wire = Wire::new();
+    for entries in 0..2_000 {
+        let head = TD_BOOK_HEAD_DATA {
+            entries,
+            target_system: 1,
+            target_component: 1,
+            ..TD_BOOK_HEAD_DATA::default()
+        };
+        let frame = wire.ground.encode(&MavMessage::TD_BOOK_HEAD(head));
+        wire.endpoint.on_frame(0, &frame, &wire.vehicle.state());
+    }
+    let sent = wire.run(1.0);
+    let bytes: usize = sent.iter().map(|frame| frame.as_bytes().len()).sum();
+    assert!(bytes <= 2 * RADIO_BUDGET_BYTES_S as usize, "{bytes} B");
+    assert!(count(&sent, HEARTBEAT_DATA::ID) >= 1);
+}
+
+fn arm_for(wire: &mut Wire, params: [f32; 3]) -> (u8, String) {
+    wire.beats = true;
+    wire.beat();
+    wire.run(0.5);
+    let [param4, param5, param6] = params;
+    let arm = COMMAND_LONG_DATA {
+        command: MavCmd::MAV_CMD_COMPONENT_ARM_DISARM,
+        param1: 1.0,
+        param4,
+        param5,
+        param6,
+        target_system: 1,
+        target_component: 1,
+        ..COMMAND_LONG_DATA::default()
+    };
+    let frame = wire.ground.encode(&MavMessage::COMMAND_LONG(arm));
+    wire.endpoint.on_frame(0, &frame, &wire.vehicle.state());
+    let sent = wire.run(0.5);
+    let answers: Vec<_> = sent.iter().filter_map(CommandAnswer::from_frame).collect();
+    assert_eq!((answers.len(), answers[0].command), (1, ARM));
+    (answers[0].result, texts(&sent).join("; "))
+}
+
+#[test]
+fn another_mission_is_not_armed_whatever_the_station_shows() {
+    let fresh = || {
+        let mut wire = Wire::new();
+        wire.vehicle = rocket().of_mission("mk2", "the right one");
+        wire
+    };
+    let ours = MissionHash::of("the right one");
+    let other = MissionHash::of("another one");
+    let mut wire = fresh();
+    let (result, words) = arm_for(&mut wire, other.to_params());
+    assert_eq!(result, MavResult::MAV_RESULT_DENIED as u8, "{words}");
+    assert!(words.contains(&format!("this vehicle flies mk2 {ours}, not {other}")), "{words}");
+    assert!(!wire.vehicle.mode().interlocks.armed);
+    let (result, words) = arm_for(&mut wire, [1.0, 0.0, 0.0]);
+    assert_eq!(result, MavResult::MAV_RESULT_DENIED as u8, "{words}");
+    assert!(!wire.vehicle.mode().interlocks.armed);
+    for params in [ours.to_params(), [0.0; 3], [f32::NAN; 3]] {
+        let mut wire = fresh();
+        let (result, words) = arm_for(&mut wire, params);
+        assert_eq!(result, MavResult::MAV_RESULT_ACCEPTED as u8, "{words}");
+    }
+}
+
+proptest! {
+    /// Whatever a station writes there, it arms no vehicle of another mission.
+    #[test]
+    fn no_parameters_but_the_own_hash_or_none_arm(params in prop::array::uniform3(any::<u32>())) {
+        let params = params.map(f32::from_bits);
+        let arms = match protocol::mission::Expected::of_params(params) {
+            protocol::mission::Expected::Any => true,
+            protocol::mission::Expected::Hash(hash) => hash == MissionHash::of("the right one"),
+            protocol::mission::Expected::Unreadable => false,
+        };
+        let request = CommandRequest {
+            source: GROUND,
+            target: VEHICLE,
+            command: ARM,
+            params: [1.0, 0.0, 0.0, params[0], params[1], params[2], 0.0],
+            confirmation: 0,
+        };
+        let vehicle = rocket().of_mission("mk2", "the right one");
+        let why = avionics::link::endpoint::meant::why_other_mission(&request, &vehicle.state());
+        prop_assert_eq!(why.is_none(), arms);
+    }
+}

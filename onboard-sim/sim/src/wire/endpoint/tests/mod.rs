@@ -1,0 +1,422 @@
+//! Tests the vehicle's endpoint frame by frame.
+
+use std::sync::LazyLock;
+use std::time::Duration;
+
+use avionics::link::streams::{STANDARD, Streams};
+use flight::computer::LogState;
+use flight::computer::crew::{Asked, Request};
+use flight::computer::news::Severity;
+use flight::rules::arming::all_passed;
+use flight::rules::phase::Phase;
+use mavlink::MessageData as _;
+use proptest::prelude::*;
+use protocol::command::{CommandAnswer, CommandRequest};
+use protocol::dialect::{
+    ATTITUDE_QUATERNION_DATA, AVAILABLE_MODES_DATA, COMMAND_LONG_DATA, ESTIMATOR_STATUS_DATA, HEARTBEAT_DATA,
+    MavCmd, MavMessage, MavResult, TD_DESCENT_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA,
+    TD_LANDING_VERDICT_DATA, TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_PREDICTION_DATA, TIMESYNC_DATA, TdCheck,
+};
+use protocol::frame::{Encoder, Frame, SIGNATURE_LEN};
+use protocol::identity::{Address, GROUND, RADIO_BUDGET_BYTES_S, VEHICLE};
+use protocol::text::Reassembler;
+
+use super::{Outgoing, VehicleEndpoint, VehicleKind, step};
+use crate::dispersion::Dispersion;
+use crate::wire::fly::load_flight;
+use crate::wire::vehicle::{Vehicle, VehicleEvent};
+
+/// mk2 without dispersions on its pad, with its rehearsal done: most tests begin there.
+static READY: LazyLock<Vehicle> = LazyLock::new(|| {
+    let mut flight = load_flight("mk2").unwrap();
+    flight.recipe.dispersion = Dispersion::builtin("none").unwrap();
+    let mut vehicle = Vehicle::on_the_pad(&flight).unwrap();
+    vehicle.set_log_state(LogState { running: true, space_bytes: u64::MAX });
+    vehicle.set_pin_out(true);
+    while !all_passed(&vehicle.arming_checks()) {
+        assert!(vehicle.time_s() < 20.0, "{:?}", vehicle.arming_checks());
+        vehicle.step(&[]);
+    }
+    vehicle
+});
+
+fn rocket() -> Vehicle {
+    READY.clone()
+}
+
+/// What has nothing to say on the pad.
+const IN_FLIGHT: [u32; 5] = [
+    TD_DESCENT_DATA::ID,
+    TD_TOUCHDOWN_PREDICTION_DATA::ID,
+    TD_PREDICTED_PATH_DATA::ID,
+    TD_LANDING_VERDICT_DATA::ID,
+    ESTIMATOR_STATUS_DATA::ID,
+];
+
+/// One frame as in the run loop, with the requests of the vehicle's own programme.
+fn frame(
+    vehicle: &mut Vehicle,
+    endpoint: &mut VehicleEndpoint,
+    own: &[Asked],
+) -> (Vec<VehicleEvent>, Vec<Outgoing>) {
+    let own: Vec<Request> = own.iter().copied().map(Request::of_the_programme).collect();
+    let (events, _) = step(endpoint, vehicle, &own);
+    (events, endpoint.poll(&vehicle.state()))
+}
+
+struct Wire {
+    vehicle: Vehicle,
+    endpoint: VehicleEndpoint,
+    ground: Encoder,
+    /// The ground station sends heartbeats as often as to an armed vehicle.
+    beats: bool,
+}
+
+impl Wire {
+    fn new() -> Self {
+        let mut wire = Self {
+            vehicle: rocket(),
+            // Every field has a value: no frame is shorter than it is in use.
+            endpoint: VehicleEndpoint::new(VehicleKind::Simulated).booted(0x00AB_CDEF).known_as(0xABCD),
+            ground: Encoder::new(GROUND),
+            beats: false,
+        };
+        wire.run(0.5);
+        wire
+    }
+
+    /// Runs for this long; returns what was sent.
+    fn run(&mut self, duration_s: f64) -> Vec<Frame> {
+        let end_s = self.vehicle.time_s() + duration_s;
+        let mut sent = Vec::new();
+        while self.vehicle.time_s() < end_s {
+            // Frames of 5 ms: ten heartbeats a second.
+            if self.beats && ((self.vehicle.time_s() * 200.0).round() as u64).is_multiple_of(20) {
+                self.beat();
+            }
+            let (_, leaving) = frame(&mut self.vehicle, &mut self.endpoint, &[]);
+            sent.extend(leaving.into_iter().map(|outgoing| outgoing.frame));
+        }
+        sent
+    }
+
+    fn beat(&mut self) {
+        let beat = self.ground.encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
+        self.endpoint.on_frame(0, &beat, &self.vehicle.state());
+    }
+
+    /// Sends a command from a ground station that is heard.
+    fn ask(&mut self, command: u16, param1: f32, param2: f32) -> (u8, String) {
+        self.beats = true;
+        self.beat();
+        self.ask_once(command, param1, param2)
+    }
+
+    fn ask_once(&mut self, command: u16, param1: f32, param2: f32) -> (u8, String) {
+        let mut payload = COMMAND_LONG_DATA {
+            param1,
+            param2,
+            target_system: 1,
+            target_component: 1,
+            ..COMMAND_LONG_DATA::default()
+        };
+        payload.param3 = f32::NAN;
+        let mut bytes = [0; 255];
+        let len = mavlink::MessageData::ser(&payload, mavlink::MavlinkVersion::V1, &mut bytes);
+        bytes[28..30].copy_from_slice(&command.to_le_bytes());
+        let frame = self.ground.encode_payload(COMMAND_LONG_DATA::ID, &bytes[..len]).unwrap();
+        self.endpoint.on_frame(0, &frame, &self.vehicle.state());
+        let sent = self.run(0.5);
+        let answers: Vec<_> = sent.iter().filter_map(CommandAnswer::from_frame).collect();
+        assert_eq!(answers.len(), 1, "one answer to one command");
+        assert_eq!((answers[0].command, answers[0].target), (command, GROUND));
+        (answers[0].result, texts(&sent).join("; "))
+    }
+}
+
+fn texts(frames: &[Frame]) -> Vec<String> {
+    let mut reassembler = Reassembler::new();
+    let chunks = frames.iter().filter_map(|frame| match frame.decode() {
+        Ok(MavMessage::STATUSTEXT(chunk)) => Some(reassembler.push(frame.source(), &chunk, Duration::ZERO)),
+        _ => None,
+    });
+    chunks.flatten().map(|text| text.text).collect()
+}
+
+fn count(frames: &[Frame], message_id: u32) -> usize {
+    frames.iter().filter(|frame| frame.message_id() == message_id).count()
+}
+
+#[test]
+fn the_standard_rates_fit_the_radio_and_are_kept() {
+    let streams = Streams::new();
+    assert!(streams.fit(), "{} B/s", streams.bytes_s());
+    let mut wire = Wire::new();
+    let sent = wire.run(10.0);
+    for standard in STANDARD {
+        // In flight only, and the verdict after it.
+        if IN_FLIGHT.contains(&standard.message_id) {
+            continue;
+        }
+        let expected = 10.0 * streams.rate_hz(standard.message_id);
+        let found = count(&sent, standard.message_id) as f64;
+        assert!((found - expected).abs() <= 1.0, "message {}: {found} of {expected}", standard.message_id);
+    }
+}
+
+#[test]
+fn signatures_fit_the_radio_too() {
+    let streams = Streams::signed();
+    assert!(streams.fit(), "{} B/s", streams.bytes_s());
+    let mut wire = Wire { endpoint: VehicleEndpoint::sending_signed(VehicleKind::Simulated), ..Wire::new() };
+    wire.run(1.0);
+    let sent = wire.run(10.0);
+    for (message_id, expected) in
+        [(HEARTBEAT_DATA::ID, 10), (TD_FLIGHT_STATUS_DATA::ID, 50), (ATTITUDE_QUATERNION_DATA::ID, 32)]
+    {
+        let found = count(&sent, message_id);
+        assert!(found.abs_diff(expected) <= 1, "message {message_id}: {found} of {expected}");
+    }
+}
+
+#[test]
+fn arming_is_answered_and_seen_in_the_heartbeat() {
+    let mut wire = Wire::new();
+    assert_eq!(wire.ask(400, 1.0, 0.0).0, MavResult::MAV_RESULT_ACCEPTED as u8);
+    let armed = wire.run(1.5).iter().any(|frame| {
+        matches!(frame.decode(), Ok(MavMessage::HEARTBEAT(beat))
+            if beat.base_mode.contains(protocol::dialect::MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED))
+    });
+    assert!(armed);
+}
+
+#[test]
+fn a_refusal_is_answered_and_explained_in_words() {
+    let mut wire = Wire::new();
+    let (result, words) = wire.ask(300, 0.0, 0.0);
+    assert_eq!(result, MavResult::MAV_RESULT_DENIED as u8);
+    assert!(words.contains("start refused: cannot start in PAD_IDLE"), "{words}");
+    wire.vehicle.set_log_state(LogState { running: false, space_bytes: 0 });
+    // Force codes have no effect. The reason is sent once.
+    for (code, said) in [(0.0, true), (21196.0, false), (2989.0, false)] {
+        let (result, words) = wire.ask(400, 1.0, code);
+        assert_eq!(result, MavResult::MAV_RESULT_TEMPORARILY_REJECTED as u8);
+        assert_eq!(words.contains("arm refused: log"), said, "{words}");
+    }
+    // Texts have a share of each second.
+    wire.run(1.0);
+    let (result, words) = wire.ask(400, 2.0, 0.0);
+    assert_eq!(result, MavResult::MAV_RESULT_DENIED as u8);
+    assert!(words.contains("param1 = 2"), "{words}");
+}
+
+#[test]
+fn commands_this_vehicle_or_even_the_dialect_does_not_know_are_unsupported() {
+    let mut wire = Wire::new();
+    for command in [MavCmd::MAV_CMD_NAV_TAKEOFF as u16, 12_345, u16::MAX] {
+        assert_eq!(wire.ask(command, 0.0, 0.0).0, MavResult::MAV_RESULT_UNSUPPORTED as u8);
+    }
+}
+
+#[test]
+fn a_command_for_somebody_else_is_left_alone() {
+    let mut wire = Wire::new();
+    for target_system in [2, 255] {
+        let command = COMMAND_LONG_DATA {
+            param1: 1.0,
+            command: MavCmd::MAV_CMD_COMPONENT_ARM_DISARM,
+            target_system,
+            target_component: 1,
+            ..COMMAND_LONG_DATA::default()
+        };
+        let frame = wire.ground.encode(&MavMessage::COMMAND_LONG(command));
+        wire.endpoint.on_frame(0, &frame, &wire.vehicle.state());
+    }
+    let sent = wire.run(0.5);
+    assert_eq!(count(&sent, 77), 0);
+    assert!(!wire.vehicle.mode().interlocks.armed);
+}
+
+#[test]
+fn intervals_can_be_set_within_the_budget_and_read_back() {
+    let mut wire = Wire::new();
+    let fins = TD_FINS_DATA::ID as f32;
+    assert_eq!(wire.ask(511, fins, -1.0).0, 0);
+    assert_eq!(count(&wire.run(3.0), TD_FINS_DATA::ID), 0, "switched off");
+    assert_eq!(wire.ask(511, fins, 250_000.0).0, 0);
+    let found = count(&wire.run(3.0), TD_FINS_DATA::ID);
+    assert!((11..=13).contains(&found), "{found} in 3 s at 4 Hz");
+    let (result, words) = wire.ask(511, fins, 10_000.0);
+    assert_eq!(result, MavResult::MAV_RESULT_DENIED as u8);
+    assert!(words.contains("budget is 2000"), "{words}");
+    wire.endpoint.on_command(
+        0,
+        (
+            &CommandRequest {
+                source: GROUND,
+                target: VEHICLE,
+                command: 512,
+                params: [244.0, fins, 0.0, 0.0, 0.0, 0.0, 0.0],
+                confirmation: 0,
+            },
+            None,
+        ),
+        &wire.vehicle.state(),
+    );
+    let interval = wire.run(0.5).iter().find_map(|frame| match frame.decode() {
+        Ok(MavMessage::MESSAGE_INTERVAL(interval)) => Some(interval.interval_us),
+        _ => None,
+    });
+    assert_eq!(interval, Some(250_000));
+}
+
+#[test]
+fn every_phase_has_a_name_for_other_people_s_clients() {
+    let mut wire = Wire::new();
+    let request = CommandRequest {
+        source: GROUND,
+        target: VEHICLE,
+        command: 512,
+        params: [AVAILABLE_MODES_DATA::ID as f32, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        confirmation: 0,
+    };
+    wire.endpoint.on_command(0, (&request, None), &wire.vehicle.state());
+    // A second request while the first still waits is refused for now, so that the queue stays bounded.
+    for _ in 0..3 {
+        wire.endpoint.on_command(0, (&request, None), &wire.vehicle.state());
+    }
+    // They use the room that telemetry leaves.
+    let sent = wire.run(8.0);
+    let answers: Vec<_> =
+        sent.iter().filter_map(CommandAnswer::from_frame).map(|answer| answer.result).collect();
+    assert_eq!(answers, [0, 0, 1, 1]);
+    let names: Vec<String> = sent
+        .iter()
+        .filter_map(|frame| match frame.decode() {
+            Ok(MavMessage::AVAILABLE_MODES(mode)) => mode.mode_name.to_str().ok().map(str::to_owned),
+            _ => None,
+        })
+        .take(Phase::ALL.len())
+        .collect();
+    assert_eq!(names.len(), Phase::ALL.len());
+    assert_eq!(names[9], "POWERED");
+}
+
+#[test]
+fn a_stream_that_was_slowed_comes_back_at_once_and_vital_ones_are_not_slowed() {
+    let mut wire = Wire::new();
+    let attitude = ATTITUDE_QUATERNION_DATA::ID as f32;
+    assert_eq!(wire.ask(511, attitude, 60e6).0, 0);
+    assert!(count(&wire.run(5.0), ATTITUDE_QUATERNION_DATA::ID) <= 1);
+    assert_eq!(wire.ask(511, attitude, 0.0).0, 0);
+    assert!(count(&wire.run(2.0), ATTITUDE_QUATERNION_DATA::ID) >= 15, "8 Hz");
+    for (vital, interval_us) in [(HEARTBEAT_DATA::ID, -1.0), (TD_FLIGHT_STATUS_DATA::ID, 2e6)] {
+        assert_eq!(wire.ask(511, vital as f32, interval_us).0, MavResult::MAV_RESULT_DENIED as u8);
+    }
+    assert_eq!(wire.ask(511, attitude, f32::INFINITY).0, MavResult::MAV_RESULT_DENIED as u8);
+    assert_eq!(wire.ask(511, f32::NAN, -1.0).0, MavResult::MAV_RESULT_DENIED as u8);
+}
+
+#[test]
+fn a_flood_of_requests_does_not_silence_telemetry() {
+    let mut wire = Wire::new();
+    for _ in 0..200 {
+        let request = CommandRequest {
+            source: GROUND,
+            target: VEHICLE,
+            command: 512,
+            params: [148.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            confirmation: 0,
+        };
+        wire.endpoint.on_command(0, (&request, None), &wire.vehicle.state());
+    }
+    wire.run(2.0);
+    assert!(count(&wire.run(2.0), ATTITUDE_QUATERNION_DATA::ID) >= 14, "8 Hz");
+}
+
+#[test]
+fn a_new_phase_is_sent_at_once_and_only_once() {
+    let mut wire = Wire::new();
+    wire.run(1.03);
+    let (_, leaving) = frame(&mut wire.vehicle, &mut wire.endpoint, &[Asked::Arm]);
+    let mut sent: Vec<Frame> = leaving.into_iter().map(|outgoing| outgoing.frame).collect();
+    sent.extend(wire.run(0.08));
+    assert_eq!(count(&sent, HEARTBEAT_DATA::ID), 1);
+    assert_eq!(count(&sent, TD_FLIGHT_STATUS_DATA::ID), 1);
+}
+
+#[test]
+fn a_new_station_gets_the_limits() {
+    let mut wire = Wire::new();
+    wire.run(1.0);
+    let beat = wire.ground.encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
+    wire.endpoint.on_frame(0, &beat, &wire.vehicle.state());
+    let limits = wire.run(0.1).iter().find_map(|frame| match frame.decode() {
+        Ok(MavMessage::TD_TOUCHDOWN_LIMITS(limits)) => Some(limits),
+        _ => None,
+    });
+    let legs = flight::vehicles::mission::builtin("mk2").unwrap().unwrap().leg_limits;
+    assert!((f64::from(limits.unwrap().vertical_m_s) - legs.vertical_m_s).abs() < 1e-6, "of the legs");
+}
+
+#[test]
+fn time_is_told_to_those_who_ask_this_vehicle() {
+    let mut wire = Wire::new();
+    for (target_system, answered) in [(0, true), (1, true), (2, false)] {
+        let sync = TIMESYNC_DATA { ts1: 77, target_system, ..TIMESYNC_DATA::default() };
+        let frame = wire.ground.encode(&MavMessage::TIMESYNC(sync));
+        wire.endpoint.on_frame(0, &frame, &wire.vehicle.state());
+        assert_eq!(count(&wire.run(0.1), TIMESYNC_DATA::ID) == 1, answered, "target {target_system}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    /// Whatever frames arrive, the vehicle keeps running, and only the two proper commands arm and start it.
+    #[test]
+    fn hostile_payloads_never_stop_the_vehicle(
+        messages in prop::collection::vec((prop::sample::select(vec![0u32, 4, 75, 76, 77, 111, 253, 54_000]), prop::collection::vec(any::<u8>(), 1..64)), 1..40)
+    ) {
+        let mut wire = Wire::new();
+        for (message_id, payload) in messages {
+            if let Some(frame) = wire.ground.encode_payload(message_id, &payload) {
+                wire.endpoint.on_frame(0, &frame, &wire.vehicle.state());
+            }
+            wire.run(0.02);
+        }
+        let beats = count(&wire.run(2.0), HEARTBEAT_DATA::ID);
+        prop_assert!(beats >= 1);
+        // None of these payloads is the arm command with exactly 1: nothing was armed or started.
+        prop_assert!(!wire.vehicle.mode().interlocks.armed);
+        prop_assert!(wire.vehicle.phase() == Phase::PadIdle);
+    }
+}
+
+/// The bits of `checks_failed` have the order of the vehicle's checks: the name of each bit is the start of its
+/// check's name.
+#[test]
+fn the_dialect_names_the_arming_checks_in_their_order() {
+    let checks = rocket().arming_checks();
+    let bits: Vec<_> = TdCheck::all().iter_names().collect();
+    // The last is that of a vehicle below a drone.
+    assert_eq!((bits.len(), bits[checks.len()].0), (checks.len() + 1, "TD_CHECK_HEIGHT"));
+    for (place, (check, (name, bit))) in checks.iter().zip(bits).enumerate() {
+        assert_eq!(bit.bits(), 1 << place);
+        let words = name.trim_start_matches("TD_CHECK_").to_lowercase().replace('_', " ");
+        assert!(
+            check.name.to_lowercase().replace('-', " ").starts_with(&words),
+            "bit {place}: {name} is not {}",
+            check.name
+        );
+    }
+}
+
+mod budget;
+mod crew;
+mod manners;
+mod meant;
+mod questions;
+mod rocket;
+mod slow_line;
+mod uplink;

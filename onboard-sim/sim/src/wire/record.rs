@@ -1,0 +1,189 @@
+//! A simulated flight as log records: the flight computer's frames, what it thought, and the truth. A replay runs the
+//! flight computer again from the frames.
+
+use std::collections::BTreeMap;
+
+use crate::dispersion::{Dispersion, DispersionError};
+use crate::outcome::{by_envelope, by_table_2};
+use crate::outside::Watch;
+use crate::recipe::Recipe;
+use crate::sortie::Sortie;
+use crate::world::Strain;
+use flight::computer::{Computer, Input, Output};
+use flight::rules::phase::Phase;
+use flight::rules::verdict::{Landing, LandingVerdict};
+use protocol::log::computer_v1::{ComputerFrame, ComputerStart};
+use protocol::log::flight_v1::TruthSample;
+use protocol::log::record::{Event, EventLevel, Record};
+use protocol::log::v1;
+use protocol::log::writer::LogHeader;
+
+use avionics::log::frame::{frame_to_log, start_to_log, thought_to_log};
+use avionics::log::logged::Logged as _;
+
+/// The header of the log of a simulated flight.
+pub fn header(writer: &str, recipe: &Recipe, number: u64, start_unix_ns: u64) -> LogHeader {
+    let faults = recipe.faults.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ");
+    let run = [
+        ("profile", recipe.mission.name.clone()),
+        ("dispersion", recipe.dispersion_name.clone()),
+        ("seed", recipe.seed.to_string()),
+        ("flight", number.to_string()),
+        ("faults", faults),
+        ("start_unix_ns", start_unix_ns.to_string()),
+    ];
+    LogHeader {
+        writer: writer.to_owned(),
+        start_unix_ns,
+        run: run.into_iter().map(|(key, value)| (key.to_owned(), value)).collect::<BTreeMap<_, _>>(),
+        profile_toml: Some(recipe.mission_toml.clone()),
+        scenario_toml: Some(recipe.dispersion_toml.clone()),
+    }
+}
+
+/// The computer of a flight as it is now: at power-up or at its release, before its first frame there.
+pub fn start(flight: &Sortie) -> ComputerStart {
+    start_to_log(flight.computer())
+}
+
+/// Keeps the flight computer's last frame as its record.
+#[derive(Debug, Clone, Default)]
+pub struct LastFrame {
+    /// `None` while the computer is dead.
+    frame: Option<Box<ComputerFrame>>,
+    /// The result of the rehearsal is already in a recorded frame.
+    rehearsed: bool,
+    /// The number of the next frame of a computer that lives.
+    next: u64,
+}
+
+impl LastFrame {
+    /// The frame, once.
+    pub fn take(&mut self) -> Option<Box<ComputerFrame>> {
+        self.frame.take()
+    }
+}
+
+impl Watch for LastFrame {
+    fn decided(&mut self, input: &Input<'_>, output: &Output, computer: &Computer) {
+        // A computer that has restarted takes the rehearsal again.
+        let known = self.rehearsed && input.frame == self.next;
+        self.frame = Some(Box::new(frame_to_log(input, output, computer, known)));
+        (self.rehearsed, self.next) = (computer.rehearsed().is_some(), input.frame + 1);
+    }
+}
+
+/// What the flight computer thought in the frame that was just flown, and the truth.
+pub fn thought_and_truth(flight: &Sortie) -> Vec<Record> {
+    let thought = thought_to_log(flight.pilot()).filter(|_| !flight.computer_is_dead());
+    let thought = thought.map(|estimate| Record::Estimate(Box::new(estimate)));
+    thought.into_iter().chain([Record::TruthSample(Box::new(truth(flight)))]).collect()
+}
+
+fn truth(flight: &Sortie) -> TruthSample {
+    let world = flight.world();
+    let commanded = flight.computer().commands();
+    TruthSample {
+        time_s: world.time_s(),
+        state: world.state().to_log(),
+        height_m: world.height_m(),
+        thrust_n: world.thrust_n(),
+        mass_kg: world.mass().mass_kg,
+        wind_m_s: world.wind_m_s().to_log(),
+        gimbal_commanded_rad: commanded.gimbal_rad.to_vec(),
+        gimbal_actual_rad: world.gimbal_rad().to_vec(),
+        fins_commanded_rad: commanded.fins_rad.to_vec(),
+        fins_actual_rad: world.fins_rad().to_vec(),
+        parachute_open_share: world.parachute_open_share(),
+        in_contact: world.touchdown().is_some(),
+        nees_of_motion: flight.nees_of_motion(),
+        booster_thrust_n: world.booster_attached().then(|| world.booster_thrust_n()),
+    }
+}
+
+/// The header for a flight of a campaign. It has no date: its log begins at the epoch, so that the same flight always
+/// gives the same log.
+pub fn campaign_header(recipe: &Recipe, number: u64) -> LogHeader {
+    header("onboard-sim campaign", recipe, number, 0)
+}
+
+/// The dispersions of a log: from the text of its scenario, or else the built-in set that its run facts name.
+///
+/// # Errors
+/// The text is not a set of dispersions, or no built-in set has the name.
+pub fn dispersion_of(
+    run: &BTreeMap<String, String>,
+    scenario_toml: Option<&str>,
+) -> Result<Dispersion, DispersionError> {
+    let name = run.get("dispersion").map_or("", String::as_str);
+    match scenario_toml {
+        Some(text) => Dispersion::from_toml(text, name),
+        None => Dispersion::builtin(name),
+    }
+}
+
+/// Nanoseconds since the start at the end of the last frame.
+pub fn time_ns(flight: &Sortie) -> u64 {
+    flight.frame() * u64::from(flight::computer::FRAME_MS) * 1_000_000
+}
+
+/// The last frame's records, and a change of phase since `phase`.
+pub fn frame_and_phase(flight: &Sortie, last: &mut LastFrame, phase: Phase) -> Vec<Record> {
+    let mut records: Vec<Record> = last.take().map(Record::ComputerFrame).into_iter().collect();
+    records.extend(thought_and_truth(flight));
+    let now = flight.computer().mode().phase;
+    if now != phase {
+        records.push(Record::Event(Event {
+            level: EventLevel::Info,
+            name: "vehicle".to_owned(),
+            message: format!("phase {} to {}", phase.name(), now.name()),
+        }));
+    }
+    records
+}
+
+/// The verdict on a finished flight; `None` if it did not come down.
+pub fn verdict(flight: &Sortie) -> Option<v1::LandingVerdict> {
+    let outcome = flight.outcome();
+    let touchdown = outcome.touchdown.as_ref()?;
+    let one = |name: &str, value, maximum, passed| v1::LimitResult {
+        name: name.to_owned(),
+        value,
+        minimum: 0.0,
+        maximum,
+        unit: String::new(),
+        passed,
+    };
+    let mut borne = Vec::new();
+    if let Some(Strain { stroke_used, strength_used, .. }) = outcome.rest.and_then(|rest| rest.strain) {
+        borne.push(one("stroke used", stroke_used, 1.0, stroke_used < 1.0));
+        borne.push(one("leg load", strength_used, 1.0, strength_used <= 1.0));
+    }
+    if let Some(failure) = outcome.failure.filter(|failure| !failure.is_of_a_limit()) {
+        borne.push(one(failure.name(), 1.0, 0.0, false));
+    }
+    let Landing { stands, upright, envelope, table_2 } = outcome.landing;
+    let aborted = flight.computer().mode().interlocks.abort_latched;
+    Some(v1::LandingVerdict {
+        time_s: touchdown.time_s,
+        table_2: limits_to_log(&by_table_2(touchdown)),
+        ending: Some(outcome.ending(aborted).to_string()),
+        landing: v1::Landing { stands, upright, envelope, table_2 },
+        envelope: limits_to_log(&by_envelope(&flight.mission().leg_limits, touchdown)),
+        borne,
+    })
+}
+
+/// Each limit with its result, as records; what is not limited has none.
+pub fn limits_to_log(verdict: &LandingVerdict) -> Vec<v1::LimitResult> {
+    let limits = verdict.results.iter().filter(|result| !result.highest.is_infinite());
+    let limits = limits.map(|result| v1::LimitResult {
+        name: result.name.to_owned(),
+        value: result.value,
+        minimum: result.lowest,
+        maximum: result.highest,
+        unit: result.unit.to_owned(),
+        passed: result.passed,
+    });
+    limits.collect()
+}

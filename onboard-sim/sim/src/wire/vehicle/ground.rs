@@ -1,0 +1,77 @@
+//! Contact with the ground, the verdict on it, and the end of the flight: what only the simulation knows.
+
+use crate::outcome::Outcome;
+use crate::sortie::Sortie;
+use flight::computer::Computer;
+use flight::computer::news::Severity;
+use flight::rules::phase::Phase;
+
+use super::{Judged, VehicleEvent};
+
+/// A flight computer that does not notice within this time that it lies on the ground is waited for no longer, s.
+const UNNOTICED_S: f64 = 15.0;
+
+/// What has become of the flight.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Ground {
+    contacts: usize,
+    judged: Option<Judged>,
+    given_up: bool,
+}
+
+impl Ground {
+    pub(super) fn judged(&self) -> Option<Judged> {
+        self.judged
+    }
+
+    pub(super) fn is_over(&self, computer: &Computer) -> bool {
+        // The computer may be sure of the ground before the vehicle lies still.
+        (computer.is_over() && (self.contacts == 0 || self.judged.is_some())) || self.given_up
+    }
+
+    /// Looks at a rocket after a frame.
+    pub(super) fn watch(&mut self, sortie: &Sortie) -> Vec<VehicleEvent> {
+        let mut events = Vec::new();
+        let Some(released_at_s) = sortie.computer().released_at_s() else { return events };
+        let world = sortie.world();
+        if let Some(touchdown) = world.touchdown().filter(|_| self.contacts == 0) {
+            self.contacts = 1;
+            events.push(contact(touchdown.over_ground.vertical_m_s));
+        }
+        if sortie.goes_on() {
+            return events;
+        }
+        if let (Some(touchdown), None) = (world.touchdown(), self.judged) {
+            let outcome = sortie.outcome();
+            let time_s = released_at_s + touchdown.time_s;
+            let (touchdown, landing) = (touchdown.over_ground, outcome.landing);
+            self.judged = Some(Judged { time_s, touchdown, landing });
+            events.push(VehicleEvent::Verdict);
+            let text = in_words(&outcome, sortie.computer().mode().interlocks.abort_latched);
+            events.push(VehicleEvent::Text { severity: Severity::Notice, text });
+        }
+        let waited_s = world.rest().map_or(f64::INFINITY, |rest| world.time_s() - rest.time_s);
+        let phase = sortie.computer().mode().phase;
+        let unnoticed = !matches!(phase, Phase::Touchdown | Phase::Safed);
+        if unnoticed && waited_s > UNNOTICED_S && !self.given_up {
+            self.given_up = true;
+            let text = format!("the simulation ends here, in {}", phase.name());
+            events.push(VehicleEvent::Text { severity: Severity::Error, text });
+        }
+        events
+    }
+}
+
+fn contact(vertical_m_s: f64) -> VehicleEvent {
+    let text = format!("ground contact at {vertical_m_s:.2} m/s");
+    VehicleEvent::Text { severity: Severity::Notice, text }
+}
+
+/// How the flight ended, and what legs that can give way bore.
+fn in_words(outcome: &Outcome, aborted: bool) -> String {
+    let strain = outcome.rest.and_then(|rest| rest.strain).map_or_else(String::new, |strain| {
+        let [stroke, load] = [strain.stroke_used, strain.strength_used].map(|share| 100.0 * share);
+        format!("; stroke {stroke:.0} %, leg load {load:.0} %")
+    });
+    format!("{}{strain}", outcome.ending(aborted))
+}

@@ -1,0 +1,320 @@
+//! The simulated vehicle as the crew sees it: a flight that is stepped frame by frame, and the events it reports.
+//!
+//! This module has the interface that the run loop uses; the radio takes a [`VehicleState`], and the log takes records.
+//!
+//! It is pure: time is simulated.
+
+mod ground;
+
+use crate::outside::Outside;
+use crate::recipe::Recipe;
+use crate::sortie::{Radio, SetUpError, Sortie};
+use crate::wire::record::LastFrame;
+pub use avionics::link::vehicle::{BatteryFacts, Judged, MissionName, VehicleState};
+use flight::computer::crew::{Answer, People, Request};
+use flight::computer::findings::Findings;
+use flight::computer::news::{CrewMessage, Severity};
+use flight::computer::pilot::planner::PLAN_WITHIN_S;
+use flight::computer::{Commander, Computer, Input, LogState};
+use flight::rules::arming::{Check, Uplink};
+use flight::rules::operator::Operator;
+use flight::rules::phase::{Mode, Phase};
+use flight::vehicle::mission::StartPoint;
+use protocol::log::computer_v1::ComputerFrame;
+use protocol::log::record::Record;
+use protocol::log::v1;
+
+use self::ground::Ground;
+
+/// A flight, by recipe and number.
+#[derive(Debug, Clone)]
+pub struct RocketFlight {
+    pub recipe: Recipe,
+    pub number: u64,
+}
+
+/// One vehicle, one flight.
+#[derive(Clone)]
+pub struct Vehicle {
+    sortie: Sortie,
+    findings: Findings,
+    /// A frame of the flight computer was flown in the air just now.
+    flown: bool,
+    pin_out: bool,
+    log: LogState,
+    uplink: Uplink,
+    commander: Option<Commander>,
+    people: Option<People>,
+    operators: Vec<Operator>,
+    mission: MissionName,
+    ground: Ground,
+    /// Input and output of the flight computer in the last frame; `None` if it was dead.
+    computer_frame: Option<Box<ComputerFrame>>,
+    /// How many frames the flight computer has decided.
+    frames_decided: u64,
+    last: LastFrame,
+}
+
+/// The result of one frame.
+#[derive(Debug, Clone, Default)]
+pub struct VehicleStep {
+    /// Events, in order.
+    pub events: Vec<VehicleEvent>,
+    /// An answer to each request, in order; none while the flight computer is dead.
+    pub answers: Vec<Answer>,
+}
+
+impl Vehicle {
+    /// A vehicle powered up on its pad.
+    ///
+    /// # Errors
+    /// The flight cannot be set up.
+    pub fn on_the_pad(flight: &RocketFlight) -> Result<Self, SetUpError> {
+        Ok(Self {
+            sortie: Sortie::on_the_pad(&flight.recipe, flight.number)?,
+            findings: Findings::default(),
+            flown: false,
+            pin_out: false,
+            log: LogState::NONE,
+            uplink: Uplink::NotNeeded,
+            commander: None,
+            people: None,
+            operators: Vec::new(),
+            mission: MissionName::default(),
+            ground: Ground::default(),
+            computer_frame: None,
+            frames_decided: 0,
+            last: LastFrame::default(),
+        })
+    }
+
+    /// Moves the pin that a crew moves by hand.
+    pub fn set_pin_out(&mut self, pin_out: bool) {
+        self.pin_out = pin_out;
+    }
+
+    /// Tells the vehicle the state of its log.
+    pub fn set_log_state(&mut self, log: LogState) {
+        self.log = log;
+    }
+
+    /// Tells the vehicle the quality of its uplink, and the station that armed it, if one did.
+    pub fn set_uplink(&mut self, uplink: Uplink, commander: Option<Commander>) {
+        self.uplink = uplink;
+        self.commander = commander;
+    }
+
+    /// Sets who may command, from power-up on.
+    #[must_use]
+    pub fn with_crew(self, people: People, operators: Vec<Operator>) -> Self {
+        Self { people: Some(people), operators, ..self }
+    }
+
+    /// Sets when it was aborted on its pad before this power-up, vehicle time, s: before zero.
+    #[must_use]
+    pub fn aborted_before(self, at_s: f64) -> Self {
+        Self { sortie: self.sortie.aborted_before(at_s), ..self }
+    }
+
+    /// Which mission it flies.
+    pub fn mission(&self) -> &MissionName {
+        &self.mission
+    }
+
+    /// Sets the name and the text of the mission that it flies.
+    #[must_use]
+    pub fn of_mission(self, name: &str, text: &str) -> Self {
+        let mission = MissionName::of(name, text, self.sortie.mission());
+        Self { mission, ..self }
+    }
+
+    /// Who may command; empty without operators.
+    pub fn operators(&self) -> &[Operator] {
+        &self.operators
+    }
+
+    /// How many people an arming and a start take; `None` without operators.
+    pub fn people(&self) -> Option<People> {
+        self.people
+    }
+
+    /// Advances by one frame, in which these requests are decided.
+    pub fn step(&mut self, requests: &[Request]) -> VehicleStep {
+        let outside = Outside {
+            pin_out: self.pin_out,
+            log: self.log,
+            uplink: self.uplink,
+            commander: self.commander,
+            people: self.people,
+            requests,
+        };
+        let output = self.sortie.step_with(&outside, &mut self.last);
+        self.computer_frame = self.last.take();
+        self.frames_decided += u64::from(self.computer_frame.is_some());
+        let mut events = Vec::new();
+        let (mut released, mut answers) = (false, Vec::new());
+        if let Some(output) = output {
+            events.extend(output.news.into_iter().map(VehicleEvent::from));
+            if output.planned {
+                events.extend(self.planned());
+            }
+            (released, answers) = (output.released, output.answers);
+        }
+        let flying = self.computer().released_at_s().is_some();
+        self.flown = flying && !released && !self.computer().is_over() && !self.is_over();
+        self.findings.note(self.sortie.computer());
+        events.extend(self.events_of_the_simulation(released));
+        VehicleStep { events, answers }
+    }
+
+    /// The event for a frame in which the pilot took over a plan.
+    fn planned(&self) -> Option<VehicleEvent> {
+        let Input { frame, time_s, .. } = self.computer().flown()?;
+        let took_s = self.computer().pilot().report().took_s;
+        Some(VehicleEvent::Planned { frame, time_s, took_s, deadline_s: PLAN_WITHIN_S })
+    }
+
+    /// Events that only the simulation knows: the start of the flight, contact with the ground, the verdict.
+    fn events_of_the_simulation(&mut self, released: bool) -> Vec<VehicleEvent> {
+        if !released {
+            return self.ground.watch(&self.sortie);
+        }
+        if self.sortie.mission().start.at != StartPoint::Apogee {
+            return Vec::new();
+        }
+        let height_m = self.sortie.world().height_m();
+        let text = format!("the simulation goes on at apogee, {height_m:.0} m up; no ascent is flown");
+        vec![VehicleEvent::Text { severity: Severity::Notice, text }]
+    }
+
+    /// Its flight computer.
+    pub fn computer(&self) -> &Computer {
+        self.sortie.computer()
+    }
+
+    /// Simulated time since power-up, s.
+    pub fn time_s(&self) -> f64 {
+        flight::computer::flight_time_s(self.sortie.frame())
+    }
+
+    /// The state now, as the radio sends it.
+    pub fn state(&self) -> VehicleState<'_> {
+        let (sortie, battery) = (&self.sortie, self.sortie.battery());
+        VehicleState {
+            computer: self.computer(),
+            time_s: self.time_s(),
+            name: &self.mission,
+            operators: &self.operators,
+            findings: &self.findings,
+            battery: Some(BatteryFacts {
+                volts: battery.volts(),
+                current_a: Some(battery.current_a()),
+                left: Some(battery.charge()),
+            }),
+            rehearsed: sortie.rehearsed().map(|(_, report)| report),
+            parachute_ejected: sortie.world().parachute_ejected(),
+            judged: self.judged(),
+        }
+    }
+
+    /// Phase, latches and countdown.
+    pub fn mode(&self) -> &Mode {
+        self.computer().mode()
+    }
+
+    pub fn phase(&self) -> Phase {
+        self.mode().phase
+    }
+
+    /// Whether an abort has been accepted.
+    pub fn aborted(&self) -> bool {
+        self.mode().interlocks.abort_latched
+    }
+
+    /// Whether the flight is over: the vehicle lies on the ground and is judged, or was aborted on the pad.
+    pub fn is_over(&self) -> bool {
+        self.ground.is_over(self.computer())
+    }
+
+    /// The arming checks with the present values.
+    pub fn arming_checks(&self) -> Vec<Check> {
+        self.computer().arming_checks()
+    }
+
+    /// The touchdown, once the landing is judged.
+    pub fn judged(&self) -> Option<Judged> {
+        self.ground.judged()
+    }
+
+    /// The simulated radio: its silence and its delay.
+    pub fn radio(&self) -> Radio {
+        let radio = *self.sortie.radio();
+        Radio { silent: radio.silent || self.sortie.computer_is_dead(), ..radio }
+    }
+}
+
+// The events that a vehicle reports.
+
+/// An event that a vehicle reports.
+#[derive(Debug, Clone, PartialEq)]
+pub enum VehicleEvent {
+    /// A message to the crew.
+    Text {
+        severity: Severity,
+        text: String,
+    },
+    PhaseChanged {
+        from: Phase,
+        to: Phase,
+    },
+    /// The pilot took over a plan in this frame.
+    Planned {
+        /// The frame's number, from the release.
+        frame: u64,
+        /// Its time since the release, s.
+        time_s: f64,
+        /// From the frame that posed the plan, s.
+        took_s: f64,
+        /// Allowed, s.
+        deadline_s: f64,
+    },
+    /// The vehicle touched down and its landing was judged.
+    Verdict,
+}
+
+impl From<CrewMessage> for VehicleEvent {
+    fn from(news: CrewMessage) -> Self {
+        match news {
+            CrewMessage::Said { severity, words } => Self::Text { severity, text: words },
+            CrewMessage::PhaseChanged { from, to } => Self::PhaseChanged { from, to },
+        }
+    }
+}
+
+// What of a flight goes into its log beside its events.
+
+impl Vehicle {
+    /// The last frame of the flight computer, and what it starts from: before its first frame and behind its release. They
+    /// come before all others, so that a flight begins with the power-up of its computer.
+    pub fn computer_records(&self) -> Vec<Record> {
+        let Some(frame) = &self.computer_frame else { return Vec::new() };
+        let started = || Record::ComputerStart(Box::new(crate::wire::record::start(&self.sortie)));
+        let powered_up = (self.frames_decided == 1).then(started);
+        let released = frame.output.released.then(started);
+        powered_up.into_iter().chain([Record::ComputerFrame(frame.clone())]).chain(released).collect()
+    }
+
+    /// The other records of the last frame: in flight what the computer thought, and the truth.
+    pub fn records(&self) -> Vec<Record> {
+        if self.flown { crate::wire::record::thought_and_truth(&self.sortie) } else { Vec::new() }
+    }
+
+    /// The landing as a log's record, once it is judged. Its time counts from the release, as that of the frames.
+    pub fn verdict_record(&self) -> Option<v1::LandingVerdict> {
+        self.judged()?;
+        crate::wire::record::verdict(&self.sortie)
+    }
+}
+
+#[cfg(test)]
+mod tests;

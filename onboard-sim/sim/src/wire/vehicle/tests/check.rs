@@ -1,0 +1,327 @@
+//! The check that the crew asks for on the pad: what it finds, when it is refused, and what ends it.
+
+use crate::world::Fault;
+use flight::computer::pad_check::{CheckState, Item, Verdict};
+use flight::vehicle::mission::StartPoint;
+use proptest::prelude::*;
+
+use super::space::flight_of;
+use super::*;
+use crate::wire::fly::load_flight;
+
+fn on_the_pad(dispersion: &str, faults: &[&str]) -> Told {
+    Told::of(Vehicle::on_the_pad(&flight_of(dispersion, faults)).unwrap()).run_to(Phase::PadIdle)
+}
+
+fn failing(rocket: &Vehicle) -> Vec<Item> {
+    let findings = rocket.computer().pad_check().findings().iter();
+    findings.filter(|found| found.verdict == Verdict::NotOk).map(|found| found.item).collect()
+}
+
+fn state(rocket: &Vehicle) -> CheckState {
+    rocket.computer().pad_check().state()
+}
+
+/// Asks for a check and waits for its end.
+fn checked(rocket: &mut Told) -> Vec<VehicleEvent> {
+    assert_eq!(rocket.request(Asked::Check).ending, Ending::Accepted);
+    rocket.run_until(|rocket| state(rocket) != CheckState::Running)
+}
+
+/// Gimbal and fins are commanded to rest.
+fn rests(rocket: &Vehicle) -> bool {
+    let commands = rocket.computer().commands();
+    commands.gimbal_rad.iter().chain(&commands.fins_rad).all(|angle_rad| angle_rad.abs() < f64::MIN_POSITIVE)
+}
+
+#[test]
+fn every_built_in_mission_passes_its_check() {
+    for (name, _) in flight::vehicles::mission::BUILTIN {
+        for dispersion in ["none", "field", "real"] {
+            let mut flight = load_flight(name).unwrap();
+            flight.recipe.dispersion = crate::dispersion::Dispersion::builtin(dispersion).unwrap();
+            let mut rocket = Told::of(Vehicle::on_the_pad(&flight).unwrap());
+            rocket.run_until(|rocket| rocket.phase() == Phase::PadIdle);
+            let events = checked(&mut rocket);
+            let findings = rocket.computer().pad_check().findings();
+            assert_eq!(state(&rocket), CheckState::Passed, "{name}, {dispersion}: {findings:#?}");
+            assert!(said(&events, "check of the vehicle begins: gimbal and fins MOVE"));
+            assert!(said(&events, "check passed: 3"), "{events:?}");
+            assert!(rests(&rocket), "{name}");
+        }
+    }
+}
+
+/// Closed, it stands where it is told to: nothing but the check finds it before the flight.
+#[test]
+fn a_fin_that_stuck_after_the_self_test_is_found_and_named() {
+    let mut rocket = on_the_pad("field", &["fin-stuck:1@pad+1"]);
+    let since_s = rocket.time_s();
+    rocket.run_until(|rocket| rocket.time_s() > since_s + 2.0);
+    assert_eq!(rocket.state().checks_failed(), 0, "{:?}", rocket.arming_checks());
+    let events = checked(&mut rocket);
+    assert_eq!(state(&rocket), CheckState::Failed);
+    // Fin 2 is surface 3.
+    assert_eq!(failing(&rocket), [Item::Range(3), Item::Error(3), Item::Lag(3)]);
+    assert!(said(&events, "check FAILED: fin 2 range and 2 more"), "{events:?}");
+}
+
+/// Every wrong wiring of one or two surfaces: reversed ones, and swapped ones.
+fn wrong_wirings() -> Vec<Fault> {
+    let reversed = (0..6).map(|surface| Fault::Reversed { surface });
+    let swapped =
+        (0..6).flat_map(|one| (one + 1..6).map(move |other| Fault::Swapped { surfaces: [one, other] }));
+    reversed.chain(swapped).collect()
+}
+
+/// Servos that report where their surfaces are: a surface that moves otherwise than it is told is found and named.
+#[test]
+fn every_wrong_wiring_is_found_where_servos_tell() {
+    for wrong in wrong_wirings() {
+        let mut rocket = on_the_pad("none", &[]);
+        rocket.vehicle.sortie.world_mut().inject(&wrong);
+        checked(&mut rocket);
+        assert_eq!(state(&rocket), CheckState::Failed, "{wrong:?}");
+        let surfaces = match wrong {
+            Fault::Reversed { surface } => vec![surface],
+            Fault::Swapped { surfaces } => surfaces.to_vec(),
+            _ => vec![],
+        };
+        for surface in surfaces {
+            assert!(failing(&rocket).contains(&Item::Error(surface)), "{wrong:?}: {:?}", failing(&rocket));
+        }
+    }
+}
+
+/// What two people see in a check: how each surface stands whenever one is told to go somewhere. A fin is open (1) or closed
+/// (0); the nozzle swings towards the fins of one side (y, z), or hangs straight.
+fn seen_motions(rocket: &mut Told) -> Vec<([f64; 2], [f64; 4])> {
+    let mut seen: Vec<([f64; 2], [f64; 4])> = Vec::new();
+    rocket.request(Asked::Check);
+    rocket.run_until(|rocket| {
+        let ([pitch_rad, yaw_rad], fins_rad) =
+            (rocket.sortie.world().gimbal_rad(), rocket.sortie.world().fins_rad());
+        // The thrust is turned to (sin yaw, -sin pitch) in (y, z), and the nozzle's end goes the other way.
+        let side = |angle_rad: f64| if angle_rad.abs() < 0.1 { 0.0 } else { angle_rad.signum() };
+        let stands =
+            ([-side(yaw_rad), side(pitch_rad)], fins_rad.map(|fin_rad| f64::from(u8::from(fin_rad > 1.5))));
+        if seen.last() != Some(&stands) {
+            seen.push(stands);
+        }
+        state(rocket) != CheckState::Running
+    });
+    seen
+}
+
+/// The words of the crew's page as motions: the nozzle towards fins 1 and 4, 2 and 3, 1 and 2, 3 and 4; then each fin.
+fn motions_of_the_page() -> Vec<([f64; 2], [f64; 4])> {
+    let fins = flight::vehicles::airframe::builtin("mk3").unwrap().fin_model();
+    let towards = |one: usize, other: usize| {
+        let middle = [0, 1].map(|axis: usize| fins.outward(one)[axis] + fins.outward(other)[axis]);
+        middle.map(|part| if part.abs() < 1e-9 { 0.0 } else { part.signum() })
+    };
+    let rest = ([0.0; 2], [0.0; 4]);
+    let mut seen = vec![rest];
+    for sides in [[[1, 4], [2, 3]], [[1, 2], [3, 4]]] {
+        for [one, other] in sides {
+            seen.extend([(towards(one - 1, other - 1), [0.0; 4]), rest]);
+        }
+    }
+    for fin in 0..4 {
+        let mut open = [0.0; 4];
+        open[fin] = 1.0;
+        seen.extend([([0.0; 2], open), rest]);
+    }
+    seen
+}
+
+fn without_feedback() -> Told {
+    let mut flight = flight_of("none", &[]);
+    flight.recipe.mission.airframe.servos_tell = false;
+    let mut rocket = Told::of(Vehicle::on_the_pad(&flight).unwrap());
+    // Every check passes but one.
+    rocket.run_until(|rocket| {
+        rocket.phase() == Phase::PadIdle && rocket.state().checks_failed().is_power_of_two()
+    });
+    rocket
+}
+
+/// Servos that tell nothing: the positions are the commands, and pass whatever moves. Without the word of two people the vehicle
+/// is not armed, and what they see is not what the page says if any wire is wrong.
+#[test]
+fn without_feedback_two_people_see_every_wrong_wiring_and_nobody_arms_before() {
+    let mut rocket = without_feedback();
+    let refused = |rocket: &mut Told| rocket.request(Asked::Arm).reason.unwrap_or_default();
+    assert!(refused(&mut rocket).starts_with("fins answering: found servos that tell nothing, seen by 0"));
+    assert_eq!(rocket.request(Asked::Seen).reason.unwrap(), "no check with motion has passed");
+    assert_eq!(seen_motions(&mut rocket), motions_of_the_page());
+    assert_eq!(state(&rocket), CheckState::Passed);
+    let shown = |item| {
+        rocket.computer().pad_check().findings().iter().find(|found| found.item == item).unwrap().verdict
+    };
+    assert_eq!((shown(Item::Range(0)), shown(Item::Lag(5))), (Verdict::NotJudged, Verdict::NotJudged));
+    assert_eq!(rocket.request(Asked::Seen).ending, Ending::Accepted);
+    assert!(refused(&mut rocket).contains("seen by 1, required 2 people who saw"));
+    assert_eq!(rocket.request(Asked::Seen).ending, Ending::Accepted);
+    assert_eq!(rocket.request(Asked::Arm).ending, Ending::Accepted);
+    rocket.request(Asked::Disarm);
+    // Another check takes two people's words again.
+    checked(&mut rocket);
+    assert!(refused(&mut rocket).contains("seen by 0"));
+    for wrong in wrong_wirings() {
+        let mut rocket = without_feedback();
+        rocket.vehicle.sortie.world_mut().inject(&wrong);
+        assert_ne!(seen_motions(&mut rocket), motions_of_the_page(), "{wrong:?}");
+        assert_eq!(state(&rocket), CheckState::Passed, "{wrong:?}: nothing but eyes finds it");
+        assert!(refused(&mut rocket).contains("seen by 0"), "{wrong:?}");
+    }
+}
+
+#[test]
+fn a_failed_self_test_is_a_reason_to_look_closer() {
+    let mut rocket = Told::of(Vehicle::on_the_pad(&flight_of("none", &[])).unwrap());
+    rocket.vehicle.sortie.world_mut().inject(&Fault::FinStuck { fin: 2 });
+    let refused = rocket.request(Asked::Check);
+    assert_eq!(refused.ending, Ending::NotNow);
+    assert_eq!(refused.reason.unwrap(), "the self-test is not over");
+    rocket.run_until(|rocket| rocket.time_s() > 4.0);
+    assert_eq!(rocket.phase(), Phase::Safe);
+    checked(&mut rocket);
+    assert_eq!(failing(&rocket), [Item::Range(4), Item::Error(4), Item::Lag(4)]);
+}
+
+#[test]
+fn without_motion_everything_but_the_surfaces_is_checked() {
+    let mut rocket = on_the_pad("field", &[]);
+    assert_eq!(rocket.request(Asked::CheckStill).ending, Ending::Accepted);
+    rocket.run_until(|rocket| {
+        assert!(rests(rocket));
+        state(rocket) != CheckState::Running
+    });
+    assert_eq!(state(&rocket), CheckState::Passed);
+    // Eight of the sensors, five of switches, battery and log: mk2 starts at apogee, without a booster's wire.
+    assert_eq!(rocket.computer().pad_check().findings().len(), 13);
+}
+
+#[test]
+fn an_empty_battery_is_found_refuses_the_arming_and_is_told() {
+    let mut rocket = on_the_pad("none", &[]);
+    rocket.vehicle.sortie.set_battery(0.08);
+    checked(&mut rocket);
+    assert_eq!(failing(&rocket), [Item::BatteryVoltage]);
+    let refused = rocket.request(Asked::Arm);
+    let reason = refused.reason.unwrap();
+    assert!(reason.starts_with("battery: found 7.1") && reason.ends_with("at least 7.4 V"), "{reason}");
+    let battery = rocket.state().battery.unwrap();
+    let left = battery.left.is_some_and(|left| (left - 0.08).abs() < 0.01);
+    assert!(left && (7.0..7.4).contains(&battery.volts), "{battery:?}");
+}
+
+#[test]
+fn it_is_refused_with_the_reason_unless_disarmed_on_the_pad() {
+    let refused = |rocket: &mut Told| {
+        let answer = rocket.request(Asked::Check);
+        assert_eq!(answer.ending, Ending::NotNow);
+        assert!(rests(rocket) || !rocket.phase().on_pad());
+        answer.reason.unwrap()
+    };
+    let mut rocket = on_the_pad("none", &[]);
+    rocket.request(Asked::Arm);
+    assert_eq!(refused(&mut rocket), "armed: disarm first");
+    rocket.request(Asked::Start);
+    assert_eq!(refused(&mut rocket), "armed: disarm first");
+    rocket.run_until(|rocket| rocket.phase() == Phase::AeroDescent);
+    assert_eq!(refused(&mut rocket), "not on the pad");
+    let mut rocket = on_the_pad("none", &[]);
+    rocket.request(Asked::Abort);
+    assert_eq!(refused(&mut rocket), "an abort is latched: restart to clear it");
+}
+
+#[test]
+fn every_other_request_ends_it_and_an_arming_waits_for_the_surfaces() {
+    for asked in
+        [Asked::Arm, Asked::Start, Asked::Abort, Asked::Disarm, Asked::Hold, Asked::EndCheck, Asked::Seen]
+    {
+        let mut rocket = on_the_pad("none", &[]);
+        rocket.request(Asked::Check);
+        rocket.run_until(|rocket| rocket.computer().commands().gimbal_rad[0] > 0.1);
+        assert!(rocket.state().checks_failed() != 0, "not ready meanwhile");
+        let answer = rocket.request(asked);
+        assert_eq!(state(&rocket), CheckState::Stopped, "{asked:?}");
+        assert!(rests(&rocket), "{asked:?}");
+        assert!(!rocket.mode().interlocks.armed, "{asked:?}");
+        if asked == Asked::Arm {
+            assert_eq!(answer.ending, Ending::NotNow);
+            assert!(answer.reason.unwrap().starts_with("a check of the vehicle ran"));
+            let again = rocket.request(Asked::Arm).reason.unwrap();
+            assert!(again.starts_with("self-test: found a check of the vehicle runs"), "{again}");
+            let since_s = rocket.time_s();
+            rocket.run_until(|rocket| rocket.time_s() > since_s + 1.0);
+            assert_eq!(rocket.request(Asked::Arm).ending, Ending::Accepted);
+        }
+        if asked == Asked::Abort {
+            assert!(rocket.aborted());
+        }
+    }
+}
+
+#[test]
+fn a_lift_off_that_nobody_asked_for_ends_it() {
+    let mut flight = flight_of("none", &[]);
+    flight.recipe = flight.recipe.starting_at(StartPoint::Pad).unwrap();
+    flight.recipe.faults = vec!["ascent-self-lights@pad+6".parse().unwrap()];
+    let mut rocket = Told::of(Vehicle::on_the_pad(&flight).unwrap());
+    rocket.run_until(|rocket| rocket.time_s() > 6.0);
+    rocket.request(Asked::Check);
+    rocket.run_until(|rocket| !rocket.phase().on_pad());
+    assert_eq!(state(&rocket), CheckState::Stopped);
+}
+
+/// What may come, and after how many frames.
+fn requests() -> impl Strategy<Value = Vec<(Asked, u16)>> {
+    let asked = prop_oneof![
+        4 => Just(Asked::Check),
+        1 => Just(Asked::CheckStill),
+        1 => Just(Asked::EndCheck),
+        1 => Just(Asked::Seen),
+        2 => Just(Asked::Arm),
+        1 => Just(Asked::Start),
+        1 => Just(Asked::Disarm),
+        1 => Just(Asked::Hold),
+        1 => Just(Asked::Abort),
+    ];
+    prop::collection::vec((asked, 0..400_u16), 1..24)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
+
+    /// Whatever the crew asks for, and whenever: no check moves anything while the vehicle is armed, counts down, is
+    /// aborted or flies.
+    #[test]
+    fn no_check_moves_a_surface_of_an_armed_or_a_flying_vehicle(requests in requests()) {
+        let mut rocket = on_the_pad("none", &[]);
+        let mut next = requests.into_iter();
+        let (mut asked, mut wait) = next.next().unwrap();
+        for _ in 0..4_000 {
+            if wait == 0 {
+                rocket.request(asked);
+                match next.next() {
+                    Some(more) => (asked, wait) = more,
+                    None => break,
+                }
+            } else {
+                wait -= 1;
+                rocket.advance();
+            }
+            let mode = rocket.mode();
+            let may_move = mode.phase == Phase::PadIdle
+                && !mode.interlocks.armed
+                && !mode.interlocks.abort_latched
+                && mode.countdown_end_s.is_none();
+            let runs = state(&rocket) == CheckState::Running;
+            prop_assert!(may_move || !runs, "{:?}", rocket.mode());
+            prop_assert!(runs || rests(&rocket) || !mode.phase.on_pad(), "{:?}", rocket.mode());
+        }
+    }
+}

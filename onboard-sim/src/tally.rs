@@ -1,0 +1,236 @@
+//! Flies one flight of a campaign and collects the values of its row; and finds the ignition height of the simpler guidance
+//! laws before the flight.
+
+use flight::guidance::powered::ControlLevel;
+use flight::rules::phase::Phase;
+use flight::vehicle::mission::LegLimits;
+use ocp::Status;
+use sim::outcome::by_envelope;
+use sim::outside::{Outside, Unwatched, Watch};
+use sim::recipe::Recipe;
+use sim::sortie::{SetUpError, Sortie};
+use sim::world::{FirstContact, RestOutcome};
+
+use crate::attainable;
+use crate::row::Row;
+
+/// Fraction of the gimbal's travel from which a command counts as at its stop.
+const AT_STOP_SHARE: f64 = 0.999;
+/// By then the filter has seen most of the burn, and the plan can still use what it knows, s.
+const MOTOR_KNOWN_S: f64 = 3.0;
+
+/// A running flight, and the values collected for its row.
+pub struct Tally {
+    number: u64,
+    flight: Sortie,
+    gimbal_limit_rad: f64,
+    ignition: Option<AtIgnition>,
+    onset: Option<(f64, f64)>,
+    nees_of_motor: Option<f64>,
+    /// Sum over frames, and their number.
+    nees_of_motion: (f64, u32),
+    plans: [u64; ControlLevel::ALL.len()],
+    solver_iterations: u64,
+    solver_failures: u64,
+    burning_frames: u64,
+    saturated_frames: u64,
+}
+
+/// The state at the ignition command.
+struct AtIgnition {
+    chosen_onset_m: Option<f64>,
+    height_m: f64,
+    outside_gate: bool,
+}
+
+impl Tally {
+    /// Flight `number` of a recipe, before its release.
+    ///
+    /// # Errors
+    /// The flight cannot be set up.
+    pub fn new(recipe: &Recipe, number: u64) -> Result<Self, SetUpError> {
+        let mission = &recipe.mission;
+        Ok(Self {
+            number,
+            flight: Sortie::new(recipe, number)?,
+            gimbal_limit_rad: mission.airframe.gimbal.limit_rad(),
+            ignition: None,
+            onset: None,
+            nees_of_motor: None,
+            nees_of_motion: (0.0, 0),
+            plans: [0; ControlLevel::ALL.len()],
+            solver_iterations: 0,
+            solver_failures: 0,
+            burning_frames: 0,
+            saturated_frames: 0,
+        })
+    }
+
+    pub fn flight(&self) -> &Sortie {
+        &self.flight
+    }
+
+    /// The flight, for a caller that asks for an abort.
+    pub fn flight_mut(&mut self) -> &mut Sortie {
+        &mut self.flight
+    }
+
+    /// Flies one frame. Returns `false` when the flight is over.
+    pub fn step(&mut self) -> bool {
+        self.step_watched(&mut Unwatched)
+    }
+
+    /// Flies one frame, which somebody watches.
+    pub fn step_watched(&mut self, watch: &mut dyn Watch) -> bool {
+        let decided = self.flight.step_with(&Outside::NOBODY, watch);
+        self.count(decided.is_some_and(|output| output.planned));
+        self.flight.goes_on()
+    }
+
+    fn count(&mut self, planned: bool) {
+        let (flight, world) = (&self.flight, self.flight.world());
+        let pilot = flight.pilot();
+        if self.ignition.is_none() && pilot.ignited_at_s().is_some() {
+            self.ignition = Some(AtIgnition {
+                chosen_onset_m: pilot.prediction().ignition.chosen_m,
+                height_m: world.height_m(),
+                outside_gate: pilot.gate_refusal().is_some(),
+            });
+        }
+        if self.onset.is_none() && world.thrust_n() > 0.0 {
+            self.onset = Some((world.height_m(), world.state().velocity_m_s.z));
+        }
+        let burning_s = world.thrust_begins_s().map_or(-1.0, |begins_s| world.time_s() - begins_s);
+        if burning_s >= 0.0 && world.touchdown().is_none() {
+            if let Some(nees) = flight.nees_of_motion() {
+                self.nees_of_motion = (self.nees_of_motion.0 + nees, self.nees_of_motion.1 + 1);
+            }
+            if burning_s >= MOTOR_KNOWN_S && self.nees_of_motor.is_none() {
+                self.nees_of_motor = flight.nees_of_motor();
+            }
+        }
+        let computer = flight.computer();
+        let powered = computer.mode().phase == Phase::Powered && !flight.computer_is_dead();
+        if !powered || world.touchdown().is_some() {
+            return;
+        }
+        self.burning_frames += 1;
+        let stop_rad = AT_STOP_SHARE * self.gimbal_limit_rad;
+        self.saturated_frames +=
+            u64::from(computer.commands().gimbal_rad.iter().any(|angle| angle.abs() >= stop_rad));
+        if planned {
+            let report = pilot.report();
+            self.plans[usize::from(computer.level().index())] += 1;
+            self.solver_iterations += report.iterations as u64;
+            let solved = matches!(report.status, Status::Converged | Status::NotRun);
+            self.solver_failures += u64::from(!solved);
+        }
+    }
+
+    /// The row of the flight so far.
+    pub fn row(&self) -> Row {
+        let outcome = self.flight.outcome();
+        let (touchdown, landing) = (outcome.touchdown.as_ref(), outcome.landing);
+        let world = self.flight.world();
+        let errors = self.flight.largest_errors();
+        let drawn = self.flight.drawn();
+        let (truth, apogee) = (&drawn.truth, self.flight.fell_from());
+        let at = |read: fn(&FirstContact) -> f64| touchdown.map(read);
+        let plans = |level: ControlLevel| self.plans[usize::from(level.index())];
+        let ignition = self.ignition.as_ref();
+        let strain = outcome.rest.and_then(|rest| rest.strain);
+        let attainable = attainable::window(self.flight.mission(), drawn, apogee);
+        Row {
+            number: self.number,
+            impulse_scale: truth.impulse_scale,
+            burn_time_scale: truth.burn_time_scale,
+            ignition_delay_s: truth.ignition_delay_s,
+            thrust_misalignment_pitch_deg: truth.thrust_misalignment_rad[0].to_degrees(),
+            thrust_misalignment_yaw_deg: truth.thrust_misalignment_rad[1].to_degrees(),
+            mass_scale: truth.mass_scale,
+            drag_scale: truth.drag_scale,
+            cg_offset_y_m: truth.cg_offset_m[1],
+            cg_offset_z_m: truth.cg_offset_m[2],
+            wind_m_s: truth.wind_m_s,
+            wind_towards_deg: truth.wind_towards_rad.to_degrees(),
+            apogee_height_m: apogee.position_m.z,
+            apogee_distance_m: libm::hypot(apogee.position_m.x, apogee.position_m.y),
+            apogee_speed_m_s: libm::hypot(apogee.velocity_m_s.x, apogee.velocity_m_s.y),
+            apogee_tilt_deg: apogee.tilt_rad().to_degrees(),
+            apogee_rate_deg_s: libm::sqrt(apogee.rate_rad_s.norm_squared()).to_degrees(),
+            attainable_low_m: attainable.map(|window| window.low_m),
+            attainable_high_m: attainable.map(|window| window.high_m),
+            ignited: ignition.is_some(),
+            ignition_outside_gate: ignition.is_some_and(|ignition| ignition.outside_gate),
+            parachute: world.parachute_ejected(),
+            chosen_onset_height_m: ignition.and_then(|ignition| ignition.chosen_onset_m),
+            ignition_height_m: ignition.map(|ignition| ignition.height_m),
+            onset_height_m: self.onset.map(|(height_m, _)| height_m),
+            onset_vertical_m_s: self.onset.map(|(_, vertical_m_s)| vertical_m_s),
+            burn_time_at_contact_s: touchdown
+                .zip(world.thrust_begins_s())
+                .map(|(touchdown, begins_s)| touchdown.time_s - begins_s)
+                .filter(|burning_s| *burning_s >= 0.0),
+            touchdown_time_s: at(|touchdown| touchdown.time_s),
+            touchdown_vertical_m_s: at(|touchdown| touchdown.over_ground.vertical_m_s),
+            touchdown_lateral_m_s: at(|touchdown| touchdown.over_ground.lateral_m_s),
+            touchdown_tilt_deg: at(|touchdown| touchdown.over_ground.tilt_rad.to_degrees()),
+            touchdown_rate_deg_s: at(|touchdown| touchdown.over_ground.rate_rad_s.to_degrees()),
+            touchdown_x_m: at(|touchdown| touchdown.state.position_m.x),
+            touchdown_y_m: at(|touchdown| touchdown.state.position_m.y),
+            touchdown_thrust_over_weight: at(|touchdown| touchdown.thrust_n / touchdown.weight_n),
+            leg_use: touchdown.map(|contact| leg_use(&self.flight.mission().leg_limits, contact)),
+            stands: landing.stands,
+            upright: landing.upright,
+            envelope: landing.envelope,
+            table_2: landing.table_2,
+            failure: outcome.failure.map_or("", |failure| failure.name()).to_owned(),
+            rest: outcome.rest.map_or("", |rest| rest_name(rest.outcome)).to_owned(),
+            stroke_used: strain.map(|strain| strain.stroke_used),
+            strength_used: strain.map(|strain| strain.strength_used),
+            clearance_m: strain.map(|strain| strain.clearance_m),
+            leaned_deg: strain.map(|strain| strain.tilt_rad.to_degrees()),
+            phase: outcome.phase.name().to_owned(),
+            plans_converged: plans(ControlLevel::Converged),
+            plans_best_feasible: plans(ControlLevel::BestFeasible),
+            plans_shifted: plans(ControlLevel::ShiftedPlan),
+            plans_stabiliser: plans(ControlLevel::Stabiliser),
+            solver_iterations: self.solver_iterations,
+            solver_failures: self.solver_failures,
+            gimbal_saturation_share: self.saturated_frames as f64 / self.burning_frames.max(1) as f64,
+            error_vertical_m_s: errors.vertical_m_s,
+            error_lateral_m_s: errors.lateral_m_s,
+            error_height_m: errors.height_m,
+            error_nose_deg: errors.nose_rad.to_degrees(),
+            nees_of_motor: self.nees_of_motor,
+            nees_of_motion: (self.nees_of_motion.1 > 0)
+                .then(|| self.nees_of_motion.0 / f64::from(self.nees_of_motion.1)),
+            faults: self.flight.faults_happened(),
+            flight_time_s: world.rest().map_or_else(|| world.time_s(), |rest| rest.time_s),
+        }
+    }
+}
+
+/// The largest share of the legs' design envelope.
+fn leg_use(legs: &LegLimits, contact: &FirstContact) -> f64 {
+    let shares = by_envelope(legs, contact).results.map(|limit| limit.value.abs() / limit.highest);
+    shares.into_iter().fold(0.0, f64::max)
+}
+
+/// Flies a whole flight.
+///
+/// # Errors
+/// The flight cannot be set up.
+pub fn fly(recipe: &Recipe, number: u64) -> Result<Row, SetUpError> {
+    let mut tally = Tally::new(recipe, number)?;
+    while tally.step() {}
+    Ok(tally.row())
+}
+
+fn rest_name(rest: RestOutcome) -> &'static str {
+    match rest {
+        RestOutcome::Upright => "upright",
+        RestOutcome::TippedOver => "tipped over",
+        RestOutcome::BodyStrike => "body strike",
+    }
+}

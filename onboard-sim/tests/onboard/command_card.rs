@@ -1,0 +1,190 @@
+//! Tests the command lines of `check`, `card` and `hazard`: their answers, files and refusals, and that what they write is flown.
+#![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn run(directory: &Path, arguments: &[&str]) -> Output {
+    let program = env!("CARGO_BIN_EXE_onboard-sim");
+    Command::new(program).current_dir(directory).args(arguments).output().unwrap()
+}
+
+fn stdout(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn names(directory: &Path) -> Vec<String> {
+    let mut names: Vec<String> = fs::read_dir(directory)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    names
+}
+
+/// The built-in motor F10; its header is line 11.
+const F10: &str = include_str!("../../flight/vehicles/motors/Apogee_F10.eng");
+
+#[test]
+fn a_check_answers_with_its_worst_word_and_names_motors_that_cannot_be_used() {
+    let directory = tempfile::tempdir().unwrap();
+    let folder = directory.path().join("motors");
+    fs::create_dir(&folder).unwrap();
+    fs::write(folder.join("F10.eng"), F10).unwrap();
+    fs::write(folder.join("grams.eng"), F10.replace("0.0407 0.0841", "40.7 84.1")).unwrap();
+    let none = ["--flights", "0", "--from", "motors"];
+    let good = run(directory.path(), &[&["check", "mk3"], &none[..]].concat());
+    assert_eq!(good.status.code(), Some(0), "{}", stderr(&good));
+    let page = stdout(&good);
+    assert!(page.starts_with("mk3: 3.700 kg on HP-H45W") && !page.contains("flights"), "{page}");
+    let words = stderr(&good);
+    assert!(words.contains("grams.eng: line 11: propellant mass is '40.7 kg"), "{words}");
+    let mk3 = include_str!("../../flight/vehicles/missions/mk3.toml");
+    fs::write(directory.path().join("heavy.toml"), mk3.replace("loaded_kg = 3.7", "loaded_kg = 5.0"))
+        .unwrap();
+    let heavy = run(directory.path(), &[&["check", "heavy.toml"], &none[..]].concat());
+    assert_eq!(heavy.status.code(), Some(1), "{}", stderr(&heavy));
+    let page = stdout(&heavy);
+    assert!(page.contains("no    impulse    too heavy for its motor") && page.ends_with("\nno\n"), "{page}");
+    fs::write(directory.path().join("weak.toml"), mk3.replace("force_n = 90.0", "force_n = 10.0")).unwrap();
+    let weak = run(directory.path(), &["check", "weak.toml"]);
+    assert_eq!(weak.status.code(), Some(1));
+    assert!(stderr(&weak).contains("airframe.legs.crush.force_n = 10: must"), "{}", stderr(&weak));
+}
+
+#[test]
+fn a_folder_without_motors_and_a_wrong_value_are_named() {
+    let directory = tempfile::tempdir().unwrap();
+    let refused = |arguments: &[&str]| {
+        let output = run(directory.path(), arguments);
+        assert_ne!(output.status.code(), Some(0), "{arguments:?}");
+        stderr(&output)
+    };
+    assert!(
+        refused(&["check", "mk3", "--from", "."])
+            .contains(". holds no file that ends in .eng, .rse or .json")
+    );
+    assert!(refused(&["check", "mk3", "--from", "no.eng"]).contains("cannot read no.eng"));
+    fs::write(directory.path().join("list.json"), "{}").unwrap();
+    assert!(refused(&["check", "mk3", "--from", "list.json"]).contains("list.json: not a list of motors"));
+    assert!(refused(&["card", "--wind", "3,40"]).contains("--wind 40: must be 0 to 30 m/s"));
+    assert!(
+        refused(&["card", "--wind-from", "400"]).contains("`400` is not a direction of 0 to 360 degrees")
+    );
+    assert_eq!(names(directory.path()), ["list.json"]);
+}
+
+#[test]
+fn a_card_is_written_whole_shows_what_is_left_and_names_no_rate_of_two_flights() {
+    let directory = tempfile::tempdir().unwrap();
+    let few = ["--flights", "2", "--hazard-flights", "3"];
+    let arguments = [&["card", "--mission", "mk2", "--wind", "6,0", "--wind-from", "225"], &few[..]].concat();
+    let written = run(directory.path(), &arguments);
+    assert_eq!(written.status.code(), Some(0), "{}", stderr(&written));
+    let progress = stderr(&written);
+    assert!(progress.contains("12 of 12 flights\n"), "{progress}");
+    let card = directory.path().join("card");
+    assert_eq!(names(&card), ["card.html", "card.txt", "mission.toml"]);
+    let mission = fs::read_to_string(card.join("mission.toml")).unwrap();
+    assert_eq!(mission, include_str!("../../flight/vehicles/missions/mk2.toml"), "byte for byte");
+    let text = fs::read_to_string(card.join("card.txt")).unwrap();
+    for expected in [
+        "Range safety: mk2, mission ",
+        "no radius, no rate and no wind to fly in. Do not fly by this card.",
+        "--dispersion real --wind 0,6 --seed 1 --flights 2 --hazard-flights 3",
+        "landing motor lit ",
+        "Book of station 1 ______ : ______ - ",
+        "signature",
+        "Landing card: mk2, mission ",
+        "3.100 kg",
+        "Highest point above the pad",
+        "[ ] Weigh the vehicle",
+    ] {
+        assert!(text.contains(expected), "{expected} in\n{text}");
+    }
+    assert!(!text.contains(" of 2:") && !text.contains("kinder"), "{text}");
+    assert!(stdout(&written).starts_with(&text));
+    let html = fs::read_to_string(card.join("card.html")).unwrap();
+    assert!(html.contains("<td>3.100 kg</td>") && html.ends_with("</html>\n"), "{html}");
+
+    let again = run(directory.path(), &arguments);
+    assert_eq!(again.status.code(), Some(1));
+    assert!(stderr(&again).contains("card.html exists already; --force"), "{}", stderr(&again));
+}
+
+/// The station refuses a vehicle whose mission has another hash.
+#[test]
+fn the_mission_of_a_card_is_the_one_that_flies() {
+    let directory = tempfile::tempdir().unwrap();
+    for (name, mission) in flight::vehicles::mission::BUILTIN {
+        let few = ["--wind", "0", "--flights", "1", "--hazard-flights", "1", "--dispersion", "none"];
+        let card = [&["card", "--mission", name, "--out", name][..], &few].concat();
+        let written = run(directory.path(), &card);
+        assert_eq!(written.status.code(), Some(0), "{name}: {}", stderr(&written));
+        let file = |file: &str| fs::read_to_string(directory.path().join(name).join(file)).unwrap();
+        assert_eq!(file("mission.toml"), *mission, "{name}");
+        let hash = protocol::mission::MissionHash::of(mission).to_string();
+        assert!(file("card.txt").contains(&hash) && file("card.html").contains(&hash), "{name}");
+    }
+}
+
+#[test]
+fn the_help_has_an_example() {
+    let directory = tempfile::tempdir().unwrap();
+    let hazard = stdout(&run(directory.path(), &["hazard", "--help"]));
+    assert!(hazard.contains("[default: real]") && hazard.contains("Example: onboard-sim hazard"), "{hazard}");
+    for (command, set) in [("check mk3", "field"), ("card --mission mini-f10", "real")] {
+        let name = command.split(' ').next().unwrap();
+        let help = stdout(&run(directory.path(), &[name, "--help"]));
+        assert!(help.contains(&format!("Example: onboard-sim {command}")), "{help}");
+        assert!(help.contains(&format!("[default: {set}]")), "{help}");
+    }
+}
+
+/// What a person acts on says its set, and a set that may be kinder than `real` says that.
+#[test]
+fn where_a_vehicle_comes_down_is_told_with_set_flights_interval_and_rule() {
+    let directory = tempfile::tempdir().unwrap();
+    let few = ["hazard", "--profile", "vlr", "--wind", "0,4", "--flights", "1", "--hazard-flights", "2"];
+    let hazard = |more: &[&str]| run(directory.path(), &[&few, more].concat());
+    let written = hazard(&["--csv", "hazard.csv", "--svg", "hazard.svg"]);
+    assert_eq!(written.status.code(), Some(0), "{}", stderr(&written));
+    let text = stdout(&written);
+    for expected in [
+        "vlr from drone",
+        "Set `real`, seed 1",
+        "0 m/s",
+        "4 m/s: nobody within ",
+        "at least: too few flights",
+        "ballistic",
+        "model rocket",
+        "NAR Model Rocket Safety Code",
+    ] {
+        assert!(text.contains(expected), "{expected} in\n{text}");
+    }
+    let csv = fs::read_to_string(directory.path().join("hazard.csv")).unwrap();
+    assert!(
+        csv.starts_with(
+            "wind_m_s,way,flight,x_m,y_m,downwind_m,across_m,stands,upright,envelope,table_2\n0,as planned,0,"
+        ),
+        "{csv}"
+    );
+    let svg = fs::read_to_string(directory.path().join("hazard.svg")).unwrap();
+    for expected in [
+        "vlr: where it comes down",
+        "rule of NAR: 9 m",
+        "0 m/s: nobody within at least ",
+        "4 m/s: nobody within at least ",
+    ] {
+        assert!(svg.contains(expected), "{expected} in\n{svg}");
+    }
+    let again = hazard(&["--csv", "hazard.csv"]);
+    assert!(stderr(&again).contains("hazard.csv exists already; --force"), "{}", stderr(&again));
+    let kind = stdout(&hazard(&["--dispersion", "field"]));
+    assert!(kind.contains("Set `field`, which may be kinder than `real`, seed 1"), "{kind}");
+}

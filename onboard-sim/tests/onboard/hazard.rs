@@ -1,0 +1,115 @@
+//! Where flights come down that do not end on the pad.
+#![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
+
+use flight::rules::verdict::Landing;
+use flight::vehicle::mission::StartPoint;
+use onboard_sim::hazard::{Course, Flights, Impact, Radius, Way, fly, study, widest};
+use onboard_sim::run::threads;
+use sim::recipe::Recipe;
+use sim::sortie::Sortie;
+
+fn recipe(mission: &str, start: StartPoint) -> Recipe {
+    Recipe { seed: 31, ..Recipe::built_in(mission, "real").unwrap() }.starting_at(start).unwrap()
+}
+
+/// The fence of mk2 is 120 m. What the card once said of people outside of it was not true.
+#[test]
+fn a_flight_from_the_pad_that_ends_otherwise_comes_down_beyond_the_fence() {
+    let recipe = recipe("mk2", StartPoint::Pad);
+    let ways = Way::of(&recipe.mission);
+    let flights: Vec<Vec<Impact>> = (0..3).map(|number| fly(&recipe, &ways, number).unwrap()).collect();
+    for impacts in &flights {
+        assert_eq!(
+            impacts.iter().map(|impact| impact.way).collect::<Vec<_>>(),
+            ways,
+            "every way, in its order"
+        );
+        assert!(impacts.iter().all(|impact| impact.place_m.is_some()), "{impacts:?}");
+        let landed = impacts.iter().filter(|impact| impact.landing.stands);
+        let may_land = [Way::AsPlanned, Way::AbortTooLow, Way::AbortUnderThrust];
+        assert!(landed.clone().all(|impact| may_land.contains(&impact.way)), "{impacts:?}");
+    }
+    let farthest_m = |way: Way| {
+        let of_way = flights.iter().flatten().filter(|impact| impact.way == way);
+        of_way.map(Impact::distance_m).fold(0.0, f64::max)
+    };
+    for way in [Way::AbortInAscent, Way::NoSeparation, Way::Uncommanded] {
+        assert!(farthest_m(way) > 120.0, "{way:?} {} m", farthest_m(way));
+    }
+    assert!(farthest_m(Way::AsPlanned) < 120.0);
+}
+
+/// The study holds the fins and moves the world alone once the parachute is out. A flight with its computer to the end
+/// comes down at the same place, to the bit; and an abort in the boost where one in the coast does.
+#[test]
+fn under_the_parachute_the_computer_changes_nothing() {
+    let recipe = recipe("mk2", StartPoint::Pad);
+    let flown = |fault: &str| {
+        let faults = vec![fault.parse().unwrap()];
+        let mut flight = Sortie::new(&Recipe { faults, ..recipe.clone() }, 1).unwrap();
+        while flight.world().rest().is_none() {
+            flight.step();
+        }
+        let place_m = flight.world().state().position_m;
+        Some([place_m.x, place_m.y])
+    };
+    let found = fly(&recipe, &[Way::AbortInAscent, Way::NoSeparation], 1).unwrap();
+    let [aborted, stays_on] = [0, 1].map(|place: usize| found[place].place_m);
+    assert_eq!([aborted, aborted], [flown("abort@boost+0.5"), flown("abort@coast+2")]);
+    assert_eq!(stays_on, flown("separation-fails@0"));
+}
+
+#[test]
+fn the_widest_way_is_flown_more_often_and_on_any_number_of_threads_alike() {
+    let recipe = recipe("mk2", StartPoint::Apogee);
+    let study = || study(&recipe, Flights { survey: 1, of_widest: 3 }, &|_, _| {}).unwrap();
+    let flown = |jobs| threads(Some(jobs)).unwrap().install(study);
+    let alone = flown(1);
+    assert_eq!(alone, flown(2));
+    // A parachute drifts with the wind; what falls without one does not.
+    let (way, radius) = widest(&alone).unwrap();
+    // From the apogee or a moment after it: which of the two reaches further is decided by metres.
+    assert!(matches!(way, Way::ParachuteFromApogee | Way::AbortInDescent), "{way:?}");
+    assert_eq!(radius.flights, 3);
+    let falls = Radius::of_way(&alone, Way::Ballistic).unwrap();
+    assert!(falls.flights == 1 && falls.farthest_m < radius.farthest_m, "{falls:?}");
+}
+
+/// The wind of each flight blows to another side. Whatever it is, a parachute drifts with it.
+#[test]
+fn a_parachute_drifts_downwind_whatever_the_direction_of_the_wind() {
+    let mut recipe = recipe("mk2", StartPoint::Pad);
+    recipe.dispersion.wind_m_s = [8.0; 2];
+    let mut quarters = [false; 4];
+    for number in 0..8 {
+        let impact = fly(&recipe, &[Way::Uncommanded], number).unwrap()[0];
+        let [along_m, left_m] = impact.in_wind_m().unwrap();
+        assert!(along_m > 150.0 && left_m.abs() < 0.6 * along_m, "{number}: {along_m} {left_m}");
+        quarters[(impact.downwind_rad / core::f64::consts::FRAC_PI_2) as usize % 4] = true;
+    }
+    assert!(quarters.iter().filter(|seen| **seen).count() >= 3, "{quarters:?}");
+}
+
+/// The wind blows to +y: 10 m there is 10 m downwind, and -x is left of it.
+#[test]
+fn val_hand_a_place_downwind_and_left_of_it() {
+    let impact = Impact {
+        way: Way::AsPlanned,
+        number: 0,
+        place_m: Some([-3.0, 10.0]),
+        downwind_rad: core::f64::consts::FRAC_PI_2,
+        landing: Landing::default(),
+        course: Course::default(),
+    };
+    let [along_m, left_m] = impact.in_wind_m().unwrap();
+    assert!((along_m - 10.0).abs() < 1e-12 && (left_m - 3.0).abs() < 1e-12, "{along_m} {left_m}");
+    assert_eq!(Impact { place_m: None, ..impact }.in_wind_m(), None);
+}
+
+#[test]
+fn without_a_booster_nothing_of_one_is_asked() {
+    let apogee = Way::of(&recipe("mk2", StartPoint::Apogee).mission);
+    assert!(!apogee.contains(&Way::AbortInAscent) && apogee.contains(&Way::ParachuteFromApogee));
+    let drone = Way::of(&recipe("vlr", StartPoint::Drone).mission);
+    assert!(!drone.contains(&Way::ParachuteFromApogee) && drone.contains(&Way::Ballistic));
+}

@@ -1,0 +1,16 @@
+//! The command line, and the library of campaigns behind it.
+
+mod aborted;
+mod attainable;
+mod bar;
+mod campaign;
+mod card;
+mod check;
+mod command_campaign;
+mod command_card;
+mod command_fly_log;
+mod faults;
+mod findings;
+mod hazard;
+mod own_vehicles;
+mod unbraked;
