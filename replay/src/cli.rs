@@ -6,9 +6,11 @@ use std::path::Path;
 
 use anyhow::{Context as _, Result, ensure};
 use onboard_sim::run::threads;
+use serde::Serialize;
 
 use crate::log::{Cut, Gap, Recording};
 use crate::output::write_whole;
+use crate::print::{print_json, shown};
 
 /// The answer is no: the controller decides differently from the record, or flights differ by more than is tolerated.
 const EXIT_NO: u8 = 1;
@@ -16,6 +18,7 @@ const EXIT_NO: u8 = 1;
 pub const EXIT_NO_ANSWER: u8 = 2;
 
 /// How an answer turned out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
     /// There is an answer.
     Given,
@@ -34,76 +37,78 @@ impl Outcome {
             Self::NotAll => EXIT_NO_ANSWER,
         }
     }
-}
 
-/// Passes text on without what steers a terminal: text of a log or a file name is only shown.
-pub(crate) struct Shown<W> {
-    output: W,
-    /// The first byte of a character that may be a control character.
-    held: bool,
-}
-
-/// In UTF-8, the control characters from U+0080 to U+009F are this byte and one of 80 to 9f.
-const HIGH_CONTROL: u8 = 0xc2;
-const REPLACEMENT: &[u8] = "\u{fffd}".as_bytes();
-
-impl<W: Write> Shown<W> {
-    fn new(output: W) -> Self {
-        Self { output, held: false }
-    }
-
-    fn release(&mut self) -> io::Result<()> {
-        if std::mem::take(&mut self.held) { self.output.write_all(&[HIGH_CONTROL]) } else { Ok(()) }
+    /// The worse of two: a no, then what could not be answered.
+    #[must_use]
+    pub fn or_worse(self, other: Self) -> Self {
+        let rank = |outcome: Self| match outcome.exit_code() {
+            EXIT_NO => 2,
+            EXIT_NO_ANSWER => 1,
+            _ => 0,
+        };
+        if rank(other) > rank(self) { other } else { self }
     }
 }
 
-impl<W: Write> Write for Shown<W> {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        for byte in bytes {
-            if self.held && (0x80..0xa0).contains(byte) {
-                self.held = false;
-                self.output.write_all(REPLACEMENT)?;
-                continue;
+/// What a command has found: data for programs, sentences for people.
+pub trait Answer: Serialize {
+    /// What it says, a line each.
+    fn sentences(&self) -> Vec<String>;
+
+    fn outcome(&self) -> Outcome {
+        Outcome::Given
+    }
+}
+
+/// Of several answers the worst decides. Those of more than a line stand apart.
+impl<A: Answer> Answer for Vec<A> {
+    fn sentences(&self) -> Vec<String> {
+        let mut lines = Vec::new();
+        for said in self.iter().map(Answer::sentences) {
+            if said.len() > 1 && !lines.is_empty() {
+                lines.push(String::new());
             }
-            self.release()?;
-            match byte {
-                &HIGH_CONTROL => self.held = true,
-                b'\n' | b'\t' => self.output.write_all(&[*byte])?,
-                0..=0x1f | 0x7f => self.output.write_all(REPLACEMENT)?,
-                _ => self.output.write_all(&[*byte])?,
-            }
+            lines.extend(said);
         }
-        Ok(bytes.len())
+        lines
     }
 
-    fn flush(&mut self) -> io::Result<()> {
-        self.release()?;
-        self.output.flush()
+    fn outcome(&self) -> Outcome {
+        self.iter().map(Answer::outcome).fold(Outcome::Given, Outcome::or_worse)
     }
+}
+
+/// Prints an answer.
+pub(crate) fn give(found: &impl Answer, json: bool) -> Result<Outcome> {
+    answer(|output| match json {
+        true => print_json(found, output),
+        false => found.sentences().iter().try_for_each(|line| writeln!(output, "{}", shown(line))),
+    })?;
+    Ok(found.outcome())
 }
 
 /// Writes an answer to standard output. A reader that closes the pipe early is not an error.
-pub(crate) fn answer(
-    write: impl FnOnce(&mut Shown<io::BufWriter<io::StdoutLock<'static>>>) -> io::Result<()>,
-) -> Result<()> {
-    let mut output = Shown::new(io::BufWriter::new(io::stdout().lock()));
-    match write(&mut output).and_then(|()| output.flush()) {
+pub(crate) fn answer(write: impl FnOnce(&mut Vec<u8>) -> io::Result<()>) -> Result<()> {
+    let mut text = Vec::new();
+    write(&mut text)?;
+    let mut output = io::stdout().lock();
+    match output.write_all(harmless(&text).as_bytes()).and_then(|()| output.flush()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error).context("standard output"),
         _ => Ok(()),
     }
+}
+
+/// Text without what steers a terminal: text of a log or a file name is only shown.
+fn harmless(text: &[u8]) -> String {
+    let steers = |c: &char| c.is_control() && !matches!(c, '\n' | '\t');
+    let text = String::from_utf8_lossy(text);
+    text.chars().map(|c| if steers(&c) { char::REPLACEMENT_CHARACTER } else { c }).collect()
 }
 
 /// Writes a new file; an existing one is kept.
 pub(crate) fn write_new(path: &Path, text: &str) -> Result<()> {
     refuse_existing(path)?;
     Ok(write_whole(path.into(), Path::new(""), |file| file.write_all(text.as_bytes()))?)
-}
-
-/// Writes a table into a new file; an existing one is kept.
-pub(crate) fn write_table(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<()> {
-    let mut table = Vec::new();
-    write(&mut table)?;
-    write_new(path, std::str::from_utf8(&table)?)
 }
 
 /// Refuses a path where a file is, before the work for it is done.
@@ -129,8 +134,7 @@ pub(crate) fn text_of(name: &str, builtin: &[(&str, &str)], what: &str) -> Resul
 
 /// Writes a line to standard error; a closed standard error is ignored.
 pub fn say(text: &str) {
-    let mut output = Shown::new(io::stderr());
-    let _ = writeln!(output, "replay: {text}").and_then(|()| output.flush());
+    let _ = writeln!(io::stderr(), "replay: {}", harmless(text.as_bytes()));
 }
 
 /// Warns about damage, a missing end of the flight and missing frames.
@@ -170,16 +174,8 @@ mod tests {
 
     #[test]
     fn nothing_that_steers_a_terminal_is_shown() {
-        let text = "grün\tand\n\u{1b}[2J \u{9b}2J \u{7f}\u{8}\r§\u{c2}";
-        for length in [1, 2, 3, 100] {
-            let mut output = Shown::new(Vec::new());
-            for piece in text.as_bytes().chunks(length) {
-                output.write_all(piece).unwrap();
-            }
-            output.flush().unwrap();
-            let said = String::from_utf8(output.output).unwrap();
-            let r = char::REPLACEMENT_CHARACTER;
-            assert_eq!(said, format!("grün\tand\n{r}[2J {r}2J {r}{r}{r}§\u{c2}"));
-        }
+        let text = "grün\tand\n\u{1b}[2J \u{9b}2J \u{7f}\u{8}\r§\u{85}";
+        let r = char::REPLACEMENT_CHARACTER;
+        assert_eq!(harmless(text.as_bytes()), format!("grün\tand\n{r}[2J {r}2J {r}{r}{r}§{r}"));
     }
 }

@@ -6,7 +6,6 @@
 //! message is kept unchanged or not at all.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
@@ -18,10 +17,10 @@ use protocol::log::record::{
 };
 use serde::Serialize;
 
-use crate::cli::{Outcome, answer};
+use crate::cli::{Answer, Outcome, give};
 use crate::log::{Clock, ClockTime, Clocks, Entry, FlightLog, LogError, Moment, heard_message};
 use crate::output::{Destination, Overwrite, WriteError};
-use crate::print::{counted, print_json, shown};
+use crate::print::counted;
 use crate::recover::scan::Records;
 use crate::recover::write::{Kept, Rescue};
 
@@ -117,16 +116,12 @@ pub fn cut<'a>(
         }
         is_kept
     };
-    let mut rescue = Rescue::create(destination, input, &contents.told, &mut keeps)?;
-    for piece in &contents.good {
-        let body = records.body(piece.at)?;
-        rescue.keep(piece.opcode, &body)?;
-    }
+    let rescue = Rescue::of::<CutError>(destination, input, (&mut records, &contents), &mut keeps)?;
     let Kept { messages, left_out, .. } = rescue.kept();
     if messages == 0 {
         // A topic may have a channel a link.
         let topics: BTreeSet<String> =
-            contents.told.channels.into_values().map(|channel| channel.topic).collect();
+            contents.told.channels.values().map(|channel| channel.topic.clone()).collect();
         return Err(CutError::Nothing { name, topics: topics.into_iter().collect() });
     }
     let facts = BTreeMap::from([(CUT_FROM.to_owned(), words_of(&name, wanted))]);
@@ -196,32 +191,26 @@ fn span_ns(input: &Path, wanted: &Wanted) -> Result<(u64, u64), CutError> {
     Ok((at_ns(wanted.from, frames_ns[0], 0)?, at_ns(wanted.until, frames_ns[1], u64::MAX)?))
 }
 
-/// Writes what was kept, and what can still be proven, as text.
-///
-/// # Errors
-/// The output failed.
-pub fn print_cut(cut: &CutOut, output: &mut impl Write) -> io::Result<()> {
-    let CutOut { messages, left_out, chained, .. } = cut;
-    writeln!(
-        output,
-        "{}: kept {}, left out {left_out}; written to {}",
-        shown(&cut.input),
-        counted(*messages, "message"),
-        cut.output.display()
-    )?;
-    if *chained > 0 {
-        writeln!(output, "{chained} of them are older than the span: what comes later hangs on them")?;
+impl Answer for CutOut {
+    fn sentences(&self) -> Vec<String> {
+        let Self { input, output, messages, left_out, chained, .. } = self;
+        let (messages, output) = (counted(*messages, "message"), output.display());
+        let mut lines = vec![format!("{input}: kept {messages}, left out {left_out}; written to {output}")];
+        if *chained > 0 {
+            lines.push(format!("{chained} of them are older than the span: what comes later hangs on them"));
+        }
+        let verified = if self.can_be_verified {
+            "`replay verify` runs the flight computer again, from its beginning to where this log ends"
+        } else {
+            "`replay verify` CANNOT run it again: the flight computer's start or its frames are not in it"
+        };
+        lines.push(verified.to_owned());
+        if self.has_book {
+            let proven = "`replay verify --book` proves the book up to its last signed end in this log";
+            lines.push(proven.to_owned());
+        }
+        lines
     }
-    let verified = if cut.can_be_verified {
-        "`replay verify` runs the flight computer again, from its beginning to where this log ends"
-    } else {
-        "`replay verify` CANNOT run it again: the flight computer's start or its frames are not in it"
-    };
-    writeln!(output, "{verified}")?;
-    if cut.has_book {
-        writeln!(output, "`replay verify --book` proves the book up to its last signed end in this log")?;
-    }
-    Ok(())
 }
 
 #[derive(Debug, clap::Args)]
@@ -253,8 +242,6 @@ impl Args {
     pub(crate) fn run(self) -> Result<Outcome> {
         let destination = Destination { path: &self.output, overwrite: Overwrite::if_forced(self.force) };
         let wanted = Wanted { from: self.from, until: self.until, topics: self.topics };
-        let cut = cut(&self.file, &wanted, destination)?;
-        answer(|output| if self.json { print_json(&cut, output) } else { print_cut(&cut, output) })?;
-        Ok(Outcome::Given)
+        give(&cut(&self.file, &wanted, destination)?, self.json)
     }
 }

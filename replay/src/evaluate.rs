@@ -5,18 +5,18 @@
 //! for the [closed loop](mod@crate::refly). For example, a flight computer that lights its motor earlier than in flight
 //! measures no thrust until the recorded ignition.
 
-use std::io::{self, Write};
 use std::path::PathBuf;
 
 use anyhow::Result;
 use serde::Serialize;
 
-use crate::cli::{Outcome, answer, refuse_existing, warn_of_what_is_missing, write_table};
+use crate::cli::{Answer, Outcome, give, refuse_existing, warn_of_what_is_missing, write_new};
 pub use crate::controller::Decided;
 use crate::controller::{FrameError, LoggedComputer, phase_name};
 use crate::log::{Recording, RecordingError};
-use crate::print::{print_json, shown};
+use crate::print::columns;
 use crate::settings::{Setting, SettingArguments, SettingError};
+use crate::verify::explain::degrees;
 
 /// Sections that a flight computer never sees: the limits of the verdict, and the random draw.
 const NOT_THE_PILOTS: [&str; 2] = ["leg_limits.", "truth."];
@@ -262,129 +262,123 @@ fn phases(frames: &[EvaluatedFrame]) -> Vec<PhaseEntered> {
 /// Most differing frames that are shown.
 const FRAMES_SHOWN: usize = 120;
 
-/// Writes an evaluation as text: the summary, then the frames that differ.
-///
-/// # Errors
-/// The output failed.
-pub fn print_evaluate(report: &EvaluateReport, output: &mut impl Write) -> io::Result<()> {
-    writeln!(output, "{}: {}", shown(&report.file), report.kind)?;
-    if !report.settings.is_empty() {
-        writeln!(output, "with {}", shown(&report.settings.join(" ")))?;
-    }
-    if report.unchanged_different > 0 {
-        writeln!(
-            output,
-            "with nothing changed this build decides {} of {} frames differently from the record",
-            report.unchanged_different,
-            report.frames.len()
-        )?;
-    }
-    let largest =
-        report.gimbal_difference_max_frame.map(|frame| format!(" at frame {frame}")).unwrap_or_default();
-    writeln!(
-        output,
-        "{} of {} gimbal commands differ: root mean square {:.3} deg in the landing, largest {:.3} deg{largest}",
-        report.commands_different,
-        report.frames.len(),
-        report.gimbal_difference_rms_rad.to_degrees(),
-        report.gimbal_difference_max_rad.to_degrees()
-    )?;
-    writeln!(
-        output,
-        "fin commands differ by {:.3} deg at most; {} frames are decided by another level",
-        report.fins_difference_max_rad.to_degrees(),
-        report.levels_different
-    )?;
-    for PhaseEntered { phase, recorded_s, evaluated_s } in &report.phases {
-        if recorded_s != evaluated_s {
-            let at = |time_s: Option<f64>| {
-                time_s.map_or_else(|| "never".to_owned(), |time_s| format!("at {time_s:.3} s"))
-            };
-            writeln!(output, "{phase}: entered {} -> {}", at(*recorded_s), at(*evaluated_s))?;
+impl Answer for EvaluateReport {
+    /// The summary, then the frames that differ.
+    fn sentences(&self) -> Vec<String> {
+        let Self { file, kind, unchanged_different, commands_different, frames_compared, .. } = self;
+        let (settings, compared) = (self.settings.join(" "), frames_compared);
+        let mut lines = vec![format!("{file}: {kind}")];
+        if !settings.is_empty() {
+            lines.push(format!("with {settings}"));
         }
+        if *unchanged_different > 0 {
+            lines.push(format!(
+                "with nothing changed this build decides {unchanged_different} of {compared} frames differently from the record"
+            ));
+        }
+        let [rms_deg, largest_deg, fins_deg] =
+            [self.gimbal_difference_rms_rad, self.gimbal_difference_max_rad, self.fins_difference_max_rad]
+                .map(f64::to_degrees);
+        let at = self.gimbal_difference_max_frame.map(|frame| format!(" at frame {frame}"));
+        lines.push(format!(
+            "{commands_different} of {compared} gimbal commands differ: root mean square {rms_deg:.3} deg in the landing, largest \
+             {largest_deg:.3} deg{}",
+            at.unwrap_or_default()
+        ));
+        lines.push(format!(
+            "fin commands differ by {fins_deg:.3} deg at most; {} frames are decided by another level",
+            self.levels_different
+        ));
+        let at = |time_s: Option<f64>| {
+            time_s.map_or_else(|| "never".to_owned(), |time_s| format!("at {time_s:.3} s"))
+        };
+        let entered = self.phases.iter().filter(|phase| phase.recorded_s != phase.evaluated_s);
+        lines.extend(entered.map(|PhaseEntered { phase, recorded_s, evaluated_s }| {
+            format!("{phase}: entered {} -> {}", at(*recorded_s), at(*evaluated_s))
+        }));
+        let differing: Vec<&EvaluatedFrame> =
+            self.frames.iter().filter(|frame| frame.recorded != frame.evaluated).collect();
+        if !settings.is_empty() && !self.a_command_differs() {
+            let what = if differing.is_empty() { "did not act" } else { "changed plans only" };
+            lines.push(format!("no command differs: {settings} {what} in this flight"));
+        }
+        if differing.is_empty() {
+            return lines;
+        }
+        // Thousands of frames hardly differ.
+        let stride = differing.len().div_ceil(FRAMES_SHOWN).max(1);
+        if stride > 1 {
+            lines.push(format!("one of {stride} differing frames; --csv FILE writes all:"));
+        }
+        let head = ["frame", "time s", "phase", "gimbal deg", "cost", "iterations", "plan lands", ""];
+        let rows = differing.into_iter().step_by(stride).map(EvaluatedFrame::row);
+        let rows = std::iter::once(head.map(str::to_owned)).chain(rows);
+        lines.extend(columns(['>', '>', '<', '>', '>', '>', '>', '<'], rows));
+        lines
     }
-    let differing: Vec<&EvaluatedFrame> =
-        report.frames.iter().filter(|frame| frame.recorded != frame.evaluated).collect();
-    if !report.settings.is_empty() && !report.a_command_differs() {
-        let what = if differing.is_empty() { "did not act" } else { "changed plans only" };
-        writeln!(output, "no command differs: {} {what} in this flight", shown(&report.settings.join(" ")))?;
-    }
-    if differing.is_empty() {
-        return Ok(());
-    }
-    // Text shows planning frames only, because the others hardly differ; --csv has all 200 frames a second.
-    let stride = differing.len().div_ceil(FRAMES_SHOWN).max(1);
-    if stride > 1 {
-        writeln!(output, "one of {stride} differing frames; --csv FILE writes all:")?;
-    }
-    writeln!(
-        output,
-        "{:>5} {:>9} {:<12} {:>34} {:>22} {:>13}  plan lands",
-        "frame", "time s", "phase", "gimbal deg", "cost", "iterations"
-    )?;
-    for frame in differing.into_iter().step_by(stride) {
-        let (then, now) = (&frame.recorded, &frame.evaluated);
-        let levels = if then.level == now.level {
+}
+
+impl EvaluatedFrame {
+    fn row(&self) -> [String; 8] {
+        let both =
+            |of: &dyn Fn(&Decided) -> String| format!("{} -> {}", of(&self.recorded), of(&self.evaluated));
+        let level = if self.recorded.level == self.evaluated.level {
             String::new()
         } else {
-            format!("  {} -> {}", then.level, now.level)
+            both(&|decided| decided.level.to_owned())
         };
-        writeln!(
-            output,
-            "{:>5} {:>9.3} {:<12} {:>15} -> {:>15} {:>9.2} -> {:>9.2} {:>5} -> {:>4}   {} -> {}{levels}",
-            frame.frame,
-            frame.time_s,
-            frame.phase,
-            angles(&then.gimbal_rad),
-            angles(&now.gimbal_rad),
-            then.cost,
-            now.cost,
-            then.iterations,
-            now.iterations,
-            yes_no(then.plan_lands),
-            yes_no(now.plan_lands),
-        )?;
+        [
+            self.frame.to_string(),
+            format!("{:.3}", self.time_s),
+            self.phase.to_owned(),
+            both(&|decided| degrees(&decided.gimbal_rad, 3)),
+            both(&|decided| format!("{:.2}", decided.cost)),
+            both(&|decided| decided.iterations.to_string()),
+            both(&|decided| yes_no(decided.plan_lands).to_owned()),
+            level,
+        ]
     }
-    Ok(())
 }
 
-/// Writes every frame of an evaluation as CSV.
-///
-/// # Errors
-/// The output failed.
-pub fn write_evaluate_csv(report: &EvaluateReport, output: &mut dyn Write) -> io::Result<()> {
-    let lists = report
+/// Every frame of an evaluation as CSV.
+fn csv_of(report: &EvaluateReport) -> Result<String> {
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    let angles = |name: &str, angles: &[f64]| -> Vec<String> {
+        // A single angle has no index in its name.
+        if angles.len() == 1 {
+            vec![name.to_owned()]
+        } else {
+            (0..angles.len()).map(|k| format!("{name}_{k}")).collect()
+        }
+    };
+    let mut columns = vec!["frame".to_owned(), "time_s".to_owned()];
+    for (side, Decided { gimbal_rad, fins_rad, .. }) in report
         .frames
         .first()
-        .map_or((0, 0), |frame| (frame.recorded.gimbal_rad.len(), frame.recorded.fins_rad.len()));
-    let mut columns = vec!["frame".to_owned(), "time_s".to_owned()];
-    for side in ["recorded", "evaluated"] {
+        .into_iter()
+        .flat_map(|first| [("recorded", &first.recorded), ("evaluated", &first.evaluated)])
+    {
         columns.extend(["phase", "level", "cost", "iterations"].map(|name| format!("{side}_{name}")));
-        // A single gimbal angle has no index in its name.
-        let gimbal = (0..lists.0).map(|axis| match lists.0 {
-            1 => format!("{side}_gimbal_rad"),
-            _ => format!("{side}_gimbal_rad_{axis}"),
-        });
-        columns.extend(gimbal);
-        columns.extend((0..lists.1).map(|fin| format!("{side}_fins_rad_{fin}")));
+        columns.extend(angles(&format!("{side}_gimbal_rad"), gimbal_rad));
+        columns.extend((0..fins_rad.len()).map(|fin| format!("{side}_fins_rad_{fin}")));
     }
-    writeln!(output, "{}", columns.join(","))?;
+    csv.write_record(columns)?;
     for frame in &report.frames {
         let mut cells = vec![frame.frame.to_string(), format!("{:?}", frame.time_s)];
-        for decided in [&frame.recorded, &frame.evaluated] {
-            let Decided { gimbal_rad, fins_rad, phase, level, cost, iterations, plan_lands: _ } = decided;
-            cells.extend([(*phase).to_owned(), (*level).to_owned()]);
-            cells.extend([format!("{cost:?}"), iterations.to_string()]);
+        for Decided { gimbal_rad, fins_rad, phase, level, cost, iterations, .. } in
+            [&frame.recorded, &frame.evaluated]
+        {
+            cells.extend([
+                (*phase).to_owned(),
+                (*level).to_owned(),
+                format!("{cost:?}"),
+                iterations.to_string(),
+            ]);
             cells.extend(gimbal_rad.iter().chain(fins_rad).map(|angle| format!("{angle:?}")));
         }
-        writeln!(output, "{}", cells.join(","))?;
+        csv.write_record(cells)?;
     }
-    Ok(())
-}
-
-/// One angle, or pitch and yaw.
-fn angles(rad: &[f64]) -> String {
-    rad.iter().map(|rad| format!("{:.3}", rad.to_degrees())).collect::<Vec<_>>().join(" ")
+    Ok(String::from_utf8(csv.into_inner()?)?)
 }
 
 fn yes_no(answer: Option<bool>) -> &'static str {
@@ -416,11 +410,8 @@ impl Args {
         self.csv.as_deref().map_or(Ok(()), refuse_existing)?;
         let report = evaluate(&recording, &self.settings.all()?)?;
         if let Some(path) = &self.csv {
-            write_table(path, |output| write_evaluate_csv(&report, output))?;
+            write_new(path, &csv_of(&report)?)?;
         }
-        answer(
-            |output| if self.json { print_json(&report, output) } else { print_evaluate(&report, output) },
-        )?;
-        Ok(Outcome::Given)
+        give(&report, self.json)
     }
 }

@@ -28,47 +28,55 @@ pub(crate) fn counted(count: u64, noun: &str) -> String {
     if count == 1 { format!("1 {noun}") } else { format!("{count} {noun}s") }
 }
 
-/// One limit in both verdicts.
-pub(crate) struct LimitRow<'a> {
-    pub(crate) limit: &'a VerdictLimit,
-    /// Each verdict's value with its unit, marked if outside.
-    pub(crate) values: [String; 2],
-}
-
-/// A verdict in short; `none` if there is none.
-pub(crate) fn verdict_words(verdict: Option<&VerdictFacts>, none: &str) -> String {
-    match verdict {
-        None => none.to_owned(),
-        Some(verdict) => format!("{} at {}", verdict.landing.word(), verdict.contact()),
-    }
-}
-
-/// The limits of `named`, then those that only one verdict has, with the values of both. `shown` escapes text for the
-/// output; `outside` marks a value outside its limit.
-pub(crate) fn verdict_rows<'a>(
-    named: Option<&'a VerdictFacts>,
-    both: [Option<&'a VerdictFacts>; 2],
-    shown: fn(&str) -> String,
-    outside: &str,
-) -> Vec<LimitRow<'a>> {
-    let value = |verdict: Option<&VerdictFacts>, name: &str| {
-        let found = verdict.and_then(|verdict| verdict.of_the_legs().find(|limit| limit.name == name));
-        found.map_or_else(
-            || "-".to_owned(),
-            |found| {
-                let mark = if found.passed { "" } else { outside };
-                format!("{:.4} {}{mark}", found.value, shown(&found.unit))
-            },
-        )
+/// Rows as lines of columns, each as wide as its widest cell: a column begins at the left (`<`) or ends at the right (`>`).
+pub(crate) fn columns<const N: usize>(
+    sides: [char; N],
+    rows: impl IntoIterator<Item = [String; N]>,
+) -> Vec<String> {
+    let rows: Vec<[String; N]> = rows.into_iter().collect();
+    let widths: [usize; N] =
+        std::array::from_fn(|place| rows.iter().map(|row| row[place].chars().count()).max().unwrap_or(0));
+    let line = |row: &[String; N]| {
+        let cells = row.iter().zip(widths).zip(sides).map(|((cell, width), side)| match side {
+            '<' => format!("{cell:<width$}"),
+            _ => format!("{cell:>width$}"),
+        });
+        cells.collect::<Vec<_>>().join("  ").trim_end().to_owned()
     };
+    rows.iter().map(line).collect()
+}
+
+/// Two verdicts beside each other, and every limit that one of them has.
+pub(crate) fn verdict_table(names: [&str; 2], both: [Option<&VerdictFacts>; 2]) -> Vec<String> {
+    let words = both.map(|verdict| {
+        verdict.map_or_else(
+            || "no verdict".to_owned(),
+            |verdict| format!("{} at {}", verdict.landing.word(), verdict.contact()),
+        )
+    });
     let mut limits: Vec<&VerdictLimit> = Vec::new();
-    for limit in named.into_iter().chain(both.into_iter().flatten()).flat_map(VerdictFacts::of_the_legs) {
+    for limit in both.into_iter().rev().flatten().flat_map(VerdictFacts::of_the_legs) {
         if !limits.iter().any(|known| known.name == limit.name) {
             limits.push(limit);
         }
     }
-    limits
-        .into_iter()
-        .map(|limit| LimitRow { limit, values: both.map(|verdict| value(verdict, &limit.name)) })
-        .collect()
+    let row = |limit: &VerdictLimit| {
+        let [first, second] = both.map(|verdict| {
+            let found =
+                verdict.and_then(|verdict| verdict.of_the_legs().find(|found| found.name == limit.name));
+            found.map_or_else(
+                || "-".to_owned(),
+                |VerdictLimit { value, unit, passed, .. }| {
+                    format!("{value:.4} {unit}{}", if *passed { "" } else { " OUTSIDE" })
+                        .trim_end()
+                        .to_owned()
+                },
+            )
+        });
+        [limit.name.clone(), first, second, format!("{:.4} to {:.4}", limit.minimum, limit.maximum)]
+    };
+    let ([first, second], [then, now]) = (names.map(str::to_owned), words);
+    let head = [String::new(), first, second, "limit".to_owned()];
+    let verdict = ["verdict".to_owned(), then, now, String::new()];
+    columns(['<', '>', '>', '<'], [head, verdict].into_iter().chain(limits.into_iter().map(row)))
 }

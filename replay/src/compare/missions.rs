@@ -1,15 +1,14 @@
 //! Compares missions: every setting that only one of two has, or that has another value, with the airframe's.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::io::{self, Write};
 use std::path::Path;
 
 use anyhow::{Result, ensure};
 use flight::vehicles::mission::BUILTIN;
 use serde::Serialize;
 
-use crate::cli::text_of;
-use crate::print::{counted, shown};
+use crate::cli::{Answer, Outcome, text_of};
+use crate::print::{columns, counted};
 use crate::settings::{SettingError, settings_of_mission};
 
 /// A setting in which two missions differ; `None`: it is not in that text, and has its default or means nothing there.
@@ -78,24 +77,25 @@ pub(crate) fn compared(
     Ok(MissionComparison { same: keys.len() - differences.len(), baseline, other, differences })
 }
 
-/// Writes the settings that differ as text.
-///
-/// # Errors
-/// The output failed.
-pub(super) fn print_missions(comparisons: &[MissionComparison], output: &mut impl Write) -> io::Result<()> {
-    for MissionComparison { baseline, other, same, differences } in comparisons {
-        let (baseline, other) = (shown(baseline), shown(other));
-        let count = counted(differences.len() as u64, "setting");
+impl Answer for MissionComparison {
+    fn sentences(&self) -> Vec<String> {
+        let Self { baseline, other, same, differences } = self;
         if differences.is_empty() {
-            writeln!(output, "{other} is the same mission as {baseline}: {same} settings")?;
-            continue;
+            return vec![format!("{other} is the same mission as {baseline}: {same} settings")];
         }
-        writeln!(output, "{other} differs from {baseline} in {count}; {same} are the same")?;
-        let width = differences.iter().map(|difference| difference.setting.len()).max().unwrap_or(0);
-        for SettingDifference { setting, baseline, other } in differences {
-            let value = |value: &Option<String>| value.as_ref().map_or("-".to_owned(), |value| shown(value));
-            writeln!(output, "  {setting:<width$}  {} -> {}", value(baseline), value(other))?;
-        }
+        let count = counted(differences.len() as u64, "setting");
+        let mut lines = vec![format!("{other} differs from {baseline} in {count}; {same} are the same")];
+        let value = |value: &Option<String>| value.clone().unwrap_or_else(|| "-".to_owned());
+        lines.extend(columns(
+            ['<', '<'],
+            differences.iter().map(|SettingDifference { setting, baseline, other }| {
+                [format!("  {setting}"), format!("{} -> {}", value(baseline), value(other))]
+            }),
+        ));
+        lines
     }
-    Ok(())
+
+    fn outcome(&self) -> Outcome {
+        Outcome::Decided { yes: self.differences.is_empty() }
+    }
 }

@@ -2,8 +2,8 @@
 //!
 //! Every number of both logs becomes a signal, named as in [`table`](crate::table) (`computer_frame.output.…`). The
 //! second flight is shifted so that the chosen event of both flights coincides. It is then read at the times of the
-//! first flight: linear between samples, whole numbers held. Measured solve times are not signals. Samples that only
-//! one flight has are counted separately, because interpolation would hide a lost record.
+//! first flight: linear between samples, whole numbers held. Measured solve times are not signals. A signal with more samples
+//! in one of the two differs, because interpolation would hide a lost record.
 //!
 //! Tables of words (events, limits) are compared row by row, without times.
 //!
@@ -22,17 +22,14 @@ use anyhow::{Context as _, Result, ensure};
 use clap::ValueEnum;
 pub(crate) use missions::compared;
 pub use missions::{MissionComparison, SettingDifference};
-use missions::{compare_missions, is_mission, print_missions};
-pub use print::print_compare;
+use missions::{compare_missions, is_mission};
 use serde::Serialize;
-pub use series::{Align, Anchors, Flown, Samples, Series};
+pub use series::{Align, Anchors, Flown, Series};
 pub use tolerance::SignalDifference;
 pub use tolerance::{Tolerance, ToleranceError, Tolerances};
 
-use crate::cli::{Outcome, answer, warn_of_cut, warn_of_damage};
-use crate::log::RecordingError;
-use crate::log::VerdictFacts;
-use crate::print::print_json;
+use crate::cli::{Outcome, give, warn_of_cut, warn_of_damage};
+use crate::log::{RecordingError, VerdictFacts};
 
 /// Why flights cannot be compared.
 #[derive(Debug, thiserror::Error)]
@@ -94,7 +91,7 @@ pub struct WordsOfOne {
 impl Comparison {
     /// Number of signals that are equal in every bit.
     pub fn identical(&self) -> usize {
-        self.signals.iter().filter(|signal| signal.max == 0.0 && !signal.not_comparable).count()
+        self.signals.iter().filter(|signal| signal.is_identical()).count()
     }
 
     /// Number of tables whose signals both flights have.
@@ -142,7 +139,6 @@ pub fn compare(
         }
     }
     let mut failures = tolerances.record_failures([baseline, other]);
-    failures.extend(samples_failures(&signals, tolerances));
     failures.extend(signals.iter().filter_map(SignalDifference::failure));
     signals.sort_by(|a, b| (a.passed, &a.signal).cmp(&(b.passed, &b.signal)));
     failures.extend(tolerances.count_failures(missing.len(), added.len()));
@@ -198,30 +194,6 @@ fn words_of_one(baseline: &Flown, other: &Flown) -> Vec<WordsOfOne> {
     found
 }
 
-/// Samples missing or added beyond the tolerance: one line for each table, for the signal with the most of them.
-fn samples_failures(signals: &[SignalDifference], tolerances: &Tolerances) -> Vec<String> {
-    let mut worst: BTreeMap<(&str, bool), (usize, String)> = BTreeMap::new();
-    for signal in signals {
-        let (table, samples) = (table_of(&signal.signal), signal.samples_of_both);
-        let (missing, added) = tolerances.samples_of(&signal.signal);
-        let all = samples.expected - samples.missing + samples.added;
-        for (word, share, limit, count, of) in [
-            ("missing", samples.missing_share(), missing, samples.missing, samples.expected),
-            ("added", samples.added_share(), added, samples.added, all),
-        ] {
-            let known = worst.get(&(table, word == "added")).map_or(0, |(count, _)| *count);
-            if share > limit && count > known {
-                let words = format!(
-                    "{table}: {count} of {of} samples are {word} (tolerated {} %)",
-                    libm::round(1e6 * limit) / 1e4
-                );
-                worst.insert((table, word == "added"), (count, words));
-            }
-        }
-    }
-    worst.into_values().map(|(_, words)| words).collect()
-}
-
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// The flight to compare with, or a mission (built-in or a TOML file).
@@ -236,9 +208,8 @@ pub(crate) struct Args {
     ///
     /// [signals."NAME"] with rms and max in the signal's own unit; a * at the end of NAME matches any rest. Before
     /// that: `verdict = false` lets the verdicts differ; `missing = N` and `added = N` allow this many signals that
-    /// only one flight has; `samples_missing = SHARE` and `samples_added = SHARE` allow this share of each signal's
-    /// samples (also possible for one signal, after its max); `damaged = true` allows logs that are damaged or end
-    /// before their flight did. Anything left out is not tolerated.
+    /// only one flight has; `damaged = true` allows logs that are damaged or end before their flight did. Anything left
+    /// out is not tolerated.
     #[arg(long, value_name = "FILE")]
     tolerances: Option<PathBuf>,
     /// Answer in JSON.
@@ -274,25 +245,13 @@ impl Args {
             };
             comparisons.push(compare(&baseline, &other, align, &tolerances)?);
         }
-        answer(|output| {
-            if self.json { print_json(&comparisons, output) } else { print_compare(&comparisons, output) }
-        })?;
-        let within = |comparison: &Comparison| comparison.failures.is_empty();
-        Ok(Outcome::Decided { yes: comparisons.iter().all(within) })
+        give(&comparisons, self.json)
     }
-}
 
-impl Args {
     fn missions(&self) -> Result<Outcome> {
         ensure!(self.tolerances.is_none(), "missions are compared without tolerances");
         let others: Vec<&Path> = self.others.iter().map(PathBuf::as_path).collect();
-        let compared = compare_missions(&self.baseline, &others)?;
-        answer(
-            |output| {
-                if self.json { print_json(&compared, output) } else { print_missions(&compared, output) }
-            },
-        )?;
-        Ok(Outcome::Decided { yes: compared.iter().all(|one| one.differences.is_empty()) })
+        give(&compare_missions(&self.baseline, &others)?, self.json)
     }
 }
 

@@ -4,8 +4,6 @@
 //! verdict = true          # the verdicts must agree; the default
 //! missing = 0             # signals of the baseline that the other may lack; none if left out
 //! added = 0               # additional signals that the other may have; none if left out
-//! samples_missing = 0.01  # share of a signal's samples that the other may lack; none if left out
-//! samples_added = 0.01    # share of the other's samples that the baseline may lack; none if left out
 //! damaged = true          # damaged logs, and logs that end before their flight did, may be compared; not if left out
 //!
 //! [signals."vehicle_truth3d.state.position_m.x"]
@@ -20,7 +18,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Flown, Samples, Series};
+use super::{Flown, Series};
 
 /// How much one signal may differ, in its own unit.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize)]
@@ -30,10 +28,6 @@ pub struct Tolerance {
     pub rms: Option<f64>,
     /// Largest difference.
     pub max: Option<f64>,
-    /// Share of the baseline's samples that the other may lack.
-    pub samples_missing: Option<f64>,
-    /// Share of the other's samples that the baseline may lack.
-    pub samples_added: Option<f64>,
 }
 
 /// How much two flights may differ.
@@ -43,8 +37,6 @@ pub struct Tolerances {
     verdict: Option<bool>,
     missing: Option<usize>,
     added: Option<usize>,
-    samples_missing: Option<f64>,
-    samples_added: Option<f64>,
     #[serde(default)]
     damaged: bool,
     #[serde(default)]
@@ -69,9 +61,6 @@ pub enum ToleranceError {
         /// The signal with the most similar name.
         nearest: String,
     },
-    /// A share outside 0 to 1.
-    #[error("{given} = {found}: must be a share from 0 to 1")]
-    Share { given: String, found: f64 },
     /// A limit that no signal can meet.
     #[error("tolerance of `{given}`: {found} must be a number, 0 or more")]
     Value {
@@ -91,17 +80,7 @@ impl Tolerances {
             origin: origin.to_owned(),
             reason: error.to_string(),
         })?;
-        let shares = |of: &str, missing: Option<f64>, added: Option<f64>| {
-            for (name, share) in [("samples_missing", missing), ("samples_added", added)] {
-                if let Some(found) = share.filter(|share| !(0.0..=1.0).contains(share)) {
-                    return Err(ToleranceError::Share { given: format!("{of}{name}"), found });
-                }
-            }
-            Ok(())
-        };
-        shares("", tolerances.samples_missing, tolerances.samples_added)?;
         for (given, tolerance) in &tolerances.signals {
-            shares(&format!("{given}: "), tolerance.samples_missing, tolerance.samples_added)?;
             let limits = tolerance.rms.into_iter().chain(tolerance.max);
             for found in limits {
                 if found.is_nan() || found < 0.0 {
@@ -133,13 +112,6 @@ impl Tolerances {
             failures.push(format!("{} added (tolerated {limit})", signals_are(added)));
         }
         failures
-    }
-
-    /// Shares of a signal's samples that may be missing and added.
-    pub(super) fn samples_of(&self, signal: &str) -> (f64, f64) {
-        let own = self.of(signal).unwrap_or_default();
-        let limit = |own: Option<f64>, all: Option<f64>| own.or(all).unwrap_or(0.0);
-        (limit(own.samples_missing, self.samples_missing), limit(own.samples_added, self.samples_added))
     }
 
     /// Parts of the flights that were not compared because of damage or a missing end.
@@ -203,9 +175,8 @@ pub struct SignalDifference {
     pub samples: usize,
     /// Times of the baseline at which the other has no value.
     pub samples_outside: usize,
-    /// Samples that only one of the two has.
-    #[serde(flatten)]
-    pub samples_of_both: Samples,
+    /// All samples of the baseline and of the other.
+    pub samples_of: [usize; 2],
     /// Root mean square of the difference, in the signal's unit.
     pub rms: f64,
     /// The largest difference.
@@ -232,7 +203,7 @@ impl SignalDifference {
             signal: signal.to_owned(),
             samples: 0,
             samples_outside: 0,
-            samples_of_both: Samples::of(a, b, shift_s),
+            samples_of: [a.times_s.len(), b.times_s.len()],
             rms: 0.0,
             max: 0.0,
             max_at_s: None,
@@ -271,6 +242,12 @@ impl SignalDifference {
                 && within(found.max, tolerance.max)
         });
         found
+    }
+
+    /// Whether both flights have the same samples.
+    pub(super) fn is_identical(&self) -> bool {
+        let [ours, theirs] = self.samples_of;
+        self.max == 0.0 && !self.not_comparable && self.passed && ours == theirs
     }
 
     /// Why the difference is not tolerated, in words.

@@ -1,30 +1,21 @@
 //! Writes the content of a log in the formats of other programs.
 //!
 //! * [`export_tables`]: CSV or Parquet, one file a table; see [`table`](crate::table).
-//! * [`export_tlog`]: the raw MAVLink frames as a `.tlog`, which ground stations play back.
-//! * [`write_frames`]: the stream that a board reads, and the answers that it should give.
 //!
 //! A separate program exports to Rerun, because Rerun costs more to compile than all the rest.
 
-mod frames;
 mod tables;
-mod tlog;
 
-use std::io;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use anyhow::{Context as _, Result, bail, ensure};
 use clap::ValueEnum;
-pub use frames::{FramesError, write_frames};
 pub use tables::{ExportedFile, TableFormat, export_tables};
-pub use tlog::{ExportedTlog, export_tlog};
 
-use crate::cli::{Outcome, answer, warn_of_damage};
-use crate::log::{FlightLog, LogError, import_tlog, is_tlog};
+use crate::cli::{Answer, Outcome, give, warn_of_damage};
+use crate::log::{FlightLog, ImportedTlog, LogError, import_tlog, is_tlog};
 use crate::output::{Destination, Overwrite, WriteError};
-use crate::print::print_json;
-use serde::Serialize;
 
 /// Why a log could not be exported.
 #[derive(Debug, thiserror::Error)]
@@ -34,15 +25,6 @@ pub enum ExportError {
     Log(#[from] LogError),
     #[error(transparent)]
     Write(#[from] WriteError),
-    /// The log has no such content.
-    #[error("{name}: has {found}; {wanted}")]
-    Nothing {
-        /// The log.
-        name: String,
-        /// What the log has.
-        found: String,
-        wanted: String,
-    },
 }
 
 #[derive(Debug, clap::Args)]
@@ -52,8 +34,8 @@ pub(crate) struct Args {
     /// The format; a .tlog becomes a log.
     #[arg(long, value_enum)]
     to: Option<Format>,
-    /// Output: a directory for csv and parquet (one file for each table) and for frames, otherwise a file; of a .tlog its
-    /// name with .mcap if left out.
+    /// Output: a directory for csv and parquet (one file for each table), otherwise a file; of a .tlog its name with .mcap
+    /// if left out.
     #[arg(long, short, value_name = "PATH")]
     output: Option<PathBuf>,
     /// Replace existing files.
@@ -70,12 +52,8 @@ enum Format {
     Csv,
     /// Apache Parquet.
     Parquet,
-    /// Raw MAVLink frames, for ground stations.
-    Tlog,
     /// Rerun; a separate program writes it.
     Rrd,
-    /// The frames that `board fly` reads, and the answers recorded to them, as the files frames and recorded.
-    Frames,
     /// A log, of a .tlog.
     Mcap,
 }
@@ -84,70 +62,24 @@ impl Args {
     pub(crate) fn run(self) -> Result<Outcome> {
         let is_tlog = is_tlog(&self.file).with_context(|| self.file.display().to_string())?;
         let format = self.to.or(is_tlog.then_some(Format::Mcap));
-        let format = format.context("--to is missing: csv, parquet, tlog, rrd or frames")?;
+        let format = format.context("--to is missing: csv, parquet or rrd")?;
         let output = self.output.clone().or_else(|| is_tlog.then(|| self.file.with_extension("mcap")));
         let output = output.context("--output is missing: where to write")?;
         let destination = Destination { path: &output, overwrite: Overwrite::if_forced(self.force) };
         match format {
             Format::Csv => self.tables(TableFormat::Csv, destination),
             Format::Parquet => self.tables(TableFormat::Parquet, destination),
-            Format::Tlog => self.tlog(destination),
             Format::Rrd => self.rerun(&output),
-            Format::Frames => {
-                let written = write_frames(&self.file, destination)?;
-                self.answer(&written, |output| writeln!(output, "{written} frames"))
-            }
-            Format::Mcap => self.log(destination),
+            Format::Mcap => give(&import_tlog(&self.file, destination)?, self.json),
         }
-    }
-
-    fn answer(
-        &self,
-        written: &impl Serialize,
-        words: impl FnOnce(&mut dyn io::Write) -> io::Result<()>,
-    ) -> Result<Outcome> {
-        answer(|output| if self.json { print_json(written, output) } else { words(output) })?;
-        Ok(Outcome::Given)
     }
 
     fn tables(&self, format: TableFormat, destination: Destination) -> Result<Outcome> {
         let mut log = FlightLog::open(&self.file)?;
         let files = export_tables(&mut log, format, destination)?;
-        self.answer(&files, |output| {
-            files.iter().try_for_each(|file| {
-                writeln!(output, "{}: {} rows of {} columns", file.path.display(), file.rows, file.columns)
-            })
-        })?;
+        let outcome = give(&files, self.json)?;
         warn_of_damage(log.name(), log.damage().map(ToString::to_string).as_deref());
-        Ok(Outcome::Given)
-    }
-
-    fn tlog(&self, destination: Destination) -> Result<Outcome> {
-        let open = || FlightLog::open(&self.file);
-        let written = export_tlog(&open, None, destination)?;
-        self.answer(&written, |output| {
-            let path = destination.path.display();
-            let (received, sent) = (written.received, written.sent);
-            writeln!(output, "{path}: {received} frames received and {sent} sent by the {}", written.endpoint)
-        })?;
-        warn_of_damage(&self.file.display().to_string(), written.damage.as_deref());
-        Ok(Outcome::Given)
-    }
-
-    fn log(&self, destination: Destination) -> Result<Outcome> {
-        let imported = import_tlog(&self.file, destination)?;
-        self.answer(&imported, |output| {
-            writeln!(
-                output,
-                "{}: {} frames, {} of them not understood, and {} records of telemetry; left out: {} frames of MAVLink 1, {} bytes of no frame",
-                destination.path.display(),
-                imported.frames,
-                imported.not_understood,
-                imported.telemetry,
-                imported.mavlink1,
-                imported.garbage_bytes
-            )
-        })
+        Ok(outcome)
     }
 
     /// Rerun costs more to compile than all the rest, so a separate program does this export. If it was built, it lies
@@ -171,5 +103,22 @@ impl Args {
             .with_context(|| format!("{}", program.display()))?;
         ensure!(status.success(), "{}: the export to Rerun failed ({status})", self.file.display());
         Ok(Outcome::Given)
+    }
+}
+
+impl Answer for ExportedFile {
+    fn sentences(&self) -> Vec<String> {
+        vec![format!("{}: {} rows of {} columns", self.path.display(), self.rows, self.columns)]
+    }
+}
+
+impl Answer for ImportedTlog {
+    fn sentences(&self) -> Vec<String> {
+        let Self { output, frames, not_understood, telemetry, mavlink1, garbage_bytes } = self;
+        vec![format!(
+            "{}: {frames} frames, {not_understood} of them not understood, and {telemetry} records of telemetry; left out: \
+             {mavlink1} frames of MAVLink 1, {garbage_bytes} bytes of no frame",
+            output.display()
+        )]
     }
 }

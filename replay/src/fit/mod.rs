@@ -28,7 +28,7 @@ mod turning;
 mod wind;
 
 use std::collections::BTreeMap;
-use std::io::{self, Write};
+use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
@@ -44,10 +44,10 @@ use self::calibration::{Calibration, Table};
 use self::day::Learnt;
 use self::least_squares::Solution;
 pub use self::trace::{Frame, Trace, TraceError};
-use crate::cli::{Outcome, answer, say, text_of, warn_of_damage};
+use crate::cli::{Answer, Outcome, give, say, text_of, warn_of_damage};
 use crate::info::utc;
 use crate::output::{Destination, Overwrite, write_whole};
-use crate::print::{counted, print_json, shown};
+use crate::print::counted;
 use crate::settings::{Setting, SettingError, mission_toml_with_reasons, mission_with};
 
 /// 97.5 % point of the normal distribution.
@@ -467,70 +467,53 @@ pub struct FitReport {
     pub day: Option<Learnt>,
 }
 
-/// Writes fits as text.
-///
-/// # Errors
-/// The output failed.
-pub fn print_fit(report: &FitReport, output: &mut impl Write) -> io::Result<()> {
-    for (place, fit) in report.fits.iter().enumerate() {
-        if place > 0 {
-            writeln!(output)?;
+impl Answer for FitReport {
+    fn sentences(&self) -> Vec<String> {
+        let mut said = self.fits.sentences();
+        if !self.together.is_empty() {
+            let logs = counted(self.fits.len() as u64, "log");
+            said.push(String::new());
+            said.push(format!(
+                "together, {logs}: mean with its 95 % interval, and scatter from one to the next"
+            ));
         }
-        print_one(fit, output)?;
-    }
-    if !report.together.is_empty() {
-        let logs = counted(report.fits.len() as u64, "log");
-        writeln!(
-            output,
-            "\ntogether, {logs}: mean with its 95 % interval, and scatter from one to the next"
-        )?;
-    }
-    for Pooled { mean, flights, scatter } in &report.together {
-        let scatter = digits(*scatter, mean.sigma);
-        writeln!(output, "  {}   scatter {scatter} in {flights}", line(mean))?;
-    }
-    match &report.day {
-        Some(day) => {
-            writeln!(output)?;
-            day::print_learn(day, output)
+        said.extend(self.together.iter().map(|Pooled { mean, flights, scatter }| {
+            format!("  {}   scatter {} in {flights}", line(mean), digits(*scatter, mean.sigma))
+        }));
+        if let Some(day) = &self.day {
+            said.push(String::new());
+            said.extend(day.sentences());
         }
-        None => Ok(()),
+        said
+    }
+
+    fn outcome(&self) -> Outcome {
+        let go = self.day.as_ref().and_then(|day| day.go);
+        go.map_or(Outcome::Given, |yes| Outcome::Decided { yes })
     }
 }
 
-fn print_one(fit: &Fit, output: &mut impl Write) -> io::Result<()> {
-    let mission = if fit.mission.is_empty() { "a test stand" } else { &fit.mission };
-    writeln!(output, "{}: {} with {}", shown(&fit.source), shown(mission), shown(&fit.motor))?;
-    writeln!(output, "95 % intervals, {}", fit.widened())?;
-    for parameter in &fit.found {
-        writeln!(output, "  {}", line(parameter))?;
-    }
-    for (title, lacks) in [
-        ("not calibrated: the interval is that of the noise alone", &fit.not_calibrated),
-        ("not found", &fit.not_found),
-    ] {
-        if !lacks.is_empty() {
-            writeln!(output, "{title}")?;
+impl Answer for Fit {
+    fn sentences(&self) -> Vec<String> {
+        let Self { source, mission, motor, .. } = self;
+        let mission = if mission.is_empty() { "a test stand" } else { mission };
+        let mut said =
+            vec![format!("{source}: {mission} with {motor}"), format!("95 % intervals, {}", self.widened())];
+        said.extend(self.found.iter().map(|parameter| format!("  {}", line(parameter))));
+        for (title, lacks) in [
+            ("not calibrated: the interval is that of the noise alone", &self.not_calibrated),
+            ("not found", &self.not_found),
+        ] {
+            said.extend(lacks.first().map(|_| title.to_owned()));
+            said.extend(lacks.iter().map(|NotFound { name, reason }| format!("  {name}: {reason}")));
         }
-        for lack in lacks {
-            writeln!(output, "  {}: {}", shown(&lack.name), shown(&lack.reason))?;
-        }
+        said
     }
-    Ok(())
 }
 
-fn line(parameter: &Parameter) -> String {
-    let Parameter { name, unit, value, sigma, low, high, .. } = parameter;
-    let number = |value: f64| digits(value, *sigma);
-    let text = format!(
-        "{:<28} {:>10}   {:>10} to {:<10} {}",
-        shown(name),
-        number(*value),
-        number(*low),
-        number(*high),
-        shown(unit)
-    );
-    text.trim_end().to_owned()
+fn line(Parameter { name, unit, value, sigma, low, high, .. }: &Parameter) -> String {
+    let [value, low, high] = [value, low, high].map(|number| digits(*number, *sigma));
+    format!("{name:<28} {value:>10}   {low:>10} to {high:<10} {unit}").trim_end().to_owned()
 }
 
 /// A number to two digits of its standard deviation.
@@ -602,12 +585,8 @@ impl Args {
         }
         let day = self.day.is_asked().then(|| self.day.learn(&fits, flown)).transpose()?;
         let report = FitReport { together: pooled(&fits), fits, day };
-        answer(|output| if self.json { print_json(&report, output) } else { print_fit(&report, output) })?;
-        Ok(match report.day.and_then(|day| day.go) {
-            Some(go) => Outcome::Decided { yes: go },
-            None if refused => Outcome::NotAll,
-            None => Outcome::Given,
-        })
+        let outcome = give(&report, self.json)?;
+        Ok(if refused { Outcome::NotAll } else { outcome })
     }
 
     /// The fits of a file; notes the mission of the first log.

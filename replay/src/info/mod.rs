@@ -3,7 +3,7 @@
 mod counts;
 
 use std::collections::BTreeMap;
-use std::io::{self, IsTerminal as _, Read, Write};
+use std::io::{IsTerminal as _, Read};
 use std::path::{Path, PathBuf};
 
 use self::counts::{ChannelCounter, EndingTracker, FrameCounter, PhaseTracker};
@@ -15,14 +15,14 @@ use serde::Serialize;
 use time::OffsetDateTime;
 use time::format_description::well_known::Rfc3339;
 
-use crate::cli::{Outcome, answer, say, warn_of_cut, warn_of_damage};
+use crate::cli::{Answer, Outcome, give, say, warn_of_cut, warn_of_damage};
 use crate::cut::CUT_FROM;
 use crate::findings::{self, FindingFacts};
 use crate::log::{
     AttachmentFacts, BuildComparison, Clocks, Cut, Entry, FlightLog, Flights, Head, LogError, Recording,
-    SummaryFacts, VerdictFacts, Verdicts, heard_message, summary_of,
+    SummaryFacts, VerdictFacts, VerdictLimit, Verdicts, heard_message, summary_of,
 };
-use crate::print::{counted, print_json, shown};
+use crate::print::counted;
 
 /// Describes a log file.
 ///
@@ -379,109 +379,163 @@ fn seconds(ns: u64) -> f64 {
 /// Most phases that are shown; a flight has about ten.
 const PHASES_SHOWN: usize = 14;
 
-/// Writes a description of a log as text: one screen. JSON has the rest.
-///
-/// # Errors
-/// The output failed.
-pub fn print_info(info: &Info, output: &mut impl Write) -> io::Result<()> {
-    let size = info.size_bytes.map(|bytes| format!(", {}", size_text(bytes))).unwrap_or_default();
-    writeln!(output, "{}{size}", shown(&info.file))?;
-    print_verdict(info, output)?;
-    if info.grade.level == GradeLevel::BitExact {
-        print_findings(info, output)?;
+/// One screen; JSON has the rest.
+impl Answer for Info {
+    fn sentences(&self) -> Vec<String> {
+        let size = self.size_bytes.map(|bytes| format!(", {}", size_text(bytes))).unwrap_or_default();
+        let mut rows = self.ending();
+        rows.extend(self.phases.first().map(|timeline| ("phases", phases(timeline))));
+        rows.push(("grade", format!("{}: {}", self.grade.level.name(), self.grade.reason)));
+        rows.push(("complete", self.completeness()));
+        let flights = self.completeness.flights;
+        if flights > 1 {
+            rows.push(("flights", format!("{flights}; `replay verify` reports on each")));
+        }
+        rows.extend(self.frames.iter().flat_map(FrameFacts::rows));
+        rows.extend(self.origin());
+        let schema = &self.schema;
+        if schema.version.as_ref() != Some(&schema.this_build) {
+            let version = schema.version.as_deref().map_or("not stated", short);
+            rows.push(("schema", format!("{version}; this build reads {}", schema.this_build)));
+        }
+        rows.extend(self.span.map(|span| {
+            let (first, last) = (utc(span.first_ns), utc(span.last_ns));
+            ("time", format!("{first} to {last}, {:.3} s", span.duration_s))
+        }));
+        rows.push(("channels", channels(&self.channels)));
+        let attached: Vec<&str> =
+            self.attachments.iter().map(|attachment| attachment.name.as_str()).collect();
+        rows.push(("attached", or_none(&attached.join(", ")).to_owned()));
+        rows.extend(self.unreadable.iter().map(|reason| ("unreadable", reason.clone())));
+        let lines = rows.iter().map(|(name, text)| format!("{name:<11} {text}").trim_end().to_owned());
+        std::iter::once(format!("{}{size}", self.file)).chain(lines).collect()
     }
-    if let Some(timeline) = info.phases.first() {
-        row(output, "phases", &phases(timeline))?;
-    }
-    row(output, "grade", &format!("{}: {}", info.grade.level.name(), shown(&info.grade.reason)))?;
-    row(output, "complete", &completeness(info))?;
-    if info.completeness.flights > 1 {
-        row(output, "flights", &format!("{}; `replay verify` reports on each", info.completeness.flights))?;
-    }
-    if let Some(frames) = &info.frames {
-        print_frames(frames, output)?;
-    }
-    print_origin(info, output)?;
-    let schema = &info.schema;
-    if schema.version.as_ref() != Some(&schema.this_build) {
-        let version = schema.version.as_deref().map_or_else(|| "not stated".to_owned(), short);
-        row(output, "schema", &format!("{version}; this build reads {}", schema.this_build))?;
-    }
-    if let Some(span) = &info.span {
-        let (first, last) = (utc(span.first_ns), utc(span.last_ns));
-        row(output, "time", &format!("{first} to {last}, {:.3} s", span.duration_s))?;
-    }
-    row(output, "channels", &channels(&info.channels))?;
-    let attached: Vec<String> = info.attachments.iter().map(|attachment| shown(&attachment.name)).collect();
-    row(output, "attached", &or_none(attached.join(", ")))?;
-    if let Some(reason) = &info.unreadable {
-        row(output, "unreadable", &shown(reason))?;
-    }
-    Ok(())
 }
 
-fn row(output: &mut impl Write, name: &str, text: &str) -> io::Result<()> {
-    writeln!(output, "{}", format!("{name:<11} {text}").trim_end())
-}
+/// A line: its name and its text.
+type Row = (&'static str, String);
 
-fn completeness(info: &Info) -> String {
-    let found = &info.completeness;
-    if found.complete && found.counted {
-        return "yes: ended properly, every checksum holds".to_owned();
+impl Info {
+    /// How it ended, what was broken, and what went wrong.
+    fn ending(&self) -> Vec<Row> {
+        let touchdown =
+            |verdict: &VerdictFacts| format!("touchdown at {}", self.clocks.words(verdict.contact()));
+        let words = [self.ending.clone(), self.verdict.as_ref().map(touchdown)];
+        let words: Vec<String> = words.into_iter().flatten().collect();
+        let mut rows = Vec::new();
+        if !words.is_empty() {
+            rows.push(("verdict", words.join("; ")));
+        }
+        if let Some(verdict) = &self.verdict {
+            for (whose, limits) in
+                [("", &verdict.borne), ("envelope: ", &verdict.envelope), ("Table 2: ", &verdict.table_2)]
+            {
+                rows.extend(limits.iter().filter(|limit| !limit.passed).map(|limit| {
+                    let VerdictLimit { name, value, unit, .. } = limit;
+                    let (minimum, maximum) = (rounded(limit.minimum), rounded(limit.maximum));
+                    ("", format!("{whose}{name} {value:.4} {unit} is OUTSIDE {minimum} to {maximum}"))
+                }));
+            }
+        }
+        if self.grade.level != GradeLevel::BitExact {
+            return rows;
+        }
+        let mut found: Vec<String> = match &self.findings {
+            None => vec!["not looked for: no frame in flight, or this build decides otherwise".to_owned()],
+            Some(findings) => {
+                findings.iter().map(|found| format!("T+{:.2} s {}", found.since_s, found.words)).collect()
+            }
+        };
+        if found.is_empty() {
+            found.push(self.no_findings().to_owned());
+        }
+        let names = std::iter::once("findings").chain(std::iter::repeat(""));
+        rows.extend(names.zip(found));
+        rows
     }
-    if found.complete {
-        return "as far as can be known: it has no summary, which would say how many records there were"
-            .to_owned();
-    }
-    let mut faults = Vec::new();
-    if let Some(damage) = &found.damage {
-        faults.push(shown(damage));
-        faults.push(match found.readable_until_s {
-            None => "no record could be read".to_owned(),
-            Some(until_s) => format!("readable until {until_s:.3} s after the first record"),
-        });
-        faults.extend(found.missing_s.map(|missing_s| format!("{missing_s:.3} s after that are lost")));
-    }
-    if found.messages_lost > 0 {
-        let how = if info.run.contains_key(CUT_FROM) { "cut out or lost" } else { "lost" };
-        faults.push(format!("{} {how}", counted(found.messages_lost, "message")));
-    }
-    faults.extend(found.cut.as_ref().map(|cut| format!("the flight {cut}")));
-    format!("NO: {}", faults.join("; "))
-}
 
-fn print_origin(info: &Info, output: &mut impl Write) -> io::Result<()> {
-    row(output, "written by", &or_none(shown(&info.library)))?;
-    let listed = |entries: &BTreeMap<String, String>| {
-        let listed: Vec<String> =
-            entries.iter().map(|(key, value)| format!("{} {}", shown(key), or_none(short(value)))).collect();
-        or_none(listed.join(", "))
-    };
-    row(output, "run", &listed(&info.run))?;
-    let comparison = &info.build_comparison;
-    if !comparison.recorded {
-        row(output, "build", "not recorded")?;
-    } else if comparison.differences.is_empty() {
-        row(output, "build", "this one")?;
-    } else {
-        let value = |value: &Option<String>| value.as_deref().map_or_else(|| "not noted".to_owned(), short);
-        let differences = comparison.differences.iter().map(|difference| {
+    fn completeness(&self) -> String {
+        let found = &self.completeness;
+        if found.complete && found.counted {
+            return "yes: ended properly, every checksum holds".to_owned();
+        }
+        if found.complete {
+            return "as far as can be known: it has no summary, which would say how many records there were"
+                .to_owned();
+        }
+        let mut faults = Vec::new();
+        if let Some(damage) = &found.damage {
+            faults.push(damage.clone());
+            faults.push(match found.readable_until_s {
+                None => "no record could be read".to_owned(),
+                Some(until_s) => format!("readable until {until_s:.3} s after the first record"),
+            });
+            faults.extend(found.missing_s.map(|missing_s| format!("{missing_s:.3} s after that are lost")));
+        }
+        if found.messages_lost > 0 {
+            let how = if self.run.contains_key(CUT_FROM) { "cut out or lost" } else { "lost" };
+            faults.push(format!("{} {how}", counted(found.messages_lost, "message")));
+        }
+        faults.extend(found.cut.as_ref().map(|cut| format!("the flight {cut}")));
+        format!("NO: {}", faults.join("; "))
+    }
+
+    /// Who wrote it, of which run, by which build and mission.
+    fn origin(&self) -> Vec<Row> {
+        let run = self.run.iter().map(|(key, value)| format!("{key} {}", or_none(short(value))));
+        let run = run.collect::<Vec<_>>().join(", ");
+        let BuildComparison { recorded, differences } = &self.build_comparison;
+        let value = |value: &Option<String>| value.as_deref().map_or("not noted", short).to_owned();
+        let differences = differences.iter().map(|difference| {
             let (recorded, this) = (value(&difference.recorded), value(&difference.this_build));
-            format!("{} {recorded} (this one: {this})", shown(&difference.fact))
+            format!("{} {recorded} (this one: {this})", difference.fact)
         });
-        let differences: Vec<String> = differences.collect();
-        row(output, "build", &format!("differs from this build: {}", differences.join(", ")))?;
+        let build = match differences.collect::<Vec<_>>() {
+            _ if !recorded => "not recorded".to_owned(),
+            same if same.is_empty() => "this one".to_owned(),
+            differences => format!("differs from this build: {}", differences.join(", ")),
+        };
+        let profile = match &self.profile {
+            None => "not attached".to_owned(),
+            Some(ProfileFacts { name: Some(name), summary: Some(summary), .. }) => {
+                format!("{name}: {summary}")
+            }
+            Some(profile) => {
+                format!("cannot be used: {}", profile.problem.as_deref().unwrap_or_default())
+            }
+        };
+        let mut rows = vec![
+            ("written by", or_none(&self.library).to_owned()),
+            ("run", or_none(&run).to_owned()),
+            ("build", build),
+            ("profile", profile),
+        ];
+        let controller = self.profile.as_ref().and_then(ProfileFacts::controller);
+        rows.extend(controller.map(|controller| ("controller", controller)));
+        rows
     }
-    let profile = match &info.profile {
-        None => "not attached".to_owned(),
-        Some(profile) => match (&profile.name, &profile.summary) {
-            (Some(name), Some(summary)) => format!("{}: {}", shown(name), shown(summary)),
-            _ => format!("cannot be used: {}", shown(profile.problem.as_deref().unwrap_or_default())),
-        },
-    };
-    row(output, "profile", &profile)?;
-    let controller = info.profile.as_ref().and_then(ProfileFacts::controller);
-    controller.map_or(Ok(()), |controller| row(output, "controller", &controller))
+}
+
+impl FrameFacts {
+    fn rows(&self) -> Vec<Row> {
+        let Self { first, last, restarts, lost, repeated, start, solve_time, .. } = self;
+        let start = if *start { "" } else { ", start NOT RECORDED" };
+        let lost = match lost {
+            0 => "none lost".to_owned(),
+            gaps => format!("{} LOST", counted(*gaps as u64, "gap")),
+        };
+        let restarts = counted(*restarts as u64, "restart");
+        let mut rows = vec![("frames", format!("{first} to {last}, {restarts}, {lost}{start}"))];
+        if *repeated > 0 {
+            rows.push(("", format!("{repeated} repeated")));
+        }
+        let times = solve_time.as_ref().map_or_else(
+            || "not recorded: no plan was timed".to_owned(),
+            |times| format!("{}, of {} that planned", solve_time_text(times), counted(times.count, "frame")),
+        );
+        rows.push(("solve time", times));
+        rows
+    }
 }
 
 /// When each phase began.
@@ -496,64 +550,6 @@ fn phases(timeline: &PhaseTimeline) -> String {
     let more = spans.len().saturating_sub(PHASES_SHOWN) as u64 + timeline.further_changes;
     let more = if more > 0 { format!(" and {}", counted(more, "more change")) } else { String::new() };
     format!("{began}{more} ({clock} in s, from the {})", timeline.source.name())
-}
-
-fn print_verdict(info: &Info, output: &mut impl Write) -> io::Result<()> {
-    let touchdown = |verdict: &VerdictFacts| format!("touchdown at {}", info.clocks.words(verdict.contact()));
-    let words = [info.ending.as_deref().map(shown), info.verdict.as_ref().map(touchdown)];
-    let words: Vec<String> = words.into_iter().flatten().collect();
-    if !words.is_empty() {
-        row(output, "verdict", &words.join("; "))?;
-    }
-    let Some(verdict) = &info.verdict else { return Ok(()) };
-    for (whose, limits) in
-        [("", &verdict.borne), ("envelope: ", &verdict.envelope), ("Table 2: ", &verdict.table_2)]
-    {
-        for limit in limits.iter().filter(|limit| !limit.passed) {
-            let (name, unit) = (shown(&limit.name), shown(&limit.unit));
-            let (minimum, maximum) = (rounded(limit.minimum), rounded(limit.maximum));
-            let text = format!("{whose}{name} {:.4} {unit} is OUTSIDE {minimum} to {maximum}", limit.value);
-            row(output, "", &text)?;
-        }
-    }
-    Ok(())
-}
-
-fn print_findings(info: &Info, output: &mut impl Write) -> io::Result<()> {
-    let Some(findings) = &info.findings else {
-        return row(
-            output,
-            "findings",
-            "not looked for: no frame in flight, or this build decides otherwise",
-        );
-    };
-    if findings.is_empty() {
-        return row(output, "findings", info.no_findings());
-    }
-    for (place, finding) in findings.iter().enumerate() {
-        let name = if place == 0 { "findings" } else { "" };
-        row(output, name, &format!("T+{:.2} s {}", finding.since_s, shown(&finding.words)))?;
-    }
-    Ok(())
-}
-
-fn print_frames(frames: &FrameFacts, output: &mut impl Write) -> io::Result<()> {
-    let FrameFacts { first, last, restarts, lost, repeated, start, solve_time, .. } = frames;
-    let start = if *start { "" } else { ", start NOT RECORDED" };
-    let lost = match lost {
-        0 => "none lost".to_owned(),
-        gaps => format!("{} LOST", counted(*gaps as u64, "gap")),
-    };
-    let restarts = counted(*restarts as u64, "restart");
-    row(output, "frames", &format!("{first} to {last}, {restarts}, {lost}{start}"))?;
-    if *repeated > 0 {
-        row(output, "", &format!("{repeated} repeated"))?;
-    }
-    let text = solve_time.as_ref().map_or_else(
-        || "not recorded: no plan was timed".to_owned(),
-        |times| format!("{}, of {} that planned", solve_time_text(times), counted(times.count, "frame")),
-    );
-    row(output, "solve time", &text)
 }
 
 pub(crate) fn solve_time_text(times: &SolveTimes) -> String {
@@ -575,17 +571,17 @@ fn channels(channels: &[ChannelFacts]) -> String {
     for ChannelFacts { topic, lost, unreadable, .. } in channels {
         let faults =
             [(lost, "LOST"), (unreadable, "UNREADABLE")].into_iter().filter(|(count, _)| **count > 0);
-        words.extend(faults.map(|(count, what)| format!("{} {count} {what}", shown(topic))));
+        words.extend(faults.map(|(count, what)| format!("{topic} {count} {what}")));
     }
     words.join(", ")
 }
 
 /// Only the beginning of a hash; JSON has all of it.
-fn short(value: &str) -> String {
+fn short(value: &str) -> &str {
     const HASH_MIN: usize = 40;
     const SHOWN: usize = 12;
     let hash = value.len() >= HASH_MIN && value.bytes().all(|byte| byte.is_ascii_hexdigit());
-    shown(if hash { &value[..SHOWN] } else { value })
+    if hash { &value[..SHOWN] } else { value }
 }
 
 /// Rounds away the error of converting degrees to radians and back.
@@ -593,8 +589,8 @@ pub(crate) fn rounded(limit: f64) -> f64 {
     (limit * 1e6).round() / 1e6
 }
 
-fn or_none(text: String) -> String {
-    if text.is_empty() { "none".to_owned() } else { text }
+fn or_none(text: &str) -> &str {
+    if text.is_empty() { "none" } else { text }
 }
 
 fn size_text(bytes: u64) -> String {
@@ -641,16 +637,10 @@ impl Args {
                 }
             }
         }
-        answer(|output| match described.as_slice() {
-            [only] if self.json && self.files.len() == 1 => print_json(only, output),
-            all if self.json => print_json(&all, output),
-            all => all.iter().enumerate().try_for_each(|(place, info)| {
-                if place > 0 {
-                    writeln!(output)?;
-                }
-                print_info(info, output)
-            }),
-        })?;
+        match described.as_slice() {
+            [only] if self.files.len() == 1 => give(only, self.json)?,
+            _ => give(&described, self.json)?,
+        };
         // On a terminal the description has said it already.
         let said = !self.json && std::io::stdout().is_terminal();
         for info in described.iter().filter(|_| !said) {

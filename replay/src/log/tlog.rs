@@ -48,6 +48,8 @@ pub enum ImportError {
 /// Summary of an import.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
 pub struct ImportedTlog {
+    /// The log that was written.
+    pub output: PathBuf,
     /// Frames kept.
     pub frames: u64,
     /// Of these, frames of other dialects or with a wrong checksum: kept, but not decoded.
@@ -136,7 +138,7 @@ pub fn import_tlog<'a>(
         Stopped::Write(error) => failed(io::Error::other(error)).into(),
     })?;
     log.into_inner().map_err(|error| failed(error.into_error()))?.commit()?;
-    Ok(imported)
+    Ok(ImportedTlog { output: destination.path.to_owned(), ..imported })
 }
 
 enum Stopped {

@@ -43,8 +43,8 @@ pub(crate) struct Good {
     /// Its first byte in the file.
     pub(crate) at: u64,
     pub(crate) opcode: u8,
-    /// Name and checksum of a chunk.
-    pub(crate) chunk: Option<(ChunkName, u32)>,
+    /// The name of a chunk.
+    pub(crate) chunk: Option<ChunkName>,
 }
 
 /// A stretch of the file that cannot be kept.
@@ -174,7 +174,7 @@ impl Records {
                     hasher.update(&length.to_le_bytes());
                     hasher.update(&body);
                     if keeps {
-                        let chunk = chunk.map(|head| (head.name, head.crc));
+                        let chunk = chunk.map(|head| head.name);
                         contents.good.push(Good { at, opcode, chunk });
                     }
                     at = next;
@@ -388,7 +388,6 @@ impl Contents {
 #[derive(Debug, Clone, Copy)]
 struct ChunkHead {
     name: ChunkName,
-    crc: u32,
     /// The length of the whole body that follows from its fields.
     body_bytes: u64,
 }
@@ -406,11 +405,7 @@ impl ChunkHead {
         };
         let known = matches!(compression, b"" | b"lz4" | b"zstd");
         let body_bytes = (CHUNK_FIELDS_BYTES + compression_bytes).checked_add(name.compressed_bytes)?;
-        (known && name.first_ns <= name.last_ns).then_some(Self {
-            name,
-            crc: u32::from_le_bytes(*body.get(24..)?.first_chunk()?),
-            body_bytes,
-        })
+        (known && name.first_ns <= name.last_ns).then_some(Self { name, body_bytes })
     }
 
     /// First and last time of its messages, ns; `None` for an empty chunk.

@@ -8,7 +8,8 @@ use mcap::records::{MessageHeader, Metadata, Record, op};
 use protocol::log::reader::{RecordError, parse_record, records_of_chunk};
 use protocol::log::record::{TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START};
 
-use super::scan::WriterReport;
+use super::scan::{Contents, Records, WriterReport};
+use crate::log::{IN_ORDER_NS, LogError};
 use crate::output::{Destination, NewFile, WriteError};
 
 /// Chunk size as in the recorder's own logs.
@@ -29,7 +30,7 @@ pub(crate) struct Rescue<'a> {
     channels: BTreeMap<u16, (u16, String)>,
     kept: Kept,
     /// Messages wait until the end, and are then written in order of time.
-    pub(crate) sorts: bool,
+    sorts: bool,
     waiting: Vec<Waiting>,
 }
 
@@ -80,23 +81,29 @@ enum State {
 }
 
 impl<'a> Rescue<'a> {
-    pub(crate) fn create(
+    /// Copies what can be read of a log and is kept; sorted, if it was not in order of time.
+    pub(crate) fn of<E: From<LogError> + From<WriteError>>(
         destination: Destination,
         input: &Path,
-        told: &'a WriterReport,
+        (records, contents): (&mut Records, &'a Contents),
         keeps: &'a mut dyn FnMut(&str, u64) -> bool,
-    ) -> Result<Self, WriteError> {
-        Ok(Self {
+    ) -> Result<Self, E> {
+        let mut rescue = Self {
             path: destination.path.to_owned(),
             keeps,
-            told,
+            told: &contents.told,
             state: State::Waiting(NewFile::create(destination, input)?),
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
             kept: Kept::default(),
-            sorts: false,
+            sorts: contents.back_ns > IN_ORDER_NS,
             waiting: Vec::new(),
-        })
+        };
+        for piece in &contents.good {
+            let body = records.body(piece.at)?;
+            rescue.keep(piece.opcode, &body)?;
+        }
+        Ok(rescue)
     }
 
     /// What was kept so far.
@@ -105,7 +112,7 @@ impl<'a> Rescue<'a> {
     }
 
     /// Keeps a record, or every record of a chunk.
-    pub(crate) fn keep(&mut self, opcode: u8, body: &[u8]) -> Result<(), WriteError> {
+    fn keep(&mut self, opcode: u8, body: &[u8]) -> Result<(), WriteError> {
         let kept = if opcode == op::CHUNK {
             self.kept.chunks += 1;
             // It was read before without an error; a file that has changed since then is lost here.

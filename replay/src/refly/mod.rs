@@ -16,7 +16,6 @@
 mod rerun;
 
 use std::collections::BTreeMap;
-use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result};
@@ -34,12 +33,12 @@ use sim::sortie::SetUpError;
 use sim::wire::record;
 
 use self::rerun::Rerun;
-use crate::cli::{Outcome, answer, warn_of_what_is_missing};
+use crate::cli::{Answer, Outcome, give, warn_of_what_is_missing};
 use crate::controller::{LoggedComputer, SETTINGS_IN_FLIGHT, phase_name};
 use crate::log::VerdictFacts;
 use crate::log::{Clock, ClockTime, Moment, NewLog, Recording, RecordingError};
 use crate::output::{Destination, Overwrite, WriteError};
-use crate::print::{LimitRow, counted, print_json, shown, verdict_rows, verdict_words};
+use crate::print::{counted, verdict_table};
 use crate::settings::{Setting, SettingArguments, SettingError, mission_with, truth_with};
 use crate::worst_plans::BrokenPlan;
 
@@ -470,77 +469,58 @@ fn run_facts(
     run
 }
 
-/// Writes the result of flying a flight again.
-///
-/// # Errors
-/// The output failed.
-pub fn print_refly(report: &ReflyReport, output: &mut impl Write) -> io::Result<()> {
-    writeln!(output, "{}: {}", shown(&report.file), report.kind)?;
-    let start = &report.start;
-    writeln!(
-        output,
-        "from frame {} (T+{:.3} s, {}): x {:.3} m, altitude {:.3} m, thrust {:.4} of nominal",
-        start.frame, start.time_s, start.phase, start.x_m, start.z_m, report.thrust_scale
-    )?;
-    for (what, settings) in [("with", &report.settings), ("plant alone with", &report.plant_settings)] {
-        if !settings.is_empty() {
-            writeln!(output, "{what} {}", shown(&settings.join(" ")))?;
+impl Answer for ReflyReport {
+    fn sentences(&self) -> Vec<String> {
+        let StartState { frame, time_s, phase, x_m, z_m } = self.start;
+        let mut lines = vec![
+            format!("{}: {}", self.file, self.kind),
+            format!(
+                "from frame {frame} (T+{time_s:.3} s, {phase}): x {x_m:.3} m, altitude {z_m:.3} m, thrust {:.4} of nominal",
+                self.thrust_scale
+            ),
+        ];
+        let FaultChanges { with, without } = &self.faults;
+        for (what, changes, since) in [
+            ("with", &self.settings, ""),
+            ("plant alone with", &self.plant_settings, ""),
+            ("with the fault", with, ", from the beginning of the flight"),
+            ("without the fault", without, ", from the beginning of the flight"),
+        ] {
+            if !changes.is_empty() {
+                lines.push(format!("{what} {}{since}", changes.join(" ")));
+            }
         }
+        lines.extend(
+            self.seed.map(|seed| format!("plant drawn with seed {seed} instead of the recorded one")),
+        );
+        let Reached { frames, identical, first_different } = self.reached;
+        lines.push(format!(
+            "flown again from its start up to there: {identical} of {frames} recorded frames identical"
+        ));
+        lines.extend(first_different.map(|frame| {
+            format!(
+                "NOT AS RECORDED from frame {frame} on: this build flies differently, and the result continues from its own flight"
+            )
+        }));
+        let verdicts = [self.recorded.as_ref(), self.reflown.as_ref()];
+        lines.extend(verdict_table(["recorded", "flown again"], verdicts));
+        let answer = match self.verdict_changed {
+            Some(true) => "the verdict CHANGES",
+            Some(false) => "the verdict does not change",
+            None => "the log has no verdict to compare with",
+        };
+        let margin = self.margin.map_or_else(|| "no contact".to_owned(), |margin| format!("{margin:.3}"));
+        lines.push(format!("{answer}; margin to the nearest limit {margin}"));
+        lines.extend(self.worst_plans.iter().map(|plan| format!("worst plan: {}", plan.words())));
+        lines.push(format!(
+            "{}; of {} recorded too, {} with the same gimbal command bit for bit; largest difference {:.3e} rad",
+            counted(self.frames as u64, "frame"),
+            self.commands_recorded,
+            self.commands_identical,
+            self.gimbal_difference_max_rad
+        ));
+        lines
     }
-    for (what, faults) in
-        [("with the fault", &report.faults.with), ("without the fault", &report.faults.without)]
-    {
-        if !faults.is_empty() {
-            writeln!(output, "{what} {}, from the beginning of the flight", shown(&faults.join(" ")))?;
-        }
-    }
-    if let Some(seed) = report.seed {
-        writeln!(output, "plant drawn with seed {seed} instead of the recorded one")?;
-    }
-    let Reached { frames, identical, first_different } = report.reached;
-    writeln!(
-        output,
-        "flown again from its start up to there: {identical} of {frames} recorded frames identical"
-    )?;
-    if let Some(frame) = first_different {
-        writeln!(
-            output,
-            "NOT AS RECORDED from frame {frame} on: this build flies differently, and the result continues from its own flight"
-        )?;
-    }
-    let verdicts = [report.recorded.as_ref(), report.reflown.as_ref()];
-    let [then, now] = verdicts.map(|verdict| verdict_words(verdict, "no verdict"));
-    writeln!(output, "{:<14} {:>22} {:>22}", "", "recorded", "flown again")?;
-    writeln!(output, "{:<14} {then:>22} {now:>22}", "verdict")?;
-    for LimitRow { limit, values: [then, now] } in
-        verdict_rows(verdicts[1].or(verdicts[0]), verdicts, shown, " OUTSIDE")
-    {
-        writeln!(
-            output,
-            "{:<14} {then:>22} {now:>22}   limit {:.4} to {:.4}",
-            shown(&limit.name),
-            limit.minimum,
-            limit.maximum
-        )?;
-    }
-    let answer = match report.verdict_changed {
-        Some(true) => "the verdict CHANGES",
-        Some(false) => "the verdict does not change",
-        None => "the log has no verdict to compare with",
-    };
-    let margin = report.margin.map_or_else(|| "no contact".to_owned(), |margin| format!("{margin:.3}"));
-    writeln!(output, "{answer}; margin to the nearest limit {margin}")?;
-    for plan in &report.worst_plans {
-        writeln!(output, "worst plan: {}", shown(&plan.words()))?;
-    }
-    writeln!(
-        output,
-        "{}; of {} recorded too, {} with the same gimbal command bit for bit; largest difference {:.3e} rad",
-        counted(report.frames as u64, "frame"),
-        report.commands_recorded,
-        report.commands_identical,
-        report.gimbal_difference_max_rad
-    )
 }
 
 #[derive(Debug, clap::Args)]
@@ -608,8 +588,7 @@ impl Args {
             let destination = Destination { path, overwrite: Overwrite::if_forced(self.force) };
             write_log(destination, &recording, &flight)?;
         }
-        answer(|output| if self.json { print_json(&report, output) } else { print_refly(&report, output) })?;
-        Ok(Outcome::Given)
+        give(&report, self.json)
     }
 }
 

@@ -5,7 +5,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fs::DirEntry;
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail, ensure};
@@ -13,11 +13,11 @@ use onboard_sim::run::in_parallel;
 use serde::{Deserialize, Serialize};
 
 use super::{Obstacle, Verification, VerifyReport, verify};
-use crate::cli::{Outcome, answer, say};
+use crate::cli::{Answer, Outcome, give, say};
 use crate::digest::digest;
 use crate::log::{Entry, FlightLog, LogError, Recording};
 use crate::output::{Destination, Overwrite, write_whole};
-use crate::print::{counted, print_json, shown};
+use crate::print::{columns, counted, print_json};
 use crate::refly::{ReflyOptions, StartAt, margin, refly};
 
 /// A margin that changed by no more than this is the same; 1 is from the middle of the limits to their edge.
@@ -244,11 +244,10 @@ impl Arguments {
         let now: Flights = named.filter_map(|(log, flight)| Some((log, flight?))).collect();
         let judged = judge(&before, &now);
         ensure!(!judged.is_empty(), "{}: none of its logs holds a flight", directory.display());
-        answer(|output| if json { print_json(&judged, output) } else { print(&judged, output) })?;
+        let comparison = Comparison { judged, may_diverge: self.may_diverge };
+        let outcome = give(&comparison, json)?;
         if !self.accept {
-            return Ok(Outcome::Decided {
-                yes: !judged.iter().any(|judged| judged.change.fails(self.may_diverge)),
-            });
+            return Ok(outcome);
         }
         // Accepted, it would pass for ever.
         if let Some((log, flight)) = now.iter().find(|(_, flight)| flight.identical.is_none()) {
@@ -269,24 +268,41 @@ fn read(path: &Path) -> Result<Flights> {
         .with_context(|| format!("{}: is no baseline of `replay verify`", path.display()))
 }
 
-fn print(judged: &[Judged], output: &mut impl Write) -> io::Result<()> {
-    let width = judged.iter().map(|judged| judged.log.chars().count()).max().unwrap_or(0).clamp(6, 40);
-    writeln!(output, "{:<width$}  {:<24} {:>8} {:>8}  ending", "log", "change", "before", "margin")?;
-    for Judged { log, change, before, now } in judged {
-        let margin = |flight: Option<&Flight>| {
-            flight
-                .and_then(|flight| flight.margin)
-                .map_or_else(|| "-".to_owned(), |margin| format!("{margin:.3}"))
+/// A directory against its baseline.
+#[derive(Serialize)]
+#[serde(transparent)]
+struct Comparison<'a> {
+    judged: Vec<Judged<'a>>,
+    #[serde(skip)]
+    may_diverge: bool,
+}
+
+impl Answer for Comparison<'_> {
+    fn sentences(&self) -> Vec<String> {
+        let row = |Judged { log, change, before, now }: &Judged| {
+            let margin = |flight: Option<&Flight>| {
+                flight
+                    .and_then(|flight| flight.margin)
+                    .map_or("-".to_owned(), |margin| format!("{margin:.3}"))
+            };
+            let words = match (before, now) {
+                (Some(before), Some(now)) if before.content != now.content => "another flight has its name",
+                (_, Some(now)) => &now.words,
+                (_, None) => "no flight has its name",
+            };
+            let change = change.word().to_owned();
+            [(*log).to_owned(), change, margin(*before), margin(*now), words.to_owned()]
         };
-        let words = match (before, now) {
-            (Some(before), Some(now)) if before.content != now.content => "another flight has its name",
-            (_, Some(now)) => &now.words,
-            (_, None) => "no flight has its name",
-        };
-        let (log, word, words) = (shown(log), change.word(), shown(words));
-        writeln!(output, "{log:<width$}  {word:<24} {:>8} {:>8}  {words}", margin(*before), margin(*now))?;
+        let head = ["log", "change", "before", "margin", "ending"].map(str::to_owned);
+        let rows = std::iter::once(head).chain(self.judged.iter().map(row));
+        let mut lines = columns(['<', '<', '>', '>', '<'], rows);
+        lines.push(counted(self.judged.len() as u64, "flight"));
+        lines
     }
-    writeln!(output, "{}", counted(judged.len() as u64, "flight"))
+
+    fn outcome(&self) -> Outcome {
+        Outcome::Decided { yes: !self.judged.iter().any(|judged| judged.change.fails(self.may_diverge)) }
+    }
 }
 
 #[cfg(test)]

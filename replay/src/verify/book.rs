@@ -3,7 +3,7 @@
 //! A log of a station holds its book. A log of the vehicle holds the ends of books that stations sent: whoever changes a
 //! station's log cannot change those.
 
-use std::io::{self, BufReader, Write};
+use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
@@ -17,9 +17,8 @@ use protocol::log::record::{TOPIC_BOOK, TOPIC_BOOK_HEAD, TOPIC_RAW_RX};
 use protocol::log::v1::{BookEntry, BookHead};
 use serde::Serialize;
 
-use crate::cli::{Outcome, answer};
+use crate::cli::{Answer, Outcome, give};
 use crate::log::open_log;
-use crate::print::{print_json, shown};
 
 /// The result for one book.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -197,61 +196,48 @@ impl Contents {
     }
 }
 
-/// Writes each book, and what is proven of it or broken.
-///
-/// # Errors
-/// The output failed.
-pub fn print_audit(found: &AuditFound, output: &mut impl Write) -> io::Result<()> {
-    for book in &found.books {
-        print_book(book, output)?;
+impl Answer for AuditFound {
+    fn sentences(&self) -> Vec<String> {
+        let mut lines: Vec<String> = self.books.iter().flat_map(BookFound::sentences).collect();
+        lines.extend(self.missing.iter().map(|missing| {
+            format!("MISSING: {missing}: its log is not among these, or its first entry was changed")
+        }));
+        if self.books.is_empty() {
+            lines.push("no book in these logs: only a ground station writes one".to_owned());
+        }
+        lines
     }
-    for missing in &found.missing {
-        writeln!(
-            output,
-            "MISSING: {}: its log is not among these, or its first entry was changed",
-            shown(missing)
-        )?;
+
+    fn outcome(&self) -> Outcome {
+        if self.books.is_empty() { Outcome::NotAll } else { Outcome::Decided { yes: self.is_proven() } }
     }
-    if found.books.is_empty() {
-        writeln!(output, "no book in these logs: only a ground station writes one")?;
-    }
-    Ok(())
 }
 
-fn print_book(book: &BookFound, output: &mut impl Write) -> io::Result<()> {
-    let verdict = if book.is_proven() {
-        "PROVEN"
-    } else if book.broken.is_none() {
-        "NOT PROVEN TO ITS END"
-    } else {
-        "BROKEN"
-    };
-    for line in &book.story {
-        writeln!(output, "{}", shown(line))?;
-    }
-    writeln!(output, "{}: {verdict}: {} entries, head {}", shown(&book.log), book.entries, book.head)?;
-    if let Some(broken) = &book.broken {
-        writeln!(output, "  BROKEN: {}", shown(broken))?;
-    }
-    match &book.public_key {
-        Some(key) if book.key_is_trusted => writeln!(output, "  signed with the given key {key}")?,
-        Some(key) => writeln!(output, "  signed with {key}; --public-key says that it is the station's")?,
-        None => writeln!(output, "  not signed: the station had no key")?,
-    }
-    writeln!(
-        output,
-        "  {} entries under a signature, {} confirmed by a vehicle, {}",
-        book.signed,
-        book.witnessed,
-        if book.closed {
-            "closed by the station"
-        } else {
-            "not closed: the station was stopped, or the book was cut"
-        }
-    )?;
-    match &book.damage {
-        Some(damage) => writeln!(output, "  the log is damaged: {}", shown(damage)),
-        None => Ok(()),
+impl BookFound {
+    fn sentences(&self) -> Vec<String> {
+        let verdict = match &self.broken {
+            _ if self.is_proven() => "PROVEN",
+            None => "NOT PROVEN TO ITS END",
+            Some(_) => "BROKEN",
+        };
+        let mut lines = self.story.clone();
+        lines.push(format!("{}: {verdict}: {} entries, head {}", self.log, self.entries, self.head));
+        lines.extend(self.broken.as_ref().map(|broken| format!("  BROKEN: {broken}")));
+        lines.push(match &self.public_key {
+            Some(key) if self.key_is_trusted => format!("  signed with the given key {key}"),
+            Some(key) => format!("  signed with {key}; --public-key says that it is the station's"),
+            None => "  not signed: the station had no key".to_owned(),
+        });
+        let closed = match self.closed {
+            true => "closed by the station",
+            false => "not closed: the station was stopped, or the book was cut",
+        };
+        let (signed, witnessed) = (self.signed, self.witnessed);
+        lines.push(format!(
+            "  {signed} entries under a signature, {witnessed} confirmed by a vehicle, {closed}"
+        ));
+        lines.extend(self.damage.as_ref().map(|damage| format!("  the log is damaged: {damage}")));
+        lines
     }
 }
 
@@ -274,8 +260,6 @@ fn public_key(text: &str) -> Result<PublicKey, String> {
 
 impl Arguments {
     pub(super) fn run(self, files: &[PathBuf], json: bool) -> Result<Outcome> {
-        let found = audit_logs(files, self.public_key)?;
-        answer(|output| if json { print_json(&found, output) } else { print_audit(&found, output) })?;
-        Ok(if found.books.is_empty() { Outcome::NotAll } else { Outcome::Decided { yes: found.is_proven() } })
+        give(&audit_logs(files, self.public_key)?, json)
     }
 }

@@ -1,11 +1,10 @@
 //! Finds the fields in which two records differ, bit for bit.
 
-use std::fmt;
-
 use prost::Message;
+use prost_reflect::bytes::Bytes;
 use prost_reflect::{DynamicMessage, MessageDescriptor, ReflectMessage as _, Value};
 use protocol::log::computer_v1::ComputerFrame;
-use serde::{Serialize, Serializer};
+use serde::Serialize;
 
 use crate::controller::phase_name;
 use crate::log::{LoggedFrame, frame_descriptor, misread_frame};
@@ -23,78 +22,25 @@ pub struct FieldDifference {
     pub ulps: Option<u64>,
 }
 
-/// The content of a field.
-#[derive(Debug, Clone, Copy)]
-pub enum FieldValue {
-    /// A floating-point number.
-    Float(f64),
-    /// A whole number.
-    Integer(u64),
-    /// Yes or no.
-    Flag(bool),
-    /// The list ends before this element.
-    Absent,
-    /// A content that this comparison does not know.
-    Opaque,
+/// A value as text, of a floating-point number with its bits: JSON has no NaN and no infinity, and many readers have no -0.0.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct FieldValue {
+    /// The shortest text that reads back as the same number, with the sign of zero.
+    pub value: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bits: Option<String>,
 }
 
 impl FieldValue {
     fn of(value: &Value) -> Self {
-        match value {
-            Value::F64(number) => Self::Float(*number),
-            Value::U32(number) => Self::Integer(u64::from(*number)),
-            Value::U64(number) => Self::Integer(*number),
-            Value::Bool(flag) => Self::Flag(*flag),
-            _ => Self::Opaque,
-        }
-    }
-
-    /// The bit pattern, for a value that is compared by bits.
-    pub fn bits(&self) -> Option<u64> {
-        match self {
-            Self::Float(number) => Some(number.to_bits()),
-            _ => None,
-        }
-    }
-}
-
-/// By bits: -0.0 is not 0.0, and a NaN equals itself.
-impl PartialEq for FieldValue {
-    fn eq(&self, other: &Self) -> bool {
-        match (self, other) {
-            (Self::Float(a), Self::Float(b)) => a.to_bits() == b.to_bits(),
-            (Self::Integer(a), Self::Integer(b)) => a == b,
-            (Self::Flag(a), Self::Flag(b)) => a == b,
-            (Self::Absent, Self::Absent) => true,
-            _ => false,
-        }
-    }
-}
-
-impl fmt::Display for FieldValue {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            // The shortest text that reads back as the same number, with the sign of zero.
-            Self::Float(number) => write!(formatter, "{number:?}"),
-            Self::Integer(number) => write!(formatter, "{number}"),
-            Self::Flag(flag) => write!(formatter, "{flag}"),
-            Self::Absent => write!(formatter, "(absent)"),
-            Self::Opaque => write!(formatter, "(bytes)"),
-        }
-    }
-}
-
-/// As text and bits, because JSON has no NaN and no infinity, and many readers have no -0.0.
-impl Serialize for FieldValue {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        #[derive(Serialize)]
-        struct Shown {
-            value: String,
-            #[serde(skip_serializing_if = "Option::is_none")]
-            bits: Option<String>,
-        }
-        let bits = self.bits().map(|bits| format!("0x{bits:016x}"));
-        Shown { value: self.to_string(), bits }.serialize(serializer)
+        let (value, bits) = match value {
+            Value::F64(number) => (format!("{number:?}"), Some(format!("0x{:016x}", number.to_bits()))),
+            Value::U32(number) => (number.to_string(), None),
+            Value::U64(number) => (number.to_string(), None),
+            Value::Bool(flag) => (flag.to_string(), None),
+            _ => ("(bytes)".to_owned(), None),
+        };
+        Self { value, bits }
     }
 }
 
@@ -124,17 +70,18 @@ pub fn differences(
     }
     if found.is_empty() && recorded != recomputed {
         // Records with different bytes must not count as equal, even if no field differs.
-        found.push(difference("(record)".to_owned(), FieldValue::Opaque, FieldValue::Opaque));
+        found.push(difference(
+            "(record)".to_owned(),
+            &Value::Bytes(Bytes::new()),
+            &Value::Bytes(Bytes::new()),
+        ));
     }
     found
 }
 
-fn difference(path: String, recorded: FieldValue, recomputed: FieldValue) -> FieldDifference {
-    let ulps = match (recorded, recomputed) {
-        (FieldValue::Float(a), FieldValue::Float(b)) => ulp_distance(a, b),
-        _ => None,
-    };
-    FieldDifference { path, recorded, recomputed, ulps }
+fn difference(path: String, recorded: &Value, recomputed: &Value) -> FieldDifference {
+    let ulps = recorded.as_f64().zip(recomputed.as_f64()).and_then(|(a, b)| ulp_distance(a, b));
+    FieldDifference { path, recorded: FieldValue::of(recorded), recomputed: FieldValue::of(recomputed), ulps }
 }
 
 fn compare_messages(path: &str, a: &DynamicMessage, b: &DynamicMessage, found: &mut Vec<FieldDifference>) {
@@ -149,23 +96,18 @@ fn compare_values(path: &str, a: &Value, b: &Value, found: &mut Vec<FieldDiffere
         (Value::Message(a), Value::Message(b)) => compare_messages(path, a, b, found),
         (Value::List(a), Value::List(b)) => {
             if a.len() != b.len() {
-                let length = |list: &[Value]| FieldValue::Integer(list.len() as u64);
-                found.push(difference(format!("{path}.len"), length(a), length(b)));
+                let [ours, theirs] = [a.len(), b.len()].map(|length| Value::U64(length as u64));
+                found.push(difference(format!("{path}.len"), &ours, &theirs));
             }
             for (index, (a, b)) in a.iter().zip(b).enumerate() {
                 compare_values(&format!("{path}[{index}]"), a, b, found);
             }
         }
-        _ => {
-            let (recorded, recomputed) = (FieldValue::of(a), FieldValue::of(b));
-            let same = match (recorded, recomputed) {
-                (FieldValue::Opaque, FieldValue::Opaque) => a == b,
-                _ => recorded == recomputed,
-            };
-            if !same {
-                found.push(difference(path.to_owned(), recorded, recomputed));
-            }
-        }
+        // By bits: -0.0 is not 0.0, and a NaN equals itself.
+        (Value::F64(x), Value::F64(y)) if x.to_bits() == y.to_bits() => {}
+        (Value::F64(_), Value::F64(_)) => found.push(difference(path.to_owned(), a, b)),
+        _ if a == b => {}
+        _ => found.push(difference(path.to_owned(), a, b)),
     }
 }
 
@@ -206,7 +148,6 @@ pub(super) struct Tally {
     pub(super) first: Option<(u64, f64)>,
     pub(super) last: Option<(u64, f64)>,
     pub(super) divergence: Option<Divergence>,
-    pub(super) growth: Growth,
     recorded: Vec<u8>,
     recomputed: Vec<u8>,
 }
@@ -246,8 +187,6 @@ impl Tally {
             return Ok(());
         }
         let mut fields = differences(frame_descriptor().as_ref(), &self.recorded, &self.recomputed);
-        let axes = recorded.output.gimbal_rad.iter().zip(&again.output.gimbal_rad);
-        let gimbal_rad = axes.map(|(then, now)| (then - now).abs()).fold(0.0, f64::max);
         let fields_different = fields.len();
         let time_s = logged.flight_time_s().unwrap_or(boot_s);
         self.different += 1;
@@ -255,8 +194,6 @@ impl Tally {
             u64::from(fields.iter().any(|field| !field.path.starts_with("input.") && field.path != DIGEST));
         self.digests_different += u64::from(recorded.state_digest != again.state_digest);
         self.fields_different += fields_different as u64;
-        let worst_ulps = fields.iter().filter_map(|field| field.ulps).max();
-        self.growth.note(GrowthStep { frame, time_s, fields_different, gimbal_rad, worst_ulps });
         if self.divergence.is_none() {
             fields.truncate(FIELDS_KEPT);
             let (in_flight, phase) = (logged.since_release.is_some(), phase_name(&again.output));
@@ -270,50 +207,6 @@ impl Tally {
 pub(super) fn encode_into(record: &impl Message, bytes: &mut Vec<u8>) {
     bytes.clear();
     record.encode_raw(bytes);
-}
-
-/// Most differing frames that are kept.
-const STEPS_KEPT: usize = 200;
-
-/// One differing frame.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct GrowthStep {
-    /// Its number since power-up.
-    pub frame: u64,
-    /// Time since the release in flight, since power-up on the pad, s.
-    pub time_s: f64,
-    /// Number of fields that differ.
-    pub fields_different: usize,
-    /// Difference of the gimbal commands, rad.
-    pub gimbal_rad: f64,
-    /// The largest distance of the two values of a field, in representable numbers.
-    pub worst_ulps: Option<u64>,
-}
-
-/// How a divergence grows.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct Growth {
-    /// The first differing frames.
-    pub steps: Vec<GrowthStep>,
-    /// The frame with the largest difference of the gimbal commands.
-    pub peak: Option<GrowthStep>,
-    /// The last differing frame.
-    pub last: Option<GrowthStep>,
-}
-
-impl Growth {
-    /// Notes a differing frame.
-    pub(super) fn note(&mut self, step: GrowthStep) {
-        if self.steps.len() < STEPS_KEPT {
-            self.steps.push(step);
-        }
-        // A difference that is NaN counts as the largest.
-        let exceeds = |peak: &GrowthStep| step.gimbal_rad.is_nan() || step.gimbal_rad > peak.gimbal_rad;
-        if self.peak.as_ref().is_none_or(exceeds) {
-            self.peak = Some(step);
-        }
-        self.last = Some(step);
-    }
 }
 
 #[cfg(test)]
@@ -369,6 +262,6 @@ mod tests {
         let found = differences(descriptor.as_ref(), &longer.encode_to_vec(), &shorter.encode_to_vec());
         assert_eq!(found.len(), 1);
         assert_eq!(found[0].path, "output.fins_rad.len");
-        assert_eq!(found[0].recorded, FieldValue::Integer(2));
+        assert_eq!(found[0].recorded.value, "2");
     }
 }

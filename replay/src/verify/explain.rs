@@ -4,7 +4,6 @@
 //! planned is then solved cold, and by the [`judge`], which is written independently and solves another way. Both plans
 //! are counted by the judge's own dynamics and conditions.
 
-use std::io::{self, Write};
 use std::path::Path;
 
 use anyhow::{Context as _, Result};
@@ -19,10 +18,10 @@ use prost::Message as _;
 use protocol::log::computer_v1::ComputerFrame;
 use serde::Serialize;
 
-use crate::cli::{Outcome, answer, warn_of_what_is_missing};
+use crate::cli::{Answer, Outcome, give, warn_of_what_is_missing};
 use crate::controller::{FrameError, LoggedComputer, phase_name};
 use crate::log::{Recording, RecordingError};
-use crate::print::{print_json, shown};
+use crate::print::columns;
 use crate::settings::SettingError;
 
 /// Plans whose costs differ by less than this share, and whose first gimbal angles by less than this, are the same.
@@ -269,124 +268,113 @@ fn facts(
 /// Most nodes of the plan that are shown.
 const NODES_SHOWN: usize = 12;
 
-/// Writes a frame as text.
-///
-/// # Errors
-/// The output failed.
-pub fn print_explained(report: &FrameReport, output: &mut impl Write) -> io::Result<()> {
-    let FrameReport { frame, time_s, phase, level, burning_s, .. } = report;
-    let head = format!("{}: frame {frame} ({time_s:.3} s, {phase}), decided by {level}", shown(&report.file));
-    match &report.judged {
-        Some(judged) => writeln!(output, "{head}: {}", judged.verdict)?,
-        None => writeln!(output, "{head}")?,
+impl Answer for FrameReport {
+    fn sentences(&self) -> Vec<String> {
+        let Self { file, frame, time_s, phase, level, burning_s, .. } = self;
+        let verdict = self.judged.as_ref().map(|judged| format!(": {}", judged.verdict)).unwrap_or_default();
+        let same = if self.identical { "identical bit for bit" } else { "NOT IDENTICAL" };
+        let [recorded, now] = [&self.recorded_gimbal_rad, &self.gimbal_rad].map(|angles| degrees(angles, 4));
+        let mut lines = vec![
+            format!("{file}: frame {frame} ({time_s:.3} s, {phase}), decided by {level}{verdict}"),
+            format!(
+                "command  {recorded} deg as recorded, {now} deg now: {same}; {burning_s:.3} s since the thrust began"
+            ),
+        ];
+        let Some(judged) = &self.judged else {
+            let nearest = self.nearest_planned.map_or_else(
+                || "no frame of this log does".to_owned(),
+                |nearest| format!("the nearest that does is {nearest}"),
+            );
+            lines.push(format!("plan     this frame plans no landing; {nearest}"));
+            return lines;
+        };
+        lines.extend([("flown", &judged.flown), ("judge", &judged.judge)].map(|(name, plan)| {
+            let PlanFacts { status, iterations, cost, merit, broken, gimbal_deg, fins, .. } = plan;
+            let broken = plan.broken_condition.as_ref().map_or_else(
+                || "nothing broken".to_owned(),
+                |condition| format!("{condition} broken by {broken:.1e}"),
+            );
+            let ([north_deg, west_deg], [north_m, west_m]) = (gimbal_deg, plan.touchdown_m);
+            format!(
+                "{name:<8} {status}, {iterations} iterations, cost {cost:.4}, with what is broken {merit:.4}; gimbal {north_deg:.3} \
+                 and {west_deg:.3} deg, fins {fins:.2}; touches down {north_m:.2} m north, {west_m:.2} m west at {:.3} m/s; {broken}",
+                plan.touchdown_m_s
+            )
+        }));
+        let Judged { cold_iterations, cold_merit, .. } = judged;
+        lines.push(format!(
+            "cold     {cold_iterations} iterations without the plan before it, with what is broken {cold_merit:.4}"
+        ));
+        let stride = self.path.len().div_ceil(NODES_SHOWN).max(1);
+        let shown = self.path.iter().enumerate();
+        let shown = shown.filter(|(node, _)| node % stride == 0 || node + 1 == self.path.len());
+        lines.extend(shown.map(|(node, (time_s, state))| {
+            let name = if node == 0 { "path" } else { "" };
+            let [north, west, up, north_m_s, west_m_s, up_m_s, p, r, ..] = state;
+            let [p_deg, r_deg] = [p, r].map(|angle| angle.to_degrees());
+            format!(
+                "{name:<8} +{time_s:.2} s  {north:>7.2} m north {west:>7.2} m west {up:>7.2} m up  {north_m_s:>6.2} {west_m_s:>6.2} \
+                 {up_m_s:>6.2} m/s  leans {p_deg:>6.2} deg north {r_deg:>6.2} deg west"
+            )
+        }));
+        lines
     }
-    let same = if report.identical { "identical bit for bit" } else { "NOT IDENTICAL" };
-    writeln!(
-        output,
-        "command  {} deg as recorded, {} deg now: {same}; {burning_s:.3} s since the thrust began",
-        degrees(&report.recorded_gimbal_rad),
-        degrees(&report.gimbal_rad)
-    )?;
-    let Some(judged) = &report.judged else {
-        let nearest = report.nearest_planned.map_or_else(
-            || "no frame of this log does".to_owned(),
-            |nearest| format!("the nearest that does is {nearest}"),
-        );
-        return writeln!(output, "plan     this frame plans no landing; {nearest}");
-    };
-    for (name, plan) in [("flown", &judged.flown), ("judge", &judged.judge)] {
-        let broken = plan.broken_condition.as_ref().map_or_else(
-            || "nothing broken".to_owned(),
-            |condition| format!("{condition} broken by {:.1e}", plan.broken),
-        );
-        let ([north_deg, west_deg], [north_m, west_m]) = (plan.gimbal_deg, plan.touchdown_m);
-        writeln!(
-            output,
-            "{name:<8} {}, {} iterations, cost {:.4}, with what is broken {:.4}; gimbal {north_deg:.3} and {west_deg:.3} deg, \
-             fins {:.2}; touches down {north_m:.2} m north, {west_m:.2} m west at {:.3} m/s; {broken}",
-            plan.status, plan.iterations, plan.cost, plan.merit, plan.fins, plan.touchdown_m_s
-        )?;
-    }
-    writeln!(
-        output,
-        "cold     {} iterations without the plan before it, with what is broken {:.4}",
-        judged.cold_iterations, judged.cold_merit
-    )?;
-    let stride = report.path.len().div_ceil(NODES_SHOWN).max(1);
-    for (node, (time_s, state)) in report.path.iter().enumerate() {
-        if node % stride != 0 && node + 1 != report.path.len() {
-            continue;
-        }
-        let name = if node == 0 { "path" } else { "" };
-        let [north, west, up, north_m_s, west_m_s, up_m_s, p, r, ..] = state;
-        writeln!(
-            output,
-            "{name:<8} +{time_s:.2} s  {north:>7.2} m north {west:>7.2} m west {up:>7.2} m up  {north_m_s:>6.2} {west_m_s:>6.2} \
-             {up_m_s:>6.2} m/s  leans {:>6.2} deg north {:>6.2} deg west",
-            p.to_degrees(),
-            r.to_degrees()
-        )?;
-    }
-    Ok(())
 }
 
 /// One angle, or pitch and yaw.
-fn degrees(rad: &[f64]) -> String {
-    rad.iter().map(|rad| format!("{:.4}", rad.to_degrees())).collect::<Vec<_>>().join(" ")
+pub(crate) fn degrees(rad: &[f64], digits: usize) -> String {
+    rad.iter().map(|rad| format!("{:.digits$}", rad.to_degrees())).collect::<Vec<_>>().join(" ")
 }
 
-/// Writes the plans of a flight as a table, with the answer first.
-fn print_all(file: &str, reports: &[FrameReport], output: &mut impl Write) -> io::Result<()> {
-    let judged: Vec<(&FrameReport, &Judged)> =
-        reports.iter().filter_map(|report| Some((report, report.judged.as_ref()?))).collect();
-    let count = |is: &dyn Fn(&Judged) -> bool| judged.iter().filter(|(_, judged)| is(judged)).count();
-    writeln!(
-        output,
-        "{}: {} plans: the judge agrees within {:.0} % of cost in {} and within {SAME_DEG} deg of the first gimbal angles in {}; \
-         it found a better plan in {}, and none as good in {}",
-        shown(file),
-        judged.len(),
-        100.0 * SAME_SHARE,
-        count(&|judged| judged.flown_dearer.abs() <= SAME_SHARE),
-        count(&|judged| judged.first_input_deg <= SAME_DEG),
-        count(&|judged| judged.flown_dearer > SAME_SHARE),
-        count(&|judged| judged.flown_dearer < -SAME_SHARE),
-    )?;
-    writeln!(
-        output,
-        "{:>8} {:>8} {:<14} {:>10} {:>9} {:>9}  broken",
-        "frame", "T+, s", "level", "merit", "dearer", "first"
-    )?;
-    for (report, judged) in judged {
-        let flown = &judged.flown;
-        writeln!(
-            output,
-            "{:>8} {:>8.3} {:<14} {:>10.3} {:>7.2} % {:>6.3} deg  {}",
-            report.frame,
-            report.time_s,
-            report.level,
-            flown.merit,
-            100.0 * judged.flown_dearer,
-            judged.first_input_deg,
-            flown.broken_condition.as_deref().unwrap_or("")
-        )?;
+/// Every plan of a flight.
+#[derive(Serialize)]
+#[serde(transparent)]
+struct Plans {
+    reports: Vec<FrameReport>,
+    #[serde(skip)]
+    file: String,
+}
+
+impl Answer for Plans {
+    fn sentences(&self) -> Vec<String> {
+        let judged = || self.reports.iter().filter_map(|report| Some((report, report.judged.as_ref()?)));
+        let count = |is: &dyn Fn(&Judged) -> bool| judged().filter(|(_, judged)| is(judged)).count();
+        let mut lines = vec![format!(
+            "{}: {} plans: the judge agrees within {:.0} % of cost in {} and within {SAME_DEG} deg of the first gimbal angles in {}; \
+             it found a better plan in {}, and none as good in {}",
+            self.file,
+            judged().count(),
+            100.0 * SAME_SHARE,
+            count(&|judged| judged.flown_dearer.abs() <= SAME_SHARE),
+            count(&|judged| judged.first_input_deg <= SAME_DEG),
+            count(&|judged| judged.flown_dearer > SAME_SHARE),
+            count(&|judged| judged.flown_dearer < -SAME_SHARE),
+        )];
+        let row = |(report, judged): (&FrameReport, &Judged)| {
+            [
+                report.frame.to_string(),
+                format!("{:.3}", report.time_s),
+                report.level.to_owned(),
+                format!("{:.3}", judged.flown.merit),
+                format!("{:.2} %", 100.0 * judged.flown_dearer),
+                format!("{:.3} deg", judged.first_input_deg),
+                judged.flown.broken_condition.clone().unwrap_or_default(),
+            ]
+        };
+        let head = ["frame", "T+, s", "level", "merit", "dearer", "first", "broken"].map(str::to_owned);
+        let rows = std::iter::once(head).chain(judged().map(row));
+        lines.extend(columns(['>', '>', '<', '>', '>', '>', '<'], rows));
+        lines
     }
-    Ok(())
 }
 
 pub(super) fn run(file: &Path, frame: &str, json: bool) -> Result<Outcome> {
     let recording = Recording::open(file)?;
     warn_of_what_is_missing(&recording);
     if frame == "all" {
-        let reports = explain_all(&recording)?;
-        answer(|output| {
-            if json { print_json(&reports, output) } else { print_all(&recording.name, &reports, output) }
-        })?;
-        return Ok(Outcome::Given);
+        return give(&Plans { reports: explain_all(&recording)?, file: recording.name }, json);
     }
     let number =
         frame.parse().with_context(|| format!("--explain {frame}: neither a frame's number nor `all`"))?;
-    let report = explain(&recording, number)?;
-    answer(|output| if json { print_json(&report, output) } else { print_explained(&report, output) })?;
-    Ok(Outcome::Given)
+    give(&explain(&recording, number)?, json)
 }

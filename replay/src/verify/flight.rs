@@ -11,12 +11,11 @@ use serde::Serialize;
 use super::difference::{Tally, encode_into};
 use super::inputs::Inputs;
 use super::parts::Part;
-use super::{FileFacts, Obstacle, VerifyReport};
+use super::{FlightPlace, Obstacle, Verification, VerifyReport};
 use crate::controller::LoggedComputer;
-use crate::log::VerdictFacts;
 use crate::log::{
-    Entry, FlightLog, FrameOrder, Gap, Head, LogError, LoggedFrame, Recording, StampedEntry, misread_frame,
-    summary_of,
+    Cut, Entry, FlightLog, FrameOrder, Gap, Head, LogError, LoggedFrame, Recording, StampedEntry,
+    VerdictFacts, misread_frame, summary_of,
 };
 use crate::refly::{ReflyOptions, refly};
 
@@ -228,9 +227,15 @@ impl FlightVerifier {
         }
     }
 
-    pub(super) fn into_report(self, facts: FileFacts) -> VerifyReport {
-        let compared = self.tally.compared;
-        let parts = self.parts(&facts);
+    /// The report on the flight, whose log was read to its end or to its damage.
+    pub(super) fn into_report<R: Read>(
+        self,
+        log: &FlightLog<R>,
+        flight: Option<FlightPlace>,
+        cut: Option<Cut>,
+    ) -> VerifyReport {
+        let parts = self.parts(log.head());
+        let Tally { compared, different, first, last, .. } = self.tally;
         let obstacle = match (self.obstacle.or(self.on_the_pad), self.unreadable) {
             // An unreadable frame leaves a gap; the reason why it is unreadable says more than the gap.
             (None | Some(Obstacle::Gap { .. } | Obstacle::BeginningMissing { .. }), Some(reason)) => {
@@ -241,16 +246,43 @@ impl FlightVerifier {
             (None, None) if compared == 0 => Some(Obstacle::NoComputer),
             (obstacle, _) => obstacle,
         };
-        let obstacle = match (obstacle, &facts.schema) {
-            (obstacle @ Some(Obstacle::Unreadable { .. } | Obstacle::NoComputer), _) | (obstacle, None) => {
-                obstacle
-            }
-            (_, Some(found)) => Some(Obstacle::Schema { found: found.clone() }),
+        let head = log.head();
+        let obstacle = match obstacle {
+            Some(Obstacle::Unreadable { .. } | Obstacle::NoComputer) => obstacle,
+            _ if head.is_of_this_schema() => obstacle,
+            _ => Some(Obstacle::Schema { found: head.schema_version().unwrap_or("none").to_owned() }),
         };
-        VerifyReport::new(facts, (self.frames, self.tally), self.has_power_up, parts, obstacle)
+        // Damage ends the reading, so it belongs to the last flight.
+        let damage = log.damage().filter(|_| flight.is_none_or(|flight| flight.number == flight.of));
+        let mut report = VerifyReport {
+            file: log.name().to_owned(),
+            flight,
+            outcome: Verification::Identical,
+            from_power_up: self.has_power_up,
+            parts,
+            counted: log.is_counted(),
+            frames_recorded: self.frames,
+            frames_compared: compared,
+            frames_identical: compared - different,
+            frames_different: different,
+            frames_in_flight: self.tally.in_flight,
+            fields_different: self.tally.fields_different,
+            span: first.zip(last).map(|((first, _), (last, _))| (first, last)),
+            flight_s: first.zip(last).map(|((_, first_s), (_, last_s))| last_s - first_s),
+            first_divergence: self.tally.divergence,
+            consequence: None,
+            obstacle,
+            cut,
+            damage: damage.map(ToString::to_string),
+            unread: None,
+            build: head.compare_build(),
+            strict: false,
+        };
+        report.conclude();
+        report
     }
 
-    fn parts(&self, facts: &FileFacts) -> Vec<Part> {
+    fn parts(&self, head: &Head) -> Vec<Part> {
         let Self { frames, tally, parts, .. } = self;
         let part = |name, compared, different| Part { compared, different, ..Part::of(name, *frames) };
         let digests = part("digests", parts.digests, tally.digests_different);
@@ -262,7 +294,7 @@ impl FlightVerifier {
             (missing > 0).then(|| format!("{missing} are missing, or belong to no frame that was run again"));
         let alone = || "only --strict flies the flight again".to_owned();
         let flown = self.computer.as_ref().map(|computer| &computer.pilot().mission().name);
-        let other = facts.profile.as_ref().zip(flown).filter(|(said, flown)| said != flown);
+        let other = head.run.get("profile").zip(flown).filter(|(said, flown)| said != flown);
         let metadata = match other {
             Some((said, flown)) => Part { different: 1, ..Part::of("metadata", 1) }
                 .because(format!("its run facts name the profile {said}, and it is {flown}")),

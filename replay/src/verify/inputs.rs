@@ -4,7 +4,7 @@
 //! that does not follow from the frame before it, gives that away.
 
 use flight::computer::{FRAME_S, flight_time_s};
-use protocol::log::computer_v1::{ComputerInput, Uplink};
+use protocol::log::computer_v1::ComputerInput;
 use protocol::log::flight_v1::{GnssFix, Measurements, Vector3};
 
 /// No servo turns further, rad.
@@ -69,63 +69,49 @@ impl Inputs {
     }
 }
 
-/// A value and what it may be.
-fn outside(what: &str, value: f64, lowest: f64, highest: f64) -> Option<String> {
-    (!(lowest..=highest).contains(&value)).then(|| format!("{what} {value:?}: can be {lowest} to {highest}"))
-}
-
-fn within(what: &str, value: f64, most: f64) -> Option<String> {
-    outside(what, value, -most, most)
-}
-
-fn vector(what: &str, Vector3 { x, y, z }: &Vector3, most: f64) -> Option<String> {
-    [x, y, z].into_iter().find_map(|value| within(what, *value, most))
-}
-
 fn out_of_range(input: &ComputerInput, release_frame: Option<u64>) -> Option<String> {
     let time_s = flight_time_s(input.frame);
     if input.time_s.to_bits() != time_s.to_bits() {
         return Some(format!("time {:?} s: the frame is at {time_s} s", input.time_s));
     }
-    let angles = || input.gimbal_rad.iter().chain(&input.fins_rad);
-    let age = |what: &str, uplink: Option<&Uplink>| {
-        uplink.and_then(|uplink| outside(what, uplink.age_s?, -ROUNDING_S, f64::MAX))
-    };
-    angles()
-        .find_map(|angle| within("angle of a servo, rad,", *angle, ANGLE_MAX_RAD))
-        .or_else(|| outside("battery, V,", input.battery_v?, 0.0, BATTERY_MAX_V))
-        .or_else(|| {
-            let space = input.log.space_bytes;
-            let can_be = space <= SPACE_MAX_BYTES || space == u64::MAX;
-            (!can_be).then(|| format!("{space} bytes of space for the log: no disk has as many"))
-        })
-        .or_else(|| age("age of the uplink, s,", input.uplink.as_ref()))
-        .or_else(|| {
-            input.requests.iter().find_map(|request| age("age of the uplink, s,", request.uplink.as_ref()))
-        })
-        .or_else(|| {
-            outside("age of the commander, s,", input.commander.as_ref()?.age_s, -ROUNDING_S, f64::MAX)
-        })
-        .or_else(|| {
-            // Fixes are on the clock of the flight: from power-up, and from the release on T+.
-            let clock_s = flight_time_s(input.frame.saturating_sub(release_frame.unwrap_or(0)));
-            measured(&input.measured, clock_s)
-        })
+    let space = input.log.space_bytes;
+    if space > SPACE_MAX_BYTES && space != u64::MAX {
+        return Some(format!("{space} bytes of space for the log: no disk has as many"));
+    }
+    // Fixes are on the clock of the flight: from power-up, and from the release on T+.
+    let clock_s = flight_time_s(input.frame.saturating_sub(release_frame.unwrap_or(0)));
+    let Measurements { imu, pressure_altitude_m, gnss, lidar_range_m } = &input.measured;
+    let one = |value: Option<f64>| value.into_iter().collect();
+    let within = |most: f64| [-most, most];
+    let uplinks = input.requests.iter().map(|request| &request.uplink).chain([&input.uplink]);
+    let uplink_ages = uplinks.filter_map(|uplink| uplink.as_ref()?.age_s).collect();
+    let fix = |of: fn(&GnssFix) -> Vec<f64>| gnss.as_ref().map(of).unwrap_or_default();
+    let ages = [-ROUNDING_S, f64::MAX];
+    let rows: [(&str, Vec<f64>, [f64; 2]); 11] = [
+        ("angle of a servo, rad,", [&*input.gimbal_rad, &input.fins_rad].concat(), within(ANGLE_MAX_RAD)),
+        ("battery, V,", one(input.battery_v), [0.0, BATTERY_MAX_V]),
+        ("age of the uplink, s,", uplink_ages, ages),
+        ("age of the commander, s,", one(input.commander.as_ref().map(|commander| commander.age_s)), ages),
+        ("gyro, rad/s,", vector(imu.gyro_rad_s), within(RATE_MAX_RAD_S)),
+        ("accelerometer, m/s2,", vector(imu.specific_force_m_s2), within(FORCE_MAX_M_S2)),
+        ("pressure altitude, m,", one(*pressure_altitude_m), within(PLACE_MAX_M)),
+        ("lidar range, m,", one(*lidar_range_m), [-1.0, RANGE_MAX_M]),
+        ("position of GNSS, m,", fix(|fix| vector(fix.position_m)), within(PLACE_MAX_M)),
+        ("velocity of GNSS, m/s,", fix(|fix| vector(fix.velocity_m_s)), within(SPEED_MAX_M_S)),
+        (
+            "time of a fix, s,",
+            fix(|fix| vec![fix.valid_at_s]),
+            [clock_s - FIX_AGE_MAX_S, clock_s + ROUNDING_S],
+        ),
+    ];
+    rows.into_iter().find_map(|(what, values, [lowest, highest])| {
+        let outside = values.into_iter().find(|value| !(lowest..=highest).contains(value))?;
+        Some(format!("{what} {outside:?}: can be {lowest} to {highest}"))
+    })
 }
 
-fn measured(measured: &Measurements, time_s: f64) -> Option<String> {
-    let Measurements { imu, pressure_altitude_m, gnss, lidar_range_m } = measured;
-    vector("gyro, rad/s,", &imu.gyro_rad_s, RATE_MAX_RAD_S)
-        .or_else(|| vector("accelerometer, m/s2,", &imu.specific_force_m_s2, FORCE_MAX_M_S2))
-        .or_else(|| within("pressure altitude, m,", (*pressure_altitude_m)?, PLACE_MAX_M))
-        .or_else(|| outside("lidar range, m,", (*lidar_range_m)?, -1.0, RANGE_MAX_M))
-        .or_else(|| {
-            let GnssFix { position_m, velocity_m_s, valid_at_s } = gnss.as_ref()?;
-            let (first_s, last_s) = (time_s - FIX_AGE_MAX_S, time_s + ROUNDING_S);
-            vector("position of GNSS, m,", position_m, PLACE_MAX_M)
-                .or_else(|| vector("velocity of GNSS, m/s,", velocity_m_s, SPEED_MAX_M_S))
-                .or_else(|| outside("time of a fix, s,", *valid_at_s, first_s, last_s))
-        })
+fn vector(Vector3 { x, y, z }: Vector3) -> Vec<f64> {
+    vec![x, y, z]
 }
 
 fn out_of_order(before: &LastInput, now: &LastInput) -> Option<String> {

@@ -16,8 +16,8 @@
 //! A log joined by other tools may hold several flights; each has its own report. A flight without comparisons is never
 //! identical, and a flight whose record ends before the flight did is reported as cut.
 //!
-//! For a divergence, the report says how it grows from frame to frame. If a whole file is verified, it also says whether
-//! the landing would end differently: only for this, the flight is simulated from the first frame that differs.
+//! If a whole file diverges, the report also says whether the landing would end differently: only for this, the flight is
+//! simulated from the first frame that differs.
 
 mod again;
 mod baseline;
@@ -28,29 +28,25 @@ mod flight;
 mod inputs;
 mod parts;
 
-use std::io::{self, Read, Write};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use self::flight::FlightVerifier;
 pub use self::flight::{Consequence, Unread};
 use anyhow::{Result, bail};
-use difference::Tally;
-pub use difference::{
-    Divergence, FieldDifference, FieldValue, Growth, GrowthStep, differences, ulp_distance,
-};
+pub use difference::{Divergence, FieldDifference, FieldValue, differences, ulp_distance};
 pub use parts::Part;
-use parts::print_parts;
 use protocol::log::reader::Damage;
 use protocol::log::record::{SCHEMA_VERSION, TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START, TOPIC_VERDICT};
 use serde::Serialize;
 
-use crate::cli::{Outcome, answer, say, warn_of_cut, warn_of_damage};
+use crate::cli::{Answer, Outcome, give, say, warn_of_cut, warn_of_damage};
 use crate::controller::FrameError;
 use crate::log::{
     BuildComparison, Cut, Entry, FlightLog, Flights, Head, LogError, LoggedFlight, Recording, VerdictFacts,
 };
-use crate::print::{counted, print_json, shown};
+use crate::print::counted;
 
 /// The topics that a verification reads.
 const VERIFIED: [&str; 3] = [TOPIC_COMPUTER_START, TOPIC_COMPUTER_FRAME, TOPIC_VERDICT];
@@ -89,6 +85,7 @@ pub fn verify(path: &Path) -> Result<Vec<VerifyReport>, LogError> {
 /// As [`verify`].
 pub fn verify_strictly(path: &Path) -> Result<Vec<VerifyReport>, LogError> {
     let mut reports = verify(path)?;
+    reports.iter_mut().for_each(|report| report.strict = true);
     let [report] = reports.as_mut_slice() else {
         let why = "a file with several flights is not flown again";
         for report in &mut reports {
@@ -139,26 +136,11 @@ pub fn verify_log<R: Read>(
         computers.push(FlightVerifier::new(false, unreadable));
     }
     let of = computers.len();
-    let mut reports = Vec::new();
-    for (place, computer) in computers.into_iter().enumerate() {
+    let report = |(place, computer): (usize, FlightVerifier)| {
         let flight = (of > 1).then_some(FlightPlace { number: place + 1, of });
-        let cut = flights.found().get(place).and_then(LoggedFlight::cut);
-        // Damage ends the reading, so it belongs to the last flight.
-        let damage = log.damage().filter(|_| place + 1 == of).map(ToString::to_string);
-        let head = log.head();
-        let facts = FileFacts {
-            file: log.name().to_owned(),
-            flight,
-            cut,
-            damage,
-            counted: log.is_counted(),
-            build: head.compare_build(),
-            schema: (!head.is_of_this_schema()).then(|| head.schema_version().unwrap_or("none").to_owned()),
-            profile: head.run.get("profile").cloned(),
-        };
-        reports.push(computer.into_report(facts));
-    }
-    Ok(reports)
+        computer.into_report(log, flight, flights.found().get(place).and_then(LoggedFlight::cut))
+    };
+    Ok(computers.into_iter().enumerate().map(report).collect())
 }
 
 /// The result of a verification.
@@ -175,18 +157,6 @@ pub enum Verification {
     Impossible,
     /// Some frame could not be re-executed, and all others are identical.
     NotReplayable,
-}
-
-impl Verification {
-    /// The answer. If `strict`, only a whole flight is identical.
-    fn answer(self, strict: bool) -> Outcome {
-        match self {
-            Self::Identical => Outcome::Given,
-            Self::IdenticalReadablePart => Outcome::Decided { yes: !strict },
-            Self::Impossible | Self::Diverged => Outcome::Decided { yes: false },
-            Self::NotReplayable => Outcome::NotAll,
-        }
-    }
 }
 
 /// Why frames were not compared.
@@ -260,21 +230,6 @@ pub struct FlightPlace {
     pub of: usize,
 }
 
-/// Facts about a flight's record besides its frames.
-pub(super) struct FileFacts {
-    pub(super) file: String,
-    pub(super) flight: Option<FlightPlace>,
-    pub(super) cut: Option<Cut>,
-    pub(super) damage: Option<String>,
-    /// The log says how many records it has.
-    pub(super) counted: bool,
-    pub(super) build: BuildComparison,
-    /// The version of its contents, if this build does not read it.
-    pub(super) schema: Option<String>,
-    /// The profile that its run facts name.
-    pub(super) profile: Option<String>,
-}
-
 /// The report on one flight.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct VerifyReport {
@@ -307,8 +262,6 @@ pub struct VerifyReport {
     pub flight_s: Option<f64>,
     /// The first frame that differs.
     pub first_divergence: Option<Divergence>,
-    /// How the divergence grows.
-    pub growth: Option<Growth>,
     /// Whether the landing would end differently; only for whole files.
     pub consequence: Option<Consequence>,
     /// Why not every frame was compared.
@@ -321,47 +274,12 @@ pub struct VerifyReport {
     pub unread: Option<Unread>,
     /// Comparison of the build that wrote the log with this one.
     pub build: BuildComparison,
+    /// Only a whole flight of which everything was compared is identical.
+    #[serde(skip)]
+    pub(super) strict: bool,
 }
 
 impl VerifyReport {
-    fn new(
-        facts: FileFacts,
-        (frames_recorded, counts): (u64, Tally),
-        from_power_up: bool,
-        parts: Vec<Part>,
-        obstacle: Option<Obstacle>,
-    ) -> Self {
-        let (first_divergence, growth) = (counts.divergence, counts.growth);
-        let FileFacts { file, flight, cut, damage, counted, build, schema: _, profile: _ } = facts;
-        let (first, last) = (counts.first, counts.last);
-        let mut report = Self {
-            file,
-            flight,
-            outcome: Verification::Identical,
-            from_power_up,
-            parts,
-            counted,
-            frames_recorded,
-            frames_compared: counts.compared,
-            frames_identical: counts.compared - counts.different,
-            frames_different: counts.different,
-            frames_in_flight: counts.in_flight,
-            fields_different: counts.fields_different,
-            span: first.zip(last).map(|((first, _), (last, _))| (first, last)),
-            flight_s: first.zip(last).map(|((_, first_s), (_, last_s))| last_s - first_s),
-            growth: first_divergence.is_some().then_some(growth),
-            first_divergence,
-            consequence: None,
-            obstacle,
-            cut,
-            damage,
-            unread: None,
-            build,
-        };
-        report.conclude();
-        report
-    }
-
     /// A part of the record by its name.
     pub fn part(&self, name: &str) -> Option<&Part> {
         self.parts.iter().find(|part| part.name == name)
@@ -412,94 +330,90 @@ const ONLY_STRICTLY: [&str; 2] = ["verdict", "metadata"];
 /// Most fields of the first diverged frame that are shown.
 const FIELDS_SHOWN: usize = 5;
 
-/// Writes a verification as text.
-///
-/// # Errors
-/// The output failed.
-pub fn print_verify(report: &VerifyReport, output: &mut impl Write) -> io::Result<()> {
-    let name = name_of(report);
-    let VerifyReport { frames_identical, frames_compared, frames_recorded, .. } = report;
-    match report.outcome {
-        Verification::Identical => {
-            writeln!(output, "{name}: {frames_identical} of {frames_compared} frames identical")?;
-        }
-        Verification::IdenticalReadablePart => {
-            let of = if report.damage.is_some() { " of the readable part" } else { "" };
-            let what_is_missing = what_is_missing(report);
-            writeln!(
-                output,
-                "{name}: {frames_identical} of {frames_compared} frames identical{of}{what_is_missing}"
-            )?;
-        }
-        Verification::Diverged if report.first_divergence.is_none() => {
-            let different = report.parts.iter().filter(|part| part.different > 0);
-            let names: Vec<&str> = different.map(|part| part.name).collect();
-            writeln!(
-                output,
-                "{name}: DIVERGED: {frames_identical} of {frames_compared} frames are identical, and not: {}",
-                names.join(", ")
-            )?;
-        }
-        Verification::Diverged => {
-            let VerifyReport { frames_different, fields_different, .. } = report;
-            let fields = counted(*fields_different, "field");
-            writeln!(
-                output,
-                "{name}: DIVERGED: {frames_different} of {frames_compared} frames differ, in {fields}"
-            )?;
-        }
-        Verification::Impossible => {
-            writeln!(output, "{name}: IMPOSSIBLE: some recorded inputs cannot be")?;
-        }
-        Verification::NotReplayable if *frames_compared == 0 => {
-            let reason = report.obstacle.as_ref().map(|obstacle| shown(&obstacle.to_string()));
-            writeln!(output, "{name}: nothing was compared: {}", reason.unwrap_or_default())?;
-        }
-        Verification::NotReplayable => writeln!(
-            output,
-            "{name}: not replayable as a whole: the first {frames_identical} of {frames_recorded} frames are identical"
-        )?,
-    }
-    if let Some(first) = &report.first_divergence {
-        print_divergence(first, output)?;
-    }
-    print_beginning(report, output)?;
-    if *frames_compared > 0 {
-        print_parts(&report.parts, output)?;
-    }
-    if !report.counted {
-        writeln!(output, "{NOT_COUNTED}")?;
-    }
-    if let Some(growth) = &report.growth {
-        print_growth(growth, output)?;
-    }
-    if let Some(consequence) = &report.consequence {
-        print_consequence(consequence, output)?;
-    }
-    if let Some(obstacle) = report.obstacle.as_ref().filter(|_| *frames_compared > 0) {
-        writeln!(output, "not every frame was compared: {}", shown(&obstacle.to_string()))?;
-    }
-    if report.outcome != Verification::IdenticalReadablePart {
-        let what_is_missing = what_is_missing(report);
-        if !what_is_missing.is_empty() {
-            writeln!(output, "what was compared is{what_is_missing}")?;
+impl Answer for VerifyReport {
+    fn outcome(&self) -> Outcome {
+        match self.outcome {
+            Verification::Identical | Verification::IdenticalReadablePart => Outcome::Decided {
+                yes: !self.strict || self.outcome == Verification::Identical && self.is_all_compared(),
+            },
+            Verification::Impossible | Verification::Diverged => Outcome::Decided { yes: false },
+            Verification::NotReplayable => Outcome::NotAll,
         }
     }
-    Ok(())
+
+    fn sentences(&self) -> Vec<String> {
+        let place = self.flight.map(|FlightPlace { number, of }| format!(": flight {number} of {of}"));
+        let mut lines = vec![format!("{}{}: {}", self.file, place.unwrap_or_default(), self.headline())];
+        lines.extend(self.first_divergence.iter().flat_map(Divergence::sentences));
+        if self.frames_compared > 0 {
+            let beginning = self.flight_s.filter(|_| self.from_power_up).map_or_else(
+                || FRAMES_ALONE.to_owned(),
+                |flight_s| {
+                    let in_flight = self.frames_in_flight;
+                    format!("from power-up to {flight_s:.3} s after it, {in_flight} of them in flight")
+                },
+            );
+            lines.push(beginning);
+            lines.extend(parts::table(&self.parts));
+        }
+        if !self.counted {
+            lines.push(NOT_COUNTED.to_owned());
+        }
+        lines.extend(self.consequence.as_ref().map(Consequence::words));
+        let obstacle = self.obstacle.as_ref().filter(|_| self.frames_compared > 0);
+        lines.extend(obstacle.map(|obstacle| format!("not every frame was compared: {obstacle}")));
+        let missing = self.what_is_missing();
+        if self.outcome != Verification::IdenticalReadablePart && !missing.is_empty() {
+            lines.push(format!("what was compared is{missing}"));
+        }
+        lines
+    }
 }
 
-/// Prints from where on the flight computer was run again.
-fn print_beginning(report: &VerifyReport, output: &mut impl Write) -> io::Result<()> {
-    let VerifyReport { from_power_up, frames_compared, frames_in_flight, flight_s, .. } = report;
-    match (frames_compared, flight_s) {
-        (0, _) | (_, None) => Ok(()),
-        (_, Some(flight_s)) if *from_power_up => {
-            writeln!(
-                output,
-                "from power-up to {flight_s:.3} s after it, {frames_in_flight} of them in flight"
-            )
+impl VerifyReport {
+    fn headline(&self) -> String {
+        let Self { frames_identical: identical, frames_compared: compared, .. } = self;
+        match self.outcome {
+            Verification::Identical => format!("{identical} of {compared} frames identical"),
+            Verification::IdenticalReadablePart => {
+                let of = if self.damage.is_some() { " of the readable part" } else { "" };
+                format!("{identical} of {compared} frames identical{of}{}", self.what_is_missing())
+            }
+            Verification::Diverged if self.first_divergence.is_none() => {
+                let different = self.parts.iter().filter(|part| part.different > 0);
+                let names: Vec<&str> = different.map(|part| part.name).collect();
+                let names = names.join(", ");
+                format!("DIVERGED: {identical} of {compared} frames are identical, and not: {names}")
+            }
+            Verification::Diverged => {
+                let (different, fields) = (self.frames_different, counted(self.fields_different, "field"));
+                format!("DIVERGED: {different} of {compared} frames differ, in {fields}")
+            }
+            Verification::Impossible => "IMPOSSIBLE: some recorded inputs cannot be".to_owned(),
+            Verification::NotReplayable if *compared == 0 => {
+                let reason = self.obstacle.as_ref().map(ToString::to_string);
+                format!("nothing was compared: {}", reason.unwrap_or_default())
+            }
+            Verification::NotReplayable => {
+                let recorded = self.frames_recorded;
+                format!("not replayable as a whole: the first {identical} of {recorded} frames are identical")
+            }
         }
-        _ => writeln!(output, "{FRAMES_ALONE}"),
+    }
+
+    /// What is missing from the part of the flight that was read.
+    fn what_is_missing(&self) -> String {
+        let cut = self.cut.as_ref().map(|cut| format!(" of an INCOMPLETE flight: {cut}"));
+        let unread = self.damage.as_ref().map(|damage| {
+            let frames = match self.unread.and_then(|unread| unread.frames) {
+                Some((unread, all)) => format!("{unread} of {all} frames were not read"),
+                None => "how many frames were not read is not known".to_owned(),
+            };
+            let seconds = self.unread.and_then(|unread| unread.seconds);
+            let seconds = seconds.map(|seconds| format!(" ({seconds:.3} s)")).unwrap_or_default();
+            format!("; {frames}{seconds}: {damage}")
+        });
+        [cut, unread].into_iter().flatten().collect()
     }
 }
 
@@ -510,99 +424,46 @@ const FRAMES_ALONE: &str = "the log has no frames of the flight computer from po
 const NOT_COUNTED: &str =
     "the log has no summary that counts its records: whether the last of them are missing cannot be known";
 
-/// The file and, if it holds several flights, the flight's number.
-fn name_of(report: &VerifyReport) -> String {
-    let file = shown(&report.file);
-    report
-        .flight
-        .map_or_else(|| file.clone(), |flight| format!("{file}: flight {} of {}", flight.number, flight.of))
+impl Divergence {
+    fn sentences(&self) -> Vec<String> {
+        let Self { frame, time_s, phase, .. } = self;
+        let time =
+            if self.in_flight { format!("T+{time_s:.3} s") } else { format!("{time_s:.3} s after power-up") };
+        let fields = counted(self.fields_different as u64, "field");
+        let mut lines = vec![format!("first at frame {frame} ({time}, {phase}), {fields}:")];
+        for FieldDifference { path, recorded, recomputed, ulps } in self.fields.iter().take(FIELDS_SHOWN) {
+            lines.push(format!("  {path}"));
+            for (name, FieldValue { value, bits }) in [("recorded", recorded), ("recomputed", recomputed)] {
+                lines.push(format!("    {name:<10}  {value:<24}  {}", bits.as_deref().unwrap_or_default()));
+            }
+            lines.extend(ulps.map(|ulps| format!("    apart       {ulps} ULP")));
+        }
+        let more = self.fields_different.saturating_sub(FIELDS_SHOWN) as u64;
+        lines.extend((more > 0).then(|| format!("  and {} more", counted(more, "field"))));
+        lines
+    }
 }
 
-/// What is missing from the part of the flight that was read.
-fn what_is_missing(report: &VerifyReport) -> String {
-    let cut = report.cut.as_ref().map(|cut| format!(" of an INCOMPLETE flight: {cut}"));
-    let unread = report.damage.as_ref().map(|damage| {
-        let frames = match report.unread.and_then(|unread| unread.frames) {
-            Some((unread, all)) => format!("{unread} of {all} frames were not read"),
-            None => "how many frames were not read is not known".to_owned(),
+impl Consequence {
+    fn words(&self) -> String {
+        if let Some(obstacle) = &self.obstacle {
+            return format!("verdict: whether it would change is not known: {obstacle}");
+        }
+        let word = |verdict: &Option<VerdictFacts>| {
+            verdict.as_ref().map_or("no verdict", |verdict| verdict.landing.word())
         };
-        let seconds = report.unread.and_then(|unread| unread.seconds);
-        let seconds = seconds.map(|seconds| format!(" ({seconds:.3} s)")).unwrap_or_default();
-        format!("; {frames}{seconds}: {}", shown(damage))
-    });
-    [cut, unread].into_iter().flatten().collect()
-}
-
-fn print_divergence(first: &Divergence, output: &mut impl Write) -> io::Result<()> {
-    let Divergence { frame, in_flight, time_s, phase, fields_different, .. } = first;
-    let place = if *in_flight {
-        format!("frame {frame} (T+{time_s:.3} s, {phase})")
-    } else {
-        format!("frame {frame} ({time_s:.3} s after power-up, {phase})")
-    };
-    writeln!(output, "first at {place}, {}:", counted(*fields_different as u64, "field"))?;
-    for field in first.fields.iter().take(FIELDS_SHOWN) {
-        print_field(field, output)?;
+        let answer = match self.changed {
+            Some(true) => "would CHANGE",
+            Some(false) => "would not change",
+            None => "is not comparable",
+        };
+        format!(
+            "verdict: {answer}: recorded {}, flown on by this build from frame {} (closed loop) {}",
+            word(&self.recorded),
+            self.from_frame,
+            word(&self.reflown)
+        )
     }
-    if first.fields_different > FIELDS_SHOWN {
-        writeln!(output, "  and {} more", counted((first.fields_different - FIELDS_SHOWN) as u64, "field"))?;
-    }
-    Ok(())
-}
-
-fn print_field(field: &FieldDifference, output: &mut impl Write) -> io::Result<()> {
-    writeln!(output, "  {}", field.path)?;
-    for (name, value) in [("recorded", &field.recorded), ("recomputed", &field.recomputed)] {
-        let bits = value.bits().map(|bits| format!("0x{bits:016x}")).unwrap_or_default();
-        writeln!(output, "    {}", format!("{name:<10}  {:<24}  {bits}", value.to_string()).trim_end())?;
-    }
-    if let Some(ulps) = field.ulps {
-        writeln!(output, "    apart       {ulps} ULP")?;
-    }
-    Ok(())
-}
-
-/// Prints the first diverged frame, those 1, 2, 4, 8 and so on after it, the worst and the last.
-fn print_growth(growth: &Growth, output: &mut impl Write) -> io::Result<()> {
-    writeln!(output, "how it grows (gimbal command, worst field):")?;
-    let doubling = (0..).map(|power| (1_usize << power) - 1).take_while(|place| *place < growth.steps.len());
-    let mut shown: Vec<&GrowthStep> = doubling.filter_map(|place| growth.steps.get(place)).collect();
-    shown.extend(growth.peak.iter().chain(&growth.last));
-    shown.sort_by_key(|step| step.frame);
-    shown.dedup_by_key(|step| step.frame);
-    for step in shown {
-        let ulps = step.worst_ulps.map_or_else(|| "-".to_owned(), |ulps| ulps.to_string());
-        writeln!(
-            output,
-            "  frame {:>5} {:>9.3} s  {:>10.3e} rad  {ulps} ULP in {}",
-            step.frame,
-            step.time_s,
-            step.gimbal_rad,
-            counted(step.fields_different as u64, "field")
-        )?;
-    }
-    Ok(())
-}
-
-fn print_consequence(consequence: &Consequence, output: &mut impl Write) -> io::Result<()> {
-    if let Some(obstacle) = &consequence.obstacle {
-        return writeln!(output, "verdict: whether it would change is not known: {}", shown(obstacle));
-    }
-    let word = |verdict: &Option<VerdictFacts>| {
-        verdict.as_ref().map_or("no verdict", |verdict| verdict.landing.word())
-    };
-    let answer = match consequence.changed {
-        Some(true) => "would CHANGE",
-        Some(false) => "would not change",
-        None => "is not comparable",
-    };
-    writeln!(
-        output,
-        "verdict: {answer}: recorded {}, flown on by this build from frame {} (closed loop) {}",
-        word(&consequence.recorded),
-        consequence.from_frame,
-        word(&consequence.reflown)
-    )
 }
 
 #[derive(Debug, clap::Args)]
@@ -626,9 +487,6 @@ pub(crate) struct Args {
     book: book::Arguments,
 }
 
-/// The result for one log.
-type Verified<'a> = (&'a Path, Result<Vec<VerifyReport>, LogError>);
-
 impl Args {
     pub(crate) fn run(self) -> Result<Outcome> {
         if self.book.book {
@@ -650,62 +508,35 @@ impl Args {
         for file in &self.files {
             if file.is_dir() { files.extend(baseline::logs_of(file)?) } else { files.push(file.clone()) }
         }
-        let mut answers: Vec<Verified> = Vec::new();
+        let (mut reports, mut outcome) = (Vec::new(), Outcome::Given);
         for file in &files {
             #[expect(clippy::disallowed_methods, reason = "tells the user how fast it was; decides nothing")]
             let started = Instant::now();
-            let verified = if self.strict { verify_strictly(file) } else { verify(file) };
-            let took = started.elapsed();
-            match &verified {
-                Ok(reports) => {
-                    for report in reports {
+            match if self.strict { verify_strictly(file) } else { verify(file) } {
+                Ok(found) => {
+                    let took = started.elapsed();
+                    for report in &found {
                         warn_of_damage(&report.file, report.damage.as_deref());
                         warn_of_cut(&report.file, report.cut.as_ref());
                         warn_of_build(report);
                     }
-                    say_speed(reports, took);
+                    say_speed(&found, took);
+                    reports.extend(found);
                 }
+                Err(error) if files.len() == 1 => return Err(error.into()),
                 // One unreadable log must not hide the results of the others.
-                Err(error) if files.len() > 1 => say(&format!("{error}")),
-                Err(_) => {}
+                Err(error) => {
+                    say(&format!("{:#}", anyhow::Error::from(error)));
+                    outcome = Outcome::NotAll;
+                }
             }
-            answers.push((file, verified));
         }
-        if let [(_, Err(_))] = answers.as_slice()
-            && let Some((_, Err(error))) = answers.pop()
-        {
-            return Err(error.into());
-        }
-        let reports: Vec<&VerifyReport> =
-            answers.iter().filter_map(|(_, verified)| verified.as_ref().ok()).flatten().collect();
-        answer(|output| match reports.as_slice() {
-            [report] if self.json && answers.len() == 1 => print_json(report, output),
-            reports if self.json => print_json(&reports, output),
-            reports => reports.iter().try_for_each(|report| print_verify(report, output)),
-        })?;
-        let all_compared = reports.iter().all(|report| report.is_all_compared());
-        let outcome = match worst(&answers) {
-            Verification::Identical if self.strict && !all_compared => Verification::IdenticalReadablePart,
-            worst => worst,
+        let given = match reports.as_slice() {
+            [report] if files.len() == 1 => give(report, self.json)?,
+            _ => give(&reports, self.json)?,
         };
-        Ok(outcome.answer(self.strict))
+        Ok(given.or_worse(outcome))
     }
-}
-
-/// The worst result decides: a difference, then no answer, then identical.
-fn worst(answers: &[Verified]) -> Verification {
-    let rank = |outcome: Verification| match outcome {
-        Verification::Identical => 0,
-        Verification::IdenticalReadablePart => 1,
-        Verification::NotReplayable => 2,
-        Verification::Impossible => 3,
-        Verification::Diverged => 4,
-    };
-    let outcomes = answers.iter().flat_map(|(_, verified)| match verified {
-        Ok(reports) => reports.iter().map(|report| report.outcome).collect(),
-        Err(_) => vec![Verification::NotReplayable],
-    });
-    outcomes.max_by_key(|outcome| rank(*outcome)).unwrap_or(Verification::NotReplayable)
 }
 
 fn warn_of_build(report: &VerifyReport) {

@@ -1,10 +1,8 @@
 //! What of a record was compared, and what was not.
 
-use std::io::{self, Write};
-
 use serde::Serialize;
 
-use crate::print::shown;
+use crate::print::columns;
 
 /// A part of a record.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -47,17 +45,17 @@ impl Part {
     }
 }
 
-/// Writes the parts as a table.
-pub(super) fn print_parts(parts: &[Part], output: &mut impl Write) -> io::Result<()> {
-    writeln!(output, "  {:<10} {:>8} {:>8} {:>9}", "part", "recorded", "compared", "different")?;
-    for Part { name, recorded, compared, different, why, follows } in parts {
+/// The parts as a table.
+pub(super) fn table(parts: &[Part]) -> Vec<String> {
+    let head = ["  part", "recorded", "compared", "different", ""].map(str::to_owned);
+    let row = |Part { name, recorded, compared, different, why, follows }: &Part| {
         let words = match why {
-            Some(why) => shown(why),
+            Some(why) => why.clone(),
             None if !follows => "follows from nothing recorded".to_owned(),
             None => String::new(),
         };
-        let row = format!("  {name:<10} {recorded:>8} {compared:>8} {different:>9}  {words}");
-        writeln!(output, "{}", row.trim_end())?;
-    }
-    Ok(())
+        let [recorded, compared, different] = [recorded, compared, different].map(ToString::to_string);
+        [format!("  {name}"), recorded, compared, different, words]
+    };
+    columns(['<', '>', '>', '>', '<'], std::iter::once(head).chain(parts.iter().map(row)))
 }

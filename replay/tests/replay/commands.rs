@@ -24,8 +24,7 @@ fn several_logs_are_verified_at_once_and_the_worst_decides() {
     let (code, stdout, _) = run(replay("verify", &good).arg(&bad).arg("--json"));
     let reports: serde_json::Value = serde_json::from_str(&stdout).unwrap();
     assert_eq!((code, reports.as_array().unwrap().len()), (1, 2));
-    assert_eq!(reports[1]["growth"]["steps"][0]["frame"], 7);
-    assert_eq!(reports[1]["growth"]["peak"]["frame"], 7);
+    assert_eq!(reports[1]["first_divergence"]["frame"], 7);
 }
 
 #[test]
@@ -34,7 +33,7 @@ fn a_comparison_exits_1_outside_its_tolerance() {
     let dispersed = &DISPERSED;
     let (code, stdout, _) = run(replay("compare", &nominal.log).arg(&nominal.log));
     assert_eq!(code, 0, "{stdout}");
-    assert!(stdout.contains("is within tolerance of") && stdout.contains("are identical.\n"), "{stdout}");
+    assert!(stdout.contains("is within tolerance of") && stdout.contains("are identical\n"), "{stdout}");
     let tolerances = nominal.beside("tolerances.toml");
     std::fs::write(&tolerances, "[signals.\"vehicle_truth3d.state.position_m.x\"]\nmax = 1e-6\n").unwrap();
     let compare = |flag: Option<&str>| {
@@ -45,7 +44,7 @@ fn a_comparison_exits_1_outside_its_tolerance() {
     let (code, stdout, _) = compare(None);
     assert_eq!(code, 1);
     assert!(
-        stdout.contains("| vehicle_truth3d.state.position_m.x |") && stdout.contains("**EXCEEDED**"),
+        stdout.contains("\nvehicle_truth3d.state.position_m.x ") && stdout.contains("EXCEEDED"),
         "{stdout}"
     );
     let (code, stdout, _) = compare(Some("--json"));
@@ -162,9 +161,7 @@ fn the_command_exports_and_imports_logs() {
         assert!(at(format).join(format!("computer_frame.{format}")).exists());
     }
     let tlog = at("flight.tlog");
-    let (code, stdout, _) =
-        run(replay("export", &WITH_FRAMES.log).args(["--to", "tlog", "--output"]).arg(&tlog));
-    assert!(code == 0 && stdout.contains("sent by the vehicle"), "{stdout}");
+    std::fs::rename(crate::simulated::tlog(&WITH_FRAMES, "export.tlog"), &tlog).unwrap();
     let (code, stdout, _) = run(&mut replay("export", &tlog));
     assert!(code == 0 && stdout.contains("flight.mcap: "), "{stdout}");
     let (code, _, stderr) = run(&mut replay("export", &tlog));
@@ -172,9 +169,6 @@ fn the_command_exports_and_imports_logs() {
     let (code, stdout, _) = run(replay("report", &at("flight.mcap")).arg("--output").arg(at("page.html")));
     assert!(code == 0 && stdout.contains("page.html"), "{stdout}");
     assert!(std::fs::read_to_string(at("page.html")).unwrap().starts_with("<!DOCTYPE html>"));
-    let (code, _, stderr) =
-        run(replay("export", &MK2.log).args(["--to", "tlog", "--output"]).arg(at("none.tlog")));
-    assert!(code == 2 && stderr.contains("no raw MAVLink frames"), "{stderr}");
 }
 
 #[test]

@@ -63,9 +63,8 @@ fn no_command_is_silent_about_damage() {
     let directory = tempfile::tempdir().unwrap();
     let path = flipped(&WITH_FRAMES.log, &directory);
     let at = |name: &str| directory.path().join(name).display().to_string();
-    let (html, csv, tlog, whole, again) =
-        (at("p.html"), at("csv"), at("f.tlog"), at("whole.mcap"), at("again.mcap"));
-    let questions: [&[&str]; 9] = [
+    let (html, csv, whole, again) = (at("p.html"), at("csv"), at("whole.mcap"), at("again.mcap"));
+    let questions: [&[&str]; 8] = [
         &["info"],
         &["verify"],
         &["evaluate"],
@@ -73,7 +72,6 @@ fn no_command_is_silent_about_damage() {
         &["verify", "--explain", "20"],
         &["report", "--output", &html],
         &["export", "--to", "csv", "--output", &csv],
-        &["export", "--to", "tlog", "--output", &tlog],
         &["recover", &whole],
     ];
     for question in questions {

