@@ -5,7 +5,7 @@
 #![expect(clippy::unwrap_used, reason = "a built-in mission that cannot be flown ends the program")]
 #![expect(clippy::print_stdout, reason = "the hashes are its output")]
 
-use flight::rules::outputs::Line;
+use flight::rules::outputs::PyroOutput;
 use flight::vehicle::mission::StartPoint;
 use onboard_sim::run::in_parallel;
 use sha2::{Digest as _, Sha256};
@@ -63,7 +63,12 @@ fn decisions(recipe: &Recipe, number: u64) -> ([u8; 32], bool) {
             for angle_rad in commands.gimbal_rad.iter().chain(&commands.fins_rad) {
                 hash.update(angle_rad.to_le_bytes());
             }
-            let lines = [Line::LandingIgniter, Line::Parachute, Line::AscentIgniter, Line::Separation];
+            let lines = [
+                PyroOutput::LandingIgniter,
+                PyroOutput::Parachute,
+                PyroOutput::AscentIgniter,
+                PyroOutput::Separation,
+            ];
             hash.update(lines.map(|line| u8::from(commands.outputs.is_on(line))));
         }
         if !flight.goes_on() {

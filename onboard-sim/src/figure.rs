@@ -158,9 +158,6 @@ impl Legend {
     }
 }
 
-/// Size of a panel, px: one of several, and one alone.
-const PANEL_PX: (u32, u32) = (400, 340);
-const LONE_PANEL_PX: (u32, u32) = (720, 500);
 /// Length of the dashes and of the gaps, px.
 const DASH_PX: (i32, i32) = (8, 5);
 /// Room beside the outermost points, of the extent.
@@ -214,21 +211,7 @@ pub fn plotted_px((width_px, height_px): (u32, u32)) -> [u32; 4] {
     [12 + 62, TITLE_PX + 12, width_px.saturating_sub(12), TITLE_PX + height_px.saturating_sub(12 + 42)]
 }
 
-/// Panels in rows of `columns`, below a title. `cross_name` says what the crosses are.
-///
-/// # Errors
-/// A panel has no finite point.
-pub fn lines_svg(
-    title: &str,
-    panels: &[Panel],
-    columns: usize,
-    cross_name: Option<&str>,
-) -> Result<String, FigureError> {
-    let size_px = if panels.len() == 1 { LONE_PANEL_PX } else { PANEL_PX };
-    sized_lines_svg(title, panels, columns, cross_name, size_px)
-}
-
-/// As [`lines_svg`], with panels of a size, px.
+/// Panels of a size, px, in rows of `columns`, below a title. `cross_name` says what the crosses are.
 ///
 /// # Errors
 /// A panel has no finite point, or is too small.
@@ -355,76 +338,6 @@ fn equalise(ends: &mut [(f64, f64); 2], size_px: [u32; 2]) {
     }
 }
 
-/// Size of the axes' area, px.
-const MAP_PX: (u32, u32) = (760, 520);
-
-/// An axis: evenly spaced values in the middles of the cells.
-#[derive(Debug, Clone, PartialEq)]
-pub struct CellAxis {
-    pub label: String,
-    pub first: f64,
-    pub last: f64,
-    pub count: usize,
-}
-
-/// What to draw.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Cells<'a> {
-    pub x: CellAxis,
-    pub y: CellAxis,
-    /// Names and colours (red, green, blue) of the kinds of cells.
-    pub kinds: &'a [(&'a str, [u8; 3])],
-    /// The kind of each cell, row by row, the first row at the first value of `y`.
-    pub cells: &'a [usize],
-}
-
-impl CellAxis {
-    /// The two edges of a cell.
-    fn edges(&self, place: usize) -> (f64, f64) {
-        let step = self.step();
-        let middle = self.first + step * place as f64;
-        (middle - 0.5 * step, middle + 0.5 * step)
-    }
-
-    fn step(&self) -> f64 {
-        let steps = self.count.saturating_sub(1);
-        if steps == 0 { 1.0 } else { (self.last - self.first) / steps as f64 }
-    }
-
-    /// The outer edges, in ascending order.
-    fn ends(&self) -> (f64, f64) {
-        let (from, to) = (self.edges(0).0, self.edges(self.count.saturating_sub(1)).1);
-        (from.min(to), from.max(to))
-    }
-}
-
-/// The map as SVG.
-///
-/// # Errors
-/// An axis is not finite.
-pub fn cells_svg(title: &str, map: &Cells<'_>) -> Result<String, FigureError> {
-    let (width_px, height_px) = MAP_PX;
-    let colour = |kind: usize| {
-        let [red, green, blue] = map.kinds.get(kind).map_or([0; 3], |(_, colour)| *colour);
-        RGBColor(red, green, blue)
-    };
-    let legend = Legend::new(map.kinds.iter().map(|(name, _)| (*name).to_owned()).collect(), width_px);
-    drawn(title, (width_px, height_px + legend.height_px()), |root| -> Drawn {
-        let (upper, lower) = root.split_vertically(height_px);
-        let mut chart = axes(&upper, [map.x.ends(), map.y.ends()], [&map.x.label, &map.y.label])?;
-        chart.draw_series(map.cells.iter().enumerate().map(|(place, kind)| {
-            let (from, to) = map.x.edges(place % map.x.count);
-            let (below, above) = map.y.edges(place / map.x.count);
-            Rectangle::new([(from, below), (to, above)], colour(*kind).filled())
-        }))?;
-        legend.draw(&lower, |area, place, (left, middle)| {
-            let corners = [(left + 4, middle - 7), (left + 20, middle + 7)];
-            area.draw(&Rectangle::new(corners, colour(place).filled()))?;
-            Ok(())
-        })
-    })
-}
-
 /// Side of the square of places, px: of one of several, and of one alone.
 const SIDE_PX: u32 = 400;
 const LONE_SIDE_PX: u32 = 620;
@@ -533,6 +446,9 @@ fn line(radius: usize) -> ShapeStyle {
     BLACK.stroke_width(if radius == 0 { 2 } else { 1 })
 }
 
+/// Size of the axes' area of bars, px.
+const BARS_PX: (u32, u32) = (720, 500);
+
 /// A bar: from its left to its right end, and its height.
 pub type Bar = ([f64; 2], f64);
 
@@ -546,7 +462,7 @@ pub fn bars_svg(
     bars: &[Bar],
     mark: Option<(&str, f64)>,
 ) -> Result<String, FigureError> {
-    let (width_px, height_px) = LONE_PANEL_PX;
+    let (width_px, height_px) = BARS_PX;
     let legend = Legend::new(mark.iter().map(|(name, _)| (*name).to_owned()).collect(), width_px);
     drawn(title, (width_px, height_px + legend.height_px()), |root| -> Drawn {
         let (upper, lower) = root.split_vertically(height_px);
@@ -587,33 +503,14 @@ mod tests {
     #[test]
     fn a_figure_names_its_axes_and_curves_and_a_curve_without_points_is_refused() {
         let panels = [panel(vec![(0.0, 0.0), (1.0, 2.0)]), panel(vec![(0.0, 1.0), (1.0, 1.0)])];
-        let svg = lines_svg("Fig. 0", &panels, 2, Some("paper")).unwrap();
+        let svg = sized_lines_svg("Fig. 0", &panels, 2, Some("paper"), BARS_PX).unwrap();
         for text in ["Fig. 0", "time, s", "height, m", "a &lt; b", "paper"] {
             assert!(svg.contains(text), "{text}");
         }
         assert_eq!(svg.matches("a &lt; b").count(), 1);
         let empty = Panel { crosses: vec![], ..panel(vec![(f64::NAN, 1.0)]) };
-        let error = lines_svg("Fig. 0", &[empty], 1, None).unwrap_err();
+        let error = sized_lines_svg("Fig. 0", &[empty], 1, None, BARS_PX).unwrap_err();
         assert_eq!(error.to_string(), "cannot draw the figure 'Fig. 0': no finite point");
-    }
-
-    #[test]
-    fn every_cell_is_drawn_and_every_kind_is_named() {
-        let axis = |label: &str, last| CellAxis { label: label.to_owned(), first: 0.0, last, count: 3 };
-        let map = Cells {
-            x: axis("tilt, deg", 10.0),
-            y: axis("wind, m/s", 4.0),
-            kinds: &[("lands", [1, 2, 3]), ("misses", [4, 5, 6])],
-            cells: &[0, 1, 1, 0, 0, 1, 1, 1, 1],
-        };
-        let svg = cells_svg("a & b", &map).unwrap();
-        for text in ["a &amp; b", "tilt, deg", "wind, m/s", "lands", "misses"] {
-            assert!(svg.contains(text), "{text}");
-        }
-        // Each once more in the legend.
-        assert_eq!([svg.matches("#010203").count(), svg.matches("#040506").count()], [3 + 1, 6 + 1]);
-        let broken = Cells { x: axis("", f64::NAN), ..map };
-        assert!(cells_svg("", &broken).is_err());
     }
 
     #[test]
@@ -643,7 +540,7 @@ mod tests {
             places: vec![(0.2, 0.3, "apogee".to_owned())],
             ..panel(vec![(0.0, 0.0), (1.0, 2.0)])
         };
-        let svg = lines_svg("T", &[panel], 1, None).unwrap();
+        let svg = sized_lines_svg("T", &[panel], 1, None, BARS_PX).unwrap();
         assert!(svg.contains("ignition") && svg.contains("apogee") && !svg.contains("outside"), "{svg}");
         assert_eq!(svg.matches("#B3261E").count(), 1);
     }

@@ -6,7 +6,7 @@
 use core::fmt;
 
 use flight::computer::{AbortEffect, FRAME_MS};
-use flight::rules::outputs::Line;
+use flight::rules::outputs::PyroOutput;
 use flight::rules::phase::Phase;
 use flight::rules::verdict::Landing;
 use flight::vehicle::atmosphere::Air;
@@ -480,7 +480,7 @@ fn come_down(flight: &mut Sortie, mut look: impl FnMut(&Sortie) -> bool) -> (Opt
     };
     while goes_on(flight) && look(flight) {
         course.note(flight);
-        if flight.computer().commands().outputs.is_on(Line::Parachute) {
+        if flight.computer().commands().outputs.is_on(PyroOutput::Parachute) {
             // The computer has nothing to decide any more: its commands stay as they are.
             let last = *flight.computer().commands();
             flight.step();

@@ -1,9 +1,10 @@
 //! Simulates thousands of flights on several threads and summarises how they end.
 //!
-//! * [`store`]: everything that a campaign's results depend on, and its directory.
+//! * [`store`]: a campaign's directory, and everything that its results depend on.
 //! * [`tally`]: flies one flight of a campaign and collects the values of its [`row`].
-//! * [`run`]: the same work on many things, on several threads; flies the missing flights and writes the results.
-//! * [`stopwatch`]: how far something long is.
+//! * [`run`]: the same work on many things, on several threads; flies the missing flights.
+//! * [`progress`]: how far something long is.
+//! * [`files`]: files that are written whole.
 //! * [`statistics`], [`summary`]: percentiles, texts and pictures from the rows; [`figure`] draws.
 //! * [`attainable`]: whether a flight could have been landed with perfect information.
 //! * [`hazard`]: where a flight comes down in each way that it can end.
@@ -17,13 +18,14 @@
 pub mod attainable;
 pub mod check;
 pub mod figure;
+pub mod files;
 pub mod hazard;
 pub mod motors;
+pub mod progress;
 pub mod row;
 pub mod run;
 pub mod scenario;
 pub mod statistics;
-pub mod stopwatch;
 pub mod store;
 pub mod summary;
 pub mod tally;

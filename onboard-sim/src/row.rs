@@ -1,86 +1,20 @@
-//! One row per flight: its random draws, its outcome and the work of its solver; rows as CSV and as Parquet.
+//! One row per flight: its random draws, its outcome and the work of its solver.
 //!
-//! The columns and their units are named only here; CSV, Parquet and the summary take them from [`COLUMNS`]. The cell
-//! of a quantity that a flight does not have (such as the height of an ignition that never came) is empty. A number in CSV
-//! has enough digits to read the same bits back. Parquet is written without compression and in one row group: a thousand
-//! flights need half a megabyte.
-
-use std::sync::Arc;
+//! The columns and their units are named only here. The cell of a quantity that a flight does not have (such as the height of an
+//! ignition that never came) is empty. A number in CSV has enough digits to read the same bits back.
 
 use flight::rules::verdict::Landing;
-use parquet::basic::{LogicalType, Repetition, Type as Physical};
-use parquet::data_type::{BoolType, ByteArray, ByteArrayType, DoubleType, Int64Type};
-use parquet::errors::ParquetError;
-use parquet::file::properties::WriterProperties;
-use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
-use parquet::schema::types::Type;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use crate::attainable::Window;
-
-/// A cell's value.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Value<'a> {
-    /// A whole number.
-    Count(u64),
-    /// A number.
-    Real(f64),
-    /// A number, if there is one.
-    Maybe(Option<f64>),
-    /// Yes or no.
-    Flag(bool),
-    Word(&'a str),
-}
-
-impl Value<'_> {
-    /// The value as a number: a flag is 0 or 1, a word is `None`.
-    pub fn number(&self) -> Option<f64> {
-        match *self {
-            Self::Count(count) => Some(count as f64),
-            Self::Real(real) => Some(real),
-            Self::Maybe(maybe) => maybe,
-            Self::Flag(flag) => Some(f64::from(u8::from(flag))),
-            Self::Word(_) => None,
-        }
-    }
-}
-
-impl<'a> From<&'a u64> for Value<'a> {
-    fn from(count: &'a u64) -> Self {
-        Self::Count(*count)
-    }
-}
-
-impl<'a> From<&'a f64> for Value<'a> {
-    fn from(real: &'a f64) -> Self {
-        Self::Real(*real)
-    }
-}
-
-impl<'a> From<&'a Option<f64>> for Value<'a> {
-    fn from(maybe: &'a Option<f64>) -> Self {
-        Self::Maybe(*maybe)
-    }
-}
-
-impl<'a> From<&'a bool> for Value<'a> {
-    fn from(flag: &'a bool) -> Self {
-        Self::Flag(*flag)
-    }
-}
-
-impl<'a> From<&'a String> for Value<'a> {
-    fn from(word: &'a String) -> Self {
-        Self::Word(word)
-    }
-}
 
 /// A column: its name and how to read it off a row.
 pub struct Column {
     /// The name, with its unit.
     pub name: &'static str,
     /// The cell of a row.
-    pub value: for<'a> fn(&'a Row) -> Value<'a>,
+    pub value: fn(&Row) -> Value,
 }
 
 macro_rules! row {
@@ -93,7 +27,7 @@ macro_rules! row {
 
         /// Every column, in order.
         pub const COLUMNS: &[Column] =
-            &[$(Column { name: stringify!($name), value: |row| Value::from(&row.$name) },)*];
+            &[$(Column { name: stringify!($name), value: |row| Value::from(row.$name.clone()) },)*];
     };
 }
 
@@ -260,107 +194,6 @@ impl Row {
     ];
 }
 
-/// The column of that name.
-pub fn column(name: &str) -> Option<&'static Column> {
-    COLUMNS.iter().find(|column| column.name == name)
-}
-
-/// Rows as CSV, with a header line.
-///
-/// # Errors
-/// The error of the CSV writer; it does not happen for rows of a campaign.
-pub fn to_csv(rows: &[Row]) -> Result<Vec<u8>, csv::Error> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    for row in rows {
-        writer.serialize(row)?;
-    }
-    writer.into_inner().map_err(|error| error.into_error().into())
-}
-
-/// Rows from CSV.
-///
-/// # Errors
-/// A line or a cell does not fit the columns of a campaign.
-pub fn from_csv(bytes: &[u8]) -> Result<Vec<Row>, csv::Error> {
-    csv::Reader::from_reader(bytes).deserialize().collect()
-}
-
-/// Rows as Parquet.
-///
-/// # Errors
-/// The error of the Parquet writer.
-pub fn to_parquet(rows: &[Row]) -> Result<Vec<u8>, ParquetError> {
-    let fields = COLUMNS.iter().map(field).collect::<Result<_, _>>()?;
-    let schema = Type::group_type_builder("flight").with_fields(fields).build()?;
-    let properties = WriterProperties::builder().set_created_by("touchdown campaign".to_owned()).build();
-    let mut writer = SerializedFileWriter::new(Vec::new(), Arc::new(schema), Arc::new(properties))?;
-    let mut group = writer.next_row_group()?;
-    for column in COLUMNS {
-        // There are as many writers as columns in the schema.
-        let Some(mut cells) = group.next_column()? else { break };
-        write_column(column, rows, &mut cells)?;
-        cells.close()?;
-    }
-    group.close()?;
-    writer.into_inner()
-}
-
-fn field(column: &Column) -> Result<Arc<Type>, ParquetError> {
-    // Every row has cells of one type in a column.
-    let (physical, logical, repetition) = match (column.value)(&Row::default()) {
-        Value::Count(_) => (Physical::INT64, None, Repetition::REQUIRED),
-        Value::Real(_) => (Physical::DOUBLE, None, Repetition::REQUIRED),
-        Value::Maybe(_) => (Physical::DOUBLE, None, Repetition::OPTIONAL),
-        Value::Flag(_) => (Physical::BOOLEAN, None, Repetition::REQUIRED),
-        Value::Word(_) => (Physical::BYTE_ARRAY, Some(LogicalType::String), Repetition::REQUIRED),
-    };
-    let field = Type::primitive_type_builder(column.name, physical)
-        .with_logical_type(logical)
-        .with_repetition(repetition)
-        .build()?;
-    Ok(Arc::new(field))
-}
-
-fn write_column(
-    column: &Column,
-    rows: &[Row],
-    cells: &mut SerializedColumnWriter<'_>,
-) -> Result<(), ParquetError> {
-    let values = rows.iter().map(|row| (column.value)(row));
-    match (column.value)(&Row::default()) {
-        Value::Count(_) => {
-            let counts: Vec<i64> = values
-                .filter_map(
-                    |value| if let Value::Count(count) = value { i64::try_from(count).ok() } else { None },
-                )
-                .collect();
-            cells.typed::<Int64Type>().write_batch(&counts, None, None)?;
-        }
-        Value::Real(_) => {
-            let reals: Vec<f64> = values.filter_map(|value| value.number()).collect();
-            cells.typed::<DoubleType>().write_batch(&reals, None, None)?;
-        }
-        Value::Maybe(_) => {
-            let levels: Vec<i16> = values.clone().map(|value| i16::from(value.number().is_some())).collect();
-            let reals: Vec<f64> = values.filter_map(|value| value.number()).collect();
-            cells.typed::<DoubleType>().write_batch(&reals, Some(&levels), None)?;
-        }
-        Value::Flag(_) => {
-            let flags: Vec<bool> = values.map(|value| value == Value::Flag(true)).collect();
-            cells.typed::<BoolType>().write_batch(&flags, None, None)?;
-        }
-        Value::Word(_) => {
-            let words: Vec<ByteArray> = values
-                .filter_map(
-                    |value| if let Value::Word(word) = value { Some(ByteArray::from(word)) } else { None },
-                )
-                .collect();
-            cells.typed::<ByteArrayType>().write_batch(&words, None, None)?;
-        }
-    }
-    Ok(())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -368,7 +201,7 @@ mod tests {
     #[test]
     fn every_drawn_quantity_is_a_column() {
         for (name, _) in Row::DRAWN {
-            assert!(column(name).is_some(), "{name}");
+            assert!(COLUMNS.iter().any(|column| column.name == name), "{name}");
         }
     }
 }

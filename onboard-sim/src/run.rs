@@ -1,6 +1,6 @@
-//! The same work on many things, on several threads: the missing flights of a campaign, and then its results.
+//! The same work on many things, on several threads.
 //!
-//! What a thread does depends only on its thing (of a flight on the order and its number), so no result depends on the
+//! What a thread does depends only on its thing (of a flight on the recipe and its number), so no result depends on the
 //! number of threads.
 
 use std::any::Any;
@@ -13,10 +13,8 @@ use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 use sim::recipe::Recipe;
 use sim::sortie::SetUpError;
 
-use crate::figure::FigureError;
-use crate::row::{Row, to_csv, to_parquet};
-use crate::store::{Order, Store, StoreError};
-use crate::summary::{PICTURES, Summary, pictures, to_markdown};
+use crate::row::Row;
+use crate::store::{Store, StoreError};
 use crate::tally;
 
 /// So many threads, or as many as there are processors, for all work inside their `install`.
@@ -44,18 +42,17 @@ pub fn in_parallel<'a, T: Sync, R: Send>(
     items.par_iter().with_max_len(1).map(one).collect()
 }
 
-/// Progress of a run.
+/// What a run has flown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Progress {
-    /// Flights flown in this run.
+pub struct Counts {
     pub flown: u64,
     /// Flights that this run has to fly.
     pub of: u64,
-    /// Flights of this run that stand undamaged.
+    /// Flights that stand undamaged.
     pub stands: u64,
-    /// Flights of this run that touched down inside the design envelope of their legs.
+    /// Flights that touched down inside the design envelope of their legs.
     pub envelope: u64,
-    /// Simulated time of this run's flights, whole milliseconds.
+    /// Simulated time of the flights, whole milliseconds.
     pub flight_time_ms: u64,
 }
 
@@ -81,34 +78,24 @@ pub enum RunError {
     Store(#[from] StoreError),
 }
 
-/// Flies the chunks that are not in the store yet. `progress` is called after every flight.
+/// Flies the flights that are not in the store yet. `progress` is called after every flight.
 ///
 /// # Errors
-/// The first error; the chunks that were finished before it stay in the store.
-pub fn run(
-    order: &Order,
-    store: &Store,
-    progress: &(dyn Fn(&Progress) + Sync),
-) -> Result<Progress, RunError> {
-    let missing: Vec<u64> = store.chunks().filter(|chunk| !store.has(*chunk)).collect();
-    let of = missing.iter().map(|chunk| store.flights_of(*chunk).count() as u64).sum();
-    let total = Mutex::new(Progress { of, ..Progress::default() });
-    let fly_chunk = |chunk: &u64| -> Result<(), RunError> {
-        let fly = |number| {
-            let row = fly_caught(&order.recipe, number)?;
-            // Only `progress` can panic with the lock held, and then the counts are still valid.
-            let mut total = total.lock().unwrap_or_else(PoisonError::into_inner);
-            total.flown += 1;
-            total.stands += u64::from(row.stands);
-            total.envelope += u64::from(row.envelope);
-            total.flight_time_ms += (row.flight_time_s * 1e3) as u64;
-            progress(&total);
-            Ok::<_, RunError>(row)
-        };
-        let rows: Vec<Row> = store.flights_of(*chunk).map(fly).collect::<Result<_, _>>()?;
-        Ok(store.write(*chunk, &rows)?)
-    };
-    missing.par_iter().with_max_len(1).try_for_each(fly_chunk)?;
+/// The first error; the flights that ended before it stay in the store.
+pub fn run(recipe: &Recipe, store: &Store, progress: &(dyn Fn(&Counts) + Sync)) -> Result<Counts, RunError> {
+    let missing = store.missing();
+    let total = Mutex::new(Counts { of: missing.len() as u64, ..Counts::default() });
+    missing.par_iter().with_max_len(1).try_for_each(|number| {
+        let row = fly_caught(recipe, *number)?;
+        // Only `progress` can panic with the lock held, and then the counts are still valid.
+        let mut total = total.lock().unwrap_or_else(PoisonError::into_inner);
+        total.flown += 1;
+        total.stands += u64::from(row.stands);
+        total.envelope += u64::from(row.envelope);
+        total.flight_time_ms += (row.flight_time_s * 1e3) as u64;
+        progress(&total);
+        Ok::<_, RunError>(store.add(row)?)
+    })?;
     Ok(total.into_inner().unwrap_or_else(PoisonError::into_inner))
 }
 
@@ -131,27 +118,6 @@ fn fly_caught(recipe: &Recipe, number: u64) -> Result<Row, RunError> {
 fn words(panic: &(dyn Any + Send)) -> String {
     let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
     text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "without words".to_owned())
-}
-
-/// Writes `flights.csv`, `flights.parquet`, `summary.json`, `summary.md` and the pictures from the store's chunks.
-///
-/// # Errors
-/// A chunk is missing or damaged, or a file cannot be written.
-pub fn publish(order: &Order, store: &Store) -> Result<Summary, StoreError> {
-    let rows = store.rows()?;
-    let summary = Summary::new(store.manifest(), &rows);
-    let write = |name: &str, made: Result<Vec<u8>, String>| match made {
-        Ok(bytes) => store.publish(name, &bytes),
-        Err(message) => Err(StoreError::Content { path: store.path().join(name), message }),
-    };
-    write("flights.csv", to_csv(&rows).map_err(|error| error.to_string()))?;
-    write("flights.parquet", to_parquet(&rows).map_err(|error| error.to_string()))?;
-    write("summary.json", serde_json::to_vec_pretty(&summary).map_err(|error| error.to_string()))?;
-    write("summary.md", Ok(to_markdown(&summary).into_bytes()))?;
-    for ((name, _), picture) in PICTURES.iter().zip(pictures(&rows, &order.recipe.mission.leg_limits)) {
-        write(name, picture.map(String::into_bytes).map_err(|error: FigureError| error.to_string()))?;
-    }
-    Ok(summary)
 }
 
 #[cfg(test)]

@@ -2,7 +2,9 @@
 //!
 //! It does not depend on a clock, a thread or a machine, so it is the same however the campaign was run.
 
+use core::cmp::Reverse;
 use core::fmt::{self, Write};
+use std::collections::BTreeMap;
 
 use flight::rules::verdict::Landing;
 use flight::vehicle::mission::LegLimits;
@@ -10,7 +12,7 @@ use serde::Serialize;
 
 use crate::attainable::{Window, best_height_m};
 use crate::figure::{Bar, FigureError, Places, PlacesPanel, bars_svg, places_svg};
-use crate::row::{Row, column};
+use crate::row::{COLUMNS, Row};
 use crate::statistics::{Landings, Share, quantile, rank_correlation, sorted};
 use crate::store::{Manifest, Shard};
 
@@ -190,21 +192,20 @@ impl Summary {
 }
 
 pub(crate) fn failures(rows: &[Row]) -> Vec<Failures> {
-    let mut found: Vec<Failures> = Vec::new();
+    let mut found = BTreeMap::new();
     for row in rows.iter().filter(|row| !row.failure.is_empty()) {
-        match found.iter_mut().find(|known| known.reason == row.failure) {
-            Some(known) => known.flights += 1,
-            None => found.push(Failures { reason: row.failure.clone(), flights: 1 }),
-        }
+        *found.entry(&row.failure).or_default() += 1;
     }
-    found.sort_by(|one, two| two.flights.cmp(&one.flights).then_with(|| one.reason.cmp(&two.reason)));
+    let found = found.into_iter().map(|(reason, flights)| Failures { reason: reason.clone(), flights });
+    let mut found: Vec<Failures> = found.collect();
+    found.sort_by_key(|failures| Reverse(failures.flights));
     found
 }
 
 /// The numbers in a column.
 pub(crate) fn numbers<'a>(rows: &'a [Row], name: &str) -> impl Iterator<Item = f64> + use<'a> {
-    let column = column(name);
-    rows.iter().filter_map(move |row| (column?.value)(row).number())
+    let column = COLUMNS.iter().find(|column| column.name == name);
+    rows.iter().filter_map(move |row| (column?.value)(row).as_f64())
 }
 
 fn distribution(rows: &[Row], name: &'static str) -> Option<Distribution> {
@@ -225,15 +226,15 @@ fn distribution(rows: &[Row], name: &'static str) -> Option<Distribution> {
 }
 
 fn sensitivity(rows: &[Row]) -> Vec<Sensitivity> {
-    let mut found: Vec<Sensitivity> = Row::DRAWN
-        .iter()
-        .filter_map(|(name, nominal)| {
-            let drawn = numbers(rows, name);
-            let deviations: Vec<f64> =
-                drawn.map(|value| nominal.map_or(value, |nominal| (value - nominal).abs())).collect();
-            sensitivity_to(rows, name, &deviations)
-        })
-        .collect();
+    let to = |(name, nominal): &(&'static str, Option<f64>)| {
+        let drawn = numbers(rows, name);
+        sensitivity_to(
+            rows,
+            name,
+            drawn.map(|value| nominal.map_or(value, |nominal| (value - nominal).abs())),
+        )
+    };
+    let mut found: Vec<Sensitivity> = Row::DRAWN.iter().filter_map(to).collect();
     found.sort_by(|one, two| {
         let cost = two.cost().total_cmp(&one.cost());
         cost.then_with(|| two.rank_correlation.total_cmp(&one.rank_correlation))
@@ -242,24 +243,25 @@ fn sensitivity(rows: &[Row]) -> Vec<Sensitivity> {
 }
 
 /// `None` for a quantity that does not vary.
-fn sensitivity_to(rows: &[Row], name: &'static str, deviations: &[f64]) -> Option<Sensitivity> {
-    let order = sorted(deviations.iter().copied());
+fn sensitivity_to(
+    rows: &[Row],
+    column: &'static str,
+    deviations: impl Iterator<Item = f64>,
+) -> Option<Sensitivity> {
+    let flights: Vec<(f64, &Row)> = deviations.zip(rows).collect();
+    let order = sorted(flights.iter().map(|(deviation, _)| *deviation));
     let median = quantile(&order, 0.5)?;
     if order.first()?.to_bits() == order.last()?.to_bits() {
         return None;
     }
     let half = |outer: bool| {
-        let mine =
-            || rows.iter().zip(deviations).filter(move |(_, deviation)| (**deviation > median) == outer);
-        Share::new(mine().filter(|(row, _)| row.stands).count() as u64, mine().count() as u64)
+        let mine = || flights.iter().filter(|(deviation, _)| (*deviation > median) == outer);
+        Share::new(mine().filter(|(_, row)| row.stands).count() as u64, mine().count() as u64)
     };
-    let pairs: Vec<(f64, f64)> = rows
-        .iter()
-        .zip(deviations)
-        .filter_map(|(row, deviation)| row.leg_use.map(|leg_use| (*deviation, leg_use)))
-        .collect();
+    let pairs: Vec<_> =
+        flights.iter().filter_map(|(deviation, row)| Some((*deviation, row.leg_use?))).collect();
     Some(Sensitivity {
-        column: name,
+        column,
         median_deviation: median,
         inner: half(false),
         outer: half(true),
@@ -271,7 +273,7 @@ fn sensitivity_to(rows: &[Row], name: &'static str, deviations: &[f64]) -> Optio
 pub fn to_text(summary: &Summary) -> String {
     let mut out = String::new();
     // Writing to a String cannot fail.
-    let _ = text(summary, &mut out);
+    let _ = write_text(summary, &mut out);
     out
 }
 
@@ -287,16 +289,6 @@ const ATTAINABLE: &str = "attainable: perfect information lands it with the legs
 is the same for all flights; once the thrust begins, motor, mass and drag are
 known, and fins and tilt are a throttle. Wind, place and attitude are left out";
 
-/// The landings beyond that.
-fn others(attainable: &Attainable) -> String {
-    match [attainable.landed_from_another_height, attainable.landed_beyond] {
-        [0, 0] => String::new(),
-        [chosen, beyond] => {
-            format!("; besides, {chosen} landed from another height, and {beyond} beyond what is attainable")
-        }
-    }
-}
-
 fn what(manifest: &Manifest) -> String {
     let mut what =
         format!("{}, dispersion {}, seed {}", manifest.mission, manifest.dispersion, manifest.seed);
@@ -309,47 +301,40 @@ fn what(manifest: &Manifest) -> String {
     what
 }
 
-/// A heading and rows; the first column is text, the others are numbers.
-type Table = Vec<Vec<String>>;
-
 /// What fits into 80 columns; the summary has the other percentiles.
-fn distributions(summary: &Summary) -> Table {
-    let heading = ["", "least", "5 %", "50 %", "95 %", "greatest"];
-    let row = |found: &Distribution| {
-        let Distribution { least, p5, p50, p95, greatest, .. } = found;
-        let values = [least, p5, p50, p95, greatest].map(|value| format!("{value:.3}"));
-        core::iter::once(found.column.to_owned()).chain(values).collect()
-    };
-    let heading = heading.map(str::to_owned).to_vec();
-    core::iter::once(heading).chain(summary.distributions.iter().map(row)).collect()
+fn write_distributions(summary: &Summary, out: &mut String) -> fmt::Result {
+    let heading = ["least", "5 %", "50 %", "95 %", "greatest"];
+    writeln!(out, "{:<30}{}", "", heading.map(|name| format!("{name:>10}")).concat())?;
+    summary.distributions.iter().try_for_each(|found| {
+        let Distribution { column, least, p5, p50, p95, greatest, .. } = found;
+        writeln!(out, "{column:<30}{least:>10.3}{p5:>10.3}{p50:>10.3}{p95:>10.3}{greatest:>10.3}")
+    })
 }
 
 /// The quantities whose cost the number of flights can tell from nothing.
-fn sensitivities(summary: &Summary) -> Table {
-    let heading = ["", "deviation", "inner %", "outer %", "cost %", "from %", "to %"];
-    let row = |found: &Sensitivity| {
+fn write_sensitivities(summary: &Summary, out: &mut String) -> fmt::Result {
+    let Summary { sensitivity, landings, .. } = summary;
+    let told = || sensitivity.iter().filter(|found| found.cost_interval()[0] > 0.0);
+    if told().next().is_none() {
+        return writeln!(out, "\nwhat costs landings: {} flights do not tell", landings.stands.of);
+    }
+    writeln!(
+        out,
+        "\nwhat costs landings, with 95 % intervals: the half nearest the nominal value (of\nwind and the state at apogee the \
+         lower half) against the other half. Of {} quantities\none in forty stands here by chance",
+        sensitivity.len()
+    )?;
+    let heading = ["deviation", "inner %", "outer %", "cost %", "from %", "to %"];
+    writeln!(out, "{:<30}{}", "", heading.map(|name| format!("{name:>8}")).concat())?;
+    told().try_for_each(|found| {
         let [low, high] = found.cost_interval();
         let percents = [found.inner.share, found.outer.share, found.cost(), low, high];
-        let percents = percents.map(|share| format!("{:.1}", 100.0 * share));
-        let first = [found.column.to_owned(), format!("{:.4}", found.median_deviation)];
-        first.into_iter().chain(percents).collect()
-    };
-    let told = summary.sensitivity.iter().filter(|found| found.cost_interval()[0] > 0.0);
-    core::iter::once(heading.map(str::to_owned).to_vec()).chain(told.map(row)).collect()
+        let percents = percents.map(|share| format!("{:>8.1}", 100.0 * share)).concat();
+        writeln!(out, "{:<30}{:>8.4}{percents}", found.column, found.median_deviation)
+    })
 }
 
-fn write_text(table: &Table, out: &mut String) -> fmt::Result {
-    let width = table.first().map_or(0, |heading| 50 / heading.len().saturating_sub(1).max(1));
-    for row in table {
-        for (place, cell) in row.iter().enumerate() {
-            if place == 0 { write!(out, "{cell:<30}") } else { write!(out, "{cell:>width$}") }?;
-        }
-        writeln!(out)?;
-    }
-    Ok(())
-}
-
-fn text(summary: &Summary, out: &mut String) -> fmt::Result {
+fn write_text(summary: &Summary, out: &mut String) -> fmt::Result {
     let Landings { stands, envelope, .. } = &summary.landings;
     let (of, inside) = (stands.of, envelope.count);
     writeln!(
@@ -362,10 +347,17 @@ fn text(summary: &Summary, out: &mut String) -> fmt::Result {
         writeln!(out, "{word:<38}  {share}")?;
     }
     if let Some(attainable) = &summary.attainable {
-        let Attainable { command_height_m, .. } = attainable;
-        writeln!(out, "attainable, ignition command at {command_height_m:.1} m  {}", attainable.attainable)?;
-        writeln!(out, "landed of attainable  {}{}", attainable.landed, others(attainable))?;
-        writeln!(out, "({ATTAINABLE})")?;
+        let Attainable { command_height_m, attainable, landed, landed_from_another_height, landed_beyond } =
+            attainable;
+        writeln!(out, "attainable, ignition command at {command_height_m:.1} m  {attainable}")?;
+        write!(out, "landed of attainable  {landed}")?;
+        if landed_from_another_height + landed_beyond > 0 {
+            write!(
+                out,
+                "; besides, {landed_from_another_height} landed from another height, and {landed_beyond} beyond what is attainable"
+            )?;
+        }
+        writeln!(out, "\n({ATTAINABLE})")?;
     }
     writeln!(out, "ignitions outside the gate: {}", summary.ignitions_outside_gate)?;
     if !summary.failures.is_empty() {
@@ -374,30 +366,15 @@ fn text(summary: &Summary, out: &mut String) -> fmt::Result {
             writeln!(out, "{:>6}  {}", failure.flights, failure.reason)?;
         }
     }
-    let plans = &summary.plans;
+    let Plans { converged, best_feasible, shifted, stabiliser, solver_iterations, solver_failures } =
+        summary.plans;
     writeln!(
         out,
-        "\nplans: {} converged, {} best feasible, {} shifted, {} upright law;\n{} iterations, {} solves not converged",
-        plans.converged,
-        plans.best_feasible,
-        plans.shifted,
-        plans.stabiliser,
-        plans.solver_iterations,
-        plans.solver_failures
+        "\nplans: {converged} converged, {best_feasible} best feasible, {shifted} shifted, {stabiliser} upright law;\n\
+         {solver_iterations} iterations, {solver_failures} solves not converged\n"
     )?;
-    writeln!(out)?;
-    write_text(&distributions(summary), out)?;
-    let told = sensitivities(summary);
-    if told.len() == 1 {
-        return writeln!(out, "\nwhat costs landings: {of} flights do not tell");
-    }
-    writeln!(
-        out,
-        "\nwhat costs landings, with 95 % intervals: the half nearest the nominal value (of\nwind and the state at apogee the \
-         lower half) against the other half. Of {} quantities\none in forty stands here by chance",
-        summary.sensitivity.len()
-    )?;
-    write_text(&told, out)
+    write_distributions(summary, out)?;
+    write_sensitivities(summary, out)
 }
 
 /// Bars of a histogram.

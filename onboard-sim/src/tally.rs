@@ -1,5 +1,4 @@
-//! Flies one flight of a campaign and collects the values of its row; and finds the ignition height of the simpler guidance
-//! laws before the flight.
+//! Flies one flight of a campaign and collects the values of its row.
 
 use flight::guidance::powered::ControlLevel;
 use flight::rules::phase::Phase;
@@ -21,26 +20,13 @@ const MOTOR_KNOWN_S: f64 = 3.0;
 
 /// A running flight, and the values collected for its row.
 pub struct Tally {
-    number: u64,
     flight: Sortie,
-    gimbal_limit_rad: f64,
-    ignition: Option<AtIgnition>,
-    onset: Option<(f64, f64)>,
-    nees_of_motor: Option<f64>,
+    /// What is known before the end.
+    so_far: Row,
     /// Sum over frames, and their number.
     nees_of_motion: (f64, u32),
-    plans: [u64; ControlLevel::ALL.len()],
-    solver_iterations: u64,
-    solver_failures: u64,
     burning_frames: u64,
     saturated_frames: u64,
-}
-
-/// The state at the ignition command.
-struct AtIgnition {
-    chosen_onset_m: Option<f64>,
-    height_m: f64,
-    outside_gate: bool,
 }
 
 impl Tally {
@@ -49,18 +35,10 @@ impl Tally {
     /// # Errors
     /// The flight cannot be set up.
     pub fn new(recipe: &Recipe, number: u64) -> Result<Self, SetUpError> {
-        let mission = &recipe.mission;
         Ok(Self {
-            number,
             flight: Sortie::new(recipe, number)?,
-            gimbal_limit_rad: mission.airframe.gimbal.limit_rad(),
-            ignition: None,
-            onset: None,
-            nees_of_motor: None,
+            so_far: Row { number, ..Row::default() },
             nees_of_motion: (0.0, 0),
-            plans: [0; ControlLevel::ALL.len()],
-            solver_iterations: 0,
-            solver_failures: 0,
             burning_frames: 0,
             saturated_frames: 0,
         })
@@ -88,42 +66,50 @@ impl Tally {
     }
 
     fn count(&mut self, planned: bool) {
-        let (flight, world) = (&self.flight, self.flight.world());
-        let pilot = flight.pilot();
-        if self.ignition.is_none() && pilot.ignited_at_s().is_some() {
-            self.ignition = Some(AtIgnition {
-                chosen_onset_m: pilot.prediction().ignition.chosen_m,
-                height_m: world.height_m(),
-                outside_gate: pilot.gate_refusal().is_some(),
-            });
+        let (flight, row) = (&self.flight, &mut self.so_far);
+        let (world, pilot, computer) = (flight.world(), flight.pilot(), flight.computer());
+        if !row.ignited && pilot.ignited_at_s().is_some() {
+            row.ignited = true;
+            row.chosen_onset_height_m = pilot.prediction().ignition.chosen_m;
+            row.ignition_height_m = Some(world.height_m());
+            row.ignition_outside_gate = pilot.gate_refusal().is_some();
         }
-        if self.onset.is_none() && world.thrust_n() > 0.0 {
-            self.onset = Some((world.height_m(), world.state().velocity_m_s.z));
+        if row.onset_height_m.is_none() && world.thrust_n() > 0.0 {
+            row.onset_height_m = Some(world.height_m());
+            row.onset_vertical_m_s = Some(world.state().velocity_m_s.z);
+        }
+        if world.touchdown().is_some() {
+            return;
         }
         let burning_s = world.thrust_begins_s().map_or(-1.0, |begins_s| world.time_s() - begins_s);
-        if burning_s >= 0.0 && world.touchdown().is_none() {
+        if burning_s >= 0.0 {
             if let Some(nees) = flight.nees_of_motion() {
                 self.nees_of_motion = (self.nees_of_motion.0 + nees, self.nees_of_motion.1 + 1);
             }
-            if burning_s >= MOTOR_KNOWN_S && self.nees_of_motor.is_none() {
-                self.nees_of_motor = flight.nees_of_motor();
+            if burning_s >= MOTOR_KNOWN_S && row.nees_of_motor.is_none() {
+                row.nees_of_motor = flight.nees_of_motor();
             }
         }
-        let computer = flight.computer();
-        let powered = computer.mode().phase == Phase::Powered && !flight.computer_is_dead();
-        if !powered || world.touchdown().is_some() {
+        if computer.mode().phase != Phase::Powered || flight.computer_is_dead() {
             return;
         }
         self.burning_frames += 1;
-        let stop_rad = AT_STOP_SHARE * self.gimbal_limit_rad;
+        let stop_rad = AT_STOP_SHARE * flight.mission().airframe.gimbal.limit_rad();
         self.saturated_frames +=
             u64::from(computer.commands().gimbal_rad.iter().any(|angle| angle.abs() >= stop_rad));
         if planned {
             let report = pilot.report();
-            self.plans[usize::from(computer.level().index())] += 1;
-            self.solver_iterations += report.iterations as u64;
+            let plans = match computer.level() {
+                ControlLevel::Idle | ControlLevel::Rehearsal => None,
+                ControlLevel::Converged => Some(&mut row.plans_converged),
+                ControlLevel::BestFeasible => Some(&mut row.plans_best_feasible),
+                ControlLevel::ShiftedPlan => Some(&mut row.plans_shifted),
+                ControlLevel::Stabiliser => Some(&mut row.plans_stabiliser),
+            };
+            plans.into_iter().for_each(|plans| *plans += 1);
+            row.solver_iterations += report.iterations as u64;
             let solved = matches!(report.status, Status::Converged | Status::NotRun);
-            self.solver_failures += u64::from(!solved);
+            row.solver_failures += u64::from(!solved);
         }
     }
 
@@ -136,12 +122,9 @@ impl Tally {
         let drawn = self.flight.drawn();
         let (truth, apogee) = (&drawn.truth, self.flight.fell_from());
         let at = |read: fn(&FirstContact) -> f64| touchdown.map(read);
-        let plans = |level: ControlLevel| self.plans[usize::from(level.index())];
-        let ignition = self.ignition.as_ref();
         let strain = outcome.rest.and_then(|rest| rest.strain);
         let attainable = attainable::window(self.flight.mission(), drawn, apogee);
         Row {
-            number: self.number,
             impulse_scale: truth.impulse_scale,
             burn_time_scale: truth.burn_time_scale,
             ignition_delay_s: truth.ignition_delay_s,
@@ -160,13 +143,7 @@ impl Tally {
             apogee_rate_deg_s: libm::sqrt(apogee.rate_rad_s.norm_squared()).to_degrees(),
             attainable_low_m: attainable.map(|window| window.low_m),
             attainable_high_m: attainable.map(|window| window.high_m),
-            ignited: ignition.is_some(),
-            ignition_outside_gate: ignition.is_some_and(|ignition| ignition.outside_gate),
             parachute: world.parachute_ejected(),
-            chosen_onset_height_m: ignition.and_then(|ignition| ignition.chosen_onset_m),
-            ignition_height_m: ignition.map(|ignition| ignition.height_m),
-            onset_height_m: self.onset.map(|(height_m, _)| height_m),
-            onset_vertical_m_s: self.onset.map(|(_, vertical_m_s)| vertical_m_s),
             burn_time_at_contact_s: touchdown
                 .zip(world.thrust_begins_s())
                 .map(|(touchdown, begins_s)| touchdown.time_s - begins_s)
@@ -191,22 +168,16 @@ impl Tally {
             clearance_m: strain.map(|strain| strain.clearance_m),
             leaned_deg: strain.map(|strain| strain.tilt_rad.to_degrees()),
             phase: outcome.phase.name().to_owned(),
-            plans_converged: plans(ControlLevel::Converged),
-            plans_best_feasible: plans(ControlLevel::BestFeasible),
-            plans_shifted: plans(ControlLevel::ShiftedPlan),
-            plans_stabiliser: plans(ControlLevel::Stabiliser),
-            solver_iterations: self.solver_iterations,
-            solver_failures: self.solver_failures,
             gimbal_saturation_share: self.saturated_frames as f64 / self.burning_frames.max(1) as f64,
             error_vertical_m_s: errors.vertical_m_s,
             error_lateral_m_s: errors.lateral_m_s,
             error_height_m: errors.height_m,
             error_nose_deg: errors.nose_rad.to_degrees(),
-            nees_of_motor: self.nees_of_motor,
             nees_of_motion: (self.nees_of_motion.1 > 0)
                 .then(|| self.nees_of_motion.0 / f64::from(self.nees_of_motion.1)),
             faults: self.flight.faults_happened(),
             flight_time_s: world.rest().map_or_else(|| world.time_s(), |rest| rest.time_s),
+            ..self.so_far.clone()
         }
     }
 }

@@ -15,7 +15,7 @@ use flight::computer::crew::{Asked, Request};
 use flight::computer::news::CrewMessage;
 use flight::computer::pilot::planner::Planner;
 use flight::computer::{Commands, Computer};
-use flight::rules::outputs::Line;
+use flight::rules::outputs::PyroOutput;
 use protocol::dialect::{MavMessage, MavModeFlag, TdVehicleFlag};
 use protocol::frame::Framer;
 use protocol::records::computer_v1::ComputerFrame;
@@ -231,7 +231,12 @@ fn commands_the_same(computer: Computer, frames: &[ComputerFrame]) -> Frames {
         let bits = |angles: &[f64]| angles.iter().map(|angle| angle.to_bits()).collect::<Vec<_>>();
         assert_eq!(bits(&commands.gimbal_rad), bits(&recorded.gimbal_rad), "frame {number}");
         assert_eq!(bits(&commands.fins_rad), bits(&recorded.fins_rad), "frame {number}");
-        let lines = [Line::LandingIgniter, Line::Parachute, Line::AscentIgniter, Line::Separation];
+        let lines = [
+            PyroOutput::LandingIgniter,
+            PyroOutput::Parachute,
+            PyroOutput::AscentIgniter,
+            PyroOutput::Separation,
+        ];
         let recorded =
             [recorded.ignite, recorded.parachute, recorded.ignite_booster, recorded.separate_booster];
         assert_eq!(lines.map(|line| commands.outputs.is_on(line)), recorded, "frame {number}");

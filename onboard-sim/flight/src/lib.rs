@@ -13,7 +13,7 @@
 //! * [`rules`] decides what the vehicle may do: phases, checks and limits.
 //! * [`computer`] is the flight computer: one frame, from sensor samples to commands.
 //!
-//! The crate `vehicles` reads the files that describe a vehicle, and the crate [`ocp`] solves the landing problem.
+//! With the feature `files`, `vehicles` reads the files that describe a vehicle. The crate [`ocp`] solves the landing problem.
 //!
 //! Units are SI and radians; names carry units and frames. The frames are those of [`vehicle::rigid`].
 #![cfg_attr(not(test), no_std)]
@@ -21,6 +21,35 @@
 extern crate alloc;
 #[cfg(test)]
 extern crate self as flight;
+
+/// An enumeration whose variants have a number, from 0, and a name that people see.
+macro_rules! numbered_enum {
+    ($(#[$attribute:meta])* pub enum $name:ident { $($(#[$meaning:meta])* $variant:ident = $word:literal,)+ }) => {
+        $(#[$attribute])*
+        #[repr(u8)]
+        pub enum $name { $($(#[$meaning])* $variant),+ }
+
+        impl $name {
+            /// Every one, in the order of the numbers.
+            pub const ALL: [Self; [$($word),+].len()] = [$(Self::$variant),+];
+
+            /// The name that people see.
+            pub fn name(self) -> &'static str {
+                match self { $(Self::$variant => $word),+ }
+            }
+
+            /// The number in telemetry and logs, from 0.
+            pub fn index(self) -> u8 {
+                self as u8
+            }
+
+            /// The one of a number, if there is one.
+            pub fn from_index(index: u8) -> Option<Self> {
+                Self::ALL.get(usize::from(index)).copied()
+            }
+        }
+    };
+}
 
 pub mod vehicle {
     //! Describes the rocket, its motor, the air and a mission as data.

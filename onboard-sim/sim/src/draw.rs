@@ -37,23 +37,24 @@ pub struct Draw {
 pub fn draw(mission: &Mission, dispersion: &Dispersion, seed: u64, number: u64) -> Draw {
     let mut chance = Chance::of(seed, number);
     let sigma = &known(mission, dispersion);
-    let nominal = Truth::default();
-    let impulse_scale =
-        1.0 + sigma.impulse_share * chance.normal() + sigma.impulse_even_share * chance.even();
-    let burn_time_scale = 1.0 + sigma.burn_time_share * chance.normal();
+    let mut truth = Truth { gust_scale: sigma.gust_scale, ..Truth::default() };
+    truth.impulse_scale =
+        (1.0 + sigma.impulse_share * chance.normal() + sigma.impulse_even_share * chance.even()).max(0.1);
+    truth.burn_time_scale = (1.0 + sigma.burn_time_share * chance.normal()).max(0.3);
     let scatter_scale = mission.airframe.igniter_scatter();
-    let ignition_delay_s = (nominal.ignition_delay_s
+    truth.ignition_delay_s = (truth.ignition_delay_s
         + scatter_scale * sigma.ignition_delay_s * chance.normal()
         + scatter_scale * sigma.ignition_delay_even_s * chance.even())
     .max(0.02);
     let misalignment_rad = sigma.thrust_misalignment_deg.to_radians();
-    let thrust_misalignment_rad = [misalignment_rad * chance.normal(), misalignment_rad * chance.normal()];
-    let mass_scale = 1.0 + sigma.mass_share * chance.normal();
-    let drag_scale = 1.0 + sigma.drag_share * chance.normal();
-    let cg_offset_m = [0.0, sigma.cg_off_axis_m * chance.normal(), sigma.cg_off_axis_m * chance.normal()];
+    truth.thrust_misalignment_rad = [(); 2].map(|()| misalignment_rad * chance.normal());
+    truth.mass_scale = (1.0 + sigma.mass_share * chance.normal()).max(0.5);
+    truth.drag_scale = (1.0 + sigma.drag_share * chance.normal()).max(0.2);
+    truth.cg_offset_m = [0.0, sigma.cg_off_axis_m * chance.normal(), sigma.cg_off_axis_m * chance.normal()];
     let [calmest, windiest] = sigma.wind_m_s;
-    let wind_m_s = calmest + (windiest - calmest) * chance.unit();
-    let wind_towards_rad = TAU * chance.unit();
+    truth.wind_m_s = calmest + (windiest - calmest) * chance.unit();
+    truth.wind_towards_rad = TAU * chance.unit();
+
     let start = &mission.start;
     let away_rad = TAU * chance.unit();
     let (away_sin, away_cos) = libm::sincos(away_rad);
@@ -67,7 +68,7 @@ pub fn draw(mission: &Mission, dispersion: &Dispersion, seed: u64, number: u64) 
     let roll_rad = TAU * chance.unit();
     let flight_seed = chance.random.next_u64();
 
-    let wind = Wind::new(wind_m_s, wind_towards_rad, 0.0, 0);
+    let wind = Wind::new(truth.wind_m_s, truth.wind_towards_rad, 0.0, 0);
     let carried = wind.mean_m_s(height_m) * start.carried_share;
     // It leans in the direction of its motion; the roll angle is arbitrary.
     let leaning = Vector3::z().cross(&away) * start.tilt_deg.to_radians();
@@ -78,20 +79,7 @@ pub fn draw(mission: &Mission, dispersion: &Dispersion, seed: u64, number: u64) 
         world_from_body: UnitQuaternion::from_scaled_axis(leaning + tilt) * roll * upright(),
         rate_rad_s: rate,
     };
-    let truth = Truth {
-        impulse_scale: impulse_scale.max(0.1),
-        burn_time_scale: burn_time_scale.max(0.3),
-        ignition_delay_s,
-        thrust_misalignment_rad,
-        mass_scale: mass_scale.max(0.5),
-        drag_scale: drag_scale.max(0.2),
-        cg_offset_m,
-        wind_m_s,
-        wind_towards_rad,
-        gust_scale: sigma.gust_scale,
-        ..nominal
-    };
-    let truth = mismatched(&truth, &mission.airframe.legs, &sigma.mismatch, seed, number);
+    mismatch(&mut truth, &mission.airframe.legs, &sigma.mismatch, seed, number);
     // The booster's motor is of another lot.
     let ascent = ascended(mission, dispersion, seed, number);
     let hanging = hung(mission, dispersion, seed, number);
@@ -183,70 +171,45 @@ fn hung(mission: &Mission, sigma: &Dispersion, seed: u64, number: u64) -> Option
 /// How long a chuffing motor burns, and how long it is out before it burns on, s.
 const CHUFF_S: [f64; 2] = [0.1, 0.2];
 
-/// A truth with the differences of flight `number` that the flight computer's models do not have. They come from a
-/// generator of their own: a set without them draws what it always drew.
-fn mismatched(truth: &Truth, legs: &Legs, sigma: &Mismatch, seed: u64, number: u64) -> Truth {
+/// Draws the differences of flight `number` that the flight computer's models do not have. They come from a generator of their
+/// own: a set without them draws what it always drew.
+fn mismatch(truth: &mut Truth, legs: &Legs, sigma: &Mismatch, seed: u64, number: u64) {
     /// Any number that no other draw uses.
     const OF_MISMATCH: u64 = 0x3d15_0000_0000_0002;
     let mut chance = Chance::of(seed ^ OF_MISMATCH, number);
     // Amplitudes that fall as 1 / k; a cosine's rms is its amplitude over the root of 2.
     let terms: [f64; SHAPE_TERMS] = core::array::from_fn(|k| 1.0 / (k + 1) as f64);
     let whole = libm::sqrt(0.5 * terms.iter().map(|term| term * term).sum::<f64>());
-    let thrust_shape = terms.map(|term| {
+    truth.thrust_shape = terms.map(|term| {
         (sigma.thrust_shape_share * term / whole * chance.normal()).clamp(-SHAPE_MOST, SHAPE_MOST)
     });
-    let plume_body_loss = chance.between(sigma.plume_body_loss);
-    let plume_fin_loss = chance.between(sigma.plume_fin_loss);
-    let [body_drag_scale, fin_drag_scale, crossflow_scale, inertia_scale, gimbal_gain] = [
-        sigma.body_drag_share,
-        sigma.fin_drag_share,
-        sigma.crossflow_share,
-        sigma.inertia_share,
-        sigma.gimbal_gain_share,
-    ]
-    .map(|share| (1.0 + share * chance.normal()).clamp(0.2, 2.0));
-    let [_, y_m, z_m] = truth.cg_offset_m;
-    let cg_offset_m = [sigma.cg_along_m * chance.normal(), y_m, z_m];
-    let thrust_offset_m = [sigma.thrust_offset_m * chance.normal(), sigma.thrust_offset_m * chance.normal()];
-    let gimbal_slop_rad = chance.between(sigma.gimbal_slop_deg).to_radians();
-    let fin_slop_rad = chance.between(sigma.fin_slop_deg).to_radians();
-    let fin_offset_rad = [(); 4].map(|()| sigma.fin_offset_deg.to_radians() * chance.normal());
-    let wind_exponent = (truth.wind_exponent + sigma.wind_exponent * chance.normal()).clamp(0.0, 0.5);
-    let wind_veer_rad_m = sigma.wind_veer_deg_100m.to_radians() / 100.0 * chance.normal();
-    let ground_rise = [(); 2].map(|()| libm::tan(sigma.ground_slope_deg.to_radians()) * chance.normal());
-    let principal_axis_rad = [(); 2].map(|()| sigma.principal_axis_deg.to_radians() * chance.normal());
-    let chuff_s = if chance.unit() < sigma.chuff_share { CHUFF_S } else { [0.0; 2] };
-    let thrust_rise_s = chance.between(sigma.thrust_rise_s);
-    let leg_drag_m2 = (legs.drag_area_m2 * sigma.leg_drag_share * chance.normal()
+    truth.plume_body_loss = chance.between(sigma.plume_body_loss);
+    truth.plume_fin_loss = chance.between(sigma.plume_fin_loss);
+    for (factor, share) in [
+        (&mut truth.body_drag_scale, sigma.body_drag_share),
+        (&mut truth.fin_drag_scale, sigma.fin_drag_share),
+        (&mut truth.crossflow_scale, sigma.crossflow_share),
+        (&mut truth.inertia_scale, sigma.inertia_share),
+        (&mut truth.gimbal_gain, sigma.gimbal_gain_share),
+    ] {
+        *factor = (1.0 + share * chance.normal()).clamp(0.2, 2.0);
+    }
+    truth.cg_offset_m[0] = sigma.cg_along_m * chance.normal();
+    truth.thrust_offset_m = [(); 2].map(|()| sigma.thrust_offset_m * chance.normal());
+    truth.gimbal_slop_rad = chance.between(sigma.gimbal_slop_deg).to_radians();
+    truth.fin_slop_rad = chance.between(sigma.fin_slop_deg).to_radians();
+    truth.fin_offset_rad = [(); 4].map(|()| sigma.fin_offset_deg.to_radians() * chance.normal());
+    truth.wind_exponent = (truth.wind_exponent + sigma.wind_exponent * chance.normal()).clamp(0.0, 0.5);
+    truth.wind_veer_rad_m = sigma.wind_veer_deg_100m.to_radians() / 100.0 * chance.normal();
+    truth.ground_rise = [(); 2].map(|()| libm::tan(sigma.ground_slope_deg.to_radians()) * chance.normal());
+    truth.principal_axis_rad = [(); 2].map(|()| sigma.principal_axis_deg.to_radians() * chance.normal());
+    truth.chuff_s = if chance.unit() < sigma.chuff_share { CHUFF_S } else { [0.0; 2] };
+    truth.thrust_rise_s = chance.between(sigma.thrust_rise_s);
+    truth.leg_drag_m2 = (legs.drag_area_m2 * sigma.leg_drag_share * chance.normal()
         + chance.between(sigma.leg_drag_m2))
     .max(-legs.drag_area_m2);
-    let inertia_split = (sigma.inertia_split_share * chance.normal()).clamp(-0.3, 0.3);
-    let other_curve = chance.between(sigma.other_curve);
-    Truth {
-        other_curve,
-        chuff_s,
-        thrust_rise_s,
-        thrust_offset_m,
-        cg_offset_m,
-        wind_exponent,
-        wind_veer_rad_m,
-        thrust_shape,
-        plume_body_loss,
-        plume_fin_loss,
-        body_drag_scale,
-        fin_drag_scale,
-        crossflow_scale,
-        leg_drag_m2,
-        inertia_scale,
-        inertia_split,
-        principal_axis_rad,
-        gimbal_gain,
-        gimbal_slop_rad,
-        fin_offset_rad,
-        fin_slop_rad,
-        ground_rise,
-        ..*truth
-    }
+    truth.inertia_split = (sigma.inertia_split_share * chance.normal()).clamp(-0.3, 0.3);
+    truth.other_curve = chance.between(sigma.other_curve);
 }
 
 /// Fractions of a delay, uniform in [0, 1), for the faults of flight `number`. They come from a generator of their

@@ -42,8 +42,10 @@ pub enum When {
 }
 
 /// A fault of a flight.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct TimedFault {
+    /// As it was written, without its time.
+    what: String,
     /// What breaks.
     pub breakage: Breakage,
     pub when: When,
@@ -141,26 +143,6 @@ const WRONG: [(&str, OfValue); 6] = [
     ("noise", Defect::Noise),
     ("blocked", Defect::Blocked),
 ];
-
-fn named(sensor: Sensor) -> (&'static str, &'static str) {
-    SENSORS.iter().find(|(known, ..)| *known == sensor).map_or(("?", ""), |(_, name, unit)| (name, unit))
-}
-
-/// A defect's name and value.
-fn how(defect: Defect) -> (&'static str, Option<f64>) {
-    let same = |known: Defect| core::mem::discriminant(&known) == core::mem::discriminant(&defect);
-    let silent = SILENT.iter().find(|(_, known)| same(*known)).map(|(name, _)| (*name, None));
-    let value = match defect {
-        Defect::Step(value)
-        | Defect::Ramp(value)
-        | Defect::Spike(value)
-        | Defect::Noise(value)
-        | Defect::Blocked(value) => value,
-        Defect::Out | Defect::Dead | Defect::Stuck | Defect::NotANumber => f64::NAN,
-    };
-    let wrong = || WRONG.iter().find(|(_, of)| same(of(value))).map_or("?", |(name, _)| *name);
-    silent.unwrap_or_else(|| (wrong(), Some(value)))
-}
 
 /// A sensor's defect by its name; the value it takes, if it takes one, and the unit of that value.
 fn sensor_fault(name: &str, value: Option<f64>) -> Option<(&'static str, Option<Breakage>)> {
@@ -274,7 +256,7 @@ impl FromStr for TimedFault {
                 format!("its value must be {unit}")
             })
         })?;
-        Ok(Self { breakage, when })
+        Ok(Self { what: what.to_owned(), breakage, when })
     }
 }
 
@@ -291,38 +273,7 @@ impl fmt::Display for When {
 
 impl fmt::Display for TimedFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.breakage {
-            Breakage::LinkLoss => write!(f, "link-loss"),
-            Breakage::LinkDelay(delay_s) => write!(f, "link-delay:{delay_s}"),
-            Breakage::Sensor(sensor, defect) => {
-                let (name, _) = named(sensor);
-                let (how, value) = how(defect);
-                let inertial = matches!(sensor, Sensor::Gyro | Sensor::Accelerometer);
-                let how = if inertial && how == "step" { "bias" } else { how };
-                write!(f, "{name}-{how}")?;
-                value.map_or(Ok(()), |value| write!(f, ":{value}"))
-            }
-            Breakage::Reboot(down_s) => write!(f, "reboot:{down_s}"),
-            Breakage::Abort => write!(f, "abort"),
-            Breakage::Vehicle(Fault::NoLight) => write!(f, "no-light"),
-            Breakage::Vehicle(Fault::LateLight { delay_s }) => write!(f, "late-light:{delay_s}"),
-            Breakage::Vehicle(Fault::WeakMotor { scale }) => write!(f, "weak-motor:{scale}"),
-            Breakage::Vehicle(Fault::EarlyBurnout { after_s }) => write!(f, "early-burnout:{after_s}"),
-            Breakage::Vehicle(Fault::AscentNoLight) => write!(f, "ascent-no-light"),
-            Breakage::Vehicle(Fault::AscentSelfLights) => write!(f, "ascent-self-lights"),
-            Breakage::Vehicle(Fault::AscentWeak { scale }) => write!(f, "ascent-weak:{scale}"),
-            Breakage::Vehicle(Fault::SeparationFails) => write!(f, "separation-fails"),
-            Breakage::Vehicle(Fault::ParachuteFails) => write!(f, "parachute-fails"),
-            Breakage::Vehicle(Fault::GimbalStuck) => write!(f, "gimbal-stuck"),
-            Breakage::Vehicle(Fault::GimbalJams { deg }) => write!(f, "gimbal-jams:{deg}"),
-            Breakage::Vehicle(Fault::GimbalSlow { scale }) => write!(f, "gimbal-slow:{scale}"),
-            Breakage::Vehicle(Fault::Reversed { surface }) => write!(f, "reversed:{}", surface + 1),
-            Breakage::Vehicle(Fault::Swapped { surfaces: [one, other] }) => {
-                write!(f, "swapped:{}{}", one + 1, other + 1)
-            }
-            Breakage::Vehicle(Fault::FinStuck { fin }) => write!(f, "fin-stuck:{fin}"),
-        }?;
-        write!(f, "@{}", self.when)
+        write!(f, "{}@{}", self.what, self.when)
     }
 }
 
@@ -343,9 +294,9 @@ impl Injector {
         let shares = fault_shares(seed, number, faults.len());
         let waiting = faults.iter().zip(shares).map(|(fault, share)| match fault.when {
             When::PhaseBetween(phase, [from_s, to_s]) => {
-                TimedFault { when: When::Phase(phase, from_s + share * (to_s - from_s)), ..*fault }
+                TimedFault { when: When::Phase(phase, from_s + share * (to_s - from_s)), ..fault.clone() }
             }
-            When::Time(_) | When::Phase(..) => *fault,
+            When::Time(_) | When::Phase(..) => fault.clone(),
         });
         Self { waiting: waiting.collect(), entered_s: [None; Phase::ALL.len()], happened: 0 }
     }

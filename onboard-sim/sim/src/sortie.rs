@@ -9,7 +9,7 @@ use crate::world::whole::WorldError;
 use crate::world::{Battery, World};
 use flight::computer::crew::{Asked, Request};
 use flight::computer::pilot::Pilot;
-use flight::computer::{Commands, Computer, FRAME_S, Input, Output, Rehearsed, flight_time_s};
+use flight::computer::{Commands, Computer, FRAME_S, Input, KeptInput, Output, Rehearsed, flight_time_s};
 use flight::estimation::estimator::Measurements;
 use flight::guidance::powered::{ControlLevel, PoweredReport};
 use flight::rules::arming::PredictedLanding;
@@ -212,7 +212,7 @@ impl Sortie {
         };
         let Feedback { gimbal_rad, fins_rad, contact, igniter_continuity, booster_attached } =
             self.surroundings.feedback(self.computer.released_at_s().is_some());
-        let input = Input {
+        let kept = KeptInput {
             frame: self.frame,
             time_s: flight_time_s(self.frame),
             measured,
@@ -227,6 +227,9 @@ impl Sortie {
             uplink: outside.uplink,
             commander: outside.commander,
             people: outside.people,
+        };
+        let input = Input {
+            kept,
             requests,
             rehearsed: self.rehearsal.as_ref().and_then(Rehearsal::over).map(|(rehearsed, _)| rehearsed),
             plan_ready: self.plan_ready_at.take_if(|at| self.frame >= *at).is_some(),

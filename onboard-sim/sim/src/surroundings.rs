@@ -7,7 +7,7 @@ use crate::world::sensors::{
 use crate::world::{Actuators, Battery, World};
 use flight::computer::{Commands, FRAME_MS, FRAME_S, pad_check};
 use flight::estimation::estimator::{Measurements, StartUncertainty};
-use flight::rules::outputs::Line;
+use flight::rules::outputs::PyroOutput;
 use flight::rules::phase::Phase;
 use flight::vehicle::mission::{Mission, StartPoint};
 use flight::vehicle::rigid::RigidState;
@@ -106,10 +106,10 @@ impl Surroundings {
         self.actuators = Actuators {
             gimbal_rad,
             fins_rad,
-            ignite: outputs.is_on(Line::LandingIgniter),
-            parachute: outputs.is_on(Line::Parachute),
-            ignite_booster: outputs.is_on(Line::AscentIgniter),
-            separate: outputs.is_on(Line::Separation),
+            ignite: outputs.is_on(PyroOutput::LandingIgniter),
+            parachute: outputs.is_on(PyroOutput::Parachute),
+            ignite_booster: outputs.is_on(PyroOutput::AscentIgniter),
+            separate: outputs.is_on(PyroOutput::Separation),
         };
         self.finite &= self.world.state().is_finite()
             && gimbal_rad.iter().chain(&fins_rad).all(|angle| angle.is_finite());

@@ -1,6 +1,6 @@
 //! What the flight computer detects on the way up, it detects from sensors.
 
-use flight::computer::{Computer, Input, Output};
+use flight::computer::{Computer, Input, KeptInput, Output};
 use flight::estimation::estimator::Measurements;
 use flight::rules::phase::Phase;
 use flight::vehicle::mission::StartPoint;
@@ -9,20 +9,20 @@ use sim::recipe::Recipe;
 use sim::sortie::Sortie;
 
 /// The frames of a flight without requests.
-struct Frames(Vec<Input<'static>>);
+struct Frames(Vec<(KeptInput, bool)>);
 
 impl Watch for Frames {
     fn decided(&mut self, input: &Input<'_>, _: &Output, _: &Computer) {
         assert!(input.requests.is_empty() && input.rehearsed.is_none());
-        self.0.push(Input { requests: &[], rehearsed: None, ..*input });
+        self.0.push((input.kept, input.plan_ready));
     }
 }
 
 /// The phases that a computer passes through.
-fn phases(mut computer: Computer, frames: impl Iterator<Item = Input<'static>>) -> Vec<Phase> {
+fn phases(mut computer: Computer, frames: impl Iterator<Item = (KeptInput, bool)>) -> Vec<Phase> {
     let mut phases = Vec::new();
-    for frame in frames {
-        computer.step(&frame);
+    for (kept, plan_ready) in frames {
+        computer.step(&Input { kept, requests: &[], rehearsed: None, plan_ready });
         let phase = computer.mode().phase;
         if phases.last() != Some(&phase) {
             phases.push(phase);
@@ -44,8 +44,8 @@ fn a_flight_whose_sensors_stand_on_the_rail_is_never_detected() {
     let frames = frames.0;
     let flown = phases(computer.clone(), frames.iter().copied());
     assert!(flown.starts_with(&[Phase::Boost, Phase::Coast, Phase::Deploy]), "{flown:?}");
-    let measured = Measurements { gnss: None, ..frames[0].measured };
-    let stood = frames.iter().map(|frame| Input { measured, ..*frame });
+    let measured = Measurements { gnss: None, ..frames[0].0.measured };
+    let stood = frames.iter().map(|&(kept, ready)| (KeptInput { measured, ..kept }, ready));
     let told = phases(computer, stood);
     assert!(!told.contains(&Phase::Coast) && !told.contains(&Phase::Deploy), "{told:?}");
 }

@@ -3,23 +3,24 @@
 use std::fmt;
 use std::fs;
 use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::Context as _;
 use clap::{Args, Subcommand};
 use flight::vehicle::mission::StartPoint;
-use onboard_sim::run::{self, Progress};
+use onboard_sim::files::write_folder;
+use onboard_sim::run::{self, Counts};
 use onboard_sim::scenario::{Expected, Scenario};
-use onboard_sim::store::{Order, Shard, Store, merge};
+use onboard_sim::store::{Manifest, Shard, Store, merge, sha256};
 use onboard_sim::summary::to_text;
 use protocol::log::build::build_info;
-use serde_json::json;
-use sha2::Digest as _;
+use serde::Serialize;
 use sim::dispersion;
 use sim::fault::{TimedFault, how_to_write};
+use sim::recipe::Recipe;
 
-use super::{Stopwatch, on_threads, recipe, single};
+use super::{Progress, on_threads, recipe, single};
 
 #[derive(Args)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
@@ -44,7 +45,7 @@ pub(crate) struct CampaignArguments {
     /// Flights at the same time; the results do not depend on it.
     #[arg(long, value_name = "N")]
     jobs: Option<usize>,
-    /// Fly only this part of the chunks of flights, counted from 1.
+    /// Fly only this part of the flights, counted from 1.
     #[arg(long, default_value = "1/1", value_name = "I/N")]
     shard: Shard,
     /// Break something in every flight; may be repeated.
@@ -79,122 +80,92 @@ enum CampaignCommand {
 }
 
 pub(crate) fn run(arguments: &CampaignArguments) -> anyhow::Result<ExitCode> {
+    let mut stdout = std::io::stdout().lock();
     if let Some(CampaignCommand::Merge { parts, out }) = &arguments.command {
-        return gather(parts, out);
+        let summary = merge(parts, out)?;
+        writeln!(stdout, "{}results {}", to_text(&summary), out.display())?;
+        return Ok(ExitCode::SUCCESS);
     }
-    let (order, expected) = order(arguments)?;
+    let (recipe, expected) = flights(arguments)?;
     if let Some(number) = arguments.only {
-        return single::fly(&order.recipe, number, expected, arguments.log.as_deref());
+        return single::fly(&recipe, number, expected, arguments.log.as_deref());
     }
     let out = arguments.out.as_deref().context("--out is missing")?;
-    let store = Store::open(out, &order, &order.manifest(&program()?, arguments.shard))?;
-    let stopwatch = Stopwatch::start();
-    let flown = on_threads(arguments.jobs, || {
-        Ok((run::run(&order, &store, &|progress| show(&stopwatch, progress))?, rayon::current_num_threads()))
-    });
-    let (flown, jobs) = flown?;
-    let cost = Cost::of(&flown, stopwatch.elapsed_s(), jobs);
-    let summary = run::publish(&order, &store)?;
-    let mut stdout = std::io::stdout().lock();
+    let manifest = Manifest::of(&recipe, arguments.flights, &program()?, arguments.shard);
+    let store = Store::open(out, &recipe, manifest)?;
+    let progress = Progress::start();
+    let cost = on_threads(arguments.jobs, || {
+        let flown = run::run(&recipe, &store, &|flown| show(&progress, flown))?;
+        Ok(Cost::of(&flown, progress.elapsed_s()))
+    })?;
+    let summary = store.publish(&recipe.mission.leg_limits)?;
     write!(stdout, "{}", to_text(&summary))?;
-    if let Some(cost) = cost {
-        store.publish("cost.json", cost.to_json().as_bytes())?;
+    if cost.flights > 0 {
+        write_folder(out, vec![("cost.json", serde_json::to_vec_pretty(&cost)?)], true)?;
         writeln!(stdout, "\n{cost}")?;
     }
     writeln!(stdout, "results {}", out.display())?;
     Ok(ExitCode::SUCCESS)
 }
 
-fn gather(parts: &[PathBuf], out: &Path) -> anyhow::Result<ExitCode> {
-    let (store, order) = merge(parts, out)?;
-    let summary = run::publish(&order, &store)?;
-    let mut stdout = std::io::stdout().lock();
-    write!(stdout, "{}", to_text(&summary))?;
-    writeln!(stdout, "results {}", out.display())?;
-    Ok(ExitCode::SUCCESS)
-}
-
-fn order(arguments: &CampaignArguments) -> anyhow::Result<(Order, Option<Expected>)> {
-    let CampaignArguments { profile, dispersion, .. } = arguments;
-    let mut recipe = recipe(profile, arguments.start, dispersion, arguments.seed)?;
+/// What is flown, and how it should end.
+fn flights(arguments: &CampaignArguments) -> anyhow::Result<(Recipe, Option<Expected>)> {
+    let mut recipe = recipe(&arguments.profile, arguments.start, &arguments.dispersion, arguments.seed)?;
     recipe.faults.clone_from(&arguments.faults);
-    let mut expected = None;
-    if let Some(path) = &arguments.scenario {
-        let text = fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
-        let scenario = Scenario::from_toml(&text, &path.display().to_string())?;
-        recipe.faults.extend(scenario.faults);
-        expected = scenario.expected;
-    }
-    Ok((Order { recipe, flights: arguments.flights }, expected))
+    let Some(path) = &arguments.scenario else { return Ok((recipe, None)) };
+    let text = fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let scenario = Scenario::from_toml(&text, &path.display().to_string())?;
+    recipe.faults.extend(scenario.faults);
+    Ok((recipe, scenario.expected))
 }
 
 /// The build and a digest of the running program, so that results of different programs are not mixed.
 fn program() -> anyhow::Result<String> {
     let path = std::env::current_exe().context("which program this is")?;
     let bytes = fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
-    let digest = sha2::Sha256::digest(&bytes);
-    let short = digest.iter().take(8).fold(String::new(), |mut short, byte| {
-        short.extend(
-            [byte >> 4, byte & 15].map(|digit| char::from_digit(u32::from(digit), 16).unwrap_or('?')),
-        );
-        short
-    });
     let build = build_info();
     let commit = build.get("git_commit").map_or("unknown", String::as_str);
-    Ok(format!("{} {commit} {short}", env!("CARGO_PKG_VERSION")))
-}
-
-/// Cost of a run.
-struct Cost {
-    flights: u64,
-    wall_s: f64,
-    flights_per_s: f64,
-    times_real_time_per_job: f64,
-    jobs: usize,
+    Ok(format!("{} {commit} {:.16}", env!("CARGO_PKG_VERSION"), sha256(bytes)))
 }
 
 /// Shows how far a campaign is.
-fn show(stopwatch: &Stopwatch, progress: &Progress) {
-    let Progress { flown, of, stands, envelope, .. } = progress;
-    let rate = *flown as f64 / stopwatch.elapsed_s().max(1e-3);
+fn show(progress: &Progress, Counts { flown, of, stands, envelope, .. }: &Counts) {
+    let rate = *flown as f64 / progress.elapsed_s().max(1e-3);
     let words =
         format!("flights, {rate:.1} a second, {stands} stand undamaged, {envelope} inside the envelope");
-    stopwatch.show(*flown as usize, *of as usize, words);
+    progress.show(*flown as usize, *of as usize, words);
+}
+
+/// Cost of a run.
+#[derive(Serialize)]
+struct Cost {
+    flights: u64,
+    flights_per_s: f64,
+    jobs: usize,
+    times_real_time_per_job: f64,
+    wall_s: f64,
 }
 
 impl Cost {
-    /// `None` if nothing was flown.
-    fn of(flown: &Progress, wall_s: f64, jobs: usize) -> Option<Self> {
-        let flight_s = flown.flight_time_ms as f64 * 1e-3;
-        (flown.flown > 0).then(|| Self {
+    fn of(flown: &Counts, wall_s: f64) -> Self {
+        let jobs = rayon::current_num_threads();
+        Self {
             flights: flown.flown,
-            wall_s,
             flights_per_s: flown.flown as f64 / wall_s,
-            times_real_time_per_job: flight_s / wall_s / jobs.max(1) as f64,
             jobs,
-        })
-    }
-
-    fn to_json(&self) -> String {
-        format!(
-            "{:#}\n",
-            json!({
-                "flights": self.flights,
-                "jobs": self.jobs,
-                "wall_s": self.wall_s,
-                "flights_per_s": self.flights_per_s,
-                "times_real_time_per_job": self.times_real_time_per_job,
-            })
-        )
+            times_real_time_per_job: flown.flight_time_ms as f64 * 1e-3 / wall_s / jobs as f64,
+            wall_s,
+        }
     }
 }
 
 impl fmt::Display for Cost {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { flights, flights_per_s, jobs, times_real_time_per_job, wall_s } = self;
         write!(
             f,
-            "{} flights in {:.1} s on {} jobs: {:.1} a second, each job {:.0} times real time",
-            self.flights, self.wall_s, self.jobs, self.flights_per_s, self.times_real_time_per_job
+            "{flights} flights in {wall_s:.1} s on {jobs} jobs: {flights_per_s:.1} a second, each job {times_real_time_per_job:.0} times \
+             real time"
         )
     }
 }

@@ -5,13 +5,14 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
+use onboard_sim::files::{refuse_loss, write_folder};
 use onboard_sim::hazard::Flights;
 use onboard_sim::motors::card::{Card, Day, Order};
 use protocol::mission::MissionHash;
 use sim::dispersion;
 
 use super::hazard::check_winds;
-use super::{in_wind, on_threads, recipe, refuse_loss, show_flights, write_folder};
+use super::{in_wind, on_threads, recipe, show_flights};
 
 /// The files of a card.
 const FILES: [&str; 3] = ["card.html", "card.txt", "mission.toml"];
@@ -80,7 +81,11 @@ pub(crate) fn run(arguments: &CardArguments) -> anyhow::Result<ExitCode> {
     let [html, text, mission_file] = FILES;
     let page = card.text();
     let files = [(html, card.html()), (text, page.clone()), (mission_file, card.recipe.mission_toml)];
-    write_folder(&arguments.out, &files, arguments.force)?;
+    write_folder(
+        &arguments.out,
+        files.map(|(name, text)| (name, text.into_bytes())).to_vec(),
+        arguments.force,
+    )?;
     writeln!(std::io::stdout().lock(), "{page}card {}", arguments.out.join(html).display())?;
     Ok(ExitCode::SUCCESS)
 }

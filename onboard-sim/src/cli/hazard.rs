@@ -1,6 +1,5 @@
 //! `onboard-sim hazard`: how near people may stand.
 
-use std::io::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -8,13 +7,14 @@ use clap::Args;
 use flight::rules::verdict::Landing;
 use flight::vehicle::mission::StartPoint;
 use onboard_sim::figure::{Places, PlacesPanel, places_svg};
+use onboard_sim::files::{refuse_loss, write_all};
 use onboard_sim::hazard::{self, Flights, Impact, Radius, Rule, Way, keep_out_m, landed_as_planned, widest};
 use onboard_sim::statistics::Landings;
 use sim::dispersion::{self, may_be_kinder};
 use sim::recipe::Recipe;
 
 use super::fly::WIND_MAX_M_S;
-use super::{in_wind, mission_text, on_threads, recipe, refuse_loss, show_flights, write_file};
+use super::{in_wind, mission_text, on_threads, recipe, show_flights};
 
 /// Flights of each kind that the picture shows.
 const SHOWN: u64 = 30;
@@ -71,11 +71,10 @@ pub(crate) fn run(arguments: &HazardArguments) -> anyhow::Result<ExitCode> {
         Study { arguments, mission: &mission.name, start: mission.start.at, ways: &ways, impacts: &impacts };
     study.write_text(&rule, mission.gate.fence_radius_m, &mut std::io::stdout().lock())?;
     if let Some(path) = &arguments.csv {
-        write_file(path, arguments.force, |out| study.write_csv(out))?;
+        write_all(&[(path.clone(), study.csv()?)], arguments.force)?;
     }
     if let Some(path) = &arguments.svg {
-        let svg = study.svg(&rule)?;
-        write_file(path, arguments.force, |out| out.write_all(svg.as_bytes()))?;
+        write_all(&[(path.clone(), study.svg(&rule)?.into_bytes())], arguments.force)?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -164,8 +163,8 @@ impl Study<'_> {
         Ok(())
     }
 
-    fn write_csv(&self, out: &mut impl std::io::Write) -> std::io::Result<()> {
-        let mut table = csv::Writer::from_writer(out);
+    fn csv(&self) -> anyhow::Result<Vec<u8>> {
+        let mut table = csv::Writer::from_writer(Vec::new());
         let told = ["wind_m_s", "way", "flight", "x_m", "y_m", "downwind_m", "across_m"];
         table.write_record(told.iter().chain(&Landing::COLUMNS))?;
         for (wind_m_s, impacts) in self.arguments.winds.iter().zip(self.impacts) {
@@ -181,7 +180,7 @@ impl Study<'_> {
                 )?;
             }
         }
-        table.flush()
+        Ok(table.into_inner()?)
     }
 
     /// One wind a panel, with its own radius.

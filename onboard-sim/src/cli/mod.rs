@@ -1,5 +1,4 @@
-//! The subcommands of the program, and what they have in common: the texts that they read, the threads that they use, and
-//! the files that they write: each is complete or absent, and replaces an existing one only on request.
+//! The subcommands of the program, and what they have in common: the texts that they read, and the threads that they use.
 
 pub(crate) mod campaign;
 pub(crate) mod card;
@@ -9,16 +8,12 @@ pub(crate) mod hazard;
 pub(crate) mod new;
 mod single;
 
-use std::io::Write as _;
-use std::path::{Path, PathBuf};
-
 use anyhow::Context as _;
 use flight::vehicle::mission::StartPoint;
+use onboard_sim::progress::Progress;
 use onboard_sim::run::threads;
-use onboard_sim::stopwatch::Stopwatch;
 use sim::dispersion::{self, Dispersion};
 use sim::recipe::{self, Recipe};
-use tempfile::NamedTempFile;
 
 /// Does work on so many threads, or on as many as there are processors; the results do not depend on it.
 fn on_threads<T: Send>(
@@ -65,78 +60,6 @@ fn in_wind(recipe: &Recipe, wind_m_s: f64) -> anyhow::Result<Recipe> {
 
 /// Shows how many flights are flown, of how many.
 fn show_flights() -> impl Fn(usize, usize) + Sync {
-    let stopwatch = Stopwatch::start();
-    move |done, of| stopwatch.show(done, of, "flights")
-}
-
-/// An existing file is replaced only on request; a pipe or a device has no content that could be lost.
-fn refuse_loss(path: &Path, force: bool) -> anyhow::Result<()> {
-    let there = path.symlink_metadata().is_ok_and(|found| found.is_file() || found.is_symlink());
-    anyhow::ensure!(
-        force || is_device(path) || !there,
-        "{} exists already; --force replaces it",
-        path.display()
-    );
-    Ok(())
-}
-
-fn is_device(path: &Path) -> bool {
-    std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
-}
-
-/// Writes what a function writes as a file.
-fn write_file(
-    path: &Path,
-    force: bool,
-    write: impl FnOnce(&mut Vec<u8>) -> std::io::Result<()>,
-) -> anyhow::Result<()> {
-    let mut bytes = Vec::new();
-    write(&mut bytes)?;
-    write_all(&[(path.to_owned(), bytes)], force)
-}
-
-/// Writes texts as the files of a folder, which is made if it is not there.
-fn write_folder(folder: &Path, files: &[(&str, String)], force: bool) -> anyhow::Result<()> {
-    let files = files.iter().map(|(name, text)| (folder.join(name), text.clone().into_bytes()));
-    let files: Vec<_> = files.collect();
-    files.iter().try_for_each(|(path, _)| refuse_loss(path, force))?;
-    std::fs::create_dir_all(folder)
-        .with_context(|| format!("cannot make the folder {}", folder.display()))?;
-    write_all(&files, force)
-}
-
-/// Writes all files or none, under hidden temporary names first, so that a file with the final name is always complete.
-fn write_all(files: &[(PathBuf, Vec<u8>)], force: bool) -> anyhow::Result<()> {
-    let mut complete = Vec::with_capacity(files.len());
-    for (path, bytes) in files {
-        refuse_loss(path, force)?;
-        let cannot = || format!("cannot write {}", path.display());
-        if is_device(path) {
-            std::fs::write(path, bytes).with_context(cannot)?;
-            continue;
-        }
-        let mut unfinished = unfinished_beside(path).with_context(cannot)?;
-        unfinished.write_all(bytes).and_then(|()| unfinished.as_file().sync_all()).with_context(cannot)?;
-        complete.push((unfinished, path));
-    }
-    complete.into_iter().try_for_each(|(unfinished, path)| {
-        let kept = if force { unfinished.persist(path) } else { unfinished.persist_noclobber(path) };
-        kept.map(drop)
-            .map_err(|error| error.error)
-            .with_context(|| format!("cannot write {}", path.display()))
-    })
-}
-
-/// A file that disappears unless it is kept.
-fn unfinished_beside(path: &Path) -> std::io::Result<NamedTempFile> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut unfinished = tempfile::Builder::new();
-    unfinished.prefix(".unfinished-");
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt as _;
-        // The user's umask applies as to any new file; a temporary file would be readable by its owner only.
-        unfinished.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    unfinished.tempfile_in(folder)
+    let progress = Progress::start();
+    move |done, of| progress.show(done, of, "flights")
 }

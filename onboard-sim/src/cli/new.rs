@@ -13,9 +13,10 @@ use flight::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use flight::vehicle::mission::Mission;
 use flight::vehicle::thrust_curve::ThrustCurve;
 use flight::vehicles::{mission, motors, openrocket, table, thrust_curve};
+use onboard_sim::files::{refuse_loss, write_all};
 use toml::Value;
 
-use super::{refuse_loss, text_of, write_file};
+use super::text_of;
 
 const MASS: &str = "airframe.mass.loaded_kg";
 const LENGTH: &str = "airframe.body.length_m";
@@ -71,7 +72,7 @@ pub(crate) fn run(arguments: &NewArguments) -> anyhow::Result<ExitCode> {
         writeln!(stderr, "no terminal on which to ask: what is not told is {}'s", mission::DEFAULT)?;
     }
     let text = made(arguments, asks && terminal, &mut ask, &path.display().to_string())?;
-    write_file(&path, arguments.force, |file| file.write_all(text.as_bytes()))?;
+    write_all(&[(path.clone(), text.into_bytes())], arguments.force)?;
     writeln!(stderr, "{0} is written; `onboard-sim check {0}` says whether it will land", path.display())?;
     Ok(ExitCode::SUCCESS)
 }

@@ -5,11 +5,12 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use anyhow::Context as _;
-use onboard_sim::row::{COLUMNS, Row, Value};
+use onboard_sim::row::{COLUMNS, Row};
 use onboard_sim::scenario::Expected;
 use onboard_sim::tally::Tally;
 use protocol::log::record::Record;
 use protocol::log::recorder::Recorder;
+use serde_json::Value;
 use sim::recipe::Recipe;
 use sim::wire::record::{self, LastFrame};
 
@@ -42,17 +43,17 @@ pub(super) fn fly(
 }
 
 fn print_row(row: &Row, out: &mut impl std::io::Write) -> std::io::Result<()> {
-    for column in COLUMNS {
+    COLUMNS.iter().try_for_each(|column| {
         let name = column.name;
         match (column.value)(row) {
-            Value::Maybe(None) => writeln!(out, "{name:<32}-")?,
-            Value::Count(count) => writeln!(out, "{name:<32}{count}")?,
-            Value::Real(real) | Value::Maybe(Some(real)) => writeln!(out, "{name:<32}{real:.4}")?,
-            Value::Flag(flag) => writeln!(out, "{name:<32}{flag}")?,
-            Value::Word(word) => writeln!(out, "{name:<32}{word}")?,
+            Value::Null => writeln!(out, "{name:<32}-"),
+            Value::String(word) => writeln!(out, "{name:<32}{word}"),
+            Value::Number(real) if real.is_f64() => {
+                writeln!(out, "{name:<32}{:.4}", real.as_f64().unwrap_or(f64::NAN))
+            }
+            other => writeln!(out, "{name:<32}{other}"),
         }
-    }
-    Ok(())
+    })
 }
 
 fn fly_logged(recipe: &Recipe, number: u64, tally: &mut Tally, path: &Path) -> anyhow::Result<()> {

@@ -15,8 +15,8 @@ use anyhow::{Context as _, Result, bail, ensure};
 use clap::Args;
 use flight::vehicle::lot::{Burnt, Posterior};
 use flight::vehicle::mission::Mission;
+use onboard_sim::progress::Progress;
 use onboard_sim::run::in_parallel;
-use onboard_sim::stopwatch::Stopwatch;
 use serde::Serialize;
 use sim::dispersion::{DEFAULT, Dispersion, may_be_kinder};
 use sim::draw::{Chance, Draw, draw};
@@ -291,7 +291,7 @@ fn fly(seed: u64, flights: usize, lots: &[Posterior], day: &Day) -> Result<Vec<T
         let draw = Draw { truth, ..drawn };
         Ok(Sortie::drawn_as(&day.mission, &day.dispersion, &draw)?.run().landing.stands)
     };
-    let stopwatch = Stopwatch::start();
+    let stopwatch = Progress::start();
     let landed = in_parallel(&motors, one, &|done| stopwatch.show(done, flights, "flights"));
     let trials =
         motors.into_iter().zip(landed).map(|((_, drawn), landed)| Ok(Trial { drawn, landed: landed? }));

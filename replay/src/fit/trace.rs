@@ -6,9 +6,9 @@ use std::path::Path;
 use avionics::log::frame::{commands_from_log, input_from_log, phase_of};
 use avionics::log::logged::{At, Logged, RecordError};
 use flight::computer::Commands;
-use flight::computer::Input;
+use flight::computer::KeptInput;
 use flight::estimation::estimator::{Estimate, Measurements};
-use flight::rules::outputs::Line;
+use flight::rules::outputs::PyroOutput;
 use flight::rules::phase::Phase;
 use flight::vehicle::airframe::MassModel;
 use flight::vehicle::atmosphere::Air;
@@ -130,8 +130,8 @@ impl Trace {
     }
 
     /// Adds a frame; one with numbers that are not finite is left out.
-    pub fn push(&mut self, input: &Input<'_>, commands: &Commands, phase: Phase, estimate: &Estimate) {
-        let Input { time_s, measured, gimbal_rad, fins_rad, .. } = *input;
+    pub fn push(&mut self, input: &KeptInput, commands: &Commands, phase: Phase, estimate: &Estimate) {
+        let KeptInput { time_s, measured, gimbal_rad, fins_rad, .. } = *input;
         let fix = measured.gnss.as_ref().map(|fix| [&fix.position_m, &fix.velocity_m_s]);
         let vectors = [measured.imu.gyro_rad_s, measured.imu.specific_force_m_s2];
         let numbers = vectors.iter().chain(fix.into_iter().flatten()).flat_map(|vector| vector.iter());
@@ -148,8 +148,8 @@ impl Trace {
             fins_rad,
             gimbal_reported_rad: gimbal_rad,
             gimbal_rad: commands.gimbal_rad,
-            ignite: commands.outputs.is_on(Line::LandingIgniter),
-            parachute: commands.outputs.is_on(Line::Parachute),
+            ignite: commands.outputs.is_on(PyroOutput::LandingIgniter),
+            parachute: commands.outputs.is_on(PyroOutput::Parachute),
             contact: input.contact,
             booster_attached: input.booster_attached,
             phase,

@@ -12,8 +12,8 @@ use flight::guidance::powered::{ControlLevel, LandingSolved};
 use judge::{Judgement, Score};
 use ocp::Outcome as SolveOutcome;
 use ocp::landing::State;
+use onboard_sim::progress::Progress;
 use onboard_sim::run::in_parallel;
-use onboard_sim::stopwatch::Stopwatch;
 use prost::Message as _;
 use protocol::log::computer_v1::ComputerFrame;
 use serde::Serialize;
@@ -198,7 +198,7 @@ pub fn explain(recording: &Recording, number: u64) -> Result<FrameReport, Explai
 /// See [`ExplainError`].
 pub fn explain_all(recording: &Recording) -> Result<Vec<FrameReport>, ExplainError> {
     let explained = inspected(recording, None)?;
-    let progress = Stopwatch::start();
+    let progress = Progress::start();
     let one =
         |frame: &Explained| FrameReport { judged: frame.solved.as_ref().map(judged), ..frame.report.clone() };
     Ok(in_parallel(&explained, one, &|done| progress.show(done, explained.len(), "plans")))

@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 
 use avionics::log::frame::frame_to_log;
 use avionics::log::logged::Logged as _;
-use flight::computer::{Computer, Input, LogState};
+use flight::computer::{Computer, Input, KeptInput, LogState};
 use flight::estimation::estimator::{ImuSample, Measurements};
 use flight::rules::arming::Uplink;
 use flight::vehicle::rigid::RigidState;
@@ -59,7 +59,7 @@ static FALL: LazyLock<Fall> = LazyLock::new(|| {
             pressure_altitude_m: frame.is_multiple_of(4).then_some(falling_m),
             ..Measurements::of_imu(imu)
         };
-        let input = Input {
+        let kept = KeptInput {
             frame,
             time_s,
             measured,
@@ -74,10 +74,8 @@ static FALL: LazyLock<Fall> = LazyLock::new(|| {
             uplink: Uplink::NotNeeded,
             commander: None,
             people: None,
-            requests: &[],
-            rehearsed: None,
-            plan_ready: frame % 10 == 5,
         };
+        let input = Input { kept, requests: &[], rehearsed: None, plan_ready: frame % 10 == 5 };
         let output = computer.step(&input);
         frames.push(frame_to_log(&input, &output, &computer, false));
     }

@@ -32,9 +32,9 @@ use embedded_io::{Read, ReadReady};
 use flight::computer::news::CrewMessage;
 use flight::computer::pad_check::surfaces_rad;
 use flight::computer::pilot::planner::Planner;
-use flight::computer::{Commands, Computer, FRAME_S, Input, LogState, flight_time_s};
+use flight::computer::{Commands, Computer, FRAME_S, KeptInput, LogState, flight_time_s};
 use flight::estimation::estimator::{GnssFix, ImuSample, Measurements};
-use flight::rules::outputs::Line;
+use flight::rules::outputs::PyroOutput;
 use flight::vehicle::atmosphere::{Air, pressure_altitude_m};
 use flight::vehicle::site::Site;
 use nalgebra::Vector3;
@@ -114,8 +114,13 @@ pub struct Parts<W: Wiring> {
 }
 
 /// What each output switches: both igniters of the landing motor, that of the ascent motor, separation and parachute.
-pub const LINES: [Line; 5] =
-    [Line::LandingIgniter, Line::LandingIgniter, Line::AscentIgniter, Line::Separation, Line::Parachute];
+pub const LINES: [PyroOutput; 5] = [
+    PyroOutput::LandingIgniter,
+    PyroOutput::LandingIgniter,
+    PyroOutput::AscentIgniter,
+    PyroOutput::Separation,
+    PyroOutput::Parachute,
+];
 
 /// Axes from other ones: for each, which of the others it lies on, and whether along it (1) or against it (-1).
 pub type Axes = [(usize, f64); 3];
@@ -277,7 +282,7 @@ impl<W: Wiring> Board for TeensyBoard<W> {
         // What cannot be read is: no contact, no igniter, no booster, pin in.
         let high = |switch: &mut W::Switch| switch.is_high().unwrap_or(false);
         let low = |switch: &mut W::Switch| switch.is_low().unwrap_or(false);
-        let rest = Input {
+        let kept = KeptInput {
             frame: 0,
             time_s: 0.0,
             measured: self.measured(),
@@ -294,11 +299,8 @@ impl<W: Wiring> Board for TeensyBoard<W> {
             commander,
             // `avionics::board::radio` knows no operators yet.
             people: None,
-            requests: &[],
-            rehearsed: None,
-            plan_ready: false,
         };
-        Ok(Some(LoggedInput::new(rest, requests, None)))
+        Ok(Some(LoggedInput { kept, requests, rehearsed: None, plan_ready: false }))
     }
 
     fn act(&mut self, commands: &Commands) -> Result<(), Infallible> {

@@ -10,7 +10,7 @@ use alloc::boxed::Box;
 use crate::log::frame::{LoggedInput, frame_to_log};
 use flight::computer::news::CrewMessage;
 use flight::computer::pilot::planner::Planner;
-use flight::computer::{Commands, Computer, Input, Output, Rehearsed, flight_time_s};
+use flight::computer::{Commands, Computer, Input, KeptInput, Output, Rehearsed, flight_time_s};
 use protocol::records::computer_v1::ComputerFrame;
 
 /// A board: a crate for one board implements this with its drivers.
@@ -76,13 +76,9 @@ impl Frames {
         let Some(read) = board.sense()? else { return Ok(false) };
         self.frame += 1;
         let (solved, rehearsed) = (board.solved(), self.rehearsed.take());
-        let input = Input {
-            frame: self.frame,
-            time_s: flight_time_s(self.frame),
-            rehearsed: rehearsed.as_ref(),
-            plan_ready: solved.is_some(),
-            ..read.input()
-        };
+        let kept = KeptInput { frame: self.frame, time_s: flight_time_s(self.frame), ..read.kept };
+        let (requests, plan_ready) = (&*read.requests, solved.is_some());
+        let input = Input { kept, requests, rehearsed: rehearsed.as_ref(), plan_ready };
         if let Some(planner) = solved {
             self.computer.give_back(planner);
         }

@@ -8,8 +8,8 @@ use crate::log::frame::LoggedInput;
 use crate::log::logged::Logged;
 use flight::computer::findings::Findings;
 use flight::computer::news::CrewMessage;
-use flight::computer::{Computer, Input, Output};
-use flight::rules::outputs::Line;
+use flight::computer::{Computer, Input, KeptInput, Output};
+use flight::rules::outputs::PyroOutput;
 use flight::vehicle::mission::Mission;
 use protocol::frame::Framer;
 
@@ -72,7 +72,7 @@ impl Crewed {
     /// A frame's input, with what the crew has asked for.
     pub(crate) fn hear(&self, input: LoggedInput) -> LoggedInput {
         let UplinkState { uplink, commander, requests } = self.heard.clone();
-        input.hearing(uplink, commander, requests)
+        LoggedInput { kept: KeptInput { uplink, commander, ..input.kept }, requests, ..input }
     }
 
     /// Speaks with the ground after a frame; returns what the next one is told and asked. Never inline: what it keeps on the stack
@@ -86,7 +86,7 @@ impl Crewed {
         radio: &mut impl Radio,
     ) -> stream::Heard {
         self.findings.note(computer);
-        self.parachute_ejected |= output.commands.outputs.is_on(Line::Parachute);
+        self.parachute_ejected |= output.commands.outputs.is_on(PyroOutput::Parachute);
         let flown = VehicleState {
             computer,
             time_s: input.time_s,

@@ -4,7 +4,7 @@ use alloc::string::String;
 
 use flight::computer::findings::Findings;
 use flight::computer::pilot::{FRAMES_PER_PLAN, touchdown_from_below_m, touchdown_m};
-use flight::computer::{Computer, Input};
+use flight::computer::{Computer, KeptInput};
 use flight::estimation::estimator::Estimate;
 use flight::guidance::powered::{ControlLevel, Plan, PoweredReport};
 use flight::rules::operator::Operator;
@@ -124,7 +124,7 @@ impl<'a> VehicleState<'a> {
     }
 
     /// The input of the computer's last frame.
-    pub fn input(&self) -> &'a Input<'static> {
+    pub fn input(&self) -> &'a KeptInput {
         self.computer.input()
     }
 
@@ -238,7 +238,7 @@ impl<'a> VehicleState<'a> {
 pub struct Airborne<'a> {
     pub released_at_s: f64,
     /// The last input, its frame and time counted from the release.
-    pub flown: Input<'static>,
+    pub flown: KeptInput,
     pub estimate: &'a Estimate,
     burn: Burn<'a>,
     burning_s: Option<f64>,

@@ -5,11 +5,10 @@ use alloc::vec::Vec;
 
 use flight::computer::crew::{Asked, Ending, Request};
 use flight::computer::pilot::Pilot;
-use flight::computer::{Commander, Commands, Computer, Input, Output, Rehearsed};
+use flight::computer::{Commands, Computer, Input, KeptInput, Output, Rehearsed};
 use flight::estimation::estimator::AidStatus;
 use flight::guidance::powered::ControlLevel;
-use flight::rules::arming::Uplink;
-use flight::rules::outputs::{Line, Outputs};
+use flight::rules::outputs::{Outputs, PyroOutput};
 use flight::rules::phase::Phase;
 use flight::vehicle::mission::StartPoint;
 use protocol::records::computer_v1 as v1;
@@ -20,26 +19,17 @@ use crate::log::logged::{At, Logged, RecordError};
 /// A frame's input that owns its lists: read from a log, or by a board.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LoggedInput {
-    requests: Vec<Request>,
-    rehearsed: Option<Rehearsed>,
-    rest: Input<'static>,
+    pub kept: KeptInput,
+    pub requests: Vec<Request>,
+    pub rehearsed: Option<Rehearsed>,
+    pub plan_ready: bool,
 }
 
 impl LoggedInput {
-    /// `rest` is everything but requests and rehearsal.
-    pub fn new(rest: Input<'static>, requests: Vec<Request>, rehearsed: Option<Rehearsed>) -> Self {
-        Self { requests, rehearsed, rest }
-    }
-
     /// The input, as the flight computer takes it.
     pub fn input(&self) -> Input<'_> {
-        Input { requests: &self.requests, rehearsed: self.rehearsed.as_ref(), ..self.rest }
-    }
-
-    /// The same input with what a board has heard itself.
-    #[must_use]
-    pub fn hearing(self, uplink: Uplink, commander: Option<Commander>, requests: Vec<Request>) -> Self {
-        Self { requests, rest: Input { uplink, commander, ..self.rest }, ..self }
+        let &Self { kept, ref requests, ref rehearsed, plan_ready } = self;
+        Input { kept, requests, rehearsed: rehearsed.as_ref(), plan_ready }
     }
 }
 
@@ -75,43 +65,12 @@ pub fn frame_to_log(
 }
 
 fn input_to_log(input: &Input<'_>) -> v1::ComputerInput {
-    let &Input {
-        frame,
-        time_s,
-        ref measured,
-        gimbal_rad,
-        fins_rad,
-        contact,
-        igniter_continuity,
-        booster_attached,
-        pin_out,
-        battery_v,
-        log,
-        uplink,
-        ref commander,
-        people,
-        requests,
-        rehearsed,
-        plan_ready,
-    } = input;
+    let &Input { ref kept, requests, rehearsed, plan_ready } = input;
     v1::ComputerInput {
-        frame,
-        time_s,
-        measured: measured.to_log(),
-        gimbal_rad: gimbal_rad.to_vec(),
-        fins_rad: fins_rad.to_vec(),
-        contact,
-        igniter_continuity,
-        booster_attached,
-        pin_out,
-        battery_v,
-        log: log.to_log(),
-        uplink: uplink.to_log(),
-        commander: commander.to_log(),
-        people: people.to_log(),
         requests: requests.iter().map(Logged::to_log).collect(),
         rehearsed: rehearsed.map(Logged::to_log),
         plan_ready,
+        ..kept.to_log()
     }
 }
 
@@ -120,30 +79,14 @@ fn input_to_log(input: &Input<'_>) -> v1::ComputerInput {
 /// # Errors
 /// This build does not know some value of it.
 pub fn input_from_log(input: &v1::ComputerInput) -> Result<LoggedInput, RecordError> {
-    let frame = input.frame;
-    let at = |field| At { frame, field };
-    let rest = Input {
-        frame,
-        time_s: input.time_s,
-        measured: Logged::from_log(&input.measured, at("measured"))?,
-        gimbal_rad: Logged::from_log(&input.gimbal_rad, at("gimbal_rad"))?,
-        fins_rad: Logged::from_log(&input.fins_rad, at("fins_rad"))?,
-        contact: input.contact,
-        igniter_continuity: input.igniter_continuity,
-        booster_attached: input.booster_attached,
-        pin_out: input.pin_out,
-        battery_v: input.battery_v,
-        log: Logged::from_log(&input.log, at("log"))?,
-        uplink: Logged::from_log(&input.uplink, at("uplink"))?,
-        commander: Logged::from_log(&input.commander, at("commander"))?,
-        people: Logged::from_log(&input.people, at("people"))?,
-        requests: &[],
-        rehearsed: None,
+    let at = At { frame: input.frame, field: "input" };
+    let requests = input.requests.iter().map(|request| Logged::from_log(request, at));
+    Ok(LoggedInput {
+        kept: Logged::from_log(input, at)?,
+        requests: requests.collect::<Result<_, _>>()?,
+        rehearsed: Logged::from_log(&input.rehearsed, at)?,
         plan_ready: input.plan_ready,
-    };
-    let requests = input.requests.iter().map(|request| Logged::from_log(request, at("request")));
-    let rehearsed = Logged::from_log(&input.rehearsed, at("rehearsed"))?;
-    Ok(LoggedInput { requests: requests.collect::<Result<_, _>>()?, rehearsed, rest })
+    })
 }
 
 /// Whether a frame accepted an abort.
@@ -160,16 +103,16 @@ pub fn output_to_log(output: &Output, computer: &Computer) -> v1::ComputerOutput
     v1::ComputerOutput {
         gimbal_rad: gimbal_rad.to_vec(),
         fins_rad: fins_rad.to_vec(),
-        ignite: outputs.is_on(Line::LandingIgniter),
-        parachute: outputs.is_on(Line::Parachute),
+        ignite: outputs.is_on(PyroOutput::LandingIgniter),
+        parachute: outputs.is_on(PyroOutput::Parachute),
         released: *released,
         planned: *planned,
         phase: u32::from(computer.mode().phase.index()),
         level: u32::from(computer.level().index()),
         over: computer.is_over(),
         answers: answers.iter().map(|answer| answer.ending.to_log()).collect(),
-        ignite_booster: outputs.is_on(Line::AscentIgniter),
-        separate_booster: outputs.is_on(Line::Separation),
+        ignite_booster: outputs.is_on(PyroOutput::AscentIgniter),
+        separate_booster: outputs.is_on(PyroOutput::Separation),
     }
 }
 
@@ -182,10 +125,10 @@ pub fn commands_from_log(output: &v1::ComputerOutput, frame: u64) -> Result<Comm
         gimbal_rad: Logged::from_log(&output.gimbal_rad, At { frame, field: "gimbal_rad" })?,
         fins_rad: Logged::from_log(&output.fins_rad, At { frame, field: "fins_rad" })?,
         outputs: Outputs::of(|line| match line {
-            Line::LandingIgniter => output.ignite,
-            Line::Parachute => output.parachute,
-            Line::AscentIgniter => output.ignite_booster,
-            Line::Separation => output.separate_booster,
+            PyroOutput::LandingIgniter => output.ignite,
+            PyroOutput::Parachute => output.parachute,
+            PyroOutput::AscentIgniter => output.ignite_booster,
+            PyroOutput::Separation => output.separate_booster,
         }),
     })
 }
@@ -250,10 +193,10 @@ fn motor_to_log(pilot: &Pilot) -> Option<flight_v1::MotorEstimate> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use flight::computer::LogState;
     use flight::computer::crew::{Asked, People};
+    use flight::computer::{Commander, LogState};
     use flight::estimation::estimator::{ImuSample, Measurements};
-    use flight::rules::arming::PredictedLanding;
+    use flight::rules::arming::{PredictedLanding, Uplink};
     use flight::rules::operator::{Name, Operator, Role};
     use flight::rules::two_person::Station;
     use nalgebra::Vector3;
@@ -351,7 +294,7 @@ mod tests {
                 found,
                 landing: landing.map(|(lands, found)| PredictedLanding { lands, found }),
             });
-            let input = Input {
+            let kept = KeptInput {
                 frame,
                 time_s: number(9),
                 measured,
@@ -370,11 +313,10 @@ mod tests {
                     deaf: flags[1],
                 }),
                 people,
-                requests: &requests,
-                rehearsed: rehearsed.as_ref(),
                 booster_attached: flags[6],
-                plan_ready: flags[8],
             };
+            let input =
+                Input { kept, requests: &requests, rehearsed: rehearsed.as_ref(), plan_ready: flags[8] };
             let bytes = input_to_log(&input).encode_to_vec();
             let read = input_from_log(&v1::ComputerInput::decode(bytes.as_slice()).unwrap()).unwrap();
             // Compared as bytes as well, because a NaN never equals itself.

@@ -4,7 +4,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 
 use flight::computer::crew::{Asked, Ending, People, Request};
-use flight::computer::{Commander, LogState, Rehearsed};
+use flight::computer::{Commander, KeptInput, LogState, Rehearsed};
 use flight::estimation::estimator::{
     Doubt, Estimate, GnssFix, Health, HeightSources, ImuSample, Measurements, Sigmas,
 };
@@ -73,7 +73,7 @@ macro_rules! record {
 
             fn to_log(&self) -> Self::Record {
                 let Self { $($field),+ } = self;
-                $record { $($field: $field.to_log(),)+ $($($beside: None),+)? }
+                $record { $($field: $field.to_log(),)+ $($($beside: Default::default()),+)? }
             }
 
             fn from_log(record: &Self::Record, at: At) -> Result<Self, RecordError> {
@@ -94,6 +94,11 @@ record!(HeightSources as flight_v1::HeightSources { inertial_m, inertial_sigma_m
 record!(Estimate as flight_v1::Estimate {
     time_s, state, specific_force_m_s2, wind_m_s, gyro_bias_rad_s, accelerometer_bias_m_s2, sigmas, heights, health;
     motor, barometer, gnss_velocity, gnss_position, lidar, wind
+});
+record!(KeptInput as computer_v1::ComputerInput {
+    frame, time_s, measured, gimbal_rad, fins_rad, contact, igniter_continuity, booster_attached, pin_out, battery_v, log,
+    uplink, commander, people;
+    requests, rehearsed, plan_ready
 });
 record!(LogState as computer_v1::LogState { running, space_bytes });
 record!(Station as computer_v1::Station { system, component, number });

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::news::Severity;
 use super::table::PhaseTable;
-use super::{Commander, Computer, Input};
+use super::{Commander, Computer, KeptInput};
 use crate::rules::arming;
 use crate::rules::arming::{Check, Uplink};
 use crate::rules::operator::Operator;
@@ -129,13 +129,7 @@ pub(super) fn is_so_already(mode: &Mode, asked: Asked) -> bool {
         Asked::Start => locks.armed && mode.countdown_end_s.is_some(),
         Asked::Hold => mode.hold.is_some(),
         // A second abort may do more than the first: the phase table decides.
-        Asked::Abort
-        | Asked::Tap
-        | Asked::TakeCommand
-        | Asked::Check
-        | Asked::CheckStill
-        | Asked::EndCheck
-        | Asked::Seen => false,
+        _ => false,
     }
 }
 
@@ -154,23 +148,12 @@ pub(super) fn event_of(
         Asked::Start => Event::StartRequested { countdown_s, checks_passed: arming::all_passed(checks) },
         Asked::Hold => Event::Hold { cause: HoldCause::Commanded, start },
         Asked::Abort => abort,
-        Asked::Tap
-        | Asked::TakeCommand
-        | Asked::Check
-        | Asked::CheckStill
-        | Asked::EndCheck
-        | Asked::Seen => return None,
+        _ => return None,
     })
 }
 
 /// The answer to a request whose event the table has refused; the crew is told the reason.
-pub(super) fn refused(
-    table: &mut PhaseTable,
-    asked: Asked,
-    event: Event,
-    refusal: Refusal,
-    checks: &[Check],
-) -> Answer {
+pub(super) fn refused(table: &mut PhaseTable, asked: Asked, refusal: Refusal, checks: &[Check]) -> Answer {
     // The first answer may have been lost: a latched abort is accepted again, also under the parachute and on the
     // ground.
     let latched = asked == Asked::Abort && table.mode().interlocks.abort_latched;
@@ -186,7 +169,7 @@ pub(super) fn refused(
         (_, Refusal::ChecksFailed | Refusal::PinIn) => Ending::NotNow,
         _ => Ending::Denied,
     };
-    table.say(Severity::Warning, format!("{} refused: {reason}", event.name()));
+    table.say(Severity::Warning, format!("{} refused: {reason}", asked.name()));
     Answer { ending, reason: Some(reason) }
 }
 
@@ -267,7 +250,7 @@ impl Computer {
                 self.note_done(asked, by, agreed);
                 Answer::ACCEPTED
             }
-            Err(refusal) => refused(&mut self.table, asked, event, refusal, &checks),
+            Err(refusal) => refused(&mut self.table, asked, refusal, &checks),
         }
     }
 
@@ -414,7 +397,7 @@ impl Computer {
     }
 
     /// Holds the countdown if the station that armed the vehicle has fallen silent, or hears nothing of the vehicle.
-    pub(super) fn watch_the_commander(&mut self, input: &Input<'_>) {
+    pub(super) fn watch_the_commander(&mut self, input: &KeptInput) {
         let Some(Commander { station, age_s, by, deaf }) = input.commander else { return };
         // An age that is not a number is no sign of life.
         let is_heard = age_s <= UPLINK_SILENT_S;
@@ -463,15 +446,7 @@ fn act_of(asked: Asked) -> Option<Act> {
     match asked {
         Asked::Arm => Some(Act::Arm),
         Asked::Start => Some(Act::Start),
-        Asked::Disarm
-        | Asked::Hold
-        | Asked::Abort
-        | Asked::Tap
-        | Asked::TakeCommand
-        | Asked::Check
-        | Asked::CheckStill
-        | Asked::EndCheck
-        | Asked::Seen => None,
+        _ => None,
     }
 }
 

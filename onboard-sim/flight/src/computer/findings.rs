@@ -9,14 +9,14 @@ use alloc::format;
 use alloc::string::{String, ToString as _};
 use alloc::vec::Vec;
 
-use super::pad_check::{SURFACES, surfaces_rad};
-use super::{Computer, FRAME_S, Input};
+use super::pad_check::{SURFACE_NAMES, SURFACES, surfaces_rad};
+use super::{Computer, FRAME_S, KeptInput};
 use crate::control::servo::{GIMBALS, ServoModel};
 use crate::estimation::estimator::{Estimate, Health};
 use crate::estimation::motor_estimate::MotorStage;
 use crate::estimation::sensor_watch::{BAROMETER_LOST_S, GNSS_LOST_S, LIDAR_LOST_S};
 use crate::guidance::powered::ControlLevel;
-use crate::rules::outputs::Line;
+use crate::rules::outputs::PyroOutput;
 use crate::rules::phase::{Latch, Phase};
 
 /// Something that no flight shows as long as its vehicle does what it should.
@@ -85,8 +85,6 @@ const RULES: [(Sign, f64); 24] = [
     (Sign::Gate, 0.0),
     (Sign::Latched, 0.0),
 ];
-
-const SURFACE_NAMES: [&str; SURFACES] = ["gimbal pitch", "gimbal yaw", "fin 1", "fin 2", "fin 3", "fin 4"];
 
 /// Something that went wrong.
 #[derive(Debug, Clone, PartialEq)]
@@ -287,7 +285,7 @@ struct Watcher {
 }
 
 impl Watcher {
-    fn new(computer: &Computer, flown: &Input<'_>) -> Self {
+    fn new(computer: &Computer, flown: &KeptInput) -> Self {
         let airframe = &computer.pilot().mission().airframe;
         Self {
             frame: flown.frame.saturating_sub(1),
@@ -303,7 +301,7 @@ impl Watcher {
         }
     }
 
-    fn take(&mut self, computer: &Computer, flown: &Input<'_>, estimate: &Estimate) {
+    fn take(&mut self, computer: &Computer, flown: &KeptInput, estimate: &Estimate) {
         self.missing = flown.frame.saturating_sub(self.frame + 1);
         self.frame = flown.frame;
         let (time_s, phase) = (flown.time_s, computer.mode().phase);
@@ -324,10 +322,10 @@ impl Watcher {
             servo.advance();
             servo.take(command_rad);
         }
-        for (line, since_s) in
-            [(Line::Parachute, &mut self.ejected_s), (Line::Separation, &mut self.parted_s)]
+        for (output, since_s) in
+            [(PyroOutput::Parachute, &mut self.ejected_s), (PyroOutput::Separation, &mut self.parted_s)]
         {
-            if commands.outputs.is_on(line) {
+            if commands.outputs.is_on(output) {
                 since_s.get_or_insert(time_s);
             }
         }
@@ -339,7 +337,7 @@ impl Watcher {
     }
 
     /// Whether a sign shows in this frame.
-    fn seen(&self, sign: Sign, computer: &Computer, flown: &Input<'_>, estimate: &Estimate) -> Option<Seen> {
+    fn seen(&self, sign: Sign, computer: &Computer, flown: &KeptInput, estimate: &Estimate) -> Option<Seen> {
         let (phase, time_s) = (computer.mode().phase, flown.time_s);
         let pilot = computer.pilot();
         let mission = pilot.mission();
@@ -375,7 +373,7 @@ fn seen_in_flight(
     watcher: &Watcher,
     sign: Sign,
     computer: &Computer,
-    flown: &Input<'_>,
+    flown: &KeptInput,
     estimate: &Estimate,
 ) -> Option<Seen> {
     let (pilot, mode, time_s) = (computer.pilot(), computer.mode(), flown.time_s);

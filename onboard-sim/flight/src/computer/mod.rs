@@ -29,6 +29,8 @@ use alloc::boxed::Box;
 use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
+use core::ops::Deref;
+
 use serde::{Deserialize, Serialize};
 
 pub use self::crew::CrewMemory;
@@ -83,9 +85,9 @@ pub struct Computer {
     /// The state at power-up, to power up again.
     #[serde(skip)]
     believed: RigidState,
-    /// The input of the last frame, without requests and rehearsal. What of it decides later is in the next one, too.
+    /// What is kept of the last frame's input. What of it decides later is in the next one, too.
     #[serde(skip)]
-    input: Input<'static>,
+    input: KeptInput,
     /// The gate check that the crew was last told of.
     gate_told: Option<&'static str>,
     #[serde(skip)]
@@ -113,7 +115,7 @@ impl Computer {
         let input = &self.with_silent_servos(input);
         self.table.begin(input.time_s);
         self.report_changes(input);
-        self.input = input.kept();
+        self.input = input.kept;
         let commanded_rad = self.commands.fins_rad;
         self.fins_answering =
             core::array::from_fn(|fin| (commanded_rad[fin] - input.fins_rad[fin]).abs() <= ANSWERING_RAD);
@@ -175,12 +177,13 @@ impl Computer {
             servo.advance();
         }
         let [pitch, yaw, one, two, three, four] = servos.each_ref().map(|servo| servo.at_rad);
-        Input { gimbal_rad: [pitch, yaw], fins_rad: [one, two, three, four], ..*input }
+        let kept = KeptInput { gimbal_rad: [pitch, yaw], fins_rad: [one, two, three, four], ..input.kept };
+        Input { kept, ..*input }
     }
 
     /// Whether no fin is over the parachute's hatch: they stand open, or have had the time of their servos since they were told
     /// to. One that is stuck keeps no parachute in.
-    fn hatch_is_free(&self, input: &Input<'_>) -> bool {
+    fn hatch_is_free(&self, input: &KeptInput) -> bool {
         let airframe = &self.pilot.mission().airframe;
         let fins = &airframe.fins;
         let opening_s = fins.servo.delay_s + (fins.open_rad() - fins.closed_rad()) / fins.servo.rate_rad_s();
@@ -213,7 +216,7 @@ impl Computer {
     }
 
     /// Reports what the input changes: the pin, and a log that has stopped.
-    fn report_changes(&mut self, input: &Input<'_>) {
+    fn report_changes(&mut self, input: &KeptInput) {
         let pin_out = self.table.mode().interlocks.pin_out;
         if input.pin_out != pin_out {
             // Refused in the air, where nobody can move it.
@@ -277,8 +280,8 @@ impl Computer {
         self.input.frame
     }
 
-    /// The input of the last frame, without requests and rehearsal.
-    pub fn input(&self) -> &Input<'static> {
+    /// The input of the last frame.
+    pub fn input(&self) -> &KeptInput {
         &self.input
     }
 
@@ -324,7 +327,7 @@ impl Computer {
     }
 
     /// The input of the last frame in the air, its frame and time counted from the release.
-    pub fn flown(&self) -> Option<Input<'static>> {
+    pub fn flown(&self) -> Option<KeptInput> {
         let release = self.release?;
         (self.input.frame > release.frame).then(|| self.input.since(release.frame))
     }
@@ -410,6 +413,26 @@ pub struct Commander {
 /// Everything that a frame depends on besides the computer's memory.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Input<'a> {
+    pub kept: KeptInput,
+    /// Requests since the last frame, in order.
+    pub requests: &'a [Request],
+    /// Result of the rehearsal, once it is over.
+    pub rehearsed: Option<&'a Rehearsed>,
+    /// What was posed last is computed: this frame takes it over.
+    pub plan_ready: bool,
+}
+
+impl Deref for Input<'_> {
+    type Target = KeptInput;
+
+    fn deref(&self) -> &KeptInput {
+        &self.kept
+    }
+}
+
+/// What the computer keeps of a frame's input until the next one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct KeptInput {
     /// Number of the frame since power-up.
     pub frame: u64,
     /// Vehicle time at its end, s.
@@ -434,17 +457,11 @@ pub struct Input<'a> {
     pub commander: Option<Commander>,
     /// How many people an arming and a start take; `None` without operators.
     pub people: Option<People>,
-    /// Requests since the last frame, in order.
-    pub requests: &'a [Request],
-    /// Result of the rehearsal, once it is over.
-    pub rehearsed: Option<&'a Rehearsed>,
-    /// What was posed last is computed: this frame takes it over.
-    pub plan_ready: bool,
 }
 
-impl Input<'_> {
+impl KeptInput {
     /// Before the first frame: nothing is known, and nothing answers.
-    const NONE: Input<'static> = Input {
+    pub const NONE: Self = Self {
         frame: 0,
         time_s: 0.0,
         measured: Measurements::of_imu(ImuSample::NONE),
@@ -459,52 +476,7 @@ impl Input<'_> {
         uplink: Uplink::NeverHeard,
         commander: None,
         people: None,
-        requests: &[],
-        rehearsed: None,
-        plan_ready: false,
     };
-
-    /// The same input without what lives for one frame only.
-    fn kept(&self) -> Input<'static> {
-        let &Self {
-            frame,
-            time_s,
-            measured,
-            gimbal_rad,
-            fins_rad,
-            contact,
-            igniter_continuity,
-            booster_attached,
-            pin_out,
-            battery_v,
-            log,
-            uplink,
-            commander,
-            people,
-            requests: _,
-            rehearsed: _,
-            plan_ready: _,
-        } = self;
-        Input {
-            frame,
-            time_s,
-            measured,
-            gimbal_rad,
-            fins_rad,
-            contact,
-            igniter_continuity,
-            booster_attached,
-            pin_out,
-            battery_v,
-            log,
-            uplink,
-            commander,
-            people,
-            requests: &[],
-            rehearsed: None,
-            plan_ready: false,
-        }
-    }
 
     /// The same input with frame and time counted from a release.
     #[must_use]

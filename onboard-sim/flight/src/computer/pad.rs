@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use serde::Serialize;
 
 use super::news::Severity;
-use super::{Computer, Input, Release};
+use super::{Computer, KeptInput, Release};
 use crate::estimation::estimator::Measurements;
 use crate::estimation::estimator::alignment::{PadAlignment, PadStart};
 use crate::estimation::sensor_watch::Rests;
@@ -296,7 +296,7 @@ impl Computer {
 
 impl Computer {
     /// One frame on the pad.
-    pub(super) fn wait_on_the_pad(&mut self, input: &Input<'_>) {
+    pub(super) fn wait_on_the_pad(&mut self, input: &KeptInput) {
         if self.table.mode().phase == Phase::Safe {
             self.test_itself(input);
         }
@@ -311,7 +311,7 @@ impl Computer {
     }
 
     /// A motor may light that nobody lit.
-    fn wait_on_the_rail(&mut self, input: &Input<'_>) {
+    fn wait_on_the_rail(&mut self, input: &KeptInput) {
         if self.pilot.detects_lift_off(&input.measured) {
             self.table.say(Severity::Critical, "LIFT-OFF without a countdown".into());
             if self.table.happen(Event::LiftOff).is_ok() {
@@ -341,7 +341,7 @@ impl Computer {
     }
 
     /// Moves every actuator and brings it back. The test is not passed before the sensors were felt for a second.
-    fn test_itself(&mut self, input: &Input<'_>) {
+    fn test_itself(&mut self, input: &KeptInput) {
         let gimbal = self.commands.gimbal_rad.iter().zip(&input.gimbal_rad);
         let answering = gimbal.clone().all(|(told, found)| (told - found).abs() <= ANSWERING_RAD)
             && self.fins_answering == [true; 4];

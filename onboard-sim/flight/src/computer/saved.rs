@@ -20,7 +20,7 @@ use super::pad::{PadWatch, SelfTest};
 use super::pad_check::PadCheck;
 use super::pilot::{Pilot, SavedPilot};
 use super::table::PhaseTable;
-use super::{Commands, Computer, CrewMemory, Input, LogState, Release, Severity, flight_time_s};
+use super::{Commands, Computer, CrewMemory, KeptInput, LogState, Release, Severity, flight_time_s};
 use crate::estimation::estimator::StartUncertainty;
 use crate::estimation::sensor_watch::SensorWatch;
 use crate::guidance::powered::ControlLevel;
@@ -193,7 +193,7 @@ impl Computer {
             pad: PadWatch::default(),
             pilot: Box::new(Pilot::starting(mission, 0.0, believed, &uncertainty)),
             believed: *believed,
-            input: Input::NONE,
+            input: KeptInput::NONE,
             gate_told: None,
             arming,
             countdown_s: mission.start.countdown_s,
@@ -283,7 +283,7 @@ mod tests {
     fn falling() -> Computer {
         let mut computer = powered_up().released(0);
         for frame in 1..=40 {
-            computer.step(&sample::input(frame, 0.005 * frame as f64));
+            computer.step(&sample::alone(sample::input(frame, 0.005 * frame as f64)));
         }
         computer
     }
@@ -330,7 +330,7 @@ mod tests {
         here.restart(0.3);
         assert_eq!(here.digest(), there.digest());
         for frame in 61..=100 {
-            let input = sample::input(frame, 0.005 * frame as f64);
+            let input = sample::alone(sample::input(frame, 0.005 * frame as f64));
             assert_eq!(here.step(&input), there.step(&input));
             assert_eq!(here.digest(), there.digest(), "frame {frame}");
         }

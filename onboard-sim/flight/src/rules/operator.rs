@@ -3,32 +3,21 @@
 use core::fmt;
 use serde::Serialize;
 
+numbered_enum! {
 /// What an operator is there for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[repr(u8)]
 pub enum Role {
     /// Looks on, and commands nothing.
-    Observer = 0,
-    RangeSafety = 1,
-    Flight = 2,
-    Pad = 3,
+    Observer = "OBSERVER",
+    RangeSafety = "RANGE SAFETY",
+    Flight = "FLIGHT",
+    Pad = "PAD",
+}
 }
 
 impl Role {
-    /// Every role, by its number.
-    pub const ALL: [Self; 4] = [Self::Observer, Self::RangeSafety, Self::Flight, Self::Pad];
-
     /// The roles that may command.
     const COMMANDING: [Self; 3] = [Self::RangeSafety, Self::Flight, Self::Pad];
-
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Observer => "OBSERVER",
-            Self::RangeSafety => "RANGE SAFETY",
-            Self::Flight => "FLIGHT",
-            Self::Pad => "PAD",
-        }
-    }
 
     pub fn may_command(self) -> bool {
         self != Self::Observer

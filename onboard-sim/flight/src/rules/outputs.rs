@@ -11,12 +11,12 @@ use crate::rules::phase::{Mode, Motor, Phase};
 
 /// Something that gets current.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Line {
-    AscentIgniter,
+pub enum PyroOutput {
     LandingIgniter,
+    Parachute,
+    AscentIgniter,
     /// The charge between booster and vehicle.
     Separation,
-    Parachute,
 }
 
 /// What the outputs depend on besides the mode.
@@ -33,10 +33,14 @@ pub struct FlightProgress {
 }
 
 /// Every reason for which an output has no current now; none of them: it has.
-pub fn why_not(line: Line, mode: &Mode, progress: FlightProgress) -> impl Iterator<Item = &'static str> {
+pub fn why_not(
+    output: PyroOutput,
+    mode: &Mode,
+    progress: FlightProgress,
+) -> impl Iterator<Item = &'static str> {
     let Mode { phase, interlocks: locks, motor, .. } = *mode;
-    let reasons: [Option<&'static str>; 6] = match line {
-        Line::AscentIgniter => [
+    let reasons: [Option<&'static str>; 6] = match output {
+        PyroOutput::AscentIgniter => [
             (phase != Phase::Boost).then_some("only BOOST lights the ascent motor"),
             (!progress.flying).then_some("the flight begins with the next frame"),
             progress.lifted_off.then_some("the vehicle has lifted off"),
@@ -44,7 +48,7 @@ pub fn why_not(line: Line, mode: &Mode, progress: FlightProgress) -> impl Iterat
             (!locks.pin_out).then_some("the pin is in"),
             locks.abort_latched.then_some("an abort is latched"),
         ],
-        Line::LandingIgniter => [
+        PyroOutput::LandingIgniter => [
             (phase != Phase::Ignition).then_some("only IGNITION lights the landing motor"),
             locks.landing_motor_inhibited.then_some("the landing motor is inhibited"),
             (!locks.armed).then_some("not armed"),
@@ -53,7 +57,7 @@ pub fn why_not(line: Line, mode: &Mode, progress: FlightProgress) -> impl Iterat
             (locks.abort_latched && !locks.lands_in_place).then_some("an abort is latched"),
             None,
         ],
-        Line::Separation => [
+        PyroOutput::Separation => [
             (!progress.separation_due).then_some("apogee is not near"),
             phase.on_pad().then_some("the vehicle is on its pad"),
             None,
@@ -61,7 +65,7 @@ pub fn why_not(line: Line, mode: &Mode, progress: FlightProgress) -> impl Iterat
             None,
             None,
         ],
-        Line::Parachute => [
+        PyroOutput::Parachute => [
             (phase != Phase::Chute).then_some("only CHUTE ejects the parachute"),
             (motor == Motor::Burning).then_some("the landing motor burns"),
             (!progress.hatch_free).then_some("the fins are still over its hatch"),
@@ -73,48 +77,33 @@ pub fn why_not(line: Line, mode: &Mode, progress: FlightProgress) -> impl Iterat
     reasons.into_iter().flatten()
 }
 
-/// Which outputs have current. Nothing else in the flight computer can set one: the fields are private.
+/// Which outputs have current. Nothing else in the flight computer can set one: the field is private.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct Outputs {
-    landing_igniter: bool,
-    parachute: bool,
-    ascent_igniter: bool,
-    separation: bool,
-}
+pub struct Outputs([bool; 4]);
 
 impl Outputs {
     /// No current anywhere.
-    pub const NONE: Self =
-        Self { landing_igniter: false, parachute: false, ascent_igniter: false, separation: false };
+    pub const NONE: Self = Self([false; 4]);
 
     /// The outputs at the end of a frame.
     pub fn decided(mode: &Mode, progress: FlightProgress) -> Self {
-        Self::of(|line| why_not(line, mode, progress).next().is_none())
+        Self::of(|output| why_not(output, mode, progress).next().is_none())
     }
 
     /// The outputs that a log or a board tells of.
-    pub fn of(is_on: impl Fn(Line) -> bool) -> Self {
-        Self {
-            landing_igniter: is_on(Line::LandingIgniter),
-            parachute: is_on(Line::Parachute),
-            ascent_igniter: is_on(Line::AscentIgniter),
-            separation: is_on(Line::Separation),
-        }
+    pub fn of(is_on: impl Fn(PyroOutput) -> bool) -> Self {
+        use PyroOutput as P;
+        Self([P::LandingIgniter, P::Parachute, P::AscentIgniter, P::Separation].map(is_on))
     }
 
     /// Whether an output has current.
-    pub fn is_on(&self, line: Line) -> bool {
-        match line {
-            Line::AscentIgniter => self.ascent_igniter,
-            Line::LandingIgniter => self.landing_igniter,
-            Line::Separation => self.separation,
-            Line::Parachute => self.parachute,
-        }
+    pub fn is_on(&self, output: PyroOutput) -> bool {
+        self.0[output as usize]
     }
 
     /// Whether an igniter has current.
     pub fn lights(&self) -> bool {
-        self.ascent_igniter || self.landing_igniter
+        self.is_on(PyroOutput::AscentIgniter) || self.is_on(PyroOutput::LandingIgniter)
     }
 }
 
@@ -140,32 +129,32 @@ mod tests {
     #[test]
     fn each_output_that_is_off_names_every_reason() {
         let reasons = |line, mode: &Mode, progress| why_not(line, mode, progress).collect::<Vec<_>>();
-        assert!(reasons(Line::AscentIgniter, &boosting(), SEEN).is_empty());
+        assert!(reasons(PyroOutput::AscentIgniter, &boosting(), SEEN).is_empty());
         let risen = FlightProgress { lifted_off: true, ..SEEN };
-        assert_eq!(reasons(Line::AscentIgniter, &boosting(), risen), ["the vehicle has lifted off"]);
+        assert_eq!(reasons(PyroOutput::AscentIgniter, &boosting(), risen), ["the vehicle has lifted off"]);
         let at_power_up = Mode::power_up(0.0);
         assert_eq!(
-            reasons(Line::AscentIgniter, &at_power_up, SEEN),
+            reasons(PyroOutput::AscentIgniter, &at_power_up, SEEN),
             ["only BOOST lights the ascent motor", "not armed", "the pin is in"]
         );
         assert_eq!(
-            reasons(Line::LandingIgniter, &at_power_up, SEEN),
+            reasons(PyroOutput::LandingIgniter, &at_power_up, SEEN),
             ["only IGNITION lights the landing motor", "not armed", "the pin is in"]
         );
         assert_eq!(
-            reasons(Line::Separation, &at_power_up, SEEN),
+            reasons(PyroOutput::Separation, &at_power_up, SEEN),
             ["apogee is not near", "the vehicle is on its pad"]
         );
         let burning = Mode { phase: Phase::Powered, motor: Motor::Burning, ..boosting() };
         assert_eq!(
-            reasons(Line::Parachute, &burning, SEEN),
+            reasons(PyroOutput::Parachute, &burning, SEEN),
             ["only CHUTE ejects the parachute", "the landing motor burns"]
         );
         let ejecting = Mode { phase: Phase::Chute, ..boosting() };
         let closed = FlightProgress { hatch_free: false, ..SEEN };
-        assert_eq!(reasons(Line::Parachute, &ejecting, closed), ["the fins are still over its hatch"]);
-        assert!(Outputs::decided(&ejecting, SEEN).is_on(Line::Parachute));
-        assert!(Outputs::decided(&boosting(), SEEN).is_on(Line::AscentIgniter));
+        assert_eq!(reasons(PyroOutput::Parachute, &ejecting, closed), ["the fins are still over its hatch"]);
+        assert!(Outputs::decided(&ejecting, SEEN).is_on(PyroOutput::Parachute));
+        assert!(Outputs::decided(&boosting(), SEEN).is_on(PyroOutput::AscentIgniter));
         assert!(Outputs::decided(&boosting(), SEEN).lights());
         assert_eq!(Outputs::decided(&at_power_up, SEEN), Outputs::NONE);
     }
@@ -238,22 +227,22 @@ mod tests {
                 if accepted && stops {
                     stopped = true;
                     ended += 1;
-                    lit_before += u64::from(before.is_on(Line::AscentIgniter));
+                    lit_before += u64::from(before.is_on(PyroOutput::AscentIgniter));
                 } else if accepted && matches!(asked, Event::StartRequested { .. } | Event::LiftOff) {
                     // An armed vehicle that lifts off by itself flies its mission.
                     stopped = false;
                 }
                 let (ascent, landing) =
-                    (outputs.is_on(Line::AscentIgniter), outputs.is_on(Line::LandingIgniter));
+                    (outputs.is_on(PyroOutput::AscentIgniter), outputs.is_on(PyroOutput::LandingIgniter));
                 let locks = mode.interlocks;
                 assert!(!(ascent && (stopped || locks.abort_latched)), "{asked:?}: {mode:?}");
                 assert!(!(landing && (stopped || locks.abort_latched) && !locks.lands_in_place), "{mode:?}");
                 assert!(!outputs.lights() || (locks.armed && locks.pin_out), "{mode:?}");
                 assert!(!(ascent && landing), "{mode:?}");
-                assert!(!outputs.is_on(Line::Parachute) || !outputs.lights(), "{mode:?}");
+                assert!(!outputs.is_on(PyroOutput::Parachute) || !outputs.lights(), "{mode:?}");
                 // What was switched off does not come on again.
-                assert!(!(ascent && ascent_began && !before.is_on(Line::AscentIgniter)), "{mode:?}");
-                assert!(!(landing && landing_began && !before.is_on(Line::LandingIgniter)), "{mode:?}");
+                assert!(!(ascent && ascent_began && !before.is_on(PyroOutput::AscentIgniter)), "{mode:?}");
+                assert!(!(landing && landing_began && !before.is_on(PyroOutput::LandingIgniter)), "{mode:?}");
                 (ascent_began, landing_began) = (ascent_began | ascent, landing_began | landing);
                 landings += u64::from(landing && stopped);
                 before = outputs;

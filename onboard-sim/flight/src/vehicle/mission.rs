@@ -21,35 +21,25 @@ use crate::vehicle::thrust_curve::ThrustCurve;
 
 pub use ocp::landing::SolverLimits;
 
-/// Where a flight begins.
+numbered_enum! {
+/// Where a flight begins, by its name in files and on the command line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum StartPoint {
     /// On the pad, under its own ascent motor.
-    Pad,
+    Pad = "pad",
     /// Released at apogee.
-    Apogee,
+    Apogee = "apogee",
     /// Hanging below a drone, which lets it go.
-    Drone,
+    Drone = "drone",
 }
-
-impl StartPoint {
-    /// The name in files and on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Pad => "pad",
-            Self::Apogee => "apogee",
-            Self::Drone => "drone",
-        }
-    }
 }
 
 impl core::str::FromStr for StartPoint {
     type Err = UnknownStart;
 
     fn from_str(name: &str) -> Result<Self, UnknownStart> {
-        let all = [Self::Pad, Self::Apogee, Self::Drone];
-        all.into_iter().find(|start| start.name() == name).ok_or(UnknownStart)
+        Self::ALL.into_iter().find(|start| start.name() == name).ok_or(UnknownStart)
     }
 }
 

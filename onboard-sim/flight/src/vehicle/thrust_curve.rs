@@ -227,11 +227,6 @@ impl ThrustCurve {
         self.propellant_mass_kg * self.impulse_to_n_s(time_s) / self.total_impulse_n_s()
     }
 
-    /// Propellant left at a time since the thrust began, kg.
-    pub fn propellant_left_kg(&self, time_s: f64) -> f64 {
-        self.propellant_mass_kg - self.propellant_burnt_kg(time_s)
-    }
-
     /// When the thrust falls through a value for the last time, s; `None` if it never exceeds the value.
     pub fn falls_through_s(&self, thrust_n: f64) -> Option<f64> {
         let last_above = self.points.iter().rposition(|point| point.thrust_n > thrust_n)?;
@@ -277,7 +272,7 @@ mod tests {
         ] {
             assert!((motor.thrust_at_n(time_s) - thrust_n).abs() < 1e-12, "{time_s}");
             assert!((motor.impulse_to_n_s(time_s) - impulse_n_s).abs() < 1e-12, "{time_s}");
-            assert!((motor.propellant_left_kg(time_s) - 0.12 * (1.0 - impulse_n_s / 120.0)).abs() < 1e-12);
+            assert!((motor.propellant_burnt_kg(time_s) - 0.12 * impulse_n_s / 120.0).abs() < 1e-12);
         }
         assert!((motor.mean_thrust_n(0.5, 3.0) - 110.0 / 3.0).abs() < 1e-12);
         assert!((motor.mean_thrust_n(2.0, 0.0) - 40.0).abs() < 1e-12);

@@ -59,28 +59,16 @@ pub(crate) fn rk4_step(
     let second = rates(&moved(state, &first, 0.5 * step_s), 0.5);
     let third = rates(&moved(state, &second, 0.5 * step_s), 0.5);
     let fourth = rates(&moved(state, &third, step_s), 1.0);
+    let weigh =
+        |of: fn(&Rates) -> Vector3<f64>| (of(&first) + (of(&second) + of(&third)) * 2.0 + of(&fourth)) / 6.0;
     let mean = Rates {
-        velocity: weigh(first.velocity, second.velocity, third.velocity, fourth.velocity),
-        acceleration: weigh(first.acceleration, second.acceleration, third.acceleration, fourth.acceleration),
+        velocity: weigh(|rates| rates.velocity),
+        acceleration: weigh(|rates| rates.acceleration),
         attitude: (first.attitude + (second.attitude + third.attitude) * 2.0 + fourth.attitude) / 6.0,
-        rotation: weigh(first.rotation, second.rotation, third.rotation, fourth.rotation),
-        specific_force: weigh(
-            first.specific_force,
-            second.specific_force,
-            third.specific_force,
-            fourth.specific_force,
-        ),
+        rotation: weigh(|rates| rates.rotation),
+        specific_force: weigh(|rates| rates.specific_force),
     };
     (moved(state, &mean, step_s), mean.specific_force)
-}
-
-fn weigh(
-    first: Vector3<f64>,
-    second: Vector3<f64>,
-    third: Vector3<f64>,
-    fourth: Vector3<f64>,
-) -> Vector3<f64> {
-    (first + (second + third) * 2.0 + fourth) / 6.0
 }
 
 fn moved(state: &RigidState, rates: &Rates, step_s: f64) -> RigidState {

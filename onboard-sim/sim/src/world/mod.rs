@@ -28,14 +28,38 @@ pub mod vertical;
 pub mod whole;
 pub mod wind;
 
+use serde::Serialize;
+use toml::Value;
+
 pub use battery::Battery;
 pub use ground::{FirstContact, Rest, RestOutcome, Strain};
 pub use hanging::Hanging;
 pub use motor::TrueBurn;
-pub use truth::{AscentTruth, Truth};
+pub use truth::{AscentTruth, Fault, Truth};
 pub use whole::{Actuators, World};
-
-pub use truth::Fault;
 
 /// Length of one step, s.
 pub const STEP_S: f64 = 1e-3;
+
+/// Every number of a structure by its key, `section.key` in a section.
+pub(crate) fn numbers(of: &impl Serialize) -> Vec<(String, f64)> {
+    fn collect(key: &str, value: &Value, found: &mut Vec<(String, f64)>) {
+        match value {
+            Value::Float(number) => found.push((key.to_owned(), *number)),
+            Value::Integer(number) => found.push((key.to_owned(), *number as f64)),
+            Value::Array(values) => values.iter().for_each(|value| collect(key, value, found)),
+            Value::Table(fields) => {
+                let within =
+                    |field: &str| if key.is_empty() { field.into() } else { format!("{key}.{field}") };
+                fields.iter().for_each(|(field, value)| collect(&within(field), value, found));
+            }
+            _ => {}
+        }
+    }
+    let mut found = Vec::new();
+    // Structures of numbers always have such a value; a test would find none missing.
+    if let Ok(value) = Value::try_from(of) {
+        collect("", &value, &mut found);
+    }
+    found
+}

@@ -121,7 +121,9 @@ impl Truth {
     /// [`WorldError::Truth`] if the share is not 0 to 1, or not 0 and the mission has no other curve.
     pub fn curve<'a>(&self, mission: &'a Mission) -> Result<Cow<'a, ThrustCurve>, WorldError> {
         let share = self.other_curve;
-        let refuse = |required| Err(WorldError::Truth { key: "other_curve", found: share, required });
+        let refuse = |required: &str| {
+            Err(WorldError::Truth { key: "other_curve".into(), found: share, required: required.into() })
+        };
         if share == 0.0 {
             return Ok(Cow::Borrowed(&mission.motor_curve));
         }

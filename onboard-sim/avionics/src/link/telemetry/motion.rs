@@ -3,7 +3,7 @@
 
 use flight::computer::pilot::ApogeeAhead;
 use flight::estimation::estimator::{Doubt, Health};
-use flight::rules::outputs::Line;
+use flight::rules::outputs::PyroOutput;
 use flight::rules::phase::Phase;
 use flight::vehicle::mission::StartPoint;
 use protocol::dialect::{
@@ -225,7 +225,7 @@ fn chute(state: &VehicleState<'_>, air: &Airborne<'_>) -> TdChute {
 }
 
 fn booster(state: &VehicleState<'_>, air: &Airborne<'_>) -> TdBooster {
-    let separating = state.computer.commands().outputs.is_on(Line::Separation);
+    let separating = state.computer.commands().outputs.is_on(PyroOutput::Separation);
     match (air.flown.booster_attached, separating) {
         (true, false) => TdBooster::TD_BOOSTER_ATTACHED,
         (true, true) => TdBooster::TD_BOOSTER_SEPARATING,

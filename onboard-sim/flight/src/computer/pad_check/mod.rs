@@ -20,8 +20,7 @@ use self::sweep::{Still, Sweep};
 use super::crew::{Answer, Asked, Ending, People};
 use super::news::Severity;
 use super::pad::SelfTest;
-use super::{Computer, Input};
-use crate::estimation::estimator::Measurements;
+use super::{Computer, KeptInput};
 use crate::rules::arming::SEERS;
 use crate::rules::operator::Operator;
 use crate::rules::phase::Phase;
@@ -71,27 +70,6 @@ pub struct PadCheck {
     seen_by: Vec<Option<Operator>>,
 }
 
-/// One frame on the pad, as the check sees it.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct PadReadings<'a> {
-    /// Where the surfaces are: gimbal (pitch, yaw), fins 1 to 4, rad.
-    pub(super) surfaces_rad: [f64; SURFACES],
-    pub(super) measured: &'a Measurements,
-    pub(super) switches: PadSwitches,
-}
-
-/// What is read once, at the end of the check.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct PadSwitches {
-    pub(super) igniter_continuity: bool,
-    pub(super) booster_attached: bool,
-    pub(super) pin_out: bool,
-    /// `None`: not measured.
-    pub(super) battery_v: Option<f64>,
-    pub(super) log_running: bool,
-    pub(super) log_space_bytes: u64,
-}
-
 /// Where a surface is told to go: its number, and its angle, rad. All others rest.
 pub(super) type SurfaceCommand = (usize, f64);
 
@@ -134,14 +112,14 @@ impl PadCheck {
     /// One frame of a running check: where a surface is told to go, if one moves.
     pub(super) fn step(
         &mut self,
-        seen: &PadReadings<'_>,
+        input: &KeptInput,
         mission: &Mission,
         arming: &ArmingLimits,
     ) -> Option<SurfaceCommand> {
         match &mut self.stage {
             Stage::Resting => return None,
             Stage::Sweeping(sweep) => {
-                let (told, found) = sweep.step(&seen.surfaces_rad);
+                let (told, found) = sweep.step(&surfaces_rad(input.gimbal_rad, input.fins_rad));
                 self.findings.extend(found.into_iter().flatten());
                 if told.is_none() {
                     self.swept_frames = sweep.frames().0;
@@ -150,7 +128,7 @@ impl PadCheck {
                 return told;
             }
             Stage::Still(still) => {
-                still.take(seen.measured);
+                still.take(&input.measured);
                 if !still.is_over() {
                     return None;
                 }
@@ -159,7 +137,7 @@ impl PadCheck {
                 self.findings.extend(still.lean_from_the_rail(mission));
             }
         }
-        self.findings.extend(findings_of_switches(&seen.switches, mission, arming));
+        self.findings.extend(findings_of_switches(input, mission, arming));
         let failed = self.findings.iter().any(|found| found.verdict == Verdict::NotOk);
         self.state = if failed { CheckState::Failed } else { CheckState::Passed };
         self.stage = Stage::Resting;
@@ -237,6 +215,10 @@ impl PadCheck {
 /// The surfaces: gimbal pitch and yaw, fins 1 to 4.
 pub const SURFACES: usize = 6;
 
+/// Their names.
+pub const SURFACE_NAMES: [&str; SURFACES] =
+    ["gimbal pitch", "gimbal yaw", "fin 1", "fin 2", "fin 3", "fin 4"];
+
 /// The surfaces in that order, rad.
 pub fn surfaces_rad([pitch, yaw]: [f64; 2], [one, two, three, four]: [f64; 4]) -> [f64; SURFACES] {
     [pitch, yaw, one, two, three, four]
@@ -276,55 +258,40 @@ pub enum Item {
 impl Item {
     /// Its number on the wire, as in the dialect's TD_PAD_CHECK_ITEM: three for each surface, then the others.
     pub fn number(self) -> u8 {
-        let of_surface = |surface: usize, which: u8| 3 * u8::try_from(surface).unwrap_or(u8::MAX / 4) + which;
-        match self {
-            Self::Range(surface) => of_surface(surface, 0),
-            Self::Error(surface) => of_surface(surface, 1),
-            Self::Lag(surface) => of_surface(surface, 2),
-            Self::GyroBias => 32,
-            Self::GyroNoise => 33,
-            Self::Gravity => 34,
-            Self::AccelerometerNoise => 35,
-            Self::BarometerNoise => 36,
-            Self::GnssFixes => 37,
-            Self::GnssSpeed => 38,
-            Self::LidarRange => 39,
-            Self::RailLean => 40,
-            Self::IgniterContinuity => 48,
-            Self::BoosterWire => 49,
-            Self::PinOut => 50,
-            Self::BatteryVoltage => 51,
-            Self::LogRunning => 52,
-            Self::LogSpace => 53,
-        }
+        self.row().0
     }
 
     fn name(self) -> String {
-        let surface = |surface: usize| match surface {
-            0 => "gimbal pitch".into(),
-            1 => "gimbal yaw".into(),
-            fin => format!("fin {}", fin - 1),
+        self.row().1
+    }
+
+    /// Its number and its name.
+    fn row(self) -> (u8, String) {
+        let of = |surface: usize, which: u8, words: &str| {
+            let number = 3 * u8::try_from(surface).unwrap_or(u8::MAX / 4) + which;
+            (number, format!("{} {words}", SURFACE_NAMES.get(surface).unwrap_or(&"surface")))
         };
-        match self {
-            Self::Range(of) => format!("{} range", surface(of)),
-            Self::Error(of) => format!("{} error", surface(of)),
-            Self::Lag(of) => format!("{} lag", surface(of)),
-            Self::GyroBias => "gyro bias".into(),
-            Self::GyroNoise => "gyro noise".into(),
-            Self::Gravity => "gravity".into(),
-            Self::AccelerometerNoise => "accelerometer noise".into(),
-            Self::BarometerNoise => "barometer noise".into(),
-            Self::GnssFixes => "GNSS fixes".into(),
-            Self::GnssSpeed => "GNSS speed".into(),
-            Self::LidarRange => "lidar".into(),
-            Self::RailLean => "lean from the rail".into(),
-            Self::IgniterContinuity => "igniter continuity".into(),
-            Self::BoosterWire => "booster wire".into(),
-            Self::PinOut => "pin".into(),
-            Self::BatteryVoltage => "battery".into(),
-            Self::LogRunning => "log".into(),
-            Self::LogSpace => "log space".into(),
-        }
+        let (number, name) = match self {
+            Self::Range(surface) => return of(surface, 0, "range"),
+            Self::Error(surface) => return of(surface, 1, "error"),
+            Self::Lag(surface) => return of(surface, 2, "lag"),
+            Self::GyroBias => (32, "gyro bias"),
+            Self::GyroNoise => (33, "gyro noise"),
+            Self::Gravity => (34, "gravity"),
+            Self::AccelerometerNoise => (35, "accelerometer noise"),
+            Self::BarometerNoise => (36, "barometer noise"),
+            Self::GnssFixes => (37, "GNSS fixes"),
+            Self::GnssSpeed => (38, "GNSS speed"),
+            Self::LidarRange => (39, "lidar"),
+            Self::RailLean => (40, "lean from the rail"),
+            Self::IgniterContinuity => (48, "igniter continuity"),
+            Self::BoosterWire => (49, "booster wire"),
+            Self::PinOut => (50, "pin"),
+            Self::BatteryVoltage => (51, "battery"),
+            Self::LogRunning => (52, "log"),
+            Self::LogSpace => (53, "log space"),
+        };
+        (number, name.into())
     }
 }
 
@@ -380,22 +347,22 @@ fn judged(ok: bool) -> Verdict {
 
 /// Switches, battery and log.
 fn findings_of_switches(
-    switches: &PadSwitches,
+    input: &KeptInput,
     mission: &Mission,
     arming: &ArmingLimits,
 ) -> impl Iterator<Item = Finding> {
     let closed = |item, closed: bool| Finding::at_least(item, f64::from(u8::from(closed)), 1.0);
     let on_a_rail = mission.start.at == StartPoint::Pad;
     [
-        Some(closed(Item::IgniterContinuity, switches.igniter_continuity)),
-        on_a_rail.then(|| closed(Item::BoosterWire, switches.booster_attached)),
+        Some(closed(Item::IgniterContinuity, input.igniter_continuity)),
+        on_a_rail.then(|| closed(Item::BoosterWire, input.booster_attached)),
         // In while people work at the vehicle, out before it is armed: both are right in their time.
-        Some(Finding::only_shown(Item::PinOut, f64::from(u8::from(switches.pin_out)))),
-        switches.battery_v.map(|volts| Finding::at_least(Item::BatteryVoltage, volts, arming.battery_min_v)),
-        Some(closed(Item::LogRunning, switches.log_running)),
+        Some(Finding::only_shown(Item::PinOut, f64::from(u8::from(input.pin_out)))),
+        input.battery_v.map(|volts| Finding::at_least(Item::BatteryVoltage, volts, arming.battery_min_v)),
+        Some(closed(Item::LogRunning, input.log.running)),
         Some(Finding::at_least(
             Item::LogSpace,
-            switches.log_space_bytes as f64,
+            input.log.space_bytes as f64,
             arming.log_space_min_bytes as f64,
         )),
     ]
@@ -480,7 +447,7 @@ impl Computer {
     }
 
     /// One frame of a running check. It ends here at the latest, whatever has happened in this frame.
-    pub(super) fn check_itself(&mut self, input: &Input<'_>) {
+    pub(super) fn check_itself(&mut self, input: &KeptInput) {
         if !self.pad_check.is_running() {
             return;
         }
@@ -489,19 +456,7 @@ impl Computer {
             self.end_check(&reason);
             return;
         }
-        let seen = PadReadings {
-            surfaces_rad: surfaces_rad(input.gimbal_rad, input.fins_rad),
-            measured: &input.measured,
-            switches: PadSwitches {
-                igniter_continuity: self.input.igniter_continuity,
-                booster_attached: self.input.booster_attached,
-                pin_out: input.pin_out,
-                battery_v: self.input.battery_v,
-                log_running: self.input.log.running,
-                log_space_bytes: self.input.log.space_bytes,
-            },
-        };
-        let told = self.pad_check.step(&seen, self.pilot.mission(), &self.arming);
+        let told = self.pad_check.step(input, self.pilot.mission(), &self.arming);
         self.rest_surfaces();
         match told {
             Some((surface @ 0..2, angle_rad)) => self.commands.gimbal_rad[surface] = angle_rad,

@@ -4,7 +4,8 @@ use nalgebra::Vector3;
 use proptest::prelude::*;
 
 use super::*;
-use crate::estimation::estimator::{GnssFix, ImuSample};
+use crate::computer::LogState;
+use crate::estimation::estimator::{GnssFix, ImuSample, Measurements};
 use crate::vehicle::airframe::Servo;
 
 fn mission() -> Mission {
@@ -93,16 +94,24 @@ fn at_rest(frame: u32, noise: f64) -> Measurements {
     }
 }
 
-const SWITCHES: PadSwitches = PadSwitches {
+/// Switches, battery and log as they should be.
+const SOUND: KeptInput = KeptInput {
     igniter_continuity: true,
     booster_attached: true,
-    pin_out: false,
     battery_v: Some(8.1),
-    log_running: true,
-    log_space_bytes: 1 << 30,
+    log: LogState { running: true, space_bytes: 1 << 30 },
+    ..KeptInput::NONE
 };
 
-fn checked(wrong: Wrong, noise: f64, switches: PadSwitches, moves: bool) -> PadCheck {
+fn reading(
+    [pitch, yaw, one, two, three, four]: [f64; SURFACES],
+    measured: Measurements,
+    switches: KeptInput,
+) -> KeptInput {
+    KeptInput { gimbal_rad: [pitch, yaw], fins_rad: [one, two, three, four], measured, ..switches }
+}
+
+fn checked(wrong: Wrong, noise: f64, switches: KeptInput, moves: bool) -> PadCheck {
     let mission = mission();
     let mut bench = Bench::new(&mission.airframe, wrong);
     let mut check = PadCheck::default();
@@ -110,7 +119,7 @@ fn checked(wrong: Wrong, noise: f64, switches: PadSwitches, moves: bool) -> PadC
     let mut told = None;
     for frame in 0..6000 {
         let measured = at_rest(frame, noise);
-        let seen = PadReadings { surfaces_rad: bench.step(told), measured: &measured, switches };
+        let seen = reading(bench.step(told), measured, switches);
         let before = check.progress_percent();
         told = check.step(&seen, &mission, &mission.arming);
         assert!(check.progress_percent() >= before, "frame {frame}");
@@ -129,7 +138,7 @@ fn failing(check: &PadCheck) -> Vec<Item> {
 
 #[test]
 fn a_sound_vehicle_passes_and_every_item_has_its_value() {
-    let check = checked(NOTHING_WRONG, 1.0, SWITCHES, true);
+    let check = checked(NOTHING_WRONG, 1.0, SOUND, true);
     assert_eq!((check.state(), check.run(), check.progress_percent()), (CheckState::Passed, 1, 100));
     assert_eq!(check.findings().len(), 3 * SURFACES + 9 + 6);
     for found in check.findings() {
@@ -147,7 +156,7 @@ fn a_sound_vehicle_passes_and_every_item_has_its_value() {
 
 #[test]
 fn without_motion_no_surface_is_told_to_move() {
-    let check = checked(NOTHING_WRONG, 1.0, SWITCHES, false);
+    let check = checked(NOTHING_WRONG, 1.0, SOUND, false);
     assert_eq!(check.state(), CheckState::Passed);
     assert_eq!(check.findings().len(), 9 + 6);
 }
@@ -155,7 +164,7 @@ fn without_motion_no_surface_is_told_to_move() {
 #[test]
 fn each_wrong_surface_is_named_with_what_is_wrong() {
     for surface in 0..SURFACES {
-        let of = |wrong: Wrong| failing(&checked(Wrong { surface, ..wrong }, 1.0, SWITCHES, true));
+        let of = |wrong: Wrong| failing(&checked(Wrong { surface, ..wrong }, 1.0, SOUND, true));
         let all = [Item::Range(surface), Item::Error(surface), Item::Lag(surface)];
         assert_eq!(of(Wrong { stuck: true, ..NOTHING_WRONG }), all, "stuck");
         assert_eq!(of(Wrong { later_s: 0.04, ..NOTHING_WRONG }), [Item::Lag(surface)], "late");
@@ -169,15 +178,21 @@ fn each_wrong_surface_is_named_with_what_is_wrong() {
 #[test]
 fn each_sensor_and_switch_is_judged() {
     let still = |noise, switches| failing(&checked(NOTHING_WRONG, noise, switches, false));
-    assert_eq!(still(3.0, SWITCHES), [Item::GyroNoise, Item::AccelerometerNoise, Item::BarometerNoise]);
-    assert_eq!(still(1.0, PadSwitches { igniter_continuity: false, ..SWITCHES }), [Item::IgniterContinuity]);
-    assert_eq!(still(1.0, PadSwitches { battery_v: Some(7.3), ..SWITCHES }), [Item::BatteryVoltage]);
-    assert_eq!(still(1.0, PadSwitches { battery_v: Some(f64::NAN), ..SWITCHES }), [Item::BatteryVoltage]);
-    assert_eq!(still(1.0, PadSwitches { battery_v: None, ..SWITCHES }), []);
-    assert_eq!(still(1.0, PadSwitches { log_running: false, ..SWITCHES }), [Item::LogRunning]);
-    assert_eq!(still(1.0, PadSwitches { log_space_bytes: 1 << 20, ..SWITCHES }), [Item::LogSpace]);
-    assert_eq!(still(1.0, PadSwitches { pin_out: true, ..SWITCHES }), [], "the pin is only shown");
-    assert_eq!(still(f64::NAN, SWITCHES).len(), 7, "no number passes");
+    assert_eq!(still(3.0, SOUND), [Item::GyroNoise, Item::AccelerometerNoise, Item::BarometerNoise]);
+    assert_eq!(still(1.0, KeptInput { igniter_continuity: false, ..SOUND }), [Item::IgniterContinuity]);
+    assert_eq!(still(1.0, KeptInput { battery_v: Some(7.3), ..SOUND }), [Item::BatteryVoltage]);
+    assert_eq!(still(1.0, KeptInput { battery_v: Some(f64::NAN), ..SOUND }), [Item::BatteryVoltage]);
+    assert_eq!(still(1.0, KeptInput { battery_v: None, ..SOUND }), []);
+    assert_eq!(
+        still(1.0, KeptInput { log: LogState { running: false, ..SOUND.log }, ..SOUND }),
+        [Item::LogRunning]
+    );
+    assert_eq!(
+        still(1.0, KeptInput { log: LogState { space_bytes: 1 << 20, ..SOUND.log }, ..SOUND }),
+        [Item::LogSpace]
+    );
+    assert_eq!(still(1.0, KeptInput { pin_out: true, ..SOUND }), [], "the pin is only shown");
+    assert_eq!(still(f64::NAN, SOUND).len(), 7, "no number passes");
 }
 
 /// A mount that is 4 degrees askew looks like a rail that leans by 4 degrees: the crew looks at both.
@@ -209,7 +224,7 @@ fn a_mount_that_leans_further_than_stated_fails() {
 
 #[test]
 fn no_two_items_have_the_same_number() {
-    let check = checked(NOTHING_WRONG, 1.0, SWITCHES, true);
+    let check = checked(NOTHING_WRONG, 1.0, SOUND, true);
     let mut numbers: Vec<u8> = check.findings().iter().map(|found| found.item.number()).collect();
     numbers.sort_unstable();
     numbers.dedup();
@@ -227,7 +242,7 @@ proptest! {
         for frame in 0..4000_usize {
             let surfaces_rad = core::array::from_fn(|surface| feedback[(frame + 7 * surface) % 64]);
             let measured = at_rest(0, 1.0);
-            let seen = PadReadings { surfaces_rad, measured: &measured, switches: SWITCHES };
+            let seen = reading(surfaces_rad, measured, SOUND);
             match check.step(&seen, &mission, &mission.arming) {
                 Some((0..2, angle_rad)) => prop_assert!(angle_rad.abs() <= limit_rad),
                 Some((surface, angle_rad)) => {

@@ -360,7 +360,7 @@ pub(super) mod sample {
 
     use super::Pilot;
     use crate::computer::table::PhaseTable;
-    use crate::computer::{Computer, Input, LogState};
+    use crate::computer::{Computer, Input, KeptInput, LogState};
     use crate::estimation::estimator::{ImuSample, Measurements, StartUncertainty};
     use crate::rules::arming::Uplink;
     use crate::vehicle::rigid::RigidState;
@@ -378,13 +378,18 @@ pub(super) mod sample {
         Pilot::starting(&mission, 0.0, &RigidState::upright(300.0), &StartUncertainty::at_apogee())
     }
 
+    /// A frame's input without requests, rehearsal and plan.
+    pub(in crate::computer) fn alone(kept: KeptInput) -> Input<'static> {
+        Input { kept, requests: &[], rehearsed: None, plan_ready: false }
+    }
+
     /// The input of a frame with almost no specific force, turning at a rate, of a computer that was released at once.
-    pub(in crate::computer) fn input(frame: u64, gyro_rad_s: f64) -> Input<'static> {
+    pub(in crate::computer) fn input(frame: u64, gyro_rad_s: f64) -> KeptInput {
         let imu = ImuSample {
             gyro_rad_s: Vector3::new(0.0, gyro_rad_s, 0.0),
             specific_force_m_s2: Vector3::new(0.1, 0.0, 0.0),
         };
-        Input {
+        KeptInput {
             frame,
             time_s: 0.005 * frame as f64,
             measured: Measurements::of_imu(imu),
@@ -392,7 +397,7 @@ pub(super) mod sample {
             pin_out: true,
             log: LogState { running: true, space_bytes: u64::MAX },
             uplink: Uplink::NotNeeded,
-            ..Input::NONE
+            ..KeptInput::NONE
         }
     }
 }

@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::Pilot;
 use super::vehicle_model::VehicleModel;
-use crate::computer::Input;
+use crate::computer::KeptInput;
 use crate::estimation::estimator::Estimate;
 use crate::estimation::sensor_watch::SensorWatch;
 use crate::guidance::ignition::IgnitionPrediction;
@@ -178,7 +178,7 @@ impl Pilot {
     pub(super) fn gate_will_not_open(
         &mut self,
         mode: &Mode,
-        input: &Input<'_>,
+        input: &KeptInput,
         estimate: &Estimate,
         sensors: &SensorWatch,
     ) -> Option<(Event, String)> {
@@ -275,13 +275,13 @@ mod tests {
     use crate::vehicle::rigid::RigidState;
 
     /// One frame, in which the crew may abort.
-    fn frame_with(pilot: &mut Pilot, table: &mut PhaseTable, input: &Input<'_>, abort: bool) -> [f64; 4] {
+    fn frame_with(pilot: &mut Pilot, table: &mut PhaseTable, input: &KeptInput, abort: bool) -> [f64; 4] {
         pilot.estimate_state(table.mode().phase, input);
         fly_on(pilot, table, input, abort)
     }
 
     /// The same after the estimate.
-    fn fly_on(pilot: &mut Pilot, table: &mut PhaseTable, input: &Input<'_>, abort: bool) -> [f64; 4] {
+    fn fly_on(pilot: &mut Pilot, table: &mut PhaseTable, input: &KeptInput, abort: bool) -> [f64; 4] {
         pilot.take_over(input.time_s);
         pilot.predict(table, input);
         if abort {
@@ -324,7 +324,7 @@ mod tests {
     }
 
     /// What is wrong in a fall, at the height of the centre of gravity, m.
-    type Wrong = fn(f64, &mut Estimate, &mut Input<'static>);
+    type Wrong = fn(f64, &mut Estimate, &mut KeptInput);
 
     const NO_ABORT_M: f64 = 0.0;
 
@@ -352,7 +352,7 @@ mod tests {
             let time_s = frame as f64 * 0.005;
             let mut estimate = falling(time_s);
             let height_m = estimate.state.position_m.z;
-            let mut input = Input { fins_rad, ..sample::input(frame, 0.0) };
+            let mut input = KeptInput { fins_rad, ..sample::input(frame, 0.0) };
             wrong(height_m, &mut estimate, &mut input);
             let aborts = height_m < abort_below_m && !table.mode().interlocks.abort_latched;
             pilot.estimate = Some(estimate);

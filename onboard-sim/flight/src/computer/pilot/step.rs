@@ -8,7 +8,7 @@ use super::ascent::{AscentReadings, words_of_ascent};
 use super::vehicle_model::Burning;
 use super::vertical_speed::SpeedReadings;
 use super::{FRAMES_PER_PLAN, Pilot, Pointed, Prediction};
-use crate::computer::Input;
+use crate::computer::KeptInput;
 use crate::computer::news::Severity;
 use crate::computer::table::PhaseTable;
 use crate::control::aim::Aim;
@@ -61,14 +61,14 @@ fn on_the_way_up(
 
 impl Pilot {
     /// Estimates the vehicle's state, and its motor and drag.
-    pub(in crate::computer) fn estimate_state(&mut self, phase: Phase, input: &Input<'_>) {
+    pub(in crate::computer) fn estimate_state(&mut self, phase: Phase, input: &KeptInput) {
         let estimate = self.estimated(phase, input);
         self.estimate = Some(estimate);
         self.update_models(phase, input, &estimate);
     }
 
     /// Follows the ascent, predicts ignition and abort, and watches the fins. Every event goes through the `table`.
-    pub(in crate::computer) fn predict(&mut self, table: &mut PhaseTable, input: &Input<'_>) {
+    pub(in crate::computer) fn predict(&mut self, table: &mut PhaseTable, input: &KeptInput) {
         let Some(estimate) = self.estimate else { return };
         self.watch_the_speeds(input, &estimate);
         // Before the prediction: at apogee an abort has to know at once whether the parachute has room.
@@ -92,7 +92,7 @@ impl Pilot {
 
     /// Poses a landing in the first frame of the burn, and again ten frames after the last, or later if that one takes longer: not in
     /// the frame that took it over, so that it can be looked at behind it.
-    pub(in crate::computer) fn plan(&mut self, mode: &Mode, input: &Input<'_>, took_over: bool) {
+    pub(in crate::computer) fn plan(&mut self, mode: &Mode, input: &KeptInput, took_over: bool) {
         let due = !took_over && input.frame >= self.plan_due && mode.phase.in_landing_burn();
         let burning = self.burning(mode, input.time_s).filter(|_| due);
         if let Some((burning, estimate)) = burning.zip(self.estimate)
@@ -103,7 +103,7 @@ impl Pilot {
     }
 
     /// Points fins and gimbal.
-    pub(in crate::computer) fn point(&mut self, mode: &Mode, input: &Input<'_>) -> Pointed {
+    pub(in crate::computer) fn point(&mut self, mode: &Mode, input: &KeptInput) -> Pointed {
         let flying = mode.phase.in_landing_burn();
         if let Some(estimate) = self.estimate {
             let estimate = &estimate;
@@ -138,7 +138,7 @@ impl Pilot {
         })
     }
 
-    fn estimated(&mut self, phase: Phase, input: &Input<'_>) -> Estimate {
+    fn estimated(&mut self, phase: Phase, input: &KeptInput) -> Estimate {
         let mut measurements = input.measured;
         self.silence_what_is_wrong(&mut measurements, input.time_s);
         let burning_s = self.model.burning_s(input.time_s);
@@ -176,7 +176,7 @@ impl Pilot {
 
     /// Estimates motor and drag from the specific force along the axis; not on the way up, on the ground or under the
     /// parachute.
-    pub(super) fn update_models(&mut self, phase: Phase, input: &Input<'_>, estimate: &Estimate) {
+    pub(super) fn update_models(&mut self, phase: Phase, input: &KeptInput, estimate: &Estimate) {
         if input.contact || phase == Phase::Chute || phase.before_apogee() {
             return;
         }
@@ -205,7 +205,7 @@ impl Pilot {
         self.model.learn(&sample);
     }
 
-    fn watch_the_speeds(&mut self, input: &Input<'_>, estimate: &Estimate) {
+    fn watch_the_speeds(&mut self, input: &KeptInput, estimate: &Estimate) {
         let Measurements { imu, pressure_altitude_m, gnss, .. } = input.measured;
         self.speeds.take(&SpeedReadings {
             time_s: input.time_s,
@@ -219,7 +219,7 @@ impl Pilot {
     }
 
     /// Moves through the phases up to apogee.
-    fn watch_the_ascent(&mut self, table: &mut PhaseTable, input: &Input<'_>, estimate: &Estimate) {
+    fn watch_the_ascent(&mut self, table: &mut PhaseTable, input: &KeptInput, estimate: &Estimate) {
         let phase = table.mode().phase;
         let Some(launch) = self.model.mission.launch.as_ref().filter(|_| phase.before_apogee()) else {
             return;
@@ -250,7 +250,7 @@ impl Pilot {
     pub(in crate::computer) fn decide(
         &mut self,
         table: &mut PhaseTable,
-        input: &Input<'_>,
+        input: &KeptInput,
         sensors: &SensorWatch,
     ) {
         let Some(estimate) = self.estimate else { return };
@@ -320,7 +320,7 @@ impl Pilot {
     fn consider_ignition(
         &mut self,
         table: &mut PhaseTable,
-        input: &Input<'_>,
+        input: &KeptInput,
         estimate: &Estimate,
         sensors: &SensorWatch,
     ) {
@@ -347,7 +347,7 @@ impl Pilot {
     }
 
     /// The event that an abort is now, from the findings of the last frame, if there was one.
-    pub(crate) fn abort_event(&self, mode: &Mode, last: Option<&Input<'_>>, sensors: &SensorWatch) -> Event {
+    pub(crate) fn abort_event(&self, mode: &Mode, last: Option<&KeptInput>, sensors: &SensorWatch) -> Event {
         let found = last.zip(self.estimate.as_ref());
         let gate_open = found.is_some_and(|(input, estimate)| {
             !self.gate_checks(mode, input, estimate, sensors).iter().any(|check| check.shut)
@@ -370,7 +370,7 @@ impl Pilot {
     pub(super) fn gate_checks(
         &self,
         mode: &Mode,
-        input: &Input<'_>,
+        input: &KeptInput,
         estimate: &Estimate,
         sensors: &SensorWatch,
     ) -> [GateCheck; GATE_CHECKS] {

@@ -69,12 +69,12 @@ impl PoweredGuidance {
         planned.flown.clear();
         planned.plan(&mut search, state, situation);
         planned.flown.clear();
-        (Self { settings, report: PoweredReport::idle(), ..planned }, search)
+        (Self { settings, report: PoweredReport::default(), ..planned }, search)
     }
 
     /// Guidance without a plan.
     pub fn new(settings: PoweredSettings) -> Self {
-        Self { settings, report: PoweredReport::idle(), flown: Plan::default() }
+        Self { settings, report: PoweredReport::default(), flown: Plan::default() }
     }
 
     /// Plans from time zero, and takes the plan over at once.
@@ -122,7 +122,7 @@ impl PoweredGuidance {
         let took_s = time_s - posed_at_s;
         let Some(outcome) = outcome else {
             let level = ControlLevel::Stabiliser;
-            self.report = PoweredReport { level, posed_at_s, took_s, ..PoweredReport::idle() };
+            self.report = PoweredReport { level, posed_at_s, took_s, ..PoweredReport::default() };
             return;
         };
         let found = &mut search.found;

@@ -7,22 +7,24 @@ use serde::{Deserialize, Serialize};
 use super::Homing;
 use crate::vehicle::mission::{FinalBox, PlanWeights};
 
+numbered_enum! {
 /// What decides where the nose points; the levels in flight are ordered from best to worst.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[repr(u8)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
 pub enum ControlLevel {
     /// Nothing to control; the gimbal is centred.
-    Idle = 0,
+    #[default]
+    Idle = "IDLE",
     /// On the pad: the landing is rehearsed, the gimbal is centred.
-    Rehearsal = 1,
+    Rehearsal = "REHEARSAL",
     /// A converged plan that lands.
-    Converged = 2,
+    Converged = "CONVERGED",
     /// The best plan found: not converged, or missing its end conditions by a little.
-    BestFeasible = 3,
+    BestFeasible = "BEST_FEASIBLE",
     /// The previous plan goes on: this tick found none that is good enough.
-    ShiftedPlan = 4,
+    ShiftedPlan = "SHIFTED_PLAN",
     /// Upright, with a lean against the sideways velocity.
-    Stabiliser = 5,
+    Stabiliser = "STABILISER",
+}
 }
 
 impl ControlLevel {
@@ -39,42 +41,10 @@ impl ControlLevel {
             Self::BestFeasible
         }
     }
-
-    /// Every level, in index order.
-    pub const ALL: [Self; 6] = [
-        Self::Idle,
-        Self::Rehearsal,
-        Self::Converged,
-        Self::BestFeasible,
-        Self::ShiftedPlan,
-        Self::Stabiliser,
-    ];
-
-    /// The name operators see.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Idle => "IDLE",
-            Self::Rehearsal => "REHEARSAL",
-            Self::Converged => "CONVERGED",
-            Self::BestFeasible => "BEST_FEASIBLE",
-            Self::ShiftedPlan => "SHIFTED_PLAN",
-            Self::Stabiliser => "STABILISER",
-        }
-    }
-
-    /// The number in telemetry and logs, 0 to 5.
-    pub fn index(self) -> u8 {
-        self as u8
-    }
-
-    /// The level of a number, or `None` above 5.
-    pub fn from_index(index: u8) -> Option<Self> {
-        Self::ALL.get(usize::from(index)).copied()
-    }
 }
 
-/// The report of a tick.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+/// The report of a tick; the default is that before the first.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct PoweredReport {
     /// The source of the nose's direction.
     pub level: ControlLevel,
@@ -102,27 +72,6 @@ pub struct PoweredReport {
     pub touchdown_m_s: f64,
     /// Largest planned tilt, rad.
     pub largest_tilt_rad: f64,
-}
-
-impl PoweredReport {
-    /// Before the first tick.
-    pub fn idle() -> Self {
-        Self {
-            level: ControlLevel::Idle,
-            status: Status::NotRun,
-            iterations: 0,
-            passes: 0,
-            posed_at_s: 0.0,
-            took_s: 0.0,
-            kkt_stationarity: 0.0,
-            kkt_feasibility: 0.0,
-            cost: 0.0,
-            condition_miss: 0.0,
-            touchdown_in_s: 0.0,
-            touchdown_m_s: 0.0,
-            largest_tilt_rad: 0.0,
-        }
-    }
 }
 
 /// The settings of the landing burn.

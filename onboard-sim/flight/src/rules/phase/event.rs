@@ -100,39 +100,6 @@ pub enum Event {
     SafingDone,
 }
 
-impl Event {
-    /// The name in messages and logs.
-    pub fn name(&self) -> &'static str {
-        match self {
-            Self::SelfTestPassed => "self-test passed",
-            Self::PinPulled => "pin pulled",
-            Self::PinInserted => "pin inserted",
-            Self::ArmRequested { .. } => "arm",
-            Self::DisarmRequested { .. } => "disarm",
-            Self::StartRequested { .. } => "start",
-            Self::Hold { .. } => "hold",
-            Self::HoldElapsed => "hold elapsed",
-            Self::CountdownElapsed => "countdown elapsed",
-            Self::ReleasedAt(_) => "release",
-            Self::LiftOff => "lift-off",
-            Self::NoLiftOff => "no lift-off",
-            Self::Burnout => "burn-out",
-            Self::SeparationDue => "separation",
-            Self::Apogee { .. } => "apogee",
-            Self::ReleasedEarly { .. } => "early release",
-            Self::FinsConfirmed => "fins confirmed",
-            Self::LandArm => "land arm",
-            Self::IgnitionGate { .. } => "ignition gate",
-            Self::ThrustConfirmed => "thrust confirmed",
-            Self::NoThrustTimeout => "no thrust",
-            Self::GateShutForGood { .. } => "gate shut for good",
-            Self::AbortRequested { .. } => "abort",
-            Self::Contact { .. } => "contact",
-            Self::SafingDone => "safing done",
-        }
-    }
-}
-
 /// An action that must follow now.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]

@@ -22,86 +22,41 @@ pub const PAD_ABORT_WAIT_S: f64 = 60.0;
 /// Time after the ignition command at which missing thrust counts as "no light", s.
 pub const NO_THRUST_TIMEOUT_S: f64 = 0.5;
 
+numbered_enum! {
 /// The phase of the flight.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[repr(u8)]
 pub enum Phase {
     /// Powered up, self-test not passed.
-    Safe = 0,
+    Safe = "SAFE",
     /// On the pad, self-test passed, disarmed.
-    PadIdle = 1,
+    PadIdle = "PAD_IDLE",
     /// On the pad, armed; a countdown may be running.
-    PadArmed = 2,
+    PadArmed = "PAD_ARMED",
     /// Under the ascent motor.
-    Boost = 3,
+    Boost = "BOOST",
     /// Rising without thrust.
-    Coast = 4,
+    Coast = "COAST",
     /// Past apogee, fins opening.
-    Deploy = 5,
+    Deploy = "DEPLOY",
     /// Falling on the fins.
-    AeroDescent = 6,
+    AeroDescent = "AERO_DESCENT",
     /// Falling, landing controller running, waiting for the ignition gate.
-    LandArmed = 7,
+    LandArmed = "LAND_ARMED",
     /// Landing motor commanded to light; entered at most once.
-    Ignition = 8,
+    Ignition = "IGNITION",
     /// Landing motor burning.
-    Powered = 9,
+    Powered = "POWERED",
     /// On the ground, thrust below weight.
-    Touchdown = 10,
+    Touchdown = "TOUCHDOWN",
     /// On the ground, everything inhibited, and the vehicle safe to approach: the motor burnt out and cooled, or its
     /// pin in.
-    Safed = 11,
+    Safed = "SAFED",
     /// Under the parachute.
-    Chute = 12,
+    Chute = "CHUTE",
+}
 }
 
 impl Phase {
-    /// Every phase, in index order.
-    pub const ALL: [Self; 13] = [
-        Self::Safe,
-        Self::PadIdle,
-        Self::PadArmed,
-        Self::Boost,
-        Self::Coast,
-        Self::Deploy,
-        Self::AeroDescent,
-        Self::LandArmed,
-        Self::Ignition,
-        Self::Powered,
-        Self::Touchdown,
-        Self::Safed,
-        Self::Chute,
-    ];
-
-    /// The name operators see.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Safe => "SAFE",
-            Self::PadIdle => "PAD_IDLE",
-            Self::PadArmed => "PAD_ARMED",
-            Self::Boost => "BOOST",
-            Self::Coast => "COAST",
-            Self::Deploy => "DEPLOY",
-            Self::AeroDescent => "AERO_DESCENT",
-            Self::LandArmed => "LAND_ARMED",
-            Self::Ignition => "IGNITION",
-            Self::Powered => "POWERED",
-            Self::Touchdown => "TOUCHDOWN",
-            Self::Safed => "SAFED",
-            Self::Chute => "CHUTE",
-        }
-    }
-
-    /// The number sent over the air and written to logs, 0 to 12.
-    pub fn index(self) -> u8 {
-        self as u8
-    }
-
-    /// The phase of a number, or `None` above 12.
-    pub fn from_index(index: u8) -> Option<Self> {
-        Self::ALL.get(usize::from(index)).copied()
-    }
-
     /// On the pad, before lift-off or release.
     pub fn on_pad(self) -> bool {
         matches!(self, Self::Safe | Self::PadIdle | Self::PadArmed)
@@ -176,22 +131,6 @@ impl Mode {
             hold: None,
             motor: Motor::Unlit,
             aborted_before_s: None,
-        }
-    }
-
-    /// The same mode on a clock that is ahead by this much, s.
-    #[must_use]
-    pub fn on_clock_ahead_by(&self, ahead_s: f64) -> Self {
-        Self {
-            entered_at_s: self.entered_at_s + ahead_s,
-            countdown_end_s: self.countdown_end_s.map(|end_s| end_s + ahead_s),
-            hold: self.hold.map(|hold| Hold { at_s: hold.at_s + ahead_s, ..hold }),
-            motor: match self.motor {
-                Motor::BurntOut { at_s } => Motor::BurntOut { at_s: at_s + ahead_s },
-                motor => motor,
-            },
-            aborted_before_s: self.aborted_before_s.map(|at_s| at_s + ahead_s),
-            ..*self
         }
     }
 

@@ -161,8 +161,3 @@ fn check_start(mission: &Mission, origin: &str) -> Result<(), MissionError> {
 pub fn builtin(name: &str) -> Option<Result<Mission, MissionError>> {
     BUILTIN.iter().find(|(known, _)| *known == name).map(|(name, text)| from_toml(text, name))
 }
-
-/// Whether a text is a mission and not a set of dispersions: a mission contains an airframe.
-pub fn is_meant(text: &str) -> bool {
-    toml::from_str::<toml::Table>(text).is_ok_and(|table| table.contains_key("airframe"))
-}

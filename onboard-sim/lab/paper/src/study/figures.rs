@@ -8,7 +8,7 @@ use core::f64::consts::FRAC_PI_2;
 use super::fall::{ANGLES_DEG, Fate, OPENINGS_DEG, Stability, TILTS_DEG};
 use super::fall::{Moment, Vehicle};
 use super::{PaperError, Row, Sample, Table};
-use onboard_sim::figure::{CellAxis, Cells, Line, Panel, cells_svg, lines_svg};
+use onboard_sim::figure::{FigureError, Line, Panel, sized_lines_svg};
 
 /// Pitch and yaw at the start of Fig. 5, degrees.
 const FIG_5_START_DEG: [f64; 2] = [2.0, 1.0];
@@ -103,6 +103,17 @@ fn fig_6(rows: &[Row]) -> Result<String, PaperError> {
     Ok(lines_svg(title, &panels, 4, Some(CROSSES))?)
 }
 
+/// Panels in rows of `columns`, smaller ones if there are several.
+fn lines_svg(
+    title: &str,
+    panels: &[Panel],
+    columns: usize,
+    cross_name: Option<&str>,
+) -> Result<String, FigureError> {
+    let size_px = if panels.len() == 1 { (720, 500) } else { (400, 340) };
+    sized_lines_svg(title, panels, columns, cross_name, size_px)
+}
+
 /// The pitch plane.
 fn path_panel(rows: &[&Row]) -> Panel {
     let crosses = rows
@@ -135,29 +146,29 @@ fn panel([x_label, y_label]: [&str; 2], lines: Vec<Line>) -> Panel {
     Panel { x_label: x_label.to_owned(), y_label: y_label.to_owned(), lines, ..Panel::default() }
 }
 
+/// A cross for each fall.
 fn fates(stability: &Stability) -> Result<String, PaperError> {
-    let axis = |label: &str, values: &[f64]| CellAxis {
-        label: label.to_owned(),
-        first: values[0],
-        last: values[values.len() - 1],
-        count: values.len(),
+    let colour = |fate: Fate| match fate {
+        Fate::Settles => 2,
+        Fate::DependsOnRoll => 1,
+        Fate::Flips => 4,
     };
-    let cells: Vec<usize> = stability.fates.iter().map(|fate| *fate as usize).collect();
-    let kinds = Fate::ALL.map(|fate| {
-        let colour = match fate {
-            Fate::Settles => [0x7f, 0xc9, 0x7f],
-            Fate::DependsOnRoll => [0xe6, 0xa2, 0x3c],
-            Fate::Flips => [0x5b, 0x4b, 0x6b],
-        };
-        (fate.name(), colour)
+    let named = Fate::ALL.map(|fate| Line {
+        name: fate.name().to_owned(),
+        colour: colour(fate),
+        dashed: false,
+        points: Vec::new(),
     });
-    let map = Cells {
-        x: axis("tilt at the start, deg", &TILTS_DEG),
-        y: axis("opening of the fins, deg", &OPENINGS_DEG),
-        kinds: &kinds,
-        cells: &cells,
+    let starts =
+        OPENINGS_DEG.iter().flat_map(|opening_deg| TILTS_DEG.map(|tilt_deg| (tilt_deg, *opening_deg)));
+    let falls = starts.zip(&stability.fates);
+    let map = Panel {
+        crosses: falls
+            .map(|((tilt_deg, opening_deg), fate)| (tilt_deg, opening_deg, colour(*fate)))
+            .collect(),
+        ..panel(["tilt at the start, deg", "opening of the fins, deg"], named.to_vec())
     };
-    Ok(cells_svg("The paper's vehicle in a passive fall (centre of gravity at 0.52 m)", &map)?)
+    Ok(lines_svg("The paper's vehicle in a passive fall (centre of gravity at 0.52 m)", &[map], 1, None)?)
 }
 
 fn margins(stability: &Stability) -> Result<String, PaperError> {

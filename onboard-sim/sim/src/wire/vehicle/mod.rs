@@ -15,7 +15,7 @@ use flight::computer::crew::{Answer, People, Request};
 use flight::computer::findings::Findings;
 use flight::computer::news::{CrewMessage, Severity};
 use flight::computer::pilot::planner::PLAN_WITHIN_S;
-use flight::computer::{Commander, Computer, Input, LogState};
+use flight::computer::{Commander, Computer, KeptInput, LogState};
 use flight::rules::arming::{Check, Uplink};
 use flight::rules::operator::Operator;
 use flight::rules::phase::{Mode, Phase};
@@ -169,7 +169,7 @@ impl Vehicle {
 
     /// The event for a frame in which the pilot took over a plan.
     fn planned(&self) -> Option<VehicleEvent> {
-        let Input { frame, time_s, .. } = self.computer().flown()?;
+        let KeptInput { frame, time_s, .. } = self.computer().flown()?;
         let took_s = self.computer().pilot().report().took_s;
         Some(VehicleEvent::Planned { frame, time_s, took_s, deadline_s: PLAN_WITHIN_S })
     }

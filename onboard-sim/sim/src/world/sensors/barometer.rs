@@ -1,13 +1,12 @@
 //! The barometer.
 
 use flight::estimation::estimator::GRAVITY_M_S2;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::noise::EJECTION_LASTS_S;
-use super::params::{multiple_of_a_frame, not_below_zero};
-use super::{MS_S, SensorParamError, SensorTruth, Sensors};
+use super::{MS_S, SensorTruth, Sensors};
 
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct BarometerParams {
     /// Time between samples, ms; a multiple of the frame's 5 ms.
@@ -43,24 +42,6 @@ impl Default for BarometerParams {
             plume_m: 0.0,
             ejection_m: 0.0,
         }
-    }
-}
-
-impl BarometerParams {
-    /// The first parameter that is out of range.
-    pub(super) fn wrong(&self) -> Option<SensorParamError> {
-        not_below_zero(&[
-            ("barometer.crossflow, lowest", self.crossflow[0]),
-            ("barometer.crossflow, highest", self.crossflow[1]),
-            ("barometer.late_s", self.late_s),
-            ("barometer.plume_m", self.plume_m),
-            ("barometer.ejection_m", self.ejection_m),
-            ("barometer.noise_m", self.noise_m),
-            ("barometer.offset_m", self.offset_m),
-            ("barometer.offset_walk_m_sqrt_s", self.offset_walk_m_sqrt_s),
-            ("barometer.ram_coefficient", self.ram_coefficient),
-        ])
-        .or_else(|| multiple_of_a_frame("barometer.period_ms", self.period_ms))
     }
 }
 

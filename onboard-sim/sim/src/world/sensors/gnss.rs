@@ -3,14 +3,13 @@
 use flight::estimation::estimator::{GRAVITY_M_S2, GnssFix};
 use flight::vehicle::rigid::RigidState;
 use nalgebra::Vector3;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::noise::{Fate, Flaws, fate};
-use super::params::{above_zero, not_below_zero, shares};
-use super::{MS_S, SensorParamError, SensorParams, SensorTruth, Sensors};
+use super::{MS_S, SensorParams, SensorTruth, Sensors};
 
 /// Satellite receiver. Its position is zeroed on the pad before the flight and wanders from then on.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct GnssParams {
     /// Time between fixes, ms.
@@ -65,40 +64,6 @@ impl Default for GnssParams {
             outlier_share: 0.0,
             outlier_m: 0.0,
         }
-    }
-}
-
-impl GnssParams {
-    /// The first parameter that is out of range.
-    pub(super) fn wrong(&self) -> Option<SensorParamError> {
-        not_below_zero(&[
-            ("gnss.time_tag_s", self.time_tag_s),
-            ("gnss.age_jitter_s", self.age_jitter_s),
-            ("gnss.velocity_wander_m_s", self.velocity_wander_m_s),
-            ("gnss.outlier_m", self.outlier_m),
-            ("gnss.velocity_m_s", self.velocity_m_s),
-            ("gnss.horizontal_white_m", self.horizontal_white_m),
-            ("gnss.vertical_white_m", self.vertical_white_m),
-            ("gnss.horizontal_wander_m", self.horizontal_wander_m),
-            ("gnss.vertical_wander_m", self.vertical_wander_m),
-            ("gnss.zeroed_before_s", self.zeroed_before_s),
-        ])
-        .or_else(|| {
-            above_zero(&[
-                ("gnss.wander_correlation_s", self.wander_correlation_s),
-                ("gnss.velocity_wander_correlation_s", self.velocity_wander_correlation_s),
-            ])
-        })
-        .or_else(|| {
-            shares(&[("gnss.dropout_share", self.dropout_share), ("gnss.outlier_share", self.outlier_share)])
-        })
-        .or_else(|| {
-            (self.delay_ms >= self.period_ms).then(|| SensorParamError {
-                field: "gnss.delay_ms",
-                found: f64::from(self.delay_ms),
-                accepted: "below gnss.period_ms",
-            })
-        })
     }
 }
 

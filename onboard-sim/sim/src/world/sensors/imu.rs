@@ -3,14 +3,13 @@
 use flight::computer::{FRAME_MS, FRAME_S};
 use flight::estimation::estimator::{GRAVITY_M_S2, ImuSample};
 use nalgebra::Vector3;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::noise::Flaws;
-use super::params::{above_zero, not_below_zero};
-use super::{SensorParamError, SensorParams, SensorTruth, Sensors};
+use super::{SensorParams, SensorTruth, Sensors};
 
 /// Inertial measurement unit.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ImuParams {
     /// Gyro noise density, deg/s/sqrt(Hz).
@@ -64,33 +63,6 @@ impl Default for ImuParams {
             mounting_deg: 0.0,
             off_cg_m: 0.0,
         }
-    }
-}
-
-impl ImuParams {
-    /// The first parameter that is out of range.
-    pub(super) fn wrong(&self) -> Option<SensorParamError> {
-        not_below_zero(&[
-            ("imu.gyro_noise_deg_s_sqrt_hz", self.gyro_noise_deg_s_sqrt_hz),
-            ("imu.gyro_bias_deg_s", self.gyro_bias_deg_s),
-            ("imu.gyro_bias_walk_deg_s_sqrt_s", self.gyro_bias_walk_deg_s_sqrt_s),
-            ("imu.accelerometer_noise_mg_sqrt_hz", self.accelerometer_noise_mg_sqrt_hz),
-            ("imu.accelerometer_bias_mg", self.accelerometer_bias_mg),
-            ("imu.accelerometer_scale_share", self.accelerometer_scale_share),
-            ("imu.accelerometer_cross_axis_share", self.accelerometer_cross_axis_share),
-            ("imu.vibration_g", self.vibration_g),
-            ("imu.vibration_deg_s", self.vibration_deg_s),
-            ("imu.vibration_bias_mg", self.vibration_bias_mg),
-            ("imu.vibration_bias_deg_s", self.vibration_bias_deg_s),
-            ("imu.mounting_deg", self.mounting_deg),
-            ("imu.off_cg_m", self.off_cg_m),
-        ])
-        .or_else(|| {
-            above_zero(&[
-                ("imu.gyro_range_deg_s", self.gyro_range_deg_s),
-                ("imu.accelerometer_range_g", self.accelerometer_range_g),
-            ])
-        })
     }
 }
 

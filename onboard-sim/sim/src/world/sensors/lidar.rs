@@ -1,14 +1,13 @@
 //! The lidar.
 
 use flight::vehicle::rigid::RigidState;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::noise::{Fate, Flaws, fate};
-use super::params::{above_zero, multiple_of_a_frame, not_below_zero, shares};
-use super::{SensorParamError, SensorParams, SensorTruth, Sensors};
+use super::{SensorParams, SensorTruth, Sensors};
 
 /// Lidar, looking backwards along the axis.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct LidarParams {
     /// Time between samples, ms; a multiple of the frame's 5 ms.
@@ -60,35 +59,6 @@ impl LidarParams {
     /// Its distance behind the centre of gravity, m, from that centre's height above the feet, m.
     pub fn behind_cg_m(&self, cg_over_feet_m: f64) -> f64 {
         cg_over_feet_m - self.ahead_of_feet_m
-    }
-
-    /// The first parameter that is out of range.
-    pub(super) fn wrong(&self) -> Option<SensorParamError> {
-        not_below_zero(&[
-            ("lidar.blind_below_m", self.blind_below_m),
-            ("lidar.beam_deg", self.beam_deg),
-            ("lidar.grass_m, lowest", self.grass_m[0]),
-            ("lidar.grass_m, highest", self.grass_m[1]),
-            ("lidar.late_s", self.late_s),
-            ("lidar.noise_m", self.noise_m),
-            ("lidar.range_min_m", self.range_min_m),
-            ("lidar.ahead_of_feet_m", self.ahead_of_feet_m),
-        ])
-        .or_else(|| above_zero(&[("lidar.range_max_m", self.range_max_m)]))
-        .or_else(|| {
-            shares(&[
-                ("lidar.dropout_share", self.dropout_share),
-                ("lidar.outlier_share", self.outlier_share),
-            ])
-        })
-        .or_else(|| multiple_of_a_frame("lidar.period_ms", self.period_ms))
-        .or_else(|| {
-            (!(0.0..90.0).contains(&self.tilt_max_deg)).then_some(SensorParamError {
-                field: "lidar.tilt_max_deg",
-                found: self.tilt_max_deg,
-                accepted: "0 to below 90",
-            })
-        })
     }
 }
 

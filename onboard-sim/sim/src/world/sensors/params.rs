@@ -1,15 +1,17 @@
 //! The errors of the sensors, as data. The defaults are those of sensors that a student club can buy.
 
-use serde::Deserialize;
+use flight::computer::FRAME_MS;
+use serde::{Deserialize, Serialize};
 
 use super::barometer::BarometerParams;
 use super::gnss::GnssParams;
 use super::imu::ImuParams;
 use super::lidar::LidarParams;
 use super::switches::SwitchParams;
+use crate::world::numbers;
 
 /// The parameters of every sensor. Each value is a standard deviation unless its name says otherwise.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SensorParams {
     /// Inertial measurement unit.
@@ -23,11 +25,11 @@ pub struct SensorParams {
 }
 
 /// Why a sensor parameter is wrong.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("sensors: {field} is {found}, accepted is {accepted}")]
 pub struct SensorParamError {
     /// Section and field.
-    pub field: &'static str,
+    pub field: String,
     pub found: f64,
     pub accepted: &'static str,
 }
@@ -38,39 +40,28 @@ impl SensorParams {
     /// # Errors
     /// The first parameter of a sensor that is out of range.
     pub fn validate(&self) -> Result<(), SensorParamError> {
-        let Self { imu, barometer, gnss, lidar, switches } = self;
-        let wrong = imu.wrong().or_else(|| barometer.wrong()).or_else(|| gnss.wrong());
-        wrong.or_else(|| lidar.wrong()).or_else(|| switches.wrong()).map_or(Ok(()), Err)
+        for (field, found) in numbers(self) {
+            let is_finite = found.is_finite();
+            let (is_right, accepted) = match field.as_str() {
+                "imu.gyro_range_deg_s"
+                | "imu.accelerometer_range_g"
+                | "gnss.wander_correlation_s"
+                | "gnss.velocity_wander_correlation_s"
+                | "lidar.range_max_m" => (is_finite && found > 0.0, "a finite number above 0"),
+                "gnss.delay_ms" => (self.gnss.delay_ms < self.gnss.period_ms, "below gnss.period_ms"),
+                "barometer.period_ms" | "lidar.period_ms" => {
+                    (found > 0.0 && found % f64::from(FRAME_MS) == 0.0, "a multiple of 5 above 0")
+                }
+                "lidar.tilt_max_deg" => ((0.0..90.0).contains(&found), "0 to below 90"),
+                share if share.ends_with("_share") => ((0.0..=1.0).contains(&found), "0 to 1"),
+                _ => (is_finite && found >= 0.0, "a finite number not below 0"),
+            };
+            if !is_right {
+                return Err(SensorParamError { field, found, accepted });
+            }
+        }
+        Ok(())
     }
-}
-
-type Named = (&'static str, f64);
-
-fn first_not(
-    fields: &[Named],
-    accepted: &'static str,
-    is_right: impl Fn(f64) -> bool,
-) -> Option<SensorParamError> {
-    let (field, found) = *fields.iter().find(|(_, found)| !is_right(*found))?;
-    Some(SensorParamError { field, found, accepted })
-}
-
-pub(super) fn not_below_zero(fields: &[Named]) -> Option<SensorParamError> {
-    first_not(fields, "a finite number not below 0", |found| found.is_finite() && found >= 0.0)
-}
-
-pub(super) fn above_zero(fields: &[Named]) -> Option<SensorParamError> {
-    first_not(fields, "a finite number above 0", |found| found.is_finite() && found > 0.0)
-}
-
-pub(super) fn shares(fields: &[Named]) -> Option<SensorParamError> {
-    first_not(fields, "0 to 1", |found| (0.0..=1.0).contains(&found))
-}
-
-pub(super) fn multiple_of_a_frame(field: &'static str, period_ms: u32) -> Option<SensorParamError> {
-    let is_right = period_ms > 0 && period_ms.is_multiple_of(flight::computer::FRAME_MS);
-    let found = f64::from(period_ms);
-    (!is_right).then_some(SensorParamError { field, found, accepted: "a multiple of 5 above 0" })
 }
 
 #[cfg(test)]

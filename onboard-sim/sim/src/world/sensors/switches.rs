@@ -1,12 +1,11 @@
 //! Switches and feedback.
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
-use super::params::{not_below_zero, shares};
-use super::{SensorParamError, Sensors};
+use super::Sensors;
 
 /// Switches and feedback: what tells the flight computer of contact, of the igniter and of the fins.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SwitchParams {
     /// Time from the first contact until it is reported, ms.
@@ -15,14 +14,6 @@ pub struct SwitchParams {
     pub continuity_lost_share: f64,
     /// Error of each fin's feedback, the same for all of a flight, degrees.
     pub fin_feedback_deg: f64,
-}
-
-impl SwitchParams {
-    /// The first parameter that is out of range.
-    pub(super) fn wrong(&self) -> Option<SensorParamError> {
-        not_below_zero(&[("switches.fin_feedback_deg", self.fin_feedback_deg)])
-            .or_else(|| shares(&[("switches.continuity_lost_share", self.continuity_lost_share)]))
-    }
 }
 
 impl Sensors {

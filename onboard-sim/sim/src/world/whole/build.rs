@@ -16,6 +16,7 @@ use crate::world::aero::{Parachute, Shape};
 use crate::world::ground::Ground;
 use crate::world::hanging::Hanging;
 use crate::world::motor::Motor;
+use crate::world::numbers;
 use crate::world::servo::{Linkage, Servo};
 use crate::world::truth::{AscentTruth, SHAPE_MOST, Truth};
 use crate::world::wind::Wind;
@@ -42,9 +43,9 @@ pub enum WorldError {
     #[error("truth.{key} is {found}; {required} is accepted")]
     Truth {
         /// The parameter.
-        key: &'static str,
+        key: String,
         found: f64,
-        required: &'static str,
+        required: String,
     },
     /// The initial state is not finite, or its attitude is not a rotation.
     #[error("the initial state is {0}; finite numbers and a unit attitude are accepted")]
@@ -172,95 +173,29 @@ pub(super) fn check_state(state: &RigidState) -> Result<(), WorldError> {
     Ok(())
 }
 
+/// What is accepted of a truth; any finite number of what is not here.
+const ACCEPTED: [([f64; 2], &[&str]); 12] = [
+    ([0.1, 10.0], &["impulse_scale", "burn_time_scale", "mass_scale", "inertia_scale", "gimbal_gain"]),
+    ([0.0, 10.0], &["drag_scale", "gust_scale", "body_drag_scale", "fin_drag_scale", "crossflow_scale"]),
+    ([0.0, 60.0], &["ignition_delay_s", "wind_m_s"]),
+    ([0.0, 5.0], &["chuff_s", "thrust_rise_s"]),
+    ([0.0, 1.0], &["wind_exponent"]),
+    ([0.0, 0.5], &["gimbal_slop_rad", "fin_slop_rad"]),
+    ([-0.05, 0.05], &["wind_veer_rad_m"]),
+    ([-0.1, 0.1], &["thrust_offset_m", "cg_offset_m"]),
+    ([-SHAPE_MOST, SHAPE_MOST], &["thrust_shape"]),
+    ([-0.3, 0.3], &["ground_rise"]),
+    ([-0.5, 0.5], &["fin_offset_rad", "principal_axis_rad", "thrust_misalignment_rad"]),
+    ([-1.0, 1.0], &["plume_body_loss", "plume_fin_loss"]),
+];
+
 fn check(truth: &Truth) -> Result<(), WorldError> {
-    let refuse = |key, found, required| Err(WorldError::Truth { key, found, required });
-    for (key, value) in [
-        ("impulse_scale", truth.impulse_scale),
-        ("burn_time_scale", truth.burn_time_scale),
-        ("mass_scale", truth.mass_scale),
-        ("inertia_scale", truth.inertia_scale),
-        ("gimbal_gain", truth.gimbal_gain),
-    ] {
-        if !(0.1..=10.0).contains(&value) {
-            return refuse(key, value, "0.1 to 10");
-        }
-    }
-    for (key, value) in [
-        ("drag_scale", truth.drag_scale),
-        ("gust_scale", truth.gust_scale),
-        ("body_drag_scale", truth.body_drag_scale),
-        ("fin_drag_scale", truth.fin_drag_scale),
-        ("crossflow_scale", truth.crossflow_scale),
-    ] {
-        if !(0.0..=10.0).contains(&value) {
-            return refuse(key, value, "0 to 10");
-        }
-    }
-    if !(0.0..=60.0).contains(&truth.ignition_delay_s) {
-        return refuse("ignition_delay_s", truth.ignition_delay_s, "0 to 60");
-    }
-    if !(0.0..=60.0).contains(&truth.wind_m_s) {
-        return refuse("wind_m_s", truth.wind_m_s, "0 to 60");
-    }
-    if !truth.wind_towards_rad.is_finite() {
-        return refuse("wind_towards_rad", truth.wind_towards_rad, "a finite number");
-    }
-    for (key, value) in [("plume_body_loss", truth.plume_body_loss), ("plume_fin_loss", truth.plume_fin_loss)]
-    {
-        if !(-1.0..=1.0).contains(&value) {
-            return refuse(key, value, "-1 to 1");
-        }
-    }
-    for (key, value) in [("gimbal_slop_rad", truth.gimbal_slop_rad), ("fin_slop_rad", truth.fin_slop_rad)] {
-        if !(0.0..=0.5).contains(&value) {
-            return refuse(key, value, "0 to 0.5");
-        }
-    }
-    if !(0.0..=1.0).contains(&truth.wind_exponent) {
-        return refuse("wind_exponent", truth.wind_exponent, "0 to 1");
-    }
-    if !(-0.05..=0.05).contains(&truth.wind_veer_rad_m) {
-        return refuse("wind_veer_rad_m", truth.wind_veer_rad_m, "-0.05 to 0.05");
-    }
-    for value in truth.thrust_shape {
-        if value.is_nan() || value.abs() > SHAPE_MOST {
-            return refuse("thrust_shape", value, "-0.19 to 0.19");
-        }
-    }
-    for value in truth.fin_offset_rad {
-        if !(-0.5..=0.5).contains(&value) {
-            return refuse("fin_offset_rad", value, "-0.5 to 0.5");
-        }
-    }
-    for value in truth.principal_axis_rad {
-        if !(-0.5..=0.5).contains(&value) {
-            return refuse("principal_axis_rad", value, "-0.5 to 0.5");
-        }
-    }
-    let [burns_s, out_s] = truth.chuff_s;
-    for (key, value) in [("chuff_s", burns_s), ("chuff_s", out_s), ("thrust_rise_s", truth.thrust_rise_s)] {
-        if !(0.0..=5.0).contains(&value) {
-            return refuse(key, value, "0 to 5");
-        }
-    }
-    for value in truth.ground_rise {
-        if !(-0.3..=0.3).contains(&value) {
-            return refuse("ground_rise", value, "-0.3 to 0.3");
-        }
-    }
-    for value in truth.thrust_misalignment_rad {
-        if !(-0.5..=0.5).contains(&value) {
-            return refuse("thrust_misalignment_rad", value, "-0.5 to 0.5");
-        }
-    }
-    for (key, value) in truth
-        .thrust_offset_m
-        .iter()
-        .map(|value| ("thrust_offset_m", *value))
-        .chain(truth.cg_offset_m.iter().map(|value| ("cg_offset_m", *value)))
-    {
-        if !(-0.1..=0.1).contains(&value) {
-            return refuse(key, value, "-0.1 to 0.1");
+    for (key, found) in numbers(truth) {
+        let range = ACCEPTED.iter().find(|(_, keys)| keys.contains(&key.as_str()));
+        let [least, most] = range.map_or([f64::MIN, f64::MAX], |(range, _)| *range);
+        if !(least..=most).contains(&found) {
+            let required = range.map_or("a finite number".into(), |_| format!("{least} to {most}"));
+            return Err(WorldError::Truth { key, found, required });
         }
     }
     Ok(())
@@ -287,6 +222,7 @@ impl World {
         let servo = |here: &Servo, before: &ServoData, after: &Servo| here.changed(before, after);
         let gimbal_data = &self.airframe.gimbal.servo;
         let fin_data = &self.airframe.fins.servo;
+        let mass = if *airframe == self.airframe && *truth == self.truth { self.mass } else { other.mass };
         Ok(Self {
             motor: self.motor.changed(&other.motor, &self.truth),
             gimbal: core::array::from_fn(|axis| servo(&self.gimbal[axis], gimbal_data, &other.gimbal[axis])),
@@ -295,20 +231,16 @@ impl World {
                 self.gimbal_links[axis].changed(&other.gimbal_links[axis])
             }),
             fin_links: core::array::from_fn(|fin| self.fin_links[fin].changed(&other.fin_links[fin])),
-            wires: self.wires,
-            parachute: self.parachute.clone(),
+            gimbal_rates_rad_s: other.gimbal_rates_rad_s,
             wind: self.wind.changed(&other.wind),
-            air: self.air,
-            steps: self.steps,
-            mass: if *airframe == self.airframe && *truth == self.truth { self.mass } else { other.mass },
-            specific_force_m_s2: self.specific_force_m_s2,
-            angular_acceleration_rad_s2: self.angular_acceleration_rad_s2,
-            touchdown: self.touchdown,
-            rest: self.rest,
-            stack: self.stack.clone(),
-            separated_s: self.separated_s,
-            hanging: self.hanging,
-            ..other
+            mass,
+            airframe: other.airframe,
+            truth: other.truth,
+            shape: other.shape,
+            mass_model: other.mass_model,
+            certified: other.certified,
+            ground: other.ground,
+            ..self.clone()
         })
     }
 }

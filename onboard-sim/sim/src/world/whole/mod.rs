@@ -131,6 +131,8 @@ impl AirHere {
 struct Acting<'a> {
     shape: &'a Shape,
     configuration: Configuration,
+    /// The booster below it, and the body's area, m^2.
+    stack: Option<(&'a Stack, f64)>,
     wind_m_s: Vector3<f64>,
     air: AirHere,
     /// Thrust at the start, middle and end, N.
@@ -150,6 +152,9 @@ impl Loads for Acting<'_> {
             rate_rad_s: state.rate_rad_s,
         };
         let mut load = self.shape.load(&flow, &self.configuration);
+        if let Some((stack, area_m2)) = self.stack {
+            stack.add_air(&mut load, &flow, &self.configuration.cg_m, area_m2);
+        }
         let thrust_n = self.thrust_n[(2.0 * share) as usize];
         if thrust_n > 0.0 {
             load.add_at(&self.thrust_place_m, &(self.thrust_direction * thrust_n));
@@ -318,6 +323,7 @@ impl World {
                 plume: self.plume(thrust_n[1], self.air.density_kg_m3),
                 cg_m,
             },
+            stack: None,
             wind_m_s: self.wind.now_m_s(),
             air: self.air,
             thrust_n,

@@ -8,50 +8,15 @@ use flight::vehicle::airframe::MassProperties;
 use flight::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use flight::vehicle::launch::{Booster, Launch, NormalForce};
 use flight::vehicle::rigid::RigidState;
-use nalgebra::{Rotation3, Vector3};
+use nalgebra::Vector3;
 
-use super::{AirHere, World};
-use crate::world::aero::{Configuration, Flow, Load, Plume, Shape};
-use crate::world::body::{Inertia, Loads};
+use super::{Acting, World};
+use crate::world::aero::{Configuration, Flow, Load, Plume};
+use crate::world::body::{Inertia, Loads as _};
 use crate::world::ground::RestOutcome;
 use crate::world::motor::Motor;
 use crate::world::truth::{AscentTruth, Fault, Truth};
 use crate::world::{STEP_S, body};
-
-/// Everything that acts on a stack within a step.
-struct Acting<'a> {
-    shape: &'a Shape,
-    configuration: Configuration,
-    stack: &'a Stack,
-    area_m2: f64,
-    wind_m_s: Vector3<f64>,
-    air: AirHere,
-    /// Thrust at the start, middle and end, N.
-    thrust_n: [f64; 3],
-    thrust_place_m: Vector3<f64>,
-    /// Damping of the cross rates per newton of thrust, m s/rad.
-    jet_damping_m_s: f64,
-}
-
-impl Loads for Acting<'_> {
-    fn load(&self, state: &RigidState, world_from_body: &Rotation3<f64>, share: f64) -> Load {
-        let flow = Flow {
-            density_kg_m3: self.air.density_kg_m3(state.position_m.z),
-            velocity_m_s: world_from_body.inverse_transform_vector(&(state.velocity_m_s - self.wind_m_s)),
-            rate_rad_s: state.rate_rad_s,
-        };
-        let mut load = self.shape.load(&flow, &self.configuration);
-        self.stack.add_air(&mut load, &flow, &self.configuration.cg_m, self.area_m2);
-        let thrust_n = self.thrust_n[(2.0 * share) as usize];
-        if thrust_n > 0.0 {
-            load.add_at(&self.thrust_place_m, &Vector3::new(thrust_n, 0.0, 0.0));
-            let damping_n_m_s = thrust_n * self.jet_damping_m_s;
-            load.moment_n_m.y -= damping_n_m_s * state.rate_rad_s.y;
-            load.moment_n_m.z -= damping_n_m_s * state.rate_rad_s.z;
-        }
-        load
-    }
-}
 
 /// The state of another point of the body, at an offset in body axes, m.
 fn at_offset(state: &RigidState, offset_m: &Vector3<f64>) -> RigidState {
@@ -122,13 +87,14 @@ impl World {
                 plume: Plume { body: stack.drag_over(body.axial_drag_coefficient), fins: 1.0 },
                 cg_m,
             },
-            stack,
-            area_m2: body.reference_area_m2,
+            stack: Some((stack, body.reference_area_m2)),
             wind_m_s: self.wind.now_m_s(),
             air: self.air,
             thrust_n: [0.0, 0.5, 1.0].map(|share| stack.thrust_n(time_s + share * STEP_S)),
+            thrust_direction: Vector3::x(),
             thrust_place_m: stack.nozzle_m() - cg_m,
             jet_damping_m_s: stack.jet_damping_m_s(cg_m.x),
+            ground: None,
         }
     }
 

@@ -6,7 +6,7 @@ use crate::outside::{Outside, Unwatched};
 use crate::sortie::Sortie;
 use crate::world::RestOutcome;
 use flight::computer::{AbortEffect, FRAME_S};
-use flight::rules::outputs::{Line, Outputs};
+use flight::rules::outputs::{Outputs, PyroOutput};
 use flight::rules::phase::HoldCause;
 use flight::vehicle::mission::StartPoint;
 use flight::vehicles::mission::DEFAULT;
@@ -108,7 +108,7 @@ fn an_abort_or_a_disarm_before_the_lift_off_switches_the_igniter_off_and_says_th
     for asked in [Asked::Abort, Asked::Disarm] {
         let mut rocket = from(StartPoint::Pad, "none", &[]).run_to(Phase::Boost);
         rocket.advance();
-        assert!(rocket.computer().commands().outputs.is_on(Line::AscentIgniter));
+        assert!(rocket.computer().commands().outputs.is_on(PyroOutput::AscentIgniter));
         assert_eq!(rocket.computer().abort_effect(), AbortEffect::SafeOnPad);
         assert_eq!(rocket.request(asked).ending, Ending::Accepted);
         assert_eq!(rocket.computer().commands().outputs, Outputs::NONE);
@@ -192,7 +192,7 @@ fn after_an_abort_a_disarm_or_a_hold_at_any_moment_no_igniter_is_on_but_for_a_bu
             assert!(disarmed || !mode.phase.on_pad(), "{mode:?}");
             let aborted = asked_in(&flight, Asked::Abort, frames);
             assert!(aborted, "{mode:?}");
-            lit += u32::from(flight.computer().commands().outputs.is_on(Line::AscentIgniter));
+            lit += u32::from(flight.computer().commands().outputs.is_on(PyroOutput::AscentIgniter));
             flight.step();
         }
         let since_s = f64::from(u32::try_from(flight.frame()).unwrap()) * FRAME_S - release_s;

@@ -3,7 +3,7 @@
 use crate::dispersion::Dispersion;
 use flight::computer::AbortEffect;
 use flight::computer::pilot::FRAMES_PER_PLAN;
-use flight::rules::outputs::Line;
+use flight::rules::outputs::PyroOutput;
 use flight::rules::phase::MotorStatus;
 use protocol::dialect::TdChute;
 use protocol::log::record::Record;
@@ -56,7 +56,7 @@ fn the_charge_waits_for_the_fins_over_the_hatch_and_for_no_stuck_one() {
             [std::f64::consts::FRAC_PI_2; 4].map(f64::to_bits),
             "in the same frame"
         );
-        rocket.run_until(|rocket| rocket.computer().commands().outputs.is_on(Line::Parachute));
+        rocket.run_until(|rocket| rocket.computer().commands().outputs.is_on(PyroOutput::Parachute));
         let waited_s = rocket.time_s() - since_s;
         // 90 degrees at 300 degrees/s, and 20 ms.
         assert!(waited_s > 0.1 && waited_s < 0.33, "{stuck} {tells}: {waited_s}");

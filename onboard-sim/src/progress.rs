@@ -14,13 +14,13 @@ const BAR: &str = "{wide_bar} {pos} of {len} {msg}; {eta} to go";
 
 /// How far something is, from any thread.
 #[derive(Debug)]
-pub struct Stopwatch {
+pub struct Progress {
     bar: ProgressBar,
     /// When it began, and when it said something last.
     times: Mutex<(Instant, Instant)>,
 }
 
-impl Stopwatch {
+impl Progress {
     pub fn start() -> Self {
         let style = ProgressStyle::with_template(BAR).unwrap_or_else(|_wrong| ProgressStyle::default_bar());
         Self { bar: ProgressBar::no_length().with_style(style), times: Mutex::new((now(), now())) }
