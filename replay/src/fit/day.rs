@@ -291,8 +291,8 @@ fn fly(seed: u64, flights: usize, lots: &[Posterior], day: &Day) -> Result<Vec<T
         let draw = Draw { truth, ..drawn };
         Ok(Sortie::drawn_as(&day.mission, &day.dispersion, &draw)?.run().landing.stands)
     };
-    let stopwatch = Progress::start();
-    let landed = in_parallel(&motors, one, &|done| stopwatch.show(done, flights, "flights"));
+    let progress = Progress::start();
+    let landed = in_parallel(&motors, one, &|done| progress.show(done, flights, "flights"));
     let trials =
         motors.into_iter().zip(landed).map(|((_, drawn), landed)| Ok(Trial { drawn, landed: landed? }));
     trials.collect()
@@ -523,8 +523,7 @@ mod tests {
     use super::*;
 
     fn fit(source: &str, mission: &str, motor: &str, found: Vec<Parameter>) -> Fit {
-        let basis = Basis { impulse_n_s: 1.0, burn_time_s: 1.0, drag_area_m2: 1.0, loaded_kg: 1.0 };
-        Fit { found, ..Fit::of(source, mission, motor, basis) }
+        Fit { found, ..Fit::of(source, mission, motor, Basis::default()) }
     }
 
     #[test]

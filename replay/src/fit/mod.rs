@@ -669,70 +669,59 @@ fn curve_of(motor: &str) -> Result<ThrustCurve> {
 mod tests {
     use super::*;
 
+    const UNIT: Basis = Basis { impulse_n_s: 1.0, burn_time_s: 1.0, drag_area_m2: 1.0, loaded_kg: 1.0 };
+
+    fn fits<const N: usize>(name: &str, basis: Basis, values: [(f64, f64); N]) -> [Fit; N] {
+        values.map(|(value, sigma)| Fit {
+            found: vec![Parameter::normal(name, "", value, sigma)],
+            ..Fit::of("", "", "", basis)
+        })
+    }
+
     /// 2 % more than 100 N s for 3 kg are, over 110 N s for 3.3 kg, 1.02 100 / 110 1.1.
     #[test]
     fn val_hand_a_scale_over_other_data() {
         let basis = Basis { impulse_n_s: 100.0, burn_time_s: 5.0, drag_area_m2: 0.03, loaded_kg: 3.0 };
-        let fit = Fit {
-            found: vec![Parameter::normal("thrust_scale", "", 1.02, 0.01)],
-            ..Fit::of("", "", "", basis)
-        };
-        let other = Basis { impulse_n_s: 110.0, loaded_kg: 3.3, ..basis };
-        let found = &fit.over(&other).found[0];
-        assert!((found.value - 1.02).abs() < 1e-12, "the two cancel: {found:?}");
-        let heavier = Basis { loaded_kg: 3.3, ..basis };
-        assert!((fit.over(&heavier).found[0].sigma - 0.011).abs() < 1e-12);
-    }
-
-    fn fits(values: &[(f64, f64)]) -> Vec<Fit> {
-        let basis = Basis { impulse_n_s: 1.0, burn_time_s: 1.0, drag_area_m2: 1.0, loaded_kg: 1.0 };
-        let fit = |(value, sigma): &(f64, f64)| Fit {
-            found: vec![Parameter::normal("drag_scale", "", *value, *sigma)],
-            ..Fit::of("", "", "", basis)
-        };
-        values.iter().map(fit).collect()
+        let [fit] = fits("thrust_scale", basis, [(1.02, 0.01)]);
+        let over = |impulse_n_s| fit.over(&Basis { impulse_n_s, loaded_kg: 3.3, ..basis }).found.remove(0);
+        assert!((over(110.0).value - 1.02).abs() < 1e-12, "the two cancel");
+        assert!((over(100.0).sigma - 0.011).abs() < 1e-12);
     }
 
     /// 1, 2 and 3 with errors of 0.1: the weights are equal, the mean is 2, the variance between is 1 - 0.01, and the
     /// interval is 4.3027 (97.5 % of Student's t with 2 degrees) times the root of 1/3.
     #[test]
     fn val_hand_three_flights() {
-        let found = pooled(&fits(&[(1.0, 0.1), (2.0, 0.1), (3.0, 0.1)]));
-        assert_eq!(found.len(), 1);
-        let Pooled { mean, scatter, flights } = &found[0];
-        assert!((mean.value - 2.0).abs() < 1e-12 && *flights == 3);
-        assert!((scatter - libm::sqrt(0.99)).abs() < 1e-12, "{scatter}");
+        let found = pooled(&fits("drag_scale", UNIT, [(1.0, 0.1), (2.0, 0.1), (3.0, 0.1)]));
+        let [Pooled { mean, scatter, flights: 3 }] = &found[..] else { panic!("{found:?}") };
+        assert!((mean.value - 2.0).abs() < 1e-12 && (scatter - libm::sqrt(0.99)).abs() < 1e-12, "{found:?}");
         assert!((mean.high - 2.0 - 4.302_65 / libm::sqrt(3.0)).abs() < 1e-4, "{mean:?}");
     }
 
-    #[test]
-    fn one_flight_is_not_pooled_and_equal_flights_do_not_scatter() {
-        assert!(pooled(&fits(&[(1.0, 0.1)])).is_empty());
-        let found = pooled(&fits(&[(1.0, 0.1), (1.0, 0.1)]));
-        assert!(
-            found[0].scatter.abs() < 1e-12 && (found[0].mean.sigma - 0.1 / libm::sqrt(2.0)).abs() < 1e-12
-        );
-    }
-
-    /// Two equal values with a noise of 0.1 and a systematic part of 0.3: the noise of the mean is 0.1 over the root of 2, and the
-    /// systematic part stays, however many flights there are.
+    /// Two equal values do not scatter. With a noise of 0.1 and a systematic part of 0.3: the noise of the mean is 0.1 over the
+    /// root of 2, and the systematic part stays, however many flights there are. One flight is not pooled.
     #[test]
     fn val_hand_what_all_flights_have_in_common_does_not_average_out() {
-        let mut fits = fits(&[(1.0, 0.1), (1.0, 0.1)]);
-        for parameter in fits.iter_mut().flat_map(|fit| &mut fit.found) {
-            parameter.sigma = libm::hypot(0.1, 0.3);
-            parameter.systematic = Some(0.3);
+        for common in [0.0, 0.3] {
+            let mut fits = fits("drag_scale", UNIT, [(1.0, libm::hypot(0.1, common)); 2]);
+            for parameter in fits.iter_mut().flat_map(|fit| &mut fit.found) {
+                parameter.systematic = Some(common);
+            }
+            let found = pooled(&fits);
+            let expected = libm::hypot(0.1 / libm::sqrt(2.0), common);
+            assert!(
+                (found[0].mean.sigma - expected).abs() < 1e-12 && found[0].scatter.abs() < 1e-12,
+                "{found:?}"
+            );
+            assert_eq!(found[0].mean.systematic, Some(common));
+            assert!(pooled(&fits[..1]).is_empty());
         }
-        let found = pooled(&fits);
-        assert!((found[0].mean.sigma - libm::hypot(0.1 / libm::sqrt(2.0), 0.3)).abs() < 1e-12, "{found:?}");
-        assert!(found[0].scatter.abs() < 1e-12 && found[0].mean.systematic == Some(0.3), "{found:?}");
     }
 
     #[test]
     fn a_number_has_two_digits_of_its_deviation() {
-        assert_eq!(digits(0.998_765, 0.001_8), "0.9988");
-        assert_eq!(digits(254.71, 9.8), "254.7");
-        assert_eq!(digits(1234.4, 120.0), "1234");
-        assert_eq!(digits(1.0, 0.0), "1.0000");
+        let written = [(0.998_765, 0.001_8), (254.71, 9.8), (1234.4, 120.0), (1.0, 0.0)]
+            .map(|(value, sigma)| digits(value, sigma));
+        assert_eq!(written, ["0.9988", "254.7", "1234", "1.0000"]);
     }
 }
