@@ -1,6 +1,6 @@
 //! Holds a whole flight in memory, for questions that need more than one pass.
 //!
-//! Plans and raw frames are left out, so a flight of some minutes takes a few megabytes. A log that is longer than any
+//! Plans and raw frames are left out, so a flight of some minutes takes some tens of megabytes. A log that is longer than any
 //! real flight is refused.
 
 use std::path::Path;

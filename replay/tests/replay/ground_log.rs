@@ -85,7 +85,7 @@ fn the_report_of_a_ground_log_marks_the_touchdown_on_its_own_clock() {
     let own = info(&WITH_FRAMES.log).unwrap();
     let own_s = own.clocks.convert(own.verdict.unwrap().contact(), Clock::Boot).unwrap().time_s;
     assert!((contact_s - own_s - EARLIER_NS as f64 / 1e9).abs() < 0.2, "{contact_s} {own_s}");
-    let page = replay::report::report(&GROUND).unwrap().html;
+    let page = replay::report::report(&GROUND, None).unwrap().html;
     assert!(page.contains("STANDS UNDAMAGED") && page.contains("\ntouchdown\n"));
 }
 

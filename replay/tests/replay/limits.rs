@@ -324,7 +324,7 @@ proptest! {
                 prop_assert!(report.frames > 0);
             }
         }
-        prop_assert!(report(&path).unwrap().html.ends_with("</html>\n"));
+        prop_assert!(report(&path, None).unwrap().html.ends_with("</html>\n"));
         let flown = Flown::open(&path).unwrap();
         // A flight is equal to itself, in all samples that are in order and before a cut.
         let compared = compare(&flown, &flown.clone(), &Tolerances::default()).unwrap();
