@@ -6,10 +6,10 @@
 
 use std::collections::BTreeMap;
 use std::io::Write as _;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::sync_channel;
 
 use anyhow::Context as _;
+use onboard_sim::run::in_parallel;
+use onboard_sim::statistics::{Share, quantile, sorted};
 use replay::fit::calibration::{Entry, Table};
 use replay::fit::{Fit, Parameter, Trace, Z_95, fit, uncalibrated};
 use sim::recipe::Recipe;
@@ -50,43 +50,44 @@ fn truth(recipe: &Recipe, flight: &Sortie, body_share: f64) -> anyhow::Result<BT
     // The torque of an angle is that of thrust and arm, over the inertia.
     let turns = (arm_m + x_m) / arm_m / truth.inertia_scale;
     let (sin, cos) = libm::sincos(truth.wind_towards_rad);
-    let mut all = BTreeMap::new();
-    let mut put = |name: &str, value: f64| {
-        all.insert(name.to_owned(), value);
-    };
-    put("thrust_scale", truth.impulse_scale / truth.mass_scale);
-    put("burn_time_scale", truth.burn_time_scale);
-    // By impulse: a thrust that rises slowly makes the whole burn late by half of its rise.
-    put("ignition_delay", truth.ignition_delay_s + 0.5 * truth.thrust_rise_s + truth.chuff_s[1]);
     let [body, fins] =
         [truth.body_drag_scale, truth.fin_drag_scale].map(|own| truth.drag_scale * own / truth.mass_scale);
-    put("drag_scale", body_share * body + (1.0 - body_share) * fins);
-    put("body_drag_scale", body);
-    put("fin_drag_scale", fins);
-    put("exhaust_body_loss", truth.plume_body_loss);
-    put("exhaust_fin_loss", truth.plume_fin_loss);
-    for (k, amplitude) in truth.thrust_shape.iter().enumerate() {
-        put(&format!("thrust_shape_{}", k + 1), *amplitude);
-    }
-    put("gimbal_delay", airframe.gimbal.servo.delay_s);
-    put("gimbal_rate", airframe.gimbal.servo.rate_deg_s);
-    put("gimbal_gain", truth.gimbal_gain * turns);
-    put("gimbal_pitch_offset", (pitch_rad * turns + (z_m - oz_m) / arm_m / truth.inertia_scale).to_degrees());
-    put("gimbal_yaw_offset", (yaw_rad * turns - (y_m - oy_m) / arm_m / truth.inertia_scale).to_degrees());
-    put("gimbal_play", airframe.gimbal.servo.slop_deg + truth.gimbal_slop_rad.to_degrees());
-    put("wind_x", truth.wind_m_s * cos);
-    put("wind_y", truth.wind_m_s * sin);
-    put("gyro_noise", sensors.imu.gyro_noise_deg_s_sqrt_hz);
-    put("accelerometer_noise", sensors.imu.accelerometer_noise_mg_sqrt_hz);
-    put("barometer_noise", sensors.barometer.noise_m);
-    put("gnss_velocity_noise", sensors.gnss.velocity_m_s);
-    put("gnss_horizontal_noise", sensors.gnss.horizontal_white_m);
-    put("gnss_vertical_noise", sensors.gnss.vertical_white_m);
-    put("lidar_noise", sensors.lidar.noise_m);
+    let servo = &airframe.gimbal.servo;
+    let rows = [
+        ("thrust_scale", truth.impulse_scale / truth.mass_scale),
+        ("burn_time_scale", truth.burn_time_scale),
+        // By impulse: a thrust that rises slowly makes the whole burn late by half of its rise.
+        ("ignition_delay", truth.ignition_delay_s + 0.5 * truth.thrust_rise_s + truth.chuff_s[1]),
+        ("drag_scale", body_share * body + (1.0 - body_share) * fins),
+        ("body_drag_scale", body),
+        ("fin_drag_scale", fins),
+        ("exhaust_body_loss", truth.plume_body_loss),
+        ("exhaust_fin_loss", truth.plume_fin_loss),
+        ("gimbal_delay", servo.delay_s),
+        ("gimbal_rate", servo.rate_deg_s),
+        ("gimbal_gain", truth.gimbal_gain * turns),
+        (
+            "gimbal_pitch_offset",
+            (pitch_rad * turns + (z_m - oz_m) / arm_m / truth.inertia_scale).to_degrees(),
+        ),
+        ("gimbal_yaw_offset", (yaw_rad * turns - (y_m - oy_m) / arm_m / truth.inertia_scale).to_degrees()),
+        ("gimbal_play", servo.slop_deg + truth.gimbal_slop_rad.to_degrees()),
+        ("wind_x", truth.wind_m_s * cos),
+        ("wind_y", truth.wind_m_s * sin),
+        ("gyro_noise", sensors.imu.gyro_noise_deg_s_sqrt_hz),
+        ("accelerometer_noise", sensors.imu.accelerometer_noise_mg_sqrt_hz),
+        ("barometer_noise", sensors.barometer.noise_m),
+        ("gnss_velocity_noise", sensors.gnss.velocity_m_s),
+        ("gnss_horizontal_noise", sensors.gnss.horizontal_white_m),
+        ("gnss_vertical_noise", sensors.gnss.vertical_white_m),
+        ("lidar_noise", sensors.lidar.noise_m),
+    ];
+    let mut all: BTreeMap<String, f64> = rows.map(|(name, value)| (name.to_owned(), value)).into();
+    all.extend((1..).zip(truth.thrust_shape).map(|(k, value)| (format!("thrust_shape_{k}"), value)));
     for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
-        put(&format!("gyro_bias_{name}"), errors.gyro_bias_rad_s[axis].to_degrees());
+        all.insert(format!("gyro_bias_{name}"), errors.gyro_bias_rad_s[axis].to_degrees());
         let milli_g = errors.accelerometer_bias_m_s2[axis] / 9.806_65e-3;
-        put(&format!("accelerometer_bias_{name}"), milli_g);
+        all.insert(format!("accelerometer_bias_{name}"), milli_g);
     }
     Ok(all)
 }
@@ -103,64 +104,41 @@ struct Found {
 type Tallies = BTreeMap<String, (Vec<Found>, usize)>;
 
 fn tallied(recipe: &Recipe, flights: u64, fitted: fn(&Trace) -> Fit) -> anyhow::Result<Tallies> {
-    let next = AtomicU64::new(0);
+    let numbers: Vec<u64> = (0..flights).collect();
+    let one = |number: &u64| -> anyhow::Result<(Fit, BTreeMap<String, f64>)> {
+        let (trace, flight) = flown(recipe, *number)?;
+        let fit = fitted(&trace);
+        let truth = truth(recipe, &flight, fit.body_share.unwrap_or(0.5))?;
+        Ok((fit, truth))
+    };
     let mut tallies = Tallies::new();
-    std::thread::scope(|scope| -> anyhow::Result<()> {
-        let (results, inbox) = sync_channel::<anyhow::Result<(Fit, BTreeMap<String, f64>)>>(8);
-        for _ in 0..2 {
-            let (results, next) = (results.clone(), &next);
-            scope.spawn(move || {
-                loop {
-                    let number = next.fetch_add(1, Ordering::Relaxed);
-                    if number >= flights {
-                        return;
-                    }
-                    let one = flown(recipe, number).and_then(|(trace, flight)| {
-                        let fit = fitted(&trace);
-                        let truth = truth(recipe, &flight, fit.body_share.unwrap_or(0.5))?;
-                        Ok((fit, truth))
-                    });
-                    if results.send(one).is_err() {
-                        return;
-                    }
-                }
-            });
-        }
-        drop(results);
-        while let Ok(one) = inbox.recv() {
-            let (fit, truth) = one?;
-            for (name, true_value) in truth {
-                let (found, lacks) = tallies.entry(name.clone()).or_default();
-                match fit.get(&name) {
-                    None => *lacks += 1,
-                    Some(Parameter { value, sigma, low, high, .. }) => found.push(Found {
-                        error: value - true_value,
-                        sigma: *sigma,
-                        held: (*low..=*high).contains(&true_value),
-                    }),
-                }
+    for one in in_parallel(&numbers, one, &|_| {}) {
+        let (fit, truth) = one?;
+        for (name, true_value) in truth {
+            let (found, lacks) = tallies.entry(name.clone()).or_default();
+            match fit.get(&name) {
+                None => *lacks += 1,
+                Some(Parameter { value, sigma, low, high, .. }) => found.push(Found {
+                    error: value - true_value,
+                    sigma: *sigma,
+                    held: (*low..=*high).contains(&true_value),
+                }),
             }
         }
-        Ok(())
-    })?;
+    }
     Ok(tallies)
 }
 
 fn main() -> anyhow::Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let at = |place: usize, default: &str| arguments.get(place).map_or(default, String::as_str).to_owned();
+    let number = |place, default| at(place, default).parse::<u64>().context("FLIGHTS SEED");
     if at(0, "") == "--table" {
-        let file = arguments.get(1).context("FILE")?;
-        return write_table(
-            file,
-            at(2, "200").parse().context("FLIGHTS")?,
-            at(3, "9001").parse().context("SEED")?,
-        );
+        return write_table(&at(1, "calibration.toml"), number(2, "200")?, number(3, "9001")?);
     }
     let recipe = Recipe::built_in(&at(0, "mk2"), &at(1, "field"))?;
-    let flights: u64 = at(2, "100").parse().context("FLIGHTS")?;
-    let recipe = Recipe { seed: at(3, "1").parse().context("SEED")?, ..recipe };
-    print_coverage(&tallied(&recipe, flights, fit)?)
+    let recipe = Recipe { seed: number(3, "1")?, ..recipe };
+    print_coverage(&tallied(&recipe, number(2, "100")?, fit)?)
 }
 
 fn print_coverage(tallies: &Tallies) -> anyhow::Result<()> {
@@ -176,31 +154,18 @@ fn print_coverage(tallies: &Tallies) -> anyhow::Result<()> {
             writeln!(stdout, "{name:<26} {count:>5} {lacks:>71}")?;
             continue;
         }
-        let n = count as f64;
-        let held = found.iter().filter(|one| one.held).count();
-        let (low, high) = wilson(held, count);
-        let mean = found.iter().map(|one| one.error).sum::<f64>() / n;
-        let rms = (found.iter().map(|one| one.error * one.error).sum::<f64>() / n).sqrt();
-        let mut sigmas: Vec<f64> = found.iter().map(|one| one.sigma).collect();
-        sigmas.sort_by(f64::total_cmp);
+        let mean = |of: fn(&Found) -> f64| found.iter().map(of).sum::<f64>() / count as f64;
+        let (error, rms) = (mean(|one| one.error), mean(|one| one.error * one.error).sqrt());
+        let held = found.iter().filter(|one| one.held).count() as u64;
+        let Share { share, low, high, .. } = Share::new(held, count as u64);
+        let [share, low, high] = [share, low, high].map(|share| 100.0 * share);
+        let sigma = quantile(&sorted(found.iter().map(|one| one.sigma)), 0.5).unwrap_or(f64::NAN);
         writeln!(
             stdout,
-            "{name:<26} {count:>5} {:>7.1} {:>6.1} to {:>5.1} {mean:>10.5} {rms:>10.5} {:>10.5} {lacks:>6}",
-            100.0 * held as f64 / n,
-            100.0 * low,
-            100.0 * high,
-            sigmas[count / 2],
+            "{name:<26} {count:>5} {share:>7.1} {low:>6.1} to {high:>5.1} {error:>10.5} {rms:>10.5} {sigma:>10.5} {lacks:>6}"
         )?;
     }
     Ok(())
-}
-
-/// E. B. Wilson's score interval.
-fn wilson(count: usize, of: usize) -> (f64, f64) {
-    let (n, share, z2) = (of as f64, count as f64 / of as f64, 1.96 * 1.96);
-    let centre = share + z2 / (2.0 * n);
-    let half = 1.96 * (share * (1.0 - share) / n + z2 / (4.0 * n * n)).sqrt();
-    ((centre - half) / (1.0 + z2 / n), (centre + half) / (1.0 + z2 / n))
 }
 
 /// What share of the intervals must hold the truth, in each set: 95 % where the world is not the model's, and nearly as often

@@ -60,7 +60,7 @@ pub mod vehicle {
     //! * [`atmosphere`] and [`fins`] give the air and its forces on the fins.
     //! * [`rigid`] is the state in space.
     //! * [`site`] is the place of the pad on the Earth.
-    //! * [`launch`] is the ascent: the rail, and the booster stage; [`drop`] the release from a drone.
+    //! * [`launch`] is the ascent: the rail, and the booster stage; [`drop`](mod@drop) the release from a drone.
 
     pub mod airframe;
     pub mod atmosphere;

@@ -159,6 +159,7 @@ impl Survey {
         });
         let at = |entity: &str| format!("{below}/world/{entity}");
         recording.log_static(at("rocket/body"), &shape.body())?;
+        recording.log_static(at("rocket/nose"), &shape.nose())?;
         recording.log_static(at("rocket/legs"), &shape.legs())?;
         recording.log_static(at("rocket/bell"), &shape.bell())?;
         // In a view of the whole flight the rocket is small.

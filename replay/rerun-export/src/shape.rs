@@ -1,38 +1,33 @@
-//! The shape of the rocket: bodies of revolution about its x axis, which points to the nose.
+//! The shape of the rocket, seen from its centre of gravity: cylinders about its x axis, which points to the nose.
 
 use flight::vehicle::airframe::{Airframe, MassModel};
-use rerun::archetypes::{LineStrips3D, Mesh3D};
-use rerun::components::Color;
-use rerun::datatypes::{Rgba32, UVec3D, Vec3D};
-
-/// Number of edges of a circle.
-const SEGMENTS: u32 = 32;
-
-/// Number of rings along the nose.
-const NOSE_RINGS: u8 = 8;
+use rerun::archetypes::{Cylinders3D, Ellipsoids3D, LineStrips3D};
+use rerun::components::{FillMode, RotationAxisAngle};
+use rerun::datatypes::{Angle, Rgba32};
 
 const WHITE: Rgba32 = Rgba32::from_rgb(236, 238, 240);
 const BAND: Rgba32 = Rgba32::from_rgb(226, 88, 34);
 const METAL: Rgba32 = Rgba32::from_rgb(120, 126, 134);
 
-/// The measures of a rocket, seen from its centre of gravity.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[expect(clippy::struct_field_names, reason = "each name ends in its unit")]
-pub(crate) struct RocketShape {
-    /// Front end of the body, m.
-    pub(crate) nose_x_m: f32,
-    /// Rear end of the body, m.
-    pub(crate) tail_x_m: f32,
-    /// Where the nozzle turns, m.
-    pub(crate) pivot_x_m: f32,
-    /// Where the feet are, m.
-    pub(crate) foot_x_m: f32,
-    /// Radius of the body, m.
-    pub(crate) radius_m: f32,
-}
+/// Where the nose begins, over the length of the body.
+const NOSE_BASE: f32 = 0.78;
 
 /// Length of the nozzle's bell, in radii of the body.
 const BELL_RADII: f32 = 1.2;
+
+/// The measures of a rocket, m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(clippy::struct_field_names, reason = "each name ends in its unit")]
+pub(crate) struct RocketShape {
+    /// Front end of the body.
+    nose_x_m: f32,
+    /// Rear end of the body, where the nozzle turns.
+    tail_x_m: f32,
+    /// Where the feet are.
+    foot_x_m: f32,
+    /// Of the body.
+    radius_m: f32,
+}
 
 impl RocketShape {
     /// An airframe with its landing motor burnt out, as it touches down.
@@ -42,21 +37,14 @@ impl RocketShape {
         Self {
             nose_x_m: (airframe.body.length_m - cg_station_m) as f32,
             tail_x_m: -cg_station_m as f32,
-            pivot_x_m: -cg_station_m as f32,
             foot_x_m: -airframe.above_feet_m(cg_station_m) as f32,
             radius_m: (airframe.body.diameter_m / 2.0) as f32,
         }
     }
 
-    /// For logs without this data: one metre long.
+    /// For logs without this data: one metre long, its feet clear of the bell.
     pub(crate) fn unknown() -> Self {
-        Self {
-            nose_x_m: 0.5,
-            tail_x_m: -0.5,
-            pivot_x_m: -0.5,
-            foot_x_m: below_the_bell_m(-0.5, -0.5, 0.05),
-            radius_m: 0.05,
-        }
+        Self { nose_x_m: 0.5, tail_x_m: -0.5, foot_x_m: -0.584, radius_m: 0.05 }
     }
 
     /// Length of the body, m.
@@ -64,43 +52,27 @@ impl RocketShape {
         self.nose_x_m - self.tail_x_m
     }
 
-    /// Length of the nozzle's bell, m.
-    pub(crate) fn bell_m(&self) -> f32 {
-        BELL_RADII * self.radius_m
-    }
-
-    pub(crate) fn body(&self) -> Mesh3D {
-        let nose_base_x_m = self.nose_x_m - 0.22 * self.length_m();
-        let cylinder = [
-            (self.tail_x_m, 0.0, METAL),
-            (self.tail_x_m, 1.0, WHITE),
-            (self.tail_x_m + 0.55 * self.length_m(), 1.0, WHITE),
-            (self.tail_x_m + 0.55 * self.length_m(), 1.0, BAND),
-            (self.tail_x_m + 0.62 * self.length_m(), 1.0, BAND),
-            (self.tail_x_m + 0.62 * self.length_m(), 1.0, WHITE),
-            (nose_base_x_m, 1.0, WHITE),
-        ];
-        let nose = (1..=NOSE_RINGS).map(|ring| {
-            let along = f32::from(ring) / f32::from(NOSE_RINGS);
-            (nose_base_x_m + along * (self.nose_x_m - nose_base_x_m), (1.0 - along * along).sqrt(), BAND)
-        });
-        let rings: Vec<Ring> = cylinder
-            .into_iter()
-            .chain([(nose_base_x_m, 1.0, BAND)])
-            .chain(nose)
-            .map(|(x_m, part, color)| Ring { x_m, radius_m: part * self.radius_m, color })
-            .collect();
-        body_of_revolution(&rings)
-    }
-
-    /// The bell of the nozzle, seen from its pivot.
-    pub(crate) fn bell(&self) -> Mesh3D {
-        let ring = |along: f32, part: f32| Ring {
-            x_m: -along * self.bell_m(),
-            radius_m: part * self.radius_m,
-            color: METAL,
+    pub(crate) fn body(&self) -> Cylinders3D {
+        let part = |from: f32, to: f32, color| {
+            ([from, to].map(|share| self.tail_x_m + share * self.length_m()), self.radius_m, color)
         };
-        body_of_revolution(&[ring(1.0, 0.0), ring(1.0, 0.75), ring(0.5, 0.6), ring(0.0, 0.3), ring(0.0, 0.0)])
+        cylinders([part(0.0, 0.55, WHITE), part(0.55, 0.62, BAND), part(0.62, NOSE_BASE, WHITE)])
+    }
+
+    pub(crate) fn nose(&self) -> Ellipsoids3D {
+        let length_m = (1.0 - NOSE_BASE) * self.length_m();
+        let (at, half) = ([self.nose_x_m - length_m, 0.0, 0.0], [length_m, self.radius_m, self.radius_m]);
+        let nose = Ellipsoids3D::from_centers_and_half_sizes([at], [half]);
+        nose.with_colors([BAND]).with_fill_mode(FillMode::Solid)
+    }
+
+    /// The bell of the nozzle, which widens to the rear.
+    pub(crate) fn bell(&self) -> Cylinders3D {
+        let bell_m = BELL_RADII * self.radius_m;
+        cylinders([(0.0, 0.45), (0.5, 0.7)].map(|(from, radii): (f32, f32)| {
+            let rear_m = self.tail_x_m - (from + 0.5) * bell_m;
+            ([rear_m, rear_m + 0.5 * bell_m], radii * self.radius_m, METAL)
+        }))
     }
 
     /// Four legs from the body to the ground.
@@ -118,48 +90,18 @@ impl RocketShape {
     }
 }
 
-/// Position of the feet of a rocket without data about its legs, m: clear of the bell.
-fn below_the_bell_m(tail_x_m: f32, pivot_x_m: f32, radius_m: f32) -> f32 {
-    tail_x_m.min(pivot_x_m) - 1.4 * BELL_RADII * radius_m
-}
-
-/// A ring about the x axis.
-#[derive(Debug, Clone, Copy)]
-struct Ring {
-    x_m: f32,
-    radius_m: f32,
-    color: Rgba32,
-}
-
-/// The surface between neighbouring rings, from the tail forward; each pair has its own normals, so that edges stay
-/// sharp.
-fn body_of_revolution(rings: &[Ring]) -> Mesh3D {
-    let (mut positions, mut normals, mut colors) = (Vec::new(), Vec::<Vec3D>::new(), Vec::<Color>::new());
-    let mut triangles = Vec::new();
-    for (start, pair) in (0..).step_by(2 * SEGMENTS as usize).zip(rings.windows(2)) {
-        let [rear, front] = [pair[0], pair[1]];
-        let (along_m, outward_m) = (front.x_m - rear.x_m, front.radius_m - rear.radius_m);
-        let slant_m = along_m.hypot(outward_m);
-        let (normal_x, normal_out) =
-            if slant_m > 0.0 { (-outward_m / slant_m, along_m / slant_m) } else { (-1.0, 0.0) };
-        for segment in 0..SEGMENTS {
-            let angle_rad = std::f64::consts::TAU * f64::from(segment) / f64::from(SEGMENTS);
-            let (sin, cos) = libm::sincos(angle_rad);
-            let (y, z) = (cos as f32, sin as f32);
-            for ring in [rear, front] {
-                positions.push([ring.x_m, ring.radius_m * y, ring.radius_m * z]);
-                normals.push([normal_x, normal_out * y, normal_out * z].into());
-                colors.push(ring.color.into());
-            }
-            let (here, next) = (start + 2 * segment, start + 2 * ((segment + 1) % SEGMENTS));
-            triangles.push(UVec3D::new(here, here + 1, next));
-            triangles.push(UVec3D::new(next, here + 1, next + 1));
-        }
-    }
-    Mesh3D::new(positions)
-        .with_triangle_indices(triangles)
-        .with_vertex_normals(normals)
-        .with_vertex_colors(colors)
+/// Solid cylinders along x: where each begins and ends, its radius, m, and its colour.
+fn cylinders<const N: usize>(parts: [([f32; 2], f32, Rgba32); N]) -> Cylinders3D {
+    // Without a rotation they stand along z.
+    let along_x = RotationAxisAngle::new([0.0, 1.0, 0.0], Angle::from_degrees(90.0));
+    Cylinders3D::from_lengths_and_radii(
+        parts.map(|([rear, front], ..)| front - rear),
+        parts.map(|part| part.1),
+    )
+    .with_centers(parts.map(|([rear, front], ..)| [0.5 * (rear + front), 0.0, 0.0]))
+    .with_rotation_axis_angles([along_x; N])
+    .with_colors(parts.map(|part| part.2))
+    .with_fill_mode(FillMode::Solid)
 }
 
 #[cfg(test)]
@@ -167,29 +109,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_feet_are_below_the_nozzle() {
-        let shape = RocketShape::unknown();
-        assert!((shape.length_m() - 1.0).abs() < 1e-6);
-        assert!(-shape.foot_x_m > 0.5 + shape.bell_m());
-    }
-
-    #[test]
-    fn an_airframe_stands_on_its_own_feet() {
+    fn an_airframe_stands_on_its_own_feet_and_an_unknown_one_clear_of_its_bell() {
         let mission = flight::vehicles::mission::builtin("mk2").unwrap().unwrap();
-        let propellant_kg = mission.motor_curve.propellant_mass_kg();
-        let shape = RocketShape::of_airframe(&mission.airframe, propellant_kg);
         let airframe = &mission.airframe;
+        let shape = RocketShape::of_airframe(airframe, mission.motor_curve.propellant_mass_kg());
         assert!((f64::from(shape.length_m()) - airframe.body.length_m).abs() < 1e-6);
         assert!((f64::from(shape.foot_x_m - shape.tail_x_m) - airframe.legs.foot_station_m).abs() < 1e-6);
-    }
-
-    #[test]
-    fn its_meshes_are_sound() {
-        for shape in [RocketShape::unknown()] {
-            for mesh in [shape.body(), shape.bell()] {
-                mesh.sanity_check().unwrap();
-                assert!(mesh.num_triangles() > 100);
-            }
-        }
+        let unknown = RocketShape::unknown();
+        assert!((unknown.length_m() - 1.0).abs() < 1e-6);
+        assert!(unknown.foot_x_m < unknown.tail_x_m - BELL_RADII * unknown.radius_m);
     }
 }

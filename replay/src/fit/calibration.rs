@@ -101,13 +101,9 @@ mod tests {
     use crate::fit::{Basis, Parameter};
 
     fn fit(mission: &str) -> Fit {
-        let basis = Basis { impulse_n_s: 1.0, burn_time_s: 1.0, drag_area_m2: 1.0, loaded_kg: 1.0 };
-        Fit {
-            found: ["thrust_scale", "lidar_noise", "updraught_rms"]
-                .map(|name| Parameter::normal(name, "", 1.0, 0.03))
-                .to_vec(),
-            ..Fit::of("", mission, "", basis)
-        }
+        let names = ["thrust_scale", "lidar_noise", "updraught_rms"];
+        let found = names.map(|name| Parameter::normal(name, "", 1.0, 0.03)).to_vec();
+        Fit { found, ..Fit::of("", mission, "", Basis::default()) }
     }
 
     /// 0.03 of noise and 0.04 that the models lack are 0.05.
@@ -134,9 +130,7 @@ mod tests {
 
     #[test]
     fn the_table_that_is_built_in_can_be_read() {
-        let table = Table::built_in().unwrap();
-        for vehicle in ["mk2", "mk3"] {
-            assert!(table.vehicles[vehicle].contains_key("thrust_scale"), "{vehicle}");
-        }
+        let Table { vehicles, .. } = Table::built_in().unwrap();
+        assert!(["mk2", "mk3"].iter().all(|vehicle| vehicles[*vehicle].contains_key("thrust_scale")));
     }
 }

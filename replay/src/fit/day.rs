@@ -8,7 +8,6 @@
 //! scatter beside its thrust.
 
 use std::fmt::Write as _;
-use std::io::{self, Write};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
@@ -27,8 +26,8 @@ use statrs::distribution::{Beta, Binomial, ContinuousCDF as _, DiscreteCDF as _}
 
 use super::lot::{Prediction, Trial, burnt, draw_next, predict};
 use super::{Basis, Fit, Parameter, Pooled, Z_95, pooled};
-use crate::cli::{in_pool, refuse_existing, say, text_of, write_new};
-use crate::print::{counted, shown};
+use crate::cli::{Answer, in_pool, refuse_existing, say, text_of, write_new};
+use crate::print::counted;
 use crate::settings::{Setting, mission_toml_with, mission_with};
 
 /// A lot's property before the next burn.
@@ -292,8 +291,8 @@ fn fly(seed: u64, flights: usize, lots: &[Posterior], day: &Day) -> Result<Vec<T
         let draw = Draw { truth, ..drawn };
         Ok(Sortie::drawn_as(&day.mission, &day.dispersion, &draw)?.run().landing.stands)
     };
-    let stopwatch = Progress::start();
-    let landed = in_parallel(&motors, one, &|done| stopwatch.show(done, flights, "flights"));
+    let progress = Progress::start();
+    let landed = in_parallel(&motors, one, &|done| progress.show(done, flights, "flights"));
     let trials =
         motors.into_iter().zip(landed).map(|((_, drawn), landed)| Ok(Trial { drawn, landed: landed? }));
     trials.collect()
@@ -393,58 +392,57 @@ fn lot_toml(lot: &toml::Table) -> String {
     format!("[lot]\n{}", lines.collect::<String>())
 }
 
-/// Writes what was learnt as text.
-///
-/// # Errors
-/// The output failed.
-pub fn print_learn(learnt: &Learnt, output: &mut impl Write) -> io::Result<()> {
-    let [mission, motor, set] = [&learnt.mission, &learnt.motor, &learnt.set].map(|text| shown(text));
-    let fits = counted(learnt.sources.len() as u64, "fit");
-    writeln!(output, "next day: {mission} with {motor} after {fits}, prior {set}")?;
-    writeln!(
-        output,
-        "lot                  burns      mean   95 % interval       next burn +-   before any burn +-"
-    )?;
-    for LotReport { name, unit, burns, mean, low, high, next_sigma, prior_sigma, .. } in &learnt.lots {
-        let interval = format!("{low:.4} to {high:.4}");
-        let text = format!(
-            "  {name:<18} {burns:>5}  {mean:>8.4}   {interval:<18}  {next_sigma:>12.4}   {prior_sigma:>17.4} {unit}"
-        );
-        writeln!(output, "{}", text.trim_end())?;
-    }
-    for Pooled { mean: Parameter { name, unit, value, low, high, .. }, .. } in &learnt.airframe {
-        let text = format!("airframe  {:<16} {value:.4}, {low:.4} to {high:.4} {unit}", shown(name));
-        writeln!(output, "{}", text.trim_end())?;
-    }
-    let [low, high] = learnt.wind_m_s;
-    writeln!(output, "{}site      wind {low:.1} to {high:.1} m/s", learnt.lot_toml)?;
-    let Some(found) = &learnt.prediction else { return Ok(()) };
-    let percent = |shares: [f64; 3]| shares.map(|share| 100.0 * share);
-    let [rate, low, high] = percent([found.rate, found.low, found.high]);
-    let flights = counted(learnt.flights as u64, "simulated flight");
-    writeln!(
-        output,
-        "rate      {rate:.1} %, 95 % interval {low:.1} to {high:.1} %, from {flights} in {set}"
-    )?;
-    if let Some(Pulled { worth, rate, low, high }) = learnt.pulled {
-        let Outcomes { landed, of } = learnt.flown;
-        let [rate, low, high] = percent([rate, low, high]);
-        writeln!(
-            output,
-            "flown     {landed} of {of} landed: with the simulation worth {worth:.0} flights {rate:.1} %, 95 % interval {low:.1} to {high:.1} %"
-        )?;
-    }
-    let [risk, limit, taken] = percent([found.risk, learnt.limit, learnt.risk]);
-    writeln!(output, "risk      {risk:.1} % that the rate is below {limit:.0} %; {taken:.0} % is taken")?;
-    let answer = match (learnt.go == Some(true), may_be_kinder(&learnt.set)) {
-        (true, false) => "GO".to_owned(),
-        (true, true) => format!("GO in {set} only, which may be kinder than {DEFAULT}"),
-        (false, _) if found.risk <= learnt.risk => {
-            format!("NO-GO: the flights so far speak against a rate of {limit:.0} %")
+impl Answer for Learnt {
+    fn sentences(&self) -> Vec<String> {
+        let Self { mission, motor, set, .. } = self;
+        let fits = counted(self.sources.len() as u64, "fit");
+        let mut said = vec![
+            format!("next day: {mission} with {motor} after {fits}, prior {set}"),
+            "lot                  burns      mean   95 % interval       next burn +-   before any burn +-"
+                .to_owned(),
+        ];
+        for LotReport { name, unit, burns, mean, low, high, next_sigma, prior_sigma, .. } in &self.lots {
+            let interval = format!("{low:.4} to {high:.4}");
+            let line = format!(
+                "  {name:<18} {burns:>5}  {mean:>8.4}   {interval:<18}  {next_sigma:>12.4}   {prior_sigma:>17.4} {unit}"
+            );
+            said.push(line.trim_end().to_owned());
         }
-        (false, _) => "NO-GO".to_owned(),
-    };
-    writeln!(output, "{answer}")
+        for Pooled { mean: Parameter { name, unit, value, low, high, .. }, .. } in &self.airframe {
+            let line = format!("airframe  {name:<16} {value:.4}, {low:.4} to {high:.4} {unit}");
+            said.push(line.trim_end().to_owned());
+        }
+        said.extend(self.lot_toml.lines().map(str::to_owned));
+        let [low, high] = self.wind_m_s;
+        said.push(format!("site      wind {low:.1} to {high:.1} m/s"));
+        let Some(found) = &self.prediction else { return said };
+        let percent = |shares: [f64; 3]| shares.map(|share| 100.0 * share);
+        let [rate, low, high] = percent([found.rate, found.low, found.high]);
+        let flights = counted(self.flights as u64, "simulated flight");
+        said.push(format!(
+            "rate      {rate:.1} %, 95 % interval {low:.1} to {high:.1} %, from {flights} in {set}"
+        ));
+        if let Some(Pulled { worth, rate, low, high }) = self.pulled {
+            let Outcomes { landed, of } = self.flown;
+            let [rate, low, high] = percent([rate, low, high]);
+            said.push(format!(
+                "flown     {landed} of {of} landed: with the simulation worth {worth:.0} flights {rate:.1} %, 95 % interval {low:.1} to {high:.1} %"
+            ));
+        }
+        let [risk, limit, taken] = percent([found.risk, self.limit, self.risk]);
+        said.push(format!(
+            "risk      {risk:.1} % that the rate is below {limit:.0} %; {taken:.0} % is taken"
+        ));
+        said.push(match (self.go == Some(true), may_be_kinder(set)) {
+            (true, false) => "GO".to_owned(),
+            (true, true) => format!("GO in {set} only, which may be kinder than {DEFAULT}"),
+            (false, _) if found.risk <= self.risk => {
+                format!("NO-GO: the flights so far speak against a rate of {limit:.0} %")
+            }
+            (false, _) => "NO-GO".to_owned(),
+        });
+        said
+    }
 }
 
 /// What is asked of the next day.
@@ -525,8 +523,7 @@ mod tests {
     use super::*;
 
     fn fit(source: &str, mission: &str, motor: &str, found: Vec<Parameter>) -> Fit {
-        let basis = Basis { impulse_n_s: 1.0, burn_time_s: 1.0, drag_area_m2: 1.0, loaded_kg: 1.0 };
-        Fit { found, ..Fit::of(source, mission, motor, basis) }
+        Fit { found, ..Fit::of(source, mission, motor, Basis::default()) }
     }
 
     #[test]

@@ -28,7 +28,7 @@ mod turning;
 mod wind;
 
 use std::collections::BTreeMap;
-use std::io::{self, Write};
+use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
@@ -44,10 +44,10 @@ use self::calibration::{Calibration, Table};
 use self::day::Learnt;
 use self::least_squares::Solution;
 pub use self::trace::{Frame, Trace, TraceError};
-use crate::cli::{Outcome, answer, say, text_of, warn_of_damage};
+use crate::cli::{Answer, Outcome, give, say, text_of, warn_of_damage};
 use crate::info::utc;
-use crate::output::{Destination, Overwrite, write_whole};
-use crate::print::{counted, print_json, shown};
+use crate::output::{Destination, write_whole};
+use crate::print::counted;
 use crate::settings::{Setting, SettingError, mission_toml_with_reasons, mission_with};
 
 /// 97.5 % point of the normal distribution.
@@ -467,70 +467,53 @@ pub struct FitReport {
     pub day: Option<Learnt>,
 }
 
-/// Writes fits as text.
-///
-/// # Errors
-/// The output failed.
-pub fn print_fit(report: &FitReport, output: &mut impl Write) -> io::Result<()> {
-    for (place, fit) in report.fits.iter().enumerate() {
-        if place > 0 {
-            writeln!(output)?;
+impl Answer for FitReport {
+    fn sentences(&self) -> Vec<String> {
+        let mut said = self.fits.sentences();
+        if !self.together.is_empty() {
+            let logs = counted(self.fits.len() as u64, "log");
+            said.push(String::new());
+            said.push(format!(
+                "together, {logs}: mean with its 95 % interval, and scatter from one to the next"
+            ));
         }
-        print_one(fit, output)?;
-    }
-    if !report.together.is_empty() {
-        let logs = counted(report.fits.len() as u64, "log");
-        writeln!(
-            output,
-            "\ntogether, {logs}: mean with its 95 % interval, and scatter from one to the next"
-        )?;
-    }
-    for Pooled { mean, flights, scatter } in &report.together {
-        let scatter = digits(*scatter, mean.sigma);
-        writeln!(output, "  {}   scatter {scatter} in {flights}", line(mean))?;
-    }
-    match &report.day {
-        Some(day) => {
-            writeln!(output)?;
-            day::print_learn(day, output)
+        said.extend(self.together.iter().map(|Pooled { mean, flights, scatter }| {
+            format!("  {}   scatter {} in {flights}", line(mean), digits(*scatter, mean.sigma))
+        }));
+        if let Some(day) = &self.day {
+            said.push(String::new());
+            said.extend(day.sentences());
         }
-        None => Ok(()),
+        said
+    }
+
+    fn outcome(&self) -> Outcome {
+        let go = self.day.as_ref().and_then(|day| day.go);
+        go.map_or(Outcome::Given, |yes| Outcome::Decided { yes })
     }
 }
 
-fn print_one(fit: &Fit, output: &mut impl Write) -> io::Result<()> {
-    let mission = if fit.mission.is_empty() { "a test stand" } else { &fit.mission };
-    writeln!(output, "{}: {} with {}", shown(&fit.source), shown(mission), shown(&fit.motor))?;
-    writeln!(output, "95 % intervals, {}", fit.widened())?;
-    for parameter in &fit.found {
-        writeln!(output, "  {}", line(parameter))?;
-    }
-    for (title, lacks) in [
-        ("not calibrated: the interval is that of the noise alone", &fit.not_calibrated),
-        ("not found", &fit.not_found),
-    ] {
-        if !lacks.is_empty() {
-            writeln!(output, "{title}")?;
+impl Answer for Fit {
+    fn sentences(&self) -> Vec<String> {
+        let Self { source, mission, motor, .. } = self;
+        let mission = if mission.is_empty() { "a test stand" } else { mission };
+        let mut said =
+            vec![format!("{source}: {mission} with {motor}"), format!("95 % intervals, {}", self.widened())];
+        said.extend(self.found.iter().map(|parameter| format!("  {}", line(parameter))));
+        for (title, lacks) in [
+            ("not calibrated: the interval is that of the noise alone", &self.not_calibrated),
+            ("not found", &self.not_found),
+        ] {
+            said.extend(lacks.first().map(|_| title.to_owned()));
+            said.extend(lacks.iter().map(|NotFound { name, reason }| format!("  {name}: {reason}")));
         }
-        for lack in lacks {
-            writeln!(output, "  {}: {}", shown(&lack.name), shown(&lack.reason))?;
-        }
+        said
     }
-    Ok(())
 }
 
-fn line(parameter: &Parameter) -> String {
-    let Parameter { name, unit, value, sigma, low, high, .. } = parameter;
-    let number = |value: f64| digits(value, *sigma);
-    let text = format!(
-        "{:<28} {:>10}   {:>10} to {:<10} {}",
-        shown(name),
-        number(*value),
-        number(*low),
-        number(*high),
-        shown(unit)
-    );
-    text.trim_end().to_owned()
+fn line(Parameter { name, unit, value, sigma, low, high, .. }: &Parameter) -> String {
+    let [value, low, high] = [value, low, high].map(|number| digits(*number, *sigma));
+    format!("{name:<28} {value:>10}   {low:>10} to {high:<10} {unit}").trim_end().to_owned()
 }
 
 /// A number to two digits of its standard deviation.
@@ -602,12 +585,8 @@ impl Args {
         }
         let day = self.day.is_asked().then(|| self.day.learn(&fits, flown)).transpose()?;
         let report = FitReport { together: pooled(&fits), fits, day };
-        answer(|output| if self.json { print_json(&report, output) } else { print_fit(&report, output) })?;
-        Ok(match report.day.and_then(|day| day.go) {
-            Some(go) => Outcome::Decided { yes: go },
-            None if refused => Outcome::NotAll,
-            None => Outcome::Given,
-        })
+        let outcome = give(&report, self.json)?;
+        Ok(if refused { Outcome::NotAll } else { outcome })
     }
 
     /// The fits of a file; notes the mission of the first log.
@@ -653,7 +632,7 @@ fn write_into(path: &Path, log: &Path, trace: &Trace, found: &Fit) -> Result<()>
     });
     let flight = one_line(&format!("flight {flight}{day}"));
     let text = patched(&text, &trace.mission, found, &flight).context("the mission with what was found")?;
-    let destination = Destination { path, overwrite: Overwrite::Always };
+    let destination = Destination { path, force: true };
     write_whole(destination, log, |file| file.write_all(text.as_bytes()))?;
     say(&format!("{name}: --profile of `onboard-sim fly`, `campaign` and `card` takes it"));
     Ok(())
@@ -690,70 +669,59 @@ fn curve_of(motor: &str) -> Result<ThrustCurve> {
 mod tests {
     use super::*;
 
+    const UNIT: Basis = Basis { impulse_n_s: 1.0, burn_time_s: 1.0, drag_area_m2: 1.0, loaded_kg: 1.0 };
+
+    fn fits<const N: usize>(name: &str, basis: Basis, values: [(f64, f64); N]) -> [Fit; N] {
+        values.map(|(value, sigma)| Fit {
+            found: vec![Parameter::normal(name, "", value, sigma)],
+            ..Fit::of("", "", "", basis)
+        })
+    }
+
     /// 2 % more than 100 N s for 3 kg are, over 110 N s for 3.3 kg, 1.02 100 / 110 1.1.
     #[test]
     fn val_hand_a_scale_over_other_data() {
         let basis = Basis { impulse_n_s: 100.0, burn_time_s: 5.0, drag_area_m2: 0.03, loaded_kg: 3.0 };
-        let fit = Fit {
-            found: vec![Parameter::normal("thrust_scale", "", 1.02, 0.01)],
-            ..Fit::of("", "", "", basis)
-        };
-        let other = Basis { impulse_n_s: 110.0, loaded_kg: 3.3, ..basis };
-        let found = &fit.over(&other).found[0];
-        assert!((found.value - 1.02).abs() < 1e-12, "the two cancel: {found:?}");
-        let heavier = Basis { loaded_kg: 3.3, ..basis };
-        assert!((fit.over(&heavier).found[0].sigma - 0.011).abs() < 1e-12);
-    }
-
-    fn fits(values: &[(f64, f64)]) -> Vec<Fit> {
-        let basis = Basis { impulse_n_s: 1.0, burn_time_s: 1.0, drag_area_m2: 1.0, loaded_kg: 1.0 };
-        let fit = |(value, sigma): &(f64, f64)| Fit {
-            found: vec![Parameter::normal("drag_scale", "", *value, *sigma)],
-            ..Fit::of("", "", "", basis)
-        };
-        values.iter().map(fit).collect()
+        let [fit] = fits("thrust_scale", basis, [(1.02, 0.01)]);
+        let over = |impulse_n_s| fit.over(&Basis { impulse_n_s, loaded_kg: 3.3, ..basis }).found.remove(0);
+        assert!((over(110.0).value - 1.02).abs() < 1e-12, "the two cancel");
+        assert!((over(100.0).sigma - 0.011).abs() < 1e-12);
     }
 
     /// 1, 2 and 3 with errors of 0.1: the weights are equal, the mean is 2, the variance between is 1 - 0.01, and the
     /// interval is 4.3027 (97.5 % of Student's t with 2 degrees) times the root of 1/3.
     #[test]
     fn val_hand_three_flights() {
-        let found = pooled(&fits(&[(1.0, 0.1), (2.0, 0.1), (3.0, 0.1)]));
-        assert_eq!(found.len(), 1);
-        let Pooled { mean, scatter, flights } = &found[0];
-        assert!((mean.value - 2.0).abs() < 1e-12 && *flights == 3);
-        assert!((scatter - libm::sqrt(0.99)).abs() < 1e-12, "{scatter}");
+        let found = pooled(&fits("drag_scale", UNIT, [(1.0, 0.1), (2.0, 0.1), (3.0, 0.1)]));
+        let [Pooled { mean, scatter, flights: 3 }] = &found[..] else { panic!("{found:?}") };
+        assert!((mean.value - 2.0).abs() < 1e-12 && (scatter - libm::sqrt(0.99)).abs() < 1e-12, "{found:?}");
         assert!((mean.high - 2.0 - 4.302_65 / libm::sqrt(3.0)).abs() < 1e-4, "{mean:?}");
     }
 
-    #[test]
-    fn one_flight_is_not_pooled_and_equal_flights_do_not_scatter() {
-        assert!(pooled(&fits(&[(1.0, 0.1)])).is_empty());
-        let found = pooled(&fits(&[(1.0, 0.1), (1.0, 0.1)]));
-        assert!(
-            found[0].scatter.abs() < 1e-12 && (found[0].mean.sigma - 0.1 / libm::sqrt(2.0)).abs() < 1e-12
-        );
-    }
-
-    /// Two equal values with a noise of 0.1 and a systematic part of 0.3: the noise of the mean is 0.1 over the root of 2, and the
-    /// systematic part stays, however many flights there are.
+    /// Two equal values do not scatter. With a noise of 0.1 and a systematic part of 0.3: the noise of the mean is 0.1 over the
+    /// root of 2, and the systematic part stays, however many flights there are. One flight is not pooled.
     #[test]
     fn val_hand_what_all_flights_have_in_common_does_not_average_out() {
-        let mut fits = fits(&[(1.0, 0.1), (1.0, 0.1)]);
-        for parameter in fits.iter_mut().flat_map(|fit| &mut fit.found) {
-            parameter.sigma = libm::hypot(0.1, 0.3);
-            parameter.systematic = Some(0.3);
+        for common in [0.0, 0.3] {
+            let mut fits = fits("drag_scale", UNIT, [(1.0, libm::hypot(0.1, common)); 2]);
+            for parameter in fits.iter_mut().flat_map(|fit| &mut fit.found) {
+                parameter.systematic = Some(common);
+            }
+            let found = pooled(&fits);
+            let expected = libm::hypot(0.1 / libm::sqrt(2.0), common);
+            assert!(
+                (found[0].mean.sigma - expected).abs() < 1e-12 && found[0].scatter.abs() < 1e-12,
+                "{found:?}"
+            );
+            assert_eq!(found[0].mean.systematic, Some(common));
+            assert!(pooled(&fits[..1]).is_empty());
         }
-        let found = pooled(&fits);
-        assert!((found[0].mean.sigma - libm::hypot(0.1 / libm::sqrt(2.0), 0.3)).abs() < 1e-12, "{found:?}");
-        assert!(found[0].scatter.abs() < 1e-12 && found[0].mean.systematic == Some(0.3), "{found:?}");
     }
 
     #[test]
     fn a_number_has_two_digits_of_its_deviation() {
-        assert_eq!(digits(0.998_765, 0.001_8), "0.9988");
-        assert_eq!(digits(254.71, 9.8), "254.7");
-        assert_eq!(digits(1234.4, 120.0), "1234");
-        assert_eq!(digits(1.0, 0.0), "1.0000");
+        let written = [(0.998_765, 0.001_8), (254.71, 9.8), (1234.4, 120.0), (1.0, 0.0)]
+            .map(|(value, sigma)| digits(value, sigma));
+        assert_eq!(written, ["0.9988", "254.7", "1234", "1.0000"]);
     }
 }

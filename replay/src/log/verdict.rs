@@ -67,13 +67,9 @@ impl VerdictFacts {
     /// A recorded verdict.
     pub fn of(verdict: &v1::LandingVerdict) -> Self {
         let facts = |limits: &[v1::LimitResult]| -> Vec<VerdictLimit> {
-            let limits = limits.iter().map(|limit| VerdictLimit {
-                name: limit.name.clone(),
-                value: limit.value,
-                minimum: limit.minimum,
-                maximum: limit.maximum,
-                unit: limit.unit.clone(),
-                passed: limit.passed,
+            let limits = limits.iter().cloned().map(|limit| {
+                let v1::LimitResult { name, value, minimum, maximum, unit, passed } = limit;
+                VerdictLimit { name, value, minimum, maximum, unit, passed }
             });
             limits.collect()
         };
@@ -111,21 +107,16 @@ impl VerdictFacts {
     }
 }
 
-/// The verdict as the vehicle told it over the air.
-#[derive(Debug, Default)]
-pub(crate) struct Heard {
-    limits: Option<TD_TOUCHDOWN_LIMITS_DATA>,
-    verdict: Option<TD_LANDING_VERDICT_DATA>,
-    aborted: bool,
-    under_parachute: bool,
-}
-
 /// Collects the verdict while a log is read.
 #[derive(Debug, Default)]
 pub(crate) struct Verdicts {
     recorded: Option<v1::LandingVerdict>,
-    heard: Heard,
     has_frames: bool,
+    /// What the vehicle said over the air: its limits, its verdict, and whether it had aborted or hung under its parachute.
+    limits: Option<TD_TOUCHDOWN_LIMITS_DATA>,
+    heard: Option<TD_LANDING_VERDICT_DATA>,
+    aborted: bool,
+    under_parachute: bool,
 }
 
 /// A verdict of a log.
@@ -135,15 +126,24 @@ pub(crate) struct Found {
     pub(crate) heard: bool,
 }
 
-impl Heard {
-    /// Takes a message of the vehicle.
-    pub(crate) fn take(&mut self, message: &MavMessage) {
+impl Verdicts {
+    /// Notes a record, and the message of the vehicle in it ([`heard_message`]).
+    pub(crate) fn note(&mut self, stamped: &StampedEntry, message: Option<&MavMessage>) {
+        match &stamped.entry {
+            Entry::Verdict(verdict) => self.recorded = Some((**verdict).clone()),
+            Entry::ComputerFrame(_) => self.has_frames = true,
+            Entry::RawFrame if !self.has_frames => self.hear(message),
+            _ => {}
+        }
+    }
+
+    fn hear(&mut self, message: Option<&MavMessage>) {
         match message {
-            MavMessage::TD_TOUCHDOWN_LIMITS(limits) => self.limits = Some(limits.clone()),
-            MavMessage::TD_LANDING_VERDICT(verdict) => {
-                self.verdict.get_or_insert_with(|| verdict.clone());
+            Some(MavMessage::TD_TOUCHDOWN_LIMITS(limits)) => self.limits = Some(limits.clone()),
+            Some(MavMessage::TD_LANDING_VERDICT(verdict)) => {
+                self.heard.get_or_insert_with(|| verdict.clone());
             }
-            MavMessage::TD_FLIGHT_STATUS(status) => {
+            Some(MavMessage::TD_FLIGHT_STATUS(status)) => {
                 self.aborted |= status.interlocks.contains(TdInterlock::TD_INTERLOCK_ABORT_LATCHED);
                 self.under_parachute |= status.phase == TdPhase::TD_PHASE_CHUTE;
             }
@@ -151,9 +151,15 @@ impl Heard {
         }
     }
 
-    /// The verdict as a record; its time counts from power-up.
-    pub(crate) fn verdict(&self) -> Option<v1::LandingVerdict> {
-        let verdict = self.verdict.as_ref()?;
+    /// The vehicle's own verdict; without its frames, the one that was heard.
+    pub(crate) fn found(&self) -> Option<Found> {
+        let heard = self.heard().filter(|_| !self.has_frames).map(|verdict| Found { verdict, heard: true });
+        heard.or_else(|| Some(Found { verdict: self.recorded.clone()?, heard: false }))
+    }
+
+    /// The verdict that was heard, as a record; its time counts from power-up.
+    fn heard(&self) -> Option<v1::LandingVerdict> {
+        let verdict = self.heard.as_ref()?;
         let told = |limit: fn(&TD_TOUCHDOWN_LIMITS_DATA) -> f32| {
             self.limits.as_ref().map_or(NOT_TOLD, |limits| f64::from(limit(limits)))
         };
@@ -177,18 +183,15 @@ impl Heard {
         for (place, limit) in envelope.results.iter_mut().enumerate() {
             limit.passed = verdict.limits_violated.bits() & (1 << place) == 0;
         }
-        let broken = envelope.failures().next().map(|limit| limit.name);
         let landing = v1::Landing {
             stands: verdict.landing.contains(TdLanding::TD_LANDING_STANDS),
             upright: verdict.landing.contains(TdLanding::TD_LANDING_UPRIGHT),
             envelope: verdict.landing.contains(TdLanding::TD_LANDING_ENVELOPE),
             table_2: verdict.landing.contains(TdLanding::TD_LANDING_TABLE_2),
         };
-        let ending = FlightEnding {
-            aborted: self.aborted,
-            landing: landing_of(landing),
-            failure: if self.under_parachute { Some(UNDER_PARACHUTE) } else { broken },
-        };
+        let broken = envelope.failures().next().map(|limit| limit.name);
+        let failure = if self.under_parachute { Some(UNDER_PARACHUTE) } else { broken };
+        let ending = FlightEnding { aborted: self.aborted, landing: landing_of(landing), failure };
         Some(v1::LandingVerdict {
             time_s: f64::from(verdict.contact_ms) / 1e3,
             ending: Some(ending.to_string()),
@@ -232,29 +235,6 @@ pub(super) fn contradiction(verdict: &v1::LandingVerdict) -> Option<String> {
     let place = (0..4).find(|place| told[*place] != said[*place])?;
     let is_not = if said[place] { "it says" } else { "it does not say" };
     Some(format!("{is_not} `{}`, against its limits", Landing::WORDS[place]))
-}
-
-impl Verdicts {
-    /// Notes a record, and the message of the vehicle in it ([`heard_message`]).
-    pub(crate) fn note(&mut self, stamped: &StampedEntry, message: Option<&MavMessage>) {
-        match &stamped.entry {
-            Entry::Verdict(verdict) => self.recorded = Some((**verdict).clone()),
-            Entry::ComputerFrame(_) => self.has_frames = true,
-            Entry::RawFrame if !self.has_frames => {
-                if let Some(message) = message {
-                    self.heard.take(message);
-                }
-            }
-            _ => {}
-        }
-    }
-
-    /// The vehicle's own verdict; without its frames, the one that was heard.
-    pub(crate) fn found(&self) -> Option<Found> {
-        let heard = || self.heard.verdict().map(|verdict| Found { verdict, heard: true });
-        let recorded = || self.recorded.clone().map(|verdict| Found { verdict, heard: false });
-        if self.has_frames { recorded() } else { heard().or_else(recorded) }
-    }
 }
 
 /// The message of a raw frame that a ground station has received, decoded once for everybody who wants it.

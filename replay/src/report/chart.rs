@@ -53,6 +53,12 @@ pub(super) struct Chart {
 }
 
 impl Chart {
+    /// A picture without a time axis.
+    pub(super) fn new(title: &str, [x_label, y_label]: [&str; 2], lines: Vec<Line>) -> Self {
+        let [title, x_label, y_label] = [title, x_label, y_label].map(str::to_owned);
+        Self { title, panel: Panel { x_label, y_label, lines, ..Panel::default() }, own_x: true, full: false }
+    }
+
     /// The chart, or nothing if there is no point to draw.
     pub(super) fn svg(&self) -> String {
         let spread = |axis: fn(&(f64, f64)) -> f64| {

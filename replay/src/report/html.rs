@@ -29,7 +29,7 @@ pub(super) fn escaped(text: &str) -> String {
 }
 
 /// A table: headings, then rows; a heading that begins with `#` marks a column of numbers.
-pub(super) fn table(heads: &[&str], rows: &[Vec<String>]) -> String {
+pub(super) fn table<R: AsRef<[String]>>(heads: &[&str], rows: impl IntoIterator<Item = R>) -> String {
     let numeric: Vec<bool> = heads.iter().map(|head| head.starts_with('#')).collect();
     let class = |place: usize| if numeric.get(place) == Some(&true) { " class=\"n\"" } else { "" };
     let mut html = "<div class=\"wide\"><table><thead><tr>".to_owned();
@@ -39,7 +39,7 @@ pub(super) fn table(heads: &[&str], rows: &[Vec<String>]) -> String {
     html.push_str("</tr></thead><tbody>\n");
     for row in rows {
         html.push_str("<tr>");
-        for (place, cell) in row.iter().enumerate() {
+        for (place, cell) in row.as_ref().iter().enumerate() {
             put(&mut html, format_args!("<td{}>{cell}</td>", class(place)));
         }
         html.push_str("</tr>\n");
@@ -103,7 +103,7 @@ mod tests {
     #[test]
     fn text_of_a_log_does_not_become_markup() {
         assert_eq!(escaped("<script>\"&\u{1b}[2J"), "&lt;script&gt;&quot;&amp;\u{fffd}[2J");
-        let html = table(&["a", "#b"], &[vec![escaped("<i>"), "1".to_owned()]]);
+        let html = table(&["a", "#b"], [[escaped("<i>"), "1".to_owned()]]);
         assert!(html.contains("<th class=\"n\">b</th>") && html.contains("&lt;i&gt;"), "{html}");
     }
 }

@@ -16,7 +16,7 @@ use track::Flight;
 use crate::cli::{Outcome, answer};
 use crate::info::{Completeness, Info, described};
 use crate::log::{Recording, RecordingError};
-use crate::output::{Destination, Overwrite, same_file, write_whole};
+use crate::output::{Destination, same_file, write_whole};
 
 /// A flight's page.
 #[derive(Debug, Clone)]
@@ -29,25 +29,17 @@ pub struct Report {
     pub completeness: Completeness,
 }
 
-/// Builds the page of a log file.
+/// Builds the page of a log file; `with` is another one, whose flight is drawn into the same pictures behind its verdict.
 ///
 /// # Errors
-/// The file is not a flight log, cannot be read or is longer than any flight. Damage is part of the page.
-pub fn report(path: &Path) -> Result<Report, RecordingError> {
+/// A file is not a flight log, cannot be read or is longer than any flight. Damage is part of the page.
+pub fn report(path: &Path, with: Option<&Path>) -> Result<Report, RecordingError> {
     let (flight, info) = told(path)?;
-    let html = html::page(&flight, &info, &section::all(&flight, &info));
-    Ok(Report { name: info.file, html, completeness: info.completeness })
-}
-
-/// Builds the page of a log file, with the flight of another log in the same pictures behind its verdict.
-///
-/// # Errors
-/// As [`report`], for either file.
-pub fn report_with(path: &Path, with: &Path) -> Result<Report, RecordingError> {
-    let ((flight, info), (other, others)) = (told(path)?, told(with)?);
     let mut sections = section::all(&flight, &info);
-    let both = section::overlay::html([(&flight, &info), (&other, &others)]);
-    sections.insert(1, section::Section { id: "both", title: "Two flights", html: both });
+    if let Some((other, others)) = with.map(told).transpose()? {
+        let html = section::overlay::html([(&flight, &info), (&other, &others)]);
+        sections.insert(1, section::Section { id: "both", title: "Two flights", html });
+    }
     let html = html::page(&flight, &info, &sections);
     Ok(Report { name: info.file, html, completeness: info.completeness })
 }
@@ -77,23 +69,19 @@ pub(crate) struct Args {
 impl Args {
     pub(crate) fn run(self) -> Result<Outcome> {
         use std::io::Write as _;
-        let page = match &self.with {
-            None => report(&self.file)?,
-            Some(with) => report_with(&self.file, with)?,
-        };
-        let html = page.html;
-        let path = self.output.clone().unwrap_or_else(|| self.file.with_extension("html"));
+        let page = report(&self.file, self.with.as_deref())?;
+        let path = self.output.unwrap_or_else(|| self.file.with_extension("html"));
+        let html = page.html.as_bytes();
         if path.as_os_str() == "-" {
-            answer(|output| output.write_all(html.as_bytes()))?;
-            page.completeness.warn(&page.name);
-            return Ok(Outcome::Given);
+            answer(|output| output.write_all(html))?;
+        } else {
+            if self.with.as_deref().is_some_and(|with| same_file(with, &path)) {
+                bail!("{}: is a log that is being read", path.display());
+            }
+            let destination = Destination { path: &path, force: self.force };
+            write_whole(destination, &self.file, |file| file.write_all(html))?;
+            answer(|output| writeln!(output, "{}", path.display()))?;
         }
-        if self.with.as_deref().is_some_and(|with| same_file(with, &path)) {
-            bail!("{}: is a log that is being read", path.display());
-        }
-        let destination = Destination { path: &path, overwrite: Overwrite::if_forced(self.force) };
-        write_whole(destination, &self.file, |file| file.write_all(html.as_bytes()))?;
-        answer(|output| writeln!(output, "{}", path.display()))?;
         page.completeness.warn(&page.name);
         Ok(Outcome::Given)
     }

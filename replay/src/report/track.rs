@@ -5,13 +5,13 @@
 use avionics::log::frame::phase_of;
 use avionics::log::logged::state_from_log;
 use flight::computer::pilot::{FRAMES_PER_PLAN, Pilot};
-use flight::estimation::estimator::{AidStatus, Estimate};
+use flight::estimation::estimator::Estimate;
 use flight::guidance::powered::Plan;
 use flight::rules::phase::Phase;
 use flight::vehicle::rigid::RigidState;
 use onboard_sim::figure::Span;
 use protocol::log::computer_v1::ComputerFrame;
-use protocol::log::flight_v1::TruthSample;
+use protocol::log::flight_v1::{self as v1, TruthSample};
 use protocol::log::v1::Telemetry;
 
 use crate::controller::new_plan;
@@ -72,8 +72,6 @@ pub(super) struct Flight {
     pub(super) pilot: Option<Pilot>,
     /// At the planning frames.
     pub(super) thoughts: Vec<Thought>,
-    /// Of each aid the test ratios of its measurements, up to 3.
-    pub(super) test_ratios: [Series; 4],
     pub(super) worst_plans: Vec<BrokenPlan>,
     /// Where the track comes from, in a sentence; `None` if there is none.
     pub(super) source: Option<&'static str>,
@@ -93,16 +91,13 @@ impl Flight {
     /// A recorded flight and the description of its log, which gets its findings here, if its computer decides again as it did.
     /// Without mission, start or frames the sections report what is missing.
     pub(super) fn of(recording: Recording, info: &mut Info) -> Self {
-        let (mut thoughts, mut test_ratios, mut broken) = (Vec::new(), <[Series; 4]>::default(), Vec::new());
+        let (mut thoughts, mut broken) = (Vec::new(), Vec::new());
         let again = findings::run_again(&recording, |computer, recorded| {
             let (number, time_s) = (recording.release_frame + recorded.input.frame, recorded.input.time_s);
             let frame = computer.run_again(recorded)?;
             let pilot = computer.pilot();
             let solved = pilot.landing_solved().filter(|_| plans(&frame));
             broken.extend(solved.and_then(|solved| BrokenPlan::of(number, time_s, &solved)));
-            for ((_, aid), ratios) in named_aids(pilot).iter().zip(&mut test_ratios) {
-                ratios.extend(aid.fresh.then_some((time_s, aid.test_ratio.min(3.0))));
-            }
             if recorded.input.frame.is_multiple_of(FRAMES_PER_PLAN) || frame.output.planned {
                 thoughts.push(Thought::of(pilot, &frame));
             }
@@ -131,7 +126,6 @@ impl Flight {
             recording,
             pilot,
             thoughts,
-            test_ratios,
             source,
             track,
         }
@@ -177,6 +171,15 @@ impl Flight {
     pub(super) fn framed(&self, value: impl Fn(&ComputerFrame) -> Option<f64>) -> Series {
         let frames = self.recording.frames.iter();
         frames.filter_map(|frame| Some((self.axis_s(frame.input.time_s), value(frame)?))).collect()
+    }
+
+    /// A value of the recorded estimates.
+    pub(super) fn estimated(&self, value: impl Fn(&v1::Estimate) -> Option<f64>) -> Series {
+        let recorded = self.recording.estimates.iter().filter_map(|(place, estimate)| {
+            let frame = self.recording.frames.get(*place)?;
+            Some((self.axis_s(frame.input.time_s), value(estimate)?))
+        });
+        recorded.collect()
     }
 
     /// A value of the planning frames.
@@ -312,16 +315,6 @@ pub(super) fn planned_at(plan: &Plan, time_s: f64) -> Option<State> {
     let (share, states) = (steps.fract(), plan.states());
     let (before, after) = (planned(states.get(before)?), planned(states.get(before + 1)?));
     Some(core::array::from_fn(|i| before[i] + share * (after[i] - before[i])))
-}
-
-pub(super) fn named_aids(pilot: &Pilot) -> [(&'static str, AidStatus); 4] {
-    let aids = pilot.estimator().aids();
-    [
-        ("barometer", aids.barometer),
-        ("GNSS velocity", aids.gnss_velocity),
-        ("GNSS position", aids.gnss_position),
-        ("lidar", aids.lidar),
-    ]
 }
 
 #[cfg(test)]

@@ -3,6 +3,10 @@
 use std::path::Path;
 use std::process::Command;
 
+use flight::vehicle::mission::Mission;
+use flight::vehicles::mission::BUILTIN;
+use sim::dispersion::Dispersion;
+
 use crate::command_line::run;
 use crate::from_apogee::LANDED;
 
@@ -36,56 +40,43 @@ fn five_burns_become_a_day_that_the_campaigns_readers_take() {
     let directory = tempfile::tempdir().unwrap();
     let (file, out) = (directory.path().join("fits.json"), directory.path().join("day"));
     fits(&file, &[1.01, 1.02, 0.99, 1.00, 1.03]);
-    let arguments = [file.to_str().unwrap(), "--mission", "mk2", "--day", out.to_str().unwrap(), "--json"];
+    let arguments = [file.to_str().unwrap(), "--mission", "mk2", "--json", "--day", out.to_str().unwrap()];
     let (code, stdout, stderr) = learn(&arguments);
-    let answer: serde_json::Value =
-        serde_json::from_str(&stdout).unwrap_or_else(|_| panic!("{stdout}{stderr}"));
+    let answer: serde_json::Value = serde_json::from_str(&stdout).unwrap();
     let answer = &answer["day"];
     assert_eq!(code, i32::from(answer["go"] != true), "{stderr}");
     let thrust = &answer["lots"][0];
     // The prior's 1 counts as one more burn.
     assert!((thrust["mean"].as_f64().unwrap() - 6.05 / 6.0).abs() < 1e-12, "{thrust}");
     assert!(thrust["next_sigma"].as_f64() < thrust["prior_sigma"].as_f64(), "{thrust}");
+    let mission_of = |text: &str| flight::vehicles::mission::from_toml(text, "day").unwrap();
     let text = |name: &str| std::fs::read_to_string(out.join(name)).unwrap();
-    let mission = flight::vehicles::mission::from_toml(&text("mission.toml"), "day").unwrap();
-    let built_in = flight::vehicles::mission::builtin("mk2").unwrap().unwrap();
-    let impulse = |mission: &flight::vehicle::mission::Mission| mission.motor_curve.total_impulse_n_s();
+    let (mission, built_in) = (mission_of(&text("mission.toml")), mission_of(BUILTIN[0].1));
+    let impulse = |mission: &Mission| mission.motor_curve.total_impulse_n_s();
     assert!((impulse(&mission) / impulse(&built_in) - 6.05 / 6.0).abs() < 1e-9);
-    let set = sim::dispersion::Dispersion::from_toml(&text("dispersion.toml"), "day").unwrap();
     // What is known of the motors stands in one place.
-    let real = sim::dispersion::Dispersion::from_toml(
-        sim::dispersion::Dispersion::builtin_toml("real").unwrap(),
-        "real",
-    );
-    assert!((set.impulse_share - real.unwrap().impulse_share).abs() < 1e-12 && set.sensors, "{set:?}");
+    let (set, real) = (Dispersion::from_toml(&text("dispersion.toml"), "day"), Dispersion::builtin("real"));
+    let (set, real) = (set.unwrap(), real.unwrap());
+    assert!((set.impulse_share - real.impulse_share).abs() < 1e-12 && set.sensors, "{set:?}");
+    assert!(text("dispersion.toml").contains("# flight 3\n"));
     let lot = mission.lot.as_ref().unwrap();
-    assert_eq!((lot.name.as_str(), lot.burns), ("H45W", 5));
+    assert_eq!((lot.name.as_str(), lot.burns, mission.motor_burns()), ("H45W", 5, 5));
     assert!((lot.impulse.mean - 1.01).abs() < 1e-12 && (lot.impulse.scatter - 0.015_811).abs() < 1e-6);
-    assert!(mission.motor_burns() == 5 && mission.motor.impulse_sigma < built_in.motor.impulse_sigma);
+    assert!(mission.motor.impulse_sigma < built_in.motor.impulse_sigma);
     // The table can be pasted.
-    let pasted =
-        format!("{}\n{}", flight::vehicles::mission::BUILTIN[0].1, answer["lot_toml"].as_str().unwrap());
-    assert_eq!(
-        flight::vehicles::mission::from_toml(&pasted, "pasted").unwrap().motor_curve,
-        mission.motor_curve
-    );
+    let pasted = format!("{}\n{}", BUILTIN[0].1, answer["lot_toml"].as_str().unwrap());
+    assert_eq!(mission_of(&pasted).motor_curve, mission.motor_curve);
     // With the day's mission the same burns are learnt again, not on top of it.
-    let out = directory.path().join("again");
-    let mission_file = directory.path().join("day/mission.toml");
-    let again =
-        [file.to_str().unwrap(), "--mission", mission_file.to_str().unwrap(), "--day", out.to_str().unwrap()];
-    assert!(learn(&again).0 < 2);
-    let again = flight::vehicles::mission::from_toml(
-        &std::fs::read_to_string(out.join("mission.toml")).unwrap(),
-        "again",
-    );
-    assert!((impulse(&again.unwrap()) / impulse(&mission) - 1.0).abs() < 1e-12);
-    assert!(text("dispersion.toml").contains("# flight 3\n"), "{}", text("dispersion.toml"));
+    let again = directory.path().join("again");
+    let day = [out.join("mission.toml"), again.clone()];
+    let [mission_file, again_out] = day.each_ref().map(|path| path.to_str().unwrap());
+    assert!(learn(&[arguments[0], "--mission", mission_file, "--day", again_out]).0 < 2);
+    let learnt = mission_of(&std::fs::read_to_string(again.join("mission.toml")).unwrap());
+    assert!((impulse(&learnt) / impulse(&mission) - 1.0).abs() < 1e-12);
     // The same question again gives the same answer, and replaces nothing.
     let (code, _, stderr) = learn(&arguments);
     assert!(code == 2 && stderr.contains("exists already"), "{stderr}");
-    let again = [&arguments[..3], &arguments[5..]].concat();
-    assert_eq!(learn(&again).1, stdout);
+    assert_eq!(learn(&arguments[..4]).1, stdout);
 }
 
 #[test]
@@ -134,17 +125,18 @@ fn what_cannot_be_learnt_is_refused_with_the_reason() {
     let file = directory.path().join("fits.json");
     fits(&file, &[1.0]);
     let file = file.to_str().unwrap();
-    let refused = |arguments: &[&str], words: &str| {
+    let [broken, nothing] = ["broken.json", "nothing.json"].map(|name| directory.path().join(name));
+    std::fs::write(&broken, "{}").unwrap();
+    fits(&nothing, &[]);
+    let [broken, nothing] = [&broken, &nothing].map(|path| path.to_str().unwrap());
+    for (arguments, words) in [
+        (&[file][..], "--mission is missing"),
+        (&[file, "--mission", "mk2", "--limit", "95"], "--limit 95: must be 0 to 1"),
+        (&[file, "--mission", "mk9"], "'mk9' is neither a built-in mission"),
+        (&[broken, "--mission", "mk2"], "is no answer of `replay fit --json`"),
+        (&[nothing, "--mission", "mk2"], "no burn was found in 0 fits"),
+    ] {
         let (code, _, stderr) = learn(arguments);
         assert!(code == 2 && stderr.contains(words), "{stderr}");
-    };
-    refused(&[file], "--mission is missing");
-    refused(&[file, "--mission", "mk2", "--limit", "95"], "--limit 95: must be 0 to 1");
-    refused(&[file, "--mission", "mk9"], "'mk9' is neither a built-in mission");
-    let broken = directory.path().join("broken.json");
-    std::fs::write(&broken, "{}").unwrap();
-    refused(&[broken.to_str().unwrap(), "--mission", "mk2"], "is no answer of `replay fit --json`");
-    let nothing = directory.path().join("nothing.json");
-    fits(&nothing, &[]);
-    refused(&[nothing.to_str().unwrap(), "--mission", "mk2"], "no burn was found in 0 fits");
+    }
 }

@@ -15,7 +15,7 @@ fn run(arguments: &[&Path]) -> (Option<i32>, String) {
 #[test]
 fn the_recording_stands_beside_the_log_and_is_kept_unless_forced() {
     let (_folder, log, rrd) = folder();
-    write_log(&log, true);
+    write_log(&log);
     let (code, said) = run(&[&log]);
     assert_eq!(code, Some(0), "{said}");
     assert!(said.contains("flight.rrd: 4 poses, 1 events"), "{said}");
@@ -32,7 +32,7 @@ fn the_recording_stands_beside_the_log_and_is_kept_unless_forced() {
 #[test]
 fn damage_is_a_warning_and_no_log_is_an_error() {
     let (folder, log, rrd) = folder();
-    write_log(&log, true);
+    write_log(&log);
     let bytes = std::fs::read(&log).unwrap();
     std::fs::write(&log, &bytes[..in_the_third_chunk(&bytes)]).unwrap();
     let (code, said) = run(&[&log, Path::new("-o"), &rrd]);

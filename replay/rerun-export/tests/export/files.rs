@@ -8,7 +8,7 @@ use crate::read_back::Recording;
 #[test]
 fn the_readable_part_of_a_cut_log_is_exported() {
     let (_folder, log, rrd) = folder();
-    write_log(&log, true);
+    write_log(&log);
     let bytes = std::fs::read(&log).unwrap();
     let mut partly = 0;
     let cuts = (30..100).step_by(5).map(|percent| bytes.len() * percent / 100);
@@ -34,8 +34,8 @@ fn the_readable_part_of_a_cut_log_is_exported() {
 fn nothing_is_overwritten_without_force_and_no_log_ever() {
     let (folder, log, rrd) = folder();
     let other = folder.path().join("other.mcap");
-    write_log(&log, true);
-    write_log(&other, false);
+    write_log(&log);
+    write_log(&other);
     std::fs::write(&rrd, "precious").unwrap();
     let refused = format!("{:#}", anyhow::Error::from(export(&log, None, (&rrd).into()).unwrap_err()));
     assert!(refused.contains("flight.rrd: cannot be written") && refused.contains("--force"), "{refused}");
@@ -57,7 +57,7 @@ fn a_file_that_is_not_a_log_is_named_and_leaves_nothing_behind() {
     assert!(error.to_string().contains("flight.mcap: is not a flight log"), "{error}");
     let missing = export(&folder.path().join("none.mcap"), None, (&rrd).into()).unwrap_err();
     assert!(missing.to_string().contains("none.mcap: cannot be read"), "{missing}");
-    write_log(&log, true);
+    write_log(&log);
     let nowhere = folder.path().join("nowhere").join("flight.rrd");
     let error = export(&log, None, (&nowhere).into()).unwrap_err();
     assert!(error.to_string().contains("flight.rrd: cannot be written"), "{error}");

@@ -2,7 +2,6 @@
 
 use flight::guidance::powered::{ControlLevel, Plan};
 use flight::vehicle::mission::Mission;
-use onboard_sim::figure::Panel;
 
 use super::pictures::gimbal_deg;
 use super::{COMPONENTS, DEGREES, rms_and_max};
@@ -50,10 +49,9 @@ pub(super) fn paths(flights: &[(&'static str, &'static str, &Flight)]) -> String
             line("planned", "thin", drawn.flat_map(path).collect())
         });
         let flown = flights.iter().map(|(name, class, flight)| line(name, class, shown(flight)));
-        let [x_label, y_label] = labels.map(str::to_owned);
-        let lines = plans.chain(flown).collect();
-        let panel = Panel { x_label, y_label, lines, equal_scales: true, ..Panel::default() };
-        Chart { title: title.to_owned(), panel, full: true, own_x: true }.svg()
+        let mut chart = Chart::new(title, labels, plans.chain(flown).collect());
+        (chart.panel.equal_scales, chart.full) = (true, true);
+        chart.svg()
     };
     charts(&VIEWS.map(picture))
 }
@@ -79,7 +77,7 @@ pub(super) fn thrust(flight: &Flight) -> String {
     if pilot.motor().ignition_s().is_some() {
         let scales = pilot.scales();
         for (what, scale) in ["impulse", "burn time"].into_iter().zip(scales) {
-            rows.push(vec![format!("inferred {what} at the end, of expected"), format!("{scale:.4}")]);
+            rows.push([format!("inferred {what} at the end, of expected"), format!("{scale:.4}")]);
         }
         words = another_curve(scales, pilot.mission(), pilot.other_curve());
     }
@@ -89,10 +87,10 @@ pub(super) fn thrust(flight: &Flight) -> String {
     let impulse_n_s: f64 = pairs.map(|(twice_n, dt_s)| 0.5 * twice_n * dt_s).sum();
     if impulse_n_s > 0.0 && world.last().is_some_and(|last| last.thrust_n <= 0.0) {
         let scale = impulse_n_s / pilot.mission().motor_curve.total_impulse_n_s();
-        rows.push(vec!["actual impulse, of expected".to_owned(), format!("{scale:.4}")]);
+        rows.push(["actual impulse, of expected".to_owned(), format!("{scale:.4}")]);
     }
     words.map_or_else(String::new, |words| paragraph(&words))
-        + &table(&["", "#"], &rows)
+        + &table(&["", "#"], rows)
         + &paragraph("The dashed level is the vehicle's weight.")
 }
 
@@ -146,7 +144,7 @@ pub(super) fn tracking_errors(flight: &Flight, ahead_s: f64) -> Vec<(f64, State)
 }
 
 pub(super) fn tracking(flight: &Flight) -> Option<String> {
-    let row = |ahead_s: f64| {
+    let row = |ahead_s: f64| -> Vec<String> {
         let errors = tracking_errors(flight, ahead_s);
         let cells = COMPONENTS.iter().enumerate().filter_map(|(component, (_, _, factor))| {
             let (rms, max) = rms_and_max(errors.iter().map(|(_, error)| factor * error[component]))?;
@@ -159,7 +157,7 @@ pub(super) fn tracking(flight: &Flight) -> Option<String> {
     let heads: Vec<&str> =
         ["predicted ahead", "#plans"].into_iter().chain(heads.iter().map(String::as_str)).collect();
     let words = paragraph("Actual state less the planned one, root mean square / largest.");
-    Some(words + &table(&heads, &AHEAD_S.map(row)))
+    Some(words + &table(&heads, AHEAD_S.map(row)))
 }
 
 /// A value within this fraction of a stop or of the maximum slew rate counts as saturated.
@@ -181,7 +179,7 @@ pub(super) fn saturation(flight: &Flight) -> Option<String> {
         // From positive zero, because an empty sum is a negative one.
         let found_s =
             pairs.filter(|(a, b, dt_s)| holds(*a, *b, *dt_s)).fold(0.0, |sum, (_, _, dt_s)| sum + dt_s);
-        rows.push(vec![what, format!("{found_s:.2} s"), format!("{:.1} %", 100.0 * found_s / total_s)]);
+        rows.push([what, format!("{found_s:.2} s"), format!("{:.1} %", 100.0 * found_s / total_s)]);
     };
     let slews = |rate: f64| move |a: f64, b: f64, dt_s: f64| (b - a).abs() >= AT_LIMIT * rate * dt_s;
     for (axis, name) in ["pitch", "yaw"].into_iter().enumerate() {
@@ -197,7 +195,7 @@ pub(super) fn saturation(flight: &Flight) -> Option<String> {
         put(what, &angles, &slews(rate_deg_s));
     }
     let words = paragraph(&format!("Of {total_s:.2} s in the air."));
-    Some(words + &table(&["actuator", "#time", "#share"], &rows))
+    Some(words + &table(&["actuator", "#time", "#share"], rows))
 }
 
 #[cfg(test)]

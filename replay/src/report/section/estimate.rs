@@ -2,21 +2,25 @@
 
 use avionics::log::frame::phase_of;
 use avionics::log::logged::state_from_log;
-use flight::estimation::estimator::AidStatus;
 use flight::rules::phase::Phase;
 use nalgebra::Vector3;
-use onboard_sim::figure::Panel;
 use protocol::log::computer_v1::ComputerFrame;
 
 use super::rms_and_max;
 use crate::report::chart::{Chart, line};
 use crate::report::html::{paragraph, table};
-use crate::report::track::{Flight, Part, Thought, named_aids};
+use crate::report::track::{Flight, Part, Thought};
 
 pub(super) fn aids(flight: &Flight) -> Option<String> {
-    let row =
-        |(name, aid): (&str, AidStatus)| vec![name.to_owned(), aid.used.to_string(), aid.refused.to_string()];
-    Some(table(&["measurement", "#used", "#refused"], &named_aids(flight.pilot.as_ref()?).map(row)))
+    let aids = flight.pilot.as_ref()?.estimator().aids();
+    let rows = [
+        ("barometer", aids.barometer),
+        ("GNSS velocity", aids.gnss_velocity),
+        ("GNSS position", aids.gnss_position),
+        ("lidar", aids.lidar),
+    ];
+    let rows = rows.map(|(name, aid)| [name.to_owned(), aid.used.to_string(), aid.refused.to_string()]);
+    Some(table(&["measurement", "#used", "#refused"], rows))
 }
 
 /// The rows of the errors.
@@ -37,11 +41,11 @@ pub(super) fn errors(flight: &Flight) -> Option<String> {
     errors.first()?;
     let row = |(place, name): (usize, &&str)| {
         let (rms, max) = rms_and_max(errors.iter().map(|error| error[place]))?;
-        Some(vec![(*name).to_owned(), format!("{rms:.4}"), format!("{max:.4}")])
+        Some([(*name).to_owned(), format!("{rms:.4}"), format!("{max:.4}")])
     };
-    let rows: Vec<Vec<String>> = ERRORS.iter().enumerate().filter_map(row).collect();
+    let rows = ERRORS.iter().enumerate().filter_map(row);
     let words = paragraph(&format!("At {} planning frames from the release to contact.", errors.len()));
-    Some(table(&["estimate less truth", "#root mean square", "#largest"], &rows) + &words)
+    Some(table(&["estimate less truth", "#root mean square", "#largest"], rows) + &words)
 }
 
 /// Estimate less truth, as in [`ERRORS`]; `None` without a record of the world then.
@@ -69,9 +73,7 @@ pub(super) fn vibration(flight: &Flight) -> Chart {
         line(name, class, spectrum(&frames.map(felt).collect::<Vec<f64>>()))
     };
     let lines = vec![felt("descent", "a", Phase::in_descent), felt("burn", "b", Phase::in_landing_burn)];
-    let panel = Panel { x_label: "Hz".to_owned(), lines, ..Panel::default() };
-    let title = "Specific force along the nose, m/s^2 per sqrt(Hz)".to_owned();
-    Chart { title, panel, own_x: true, full: false }
+    Chart::new("Specific force along the nose, m/s^2 per sqrt(Hz)", ["Hz", ""], lines)
 }
 
 /// Amplitude spectral density by Welch's method: half overlapping segments under a Hann window, without their means. Hz, and

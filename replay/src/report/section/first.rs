@@ -112,7 +112,7 @@ fn limits(info: &Info) -> String {
 fn limit_table(title: &str, limits: &[VerdictLimit]) -> String {
     let row = |(limit, share): (&VerdictLimit, f64)| {
         let (class, word) = if limit.passed { ("good", "inside") } else { ("bad", "OUTSIDE") };
-        vec![
+        [
             escaped(&limit.name),
             format!("{:.2} {}", limit.value + 0.0, escaped(&limit.unit)),
             format!("{} to {}", rounded(limit.minimum) + 0.0, rounded(limit.maximum) + 0.0),
@@ -120,11 +120,11 @@ fn limit_table(title: &str, limits: &[VerdictLimit]) -> String {
             format!("<span class=\"{class}\">{word}</span>"),
         ]
     };
-    let rows: Vec<Vec<String>> = worst_first(limits.iter()).into_iter().map(row).collect();
-    if rows.is_empty() {
+    if limits.is_empty() {
         return String::new();
     }
-    let html = table(&[title, "#value", "#limit", "share; the mark is the limit", ""], &rows);
+    let heads = [title, "#value", "#limit", "share; the mark is the limit", ""];
+    let html = table(&heads, worst_first(limits.iter()).into_iter().map(row));
     // On a narrow screen its pictures are left out.
     html.replacen("class=\"wide\"", "class=\"wide limits\"", 1)
 }

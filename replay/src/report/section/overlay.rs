@@ -1,12 +1,10 @@
 //! Two flights in the same pictures.
 
-use onboard_sim::figure::Panel;
-
 use super::burn::paths;
 use super::pictures;
 use crate::info::Info;
 use crate::report::chart::{Chart, line};
-use crate::report::html::{charts, paragraph, table};
+use crate::report::html::{charts, escaped, paragraph, table};
 use crate::report::track::Flight;
 
 /// A flight and what its log says.
@@ -16,9 +14,9 @@ pub(in crate::report) type LogFacts<'a> = (&'a Flight, &'a Info);
 const NAMES: [(&str, &str); 2] = [("A", "a"), ("B", "b")];
 
 pub(in crate::report) fn html(flights: [LogFacts<'_>; 2]) -> String {
-    let rows = NAMES.iter().zip(flights).map(|((name, _), (flight, info))| {
-        let ending = info.ending.clone().unwrap_or_else(|| "no verdict".to_owned());
-        vec![(*name).to_owned(), flight.recording.name.clone(), ending]
+    let rows = NAMES.into_iter().zip(flights).map(|((name, _), (flight, info))| {
+        let ending = info.ending.as_deref().unwrap_or("no verdict");
+        [name, flight.recording.name.as_str(), ending].map(escaped)
     });
     let [a, b] = flights.map(|(flight, _)| flight);
     let axis = a.axis_name();
@@ -29,10 +27,10 @@ pub(in crate::report) fn html(flights: [LogFacts<'_>; 2]) -> String {
         let flown = NAMES.iter().zip([&a, &b]).filter_map(|((name, class), picture)| {
             Some(line(name, class, picture.chart.panel.lines.first()?.points.clone()))
         });
-        let panel = Panel { x_label: axis.to_owned(), lines: flown.collect(), ..Panel::default() };
-        Chart { title: format!("Both: {}", a.chart.title), panel, ..Chart::default() }.svg()
+        let title = format!("Both: {}", a.chart.title);
+        Chart { own_x: false, ..Chart::new(&title, [axis, ""], flown.collect()) }.svg()
     });
-    table(&["", "log", "ending"], &rows.collect::<Vec<_>>())
+    table(&["", "log", "ending"], rows)
         + &paragraph(&format!("Each flight has its own {axis}."))
         + &paths(&named.collect::<Vec<_>>())
         + &charts(&both.collect::<Vec<_>>())

@@ -3,7 +3,7 @@
 use flight::computer::pilot::Pilot;
 use flight::estimation::estimator::Estimate;
 use onboard_sim::figure::Panel;
-use protocol::log::flight_v1::{Measurements, TruthSample, Vector3};
+use protocol::log::flight_v1::{AidStatus, Measurements, TruthSample, Vector3};
 
 use super::burn::{AHEAD_S, tracking_errors};
 use super::estimate::vibration;
@@ -138,6 +138,7 @@ pub(super) fn all(flight: &Flight) -> Vec<Picture<'_>> {
     let fix = |along: fn(&Vector3) -> f64| {
         off(&|it, truth| Some(along(&it.gnss.as_ref()?.position_m) - along(&truth.state.position_m)))
     };
+    let ratio = |aid: Option<AidStatus>| Some(aid?.test_ratio.min(3.0));
     let estimated =
         |value: fn(&Estimate) -> f64| flight.thought(|thought| thought.estimate.as_ref().map(value));
     pictures.extend([
@@ -176,10 +177,10 @@ pub(super) fn all(flight: &Flight) -> Vec<Picture<'_>> {
             .line("up", "c", fix(|at| at.z)),
         over("sensors", Whole, "Test ratio of each measurement; above 1 it was refused")
             .limits([1.0])
-            .line("barometer", "thin", flight.test_ratios[0].clone())
-            .line("GNSS velocity", "a", flight.test_ratios[1].clone())
-            .line("GNSS position", "c", flight.test_ratios[2].clone())
-            .line("lidar", "b", flight.test_ratios[3].clone()),
+            .line("barometer", "thin", flight.estimated(|it| ratio(it.barometer)))
+            .line("GNSS velocity", "a", flight.estimated(|it| ratio(it.gnss_velocity)))
+            .line("GNSS position", "c", flight.estimated(|it| ratio(it.gnss_position)))
+            .line("lidar", "b", flight.estimated(|it| ratio(it.lidar))),
         over("sensors", Whole, "Standard deviations of the estimate")
             .line("height, m", "a", estimated(|estimate| estimate.sigmas.position_m.z))
             .line("place, m", "c", estimated(|estimate| estimate.sigmas.position_m.xy().norm()))

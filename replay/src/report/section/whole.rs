@@ -3,7 +3,6 @@
 use flight::computer::pilot::Pilot;
 use flight::rules::phase::Phase;
 use flight::vehicles::mission::BUILTIN;
-use onboard_sim::figure::Panel;
 
 use super::burn::View;
 use crate::cli::Answer as _;
@@ -28,18 +27,14 @@ pub(super) fn events(flight: &Flight) -> Option<String> {
     let clocks = &flight.recording.clocks;
     let (clock, heading) =
         if clocks.flight_zero_s.is_some() { (Clock::Flight, "#T+, s") } else { (Clock::Log, "#log, s") };
-    let rows: Vec<Vec<String>> = events
-        .iter()
-        .take(SHOWN)
-        .map(|(log_s, event)| {
-            let time = clocks.convert(ClockTime { clock: Clock::Log, time_s: *log_s }, clock);
-            let time_s = time.map_or(*log_s, |time| time.time_s);
-            vec![format!("{:.3}", time_s + 0.0), escaped(&event.name), escaped(&event.message)]
-        })
-        .collect();
+    let rows = events.iter().take(SHOWN).map(|(log_s, event)| {
+        let time = clocks.convert(ClockTime { clock: Clock::Log, time_s: *log_s }, clock);
+        let time_s = time.map_or(*log_s, |time| time.time_s);
+        [format!("{:.3}", time_s + 0.0), escaped(&event.name), escaped(&event.message)]
+    });
     let more = events.len().saturating_sub(SHOWN);
     let rest = if more > 0 { paragraph(&format!("And {more} more.")) } else { String::new() };
-    let shown = table(&[heading, "from", "event"], &rows) + &rest;
+    let shown = table(&[heading, "from", "event"], rows) + &rest;
     Some(format!("<details><summary>{} events</summary>\n{shown}</details>\n", events.len()))
 }
 
@@ -60,11 +55,9 @@ pub(super) fn mission(flight: &Flight, info: &Info) -> Option<String> {
         return Some(paragraph(&format!("As the built-in {name}.")));
     }
     let words = |value: Option<String>| escaped(&value.unwrap_or_else(|| "absent".to_owned()));
-    let rows: Vec<Vec<String>> = differences
-        .into_iter()
-        .map(|differs| vec![escaped(&differs.setting), words(differs.baseline), words(differs.other)])
-        .collect();
-    Some(controller + &table(&["value", "built-in", "flown"], &rows))
+    let rows = differences.into_iter();
+    let rows = rows.map(|differs| [escaped(&differs.setting), words(differs.baseline), words(differs.other)]);
+    Some(controller + &table(&["value", "built-in", "flown"], rows))
 }
 
 /// A stage of the flight: its name, its class, and whether a phase belongs to it.
@@ -100,23 +93,21 @@ pub(super) fn view(flight: &Flight, (title, labels, see): View, equal_scales: bo
         let (x, y) = see(&sample.state);
         (x, y, name.to_owned())
     };
-    let [x_label, y_label] = labels.map(str::to_owned);
-    let (lines, places) = (lines.collect(), places.map(place).collect());
-    let panel = Panel { x_label, y_label, lines, places, equal_scales, ..Panel::default() };
-    Chart { title: title.to_owned(), panel, own_x: true, full: false }.svg()
+    let mut chart = Chart::new(title, labels, lines.collect());
+    (chart.panel.places, chart.panel.equal_scales) = (places.map(place).collect(), equal_scales);
+    chart.svg()
 }
 
 pub(super) fn moments_and_views(flight: &Flight) -> String {
-    let row = |(name, sample, _): (&str, &Sample, bool)| {
+    let row = |(name, sample, _): (&str, &Sample, bool)| -> Vec<String> {
         let [north, east, height_m, level_m_s, up_m_s, ..] = sample.state;
         let cells = [height_m, north, east, level_m_s, up_m_s].map(|value| format!("{:.1}", value + 0.0));
         [name.to_owned(), format!("{:.3}", flight.axis_s(sample.time_s))].into_iter().chain(cells).collect()
     };
-    let rows: Vec<Vec<String>> = moments(flight).into_iter().map(row).collect();
     let time = format!("#{}", flight.axis_name());
     let heads = ["moment", &time, "#height, m", "#north, m", "#east, m", "#level, m/s", "#up, m/s"];
     paragraph("Up to contact. Each axis has its own scale.")
-        + &table(&heads, &rows)
+        + &table(&heads, moments(flight).into_iter().map(row))
         + &charts(&SIDES.map(|seen| view(flight, seen, false)))
 }
 

@@ -1,6 +1,6 @@
 //! The flight phases, the events that change them, and the one table of all transitions.
 //!
-//! [`transition`] is a pure function: it takes a mode and an event, and returns a mode and effects, or a [`Refusal`] in
+//! [`transition()`] is a pure function: it takes a mode and an event, and returns a mode and effects, or a [`Refusal`] in
 //! words. The vehicle lights a motor on the way down, which staging electronics forbid for good reason. So the table is
 //! explicit and conservative: only one line of it lights the landing motor, once, and only if every interlock allows
 //! it.
