@@ -11,4 +11,4 @@ mod layout;
 mod shape;
 
 pub use export::{BESIDE, ExportError, Exported, FLIGHT_TIME, export};
-pub use layout::{PLOTS, Plot};
+pub use layout::{PLOTS, Plot, component};

@@ -171,20 +171,18 @@ impl Rest {
             let whitener = rest.whitener(samples, white);
             missed.iter().map(|axis| whitener.surprise(axis)).sum::<f64>()
         };
-        let numbers: [(fn(&mut Self) -> &mut f64, [f64; 2]); 3] = [
-            (|rest| &mut rest.sigma_rad_s2, [0.01, 30.0]),
-            (|rest| &mut rest.lasts_s, [0.02, 5.0]),
-            (|rest| &mut rest.rough, [1e-4, 1.0]),
-        ];
         let mut rest = self;
-        for (number, ends) in numbers.into_iter().cycle().take(2 * numbers.len()) {
-            let with = |logarithm: f64| {
-                let mut tried = rest;
-                *number(&mut tried) = libm::exp(logarithm);
-                tried
-            };
-            let [low, high] = ends.map(libm::log);
-            rest = with(lowest(low, high, 14, |at| surprise(with(at))));
+        for _ in 0..2 {
+            let of_sigma = |logarithm: f64| Self { sigma_rad_s2: libm::exp(logarithm), ..rest };
+            let sigma_rad_s2 =
+                libm::exp(lowest(libm::log(0.01), libm::log(30.0), 14, |at| surprise(of_sigma(at))));
+            rest = Self { sigma_rad_s2, ..rest };
+            let of_time = |logarithm: f64| Self { lasts_s: libm::exp(logarithm), ..rest };
+            let lasts_s = libm::exp(lowest(libm::log(0.02), libm::log(5.0), 14, |at| surprise(of_time(at))));
+            rest = Self { lasts_s, ..rest };
+            let of_rough = |logarithm: f64| Self { rough: libm::exp(logarithm), ..rest };
+            let rough = libm::exp(lowest(libm::log(1e-4), libm::log(1.0), 14, |at| surprise(of_rough(at))));
+            rest = Self { rough, ..rest };
         }
         rest
     }

@@ -13,34 +13,17 @@ fn run(arguments: &[&Path]) -> (Option<i32>, String) {
 }
 
 #[test]
-fn the_recording_stands_beside_the_log_and_is_kept_unless_forced() {
-    let (_folder, log, rrd) = folder();
-    write_log(&log);
-    let (code, said) = run(&[&log]);
-    assert_eq!(code, Some(0), "{said}");
-    assert!(said.contains("flight.rrd: 4 poses, 1 events"), "{said}");
-    assert!(!said.contains("warning"), "{said}");
-    std::fs::write(&rrd, "precious").unwrap();
-    let (code, said) = run(&[&log]);
-    assert_eq!(code, Some(2));
-    assert!(said.contains("flight.rrd: cannot be written: it exists already; --force replaces it"), "{said}");
-    assert_eq!(std::fs::read(&rrd).unwrap(), b"precious");
-    assert_eq!(run(&[&log, Path::new("--force")]).0, Some(0));
-    assert!(std::fs::read(&rrd).unwrap().starts_with(b"RRF2"));
-}
-
-#[test]
-fn damage_is_a_warning_and_no_log_is_an_error() {
+fn the_recording_stands_beside_the_log_and_what_goes_wrong_is_said() {
     let (folder, log, rrd) = folder();
     write_log(&log);
     let bytes = std::fs::read(&log).unwrap();
+    assert_eq!(run(&[&log]), (Some(0), format!("replay-rerun: {}: 4 poses, 1 events\n", rrd.display())));
+    let (code, said) = run(&[&log]);
+    assert!(code == Some(2) && said.ends_with("cannot be written: it exists already; --force replaces it\n"));
     std::fs::write(&log, &bytes[..in_the_third_chunk(&bytes)]).unwrap();
-    let (code, said) = run(&[&log, Path::new("-o"), &rrd]);
-    assert_eq!(code, Some(0), "{said}");
-    assert!(said.contains("flight.mcap is damaged: ends after"), "{said}");
-    let missing = folder.path().join("missing.mcap");
-    let (code, said) = run(&[&missing]);
-    assert_eq!(code, Some(2));
-    assert!(said.contains("missing.mcap: cannot be read"), "{said}");
+    let (code, said) = run(&[&log, Path::new("-o"), &rrd, Path::new("--force")]);
+    assert!(code == Some(0) && said.contains("flight.mcap is damaged: ends after"), "{said}");
+    assert!(std::fs::read(&rrd).unwrap().starts_with(b"RRF2"));
+    assert_eq!(run(&[&folder.path().join("missing.mcap")]).0, Some(2));
     assert_eq!(run(&[]).0, Some(2), "wrong usage");
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use re_lenses::Selector;
-use replay_rerun::{FLIGHT_TIME, PLOTS, export};
+use replay_rerun::{FLIGHT_TIME, PLOTS, component, export};
 
 use crate::flown::{MK2, WITH_FRAMES, tlog};
 use crate::logs::{FRAMES, START_UNIX_NS, folder, forced, write_log, write_log_from};
@@ -63,24 +63,24 @@ fn every_plot_of_the_layout_has_its_fields() {
     write_log(&log);
     let tlog = tlog(&WITH_FRAMES, "station.tlog");
     replay::log::import_tlog(&tlog, &station).unwrap();
-    for plot in &PLOTS {
-        let log = match plot.topic {
+    for (title, [topic, message], fields) in PLOTS {
+        let log = match topic {
             "/pilot/timing" => &MK2.log,
             "/telemetry" => &station,
             _ => &log,
         };
         export(log, None, forced(&rrd)).unwrap();
         let recording = Recording::read(&rrd);
-        for field in plot.fields {
+        for field in fields {
             let selector: Selector = field.parse().unwrap();
-            let component = rerun::ComponentIdentifier::try_new(plot.component()).unwrap();
-            let chunks = recording.of(plot.topic.trim_start_matches('/'));
+            let component = rerun::ComponentIdentifier::try_new(component(message)).unwrap();
+            let chunks = recording.of(topic.trim_start_matches('/'));
             let messages = chunks.filter_map(|chunk| chunk.components().get_array(component));
             let values = messages.map(|messages| {
                 let selected = selector.execute_per_row(messages).unwrap();
                 selected.map_or(0, |values| values.values().len())
             });
-            assert!(values.sum::<usize>() > 0, "{} {field}", plot.topic);
+            assert!(values.sum::<usize>() > 0, "{title} {field}");
         }
     }
 }
