@@ -13,7 +13,6 @@ use onboard_sim::statistics::Landings;
 use sim::dispersion::{self, may_be_kinder};
 use sim::recipe::Recipe;
 
-use super::fly::WIND_MAX_M_S;
 use super::{in_wind, mission_text, on_threads, recipe, show_flights};
 
 /// Flights of each kind that the picture shows.
@@ -60,7 +59,6 @@ pub(crate) fn run(arguments: &HazardArguments) -> anyhow::Result<ExitCode> {
     for path in [&arguments.csv, &arguments.svg].into_iter().flatten() {
         refuse_loss(path, arguments.force)?;
     }
-    check_winds(&arguments.winds)?;
     let recipes = recipes(arguments)?;
     let mission = &recipes[0].mission;
     let ways = Way::of(mission);
@@ -77,12 +75,6 @@ pub(crate) fn run(arguments: &HazardArguments) -> anyhow::Result<ExitCode> {
         write_all(&[(path.clone(), study.svg(&rule)?.into_bytes())], arguments.force)?;
     }
     Ok(ExitCode::SUCCESS)
-}
-
-/// Refuses a wind that cannot be flown.
-pub(super) fn check_winds(winds_m_s: &[f64]) -> anyhow::Result<()> {
-    let wrong = winds_m_s.iter().find(|wind_m_s| !(0.0..=WIND_MAX_M_S).contains(*wind_m_s));
-    wrong.map_or(Ok(()), |wind_m_s| anyhow::bail!("--wind {wind_m_s}: must be 0 to {WIND_MAX_M_S} m/s"))
 }
 
 /// The mission in each wind.
