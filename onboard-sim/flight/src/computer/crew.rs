@@ -223,7 +223,7 @@ impl Computer {
         }
         let checks = self.arming_checks_by(uplink);
         let start = self.start_point();
-        let lifted_off = self.pilot.has_lifted_off();
+        let lifted_off = self.pilot.ascent.has_lifted_off();
         let abort = self.abort_event();
         let Some(event) = event_of(asked, &checks, (self.countdown_s, start), abort, lifted_off) else {
             return match asked {

@@ -394,7 +394,7 @@ impl Computer {
                 ..launch.standing(mission.airframe.mass.loaded_cg_station_m)
             };
             // A lift-off that nobody commanded is felt a moment after it began.
-            believed.velocity_m_s = believed.nose_in_world() * self.pilot.pushed_to_m_s();
+            believed.velocity_m_s = believed.nose_in_world() * self.pilot.ascent.gained_m_s;
             self.pilot.stand(&believed, start.gyro_bias_rad_s);
         }
     }

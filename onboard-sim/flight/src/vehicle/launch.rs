@@ -59,7 +59,7 @@ pub struct Booster {
     /// Name of a built-in motor, or the text of its `.eng` or `.rse` file.
     pub motor: String,
     /// The certified thrust curve of that motor. The reader of the mission looks it up.
-    #[serde(skip, default = "ThrustCurve::none")]
+    #[serde(skip)]
     pub motor_curve: ThrustCurve,
     /// From its lower end, which is its nozzle, to the landing vehicle's nozzle exit, m.
     pub length_m: f64,

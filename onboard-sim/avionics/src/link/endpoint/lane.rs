@@ -205,11 +205,10 @@ impl Lane {
             self.share_with_the_radio();
         }
         let slow = is_slow(self.streams.capacity_bytes_s());
-        self.sent.move_to(now_s);
-        self.telemetry_briefly.move_to(now_s);
-        self.answers_briefly.move_to(now_s);
-        self.answered.move_to(now_s);
-        self.said.move_to(now_s);
+        let Self { sent, telemetry_briefly, answers_briefly, answered, said, .. } = self;
+        for window in [sent, telemetry_briefly, answers_briefly, answered, said] {
+            window.move_to(now_s);
+        }
         let mut frames = Vec::new();
         let due = self.streams.due(now_s, files.is_busy(&self.links, now_s));
         for due in due.iter().filter(|due| due.vital) {

@@ -33,7 +33,6 @@ use protocol::dialect::{
 use protocol::identity::GIT_COMMIT;
 use protocol::mission::MissionHash;
 
-pub use self::ours::td_phase;
 pub(crate) use self::ours::{finding, pad_check};
 use crate::link::vehicle::{Identity, VehicleKind, VehicleState};
 

@@ -11,7 +11,7 @@ use ocp::{Outcome, Status};
 
 use super::vehicle_model::{Burning, VehicleModel};
 use super::{Pilot, Prediction};
-use crate::computer::{FRAME_MS, Rehearsed};
+use crate::computer::{Computer, FRAME_MS, Rehearsed};
 use crate::estimation::estimator::Estimate;
 use crate::guidance::powered::{LandingSolved, Plan, Search};
 use crate::rules::verdict::Touchdown;
@@ -195,7 +195,7 @@ impl Pilot {
     }
 
     /// Takes over what was posed; computes it now, if nobody has. Returns whether it is a plan of a landing.
-    pub(in crate::computer) fn take_over(&mut self, time_s: f64) -> bool {
+    pub(crate) fn take_over(&mut self, time_s: f64) -> bool {
         let Some((posed_at_s, planner)) = self.posed_at_s.zip(self.planner.as_mut()) else { return false };
         self.posed_at_s = None;
         planner.solve();
@@ -217,19 +217,9 @@ impl Pilot {
     }
 
     /// What is posed and not computed yet.
-    pub(in crate::computer) fn posed(&mut self) -> Option<&mut Box<Planner>> {
+    fn posed(&mut self) -> Option<&mut Box<Planner>> {
         self.posed_at_s?;
         self.planner.as_mut().filter(|planner| planner.found.is_none())
-    }
-
-    pub(in crate::computer) fn take_posed(&mut self) -> Option<Box<Planner>> {
-        self.posed()?;
-        self.planner.take()
-    }
-
-    pub(in crate::computer) fn give_back(&mut self, planner: Box<Planner>) {
-        // One of a computer that has restarted meanwhile has its own.
-        self.planner.get_or_insert(planner);
     }
 
     /// The landing that was taken over last, and its problem; none before the first, and once the next one is posed.
@@ -244,11 +234,35 @@ impl Pilot {
         let settings = &planner.model.mission.powered;
         planner.search.solved(settings, later.time_s, outcome, self.powered.planned()?, &situation)
     }
+}
 
-    /// Rehearses the landing on the pad, from power-up on; `None` while something is posed.
-    pub(in crate::computer) fn rehearse(&mut self) -> Option<Rehearsed> {
-        let planner = self.planner.as_mut().filter(|_| self.posed_at_s.is_none())?;
-        self.powered.begin(&mut planner.search);
+impl Computer {
+    /// Computes what the pilot has posed, in this context, if it was not done yet; returns in how many frames a Cortex-M7 does.
+    pub fn solve_posed(&mut self) -> Option<u64> {
+        let planner = self.pilot.posed()?;
+        planner.solve();
+        Some(planner.frames_on_a_board())
+    }
+
+    /// What the pilot has posed, to be computed in another context; once. It has to be [given back](Self::give_back).
+    pub fn take_posed(&mut self) -> Option<Box<Planner>> {
+        self.pilot.posed()?;
+        self.pilot.planner.take()
+    }
+
+    /// Gives back what was [computed](Planner::solve) in another context. The frame that is told so takes it over.
+    pub fn give_back(&mut self, planner: Box<Planner>) {
+        // One of a computer that has restarted meanwhile has its own.
+        self.pilot.planner.get_or_insert(planner);
+    }
+
+    /// Rehearses the landing at power-up, without a simulated world: what a board puts into its inputs. `None` once it is released,
+    /// and while something is posed. It takes some seconds on a board, and leaves no memory.
+    pub fn rehearse(&mut self) -> Option<Rehearsed> {
+        let pilot = &mut *self.pilot;
+        let planner =
+            pilot.planner.as_mut().filter(|_| self.release.is_none() && pilot.posed_at_s.is_none())?;
+        pilot.powered.begin(&mut planner.search);
         Some(planner.rehearse())
     }
 }

@@ -61,14 +61,14 @@ fn on_the_way_up(
 
 impl Pilot {
     /// Estimates the vehicle's state, and its motor and drag.
-    pub(in crate::computer) fn estimate_state(&mut self, phase: Phase, input: &KeptInput) {
+    pub(crate) fn estimate_state(&mut self, phase: Phase, input: &KeptInput) {
         let estimate = self.estimated(phase, input);
         self.estimate = Some(estimate);
         self.update_models(phase, input, &estimate);
     }
 
     /// Follows the ascent, predicts ignition and abort, and watches the fins. Every event goes through the `table`.
-    pub(in crate::computer) fn predict(&mut self, table: &mut PhaseTable, input: &KeptInput) {
+    pub(crate) fn predict(&mut self, table: &mut PhaseTable, input: &KeptInput) {
         let Some(estimate) = self.estimate else { return };
         self.watch_the_speeds(input, &estimate);
         // Before the prediction: at apogee an abort has to know at once whether the parachute has room.
@@ -92,7 +92,7 @@ impl Pilot {
 
     /// Poses a landing in the first frame of the burn, and again ten frames after the last, or later if that one takes longer: not in
     /// the frame that took it over, so that it can be looked at behind it.
-    pub(in crate::computer) fn plan(&mut self, mode: &Mode, input: &KeptInput, took_over: bool) {
+    pub(crate) fn plan(&mut self, mode: &Mode, input: &KeptInput, took_over: bool) {
         let due = !took_over && input.frame >= self.plan_due && mode.phase.in_landing_burn();
         let burning = self.burning(mode, input.time_s).filter(|_| due);
         if let Some((burning, estimate)) = burning.zip(self.estimate)
@@ -103,7 +103,7 @@ impl Pilot {
     }
 
     /// Points fins and gimbal.
-    pub(in crate::computer) fn point(&mut self, mode: &Mode, input: &KeptInput) -> Pointed {
+    pub(crate) fn point(&mut self, mode: &Mode, input: &KeptInput) -> Pointed {
         let flying = mode.phase.in_landing_burn();
         if let Some(estimate) = self.estimate {
             let estimate = &estimate;
@@ -247,12 +247,7 @@ impl Pilot {
     }
 
     /// Moves through the phases of the descent and the landing.
-    pub(in crate::computer) fn decide(
-        &mut self,
-        table: &mut PhaseTable,
-        input: &KeptInput,
-        sensors: &SensorWatch,
-    ) {
+    pub(crate) fn decide(&mut self, table: &mut PhaseTable, input: &KeptInput, sensors: &SensorWatch) {
         let Some(estimate) = self.estimate else { return };
         let estimate = &estimate;
         let time_s = input.time_s;
@@ -311,7 +306,7 @@ impl Pilot {
     }
 
     /// The motor's thrust as estimated, and the weight, N.
-    pub(in crate::computer) fn thrust_and_weight_n(&self, time_s: f64) -> (f64, f64) {
+    pub(crate) fn thrust_and_weight_n(&self, time_s: f64) -> (f64, f64) {
         let burning_s = self.model.burning_s(time_s);
         let thrust_n = burning_s.map_or(0.0, |burning_s| self.model.burn().thrust_n(burning_s));
         (thrust_n, self.model.mass_now(burning_s).mass_kg * self.model.mission.gravity_m_s2)
@@ -353,7 +348,7 @@ impl Pilot {
             !self.gate_checks(mode, input, estimate, sensors).iter().any(|check| check.shut)
         });
         Event::AbortRequested {
-            lifted_off: self.has_lifted_off(),
+            lifted_off: self.ascent.has_lifted_off(),
             above_commit_height: self.parachute_has_room(gate_open),
             gate_open,
         }
@@ -417,7 +412,7 @@ impl Pilot {
     ///
     /// # Errors
     /// The table refuses it, and nothing has changed.
-    pub(in crate::computer) fn told(
+    pub(crate) fn told(
         &mut self,
         table: &mut PhaseTable,
         event: Event,
