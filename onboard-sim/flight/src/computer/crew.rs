@@ -13,7 +13,9 @@ use crate::rules::operator::Operator;
 use crate::rules::phase::{
     Event, HoldCause, Mode, Phase, Refusal, StartPoint, UPLINK_PROVEN_S, UPLINK_SILENT_S, transition,
 };
-use crate::rules::two_person::{self, Act, Ask, CONFIRM_WITHIN_S, Reply, Station, TAP_WITHIN_S, TwoPerson};
+use crate::rules::two_person::{
+    Act, Ask, CONFIRM_WITHIN_S, NoAgreement, Reply, Station, TAP_WITHIN_S, TwoPerson,
+};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Asked {
@@ -457,15 +459,15 @@ fn ask_in_words(ask: &Ask, time_s: f64) -> String {
     format!("{} asks to {}: {one} or {other} must confirm within {left_s:.0} s", ask.by, ask.act.name())
 }
 
-fn why_no_agreement(refusal: two_person::Refusal, act: Act, time_s: f64) -> String {
+fn why_no_agreement(refusal: NoAgreement, act: Act, time_s: f64) -> String {
     match refusal {
-        two_person::Refusal::Observer => "observers command nothing".to_string(),
-        two_person::Refusal::AnotherAsks(ask) => ask_in_words(&ask, time_s),
-        two_person::Refusal::NothingToConfirm => {
+        NoAgreement::Observer => "observers command nothing".to_string(),
+        NoAgreement::AnotherAsks(ask) => ask_in_words(&ask, time_s),
+        NoAgreement::NothingToConfirm => {
             format!("nobody asks to {}, or not by that number any more", act.name())
         }
-        two_person::Refusal::OwnAsk(ask) => format!("{} asked: another role must confirm", ask.by),
-        two_person::Refusal::SameRole(ask) => {
+        NoAgreement::OwnAsk(ask) => format!("{} asked: another role must confirm", ask.by),
+        NoAgreement::SameRole(ask) => {
             format!("{} asked: another role than {} must confirm", ask.by, ask.by.role.name())
         }
     }

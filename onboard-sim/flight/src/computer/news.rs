@@ -84,7 +84,7 @@ const FAILS_FOR_S: f64 = 0.1;
 /// The failing arming check that the crew on the pad was last told of, and since when one fails, s.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub(super) struct Readiness {
-    told: Option<&'static str>,
+    last_check: Option<&'static str>,
     since_s: Option<f64>,
 }
 
@@ -100,7 +100,7 @@ impl Readiness {
         if time_s - *self.since_s.get_or_insert(time_s) < FAILS_FOR_S {
             return None;
         }
-        let untold = self.told.replace(check.name) != Some(check.name);
+        let untold = self.last_check.replace(check.name) != Some(check.name);
         check.refusal().map(|reason| (reason, untold))
     }
 }

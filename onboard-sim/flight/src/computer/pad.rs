@@ -50,7 +50,7 @@ impl Stance {
 
 /// Result of one second on the pad.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-struct PadFindings {
+struct PadSecond {
     /// Attitude with the heading of the pad, and the gyro's bias, rad/s; `None` if the vehicle was not at rest.
     at_rest: Option<PadStart>,
     /// Mean angle between the axis and what is felt, rad: the tilt of a vehicle that hangs still in the mean.
@@ -72,7 +72,7 @@ pub(super) struct PadWatch {
     pressures: u32,
     altitude_sum_m: f64,
     falling_frames: u32,
-    found: Option<PadFindings>,
+    found: Option<PadSecond>,
 }
 
 impl PadWatch {
@@ -97,7 +97,7 @@ impl PadWatch {
         let over = core::mem::take(self);
         self.falling_frames = over.falling_frames;
         let across_m_s2 = over.force_sum_m_s2.yz().norm();
-        self.found = Some(PadFindings {
+        self.found = Some(PadSecond {
             at_rest: over.alignment.finish(0.0).ok(),
             lean_rad: libm::atan2(across_m_s2, over.force_sum_m_s2.x),
             pressure_altitude_m: over.altitude_sum_m / f64::from(over.pressures),

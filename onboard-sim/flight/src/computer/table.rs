@@ -137,7 +137,7 @@ impl Computer {
     pub(super) fn happen(&mut self, event: Event) -> Result<Effects, Refusal> {
         let before = self.table.mode().phase;
         let effects = match self.flown() {
-            Some(input) => self.pilot.told(&mut self.table, event, input.time_s),
+            Some(input) => self.pilot.apply(&mut self.table, event, input.time_s),
             None => self.table.happen(event),
         }?;
         if before == Phase::Boost && self.table.mode().phase.on_pad() {

@@ -411,7 +411,7 @@ const POSITIVE: &str = "a finite number above 0";
 const NOT_NEGATIVE: &str = "a finite number, 0 or more,";
 
 /// A key, its value, whether it is accepted, and what is.
-type Row = (&'static str, f64, bool, &'static str);
+type RangeCheck = (&'static str, f64, bool, &'static str);
 
 #[rustfmt::skip]
 fn validate(airframe: &Airframe) -> Result<(), BadValue> {
@@ -426,7 +426,7 @@ fn validate(airframe: &Airframe) -> Result<(), BadValue> {
     let (length_m, from_y_deg, foot_m) = (body.length_m, fins.from_y_deg, legs.foot_station_m);
     let apart_rad = (2.0 * from_y_deg).min(180.0 - 2.0 * from_y_deg).to_radians();
     let control_deg = fins.control_min_deg;
-    let rows: [Row; 42] = [
+    let rows: [RangeCheck; 42] = [
         row("igniters", f64::from(airframe.igniters), (1..=3).contains(&airframe.igniters), "1 to 3"),
         positive("mass.loaded_kg", mass.loaded_kg),
         positive("mass.loaded_cg_station_m", mass.loaded_cg_station_m),
@@ -507,7 +507,7 @@ mod tests {
     #[test]
     fn every_builtin_airframe_is_sound_and_has_its_motor() {
         for (name, _) in crate::vehicles::mission::BUILTIN {
-            let airframe = crate::vehicles::airframe::builtin(name).unwrap();
+            let airframe = crate::vehicles::mission::builtin_airframe(name).unwrap();
             let motor = motors::builtin(&airframe.motor).unwrap();
             let propellant_kg = motor.propellant_mass_kg();
             let model = MassModel::new(&airframe.mass, propellant_kg);
@@ -523,7 +523,7 @@ mod tests {
     /// The terminal speed with open fins is the landing paper's 39.4 m/s at 3 kg and sea level.
     #[test]
     fn val_landing_paper_terminal_speed_with_open_fins() {
-        let airframe = crate::vehicles::airframe::builtin("mk2-h53").unwrap();
+        let airframe = crate::vehicles::mission::builtin_airframe("mk2-h53").unwrap();
         let area_m2 = airframe.drag_area_m2(core::f64::consts::FRAC_PI_2);
         let speed_m_s = (2.0 * airframe.mass.loaded_kg * 9.806_65 / (1.225 * area_m2)).sqrt();
         assert!((speed_m_s - 39.4).abs() < 0.05, "{speed_m_s}");
@@ -531,7 +531,7 @@ mod tests {
 
     #[test]
     fn a_bad_value_is_named_in_the_error() {
-        let mut airframe = crate::vehicles::airframe::builtin("mk2").unwrap();
+        let mut airframe = crate::vehicles::mission::builtin_airframe("mk2").unwrap();
         airframe.gimbal.limit_deg = -3.0;
         let error = airframe.validate().unwrap_err().to_string();
         assert_eq!(error, "gimbal.limit_deg is -3; above 0 and below 90 is accepted");
@@ -540,7 +540,7 @@ mod tests {
     /// Quarters of the skin of a body of 74 mm are 58.1 mm wide. Turned by 15 degrees, neighbours are 38.7 mm apart on one side.
     #[test]
     fn val_hand_closed_fins_must_not_overlap() {
-        let mk3 = crate::vehicles::airframe::builtin("mk3").unwrap();
+        let mk3 = crate::vehicles::mission::builtin_airframe("mk3").unwrap();
         for (width_m, from_y_deg, hinge_off_deg, wrong) in [
             (0.0581, 45.0, 15.0, None),
             (0.0582, 45.0, 15.0, Some("fins.width_m")),
@@ -564,7 +564,7 @@ mod tests {
     /// It crushes under half the weight, jams, lets the nozzle touch the ground, or its leg breaks first.
     #[test]
     fn a_foot_that_cannot_give_way_is_named_in_the_error() {
-        let mut airframe = crate::vehicles::airframe::builtin("mk3").unwrap();
+        let mut airframe = crate::vehicles::mission::builtin_airframe("mk3").unwrap();
         let sound = airframe.legs.crush.unwrap();
         for (key, crush) in [
             ("legs.crush.force_n", Crush { force_n: 16.0, ..sound }),
@@ -585,7 +585,7 @@ mod tests {
     fn val_order_statistics_the_earliest_of_several_igniters() {
         use core::f64::consts::PI;
         let scatter = |igniters| {
-            let airframe = crate::vehicles::airframe::builtin("mk2").unwrap();
+            let airframe = crate::vehicles::mission::builtin_airframe("mk2").unwrap();
             Airframe { igniters, ..airframe }.igniter_scatter()
         };
         assert!((scatter(1) - 1.0).abs() < 1e-12);
@@ -595,7 +595,7 @@ mod tests {
 
     #[test]
     fn a_single_igniter_is_the_default_and_the_number_has_a_range() {
-        let mut airframe = crate::vehicles::airframe::builtin("mk2").unwrap();
+        let mut airframe = crate::vehicles::mission::builtin_airframe("mk2").unwrap();
         assert_eq!(airframe.igniters, 1);
         for (igniters, ok) in [(0, false), (1, true), (3, true), (4, false)] {
             airframe.igniters = igniters;

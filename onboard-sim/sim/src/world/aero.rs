@@ -280,7 +280,7 @@ mod tests {
     /// What legs of 0.01 m2 add at 30 m/s from the tail, 20 degrees from the side, and in a roll.
     #[test]
     fn val_hand_air_on_the_legs() {
-        let mut airframe = flight::vehicles::airframe::builtin("mk2").unwrap();
+        let mut airframe = flight::vehicles::mission::builtin_airframe("mk2").unwrap();
         let bare = Shape::new(&airframe, &Truth::default());
         (airframe.legs.drag_area_m2, airframe.legs.drag_station_m) = (0.006, 0.05);
         let legged = Shape::new(&airframe, &Truth { leg_drag_m2: 0.004, ..Truth::default() });

@@ -67,7 +67,7 @@ mod tests {
     use super::*;
 
     fn balance() -> (Airframe, Balance) {
-        let airframe = flight::vehicles::airframe::builtin("mk2").unwrap();
+        let airframe = flight::vehicles::mission::builtin_airframe("mk2").unwrap();
         let balance = Balance::new(&airframe);
         (airframe, balance)
     }

@@ -289,7 +289,7 @@ mod tests {
     use crate::world::body::{Inertia, Loads, rk4_step};
 
     fn mk3() -> Airframe {
-        flight::vehicles::airframe::builtin("mk3").unwrap()
+        flight::vehicles::mission::builtin_airframe("mk3").unwrap()
     }
 
     fn at_cg(airframe: &Airframe) -> Vector3<f64> {

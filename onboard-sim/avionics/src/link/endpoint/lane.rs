@@ -37,12 +37,12 @@ const LINE_HOLDS_S: f64 = 0.3;
 
 /// An answer in the queue.
 #[derive(Debug, Clone)]
-pub(super) enum Answer {
+pub(super) enum QueuedAnswer {
     Message(Box<MavMessage>),
     Command(CommandAnswer),
 }
 
-impl From<MavMessage> for Answer {
+impl From<MavMessage> for QueuedAnswer {
     fn from(message: MavMessage) -> Self {
         Self::Message(Box::new(message))
     }
@@ -68,8 +68,8 @@ pub(super) struct Lane {
     /// Answers to aborts, at most one for each station.
     aborts: VecDeque<CommandAnswer>,
     abort_answered_s: f64,
-    texts: VecDeque<Answer>,
-    answers: VecDeque<Answer>,
+    texts: VecDeque<QueuedAnswer>,
+    answers: VecDeque<QueuedAnswer>,
     /// Requested messages; they are sent after all vital messages.
     requested: VecDeque<MavMessage>,
     /// The next parameter of a requested list; `None` when the list has been sent.
@@ -78,7 +78,7 @@ pub(super) struct Lane {
     piece_due_s: f64,
     /// The budget that the lane was given, bytes per second; a radio may leave less of it.
     granted_bytes_s: u32,
-    radio: Radio,
+    radio: RadioShare,
     /// When a line slower than a radio has sent what it was given. What is not vital waits for that, so that nothing queues
     /// behind it.
     line_free_at_s: f64,
@@ -112,7 +112,7 @@ impl Lane {
             next_parameter: None,
             piece_due_s: 0.0,
             granted_bytes_s: 0,
-            radio: Radio::default(),
+            radio: RadioShare::default(),
             line_free_at_s: 0.0,
             uplinks_at_s: 0.0,
         };
@@ -164,7 +164,7 @@ impl Lane {
         self.uplinks.push_front(message);
     }
 
-    pub(super) fn answer(&mut self, answer: Answer) {
+    pub(super) fn answer(&mut self, answer: QueuedAnswer) {
         if self.answers.len() < MAX_WAITING {
             self.answers.push_back(answer);
         }
@@ -201,7 +201,7 @@ impl Lane {
     ) -> Vec<Outgoing> {
         let now_s = context.now_s;
         if self.radio.is_outdated(now_s) {
-            self.radio = Radio::default();
+            self.radio = RadioShare::default();
             self.share_with_the_radio();
         }
         let slow = is_slow(self.streams.capacity_bytes_s());
@@ -220,7 +220,7 @@ impl Lane {
         let answered_every_s = if slow { SLOW_ABORT_ANSWERED_S } else { ABORT_ANSWERED_S };
         if now_s - self.abort_answered_s >= answered_every_s
             && let Some(answer) = self.aborts.front().copied()
-            && let Some(frame) = self.encode(&Answer::Command(answer), self.sent.room())
+            && let Some(frame) = self.encode(&QueuedAnswer::Command(answer), self.sent.room())
         {
             self.put(frame, now_s, &mut frames);
             self.abort_answered_s = now_s;
@@ -358,12 +358,12 @@ impl Lane {
     }
 
     /// The frame, if it is not longer than this; a frame that is not sent uses no sequence number.
-    fn encode(&mut self, answer: &Answer, room: usize) -> Option<Frame> {
+    fn encode(&mut self, answer: &QueuedAnswer, room: usize) -> Option<Frame> {
         let mut encoder = self.encoder.clone();
         let frame = match answer {
-            Answer::Message(message) => encoder.encode(message),
+            QueuedAnswer::Message(message) => encoder.encode(message),
             // The dialect always has COMMAND_ACK.
-            Answer::Command(answer) => answer.encode(&mut encoder)?,
+            QueuedAnswer::Command(answer) => answer.encode(&mut encoder)?,
         };
         if self.len_of(&frame) > room {
             return None;
@@ -415,18 +415,18 @@ const RADIO_REPORT_HOLDS_S: f64 = 10.0;
 
 /// What a radio leaves of the budget: less while its buffer is full (RADIO_STATUS).
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Radio {
+pub(super) struct RadioShare {
     share: f64,
     reported_s: Option<f64>,
 }
 
-impl Default for Radio {
+impl Default for RadioShare {
     fn default() -> Self {
         Self { share: 1.0, reported_s: None }
     }
 }
 
-impl Radio {
+impl RadioShare {
     pub(super) fn share(self) -> f64 {
         self.share
     }

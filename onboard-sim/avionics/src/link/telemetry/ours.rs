@@ -4,7 +4,7 @@
 use flight::computer::AbortEffect;
 use flight::computer::crew::People;
 use flight::computer::findings::Findings;
-use flight::computer::pad_check::{Finding, PadCheck};
+use flight::computer::pad_check::{CheckedValue, PadCheck};
 use flight::computer::pilot::planner::PLAN_WITHIN_S;
 use flight::rules::operator::Operator;
 use flight::rules::phase::Mode;
@@ -279,7 +279,7 @@ pub(crate) fn pad_check(check: &PadCheck, place: usize, time_s: f64) -> MavMessa
         asked_by: check.by().map_or(0, |by| by.number),
         ..TD_PAD_CHECK_DATA::default()
     };
-    if let Some(Finding { item, value, least, most, verdict }) = findings.get(place).copied()
+    if let Some(CheckedValue { item, value, least, most, verdict }) = findings.get(place).copied()
         && let Some(item) = TdPadCheckItem::from_u8(item.number())
     {
         (data.value, data.least, data.most) = (value as f32, least as f32, most as f32);

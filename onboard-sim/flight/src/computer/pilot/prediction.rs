@@ -286,7 +286,7 @@ mod tests {
         pilot.predict(table, input);
         if abort {
             let event = pilot.abort_event(table.mode(), Some(input), &SensorWatch::default());
-            pilot.told(table, event, input.time_s).expect("an abort is never refused in the air");
+            pilot.apply(table, event, input.time_s).expect("an abort is never refused in the air");
         }
         pilot.decide(table, input, &SensorWatch::default());
         pilot.plan(table.mode(), input, false);

@@ -243,7 +243,7 @@ impl Pilot {
         if let Some((severity, words)) = words_of_ascent(event, estimate) {
             table.say(severity, words);
         }
-        self.happen(table, event, input.time_s);
+        self.try_apply(table, event, input.time_s);
     }
 
     /// Moves through the phases of the descent and the landing.
@@ -252,14 +252,14 @@ impl Pilot {
         let estimate = &estimate;
         let time_s = input.time_s;
         if let Some((hopeless, why)) = self.gate_will_not_open(table.mode(), input, estimate, sensors)
-            && self.told(table, hopeless, time_s).is_ok()
+            && self.apply(table, hopeless, time_s).is_ok()
         {
             table.say(Severity::Critical, format!("no landing: {why}"));
             self.gave_up = Some(why);
         }
         match table.mode().phase {
             Phase::Deploy if self.fins_are_out(&input.fins_rad) => {
-                self.happen(table, Event::FinsConfirmed, time_s);
+                self.try_apply(table, Event::FinsConfirmed, time_s);
             }
             Phase::AeroDescent => {
                 let soon = self
@@ -268,17 +268,17 @@ impl Pilot {
                     .command_in_s
                     .is_some_and(|in_s| in_s <= self.model.mission.ignition.arm_before_s);
                 if soon {
-                    self.happen(table, Event::LandArm, time_s);
+                    self.try_apply(table, Event::LandArm, time_s);
                 }
             }
             Phase::LandArmed => self.consider_ignition(table, input, estimate, sensors),
             Phase::Ignition => {
                 if self.model.burning_s(time_s).is_some() {
-                    self.happen(table, Event::ThrustConfirmed, time_s);
+                    self.try_apply(table, Event::ThrustConfirmed, time_s);
                 } else if self.ignited_at_s.is_some_and(|at_s| time_s - at_s >= NO_THRUST_TIMEOUT_S)
                     && !table.mode().interlocks.no_light_latched
                 {
-                    self.happen(table, Event::NoThrustTimeout, time_s);
+                    self.try_apply(table, Event::NoThrustTimeout, time_s);
                 }
             }
             _ => {}
@@ -290,10 +290,10 @@ impl Pilot {
         {
             let (thrust_n, weight_n) = self.thrust_and_weight_n(time_s);
             let thrust_below_weight = thrust_n < weight_n;
-            self.happen(table, Event::Contact { thrust_below_weight }, time_s);
+            self.try_apply(table, Event::Contact { thrust_below_weight }, time_s);
         }
         if table.mode().motor == Motor::Burning && self.model.burn_is_over(time_s) {
-            self.happen(table, Event::Burnout, time_s);
+            self.try_apply(table, Event::Burnout, time_s);
         }
     }
 
@@ -323,7 +323,7 @@ impl Pilot {
             let checks = self.gate_checks(table.mode(), input, estimate, sensors);
             self.gate_refusal = checks.iter().find(|check| check.shut).map(|check| check.name);
             let open = self.gate_refusal.is_none();
-            self.happen(table, Event::IgnitionGate { open }, input.time_s);
+            self.try_apply(table, Event::IgnitionGate { open }, input.time_s);
         }
     }
 
@@ -404,15 +404,15 @@ impl Pilot {
     }
 
     /// Applies an event. If the table refuses it, nothing changes.
-    fn happen(&mut self, table: &mut PhaseTable, event: Event, time_s: f64) {
-        let _ = self.told(table, event, time_s);
+    fn try_apply(&mut self, table: &mut PhaseTable, event: Event, time_s: f64) {
+        let _ = self.apply(table, event, time_s);
     }
 
     /// Applies an event, from whomever it comes.
     ///
     /// # Errors
     /// The table refuses it, and nothing has changed.
-    pub(crate) fn told(
+    pub(crate) fn apply(
         &mut self,
         table: &mut PhaseTable,
         event: Event,

@@ -24,7 +24,7 @@ use protocol::log::computer_v1::ComputerFrame;
 use protocol::log::record::Record;
 use protocol::log::v1;
 
-use self::ground::Ground;
+use self::ground::GroundWatch;
 
 /// A flight, by recipe and number.
 #[derive(Debug, Clone)]
@@ -47,7 +47,7 @@ pub struct Vehicle {
     people: Option<People>,
     operators: Vec<Operator>,
     mission: MissionName,
-    ground: Ground,
+    ground: GroundWatch,
     /// Input and output of the flight computer in the last frame; `None` if it was dead.
     computer_frame: Option<Box<ComputerFrame>>,
     /// How many frames the flight computer has decided.
@@ -81,7 +81,7 @@ impl Vehicle {
             people: None,
             operators: Vec::new(),
             mission: MissionName::default(),
-            ground: Ground::default(),
+            ground: GroundWatch::default(),
             computer_frame: None,
             frames_decided: 0,
             last: LastFrame::default(),

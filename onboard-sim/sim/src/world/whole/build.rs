@@ -256,7 +256,7 @@ mod tests {
         Actuators { gimbal_rad: [0.02, -0.01], fins_rad: [0.4; 4], ignite: true, ..Actuators::NONE };
 
     fn airframe() -> Airframe {
-        flight::vehicles::airframe::builtin("mk2").unwrap()
+        flight::vehicles::mission::builtin_airframe("mk2").unwrap()
     }
 
     /// Half a second into its burn, with a weakened motor and a slow gimbal, in wind.
