@@ -161,7 +161,8 @@ pub struct MassModel {
 }
 
 impl MassModel {
-    /// Removes the propellant, a point mass on the axis, from the loaded vehicle (parallel axes).
+    /// Removes the propellant, a point mass on the axis, from the loaded vehicle (parallel axes: H. Goldstein, C. Poole and J. Safko,
+    /// Classical Mechanics, 3rd edition, chapter 5).
     pub fn new(mass: &Mass, propellant_mass_kg: f64) -> Self {
         let dry_mass_kg = mass.loaded_kg - propellant_mass_kg;
         let moment_kg_m = mass.loaded_kg * mass.loaded_cg_station_m;

@@ -1,7 +1,8 @@
 //! A solid motor's thrust over time.
 //!
 //! Thrust is linear between the points and zero outside them, so impulse and mean thrust are exact. Propellant burns in
-//! proportion to the delivered impulse (a constant exhaust velocity).
+//! proportion to the delivered impulse (a constant exhaust velocity: G. P. Sutton and O. Biblarz, Rocket Propulsion Elements,
+//! 9th edition, chapter 2).
 
 use alloc::format;
 use alloc::string::String;

@@ -49,7 +49,7 @@ impl Prediction {
 }
 
 /// Height that a parachute needs at a speed, with a margin: the fall until it is ejected, plus the distance over which
-/// it inflates.
+/// it inflates (T. W. Knacke, Parachute Recovery Systems Design Manual, NWC TP 6575, 1991, chapter 5).
 pub(super) fn commit_height_m(speed_m_s: f64, ejection_delay_s: f64, inflation_distance_m: f64) -> f64 {
     COMMIT_MARGIN * (speed_m_s * ejection_delay_s + inflation_distance_m)
 }

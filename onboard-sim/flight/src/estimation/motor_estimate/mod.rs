@@ -8,6 +8,8 @@
 //! the filter is ever surer of. The specific force along the nose contains the thrust and the air force:
 //! `m f_x = T cos p cos y + d A`, with the gimbal angles `p` and `y`, the modelled air force `A` and its scale `d`. An
 //! extended Kalman filter over `(s, b, t0, d, n)` finds all five; it finds `d` before ignition, while the vehicle falls.
+//!
+//! The process and the filter are those of A. Gelb (editor), Applied Optimal Estimation, 1974, chapters 3 and 6.
 
 #[cfg(test)]
 mod tests;
