@@ -203,7 +203,6 @@ mod tests {
     use proptest::prelude::*;
     use prost::Message as _;
 
-    use crate::log::logged::ASKED;
     use crate::log::logged::tests::any_bits;
 
     fn any_uplink() -> impl Strategy<Value = Uplink> {
@@ -229,9 +228,10 @@ mod tests {
 
     fn any_request() -> impl Strategy<Value = Request> {
         let by = prop::option::of(any_operator());
-        let any = (0..ASKED.len(), any_uplink(), prop::option::of(any_station()), by, any::<Option<u16>>());
+        let any =
+            (0..Asked::ALL.len(), any_uplink(), prop::option::of(any_station()), by, any::<Option<u16>>());
         any.prop_map(|(asked, uplink, station, by, confirms)| Request {
-            asked: ASKED[asked],
+            asked: Asked::ALL[asked],
             uplink,
             station,
             by,
@@ -242,7 +242,7 @@ mod tests {
     /// A new request has to be added to the list before this compiles and passes.
     #[test]
     fn every_request_has_its_number() {
-        let numbers = ASKED.map(|asked| match asked {
+        let numbers = Asked::ALL.map(|asked| match asked {
             Asked::Arm => 0,
             Asked::Disarm => 1,
             Asked::Start => 2,

@@ -17,47 +17,32 @@ use crate::rules::two_person::{
     Act, Ask, CONFIRM_WITHIN_S, NoAgreement, Reply, Station, TAP_WITHIN_S, TwoPerson,
 };
 
+numbered_enum! {
+/// A request, by its number in the log, and its name as in `abort refused`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Asked {
-    Arm,
+    Arm = "arm",
     /// Disarm; cancels a countdown.
-    Disarm,
+    Disarm = "disarm",
     /// Start the countdown.
-    Start,
+    Start = "start",
     /// Hold the countdown.
-    Hold,
+    Hold = "hold",
     /// Abort, irreversibly.
-    Abort,
+    Abort = "abort",
     /// A tap in the countdown: whoever confirmed the start is still there.
-    Tap,
+    Tap = "tap",
     /// Take the command from a station that is silent.
-    TakeCommand,
+    TakeCommand = "take-over",
     /// Check the vehicle on its pad: surfaces, sensors, switches, battery and storage.
-    Check,
+    Check = "check",
     /// The same, but nothing moves.
-    CheckStill,
+    CheckStill = "check",
     /// End the running check.
-    EndCheck,
+    EndCheck = "end of the check",
     /// One person has seen every surface of the last check move as the crew's page says.
-    Seen,
+    Seen = "seen motion",
 }
-
-impl Asked {
-    /// As in `abort refused`.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Arm => "arm",
-            Self::Disarm => "disarm",
-            Self::Start => "start",
-            Self::Hold => "hold",
-            Self::Abort => "abort",
-            Self::Tap => "tap",
-            Self::TakeCommand => "take-over",
-            Self::Check | Self::CheckStill => "check",
-            Self::EndCheck => "end of the check",
-            Self::Seen => "seen motion",
-        }
-    }
 }
 
 /// How many people an arming and a start take. Without one of these there are no operators, and whoever is heard

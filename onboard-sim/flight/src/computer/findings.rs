@@ -402,7 +402,7 @@ fn seen_in_flight(
             (apart_m > HEIGHTS_APART_M).then(|| now(apart_m, 0.0))
         }
         Sign::Estimate => match estimate.health {
-            Health::Doubtful(doubt) if mode.phase.is_landing() => Some(seen(time_s, 0.0, 0.0, doubt.words())),
+            Health::Doubtful(doubt) if mode.phase.is_landing() => Some(seen(time_s, 0.0, 0.0, doubt.name())),
             _ => None,
         },
         Sign::Surface(surface) => {
