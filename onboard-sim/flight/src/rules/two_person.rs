@@ -11,7 +11,7 @@
 //!
 //! The way of an ask: a station sends the command, signed with its operator's own key. `protocol::signing` checks the frame with
 //! the key that its link id names, and the vehicle's endpoint takes the operator from there; it refuses what names another boot,
-//! what is for everybody, and what comes from ids under which two stations are heard. `computer::requests` asks here; the number
+//! what is for everybody, and what comes from ids under which two stations are heard. `computer::crew` asks here; the number
 //! goes back in the answer and in TD_CREW, and the other operator's command names it. How many people it takes is in every
 //! frame's input, so a replay decides the same.
 

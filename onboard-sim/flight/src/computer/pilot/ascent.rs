@@ -284,7 +284,7 @@ pub(super) fn words_of_ascent(event: Event, estimate: &Estimate) -> Option<(Seve
 // stuck. A fin is stuck if its command has been far away for longer than a servo needs and the fin has not moved.
 
 /// A working fin moves at once if its command is farther away than this, rad: the tolerance of the ignition gate.
-const FAR_RAD: f64 = super::step::FIN_THERE_RAD;
+const FAR_RAD: f64 = super::gate::FIN_THERE_RAD;
 /// A fin is stuck if its command has been far away for this long in total and it has not moved, s: more than ten times the
 /// delay of a servo.
 const STUCK_AFTER_S: f64 = 0.25;

@@ -5,9 +5,11 @@
 //! landing, to the [`planner`].
 
 mod ascent;
+mod gate;
 pub mod planner;
 mod prediction;
 mod rehearsal;
+mod steering;
 mod step;
 mod vehicle_model;
 mod vertical_speed;
