@@ -210,7 +210,7 @@ impl Computer {
         let phase = self.table.mode().phase;
         let refusal = self.pilot.gate_refusal().filter(|_| phase == Phase::LandArmed);
         if let Some(check) = refusal.filter(|_| refusal != self.gate_told) {
-            self.table.say_gate_shut(check);
+            self.table.say(Severity::Critical, format!("ignition gate closed: {check}"));
         }
         self.gate_told = refusal;
         self.commands = Commands { gimbal_rad, fins_rad, ..self.commands };

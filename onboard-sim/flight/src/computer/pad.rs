@@ -110,11 +110,6 @@ impl PadWatch {
         });
     }
 
-    /// Whether a whole second has been evaluated.
-    pub(super) fn has_felt(&self) -> bool {
-        self.found.is_some()
-    }
-
     /// Attitude and motion on the pad, or below a drone, of a vehicle that turns at a rate, rad/s.
     pub(super) fn stance(&self, hangs: bool, rotation_rad_s: f64) -> Stance {
         let Some(found) = &self.found else { return Stance::UNKNOWN };
@@ -353,7 +348,7 @@ impl Computer {
                 self.commands.gimbal_rad = [angle_rad; 2];
                 self.commands.fins_rad = [closed_rad + angle_rad; 4];
             }
-            TestStep::Passed if self.pad.has_felt() => {
+            TestStep::Passed if self.pad.found.is_some() => {
                 let _ = self.table.happen(Event::SelfTestPassed);
             }
             TestStep::Failed => {

@@ -12,7 +12,7 @@ use protocol::command::CommandAnswer;
 use protocol::dialect::MavMessage;
 use protocol::frame::{Encoder, Frame};
 use protocol::hub::line::{SHARE, slowed};
-use protocol::identity::{Address, NETWORK_BUDGET_BYTES_S};
+use protocol::identity::NETWORK_BUDGET_BYTES_S;
 
 use super::questions::FileService;
 use super::{Context, MAX_REQUESTED, Outgoing};
@@ -53,7 +53,7 @@ impl From<MavMessage> for QueuedAnswer {
 pub(super) struct Lane {
     pub(super) links: Vec<usize>,
     pub(super) streams: Streams,
-    encoder: Encoder,
+    pub(super) encoder: Encoder,
     signature_len: usize,
     sent: Window,
     /// Telemetry of the last [`BRIEFLY_S`] seconds.
@@ -73,7 +73,7 @@ pub(super) struct Lane {
     /// Requested messages; they are sent after all vital messages.
     requested: VecDeque<MavMessage>,
     /// The next parameter of a requested list; `None` when the list has been sent.
-    next_parameter: Option<u16>,
+    pub(super) next_parameter: Option<u16>,
     /// When the next piece of a file may be sent: they are spread evenly, as the link carries them.
     piece_due_s: f64,
     /// The budget that the lane was given, bytes per second; a radio may leave less of it.
@@ -87,11 +87,6 @@ pub(super) struct Lane {
 }
 
 impl Lane {
-    /// Sets the sender's address.
-    pub(super) fn speak_as(&mut self, us: Address) {
-        self.encoder = Encoder::new(us);
-    }
-
     pub(super) fn new(links: Vec<usize>, streams: Streams, encoder: Encoder, signature_len: usize) -> Self {
         let mut lane = Self {
             links,
@@ -139,8 +134,10 @@ impl Lane {
         // The reserve of a slow line is in what its budget leaves of its baud rate.
         let reserve = if is_slow(capacity_bytes_s) { kept_free_bytes(self.signature_len) } else { 0 };
         self.sent.set_limit(capacity_bytes_s as usize + reserve);
-        self.telemetry_briefly.set_limit(telemetry_briefly_bytes(capacity_bytes_s));
-        self.answers_briefly.set_limit(answers_briefly_bytes(capacity_bytes_s));
+        // Over a slow line frames go one by one, so that there are no bursts.
+        let briefly = |bytes| if is_slow(capacity_bytes_s) { usize::MAX } else { bytes };
+        self.telemetry_briefly.set_limit(briefly(capacity_bytes_s as usize * 22 / 100));
+        self.answers_briefly.set_limit(briefly(capacity_bytes_s as usize / 6));
         self.answered.set_limit(share_bytes_s(capacity_bytes_s));
         self.said.set_limit(share_bytes_s(capacity_bytes_s));
     }
@@ -184,11 +181,6 @@ impl Lane {
             self.requested.extend(messages);
         }
         fits
-    }
-
-    /// Sends every parameter from the first one, also if an earlier list is not finished.
-    pub(super) fn list_parameters(&mut self) {
-        self.next_parameter = Some(0);
     }
 
     /// The frames to send now: vital messages first, then answers, then texts (in the fall after telemetry), then telemetry by
@@ -399,16 +391,6 @@ impl Lane {
 /// In any fifth of a second telemetry may take 22 % of the budget of one second, and answers and texts a sixth of it.
 /// Otherwise a burst could spend the whole budget, and even vital messages would wait.
 pub(super) const BRIEFLY_S: f64 = 0.2;
-
-/// The share of telemetry, bytes. Over a slow line frames go one by one, so that there are no bursts.
-pub(super) fn telemetry_briefly_bytes(capacity_bytes_s: u32) -> usize {
-    if is_slow(capacity_bytes_s) { usize::MAX } else { capacity_bytes_s as usize * 22 / 100 }
-}
-
-/// The share of answers and texts, bytes.
-pub(super) fn answers_briefly_bytes(capacity_bytes_s: u32) -> usize {
-    if is_slow(capacity_bytes_s) { usize::MAX } else { capacity_bytes_s as usize / 6 }
-}
 
 /// A radio that has not reported for this long has no say any more, s.
 const RADIO_REPORT_HOLDS_S: f64 = 10.0;

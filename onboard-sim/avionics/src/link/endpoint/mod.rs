@@ -191,7 +191,7 @@ impl VehicleEndpoint {
         let us = VEHICLE.of_system(system_id);
         let mut lanes = self.lanes;
         for lane in &mut lanes {
-            lane.speak_as(us);
+            lane.encoder = Encoder::new(us);
         }
         Self { us, lanes, ..self }
     }

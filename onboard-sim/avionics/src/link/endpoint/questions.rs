@@ -47,7 +47,8 @@ impl VehicleEndpoint {
         }
         let (asker, by) = (frame.source(), operator_of(frame, vehicle));
         match request.question {
-            ParamQuestion::List => self.lane(link).list_parameters(),
+            // From the first one, also if an earlier list is not finished.
+            ParamQuestion::List => self.lane(link).next_parameter = Some(0),
             ParamQuestion::Read(key) => {
                 let lane = self.lane(link);
                 let answer = match parameters::place_of(key) {

@@ -173,19 +173,8 @@ impl Pilot {
         Box::new(Planner { model: model.without_filters(), posed: None, search, found: None })
     }
 
-    /// Poses the prediction in the fall.
-    pub(super) fn pose_prediction(&mut self, time_s: f64, estimate: &Estimate) {
-        let (fins_rad, apogee_m) = (self.fins_rad, self.apogee_m);
-        self.pose(time_s, estimate, Posed::Prediction { fins_rad, apogee_m });
-    }
-
-    /// Poses a landing. Returns whether it could.
-    pub(super) fn pose_landing(&mut self, time_s: f64, estimate: &Estimate, burning: Burning) -> bool {
-        self.pose(time_s, estimate, Posed::Landing(burning))
-    }
-
-    /// Nothing is posed before the last has been taken over.
-    fn pose(&mut self, time_s: f64, estimate: &Estimate, asked: Posed) -> bool {
+    /// Poses a prediction or a landing. Returns whether it could: nothing is posed before the last has been taken over.
+    pub(super) fn pose(&mut self, time_s: f64, estimate: &Estimate, asked: Posed) -> bool {
         let Some(planner) = self.planner.as_mut().filter(|_| self.posed_at_s.is_none()) else { return false };
         self.posed_at_s = Some(time_s);
         self.powered.begin(&mut planner.search);

@@ -37,12 +37,15 @@ impl Pilot {
             let estimate = &estimate;
             let thrusting = self.burning(mode, input.time_s);
             let burning = thrusting.as_ref().filter(|_| flying);
+            // The thrust still carries a vehicle that stands: the legs then carry little, and the wind tips it over. So the gimbal
+            // holds it upright until the thrust ends.
+            let balances = self.model.mission.upright_after_contact && mode.phase == Phase::Touchdown;
             self.gimbal_rad = match burning {
                 Some(burning) => {
                     self.fin_share = self.powered.fin_share(input.time_s).unwrap_or(self.fin_share);
                     self.gimbal(input.time_s, estimate, burning, &input.fins_rad)
                 }
-                None => match thrusting.as_ref().filter(|_| self.balances(mode)) {
+                None => match thrusting.as_ref().filter(|_| balances) {
                     Some(burning) => self.turned_towards(&Aim::upright(), estimate, burning),
                     None => [0.0; 2],
                 },
@@ -69,12 +72,6 @@ impl Pilot {
             &self.model.powered_situation(estimate, situation, self.model.burn(), fins_m2),
         );
         self.turned_towards(&aim, estimate, situation)
-    }
-
-    /// Whether the thrust still carries a vehicle that stands: the legs then carry little, and the wind tips it over. So the
-    /// gimbal holds it upright until the thrust ends.
-    fn balances(&self, mode: &Mode) -> bool {
-        self.model.mission.upright_after_contact && mode.phase == Phase::Touchdown
     }
 
     /// The gimbal's command that turns the nose as an aim wants.

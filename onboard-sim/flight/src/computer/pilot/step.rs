@@ -1,6 +1,7 @@
 //! One frame of the flight: estimates, follows the ascent, and poses what is planned and predicted.
 
 use super::ascent::{AscentReadings, words_of_ascent};
+use super::planner::Posed;
 use super::vehicle_model::Burning;
 use super::vertical_speed::SpeedReadings;
 use super::{FRAMES_PER_PLAN, Pilot, Prediction};
@@ -53,7 +54,8 @@ impl Pilot {
                 self.prediction = self.model.fall(&estimate, &self.fins_rad, self.apogee_m);
             }
             if due || unknown {
-                self.pose_prediction(input.time_s, &estimate);
+                let (fins_rad, apogee_m) = (self.fins_rad, self.apogee_m);
+                self.pose(input.time_s, &estimate, Posed::Prediction { fins_rad, apogee_m });
             }
         }
         self.fin_watch.update(&input.fins_rad, &self.fins_rad, self.model.mission.estimator.frame_s);
@@ -65,7 +67,7 @@ impl Pilot {
         let due = !took_over && input.frame >= self.plan_due && mode.phase.in_landing_burn();
         let burning = self.burning(mode, input.time_s).filter(|_| due);
         if let Some((burning, estimate)) = burning.zip(self.estimate)
-            && self.pose_landing(input.time_s, &estimate, burning)
+            && self.pose(input.time_s, &estimate, Posed::Landing(burning))
         {
             self.plan_due = input.frame + FRAMES_PER_PLAN;
         }

@@ -507,7 +507,7 @@ impl World {
 
     /// Whether the parachute was ejected.
     pub fn parachute_ejected(&self) -> bool {
-        self.parachute.ejected()
+        self.parachute.ejected_s().is_some()
     }
 
     /// Whether the wire between booster and vehicle is whole.
