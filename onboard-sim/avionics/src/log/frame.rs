@@ -168,24 +168,19 @@ fn aid_to_log(status: &AidStatus) -> Option<flight_v1::AidStatus> {
 fn motor_to_log(pilot: &Pilot) -> Option<flight_v1::MotorEstimate> {
     let motor = pilot.motor();
     let ignition_s = motor.ignition_s()?;
-    let [
-        impulse_scale_sigma,
-        burn_time_scale_sigma,
-        ignition_sigma_s,
-        air_scale_sigma,
-        shape_deviation_sigma,
-    ] = motor.sigmas();
+    // Of impulse, burn time, ignition, air and shape.
+    let sigmas = motor.sigmas();
     Some(flight_v1::MotorEstimate {
         impulse_scale: motor.impulse_scale(),
         burn_time_scale: motor.burn_time_stretch(),
         ignition_s,
         air_scale: motor.air_scale(),
         shape_deviation: motor.shape_deviation(),
-        impulse_scale_sigma,
-        burn_time_scale_sigma,
-        ignition_sigma_s,
-        air_scale_sigma,
-        shape_deviation_sigma,
+        impulse_scale_sigma: sigmas[0],
+        burn_time_scale_sigma: sigmas[1],
+        ignition_sigma_s: sigmas[2],
+        air_scale_sigma: sigmas[3],
+        shape_deviation_sigma: sigmas[4],
         other_curve: pilot.other_curve().map(str::to_owned),
     })
 }

@@ -305,35 +305,22 @@ impl Pilot {
                 Box::new(estimator.with_gyro_bias(estimate.gyro_bias_rad_s))
             },
         );
-        let SavedPilot {
-            motor,
-            other_curve,
-            estimate,
-            speeds,
-            ascent,
-            apogee_m,
-            ignited_at_s,
-            fin_share,
-            fins_rad,
-            fin_watch,
-            gimbal_rad,
-        } = *saved;
         let mut resumed = Self {
             estimator,
-            estimate,
-            speeds: speeds.resumed(),
-            ascent,
-            apogee_m,
-            ignited_at_s,
-            fin_share,
-            fins_rad,
-            fin_watch,
-            gimbal_rad,
+            estimate: saved.estimate,
+            speeds: saved.speeds.resumed(),
+            ascent: saved.ascent,
+            apogee_m: saved.apogee_m,
+            ignited_at_s: saved.ignited_at_s,
+            fin_share: saved.fin_share,
+            fins_rad: saved.fins_rad,
+            fin_watch: saved.fin_watch,
+            gimbal_rad: saved.gimbal_rad,
             ..self.clone()
         };
-        resumed.model.motor = motor;
-        if motor.ignition_s().is_some() {
-            resumed.model.others = OtherCurves::chosen_before(other_curve);
+        resumed.model.motor = saved.motor;
+        if saved.motor.ignition_s().is_some() {
+            resumed.model.others = OtherCurves::chosen_before(saved.other_curve);
         }
         resumed
     }
