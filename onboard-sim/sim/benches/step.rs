@@ -14,7 +14,7 @@ fn main() {
 }
 
 fn windy(height_m: f64) -> World {
-    let airframe = flight::vehicles::airframe::builtin("mk2").expect("a built-in airframe");
+    let airframe = flight::vehicles::mission::builtin_airframe("mk2").expect("a built-in airframe");
     let motor = motors::builtin(&airframe.motor).expect("a built-in motor");
     let truth = Truth { wind_m_s: 5.0, ..Truth::default() };
     World::new(&airframe, &motor, &truth, &RigidState::upright(height_m), 1)

@@ -4,7 +4,7 @@
 
 use std::f64::consts::TAU;
 
-use flight::vehicles::{airframe, motors};
+use flight::vehicles::{mission, motors};
 use sim::dispersion::Dispersion;
 use sim::world::truth::Truth;
 
@@ -41,7 +41,7 @@ fn about(value: f64, deviation: f64) -> [f64; 3] {
 
 #[test]
 fn the_bounds_for_a_builder_follow_from_the_data() {
-    let (mk3, real) = (airframe::builtin("mk3").unwrap(), Dispersion::builtin("real").unwrap());
+    let (mk3, real) = (mission::builtin_airframe("mk3").unwrap(), Dispersion::builtin("real").unwrap());
     let (mass, wrong) = (&mk3.mass, &real.mismatch);
     says("mass,", about(mass.loaded_kg, real.mass_share * mass.loaded_kg), 2);
     says("centre of gravity,", about(1e3 * mass.loaded_cg_station_m, 1e3 * wrong.cg_along_m), 0);
@@ -90,7 +90,7 @@ fn the_bounds_for_a_builder_follow_from_the_data() {
 /// that at a stall.
 #[test]
 fn val_hand_the_servo_of_a_fin() {
-    let mk3 = airframe::builtin("mk3").unwrap();
+    let mk3 = mission::builtin_airframe("mk3").unwrap();
     let fins = &mk3.fins;
     let drag_n = 0.5 * 1.225 * 36.0 * 36.0 * mk3.body.reference_area_m2 * fins.drag_coefficient;
     let hinge_n_m = drag_n * 0.5 * fins.length_m;

@@ -9,7 +9,7 @@ use sim::world::{Actuators, Truth, World};
 
 #[test]
 fn steps_do_not_allocate() {
-    let airframe = flight::vehicles::airframe::builtin("mk2").expect("a built-in airframe");
+    let airframe = flight::vehicles::mission::builtin_airframe("mk2").expect("a built-in airframe");
     let motor = motors::builtin(&airframe.motor).expect("a built-in motor");
     let truth = Truth { wind_m_s: 5.0, ..Truth::default() };
     let mut world =

@@ -353,7 +353,7 @@ mod tests {
     /// 1.2 0.074 0.7 m^2 in the middle, at 0.35 m: 0.6 0.06216 1, 0.05 m behind.
     #[test]
     fn val_hand_equal_fins_and_a_side_wind() {
-        let mut airframe = flight::vehicles::airframe::builtin("mk2").unwrap();
+        let mut airframe = flight::vehicles::mission::builtin_airframe("mk2").unwrap();
         airframe.body.reference_area_m2 = 0.0043;
         (airframe.fins.drag_coefficient, airframe.fins.lift_coefficient) = (1.55, 1.28);
         let open = [core::f64::consts::FRAC_PI_2; 4];

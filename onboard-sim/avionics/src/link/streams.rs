@@ -513,7 +513,7 @@ impl Turn {
 /// Tells the values of a check.
 #[derive(Debug, Default)]
 pub(super) struct CheckReporter {
-    told: Option<(u16, CheckState)>,
+    last_state: Option<(u16, CheckState)>,
     turn: Turn,
     due_s: f64,
 }
@@ -527,9 +527,9 @@ impl CheckReporter {
         if check.state() == CheckState::NotRun || !mode.phase.on_pad() || mode.interlocks.armed {
             return None;
         }
-        if self.told != Some(now) {
+        if self.last_state != Some(now) {
             // At once: a new check, or its end.
-            (self.told, self.turn.rounds, self.due_s) = (Some(now), 0, now_s);
+            (self.last_state, self.turn.rounds, self.due_s) = (Some(now), 0, now_s);
         }
         if now_s < self.due_s {
             return None;

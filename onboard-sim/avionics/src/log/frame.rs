@@ -168,24 +168,19 @@ fn aid_to_log(status: &AidStatus) -> Option<flight_v1::AidStatus> {
 fn motor_to_log(pilot: &Pilot) -> Option<flight_v1::MotorEstimate> {
     let motor = pilot.motor();
     let ignition_s = motor.ignition_s()?;
-    let [
-        impulse_scale_sigma,
-        burn_time_scale_sigma,
-        ignition_sigma_s,
-        air_scale_sigma,
-        shape_deviation_sigma,
-    ] = motor.sigmas();
+    // Of impulse, burn time, ignition, air and shape.
+    let sigmas = motor.sigmas();
     Some(flight_v1::MotorEstimate {
         impulse_scale: motor.impulse_scale(),
         burn_time_scale: motor.burn_time_stretch(),
         ignition_s,
         air_scale: motor.air_scale(),
         shape_deviation: motor.shape_deviation(),
-        impulse_scale_sigma,
-        burn_time_scale_sigma,
-        ignition_sigma_s,
-        air_scale_sigma,
-        shape_deviation_sigma,
+        impulse_scale_sigma: sigmas[0],
+        burn_time_scale_sigma: sigmas[1],
+        ignition_sigma_s: sigmas[2],
+        air_scale_sigma: sigmas[3],
+        shape_deviation_sigma: sigmas[4],
         other_curve: pilot.other_curve().map(str::to_owned),
     })
 }
@@ -203,7 +198,6 @@ mod tests {
     use proptest::prelude::*;
     use prost::Message as _;
 
-    use crate::log::logged::ASKED;
     use crate::log::logged::tests::any_bits;
 
     fn any_uplink() -> impl Strategy<Value = Uplink> {
@@ -229,9 +223,10 @@ mod tests {
 
     fn any_request() -> impl Strategy<Value = Request> {
         let by = prop::option::of(any_operator());
-        let any = (0..ASKED.len(), any_uplink(), prop::option::of(any_station()), by, any::<Option<u16>>());
+        let any =
+            (0..Asked::ALL.len(), any_uplink(), prop::option::of(any_station()), by, any::<Option<u16>>());
         any.prop_map(|(asked, uplink, station, by, confirms)| Request {
-            asked: ASKED[asked],
+            asked: Asked::ALL[asked],
             uplink,
             station,
             by,
@@ -242,7 +237,7 @@ mod tests {
     /// A new request has to be added to the list before this compiles and passes.
     #[test]
     fn every_request_has_its_number() {
-        let numbers = ASKED.map(|asked| match asked {
+        let numbers = Asked::ALL.map(|asked| match asked {
             Asked::Arm => 0,
             Asked::Disarm => 1,
             Asked::Start => 2,

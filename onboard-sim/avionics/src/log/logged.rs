@@ -126,20 +126,6 @@ macro_rules! numbered {
     };
 }
 
-/// Requests, by their number in the log.
-pub(crate) const ASKED: [Asked; 11] = [
-    Asked::Arm,
-    Asked::Disarm,
-    Asked::Start,
-    Asked::Hold,
-    Asked::Abort,
-    Asked::Tap,
-    Asked::TakeCommand,
-    Asked::Check,
-    Asked::CheckStill,
-    Asked::EndCheck,
-    Asked::Seen,
-];
 const ENDINGS: [Ending; 5] =
     [Ending::Accepted, Ending::NotNow, Ending::Denied, Ending::Failed, Ending::Asked];
 pub(crate) const HEALTHS: [Health; 8] = [
@@ -152,7 +138,7 @@ pub(crate) const HEALTHS: [Health; 8] = [
     Health::Doubtful(Doubt::Horizontal),
     Health::Doubtful(Doubt::Tilt),
 ];
-numbered!(Asked: ASKED);
+numbered!(Asked: Asked::ALL);
 numbered!(Ending: ENDINGS);
 numbered!(Health: HEALTHS);
 numbered!(Role: Role::ALL);

@@ -13,49 +13,36 @@ use crate::rules::operator::Operator;
 use crate::rules::phase::{
     Event, HoldCause, Mode, Phase, Refusal, StartPoint, UPLINK_PROVEN_S, UPLINK_SILENT_S, transition,
 };
-use crate::rules::two_person::{self, Act, Ask, CONFIRM_WITHIN_S, Reply, Station, TAP_WITHIN_S, TwoPerson};
+use crate::rules::two_person::{
+    Act, Ask, CONFIRM_WITHIN_S, NoAgreement, Reply, Station, TAP_WITHIN_S, TwoPerson,
+};
 
+numbered_enum! {
+/// A request, by its number in the log, and its name as in `abort refused`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Asked {
-    Arm,
+    Arm = "arm",
     /// Disarm; cancels a countdown.
-    Disarm,
+    Disarm = "disarm",
     /// Start the countdown.
-    Start,
+    Start = "start",
     /// Hold the countdown.
-    Hold,
+    Hold = "hold",
     /// Abort, irreversibly.
-    Abort,
+    Abort = "abort",
     /// A tap in the countdown: whoever confirmed the start is still there.
-    Tap,
+    Tap = "tap",
     /// Take the command from a station that is silent.
-    TakeCommand,
+    TakeCommand = "take-over",
     /// Check the vehicle on its pad: surfaces, sensors, switches, battery and storage.
-    Check,
+    Check = "check",
     /// The same, but nothing moves.
-    CheckStill,
+    CheckStill = "check",
     /// End the running check.
-    EndCheck,
+    EndCheck = "end of the check",
     /// One person has seen every surface of the last check move as the crew's page says.
-    Seen,
+    Seen = "seen motion",
 }
-
-impl Asked {
-    /// As in `abort refused`.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Arm => "arm",
-            Self::Disarm => "disarm",
-            Self::Start => "start",
-            Self::Hold => "hold",
-            Self::Abort => "abort",
-            Self::Tap => "tap",
-            Self::TakeCommand => "take-over",
-            Self::Check | Self::CheckStill => "check",
-            Self::EndCheck => "end of the check",
-            Self::Seen => "seen motion",
-        }
-    }
 }
 
 /// How many people an arming and a start take. Without one of these there are no operators, and whoever is heard
@@ -223,7 +210,7 @@ impl Computer {
         }
         let checks = self.arming_checks_by(uplink);
         let start = self.start_point();
-        let lifted_off = self.pilot.has_lifted_off();
+        let lifted_off = self.pilot.ascent.has_lifted_off();
         let abort = self.abort_event();
         let Some(event) = event_of(asked, &checks, (self.countdown_s, start), abort, lifted_off) else {
             return match asked {
@@ -457,15 +444,15 @@ fn ask_in_words(ask: &Ask, time_s: f64) -> String {
     format!("{} asks to {}: {one} or {other} must confirm within {left_s:.0} s", ask.by, ask.act.name())
 }
 
-fn why_no_agreement(refusal: two_person::Refusal, act: Act, time_s: f64) -> String {
+fn why_no_agreement(refusal: NoAgreement, act: Act, time_s: f64) -> String {
     match refusal {
-        two_person::Refusal::Observer => "observers command nothing".to_string(),
-        two_person::Refusal::AnotherAsks(ask) => ask_in_words(&ask, time_s),
-        two_person::Refusal::NothingToConfirm => {
+        NoAgreement::Observer => "observers command nothing".to_string(),
+        NoAgreement::AnotherAsks(ask) => ask_in_words(&ask, time_s),
+        NoAgreement::NothingToConfirm => {
             format!("nobody asks to {}, or not by that number any more", act.name())
         }
-        two_person::Refusal::OwnAsk(ask) => format!("{} asked: another role must confirm", ask.by),
-        two_person::Refusal::SameRole(ask) => {
+        NoAgreement::OwnAsk(ask) => format!("{} asked: another role must confirm", ask.by),
+        NoAgreement::SameRole(ask) => {
             format!("{} asked: another role than {} must confirm", ask.by, ask.by.role.name())
         }
     }

@@ -147,7 +147,7 @@ struct Seen {
 
 /// A sign that is being watched.
 #[derive(Debug, Clone, Copy, Default)]
-struct Watch {
+struct SignWatch {
     since_s: Option<f64>,
     /// The place of its finding.
     found: Option<usize>,
@@ -158,14 +158,14 @@ struct Watch {
 #[derive(Debug, Clone)]
 pub struct Findings {
     watcher: Option<Watcher>,
-    watches: [Watch; RULES.len()],
+    watches: [SignWatch; RULES.len()],
     found: Vec<Finding>,
     thrust_over_weight: Option<f64>,
 }
 
 impl Default for Findings {
     fn default() -> Self {
-        let watches = [Watch::default(); RULES.len()];
+        let watches = [SignWatch::default(); RULES.len()];
         Self { watcher: None, watches, found: Vec::new(), thrust_over_weight: None }
     }
 }
@@ -402,7 +402,7 @@ fn seen_in_flight(
             (apart_m > HEIGHTS_APART_M).then(|| now(apart_m, 0.0))
         }
         Sign::Estimate => match estimate.health {
-            Health::Doubtful(doubt) if mode.phase.is_landing() => Some(seen(time_s, 0.0, 0.0, doubt.words())),
+            Health::Doubtful(doubt) if mode.phase.is_landing() => Some(seen(time_s, 0.0, 0.0, doubt.name())),
             _ => None,
         },
         Sign::Surface(surface) => {

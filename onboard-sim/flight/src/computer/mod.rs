@@ -38,7 +38,6 @@ use self::crew::{Answer, People, Request};
 use self::news::{CrewMessage, MotorWatch, Readiness, Severity};
 use self::pad::{ANSWERING_RAD, PadWatch, SelfTest};
 use self::pad_check::{PadCheck, SURFACES, surfaces_rad};
-use self::pilot::planner::Planner;
 use self::pilot::{Pilot, Pointed};
 pub use self::table::AbortEffect;
 use self::table::PhaseTable;
@@ -150,8 +149,8 @@ impl Computer {
         self.keep_time();
         let progress = FlightProgress {
             flying: flown.is_some(),
-            lifted_off: self.pilot.has_lifted_off(),
-            separation_due: self.pilot.separates(),
+            lifted_off: self.pilot.ascent.has_lifted_off(),
+            separation_due: self.pilot.ascent.separates(),
             hatch_free: self.hatch_is_free(input),
         };
         self.commands.outputs = Outputs::decided(self.table.mode(), progress);
@@ -192,29 +191,6 @@ impl Computer {
             || self.table.time_s() - self.table.mode().entered_at_s >= opening_s
     }
 
-    /// Computes what the pilot has posed, in this context, if it was not done yet; returns in how many frames a Cortex-M7 does.
-    pub fn solve_posed(&mut self) -> Option<u64> {
-        let planner = self.pilot.posed()?;
-        planner.solve();
-        Some(planner.frames_on_a_board())
-    }
-
-    /// Rehearses the landing at power-up, without a simulated world: what a board puts into its inputs. `None` once it is released. It
-    /// takes some seconds on a board, and leaves no memory.
-    pub fn rehearse(&mut self) -> Option<Rehearsed> {
-        if self.release.is_some() { None } else { self.pilot.rehearse() }
-    }
-
-    /// What the pilot has posed, to be computed in another context; once. It has to be [given back](Self::give_back).
-    pub fn take_posed(&mut self) -> Option<Box<Planner>> {
-        self.pilot.take_posed()
-    }
-
-    /// Gives back what was [computed](Planner::solve) in another context. The frame that is told so takes it over.
-    pub fn give_back(&mut self, planner: Box<Planner>) {
-        self.pilot.give_back(planner);
-    }
-
     /// Reports what the input changes: the pin, and a log that has stopped.
     fn report_changes(&mut self, input: &KeptInput) {
         let pin_out = self.table.mode().interlocks.pin_out;
@@ -234,7 +210,7 @@ impl Computer {
         let phase = self.table.mode().phase;
         let refusal = self.pilot.gate_refusal().filter(|_| phase == Phase::LandArmed);
         if let Some(check) = refusal.filter(|_| refusal != self.gate_told) {
-            self.table.say_gate_shut(check);
+            self.table.say(Severity::Critical, format!("ignition gate closed: {check}"));
         }
         self.gate_told = refusal;
         self.commands = Commands { gimbal_rad, fins_rad, ..self.commands };

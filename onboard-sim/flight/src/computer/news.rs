@@ -41,27 +41,22 @@ pub enum CrewMessage {
 
 /// The message for an effect; `None` if the change of phase already says it.
 pub(super) fn words_of(effect: Effect, countdown_s: f64) -> Option<(Severity, String)> {
-    let (severity, words) = match effect {
-        Effect::IgniteLandingMotor => (Severity::Notice, "landing motor commanded to light"),
-        Effect::InhibitLandingMotor => (Severity::Notice, "landing motor inhibited"),
-        Effect::Disarm => (Severity::Notice, "disarmed"),
-        Effect::StartCountdown => {
-            return Some((Severity::Notice, format!("countdown started: release in {countdown_s} s")));
-        }
-        Effect::CancelCountdown => (Severity::Warning, "countdown cancelled"),
-        Effect::HoldCountdown => {
-            let words = format!("HOLD: no countdown; start anew or it disarms in {HOLD_LIMIT_S} s");
-            return Some((Severity::Critical, words));
-        }
-        Effect::ShowPadWait => (Severity::Critical, "ABORT on the pad: keep away for 60 s"),
-        Effect::RecordLoss => (Severity::Critical, "vehicle will be lost: landing motor inhibited"),
-        Effect::DeployChute => (Severity::Critical, "parachute deployed"),
-        Effect::IgniteAscentMotor => (Severity::Notice, "ascent motor commanded to light"),
-        Effect::SeparateBooster => (Severity::Notice, "booster commanded to separate"),
-        // The crew can see the fins.
-        Effect::FinsOpen => return None,
+    use Effect as E;
+    let severity = match effect {
+        E::FinsOpen => return None,
+        E::CancelCountdown => Severity::Warning,
+        E::HoldCountdown | E::ShowPadWait | E::RecordLoss | E::DeployChute => Severity::Critical,
+        _ => Severity::Notice,
     };
-    Some((severity, words.to_owned()))
+    let words = effect.name();
+    Some((
+        severity,
+        match effect {
+            E::StartCountdown => format!("{words}: release in {countdown_s} s"),
+            E::HoldCountdown => format!("{words}; start anew or it disarms in {HOLD_LIMIT_S} s"),
+            _ => words.to_owned(),
+        },
+    ))
 }
 
 /// The message for an abort that lands on the motor, if the abort came between these two modes.
@@ -84,7 +79,7 @@ const FAILS_FOR_S: f64 = 0.1;
 /// The failing arming check that the crew on the pad was last told of, and since when one fails, s.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub(super) struct Readiness {
-    told: Option<&'static str>,
+    last_check: Option<&'static str>,
     since_s: Option<f64>,
 }
 
@@ -100,7 +95,7 @@ impl Readiness {
         if time_s - *self.since_s.get_or_insert(time_s) < FAILS_FOR_S {
             return None;
         }
-        let untold = self.told.replace(check.name) != Some(check.name);
+        let untold = self.last_check.replace(check.name) != Some(check.name);
         check.refusal().map(|reason| (reason, untold))
     }
 }

@@ -50,7 +50,7 @@ impl Stance {
 
 /// Result of one second on the pad.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-struct PadFindings {
+struct PadSecond {
     /// Attitude with the heading of the pad, and the gyro's bias, rad/s; `None` if the vehicle was not at rest.
     at_rest: Option<PadStart>,
     /// Mean angle between the axis and what is felt, rad: the tilt of a vehicle that hangs still in the mean.
@@ -72,7 +72,7 @@ pub(super) struct PadWatch {
     pressures: u32,
     altitude_sum_m: f64,
     falling_frames: u32,
-    found: Option<PadFindings>,
+    found: Option<PadSecond>,
 }
 
 impl PadWatch {
@@ -97,7 +97,7 @@ impl PadWatch {
         let over = core::mem::take(self);
         self.falling_frames = over.falling_frames;
         let across_m_s2 = over.force_sum_m_s2.yz().norm();
-        self.found = Some(PadFindings {
+        self.found = Some(PadSecond {
             at_rest: over.alignment.finish(0.0).ok(),
             lean_rad: libm::atan2(across_m_s2, over.force_sum_m_s2.x),
             pressure_altitude_m: over.altitude_sum_m / f64::from(over.pressures),
@@ -108,11 +108,6 @@ impl PadWatch {
                 None => over.velocity_sum_m_s / f64::from(over.fixes),
             },
         });
-    }
-
-    /// Whether a whole second has been evaluated.
-    pub(super) fn has_felt(&self) -> bool {
-        self.found.is_some()
     }
 
     /// Attitude and motion on the pad, or below a drone, of a vehicle that turns at a rate, rad/s.
@@ -353,7 +348,7 @@ impl Computer {
                 self.commands.gimbal_rad = [angle_rad; 2];
                 self.commands.fins_rad = [closed_rad + angle_rad; 4];
             }
-            TestStep::Passed if self.pad.has_felt() => {
+            TestStep::Passed if self.pad.found.is_some() => {
                 let _ = self.table.happen(Event::SelfTestPassed);
             }
             TestStep::Failed => {
@@ -394,7 +389,7 @@ impl Computer {
                 ..launch.standing(mission.airframe.mass.loaded_cg_station_m)
             };
             // A lift-off that nobody commanded is felt a moment after it began.
-            believed.velocity_m_s = believed.nose_in_world() * self.pilot.pushed_to_m_s();
+            believed.velocity_m_s = believed.nose_in_world() * self.pilot.ascent.gained_m_s;
             self.pilot.stand(&believed, start.gyro_bias_rad_s);
         }
     }

@@ -2,7 +2,6 @@
 //! an abort would do now.
 
 use alloc::borrow::ToOwned as _;
-use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
 use serde::Serialize;
@@ -92,11 +91,6 @@ impl PhaseTable {
         self.news.push(CrewMessage::Said { severity, words });
     }
 
-    /// Tells the crew that the ignition gate is shut.
-    pub(crate) fn say_gate_shut(&mut self, reason: &str) {
-        self.say(Severity::Critical, format!("ignition gate closed: {reason}"));
-    }
-
     /// Takes the reports of this frame, in order.
     pub(super) fn take_news(&mut self) -> Vec<CrewMessage> {
         core::mem::take(&mut self.news)
@@ -137,7 +131,7 @@ impl Computer {
     pub(super) fn happen(&mut self, event: Event) -> Result<Effects, Refusal> {
         let before = self.table.mode().phase;
         let effects = match self.flown() {
-            Some(input) => self.pilot.told(&mut self.table, event, input.time_s),
+            Some(input) => self.pilot.apply(&mut self.table, event, input.time_s),
             None => self.table.happen(event),
         }?;
         if before == Phase::Boost && self.table.mode().phase.on_pad() {
@@ -155,16 +149,6 @@ impl Computer {
         self.pilot.abort_event(self.table.mode(), self.flown().as_ref(), &self.sensors)
     }
 
-    /// Whether a landing under thrust can be planned; true until the first attempt.
-    fn plans_a_landing(&self) -> bool {
-        self.pilot.report().level != ControlLevel::Stabiliser
-    }
-
-    /// Speed at the ground after a fall from here without thrust, m/s, falling positive.
-    fn impact_m_s(&self) -> f64 {
-        self.pilot.impact_m_s().unwrap_or(0.0)
-    }
-
     /// What an abort would do now. The phase table itself is asked, so the text beside the abort key cannot differ from
     /// it.
     pub fn abort_effect(&self) -> AbortEffect {
@@ -172,7 +156,8 @@ impl Computer {
         let next = transition(mode, self.abort_event(), self.table.time_s());
         let does = |effect| next.effects.contains(effect);
         // Rounded up to be on the safe side; 254 is the largest value reported, 255 would mean "unknown".
-        let impact = || AbortEffect::Impact { m_s: libm::ceil(self.impact_m_s()).clamp(0.0, 254.0) as u8 };
+        let fallen_m_s = self.pilot.impact_m_s().unwrap_or(0.0);
+        let impact = || AbortEffect::Impact { m_s: libm::ceil(fallen_m_s).clamp(0.0, 254.0) as u8 };
         // The motor was commanded to light and has not.
         let unlit = mode.phase == Phase::Ignition && mode.interlocks.no_light_latched;
         if next.refusal.is_some() {
@@ -189,7 +174,8 @@ impl Computer {
             AbortEffect::Burn
         } else if unlit {
             impact()
-        } else if self.plans_a_landing() {
+        } else if self.pilot.report().level != ControlLevel::Stabiliser {
+            // It can be planned, or was not tried yet.
             AbortEffect::LandInPlace
         } else {
             AbortEffect::LandUpright

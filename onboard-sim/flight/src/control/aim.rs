@@ -3,12 +3,13 @@
 //! The landing planner runs every tenth of a second; this loop runs at every frame. It is a second-order law on the
 //! angle between the nose and its aim, in body axes, so roll does not matter. A real nozzle needs three additions:
 //!
-//! * The effect of commands that have not moved the vehicle yet is predicted (Smith's predictor, with the latency of
+//! * The effect of commands that have not moved the vehicle yet is predicted (O. J. M. Smith, "Closer control of loops with
+//!   dead time", Chemical Engineering Progress 53, 1957; with the latency of
 //!   servo and linkage in frames). Without it the loop would have to be several times softer.
 //! * The acceleration that the model does not explain (air, a crooked nozzle, a shifted centre of gravity) is
-//!   estimated and compensated (a disturbance observer).
+//!   estimated and compensated (a disturbance observer: W.-H. Chen et al., IEEE Trans. Industrial Electronics 63, 2016).
 //! * The linkage has play. At each reversal the horn must cross it before the nozzle moves, so the command crosses it
-//!   at once.
+//!   at once (G. Tao and P. V. Kokotovic, Automatica 29, 1993).
 
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};

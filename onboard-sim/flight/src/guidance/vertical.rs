@@ -3,7 +3,8 @@
 //! The vehicle has no throttle, but its tilt reduces the vertical thrust and its fins add drag. Both are bounded, so at
 //! every instant the deceleration lies between a soft and a hard one. A landing must end with both height and sinking
 //! speed near zero. It must not end before the thrust falls through the weight, or the vehicle would lift off again.
-//! For a bounded double integrator the extremes are bang-bang: the highest start brakes softly first and hard later;
+//! For a bounded double integrator the extremes are bang-bang (A. E. Bryson and Y.-C. Ho, Applied Optimal Control, 1975, chapter 3):
+//! the highest start brakes softly first and hard later;
 //! the lowest start brakes hard first and softly later, but the vehicle never rises. Constant braking lies in between.
 //! The heights from which these landings begin span the band of feasible heights ([`Column::band`]). The vehicle's
 //! place in the band says how hard to brake ([`Band::place`]). The last moments are flown upright, so that the vehicle

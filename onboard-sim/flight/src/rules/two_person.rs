@@ -11,7 +11,7 @@
 //!
 //! The way of an ask: a station sends the command, signed with its operator's own key. `protocol::signing` checks the frame with
 //! the key that its link id names, and the vehicle's endpoint takes the operator from there; it refuses what names another boot,
-//! what is for everybody, and what comes from ids under which two stations are heard. `computer::requests` asks here; the number
+//! what is for everybody, and what comes from ids under which two stations are heard. `computer::crew` asks here; the number
 //! goes back in the answer and in TD_CREW, and the other operator's command names it. How many people it takes is in every
 //! frame's input, so a replay decides the same.
 
@@ -111,7 +111,7 @@ impl Tapping {
 
 /// Why a request is not an agreement.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Refusal {
+pub enum NoAgreement {
     /// Observers command nothing.
     Observer,
     /// Another person's ask already waits: it is to be confirmed.
@@ -134,7 +134,7 @@ pub enum Reply {
         ask: Ask,
         confirmed_by: Operator,
     },
-    Refused(Refusal),
+    Refused(NoAgreement),
 }
 
 /// What is asked, and whose taps are waited for.
@@ -159,25 +159,25 @@ impl TwoPerson {
         time_s: f64,
     ) -> Reply {
         if !by.role.may_command() {
-            return Reply::Refused(Refusal::Observer);
+            return Reply::Refused(NoAgreement::Observer);
         }
         let waiting = self.waiting(time_s);
         let Some(number) = confirms else {
             return match waiting {
-                Some(ask) if ask.by.number != by.number => Reply::Refused(Refusal::AnotherAsks(ask)),
+                Some(ask) if ask.by.number != by.number => Reply::Refused(NoAgreement::AnotherAsks(ask)),
                 // A repeated ask does not wait longer.
                 Some(ask) if ask.act == act => Reply::Asked(ask),
                 _ => self.ask(act, (by, station), first, time_s),
             };
         };
         let Some(ask) = waiting.filter(|ask| ask.act == act && ask.number == number) else {
-            return Reply::Refused(Refusal::NothingToConfirm);
+            return Reply::Refused(NoAgreement::NothingToConfirm);
         };
         if ask.by.number == by.number {
-            return Reply::Refused(Refusal::OwnAsk(ask));
+            return Reply::Refused(NoAgreement::OwnAsk(ask));
         }
         if ask.by.role == by.role {
-            return Reply::Refused(Refusal::SameRole(ask));
+            return Reply::Refused(NoAgreement::SameRole(ask));
         }
         self.ask = None;
         Reply::Agreed { ask, confirmed_by: by }
@@ -287,14 +287,18 @@ mod tests {
         // A repeated ask neither confirms itself nor waits longer.
         assert_eq!(asks(&mut two, Act::Arm, flight, 5.0), Reply::Asked(ask));
         let no = |refusal| Reply::Refused(refusal);
-        assert_eq!(confirms(&mut two, Act::Arm, 100, flight, 2.0), no(Refusal::OwnAsk(ask)));
-        assert_eq!(confirms(&mut two, Act::Arm, 100, other_flight, 2.0), no(Refusal::SameRole(ask)));
-        assert_eq!(confirms(&mut two, Act::Arm, 100, observer, 2.0), no(Refusal::Observer));
-        assert_eq!(confirms(&mut two, Act::Arm, 101, range, 2.0), no(Refusal::NothingToConfirm));
-        assert_eq!(confirms(&mut two, Act::Start, 100, range, 2.0), no(Refusal::NothingToConfirm));
-        assert_eq!(asks(&mut two, Act::Arm, range, 2.0), no(Refusal::AnotherAsks(ask)));
+        assert_eq!(confirms(&mut two, Act::Arm, 100, flight, 2.0), no(NoAgreement::OwnAsk(ask)));
+        assert_eq!(confirms(&mut two, Act::Arm, 100, other_flight, 2.0), no(NoAgreement::SameRole(ask)));
+        assert_eq!(confirms(&mut two, Act::Arm, 100, observer, 2.0), no(NoAgreement::Observer));
+        assert_eq!(confirms(&mut two, Act::Arm, 101, range, 2.0), no(NoAgreement::NothingToConfirm));
+        assert_eq!(confirms(&mut two, Act::Start, 100, range, 2.0), no(NoAgreement::NothingToConfirm));
+        assert_eq!(asks(&mut two, Act::Arm, range, 2.0), no(NoAgreement::AnotherAsks(ask)));
         assert_eq!(confirms(&mut two, Act::Arm, 100, pad, 11.0), Reply::Agreed { ask, confirmed_by: pad });
-        assert_eq!(confirms(&mut two, Act::Arm, 100, pad, 11.0), no(Refusal::NothingToConfirm), "used up");
+        assert_eq!(
+            confirms(&mut two, Act::Arm, 100, pad, 11.0),
+            no(NoAgreement::NothingToConfirm),
+            "used up"
+        );
     }
 
     #[test]
@@ -303,14 +307,14 @@ mod tests {
         let mut two = TwoPerson::default();
         asks(&mut two, Act::Arm, flight, 1.0);
         let late = confirms(&mut two, Act::Arm, 100, range, 11.001);
-        assert_eq!(late, Reply::Refused(Refusal::NothingToConfirm));
+        assert_eq!(late, Reply::Refused(NoAgreement::NothingToConfirm));
         let Reply::Asked(ask) = asks(&mut two, Act::Arm, range, 12.0) else { panic!("not asked") };
         assert_eq!(ask.number, 101);
         let old = confirms(&mut two, Act::Arm, 100, flight, 12.0);
-        assert_eq!(old, Reply::Refused(Refusal::NothingToConfirm));
+        assert_eq!(old, Reply::Refused(NoAgreement::NothingToConfirm));
         two.withdraw();
         let gone = confirms(&mut two, Act::Arm, 101, flight, 12.0);
-        assert_eq!(gone, Reply::Refused(Refusal::NothingToConfirm));
+        assert_eq!(gone, Reply::Refused(NoAgreement::NothingToConfirm));
     }
 
     #[test]

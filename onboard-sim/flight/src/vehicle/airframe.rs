@@ -4,6 +4,7 @@
 //! the gimbal's pivot. The controller's model and the simulated truth use the same data.
 
 use alloc::string::String;
+use core::ops::RangeInclusive;
 use serde::{Deserialize, Serialize};
 
 use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
@@ -40,6 +41,16 @@ pub struct BadValue {
     pub key: &'static str,
     pub found: f64,
     pub required: &'static str,
+}
+
+/// The first value outside its range: key, value, range, and the range in words.
+pub(super) fn within<const N: usize>(
+    values: [(&'static str, f64, RangeInclusive<f64>, &'static str); N],
+) -> Result<(), BadValue> {
+    match values.into_iter().find(|(_, found, range, _)| !range.contains(found)) {
+        Some((key, found, _, required)) => Err(BadValue { key, found, required }),
+        None => Ok(()),
+    }
 }
 
 impl Airframe {
@@ -161,7 +172,8 @@ pub struct MassModel {
 }
 
 impl MassModel {
-    /// Removes the propellant, a point mass on the axis, from the loaded vehicle (parallel axes).
+    /// Removes the propellant, a point mass on the axis, from the loaded vehicle (parallel axes: H. Goldstein, C. Poole and J. Safko,
+    /// Classical Mechanics, 3rd edition, chapter 5).
     pub fn new(mass: &Mass, propellant_mass_kg: f64) -> Self {
         let dry_mass_kg = mass.loaded_kg - propellant_mass_kg;
         let moment_kg_m = mass.loaded_kg * mass.loaded_cg_station_m;
@@ -404,178 +416,99 @@ pub struct Parachute {
 
 // Range checks of an airframe: one line for each key.
 
-type Check = Result<(), BadValue>;
-
 /// Longest servo delay, s: the length of the simulation's delay line.
 const DELAY_MAX_S: f64 = 0.1;
 
-fn require(ok: bool, key: &'static str, found: f64, required: &'static str) -> Check {
-    if ok { Ok(()) } else { Err(BadValue { key, found, required }) }
-}
+const POSITIVE: &str = "a finite number above 0";
+const NOT_NEGATIVE: &str = "a finite number, 0 or more,";
 
-fn positive(key: &'static str, value: f64) -> Check {
-    require(value.is_finite() && value > 0.0, key, value, "a finite number above 0")
-}
+/// A key, its value, whether it is accepted, and what is.
+type RangeCheck = (&'static str, f64, bool, &'static str);
 
-fn not_negative(key: &'static str, value: f64) -> Check {
-    require(value.is_finite() && value >= 0.0, key, value, "a finite number, 0 or more,")
-}
-
-fn validate(airframe: &Airframe) -> Check {
-    igniter(airframe)?;
-    masses(airframe)?;
-    shape(airframe)?;
-    actuators(airframe)?;
-    recovery(airframe)
-}
-
-fn igniter(airframe: &Airframe) -> Check {
-    require((1..=3).contains(&airframe.igniters), "igniters", f64::from(airframe.igniters), "1 to 3")
-}
-
-fn masses(airframe: &Airframe) -> Check {
-    let mass = &airframe.mass;
-    positive("mass.loaded_kg", mass.loaded_kg)?;
-    positive("mass.loaded_cg_station_m", mass.loaded_cg_station_m)?;
-    positive("mass.loaded_pitch_inertia_kg_m2", mass.loaded_pitch_inertia_kg_m2)?;
-    positive("mass.roll_inertia_kg_m2", mass.roll_inertia_kg_m2)?;
-    require(
-        (0.0..mass.loaded_cg_station_m).contains(&mass.propellant_station_m),
-        "mass.propellant_station_m",
-        mass.propellant_station_m,
-        "0 or more and below mass.loaded_cg_station_m",
-    )
-}
-
-fn shape(airframe: &Airframe) -> Check {
-    let (body, fins) = (&airframe.body, &airframe.fins);
-    let length_m = body.length_m;
-    require(length_m > 0.0 && length_m <= 3.0, "body.length_m", length_m, "above 0 to 3")?;
-    positive("body.diameter_m", body.diameter_m)?;
-    positive("body.reference_area_m2", body.reference_area_m2)?;
-    not_negative("body.axial_drag_coefficient", body.axial_drag_coefficient)?;
-    not_negative("body.crossflow_drag_coefficient", body.crossflow_drag_coefficient)?;
-    require(
-        (0.0..=body.length_m).contains(&fins.station_m),
-        "fins.station_m",
-        fins.station_m,
-        "0 (the nozzle) to body.length_m",
-    )?;
-    positive("fins.length_m", fins.length_m)?;
-    let from_y_deg = fins.from_y_deg;
-    require(from_y_deg > 0.0 && from_y_deg < 90.0, "fins.from_y_deg", from_y_deg, "above 0 and below 90")?;
-    require(
-        fins.hinge_off_deg > 0.0 && fins.hinge_off_deg < from_y_deg,
-        "fins.hinge_off_deg",
-        fins.hinge_off_deg,
-        "above 0 (a fin hinged at its middle has no lift, and the roll no control) and below fins.from_y_deg",
-    )?;
+#[rustfmt::skip]
+fn validate(airframe: &Airframe) -> Result<(), BadValue> {
+    let Airframe { mass, body, fins, gimbal, legs, parachute, .. } = airframe;
+    let positive = |key, value: f64| (key, value, value.is_finite() && value > 0.0, POSITIVE);
+    let not_negative = |key, value: f64| (key, value, value.is_finite() && value >= 0.0, NOT_NEGATIVE);
+    let row = |key, value: f64, ok: bool, words| (key, value, ok, words);
+    let opening = |key, deg: f64| row(key, deg, (0.0..=90.0).contains(&deg), "0 (closed) to 90 (open)");
+    let delay = |key, servo: &Servo| row(key, servo.delay_s, (0.0..=DELAY_MAX_S).contains(&servo.delay_s), "0 to 0.1");
+    let slop = |key, servo: &Servo| row(key, servo.slop_deg, (0.0..10.0).contains(&servo.slop_deg), "0 or more and below 10");
+    let in_front = |value: f64| (0.0..mass.loaded_cg_station_m).contains(&value);
+    let (length_m, from_y_deg, foot_m) = (body.length_m, fins.from_y_deg, legs.foot_station_m);
     let apart_rad = (2.0 * from_y_deg).min(180.0 - 2.0 * from_y_deg).to_radians();
-    require(
-        fins.width_m > 0.0 && fins.width_m <= 0.5 * body.diameter_m * apart_rad,
-        "fins.width_m",
-        fins.width_m,
-        "above 0 and at most the arc between the middles of closed neighbours (wider fins overlap)",
-    )?;
-    not_negative("fins.drag_coefficient", fins.drag_coefficient)?;
-    not_negative("fins.lift_coefficient", fins.lift_coefficient)
-}
-
-fn actuators(airframe: &Airframe) -> Check {
-    let (fins, gimbal) = (&airframe.fins, &airframe.gimbal);
-    for (key, value_deg) in [
-        ("fins.closed_deg", fins.closed_deg),
-        ("fins.open_deg", fins.open_deg),
-        ("fins.control_min_deg", fins.control_min_deg),
-    ] {
-        require((0.0..=90.0).contains(&value_deg), key, value_deg, "0 (closed) to 90 (open)")?;
+    let control_deg = fins.control_min_deg;
+    let rows: [RangeCheck; 42] = [
+        row("igniters", f64::from(airframe.igniters), (1..=3).contains(&airframe.igniters), "1 to 3"),
+        positive("mass.loaded_kg", mass.loaded_kg),
+        positive("mass.loaded_cg_station_m", mass.loaded_cg_station_m),
+        positive("mass.loaded_pitch_inertia_kg_m2", mass.loaded_pitch_inertia_kg_m2),
+        positive("mass.roll_inertia_kg_m2", mass.roll_inertia_kg_m2),
+        row("mass.propellant_station_m", mass.propellant_station_m, in_front(mass.propellant_station_m),
+            "0 or more and below mass.loaded_cg_station_m"),
+        row("body.length_m", length_m, length_m > 0.0 && length_m <= 3.0, "above 0 to 3"),
+        positive("body.diameter_m", body.diameter_m),
+        positive("body.reference_area_m2", body.reference_area_m2),
+        not_negative("body.axial_drag_coefficient", body.axial_drag_coefficient),
+        not_negative("body.crossflow_drag_coefficient", body.crossflow_drag_coefficient),
+        row("fins.station_m", fins.station_m, (0.0..=length_m).contains(&fins.station_m), "0 (the nozzle) to body.length_m"),
+        positive("fins.length_m", fins.length_m),
+        row("fins.from_y_deg", from_y_deg, from_y_deg > 0.0 && from_y_deg < 90.0, "above 0 and below 90"),
+        row("fins.hinge_off_deg", fins.hinge_off_deg, fins.hinge_off_deg > 0.0 && fins.hinge_off_deg < from_y_deg,
+            "above 0 (a fin hinged at its middle has no lift, and the roll no control) and below fins.from_y_deg"),
+        row("fins.width_m", fins.width_m, fins.width_m > 0.0 && fins.width_m <= 0.5 * body.diameter_m * apart_rad,
+            "above 0 and at most the arc between the middles of closed neighbours (wider fins overlap)"),
+        not_negative("fins.drag_coefficient", fins.drag_coefficient),
+        not_negative("fins.lift_coefficient", fins.lift_coefficient),
+        opening("fins.closed_deg", fins.closed_deg),
+        opening("fins.open_deg", fins.open_deg),
+        opening("fins.control_min_deg", control_deg),
+        row("fins.control_min_deg", control_deg, fins.closed_deg <= control_deg && control_deg < fins.open_deg,
+            "fins.closed_deg or more and below fins.open_deg"),
+        row("gimbal.limit_deg", gimbal.limit_deg, gimbal.limit_deg > 0.0 && gimbal.limit_deg < 90.0, "above 0 and below 90"),
+        row("gimbal.pivot_station_m", gimbal.pivot_station_m, in_front(gimbal.pivot_station_m),
+            "0 or more and below mass.loaded_cg_station_m"),
+        row("gimbal.inside_diameter_m", gimbal.inside_diameter_m,
+            gimbal.inside_diameter_m > 0.0 && gimbal.inside_diameter_m < body.diameter_m, "above 0 and below body.diameter_m"),
+        positive("fins.servo.rate_deg_s", fins.servo.rate_deg_s),
+        delay("fins.servo.delay_s", &fins.servo),
+        slop("fins.servo.slop_deg", &fins.servo),
+        positive("gimbal.servo.rate_deg_s", gimbal.servo.rate_deg_s),
+        delay("gimbal.servo.delay_s", &gimbal.servo),
+        slop("gimbal.servo.slop_deg", &gimbal.servo),
+        row("legs.foot_station_m", foot_m, foot_m >= -length_m && foot_m < 0.0,
+            "-body.length_m or more and below 0 (under the nozzle)"),
+        positive("legs.foot_radius_m", legs.foot_radius_m),
+        positive("legs.stiffness_n_m", legs.stiffness_n_m),
+        not_negative("legs.drag_area_m2", legs.drag_area_m2),
+        row("legs.drag_station_m", legs.drag_station_m, (foot_m..=length_m).contains(&legs.drag_station_m),
+            "legs.foot_station_m to body.length_m"),
+        not_negative("legs.damping_n_s_m", legs.damping_n_s_m),
+        not_negative("legs.friction_coefficient", legs.friction_coefficient),
+        positive("parachute.area_m2", parachute.area_m2),
+        positive("parachute.drag_coefficient", parachute.drag_coefficient),
+        not_negative("parachute.ejection_delay_s", parachute.ejection_delay_s),
+        positive("parachute.inflation_distance_m", parachute.inflation_distance_m),
+    ];
+    let crush = legs.crush.iter().flat_map(|crush| {
+        let half_weight_n = 0.5 * mass.loaded_kg * STANDARD_GRAVITY_M_S2;
+        [
+            row("legs.crush.force_n", crush.force_n, crush.force_n.is_finite() && crush.force_n > half_weight_n,
+                "a finite number above half the loaded weight (the vehicle may stand on two feet)"),
+            row("legs.crush.guide_share", crush.guide_share,
+                crush.guide_share >= 0.0 && crush.guide_share * legs.friction_coefficient < 1.0,
+                "0 or more and below 1 / legs.friction_coefficient (a foot that slides does not jam)"),
+            row("legs.crush.stroke_m", crush.stroke_m, crush.stroke_m > 0.0 && crush.stroke_m < -foot_m,
+                "above 0 and below -foot_station_m (the nozzle stays above the ground)"),
+            row("legs.crush.strength_n", crush.strength_n, crush.strength_n.is_finite() && crush.strength_n > crush.force_n,
+                "a finite number above legs.crush.force_n (the block gives way before the leg breaks)"),
+            positive("legs.crush.strength_across_n", crush.strength_across_n),
+        ]
+    });
+    match rows.into_iter().chain(crush).find(|(_, _, ok, _)| !ok) {
+        Some((key, found, _, required)) => Err(BadValue { key, found, required }),
+        None => Ok(()),
     }
-    require(
-        fins.closed_deg <= fins.control_min_deg && fins.control_min_deg < fins.open_deg,
-        "fins.control_min_deg",
-        fins.control_min_deg,
-        "fins.closed_deg or more and below fins.open_deg",
-    )?;
-    require(
-        gimbal.limit_deg > 0.0 && gimbal.limit_deg < 90.0,
-        "gimbal.limit_deg",
-        gimbal.limit_deg,
-        "above 0 and below 90",
-    )?;
-    require(
-        (0.0..airframe.mass.loaded_cg_station_m).contains(&gimbal.pivot_station_m),
-        "gimbal.pivot_station_m",
-        gimbal.pivot_station_m,
-        "0 or more and below mass.loaded_cg_station_m",
-    )?;
-    require(
-        gimbal.inside_diameter_m > 0.0 && gimbal.inside_diameter_m < airframe.body.diameter_m,
-        "gimbal.inside_diameter_m",
-        gimbal.inside_diameter_m,
-        "above 0 and below body.diameter_m",
-    )?;
-    servo(&fins.servo, ["fins.servo.rate_deg_s", "fins.servo.delay_s", "fins.servo.slop_deg"])?;
-    servo(&gimbal.servo, ["gimbal.servo.rate_deg_s", "gimbal.servo.delay_s", "gimbal.servo.slop_deg"])
-}
-
-fn servo(servo: &Servo, [rate, delay, slop]: [&'static str; 3]) -> Check {
-    positive(rate, servo.rate_deg_s)?;
-    require((0.0..=DELAY_MAX_S).contains(&servo.delay_s), delay, servo.delay_s, "0 to 0.1")?;
-    require((0.0..10.0).contains(&servo.slop_deg), slop, servo.slop_deg, "0 or more and below 10")
-}
-
-fn recovery(airframe: &Airframe) -> Check {
-    let (legs, parachute) = (&airframe.legs, &airframe.parachute);
-    require(
-        legs.foot_station_m >= -airframe.body.length_m && legs.foot_station_m < 0.0,
-        "legs.foot_station_m",
-        legs.foot_station_m,
-        "-body.length_m or more and below 0 (under the nozzle)",
-    )?;
-    positive("legs.foot_radius_m", legs.foot_radius_m)?;
-    positive("legs.stiffness_n_m", legs.stiffness_n_m)?;
-    not_negative("legs.drag_area_m2", legs.drag_area_m2)?;
-    let between = legs.foot_station_m..=airframe.body.length_m;
-    require(
-        between.contains(&legs.drag_station_m),
-        "legs.drag_station_m",
-        legs.drag_station_m,
-        "legs.foot_station_m to body.length_m",
-    )?;
-    not_negative("legs.damping_n_s_m", legs.damping_n_s_m)?;
-    not_negative("legs.friction_coefficient", legs.friction_coefficient)?;
-    if let Some(crush) = &legs.crush {
-        let weight_n = airframe.mass.loaded_kg * STANDARD_GRAVITY_M_S2;
-        require(
-            crush.force_n.is_finite() && crush.force_n > 0.5 * weight_n,
-            "legs.crush.force_n",
-            crush.force_n,
-            "a finite number above half the loaded weight (the vehicle may stand on two feet)",
-        )?;
-        require(
-            crush.guide_share >= 0.0 && crush.guide_share * legs.friction_coefficient < 1.0,
-            "legs.crush.guide_share",
-            crush.guide_share,
-            "0 or more and below 1 / legs.friction_coefficient (a foot that slides does not jam)",
-        )?;
-        require(
-            crush.stroke_m > 0.0 && crush.stroke_m < -legs.foot_station_m,
-            "legs.crush.stroke_m",
-            crush.stroke_m,
-            "above 0 and below -foot_station_m (the nozzle stays above the ground)",
-        )?;
-        require(
-            crush.strength_n.is_finite() && crush.strength_n > crush.force_n,
-            "legs.crush.strength_n",
-            crush.strength_n,
-            "a finite number above legs.crush.force_n (the block gives way before the leg breaks)",
-        )?;
-        positive("legs.crush.strength_across_n", crush.strength_across_n)?;
-    }
-    positive("parachute.area_m2", parachute.area_m2)?;
-    positive("parachute.drag_coefficient", parachute.drag_coefficient)?;
-    not_negative("parachute.ejection_delay_s", parachute.ejection_delay_s)?;
-    positive("parachute.inflation_distance_m", parachute.inflation_distance_m)
 }
 
 #[cfg(test)]
@@ -586,7 +519,7 @@ mod tests {
     #[test]
     fn every_builtin_airframe_is_sound_and_has_its_motor() {
         for (name, _) in crate::vehicles::mission::BUILTIN {
-            let airframe = crate::vehicles::airframe::builtin(name).unwrap();
+            let airframe = crate::vehicles::mission::builtin_airframe(name).unwrap();
             let motor = motors::builtin(&airframe.motor).unwrap();
             let propellant_kg = motor.propellant_mass_kg();
             let model = MassModel::new(&airframe.mass, propellant_kg);
@@ -602,7 +535,7 @@ mod tests {
     /// The terminal speed with open fins is the landing paper's 39.4 m/s at 3 kg and sea level.
     #[test]
     fn val_landing_paper_terminal_speed_with_open_fins() {
-        let airframe = crate::vehicles::airframe::builtin("mk2-h53").unwrap();
+        let airframe = crate::vehicles::mission::builtin_airframe("mk2-h53").unwrap();
         let area_m2 = airframe.drag_area_m2(core::f64::consts::FRAC_PI_2);
         let speed_m_s = (2.0 * airframe.mass.loaded_kg * 9.806_65 / (1.225 * area_m2)).sqrt();
         assert!((speed_m_s - 39.4).abs() < 0.05, "{speed_m_s}");
@@ -610,7 +543,7 @@ mod tests {
 
     #[test]
     fn a_bad_value_is_named_in_the_error() {
-        let mut airframe = crate::vehicles::airframe::builtin("mk2").unwrap();
+        let mut airframe = crate::vehicles::mission::builtin_airframe("mk2").unwrap();
         airframe.gimbal.limit_deg = -3.0;
         let error = airframe.validate().unwrap_err().to_string();
         assert_eq!(error, "gimbal.limit_deg is -3; above 0 and below 90 is accepted");
@@ -619,7 +552,7 @@ mod tests {
     /// Quarters of the skin of a body of 74 mm are 58.1 mm wide. Turned by 15 degrees, neighbours are 38.7 mm apart on one side.
     #[test]
     fn val_hand_closed_fins_must_not_overlap() {
-        let mk3 = crate::vehicles::airframe::builtin("mk3").unwrap();
+        let mk3 = crate::vehicles::mission::builtin_airframe("mk3").unwrap();
         for (width_m, from_y_deg, hinge_off_deg, wrong) in [
             (0.0581, 45.0, 15.0, None),
             (0.0582, 45.0, 15.0, Some("fins.width_m")),
@@ -643,7 +576,7 @@ mod tests {
     /// It crushes under half the weight, jams, lets the nozzle touch the ground, or its leg breaks first.
     #[test]
     fn a_foot_that_cannot_give_way_is_named_in_the_error() {
-        let mut airframe = crate::vehicles::airframe::builtin("mk3").unwrap();
+        let mut airframe = crate::vehicles::mission::builtin_airframe("mk3").unwrap();
         let sound = airframe.legs.crush.unwrap();
         for (key, crush) in [
             ("legs.crush.force_n", Crush { force_n: 16.0, ..sound }),
@@ -664,7 +597,7 @@ mod tests {
     fn val_order_statistics_the_earliest_of_several_igniters() {
         use core::f64::consts::PI;
         let scatter = |igniters| {
-            let airframe = crate::vehicles::airframe::builtin("mk2").unwrap();
+            let airframe = crate::vehicles::mission::builtin_airframe("mk2").unwrap();
             Airframe { igniters, ..airframe }.igniter_scatter()
         };
         assert!((scatter(1) - 1.0).abs() < 1e-12);
@@ -674,7 +607,7 @@ mod tests {
 
     #[test]
     fn a_single_igniter_is_the_default_and_the_number_has_a_range() {
-        let mut airframe = crate::vehicles::airframe::builtin("mk2").unwrap();
+        let mut airframe = crate::vehicles::mission::builtin_airframe("mk2").unwrap();
         assert_eq!(airframe.igniters, 1);
         for (igniters, ok) in [(0, false), (1, true), (3, true), (4, false)] {
             airframe.igniters = igniters;

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::airframe::BadValue;
+use super::airframe::{BadValue, within};
 
 /// Below this height a hanging vehicle is never armed, m: a motor that is lit there has no room to brake a fall, and
 /// people may stand under it.
@@ -53,7 +53,7 @@ impl Drop {
     /// # Errors
     /// [`BadValue`] names the first key with a wrong value.
     pub fn validate(&self) -> Result<(), BadValue> {
-        for (key, found, range, required) in [
+        within([
             ("drop.height_m", self.height_m, LOWEST_ARMED_M..=150.0, "10 to 150"),
             ("drop.drift_m_s", self.drift_m_s, 0.0..=5.0, "0 to 5"),
             ("drop.rope_m", self.rope_m, 0.05..=10.0, "0.05 to 10"),
@@ -62,11 +62,6 @@ impl Drop {
             ("drop.rotation_max_deg_s", self.rotation_max_deg_s, 0.0..=360.0, "0 to 360"),
             ("drop.speed_max_m_s", self.speed_max_m_s, 0.0..=10.0, "0 to 10"),
             ("drop.release_after_s", self.release_after_s, 0.0..=60.0, "0 to 60"),
-        ] {
-            if !range.contains(&found) {
-                return Err(BadValue { key, found, required });
-            }
-        }
-        Ok(())
+        ])
     }
 }

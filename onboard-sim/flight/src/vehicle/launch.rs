@@ -8,7 +8,7 @@ use alloc::string::String;
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::airframe::BadValue;
+use super::airframe::{BadValue, within};
 use super::rigid::{RigidState, upright};
 use super::thrust_curve::ThrustCurve;
 
@@ -59,7 +59,7 @@ pub struct Booster {
     /// Name of a built-in motor, or the text of its `.eng` or `.rse` file.
     pub motor: String,
     /// The certified thrust curve of that motor. The reader of the mission looks it up.
-    #[serde(skip, default = "ThrustCurve::none")]
+    #[serde(skip)]
     pub motor_curve: ThrustCurve,
     /// From its lower end, which is its nozzle, to the landing vehicle's nozzle exit, m.
     pub length_m: f64,
@@ -131,20 +131,14 @@ impl BoosterFins {
     }
 }
 
-impl Booster {
-    /// Distance from the stack's lower end up to a station, m.
-    pub fn above_lower_end_m(&self, station_m: f64) -> f64 {
-        station_m + self.length_m
-    }
-}
-
 impl Launch {
     /// The vehicle on the rail, at rest: its centre of gravity at a station, m.
     pub fn standing(&self, cg_station_m: f64) -> RigidState {
         let (sin, cos) = libm::sincos(self.rail.towards_deg.to_radians());
         let axis = Vector3::new(-sin, cos, 0.0) * self.rail.tilt_deg.to_radians();
         let world_from_body = UnitQuaternion::from_scaled_axis(axis) * upright();
-        let along_m = self.booster.above_lower_end_m(cg_station_m);
+        // From the stack's lower end.
+        let along_m = cg_station_m + self.booster.length_m;
         RigidState {
             position_m: self.rail.foot_m() + world_from_body * Vector3::x() * along_m,
             world_from_body,
@@ -158,48 +152,34 @@ impl Launch {
     /// [`BadValue`] names the first key with a wrong value.
     pub fn validate(&self) -> Result<(), BadValue> {
         let (rail, booster) = (&self.rail, &self.booster);
-        let within = |key, found: f64, range: core::ops::RangeInclusive<f64>, required| {
-            if range.contains(&found) { Ok(()) } else { Err(BadValue { key, found, required }) }
-        };
-        within("launch.rail.length_m", rail.length_m, 0.5..=10.0, "0.5 to 10")?;
-        // NAR Model Rocket Safety Code, rule 5: within 30 degrees of the vertical.
-        within("launch.rail.tilt_deg", rail.tilt_deg, 0.0..=30.0, "0 to 30")?;
-        within("launch.rail.towards_deg", rail.towards_deg, -360.0..=360.0, "-360 to 360")?;
-        // Farther away lies beyond the largest fence.
-        within("launch.rail.x_m", rail.x_m, -1000.0..=1000.0, "-1000 to 1000")?;
-        within("launch.rail.y_m", rail.y_m, -1000.0..=1000.0, "-1000 to 1000")?;
-        within("launch.rail.upwind_s", rail.upwind_s, -60.0..=60.0, "-60 to 60")?;
-        within("launch.separate_before_apogee_s", self.separate_before_apogee_s, 0.0..=10.0, "0 to 10")?;
-        within("launch.booster.length_m", booster.length_m, 0.05..=3.0, "0.05 to 3")?;
-        within("launch.booster.dry_kg", booster.dry_kg, 0.01..=20.0, "0.01 to 20")?;
-        for (key, found) in [
-            ("launch.booster.cg_station_m", booster.cg_station_m),
-            ("launch.booster.propellant_station_m", booster.propellant_station_m),
-            ("launch.booster.fins", booster.fin_force.station_m),
-        ] {
-            within(
-                key,
-                found,
-                -booster.length_m..=0.0,
-                "between launch.booster.length_m below the vehicle and 0",
-            )?;
-        }
-        for (key, found) in [
-            ("launch.booster.pitch_inertia_kg_m2", booster.pitch_inertia_kg_m2),
-            ("launch.booster.roll_inertia_kg_m2", booster.roll_inertia_kg_m2),
-        ] {
-            within(key, found, 1e-6..=10.0, "above 0 to 10")?;
-        }
-        within("launch.booster.nose.station_m", booster.nose.station_m, 0.0..=3.0, "0 to 3")?;
-        for (key, found) in [
-            ("launch.booster.stack_drag_coefficient", booster.stack_drag_coefficient),
-            ("launch.booster.nose.slope_per_rad", booster.nose.slope_per_rad),
-            ("launch.booster.fins", booster.fin_force.slope_per_rad),
-        ] {
-            within(key, found, 0.0..=100.0, "0 to 100")?;
-        }
-        within("launch.booster.fin_radius_m", booster.fin_radius_m, 0.001..=1.0, "0.001 to 1")?;
-        within("launch.booster.separation_impulse_n_s", booster.separation_impulse_n_s, 0.0..=20.0, "0 to 20")
+        let between = "between launch.booster.length_m below the vehicle and 0";
+        let below = |key, found| (key, found, -booster.length_m..=0.0, between);
+        let inertia = |key, found| (key, found, 1e-6..=10.0, "above 0 to 10");
+        let coefficient = |key, found| (key, found, 0.0..=100.0, "0 to 100");
+        within([
+            ("launch.rail.length_m", rail.length_m, 0.5..=10.0, "0.5 to 10"),
+            // NAR Model Rocket Safety Code, rule 5: within 30 degrees of the vertical.
+            ("launch.rail.tilt_deg", rail.tilt_deg, 0.0..=30.0, "0 to 30"),
+            ("launch.rail.towards_deg", rail.towards_deg, -360.0..=360.0, "-360 to 360"),
+            // Farther away lies beyond the largest fence.
+            ("launch.rail.x_m", rail.x_m, -1000.0..=1000.0, "-1000 to 1000"),
+            ("launch.rail.y_m", rail.y_m, -1000.0..=1000.0, "-1000 to 1000"),
+            ("launch.rail.upwind_s", rail.upwind_s, -60.0..=60.0, "-60 to 60"),
+            ("launch.separate_before_apogee_s", self.separate_before_apogee_s, 0.0..=10.0, "0 to 10"),
+            ("launch.booster.length_m", booster.length_m, 0.05..=3.0, "0.05 to 3"),
+            ("launch.booster.dry_kg", booster.dry_kg, 0.01..=20.0, "0.01 to 20"),
+            below("launch.booster.cg_station_m", booster.cg_station_m),
+            below("launch.booster.propellant_station_m", booster.propellant_station_m),
+            below("launch.booster.fins", booster.fin_force.station_m),
+            inertia("launch.booster.pitch_inertia_kg_m2", booster.pitch_inertia_kg_m2),
+            inertia("launch.booster.roll_inertia_kg_m2", booster.roll_inertia_kg_m2),
+            ("launch.booster.nose.station_m", booster.nose.station_m, 0.0..=3.0, "0 to 3"),
+            coefficient("launch.booster.stack_drag_coefficient", booster.stack_drag_coefficient),
+            coefficient("launch.booster.nose.slope_per_rad", booster.nose.slope_per_rad),
+            coefficient("launch.booster.fins", booster.fin_force.slope_per_rad),
+            ("launch.booster.fin_radius_m", booster.fin_radius_m, 0.001..=1.0, "0.001 to 1"),
+            ("launch.booster.separation_impulse_n_s", booster.separation_impulse_n_s, 0.0..=20.0, "0 to 20"),
+        ])
     }
 }
 

@@ -9,7 +9,7 @@ use alloc::string::String;
 use serde::{Deserialize, Serialize};
 
 use crate::estimation::motor_estimate::MotorPrior;
-use crate::vehicle::airframe::BadValue;
+use crate::vehicle::airframe::{BadValue, within};
 
 /// The section `[lot]`.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
@@ -203,27 +203,22 @@ impl Lot {
     /// [`BadValue`] names the first key with a wrong value.
     pub fn validate(&self) -> Result<(), BadValue> {
         // The filter of the motor knows scales from 0.7 to 1.3; a motor further off is another motor.
-        let scale = (0.7..=1.3, "0.7 to 1.3");
-        let share = (0.0..=0.2, "0 to 0.2");
+        let scale = |key, found| (key, found, 0.7..=1.3, "0.7 to 1.3");
+        let share = |key, found| (key, found, 0.0..=0.2, "0 to 0.2");
         // Kelvin or Fahrenheit are not meant; propellants are sold for -30 to 55 degrees.
-        let celsius = (-40.0..=60.0, "degrees Celsius, -40 to 60");
+        let celsius = |key, found| (key, found, -40.0..=60.0, "degrees Celsius, -40 to 60");
         let Temperature { burns_c, pad_c } =
             self.temperature.unwrap_or(Temperature { burns_c: 0.0, pad_c: 0.0 });
-        for (key, found, (range, required)) in [
-            ("lot.impulse.mean", self.impulse.mean, scale.clone()),
-            ("lot.burn_time.mean", self.burn_time.mean, scale),
-            ("lot.impulse.scatter", self.impulse.scatter, share.clone()),
-            ("lot.burn_time.scatter", self.burn_time.scatter, share.clone()),
-            ("lot.impulse.common", self.impulse.common, share.clone()),
-            ("lot.burn_time.common", self.burn_time.common, share),
-            ("lot.temperature.burns_c", burns_c, celsius.clone()),
-            ("lot.temperature.pad_c", pad_c, celsius),
-        ] {
-            if !range.contains(&found) {
-                return Err(BadValue { key, found, required });
-            }
-        }
-        Ok(())
+        within([
+            scale("lot.impulse.mean", self.impulse.mean),
+            scale("lot.burn_time.mean", self.burn_time.mean),
+            share("lot.impulse.scatter", self.impulse.scatter),
+            share("lot.burn_time.scatter", self.burn_time.scatter),
+            share("lot.impulse.common", self.impulse.common),
+            share("lot.burn_time.common", self.burn_time.common),
+            celsius("lot.temperature.burns_c", burns_c),
+            celsius("lot.temperature.pad_c", pad_c),
+        ])
     }
 
     /// Checks the weights against what motor and vehicle are by their data, kg: another one was weighed, or in grams.

@@ -189,7 +189,7 @@ pub struct Mission {
     pub airframe: Airframe,
     /// The expected thrust curve of the landing motor: the certified one of the motor that the airframe names, or what the lot
     /// tells instead. It is not in the mission's file; the reader of the mission looks the motor up.
-    #[serde(skip, default = "ThrustCurve::none")]
+    #[serde(skip)]
     pub motor_curve: ThrustCurve,
     /// Other curves that the landing motor may turn out to have: names of built-in motors, or texts of motor files.
     #[serde(default)]

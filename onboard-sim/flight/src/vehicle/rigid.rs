@@ -7,6 +7,8 @@
 //! The nozzle points along body `-x`. Gimbal angles `(pitch, yaw)` turn the thrust to
 //! `T (cos p cos y, sin y, -sin p cos y)` in body axes: a positive angle pitches the nose down, or yaws it, by
 //! `q' = -T sin p (X_CG - X_THR) / I` and `r' = -T sin y (X_CG - X_THR) / I`.
+//!
+//! Rotations are unit quaternions (B. L. Stevens and F. L. Lewis, Aircraft Control and Simulation, chapter 1).
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};

@@ -42,7 +42,8 @@ impl Site {
         (north_m, east_m)
     }
 
-    /// How far from the pad a radian of latitude and a radian of longitude reach, m.
+    /// How far from the pad a radian of latitude and a radian of longitude reach, m: the ellipsoid's two radii of curvature
+    /// (P. D. Groves, Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems, 2nd edition, section 2.4).
     fn radii_m(&self) -> (f64, f64) {
         let latitude_rad = self.latitude_deg.to_radians();
         let flattened = 1.0 - ECCENTRICITY_SQUARED * libm::pow(libm::sin(latitude_rad), 2.0);

@@ -1,7 +1,8 @@
 //! A solid motor's thrust over time.
 //!
 //! Thrust is linear between the points and zero outside them, so impulse and mean thrust are exact. Propellant burns in
-//! proportion to the delivered impulse (a constant exhaust velocity).
+//! proportion to the delivered impulse (a constant exhaust velocity: G. P. Sutton and O. Biblarz, Rocket Propulsion Elements,
+//! 9th edition, chapter 2).
 
 use alloc::format;
 use alloc::string::String;
@@ -16,21 +17,15 @@ pub struct ThrustPoint {
 }
 
 /// A motor: its thrust curve, masses and size.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct ThrustCurve {
-    name: String,
-    manufacturer: String,
-    diameter_m: f64,
-    length_m: f64,
-    propellant_mass_kg: f64,
-    total_mass_kg: f64,
-    points: Vec<ThrustPoint>,
+    data: MotorData,
     /// Impulse up to each point, N s.
     impulse_n_s: Vec<f64>,
 }
 
 /// The data of a motor file.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct MotorData {
     /// Its name ("H45W").
     pub name: String,
@@ -50,8 +45,7 @@ pub struct MotorData {
 impl ThrustCurve {
     /// The motor from this data; `None` if it has no thrust after its first point.
     pub fn new(data: MotorData) -> Option<Self> {
-        let MotorData { name, manufacturer, diameter_m, length_m, propellant_mass_kg, total_mass_kg, points } =
-            data;
+        let points = &data.points;
         let mut impulse_n_s = Vec::with_capacity(points.len());
         let mut sum_n_s = 0.0;
         impulse_n_s.push(sum_n_s);
@@ -64,16 +58,7 @@ impl ThrustCurve {
         if points.len() < 2 || !(sum_n_s.is_finite() && sum_n_s > 0.0) {
             return None;
         }
-        Some(Self {
-            name,
-            manufacturer,
-            diameter_m,
-            length_m,
-            propellant_mass_kg,
-            total_mass_kg,
-            points,
-            impulse_n_s,
-        })
+        Some(Self { data, impulse_n_s })
     }
 
     /// This motor with another impulse in another time, as factors.
@@ -84,9 +69,8 @@ impl ThrustCurve {
             thrust_n: point.thrust_n * impulse / burn_time,
         };
         Self {
-            points: self.points.iter().map(point).collect(),
+            data: MotorData { points: self.points().iter().map(point).collect(), ..self.data.clone() },
             impulse_n_s: self.impulse_n_s.iter().map(|before_n_s| before_n_s * impulse).collect(),
-            ..self.clone()
         }
     }
 
@@ -95,7 +79,7 @@ impl ThrustCurve {
     pub fn towards(&self, other: &Self, share: f64) -> Self {
         let between = |here: f64, there: f64| here + share * (there - here);
         let mut times_s: Vec<f64> =
-            [&self.points, &other.points].into_iter().flatten().map(|p| p.time_s).collect();
+            [self.points(), other.points()].into_iter().flatten().map(|p| p.time_s).collect();
         times_s.sort_by(f64::total_cmp);
         times_s.dedup();
         let points = times_s.into_iter().map(|time_s| ThrustPoint {
@@ -103,13 +87,11 @@ impl ThrustCurve {
             thrust_n: between(self.thrust_at_n(time_s), other.thrust_at_n(time_s)),
         });
         let data = MotorData {
-            name: format!("{} towards {}", self.name, other.name),
-            manufacturer: self.manufacturer.clone(),
-            diameter_m: self.diameter_m,
-            length_m: self.length_m,
-            propellant_mass_kg: between(self.propellant_mass_kg, other.propellant_mass_kg),
-            total_mass_kg: between(self.total_mass_kg, other.total_mass_kg),
+            name: format!("{} towards {}", self.name(), other.name()),
+            propellant_mass_kg: between(self.propellant_mass_kg(), other.propellant_mass_kg()),
+            total_mass_kg: between(self.total_mass_kg(), other.total_mass_kg()),
             points: points.collect(),
+            ..self.data.clone()
         };
         Self::new(data).unwrap_or_else(|| self.clone())
     }
@@ -117,66 +99,52 @@ impl ThrustCurve {
     /// This motor with another mass before ignition, kg; the propellant stays.
     #[must_use]
     pub fn weighing(self, total_mass_kg: f64) -> Self {
-        Self { total_mass_kg, ..self }
-    }
-
-    /// No motor: no thrust at any time, and no mass.
-    pub(crate) fn none() -> Self {
-        Self {
-            name: String::new(),
-            manufacturer: String::new(),
-            diameter_m: 0.0,
-            length_m: 0.0,
-            propellant_mass_kg: 0.0,
-            total_mass_kg: 0.0,
-            points: Vec::new(),
-            impulse_n_s: Vec::new(),
-        }
+        Self { data: MotorData { total_mass_kg, ..self.data }, ..self }
     }
 
     /// The motor's name as its file has it ("H45W").
     pub fn name(&self) -> &str {
-        &self.name
+        &self.data.name
     }
 
     /// The manufacturer as the file has it ("AT").
     pub fn manufacturer(&self) -> &str {
-        &self.manufacturer
+        &self.data.manufacturer
     }
 
     /// Diameter of the casing, m.
     pub fn diameter_m(&self) -> f64 {
-        self.diameter_m
+        self.data.diameter_m
     }
 
     /// Length of the casing, m.
     pub fn length_m(&self) -> f64 {
-        self.length_m
+        self.data.length_m
     }
 
     /// Mass of the propellant before ignition, kg.
     pub fn propellant_mass_kg(&self) -> f64 {
-        self.propellant_mass_kg
+        self.data.propellant_mass_kg
     }
 
     /// Mass of the motor before ignition, kg.
     pub fn total_mass_kg(&self) -> f64 {
-        self.total_mass_kg
+        self.data.total_mass_kg
     }
 
     /// The square of the casing's radius of gyration across its axis, m^2, taken as a full cylinder.
     pub fn gyration_m2(&self) -> f64 {
-        self.length_m * self.length_m / 12.0 + self.diameter_m * self.diameter_m / 16.0
+        self.data.length_m * self.data.length_m / 12.0 + self.data.diameter_m * self.data.diameter_m / 16.0
     }
 
     /// The points, in order of time; at least two.
     pub fn points(&self) -> &[ThrustPoint] {
-        &self.points
+        &self.data.points
     }
 
     /// Time of the last point, s.
     pub fn burn_time_s(&self) -> f64 {
-        self.points.last().map_or(0.0, |point| point.time_s)
+        self.data.points.last().map_or(0.0, |point| point.time_s)
     }
 
     /// Impulse of the whole burn, N s.
@@ -186,14 +154,14 @@ impl ThrustCurve {
 
     /// Highest thrust, N.
     pub fn peak_thrust_n(&self) -> f64 {
-        self.points.iter().fold(0.0, |peak: f64, point| peak.max(point.thrust_n))
+        self.data.points.iter().fold(0.0, |peak: f64, point| peak.max(point.thrust_n))
     }
 
     /// The segment that contains a time: its ends and the impulse before it. `None` outside the burn.
     fn segment(&self, time_s: f64) -> Option<(ThrustPoint, ThrustPoint, f64)> {
-        let after = self.points.partition_point(|point| point.time_s <= time_s);
-        let from = *self.points.get(after.checked_sub(1)?)?;
-        Some((from, *self.points.get(after)?, *self.impulse_n_s.get(after - 1)?))
+        let after = self.data.points.partition_point(|point| point.time_s <= time_s);
+        let from = *self.data.points.get(after.checked_sub(1)?)?;
+        Some((from, *self.data.points.get(after)?, *self.impulse_n_s.get(after - 1)?))
     }
 
     /// Thrust at a time since it began, N; zero before and after the burn.
@@ -224,14 +192,14 @@ impl ThrustCurve {
 
     /// Propellant burnt up to a time since the thrust began, kg.
     pub fn propellant_burnt_kg(&self, time_s: f64) -> f64 {
-        self.propellant_mass_kg * self.impulse_to_n_s(time_s) / self.total_impulse_n_s()
+        self.data.propellant_mass_kg * self.impulse_to_n_s(time_s) / self.total_impulse_n_s()
     }
 
     /// When the thrust falls through a value for the last time, s; `None` if it never exceeds the value.
     pub fn falls_through_s(&self, thrust_n: f64) -> Option<f64> {
-        let last_above = self.points.iter().rposition(|point| point.thrust_n > thrust_n)?;
-        let from = self.points.get(last_above)?;
-        let Some(to) = self.points.get(last_above + 1) else { return Some(from.time_s) };
+        let last_above = self.data.points.iter().rposition(|point| point.thrust_n > thrust_n)?;
+        let from = self.data.points.get(last_above)?;
+        let Some(to) = self.data.points.get(last_above + 1) else { return Some(from.time_s) };
         let share = (from.thrust_n - thrust_n) / (from.thrust_n - to.thrust_n);
         Some(from.time_s + share.min(1.0) * (to.time_s - from.time_s))
     }

@@ -4,13 +4,11 @@
 //! the accepted values.
 //!
 //! * [`mission`]: missions, from TOML.
-//! * [`airframe`]: the airframes of the built-in missions.
 //! * [`motors`]: the built-in motors, by name.
 //! * [`thrust_curve`]: motor files, RASP (`.eng`) and RockSim (`.rse`), and tables of a test stand.
 //! * [`openrocket`]: a vehicle as OpenRocket simulates it. [`table`]: tables whose columns say their units.
 //! * [`file_error`]: why a mission cannot be used.
 
-pub mod airframe;
 pub mod file_error;
 pub mod mission;
 pub mod motors;

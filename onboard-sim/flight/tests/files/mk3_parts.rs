@@ -1,6 +1,6 @@
 //! The parts list of MK3.md adds up to the airframe's mass, centre of gravity and inertias.
 
-use flight::vehicles::airframe::builtin;
+use flight::vehicles::mission::builtin_airframe as builtin;
 
 /// A row of the list.
 struct Part {

@@ -5,7 +5,7 @@ use core::f64::consts::FRAC_PI_2;
 use flight::vehicle::atmosphere::{Air, STANDARD_GRAVITY_M_S2};
 use flight::vehicle::rigid::{RigidState, upright};
 use flight::vehicle::thrust_curve::{MotorData, ThrustCurve, ThrustPoint};
-use flight::vehicles::airframe;
+use flight::vehicles::mission;
 use nalgebra::{UnitQuaternion, Vector3};
 use paper::plane::dynamics::{ModelKind, PlanarModel, PlanarState};
 use sim::world::{Actuators, STEP_S, Truth, World};
@@ -26,7 +26,7 @@ fn in_space(planar: &PlanarState) -> RigidState {
 /// A motor of constant thrust with almost no propellant, an ideal gimbal, no crossflow, fins closed, near sea level.
 #[test]
 fn the_planar_equations_are_the_motion_in_the_x_z_plane() {
-    let mut airframe = airframe::builtin("mk2").unwrap();
+    let mut airframe = mission::builtin_airframe("mk2").unwrap();
     airframe.body.crossflow_drag_coefficient = 0.0;
     airframe.gimbal.servo.rate_deg_s = 1e6;
     airframe.gimbal.servo.delay_s = 0.0;

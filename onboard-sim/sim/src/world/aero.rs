@@ -246,10 +246,6 @@ impl Parachute {
         self.fails = true;
     }
 
-    pub(crate) fn ejected(&self) -> bool {
-        self.commanded_s.is_some()
-    }
-
     pub(crate) fn ejected_s(&self) -> Option<f64> {
         self.commanded_s
     }
@@ -280,7 +276,7 @@ mod tests {
     /// What legs of 0.01 m2 add at 30 m/s from the tail, 20 degrees from the side, and in a roll.
     #[test]
     fn val_hand_air_on_the_legs() {
-        let mut airframe = flight::vehicles::airframe::builtin("mk2").unwrap();
+        let mut airframe = flight::vehicles::mission::builtin_airframe("mk2").unwrap();
         let bare = Shape::new(&airframe, &Truth::default());
         (airframe.legs.drag_area_m2, airframe.legs.drag_station_m) = (0.006, 0.05);
         let legged = Shape::new(&airframe, &Truth { leg_drag_m2: 0.004, ..Truth::default() });
@@ -324,7 +320,7 @@ mod tests {
         };
         let mut parachute = Parachute::new(&data);
         parachute.step(100.0, 50.0);
-        assert!(parachute.drag_area_m2().abs() < 1e-15 && !parachute.ejected());
+        assert!(parachute.drag_area_m2().abs() < 1e-15 && !parachute.ejected_s().is_some());
         parachute.eject(0.0);
         for (step, expected) in [(1000, 0.0), (1250, 0.25), (1500, 1.0), (3000, 1.0)] {
             let mut parachute = parachute.clone();
@@ -337,6 +333,6 @@ mod tests {
         broken.break_down();
         broken.eject(0.0);
         broken.step(100.0, 50.0);
-        assert!(broken.drag_area_m2().abs() < 1e-15 && !broken.ejected());
+        assert!(broken.drag_area_m2().abs() < 1e-15 && !broken.ejected_s().is_some());
     }
 }

@@ -3,6 +3,8 @@
 //! With the centre of pressure above the centre of gravity (the fins trail) the air turns the tail into the wind: the
 //! fall is stable. Below it, the air turns the nose down. The fins' force across the axis grows with the sine of the
 //! angle to the wind, that of the bare body with its square, so the centre of pressure comes down as the angle grows.
+//!
+//! Forces across a slender body at large angles: H. J. Allen and E. W. Perkins, NACA Report 1048, 1951.
 
 use flight::vehicle::airframe::Airframe;
 use nalgebra::Vector3;
@@ -67,7 +69,7 @@ mod tests {
     use super::*;
 
     fn balance() -> (Airframe, Balance) {
-        let airframe = flight::vehicles::airframe::builtin("mk2").unwrap();
+        let airframe = flight::vehicles::mission::builtin_airframe("mk2").unwrap();
         let balance = Balance::new(&airframe);
         (airframe, balance)
     }

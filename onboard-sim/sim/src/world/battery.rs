@@ -1,6 +1,8 @@
 //! The battery of the vehicle: charge, voltage under load, and what the vehicle draws.
 //!
 //! Two lithium-polymer cells of 1 Ah. Nothing of it was measured on this vehicle.
+//!
+//! An open-circuit voltage behind a resistance (G. L. Plett, Battery Management Systems, volume 1, 2015, chapter 2).
 
 /// Cells in series.
 const CELLS: f64 = 2.0;

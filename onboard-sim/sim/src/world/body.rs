@@ -1,4 +1,7 @@
 //! The rigid body: its equations of motion and their integrator.
+//!
+//! Newton's and Euler's equations with a quaternion (B. L. Stevens and F. L. Lewis, Aircraft Control and Simulation, chapter 1), in
+//! classical Runge-Kutta steps (E. Hairer, S. P. Norsett and G. Wanner, Solving Ordinary Differential Equations I, section II.1).
 
 use flight::vehicle::rigid::RigidState;
 use nalgebra::{Quaternion, Rotation3, UnitQuaternion, Vector3};

@@ -6,6 +6,9 @@
 //! a share of the force across, which friction on the ground and a tilt bring about. A foot has no mass of its own: the body
 //! carries it, and the block stops a little more than it has to. Its friction on the ground is that of a foot which moves with the
 //! body, also while it slides in its guide. Legs do not bend across.
+//!
+//! Contact by springs, dampers and Coulomb's friction: G. Gilardi and I. Sharf, "Literature survey of contact dynamics modelling",
+//! Mechanism and Machine Theory 37, 2002.
 
 use flight::rules::verdict::Touchdown;
 use flight::vehicle::airframe::{Airframe, Crush};
@@ -289,7 +292,7 @@ mod tests {
     use crate::world::body::{Inertia, Loads, rk4_step};
 
     fn mk3() -> Airframe {
-        flight::vehicles::airframe::builtin("mk3").unwrap()
+        flight::vehicles::mission::builtin_airframe("mk3").unwrap()
     }
 
     fn at_cg(airframe: &Airframe) -> Vector3<f64> {

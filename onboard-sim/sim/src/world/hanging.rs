@@ -1,6 +1,7 @@
 //! A vehicle that hangs tail-down below a drone: a stiff pendulum on a hook that wanders about its place.
 //!
-//! Rope and vehicle are one line. The swing is that of a mathematical pendulum with small angles, and nothing damps it:
+//! Rope and vehicle are one line. The swing is that of a mathematical pendulum with small angles (L. D. Landau and E. M.
+//! Lifshitz, Mechanics, 3rd edition, section 21), and nothing damps it:
 //! the vehicle moves as told here until the drone lets it go.
 
 use core::f64::consts::TAU;

@@ -1,6 +1,9 @@
 //! The true landing motor: `T(t) = s/b T0(t/b) (1 + sum of a_k cos(k pi i))` for impulse scale s, burn-time scale b and
 //! the fraction i of the impulse that `T0` has given by then. The cosines have no mean over the impulse, so a shape keeps
 //! it.
+//!
+//! Burn rate and pressure change thrust and time against each other at the same impulse (G. P. Sutton and O. Biblarz, Rocket Propulsion
+//! Elements, 9th edition, chapter 12).
 
 use core::f64::consts::PI;
 

@@ -1,5 +1,7 @@
 //! A servo: a pure delay, a rate limit, stops, and play between horn and load. A linkage is what lies between it and
 //! the surface that it moves.
+//!
+//! Play: G. Tao and P. V. Kokotovic, "Adaptive control of systems with backlash", Automatica 29, 1993.
 
 use flight::vehicle::airframe::Servo as ServoData;
 

@@ -105,7 +105,7 @@ mod tests {
     /// The whole world with a vehicle that is upright in still air: its vertical acceleration is this room's.
     #[test]
     fn val_world_the_forces_are_those_of_an_upright_vehicle() {
-        let airframe = flight::vehicles::airframe::builtin("mk2").unwrap();
+        let airframe = flight::vehicles::mission::builtin_airframe("mk2").unwrap();
         let motor = flight::vehicles::motors::builtin(&airframe.motor).unwrap();
         let truth = Truth {
             impulse_scale: 1.04,

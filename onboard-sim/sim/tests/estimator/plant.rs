@@ -80,7 +80,7 @@ fn upright_fins(state: &RigidState, mass: &MassProperties) -> FinCommand {
 }
 
 fn fly(seed: u64) -> Vec<Frame> {
-    let airframe = flight::vehicles::airframe::builtin("mk2").expect("a built-in airframe");
+    let airframe = flight::vehicles::mission::builtin_airframe("mk2").expect("a built-in airframe");
     let curve: ThrustCurve = motors::builtin(&airframe.motor).expect("a built-in motor");
     let truth = truth_of(seed);
     let mut world =

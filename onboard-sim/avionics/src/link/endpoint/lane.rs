@@ -12,7 +12,7 @@ use protocol::command::CommandAnswer;
 use protocol::dialect::MavMessage;
 use protocol::frame::{Encoder, Frame};
 use protocol::hub::line::{SHARE, slowed};
-use protocol::identity::{Address, NETWORK_BUDGET_BYTES_S};
+use protocol::identity::NETWORK_BUDGET_BYTES_S;
 
 use super::questions::FileService;
 use super::{Context, MAX_REQUESTED, Outgoing};
@@ -37,12 +37,12 @@ const LINE_HOLDS_S: f64 = 0.3;
 
 /// An answer in the queue.
 #[derive(Debug, Clone)]
-pub(super) enum Answer {
+pub(super) enum QueuedAnswer {
     Message(Box<MavMessage>),
     Command(CommandAnswer),
 }
 
-impl From<MavMessage> for Answer {
+impl From<MavMessage> for QueuedAnswer {
     fn from(message: MavMessage) -> Self {
         Self::Message(Box::new(message))
     }
@@ -53,7 +53,7 @@ impl From<MavMessage> for Answer {
 pub(super) struct Lane {
     pub(super) links: Vec<usize>,
     pub(super) streams: Streams,
-    encoder: Encoder,
+    pub(super) encoder: Encoder,
     signature_len: usize,
     sent: Window,
     /// Telemetry of the last [`BRIEFLY_S`] seconds.
@@ -68,17 +68,17 @@ pub(super) struct Lane {
     /// Answers to aborts, at most one for each station.
     aborts: VecDeque<CommandAnswer>,
     abort_answered_s: f64,
-    texts: VecDeque<Answer>,
-    answers: VecDeque<Answer>,
+    texts: VecDeque<QueuedAnswer>,
+    answers: VecDeque<QueuedAnswer>,
     /// Requested messages; they are sent after all vital messages.
     requested: VecDeque<MavMessage>,
     /// The next parameter of a requested list; `None` when the list has been sent.
-    next_parameter: Option<u16>,
+    pub(super) next_parameter: Option<u16>,
     /// When the next piece of a file may be sent: they are spread evenly, as the link carries them.
     piece_due_s: f64,
     /// The budget that the lane was given, bytes per second; a radio may leave less of it.
     granted_bytes_s: u32,
-    radio: Radio,
+    radio: RadioShare,
     /// When a line slower than a radio has sent what it was given. What is not vital waits for that, so that nothing queues
     /// behind it.
     line_free_at_s: f64,
@@ -87,11 +87,6 @@ pub(super) struct Lane {
 }
 
 impl Lane {
-    /// Sets the sender's address.
-    pub(super) fn speak_as(&mut self, us: Address) {
-        self.encoder = Encoder::new(us);
-    }
-
     pub(super) fn new(links: Vec<usize>, streams: Streams, encoder: Encoder, signature_len: usize) -> Self {
         let mut lane = Self {
             links,
@@ -112,7 +107,7 @@ impl Lane {
             next_parameter: None,
             piece_due_s: 0.0,
             granted_bytes_s: 0,
-            radio: Radio::default(),
+            radio: RadioShare::default(),
             line_free_at_s: 0.0,
             uplinks_at_s: 0.0,
         };
@@ -139,8 +134,10 @@ impl Lane {
         // The reserve of a slow line is in what its budget leaves of its baud rate.
         let reserve = if is_slow(capacity_bytes_s) { kept_free_bytes(self.signature_len) } else { 0 };
         self.sent.set_limit(capacity_bytes_s as usize + reserve);
-        self.telemetry_briefly.set_limit(telemetry_briefly_bytes(capacity_bytes_s));
-        self.answers_briefly.set_limit(answers_briefly_bytes(capacity_bytes_s));
+        // Over a slow line frames go one by one, so that there are no bursts.
+        let briefly = |bytes| if is_slow(capacity_bytes_s) { usize::MAX } else { bytes };
+        self.telemetry_briefly.set_limit(briefly(capacity_bytes_s as usize * 22 / 100));
+        self.answers_briefly.set_limit(briefly(capacity_bytes_s as usize / 6));
         self.answered.set_limit(share_bytes_s(capacity_bytes_s));
         self.said.set_limit(share_bytes_s(capacity_bytes_s));
     }
@@ -164,7 +161,7 @@ impl Lane {
         self.uplinks.push_front(message);
     }
 
-    pub(super) fn answer(&mut self, answer: Answer) {
+    pub(super) fn answer(&mut self, answer: QueuedAnswer) {
         if self.answers.len() < MAX_WAITING {
             self.answers.push_back(answer);
         }
@@ -186,11 +183,6 @@ impl Lane {
         fits
     }
 
-    /// Sends every parameter from the first one, also if an earlier list is not finished.
-    pub(super) fn list_parameters(&mut self) {
-        self.next_parameter = Some(0);
-    }
-
     /// The frames to send now: vital messages first, then answers, then texts (in the fall after telemetry), then telemetry by
     /// importance, then requested messages, then pieces of files. The budget holds in every second.
     pub(super) fn poll(
@@ -201,15 +193,14 @@ impl Lane {
     ) -> Vec<Outgoing> {
         let now_s = context.now_s;
         if self.radio.is_outdated(now_s) {
-            self.radio = Radio::default();
+            self.radio = RadioShare::default();
             self.share_with_the_radio();
         }
         let slow = is_slow(self.streams.capacity_bytes_s());
-        self.sent.move_to(now_s);
-        self.telemetry_briefly.move_to(now_s);
-        self.answers_briefly.move_to(now_s);
-        self.answered.move_to(now_s);
-        self.said.move_to(now_s);
+        let Self { sent, telemetry_briefly, answers_briefly, answered, said, .. } = self;
+        for window in [sent, telemetry_briefly, answers_briefly, answered, said] {
+            window.move_to(now_s);
+        }
         let mut frames = Vec::new();
         let due = self.streams.due(now_s, files.is_busy(&self.links, now_s));
         for due in due.iter().filter(|due| due.vital) {
@@ -221,7 +212,7 @@ impl Lane {
         let answered_every_s = if slow { SLOW_ABORT_ANSWERED_S } else { ABORT_ANSWERED_S };
         if now_s - self.abort_answered_s >= answered_every_s
             && let Some(answer) = self.aborts.front().copied()
-            && let Some(frame) = self.encode(&Answer::Command(answer), self.sent.room())
+            && let Some(frame) = self.encode(&QueuedAnswer::Command(answer), self.sent.room())
         {
             self.put(frame, now_s, &mut frames);
             self.abort_answered_s = now_s;
@@ -359,12 +350,12 @@ impl Lane {
     }
 
     /// The frame, if it is not longer than this; a frame that is not sent uses no sequence number.
-    fn encode(&mut self, answer: &Answer, room: usize) -> Option<Frame> {
+    fn encode(&mut self, answer: &QueuedAnswer, room: usize) -> Option<Frame> {
         let mut encoder = self.encoder.clone();
         let frame = match answer {
-            Answer::Message(message) => encoder.encode(message),
+            QueuedAnswer::Message(message) => encoder.encode(message),
             // The dialect always has COMMAND_ACK.
-            Answer::Command(answer) => answer.encode(&mut encoder)?,
+            QueuedAnswer::Command(answer) => answer.encode(&mut encoder)?,
         };
         if self.len_of(&frame) > room {
             return None;
@@ -401,33 +392,23 @@ impl Lane {
 /// Otherwise a burst could spend the whole budget, and even vital messages would wait.
 pub(super) const BRIEFLY_S: f64 = 0.2;
 
-/// The share of telemetry, bytes. Over a slow line frames go one by one, so that there are no bursts.
-pub(super) fn telemetry_briefly_bytes(capacity_bytes_s: u32) -> usize {
-    if is_slow(capacity_bytes_s) { usize::MAX } else { capacity_bytes_s as usize * 22 / 100 }
-}
-
-/// The share of answers and texts, bytes.
-pub(super) fn answers_briefly_bytes(capacity_bytes_s: u32) -> usize {
-    if is_slow(capacity_bytes_s) { usize::MAX } else { capacity_bytes_s as usize / 6 }
-}
-
 /// A radio that has not reported for this long has no say any more, s.
 const RADIO_REPORT_HOLDS_S: f64 = 10.0;
 
 /// What a radio leaves of the budget: less while its buffer is full (RADIO_STATUS).
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Radio {
+pub(super) struct RadioShare {
     share: f64,
     reported_s: Option<f64>,
 }
 
-impl Default for Radio {
+impl Default for RadioShare {
     fn default() -> Self {
         Self { share: 1.0, reported_s: None }
     }
 }
 
-impl Radio {
+impl RadioShare {
     pub(super) fn share(self) -> f64 {
         self.share
     }

@@ -33,7 +33,7 @@ use protocol::identity::{Address, RADIO, RADIO_BUDGET_BYTES_S, VEHICLE};
 use protocol::signing::Rejection;
 use protocol::text;
 
-use self::lane::{Answer, Lane};
+use self::lane::{Lane, QueuedAnswer};
 use self::questions::FileService;
 pub use self::questions::gives_out_its_log;
 pub use self::requests::UplinkState;
@@ -79,12 +79,12 @@ pub struct VehicleEndpoint {
     known: BTreeSet<Address>,
     refusals: Refusals,
     warnings: Warnings,
-    told: Option<LastReported>,
-    told_crew: Option<(TwoPerson, Option<Operator>, Option<Station>)>,
+    last_reported: Option<LastReported>,
+    last_crew: Option<(TwoPerson, Option<Operator>, Option<Station>)>,
     aborted_at_s: Option<f64>,
     files: FileService,
-    check_teller: CheckReporter,
-    finding_teller: FindingReporter,
+    check_reporter: CheckReporter,
+    finding_reporter: FindingReporter,
 }
 
 /// An outgoing frame, and the links that carry it.
@@ -151,12 +151,12 @@ impl VehicleEndpoint {
             answered: VecDeque::new(),
             refusals: Refusals::default(),
             warnings: Warnings::default(),
-            told: None,
-            told_crew: None,
+            last_reported: None,
+            last_crew: None,
             aborted_at_s: None,
             files: FileService::default(),
-            check_teller: CheckReporter::default(),
-            finding_teller: FindingReporter::default(),
+            check_reporter: CheckReporter::default(),
+            finding_reporter: FindingReporter::default(),
         }
     }
 
@@ -191,7 +191,7 @@ impl VehicleEndpoint {
         let us = VEHICLE.of_system(system_id);
         let mut lanes = self.lanes;
         for lane in &mut lanes {
-            lane.speak_as(us);
+            lane.encoder = Encoder::new(us);
         }
         Self { us, lanes, ..self }
     }
@@ -308,8 +308,8 @@ impl VehicleEndpoint {
             }
         }
         let in_turn = [
-            self.check_teller.due(vehicle, boot, self.now_s),
-            self.finding_teller.due(vehicle, boot, self.now_s),
+            self.check_reporter.due(vehicle, boot, self.now_s),
+            self.finding_reporter.due(vehicle, boot, self.now_s),
         ];
         for message in in_turn.into_iter().flatten() {
             for lane in &mut self.lanes {
@@ -324,14 +324,14 @@ impl VehicleEndpoint {
 
     /// Reports a change of state to the crew at once, with the two messages that carry it.
     fn watch(&mut self, mode: &Mode) {
-        let told = LastReported::from(mode);
-        let before = self.told.replace(told);
-        if before != Some(told) {
+        let now = LastReported::from(mode);
+        let before = self.last_reported.replace(now);
+        if before != Some(now) {
             self.hurry(HEARTBEAT_DATA::ID);
             self.hurry(TD_FLIGHT_STATUS_DATA::ID);
         }
         // A phase of the flight may be over within a tenth of a second, and no command can bring it back.
-        if !told.phase.on_pad() && before.is_some_and(|before| before.phase != told.phase) {
+        if !now.phase.on_pad() && before.is_some_and(|before| before.phase != now.phase) {
             for lane in &mut self.lanes {
                 lane.streams.at_least_every(TD_FLIGHT_STATUS_DATA::ID, 0.0);
             }
@@ -343,10 +343,10 @@ impl VehicleEndpoint {
                 lane.streams.at_least_every(TD_FLIGHT_STATUS_DATA::ID, COUNTDOWN_TOLD_S);
             }
         }
-        if !told.interlocks.armed {
+        if !now.interlocks.armed {
             self.stations.set_commander(None);
         }
-        if told.interlocks.abort_latched {
+        if now.interlocks.abort_latched {
             let aborted_at_s = *self.aborted_at_s.get_or_insert(self.now_s);
             if self.now_s - aborted_at_s < ABORTED_BEATS_FOR_S {
                 for lane in &mut self.lanes {
@@ -363,7 +363,7 @@ impl VehicleEndpoint {
         }
         let memory = vehicle.computer.crew();
         let told = (memory.two_person, memory.held_by, self.stations.armed_by());
-        if self.told_crew.replace(told) != Some(told) {
+        if self.last_crew.replace(told) != Some(told) {
             self.hurry(TD_CREW_DATA::ID);
         }
     }
@@ -451,7 +451,7 @@ impl VehicleEndpoint {
         {
             let answer = CommandAnswer::to(request, result);
             let answer = ask.map_or(answer, |ask| answer.asking(ask));
-            self.lane(link).answer(Answer::Command(answer));
+            self.lane(link).answer(QueuedAnswer::Command(answer));
         }
     }
 

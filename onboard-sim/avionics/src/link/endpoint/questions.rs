@@ -10,6 +10,7 @@ use flight::computer::news::Severity;
 use flight::rules::operator::Operator;
 use flight::rules::phase::Phase;
 use mavlink::types::CharArray;
+use num_traits::FromPrimitive as _;
 use protocol::dialect::{
     LOG_DATA_DATA, LOG_ENTRY_DATA, MISSION_ACK_DATA, MISSION_COUNT_DATA, MavMessage, MavMissionResult,
     MavMissionType, MavParamError, PARAM_ERROR_DATA, PARAM_EXT_ACK_DATA, ParamAck,
@@ -46,7 +47,8 @@ impl VehicleEndpoint {
         }
         let (asker, by) = (frame.source(), operator_of(frame, vehicle));
         match request.question {
-            ParamQuestion::List => self.lane(link).list_parameters(),
+            // From the first one, also if an earlier list is not finished.
+            ParamQuestion::List => self.lane(link).next_parameter = Some(0),
             ParamQuestion::Read(key) => {
                 let lane = self.lane(link);
                 let answer = match parameters::place_of(key) {
@@ -100,11 +102,15 @@ impl ListQuestion {
     pub(super) fn from_frame(frame: &Frame) -> Option<Self> {
         let bytes = frame.padded_payload();
         let integer = |at: usize| u16::from_le_bytes([bytes[at], bytes[at + 1]]);
+        let address = |at: usize| Address { system_id: bytes[at], component_id: bytes[at + 1] };
+        let id = |at: usize| bytes[at..at + 16].first_chunk().copied().unwrap_or_default();
         let of = |target_at: usize, type_at: usize| List {
-            target: Address { system_id: bytes[target_at], component_id: bytes[target_at + 1] },
+            target: address(target_at),
             asker: frame.source(),
-            mission_type: mission_type(bytes[type_at]),
+            mission_type: MavMissionType::from_u8(bytes[type_at])
+                .filter(|kind| *kind != MavMissionType::MAV_MISSION_TYPE_ALL),
         };
+        let answer = |target_at: usize, answer| Self { target: address(target_at), answer };
         Some(match frame.message_id() {
             MISSION_REQUEST_LIST => of(0, 2).empty(),
             // An upload of zero items clears the list, which is always clear.
@@ -116,33 +122,23 @@ impl ListQuestion {
             }
             MISSION_WRITE_PARTIAL_LIST => of(4, 6).unsupported(),
             MISSION_ITEM | MISSION_ITEM_INT => of(32, 37).unsupported(),
-            LOG_REQUEST_LIST => {
-                let target = Address { system_id: bytes[4], component_id: bytes[5] };
-                Self { target, answer: MavMessage::LOG_ENTRY(LOG_ENTRY_DATA::default()) }
-            }
+            LOG_REQUEST_LIST => answer(4, MavMessage::LOG_ENTRY(LOG_ENTRY_DATA::default())),
             LOG_REQUEST_DATA => {
-                let target = Address { system_id: bytes[10], component_id: bytes[11] };
                 let ofs = u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
-                let answer = LOG_DATA_DATA { ofs, id: integer(8), count: 0, data: [0; 90] };
-                Self { target, answer: MavMessage::LOG_DATA(answer) }
+                let nothing = LOG_DATA_DATA { ofs, id: integer(8), count: 0, data: [0; 90] };
+                answer(10, MavMessage::LOG_DATA(nothing))
             }
             PARAM_EXT_REQUEST_READ => {
-                let target = Address { system_id: bytes[2], component_id: bytes[3] };
-                let id = bytes[4..20].first_chunk().copied().unwrap_or_default();
-                Self { target, answer: no_parameter(id, integer(0).cast_signed(), frame.source()) }
+                answer(2, no_parameter(id(4), integer(0).cast_signed(), frame.source()))
             }
-            PARAM_EXT_REQUEST_LIST => {
-                let target = Address { system_id: bytes[0], component_id: bytes[1] };
-                Self { target, answer: no_parameter([0; 16], -1, frame.source()) }
-            }
+            PARAM_EXT_REQUEST_LIST => answer(0, no_parameter([0; 16], -1, frame.source())),
             PARAM_EXT_SET => {
-                let target = Address { system_id: bytes[0], component_id: bytes[1] };
-                let answer = PARAM_EXT_ACK_DATA {
-                    param_id: CharArray::new(bytes[2..18].first_chunk().copied().unwrap_or_default()),
+                let failed = PARAM_EXT_ACK_DATA {
+                    param_id: CharArray::new(id(2)),
                     param_result: ParamAck::PARAM_ACK_FAILED,
                     ..PARAM_EXT_ACK_DATA::default()
                 };
-                Self { target, answer: MavMessage::PARAM_EXT_ACK(answer) }
+                answer(0, MavMessage::PARAM_EXT_ACK(failed))
             }
             _ => return None,
         })
@@ -175,19 +171,10 @@ const MISSION_ITEM_INT: u32 = 73;
 const LOG_REQUEST_LIST: u32 = 117;
 const LOG_REQUEST_DATA: u32 = 119;
 
-/// The kind of list; `None` for an unknown number.
-fn mission_type(number: u8) -> Option<MavMissionType> {
-    match number {
-        0 => Some(MavMissionType::MAV_MISSION_TYPE_MISSION),
-        1 => Some(MavMissionType::MAV_MISSION_TYPE_FENCE),
-        2 => Some(MavMissionType::MAV_MISSION_TYPE_RALLY),
-        _ => None,
-    }
-}
-
 struct List {
     target: Address,
     asker: Address,
+    /// `None` for an unknown number.
     mission_type: Option<MavMissionType>,
 }
 

@@ -33,9 +33,8 @@ use protocol::dialect::{
 use protocol::identity::{GIT_COMMIT, PHASE_BITS};
 use protocol::mission::MissionHash;
 
-pub use self::ours::td_phase;
 pub(crate) use self::ours::{finding, pad_check};
-use crate::link::vehicle::{Identity, VehicleKind, VehicleState};
+use crate::link::vehicle::{BatteryFacts, Identity, VehicleKind, VehicleState};
 
 /// PROTOCOL_VERSION: deprecated late in 2025, but some clients still request it first.
 const PROTOCOL_VERSION_ID: u32 = 300;
@@ -131,14 +130,15 @@ fn sys_status(state: &VehicleState<'_>) -> MavMessage {
         | present(state);
     let mut healthy = present - silent - failing(state);
     healthy.set(MavSysStatusSensor::MAV_SYS_STATUS_PREARM_CHECK, state.checks_failed() == 0);
+    let (voltage_battery, current_battery, battery_remaining) = figures(state);
     MavMessage::SYS_STATUS(SYS_STATUS_DATA {
         onboard_control_sensors_present: present,
         onboard_control_sensors_enabled: present,
         onboard_control_sensors_health: healthy,
         load: (1000.0 * state.solve_time_s() / PLAN_WITHIN_S).clamp(0.0, 1000.0) as u16,
-        voltage_battery: millivolts(state),
-        current_battery: centiamperes(state),
-        battery_remaining: percent(state),
+        voltage_battery,
+        current_battery,
+        battery_remaining,
         // Explicitly empty: the generated default of a set of flags is its first flag.
         onboard_control_sensors_present_extended: MavSysStatusSensorExtended::empty(),
         onboard_control_sensors_enabled_extended: MavSysStatusSensorExtended::empty(),
@@ -311,33 +311,25 @@ fn failing(state: &VehicleState<'_>) -> MavSysStatusSensor {
     failing
 }
 
-/// mV; `UINT16_MAX`: not known.
-fn millivolts(state: &VehicleState<'_>) -> u16 {
-    state.battery.map_or(u16::MAX, |battery| libm::round(1000.0 * battery.volts) as u16)
-}
-
-/// cA; -1: not known.
-fn centiamperes(state: &VehicleState<'_>) -> i16 {
-    let current_a = state.battery.and_then(|battery| battery.current_a);
-    current_a.map_or(-1, |current_a| libm::round(100.0 * current_a) as i16)
-}
-
-/// Percent; -1: not known.
-fn percent(state: &VehicleState<'_>) -> i8 {
-    let left = state.battery.and_then(|battery| battery.left);
-    left.map_or(-1, |left| libm::round(100.0 * left) as i8)
+/// mV, cA and percent of the battery; `UINT16_MAX`, -1 and -1: not known.
+fn figures(state: &VehicleState<'_>) -> (u16, i16, i8) {
+    let BatteryFacts { volts, current_a, left } =
+        state.battery.unwrap_or(BatteryFacts { volts: f64::INFINITY, current_a: None, left: None });
+    let hundred = |value: Option<f64>| value.map_or(-1.0, |value| libm::round(100.0 * value));
+    (libm::round(1000.0 * volts) as u16, hundred(current_a) as i16, hundred(left) as i8)
 }
 
 fn battery(state: &VehicleState<'_>) -> MavMessage {
     let mut voltages = [u16::MAX; 10];
-    voltages[0] = millivolts(state);
+    let (millivolts, current_battery, battery_remaining) = figures(state);
+    voltages[0] = millivolts;
     MavMessage::BATTERY_STATUS(BATTERY_STATUS_DATA {
         temperature: i16::MAX,
         voltages,
-        current_battery: centiamperes(state),
+        current_battery,
         current_consumed: -1,
         energy_consumed: -1,
-        battery_remaining: percent(state),
+        battery_remaining,
         // The generated default is the first flag.
         fault_bitmask: MavBatteryFault::empty(),
         ..BATTERY_STATUS_DATA::default()

@@ -25,18 +25,15 @@ fn roll_pitch_yaw_rad([w, x, y, z]: &[f64; 4]) -> [f64; 3] {
     let sine = 2.0 * (w * y - x * z);
     if sine.abs() > UPRIGHT_SINE {
         let up = libm::copysign(1.0, sine);
-        return [0.0, up * core::f64::consts::FRAC_PI_2, wrapped_rad(-2.0 * up * libm::atan2(*x, *w))];
+        let turned_rad = -2.0 * up * libm::atan2(*x, *w);
+        let yaw_rad = libm::atan2(libm::sin(turned_rad), libm::cos(turned_rad));
+        return [0.0, up * core::f64::consts::FRAC_PI_2, yaw_rad];
     }
     [
         libm::atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
         libm::asin(sine),
         libm::atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
     ]
-}
-
-/// The same angle between minus and plus half a turn.
-fn wrapped_rad(angle_rad: f64) -> f64 {
-    libm::atan2(libm::sin(angle_rad), libm::cos(angle_rad))
 }
 
 /// The compass heading of the vehicle, degrees from north over east, 0 to 360. If the nose is steeper than 45 degrees,
@@ -50,8 +47,13 @@ pub(super) fn heading_deg([w, x, y, z]: &[f64; 4]) -> f64 {
         steep if steep > core::f64::consts::FRAC_1_SQRT_2 => belly.map(|part| -part),
         _ => nose,
     };
-    let heading_deg = libm::atan2(east, north).to_degrees();
-    if heading_deg < 0.0 { heading_deg + 360.0 } else { heading_deg }
+    compass_deg(north, east)
+}
+
+/// The direction of a vector from north over east, degrees, 0 to 360.
+fn compass_deg(north: f64, east: f64) -> f64 {
+    let deg = libm::atan2(east, north).to_degrees();
+    if deg < 0.0 { deg + 360.0 } else { deg }
 }
 
 pub(super) fn attitude(state: &VehicleState<'_>) -> MavMessage {
@@ -122,7 +124,6 @@ pub(super) fn gps(state: &VehicleState<'_>) -> MavMessage {
     let [north_m, east_m, down_m] = motion.position_m;
     let [north_m_s, east_m_s, _] = motion.velocity_m_s;
     let (lat, lon) = degrees_e7(state, north_m, east_m);
-    let course_deg = libm::atan2(east_m_s, north_m_s).to_degrees();
     let fix_type = if state.computer.sensors().gnss_speaks() {
         GpsFixType::GPS_FIX_TYPE_3D_FIX
     } else {
@@ -144,8 +145,7 @@ pub(super) fn gps(state: &VehicleState<'_>) -> MavMessage {
             lon,
             alt: millimetres(state.mission().pad_altitude_m - down_m),
             vel: libm::round(100.0 * libm::hypot(north_m_s, east_m_s)) as u16,
-            cog: libm::round(100.0 * if course_deg < 0.0 { course_deg + 360.0 } else { course_deg }) as u16
-                % 36_000,
+            cog: libm::round(100.0 * compass_deg(north_m_s, east_m_s)) as u16 % 36_000,
             ..unknown
         }
     } else {

@@ -4,21 +4,18 @@
 use flight::computer::AbortEffect;
 use flight::computer::crew::People;
 use flight::computer::findings::Findings;
-use flight::computer::pad_check::{CheckState, Finding, PadCheck, Verdict};
+use flight::computer::pad_check::{CheckedValue, PadCheck};
 use flight::computer::pilot::planner::PLAN_WITHIN_S;
-use flight::rules::operator::{Operator, Role};
-use flight::rules::phase::{HoldCause, Latch, Mode, MotorStatus, Phase};
-use flight::rules::two_person::Act;
+use flight::rules::operator::Operator;
+use flight::rules::phase::Mode;
 use flight::rules::verdict::LandingVerdict;
-use flight::vehicle::mission::StartPoint;
 use mavlink::types::CharArray;
-use num_traits::FromPrimitive as _;
+use num_traits::FromPrimitive;
 use protocol::dialect::{
     MavMessage, TD_CONTROLLER_DATA, TD_CREW_DATA, TD_FINDING_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA,
     TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_MISSION_DATA, TD_OPERATOR_DATA, TD_PAD_CHECK_DATA,
-    TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, TdAbortEffect, TdAct,
-    TdCheck, TdControlLevel, TdHold, TdInterlock, TdLanding, TdLatch, TdLimit, TdMotor, TdPadCheckItem,
-    TdPadCheckState, TdPadCheckVerdict, TdPhase, TdRole, TdSolverStatus, TdStart, TdVehicleFlag,
+    TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, TdAbortEffect, TdCheck,
+    TdInterlock, TdLanding, TdLimit, TdPadCheckItem, TdSolverStatus, TdVehicleFlag,
 };
 
 use super::{boot_ms, centidegrees, centimetres, characters};
@@ -37,17 +34,11 @@ pub(super) fn flight_status(state: &VehicleState<'_>, identity: Identity) -> Mav
         interlocks: interlocks(mode),
         checks_failed: TdCheck::from_bits_truncate(state.checks_failed()),
         approach_wait_s: mode.approach_wait_s(time_s).map_or(u16::MAX, |s| libm::ceil(s) as u16),
-        motor: td_motor(mode.motor_status(time_s)),
-        hold: match held {
-            None => TdHold::TD_HOLD_NONE,
-            Some((HoldCause::UplinkSilent, _)) => TdHold::TD_HOLD_UPLINK_SILENT,
-            Some((HoldCause::Commanded, _)) => TdHold::TD_HOLD_COMMANDED,
-            Some((HoldCause::TapOverdue, _)) => TdHold::TD_HOLD_TAP_OVERDUE,
-            Some((HoldCause::StationDeaf, _)) => TdHold::TD_HOLD_STATION_DEAF,
-            Some((HoldCause::CheckFailed, _)) => TdHold::TD_HOLD_CHECK_FAILED,
-        },
+        // In the dialect's order, behind the unknown one.
+        motor: numbered(mode.motor_status(time_s) as u8 + 1),
+        hold: numbered(held.map_or(0, |(cause, _)| cause as u8)),
         hold_left_s: held.map_or(0, |(_, left_s)| libm::ceil(left_s) as u8),
-        phase: td_phase(mode.phase),
+        phase: numbered(mode.phase.index()),
         abort_effect,
         abort_impact_m_s,
         boot_number: identity.boot_number,
@@ -56,7 +47,7 @@ pub(super) fn flight_status(state: &VehicleState<'_>, identity: Identity) -> Mav
             VehicleKind::Simulated => TdVehicleFlag::TD_VEHICLE_FLAG_SIMULATED,
             VehicleKind::Real => TdVehicleFlag::empty(),
         },
-        latch: td_latch(state.computer.latch()),
+        latch: numbered(state.computer.latch().map_or(0, |latch| latch as u8)),
         last_hold_ds: last_hold_s.map_or(0, |s| libm::ceil(10.0 * s) as u8),
     })
 }
@@ -87,46 +78,9 @@ fn interlocks(mode: &Mode) -> TdInterlock {
     bits
 }
 
-fn td_latch(latch: Option<Latch>) -> TdLatch {
-    match latch {
-        None => TdLatch::TD_LATCH_NONE,
-        Some(Latch::Commanded) => TdLatch::TD_LATCH_COMMANDED,
-        Some(Latch::UncommandedLiftOff) => TdLatch::TD_LATCH_UNCOMMANDED_LIFTOFF,
-        Some(Latch::UncommandedRelease) => TdLatch::TD_LATCH_UNCOMMANDED_RELEASE,
-        Some(Latch::NoSeparation) => TdLatch::TD_LATCH_NO_SEPARATION,
-        Some(Latch::Gate) => TdLatch::TD_LATCH_GATE,
-        Some(Latch::NoLight) => TdLatch::TD_LATCH_NO_LIGHT,
-        Some(Latch::Other) => TdLatch::TD_LATCH_OTHER,
-    }
-}
-
-fn td_motor(status: MotorStatus) -> TdMotor {
-    match status {
-        MotorStatus::PinIn => TdMotor::TD_MOTOR_PIN_IN,
-        MotorStatus::Live => TdMotor::TD_MOTOR_LIVE,
-        MotorStatus::Burning => TdMotor::TD_MOTOR_BURNING,
-        MotorStatus::Hot => TdMotor::TD_MOTOR_HOT,
-        MotorStatus::Burnt => TdMotor::TD_MOTOR_BURNT,
-    }
-}
-
-/// A phase as it is sent.
-pub fn td_phase(phase: Phase) -> TdPhase {
-    match phase {
-        Phase::Safe => TdPhase::TD_PHASE_SAFE,
-        Phase::PadIdle => TdPhase::TD_PHASE_PAD_IDLE,
-        Phase::PadArmed => TdPhase::TD_PHASE_PAD_ARMED,
-        Phase::Boost => TdPhase::TD_PHASE_BOOST,
-        Phase::Coast => TdPhase::TD_PHASE_COAST,
-        Phase::Deploy => TdPhase::TD_PHASE_DEPLOY,
-        Phase::AeroDescent => TdPhase::TD_PHASE_AERO_DESCENT,
-        Phase::LandArmed => TdPhase::TD_PHASE_LAND_ARMED,
-        Phase::Ignition => TdPhase::TD_PHASE_IGNITION,
-        Phase::Powered => TdPhase::TD_PHASE_POWERED,
-        Phase::Touchdown => TdPhase::TD_PHASE_TOUCHDOWN,
-        Phase::Safed => TdPhase::TD_PHASE_SAFED,
-        Phase::Chute => TdPhase::TD_PHASE_CHUTE,
-    }
+/// A value of the dialect whose number is that of our own.
+fn numbered<T: FromPrimitive + Default>(number: u8) -> T {
+    T::from_u8(number).unwrap_or_default()
 }
 
 pub(super) fn fins(state: &VehicleState<'_>, boot_number: u32) -> MavMessage {
@@ -161,21 +115,9 @@ pub(super) fn controller(state: &VehicleState<'_>, boot_number: u32) -> Option<M
         solve_time_us: microseconds(solve_time_s) as u32,
         deadline_margin_us: microseconds(PLAN_WITHIN_S - solve_time_s) as i32,
         iterations: u16::try_from(report.iterations).unwrap_or(u16::MAX),
-        level: td_level(level),
+        level: numbered(level.index()),
         solver_status: td_status(report.status),
     }))
-}
-
-fn td_level(level: flight::guidance::powered::ControlLevel) -> TdControlLevel {
-    use flight::guidance::powered::ControlLevel as L;
-    match level {
-        L::Idle => TdControlLevel::TD_CONTROL_LEVEL_IDLE,
-        L::Rehearsal => TdControlLevel::TD_CONTROL_LEVEL_REHEARSAL,
-        L::Converged => TdControlLevel::TD_CONTROL_LEVEL_CONVERGED,
-        L::BestFeasible => TdControlLevel::TD_CONTROL_LEVEL_BEST_FEASIBLE,
-        L::ShiftedPlan => TdControlLevel::TD_CONTROL_LEVEL_SHIFTED_PLAN,
-        L::Stabiliser => TdControlLevel::TD_CONTROL_LEVEL_STABILISER,
-    }
 }
 
 fn td_status(status: ocp::Status) -> TdSolverStatus {
@@ -255,17 +197,11 @@ pub(super) fn touchdown_limits(state: &VehicleState<'_>, boot_number: u32) -> Ma
 
 pub(super) fn mission(state: &VehicleState<'_>, boot_number: u32) -> MavMessage {
     let name = characters(&state.name.name);
-    let start = match state.name.start {
-        None => TdStart::TD_START_UNKNOWN,
-        Some(StartPoint::Pad) => TdStart::TD_START_PAD,
-        Some(StartPoint::Apogee) => TdStart::TD_START_APOGEE,
-        Some(StartPoint::Drone) => TdStart::TD_START_DRONE,
-    };
     MavMessage::TD_MISSION(TD_MISSION_DATA {
         boot_number,
         hash: state.name.hash.0,
         name,
-        start,
+        start: numbered(state.name.start.map_or(0, |start| start.index() + 1)),
         motor_burns: state.name.motor_burns,
     })
 }
@@ -287,11 +223,7 @@ pub(super) fn crew(state: &VehicleState<'_>, boot_number: u32) -> Option<MavMess
             People::One => 1,
             People::Two { .. } => 2,
         },
-        act: match ask.map(|ask| ask.act) {
-            None => TdAct::TD_ACT_NONE,
-            Some(Act::Arm) => TdAct::TD_ACT_ARM,
-            Some(Act::Start) => TdAct::TD_ACT_START,
-        },
+        act: numbered(ask.map_or(0, |ask| ask.act as u8)),
         asked_by: number(ask.map(|ask| ask.by)),
         tapped_by: number(tap.map(|tap| tap.by)),
         commanded_by: number(commander.and_then(|commander| commander.by)),
@@ -309,16 +241,10 @@ pub(super) fn operator(state: &VehicleState<'_>, boot_number: u32) -> Option<Mav
     state.input().people?;
     let count = state.operators.len().max(1);
     let operator = state.operators.get((TURNS_PER_S * state.time_s) as usize % count)?;
-    let role = match operator.role {
-        Role::Observer => TdRole::TD_ROLE_OBSERVER,
-        Role::RangeSafety => TdRole::TD_ROLE_RANGE_SAFETY,
-        Role::Flight => TdRole::TD_ROLE_FLIGHT,
-        Role::Pad => TdRole::TD_ROLE_PAD,
-    };
     Some(MavMessage::TD_OPERATOR(TD_OPERATOR_DATA {
         boot_number,
         number: operator.number,
-        role,
+        role: numbered(operator.role.index()),
         name: CharArray::new(*operator.name.bytes()),
     }))
 }
@@ -352,35 +278,75 @@ pub(crate) fn pad_check(check: &PadCheck, place: usize, time_s: f64, boot_number
         least: f32::NAN,
         most: f32::NAN,
         run: check.run(),
-        state: match check.state() {
-            CheckState::NotRun => TdPadCheckState::TD_PAD_CHECK_STATE_NOT_RUN,
-            CheckState::Running => TdPadCheckState::TD_PAD_CHECK_STATE_RUNNING,
-            CheckState::Passed => TdPadCheckState::TD_PAD_CHECK_STATE_PASSED,
-            CheckState::Failed => TdPadCheckState::TD_PAD_CHECK_STATE_FAILED,
-            CheckState::Stopped => TdPadCheckState::TD_PAD_CHECK_STATE_STOPPED,
-        },
+        state: numbered(check.state() as u8),
         progress: check.progress_percent(),
         found: u8::try_from(findings.len()).unwrap_or(u8::MAX),
         asked_by: check.by().map_or(0, |by| by.number),
         ..TD_PAD_CHECK_DATA::default()
     };
-    if let Some(Finding { item, value, least, most, verdict }) = findings.get(place).copied()
+    if let Some(CheckedValue { item, value, least, most, verdict }) = findings.get(place).copied()
         && let Some(item) = TdPadCheckItem::from_u8(item.number())
     {
         (data.value, data.least, data.most) = (value as f32, least as f32, most as f32);
         (data.item, data.place) = (item, u8::try_from(place).unwrap_or(u8::MAX));
-        data.verdict = match verdict {
-            Verdict::NotJudged => TdPadCheckVerdict::TD_PAD_CHECK_VERDICT_NOT_JUDGED,
-            Verdict::Ok => TdPadCheckVerdict::TD_PAD_CHECK_VERDICT_OK,
-            Verdict::NotOk => TdPadCheckVerdict::TD_PAD_CHECK_VERDICT_NOT_OK,
-        };
+        data.verdict = numbered(verdict as u8);
     }
     MavMessage::TD_PAD_CHECK(data)
 }
 
 #[cfg(test)]
 mod tests {
+    use core::fmt::Debug;
+
+    use flight::computer::pad_check::{CheckState, Verdict};
+    use flight::guidance::powered::ControlLevel;
+    use flight::rules::operator::Role;
+    use flight::rules::phase::{HoldCause, Latch, MotorStatus, Phase};
+    use flight::rules::two_person::Act;
+    use flight::vehicle::mission::StartPoint;
+    use protocol::dialect::{
+        TdAct, TdControlLevel, TdHold, TdLatch, TdMotor, TdPadCheckState, TdPadCheckVerdict, TdPhase, TdRole,
+        TdStart,
+    };
+
     use super::*;
+
+    /// Our values of these numbers have the dialect's names, whatever their underscores.
+    fn agree<T: FromPrimitive + Default + Debug, O: Copy + Debug>(
+        ours: &[O],
+        number: fn(O) -> u8,
+        prefix: &str,
+    ) {
+        let plain = |text: alloc::string::String| text.replace('_', "").to_uppercase();
+        for value in ours {
+            let theirs = plain(alloc::format!("{:?}", numbered::<T>(number(*value))));
+            assert_eq!(theirs, plain(alloc::format!("{prefix}{value:?}")));
+        }
+    }
+
+    #[test]
+    fn every_number_means_the_same_in_the_dialect() {
+        use CheckState as C;
+        use HoldCause as H;
+        use Latch as L;
+        use MotorStatus as M;
+        agree::<TdPhase, _>(&Phase::ALL, Phase::index, "TdPhase");
+        agree::<TdControlLevel, _>(&ControlLevel::ALL, ControlLevel::index, "TdControlLevel");
+        agree::<TdRole, _>(&Role::ALL, Role::index, "TdRole");
+        agree::<TdStart, _>(&StartPoint::ALL, |start| start.index() + 1, "TdStart");
+        agree::<TdAct, _>(&[Act::Arm, Act::Start], |act| act as u8, "TdAct");
+        let states = [C::NotRun, C::Running, C::Passed, C::Failed, C::Stopped];
+        agree::<TdPadCheckState, _>(&states, |state| state as u8, "TdPadCheckState");
+        let verdicts = [Verdict::NotJudged, Verdict::Ok, Verdict::NotOk];
+        agree::<TdPadCheckVerdict, _>(&verdicts, |verdict| verdict as u8, "TdPadCheckVerdict");
+        let holds = [H::UplinkSilent, H::Commanded, H::TapOverdue, H::StationDeaf, H::CheckFailed];
+        agree::<TdHold, _>(&holds, |cause| cause as u8, "TdHold");
+        let latches = [L::Commanded, L::UncommandedLiftOff, L::UncommandedRelease, L::NoSeparation, L::Gate];
+        agree::<TdLatch, _>(&latches, |latch| latch as u8, "TdLatch");
+        agree::<TdLatch, _>(&[L::NoLight, L::Other], |latch| latch as u8, "TdLatch");
+        let motors = [M::PinIn, M::Live, M::Burning, M::Hot, M::Burnt];
+        agree::<TdMotor, _>(&motors, |status| status as u8 + 1, "TdMotor");
+    }
 
     #[test]
     fn only_an_impact_is_sent_with_its_speed() {
@@ -397,16 +363,6 @@ mod tests {
         for (effect, number, m_s) in told {
             let (td_effect, td_m_s) = td_abort_effect(effect);
             assert_eq!((td_effect as u32, td_m_s), (number, m_s), "{effect:?}");
-        }
-    }
-
-    #[test]
-    fn phases_and_levels_have_the_same_numbers_on_the_wire_and_in_flight() {
-        for phase in Phase::ALL {
-            assert_eq!(td_phase(phase) as u32, u32::from(phase.index()));
-        }
-        for level in flight::guidance::powered::ControlLevel::ALL {
-            assert_eq!(td_level(level) as u32, u32::from(level.index()));
         }
     }
 }

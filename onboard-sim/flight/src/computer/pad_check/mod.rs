@@ -65,7 +65,7 @@ pub struct PadCheck {
     swept_frames: u64,
     /// The surfaces return to rest until this frame.
     returns_until: u64,
-    findings: Vec<Finding>,
+    findings: Vec<CheckedValue>,
     /// Who has seen every surface move as the crew's page says.
     seen_by: Vec<Option<Operator>>,
 }
@@ -186,7 +186,7 @@ impl PadCheck {
     }
 
     /// What has been found so far, in the order in which it was found.
-    pub fn findings(&self) -> &[Finding] {
+    pub fn findings(&self) -> &[CheckedValue] {
         &self.findings
     }
 
@@ -299,7 +299,7 @@ impl Item {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[repr(u8)]
 pub enum Verdict {
-    /// Shown only: here nothing is wrong with any value.
+    /// SurfaceShown only: here nothing is wrong with any value.
     NotJudged = 0,
     Ok = 1,
     NotOk = 2,
@@ -307,7 +307,7 @@ pub enum Verdict {
 
 /// A value with its limits; NaN is no limit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Finding {
+pub struct CheckedValue {
     pub item: Item,
     /// NaN: there was none.
     pub value: f64,
@@ -316,7 +316,7 @@ pub struct Finding {
     pub verdict: Verdict,
 }
 
-impl Finding {
+impl CheckedValue {
     /// A value that must not be less. One that is not a number fails.
     fn at_least(item: Item, value: f64, least: f64) -> Self {
         Self { item, value, least, most: f64::NAN, verdict: judged(value >= least) }
@@ -350,17 +350,19 @@ fn findings_of_switches(
     input: &KeptInput,
     mission: &Mission,
     arming: &ArmingLimits,
-) -> impl Iterator<Item = Finding> {
-    let closed = |item, closed: bool| Finding::at_least(item, f64::from(u8::from(closed)), 1.0);
+) -> impl Iterator<Item = CheckedValue> {
+    let closed = |item, closed: bool| CheckedValue::at_least(item, f64::from(u8::from(closed)), 1.0);
     let on_a_rail = mission.start.at == StartPoint::Pad;
     [
         Some(closed(Item::IgniterContinuity, input.igniter_continuity)),
         on_a_rail.then(|| closed(Item::BoosterWire, input.booster_attached)),
         // In while people work at the vehicle, out before it is armed: both are right in their time.
-        Some(Finding::only_shown(Item::PinOut, f64::from(u8::from(input.pin_out)))),
-        input.battery_v.map(|volts| Finding::at_least(Item::BatteryVoltage, volts, arming.battery_min_v)),
+        Some(CheckedValue::only_shown(Item::PinOut, f64::from(u8::from(input.pin_out)))),
+        input
+            .battery_v
+            .map(|volts| CheckedValue::at_least(Item::BatteryVoltage, volts, arming.battery_min_v)),
         Some(closed(Item::LogRunning, input.log.running)),
-        Some(Finding::at_least(
+        Some(CheckedValue::at_least(
             Item::LogSpace,
             input.log.space_bytes as f64,
             arming.log_space_min_bytes as f64,
@@ -371,7 +373,7 @@ fn findings_of_switches(
 }
 
 /// How many values are outside their limits, and which is the first.
-fn words_of_findings(findings: &[Finding]) -> String {
+fn words_of_findings(findings: &[CheckedValue]) -> String {
     let mut failed = findings.iter().filter(|found| found.verdict == Verdict::NotOk);
     match (failed.next(), failed.count()) {
         (None, _) => format!("check passed: {} values found", findings.len()),

@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use nalgebra::Vector3;
 use serde::Serialize;
 
-use super::{Finding, Item, SURFACES, SurfaceCommand, larger};
+use super::{CheckedValue, Item, SURFACES, SurfaceCommand, larger};
 use crate::computer::pad::ANSWERING_RAD;
 use crate::computer::{FRAME_MS, FRAME_S};
 use crate::estimation::estimator::Measurements;
@@ -81,7 +81,7 @@ impl Reach {
 
 /// What one surface has shown so far.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-struct Shown {
+struct SurfaceShown {
     least_rad: f64,
     most_rad: f64,
     error_rad: f64,
@@ -89,8 +89,8 @@ struct Shown {
     lag_s: f64,
 }
 
-const NOTHING_SHOWN: Shown =
-    Shown { least_rad: f64::INFINITY, most_rad: f64::NEG_INFINITY, error_rad: 0.0, lag_s: 0.0 };
+const NOTHING_SHOWN: SurfaceShown =
+    SurfaceShown { least_rad: f64::INFINITY, most_rad: f64::NEG_INFINITY, error_rad: 0.0, lag_s: 0.0 };
 
 /// The sweep of all surfaces.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -108,7 +108,7 @@ pub(super) struct Sweep {
     frames: u32,
     frames_before: u64,
     arrived_s: Option<f64>,
-    shown: Shown,
+    shown: SurfaceShown,
 }
 
 impl Sweep {
@@ -139,7 +139,7 @@ impl Sweep {
     pub(super) fn step(
         &mut self,
         surfaces_rad: &[f64; SURFACES],
-    ) -> (Option<SurfaceCommand>, Option<[Finding; 3]>) {
+    ) -> (Option<SurfaceCommand>, Option<[CheckedValue; 3]>) {
         let Some(reach) = self.reaches.get(self.surface).copied() else { return (None, None) };
         let targets = reach.targets_rad();
         let (target_rad, way_rad) = (targets[self.target], way_rad(&reach, &targets, self.target));
@@ -179,22 +179,22 @@ impl Sweep {
         }
     }
 
-    fn findings(&self, reach: &Reach) -> [Finding; 3] {
+    fn findings(&self, reach: &Reach) -> [CheckedValue; 3] {
         if !self.tell {
             return [Item::Range, Item::Error, Item::Lag]
-                .map(|item| Finding::only_shown(item(self.surface), f64::NAN));
+                .map(|item| CheckedValue::only_shown(item(self.surface), f64::NAN));
         }
-        let Shown { least_rad, most_rad, error_rad, lag_s } = self.shown;
+        let SurfaceShown { least_rad, most_rad, error_rad, lag_s } = self.shown;
         let whole_rad = reach.high_rad - reach.low_rad;
         [
             // The same tolerance as at power-up and before arming, at both ends.
-            Finding::at_least(
+            CheckedValue::at_least(
                 Item::Range(self.surface),
                 most_rad - least_rad,
                 whole_rad - 2.0 * ANSWERING_RAD,
             ),
-            Finding::at_most(Item::Error(self.surface), error_rad, ANSWERING_RAD),
-            Finding::at_most(Item::Lag(self.surface), lag_s, reach.lag_most_s()),
+            CheckedValue::at_most(Item::Error(self.surface), error_rad, ANSWERING_RAD),
+            CheckedValue::at_most(Item::Lag(self.surface), lag_s, reach.lag_most_s()),
         ]
     }
 }
@@ -286,7 +286,12 @@ impl Still {
     }
 
     /// A vehicle that hangs below a drone swings, and climbs: then only the fixes are judged.
-    pub(super) fn findings(&self, mission: &Mission, arming: &ArmingLimits, hangs: bool) -> [Finding; 8] {
+    pub(super) fn findings(
+        &self,
+        mission: &Mission,
+        arming: &ArmingLimits,
+        hangs: bool,
+    ) -> [CheckedValue; 8] {
         let config = &mission.estimator;
         // White noise of this density, seen up to half the sampling rate.
         let band_sqrt_hz = libm::sqrt(0.5 / FRAME_S);
@@ -301,46 +306,46 @@ impl Still {
         let largest = |spreads: &[Spread; 3]| spreads.iter().map(Spread::sigma).fold(0.0, larger);
         let speed_m_s = (self.velocity_sum_m_s / f64::from(self.fixes)).norm();
         let found = [
-            Finding::at_most(Item::GyroBias, mean(&self.gyro_rad_s), STILL_RAD_S),
-            Finding::at_most(Item::GyroNoise, largest(&self.gyro_rad_s), SPREAD_MOST * gyro_rad_s),
-            Finding::between(
+            CheckedValue::at_most(Item::GyroBias, mean(&self.gyro_rad_s), STILL_RAD_S),
+            CheckedValue::at_most(Item::GyroNoise, largest(&self.gyro_rad_s), SPREAD_MOST * gyro_rad_s),
+            CheckedValue::between(
                 Item::Gravity,
                 mean(&self.force_m_s2),
                 *FELT_AT_REST_M_S2.start(),
                 *FELT_AT_REST_M_S2.end(),
             ),
-            Finding::at_most(
+            CheckedValue::at_most(
                 Item::AccelerometerNoise,
                 largest(&self.force_m_s2),
                 SPREAD_MOST * accelerometer_m_s2,
             ),
-            Finding::at_most(
+            CheckedValue::at_most(
                 Item::BarometerNoise,
                 self.pressure_altitude_m.sigma(),
                 SPREAD_MOST * barometer_m,
             ),
-            Finding::at_least(Item::GnssFixes, f64::from(self.fixes), FIXES_LEAST),
-            Finding::at_most(Item::GnssSpeed, speed_m_s, arming.speed_max_m_s),
-            Finding::only_shown(Item::LidarRange, self.lidar_m.unwrap_or(f64::NAN)),
+            CheckedValue::at_least(Item::GnssFixes, f64::from(self.fixes), FIXES_LEAST),
+            CheckedValue::at_most(Item::GnssSpeed, speed_m_s, arming.speed_max_m_s),
+            CheckedValue::only_shown(Item::LidarRange, self.lidar_m.unwrap_or(f64::NAN)),
         ];
         if !hangs {
             return found;
         }
         found.map(|found| match found.item {
             Item::GnssFixes => found,
-            item => Finding::only_shown(item, found.value),
+            item => CheckedValue::only_shown(item, found.value),
         })
     }
 
     /// What the rail's level and the inertial unit's mount lean together, on a rail. The filter doubts its attitude by the
     /// mount's stated misalignment, and no sensor shows it in flight.
-    pub(super) fn lean_from_the_rail(&self, mission: &Mission) -> Option<Finding> {
+    pub(super) fn lean_from_the_rail(&self, mission: &Mission) -> Option<CheckedValue> {
         let launch = mission.launched()?;
         let rail = launch.standing(mission.airframe.mass.loaded_cg_station_m).world_from_body;
         let up = rail.inverse_transform_vector(&Vector3::z());
         let felt = Vector3::from(self.force_m_s2.map(|spread| spread.mean));
         let lean_rad = libm::atan2(felt.cross(&up).norm(), felt.dot(&up));
         let stated_rad = libm::hypot(RAIL_LEVEL_DEG, mission.estimator.mounting_deg).to_radians();
-        Some(Finding::at_most(Item::RailLean, lean_rad, LEAN_SIGMAS * stated_rad))
+        Some(CheckedValue::at_most(Item::RailLean, lean_rad, LEAN_SIGMAS * stated_rad))
     }
 }

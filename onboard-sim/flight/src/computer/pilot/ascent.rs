@@ -66,8 +66,9 @@ pub(super) struct AscentReadings {
 
 /// The watch's memory.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub(super) struct AscentWatch {
-    pub(super) gained_m_s: f64,
+pub(crate) struct AscentWatch {
+    /// Speed that it was pushed to on its rail, m/s; zero while nothing pushes.
+    pub(crate) gained_m_s: f64,
     lifted_off: bool,
     lifted_off_at_s: f64,
     /// More than the accelerometer says that it has lifted off.
@@ -108,12 +109,12 @@ impl Default for AscentWatch {
 
 impl AscentWatch {
     /// The vehicle has left its rail.
-    pub(super) fn has_lifted_off(&self) -> bool {
+    pub(crate) fn has_lifted_off(&self) -> bool {
         self.lifted_off
     }
 
     /// Apogee is near, or was: the booster goes.
-    pub(super) fn separates(&self) -> bool {
+    pub(crate) fn separates(&self) -> bool {
         self.separating_since_s.is_some()
     }
 
@@ -283,7 +284,7 @@ pub(super) fn words_of_ascent(event: Event, estimate: &Estimate) -> Option<(Seve
 // stuck. A fin is stuck if its command has been far away for longer than a servo needs and the fin has not moved.
 
 /// A working fin moves at once if its command is farther away than this, rad: the tolerance of the ignition gate.
-const FAR_RAD: f64 = super::step::FIN_THERE_RAD;
+const FAR_RAD: f64 = super::gate::FIN_THERE_RAD;
 /// A fin is stuck if its command has been far away for this long in total and it has not moved, s: more than ten times the
 /// delay of a servo.
 const STUCK_AFTER_S: f64 = 0.25;

@@ -5,9 +5,11 @@
 //! landing, to the [`planner`].
 
 mod ascent;
+mod gate;
 pub mod planner;
 mod prediction;
 mod rehearsal;
+mod steering;
 mod step;
 mod vehicle_model;
 mod vertical_speed;
@@ -39,7 +41,7 @@ pub const FRAMES_PER_PLAN: u64 = 10;
 
 /// Where a frame points the vehicle. What lights and ejects is decided [at the end of the frame](crate::rules::outputs).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Pointed {
+pub(crate) struct Pointed {
     /// Gimbal angles (pitch, yaw), rad.
     pub gimbal_rad: [f64; 2],
     /// Fin openings, rad.
@@ -58,7 +60,7 @@ pub struct Pilot {
     /// Position and velocity of the last fix.
     last_fix: Option<(Vector3<f64>, Vector3<f64>)>,
     speeds: VerticalSpeeds,
-    ascent: AscentWatch,
+    pub(super) ascent: AscentWatch,
     /// Height at which the fall begins or began, m.
     apogee_m: f64,
     ignited_at_s: Option<f64>,
@@ -143,21 +145,6 @@ impl Pilot {
         let config = &self.model.mission.estimator;
         let estimator = Estimator::new(config, &StartUncertainty::on_pad(), 0.0, believed);
         *self.estimator = estimator.with_gyro_bias(gyro_bias_rad_s);
-    }
-
-    /// The vehicle has left its rail.
-    pub(super) fn has_lifted_off(&self) -> bool {
-        self.ascent.has_lifted_off()
-    }
-
-    /// Speed that it was pushed to on its rail, m/s; zero while nothing pushes.
-    pub(super) fn pushed_to_m_s(&self) -> f64 {
-        self.ascent.gained_m_s
-    }
-
-    /// Apogee is near, or was: the booster goes.
-    pub(super) fn separates(&self) -> bool {
-        self.ascent.separates()
     }
 
     /// Whether a vehicle that nobody has started lifts off from its rail in this frame.
@@ -318,35 +305,22 @@ impl Pilot {
                 Box::new(estimator.with_gyro_bias(estimate.gyro_bias_rad_s))
             },
         );
-        let SavedPilot {
-            motor,
-            other_curve,
-            estimate,
-            speeds,
-            ascent,
-            apogee_m,
-            ignited_at_s,
-            fin_share,
-            fins_rad,
-            fin_watch,
-            gimbal_rad,
-        } = *saved;
         let mut resumed = Self {
             estimator,
-            estimate,
-            speeds: speeds.resumed(),
-            ascent,
-            apogee_m,
-            ignited_at_s,
-            fin_share,
-            fins_rad,
-            fin_watch,
-            gimbal_rad,
+            estimate: saved.estimate,
+            speeds: saved.speeds.resumed(),
+            ascent: saved.ascent,
+            apogee_m: saved.apogee_m,
+            ignited_at_s: saved.ignited_at_s,
+            fin_share: saved.fin_share,
+            fins_rad: saved.fins_rad,
+            fin_watch: saved.fin_watch,
+            gimbal_rad: saved.gimbal_rad,
             ..self.clone()
         };
-        resumed.model.motor = motor;
-        if motor.ignition_s().is_some() {
-            resumed.model.others = OtherCurves::chosen_before(other_curve);
+        resumed.model.motor = saved.motor;
+        if saved.motor.ignition_s().is_some() {
+            resumed.model.others = OtherCurves::chosen_before(saved.other_curve);
         }
         resumed
     }
@@ -379,12 +353,12 @@ pub(super) mod sample {
     }
 
     /// A frame's input without requests, rehearsal and plan.
-    pub(in crate::computer) fn alone(kept: KeptInput) -> Input<'static> {
+    pub(crate) fn alone(kept: KeptInput) -> Input<'static> {
         Input { kept, requests: &[], rehearsed: None, plan_ready: false }
     }
 
     /// The input of a frame with almost no specific force, turning at a rate, of a computer that was released at once.
-    pub(in crate::computer) fn input(frame: u64, gyro_rad_s: f64) -> KeptInput {
+    pub(crate) fn input(frame: u64, gyro_rad_s: f64) -> KeptInput {
         let imu = ImuSample {
             gyro_rad_s: Vector3::new(0.0, gyro_rad_s, 0.0),
             specific_force_m_s2: Vector3::new(0.1, 0.0, 0.0),

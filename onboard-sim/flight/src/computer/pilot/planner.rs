@@ -11,7 +11,7 @@ use ocp::{Outcome, Status};
 
 use super::vehicle_model::{Burning, VehicleModel};
 use super::{Pilot, Prediction};
-use crate::computer::{FRAME_MS, Rehearsed};
+use crate::computer::{Computer, FRAME_MS, Rehearsed};
 use crate::estimation::estimator::Estimate;
 use crate::guidance::powered::{LandingSolved, Plan, Search};
 use crate::rules::verdict::Touchdown;
@@ -35,7 +35,7 @@ const PASS: u64 = 12_050;
 
 /// What is asked.
 #[derive(Debug, Clone)]
-pub(super) enum Asked {
+pub(super) enum Posed {
     Landing(Burning),
     /// With the fins' openings, rad, and the height from which it falls, m.
     Prediction {
@@ -46,7 +46,7 @@ pub(super) enum Asked {
 
 /// What was found.
 #[derive(Debug, Clone)]
-enum Found {
+enum Solved {
     /// The search's outcome (none if the thrust never carries the vehicle), unless the flown plan is flown to its end; whether the
     /// vehicle was high; and the share of the fins' drag area if no plan says it.
     Landing {
@@ -61,9 +61,9 @@ enum Found {
 pub struct Planner {
     model: VehicleModel,
     /// Its time is that of its frame since the release.
-    posed: Option<(Estimate, Asked)>,
+    posed: Option<(Estimate, Posed)>,
     search: Search,
-    found: Option<Found>,
+    found: Option<Solved>,
 }
 
 impl Planner {
@@ -73,10 +73,10 @@ impl Planner {
             return;
         };
         *found = Some(match asked {
-            Asked::Prediction { fins_rad, apogee_m } => {
-                Found::Prediction(model.prediction(estimate, fins_rad, *apogee_m))
+            Posed::Prediction { fins_rad, apogee_m } => {
+                Solved::Prediction(model.prediction(estimate, fins_rad, *apogee_m))
             }
-            Asked::Landing(burning) => {
+            Posed::Landing(burning) => {
                 let (settings, time_s) = (&model.mission.powered, estimate.time_s);
                 let searched = (!search.is_flown_out(settings, time_s)).then(|| {
                     let (later, burning) = model.later(search.from(), estimate, burning);
@@ -86,13 +86,13 @@ impl Planner {
                 let outcome = searched.as_ref().and_then(|(outcome, _)| outcome.as_ref());
                 let says_none = search.to_be_flown(outcome).fin_share(time_s).is_none();
                 let fin_share = says_none.then(|| model.fin_share(estimate, burning));
-                Found::Landing { fin_share, searched }
+                Solved::Landing { fin_share, searched }
             }
         });
     }
 
     /// Asks it.
-    pub(super) fn ask(&mut self, time_s: f64, estimate: &Estimate, asked: Asked) {
+    pub(super) fn ask(&mut self, time_s: f64, estimate: &Estimate, asked: Posed) {
         self.posed = Some((Estimate { time_s, ..*estimate }, asked));
         self.found = None;
     }
@@ -100,7 +100,7 @@ impl Planner {
     /// The next landing starts from the plan that was found, or goes on with the last one. Returns whether the search converged on a
     /// landing; `None` if there was none, because the last plan is flown to its end or the thrust never carries the vehicle.
     pub(super) fn fly_on(&mut self) -> Option<bool> {
-        let Some(Found::Landing { searched: Some((Some(outcome), _)), .. }) = &self.found else {
+        let Some(Solved::Landing { searched: Some((Some(outcome), _)), .. }) = &self.found else {
             return None;
         };
         self.search.fly_on();
@@ -124,11 +124,11 @@ impl Planner {
     /// In how many frames a Cortex-M7 has computed what was found.
     pub fn frames_on_a_board(&self) -> u64 {
         let instructions = match &self.found {
-            Some(Found::Landing { searched: Some((Some(_), _)), .. }) => {
+            Some(Solved::Landing { searched: Some((Some(_), _)), .. }) => {
                 LANDING + PASS * self.search.passes() as u64
             }
-            Some(Found::Landing { .. }) => LANDING,
-            Some(Found::Prediction(_)) => PREDICTION,
+            Some(Solved::Landing { .. }) => LANDING,
+            Some(Solved::Prediction(_)) => PREDICTION,
             None => 0,
         };
         instructions.div_ceil(INSTRUCTIONS_PER_FRAME)
@@ -173,19 +173,8 @@ impl Pilot {
         Box::new(Planner { model: model.without_filters(), posed: None, search, found: None })
     }
 
-    /// Poses the prediction in the fall.
-    pub(super) fn pose_prediction(&mut self, time_s: f64, estimate: &Estimate) {
-        let (fins_rad, apogee_m) = (self.fins_rad, self.apogee_m);
-        self.pose(time_s, estimate, Asked::Prediction { fins_rad, apogee_m });
-    }
-
-    /// Poses a landing. Returns whether it could.
-    pub(super) fn pose_landing(&mut self, time_s: f64, estimate: &Estimate, burning: Burning) -> bool {
-        self.pose(time_s, estimate, Asked::Landing(burning))
-    }
-
-    /// Nothing is posed before the last has been taken over.
-    fn pose(&mut self, time_s: f64, estimate: &Estimate, asked: Asked) -> bool {
+    /// Poses a prediction or a landing. Returns whether it could: nothing is posed before the last has been taken over.
+    pub(super) fn pose(&mut self, time_s: f64, estimate: &Estimate, asked: Posed) -> bool {
         let Some(planner) = self.planner.as_mut().filter(|_| self.posed_at_s.is_none()) else { return false };
         self.posed_at_s = Some(time_s);
         self.powered.begin(&mut planner.search);
@@ -195,12 +184,12 @@ impl Pilot {
     }
 
     /// Takes over what was posed; computes it now, if nobody has. Returns whether it is a plan of a landing.
-    pub(in crate::computer) fn take_over(&mut self, time_s: f64) -> bool {
+    pub(crate) fn take_over(&mut self, time_s: f64) -> bool {
         let Some((posed_at_s, planner)) = self.posed_at_s.zip(self.planner.as_mut()) else { return false };
         self.posed_at_s = None;
         planner.solve();
         match &planner.found {
-            Some(Found::Landing { searched, fin_share }) => {
+            Some(Solved::Landing { searched, fin_share }) => {
                 self.fin_share = fin_share.unwrap_or(self.fin_share);
                 if let Some((outcome, high)) = searched {
                     let times_s = [posed_at_s, time_s];
@@ -208,7 +197,7 @@ impl Pilot {
                 }
                 searched.is_some()
             }
-            Some(Found::Prediction(prediction)) => {
+            Some(Solved::Prediction(prediction)) => {
                 self.prediction = *prediction;
                 false
             }
@@ -217,26 +206,16 @@ impl Pilot {
     }
 
     /// What is posed and not computed yet.
-    pub(in crate::computer) fn posed(&mut self) -> Option<&mut Box<Planner>> {
+    fn posed(&mut self) -> Option<&mut Box<Planner>> {
         self.posed_at_s?;
         self.planner.as_mut().filter(|planner| planner.found.is_none())
-    }
-
-    pub(in crate::computer) fn take_posed(&mut self) -> Option<Box<Planner>> {
-        self.posed()?;
-        self.planner.take()
-    }
-
-    pub(in crate::computer) fn give_back(&mut self, planner: Box<Planner>) {
-        // One of a computer that has restarted meanwhile has its own.
-        self.planner.get_or_insert(planner);
     }
 
     /// The landing that was taken over last, and its problem; none before the first, and once the next one is posed.
     pub fn landing_solved(&self) -> Option<LandingSolved> {
         let planner = self.planner.as_ref()?;
-        let (estimate, Asked::Landing(burning)) = planner.posed.as_ref()? else { return None };
-        let Some(Found::Landing { searched: Some((Some(outcome), _)), .. }) = &planner.found else {
+        let (estimate, Posed::Landing(burning)) = planner.posed.as_ref()? else { return None };
+        let Some(Solved::Landing { searched: Some((Some(outcome), _)), .. }) = &planner.found else {
             return None;
         };
         let (later, burning) = planner.later(estimate, burning);
@@ -244,11 +223,35 @@ impl Pilot {
         let settings = &planner.model.mission.powered;
         planner.search.solved(settings, later.time_s, outcome, self.powered.planned()?, &situation)
     }
+}
 
-    /// Rehearses the landing on the pad, from power-up on; `None` while something is posed.
-    pub(in crate::computer) fn rehearse(&mut self) -> Option<Rehearsed> {
-        let planner = self.planner.as_mut().filter(|_| self.posed_at_s.is_none())?;
-        self.powered.begin(&mut planner.search);
+impl Computer {
+    /// Computes what the pilot has posed, in this context, if it was not done yet; returns in how many frames a Cortex-M7 does.
+    pub fn solve_posed(&mut self) -> Option<u64> {
+        let planner = self.pilot.posed()?;
+        planner.solve();
+        Some(planner.frames_on_a_board())
+    }
+
+    /// What the pilot has posed, to be computed in another context; once. It has to be [given back](Self::give_back).
+    pub fn take_posed(&mut self) -> Option<Box<Planner>> {
+        self.pilot.posed()?;
+        self.pilot.planner.take()
+    }
+
+    /// Gives back what was [computed](Planner::solve) in another context. The frame that is told so takes it over.
+    pub fn give_back(&mut self, planner: Box<Planner>) {
+        // One of a computer that has restarted meanwhile has its own.
+        self.pilot.planner.get_or_insert(planner);
+    }
+
+    /// Rehearses the landing at power-up, without a simulated world: what a board puts into its inputs. `None` once it is released,
+    /// and while something is posed. It takes some seconds on a board, and leaves no memory.
+    pub fn rehearse(&mut self) -> Option<Rehearsed> {
+        let pilot = &mut *self.pilot;
+        let planner =
+            pilot.planner.as_mut().filter(|_| self.release.is_none() && pilot.posed_at_s.is_none())?;
+        pilot.powered.begin(&mut planner.search);
         Some(planner.rehearse())
     }
 }

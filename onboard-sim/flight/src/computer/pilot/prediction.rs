@@ -1,21 +1,14 @@
-//! The pilot's forecast for the next seconds, and the parachute if it shows that no landing will be possible.
-
-use alloc::format;
-use alloc::string::String;
-use alloc::vec::Vec;
+//! The pilot's forecast for the next seconds.
 
 use nalgebra::{Vector2, Vector3};
 use serde::Serialize;
 
 use super::Pilot;
 use super::vehicle_model::VehicleModel;
-use crate::computer::KeptInput;
 use crate::estimation::estimator::Estimate;
-use crate::estimation::sensor_watch::SensorWatch;
 use crate::guidance::ignition::IgnitionPrediction;
 use crate::guidance::vertical::fall_ends_m_s;
-use crate::rules::gate::{GATE_CHECKS, GateCheck};
-use crate::rules::phase::{Event, Mode, Phase};
+use crate::rules::phase::Phase;
 use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 
 /// The commit height is the height that the parachute needs, times this: half as much again, because ejection and filling
@@ -49,7 +42,7 @@ impl Prediction {
 }
 
 /// Height that a parachute needs at a speed, with a margin: the fall until it is ejected, plus the distance over which
-/// it inflates.
+/// it inflates (T. W. Knacke, Parachute Recovery Systems Design Manual, NWC TP 6575, 1991, chapter 5).
 pub(super) fn commit_height_m(speed_m_s: f64, ejection_delay_s: f64, inflation_distance_m: f64) -> f64 {
     COMMIT_MARGIN * (speed_m_s * ejection_delay_s + inflation_distance_m)
 }
@@ -159,153 +152,9 @@ impl Pilot {
     }
 }
 
-// Releases the parachute while there is height for it, if the ignition gate will not open.
-
-/// A reason that has kept the gate shut for this long, s, will not go away before ignition.
-const LASTS_S: f64 = 0.5;
-/// The decision is taken this long before the room for the parachute ends, s. As long may a due ignition be refused: a fin
-/// that is still moving has kept the gate shut for up to 45 ms in 1500 simulated flights.
-const BEFORE_S: f64 = 0.1;
-/// A pressure altitude that is lower than the estimate by more, m, is not only its ram error and a slow offset.
-const HEIGHTS_APART_M: f64 = 8.0;
-
-impl Pilot {
-    /// The event that the gate will not open any more, as soon as waiting gains nothing, and why.
-    ///
-    /// Above the commit height: the gate has been shut for a lasting reason, and this is the last chance for the parachute
-    /// with its margin. Below: ignition is due and refused, or no landing is possible from here any more. The motor must
-    /// never be lit outside the gate, so only the parachute is left, without the margin.
-    pub(super) fn gate_will_not_open(
-        &mut self,
-        mode: &Mode,
-        input: &KeptInput,
-        estimate: &Estimate,
-        sensors: &SensorWatch,
-    ) -> Option<(Event, String)> {
-        let checks = self.gate_checks(mode, input, estimate, sensors);
-        for (check, since_s) in checks.iter().zip(&mut self.shut_since_s) {
-            *since_s = check.shut.then(|| since_s.unwrap_or(input.time_s));
-        }
-        if mode.phase.in_descent() && checks.iter().any(|check| check.lasts) {
-            self.gate_shut_since_s.get_or_insert(input.time_s);
-        } else {
-            self.gate_shut_since_s = None;
-        }
-        if !mode.phase.in_descent() || self.prediction.commit_height_m <= 0.0 {
-            return None;
-        }
-        let lasts = self.gate_shut_since_s.is_some_and(|since_s| {
-            // A stuck fin has already been watched for long enough.
-            self.fin_watch.any_stuck() || input.time_s - since_s >= LASTS_S
-        });
-        // The parachute comes anyway: of two heights the lower one says when.
-        let estimated_m = self.feet_height_m(estimate);
-        let below_cg_m = estimate.state.position_m.z - estimated_m;
-        let pressure_m = self.speeds.altitude_m(input.time_s).map(|altitude_m| altitude_m - below_cg_m);
-        let feet_m = pressure_m
-            .filter(|pressure_m| lasts && *pressure_m < estimated_m - HEIGHTS_APART_M)
-            .unwrap_or(estimated_m);
-        let decided_m = BEFORE_S * (-estimate.state.velocity_m_s.z).max(0.0);
-        let filling_m = self.prediction.filling_height_m();
-        let above_commit_m = feet_m - self.prediction.commit_height_m;
-        let hopeless = if above_commit_m > 0.0 {
-            lasts && above_commit_m < decided_m
-        } else {
-            let last_room = feet_m - filling_m < decided_m;
-            let overdue_s = self.ignition_overdue_s(estimate);
-            let refused = overdue_s.is_some() && checks.iter().any(|check| check.shut);
-            let outside = self.prediction.touchdown_distance_m > self.model.mission.gate.fence_radius_m;
-            let too_low =
-                self.prediction.ignition.band.is_some_and(|band| self.onset_m(estimate) < band.low_m);
-            (lasts && (refused || last_room))
-                || (refused
-                    && last_room
-                    && (outside || overdue_s.is_some_and(|overdue_s| overdue_s >= BEFORE_S)))
-                || too_low
-        };
-        // Any lower, the parachute reaches the ground before it is ejected.
-        let ejected =
-            feet_m.max(estimated_m) > filling_m - self.model.airframe().parachute.inflation_distance_m;
-        if self.is_astray(sensors) {
-            // Nobody knows the attitude, and the pressure alone knows the height: nothing is gained by waiting.
-            let parachute_fills = pressure_m.is_none_or(|pressure_m| pressure_m > filling_m);
-            return Some((
-                Event::GateShutForGood { parachute_fills },
-                self.why_given_up(&checks, input.time_s),
-            ));
-        }
-        (hopeless && ejected).then(|| {
-            let event = Event::GateShutForGood { parachute_fills: feet_m > filling_m };
-            (event, self.why_given_up(&checks, input.time_s))
-        })
-    }
-
-    /// Without what is felt, or with an estimate that two of three speeds contradict, no landing is tried.
-    pub(super) fn is_astray(&self, sensors: &SensorWatch) -> bool {
-        sensors.feels_nothing_for_s() >= LASTS_S || self.speeds.contradict_the_estimate()
-    }
-
-    /// All that decided, with values, and for how long: what lasts, or else what keeps the gate shut now.
-    fn why_given_up(&self, checks: &[GateCheck; GATE_CHECKS], time_s: f64) -> String {
-        let for_s = |since_s: &Option<f64>| since_s.map_or(0.0, |since_s| time_s - since_s);
-        // A fin on its way fails for a moment and decides nothing beside what has lasted.
-        let keeps: [fn(&GateCheck, f64) -> bool; 3] =
-            [|check, for_s| check.lasts && for_s >= LASTS_S, |check, _| check.lasts, |check, _| check.shut];
-        let told = keeps.iter().map(|keep| {
-            let kept =
-                checks.iter().zip(&self.shut_since_s).filter(|(check, since_s)| keep(check, for_s(since_s)));
-            let words =
-                kept.map(|(check, since_s)| format!("{}, for {:.1} s", check.words(), for_s(since_s)));
-            words.collect::<Vec<_>>().join("; ")
-        });
-        told.into_iter()
-            .find(|told| !told.is_empty())
-            .unwrap_or_else(|| "too low for the landing motor".into())
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::{Vector2, Vector3};
-
-    use crate::computer::pilot::sample::{self, input, released};
-    use crate::computer::table::PhaseTable;
-    use crate::estimation::estimator::StartUncertainty;
-    use crate::vehicle::rigid::RigidState;
-
-    /// One frame, in which the crew may abort.
-    fn frame_with(pilot: &mut Pilot, table: &mut PhaseTable, input: &KeptInput, abort: bool) -> [f64; 4] {
-        pilot.estimate_state(table.mode().phase, input);
-        fly_on(pilot, table, input, abort)
-    }
-
-    /// The same after the estimate.
-    fn fly_on(pilot: &mut Pilot, table: &mut PhaseTable, input: &KeptInput, abort: bool) -> [f64; 4] {
-        pilot.take_over(input.time_s);
-        pilot.predict(table, input);
-        if abort {
-            let event = pilot.abort_event(table.mode(), Some(input), &SensorWatch::default());
-            pilot.told(table, event, input.time_s).expect("an abort is never refused in the air");
-        }
-        pilot.decide(table, input, &SensorWatch::default());
-        pilot.plan(table.mode(), input, false);
-        pilot.point(table.mode(), input).fins_rad
-    }
-
-    /// Whether an abort in the very next frame releases the parachute.
-    fn abort_releases(pilot: &mut Pilot, frame: u64) -> bool {
-        let mut table = released();
-        frame_with(pilot, &mut table, &input(frame, 0.0), true);
-        table.mode().phase == Phase::Chute
-    }
-
-    #[test]
-    fn an_abort_in_the_first_frame_knows_the_height() {
-        let pilot = sample::falling();
-        assert!(abort_releases(&mut pilot.clone(), 1));
-        assert!(abort_releases(&mut sample::falling().resumed(&pilot.saved(), 0.1), 21));
-    }
 
     #[test]
     fn touchdown_lies_along_the_velocity_and_the_time_of_a_slow_fall_is_limited() {
@@ -315,133 +164,5 @@ mod tests {
         let at_apogee = touchdown_m(&place_m, &Vector3::new(-2.0, 1.0, 0.0), 80.0);
         assert_eq!(at_apogee, Vector2::new(-22.0, 12.0));
         assert_eq!(touchdown_m(&place_m, &Vector3::new(-2.0, 1.0, -0.2), -0.1), place_m.xy());
-    }
-
-    fn falling(time_s: f64) -> Estimate {
-        let mut state = RigidState::upright(250.0 - 38.0 * time_s);
-        state.velocity_m_s.z = -38.0;
-        Estimate::exact(time_s, state, Vector3::new(9.8, 0.0, 0.0), Vector2::zeros())
-    }
-
-    /// What is wrong in a fall, at the height of the centre of gravity, m.
-    type Wrong = fn(f64, &mut Estimate, &mut KeptInput);
-
-    const NO_ABORT_M: f64 = 0.0;
-
-    const NOTHING: Wrong = |_, _, _| {};
-
-    /// How a fall at 38 m/s ended.
-    #[derive(Debug, Clone, Copy, PartialEq)]
-    enum Ended {
-        /// With the parachute, released at a height, m; whether the loss was recorded.
-        Parachute(f64, bool),
-        /// With the ignition, commanded at a height, m.
-        Ignition(f64),
-        /// With neither.
-        Unbraked,
-    }
-
-    /// A fall at 38 m/s: the commit height is at 87 m, the ignition at about 70 m, and the parachute fills in 58 m. The crew
-    /// aborts below a height.
-    fn fall(wrong: Wrong, abort_below_m: f64) -> Ended {
-        let mission = crate::vehicles::mission::builtin("mk2").expect("built in").expect("sound");
-        let start = RigidState::upright(250.0);
-        let mut pilot = Pilot::starting(&mission, 0.0, &start, &StartUncertainty::at_apogee());
-        let (mut table, mut fins_rad) = (released(), [0.0; 4]);
-        let ended = (1..1300).find_map(|frame| {
-            let time_s = frame as f64 * 0.005;
-            let mut estimate = falling(time_s);
-            let height_m = estimate.state.position_m.z;
-            let mut input = KeptInput { fins_rad, ..sample::input(frame, 0.0) };
-            wrong(height_m, &mut estimate, &mut input);
-            let aborts = height_m < abort_below_m && !table.mode().interlocks.abort_latched;
-            pilot.estimate = Some(estimate);
-            pilot.update_models(table.mode().phase, &input, &estimate);
-            fins_rad = fly_on(&mut pilot, &mut table, &input, aborts);
-            let phase = table.mode().phase;
-            let lost = table.take_news().iter().any(|news| format!("{news:?}").contains("will be lost"));
-            match phase {
-                Phase::Chute => Some(Ended::Parachute(height_m, lost)),
-                Phase::Ignition => Some(Ended::Ignition(height_m)),
-                _ => None,
-            }
-        });
-        ended.unwrap_or(Ended::Unbraked)
-    }
-
-    #[track_caller]
-    fn assert_parachute(wrong: Wrong, between_m: core::ops::Range<f64>) {
-        assert_ended_with_the_parachute(fall(wrong, NO_ABORT_M), between_m);
-    }
-
-    #[track_caller]
-    fn assert_ended_with_the_parachute(ended: Ended, between_m: core::ops::Range<f64>) {
-        let filled = matches!(ended, Ended::Parachute(at_m, false) if between_m.contains(&at_m));
-        assert!(filled, "{ended:?}, not between {between_m:?} m");
-    }
-
-    /// 1.5 times a second's fall and 20 m of inflation, and the feet below the centre of gravity.
-    const AT_COMMIT_HEIGHT_M: core::ops::Range<f64> = 87.0..93.0;
-
-    #[test]
-    fn a_fall_with_nothing_wrong_ends_with_the_ignition() {
-        let ended = fall(NOTHING, NO_ABORT_M);
-        assert!(matches!(ended, Ended::Ignition(at_m) if (60.0..80.0).contains(&at_m)), "{ended:?}");
-    }
-
-    #[test]
-    fn a_foot_s_switch_that_closes_high_up_ends_no_flight() {
-        let ended = fall(|height_m, _, input| input.contact = height_m > 100.0, NO_ABORT_M);
-        assert!(matches!(ended, Ended::Ignition(_)), "{ended:?}");
-    }
-
-    #[test]
-    fn what_lasts_brings_the_parachute_above_the_commit_height() {
-        assert_parachute(|_, _, input| input.fins_rad = [0.0; 4], AT_COMMIT_HEIGHT_M);
-        assert_parachute(|_, _, input| input.igniter_continuity = false, AT_COMMIT_HEIGHT_M);
-        // The fence is at 120 m.
-        assert_parachute(|_, estimate, _| estimate.state.position_m.x = 121.0, AT_COMMIT_HEIGHT_M);
-        let drifting_out: Wrong = |height_m, estimate, _| {
-            estimate.state.velocity_m_s.x = 5.0;
-            estimate.state.position_m.x = 121.0 - 5.0 * height_m / 38.0;
-        };
-        assert_parachute(drifting_out, AT_COMMIT_HEIGHT_M);
-    }
-
-    #[test]
-    fn inside_the_fence_it_lands() {
-        let ended = fall(|_, estimate, _| estimate.state.position_m.x = 119.0, NO_ABORT_M);
-        assert!(matches!(ended, Ended::Ignition(_)), "{ended:?}");
-    }
-
-    #[test]
-    fn a_gate_shut_after_the_commit_height_brings_the_parachute_while_it_fills() {
-        let filling_m = 58.0..75.0;
-        let out_of_the_fence: Wrong = |height_m, estimate, _| {
-            estimate.state.position_m.y = if height_m < 80.0 { 121.0 } else { 119.0 };
-        };
-        assert_parachute(out_of_the_fence, filling_m.clone());
-        let open_circuit: Wrong = |height_m, _, input| input.igniter_continuity = height_m > 73.0;
-        assert_parachute(open_circuit, filling_m.clone());
-        let turning: Wrong = |height_m, estimate, _| {
-            estimate.state.rate_rad_s.y = if height_m < 80.0 { 1.2 } else { 0.0 };
-        };
-        assert_parachute(turning, filling_m);
-    }
-
-    /// A fin on its way keeps the gate shut for up to 45 ms, a gust that turns the vehicle for somewhat longer.
-    #[test]
-    fn a_gate_shut_for_a_moment_delays_the_ignition_only() {
-        let Ended::Ignition(due_m) = fall(NOTHING, NO_ABORT_M) else { panic!("no ignition") };
-        let turning: Wrong = |height_m, estimate, _| {
-            estimate.state.rate_rad_s.y = if height_m > 66.0 && height_m < 80.0 { 1.2 } else { 0.0 };
-        };
-        let ended = fall(turning, NO_ABORT_M);
-        assert!(matches!(ended, Ended::Ignition(at_m) if at_m < 66.0 && at_m < due_m), "{ended:?}");
-    }
-
-    #[test]
-    fn an_operators_abort_with_the_gate_shut_brings_the_parachute_while_it_fills() {
-        assert_ended_with_the_parachute(fall(NOTHING, 86.0), 85.0..86.0);
     }
 }

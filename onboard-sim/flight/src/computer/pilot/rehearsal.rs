@@ -7,7 +7,7 @@ use alloc::format;
 
 use nalgebra::{Vector2, Vector3};
 
-use super::planner::{Asked, Planner};
+use super::planner::{Planner, Posed};
 use super::vehicle_model::{Burning, VehicleModel};
 use crate::computer::Rehearsed;
 use crate::estimation::estimator::Estimate;
@@ -27,7 +27,7 @@ impl Planner {
         let (mut plans, mut converged) = (0, 0);
         let mut flown = self.model().lit();
         while let Some((estimate, burning)) = flown.take().filter(|_| plans < MOST_PLANS) {
-            self.ask(estimate.time_s, &estimate, Asked::Landing(burning.clone()));
+            self.ask(estimate.time_s, &estimate, Posed::Landing(burning.clone()));
             self.solve();
             // It moves as planned before, until the plan is ready.
             let (estimate, burning) = self.later(&estimate, &burning);

@@ -80,15 +80,6 @@ impl VehicleModel {
         self.airframe().unfinned_drag_area_m2(0.0)
     }
 
-    fn burning_body_drag_area_m2(&self) -> f64 {
-        self.airframe().unfinned_drag_area_m2(self.mission.exhaust.body_loss)
-    }
-
-    /// What the exhaust leaves of a drag area of the fins, m^2.
-    fn burning_fins(&self, fin_drag_area_m2: f64) -> f64 {
-        fin_drag_area_m2 * (1.0 - self.mission.exhaust.fin_loss)
-    }
-
     pub(super) fn fin_drag_area_m2(&self, fins_rad: &[f64; 4]) -> f64 {
         self.airframe().fin_drag_area_m2(fins_rad)
     }
@@ -158,6 +149,7 @@ impl VehicleModel {
         burn: Burn<'a>,
         fin_drag_area_m2: f64,
     ) -> PoweredSituation<'a> {
+        let exhaust = &self.mission.exhaust;
         PoweredSituation {
             burn,
             burning_s: situation.burning_s,
@@ -169,9 +161,10 @@ impl VehicleModel {
             gravity_m_s2: self.mission.gravity_m_s2,
             air_density_kg_m3: situation.density_kg_m3,
             wind_m_s: estimate.wind_m_s.push(0.0),
-            body_drag_area_m2: self.motor.air_scale() * self.burning_body_drag_area_m2(),
+            body_drag_area_m2: self.motor.air_scale()
+                * self.airframe().unfinned_drag_area_m2(exhaust.body_loss),
             crossflow_area_m2: self.crossflow_area_m2(),
-            fin_drag_area_m2: self.motor.air_scale() * self.burning_fins(fin_drag_area_m2),
+            fin_drag_area_m2: self.motor.air_scale() * (fin_drag_area_m2 * (1.0 - exhaust.fin_loss)),
             gimbal_limit_rad: self.airframe().gimbal.limit_rad(),
             lands_in_place: situation.lands_in_place,
             high: false,

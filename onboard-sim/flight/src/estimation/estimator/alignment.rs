@@ -1,4 +1,6 @@
 //! Finds the initial attitude on the pad: at rest the accelerometer shows the vertical and the gyro shows its own bias.
+//!
+//! This is the levelling of a strapdown unit (Groves 2013, section 5.6).
 
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::Serialize;

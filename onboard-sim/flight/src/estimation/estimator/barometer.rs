@@ -1,4 +1,7 @@
 //! The barometer: height by the static pressure, with its own offset and the errors of the flow around it.
+//!
+//! The error of a static port is in proportion to the dynamic pressure (W. Gracey, Measurement of Aircraft Speed and Altitude, NASA
+//! Reference Publication 1046, 1980).
 
 use super::Estimator;
 use super::correction::{DOUBT_POSITION_M, without_last_if};

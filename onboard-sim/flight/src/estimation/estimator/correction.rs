@@ -1,4 +1,7 @@
 //! A correction by one scalar, and the status record of everything that corrects.
+//!
+//! The gate is that of the normalised innovation (Y. Bar-Shalom, X. R. Li and T. Kirubarajan, Estimation with Applications to Tracking
+//! and Navigation, 2001, section 5.4).
 
 use serde::Serialize;
 

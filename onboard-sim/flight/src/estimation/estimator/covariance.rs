@@ -156,7 +156,8 @@ impl Covariance {
         (variance, with)
     }
 
-    /// Joseph's form for one scalar and any gain, `(I - K h) P (I - K h)' + K r K'`, multiplied out:
+    /// Joseph's form (R. S. Bucy and P. D. Joseph, Filtering for Stochastic Processes with Applications to Guidance, 1968) for one
+    /// scalar and any gain, `(I - K h) P (I - K h)' + K r K'`, multiplied out:
     /// `P - K (P h')' - (P h') K' + s K K'` with `s = h P h' + r`.
     pub(super) fn update(&mut self, gain: &Row, with: &Row, innovation_variance: f64) {
         for (index, row) in self.rows.iter_mut().enumerate() {

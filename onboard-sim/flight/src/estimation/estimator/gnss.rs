@@ -1,4 +1,6 @@
 //! The satellite receiver: fixes of position and velocity that arrive late.
+//!
+//! A fix has white noise and an error that wanders slowly (Groves 2013, chapter 9).
 
 use serde::Serialize;
 

@@ -19,24 +19,26 @@ pub enum Health {
     Doubtful(Doubt),
 }
 
-/// Why an estimate must not be used.
+numbered_enum! {
+/// Why an estimate must not be used; the worst reason comes first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Doubt {
     /// The state was not a number, and the filter restarted.
-    Restarted,
+    Restarted = "estimate diverged and started afresh",
     /// The inertial unit has sent nothing usable for several frames.
-    Imu,
+    Imu = "no usable inertial samples",
     /// The filter had to increase its uncertainty, because satellite velocities differed too much from their
     /// predictions on average.
-    Surprised,
+    Surprised = "satellite velocities kept disagreeing",
     /// The velocity's standard deviation is too large.
-    Velocity,
+    Velocity = "velocity uncertain",
     /// The height's standard deviation is too large.
-    Height,
+    Height = "height uncertain",
     /// The horizontal position's standard deviation is too large.
-    Horizontal,
+    Horizontal = "horizontal position uncertain",
     /// The tilt's standard deviation is too large.
-    Tilt,
+    Tilt = "tilt uncertain",
+}
 }
 
 impl Health {
@@ -55,24 +57,9 @@ impl fmt::Display for Health {
     }
 }
 
-impl Doubt {
-    /// The reason in words.
-    pub fn words(self) -> &'static str {
-        match self {
-            Self::Restarted => "estimate diverged and started afresh",
-            Self::Imu => "no usable inertial samples",
-            Self::Surprised => "satellite velocities kept disagreeing",
-            Self::Velocity => "velocity uncertain",
-            Self::Height => "height uncertain",
-            Self::Horizontal => "horizontal position uncertain",
-            Self::Tilt => "tilt uncertain",
-        }
-    }
-}
-
 impl fmt::Display for Doubt {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        out.write_str(self.words())
+        out.write_str(self.name())
     }
 }
 
@@ -85,19 +72,18 @@ pub(super) fn judge(
     surprise_age_s: f64,
 ) -> Health {
     let limits = &config.health;
-    let doubts = [
-        (restart_age_s < DOUBT_AFTER_RESTART_S, Doubt::Restarted),
-        (aids.imu.refused_in_a_row > BRIDGED_FRAMES, Doubt::Imu),
-        (surprise_age_s < DOUBT_AFTER_RESTART_S, Doubt::Surprised),
-        (sigmas.velocity_m_s.max() > limits.velocity_m_s, Doubt::Velocity),
-        (sigmas.position_m.z > limits.height_m, Doubt::Height),
-        (sigmas.position_m.xy().max() > limits.horizontal_m, Doubt::Horizontal),
-        (sigmas.attitude_rad.xy().max() > limits.tilt_deg.to_radians(), Doubt::Tilt),
+    // In the order of the doubts.
+    let applies = [
+        restart_age_s < DOUBT_AFTER_RESTART_S,
+        aids.imu.refused_in_a_row > BRIDGED_FRAMES,
+        surprise_age_s < DOUBT_AFTER_RESTART_S,
+        sigmas.velocity_m_s.max() > limits.velocity_m_s,
+        sigmas.position_m.z > limits.height_m,
+        sigmas.position_m.xy().max() > limits.horizontal_m,
+        sigmas.attitude_rad.xy().max() > limits.tilt_deg.to_radians(),
     ];
-    doubts
-        .into_iter()
-        .find_map(|(applies, doubt)| applies.then_some(Health::Doubtful(doubt)))
-        .unwrap_or(Health::Good)
+    let doubt = Doubt::ALL.into_iter().zip(applies).find_map(|(doubt, applies)| applies.then_some(doubt));
+    doubt.map_or(Health::Good, Health::Doubtful)
 }
 
 /// Whether satellite velocities still fit on average. Each of them may pass its gate although together they differ too

@@ -269,7 +269,8 @@ impl Estimator {
         self.restarts
     }
 
-    /// Normalised estimation error squared of position, velocity and attitude against the truth. In a consistent filter
+    /// Normalised estimation error squared (Bar-Shalom, Li and Kirubarajan 2001, section 5.4) of position, velocity and attitude
+    /// against the truth. In a consistent filter
     /// it is chi-square with 9 degrees of freedom. `None` if the covariance has lost rank.
     pub fn nees_of_motion(&self, truth: &RigidState) -> Option<f64> {
         let turn = (truth.world_from_body * self.nominal.world_from_body.inverse()).scaled_axis();

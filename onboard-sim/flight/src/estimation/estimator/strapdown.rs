@@ -1,4 +1,7 @@
 //! Propagates the state and its error with the inertial unit, and keeps the recent motion for late measurements.
+//!
+//! The motion follows the navigation equations of a world at rest (Groves 2013, chapter 5); its error grows as in Solà 2017, here in
+//! world axes.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector2, Vector3};
 use serde::Serialize;

@@ -306,7 +306,7 @@ mod tests {
 
     #[test]
     fn equal_openings_have_the_airframes_drag_and_no_side_force() {
-        let airframe = crate::vehicles::airframe::builtin("mk2").unwrap();
+        let airframe = crate::vehicles::mission::builtin_airframe("mk2").unwrap();
         let mass = crate::vehicle::airframe::MassModel::new(&airframe.mass, 0.2).at(0.0);
         let opening_rad = 1.2;
         let vehicle = VehicleNow::of(&airframe, &mass, 1.2, [opening_rad; 4], false, 0.15);

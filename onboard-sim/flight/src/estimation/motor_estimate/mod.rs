@@ -8,6 +8,8 @@
 //! the filter is ever surer of. The specific force along the nose contains the thrust and the air force:
 //! `m f_x = T cos p cos y + d A`, with the gimbal angles `p` and `y`, the modelled air force `A` and its scale `d`. An
 //! extended Kalman filter over `(s, b, t0, d, n)` finds all five; it finds `d` before ignition, while the vehicle falls.
+//!
+//! The process and the filter are those of A. Gelb (editor), Applied Optimal Estimation, 1974, chapters 3 and 6.
 
 #[cfg(test)]
 mod tests;
@@ -17,24 +19,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::vehicle::burn::{Burn, Deviation};
 use crate::vehicle::thrust_curve::ThrustCurve;
-
-/// The data sheet's thrust by time since ignition, s to N; zero before 0 and after the burn.
-pub trait NominalThrust {
-    /// Thrust at a time since ignition, N.
-    fn thrust_n(&self, time_s: f64) -> f64;
-    /// Largest thrust, N.
-    fn peak_n(&self) -> f64;
-}
-
-impl NominalThrust for ThrustCurve {
-    fn thrust_n(&self, time_s: f64) -> f64 {
-        self.thrust_at_n(time_s)
-    }
-
-    fn peak_n(&self) -> f64 {
-        self.peak_thrust_n()
-    }
-}
 
 /// The input of one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -274,7 +258,7 @@ impl MotorEstimate {
     }
 
     /// Takes one frame. A sample that is not finite is ignored.
-    pub fn update(&mut self, curve: &impl NominalThrust, sample: &MotorSample) {
+    pub fn update(&mut self, curve: &ThrustCurve, sample: &MotorSample) {
         let force_n = sample.mass_kg * sample.axial_specific_force_m_s2;
         let cosine = libm::cos(sample.gimbal_rad[0]) * libm::cos(sample.gimbal_rad[1]);
         let finite = [sample.time_s, force_n, sample.axial_air_force_n, cosine];
@@ -290,12 +274,12 @@ impl MotorEstimate {
     }
 
     /// Before ignition: estimates the air scale, and searches for thrust once the igniter is fired.
-    fn wait(&mut self, curve: &impl NominalThrust, sample: &MotorSample, force_n: f64) {
+    fn wait(&mut self, curve: &ThrustCurve, sample: &MotorSample, force_n: f64) {
         let air_n = sample.axial_air_force_n;
         let thrust_n = force_n - self.air_scale() * air_n;
         if sample.may_burn {
             let middle_s = sample.time_s - 0.5 * self.prior.frame_s;
-            let mark_n = CAUGHT_SHARE * curve.peak_n();
+            let mark_n = CAUGHT_SHARE * curve.peak_thrust_n();
             if let Some(crossed_s) = self.detector.take(mark_n, middle_s, thrust_n) {
                 self.stage = MotorStage::Burning;
                 // A motor that chuffed goes on along its curve.
@@ -311,7 +295,7 @@ impl MotorEstimate {
     }
 
     /// Thrust at a time on the sample's clock. Before ignition the motor is assumed to light at `lights_at_s`.
-    pub fn predict(&self, curve: &impl NominalThrust, time_s: f64, lights_at_s: f64) -> PredictedThrust {
+    pub fn predict(&self, curve: &ThrustCurve, time_s: f64, lights_at_s: f64) -> PredictedThrust {
         let ignition_s = match self.stage {
             MotorStage::Waiting => lights_at_s,
             MotorStage::EndedEarly { at_s } if time_s >= at_s => {
@@ -343,17 +327,17 @@ impl MotorEstimate {
     }
 
     /// Thrust and its derivatives by the four, at a time since ignition.
-    fn thrust(&self, curve: &impl NominalThrust, since_s: f64) -> (f64, Vector5<f64>) {
+    fn thrust(&self, curve: &ThrustCurve, since_s: f64) -> (f64, Vector5<f64>) {
         let (scale, stretch) = (self.mean[IMPULSE], self.mean[STRETCH]);
         let nominal_s = since_s / stretch;
-        let nominal_n = curve.thrust_n(nominal_s);
+        let nominal_n = curve.thrust_at_n(nominal_s);
         let as_certified_n = scale / stretch * nominal_n;
         let shape = 1.0 + self.mean[SHAPE];
         let thrust_n = as_certified_n * shape;
         // Only points inside the burn are used, because the curve has steps at its ends.
         let (from_s, to_s) = ((nominal_s - SLOPE_SPAN_S).max(0.0), nominal_s + SLOPE_SPAN_S);
         let slope_n_s = if nominal_n > 0.0 {
-            (curve.thrust_n(to_s) - curve.thrust_n(from_s)) / (to_s - from_s)
+            (curve.thrust_at_n(to_s) - curve.thrust_at_n(from_s)) / (to_s - from_s)
         } else {
             0.0
         };
@@ -368,12 +352,12 @@ impl MotorEstimate {
         (thrust_n, sensitivity)
     }
 
-    fn follow(&mut self, curve: &impl NominalThrust, sample: &MotorSample, force_n: f64, cosine: f64) {
+    fn follow(&mut self, curve: &ThrustCurve, sample: &MotorSample, force_n: f64, cosine: f64) {
         self.wander();
         self.felt_at_s = sample.time_s;
         let since_s = sample.time_s - 0.5 * self.prior.frame_s - self.mean[IGNITION];
         let (thrust_n, by_motor) = self.thrust(curve, since_s);
-        if since_s < SPIKE_S || thrust_n < TAIL_SHARE * curve.peak_n() {
+        if since_s < SPIKE_S || thrust_n < TAIL_SHARE * curve.peak_thrust_n() {
             self.starved_frames = 0;
             return;
         }
@@ -498,10 +482,10 @@ impl Detector {
 }
 
 /// How long the curve itself takes to rise to the threshold, s.
-fn rise_s(curve: &impl NominalThrust, mark_n: f64) -> f64 {
+fn rise_s(curve: &ThrustCurve, mark_n: f64) -> f64 {
     let steps = (RISE_S / RISE_STEP_S) as u32;
     (0..steps)
         .map(|step| f64::from(step) * RISE_STEP_S)
-        .find(|time_s| curve.thrust_n(*time_s) >= mark_n)
+        .find(|time_s| curve.thrust_at_n(*time_s) >= mark_n)
         .unwrap_or(0.0)
 }

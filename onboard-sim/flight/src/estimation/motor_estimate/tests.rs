@@ -1,27 +1,19 @@
 //! The filter finds the parameters of simulated motors that are drawn from the prior.
 
-use super::*;
-use serde::Serialize;
+use std::sync::LazyLock;
 
-/// A regressive motor like a slow-burning H: it rises in 0.14 s, is flat for a while, then falls for a long time.
-#[derive(Debug, Clone, Copy)]
-struct Curve;
+use super::*;
+use crate::vehicle::thrust_curve::{MotorData, ThrustPoint};
+use serde::Serialize;
 
 const POINTS: [(f64, f64); 7] =
     [(0.0, 0.0), (0.14, 62.0), (1.3, 69.0), (2.5, 61.0), (4.1, 34.0), (5.5, 14.0), (7.2, 0.0)];
 
-impl NominalThrust for Curve {
-    fn thrust_n(&self, time_s: f64) -> f64 {
-        POINTS.windows(2).find(|pair| (pair[0].0..pair[1].0).contains(&time_s)).map_or(0.0, |pair| {
-            let share = (time_s - pair[0].0) / (pair[1].0 - pair[0].0);
-            pair[0].1 + share * (pair[1].1 - pair[0].1)
-        })
-    }
-
-    fn peak_n(&self) -> f64 {
-        69.0
-    }
-}
+/// A regressive motor like a slow-burning H: it rises in 0.14 s, is flat for a while, then falls for a long time.
+static CURVE: LazyLock<ThrustCurve> = LazyLock::new(|| {
+    let points = POINTS.map(|(time_s, thrust_n)| ThrustPoint { time_s, thrust_n }).to_vec();
+    ThrustCurve::new(MotorData { points, ..MotorData::default() }).expect("it has thrust")
+});
 
 /// Approximately standard normal numbers from a small generator: a sum of twelve uniform numbers.
 struct Normal(u64);
@@ -83,7 +75,7 @@ impl Motor {
         let since_s = if self.chuffs && since_s > 0.2 { since_s - 0.2 } else { since_s };
         let spike = if since_s < 0.05 { self.spike } else { 1.0 };
         let wave = 1.0 + self.wave.0 * libm::sin(core::f64::consts::TAU * since_s / self.wave.1);
-        spike * wave * self.impulse / self.stretch * Curve.thrust_n(since_s / self.stretch)
+        spike * wave * self.impulse / self.stretch * CURVE.thrust_at_n(since_s / self.stretch)
     }
 
     /// Falls for four seconds, and burns until `end_s` after ignition.
@@ -109,7 +101,7 @@ impl Motor {
             let force_n = mean_n * cosine + self.air * axial_air_force_n;
             let felt = force_n / mass_kg + prior.accelerometer_m_s2 * normal.next();
             estimate.update(
-                &Curve,
+                &CURVE,
                 &MotorSample {
                     time_s,
                     axial_specific_force_m_s2: felt,
@@ -151,12 +143,12 @@ fn future_thrust_is_predicted_within_its_stated_uncertainty() {
             let motor = Motor::drawn(&mut normal);
             let estimate = motor.found_after(end_s, &mut normal);
             let time_s = motor.ignition_s + end_s + ahead_s;
-            let predicted = estimate.predict(&Curve, time_s, f64::NAN);
+            let predicted = estimate.predict(&CURVE, time_s, f64::NAN);
             let error_n = predicted.thrust_n - motor.thrust_n(time_s);
             squares += (error_n / predicted.sigma_n).powi(2);
             worst_n = worst_n.max(error_n.abs());
             informed += error_n * error_n;
-            ignorant += (Curve.thrust_n(end_s + ahead_s) - motor.thrust_n(time_s)).powi(2);
+            ignorant += (CURVE.thrust_at_n(end_s + ahead_s) - motor.thrust_n(time_s)).powi(2);
         }
         let mean = squares / f64::from(n);
         println!(
@@ -200,8 +192,8 @@ fn a_wrong_shape_is_no_surprise_to_a_filter_that_expects_one() {
 #[test]
 fn an_ignition_spike_does_not_change_the_estimate() {
     let spiked = Motor { spike: 2.5, ..GOOD }.found_after(0.5, &mut Normal(3));
-    let predicted_n = spiked.predict(&Curve, 5.5, f64::NAN).thrust_n;
-    assert!((predicted_n / Curve.thrust_n(1.5) - 1.0).abs() < 0.015, "{predicted_n} {spiked:?}");
+    let predicted_n = spiked.predict(&CURVE, 5.5, f64::NAN).thrust_n;
+    assert!((predicted_n / CURVE.thrust_at_n(1.5) - 1.0).abs() < 0.015, "{predicted_n} {spiked:?}");
 }
 
 /// It burns on from where it went out, and is then known as well as a motor that burnt on at once.
@@ -229,11 +221,11 @@ fn an_early_burnout_is_detected_and_a_weak_motor_is_not_mistaken_for_one() {
     let out = Motor { out_s: 1.2, ..GOOD }.found_after(1.4, &mut Normal(4));
     let MotorStage::EndedEarly { at_s } = out.stage() else { panic!("{out:?}") };
     assert!((at_s - 5.2).abs() < 0.01, "{at_s}");
-    assert_eq!(out.predict(&Curve, 5.3, 0.0), PredictedThrust { thrust_n: 0.0, sigma_n: 0.0 });
+    assert_eq!(out.predict(&CURVE, 5.3, 0.0), PredictedThrust { thrust_n: 0.0, sigma_n: 0.0 });
     let weak = Motor { impulse: 0.8, ..GOOD }.found_after(2.0, &mut Normal(5));
     assert_eq!(weak.stage(), MotorStage::Burning);
     assert!(
-        (weak.predict(&Curve, 6.5, 0.0).thrust_n / (0.8 * Curve.thrust_n(2.5)) - 1.0).abs() < 0.03,
+        (weak.predict(&CURVE, 6.5, 0.0).thrust_n / (0.8 * CURVE.thrust_at_n(2.5)) - 1.0).abs() < 0.03,
         "{weak:?}"
     );
 }
@@ -250,7 +242,7 @@ fn no_ignition_is_found_before_the_igniter_fires_and_bad_samples_change_nothing(
         may_burn: false,
     };
     for frame in 0..100 {
-        estimate.update(&Curve, &MotorSample { time_s: 0.005 * f64::from(frame), ..sample });
+        estimate.update(&CURVE, &MotorSample { time_s: 0.005 * f64::from(frame), ..sample });
     }
     assert_eq!(estimate.stage(), MotorStage::Waiting);
     let before = estimate;
@@ -260,7 +252,7 @@ fn no_ignition_is_found_before_the_igniter_fires_and_bad_samples_change_nothing(
         MotorSample { time_s: f64::NAN, ..sample },
         MotorSample { gimbal_rad: [f64::NAN, 0.0], ..sample },
     ] {
-        estimate.update(&Curve, &bad);
+        estimate.update(&CURVE, &bad);
         assert_eq!(estimate, before, "{bad:?}");
     }
 }

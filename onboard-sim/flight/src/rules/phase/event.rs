@@ -100,51 +100,34 @@ pub enum Event {
     SafingDone,
 }
 
-/// An action that must follow now.
+numbered_enum! {
+/// An action that must follow now, in the crew's words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
 pub enum Effect {
     /// Light the ascent motor.
-    IgniteAscentMotor = 0,
+    IgniteAscentMotor = "ascent motor commanded to light",
     /// Light the landing motor. This is emitted at most once until a restart.
-    IgniteLandingMotor = 1,
+    IgniteLandingMotor = "landing motor commanded to light",
     /// Cut the landing motor's igniter line.
-    InhibitLandingMotor = 2,
+    InhibitLandingMotor = "landing motor inhibited",
     /// Disarm both igniter lines.
-    Disarm = 3,
+    Disarm = "disarmed",
     /// Deploy the parachute.
-    DeployChute = 4,
-    /// Open the fins fully.
-    FinsOpen = 5,
+    DeployChute = "parachute deployed",
+    /// Open the fins fully. The crew can see them.
+    FinsOpen = "",
     /// The countdown began.
-    StartCountdown = 6,
-    CancelCountdown = 7,
+    StartCountdown = "countdown started",
+    CancelCountdown = "countdown cancelled",
     /// Show the 60 s wait before the pad may be approached.
-    ShowPadWait = 8,
+    ShowPadWait = "ABORT on the pad: keep away for 60 s",
     /// Record the loss of the vehicle.
-    RecordLoss = 9,
+    RecordLoss = "vehicle will be lost: landing motor inhibited",
     /// The countdown was held: it is cancelled, but the vehicle is still armed.
-    HoldCountdown = 10,
+    HoldCountdown = "HOLD: no countdown",
     /// Fire the charge between booster and vehicle.
-    SeparateBooster = 11,
+    SeparateBooster = "booster commanded to separate",
 }
-
-impl Effect {
-    /// Every effect, in index order.
-    pub const ALL: [Self; 12] = [
-        Self::IgniteAscentMotor,
-        Self::IgniteLandingMotor,
-        Self::InhibitLandingMotor,
-        Self::Disarm,
-        Self::DeployChute,
-        Self::FinsOpen,
-        Self::StartCountdown,
-        Self::CancelCountdown,
-        Self::ShowPadWait,
-        Self::RecordLoss,
-        Self::HoldCountdown,
-        Self::SeparateBooster,
-    ];
 }
 
 /// A small set of [`Effect`]s.

@@ -13,6 +13,7 @@ use alloc::vec::Vec;
 
 use core::ops::Range;
 
+use crate::vehicle::airframe::Airframe;
 use crate::vehicle::mission::{Mission, StartPoint};
 use serde::Deserialize as _;
 use toml::Spanned;
@@ -160,4 +161,9 @@ fn check_start(mission: &Mission, origin: &str) -> Result<(), MissionError> {
 /// The built-in mission of that name.
 pub fn builtin(name: &str) -> Option<Result<Mission, MissionError>> {
     BUILTIN.iter().find(|(known, _)| *known == name).map(|(name, text)| from_toml(text, name))
+}
+
+/// The airframe of the built-in mission of that name, if there is one.
+pub fn builtin_airframe(name: &str) -> Option<Airframe> {
+    Some(builtin(name)?.ok()?.airframe)
 }

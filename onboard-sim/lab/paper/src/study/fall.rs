@@ -55,7 +55,7 @@ impl Vehicle {
     /// A built-in file is missing: a defect of the build.
     pub(crate) fn new() -> Result<Self, PaperError> {
         let mut airframe =
-            flight::vehicles::airframe::builtin("mk2-h53").ok_or(PaperError::Airframe("mk2-h53"))?;
+            flight::vehicles::mission::builtin_airframe("mk2-h53").ok_or(PaperError::Airframe("mk2-h53"))?;
         airframe.mass.loaded_kg = 3.0;
         airframe.mass.loaded_cg_station_m = CG_STATION_M;
         airframe.mass.loaded_pitch_inertia_kg_m2 = 0.12;

@@ -392,7 +392,7 @@ pub async fn fly_observed(
         phase: vehicle.phase(),
         time_s: vehicle.time_s(),
         solve_times,
-        lateness: pace.into_lateness(),
+        lateness: pace.lateness,
         tx_bytes: links.tx_bytes,
     })
 }

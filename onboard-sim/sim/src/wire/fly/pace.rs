@@ -21,7 +21,7 @@ pub(super) struct Pace {
     frame: Duration,
     due: Instant,
     over_since: Option<Instant>,
-    lateness: Lateness,
+    pub(super) lateness: Lateness,
 }
 
 /// How late frames began, while simulated time was paced: the jitter of the control loop.
@@ -106,9 +106,5 @@ impl Pace {
         }
         tokio::time::sleep_until(self.due.into()).await;
         self.lateness.add(Instant::now().saturating_duration_since(self.due));
-    }
-
-    pub(super) fn into_lateness(self) -> Lateness {
-        self.lateness
     }
 }

@@ -13,13 +13,13 @@ const UNNOTICED_S: f64 = 15.0;
 
 /// What has become of the flight.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Ground {
+pub(super) struct GroundWatch {
     contacts: usize,
     judged: Option<Judged>,
     given_up: bool,
 }
 
-impl Ground {
+impl GroundWatch {
     pub(super) fn judged(&self) -> Option<Judged> {
         self.judged
     }

@@ -24,7 +24,7 @@ use protocol::log::computer_v1::ComputerFrame;
 use protocol::log::record::Record;
 use protocol::log::v1;
 
-use self::ground::Ground;
+use self::ground::GroundWatch;
 
 /// A flight, by recipe and number.
 #[derive(Debug, Clone)]
@@ -40,14 +40,11 @@ pub struct Vehicle {
     findings: Findings,
     /// A frame of the flight computer was flown in the air just now.
     flown: bool,
-    pin_out: bool,
-    log: LogState,
-    uplink: Uplink,
-    commander: Option<Commander>,
-    people: Option<People>,
+    /// What the next frame is told, but for its requests.
+    outside: Outside<'static>,
     operators: Vec<Operator>,
     mission: MissionName,
-    ground: Ground,
+    ground: GroundWatch,
     /// Input and output of the flight computer in the last frame; `None` if it was dead.
     computer_frame: Option<Box<ComputerFrame>>,
     /// How many frames the flight computer has decided.
@@ -74,14 +71,10 @@ impl Vehicle {
             sortie: Sortie::on_the_pad(&flight.recipe, flight.number)?,
             findings: Findings::default(),
             flown: false,
-            pin_out: false,
-            log: LogState::NONE,
-            uplink: Uplink::NotNeeded,
-            commander: None,
-            people: None,
+            outside: Outside { pin_out: false, log: LogState::NONE, ..Outside::NOBODY },
             operators: Vec::new(),
             mission: MissionName::default(),
-            ground: Ground::default(),
+            ground: GroundWatch::default(),
             computer_frame: None,
             frames_decided: 0,
             last: LastFrame::default(),
@@ -90,24 +83,24 @@ impl Vehicle {
 
     /// Moves the pin that a crew moves by hand.
     pub fn set_pin_out(&mut self, pin_out: bool) {
-        self.pin_out = pin_out;
+        self.outside.pin_out = pin_out;
     }
 
     /// Tells the vehicle the state of its log.
     pub fn set_log_state(&mut self, log: LogState) {
-        self.log = log;
+        self.outside.log = log;
     }
 
     /// Tells the vehicle the quality of its uplink, and the station that armed it, if one did.
     pub fn set_uplink(&mut self, uplink: Uplink, commander: Option<Commander>) {
-        self.uplink = uplink;
-        self.commander = commander;
+        (self.outside.uplink, self.outside.commander) = (uplink, commander);
     }
 
     /// Sets who may command, from power-up on.
     #[must_use]
     pub fn with_crew(self, people: People, operators: Vec<Operator>) -> Self {
-        Self { people: Some(people), operators, ..self }
+        let outside = Outside { people: Some(people), ..self.outside };
+        Self { outside, operators, ..self }
     }
 
     /// Sets when it was aborted on its pad before this power-up, vehicle time, s: before zero.
@@ -128,26 +121,9 @@ impl Vehicle {
         Self { mission, ..self }
     }
 
-    /// Who may command; empty without operators.
-    pub fn operators(&self) -> &[Operator] {
-        &self.operators
-    }
-
-    /// How many people an arming and a start take; `None` without operators.
-    pub fn people(&self) -> Option<People> {
-        self.people
-    }
-
     /// Advances by one frame, in which these requests are decided.
     pub fn step(&mut self, requests: &[Request]) -> VehicleStep {
-        let outside = Outside {
-            pin_out: self.pin_out,
-            log: self.log,
-            uplink: self.uplink,
-            commander: self.commander,
-            people: self.people,
-            requests,
-        };
+        let outside = Outside { requests, ..self.outside };
         let output = self.sortie.step_with(&outside, &mut self.last);
         self.computer_frame = self.last.take();
         self.frames_decided += u64::from(self.computer_frame.is_some());

@@ -1,4 +1,4 @@
-//! The barometer.
+//! The barometer: the errors of its ports go with the dynamic pressure (W. Gracey, NASA Reference Publication 1046, 1980).
 
 use flight::estimation::estimator::GRAVITY_M_S2;
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,4 @@
-//! The satellite receiver, whose fixes come late.
+//! The satellite receiver, whose fixes come late: white and wandering errors (Groves 2013, chapter 9).
 
 use flight::estimation::estimator::{GRAVITY_M_S2, GnssFix};
 use flight::vehicle::rigid::RigidState;

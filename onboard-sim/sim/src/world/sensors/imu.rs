@@ -1,4 +1,4 @@
-//! The inertial unit.
+//! The inertial unit: white noise by its density, a bias that walks, scale, axes and range (Groves 2013, chapter 4).
 
 use flight::computer::{FRAME_MS, FRAME_S};
 use flight::estimation::estimator::{GRAVITY_M_S2, ImuSample};
@@ -67,7 +67,8 @@ impl Default for ImuParams {
 }
 
 impl Sensors {
-    /// Specific force where the inertial unit sits: that of the centre of gravity, and what turning adds.
+    /// Specific force where the inertial unit sits: that of the centre of gravity, and what turning adds (Stevens
+    /// and Lewis, chapter 1).
     pub(super) fn force_at_unit_m_s2(&self, truth: &SensorTruth) -> Vector3<f64> {
         let (place, rate) = (&self.flaws.unit_m, &truth.state.rate_rad_s);
         truth.specific_force_m_s2

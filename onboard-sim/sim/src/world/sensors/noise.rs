@@ -9,7 +9,7 @@ use rand_chacha::ChaCha12Rng;
 
 use super::SensorParams;
 
-/// Normal numbers by Box and Muller, on `libm` so that they are the same on every machine.
+/// Normal numbers by Box and Muller (Annals of Mathematical Statistics 29, 1958), on `libm` so that they are the same on every machine.
 #[derive(Debug, Clone)]
 pub(super) struct Normal {
     random: ChaCha12Rng,
@@ -46,7 +46,8 @@ impl Normal {
     }
 }
 
-/// A stationary first-order Gauss-Markov process: its correlation decays exponentially.
+/// A stationary first-order Gauss-Markov process: its correlation decays exponentially (J. A. Farrell, Aided Navigation, 2008,
+/// chapter 4).
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Wander {
     pub(super) value: f64,

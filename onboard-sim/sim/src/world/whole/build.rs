@@ -4,14 +4,13 @@
 use core::f64::consts::FRAC_PI_2;
 
 use flight::vehicle::airframe::{Airframe, BadValue, MassModel, Servo as ServoData};
-use flight::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use flight::vehicle::launch::Launch;
 use flight::vehicle::rigid::RigidState;
 use flight::vehicle::thrust_curve::ThrustCurve;
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::riding::Stack;
-use super::{AirHere, World};
+use super::{AirHere, World, felt_at_rest_m_s2};
 use crate::world::aero::{Parachute, Shape};
 use crate::world::ground::Ground;
 use crate::world::hanging::Hanging;
@@ -126,11 +125,7 @@ impl World {
             world_from_body: lean * standing.world_from_body,
             ..standing
         };
-        self.specific_force_m_s2 = self.state.world_from_body.inverse_transform_vector(&Vector3::new(
-            0.0,
-            0.0,
-            STANDARD_GRAVITY_M_S2,
-        ));
+        self.specific_force_m_s2 = felt_at_rest_m_s2(&self.state);
         self.stack = Some(Box::new(Stack::new(launch, truth)));
         self
     }
@@ -256,7 +251,7 @@ mod tests {
         Actuators { gimbal_rad: [0.02, -0.01], fins_rad: [0.4; 4], ignite: true, ..Actuators::NONE };
 
     fn airframe() -> Airframe {
-        flight::vehicles::airframe::builtin("mk2").unwrap()
+        flight::vehicles::mission::builtin_airframe("mk2").unwrap()
     }
 
     /// Half a second into its burn, with a weakened motor and a slow gimbal, in wind.

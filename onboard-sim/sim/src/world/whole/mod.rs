@@ -402,12 +402,13 @@ impl World {
         self.state.velocity_m_s = Vector3::zeros();
         self.state.rate_rad_s = Vector3::zeros();
         self.angular_acceleration_rad_s2 = Vector3::zeros();
-        self.specific_force_m_s2 = self.state.world_from_body.inverse_transform_vector(&Vector3::new(
-            0.0,
-            0.0,
-            STANDARD_GRAVITY_M_S2,
-        ));
+        self.specific_force_m_s2 = felt_at_rest_m_s2(&self.state);
     }
+}
+
+/// What an accelerometer feels of a vehicle that does not move, body axes, m/s^2.
+fn felt_at_rest_m_s2(state: &RigidState) -> Vector3<f64> {
+    state.world_from_body.inverse_transform_vector(&Vector3::new(0.0, 0.0, STANDARD_GRAVITY_M_S2))
 }
 
 // Read access to the world.
@@ -507,7 +508,7 @@ impl World {
 
     /// Whether the parachute was ejected.
     pub fn parachute_ejected(&self) -> bool {
-        self.parachute.ejected()
+        self.parachute.ejected_s().is_some()
     }
 
     /// Whether the wire between booster and vehicle is whole.

@@ -1,6 +1,7 @@
 //! The wind: a mean that grows with height, and gusts.
 //!
-//! The mean follows the power law over flat open country with the exponent 1/7, from its value 10 m above the
+//! The mean follows the power law over flat open country with the exponent 1/7 (J. F. Manwell, J. G. McGowan and A. L. Rogers, Wind
+//! Energy Explained, 2nd edition, chapter 2), from its value 10 m above the
 //! ground. Gusts are those of [`gusts`].
 
 pub mod gusts;

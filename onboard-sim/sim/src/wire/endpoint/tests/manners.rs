@@ -24,20 +24,12 @@ impl Wire {
     }
 }
 
-fn find<T>(frames: &[Frame], of: impl Fn(MavMessage) -> Option<T>) -> Option<T> {
-    frames.iter().filter_map(|frame| frame.decode().ok()).find_map(of)
-}
-
 #[test]
 fn mission_fence_and_rally_lists_are_empty_and_other_types_are_unsupported() {
     let mut wire = Wire::new();
     for mission_type in 0..3u8 {
         let sent = wire.question(43, &[1, 1, mission_type]);
-        let list = find(&sent, |message| match message {
-            MavMessage::MISSION_COUNT(list) => Some(list),
-            _ => None,
-        })
-        .unwrap();
+        let list = decoded!(sent, MISSION_COUNT).next().unwrap();
         assert_eq!((list.count, list.mission_type as u8), (0, mission_type));
         assert_eq!((list.target_system, list.target_component), (255, 190));
     }
@@ -68,11 +60,8 @@ fn nothing_can_be_put_into_a_list_and_clearing_one_is_done() {
         (73, item(2), MavMissionResult::MAV_MISSION_UNSUPPORTED, 2),
     ] {
         let sent = wire.question(message_id, &payload);
-        let answer = find(&sent, |message| match message {
-            MavMessage::MISSION_ACK(answer) => Some(answer),
-            _ => None,
-        })
-        .unwrap_or_else(|| panic!("message {message_id} is answered"));
+        let answer =
+            decoded!(sent, MISSION_ACK).next().unwrap_or_else(|| panic!("message {message_id} is answered"));
         assert_eq!(
             (answer.mavtype, answer.mission_type as u8),
             (result, mission_type),
@@ -86,16 +75,10 @@ fn nothing_can_be_put_into_a_list_and_clearing_one_is_done() {
 fn the_list_of_logs_on_board_is_empty() {
     let mut wire = Wire::new();
     let sent = wire.question(117, &[0, 0, 0xFF, 0xFF, 1, 1]);
-    let entry = find(&sent, |message| match message {
-        MavMessage::LOG_ENTRY(entry) => Some(entry),
-        _ => None,
-    });
+    let entry = decoded!(sent, LOG_ENTRY).next();
     assert_eq!(entry, Some(LOG_ENTRY_DATA::default()));
     let sent = wire.question(119, &[7, 0, 0, 0, 90, 0, 0, 0, 3, 0, 1, 1]);
-    let data = find(&sent, |message| match message {
-        MavMessage::LOG_DATA(data) => Some((data.ofs, data.id, data.count)),
-        _ => None,
-    });
+    let data = decoded!(sent, LOG_DATA).next().map(|data| (data.ofs, data.id, data.count));
     assert_eq!(data, Some((7, 3, 0)));
 }
 
@@ -110,13 +93,7 @@ fn data_for_maps_and_instruments_is_sent_on_request_and_as_a_stream() {
     ] {
         let mut wire = Wire::new();
         assert_eq!(count(&wire.run(2.0), message_id), 0, "message {message_id} is off until asked for");
-        let request = CommandRequest {
-            source: GROUND,
-            target: VEHICLE,
-            command: 512,
-            params: [message_id as f32, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-            confirmation: 0,
-        };
+        let request = asking(512, [message_id as f32, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
         wire.endpoint.on_command(0, (&request, None), &wire.vehicle.state());
         assert_eq!(count(&wire.run(0.5), message_id), 1, "message {message_id}");
         assert_eq!(wire.ask(511, message_id as f32, 1e6).0, 0);
@@ -127,21 +104,15 @@ fn data_for_maps_and_instruments_is_sent_on_request_and_as_a_stream() {
 #[test]
 fn home_is_the_pad_and_the_compass_shows_where_the_belly_points() {
     let mut wire = Wire::new();
-    let request =
-        CommandRequest { source: GROUND, target: VEHICLE, command: 410, params: [0.0; 7], confirmation: 0 };
+    let request = asking(410, [0.0; 7]);
     wire.endpoint.on_command(0, (&request, None), &wire.vehicle.state());
     let sent = wire.run(1.5);
-    let home = find(&sent, |message| match message {
-        MavMessage::HOME_POSITION(home) => Some((home.latitude, home.longitude, home.altitude)),
-        _ => None,
-    });
+    let home =
+        decoded!(sent, HOME_POSITION).next().map(|home| (home.latitude, home.longitude, home.altitude));
     let site = wire.vehicle.state().mission().site;
     assert_eq!(home, Some(((1e7 * site.latitude_deg) as i32, (1e7 * site.longitude_deg).round() as i32, 0)));
     // Released in the plane north of the pad, nose up: heading north.
-    let heading = find(&sent, |message| match message {
-        MavMessage::VFR_HUD(hud) => Some(hud.heading),
-        _ => None,
-    });
+    let heading = decoded!(sent, VFR_HUD).next().map(|hud| hud.heading);
     assert_eq!(heading, Some(0));
     let mut flight = crate::wire::fly::load_flight("mk2").unwrap();
     flight.recipe.mission.pad_altitude_m = 510.0;
@@ -191,8 +162,7 @@ impl Wire {
             target_component: 1,
             ..COMMAND_LONG_DATA::default()
         };
-        let frame = self.ground.encode(&MavMessage::COMMAND_LONG(command));
-        self.endpoint.on_frame(0, &frame, &self.vehicle.state());
+        self.tell(MavMessage::COMMAND_LONG(command));
         self.run(0.1).iter().filter_map(CommandAnswer::from_frame).collect()
     }
 }
@@ -262,7 +232,7 @@ fn twenty_unknown_commands_at_ten_a_second_are_each_answered() {
     let mut answers = Vec::new();
     for command in 30_000..30_020 {
         let params = [0.0; 7];
-        let request = CommandRequest { source: GROUND, target: VEHICLE, command, params, confirmation: 0 };
+        let request = asking(command, params);
         wire.endpoint.on_command(0, (&request, None), &wire.vehicle.state());
         answers.extend(wire.run(0.1).iter().filter_map(CommandAnswer::from_frame));
     }
@@ -307,10 +277,7 @@ fn the_version_announces_files_and_has_an_id_and_a_hash() {
     wire.endpoint = VehicleEndpoint::new(VehicleKind::Simulated).known_as(77);
     assert_eq!(wire.ask(520, 1.0, 0.0).0, 0);
     let sent = wire.run(1.0);
-    let version = find(&sent, |message| match message {
-        MavMessage::AUTOPILOT_VERSION(version) => Some(version),
-        _ => None,
-    });
+    let version = decoded!(sent, AUTOPILOT_VERSION).next();
     // It may have come with the answer.
     let now = avionics::link::telemetry::message(
         AUTOPILOT_VERSION_DATA::ID,
@@ -332,19 +299,15 @@ fn there_are_no_extended_parameters_and_every_question_is_answered() {
     read[4..8].copy_from_slice(b"NAME");
     for question in [(320, &read[..]), (321, &[1, 1])] {
         let sent = wire.question(question.0, question.1);
-        let error = find(&sent, |message| match message {
-            MavMessage::PARAM_ERROR(error) => Some((error.error, error.target_system, error.param_index)),
-            _ => None,
-        });
+        let error = decoded!(sent, PARAM_ERROR)
+            .next()
+            .map(|error| (error.error, error.target_system, error.param_index));
         assert_eq!(error, Some((MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST, 255, -1)));
     }
     let mut set = [0; 147];
     set[..6].copy_from_slice(&[1, 1, b'N', b'A', b'M', b'E']);
     let sent = wire.question(323, &set);
-    let answer = find(&sent, |message| match message {
-        MavMessage::PARAM_EXT_ACK(answer) => Some((answer.param_result, answer.param_id)),
-        _ => None,
-    });
+    let answer = decoded!(sent, PARAM_EXT_ACK).next().map(|answer| (answer.param_result, answer.param_id));
     let (result, id) = answer.expect("an answer");
     assert_eq!(result, ParamAck::PARAM_ACK_FAILED);
     assert_eq!(id.to_str(), Ok("NAME"));
@@ -433,13 +396,9 @@ fn the_rates_of_every_kind_of_link_fit_it() {
 const ARM: u16 = 400;
 
 fn tell(wire: &mut Wire, head: TD_BOOK_HEAD_DATA) -> Vec<TD_BOOK_KEPT_DATA> {
-    let frame = wire.ground.encode(&MavMessage::TD_BOOK_HEAD(head));
-    wire.endpoint.on_frame(0, &frame, &wire.vehicle.state());
+    wire.tell(MavMessage::TD_BOOK_HEAD(head));
     let sent = wire.run(0.5);
-    let kept = sent.iter().filter_map(|frame| match frame.decode() {
-        Ok(MavMessage::TD_BOOK_KEPT(kept)) => Some(kept),
-        _ => None,
-    });
+    let kept = decoded!(sent, TD_BOOK_KEPT);
     kept.collect()
 }
 
@@ -474,8 +433,7 @@ fn a_flood_of_ends_is_answered_within_the_budget() {
             target_component: 1,
             ..TD_BOOK_HEAD_DATA::default()
         };
-        let frame = wire.ground.encode(&MavMessage::TD_BOOK_HEAD(head));
-        wire.endpoint.on_frame(0, &frame, &wire.vehicle.state());
+        wire.tell(MavMessage::TD_BOOK_HEAD(head));
     }
     let sent = wire.run(1.0);
     let bytes: usize = sent.iter().map(|frame| frame.as_bytes().len()).sum();
@@ -498,8 +456,7 @@ fn arm_for(wire: &mut Wire, params: [f32; 3]) -> (u8, String) {
         target_component: 1,
         ..COMMAND_LONG_DATA::default()
     };
-    let frame = wire.ground.encode(&MavMessage::COMMAND_LONG(arm));
-    wire.endpoint.on_frame(0, &frame, &wire.vehicle.state());
+    wire.tell(MavMessage::COMMAND_LONG(arm));
     let sent = wire.run(0.5);
     let answers: Vec<_> = sent.iter().filter_map(CommandAnswer::from_frame).collect();
     assert_eq!((answers.len(), answers[0].command), (1, ARM));

@@ -146,10 +146,7 @@ impl Range {
     fn reports(&mut self, to: Address) -> Vec<TD_UPLINK_DATA> {
         self.sent.clear();
         self.run(0.6);
-        let reports = self.sent.iter().filter_map(|frame| match frame.decode() {
-            Ok(MavMessage::TD_UPLINK(report)) => Some(report),
-            _ => None,
-        });
+        let reports = decoded!(self.sent, TD_UPLINK);
         let mut reports: Vec<_> = reports.filter(|report| report.target_system == to.system_id).collect();
         let of = |report: &TD_UPLINK_DATA| (report.session, report.commands, report.same_id);
         reports.sort_by_key(of);

@@ -115,7 +115,7 @@ fn seen_motions(rocket: &mut Told) -> Vec<([f64; 2], [f64; 4])> {
 
 /// The words of the crew's page as motions: the nozzle towards fins 1 and 4, 2 and 3, 1 and 2, 3 and 4; then each fin.
 fn motions_of_the_page() -> Vec<([f64; 2], [f64; 4])> {
-    let fins = flight::vehicles::airframe::builtin("mk3").unwrap().fin_model();
+    let fins = flight::vehicles::mission::builtin_airframe("mk3").unwrap().fin_model();
     let towards = |one: usize, other: usize| {
         let middle = [0, 1].map(|axis: usize| fins.outward(one)[axis] + fins.outward(other)[axis]);
         middle.map(|part| if part.abs() < 1e-9 { 0.0 } else { part.signum() })

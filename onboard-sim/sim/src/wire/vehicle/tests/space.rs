@@ -5,7 +5,6 @@ use flight::computer::AbortEffect;
 use flight::computer::pilot::FRAMES_PER_PLAN;
 use flight::rules::outputs::PyroOutput;
 use flight::rules::phase::MotorStatus;
-use protocol::dialect::TdChute;
 use protocol::log::record::Record;
 
 use super::*;
@@ -377,25 +376,6 @@ fn an_abort_on_the_pad_disarms_latches_and_lets_nothing_go() {
     }
 }
 
-#[test]
-fn an_abort_with_room_left_opens_the_parachute_and_lights_nothing() {
-    let flight = flight_of("field", &[]);
-    for phase in [Phase::Deploy, Phase::AeroDescent, Phase::LandArmed] {
-        let mut rocket = in_phase(&flight, phase);
-        rocket.run_until(|rocket| rocket.computer().abort_effect() == AbortEffect::ChuteNow);
-        assert_eq!(rocket.descent().chute, TdChute::TD_CHUTE_STOWED);
-        assert_eq!(rocket.request(Asked::Abort).ending, Ending::Accepted);
-        let events = rocket.run_until(Vehicle::is_over);
-        assert_eq!(phases(&events), [Phase::Chute, Phase::Touchdown]);
-        assert!(said(&events, "parachute deployed") && said(&events, "landing motor inhibited"));
-        assert!(rocket.aborted());
-        let judged = rocket.judged().unwrap();
-        assert!(!judged.landing.stands, "under the parachute it is not a landing");
-        assert!(judged.touchdown.vertical_m_s.abs() < 10.0, "{judged:?}");
-        assert_eq!(rocket.descent().chute, TdChute::TD_CHUTE_OPEN);
-    }
-}
-
 /// Below the commit height: with the gate shut the parachute still fills in time, with the gate open it burns and lands.
 #[test]
 fn an_abort_below_the_commit_height_does_what_is_said_beside_the_key() {
@@ -454,20 +434,4 @@ fn without_light_an_abort_is_a_fall() {
     assert!(said(&events, "the landing motor has not lit") && !said(&events, "landing on the ground"));
     let found_m_s = -rocket.judged().unwrap().touchdown.vertical_m_s;
     assert!((f64::from(m_s) - 2.0..=f64::from(m_s)).contains(&found_m_s), "{m_s} said, {found_m_s} found");
-}
-
-#[test]
-fn on_the_ground_there_is_nothing_to_abort_and_in_the_air_nothing_to_arm() {
-    let flight = flight_of("none", &[]);
-    let mut rocket = in_phase(&flight, Phase::AeroDescent);
-    for asked in [Asked::Arm, Asked::Disarm, Asked::Start] {
-        let answer = rocket.request(asked);
-        assert_eq!(answer.ending, Ending::Denied, "{asked:?}");
-        assert!(answer.reason.unwrap().contains("AERO_DESCENT"));
-    }
-    rocket.run_until(|rocket| rocket.phase() == Phase::Touchdown);
-    assert_eq!(rocket.computer().abort_effect(), AbortEffect::None);
-    let answer = rocket.request(Asked::Abort);
-    assert_eq!(answer.ending, Ending::Failed);
-    assert!(answer.reason.unwrap().contains("on the ground"));
 }

@@ -91,7 +91,7 @@ proptest! {
 #[test]
 fn the_same_arguments_give_the_same_bits() {
     let fly = |seed: u64| {
-        let airframe = flight::vehicles::airframe::builtin("mk2").unwrap();
+        let airframe = flight::vehicles::mission::builtin_airframe("mk2").unwrap();
         let motor = motors::builtin(&airframe.motor).unwrap();
         let mut world = World::new(&airframe, &motor, &windy(), &leaning(150.0, 0.05, 0.02), seed).unwrap();
         world.advance(&OPEN, 2000);
@@ -133,7 +133,7 @@ fn a_slow_gimbal_turns_at_its_reduced_rate() {
 
 #[test]
 fn data_out_of_range_are_refused() {
-    let airframe = flight::vehicles::airframe::builtin("mk2").unwrap();
+    let airframe = flight::vehicles::mission::builtin_airframe("mk2").unwrap();
     let motor = motors::builtin("H45W").unwrap();
     let start = RigidState::upright(100.0);
     let refuse = |truth: &Truth, start: &RigidState| {

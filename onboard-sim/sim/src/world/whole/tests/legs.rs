@@ -10,7 +10,7 @@ const CRUSH: Crush =
 
 /// mk2 with blocks in its legs, stiff springs without damping, and 110 mm below the nozzle.
 fn on_blocks(crush: Crush) -> Airframe {
-    let mut airframe = flight::vehicles::airframe::builtin("mk2").unwrap();
+    let mut airframe = flight::vehicles::mission::builtin_airframe("mk2").unwrap();
     airframe.legs.foot_station_m = -0.11;
     airframe.legs.stiffness_n_m = 20_000.0;
     airframe.legs.damping_n_s_m = 20.0;
@@ -178,7 +178,7 @@ fn at_contact(airframe: &Airframe, contact: &Contact, number: usize) -> World {
 
 /// mk3 with blocks of a force, N, and guides that add a share of the force across, on ground of a friction.
 fn mk3_on((force_n, guide_share): (f64, f64), friction: f64) -> Airframe {
-    let mut mk3 = flight::vehicles::airframe::builtin("mk3").unwrap();
+    let mut mk3 = flight::vehicles::mission::builtin_airframe("mk3").unwrap();
     mk3.legs.friction_coefficient = friction;
     mk3.legs.crush = mk3.legs.crush.map(|crush| Crush { force_n, guide_share, ..crush });
     mk3
@@ -266,7 +266,7 @@ fn the_drop_test_on_the_page_has_the_worlds_bounds() {
     // Across a foot hang 5 kg.
     let adds_n = [soft, hard].map(|(_, guide_share)| 5.0 * STANDARD_GRAVITY_M_S2 * guide_share);
     assert!(words.contains(&format!("{:.0} to {:.0} N more", adds_n[0], adds_n[1])), "{adds_n:?}");
-    let mk3 = flight::vehicles::airframe::builtin("mk3").unwrap();
+    let mk3 = flight::vehicles::mission::builtin_airframe("mk3").unwrap();
     let Crush { force_n, guide_share, .. } = mk3.legs.crush.unwrap();
     let most_n = force_n / (1.0 - guide_share * mk3.legs.friction_coefficient);
     assert!(page.contains(&format!("| foot gives way at | {force_n} to {most_n:.0} N |")), "{most_n}");
@@ -302,7 +302,7 @@ fn the_drop_test_on_the_page_has_the_worlds_bounds() {
 /// Legs cannot make good what they were not designed for, and the verdict says so.
 #[test]
 fn mk3s_legs_give_way_to_what_they_were_not_designed_for() {
-    let mk3 = flight::vehicles::airframe::builtin("mk3").unwrap();
+    let mk3 = flight::vehicles::mission::builtin_airframe("mk3").unwrap();
     let (_, strain) = until_rest(&mut at_contact(&mk3, &contact(4.5, 0.0, 0.0, 0.0, 0.0), 1));
     assert!(strain.stroke_used >= 1.0 && strain.strength_used > 1.0, "{strain:?}");
     let (outcome, _) = until_rest(&mut at_contact(&mk3, &contact(1.0, 4.0, 25.0, 0.0, 0.0), 1));

@@ -15,7 +15,7 @@ const OPEN: Actuators = Actuators { gimbal_rad: [0.0; 2], fins_rad: [FRAC_PI_2; 
 
 /// A built-in airframe on four springs without a block that gives way.
 fn on_springs(name: &str) -> Airframe {
-    let mut airframe = flight::vehicles::airframe::builtin(name).unwrap();
+    let mut airframe = flight::vehicles::mission::builtin_airframe(name).unwrap();
     let legs = &mut airframe.legs;
     (legs.foot_station_m, legs.stiffness_n_m, legs.damping_n_s_m, legs.crush) = (-0.06, 2_000.0, 45.0, None);
     airframe
@@ -182,7 +182,7 @@ fn val_gimbal_signs_and_arm() {
 /// The centre of gravity goes `m l / M` of the angle to the side.
 #[test]
 fn val_hand_a_swinging_motor_turns_the_body_back() {
-    let mut airframe = flight::vehicles::airframe::builtin("mk2").unwrap();
+    let mut airframe = flight::vehicles::mission::builtin_airframe("mk2").unwrap();
     airframe.gimbal.pivot_station_m = 0.147;
     let motor = motors::builtin(&airframe.motor).unwrap();
     let truth = Truth { drag_scale: 0.0, gust_scale: 0.0, ..Truth::default() };

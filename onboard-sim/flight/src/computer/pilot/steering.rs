@@ -1,0 +1,152 @@
+//! Points fins and gimbal.
+
+use nalgebra::Vector3;
+
+use super::vehicle_model::Burning;
+use super::{Pilot, Pointed};
+use crate::computer::KeptInput;
+use crate::control::aim::Aim;
+use crate::control::fins::{Allocation, FinCommand, OpeningRange};
+use crate::estimation::estimator::Estimate;
+use crate::guidance::descent::{DescentSituation, LEAST_AIRSPEED_M_S};
+use crate::guidance::powered::ControlLevel;
+use crate::rules::phase::{Mode, Phase};
+use crate::vehicle::airframe::MassProperties;
+use crate::vehicle::fins::Moments;
+
+/// Below this thrust the gimbal cannot turn the vehicle, N.
+const STEERING_THRUST_N: f64 = 3.0;
+
+/// Beyond this angle between nose and airflow, rad, the moment of the body is larger than the moment that partly closed
+/// fins can set against it: all fins are opened then.
+const ACROSS_THE_AIR_RAD: f64 = 0.65;
+
+/// Whether the air comes so far from the side that only fully open fins turn the vehicle back.
+fn lies_across_the_air(estimate: &Estimate) -> bool {
+    let through_air = estimate.velocity_through_air_m_s();
+    let airspeed_m_s = through_air.norm();
+    let along_m_s = -through_air.dot(&estimate.state.nose_in_world());
+    airspeed_m_s > LEAST_AIRSPEED_M_S && along_m_s < airspeed_m_s * libm::cos(ACROSS_THE_AIR_RAD)
+}
+
+impl Pilot {
+    /// Points fins and gimbal.
+    pub(crate) fn point(&mut self, mode: &Mode, input: &KeptInput) -> Pointed {
+        let flying = mode.phase.in_landing_burn();
+        if let Some(estimate) = self.estimate {
+            let estimate = &estimate;
+            let thrusting = self.burning(mode, input.time_s);
+            let burning = thrusting.as_ref().filter(|_| flying);
+            // The thrust still carries a vehicle that stands: the legs then carry little, and the wind tips it over. So the gimbal
+            // holds it upright until the thrust ends.
+            let balances = self.model.mission.upright_after_contact && mode.phase == Phase::Touchdown;
+            self.gimbal_rad = match burning {
+                Some(burning) => {
+                    self.fin_share = self.powered.fin_share(input.time_s).unwrap_or(self.fin_share);
+                    self.gimbal(input.time_s, estimate, burning, &input.fins_rad)
+                }
+                None => match thrusting.as_ref().filter(|_| balances) {
+                    Some(burning) => self.turned_towards(&Aim::upright(), estimate, burning),
+                    None => [0.0; 2],
+                },
+            };
+            let mass = self.model.mass_now(self.model.burning_s(input.time_s));
+            self.fins_rad =
+                self.fins(mode, estimate, &mass, self.model.density_kg_m3(estimate), burning.is_some());
+        }
+        let level = if flying { self.powered.report().level } else { ControlLevel::Idle };
+        Pointed { gimbal_rad: self.gimbal_rad, fins_rad: self.fins_rad, level }
+    }
+
+    fn gimbal(
+        &mut self,
+        time_s: f64,
+        estimate: &Estimate,
+        situation: &Burning,
+        fins_rad: &[f64; 4],
+    ) -> [f64; 2] {
+        let fins_m2 = self.model.fin_drag_area_m2(fins_rad);
+        let aim: Aim = self.powered.aim(
+            time_s,
+            &estimate.state,
+            &self.model.powered_situation(estimate, situation, self.model.burn(), fins_m2),
+        );
+        self.turned_towards(&aim, estimate, situation)
+    }
+
+    /// The gimbal's command that turns the nose as an aim wants.
+    fn turned_towards(&mut self, aim: &Aim, estimate: &Estimate, situation: &Burning) -> [f64; 2] {
+        let thrust_n = self.model.burn().thrust_n(situation.burning_s);
+        let turning_rad_s2 = if thrust_n > STEERING_THRUST_N {
+            thrust_n * self.model.airframe().thrust_arm_m(situation.mass.cg_station_m)
+                / situation.mass.pitch_inertia_kg_m2
+        } else {
+            0.0
+        };
+        let limit_rad = self.model.airframe().gimbal.limit_rad();
+        self.aim_loop.command_rad(
+            &estimate.state.world_from_body,
+            &estimate.state.rate_rad_s,
+            turning_rad_s2,
+            aim,
+            limit_rad,
+        )
+    }
+
+    fn fins(
+        &self,
+        mode: &Mode,
+        estimate: &Estimate,
+        mass: &MassProperties,
+        density_kg_m3: f64,
+        burning: bool,
+    ) -> [f64; 4] {
+        let fins = &self.model.airframe().fins;
+        // If no landing is steered for, the fins brake, fully open.
+        let steering = matches!(mode.phase, Phase::AeroDescent | Phase::LandArmed | Phase::Ignition)
+            && !mode.interlocks.landing_motor_inhibited;
+        if !(steering || burning) {
+            return match mode.phase {
+                phase if phase.before_apogee() => [fins.closed_rad(); 4],
+                // On the ground they stay where they are: no servo needs to move there.
+                Phase::Touchdown | Phase::Safed => self.fins_rad,
+                Phase::Deploy if !self.model.mission.descent.opens_fins => [fins.control_min_rad(); 4],
+                _ => [fins.open_rad(); 4],
+            };
+        }
+        let largest_m2 = self.model.airframe().open_fin_drag_area_m2();
+        let fins_m2 = self.model.fin_drag_area_m2(&self.fins_rad);
+        let situation = DescentSituation {
+            mass_kg: mass.mass_kg,
+            inertia_kg_m2: [mass.roll_inertia_kg_m2, mass.pitch_inertia_kg_m2],
+            air_density_kg_m3: density_kg_m3,
+            wind_m_s: estimate.wind_m_s.push(0.0),
+            drag_area_m2: self.model.body_drag_area_m2() + fins_m2,
+            crossflow_area_m2: self.model.crossflow_area_m2(),
+            restoring_m3: self.model.airframe().restoring_m3(fins_m2, mass.cg_station_m),
+            body_behind_cg_m: mass.cg_station_m - 0.5 * self.model.airframe().body.length_m,
+            time_to_go_s: self.prediction.ignition.command_in_s,
+        };
+        let demand = self.model.mission.descent.demand(&estimate.state, &situation);
+        let (moments, drag_area_m2, min_rad) = if burning {
+            // During the burn the gimbal turns the vehicle; the fins brake and stop it from rolling.
+            (Vector3::new(demand.moment_n_m.x, 0.0, 0.0), self.fin_share * largest_m2, fins.closed_rad())
+        } else if !self.model.mission.descent.opens_fins {
+            return [fins.control_min_rad(); 4];
+        } else if !lies_across_the_air(estimate) {
+            (demand.moment_n_m, largest_m2, fins.control_min_rad())
+        } else {
+            return [fins.open_rad(); 4];
+        };
+        let allocation = Allocation {
+            model: self.model.airframe().fin_model(),
+            arm_m: fins.station_m - mass.cg_station_m,
+            range: OpeningRange { min_rad, max_rad: fins.open_rad() },
+        };
+        let command = FinCommand {
+            moments: Moments { roll_n_m: moments.x, pitch_n_m: moments.y, yaw_n_m: moments.z },
+            drag_area_m2,
+        };
+        allocation.openings_rad(&command, demand.dynamic_pressure_pa)
+    }
+}
