@@ -191,26 +191,20 @@ fn on_again(model: &mut Model, dialog: Dialog, by_hand: bool, now: Duration) {
 
 /// The crew has completed every step of a dialog.
 fn confirmed(model: &mut Model, prompt: Prompt, now: Duration) {
+    if let Prompt::Confirm(waits) = &prompt
+        && let Some(why) = why_not_confirm(model, waits, now)
+    {
+        return model.warn(now, format!("nothing is confirmed: {why}"));
+    }
+    if let Some(kind) = prompt.command() {
+        return ask(model, kind, now);
+    }
     match prompt {
-        Prompt::Arm => ask(model, CommandKind::Arm, now),
-        Prompt::Start => ask(model, CommandKind::Start, now),
-        Prompt::Confirm(waits) => match why_not_confirm(model, &waits, now) {
-            None if waits.act == TdAct::TD_ACT_START => ask(model, CommandKind::ConfirmStart, now),
-            None => ask(model, CommandKind::ConfirmArm, now),
-            Some(why) => model.warn(now, format!("nothing is confirmed: {why}")),
-        },
         Prompt::WithoutLog => request(model, Request::WithoutLog, now),
         Prompt::Untested => request(model, Request::Untested, now),
-        Prompt::TakeCommand => ask(model, CommandKind::TakeCommand, now),
-        Prompt::Hold => ask(model, CommandKind::Hold, now),
-        Prompt::Disarm => ask(model, CommandKind::Disarm, now),
-        Prompt::AbortForeign => ask(model, CommandKind::Abort, now),
-        Prompt::Check { moves: true } => ask(model, CommandKind::Check, now),
-        Prompt::Seen => ask(model, CommandKind::Seen, now),
-        Prompt::Check { moves: false } => ask(model, CommandKind::CheckStill, now),
         Prompt::Sign { step, void } => pad::ask_to_sign(model, (step, void), now),
         // A live station must keep running without its screen; a demonstration or an attached screen may end.
-        Prompt::Quit => {
+        _ => {
             let stays = model.settings.role == Role::Station && !model.settings.demonstration;
             let leave =
                 if stays && why_not_quit(model, now).is_some() { Action::LeaveScreen } else { Action::Quit };
