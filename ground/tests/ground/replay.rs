@@ -59,7 +59,7 @@ fn recording() -> Recording {
 }
 
 fn load(path: &Path) -> Result<Recording, RecordingError> {
-    Recording::load(path, None, &mut |_| {})
+    Recording::load(path, None)
 }
 
 /// Every event of a recording with its time.
