@@ -343,9 +343,7 @@ impl Station {
                 Action::ReplayFlight => self.again.begin(model, now),
                 Action::WriteReport => self.write_report(model, now),
                 Action::MovePin(out) => self.demo.iter().for_each(|demo| demo.move_pin(out)),
-                // Only attached screens send requests.
-                Action::Request(_) => {}
-                Action::Tell(request) => {
+                Action::Request(request) => {
                     self.publish(&Msg::Asked { request, by: model.settings.seat.clone() }, now);
                 }
                 Action::LeaveScreen => next = next.max(Next::LeaveScreen),

@@ -202,7 +202,12 @@ fn confirmed(model: &mut Model, prompt: Prompt, now: Duration) {
     match prompt {
         Prompt::WithoutLog => request(model, Request::WithoutLog, now),
         Prompt::Untested => request(model, Request::Untested, now),
-        Prompt::Sign { step, void } => pad::ask_to_sign(model, (step, void), now),
+        Prompt::Sign { step, void } => {
+            let step = u8::try_from(step).unwrap_or(u8::MAX);
+            request(model, Request::Sign { step, void }, now);
+            // The next step that is open is chosen.
+            model.pages.step = None;
+        }
         // A live station must keep running without its screen; a demonstration or an attached screen may end.
         _ => {
             let stays = model.settings.role == Role::Station && !model.settings.demonstration;
@@ -343,7 +348,7 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
             }
         }
         Act::ReplayFlight => update::replay_flight(model, now),
-        Act::Report => update::write_report(model, now),
+        Act::Report => update::ask_for_report(model, now),
         Act::MovePin if act.works(model, now) => {
             let is_out = model
                 .vehicle
@@ -440,14 +445,12 @@ fn ask(model: &mut Model, kind: CommandKind, now: Duration) {
 }
 
 /// Does what the crew has asked for and tells the other screens, or asks the station to.
-fn request(model: &mut Model, request: Request, now: Duration) {
-    match model.settings.role {
-        Role::Attached => model.outbox.push(Action::Request(request)),
-        Role::Station => {
-            model.outbox.push(Action::Tell(request));
-            on_request(model, request, model.settings.seat.clone(), now);
-        }
-        Role::Watching | Role::Replaying => {}
+pub(super) fn request(model: &mut Model, request: Request, now: Duration) {
+    if model.settings.role.why_not_command().is_none() {
+        model.outbox.push(Action::Request(request));
+    }
+    if model.settings.role == Role::Station {
+        on_request(model, request, model.settings.seat.clone(), now);
     }
 }
 

@@ -242,7 +242,13 @@ fn on_request(model: &mut Model, request: Request, by: Seat, now: Duration) {
     match request {
         Request::Command(kind) => keys::command(model, kind, &by, now),
         Request::Acknowledge(kind) => keys::acknowledge(model, kind, now),
-        Request::Report => write_report(model, now),
+        Request::Report => match why_nothing_flown(model) {
+            Some(why) => model.info(now, format!("no report: {why}")),
+            None => {
+                model.info(now, "the report is being written");
+                model.outbox.push(Action::WriteReport);
+            }
+        },
         Request::Choose(boot) => vehicle_changes::choose(model, boot, &by, now),
         Request::RangeTest => pad::begin_range_test(model, by, now),
         Request::WithoutLog => keys::without_log(model, &by, now),
@@ -339,16 +345,10 @@ pub(super) fn replay_flight(model: &mut Model, now: Duration) {
 }
 
 /// Has the report written, by the station.
-pub(super) fn write_report(model: &mut Model, now: Duration) {
+fn ask_for_report(model: &mut Model, now: Duration) {
     let watches = (model.settings.role == Role::Watching).then_some("this screen only watches");
     match why_nothing_flown(model).or(watches) {
         Some(why) => model.info(now, format!("no report: {why}")),
-        None if model.settings.role == Role::Attached => {
-            model.outbox.push(Action::Request(Request::Report));
-        }
-        None => {
-            model.info(now, "the report is being written");
-            model.outbox.push(Action::WriteReport);
-        }
+        None => keys::request(model, Request::Report, now),
     }
 }

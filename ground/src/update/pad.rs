@@ -5,7 +5,7 @@ use std::time::Duration;
 use protocol::dialect::{TD_PAD_CHECK_DATA, TdPadCheckState};
 use protocol::log::record::EventLevel;
 
-use super::{Action, Request, tick};
+use super::{Action, tick};
 use crate::model::{
     ChecklistEntry, Mark, Model, PadCheck, Prompt, RangeTest, Role, Seat, Signature, Speaker, role_name,
     shown, why_not_check, words,
@@ -24,20 +24,6 @@ pub(super) fn open_sign_dialog(model: &mut Model, void: bool, now: Duration) {
         return refuse_signature(model, (step, void), &seat, &why, now);
     }
     model.dialog = Some(Prompt::Sign { step, void }.open(now));
-}
-
-/// The dialog is complete: signs here, or asks the station to.
-pub(super) fn ask_to_sign(model: &mut Model, (step, void): (usize, bool), now: Duration) {
-    match model.settings.role {
-        Role::Attached => {
-            let step = u8::try_from(step).unwrap_or(u8::MAX);
-            model.outbox.push(Action::Request(Request::Sign { step, void }));
-        }
-        Role::Station => sign(model, (step, void), &model.settings.seat.clone(), now),
-        Role::Watching | Role::Replaying => {}
-    }
-    // The next step that is open is chosen.
-    model.pages.step = None;
 }
 
 /// Signs or voids a step for a person at a screen of this station, unless the step or the person does not fit.
