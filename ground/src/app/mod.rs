@@ -147,7 +147,7 @@ pub fn run(given: &ArgMatches) -> anyhow::Result<Exit> {
 async fn session(args: &StationArgs, config: &Config, duty: Duty) -> anyhow::Result<Exit> {
     let clock = Clock::start();
     let demo_options = match &args.flags.link.connect[..] {
-        [] => Some(DemoOptions::load(&args.demonstration(), args.flags.link.vehicle().system_id)?),
+        [] => Some(DemoOptions::load(args)?),
         _ => None,
     };
     let header = match &demo_options {
@@ -228,7 +228,7 @@ async fn start(
     let mut model = Model::new(Settings {
         // With several links, each has its own.
         link_capacity_bytes_s: wire.capacity_bytes_s(),
-        vehicle_name: demo.as_ref().map(|_| args.demonstration().profile.to_owned()),
+        vehicle_name: demo.as_ref().map(|_| args.profile().to_owned()),
         log_path: recorder.as_ref().map(|recorder| recorder.path().display().to_string()),
         tlog_path: recorder.as_ref().and_then(Recorder::tlog_path).map(|path| path.display().to_string()),
         us: link.us(),

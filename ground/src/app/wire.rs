@@ -212,7 +212,7 @@ impl Wire {
                 LinkEvent::Down(why) if self.links.each().all(|(_, link)| link.trouble().is_some()) => {
                     msgs.push(Msg::LinkDown(why));
                 }
-                LinkEvent::Down(why) => msgs.push(Msg::OneLinkDown(why)),
+                LinkEvent::Down(why) => msgs.push(Msg::LinkSays(format!("one link down: {why}"))),
             }
         }
     }

@@ -91,8 +91,6 @@ pub enum Msg {
     LinkUp(String),
     /// No link works; the reason.
     LinkDown(String),
-    /// One of several links does not work; the reason.
-    OneLinkDown(String),
     /// A warning about the links for the crew.
     LinkSays(String),
     Log(LogHealth),
@@ -200,9 +198,6 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
             let why = protocol::text::printable(why.as_bytes());
             model.warn(now, format!("link down: {why}"));
             model.link.trouble = Some(why);
-        }
-        Msg::OneLinkDown(why) => {
-            model.warn(now, format!("one link down: {}", protocol::text::printable(why.as_bytes())));
         }
         Msg::LinkSays(words) => model.warn(now, protocol::text::printable(words.as_bytes())),
         Msg::HeardOver(number) => model.link.heard_over = Some(number),
