@@ -288,30 +288,6 @@ mod tests {
         vec![condition(AlarmKind::LinkLost, 1)]
     }
 
-    #[test]
-    fn an_alarm_stays_after_its_condition_ends_until_it_is_acknowledged() {
-        let mut alarms = Alarms::default();
-        assert_eq!(alarms.watch(S(1), lost()).len(), 1);
-        assert!(alarms.watch(S(2), lost()).is_empty(), "raised once");
-        alarms.watch(S(3), Vec::new());
-        assert_eq!(alarms.list()[0].ended_at, Some(S(3)));
-        assert!(alarms.acknowledge(AlarmKind::LinkLost).is_some());
-        assert!(alarms.list().is_empty());
-    }
-
-    #[test]
-    fn an_acknowledged_alarm_stays_while_its_condition_holds_and_is_raised_again_later() {
-        let mut alarms = Alarms::default();
-        alarms.watch(S(1), lost());
-        alarms.acknowledge(AlarmKind::LinkLost);
-        alarms.watch(S(2), lost());
-        assert!(alarms.list()[0].acknowledged);
-        alarms.watch(S(3), Vec::new());
-        assert!(alarms.list().is_empty());
-        assert_eq!(alarms.watch(S(4), lost()).len(), 1);
-        assert_eq!(alarms.unacknowledged(), 1);
-    }
-
     /// The link that is lost later hides neither an abort that does not work nor a station that is gone.
     #[test]
     fn the_most_urgent_alarm_is_foremost_and_of_equal_ones_the_newest() {
@@ -331,54 +307,6 @@ mod tests {
         assert_eq!(foremost(&alarms), Some(AlarmKind::StationSilent), "the other one is seen");
         alarms.watch(S(5), conditions[2..].to_vec());
         assert_eq!(foremost(&alarms), Some(AlarmKind::LinkLost), "what holds goes before what has ended");
-    }
-
-    /// A screen that attaches late lists past alarms and rings only for those that still hold.
-    #[test]
-    fn an_alarm_that_ended_before_the_screen_attached_does_not_ring() {
-        let mut alarms = Alarms::in_history();
-        let down = condition(AlarmKind::LinkDown, 1);
-        alarms.watch(S(1), [lost(), vec![down.clone()]].concat());
-        assert!(!alarms.rings(S(1), true));
-        alarms.watch(S(9), vec![down]);
-        assert!(!alarms.rings(S(9), false));
-        alarms.history_ends();
-        assert!(alarms.rings(S(10), false), "the link is still down");
-        assert_eq!(alarms.foremost().map(|alarm| alarm.kind), Some(AlarmKind::LinkDown));
-        alarms.watch(S(11), Vec::new());
-        assert!(alarms.rings(S(20), false), "nobody has seen it, and it was there when the screen came");
-        alarms.acknowledge(AlarmKind::LinkLost);
-        alarms.acknowledge(AlarmKind::LinkDown);
-        assert!(alarms.list().is_empty());
-
-        let mut alarms = Alarms::in_history();
-        alarms.watch(S(1), lost());
-        alarms.watch(S(2), Vec::new());
-        alarms.history_ends();
-        assert!(alarms.list()[0].past && !alarms.rings(S(30), false));
-        assert_eq!(alarms.watch(S(40), lost()).len(), 1, "it has come back");
-        assert!(!alarms.list()[0].past && alarms.rings(S(40), true));
-    }
-
-    #[test]
-    fn the_bell_rings_at_once_and_again_until_acknowledged() {
-        let mut alarms = Alarms::default();
-        let raised = !alarms.watch(S(1), lost()).is_empty();
-        assert!(alarms.rings(S(1), raised));
-        assert!(!alarms.rings(S(2), false));
-        assert!(alarms.rings(S(1) + RING_EVERY, false));
-        alarms.acknowledge(AlarmKind::LinkLost);
-        assert!(!alarms.rings(S(60), false));
-    }
-
-    #[test]
-    fn alarms_are_acknowledged_one_by_one() {
-        let mut alarms = Alarms::default();
-        let down = condition(AlarmKind::LinkDown, 1);
-        alarms.watch(S(1), [lost(), vec![down]].concat());
-        alarms.acknowledge(AlarmKind::LinkLost);
-        assert_eq!(alarms.unacknowledged(), 1);
-        assert!(alarms.rings(S(9), false), "the other is not seen yet");
     }
 
     #[test]

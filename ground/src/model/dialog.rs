@@ -406,13 +406,6 @@ mod chord_tests {
     }
 
     #[test]
-    fn a_held_key_never_aborts() {
-        for delay_ms in [250, 400, 500, 600, 1_000] {
-            assert_eq!(aborts(&held(delay_ms, 33, 200)), 0, "first repeat after {delay_ms} ms");
-        }
-    }
-
-    #[test]
     fn two_presses_abort_once_whether_fast_or_slow() {
         for pause_ms in [120, 150, 200, 350, 600, 1_000, 1_500, 2_000] {
             assert_eq!(aborts(&[0, pause_ms]), 1, "{pause_ms} ms between");

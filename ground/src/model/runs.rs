@@ -630,21 +630,6 @@ mod tests {
         }
     }
 
-    #[test]
-    fn a_chosen_boot_is_shown_while_it_is_heard() {
-        let mut runs = Runs::default();
-        let [mut first, mut second] = [Sender::new(1, 7, 0), Sender::new(2, 9, 0)];
-        for ms in (10_000..20_000).step_by(100) {
-            runs.hear(&first.word(ms), at(ms));
-            runs.hear(&second.word(ms), at(ms));
-            if ms == 15_000 {
-                assert!(!runs.choose(8, at(ms)) && runs.choose(9, at(ms)));
-            }
-            assert_eq!(runs.settle(at(ms)).is_some(), ms == 15_000);
-            assert_eq!(runs.is_chosen(at(ms)), ms >= 15_000);
-        }
-    }
-
     proptest! {
         /// Whatever else is heard, in any order and at any rate: the shown vehicle keeps the screen while it is heard.
         #[test]
