@@ -326,7 +326,7 @@ pub const ABORT_WORDS: &str = "abort, from anywhere: Enter within 2 s of Ctrl-X 
 
 /// What an entry of the palette does.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Does {
+pub enum PaletteAction {
     /// The same as its key.
     Act(Act),
     /// Only says which keys abort.
@@ -341,7 +341,7 @@ pub struct PaletteEntry {
     pub words: String,
     /// Empty without a key.
     pub key: String,
-    pub does: Does,
+    pub action: PaletteAction,
 }
 
 /// The entries whose words contain every typed word.
@@ -353,12 +353,15 @@ pub fn palette_entries(model: &Model, typed: &str, now: Duration) -> Vec<Palette
 }
 
 fn every_entry(model: &Model, now: Duration) -> impl Iterator<Item = PaletteEntry> {
-    let abort =
-        PaletteEntry { words: ABORT_WORDS.to_owned(), key: "Ctrl-X".to_owned(), does: Does::TellAbort };
+    let abort = PaletteEntry {
+        words: ABORT_WORDS.to_owned(),
+        key: "Ctrl-X".to_owned(),
+        action: PaletteAction::TellAbort,
+    };
     let acts = DEFINITIONS.iter().map(|definition| PaletteEntry {
         words: definition.words.to_owned(),
         key: model.settings.keys.name(definition.act),
-        does: Does::Act(definition.act),
+        action: PaletteAction::Act(definition.act),
     });
     let boots = model.vehicle.boot.number().into_iter().chain(model.other_boots(now));
     let several = !model.other_boots(now).is_empty();
@@ -370,13 +373,13 @@ fn every_entry(model: &Model, now: Duration) -> impl Iterator<Item = PaletteEntr
                 words::boot(boot)
             ),
             key: String::new(),
-            does: Does::Choose(boot),
+            action: PaletteAction::Choose(boot),
         })
         .collect();
     let plots = quantity::ALL.iter().map(|quantity| PaletteEntry {
         words: format!("plot {}", quantity.name),
         key: String::new(),
-        does: Does::Plot(quantity),
+        action: PaletteAction::Plot(quantity),
     });
     std::iter::once(abort).chain(choices).chain(acts).chain(plots)
 }

@@ -288,7 +288,7 @@ impl Commands {
 pub fn why_nothing_moves(model: &Model, now: Duration) -> Option<String> {
     let Settings { us, vehicle: of, .. } = &model.settings;
     let vehicle = &model.vehicle;
-    if model.beside(now).is_some() && !model.runs.is_chosen(now) {
+    if model.beside(now).is_some() && !model.boots.is_chosen(now) {
         return Some(format!("TWO VEHICLES under id {}: switch one off", of.system_id));
     }
     if let Some(foreign) =

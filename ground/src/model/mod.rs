@@ -5,6 +5,7 @@
 
 mod act;
 mod alarm;
+mod boots;
 mod checklist;
 mod checks;
 mod command;
@@ -20,7 +21,6 @@ mod pad_check;
 mod page;
 mod place;
 pub mod quantity;
-mod runs;
 mod safety;
 pub mod telemetry;
 mod vehicle;
@@ -40,6 +40,7 @@ use serde::{Deserialize, Serialize};
 
 pub use act::*;
 pub use alarm::*;
+pub use boots::*;
 pub use checklist::*;
 pub use checks::*;
 pub use command::*;
@@ -53,7 +54,6 @@ pub use motion::*;
 pub use pad_check::*;
 pub use page::*;
 pub use place::*;
-pub use runs::*;
 pub use safety::*;
 pub use vehicle::*;
 
@@ -183,10 +183,10 @@ pub struct Model {
     pub settings: Settings,
     /// The vehicle, as its telemetry shows it.
     pub vehicle: Vehicle,
-    /// Which runs of which vehicles are heard.
-    pub runs: Runs,
-    /// The vehicles of the runs that are not shown.
-    pub(crate) others: BTreeMap<RunId, Vehicle>,
+    /// Which boots of which vehicles are heard.
+    pub boots: Boots,
+    /// The vehicles of the boots that are not shown.
+    pub(crate) others: BTreeMap<BootId, Vehicle>,
     pub link: Link,
     pub commands: Commands,
     /// The open dialog, if any.

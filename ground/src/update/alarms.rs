@@ -59,7 +59,7 @@ const OF_STATION: [AlarmRow; 12] = [
     }),
     of_run(AlarmKind::TwoVehicles, WHO, |model, now| {
         let (id, other) = (model.settings.vehicle.system_id, model.beside(now)?);
-        let chosen = model.runs.is_chosen(now);
+        let chosen = model.boots.is_chosen(now);
         let what =
             if chosen { "the shown one was chosen" } else { "nothing is armed or started: switch one off" };
         Some(format!("TWO VEHICLES under id {id}: also {other}; {what}"))

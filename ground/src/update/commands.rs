@@ -400,7 +400,7 @@ fn why_unfit(model: &Model, now: Duration) -> Option<&'static str> {
     if !model.settings.auto && model.crew.is_gone(now) {
         return Some("no commanding screen in the countdown");
     }
-    if model.beside(now).is_some() && !model.runs.is_chosen(now) {
+    if model.beside(now).is_some() && !model.boots.is_chosen(now) {
         return Some("TWO VEHICLES in the countdown");
     }
     let fault = model.log_fault(now).filter(|fault| *fault != LogFault::Full);

@@ -14,10 +14,10 @@ use protocol::log::record::EventLevel;
 use super::{Action, Request, commands, on_request, pad};
 use crate::key::Key;
 use crate::model::{
-    AGAIN_AFTER, AGAIN_KEY, Act, AlarmKind, CommandKind, Dialog, Does, FINGERS_APART, KeyOrigin, LogStanding,
-    Model, Page, Prompt, RestOfWord, Role, Seat, Speaker, Standing, TextEntry, overruled_by, palette_entries,
-    quantity, standing, why_not_arm, why_not_check, why_not_confirm, why_not_here, why_not_quit,
-    why_not_seat, why_not_seen, why_not_start, why_not_take, why_nothing_moves, why_untested,
+    AGAIN_AFTER, AGAIN_KEY, Act, AlarmKind, CommandKind, Dialog, FINGERS_APART, KeyOrigin, LogStanding,
+    Model, Page, PaletteAction, Prompt, RestOfWord, Role, Seat, Speaker, Standing, TextEntry, overruled_by,
+    palette_entries, quantity, standing, why_not_arm, why_not_check, why_not_confirm, why_not_here,
+    why_not_quit, why_not_seat, why_not_seen, why_not_start, why_not_take, why_nothing_moves, why_untested,
 };
 use crate::update;
 
@@ -306,8 +306,8 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
     match act {
         Act::Arm if confirms(model, TdAct::TD_ACT_ARM, now) => {}
         Act::Start if confirms(model, TdAct::TD_ACT_START, now) => {}
-        Act::Arm => climb(model, Prompt::Arm, "arm", why_not_arm(model, now), now),
-        Act::Start => climb(model, Prompt::Start, "start", why_not_start(model, now), now),
+        Act::Arm => open_unless(model, Prompt::Arm, "arm", why_not_arm(model, now), now),
+        Act::Start => open_unless(model, Prompt::Start, "start", why_not_start(model, now), now),
         Act::Disarm => match why_nothing_moves(model, now).filter(|_| model.vehicle.as_foreign().is_some()) {
             None => open(model, Prompt::Disarm, now),
             Some(why) => model.warn(now, format!("cannot disarm: {why}")),
@@ -319,9 +319,9 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
         Act::HoldCountdown => model.info(now, "no countdown runs"),
         Act::Tap => ask(model, CommandKind::Tap, now),
         Act::TakeCommand => {
-            climb(model, Prompt::TakeCommand, "take command", why_not_take(model, now), now);
+            open_unless(model, Prompt::TakeCommand, "take command", why_not_take(model, now), now);
         }
-        Act::Seen => climb(model, Prompt::Seen, "say so", why_not_seen(model, now), now),
+        Act::Seen => open_unless(model, Prompt::Seen, "say so", why_not_seen(model, now), now),
         Act::Check | Act::CheckStill => match standing(model, now) {
             Standing::Runs | Standing::MayRun => ask(model, CommandKind::EndCheck, now),
             Standing::JustEnded => {
@@ -378,7 +378,7 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
 
 /// Opens the dialog of a rung of the ladder, or the one that overrules what alone is in the way. If it is refused, the word
 /// that the crew would have typed is swallowed.
-fn climb(model: &mut Model, prompt: Prompt, verb: &str, why_not: Option<String>, now: Duration) {
+fn open_unless(model: &mut Model, prompt: Prompt, verb: &str, why_not: Option<String>, now: Duration) {
     let Some(why) = why_not else { return open(model, prompt, now) };
     if let Some(overrules) = overruled_by(model, &why, now) {
         return open(model, overrules, now);
@@ -407,7 +407,7 @@ fn open(model: &mut Model, prompt: Prompt, now: Duration) {
 /// moment both ask: the vehicle takes the first ask, and the other one hears of it.
 fn confirms(model: &mut Model, act: TdAct, now: Duration) -> bool {
     let Some(ask) = model.ask_to_confirm(now).filter(|ask| ask.act == act) else { return false };
-    climb(model, Prompt::Confirm(ask), "confirm", why_not_confirm(model, &ask, now), now);
+    open_unless(model, Prompt::Confirm(ask), "confirm", why_not_confirm(model, &ask, now), now);
     true
 }
 
@@ -613,12 +613,14 @@ fn on_palette_key(model: &mut Model, (mut typed, mut chosen): (String, usize), k
         Key::Escape => return,
         Key::Enter => {
             let entry = palette_entries(model, &typed, now).into_iter().nth(chosen);
-            return match entry.map(|entry| entry.does) {
-                Some(Does::Act(act)) if model.key_timing.hurried && !act.only_shows_or_asks(model) => {
+            return match entry.map(|entry| entry.action) {
+                Some(PaletteAction::Act(act))
+                    if model.key_timing.hurried && !act.only_shows_or_asks(model) =>
+                {
                     drop_run(model, now);
                 }
-                Some(Does::Choose(_)) if model.key_timing.hurried => drop_run(model, now),
-                Some(does) => perform_entry(model, does, now),
+                Some(PaletteAction::Choose(_)) if model.key_timing.hurried => drop_run(model, now),
+                Some(action) => perform_entry(model, action, now),
                 None => {}
             };
         }
@@ -633,10 +635,10 @@ fn on_palette_key(model: &mut Model, (mut typed, mut chosen): (String, usize), k
 }
 
 /// Does what an entry of the palette says. It goes the way of its key, so it never does more than the key.
-fn perform_entry(model: &mut Model, does: Does, now: Duration) {
-    match does {
+fn perform_entry(model: &mut Model, action: PaletteAction, now: Duration) {
+    match action {
         // Enter has chosen it, and a held Enter would confirm it.
-        Does::Act(act) => {
+        PaletteAction::Act(act) => {
             let keys = match act {
                 Act::Disarm => ", then Enter: only these keys disarm",
                 Act::HoldCountdown => ", then Enter: only these keys hold",
@@ -646,12 +648,12 @@ fn perform_entry(model: &mut Model, does: Does, now: Duration) {
             };
             model.info(now, format!("press {}{keys}", model.settings.keys.name(act)));
         }
-        Does::Choose(boot) => match model.settings.role.why_not_command() {
+        PaletteAction::Choose(boot) => match model.settings.role.why_not_command() {
             None => request(model, Request::Choose(boot), now),
             Some(why) => model.info(now, why),
         },
-        Does::TellAbort => model.info(now, "press Ctrl-X, then Enter: only these keys abort"),
-        Does::Plot(quantity) => {
+        PaletteAction::TellAbort => model.info(now, "press Ctrl-X, then Enter: only these keys abort"),
+        PaletteAction::Plot(quantity) => {
             model.pages.plotted = quantity;
             perform(model, Act::Show(Page::Plot), now);
         }

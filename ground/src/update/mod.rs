@@ -201,7 +201,7 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
         }
         Msg::LinkSays(words) => model.warn(now, protocol::text::printable(words.as_bytes())),
         Msg::HeardOver(number) => model.link.heard_over = Some(number),
-        Msg::HeardFrom(place) => model.link.place = place,
+        Msg::HeardFrom(source) => model.link.source = source,
         Msg::Links { links, signing } => on_reports(model, links, signing, now),
         Msg::Log(health) => on_log_health(model, health, now),
         Msg::LogBegins { log, tlog } => on_log_begins(model, log, tlog, now),

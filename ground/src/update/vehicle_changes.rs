@@ -66,18 +66,18 @@ const KEPT_WITHIN_S: u16 = 2;
 
 /// Shows another run if one takes the screen.
 pub(super) fn settle(model: &mut Model, now: Duration) {
-    let Some(former) = model.runs.shown() else { return };
-    let Some(shown) = model.runs.settle(now) else { return };
+    let Some(former) = model.boots.shown() else { return };
+    let Some(shown) = model.boots.settle(now) else { return };
     let vehicle = model.others.remove(&shown).unwrap_or_default();
     let mut before = std::mem::replace(&mut model.vehicle, vehicle);
     let away = KeepAway::of(&before, now);
     model.vehicle.before = away.map(|away| Sample::new(away, now)).or(model.vehicle.before);
     model.vehicle.foreign = before.foreign.take();
-    let is_reset = model.runs.follows(shown, former);
+    let is_reset = model.boots.follows(shown, former);
     let did = is_reset.then(|| Announced::of(&before).words_of_reset());
     model.others.insert(former, before);
-    let Model { runs, others, .. } = model;
-    others.retain(|id, _| runs.knows(*id));
+    let Model { boots, others, .. } = model;
+    others.retain(|id, _| boots.knows(*id));
     on_shown(model, did, now);
     on_change(model, Announced::default(), now);
 }
@@ -107,7 +107,7 @@ pub(super) fn keep_unfinished(model: &mut Model, now: Duration) {
 /// The crew shows and commands this boot, of several vehicles under one id.
 pub(super) fn choose(model: &mut Model, boot: u32, by: &Seat, now: Duration) {
     let name = words::boot(boot);
-    if model.runs.choose(boot, now) {
+    if model.boots.choose(boot, now) {
         model.record_operator(now, "chose", by, &format!("the vehicle of boot {name}{}", by.in_brackets()));
         model.warn(now, format!("boot {name} was chosen: it is shown and commanded"));
         settle(model, now);
