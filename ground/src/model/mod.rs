@@ -328,6 +328,12 @@ impl Model {
         self.enter(kind, &by.operator, detail);
     }
 
+    /// Records what the crew did, and adds it to the list of events.
+    pub(crate) fn tell_act(&mut self, now: Duration, kind: &str, by: &Seat, level: EventLevel, text: String) {
+        self.record_operator(now, kind, by, &text);
+        self.tell(now, Speaker::Ground, level, text);
+    }
+
     /// Enters a line into the book.
     pub(crate) fn enter(&mut self, kind: &str, who: &str, text: &str) {
         self.outbox.push(Action::Enter(BookLine {

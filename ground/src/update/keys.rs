@@ -9,15 +9,14 @@
 use std::time::Duration;
 
 use protocol::dialect::{TdAct, TdInterlock};
-use protocol::log::record::EventLevel;
 
-use super::{Action, Request, commands, on_request, pad};
+use super::{Action, Request, on_request, pad};
 use crate::key::Key;
 use crate::model::{
-    AGAIN_AFTER, AGAIN_KEY, Act, AlarmKind, CommandKind, Dialog, FINGERS_APART, KeyOrigin, LogStanding,
-    Model, Page, PaletteAction, Prompt, RestOfWord, Role, Seat, Speaker, Standing, TextEntry, overruled_by,
-    palette_entries, quantity, standing, why_not_arm, why_not_check, why_not_confirm, why_not_here,
-    why_not_quit, why_not_seat, why_not_seen, why_not_start, why_not_take, why_nothing_moves, why_untested,
+    AGAIN_AFTER, AGAIN_KEY, Act, AlarmKind, CommandKind, Dialog, FINGERS_APART, KeyOrigin, Model, Page,
+    PaletteAction, Prompt, RestOfWord, Role, Standing, TextEntry, overruled_by, palette_entries, quantity,
+    standing, why_not_arm, why_not_check, why_not_confirm, why_not_here, why_not_quit, why_not_seen,
+    why_not_start, why_not_take, why_nothing_moves,
 };
 use crate::update;
 
@@ -452,85 +451,6 @@ pub(super) fn request(model: &mut Model, request: Request, now: Duration) {
     if model.settings.role == Role::Station {
         on_request(model, request, model.settings.seat.clone(), now);
     }
-}
-
-/// The crew goes on without the station's log. That it did is recorded wherever something still records: in the vehicle's
-/// log by the station's book, and on every screen.
-pub(super) fn without_log(model: &mut Model, by: &Seat, now: Duration) {
-    let LogStanding::Unfit(fault, words) = model.station_log(now) else {
-        return model.info(now, "the station's log is fit: nothing to go on without");
-    };
-    if let Some(why) = why_not_seat(model, by) {
-        return model.warn(now, format!("not without a log: {why}"));
-    }
-    model.without_log = Some(fault);
-    let text =
-        format!("WITHOUT A LOG: arm and start go on although the station log {words}{}", by.in_brackets());
-    model.record_operator(now, "without log", by, &text);
-    model.tell(now, Speaker::Ground, EventLevel::Warning, text);
-}
-
-/// The crew arms a motor that no burn of its lot has confirmed. Who did is recorded as for [`without_log`]; it counts until
-/// the vehicle's next power-up.
-pub(super) fn untested(model: &mut Model, by: &Seat, now: Duration) {
-    let Some(why) = why_untested(model) else {
-        return model.info(now, "burns confirm the motor, or it was overruled: nothing to go on with");
-    };
-    if let Some(why) = why_not_seat(model, by) {
-        return model.warn(now, format!("not with an untested motor: {why}"));
-    }
-    model.untested = model.vehicle.boot.number();
-    let text = format!("UNTESTED MOTOR: arming goes on although {why}{}", by.in_brackets());
-    model.record_operator(now, "untested motor", by, &text);
-    model.tell(now, Speaker::Ground, EventLevel::Warning, text);
-}
-
-/// Sends a command, unless the vehicle has changed in the meantime or the same command is already being sent.
-pub(super) fn command(model: &mut Model, kind: CommandKind, by: &Seat, now: Duration) {
-    let theirs = why_not_seat(model, by).filter(|_| kind.needs_the_owner());
-    let why_not = match kind {
-        _ if theirs.is_some() => theirs,
-        CommandKind::Arm => already_sent(model, kind, now).or_else(|| why_not_arm(model, now)),
-        CommandKind::Start => already_sent(model, kind, now).or_else(|| why_not_start(model, now)),
-        CommandKind::ConfirmArm | CommandKind::ConfirmStart => {
-            let none = || "nobody of another role asks for it".to_owned();
-            let start = kind == CommandKind::ConfirmStart;
-            let ask = model.ask_to_confirm(now).filter(|ask| (ask.act == TdAct::TD_ACT_START) == start);
-            ask.map_or_else(|| Some(none()), |ask| why_not_confirm(model, &ask, now))
-        }
-        CommandKind::TakeCommand => why_not_take(model, now),
-        CommandKind::Tap => {
-            let ours = model.tapping(now).is_some_and(|(by, _)| by == model.key_number());
-            let none = || (!ours).then(|| "no tap of this operator is waited for".to_owned());
-            why_nothing_moves(model, now).or_else(none)
-        }
-        CommandKind::Seen => why_not_seen(model, now),
-        CommandKind::Check | CommandKind::CheckStill => {
-            already_sent(model, kind, now).or_else(|| why_not_check(model, now))
-        }
-        // It would cut the motors of somebody else's vehicle.
-        CommandKind::Disarm if model.vehicle.as_foreign().is_some() => why_nothing_moves(model, now),
-        CommandKind::Disarm | CommandKind::Hold | CommandKind::Abort | CommandKind::EndCheck => None,
-    };
-    match why_not {
-        // The next one comes within 1 s, and the vehicle shows the time that is left.
-        None if kind == CommandKind::Tap => {
-            commands::send_once(model, kind);
-            model.record_operator(now, "commanded", by, &format!("TAP{}", by.in_brackets()));
-        }
-        None => commands::submit(model, kind, by.clone(), now),
-        Some(why) => {
-            let text = format!("cannot {}: {why}{}", kind.name().to_lowercase(), by.in_brackets());
-            model.record_operator(now, "not sent", by, &text);
-            model.tell(now, Speaker::Ground, EventLevel::Warning, text);
-        }
-    }
-}
-
-/// Why not to send a command that another screen has just sent.
-fn already_sent(model: &Model, kind: CommandKind, now: Duration) -> Option<String> {
-    let track = model.commands.of(kind).filter(|track| track.is_on_its_way(now))?;
-    Some(format!("{} is already on its way{}", kind.name(), track.by.in_brackets()))
 }
 
 /// Acknowledges the alarm in the alarm line, or the chosen one of the list.

@@ -235,7 +235,7 @@ fn on_request(model: &mut Model, request: Request, by: Seat, now: Duration) {
         model.link.abort_asked_at = None;
     }
     match request {
-        Request::Command(kind) => keys::command(model, kind, &by, now),
+        Request::Command(kind) => commands::command(model, kind, &by, now),
         Request::Acknowledge(kind) => keys::acknowledge(model, kind, now),
         Request::Report => match why_nothing_flown(model) {
             Some(why) => model.info(now, format!("no report: {why}")),
@@ -246,8 +246,8 @@ fn on_request(model: &mut Model, request: Request, by: Seat, now: Duration) {
         },
         Request::Choose(boot) => vehicle_changes::choose(model, boot, &by, now),
         Request::RangeTest => pad::begin_range_test(model, by, now),
-        Request::WithoutLog => keys::without_log(model, &by, now),
-        Request::Untested => keys::untested(model, &by, now),
+        Request::WithoutLog => commands::without_log(model, &by, now),
+        Request::Untested => commands::untested(model, &by, now),
         Request::Sign { step, void } => pad::sign(model, (step.into(), void), &by, now),
     }
 }

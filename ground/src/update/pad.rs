@@ -142,8 +142,7 @@ pub(super) fn begin_range_test(model: &mut Model, by: Seat, now: Duration) {
     }
     let counts = model.link.stats.counts(model.settings.vehicle);
     let text = format!("radio range test begins: 30 s, nothing is commanded{}", by.in_brackets());
-    model.record_operator(now, "radio range test", &by, &text);
-    model.tell(now, Speaker::Ground, EventLevel::Info, text);
+    model.tell_act(now, "radio range test", &by, EventLevel::Info, text);
     model.range_test = Some(RangeTest::begin(by, counts, now));
 }
 
@@ -162,8 +161,7 @@ pub(super) fn pass_range_test(model: &mut Model, now: Duration) {
     }
     if let Some((found, by)) = ended {
         let level = if found.passed() { EventLevel::Info } else { EventLevel::Warning };
-        model.record_operator(now, "radio range test", &by, &found.words());
-        model.tell(now, Speaker::Ground, level, found.words());
+        model.tell_act(now, "radio range test", &by, level, found.words());
     }
 }
 
