@@ -193,7 +193,7 @@ async fn start(
     config: &Config,
     duty: Duty,
     (clock, demo_options): (Clock, Option<DemoOptions>),
-    next_log: NextLog,
+    mut next_log: NextLog,
 ) -> anyhow::Result<(Station, Model, Wire)> {
     let Duty { is_daemon, interactive, time_limit } = duty;
     let recorder = next_log.present();
@@ -204,6 +204,7 @@ async fn start(
         endpoints.push(LinkAddress::UdpIn("127.0.0.1:0".to_owned()));
     }
     let KeyRing { key, owner, book_key, roles } = KeyRing::open(link)?;
+    next_log.book_key = book_key;
     let start_unix_s = clock.start_unix_ns() / 1_000_000_000;
     let checklist =
         args.flags.checklist.as_deref().map(|path| open_checklist(path, start_unix_s)).transpose()?;
@@ -219,7 +220,14 @@ async fn start(
     };
     let demo = match (&demo_options, vehicle_clock) {
         (Some(options), Some(vehicle_clock)) => {
-            Some(start_demo(options, wire.endpoints().next(), recorder.clone(), vehicle_clock)?)
+            let Some(LinkAddress::UdpIn(address)) = wire.endpoints().next() else {
+                anyhow::bail!("the demonstration listens on UDP alone");
+            };
+            let link = LinkAddress::UdpOut(address.clone());
+            Some(
+                Demo::start(options, link, recorder.clone(), vehicle_clock)
+                    .context("starting the simulator")?,
+            )
         }
         _ => None,
     };
@@ -308,7 +316,7 @@ async fn start(
         report: None,
         place_failed: false,
         report_at: Duration::ZERO,
-        next_log: next_log.signed_with(book_key),
+        next_log,
     };
     station.open_book(&model, "");
     station.publish_kept(&model, clock.now());
@@ -336,19 +344,6 @@ async fn serve(
             Ok(None)
         }
     }
-}
-
-fn start_demo(
-    options: &DemoOptions,
-    listening: Option<&LinkAddress>,
-    recorder: Option<Recorder>,
-    log_clock: LogClock,
-) -> anyhow::Result<Demo> {
-    let Some(LinkAddress::UdpIn(address)) = listening else {
-        anyhow::bail!("the demonstration listens on UDP, not on {listening:?}");
-    };
-    Demo::start(options, LinkAddress::UdpOut(address.clone()), recorder, log_clock)
-        .context("starting the simulator")
 }
 
 // Finds the name of the person at this screen.

@@ -237,12 +237,11 @@ fn expire(model: &mut Model, now: Duration) {
 /// Lets time pass: a dialog may expire, and the abort chord or a key to quit may become complete.
 pub(super) fn pass(model: &mut Model, now: Duration) {
     expire(model, now);
-    pass_abort_chord(model, now);
-    pass_quit(model, now);
-}
-
-/// Quits if no other key has followed the key to quit.
-fn pass_quit(model: &mut Model, now: Duration) {
+    // Only on ticks, because a key may be a further repeat of a held Ctrl-X.
+    if model.abort_chord.pass(now) {
+        abort(model, now);
+    }
+    // No other key has followed the key to quit.
     if model.quit_at.is_some_and(|at| now >= at) {
         model.quit_at = None;
         model.outbox.push(Action::Quit);
@@ -266,7 +265,7 @@ fn on_free_key(model: &mut Model, key: Key, touch: KeyOrigin, now: Duration) {
     let shown = model.page();
     match key {
         Key::Up | Key::Down if shown == Page::Alarms => choose_alarm(model, key == Key::Up),
-        Key::Up | Key::Down if shown == Page::Pad && lists_steps(model) => {
+        Key::Up | Key::Down if shown == Page::Pad && model.pages.checklist && model.checklist.is_some() => {
             choose_step(model, key == Key::Up, now);
         }
         Key::Up | Key::Down if shown == Page::Plot => choose_quantity(model, key == Key::Up),
@@ -368,7 +367,9 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
         Act::Hold if model.pages.held.is_some() => model.pages.hold(None),
         Act::Hold => model.pages.hold(Some(shown)),
         Act::Follow => model.pages.hold(None),
-        Act::Palette => open_palette(model),
+        Act::Palette => {
+            model.pages.entry = Some(TextEntry::Palette { typed: String::new(), chosen: 0 });
+        }
         Act::NextTheme => model.outbox.push(Action::NextTheme),
         Act::Redraw => model.outbox.push(Action::Redraw),
         Act::Quit => quit(model, now),
@@ -410,22 +411,21 @@ fn confirms(model: &mut Model, act: TdAct, now: Duration) -> bool {
     true
 }
 
-/// Whether the Pad page lists the checklist.
-fn lists_steps(model: &Model) -> bool {
-    model.checklist.is_some() && model.pages.checklist
+/// The next or the previous place of a list.
+fn beside(at: usize, up: bool, last: usize) -> usize {
+    if up { at.saturating_sub(1) } else { (at + 1).min(last) }
 }
 
 /// Chooses the next or the previous step of the checklist.
 fn choose_step(model: &mut Model, up: bool, now: Duration) {
     let Some(at) = model.chosen_step(now) else { return };
     let last = model.checklist.as_ref().map_or(0, |list| list.steps.len().saturating_sub(1));
-    model.pages.step = Some(if up { at.saturating_sub(1) } else { (at + 1).min(last) });
+    model.pages.step = Some(beside(at, up, last));
 }
 
 /// Chooses the next or the previous quantity to plot.
 fn choose_quantity(model: &mut Model, up: bool) {
-    let at = model.pages.plotted.place();
-    let next = if up { at.saturating_sub(1) } else { (at + 1).min(quantity::COUNT - 1) };
+    let next = beside(model.pages.plotted.place(), up, quantity::COUNT - 1);
     model.pages.plotted = &quantity::ALL[next];
 }
 
@@ -477,18 +477,8 @@ pub(super) fn acknowledge(model: &mut Model, kind: AlarmKind, now: Duration) {
 fn choose_alarm(model: &mut Model, up: bool) {
     let list = model.alarms.list();
     let at = model.pointed_at().and_then(|chosen| list.iter().position(|alarm| alarm.kind == chosen.kind));
-    let next = match at {
-        Some(at) if up => at.saturating_sub(1),
-        Some(at) => (at + 1).min(list.len() - 1),
-        None => return,
-    };
-    model.pages.chosen = Some(list[next].kind);
-}
-
-/// Lets time pass for the abort chord; only on ticks, because a key may be a further repeat of a held Ctrl-X.
-fn pass_abort_chord(model: &mut Model, now: Duration) {
-    if model.abort_chord.pass(now) {
-        abort(model, now);
+    if let Some(at) = at {
+        model.pages.chosen = Some(list[beside(at, up, list.len() - 1)].kind);
     }
 }
 
@@ -515,20 +505,10 @@ fn quit(model: &mut Model, now: Duration) {
 /// The longest text.
 const TYPED_MAX: usize = 30;
 
-pub(super) fn open_palette(model: &mut Model) {
-    model.pages.entry = Some(TextEntry::Palette { typed: String::new(), chosen: 0 });
-}
-
 /// A key while a text is typed. Esc gives up; the keys of the abort never come here.
-pub(super) fn on_entry_key(model: &mut Model, key: Key, now: Duration) {
-    match model.pages.entry.take() {
-        // Only a replay asks where to jump, and takes those keys itself.
-        None | Some(TextEntry::Jump { .. }) => {}
-        Some(TextEntry::Palette { typed, chosen }) => on_palette_key(model, (typed, chosen), key, now),
-    }
-}
-
-fn on_palette_key(model: &mut Model, (mut typed, mut chosen): (String, usize), key: Key, now: Duration) {
+fn on_entry_key(model: &mut Model, key: Key, now: Duration) {
+    // Only a replay asks where to jump, and takes those keys itself.
+    let Some(TextEntry::Palette { mut typed, mut chosen }) = model.pages.entry.take() else { return };
     match key {
         Key::Escape => return,
         Key::Enter => {
