@@ -10,7 +10,7 @@ use protocol::dialect::TdPhase;
 use protocol::identity::{Address, GROUND, VEHICLE};
 use protocol::transport::LinkAddress;
 use serde::Deserialize;
-use simulated_vehicle::fly::StartPoint;
+use sim::wire::fly::StartPoint;
 
 use crate::demo::Speed;
 use crate::exit;
@@ -285,7 +285,7 @@ impl LinkArgs {
 impl StationArgs {
     /// What the demonstration flies: a built-in name or a file.
     pub fn profile(&self) -> &str {
-        self.profile.as_deref().unwrap_or(simulated_vehicle::fly::DEFAULT_MISSION)
+        self.profile.as_deref().unwrap_or(sim::wire::fly::DEFAULT_MISSION)
     }
 
     /// Whether the flags describe a demonstration, so that links in the settings do not apply.
