@@ -17,10 +17,6 @@ use crate::exit;
 use crate::model::words;
 use crate::view::theme::Palette;
 
-/// The profile that the demonstration flies by default.
-const DEMO_PROFILE: &str = sim::wire::fly::DEFAULT_MISSION;
-const DEMO_SEED: u64 = 1;
-
 /// Terminal ground station for a rocket that lands on its own thrust.
 ///
 /// Without --connect it always flies a demonstration: a simulated vehicle in this process, from its pad to touchdown,
@@ -274,19 +270,6 @@ pub enum ConfigCommand {
     Example,
 }
 
-/// What the demonstration flies.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Demonstration<'a> {
-    /// A built-in name or a file.
-    pub profile: &'a str,
-    /// Where it begins; `None` leaves it to the profile.
-    pub start: Option<StartPoint>,
-    pub seed: u64,
-    pub speed: Speed,
-    /// Nobody has named a mission, so nobody waits for the countdown that it says.
-    pub counts_down_quickly: bool,
-}
-
 impl LinkArgs {
     /// Our own MAVLink address.
     pub fn us(&self) -> Address {
@@ -300,15 +283,9 @@ impl LinkArgs {
 }
 
 impl StationArgs {
-    /// What the demonstration flies.
-    pub fn demonstration(&self) -> Demonstration<'_> {
-        Demonstration {
-            profile: self.profile.as_deref().unwrap_or(DEMO_PROFILE),
-            start: self.start,
-            seed: self.seed.unwrap_or(DEMO_SEED),
-            speed: self.speed.unwrap_or(Speed::Factor(1.0)),
-            counts_down_quickly: self.profile.is_none() && self.flags.mission.is_none(),
-        }
+    /// What the demonstration flies: a built-in name or a file.
+    pub fn profile(&self) -> &str {
+        self.profile.as_deref().unwrap_or(sim::wire::fly::DEFAULT_MISSION)
     }
 
     /// Whether the flags describe a demonstration, so that links in the settings do not apply.
@@ -500,18 +477,7 @@ mod tests {
     #[test]
     fn a_demonstration_without_a_screen_starts_by_itself() {
         let demo = Cli::try_parse_from(["ground"]).unwrap().station;
-        let expected = Demonstration {
-            profile: "mk3",
-            start: None,
-            seed: 1,
-            speed: Speed::Factor(1.0),
-            counts_down_quickly: true,
-        };
-        assert_eq!(demo.demonstration(), expected);
-        for named in ["--profile", "--mission"] {
-            let named = Cli::try_parse_from(["ground", named, "mk2"]).unwrap().station;
-            assert!(!named.demonstration().counts_down_quickly, "the mission itself");
-        }
+        assert_eq!(demo.profile(), "mk3");
         assert!(demo.starts_by_itself(false) && !demo.starts_by_itself(true));
         let live = Cli::try_parse_from(["ground", "--connect", "udpin:0.0.0.0:14550"]).unwrap().station;
         assert!(!live.starts_by_itself(false));

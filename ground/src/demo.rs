@@ -17,11 +17,12 @@ pub use sim::wire::fly::{LogClock, Speed};
 use sim::wire::vehicle::RocketFlight;
 use tokio::sync::{oneshot, watch};
 
-use crate::cli::Demonstration;
+use crate::cli::StationArgs;
 
 /// How long to wait for the end of the simulator.
 const STOP_WITHIN: Duration = Duration::from_secs(3);
 
+const DEMO_SEED: u64 = 1;
 /// Long enough to see what holds a countdown and to hold it: from 2 s before the release on nothing does.
 const QUICK_COUNTDOWN_S: f64 = 5.0;
 
@@ -38,14 +39,15 @@ impl DemoOptions {
     ///
     /// # Errors
     /// There is no mission of that name, or it is invalid.
-    pub fn load(demonstration: &Demonstration<'_>, system_id: u8) -> anyhow::Result<Self> {
-        let Demonstration { profile, start, seed, speed, counts_down_quickly } = *demonstration;
-        let mut flight = fly::load_flight(profile)?.starting_at(start)?;
-        flight.recipe.seed = seed;
-        if counts_down_quickly {
+    pub fn load(args: &StationArgs) -> anyhow::Result<Self> {
+        let mut flight = fly::load_flight(args.profile())?.starting_at(args.start)?;
+        flight.recipe.seed = args.seed.unwrap_or(DEMO_SEED);
+        // Nobody has named a mission, so nobody waits for the countdown that it says.
+        if args.profile.is_none() && args.flags.mission.is_none() {
             flight.recipe = flight.recipe.counting_down(QUICK_COUNTDOWN_S)?;
         }
-        Ok(Self { flight, speed, system_id })
+        let system_id = args.flags.link.vehicle().system_id;
+        Ok(Self { flight, speed: args.speed.unwrap_or(Speed::Factor(1.0)), system_id })
     }
 
     /// The header of the log that contains both sides.

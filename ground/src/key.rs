@@ -31,15 +31,11 @@ impl Key {
         if event.kind == KeyEventKind::Release {
             return None;
         }
-        // On a terminal that reports repeats, a held key is one press; only scrolling repeats.
-        if event.kind == KeyEventKind::Repeat && !may_repeat(event.code) {
-            return None;
-        }
         if event.modifiers.contains(KeyModifiers::ALT) {
             return None;
         }
         let ctrl = event.modifiers.contains(KeyModifiers::CONTROL);
-        match event.code {
+        let key = match event.code {
             KeyCode::Char('c' | 'C') if ctrl => Some(Self::CtrlC),
             KeyCode::Char('l' | 'L') if ctrl => Some(Self::CtrlL),
             KeyCode::Char('x' | 'X') if ctrl => Some(Self::CtrlX),
@@ -62,7 +58,9 @@ impl Key {
             KeyCode::Home => Some(Self::Home),
             KeyCode::End => Some(Self::End),
             _ => None,
-        }
+        };
+        // On a terminal that reports repeats, a held key is one press; only scrolling repeats.
+        key.filter(|key| event.kind != KeyEventKind::Repeat || key.scrolls())
     }
 
     /// Whether the key only scrolls; such keys are held down on purpose.
@@ -85,32 +83,12 @@ impl Key {
         match self {
             Self::Char(' ') => "Space".to_owned(),
             Self::Char(c) => c.to_string(),
-            Self::Enter => "Enter".to_owned(),
             Self::Escape => "Esc".to_owned(),
-            Self::Backspace => "Backspace".to_owned(),
-            Self::F1 => "F1".to_owned(),
-            Self::Up => "Up".to_owned(),
-            Self::Down => "Down".to_owned(),
-            Self::Left => "Left".to_owned(),
-            Self::Right => "Right".to_owned(),
             Self::PageUp => "PgUp".to_owned(),
             Self::PageDown => "PgDn".to_owned(),
-            Self::Home => "Home".to_owned(),
-            Self::End => "End".to_owned(),
-            Self::CtrlC => "Ctrl-C".to_owned(),
-            Self::CtrlL => "Ctrl-L".to_owned(),
-            Self::CtrlX => "Ctrl-X".to_owned(),
-            Self::CtrlY => "Ctrl-Y".to_owned(),
+            key => format!("{key:?}").replace("Ctrl", "Ctrl-"),
         }
     }
-}
-
-/// Whether a person holds this key down on purpose.
-fn may_repeat(code: KeyCode) -> bool {
-    matches!(
-        code,
-        KeyCode::Up | KeyCode::Down | KeyCode::Left | KeyCode::Right | KeyCode::PageUp | KeyCode::PageDown
-    )
 }
 
 #[cfg(test)]

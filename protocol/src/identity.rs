@@ -1,7 +1,7 @@
 //! The MAVLink addresses of vehicle and ground, and the radio's budget.
 
 /// The MAVLink address of a component.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "transport", derive(serde::Serialize, serde::Deserialize))]
 pub struct Address {
     /// System id; 0 addresses every system.

@@ -66,7 +66,10 @@ pub async fn session(
     let mut model = Model::new(settings(&Hello::default(), viewer));
     let mut times = Times::default();
     take_history(&mut link, &mut model, (&mut times, &clock), viewer).await?;
-    let mut output = open_output(interactive, config)?;
+    if !interactive {
+        print(LINES_ONLY)?;
+    }
+    let mut output = Output::open(interactive, config)?;
     model.repeats_reported = output.reports_repeats();
     let mut ticks = interval(TICK);
     ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
@@ -159,13 +162,6 @@ pub async fn session(
     }
     drop(output);
     Ok(exit::decide(&model.outcome, true))
-}
-
-fn open_output(interactive: bool, config: &Config) -> anyhow::Result<Output> {
-    if !interactive {
-        print(LINES_ONLY)?;
-    }
-    Output::open(interactive, config)
 }
 
 /// Takes the history first, so that the first drawn frame is complete.
@@ -269,10 +265,7 @@ fn report_unsent(model: &mut Model, request: Request, now: Duration) {
             return;
         }
         Request::Sign { step, .. } => &format!("step {} NOT SIGNED", u32::from(step) + 1),
-        Request::Report => "no report",
-        Request::Choose(_) => "no vehicle is chosen",
-        Request::RangeTest => "no range test",
-        Request::WithoutLog | Request::Untested => "nothing goes on",
+        _ => "nothing is done",
     };
     let is_abort = request == Request::Command(CommandKind::Abort);
     // Stays in the alarm line of every page until there is a station again.

@@ -74,12 +74,27 @@ pub fn run(given: &ArgMatches) -> anyhow::Result<Exit> {
     let dumb = std::env::var_os("TERM").is_none_or(|term| term.is_empty() || term == "dumb");
     let interactive = std::io::stdout().is_terminal() && !cli.headless && !dumb;
     let load = |args: &ConfigArgs| Config::load(args.config.as_deref());
+    let said = |bytes: &[u8]| print(bytes).map(|()| Exit::Landed);
     let runtime =
         tokio::runtime::Builder::new_current_thread().enable_all().build().context("making the run loop")?;
     match cli.command {
-        Some(Command::Config { command }) => print_config(&command),
-        Some(Command::Completions { shell }) => print_completions(shell),
-        Some(Command::Man) => print_manual(),
+        Some(Command::Config { command: ConfigCommand::Example }) => said(EXAMPLE.as_bytes()),
+        Some(Command::Config { command: ConfigCommand::Check { file } }) => {
+            Config::load(file.as_deref())?;
+            let file = file.or_else(usual_path).filter(|path| path.exists());
+            let none = || "no settings file: the defaults of `ground config example` hold\n".to_owned();
+            said(file.map_or_else(none, |path| format!("{}: valid\n", path.display())).as_bytes())
+        }
+        Some(Command::Completions { shell }) => {
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut Cli::command(), "ground", &mut script);
+            said(&script)
+        }
+        Some(Command::Man) => {
+            let mut page = Vec::new();
+            clap_mangen::Man::new(Cli::command()).render(&mut page).context("writing the manual page")?;
+            said(&page)
+        }
         Some(Command::Status { json }) => runtime.block_on(stations::list(json)),
         Some(Command::Stop { force, socket }) => {
             let config = Config::load(None)?;
@@ -132,7 +147,7 @@ pub fn run(given: &ArgMatches) -> anyhow::Result<Exit> {
 async fn session(args: &StationArgs, config: &Config, duty: Duty) -> anyhow::Result<Exit> {
     let clock = Clock::start();
     let demo_options = match &args.flags.link.connect[..] {
-        [] => Some(DemoOptions::load(&args.demonstration(), args.flags.link.vehicle().system_id)?),
+        [] => Some(DemoOptions::load(args)?),
         _ => None,
     };
     let header = match &demo_options {
@@ -178,7 +193,7 @@ async fn start(
     config: &Config,
     duty: Duty,
     (clock, demo_options): (Clock, Option<DemoOptions>),
-    next_log: NextLog,
+    mut next_log: NextLog,
 ) -> anyhow::Result<(Station, Model, Wire)> {
     let Duty { is_daemon, interactive, time_limit } = duty;
     let recorder = next_log.present();
@@ -189,6 +204,7 @@ async fn start(
         endpoints.push(LinkAddress::UdpIn("127.0.0.1:0".to_owned()));
     }
     let KeyRing { key, owner, book_key, roles } = KeyRing::open(link)?;
+    next_log.book_key = book_key;
     let start_unix_s = clock.start_unix_ns() / 1_000_000_000;
     let checklist =
         args.flags.checklist.as_deref().map(|path| open_checklist(path, start_unix_s)).transpose()?;
@@ -204,7 +220,14 @@ async fn start(
     };
     let demo = match (&demo_options, vehicle_clock) {
         (Some(options), Some(vehicle_clock)) => {
-            Some(start_demo(options, wire.endpoints().next(), recorder.clone(), vehicle_clock)?)
+            let Some(LinkAddress::UdpIn(address)) = wire.endpoints().next() else {
+                anyhow::bail!("the demonstration listens on UDP alone");
+            };
+            let link = LinkAddress::UdpOut(address.clone());
+            Some(
+                Demo::start(options, link, recorder.clone(), vehicle_clock)
+                    .context("starting the simulator")?,
+            )
         }
         _ => None,
     };
@@ -213,11 +236,12 @@ async fn start(
     let mut model = Model::new(Settings {
         // With several links, each has its own.
         link_capacity_bytes_s: wire.capacity_bytes_s(),
-        vehicle_name: demo.as_ref().map(|_| args.demonstration().profile.to_owned()),
+        vehicle_name: demo.as_ref().map(|_| args.profile().to_owned()),
         log_path: recorder.as_ref().map(|recorder| recorder.path().display().to_string()),
         tlog_path: recorder.as_ref().and_then(Recorder::tlog_path).map(|path| path.display().to_string()),
         us: link.us(),
-        session: drawn_session(),
+        // The standard library's hash keys differ in every process. 0 stands for no session.
+        session: (RandomState::new().build_hasher().finish() as u32).max(1),
         vehicle: link.vehicle(),
         role: Role::Station,
         seat: if interactive {
@@ -241,8 +265,14 @@ async fn start(
         time_limit: time_limit.or(auto.then_some(AUTO_TIME_LIMIT)),
         ..Settings::on_screen(links.join(" and "))
     });
-    let renamed = other_name(args.flags.log.as_ref(), recorder.as_ref().map(Recorder::path));
-    announce(&mut model, auto, renamed, clock.now());
+    if let Some(name) = &model.settings.vehicle_name {
+        let by_whom = if auto { "it arms and starts itself" } else { "you arm and start it" };
+        let text = format!("demonstration: a simulated vehicle in this program flies {name}; {by_whom}");
+        model.info(clock.now(), text);
+    }
+    if let Some(words) = other_name(args.flags.log.as_ref(), recorder.as_ref().map(Recorder::path)) {
+        model.warn(clock.now(), words);
+    }
     let signatures = checklist.map(|(list, file, told)| {
         model.checklist = Some(list);
         for text in told {
@@ -250,8 +280,21 @@ async fn start(
         }
         file
     });
-    take_what_is_kept(&mut model, recorder.as_ref(), clock.now());
-    announce_what_is_there(&mut model, is_daemon, clock.now()).await;
+    // What an earlier run has kept beside its log. A demonstration has another vehicle.
+    let folder = recorder.as_ref().and_then(|log| log.path().parent());
+    model.place = newest_place(folder, start_unix_s);
+    if let Some(kept) = read_unfinished(folder, start_unix_s).filter(|_| demo.is_none()) {
+        model.take_unfinished(kept, clock.now());
+    }
+    if model.place.is_some() {
+        model.info(clock.now(), "the last place of a vehicle is kept from before: page Find");
+    }
+    if demo.is_some()
+        && !is_daemon
+        && let Some(line) = stations::running_beside().await
+    {
+        model.info(clock.now(), line);
+    }
     let server = serve(args, &mut model, duty, &clock).await?;
     let output = Output::open(interactive, config)?;
     model.repeats_reported = output.reports_repeats();
@@ -273,50 +316,11 @@ async fn start(
         report: None,
         place_failed: false,
         report_at: Duration::ZERO,
-        next_log: next_log.signed_with(book_key),
+        next_log,
     };
     station.open_book(&model, "");
     station.publish_kept(&model, clock.now());
     Ok((station, model, wire))
-}
-
-/// A random number other than 0: the standard library's hash keys differ in every process.
-fn drawn_session() -> u32 {
-    (RandomState::new().build_hasher().finish() as u32).max(1)
-}
-
-/// Says what the demonstration is, before anything else, and if the log has another name than was asked for.
-fn announce(model: &mut Model, auto: bool, renamed: Option<String>, now: Duration) {
-    if let Some(name) = &model.settings.vehicle_name {
-        let by_whom = if auto { "it arms and starts itself" } else { "you arm and start it" };
-        let text = format!("demonstration: a simulated vehicle in this program flies {name}; {by_whom}");
-        model.info(now, text);
-    }
-    if let Some(words) = renamed {
-        model.warn(now, words);
-    }
-}
-
-/// Takes what an earlier run has kept beside its log. A demonstration has another vehicle.
-fn take_what_is_kept(model: &mut Model, recorder: Option<&Recorder>, now: Duration) {
-    let (folder, unix_s) = (recorder.and_then(|log| log.path().parent()), model.settings.start_unix_s);
-    model.place = newest_place(folder, unix_s);
-    if let Some(kept) = read_unfinished(folder, unix_s).filter(|_| !model.settings.demonstration) {
-        model.take_unfinished(kept, now);
-    }
-}
-
-/// Says what an earlier run has left, and which stations run beside a demonstration.
-async fn announce_what_is_there(model: &mut Model, is_daemon: bool, now: Duration) {
-    if model.place.is_some() {
-        model.info(now, "the last place of a vehicle is kept from before: page Find");
-    }
-    if model.settings.demonstration
-        && !is_daemon
-        && let Some(line) = stations::running_beside().await
-    {
-        model.info(now, line);
-    }
 }
 
 /// Opens the socket for screens: for a station with a real vehicle and for every daemon. A demonstration on a
@@ -340,60 +344,6 @@ async fn serve(
             Ok(None)
         }
     }
-}
-
-fn start_demo(
-    options: &DemoOptions,
-    listening: Option<&LinkAddress>,
-    recorder: Option<Recorder>,
-    log_clock: LogClock,
-) -> anyhow::Result<Demo> {
-    let Some(LinkAddress::UdpIn(address)) = listening else {
-        anyhow::bail!("the demonstration listens on UDP, not on {listening:?}");
-    };
-    Demo::start(options, LinkAddress::UdpOut(address.clone()), recorder, log_clock)
-        .context("starting the simulator")
-}
-
-// The commands that only print: settings, completions, the manual page.
-
-/// Checks the settings, or prints an example of them.
-///
-/// # Errors
-/// The settings are wrong; the error says where, and what would be accepted.
-pub fn print_config(command: &ConfigCommand) -> anyhow::Result<Exit> {
-    match command {
-        ConfigCommand::Example => print(EXAMPLE.as_bytes())?,
-        ConfigCommand::Check { file } => {
-            Config::load(file.as_deref())?;
-            let said = match file.clone().or_else(usual_path).filter(|path| path.exists()) {
-                Some(path) => format!("{}: valid\n", path.display()),
-                None => "no settings file: the defaults of `ground config example` hold\n".to_owned(),
-            };
-            print(said.as_bytes())?;
-        }
-    }
-    Ok(Exit::Landed)
-}
-
-/// A shell's completions, from the same definition as the command line itself.
-///
-/// # Errors
-/// Standard output cannot be written.
-pub fn print_completions(shell: clap_complete::Shell) -> anyhow::Result<Exit> {
-    let mut script = Vec::new();
-    clap_complete::generate(shell, &mut Cli::command(), "ground", &mut script);
-    print(&script).map(|()| Exit::Landed)
-}
-
-/// The manual page, from the same definition as the command line itself.
-///
-/// # Errors
-/// Standard output cannot be written.
-pub fn print_manual() -> anyhow::Result<Exit> {
-    let mut page = Vec::new();
-    clap_mangen::Man::new(Cli::command()).render(&mut page).context("writing the manual page")?;
-    print(&page).map(|()| Exit::Landed)
 }
 
 // Finds the name of the person at this screen.

@@ -49,10 +49,6 @@ impl NextLog {
         Self { names, header, book_key: None, guarded, not_before: Duration::ZERO, ending: None }
     }
 
-    pub(super) fn signed_with(self, book_key: Option<BookKey>) -> Self {
-        Self { book_key, ..self }
-    }
-
     /// The log that is written; `None` if none is wanted.
     pub(super) fn present(&self) -> Option<Recorder> {
         self.guarded().as_ref().map(|log| log.recorder.clone())

@@ -20,7 +20,7 @@ use crate::exit::Exit;
 use crate::key::Key;
 use crate::model::{Bindings, Model, Role, Settings, words};
 use crate::replay::Player;
-use crate::replay::recording::{Progress, Recording};
+use crate::replay::recording::Recording;
 use crate::update::{Action, Msg};
 
 /// How often the time moves on.
@@ -52,10 +52,10 @@ pub async fn session(
     config: &Config,
     interactive: bool,
 ) -> anyhow::Result<Exit> {
-    let mut told = 0;
     let newest = (path == Path::new(LAST)).then(|| newest_log(Path::new("."))).transpose()?;
     let path = newest.as_deref().unwrap_or(path);
-    let recording = Recording::load(path, vehicle, &mut |progress| tell(path, progress, &mut told))?;
+    announce(path);
+    let recording = Recording::load(path, vehicle)?;
     let damage = recording.damage.clone();
     let mut player = Player::new(recording, settings(&path.display().to_string(), &config.keys));
     match from {
@@ -92,16 +92,13 @@ fn settings(log: &str, keys: &Bindings) -> Settings {
     }
 }
 
-/// Reports every tenth of the progress while a large log is read.
-fn tell(path: &Path, Progress { read, total }: Progress, told: &mut u64) {
+/// Says that a large log takes a while.
+fn announce(path: &Path) {
     const LARGE_BYTES: u64 = 32_000_000;
-    const MEGABYTE: u64 = 1_000_000;
-    let tenths = (10 * read).checked_div(total).unwrap_or(0);
-    if total > LARGE_BYTES && tenths > *told {
-        *told = tenths;
-        let (name, read, total) = (path.display(), read / MEGABYTE, total / MEGABYTE);
-        // Progress goes to standard error, which may be closed.
-        let _ = writeln!(std::io::stderr(), "ground: reading {name}: {read} of {total} MB");
+    let bytes = std::fs::metadata(path).map_or(0, |about| about.len());
+    if bytes > LARGE_BYTES {
+        // Standard error may be closed.
+        let _ = writeln!(std::io::stderr(), "ground: reading {}, {} MB", path.display(), bytes / 1_000_000);
     }
 }
 
@@ -184,8 +181,7 @@ impl Again {
     pub(super) fn begin(&mut self, model: &mut Model, now: Duration) {
         let Some(path) = model.settings.log_path.clone() else { return };
         let log = path.clone();
-        let load =
-            move || Recording::load(log.as_ref(), None, &mut |_| {}).map_err(|error| error.to_string());
+        let load = move || Recording::load(log.as_ref(), None).map_err(|error| error.to_string());
         match in_a_thread("replay", load) {
             Ok(told) => self.loading = Some((path, told)),
             Err(error) => model.warn(now, format!("no replay: {error}")),

@@ -230,19 +230,11 @@ async fn serve(
 ) {
     let (past, mut live) = shared.snapshot(seat.screen);
     let mut listening = tokio::spawn(listen_to(read, seat, watch, ask));
-    let mut out = Vec::new();
-    for bytes in past {
-        out.extend_from_slice(&bytes);
-        if out.len() > 256 * 1024 {
-            if write.write_all(&out).await.is_err() {
-                return hear_out(write, listening).await;
-            }
-            out.clear();
+    let live_now = encode_to_screen(&ToScreen::Live, Duration::ZERO).map(Bytes::from);
+    for bytes in past.into_iter().chain(live_now) {
+        if write.write_all(&bytes).await.is_err() {
+            return hear_out(write, listening).await;
         }
-    }
-    out.extend(encode_to_screen(&ToScreen::Live, Duration::ZERO).unwrap_or_default());
-    if write.write_all(&out).await.is_err() {
-        return hear_out(write, listening).await;
     }
     loop {
         tokio::select! {

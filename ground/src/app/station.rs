@@ -202,7 +202,7 @@ impl Station {
         let now = self.clock.now();
         let due = msgs.iter().any(|msg| match msg {
             Msg::Tick => now >= self.report_at,
-            Msg::LinkUp(_) | Msg::LinkDown(_) | Msg::OneLinkDown(_) => true,
+            Msg::LinkUp(_) | Msg::LinkDown(_) | Msg::LinkSays(_) => true,
             _ => false,
         });
         if due {
@@ -343,9 +343,7 @@ impl Station {
                 Action::ReplayFlight => self.again.begin(model, now),
                 Action::WriteReport => self.write_report(model, now),
                 Action::MovePin(out) => self.demo.iter().for_each(|demo| demo.move_pin(out)),
-                // Only attached screens send requests.
-                Action::Request(_) => {}
-                Action::Tell(request) => {
+                Action::Request(request) => {
                     self.publish(&Msg::Asked { request, by: model.settings.seat.clone() }, now);
                 }
                 Action::LeaveScreen => next = next.max(Next::LeaveScreen),

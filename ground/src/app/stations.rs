@@ -8,7 +8,6 @@ use std::time::Duration;
 
 use anyhow::Context as _;
 use protocol::transport::LinkAddress;
-use serde::Serialize;
 use tokio::io::AsyncWriteExt as _;
 
 use super::output::{absolute, print};
@@ -158,21 +157,16 @@ fn listed(found: &[Found]) -> String {
 }
 
 /// A station as a program reads it: its socket, and its status or why it gives none.
-#[derive(Serialize)]
-struct Listed<'a> {
-    socket: &'a Path,
-    #[serde(flatten)]
-    status: Option<&'a StationStatus>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    error: Option<&'a str>,
-}
-
 fn listed_as_json(found: &[Found]) -> anyhow::Result<String> {
-    let one = |(socket, status): &'_ Found| -> serde_json::Result<serde_json::Value> {
-        let error = status.as_ref().err().map(String::as_str);
-        serde_json::to_value(Listed { socket, status: status.as_ref().ok(), error })
+    let one = |(socket, status): &Found| {
+        let mut one = match status {
+            Ok(status) => serde_json::to_value(status)?,
+            Err(error) => serde_json::json!({ "error": error }),
+        };
+        one["socket"] = serde_json::to_value(socket)?;
+        Ok(one)
     };
-    let all = found.iter().map(one).collect::<Result<Vec<_>, _>>()?;
+    let all = found.iter().map(one).collect::<serde_json::Result<Vec<_>>>()?;
     Ok(serde_json::to_string_pretty(&all)? + "\n")
 }
 

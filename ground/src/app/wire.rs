@@ -30,10 +30,10 @@ const BOOTS_MAX: usize = 8;
 pub struct Wire {
     links: Links,
     /// Where the boots of the vehicle are heard, for each link.
-    boots: Vec<Boots>,
+    boots: Vec<BootOrigins>,
     vehicle: Address,
     lockouts: Lockouts,
-    places: Places,
+    sources: Sources,
     /// When the run loop last came round.
     awake_at: Duration,
     /// Until then what arrives is old: it is recorded and not shown.
@@ -50,9 +50,9 @@ pub struct Wire {
 
 /// From where each boot of the vehicle was last heard over a link, and when.
 #[derive(Default)]
-struct Boots(Vec<(u32, Origin, Duration)>);
+struct BootOrigins(Vec<(u32, Origin, Duration)>);
 
-impl Boots {
+impl BootOrigins {
     /// Notes from where a boot is heard.
     fn note(&mut self, boot: u32, from: Origin, now: Duration) {
         self.0.retain(|(known, _, at)| *known != boot && now.saturating_sub(*at) < GONE_AFTER);
@@ -64,10 +64,10 @@ impl Boots {
     ///
     /// # Errors
     /// Only other boots are heard over this link.
-    fn place_of(&self, boot: u32, now: Duration) -> Result<Option<Origin>, OtherVehicles> {
-        let place = self.0.iter().find(|(known, ..)| *known == boot).map(|(_, from, _)| *from);
+    fn origin_of(&self, boot: u32, now: Duration) -> Result<Option<Origin>, OtherVehicles> {
+        let source = self.0.iter().find(|(known, ..)| *known == boot).map(|(_, from, _)| *from);
         let others = self.0.iter().any(|(_, _, at)| now.saturating_sub(*at) < GONE_AFTER);
-        if place.is_none() && others && boot != 0 { Err(OtherVehicles) } else { Ok(place) }
+        if source.is_none() && others && boot != 0 { Err(OtherVehicles) } else { Ok(source) }
     }
 }
 
@@ -97,11 +97,11 @@ impl Wire {
     ) -> anyhow::Result<Self> {
         let links = Links::open(&endpoints, key).await?;
         Ok(Self {
-            boots: endpoints.iter().map(|_| Boots::default()).collect(),
+            boots: endpoints.iter().map(|_| BootOrigins::default()).collect(),
             links,
             vehicle,
             lockouts: Lockouts::default(),
-            places: Places::default(),
+            sources: Sources::default(),
             awake_at: clock.now(),
             old_until: Duration::ZERO,
             save_failure_reported: false,
@@ -192,9 +192,9 @@ impl Wire {
                         msgs.push(Msg::HeardOver(number));
                     }
                     if frame.source() == self.vehicle {
-                        // On a link with one peer it is the same place after the line was opened again.
+                        // On a link with one peer it is the same source after the line was opened again.
                         let several = name.starts_with("udp") || name.starts_with("tcpin");
-                        msgs.extend(self.places.turn_to((number, from.filter(|_| several))));
+                        msgs.extend(self.sources.turn_to((number, from.filter(|_| several))));
                     }
                     msgs.push(Msg::Frame(frame));
                 }
@@ -212,7 +212,7 @@ impl Wire {
                 LinkEvent::Down(why) if self.links.each().all(|(_, link)| link.trouble().is_some()) => {
                     msgs.push(Msg::LinkDown(why));
                 }
-                LinkEvent::Down(why) => msgs.push(Msg::OneLinkDown(why)),
+                LinkEvent::Down(why) => msgs.push(Msg::LinkSays(format!("one link down: {why}"))),
             }
         }
     }
@@ -248,7 +248,7 @@ impl Wire {
         let now = self.now();
         for number in 0..self.links.count() {
             let to =
-                if concerns_all(message) { Ok(None) } else { self.boots[number].place_of(boot, now.time) };
+                if concerns_all(message) { Ok(None) } else { self.boots[number].origin_of(boot, now.time) };
             // Only other vehicles are heard over this link.
             let Ok(to) = to else { continue };
             let Self { links, recorder, log_time, sent_bytes, .. } = self;
@@ -337,26 +337,26 @@ fn report_of(address: &LinkAddress, link: &HubLink, now: Duration) -> LinkReport
     }
 }
 
-/// How many places are distinguished; a reboot gives a vehicle that connects by itself another one.
-const PLACES_MAX: usize = 64;
+/// How many sources are distinguished; a reboot gives a vehicle that connects by itself another one.
+const SOURCES_MAX: usize = 64;
 
 /// From where the vehicle is heard: a number for each link and address.
 #[derive(Default)]
-struct Places {
+struct Sources {
     known: VecDeque<((usize, Option<Origin>), u16)>,
     next: u16,
     told: u16,
 }
 
-impl Places {
-    /// Frames come from this place from now on. Returns what tells it, if the last ones came from another place.
-    fn turn_to(&mut self, place: (usize, Option<Origin>)) -> Option<Msg> {
-        let known = self.known.iter().find(|(known, _)| *known == place).map(|(_, number)| *number);
+impl Sources {
+    /// Frames come from this source from now on. Returns what tells it, if the last ones came from another source.
+    fn turn_to(&mut self, source: (usize, Option<Origin>)) -> Option<Msg> {
+        let known = self.known.iter().find(|(known, _)| *known == source).map(|(_, number)| *number);
         let number = known.unwrap_or_else(|| {
             // The link's number in the upper byte.
-            self.next = (place.0 as u16) << 8 | (self.next.wrapping_add(1) & 0xff);
-            self.known.drain(..(self.known.len() + 1).saturating_sub(PLACES_MAX));
-            self.known.push_back((place, self.next));
+            self.next = (source.0 as u16) << 8 | (self.next.wrapping_add(1) & 0xff);
+            self.known.drain(..(self.known.len() + 1).saturating_sub(SOURCES_MAX));
+            self.known.push_back((source, self.next));
             self.next
         });
         (std::mem::replace(&mut self.told, number) != number).then_some(Msg::HeardFrom(number))

@@ -162,6 +162,7 @@ mod tests {
         let station = Settings {
             key_owner: Some(KeyOwner { number: 2, name: "Bob".to_owned() }),
             mission: Some(MissionHash([1, 2, 3, 4, 5, 6, 7, 8])),
+            interactive: false,
             ..Settings::on_screen("a")
         };
         let msgs = [

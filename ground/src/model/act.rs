@@ -61,60 +61,86 @@ pub enum Act {
 
 /// An action, its name in the settings, its usual key, and what it does.
 pub struct Definition {
+    effect: Effect,
     pub act: Act,
     pub name: &'static str,
     pub usual: Key,
     pub words: &'static str,
 }
 
-const fn define(act: Act, name: &'static str, usual: char, words: &'static str) -> Definition {
-    Definition { act, name, usual: Key::Char(usual), words }
+/// What a key may do at once.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Effect {
+    /// Changes only what is shown.
+    Shows,
+    /// Opens a dialog that commands the vehicle.
+    Asks,
+    /// Commands the vehicle, and moves nothing.
+    Commands,
+    /// Does something else.
+    Acts,
+}
+
+const fn shows(act: Act, name: &'static str, usual: char, words: &'static str) -> Definition {
+    Definition { effect: Effect::Shows, act, name, usual: Key::Char(usual), words }
+}
+
+const fn asks(act: Act, name: &'static str, usual: char, words: &'static str) -> Definition {
+    Definition { effect: Effect::Asks, act, name, usual: Key::Char(usual), words }
+}
+
+const fn commands(act: Act, name: &'static str, usual: char, words: &'static str) -> Definition {
+    Definition { effect: Effect::Commands, act, name, usual: Key::Char(usual), words }
+}
+
+const fn acts(act: Act, name: &'static str, usual: char, words: &'static str) -> Definition {
+    Definition { effect: Effect::Acts, act, name, usual: Key::Char(usual), words }
 }
 
 /// Every action; the most important first.
 pub const DEFINITIONS: [Definition; 37] = [
-    define(Act::Arm, "arm", 'A', "arm: then type ARM and Enter within 10 s"),
-    define(Act::Start, "start", 'S', "start the countdown: then type START and Enter within 10 s"),
-    define(Act::Disarm, "disarm", 'D', "disarm: then Enter within 5 s"),
-    define(Act::HoldCountdown, "hold-countdown", 'H', "hold the countdown: then Enter within 5 s"),
-    define(Act::Tap, "tap", 'T', "two people: tap twice a second, from the start to the release"),
-    define(Act::TakeCommand, "take", 'C', "take command from a silent station: then TAKE and Enter"),
-    define(Act::Check, "check", 'X', "check the vehicle: then Enter; fins and gimbal MOVE"),
-    define(Act::CheckStill, "check-still", 'E', "the same check without motion: then Enter"),
-    define(Act::Seen, "moved-right", 'Y', "I saw every surface move as the page x says: then SEEN and Enter"),
-    define(Act::RangeTest, "range-test", 'U', "radio range test: 30 s, nothing is commanded"),
-    define(Act::Acknowledge, "acknowledge", ' ', "acknowledge the shown alarm"),
-    define(Act::Checklist, "checklist", 'k', "the checklist on the Pad page; Up and Down choose a step"),
-    define(Act::SignStep, "sign", 'G', "sign the chosen step of the checklist: then Enter within 5 s"),
-    define(Act::VoidStep, "void", 'V', "take a step's signature back: then Enter within 5 s"),
-    define(Act::Show(Page::Pad), "pad", '1', "page: arming checks and ladder"),
-    define(Act::Show(Page::Descent), "flight", '2', "page: ascent and descent"),
-    define(Act::Show(Page::Landing), "landing", '3', "page: the burn"),
-    define(Act::Show(Page::Review), "review", '4', "page: verdict, limits, greatest values"),
-    define(Act::Show(Page::Link), "link", '5', "page: link rates and the age of every message"),
-    define(Act::Show(Page::Messages), "texts", '6', "page: events and messages"),
-    define(Act::Show(Page::Log), "log", '7', "page: the recording"),
-    define(Act::Show(Page::Alarms), "alarms", '8', "page: every alarm"),
-    define(Act::Show(Page::Path), "path", 'p', "page: the flight from two sides and from above"),
-    define(Act::Show(Page::Find), "find", 'f', "page: where to look for the vehicle, and the way there"),
-    define(
+    asks(Act::Arm, "arm", 'A', "arm: then type ARM and Enter within 10 s"),
+    asks(Act::Start, "start", 'S', "start the countdown: then type START and Enter within 10 s"),
+    asks(Act::Disarm, "disarm", 'D', "disarm: then Enter within 5 s"),
+    asks(Act::HoldCountdown, "hold-countdown", 'H', "hold the countdown: then Enter within 5 s"),
+    commands(Act::Tap, "tap", 'T', "two people: tap twice a second, from the start to the release"),
+    asks(Act::TakeCommand, "take", 'C', "take command from a silent station: then TAKE and Enter"),
+    asks(Act::Check, "check", 'X', "check the vehicle: then Enter; fins and gimbal MOVE"),
+    asks(Act::CheckStill, "check-still", 'E', "the same check without motion: then Enter"),
+    asks(Act::Seen, "moved-right", 'Y', "I saw every surface move as the page x says: then SEEN and Enter"),
+    commands(Act::RangeTest, "range-test", 'U', "radio range test: 30 s, nothing is commanded"),
+    acts(Act::Acknowledge, "acknowledge", ' ', "acknowledge the shown alarm"),
+    shows(Act::Checklist, "checklist", 'k', "the checklist on the Pad page; Up and Down choose a step"),
+    asks(Act::SignStep, "sign", 'G', "sign the chosen step of the checklist: then Enter within 5 s"),
+    asks(Act::VoidStep, "void", 'V', "take a step's signature back: then Enter within 5 s"),
+    shows(Act::Show(Page::Pad), "pad", '1', "page: arming checks and ladder"),
+    shows(Act::Show(Page::Descent), "flight", '2', "page: ascent and descent"),
+    shows(Act::Show(Page::Landing), "landing", '3', "page: the burn"),
+    shows(Act::Show(Page::Review), "review", '4', "page: verdict, limits, greatest values"),
+    shows(Act::Show(Page::Link), "link", '5', "page: link rates and the age of every message"),
+    shows(Act::Show(Page::Messages), "texts", '6', "page: events and messages"),
+    shows(Act::Show(Page::Log), "log", '7', "page: the recording"),
+    shows(Act::Show(Page::Alarms), "alarms", '8', "page: every alarm"),
+    shows(Act::Show(Page::Path), "path", 'p', "page: the flight from two sides and from above"),
+    shows(Act::Show(Page::Find), "find", 'f', "page: where to look for the vehicle, and the way there"),
+    shows(
         Act::Show(Page::Checks),
         "checks",
         'x',
         "page: checks on the pad, radio range, battery and storage",
     ),
-    define(Act::Show(Page::Values), "values", 'v', "page: every value, with the solver's residuals"),
-    define(Act::Show(Page::Plot), "plot", 't', "page: one number over time"),
-    define(Act::Show(Page::Help), "help", '?', "page: the keys that work now"),
-    define(Act::Hold, "hold", 'h', "hold this page, or follow the flight again"),
-    define(Act::Follow, "follow", '0', "follow the flight again (Esc does too)"),
-    define(Act::Palette, "palette", ':', "list every action; type a part of its words"),
-    define(Act::NextTheme, "theme", 'c', "colours: dark, light for sunlight, 16, none, contrast"),
-    define(Act::ReplayFlight, "replay", 'R', "the flight just flown, again on this screen; q ends it"),
-    define(Act::Report, "report", 'W', "write the report of the flight beside the log"),
-    define(Act::MovePin, "pin", 'I', "demonstration: put the vehicle's pin in, or pull it, by hand"),
-    Definition { act: Act::Redraw, name: "redraw", usual: Key::CtrlL, words: "draw the screen again" },
-    define(Act::Quit, "quit", 'q', "quit; while it is not over: then type QUIT and Enter"),
+    shows(Act::Show(Page::Values), "values", 'v', "page: every value, with the solver's residuals"),
+    shows(Act::Show(Page::Plot), "plot", 't', "page: one number over time"),
+    shows(Act::Show(Page::Help), "help", '?', "page: the keys that work now"),
+    shows(Act::Hold, "hold", 'h', "hold this page, or follow the flight again"),
+    shows(Act::Follow, "follow", '0', "follow the flight again (Esc does too)"),
+    shows(Act::Palette, "palette", ':', "list every action; type a part of its words"),
+    shows(Act::NextTheme, "theme", 'c', "colours: dark, light for sunlight, 16, none, contrast"),
+    acts(Act::ReplayFlight, "replay", 'R', "the flight just flown, again on this screen; q ends it"),
+    acts(Act::Report, "report", 'W', "write the report of the flight beside the log"),
+    acts(Act::MovePin, "pin", 'I', "demonstration: put the vehicle's pin in, or pull it, by hand"),
+    Definition { usual: Key::CtrlL, ..shows(Act::Redraw, "redraw", ' ', "draw the screen again") },
+    acts(Act::Quit, "quit", 'q', "quit; while it is not over: then type QUIT and Enter"),
 ];
 
 /// Whether a flight has been flown that this screen's log holds, and nothing is at risk.
@@ -170,41 +196,22 @@ impl Act {
         DEFINITIONS.iter().find(|definition| definition.act == self)
     }
 
-    /// Whether it opens a dialog that commands the vehicle.
+    /// Ascent and descent share a definition.
+    fn effect(self) -> Effect {
+        self.definition().map_or(Effect::Shows, |definition| definition.effect)
+    }
+
+    /// Whether it commands the vehicle, or opens a dialog that does.
     pub fn opens_confirmation(self) -> bool {
-        matches!(
-            self,
-            Self::Arm
-                | Self::Start
-                | Self::Disarm
-                | Self::HoldCountdown
-                | Self::Tap
-                | Self::TakeCommand
-                | Self::Check
-                | Self::CheckStill
-                | Self::Seen
-                | Self::RangeTest
-                | Self::SignStep
-                | Self::VoidStep
-        )
+        matches!(self.effect(), Effect::Asks | Effect::Commands)
     }
 
     /// Whether it changes only what is shown, or opens a dialog: it works however fast its key arrives.
     pub fn only_shows_or_asks(self, model: &Model) -> bool {
-        match self {
-            Self::Tap | Self::RangeTest => false,
-            Self::Quit => model.is_at_risk(),
-            act if act.opens_confirmation() => true,
-            act => matches!(
-                act,
-                Self::Checklist
-                    | Self::Show(_)
-                    | Self::Hold
-                    | Self::Follow
-                    | Self::Palette
-                    | Self::NextTheme
-                    | Self::Redraw
-            ),
+        if self == Self::Quit {
+            model.is_at_risk()
+        } else {
+            matches!(self.effect(), Effect::Shows | Effect::Asks)
         }
     }
 }
@@ -319,7 +326,7 @@ pub const ABORT_WORDS: &str = "abort, from anywhere: Enter within 2 s of Ctrl-X 
 
 /// What an entry of the palette does.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Does {
+pub enum PaletteAction {
     /// The same as its key.
     Act(Act),
     /// Only says which keys abort.
@@ -334,7 +341,7 @@ pub struct PaletteEntry {
     pub words: String,
     /// Empty without a key.
     pub key: String,
-    pub does: Does,
+    pub action: PaletteAction,
 }
 
 /// The entries whose words contain every typed word.
@@ -346,12 +353,15 @@ pub fn palette_entries(model: &Model, typed: &str, now: Duration) -> Vec<Palette
 }
 
 fn every_entry(model: &Model, now: Duration) -> impl Iterator<Item = PaletteEntry> {
-    let abort =
-        PaletteEntry { words: ABORT_WORDS.to_owned(), key: "Ctrl-X".to_owned(), does: Does::TellAbort };
+    let abort = PaletteEntry {
+        words: ABORT_WORDS.to_owned(),
+        key: "Ctrl-X".to_owned(),
+        action: PaletteAction::TellAbort,
+    };
     let acts = DEFINITIONS.iter().map(|definition| PaletteEntry {
         words: definition.words.to_owned(),
         key: model.settings.keys.name(definition.act),
-        does: Does::Act(definition.act),
+        action: PaletteAction::Act(definition.act),
     });
     let boots = model.vehicle.boot.number().into_iter().chain(model.other_boots(now));
     let several = !model.other_boots(now).is_empty();
@@ -363,13 +373,13 @@ fn every_entry(model: &Model, now: Duration) -> impl Iterator<Item = PaletteEntr
                 words::boot(boot)
             ),
             key: String::new(),
-            does: Does::Choose(boot),
+            action: PaletteAction::Choose(boot),
         })
         .collect();
     let plots = quantity::ALL.iter().map(|quantity| PaletteEntry {
         words: format!("plot {}", quantity.name),
         key: String::new(),
-        does: Does::Plot(quantity),
+        action: PaletteAction::Plot(quantity),
     });
     std::iter::once(abort).chain(choices).chain(acts).chain(plots)
 }

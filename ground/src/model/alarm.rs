@@ -67,51 +67,23 @@ pub enum AlarmKind {
     AbortBefore,
 }
 
-impl AlarmKind {
-    /// What hides what: an abort that does not work, then whether this screen and its vehicle are what they seem, then
-    /// the vehicle, then everything else.
-    fn urgency(self) -> u8 {
-        match self {
-            Self::Unanswered(CommandKind::Abort)
-            | Self::Disagreement(CommandKind::Abort)
-            | Self::AbortBefore
-            | Self::Refused(CommandKind::Abort) => 3,
-            Self::StationSilent | Self::TwoVehicles | Self::SameId | Self::Foreign | Self::MayBeFlying => 2,
-            Self::LinkLost
-            | Self::UplinkLost
-            | Self::Signatures
-            | Self::LinkDown
-            | Self::LiveMotor
-            | Self::Held
-            | Self::Unfit
-            | Self::Aborted
-            | Self::NoLight
-            | Self::Rebooted => 1,
-            _ => 0,
-        }
-    }
-
-    /// Whether the alarm belongs to one boot of the vehicle and ends with it.
-    fn ends_with_the_boot(self) -> bool {
-        !matches!(
-            self,
-            Self::LinkLost
-                | Self::UplinkLost
-                | Self::Signatures
-                | Self::LinkDown
-                | Self::StationSilent
-                | Self::TwoVehicles
-                | Self::SameId
-                | Self::Foreign
-                | Self::Rebooted
-                | Self::Log
-        )
-    }
+/// What holds now.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Condition {
+    pub kind: AlarmKind,
+    /// The more urgent of two alarms hides the other.
+    pub urgency: u8,
+    /// Whether it belongs to one boot of the vehicle and ends with it.
+    pub ends_with_boot: bool,
+    /// The text for a person; safe to print on a terminal.
+    pub text: String,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Alarm {
     pub kind: AlarmKind,
+    pub urgency: u8,
+    pub ends_with_boot: bool,
     /// The text for a person; safe to print on a terminal.
     pub text: String,
     /// When it was last raised, since the start of the run.
@@ -168,7 +140,7 @@ impl Alarms {
     pub fn foremost(&self) -> Option<&Alarm> {
         self.list.iter().max_by_key(|alarm| {
             let unseen = if alarm.acknowledged { 0 } else { 2 - u8::from(alarm.past) };
-            (unseen, alarm.is_active(), alarm.kind.urgency(), alarm.raised_at)
+            (unseen, alarm.is_active(), alarm.urgency, alarm.raised_at)
         })
     }
 
@@ -184,19 +156,21 @@ impl Alarms {
 
     /// Takes the conditions that hold now and returns the alarms that they raise. A condition that returns raises a
     /// new alarm with a new age, which must be acknowledged again.
-    pub(crate) fn watch(&mut self, now: Duration, conditions: Vec<(AlarmKind, String)>) -> Vec<Alarm> {
+    pub(crate) fn watch(&mut self, now: Duration, conditions: Vec<Condition>) -> Vec<Alarm> {
         for alarm in &mut self.list {
-            if !conditions.iter().any(|(kind, _)| *kind == alarm.kind) {
+            if !conditions.iter().any(|condition| condition.kind == alarm.kind) {
                 alarm.ended_at.get_or_insert(now);
             }
         }
         let mut raised = Vec::new();
-        for (kind, text) in conditions {
+        for Condition { kind, urgency, ends_with_boot, text } in conditions {
             match self.list.iter_mut().find(|alarm| alarm.kind == kind) {
                 Some(known) if known.is_active() => known.text = text,
                 known => {
                     let alarm = Alarm {
                         kind,
+                        urgency,
+                        ends_with_boot,
                         text,
                         raised_at: now,
                         ended_at: None,
@@ -218,7 +192,7 @@ impl Alarms {
 
     /// The vehicle has rebooted: alarms about the previous boot have ended.
     pub(crate) fn vehicle_rebooted(&mut self, now: Duration) {
-        for alarm in self.list.iter_mut().filter(|alarm| alarm.kind.ends_with_the_boot()) {
+        for alarm in self.list.iter_mut().filter(|alarm| alarm.ends_with_boot) {
             alarm.ended_at.get_or_insert(now);
         }
         self.forget_seen();
@@ -306,40 +280,20 @@ mod tests {
 
     const S: fn(u64) -> Duration = Duration::from_secs;
 
-    fn lost() -> Vec<(AlarmKind, String)> {
-        vec![(AlarmKind::LinkLost, "LINK LOST".to_owned())]
+    fn condition(kind: AlarmKind, urgency: u8) -> Condition {
+        Condition { kind, urgency, ends_with_boot: kind == AlarmKind::Aborted, text: "ALARM".to_owned() }
     }
 
-    #[test]
-    fn an_alarm_stays_after_its_condition_ends_until_it_is_acknowledged() {
-        let mut alarms = Alarms::default();
-        assert_eq!(alarms.watch(S(1), lost()).len(), 1);
-        assert!(alarms.watch(S(2), lost()).is_empty(), "raised once");
-        alarms.watch(S(3), Vec::new());
-        assert_eq!(alarms.list()[0].ended_at, Some(S(3)));
-        assert!(alarms.acknowledge(AlarmKind::LinkLost).is_some());
-        assert!(alarms.list().is_empty());
-    }
-
-    #[test]
-    fn an_acknowledged_alarm_stays_while_its_condition_holds_and_is_raised_again_later() {
-        let mut alarms = Alarms::default();
-        alarms.watch(S(1), lost());
-        alarms.acknowledge(AlarmKind::LinkLost);
-        alarms.watch(S(2), lost());
-        assert!(alarms.list()[0].acknowledged);
-        alarms.watch(S(3), Vec::new());
-        assert!(alarms.list().is_empty());
-        assert_eq!(alarms.watch(S(4), lost()).len(), 1);
-        assert_eq!(alarms.unacknowledged(), 1);
+    fn lost() -> Vec<Condition> {
+        vec![condition(AlarmKind::LinkLost, 1)]
     }
 
     /// The link that is lost later hides neither an abort that does not work nor a station that is gone.
     #[test]
     fn the_most_urgent_alarm_is_foremost_and_of_equal_ones_the_newest() {
-        let unsent = (AlarmKind::Unanswered(CommandKind::Abort), "ABORT NOT SENT".to_owned());
-        let gone = (AlarmKind::StationSilent, "STATION GONE".to_owned());
-        let low = (AlarmKind::Battery, "BATTERY LOW".to_owned());
+        let unsent = condition(AlarmKind::Unanswered(CommandKind::Abort), 3);
+        let gone = condition(AlarmKind::StationSilent, 2);
+        let low = condition(AlarmKind::Battery, 0);
         let foremost = |alarms: &Alarms| alarms.foremost().map(|alarm| alarm.kind);
         let mut alarms = Alarms::default();
         let mut conditions = vec![unsent, gone];
@@ -355,54 +309,6 @@ mod tests {
         assert_eq!(foremost(&alarms), Some(AlarmKind::LinkLost), "what holds goes before what has ended");
     }
 
-    /// A screen that attaches late lists past alarms and rings only for those that still hold.
-    #[test]
-    fn an_alarm_that_ended_before_the_screen_attached_does_not_ring() {
-        let mut alarms = Alarms::in_history();
-        let down = (AlarmKind::LinkDown, "LINK DOWN".to_owned());
-        alarms.watch(S(1), [lost(), vec![down.clone()]].concat());
-        assert!(!alarms.rings(S(1), true));
-        alarms.watch(S(9), vec![down]);
-        assert!(!alarms.rings(S(9), false));
-        alarms.history_ends();
-        assert!(alarms.rings(S(10), false), "the link is still down");
-        assert_eq!(alarms.foremost().map(|alarm| alarm.kind), Some(AlarmKind::LinkDown));
-        alarms.watch(S(11), Vec::new());
-        assert!(alarms.rings(S(20), false), "nobody has seen it, and it was there when the screen came");
-        alarms.acknowledge(AlarmKind::LinkLost);
-        alarms.acknowledge(AlarmKind::LinkDown);
-        assert!(alarms.list().is_empty());
-
-        let mut alarms = Alarms::in_history();
-        alarms.watch(S(1), lost());
-        alarms.watch(S(2), Vec::new());
-        alarms.history_ends();
-        assert!(alarms.list()[0].past && !alarms.rings(S(30), false));
-        assert_eq!(alarms.watch(S(40), lost()).len(), 1, "it has come back");
-        assert!(!alarms.list()[0].past && alarms.rings(S(40), true));
-    }
-
-    #[test]
-    fn the_bell_rings_at_once_and_again_until_acknowledged() {
-        let mut alarms = Alarms::default();
-        let raised = !alarms.watch(S(1), lost()).is_empty();
-        assert!(alarms.rings(S(1), raised));
-        assert!(!alarms.rings(S(2), false));
-        assert!(alarms.rings(S(1) + RING_EVERY, false));
-        alarms.acknowledge(AlarmKind::LinkLost);
-        assert!(!alarms.rings(S(60), false));
-    }
-
-    #[test]
-    fn alarms_are_acknowledged_one_by_one() {
-        let mut alarms = Alarms::default();
-        let down = (AlarmKind::LinkDown, "LINK DOWN".to_owned());
-        alarms.watch(S(1), [lost(), vec![down]].concat());
-        alarms.acknowledge(AlarmKind::LinkLost);
-        assert_eq!(alarms.unacknowledged(), 1);
-        assert!(alarms.rings(S(9), false), "the other is not seen yet");
-    }
-
     #[test]
     fn an_alarm_that_is_raised_again_or_after_a_reboot_has_a_new_age() {
         let mut alarms = Alarms::default();
@@ -414,7 +320,7 @@ mod tests {
             "nobody has seen the first, and yet it is a new one"
         );
         assert_eq!(alarms.list()[0].raised_at, S(20));
-        let latched = || vec![(AlarmKind::Aborted, "ABORT LATCHED".to_owned())];
+        let latched = || vec![condition(AlarmKind::Aborted, 1)];
         alarms.watch(S(30), latched());
         alarms.vehicle_rebooted(S(40));
         assert_eq!(alarms.watch(S(40), latched()).len(), 1);

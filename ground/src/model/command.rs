@@ -41,6 +41,15 @@ pub enum CommandKind {
     Seen,
 }
 
+/// A command as a row of their table.
+struct CommandRow {
+    name: &'static str,
+    mav: (MavCmd, f32),
+    moves: bool,
+    resend: Resend,
+    seen: Option<&'static str>,
+}
+
 impl CommandKind {
     pub const ALL: [Self; 13] = [
         Self::Arm,
@@ -58,74 +67,64 @@ impl CommandKind {
         Self::Seen,
     ];
 
+    /// What a command is, but for when it may be given.
+    ///
+    /// A repetition has the number of the command, and the vehicle does it once: a late one arms nothing that was disarmed since.
+    /// A tap is for one moment. A check is not repeated either: it would move what somebody has just laid hands on.
+    fn row(self) -> CommandRow {
+        use MavCmd::{
+            MAV_CMD_COMPONENT_ARM_DISARM as ARM, MAV_CMD_DO_FLIGHTTERMINATION as TERMINATE,
+            MAV_CMD_DO_PAUSE_CONTINUE as PAUSE, MAV_CMD_MISSION_START as START,
+            MAV_CMD_TD_PAD_CHECK as CHECK, MAV_CMD_TD_TAKE_COMMAND as TAKE, MAV_CMD_TD_TAP as TAP,
+        };
+        use Resend::{Never, Times, UntilWithdrawn};
+        let row = |name, mav, moves, resend, seen| CommandRow { name, mav, moves, resend, seen };
+        match self {
+            Self::Arm => row("ARM", (ARM, 1.0), true, Times(4), Some("HEARTBEAT says armed")),
+            Self::Disarm => row("DISARM", (ARM, 0.0), false, Times(3), Some("HEARTBEAT says disarmed")),
+            Self::Start => row("START", (START, 0.0), true, Times(4), Some("countdown runs")),
+            Self::Abort => row("ABORT", (TERMINATE, 1.0), false, UntilWithdrawn, Some("abort latched")),
+            Self::ConfirmArm => row("CONFIRM ARM", (ARM, 1.0), true, Times(4), Some("HEARTBEAT says armed")),
+            Self::ConfirmStart => row("CONFIRM START", (START, 0.0), true, Times(4), Some("countdown runs")),
+            Self::Hold => row("HOLD", (PAUSE, 0.0), false, Times(3), Some("no countdown")),
+            Self::Tap => row("TAP", (TAP, 0.0), true, Never, None),
+            Self::TakeCommand => row("TAKE COMMAND", (TAKE, 0.0), true, Times(3), None),
+            Self::Check => row("CHECK", (CHECK, 1.0), true, Never, None),
+            Self::CheckStill => row("CHECK WITHOUT MOTION", (CHECK, 2.0), true, Never, None),
+            Self::EndCheck => row("END OF CHECK", (CHECK, 0.0), false, Times(3), None),
+            Self::Seen => row("SEEN", (CHECK, 3.0), true, Never, None),
+        }
+    }
+
     /// The name on screens and in the log.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Arm => "ARM",
-            Self::Disarm => "DISARM",
-            Self::Start => "START",
-            Self::Abort => "ABORT",
-            Self::ConfirmArm => "CONFIRM ARM",
-            Self::ConfirmStart => "CONFIRM START",
-            Self::Hold => "HOLD",
-            Self::Tap => "TAP",
-            Self::TakeCommand => "TAKE COMMAND",
-            Self::Check => "CHECK",
-            Self::CheckStill => "CHECK WITHOUT MOTION",
-            Self::EndCheck => "END OF CHECK",
-            Self::Seen => "SEEN",
-        }
+        self.row().name
     }
 
     /// The MAVLink command and its first parameter.
     pub fn mav_command(self) -> (MavCmd, f32) {
-        match self {
-            Self::Arm | Self::ConfirmArm => (MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, 1.0),
-            Self::Disarm => (MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, 0.0),
-            Self::Start | Self::ConfirmStart => (MavCmd::MAV_CMD_MISSION_START, 0.0),
-            Self::Hold => (MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 0.0),
-            Self::Tap => (MavCmd::MAV_CMD_TD_TAP, 0.0),
-            Self::TakeCommand => (MavCmd::MAV_CMD_TD_TAKE_COMMAND, 0.0),
-            Self::EndCheck => (MavCmd::MAV_CMD_TD_PAD_CHECK, 0.0),
-            Self::Check => (MavCmd::MAV_CMD_TD_PAD_CHECK, 1.0),
-            Self::CheckStill => (MavCmd::MAV_CMD_TD_PAD_CHECK, 2.0),
-            Self::Seen => (MavCmd::MAV_CMD_TD_PAD_CHECK, 3.0),
-            Self::Abort => (MavCmd::MAV_CMD_DO_FLIGHTTERMINATION, 1.0),
-        }
+        self.row().mav
     }
 
     /// Whether it can make something move or light: then it names the boot that it is meant for, and is sent only to
     /// the vehicle that is shown.
     pub fn moves(self) -> bool {
-        match self {
-            Self::Arm
-            | Self::ConfirmArm
-            | Self::Start
-            | Self::ConfirmStart
-            | Self::Tap
-            | Self::TakeCommand
-            | Self::Check
-            | Self::CheckStill
-            | Self::Seen => true,
-            Self::Disarm | Self::Hold | Self::Abort | Self::EndCheck => false,
-        }
+        self.row().moves
+    }
+
+    /// How often the command is resent.
+    pub fn resend(self) -> Resend {
+        self.row().resend
+    }
+
+    /// What in the vehicle's own state shows the effect, for the event "observed"; `None` if its answer has to do.
+    pub fn seen(self) -> Option<&'static str> {
+        self.row().seen
     }
 
     /// Whether only the owner of the station's key gives it: everything but what anybody may do to stop something.
     pub fn needs_the_owner(self) -> bool {
         !matches!(self, Self::Hold | Self::Abort | Self::EndCheck)
-    }
-
-    /// How often the command is resent. A repetition has the number of the command, and the vehicle does it once: a late one arms
-    /// nothing that was disarmed since. A tap is for one moment. A check is not repeated either: it would move what somebody has
-    /// just laid hands on.
-    pub fn resend(self) -> Resend {
-        match self {
-            Self::Tap | Self::Check | Self::CheckStill | Self::Seen => Resend::Never,
-            Self::Arm | Self::ConfirmArm | Self::Start | Self::ConfirmStart => Resend::Times(4),
-            Self::Disarm | Self::Hold | Self::TakeCommand | Self::EndCheck => Resend::Times(3),
-            Self::Abort => Resend::UntilWithdrawn,
-        }
     }
 
     /// Whether the vehicle's own state, received after `since`, shows the command's effect.
@@ -162,26 +161,6 @@ impl CommandKind {
                 Some("no countdown runs")
             }
             _ => None,
-        }
-    }
-
-    /// Whether nothing in the vehicle's own state shows the effect, so that its answer has to do.
-    pub fn shows_nothing(self) -> bool {
-        matches!(
-            self,
-            Self::Tap | Self::TakeCommand | Self::Check | Self::CheckStill | Self::EndCheck | Self::Seen
-        )
-    }
-
-    /// What shows the effect, for the event "observed".
-    pub fn observed_words(self) -> &'static str {
-        match self {
-            Self::Arm | Self::ConfirmArm => "HEARTBEAT says armed",
-            Self::Disarm => "HEARTBEAT says disarmed",
-            Self::Start | Self::ConfirmStart => "countdown runs",
-            Self::Hold => "no countdown",
-            Self::Abort => "abort latched",
-            _ => "accepted",
         }
     }
 }
@@ -288,7 +267,7 @@ impl Commands {
 pub fn why_nothing_moves(model: &Model, now: Duration) -> Option<String> {
     let Settings { us, vehicle: of, .. } = &model.settings;
     let vehicle = &model.vehicle;
-    if model.beside(now).is_some() && !model.runs.is_chosen(now) {
+    if model.beside(now).is_some() && !model.boots.is_chosen(now) {
         return Some(format!("TWO VEHICLES under id {}: switch one off", of.system_id));
     }
     if let Some(foreign) =

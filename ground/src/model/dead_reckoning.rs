@@ -554,18 +554,6 @@ mod tests {
             }
         }
 
-        /// In free fall only gravity acts, on the way up and down.
-        #[test]
-        fn in_free_fall_only_gravity_acts(
-            velocity in prop::array::uniform3(-30.0..30.0_f64),
-            seconds in 1.6..4.0_f64,
-        ) {
-            let vehicle = moving(TdPhase::TD_PHASE_COAST, velocity, Some([0.0, 0.0, -GRAVITY_M_S2]));
-            let expected_m = 100.0 + velocity[2] * seconds - 0.5 * GRAVITY_M_S2 * seconds * seconds;
-            let found = after(&vehicle, seconds);
-            prop_assert!((found.altitude_m - expected_m.max(0.0)).abs() < 1e-6, "{found:?} {expected_m}");
-        }
-
         /// Whatever was last received, the prediction is finite if the last position was, and the circle never shrinks.
         #[test]
         fn any_last_report_gives_a_finite_position_and_a_growing_circle(

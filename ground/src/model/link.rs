@@ -62,7 +62,7 @@ pub struct Link {
     /// The number of the link that brought the last frame, if there are several.
     pub(crate) heard_over: Option<usize>,
     /// From where the last frame came: a number for each link and address.
-    pub(crate) place: u16,
+    pub(crate) source: u16,
     /// What the framer rejected.
     pub framing: FramerCounters,
     /// Frames with a correct checksum whose fields could not be decoded.

@@ -5,6 +5,7 @@
 
 mod act;
 mod alarm;
+mod boots;
 mod checklist;
 mod checks;
 mod command;
@@ -20,7 +21,6 @@ mod pad_check;
 mod page;
 mod place;
 pub mod quantity;
-mod runs;
 mod safety;
 pub mod telemetry;
 mod vehicle;
@@ -40,6 +40,7 @@ use serde::{Deserialize, Serialize};
 
 pub use act::*;
 pub use alarm::*;
+pub use boots::*;
 pub use checklist::*;
 pub use checks::*;
 pub use command::*;
@@ -53,7 +54,6 @@ pub use motion::*;
 pub use pad_check::*;
 pub use page::*;
 pub use place::*;
-pub use runs::*;
 pub use safety::*;
 pub use vehicle::*;
 
@@ -62,7 +62,7 @@ pub(crate) use command::AutoStep;
 /// The settings of a run, which do not change during it.
 ///
 /// An attached screen gets those of its station, except for those that are a screen's own.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
     /// The name of the link, as in `udpin:0.0.0.0:14550`.
     pub link_name: String,
@@ -122,40 +122,11 @@ pub struct Settings {
     pub time_limit: Option<Duration>,
 }
 
-impl Default for Settings {
-    fn default() -> Self {
-        Self {
-            link_name: String::new(),
-            link_capacity_bytes_s: None,
-            vehicle_name: None,
-            log_path: None,
-            tlog_path: None,
-            us: GROUND,
-            session: 0,
-            vehicle: VEHICLE,
-            role: Role::Station,
-            seat: Seat::default(),
-            key_owner: None,
-            mission: None,
-            start: None,
-            crew_roles: Vec::new(),
-            pad: None,
-            here: None,
-            start_unix_s: 0,
-            demonstration: false,
-            auto: false,
-            interactive: true,
-            keys: Bindings::default(),
-            talk: Talk::default(),
-            time_limit: None,
-        }
-    }
-}
-
 impl Settings {
     /// A station with a person at its screen, without a log or a time limit, on a link of unknown capacity.
     pub fn on_screen(link_name: impl Into<String>) -> Self {
-        Self { link_name: link_name.into(), ..Self::default() }
+        let link_name = link_name.into();
+        Self { link_name, us: GROUND, vehicle: VEHICLE, interactive: true, ..Self::default() }
     }
 }
 
@@ -212,10 +183,10 @@ pub struct Model {
     pub settings: Settings,
     /// The vehicle, as its telemetry shows it.
     pub vehicle: Vehicle,
-    /// Which runs of which vehicles are heard.
-    pub runs: Runs,
-    /// The vehicles of the runs that are not shown.
-    pub(crate) others: BTreeMap<RunId, Vehicle>,
+    /// Which boots of which vehicles are heard.
+    pub boots: Boots,
+    /// The vehicles of the boots that are not shown.
+    pub(crate) others: BTreeMap<BootId, Vehicle>,
     pub link: Link,
     pub commands: Commands,
     /// The open dialog, if any.
@@ -357,6 +328,12 @@ impl Model {
         self.enter(kind, &by.operator, detail);
     }
 
+    /// Records what the crew did, and adds it to the list of events.
+    pub(crate) fn tell_act(&mut self, now: Duration, kind: &str, by: &Seat, level: EventLevel, text: String) {
+        self.record_operator(now, kind, by, &text);
+        self.tell(now, Speaker::Ground, level, text);
+    }
+
     /// Enters a line into the book.
     pub(crate) fn enter(&mut self, kind: &str, who: &str, text: &str) {
         self.outbox.push(Action::Enter(BookLine {
@@ -437,10 +414,8 @@ pub enum Action {
     Redraw,
     /// Change the screen's colours to the next theme.
     NextTheme,
-    /// Ask the station, from a screen in another process.
+    /// The crew asks for this: a screen in another process asks its station, the station tells its other screens.
     Request(Request),
-    /// Tell the other screens that the crew has asked for this on the station's own screen.
-    Tell(Request),
     /// Give the terminal back and continue without a screen.
     LeaveScreen,
     Bell,

@@ -245,7 +245,7 @@ impl RangeTestResult {
 }
 
 /// A running or a finished test.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct RangeTest {
     pub by: Seat,
     pub began_at: Duration,
@@ -262,18 +262,7 @@ pub struct RangeTest {
 
 impl RangeTest {
     pub(crate) fn begin(by: Seat, counts: FrameCounts, now: Duration) -> Self {
-        Self {
-            by,
-            began_at: now,
-            found: None,
-            counts_before: counts,
-            counts,
-            asked: 0,
-            answered: 0,
-            open: BTreeSet::new(),
-            due_at: now,
-            margin_db: None,
-        }
+        Self { by, began_at: now, counts_before: counts, counts, due_at: now, ..Self::default() }
     }
 
     pub fn is_running(&self) -> bool {

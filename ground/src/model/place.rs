@@ -212,16 +212,7 @@ pub fn geojson(place: &LastPlace) -> String {
         })
     });
     let features: Vec<Value> = spots.chain(circle).collect();
-    let collection = json!({
-        "type": "FeatureCollection",
-        "features": features,
-        "touchdown": {
-            "boot": place.boot,
-            "heard_unix_s": place.heard_unix_s,
-            "height_m": place.height_m,
-            "pad": place.pad.map(json_position),
-        },
-    });
+    let collection = json!({ "type": "FeatureCollection", "features": features, "touchdown": place });
     format!("{collection:#}\n")
 }
 
@@ -274,32 +265,8 @@ pub fn kml(place: &LastPlace) -> Option<String> {
 
 /// Reads what [`geojson`] has written; `None` for anything else.
 pub fn read_geojson(text: &str) -> Option<LastPlace> {
-    let collection: Value = serde_json::from_str(text).ok()?;
-    let about = collection.get("touchdown")?;
-    let number = |of: &Value, key: &str| of.get(key)?.as_f64().filter(|value| value.is_finite());
-    let spot = |name: &str| {
-        let features = collection.get("features")?.as_array()?;
-        let has_name = |properties: &&Value| properties.get("name").and_then(Value::as_str) == Some(name);
-        let properties = features.iter().filter_map(|feature| feature.get("properties")).find(has_name)?;
-        Some(Spot {
-            north_m: number(properties, "north_m")?,
-            east_m: number(properties, "east_m")?,
-            error_m: number(properties, "error_m")?,
-        })
-    };
-    let pad = about.get("pad").and_then(Value::as_array).and_then(|pad| {
-        let (longitude, latitude) = (pad.first()?.as_f64()?, pad.get(1)?.as_f64()?);
-        // The same ranges as for a place that is typed in.
-        format!("{latitude},{longitude}").parse::<Degrees>().ok()
-    });
-    Some(LastPlace {
-        boot: u32::try_from(about.get("boot")?.as_u64()?).ok()?,
-        heard_unix_s: about.get("heard_unix_s")?.as_u64()?,
-        heard: spot("last heard")?,
-        height_m: number(about, "height_m")?,
-        predicted: spot("predicted"),
-        pad,
-    })
+    let mut collection: Value = serde_json::from_str(text).ok()?;
+    serde_json::from_value(collection.get_mut("touchdown")?.take()).ok()
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use std::io::{BufReader, Seek as _};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use protocol::dialect::{MavCmd, MavMessage, TdPhase};
+use protocol::dialect::{MavMessage, TdPhase};
 use protocol::frame::{Frame, Framer};
 use protocol::identity::{Address, GROUND, VEHICLE};
 use protocol::log::reader::{LogItem, LogReader};
@@ -17,8 +17,6 @@ use protocol::log::tlog::{TlogFrame, TlogReader, is_tlog};
 
 use crate::model::{CommandKind, telemetry::phase_of as phase_of_heartbeat};
 
-/// How often the reading progress is reported, bytes.
-const PROGRESS_BYTES: u64 = 4 * 1024 * 1024;
 /// A larger step back in time means that the clock was set back, not that frames of two links are out of order.
 const CLOCK_SET_BACK_NS: i128 = 1_000_000_000;
 /// A longer gap is skipped: the log was continued on another day, or a time stamp is wrong.
@@ -35,13 +33,6 @@ pub enum RecordingError {
     /// There is nothing to show.
     #[error("{}: contains no frames of a vehicle; is it a log of `ground` or `onboard-sim`?", path.display())]
     Empty { path: PathBuf },
-}
-
-/// The reading progress.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Progress {
-    pub read: u64,
-    pub total: u64,
 }
 
 /// A recorded flight.
@@ -67,42 +58,23 @@ impl Recording {
     ///
     /// # Errors
     /// The file cannot be read, or holds nothing to show.
-    pub fn load(
-        path: &Path,
-        vehicle: Option<Address>,
-        progress: &mut dyn FnMut(Progress),
-    ) -> Result<Self, RecordingError> {
+    pub fn load(path: &Path, vehicle: Option<Address>) -> Result<Self, RecordingError> {
         let read = |source| RecordingError::Read { path: path.to_owned(), source };
         let file = File::open(path).map_err(read)?;
-        let total = file.metadata().map_err(read)?.len();
         let mut events = LogEvents::begin(&file, vehicle).map_err(read)?;
-        // What the ground received; if that is missing, what the vehicle sent.
         let (mut ground, mut vehicle) = (Survey::default(), Survey::default());
-        let mut told = 0;
-        while let Some(stamped) = events.next_event().map_err(read)? {
-            let survey = match stamped.side {
-                Side::Ground => &mut ground,
-                Side::Vehicle => &mut vehicle,
-            };
-            survey.note(stamped.stamp_ns, &stamped.event);
-            if events.bytes_read() >= told + PROGRESS_BYTES {
-                told = events.bytes_read();
-                progress(Progress { read: told, total });
-            }
+        while let Some((side, at, event)) = events.next_event().map_err(read)? {
+            let survey = if side == Side::Ground { &mut ground } else { &mut vehicle };
+            survey.note(at, &event);
         }
+        // What the ground received; if that is missing, what the vehicle sent.
         let found = [(Side::Ground, ground), (Side::Vehicle, vehicle)];
         let Some((side, survey)) = found.into_iter().find(|(_, survey)| survey.has_vehicle) else {
             return Err(RecordingError::Empty { path: path.to_owned() });
         };
-        Ok(Self {
-            damage: events.damage(),
-            vehicle: events.vehicle(),
-            file,
-            side,
-            events: survey.events,
-            length: survey.length,
-            phases: survey.phases,
-        })
+        let Survey { events: count, length, phases, .. } = survey;
+        let (damage, vehicle) = (events.damage(), events.vehicle);
+        Ok(Self { damage, vehicle, file, side, events: count, length, phases })
     }
 
     /// The time of the last event.
@@ -121,14 +93,13 @@ impl Recording {
     /// The file can no longer be read.
     pub fn reader(&self) -> io::Result<Reader> {
         let events = LogEvents::begin(&self.file, self.vehicle)?;
-        Ok(Reader { events, side: self.side, clock: RecordingClock::default(), left: self.events })
+        Ok(Reader { events, side: self.side, left: self.events })
     }
 }
 
 /// What the first pass finds for one side of the log.
 #[derive(Default)]
 struct Survey {
-    clock: RecordingClock,
     events: u64,
     has_vehicle: bool,
     length: Duration,
@@ -136,8 +107,8 @@ struct Survey {
 }
 
 impl Survey {
-    fn note(&mut self, stamp_ns: u64, event: &RecordedEvent) {
-        self.length = self.clock.at(stamp_ns);
+    fn note(&mut self, at: Duration, event: &RecordedEvent) {
+        self.length = at;
         self.events += 1;
         if let RecordedEvent::Heard(frame) = event {
             self.has_vehicle = true;
@@ -155,7 +126,6 @@ impl Survey {
 pub struct Reader {
     events: LogEvents,
     side: Side,
-    clock: RecordingClock,
     left: u64,
 }
 
@@ -166,10 +136,10 @@ impl Reader {
     /// The file can no longer be read.
     pub fn next_event(&mut self) -> io::Result<Option<(Duration, RecordedEvent)>> {
         while self.left > 0 {
-            let Some(stamped) = self.events.next_event()? else { break };
-            if stamped.side == self.side {
+            let Some((side, at, event)) = self.events.next_event()? else { break };
+            if side == self.side {
                 self.left -= 1;
-                return Ok(Some((self.clock.at(stamped.stamp_ns), stamped.event)));
+                return Ok(Some((at, event)));
             }
         }
         Ok(None)
@@ -223,51 +193,31 @@ pub enum RecordedEvent {
 
 /// Who recorded a frame; the log of a demonstration contains both sides.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Side {
+enum Side {
     Ground,
     Vehicle,
 }
 
-/// An event with its time stamp.
-pub(super) struct Stamped {
-    pub(super) side: Side,
-    pub(super) stamp_ns: u64,
-    pub(super) event: RecordedEvent,
-}
-
-/// A log that is being read from its beginning.
-pub(super) struct LogEvents {
+/// A log that is being read from its beginning. The addresses of vehicle and ground are the first that are heard, unless given.
+struct LogEvents {
     format: Format,
-    sides: Sides,
-    bytes_read: u64,
-}
-
-/// The addresses of vehicle and ground: the first that are heard, unless given.
-#[derive(Debug, Clone, Copy, Default)]
-struct Sides {
     vehicle: Option<Address>,
     ground: Option<Address>,
-}
-
-impl Sides {
-    fn hear(&mut self, source: Address) {
-        if source.component_id == VEHICLE.component_id {
-            self.vehicle.get_or_insert(source);
-        } else if source.component_id == GROUND.component_id {
-            self.ground.get_or_insert(source);
-        }
-    }
+    /// One for each side.
+    clocks: [RecordingClock; 2],
+    /// What the last record holds.
+    waiting: VecDeque<(Side, Duration, RecordedEvent)>,
 }
 
 enum Format {
-    Mcap { reader: Box<LogReader<BufReader<File>>>, waiting: VecDeque<Stamped> },
+    Mcap(Box<LogReader<BufReader<File>>>),
     Tlog(TlogReader<File>),
 }
 
 impl LogEvents {
     /// Starts at the beginning of an open file, for this vehicle or the first that is heard. What has the content of a
     /// `.tlog` is read as such, everything else as MCAP.
-    pub(super) fn begin(file: &File, vehicle: Option<Address>) -> io::Result<Self> {
+    fn begin(file: &File, vehicle: Option<Address>) -> io::Result<Self> {
         let mut file = file.try_clone()?;
         file.rewind()?;
         let is_tlog = is_tlog(&file)?;
@@ -275,26 +225,16 @@ impl LogEvents {
         let format = if is_tlog {
             Format::Tlog(TlogReader::new(file))
         } else {
-            let file = BufReader::with_capacity(BUFFER_BYTES, file);
-            Format::Mcap { reader: Box::new(LogReader::new(file)), waiting: VecDeque::new() }
+            Format::Mcap(Box::new(LogReader::new(BufReader::with_capacity(BUFFER_BYTES, file))))
         };
-        Ok(Self { format, sides: Sides { vehicle, ground: None }, bytes_read: 0 })
-    }
-
-    /// Bytes of records read so far.
-    pub(super) fn bytes_read(&self) -> u64 {
-        self.bytes_read
-    }
-
-    /// The vehicle that is shown, once it is known.
-    pub(super) fn vehicle(&self) -> Option<Address> {
-        self.sides.vehicle
+        let clocks = <[RecordingClock; 2]>::default();
+        Ok(Self { format, vehicle, ground: None, clocks, waiting: VecDeque::new() })
     }
 
     /// Why reading ended early, if it did.
-    pub(super) fn damage(&self) -> Option<String> {
+    fn damage(&self) -> Option<String> {
         match &self.format {
-            Format::Mcap { reader, .. } => reader.damage().map(ToString::to_string),
+            Format::Mcap(reader) => reader.damage().map(ToString::to_string),
             Format::Tlog(reader) => {
                 let bytes = reader.garbage_bytes();
                 (bytes > 0).then(|| format!("{bytes} bytes belong to no frame"))
@@ -302,77 +242,75 @@ impl LogEvents {
         }
     }
 
-    pub(super) fn next_event(&mut self) -> io::Result<Option<Stamped>> {
-        let sides = &mut self.sides;
-        match &mut self.format {
-            Format::Mcap { reader, waiting } => loop {
-                if let Some(event) = waiting.pop_front() {
-                    return Ok(Some(event));
+    fn next_event(&mut self) -> io::Result<Option<(Side, Duration, RecordedEvent)>> {
+        loop {
+            if let Some(event) = self.waiting.pop_front() {
+                return Ok(Some(event));
+            }
+            let (side, stamp_ns, bytes) = match &mut self.format {
+                Format::Mcap(reader) => {
+                    let Some(item) = reader.next_item()? else { return Ok(None) };
+                    let LogItem::Message { channel_id, log_time_ns, data, .. } = item else { continue };
+                    let Some(channel) = reader.channel(channel_id) else { continue };
+                    let side = match channel.metadata.get("endpoint").map(String::as_str) {
+                        _ if ![TOPIC_RAW_RX, TOPIC_RAW_TX].contains(&channel.topic.as_str()) => continue,
+                        Some("ground") => Side::Ground,
+                        Some("vehicle") => Side::Vehicle,
+                        _ => continue,
+                    };
+                    (side, log_time_ns, data)
                 }
-                let Some(item) = reader.next_item()? else { return Ok(None) };
-                let LogItem::Message { channel_id, log_time_ns, data, .. } = item else { continue };
-                self.bytes_read = reader.bytes_read();
-                let Some(channel) = reader.channel(channel_id) else { continue };
-                let side = match channel.metadata.get("endpoint").map(String::as_str) {
-                    Some("ground") => Side::Ground,
-                    Some("vehicle") => Side::Vehicle,
-                    _ => continue,
-                };
-                if [TOPIC_RAW_RX, TOPIC_RAW_TX].contains(&channel.topic.as_str()) {
-                    let events = frames(&data).into_iter().filter_map(|frame| event(frame, sides));
-                    waiting.extend(events.map(|event| Stamped { side, stamp_ns: log_time_ns, event }));
+                Format::Tlog(reader) => {
+                    let Some(TlogFrame { time_us, bytes }) = reader.next_frame()? else { return Ok(None) };
+                    (Side::Ground, time_us.saturating_mul(1_000), bytes)
                 }
-            },
-            Format::Tlog(reader) => loop {
-                let Some(TlogFrame { time_us, bytes }) = reader.next_frame()? else { return Ok(None) };
-                self.bytes_read = reader.bytes_read();
-                // Frames with a wrong checksum are skipped.
-                if let Some(event) = frames(&bytes).pop().and_then(|frame| event(frame, sides)) {
-                    let stamp_ns = time_us.saturating_mul(1_000);
-                    return Ok(Some(Stamped { side: Side::Ground, stamp_ns, event }));
+            };
+            let mut framer = Framer::new();
+            framer.push_datagram(&bytes);
+            // Frames with a wrong checksum are skipped.
+            while let Some(frame) = framer.next_frame() {
+                if let Some(event) = self.event_of(frame) {
+                    let at = self.clocks[side as usize].at(stamp_ns);
+                    self.waiting.push_back((side, at, event));
                 }
-            },
+            }
         }
     }
+
+    /// The event of a frame: a frame of the vehicle, the first sending of a command, or another frame of the ground.
+    fn event_of(&mut self, frame: Frame) -> Option<RecordedEvent> {
+        let source = frame.source();
+        if source.component_id == VEHICLE.component_id {
+            self.vehicle.get_or_insert(source);
+        } else if source.component_id == GROUND.component_id {
+            self.ground.get_or_insert(source);
+        }
+        if Some(source) == self.vehicle {
+            return Some(RecordedEvent::Heard(frame));
+        }
+        (Some(source) == self.ground).then(|| {
+            let kind = command_in(&frame);
+            kind.map_or(RecordedEvent::Sent(frame.as_bytes().len()), RecordedEvent::Commanded)
+        })
+    }
 }
 
-fn frames(bytes: &[u8]) -> Vec<Frame> {
-    let mut framer = Framer::new();
-    framer.push_datagram(bytes);
-    std::iter::from_fn(|| framer.next_frame()).collect()
-}
-
-/// The event of a frame: a frame of the vehicle, the first sending of a command, or another frame of the ground.
-fn event(frame: Frame, sides: &mut Sides) -> Option<RecordedEvent> {
-    sides.hear(frame.source());
-    if Some(frame.source()) == sides.vehicle {
-        return Some(RecordedEvent::Heard(frame));
-    }
-    if Some(frame.source()) != sides.ground {
-        return None;
-    }
-    let sent = Some(RecordedEvent::Sent(frame.as_bytes().len()));
-    let Ok(MavMessage::COMMAND_LONG(command)) = frame.decode() else { return sent };
-    let kind = match command.command {
-        _ if command.confirmation > 0 => return sent,
+/// The command that a frame sends for the first time.
+fn command_in(frame: &Frame) -> Option<CommandKind> {
+    let Ok(MavMessage::COMMAND_LONG(sent)) = frame.decode() else { return None };
+    let is_sent = |kind: &CommandKind| {
+        let (command, param1) = kind.mav_command();
+        let fits = command == sent.command && (param1 - sent.param1).abs() < 0.5;
         // With the number of an ask it confirms that ask.
-        MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if command.param1 > 0.5 && command.param3 >= 1.0 => {
-            CommandKind::ConfirmArm
+        let confirms = sent.param3 >= 1.0;
+        fits && match kind {
+            CommandKind::ConfirmArm | CommandKind::ConfirmStart => confirms,
+            CommandKind::Arm | CommandKind::Start => !confirms,
+            // A tap is for one moment, and is not followed.
+            kind => *kind != CommandKind::Tap,
         }
-        MavCmd::MAV_CMD_MISSION_START if command.param3 >= 1.0 => CommandKind::ConfirmStart,
-        MavCmd::MAV_CMD_DO_PAUSE_CONTINUE => CommandKind::Hold,
-        MavCmd::MAV_CMD_TD_TAKE_COMMAND => CommandKind::TakeCommand,
-        MavCmd::MAV_CMD_TD_PAD_CHECK if command.param1 > 2.5 => CommandKind::Seen,
-        MavCmd::MAV_CMD_TD_PAD_CHECK if command.param1 > 1.5 => CommandKind::CheckStill,
-        MavCmd::MAV_CMD_TD_PAD_CHECK if command.param1 > 0.5 => CommandKind::Check,
-        MavCmd::MAV_CMD_TD_PAD_CHECK => CommandKind::EndCheck,
-        MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if command.param1 > 0.5 => CommandKind::Arm,
-        MavCmd::MAV_CMD_COMPONENT_ARM_DISARM => CommandKind::Disarm,
-        MavCmd::MAV_CMD_MISSION_START => CommandKind::Start,
-        MavCmd::MAV_CMD_DO_FLIGHTTERMINATION => CommandKind::Abort,
-        _ => return sent,
     };
-    Some(RecordedEvent::Commanded(kind))
+    CommandKind::ALL.into_iter().find(is_sent).filter(|_| sent.confirmation == 0)
 }
 
 #[cfg(test)]

@@ -8,9 +8,9 @@ use protocol::log::record::EventLevel;
 
 use super::Action;
 use crate::model::{
-    Acknowledgement, AlarmKind, Amount, Approach, CommandKind, Danger, Ending, KeepAway, LinkState,
-    LogStanding, Model, PadCheck, RED_AFTER, Speaker, dead_reckoning::may_have_left, hold_words, is_on_pad,
-    latch_words, refused_frames, why_not_reached, why_untested, words,
+    Acknowledgement, AlarmKind, Amount, Approach, CommandKind, Condition, Danger, Ending, KeepAway,
+    LinkState, LogStanding, Model, PadCheck, RED_AFTER, Speaker, dead_reckoning::may_have_left, hold_words,
+    is_on_pad, latch_words, refused_frames, why_not_reached, why_untested, words,
 };
 
 /// An abort without an answer raises an alarm after this time.
@@ -22,97 +22,155 @@ const BATTERY_LOW_PERCENT: u8 = 10;
 /// How long a reboot holds as an alarm condition.
 const REBOOT_SHOWN: Duration = Duration::from_secs(10);
 
+/// An alarm: what it is about, how urgent it is, whether it belongs to one boot of the vehicle and ends with it, and its words
+/// while it holds.
+struct AlarmRow {
+    kind: AlarmKind,
+    urgency: u8,
+    ends_with_boot: bool,
+    holds: fn(&Model, Duration) -> Option<String>,
+}
+
+// What hides what: an abort that does not work, then whether this screen and its vehicle are what they seem, then the vehicle,
+// then everything else.
+const ABORT: u8 = 3;
+const WHO: u8 = 2;
+const VEHICLE: u8 = 1;
+const OTHER: u8 = 0;
+
+const fn of_run(kind: AlarmKind, urgency: u8, holds: fn(&Model, Duration) -> Option<String>) -> AlarmRow {
+    AlarmRow { kind, urgency, ends_with_boot: false, holds }
+}
+
+const fn of_boot(kind: AlarmKind, urgency: u8, holds: fn(&Model, Duration) -> Option<String>) -> AlarmRow {
+    AlarmRow { kind, urgency, ends_with_boot: true, holds }
+}
+
+/// The alarms of the station, its link and its log. A silent station says nothing about the link.
+const OF_STATION: [AlarmRow; 12] = [
+    of_run(AlarmKind::StationSilent, WHO, |model, now| {
+        let gone = "STATION GONE: this screen shows the past and commands nothing";
+        let silent = "STATION SILENT: it does not answer this screen, which shows the past";
+        let silence = model.link.station_silence(now).map(|_| silent.to_owned());
+        if model.link.is_station_gone() { Some(gone.to_owned()) } else { silence }
+    }),
+    of_boot(AlarmKind::Unanswered(CommandKind::Abort), ABORT, |model, now| {
+        model.link.why_abort_not_sent(now).map(|why| format!("ABORT NOT SENT: {why}"))
+    }),
+    of_run(AlarmKind::TwoVehicles, WHO, |model, now| {
+        let (id, other) = (model.settings.vehicle.system_id, model.beside(now)?);
+        let chosen = model.boots.is_chosen(now);
+        let what =
+            if chosen { "the shown one was chosen" } else { "nothing is armed or started: switch one off" };
+        Some(format!("TWO VEHICLES under id {id}: also {other}; {what}"))
+    }),
+    of_run(AlarmKind::Foreign, WHO, |model, now| {
+        let version = "ANOTHER VERSION: the vehicle is heard, but its messages do not fit this station's; take one version on both";
+        let foreign =
+            model.vehicle.as_foreign().map(|foreign| format!("NOT A TOUCHDOWN VEHICLE: {}", foreign.name()));
+        let foreign = foreign.or_else(|| model.speaks_another_version(now).then(|| version.to_owned()));
+        foreign.filter(|_| model.beside(now).is_none())
+    }),
+    of_run(AlarmKind::SameId, WHO, |model, now| {
+        let Address { system_id, component_id } = model.settings.us;
+        let what = "nothing is armed or started; give it another (--sysid)";
+        let shares = model.link.shares_our_id(now);
+        shares.then(|| format!("another station uses our id {system_id}/{component_id}: {what}"))
+    }),
+    of_run(AlarmKind::LinkLost, VEHICLE, |model, now| {
+        let is_lost = matches!(model.link.state(model.link.known_until(now)), LinkState::Lost(_));
+        is_lost.then(|| "LINK LOST: the vehicle is not heard".to_owned())
+    }),
+    of_run(AlarmKind::UplinkLost, VEHICLE, |model, now| {
+        let why = || model.link.uplink.why_unheard();
+        let unheard = is_unheard(model, model.link.known_until(now));
+        unheard.then(|| format!("UPLINK LOST: the vehicle does not hear this station; {}", why()))
+    }),
+    of_boot(AlarmKind::MayBeFlying, WHO, |model, now| {
+        may_have_left(&model.vehicle, model.link.known_until(now))?;
+        let left_s = model.vehicle.countdown_s().map_or(0.0, |left| left.value);
+        Some(format!("MAY BE IN THE AIR: not heard since T-{left_s:.1} s"))
+    }),
+    of_run(AlarmKind::Signatures, VEHICLE, |model, now| refused_frames(model, model.link.known_until(now))),
+    of_run(AlarmKind::LinkDown, VEHICLE, |model, _| {
+        model.link.trouble.as_ref().map(|why| format!("LINK DOWN: {why}"))
+    }),
+    of_boot(AlarmKind::AbortBefore, ABORT, |model, _| {
+        model.abort_before.as_ref().map(|at| format!("ABORT asked at {at} NOT CONFIRMED: ask again?"))
+    }),
+    of_run(AlarmKind::Log, OTHER, |model, now| match model.station_log(model.link.known_until(now)) {
+        LogStanding::Unfit(_, words) | LogStanding::Warned(words) => Some(format!("STATION LOG {words}")),
+        LogStanding::None | LogStanding::Fine => None,
+    }),
+];
+
+/// The alarms of the vehicle.
+const OF_VEHICLE: [AlarmRow; 13] = [
+    of_run(AlarmKind::Rebooted, VEHICLE, |model, now| {
+        let (did, _) = model.rebooted.filter(|(_, at)| now.saturating_sub(*at) < REBOOT_SHOWN)?;
+        Some(format!("the vehicle has REBOOTED{did}"))
+    }),
+    of_boot(AlarmKind::LiveMotor, VEHICLE, |model, now| {
+        let away = KeepAway::of(&model.vehicle, now)?;
+        matches!(away.danger, Danger::Live | Danger::LiveWaited).then(|| away.sentence())
+    }),
+    of_boot(AlarmKind::Held, VEHICLE, |model, _| hold_words(&model.vehicle, model.link.uplink.armed_by_us)),
+    of_boot(AlarmKind::Unfit, VEHICLE, |model, _| {
+        model.vehicle.unfit_while_armed().map(|(_, words)| format!("ARMED, and NO-GO: {words}"))
+    }),
+    of_boot(AlarmKind::Battery, OTHER, |model, _| battery(model)),
+    of_boot(AlarmKind::VehicleLog, OTHER, |model, _| vehicle_log(model)),
+    // The arming checks do not see everything that a check on the pad sees.
+    of_boot(AlarmKind::CheckFailed, OTHER, |model, _| {
+        let on_pad = [TdPhase::TD_PHASE_PAD_IDLE, TdPhase::TD_PHASE_PAD_ARMED].map(Some);
+        let check = model.vehicle.pad_check.as_ref().filter(|_| on_pad.contains(&model.vehicle.phase_now()));
+        check.and_then(PadCheck::failure)
+    }),
+    of_boot(AlarmKind::Aborted, VEHICLE, |model, _| latch_words(model)),
+    of_boot(AlarmKind::NoLight, VEHICLE, |model, _| {
+        let no_light = model.vehicle.interlocks()?.contains(TdInterlock::TD_INTERLOCK_NO_LIGHT);
+        no_light.then(|| "NO LIGHT: the motor did not light".to_owned())
+    }),
+    of_boot(AlarmKind::NotLanded, OTHER, |model, now| {
+        let ending = Ending::of(&model.vehicle, now).filter(|ending| *ending != Ending::Stands)?;
+        Some(ending.sentence(&model.vehicle))
+    }),
+    of_boot(AlarmKind::DeadlineMissed, OTHER, |model, now| {
+        let missed = controller(model, now)?.deadline_margin_us < 0;
+        missed.then(|| "controller DEADLINE MISSED".to_owned())
+    }),
+    of_boot(AlarmKind::Degraded, OTHER, |model, now| {
+        let upright = controller(model, now)?.level == TdControlLevel::TD_CONTROL_LEVEL_STABILISER;
+        let lit_at = model.history.timeline.last().map_or(Duration::ZERO, |(_, at)| *at);
+        let is_late = now.saturating_sub(lit_at) >= FIRST_PLAN_WITHIN;
+        (upright && is_late).then(|| "DEGRADED: the stabiliser flies".to_owned())
+    }),
+    of_boot(AlarmKind::PlanOutside, OTHER, |model, _| {
+        let prediction = model.vehicle.prediction.filter(|_| burns(model))?;
+        prediction.value.touchdown.violations().map(|names| format!("plan ends OUTSIDE {names}"))
+    }),
+];
+
 /// Compares the present conditions with the alarms, rings the bell and reports new alarms.
 pub(super) fn watch(model: &mut Model, now: Duration) {
-    let mut conditions = Vec::new();
-    link_conditions(model, now, &mut conditions);
+    let held = |row: &AlarmRow| {
+        let AlarmRow { kind, urgency, ends_with_boot, holds } = *row;
+        holds(model, now).map(|text| Condition { kind, urgency, ends_with_boot, text })
+    };
+    let mut conditions: Vec<Condition> = OF_STATION.iter().filter_map(held).collect();
     command_conditions(model, now, &mut conditions);
-    vehicle_conditions(model, now, &mut conditions);
+    conditions.extend(OF_VEHICLE.iter().filter_map(held));
     let raised = model.alarms.watch(now, conditions);
     if model.alarms.rings(now, !raised.is_empty()) {
         model.outbox.push(Action::Bell);
     }
     for alarm in raised {
         // Also an event for runs without a screen; other alarms have an event of their own.
-        if matches!(
-            alarm.kind,
-            AlarmKind::UplinkLost
-                | AlarmKind::StationSilent
-                | AlarmKind::TwoVehicles
-                | AlarmKind::SameId
-                | AlarmKind::Foreign
-                | AlarmKind::MayBeFlying
-        ) {
+        if alarm.urgency == WHO || alarm.kind == AlarmKind::UplinkLost {
             model.say(now, Speaker::Ground, EventLevel::Error, alarm.text.clone());
         }
         model.outbox.push(Action::Alarm(alarm.text));
     }
-}
-
-fn link_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, String)>) {
-    if model.link.is_station_gone() {
-        let text = "STATION GONE: this screen shows the past and commands nothing".to_owned();
-        found.push((AlarmKind::StationSilent, text));
-    }
-    if model.link.station_silence(now).is_some() {
-        let text = "STATION SILENT: it does not answer this screen, which shows the past".to_owned();
-        found.push((AlarmKind::StationSilent, text));
-    }
-    if let Some(why) = model.link.why_abort_not_sent(now) {
-        found.push((AlarmKind::Unanswered(CommandKind::Abort), format!("ABORT NOT SENT: {why}")));
-    }
-    found.extend(identity_conditions(model, now));
-    // A silent station says nothing about the link.
-    let now = model.link.known_until(now);
-    if let LinkState::Lost(_) = model.link.state(now) {
-        found.push((AlarmKind::LinkLost, "LINK LOST: the vehicle is not heard".to_owned()));
-    }
-    if is_unheard(model, now) {
-        let why = model.link.uplink.why_unheard();
-        let text = format!("UPLINK LOST: the vehicle does not hear this station; {why}");
-        found.push((AlarmKind::UplinkLost, text));
-    }
-    if may_have_left(&model.vehicle, now).is_some() {
-        let left_s = model.vehicle.countdown_s().map_or(0.0, |left| left.value);
-        let text = format!("MAY BE IN THE AIR: not heard since T-{left_s:.1} s");
-        found.push((AlarmKind::MayBeFlying, text));
-    }
-    found.extend(refused_frames(model, now).map(|words| (AlarmKind::Signatures, words)));
-    if let Some(why) = &model.link.trouble {
-        found.push((AlarmKind::LinkDown, format!("LINK DOWN: {why}")));
-    }
-    let open = |at| (AlarmKind::AbortBefore, format!("ABORT asked at {at} NOT CONFIRMED: ask again?"));
-    found.extend(model.abort_before.as_ref().map(open));
-    if let LogStanding::Unfit(_, words) | LogStanding::Warned(words) = model.station_log(now) {
-        found.push((AlarmKind::Log, format!("STATION LOG {words}")));
-    }
-}
-
-/// It is not certain which vehicle, or which station, is obeyed.
-fn identity_conditions(model: &Model, now: Duration) -> Vec<(AlarmKind, String)> {
-    let mut found = Vec::new();
-    let id = model.settings.vehicle.system_id;
-    if let Some(other) = model.beside(now) {
-        let text = if model.runs.is_chosen(now) {
-            format!("TWO VEHICLES under id {id}: also {other}; the shown one was chosen")
-        } else {
-            format!("TWO VEHICLES under id {id}: also {other}; nothing is armed or started: switch one off")
-        };
-        found.push((AlarmKind::TwoVehicles, text));
-    } else if let Some(foreign) = model.vehicle.as_foreign() {
-        found.push((AlarmKind::Foreign, format!("NOT A TOUCHDOWN VEHICLE: {}", foreign.name())));
-    } else if model.speaks_another_version(now) {
-        let text = "ANOTHER VERSION: the vehicle is heard, but its messages do not fit this station's; take one version on both";
-        found.push((AlarmKind::Foreign, text.to_owned()));
-    }
-    if model.link.shares_our_id(now) {
-        let Address { system_id, component_id } = model.settings.us;
-        let text = format!(
-            "another station uses our id {system_id}/{component_id}: nothing is armed or started; give it another (--sysid)"
-        );
-        found.push((AlarmKind::SameId, text));
-    }
-    found
 }
 
 /// Whether the vehicle is heard and is known not to hear this station.
@@ -136,70 +194,36 @@ fn is_unheard(model: &Model, now: Duration) -> bool {
     silent && told && model.vehicle.as_foreign().is_none()
 }
 
-fn command_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, String)>) {
+fn command_conditions(model: &Model, now: Duration, found: &mut Vec<Condition>) {
     for track in &model.commands.tracks {
         let name = track.kind.name();
+        let urgency = if track.kind == CommandKind::Abort { ABORT } else { OTHER };
+        let mut hold = |kind, text| found.push(Condition { kind, urgency, ends_with_boot: true, text });
         if track.disagrees(now) {
-            found.push((AlarmKind::Disagreement(track.kind), format!("{name} acknowledged, NOT OBSERVED")));
+            hold(AlarmKind::Disagreement(track.kind), format!("{name} acknowledged, NOT OBSERVED"));
         }
         let waits = matches!(track.acknowledged, Acknowledgement::Waiting | Acknowledgement::GivenUp);
         let waited = now.saturating_sub(track.commanded_at);
         if track.kind == CommandKind::Abort && waits && waited >= UNANSWERED_FOR {
-            found.push((AlarmKind::Unanswered(track.kind), format!("{name} NOT ACKNOWLEDGED yet; repeated")));
+            hold(AlarmKind::Unanswered(track.kind), format!("{name} NOT ACKNOWLEDGED yet; repeated"));
         } else if track.acknowledged == Acknowledgement::GivenUp && !track.not_observed_reported {
-            found.push((AlarmKind::Unanswered(track.kind), format!("{name} was never acknowledged")));
+            hold(AlarmKind::Unanswered(track.kind), format!("{name} was never acknowledged"));
         }
         if matches!(track.acknowledged, Acknowledgement::Answered(_)) && !track.accepted() {
-            found.push((AlarmKind::Refused(track.kind), format!("{name} REFUSED by the vehicle")));
+            hold(AlarmKind::Refused(track.kind), format!("{name} REFUSED by the vehicle"));
         }
     }
 }
 
-fn vehicle_conditions(model: &Model, now: Duration, found: &mut Vec<(AlarmKind, String)>) {
-    let vehicle = &model.vehicle;
-    if let Some((did, at)) = &model.rebooted
-        && now.saturating_sub(*at) < REBOOT_SHOWN
-    {
-        found.push((AlarmKind::Rebooted, format!("the vehicle has REBOOTED{did}")));
-    }
-    if let Some(away) = KeepAway::of(vehicle, now).filter(|away| is_live(away.danger)) {
-        found.push((AlarmKind::LiveMotor, away.sentence()));
-    }
-    if let Some(words) = hold_words(vehicle, model.link.uplink.armed_by_us) {
-        found.push((AlarmKind::Held, words));
-    }
-    let unfit = vehicle.unfit_while_armed();
-    found.extend(unfit.map(|(_, words)| (AlarmKind::Unfit, format!("ARMED, and NO-GO: {words}"))));
-    found.extend(battery(model).map(|words| (AlarmKind::Battery, words)));
-    found.extend(vehicle_log(model).map(|words| (AlarmKind::VehicleLog, words)));
-    found.extend(failed_check(model).map(|words| (AlarmKind::CheckFailed, words)));
-    found.extend(latch_words(model).map(|words| (AlarmKind::Aborted, words)));
-    if vehicle.interlocks().is_some_and(|locks| locks.contains(TdInterlock::TD_INTERLOCK_NO_LIGHT)) {
-        found.push((AlarmKind::NoLight, "NO LIGHT: the motor did not light".to_owned()));
-    }
-    if let Some(ending) = Ending::of(vehicle, now).filter(|ending| *ending != Ending::Stands) {
-        found.push((AlarmKind::NotLanded, ending.sentence(vehicle)));
-    }
-    let powered = vehicle.phase_now() == Some(TdPhase::TD_PHASE_POWERED);
-    if !powered || vehicle.verdict().is_some() {
-        return;
-    }
-    if let Some(controller) =
-        vehicle.last::<TD_CONTROLLER_DATA>().filter(|controller| !controller.is_stale(now))
-    {
-        if controller.value.deadline_margin_us < 0 {
-            found.push((AlarmKind::DeadlineMissed, "controller DEADLINE MISSED".to_owned()));
-        }
-        let lit_at = model.history.timeline.last().map_or(Duration::ZERO, |(_, at)| *at);
-        if controller.value.level == TdControlLevel::TD_CONTROL_LEVEL_STABILISER
-            && now.saturating_sub(lit_at) >= FIRST_PLAN_WITHIN
-        {
-            found.push((AlarmKind::Degraded, "DEGRADED: the stabiliser flies".to_owned()));
-        }
-    }
-    if let Some(names) = vehicle.prediction.and_then(|prediction| prediction.value.touchdown.violations()) {
-        found.push((AlarmKind::PlanOutside, format!("plan ends OUTSIDE {names}")));
-    }
+/// Whether the landing motor burns, and the flight has no verdict yet.
+fn burns(model: &Model) -> bool {
+    model.vehicle.phase_now() == Some(TdPhase::TD_PHASE_POWERED) && model.vehicle.verdict().is_none()
+}
+
+/// What the controller says of itself under thrust.
+fn controller(model: &Model, now: Duration) -> Option<TD_CONTROLLER_DATA> {
+    let controller = model.vehicle.last().filter(|controller| burns(model) && !controller.is_stale(now));
+    controller.map(|controller| controller.value)
 }
 
 /// A battery below the vehicle's own limit, which it tells on its pad; or nearly empty, anywhere.
@@ -209,15 +233,6 @@ fn battery(model: &Model) -> Option<String> {
     let empty = battery.percent.is_some_and(|percent| percent <= BATTERY_LOW_PERCENT);
     let left = battery.percent.map_or_else(String::new, |percent| format!(", {percent} % left"));
     (refuses || empty).then(|| format!("BATTERY LOW: {:.2} V{left}", battery.volts))
-}
-
-/// The arming checks do not see everything that a check on the pad sees.
-fn failed_check(model: &Model) -> Option<String> {
-    let phase = model.vehicle.phase_now();
-    if !matches!(phase, Some(TdPhase::TD_PHASE_PAD_IDLE | TdPhase::TD_PHASE_PAD_ARMED)) {
-        return None;
-    }
-    model.vehicle.pad_check.as_ref().and_then(PadCheck::failure)
 }
 
 /// Before the self-test is over a log may still be about to begin.
@@ -238,10 +253,6 @@ fn vehicle_log(model: &Model) -> Option<String> {
 /// Whether the vehicle says that it fails this check; it says so on its pad only.
 fn fails(model: &Model, check: TdCheck) -> bool {
     model.vehicle.status.as_ref().is_some_and(|status| status.value.checks_failed.contains(check))
-}
-
-fn is_live(danger: Danger) -> bool {
-    matches!(danger, Danger::Live | Danger::LiveWaited)
 }
 
 // What is called out: as a line of text to the crew's voice, or as bells without one.
@@ -287,12 +298,19 @@ fn call(model: &mut Model, amount: Amount, text: impl Into<String>, bells: u8) {
     }
 }
 
+/// Whether this is not what was called out last.
+fn is_new<T: PartialEq>(called: &mut T, present: T) -> bool {
+    *called != present && {
+        *called = present;
+        true
+    }
+}
+
 fn call_ending(model: &mut Model, now: Duration) {
     let ending = Ending::of(&model.vehicle, now);
-    if std::mem::replace(&mut model.called.ending, ending) == ending {
-        return;
-    }
-    if let Some(ending) = ending {
+    if is_new(&mut model.called.ending, ending)
+        && let Some(ending) = ending
+    {
         let bells = if ending == Ending::Stands { EVENT } else { WRONG };
         call(model, Amount::Few, ending.word().to_lowercase(), bells);
     }
@@ -300,10 +318,9 @@ fn call_ending(model: &mut Model, now: Duration) {
 
 fn call_approach(model: &mut Model, now: Duration) {
     let headline = Approach::of(&model.vehicle, now).map(|approach| approach.headline());
-    if std::mem::replace(&mut model.called.approach, headline) == headline {
-        return;
-    }
-    if let Some(headline) = headline {
+    if is_new(&mut model.called.approach, headline)
+        && let Some(headline) = headline
+    {
         call(model, Amount::Few, headline.to_lowercase(), EVENT);
     }
 }
@@ -386,13 +403,10 @@ fn call_readiness(model: &mut Model, now: Duration) {
 
 fn call_link(model: &mut Model, now: Duration) {
     let lost = matches!(model.link.state(model.link.known_until(now)), LinkState::Lost(_));
-    if std::mem::replace(&mut model.called.lost, lost) == lost {
-        return;
-    }
-    if lost {
+    if is_new(&mut model.called.lost, lost) {
         // The alarm of the lost link rings by itself.
-        call(model, Amount::Few, "link lost", 0);
-    } else {
-        call(model, Amount::Normal, "link restored", 0);
+        let (amount, text) =
+            if lost { (Amount::Few, "link lost") } else { (Amount::Normal, "link restored") };
+        call(model, amount, text, 0);
     }
 }

@@ -1,21 +1,98 @@
-//! Follows each command: sent, answered or given up, observed. The automatic mode and the unattended countdown give
+//! Decides whether a command is sent, and follows it: sent, answered or given up, observed. The automatic mode and the unattended countdown give
 //! their commands here too.
 
 use std::time::Duration;
 
 use protocol::command::{CommandAnswer, CommandEvent, Ticket, result_words};
-use protocol::dialect::{COMMAND_LONG_DATA, MavMessage, MavResult, TdHold, TdPhase};
+use protocol::dialect::{COMMAND_LONG_DATA, MavMessage, MavResult, TdAct, TdHold, TdPhase};
 use protocol::log::record::EventLevel;
 use protocol::mission::MissionHash;
 
 use super::Action;
 use crate::model::{
-    Acknowledgement, AutoStep, CommandKind, LogFault, Model, Seat, Speaker, TrackedCommand,
-    why_nothing_moves, words,
+    Acknowledgement, AutoStep, CommandKind, LogFault, LogStanding, Model, Seat, Speaker, TrackedCommand,
+    why_not_arm, why_not_check, why_not_confirm, why_not_seat, why_not_seen, why_not_start, why_not_take,
+    why_nothing_moves, why_untested, words,
 };
 
 /// Of the many attempts of an abort, only the first and every n-th become an event.
 const ABORT_REPORTED_EVERY: u32 = 100;
+
+/// The crew goes on without the station's log. That it did is recorded wherever something still records: in the vehicle's
+/// log by the station's book, and on every screen.
+pub(super) fn without_log(model: &mut Model, by: &Seat, now: Duration) {
+    let LogStanding::Unfit(fault, words) = model.station_log(now) else {
+        return model.info(now, "the station's log is fit: nothing to go on without");
+    };
+    if let Some(why) = why_not_seat(model, by) {
+        return model.warn(now, format!("not without a log: {why}"));
+    }
+    model.without_log = Some(fault);
+    let text =
+        format!("WITHOUT A LOG: arm and start go on although the station log {words}{}", by.in_brackets());
+    model.tell_act(now, "without log", by, EventLevel::Warning, text);
+}
+
+/// The crew arms a motor that no burn of its lot has confirmed. Who did is recorded as for [`without_log`]; it counts until
+/// the vehicle's next power-up.
+pub(super) fn untested(model: &mut Model, by: &Seat, now: Duration) {
+    let Some(why) = why_untested(model) else {
+        return model.info(now, "burns confirm the motor, or it was overruled: nothing to go on with");
+    };
+    if let Some(why) = why_not_seat(model, by) {
+        return model.warn(now, format!("not with an untested motor: {why}"));
+    }
+    model.untested = model.vehicle.boot.number();
+    let text = format!("UNTESTED MOTOR: arming goes on although {why}{}", by.in_brackets());
+    model.tell_act(now, "untested motor", by, EventLevel::Warning, text);
+}
+
+/// Sends a command, unless the vehicle has changed in the meantime or the same command is already being sent.
+pub(super) fn command(model: &mut Model, kind: CommandKind, by: &Seat, now: Duration) {
+    let theirs = why_not_seat(model, by).filter(|_| kind.needs_the_owner());
+    let why_not = match kind {
+        _ if theirs.is_some() => theirs,
+        CommandKind::Arm => already_sent(model, kind, now).or_else(|| why_not_arm(model, now)),
+        CommandKind::Start => already_sent(model, kind, now).or_else(|| why_not_start(model, now)),
+        CommandKind::ConfirmArm | CommandKind::ConfirmStart => {
+            let none = || "nobody of another role asks for it".to_owned();
+            let start = kind == CommandKind::ConfirmStart;
+            let ask = model.ask_to_confirm(now).filter(|ask| (ask.act == TdAct::TD_ACT_START) == start);
+            ask.map_or_else(|| Some(none()), |ask| why_not_confirm(model, &ask, now))
+        }
+        CommandKind::TakeCommand => why_not_take(model, now),
+        CommandKind::Tap => {
+            let ours = model.tapping(now).is_some_and(|(by, _)| by == model.key_number());
+            let none = || (!ours).then(|| "no tap of this operator is waited for".to_owned());
+            why_nothing_moves(model, now).or_else(none)
+        }
+        CommandKind::Seen => why_not_seen(model, now),
+        CommandKind::Check | CommandKind::CheckStill => {
+            already_sent(model, kind, now).or_else(|| why_not_check(model, now))
+        }
+        // It would cut the motors of somebody else's vehicle.
+        CommandKind::Disarm if model.vehicle.as_foreign().is_some() => why_nothing_moves(model, now),
+        CommandKind::Disarm | CommandKind::Hold | CommandKind::Abort | CommandKind::EndCheck => None,
+    };
+    match why_not {
+        // The next one comes within 1 s, and the vehicle shows the time that is left.
+        None if kind == CommandKind::Tap => {
+            send_once(model, kind);
+            model.record_operator(now, "commanded", by, &format!("TAP{}", by.in_brackets()));
+        }
+        None => submit(model, kind, by.clone(), now),
+        Some(why) => {
+            let text = format!("cannot {}: {why}{}", kind.name().to_lowercase(), by.in_brackets());
+            model.tell_act(now, "not sent", by, EventLevel::Warning, text);
+        }
+    }
+}
+
+/// Why not to send a command that another screen has just sent.
+fn already_sent(model: &Model, kind: CommandKind, now: Duration) -> Option<String> {
+    let track = model.commands.of(kind).filter(|track| track.is_on_its_way(now))?;
+    Some(format!("{} is already on its way{}", kind.name(), track.by.in_brackets()))
+}
 
 /// Sends a command to the vehicle and starts to follow it.
 pub(super) fn submit(model: &mut Model, kind: CommandKind, by: Seat, now: Duration) {
@@ -235,7 +312,7 @@ pub(super) fn restart_after_reboot(model: &mut Model, now: Duration) -> Vec<&'st
 pub(super) fn observe(model: &mut Model, now: Duration) {
     let mut seen = Vec::new();
     for track in &mut model.commands.tracks {
-        let answered = track.kind.shows_nothing() && track.accepted();
+        let answered = track.kind.seen().is_none() && track.accepted();
         let shown = answered || track.kind.is_observed(&model.vehicle, track.commanded_at);
         if let Some(since) = track.observed_at {
             if let Some(why) = track.kind.no_longer(&model.vehicle, since) {
@@ -248,7 +325,7 @@ pub(super) fn observe(model: &mut Model, now: Duration) {
             seen.push((
                 EventLevel::Info,
                 track.by.clone(),
-                format!("{} observed: {}", track.kind.name(), track.kind.observed_words()),
+                format!("{} observed: {}", track.kind.name(), track.kind.seen().unwrap_or("accepted")),
             ));
         } else if track.disagrees(now) && !track.not_observed_reported {
             track.not_observed_reported = true;
@@ -261,8 +338,7 @@ pub(super) fn observe(model: &mut Model, now: Duration) {
         }
     }
     for (level, by, text) in seen {
-        model.record_operator(now, "observed", &by, &text);
-        model.tell(now, Speaker::Ground, level, text);
+        model.tell_act(now, "observed", &by, level, text);
     }
     stop_if_latched(model, now);
 }
@@ -400,7 +476,7 @@ fn why_unfit(model: &Model, now: Duration) -> Option<&'static str> {
     if !model.settings.auto && model.crew.is_gone(now) {
         return Some("no commanding screen in the countdown");
     }
-    if model.beside(now).is_some() && !model.runs.is_chosen(now) {
+    if model.beside(now).is_some() && !model.boots.is_chosen(now) {
         return Some("TWO VEHICLES in the countdown");
     }
     let fault = model.log_fault(now).filter(|fault| *fault != LogFault::Full);
@@ -421,8 +497,7 @@ pub(super) fn hold_if_unfit(model: &mut Model, now: Duration) {
         model.crew.too_late_told = too_late;
         let what = if too_late { "TOO LATE for a hold, only an abort ends it" } else { "HOLD" };
         let text = format!("{why}: {what}");
-        model.record_operator(now, "hold", &Seat::default(), &text);
-        model.tell(now, Speaker::Ground, EventLevel::Warning, text);
+        model.tell_act(now, "hold", &Seat::default(), EventLevel::Warning, text);
     }
     let due = model.crew.hold_due.unwrap_or(now);
     if too_late {

@@ -11,7 +11,9 @@ use protocol::text::Text;
 use protocol::told::boot_of;
 
 use super::{Action, commands, pad, vehicle_changes};
-use crate::model::{Model, Role, RunId, Speaker, Word, is_busy, may_be_ours, telemetry, time_boot_ms};
+use crate::model::{
+    BootId, Model, Role, Speaker, StatusReport, is_busy, may_be_ours, telemetry, time_boot_ms,
+};
 
 const HEARTBEAT_ID: u32 = 0;
 const RADIO_STATUS_ID: u32 = 109;
@@ -82,27 +84,27 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
     let is_nobodys = match &message {
         MavMessage::HEARTBEAT(beat) if !may_be_ours(beat) => false,
         MavMessage::TD_FLIGHT_STATUS(_) | MavMessage::STATUSTEXT(_) => false,
-        MavMessage::HEARTBEAT(_) if model.runs.is_stray(boot_of(frame).unwrap_or(0)) => true,
+        MavMessage::HEARTBEAT(_) if model.boots.is_stray(boot_of(frame).unwrap_or(0)) => true,
         _ => {
-            boot_of(frame).is_some_and(|boot| model.runs.is_stray(boot))
-                || model.runs.is_strange(model.link.place, now)
+            boot_of(frame).is_some_and(|boot| model.boots.is_stray(boot))
+                || model.boots.is_strange(model.link.source, now)
         }
     };
     if is_nobodys {
         return;
     }
     if let MavMessage::TD_FLIGHT_STATUS(status) = &message
-        && model.runs.disowns(&word(status, frame, model.link.place), now)
+        && model.boots.disowns(&report(status, frame, model.link.source), now)
     {
         return;
     }
     let speaker = speaker(model, frame, &message, now);
-    if let Some(other) = speaker.filter(|run| model.runs.shown() != Some(*run)) {
+    if let Some(other) = speaker.filter(|boot| model.boots.shown() != Some(*boot)) {
         // Answers and texts are the crew's, whoever sends them; all else of another vehicle is kept beside.
         if !matches!(message, MavMessage::STATUSTEXT(_)) {
             let vehicle = model.others.entry(other).or_default();
             telemetry::apply(vehicle, &message, now);
-            model.runs.note(other, is_busy(vehicle, now));
+            model.boots.note(other, is_busy(vehicle, now));
             vehicle_changes::settle(model, now);
             return;
         }
@@ -133,8 +135,8 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
     let before = vehicle_changes::Announced::of(&model.vehicle);
     let crew_before = vehicle_changes::CrewReport::of(model);
     telemetry::apply(&mut model.vehicle, &message, now);
-    if let Some(shown) = model.runs.shown() {
-        model.runs.note(shown, is_busy(&model.vehicle, now));
+    if let Some(shown) = model.boots.shown() {
+        model.boots.note(shown, is_busy(&model.vehicle, now));
     }
     vehicle_changes::on_change(model, before, now);
     vehicle_changes::enter_crew_changes(model, &crew_before);
@@ -142,27 +144,27 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
     commands::observe(model, now);
 }
 
-fn word(status: &TD_FLIGHT_STATUS_DATA, frame: &Frame, place: u16) -> Word {
-    Word {
+fn report(status: &TD_FLIGHT_STATUS_DATA, frame: &Frame, source: u16) -> StatusReport {
+    StatusReport {
         uid: status.vehicle_uid,
         boot: status.boot_number,
         clock_ms: status.time_boot_ms,
         sequence: frame.sequence(),
-        place,
+        source,
     }
 }
 
 /// Which vehicle has sent a message, and since which power-up; `None` before the first flight status.
-fn speaker(model: &mut Model, frame: &Frame, message: &MavMessage, now: Duration) -> Option<RunId> {
+fn speaker(model: &mut Model, frame: &Frame, message: &MavMessage, now: Duration) -> Option<BootId> {
     match message {
         MavMessage::TD_FLIGHT_STATUS(status) => {
-            Some(model.runs.hear(&word(status, frame, model.link.place), now))
+            Some(model.boots.hear(&report(status, frame, model.link.source), now))
         }
         // What another autopilot says beside ours is noted at the shown one.
-        MavMessage::HEARTBEAT(beat) if !may_be_ours(beat) => model.runs.shown(),
+        MavMessage::HEARTBEAT(beat) if !may_be_ours(beat) => model.boots.shown(),
         _ => {
             let said = (boot_of(frame), time_boot_ms(message), frame.sequence());
-            model.runs.speaker(model.link.place, said, now)
+            model.boots.speaker(model.link.source, said, now)
         }
     }
 }

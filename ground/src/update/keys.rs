@@ -9,15 +9,14 @@
 use std::time::Duration;
 
 use protocol::dialect::{TdAct, TdInterlock};
-use protocol::log::record::EventLevel;
 
-use super::{Action, Request, commands, on_request, pad};
+use super::{Action, Request, on_request, pad};
 use crate::key::Key;
 use crate::model::{
-    AGAIN_AFTER, AGAIN_KEY, Act, AlarmKind, CommandKind, Dialog, Does, FINGERS_APART, KeyOrigin, LogStanding,
-    Model, Page, Prompt, RestOfWord, Role, Seat, Speaker, Standing, TextEntry, overruled_by, palette_entries,
-    quantity, standing, why_not_arm, why_not_check, why_not_confirm, why_not_here, why_not_quit,
-    why_not_seat, why_not_seen, why_not_start, why_not_take, why_nothing_moves, why_untested,
+    AGAIN_AFTER, AGAIN_KEY, Act, AlarmKind, CommandKind, Dialog, FINGERS_APART, KeyOrigin, Model, Page,
+    PaletteAction, Prompt, RestOfWord, Role, Standing, TextEntry, overruled_by, palette_entries, quantity,
+    standing, why_not_arm, why_not_check, why_not_confirm, why_not_here, why_not_quit, why_not_seen,
+    why_not_start, why_not_take, why_nothing_moves,
 };
 use crate::update;
 
@@ -191,26 +190,25 @@ fn on_again(model: &mut Model, dialog: Dialog, by_hand: bool, now: Duration) {
 
 /// The crew has completed every step of a dialog.
 fn confirmed(model: &mut Model, prompt: Prompt, now: Duration) {
+    if let Prompt::Confirm(waits) = &prompt
+        && let Some(why) = why_not_confirm(model, waits, now)
+    {
+        return model.warn(now, format!("nothing is confirmed: {why}"));
+    }
+    if let Some(kind) = prompt.command() {
+        return ask(model, kind, now);
+    }
     match prompt {
-        Prompt::Arm => ask(model, CommandKind::Arm, now),
-        Prompt::Start => ask(model, CommandKind::Start, now),
-        Prompt::Confirm(waits) => match why_not_confirm(model, &waits, now) {
-            None if waits.act == TdAct::TD_ACT_START => ask(model, CommandKind::ConfirmStart, now),
-            None => ask(model, CommandKind::ConfirmArm, now),
-            Some(why) => model.warn(now, format!("nothing is confirmed: {why}")),
-        },
         Prompt::WithoutLog => request(model, Request::WithoutLog, now),
         Prompt::Untested => request(model, Request::Untested, now),
-        Prompt::TakeCommand => ask(model, CommandKind::TakeCommand, now),
-        Prompt::Hold => ask(model, CommandKind::Hold, now),
-        Prompt::Disarm => ask(model, CommandKind::Disarm, now),
-        Prompt::AbortForeign => ask(model, CommandKind::Abort, now),
-        Prompt::Check { moves: true } => ask(model, CommandKind::Check, now),
-        Prompt::Seen => ask(model, CommandKind::Seen, now),
-        Prompt::Check { moves: false } => ask(model, CommandKind::CheckStill, now),
-        Prompt::Sign { step, void } => pad::ask_to_sign(model, (step, void), now),
+        Prompt::Sign { step, void } => {
+            let step = u8::try_from(step).unwrap_or(u8::MAX);
+            request(model, Request::Sign { step, void }, now);
+            // The next step that is open is chosen.
+            model.pages.step = None;
+        }
         // A live station must keep running without its screen; a demonstration or an attached screen may end.
-        Prompt::Quit => {
+        _ => {
             let stays = model.settings.role == Role::Station && !model.settings.demonstration;
             let leave =
                 if stays && why_not_quit(model, now).is_some() { Action::LeaveScreen } else { Action::Quit };
@@ -239,12 +237,11 @@ fn expire(model: &mut Model, now: Duration) {
 /// Lets time pass: a dialog may expire, and the abort chord or a key to quit may become complete.
 pub(super) fn pass(model: &mut Model, now: Duration) {
     expire(model, now);
-    pass_abort_chord(model, now);
-    pass_quit(model, now);
-}
-
-/// Quits if no other key has followed the key to quit.
-fn pass_quit(model: &mut Model, now: Duration) {
+    // Only on ticks, because a key may be a further repeat of a held Ctrl-X.
+    if model.abort_chord.pass(now) {
+        abort(model, now);
+    }
+    // No other key has followed the key to quit.
     if model.quit_at.is_some_and(|at| now >= at) {
         model.quit_at = None;
         model.outbox.push(Action::Quit);
@@ -268,7 +265,7 @@ fn on_free_key(model: &mut Model, key: Key, touch: KeyOrigin, now: Duration) {
     let shown = model.page();
     match key {
         Key::Up | Key::Down if shown == Page::Alarms => choose_alarm(model, key == Key::Up),
-        Key::Up | Key::Down if shown == Page::Pad && lists_steps(model) => {
+        Key::Up | Key::Down if shown == Page::Pad && model.pages.checklist && model.checklist.is_some() => {
             choose_step(model, key == Key::Up, now);
         }
         Key::Up | Key::Down if shown == Page::Plot => choose_quantity(model, key == Key::Up),
@@ -307,8 +304,8 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
     match act {
         Act::Arm if confirms(model, TdAct::TD_ACT_ARM, now) => {}
         Act::Start if confirms(model, TdAct::TD_ACT_START, now) => {}
-        Act::Arm => climb(model, Prompt::Arm, "arm", why_not_arm(model, now), now),
-        Act::Start => climb(model, Prompt::Start, "start", why_not_start(model, now), now),
+        Act::Arm => open_unless(model, Prompt::Arm, "arm", why_not_arm(model, now), now),
+        Act::Start => open_unless(model, Prompt::Start, "start", why_not_start(model, now), now),
         Act::Disarm => match why_nothing_moves(model, now).filter(|_| model.vehicle.as_foreign().is_some()) {
             None => open(model, Prompt::Disarm, now),
             Some(why) => model.warn(now, format!("cannot disarm: {why}")),
@@ -320,9 +317,9 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
         Act::HoldCountdown => model.info(now, "no countdown runs"),
         Act::Tap => ask(model, CommandKind::Tap, now),
         Act::TakeCommand => {
-            climb(model, Prompt::TakeCommand, "take command", why_not_take(model, now), now);
+            open_unless(model, Prompt::TakeCommand, "take command", why_not_take(model, now), now);
         }
-        Act::Seen => climb(model, Prompt::Seen, "say so", why_not_seen(model, now), now),
+        Act::Seen => open_unless(model, Prompt::Seen, "say so", why_not_seen(model, now), now),
         Act::Check | Act::CheckStill => match standing(model, now) {
             Standing::Runs | Standing::MayRun => ask(model, CommandKind::EndCheck, now),
             Standing::JustEnded => {
@@ -349,7 +346,7 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
             }
         }
         Act::ReplayFlight => update::replay_flight(model, now),
-        Act::Report => update::write_report(model, now),
+        Act::Report => update::ask_for_report(model, now),
         Act::MovePin if act.works(model, now) => {
             let is_out = model
                 .vehicle
@@ -370,7 +367,9 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
         Act::Hold if model.pages.held.is_some() => model.pages.hold(None),
         Act::Hold => model.pages.hold(Some(shown)),
         Act::Follow => model.pages.hold(None),
-        Act::Palette => open_palette(model),
+        Act::Palette => {
+            model.pages.entry = Some(TextEntry::Palette { typed: String::new(), chosen: 0 });
+        }
         Act::NextTheme => model.outbox.push(Action::NextTheme),
         Act::Redraw => model.outbox.push(Action::Redraw),
         Act::Quit => quit(model, now),
@@ -379,7 +378,7 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
 
 /// Opens the dialog of a rung of the ladder, or the one that overrules what alone is in the way. If it is refused, the word
 /// that the crew would have typed is swallowed.
-fn climb(model: &mut Model, prompt: Prompt, verb: &str, why_not: Option<String>, now: Duration) {
+fn open_unless(model: &mut Model, prompt: Prompt, verb: &str, why_not: Option<String>, now: Duration) {
     let Some(why) = why_not else { return open(model, prompt, now) };
     if let Some(overrules) = overruled_by(model, &why, now) {
         return open(model, overrules, now);
@@ -408,26 +407,25 @@ fn open(model: &mut Model, prompt: Prompt, now: Duration) {
 /// moment both ask: the vehicle takes the first ask, and the other one hears of it.
 fn confirms(model: &mut Model, act: TdAct, now: Duration) -> bool {
     let Some(ask) = model.ask_to_confirm(now).filter(|ask| ask.act == act) else { return false };
-    climb(model, Prompt::Confirm(ask), "confirm", why_not_confirm(model, &ask, now), now);
+    open_unless(model, Prompt::Confirm(ask), "confirm", why_not_confirm(model, &ask, now), now);
     true
 }
 
-/// Whether the Pad page lists the checklist.
-fn lists_steps(model: &Model) -> bool {
-    model.checklist.is_some() && model.pages.checklist
+/// The next or the previous place of a list.
+fn beside(at: usize, up: bool, last: usize) -> usize {
+    if up { at.saturating_sub(1) } else { (at + 1).min(last) }
 }
 
 /// Chooses the next or the previous step of the checklist.
 fn choose_step(model: &mut Model, up: bool, now: Duration) {
     let Some(at) = model.chosen_step(now) else { return };
     let last = model.checklist.as_ref().map_or(0, |list| list.steps.len().saturating_sub(1));
-    model.pages.step = Some(if up { at.saturating_sub(1) } else { (at + 1).min(last) });
+    model.pages.step = Some(beside(at, up, last));
 }
 
 /// Chooses the next or the previous quantity to plot.
 fn choose_quantity(model: &mut Model, up: bool) {
-    let at = model.pages.plotted.place();
-    let next = if up { at.saturating_sub(1) } else { (at + 1).min(quantity::COUNT - 1) };
+    let next = beside(model.pages.plotted.place(), up, quantity::COUNT - 1);
     model.pages.plotted = &quantity::ALL[next];
 }
 
@@ -446,94 +444,13 @@ fn ask(model: &mut Model, kind: CommandKind, now: Duration) {
 }
 
 /// Does what the crew has asked for and tells the other screens, or asks the station to.
-fn request(model: &mut Model, request: Request, now: Duration) {
-    match model.settings.role {
-        Role::Attached => model.outbox.push(Action::Request(request)),
-        Role::Station => {
-            model.outbox.push(Action::Tell(request));
-            on_request(model, request, model.settings.seat.clone(), now);
-        }
-        Role::Watching | Role::Replaying => {}
+pub(super) fn request(model: &mut Model, request: Request, now: Duration) {
+    if model.settings.role.why_not_command().is_none() {
+        model.outbox.push(Action::Request(request));
     }
-}
-
-/// The crew goes on without the station's log. That it did is recorded wherever something still records: in the vehicle's
-/// log by the station's book, and on every screen.
-pub(super) fn without_log(model: &mut Model, by: &Seat, now: Duration) {
-    let LogStanding::Unfit(fault, words) = model.station_log(now) else {
-        return model.info(now, "the station's log is fit: nothing to go on without");
-    };
-    if let Some(why) = why_not_seat(model, by) {
-        return model.warn(now, format!("not without a log: {why}"));
+    if model.settings.role == Role::Station {
+        on_request(model, request, model.settings.seat.clone(), now);
     }
-    model.without_log = Some(fault);
-    let text =
-        format!("WITHOUT A LOG: arm and start go on although the station log {words}{}", by.in_brackets());
-    model.record_operator(now, "without log", by, &text);
-    model.tell(now, Speaker::Ground, EventLevel::Warning, text);
-}
-
-/// The crew arms a motor that no burn of its lot has confirmed. Who did is recorded as for [`without_log`]; it counts until
-/// the vehicle's next power-up.
-pub(super) fn untested(model: &mut Model, by: &Seat, now: Duration) {
-    let Some(why) = why_untested(model) else {
-        return model.info(now, "burns confirm the motor, or it was overruled: nothing to go on with");
-    };
-    if let Some(why) = why_not_seat(model, by) {
-        return model.warn(now, format!("not with an untested motor: {why}"));
-    }
-    model.untested = model.vehicle.boot.number();
-    let text = format!("UNTESTED MOTOR: arming goes on although {why}{}", by.in_brackets());
-    model.record_operator(now, "untested motor", by, &text);
-    model.tell(now, Speaker::Ground, EventLevel::Warning, text);
-}
-
-/// Sends a command, unless the vehicle has changed in the meantime or the same command is already being sent.
-pub(super) fn command(model: &mut Model, kind: CommandKind, by: &Seat, now: Duration) {
-    let theirs = why_not_seat(model, by).filter(|_| kind.needs_the_owner());
-    let why_not = match kind {
-        _ if theirs.is_some() => theirs,
-        CommandKind::Arm => already_sent(model, kind, now).or_else(|| why_not_arm(model, now)),
-        CommandKind::Start => already_sent(model, kind, now).or_else(|| why_not_start(model, now)),
-        CommandKind::ConfirmArm | CommandKind::ConfirmStart => {
-            let none = || "nobody of another role asks for it".to_owned();
-            let start = kind == CommandKind::ConfirmStart;
-            let ask = model.ask_to_confirm(now).filter(|ask| (ask.act == TdAct::TD_ACT_START) == start);
-            ask.map_or_else(|| Some(none()), |ask| why_not_confirm(model, &ask, now))
-        }
-        CommandKind::TakeCommand => why_not_take(model, now),
-        CommandKind::Tap => {
-            let ours = model.tapping(now).is_some_and(|(by, _)| by == model.key_number());
-            let none = || (!ours).then(|| "no tap of this operator is waited for".to_owned());
-            why_nothing_moves(model, now).or_else(none)
-        }
-        CommandKind::Seen => why_not_seen(model, now),
-        CommandKind::Check | CommandKind::CheckStill => {
-            already_sent(model, kind, now).or_else(|| why_not_check(model, now))
-        }
-        // It would cut the motors of somebody else's vehicle.
-        CommandKind::Disarm if model.vehicle.as_foreign().is_some() => why_nothing_moves(model, now),
-        CommandKind::Disarm | CommandKind::Hold | CommandKind::Abort | CommandKind::EndCheck => None,
-    };
-    match why_not {
-        // The next one comes within 1 s, and the vehicle shows the time that is left.
-        None if kind == CommandKind::Tap => {
-            commands::send_once(model, kind);
-            model.record_operator(now, "commanded", by, &format!("TAP{}", by.in_brackets()));
-        }
-        None => commands::submit(model, kind, by.clone(), now),
-        Some(why) => {
-            let text = format!("cannot {}: {why}{}", kind.name().to_lowercase(), by.in_brackets());
-            model.record_operator(now, "not sent", by, &text);
-            model.tell(now, Speaker::Ground, EventLevel::Warning, text);
-        }
-    }
-}
-
-/// Why not to send a command that another screen has just sent.
-fn already_sent(model: &Model, kind: CommandKind, now: Duration) -> Option<String> {
-    let track = model.commands.of(kind).filter(|track| track.is_on_its_way(now))?;
-    Some(format!("{} is already on its way{}", kind.name(), track.by.in_brackets()))
 }
 
 /// Acknowledges the alarm in the alarm line, or the chosen one of the list.
@@ -560,18 +477,8 @@ pub(super) fn acknowledge(model: &mut Model, kind: AlarmKind, now: Duration) {
 fn choose_alarm(model: &mut Model, up: bool) {
     let list = model.alarms.list();
     let at = model.pointed_at().and_then(|chosen| list.iter().position(|alarm| alarm.kind == chosen.kind));
-    let next = match at {
-        Some(at) if up => at.saturating_sub(1),
-        Some(at) => (at + 1).min(list.len() - 1),
-        None => return,
-    };
-    model.pages.chosen = Some(list[next].kind);
-}
-
-/// Lets time pass for the abort chord; only on ticks, because a key may be a further repeat of a held Ctrl-X.
-fn pass_abort_chord(model: &mut Model, now: Duration) {
-    if model.abort_chord.pass(now) {
-        abort(model, now);
+    if let Some(at) = at {
+        model.pages.chosen = Some(list[beside(at, up, list.len() - 1)].kind);
     }
 }
 
@@ -598,30 +505,22 @@ fn quit(model: &mut Model, now: Duration) {
 /// The longest text.
 const TYPED_MAX: usize = 30;
 
-pub(super) fn open_palette(model: &mut Model) {
-    model.pages.entry = Some(TextEntry::Palette { typed: String::new(), chosen: 0 });
-}
-
 /// A key while a text is typed. Esc gives up; the keys of the abort never come here.
-pub(super) fn on_entry_key(model: &mut Model, key: Key, now: Duration) {
-    match model.pages.entry.take() {
-        // Only a replay asks where to jump, and takes those keys itself.
-        None | Some(TextEntry::Jump { .. }) => {}
-        Some(TextEntry::Palette { typed, chosen }) => on_palette_key(model, (typed, chosen), key, now),
-    }
-}
-
-fn on_palette_key(model: &mut Model, (mut typed, mut chosen): (String, usize), key: Key, now: Duration) {
+fn on_entry_key(model: &mut Model, key: Key, now: Duration) {
+    // Only a replay asks where to jump, and takes those keys itself.
+    let Some(TextEntry::Palette { mut typed, mut chosen }) = model.pages.entry.take() else { return };
     match key {
         Key::Escape => return,
         Key::Enter => {
             let entry = palette_entries(model, &typed, now).into_iter().nth(chosen);
-            return match entry.map(|entry| entry.does) {
-                Some(Does::Act(act)) if model.key_timing.hurried && !act.only_shows_or_asks(model) => {
+            return match entry.map(|entry| entry.action) {
+                Some(PaletteAction::Act(act))
+                    if model.key_timing.hurried && !act.only_shows_or_asks(model) =>
+                {
                     drop_run(model, now);
                 }
-                Some(Does::Choose(_)) if model.key_timing.hurried => drop_run(model, now),
-                Some(does) => perform_entry(model, does, now),
+                Some(PaletteAction::Choose(_)) if model.key_timing.hurried => drop_run(model, now),
+                Some(action) => perform_entry(model, action, now),
                 None => {}
             };
         }
@@ -636,10 +535,10 @@ fn on_palette_key(model: &mut Model, (mut typed, mut chosen): (String, usize), k
 }
 
 /// Does what an entry of the palette says. It goes the way of its key, so it never does more than the key.
-fn perform_entry(model: &mut Model, does: Does, now: Duration) {
-    match does {
+fn perform_entry(model: &mut Model, action: PaletteAction, now: Duration) {
+    match action {
         // Enter has chosen it, and a held Enter would confirm it.
-        Does::Act(act) => {
+        PaletteAction::Act(act) => {
             let keys = match act {
                 Act::Disarm => ", then Enter: only these keys disarm",
                 Act::HoldCountdown => ", then Enter: only these keys hold",
@@ -649,12 +548,12 @@ fn perform_entry(model: &mut Model, does: Does, now: Duration) {
             };
             model.info(now, format!("press {}{keys}", model.settings.keys.name(act)));
         }
-        Does::Choose(boot) => match model.settings.role.why_not_command() {
+        PaletteAction::Choose(boot) => match model.settings.role.why_not_command() {
             None => request(model, Request::Choose(boot), now),
             Some(why) => model.info(now, why),
         },
-        Does::TellAbort => model.info(now, "press Ctrl-X, then Enter: only these keys abort"),
-        Does::Plot(quantity) => {
+        PaletteAction::TellAbort => model.info(now, "press Ctrl-X, then Enter: only these keys abort"),
+        PaletteAction::Plot(quantity) => {
             model.pages.plotted = quantity;
             perform(model, Act::Show(Page::Plot), now);
         }

@@ -91,8 +91,6 @@ pub enum Msg {
     LinkUp(String),
     /// No link works; the reason.
     LinkDown(String),
-    /// One of several links does not work; the reason.
-    OneLinkDown(String),
     /// A warning about the links for the crew.
     LinkSays(String),
     Log(LogHealth),
@@ -201,12 +199,9 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
             model.warn(now, format!("link down: {why}"));
             model.link.trouble = Some(why);
         }
-        Msg::OneLinkDown(why) => {
-            model.warn(now, format!("one link down: {}", protocol::text::printable(why.as_bytes())));
-        }
         Msg::LinkSays(words) => model.warn(now, protocol::text::printable(words.as_bytes())),
         Msg::HeardOver(number) => model.link.heard_over = Some(number),
-        Msg::HeardFrom(place) => model.link.place = place,
+        Msg::HeardFrom(source) => model.link.source = source,
         Msg::Links { links, signing } => on_reports(model, links, signing, now),
         Msg::Log(health) => on_log_health(model, health, now),
         Msg::LogBegins { log, tlog } => on_log_begins(model, log, tlog, now),
@@ -240,13 +235,19 @@ fn on_request(model: &mut Model, request: Request, by: Seat, now: Duration) {
         model.link.abort_asked_at = None;
     }
     match request {
-        Request::Command(kind) => keys::command(model, kind, &by, now),
+        Request::Command(kind) => commands::command(model, kind, &by, now),
         Request::Acknowledge(kind) => keys::acknowledge(model, kind, now),
-        Request::Report => write_report(model, now),
+        Request::Report => match why_nothing_flown(model) {
+            Some(why) => model.info(now, format!("no report: {why}")),
+            None => {
+                model.info(now, "the report is being written");
+                model.outbox.push(Action::WriteReport);
+            }
+        },
         Request::Choose(boot) => vehicle_changes::choose(model, boot, &by, now),
         Request::RangeTest => pad::begin_range_test(model, by, now),
-        Request::WithoutLog => keys::without_log(model, &by, now),
-        Request::Untested => keys::untested(model, &by, now),
+        Request::WithoutLog => commands::without_log(model, &by, now),
+        Request::Untested => commands::untested(model, &by, now),
         Request::Sign { step, void } => pad::sign(model, (step.into(), void), &by, now),
     }
 }
@@ -339,16 +340,10 @@ pub(super) fn replay_flight(model: &mut Model, now: Duration) {
 }
 
 /// Has the report written, by the station.
-pub(super) fn write_report(model: &mut Model, now: Duration) {
+fn ask_for_report(model: &mut Model, now: Duration) {
     let watches = (model.settings.role == Role::Watching).then_some("this screen only watches");
     match why_nothing_flown(model).or(watches) {
         Some(why) => model.info(now, format!("no report: {why}")),
-        None if model.settings.role == Role::Attached => {
-            model.outbox.push(Action::Request(Request::Report));
-        }
-        None => {
-            model.info(now, "the report is being written");
-            model.outbox.push(Action::WriteReport);
-        }
+        None => keys::request(model, Request::Report, now),
     }
 }

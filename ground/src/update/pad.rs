@@ -5,7 +5,7 @@ use std::time::Duration;
 use protocol::dialect::{TD_PAD_CHECK_DATA, TdPadCheckState};
 use protocol::log::record::EventLevel;
 
-use super::{Action, Request, tick};
+use super::{Action, tick};
 use crate::model::{
     ChecklistEntry, Mark, Model, PadCheck, Prompt, RangeTest, Role, Seat, Signature, Speaker, role_name,
     shown, why_not_check, words,
@@ -24,20 +24,6 @@ pub(super) fn open_sign_dialog(model: &mut Model, void: bool, now: Duration) {
         return refuse_signature(model, (step, void), &seat, &why, now);
     }
     model.dialog = Some(Prompt::Sign { step, void }.open(now));
-}
-
-/// The dialog is complete: signs here, or asks the station to.
-pub(super) fn ask_to_sign(model: &mut Model, (step, void): (usize, bool), now: Duration) {
-    match model.settings.role {
-        Role::Attached => {
-            let step = u8::try_from(step).unwrap_or(u8::MAX);
-            model.outbox.push(Action::Request(Request::Sign { step, void }));
-        }
-        Role::Station => sign(model, (step, void), &model.settings.seat.clone(), now),
-        Role::Watching | Role::Replaying => {}
-    }
-    // The next step that is open is chosen.
-    model.pages.step = None;
 }
 
 /// Signs or voids a step for a person at a screen of this station, unless the step or the person does not fit.
@@ -156,8 +142,7 @@ pub(super) fn begin_range_test(model: &mut Model, by: Seat, now: Duration) {
     }
     let counts = model.link.stats.counts(model.settings.vehicle);
     let text = format!("radio range test begins: 30 s, nothing is commanded{}", by.in_brackets());
-    model.record_operator(now, "radio range test", &by, &text);
-    model.tell(now, Speaker::Ground, EventLevel::Info, text);
+    model.tell_act(now, "radio range test", &by, EventLevel::Info, text);
     model.range_test = Some(RangeTest::begin(by, counts, now));
 }
 
@@ -176,8 +161,7 @@ pub(super) fn pass_range_test(model: &mut Model, now: Duration) {
     }
     if let Some((found, by)) = ended {
         let level = if found.passed() { EventLevel::Info } else { EventLevel::Warning };
-        model.record_operator(now, "radio range test", &by, &found.words());
-        model.tell(now, Speaker::Ground, level, found.words());
+        model.tell_act(now, "radio range test", &by, level, found.words());
     }
 }
 

@@ -66,18 +66,18 @@ const KEPT_WITHIN_S: u16 = 2;
 
 /// Shows another run if one takes the screen.
 pub(super) fn settle(model: &mut Model, now: Duration) {
-    let Some(former) = model.runs.shown() else { return };
-    let Some(shown) = model.runs.settle(now) else { return };
+    let Some(former) = model.boots.shown() else { return };
+    let Some(shown) = model.boots.settle(now) else { return };
     let vehicle = model.others.remove(&shown).unwrap_or_default();
     let mut before = std::mem::replace(&mut model.vehicle, vehicle);
     let away = KeepAway::of(&before, now);
     model.vehicle.before = away.map(|away| Sample::new(away, now)).or(model.vehicle.before);
     model.vehicle.foreign = before.foreign.take();
-    let is_reset = model.runs.follows(shown, former);
+    let is_reset = model.boots.follows(shown, former);
     let did = is_reset.then(|| Announced::of(&before).words_of_reset());
     model.others.insert(former, before);
-    let Model { runs, others, .. } = model;
-    others.retain(|id, _| runs.knows(*id));
+    let Model { boots, others, .. } = model;
+    others.retain(|id, _| boots.knows(*id));
     on_shown(model, did, now);
     on_change(model, Announced::default(), now);
 }
@@ -107,7 +107,7 @@ pub(super) fn keep_unfinished(model: &mut Model, now: Duration) {
 /// The crew shows and commands this boot, of several vehicles under one id.
 pub(super) fn choose(model: &mut Model, boot: u32, by: &Seat, now: Duration) {
     let name = words::boot(boot);
-    if model.runs.choose(boot, now) {
+    if model.boots.choose(boot, now) {
         model.record_operator(now, "chose", by, &format!("the vehicle of boot {name}{}", by.in_brackets()));
         model.warn(now, format!("boot {name} was chosen: it is shown and commanded"));
         settle(model, now);
@@ -293,47 +293,31 @@ pub(super) fn on_kept(model: &mut Model, kept: &TD_BOOK_KEPT_DATA) {
     }
 }
 
-/// What the vehicle says of its crew and its mission, as far as the book has it.
-#[derive(Debug, Clone, PartialEq)]
+/// What the vehicle says of its crew and its mission.
 pub(super) struct CrewReport {
-    people: u8,
-    ask: Option<(TdAct, u16, u8)>,
-    tapped_by: u8,
-    commanded_by: u8,
-    held_by: u8,
+    crew: TD_CREW_DATA,
     mission: Option<FlownMission>,
 }
 
 impl CrewReport {
     pub(super) fn of(model: &Model) -> Self {
-        let crew = model.vehicle.last::<TD_CREW_DATA>();
-        let crew = crew.as_ref().map(|crew| &crew.value);
-        Self {
-            people: crew.map_or(0, |crew| crew.people),
-            ask: crew
-                .filter(|crew| crew.act != TdAct::TD_ACT_NONE)
-                .map(|crew| (crew.act, crew.ask_number, crew.asked_by)),
-            tapped_by: crew.map_or(0, |crew| crew.tapped_by),
-            commanded_by: crew.map_or(0, |crew| crew.commanded_by),
-            held_by: crew.map_or(0, |crew| crew.held_by),
-            mission: model.vehicle.mission(),
-        }
+        let crew = model.vehicle.last::<TD_CREW_DATA>().map(|crew| crew.value).unwrap_or_default();
+        Self { crew, mission: model.vehicle.mission() }
     }
 }
 
 /// Enters what has changed.
 pub(super) fn enter_crew_changes(model: &mut Model, before: &CrewReport) {
-    let after = CrewReport::of(model);
-    if after == *before {
-        return;
-    }
+    let CrewReport { crew: after, mission } = CrewReport::of(model);
+    let (before, former) = (&before.crew, &before.mission);
     let mut lines: Vec<(u8, String)> = Vec::new();
     if after.people != before.people {
         lines.push((0, format!("an arming and a start take {} of the crew", after.people)));
     }
-    if let Some((act, number, by)) = after.ask.filter(|_| after.ask != before.ask) {
-        let act = if act == TdAct::TD_ACT_START { "start" } else { "arm" };
-        lines.push((by, format!("asks to {act} (ask {number})")));
+    let ask = |crew: &TD_CREW_DATA| (crew.act, crew.ask_number, crew.asked_by);
+    if after.act != TdAct::TD_ACT_NONE && ask(&after) != ask(before) {
+        let act = if after.act == TdAct::TD_ACT_START { "start" } else { "arm" };
+        lines.push((after.asked_by, format!("asks to {act} (ask {})", after.ask_number)));
     }
     let roles = [
         (after.commanded_by, before.commanded_by, "is in command"),
@@ -345,7 +329,7 @@ pub(super) fn enter_crew_changes(model: &mut Model, before: &CrewReport) {
             lines.push((after, words.to_owned()));
         }
     }
-    if let Some(mission) = after.mission.filter(|mission| before.mission.as_ref() != Some(mission)) {
+    if let Some(mission) = mission.filter(|mission| former.as_ref() != Some(mission)) {
         lines.push((0, format!("it flies the mission {} {}", mission.in_words(), mission.hash)));
     }
     for (by, words) in lines {

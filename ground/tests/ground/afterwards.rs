@@ -62,16 +62,16 @@ fn the_review_says_how_much_of_the_flight_was_not_heard() {
 fn replay_and_report_wait_for_the_end_of_a_flight() {
     let mut rig = station(Role::Station);
     assert_eq!((asks(&mut rig, 'R'), asks(&mut rig, 'W')), (vec![], vec![]));
-    assert!(rig.events().contains("no replay: no flight has been flown yet"), "{}", rig.events());
+    rig.expect_event("no replay: no flight has been flown yet");
     let mut rig = falling(Role::Station);
     assert_eq!((asks(&mut rig, 'R'), asks(&mut rig, 'W')), (vec![], vec![]));
-    assert!(rig.events().contains("no report: the vehicle is armed or in flight"), "{}", rig.events());
+    rig.expect_event("no report: the vehicle is armed or in flight");
     rig.phase = TdPhase::TD_PHASE_SAFED;
     rig.run(1.0);
     assert_eq!(asks(&mut rig, 'R'), [Action::ReplayFlight]);
-    assert_eq!(asks(&mut rig, 'W'), [Action::WriteReport]);
+    assert_eq!(asks(&mut rig, 'W'), [Action::Request(Request::Report), Action::WriteReport]);
     rig.msg(Msg::Report(Ok("flight.html".to_owned())));
-    assert!(rig.events().contains("the report is written: flight.html"));
+    rig.expect_event("the report is written: flight.html");
     rig.armed = true;
     rig.heartbeat();
     assert_eq!((asks(&mut rig, 'R'), asks(&mut rig, 'W')), (vec![], vec![]));

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use ground::key::Key;
-use ground::model::{AlarmKind, CommandKind, RING_EVERY, Role, Settings};
+use ground::model::{AlarmKind, RING_EVERY, Role, Settings};
 use ground::update::vehicle_changes::RESTARTED;
 use ground::update::{Action, Msg};
 use ground::view::headline::pad;
@@ -13,7 +13,6 @@ use protocol::dialect::{
 };
 use protocol::signing::SigningCounters;
 
-use crate::keys::ladder;
 use crate::rig::{Rig, settings};
 
 fn bells(rig: &Rig) -> usize {
@@ -29,7 +28,7 @@ fn the_loss_of_the_link_rings_until_it_is_acknowledged() {
     assert_eq!(bells(&rig), 0);
     rig.run(0.1);
     assert_eq!(bells(&rig), 1);
-    assert!(rig.screen(80, 24).contains("ALARM LINK LOST"));
+    rig.expect_screen("ALARM LINK LOST");
     assert!(rig.screen(20, 5).contains("ALARM LINK LOST"));
     rig.run(RING_EVERY.as_secs_f64());
     assert_eq!(bells(&rig), 2);
@@ -129,7 +128,7 @@ fn attaching_does_not_ring_for_past_alarms() {
     over.speaks = false;
     over.run(5.0);
     assert_eq!(bells(&over), 1, "lost anew");
-    assert!(over.screen(80, 24).contains("ALARM LINK LOST"));
+    over.expect_screen("ALARM LINK LOST");
     let mut lasting = attached(0.0);
     lasting.speaks = false;
     lasting.run(0.1);
@@ -169,27 +168,9 @@ fn a_screen_says_that_its_station_is_silent() {
         rig.run(1.0);
         let mut listed = rig.model.alarms.list().iter();
         assert!(listed.all(|alarm| alarm.kind != AlarmKind::StationSilent && !alarm.is_active()));
-        assert!(rig.events().contains("the station answers again"), "{}", rig.events());
+        rig.expect_event("the station answers again");
         assert!(!rig.screen(80, 24).contains("STATION SILENT 1"), "{}", rig.screen(80, 24));
     }
-}
-
-#[test]
-fn disagreement_between_acknowledged_and_observed_is_an_alarm() {
-    let mut rig = Rig::crewed();
-    rig.keys(&ladder());
-    rig.answer(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, 0);
-    rig.run(4.0);
-    let kinds: Vec<_> = rig.model.alarms.list().iter().map(|alarm| alarm.kind).collect();
-    assert_eq!(kinds, [AlarmKind::Disagreement(CommandKind::Arm)]);
-}
-
-#[test]
-fn a_latched_interlock_raises_an_alarm() {
-    let mut rig = Rig::crewed();
-    rig.interlocks |= TdInterlock::TD_INTERLOCK_NO_LIGHT;
-    rig.run(0.1);
-    assert!(rig.screen(80, 24).contains("ALARM NO LIGHT"));
 }
 
 /// Until the first plan is used the stabiliser flies by design; after that it is an alarm.
@@ -203,7 +184,7 @@ fn the_stabiliser_raises_an_alarm_only_if_it_keeps_flying() {
     assert!(rig.model.alarms.list().is_empty());
     rig.run(0.3);
     rig.controller(stabiliser);
-    assert!(rig.screen(80, 24).contains("ALARM DEGRADED"), "{}", rig.screen(80, 24));
+    rig.expect_screen("ALARM DEGRADED");
     let mut rig = Rig::crewed();
     rig.phase = TdPhase::TD_PHASE_POWERED;
     rig.run(0.1);
@@ -219,7 +200,7 @@ fn an_abort_without_an_answer_is_an_alarm_while_it_is_repeated() {
     let mut rig = Rig::crewed();
     rig.abort_chord();
     rig.run(3.0);
-    assert!(rig.screen(80, 24).contains("ABORT NOT ACKNOWLEDGED"));
+    rig.expect_screen("ABORT NOT ACKNOWLEDGED");
     rig.answer(MavCmd::MAV_CMD_DO_FLIGHTTERMINATION, 0);
     rig.key(Key::Char(' '));
     rig.run(0.1);
@@ -233,23 +214,23 @@ fn an_abort_that_would_arrive_too_late_says_so() {
     rig.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_CHUTE_NOW;
     rig.run(1.0);
     rig.descent(180.0);
-    assert!(rig.screen(80, 24).contains("abort now: parachute NOW, landing motor inhibited"));
+    rig.expect_screen("abort now: parachute NOW, landing motor inhibited");
     // 5 m above the commit height at 21.5 m/s: 0.23 s.
     rig.descent(100.0);
-    assert!(rig.screen(80, 24).contains("abort now: TOO LATE for a chute"));
+    rig.expect_screen("abort now: TOO LATE for a chute");
     // 0.2 s to ignition.
     rig.descent(62.0);
-    assert!(rig.screen(80, 24).contains("abort now: TOO LATE: arrives after ignition, lands here"));
+    rig.expect_screen("abort now: TOO LATE: arrives after ignition, lands here");
     for effect in [TdAbortEffect::TD_ABORT_EFFECT_BURN, TdAbortEffect::TD_ABORT_EFFECT_IMPACT] {
         rig.abort_effect = effect;
         rig.run(0.5);
         rig.descent(62.0);
-        assert!(rig.screen(80, 24).contains("abort now: TOO LATE: arrives after ignition, lands here"));
+        rig.expect_screen("abort now: TOO LATE: arrives after ignition, lands here");
     }
     rig.phase = TdPhase::TD_PHASE_POWERED;
     rig.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_LAND_IN_PLACE;
     rig.run(2.0);
-    assert!(rig.screen(80, 24).contains("abort now: lands here"));
+    rig.expect_screen("abort now: lands here");
 }
 
 #[test]
@@ -265,7 +246,7 @@ fn after_the_loss_of_the_link_the_position_is_a_prediction_that_grows_uncertain(
     // 60 - 5 t - g t^2 / 2 at 2 s, and 1.5 + 0.5 t + 2.5 t^2: the drag is not known.
     assert!(early.contains("30.4 ±12.5 m"), "{early}");
     rig.run(1.0);
-    assert!(rig.screen(80, 24).contains("0.9 ±25.5 m"));
+    rig.expect_screen("0.9 ±25.5 m");
 }
 
 /// With two alarms, one Space acknowledges one of them; the list marks which, and another can be chosen.
@@ -291,7 +272,7 @@ fn alarms_are_listed_and_acknowledged_one_by_one() {
         "{screen}"
     );
     assert_eq!(rig.model.alarms.unacknowledged(), 1);
-    assert!(rig.events().contains("alarm acknowledged: NO LIGHT"));
+    rig.expect_event("alarm acknowledged: NO LIGHT");
     // On any other page Space acknowledges the alarm in the alarm line.
     rig.keys(&[Key::Char('1'), Key::Char(' ')]);
     assert_eq!(rig.model.alarms.unacknowledged(), 0);
@@ -308,22 +289,6 @@ fn a_long_alarm_text_never_hides_the_key_that_acknowledges() {
         assert!(line.trim_end_matches('"').ends_with(" Space: seen "), "{screen}");
         assert!(line.contains(".. 1 s "), "the age is not cut either: {screen}");
     }
-}
-
-/// The age is that of the present alarm, not of an earlier one that nobody acknowledged.
-#[test]
-fn an_alarm_that_is_raised_again_has_a_new_age() {
-    let mut rig = Rig::crewed();
-    rig.speaks = false;
-    rig.run(20.0);
-    rig.speaks = true;
-    rig.run(21.0);
-    let screen = rig.screen(80, 24);
-    assert!(screen.contains("ended alarm: LINK LOST") && screen.contains("ended 20 s ago"), "{screen}");
-    rig.speaks = false;
-    rig.run(5.0);
-    let screen = rig.screen(80, 24);
-    assert!(screen.contains(" ALARM LINK LOST: the vehicle is not heard 1 s "), "{screen}");
 }
 
 /// A station on a wrong port says what it listens on and what to check, on the page and once as an event.

@@ -62,7 +62,7 @@ fn failing_checks_prevent_arming_and_the_run_ends_with_the_reason() {
     assert!(!rig.events().contains("gave up"), "ten seconds from the first heartbeat, at 1 s");
     rig.run(4.0);
     assert!(rig.commands().is_empty());
-    assert!(rig.events().contains("gave up 10 s after first contact: failing checks: "));
+    rig.expect_event("gave up 10 s after first contact: failing checks: ");
     assert!(rig.wants_to_quit());
     assert_eq!(decide(&rig.model.outcome, false), Exit::RefusedOrAborted);
 }
@@ -89,7 +89,7 @@ fn nothing_is_armed_before_the_vehicle_has_reported_its_checks() {
         rig.run(1.0);
         rig.heartbeat();
     }
-    assert!(rig.events().contains("gave up 10 s after first contact: the vehicle has not reported"));
+    rig.expect_event("gave up 10 s after first contact: the vehicle has not reported");
     assert!(rig.commands().is_empty());
     assert!(rig.wants_to_quit());
     assert_eq!(decide(&rig.model.outcome, false), Exit::RefusedOrAborted);
@@ -150,7 +150,7 @@ fn the_automatic_mode_is_refused_with_a_live_vehicle() {
         rig.simulated = false;
         rig.run(2.0);
         assert!(rig.take_commands().is_empty());
-        assert!(rig.events().contains("automatic mode refused: the vehicle is live"), "{}", rig.events());
+        rig.expect_event("automatic mode refused: the vehicle is live");
         rig.simulated = true;
         rig.armed = true;
         rig.phase = TdPhase::TD_PHASE_PAD_ARMED;

@@ -9,7 +9,7 @@ use protocol::dialect::{
 };
 use protocol::identity::GROUND;
 
-use crate::rig::{Rig, typed};
+use crate::rig::{Rig, enter};
 
 fn entered(rig: &Rig) -> Vec<BookLine> {
     let line = |action: &Action| match action {
@@ -27,7 +27,7 @@ fn has(rig: &Rig, kind: &str, words: &str) -> usize {
 fn keys_commands_answers_and_what_the_vehicle_shows_are_entered_once() {
     let mut rig = Rig::crewed();
     rig.actions.clear();
-    rig.keys(&[typed("AARM"), vec![Key::Enter]].concat());
+    rig.keys(&enter("AARM"));
     rig.answer(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, 0);
     rig.armed = true;
     rig.run(2.0);

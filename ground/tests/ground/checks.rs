@@ -77,7 +77,7 @@ fn a_hold_names_the_check_for_which_the_vehicle_held_also_when_it_passes_again()
         rig.checks_failed = TdCheck::TD_CHECK_FINS.bits();
         rig.hold = TdHold::TD_HOLD_CHECK_FAILED;
         rig.run(0.2);
-        assert!(rig.screen(80, 24).contains("HOLD: fins; start anew"), "{}", rig.screen(80, 24));
+        rig.expect_screen("HOLD: fins; start anew");
     }
 }
 
@@ -117,14 +117,14 @@ fn the_pad_page_the_prompt_and_the_line_say_a_failing_check_in_the_vehicle_s_wor
     assert!(screen.contains(" NO  no GNSS fix") && screen.contains(" NO  speed"), "{screen}");
     assert!(rig.screen(40, 12).contains("NO-GO: no GNSS fix, speed"), "{}", rig.screen(40, 12));
     rig.key(Key::Char('A'));
-    assert!(rig.screen(80, 24).contains("  NO no GNSS fix"), "{}", rig.screen(80, 24));
+    rig.expect_screen("  NO no GNSS fix");
     rig.key(Key::Escape);
     // Words for what has passed since are not used for what fails later.
     rig.checks_failed = 0;
     rig.run(0.2);
     rig.checks_failed = GNSS.bits();
     rig.run(0.2);
-    assert!(rig.screen(80, 24).contains(" NO  gnss"), "{}", rig.screen(80, 24));
+    rig.expect_screen(" NO  gnss");
 }
 
 #[test]

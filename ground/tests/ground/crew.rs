@@ -46,14 +46,14 @@ fn records(rig: &Rig) -> String {
 fn each_command_names_its_screen_and_operator_in_event_and_record() {
     let mut rig = with_anna();
     rig.keys(&ladder());
-    assert!(rig.events().contains("ARM commanded, attempt 1 (screen 1, anna on pts/3)"), "{}", rig.events());
+    rig.expect_event("ARM commanded, attempt 1 (screen 1, anna on pts/3)");
     rig.answer(ARM, 0);
     rig.armed = true;
     rig.phase = TdPhase::TD_PHASE_PAD_ARMED;
     rig.run(1.0);
     rig.msg(requested(CommandKind::Start, ben()));
     let by_ben = "START commanded, attempt 1 (screen 2, ben from 10.0.0.7)";
-    assert!(rig.events().contains(by_ben), "{}", rig.events());
+    rig.expect_event(by_ben);
     let records = records(&rig);
     for record in [
         "commanded: ARM commanded, attempt 1 (screen 1, anna on pts/3)",
@@ -123,14 +123,14 @@ fn a_countdown_without_a_commanding_screen_is_held() {
     holds(&mut rig);
     rig.run(5.0);
     assert_eq!(holds(&mut rig), 0);
-    assert!(rig.events().contains("the hold is no longer sent: the countdown has ended"));
+    rig.expect_event("the hold is no longer sent: the countdown has ended");
 }
 
 /// At T-2 s nothing holds any more, and the station does not claim to.
 #[test]
 fn after_the_last_moment_nothing_is_sent_and_it_is_said() {
     let mut rig = counting();
-    assert!(rig.screen(80, 24).contains("; hold until T-2"), "{}", rig.screen(80, 24));
+    rig.expect_screen("; hold until T-2");
     rig.countdown_ms = 1_900;
     rig.msg(Msg::Crew { seats: Vec::new(), silent: Vec::new() });
     rig.run(5.0);
@@ -146,13 +146,13 @@ fn after_the_last_moment_nothing_is_sent_and_it_is_said() {
     rig.countdown_ms = 2_000;
     rig.run(2.0);
     assert_eq!(holds(&mut rig), 0);
-    assert!(rig.events().contains("TOO LATE for a hold"), "{}", rig.events());
+    rig.expect_event("TOO LATE for a hold");
     // Somebody at a screen is told what still works.
     rig.msg(Msg::Crew { seats: vec![anna()], silent: Vec::new() });
     rig.keys(&[Key::Char('H'), Key::Enter]);
     assert_eq!(holds(&mut rig), 0);
-    assert!(rig.events().contains("too late for a hold: Ctrl-X, then Enter, aborts"));
-    assert!(rig.screen(80, 24).contains("; TOO LATE to hold"), "{}", rig.screen(80, 24));
+    rig.expect_event("too late for a hold: Ctrl-X, then Enter, aborts");
+    rig.expect_screen("; TOO LATE to hold");
 }
 
 /// The station has waited for its answer already.
@@ -162,11 +162,7 @@ fn a_countdown_whose_only_screen_does_not_answer_is_held_at_once() {
     rig.msg(Msg::Crew { seats: Vec::new(), silent: vec![anna()] });
     rig.run(0.1);
     assert!(holds(&mut rig) > 0);
-    assert!(
-        rig.events().contains("does not answer, so it does not count: screen 1, anna"),
-        "{}",
-        rig.events()
-    );
+    rig.expect_event("does not answer, so it does not count: screen 1, anna");
     // Somebody else who answers is enough.
     let mut rig = counting();
     rig.msg(Msg::Crew { seats: vec![ben()], silent: vec![anna()] });

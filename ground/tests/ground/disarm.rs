@@ -53,7 +53,7 @@ fn a_disarm_without_an_answer_is_given_up_after_its_attempts() {
     rig.keys(&[Key::Char('D'), Key::Enter]);
     rig.run(5.0);
     assert_eq!(rig.take_commands().iter().filter(|command| is_disarm(command)).count(), 4);
-    assert!(rig.events().contains("DISARM not acknowledged after 4 attempts"));
+    rig.expect_event("DISARM not acknowledged after 4 attempts");
 }
 
 /// After an answered arming, the next answer belongs to the disarm.

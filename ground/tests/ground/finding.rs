@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use ground::key::Key;
-use ground::model::{Bindings, DEFINITIONS, Does, Page, Prompt, palette_entries, quantity};
+use ground::model::{Bindings, DEFINITIONS, Page, PaletteAction, Prompt, palette_entries, quantity};
 use ground::update::{Action, Msg};
 use proptest::prelude::*;
 
@@ -26,12 +26,12 @@ fn the_palette_lists_every_action_with_its_key() {
     let rig = on_the_pad();
     let listed = palette_entries(&rig.model, "", rig.now);
     for definition in &DEFINITIONS {
-        let entry = listed.iter().find(|entry| entry.does == Does::Act(definition.act)).unwrap();
+        let entry = listed.iter().find(|entry| entry.action == PaletteAction::Act(definition.act)).unwrap();
         assert_eq!((entry.words.as_str(), &entry.key), (definition.words, &definition.usual.name()));
     }
-    assert!(listed.iter().any(|entry| entry.does == Does::TellAbort && entry.key == "Ctrl-X"));
+    assert!(listed.iter().any(|entry| entry.action == PaletteAction::TellAbort && entry.key == "Ctrl-X"));
     for quantity in &quantity::ALL {
-        assert!(listed.iter().any(|entry| entry.does == Does::Plot(quantity)));
+        assert!(listed.iter().any(|entry| entry.action == PaletteAction::Plot(quantity)));
     }
 }
 

@@ -13,7 +13,7 @@ use proptest::prelude::*;
 use protocol::dialect::{COMMAND_LONG_DATA, MavCmd};
 
 use crate::keys::{armed_on_pad, ladder, leaves, quit_ladder, start_ladder};
-use crate::rig::{Rig, is_abort, is_arm, typed};
+use crate::rig::{Rig, enter, is_abort, is_arm, typed};
 
 /// An input from the terminal, and its time.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -158,7 +158,7 @@ fn stream() -> impl Strategy<Value = Stream> {
         quit_ladder(),
         vec![Key::Char('D'), Key::Enter],
         typed("Send the crew away"),
-        [typed("Thanks"), vec![Key::Enter]].concat(),
+        enter("Thanks"),
     ]);
     let keys = prop_oneof![2 => ladders.clone(), 1 => bytes, 2 => some_keys()];
     // Also parts from the start or the end of a ladder.
@@ -318,7 +318,7 @@ fn some_keys() -> impl Strategy<Value = Vec<Key>> {
         1 => Just(typed("AARM")),
         1 => Just(typed("Aar")),
         1 => Just(ladder()),
-        1 => Just([typed("ARM"), vec![Key::Enter]].concat()),
+        1 => Just(enter("ARM")),
     ]
 }
 

@@ -45,8 +45,8 @@ fn several_links_are_shown_side_by_side_and_an_answer_names_its_own() {
     assert!(screen.contains("all links") && screen.contains("serial 1590/5760 B/s 12.5 %"), "{screen}");
     rig.msg(links(Some("unplugged")));
     assert!(rig.screen(140, 40).contains("serial DOWN"));
-    rig.msg(Msg::OneLinkDown("/dev/x: unplugged".to_owned()));
-    assert!(rig.events().contains("one link down"));
+    rig.msg(Msg::LinkSays("one link down: /dev/x: unplugged".to_owned()));
+    rig.expect_event("one link down");
     assert!(!rig.screen(140, 40).contains("LINK DOWN"), "the other still works");
 }
 

@@ -94,7 +94,7 @@ fn a_check_takes_a_letter_and_enter_and_the_same_letter_ends_it() {
     let mut rig = Rig::crewed();
     rig.key(Key::Char('X'));
     assert_eq!(rig.model.page(), Page::Checks);
-    assert!(rig.screen(80, 24).contains("Gimbal and fins MOVE"), "{}", rig.screen(80, 24));
+    rig.expect_screen("Gimbal and fins MOVE");
     rig.key(Key::Char('x'));
     assert!(checks(&mut rig).is_empty(), "any other key cancels");
     rig.keys(&[Key::Char('X'), Key::Enter]);
@@ -103,12 +103,12 @@ fn a_check_takes_a_letter_and_enter_and_the_same_letter_ends_it() {
     assert!(checks(&mut rig).is_empty(), "it is never repeated");
     rig.answer(CHECK, 0);
     tell(&mut rig, 1, State::TD_PAD_CHECK_STATE_RUNNING, 2);
-    assert!(rig.screen(80, 24).contains("CHECK 1 RUNS 40 %: hands off"), "{}", rig.screen(80, 24));
+    rig.expect_screen("CHECK 1 RUNS 40 %: hands off");
     rig.key(Key::Char('X'));
     assert_eq!(checks(&mut rig), [0.0], "at once");
     rig.answer(CHECK, 0);
     tell(&mut rig, 1, State::TD_PAD_CHECK_STATE_STOPPED, 2);
-    assert!(rig.screen(80, 24).contains("CHECK 1 STOPPED early"));
+    rig.expect_screen("CHECK 1 STOPPED early");
     rig.keys(&[Key::Char('X'), Key::Enter]);
     assert!(checks(&mut rig).is_empty(), "pressed to end it, a moment too late");
     rig.run(3.0);
@@ -128,11 +128,11 @@ fn what_only_people_see_is_on_the_page_and_takes_a_letter_and_a_word() {
     let mut rig = Rig::crewed();
     rig.key(Key::Char('x'));
     rig.keys(&[Key::Char('Y')]);
-    assert!(rig.events().contains("no check of servos that tell nothing has passed"), "{}", rig.events());
+    rig.expect_event("no check of servos that tell nothing has passed");
     rig.run(3.0);
     tell_values(&mut rig, 1, State::TD_PAD_CHECK_STATE_RUNNING, &silent[..1]);
     let words = "gimbal pitch  nozzle swings towards fins 1 and 4, then towards 2 and 3";
-    assert!(rig.screen(80, 24).contains(words), "{}", rig.screen(80, 24));
+    rig.expect_screen(words);
     tell_values(&mut rig, 1, State::TD_PAD_CHECK_STATE_PASSED, &silent);
     let screen = rig.screen(80, 24);
     assert!(screen.contains("CHECK 1 PASSED but for what only people see"), "{screen}");
@@ -152,11 +152,7 @@ fn the_letter_ends_a_check_of_which_nothing_was_heard() {
     let mut rig = Rig::crewed();
     rig.keys(&[Key::Char('X'), Key::Enter]);
     assert_eq!(checks(&mut rig), [1.0]);
-    assert!(
-        rig.screen(80, 24).contains("HANDS OFF: a check of the vehicle may run"),
-        "{}",
-        rig.screen(80, 24)
-    );
+    rig.expect_screen("HANDS OFF: a check of the vehicle may run");
     assert!(rig.screen(20, 5).contains(" HANDS OFF: a check"), "{}", rig.screen(20, 5));
     rig.key(Key::Char('X'));
     assert_eq!(checks(&mut rig), [0.0], "no dialog, and no second start");
@@ -169,13 +165,13 @@ fn an_armed_or_a_flying_vehicle_is_not_asked() {
     rig.phase = TdPhase::TD_PHASE_PAD_ARMED;
     rig.run(1.0);
     rig.keys(&[Key::Char('X'), Key::Enter, Key::Char('E'), Key::Enter, Key::Char('U')]);
-    assert!(rig.events().contains("cannot check: armed: disarm first"), "{}", rig.events());
-    assert!(rig.events().contains("no radio range test: armed"));
+    rig.expect_event("cannot check: armed: disarm first");
+    rig.expect_event("no radio range test: armed");
     (rig.armed, rig.phase) = (false, TdPhase::TD_PHASE_TOUCHDOWN);
     rig.run(1.0);
     rig.keys(&[Key::Char('X'), Key::Enter]);
     assert!(checks(&mut rig).is_empty());
-    assert!(rig.events().contains("cannot check: phase TOUCHDOWN"), "{}", rig.events());
+    rig.expect_event("cannot check: phase TOUCHDOWN");
 }
 
 #[test]
@@ -195,7 +191,7 @@ fn every_value_is_shown_with_its_limit_and_the_book_has_the_verdict() {
     assert_eq!(book.matches("check of the vehicle").count(), 1, "{book}");
     let words = "check 1 FAILED: 9 values, outside: fin 2 range 0.0 deg (least 87.7); fin 2 error 90.0 deg";
     assert!(book.contains(words), "{book}");
-    assert!(rig.events().contains(words), "{}", rig.events());
+    rig.expect_event(words);
     // Another check forgets the values of this one.
     tell(&mut rig, 2, State::TD_PAD_CHECK_STATE_RUNNING, 1);
     assert!(!rig.screen(80, 24).contains("NO 0.0"), "{}", rig.screen(80, 24));
@@ -228,7 +224,7 @@ fn a_low_battery_and_a_full_storage_are_alarms_outside_a_check_too() {
     let screen = rig.screen(80, 24);
     assert!(screen.contains("VEHICLE LOG has too little space: 40 MiB"), "{screen}");
     rig.key(Key::Char(' '));
-    assert!(rig.screen(80, 24).contains("BATTERY LOW: 7.31 V, 20 % left"), "{}", rig.screen(80, 24));
+    rig.expect_screen("BATTERY LOW: 7.31 V, 20 % left");
     // In the air by what is left.
     (rig.checks_failed, rig.phase) = (0, TdPhase::TD_PHASE_AERO_DESCENT);
     rig.run(0.5);
@@ -290,7 +286,7 @@ fn the_radio_is_tested_with_a_margin_and_a_verdict() {
     let screen = rig.screen(80, 24);
     assert!(screen.contains("RADIO PASSED"), "{screen}");
     assert!(screen.contains("ok margin 26.3 dB least 10"), "{screen}");
-    assert!(rig.events().contains("radio range test PASSED: loss down 0.0 %, up 0.0 %"), "{}", rig.events());
+    rig.expect_event("radio range test PASSED: loss down 0.0 %, up 0.0 %");
     let mut rig = Rig::crewed();
     range_test(&mut rig, 10);
     let screen = rig.screen(80, 24);
@@ -302,11 +298,11 @@ fn an_arming_ends_the_radio_test() {
     let mut rig = Rig::crewed();
     rig.key(Key::Char('U'));
     rig.run(2.0);
-    assert!(rig.screen(80, 24).contains("RADIO RUNS"), "{}", rig.screen(80, 24));
+    rig.expect_screen("RADIO RUNS");
     rig.armed = true;
     rig.phase = TdPhase::TD_PHASE_PAD_ARMED;
     rig.run(1.5);
-    assert!(rig.events().contains("radio range test STOPPED, the vehicle is armed"), "{}", rig.events());
+    rig.expect_event("radio range test STOPPED, the vehicle is armed");
 }
 
 #[test]
@@ -318,5 +314,5 @@ fn a_screen_that_only_watches_checks_nothing() {
     rig.run(1.0);
     rig.keys(&[typed("X"), vec![Key::Enter], typed("U")].concat());
     assert!(checks(&mut rig).is_empty() && rig.model.range_test.is_none());
-    assert!(rig.events().contains("this screen only watches"), "{}", rig.events());
+    rig.expect_event("this screen only watches");
 }

@@ -48,10 +48,10 @@ fn the_ascent_page_shows_apogee_and_booster_until_it_is_over() {
     assert!(rig.screen(140, 45).contains("apogee at         -- m"), "{}", rig.screen(140, 45));
     assert!(!rig.screen(80, 24).contains("s to apogee"), "{}", rig.screen(80, 24));
     rig.key(Key::Char('2'));
-    assert!(rig.screen(80, 24).contains("[2Ascent]"));
+    rig.expect_screen("[2Ascent]");
     rig.phase = TdPhase::TD_PHASE_AERO_DESCENT;
     rig.run(1.0);
-    assert!(rig.screen(80, 24).contains("[2Descent]"), "{}", rig.screen(80, 24));
+    rig.expect_screen("[2Descent]");
 }
 
 #[test]
@@ -122,7 +122,7 @@ fn in_phase(
 fn regress_coast() {
     let effect = TdAbortEffect::TD_ABORT_EFFECT_CHUTE_AT_APOGEE;
     let rig = in_phase(TdPhase::TD_PHASE_COAST, effect, (240.0, 31.0), (60.0, 4.0));
-    assert!(rig.screen(80, 24).contains(" next apogee, then the fins open"));
+    rig.expect_screen(" next apogee, then the fins open");
     snapshot("coast", &rig);
 }
 
@@ -165,7 +165,7 @@ fn regress_chute() {
     rig.approach_wait_s = u16::MAX;
     rig.descent_with(150.0, -30.0, TdChute::TD_CHUTE_FIRED);
     rig.run(0.1);
-    assert!(rig.screen(80, 24).contains(" next chute opens, still fast"));
+    rig.expect_screen(" next chute opens, still fast");
     rig.state_in_space([9.0, -2.0, 122.0], [1.5, 2.0, -6.1], (200.0, 3.0));
     rig.descent_with(122.0, -6.1, TdChute::TD_CHUTE_OPEN);
     rig.run(0.1);

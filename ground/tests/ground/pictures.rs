@@ -349,7 +349,7 @@ struct Moment {
 /// Plays the flight and shows every moment, until this says that it has seen enough.
 fn recorded(mut enough: impl FnMut(&Moment) -> bool) -> Moment {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("pictures/flight.tlog");
-    let recording = Recording::load(&path, None, &mut |_| {}).expect("the recorded flight");
+    let recording = Recording::load(&path, None).expect("the recorded flight");
     let mut reader = recording.reader().expect("the recorded flight");
     let mut rig = Rig::new(settings(false, true));
     rig.speaks = false;

@@ -24,40 +24,20 @@ fn err(output: &Output) -> String {
 }
 
 #[test]
-fn help_is_a_success_and_documents_the_exit_codes() {
+fn what_cannot_be_run_has_its_code_and_is_named() {
     let directory = tempfile::tempdir().unwrap();
     let output = ground(directory.path(), &["--help"]);
-    assert_eq!(output.status.code(), Some(0));
-    assert!(out(&output).contains(ground::exit::HELP));
-}
-
-#[test]
-fn a_wrong_command_line_is_code_2() {
-    let directory = tempfile::tempdir().unwrap();
-    let output = ground(directory.path(), &["--connect", "tcp:host:1"]);
-    assert_eq!(output.status.code(), Some(2));
-    assert!(err(&output).contains("udpin:ADDRESS:PORT"));
-}
-
-#[test]
-fn an_unknown_profile_is_code_1_and_named() {
-    let directory = tempfile::tempdir().unwrap();
-    let output = ground(directory.path(), &["--profile", "no-such"]);
-    assert_eq!(output.status.code(), Some(1));
-    assert!(err(&output).contains("no-such"));
-}
-
-#[test]
-fn a_flag_that_the_command_does_not_use_is_code_2_and_named() {
-    let directory = tempfile::tempdir().unwrap();
-    for (arguments, flag) in [
-        (&["attach", "--connect", "udpin:127.0.0.1:0"][..], "--connect"),
-        (&["attach", "--auto"], "--auto"),
-        (&["status", "--log", "none"], "--log"),
+    assert!(output.status.code() == Some(0) && out(&output).contains(ground::exit::HELP));
+    for (arguments, code, named) in [
+        (&["--connect", "tcp:host:1"][..], 2, "udpin:ADDRESS:PORT"),
+        (&["--profile", "no-such"], 1, "no-such"),
+        (&["attach", "--connect", "udpin:127.0.0.1:0"], 2, "--connect"),
+        (&["attach", "--auto"], 2, "--auto"),
+        (&["status", "--log", "none"], 2, "--log"),
     ] {
         let output = ground(directory.path(), arguments);
-        assert_eq!(output.status.code(), Some(2), "{}", err(&output));
-        assert!(err(&output).contains(flag), "{}", err(&output));
+        assert_eq!(output.status.code(), Some(code), "{}", err(&output));
+        assert!(err(&output).contains(named), "{}", err(&output));
     }
 }
 

@@ -59,7 +59,7 @@ fn recording() -> Recording {
 }
 
 fn load(path: &Path) -> Result<Recording, RecordingError> {
-    Recording::load(path, None, &mut |_| {})
+    Recording::load(path, None)
 }
 
 /// Every event of a recording with its time.
@@ -292,7 +292,7 @@ fn a_long_tlog_is_played_in_bounded_memory() {
     }
     let said = String::from_utf8(process.wait_with_output().unwrap().stderr).unwrap();
     assert!(0 < most_kb && most_kb < MOST_KB, "{most_kb} kB; {said}");
-    assert!(said.contains("long.tlog: 16 of 3") && said.matches("ground: reading").count() >= 8, "{said}");
+    assert!(said.contains("ground: reading") && said.contains("long.tlog, 3"), "{said}");
 }
 
 /// The bar shows the whole recording, also what is still to come, and where the replay is.

@@ -14,21 +14,17 @@ fn a_letter_of_another_keyboard_layout_is_told() {
         let mut rig = on_the_pad();
         rig.key(Key::Char(letter));
         let words = format!("KEYBOARD LAYOUT: {letter} is no key here");
-        assert!(rig.events().contains(&words), "{}", rig.events());
-        assert!(rig.screen(80, 24).contains("KEYBOARD LAYOUT"), "{}", rig.screen(80, 24));
+        rig.expect_event(&words);
+        rig.expect_screen("KEYBOARD LAYOUT");
     }
     // In the middle of a word it is none of its letters.
     let mut rig = on_the_pad();
     rig.keys(&typed("AAЯ"));
-    assert!(
-        rig.events().contains("arming: cancelled; KEYBOARD LAYOUT: Я is no key here"),
-        "{}",
-        rig.events()
-    );
+    rig.expect_event("arming: cancelled; KEYBOARD LAYOUT: Я is no key here");
     assert_eq!(rig.model.dialog, None);
     // With caps lock the key of a ladder is a small letter.
     rig.key(Key::Char('a'));
-    assert!(rig.events().contains("capital letters: A arms, S starts, D disarms (caps lock?)"));
+    rig.expect_event("capital letters: A arms, S starts, D disarms (caps lock?)");
 }
 
 #[test]
@@ -38,8 +34,8 @@ fn an_enter_after_the_question_of_an_abort_has_run_out_is_told_that_nothing_was_
     rig.run(2.3);
     rig.key(Key::Enter);
     assert!(!rig.take_commands().iter().any(is_abort));
-    assert!(rig.events().contains("too late for the abort"), "{}", rig.events());
-    assert!(rig.screen(80, 24).contains("ABORT Ctrl-X Enter"));
+    rig.expect_event("too late for the abort");
+    rig.expect_screen("ABORT Ctrl-X Enter");
     // Once, and not for an Enter that means something else.
     let said = |rig: &Rig| rig.events().matches("too late for the abort").count();
     rig.key(Key::Enter);
@@ -63,7 +59,7 @@ fn the_rest_of_a_refused_word_is_swallowed_until_enter() {
         rig.hears = false;
         rig.run(4.0);
         rig.key(Key::Char('A'));
-        assert!(rig.events().contains("cannot arm"), "{}", rig.events());
+        rig.expect_event("cannot arm");
         let before = (rig.model.page(), rig.model.pages.held);
         rig.run(0.5);
         for letter in typed(word) {

@@ -6,7 +6,7 @@ use ground::update::{Action, Msg, Request};
 use protocol::dialect::{MavCmd, TdPhase};
 use protocol::log::record::Record;
 
-use crate::rig::{Rig, is_arm, settings, typed};
+use crate::rig::{Rig, enter, is_arm, settings};
 use crate::screens::{armed, on_the_pad};
 
 const MIB: u64 = 1 << 20;
@@ -17,10 +17,6 @@ fn health(free_mib: u64, grows_bytes_s: u32) -> LogHealth {
 }
 
 const FAILED: LogHealth = LogHealth { dropped: 0, failed: true, removed: false, space: None };
-
-fn enter(word: &str) -> Vec<Key> {
-    [typed(word), vec![Key::Enter]].concat()
-}
 
 #[test]
 fn a_log_is_changed_on_the_pad_or_in_silence_and_never_in_a_flight() {
@@ -72,7 +68,7 @@ fn a_failed_or_full_log_is_a_no_go_for_arming_from_this_station() {
         (LogHealth { dropped: 7, ..LogHealth::default() }, "station log loses records, 7 so far"),
     ] {
         let mut rig = on_the_pad();
-        assert!(rig.screen(80, 24).contains(" every arming check passes"));
+        rig.expect_screen(" every arming check passes");
         rig.msg(Msg::Log(broken));
         let screen = rig.screen(80, 24);
         assert!(screen.contains(&format!("NO-GO: {words}")), "{screen}");
@@ -106,8 +102,8 @@ fn the_crew_may_go_on_without_a_log_by_a_word_that_is_recorded() {
     rig.keys(&enter("NOLOG"));
     assert!(!rig.take_commands().iter().any(is_arm), "nothing is armed by it");
     let words = "WITHOUT A LOG: arm and start go on although the station log FAILED: nothing is recorded";
-    assert!(rig.events().contains(words), "{}", rig.events());
-    assert!(rig.screen(80, 24).contains(" !!  station log overruled: FAILED"), "{}", rig.screen(80, 24));
+    rig.expect_event(words);
+    rig.expect_screen(" !!  station log overruled: FAILED");
     rig.keys(&enter("AARM"));
     assert!(rig.take_commands().iter().any(is_arm));
 
@@ -191,5 +187,5 @@ fn an_attached_screen_asks_its_station_to_go_on_without_a_log() {
     assert!(rig.model.why_no_log(rig.now).is_some(), "the station decides");
     rig.msg(Msg::Asked { request: Request::WithoutLog, by: Seat::new(2, "bob on pts/2") });
     assert_eq!(rig.model.why_no_log(rig.now), None);
-    assert!(rig.events().contains("(screen 2, bob on pts/2)"), "{}", rig.events());
+    rig.expect_event("(screen 2, bob on pts/2)");
 }

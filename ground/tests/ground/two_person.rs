@@ -10,7 +10,7 @@ use protocol::dialect::{
 use protocol::identity::{Address, GROUND};
 use protocol::mission::MissionHash;
 
-use crate::rig::{Rig, is_arm, settings, typed};
+use crate::rig::{Rig, enter, is_arm, settings, typed};
 
 const ANN: u8 = 1;
 const BOB: u8 = 2;
@@ -51,7 +51,7 @@ fn asks(rig: &mut Rig, by: u8, act: TdAct, ask_left_ms: u16) {
 }
 
 fn confirm() -> Vec<Key> {
-    [typed("ACONFIRM"), vec![Key::Enter]].concat()
+    enter("ACONFIRM")
 }
 
 /// In the countdown, which the operator has to keep running with taps.
@@ -77,13 +77,13 @@ fn the_header_names_operator_role_and_mode_on_every_page() {
         let mut rig = station_of(number, None);
         for page in "123456789".chars() {
             rig.key(Key::Char(page));
-            assert!(rig.screen(80, 24).contains(words), "{}", rig.screen(80, 24));
+            rig.expect_screen(words);
         }
     }
     let mut rig = station_of(ANN, None);
     crew(&mut rig, TD_CREW_DATA::default());
     rig.hear(&MavMessage::TD_CREW(TD_CREW_DATA { people: 1, ..TD_CREW_DATA::default() }));
-    assert!(rig.screen(80, 24).contains("RANGE SAFETY Ann one-person"));
+    rig.expect_screen("RANGE SAFETY Ann one-person");
 }
 
 #[test]
@@ -95,7 +95,7 @@ fn the_other_s_ask_is_on_this_screen_and_confirmed_by_its_number() {
     assert!(screen.contains("Press A within 9 s, then type CONFIRM and Enter to confirm."), "{screen}");
     rig.take_commands();
     // The word of an ask confirms nothing.
-    rig.keys(&[typed("AARM"), vec![Key::Enter]].concat());
+    rig.keys(&enter("AARM"));
     assert_eq!(rig.take_commands(), []);
     asks(&mut rig, BOB, TdAct::TD_ACT_ARM, 7_000);
     rig.keys(&confirm());
@@ -114,7 +114,7 @@ fn an_ask_that_has_lapsed_or_changed_is_not_confirmed() {
     asks(&mut rig, BOB, TdAct::TD_ACT_ARM, 2_000);
     rig.key(Key::Char('A'));
     rig.run(2.5);
-    rig.keys(&[typed("CONFIRM"), vec![Key::Enter]].concat());
+    rig.keys(&enter("CONFIRM"));
     assert_eq!(rig.take_commands(), []);
     asks(&mut rig, BOB, TdAct::TD_ACT_ARM, 9_000);
     rig.keys(&typed("ACONFIRM"));
@@ -131,7 +131,7 @@ fn an_ask_that_has_lapsed_or_changed_is_not_confirmed() {
     );
     rig.key(Key::Enter);
     assert_eq!(rig.take_commands(), []);
-    assert!(rig.events().contains("nothing is confirmed: it is no longer asked"), "{}", rig.events());
+    rig.expect_event("nothing is confirmed: it is no longer asked");
 }
 
 #[test]
@@ -140,7 +140,7 @@ fn an_own_ask_says_who_must_confirm_and_is_no_refusal() {
     rig.key(Key::Char('A'));
     let screen = rig.screen(80, 24);
     assert!(screen.contains("This only asks: RANGE SAFETY or PAD must confirm within 10 s."), "{screen}");
-    rig.keys(&[typed("ARM"), vec![Key::Enter]].concat());
+    rig.keys(&enter("ARM"));
     let sent = rig.take_commands();
     assert!(matches!(&sent[..], [command] if is_arm(command) && command.param3.to_bits() == 0), "{sent:?}");
     let rejected = MavResult::MAV_RESULT_TEMPORARILY_REJECTED as u8;
@@ -167,7 +167,7 @@ fn only_the_one_who_confirmed_taps_and_a_held_key_taps_once() {
     rig.hold(Key::Char('T'), 400, 33, 2);
     assert_eq!(rig.take_commands().iter().filter(tap).count(), 1, "a held key");
     let mut rig = counting(BOB);
-    assert!(rig.screen(80, 24).contains("FLIGHT Bob taps: 2.0 s left"));
+    rig.expect_screen("FLIGHT Bob taps: 2.0 s left");
     rig.take_commands();
     rig.key(Key::Char('T'));
     assert_eq!(rig.take_commands().iter().filter(tap).count(), 0);
@@ -199,9 +199,9 @@ fn anyone_holds_and_the_screen_says_who_held_and_why() {
 #[test]
 fn an_observer_arms_nothing_and_is_told_why() {
     let mut rig = station_of(0, None);
-    rig.keys(&[typed("AARM"), vec![Key::Enter]].concat());
+    rig.keys(&enter("AARM"));
     assert_eq!(rig.take_commands(), []);
-    assert!(rig.events().contains("no operator's key here (--crew, --operator)"), "{}", rig.events());
+    rig.expect_event("no operator's key here (--crew, --operator)");
 }
 
 #[test]
@@ -218,8 +218,8 @@ fn command_is_taken_with_a_ladder_of_its_own() {
     rig.keys(&[Key::Char('C'), Key::Enter]);
     assert_eq!(rig.take_commands(), [], "not without the word");
     rig.key(Key::Char('C'));
-    assert!(rig.screen(80, 24).contains("FLIGHT Bob is in command"), "{}", rig.screen(80, 24));
-    rig.keys(&[typed("TAKE"), vec![Key::Enter]].concat());
+    rig.expect_screen("FLIGHT Bob is in command");
+    rig.keys(&enter("TAKE"));
     let sent = rig.take_commands();
     assert!(matches!(&sent[..], [command] if command.command == MavCmd::MAV_CMD_TD_TAKE_COMMAND), "{sent:?}");
     rig.answer(MavCmd::MAV_CMD_TD_TAKE_COMMAND, MavResult::MAV_RESULT_DENIED as u8);
@@ -240,18 +240,18 @@ fn another_mission_is_not_armed_and_both_hashes_are_named() {
             start,
             ..TD_MISSION_DATA::default()
         }));
-        rig.keys(&[typed("AARM"), vec![Key::Enter]].concat());
+        rig.keys(&enter("AARM"));
         rig.take_commands()
     };
-    rig.keys(&[typed("AARM"), vec![Key::Enter]].concat());
+    rig.keys(&enter("AARM"));
     assert_eq!(rig.take_commands(), [], "the vehicle has not said what it flies");
     assert_eq!(fly(&mut rig, "another one"), []);
     let theirs = MissionHash::of("another one").to_string();
     assert!(rig.events().contains(&theirs) && rig.events().contains(&ours), "{}", rig.events());
-    assert!(rig.screen(80, 24).contains("NO-GO: the vehicle flies mk2"), "{}", rig.screen(80, 24));
+    rig.expect_screen("NO-GO: the vehicle flies mk2");
     rig.model.settings.start = Some("pad".to_owned());
     assert_eq!(fly(&mut rig, "the right one"), []);
-    assert!(rig.events().contains("the flight begins at: apogee, --start is pad"), "{}", rig.events());
+    rig.expect_event("the flight begins at: apogee, --start is pad");
     rig.model.settings.start = Some("apogee".to_owned());
     assert_eq!(fly(&mut rig, "the right one").len(), 1);
     // An attached screen asks its station, which knows the same mission.

@@ -10,7 +10,7 @@ use ground::update::{Msg, Request};
 use protocol::dialect::{MavCmd, TdInterlock, TdMotor, TdPhase};
 
 use crate::keys::ladder;
-use crate::rig::{Rig, settings};
+use crate::rig::{Rig, enter, settings};
 use crate::screens::counting;
 
 const ABORT: MavCmd = MavCmd::MAV_CMD_DO_FLIGHTTERMINATION;
@@ -98,7 +98,7 @@ fn a_station_that_is_started_again_goes_on_with_the_wait_and_then_asks_for_the_p
     assert!(screen(&rig).contains("do not approach for 50 s: LIVE MOTOR"), "{}", screen(&rig));
     rig.keys(&ladder());
     assert_eq!(rig.take_commands(), []);
-    assert!(rig.events().contains("cannot arm: do not approach for 5"), "{}", rig.events());
+    rig.expect_event("cannot arm: do not approach for 5");
     rig.run(52.0);
     assert!(screen(&rig).contains("one person: pin in: the motor is LIVE"), "{}", screen(&rig));
     // It is kept for the next start, too.
@@ -118,7 +118,7 @@ fn after_the_wait_for_a_hot_motor_nobody_is_asked_to_put_a_pin_in() {
     let hot = KeepAway { danger: Danger::Hot, wait_s: Some(20) };
     rig.msg(Msg::Unfinished(Box::new(Unfinished { abort: None, away: Some(hot) })));
     rig.run(2.0);
-    assert!(rig.screen(80, 24).contains("do not approach for 18 s: MOTOR HOT"), "{}", rig.screen(80, 24));
+    rig.expect_screen("do not approach for 18 s: MOTOR HOT");
     rig.run(20.0);
     let screen = rig.screen(80, 24);
     assert!(!screen.contains("approach") && !screen.contains("pin in"), "{screen}");
@@ -132,7 +132,7 @@ fn a_new_station_says_what_was_asked_for_and_not_confirmed() {
     rig.run(1.0);
     let words = "ABORT asked at 12:03:05 UTC (screen 2, Ann) NOT CONFIRMED";
     assert!(rig.screen(120, 36).contains(words), "{}", rig.screen(120, 36));
-    assert!(rig.events().contains("an ABORT was asked for at 12:03:05 UTC (screen 2, Ann)"));
+    rig.expect_event("an ABORT was asked for at 12:03:05 UTC (screen 2, Ann)");
     assert!(rig.take_commands().is_empty(), "nothing is sent by itself");
     // It ends when somebody has seen it, or with another abort.
     rig.key(Key::Char(' '));
@@ -161,7 +161,7 @@ fn quitting_takes_the_word_while_people_must_keep_away() {
         assert_eq!(rig.model.dialog.as_ref().map(|dialog| dialog.prompt), Some(Prompt::Quit), "{key}");
         assert!(rig.screen(80, 24).contains("people must keep away, DO NOT APPROACH"), "{key}");
         assert!(!rig.wants_to_quit());
-        rig.keys(&[crate::rig::typed("QUIT"), vec![Key::Enter]].concat());
+        rig.keys(&enter("QUIT"));
         assert!(rig.actions.contains(&Action::LeaveScreen) && !rig.wants_to_quit(), "the station goes on");
     }
     let mut rig = counting();
@@ -200,12 +200,12 @@ fn asks(rig: &mut Rig) {
 fn an_abort_that_a_hung_station_has_not_sent_is_the_largest_word_of_every_page() {
     let mut before = hung();
     hangs(&mut before, 3);
-    assert!(before.screen(80, 24).contains("abort now: NOT SENT while the station hangs"));
+    before.expect_screen("abort now: NOT SENT while the station hangs");
     asks(&mut before);
     // It may be asked for before the silence is long enough to be one.
     let mut after = hung();
     asks(&mut after);
-    assert!(after.screen(80, 24).contains("ABORT asked, not yet taken by the station"));
+    after.expect_screen("ABORT asked, not yet taken by the station");
     hangs(&mut after, 3);
     for mut rig in [before, after] {
         for digit in "123456789".chars() {

@@ -6,12 +6,8 @@ use ground::update::{Action, Msg, Request};
 use protocol::dialect::{MavMessage, TD_MISSION_DATA};
 use protocol::log::record::Record;
 
-use crate::rig::{Rig, is_arm, settings, typed};
+use crate::rig::{Rig, enter, is_arm, settings};
 use crate::screens::on_the_pad;
-
-fn enter(word: &str) -> Vec<Key> {
-    [typed(word), vec![Key::Enter]].concat()
-}
 
 fn tell_mission(rig: &mut Rig, motor_burns: u8) {
     rig.hear(&MavMessage::TD_MISSION(TD_MISSION_DATA { motor_burns, ..TD_MISSION_DATA::default() }));
@@ -45,7 +41,7 @@ fn an_unconfirmed_motor_of_a_real_vehicle_is_armed_by_a_word_that_is_recorded() 
     rig.keys(&enter("UNTESTED"));
     assert!(!rig.take_commands().iter().any(is_arm), "nothing is armed by it");
     let words = "UNTESTED MOTOR: arming goes on although motor UNCONFIRMED: no burn of its lot";
-    assert!(rig.events().contains(words), "{}", rig.events());
+    rig.expect_event(words);
     assert!(rig.screen(120, 40).contains(" !!  motor       overruled"), "{}", rig.screen(120, 40));
     rig.keys(&enter("AARM"));
     assert!(rig.take_commands().iter().any(is_arm));
@@ -65,7 +61,7 @@ fn a_confirmed_or_a_simulated_motor_needs_no_word() {
         (real(4), "motor       confirmed, burns of its lot: 4"),
         (simulated, "motor       certified, no burn of its lot"),
     ] {
-        assert!(rig.screen(80, 24).contains("every arming check passes"), "{}", rig.screen(80, 24));
+        rig.expect_screen("every arming check passes");
         assert!(rig.screen(120, 40).contains(told), "{}", rig.screen(120, 40));
         rig.keys(&enter("AARM"));
         assert!(rig.take_commands().iter().any(is_arm), "{told}");
@@ -78,7 +74,7 @@ fn the_word_counts_for_one_power_up_only() {
     let mut rig = on_the_pad();
     rig.simulated = false;
     rig.run(1.0);
-    assert!(rig.screen(80, 24).contains("NO-GO: motor not known"), "{}", rig.screen(80, 24));
+    rig.expect_screen("NO-GO: motor not known");
     tell_mission(&mut rig, 0);
     rig.keys(&enter("AUNTESTED"));
     assert_eq!(why_untested(&rig.model), None);
@@ -101,5 +97,5 @@ fn an_attached_screen_asks_its_station_to_go_on_with_an_untested_motor() {
     assert!(why_untested(&rig.model).is_some(), "the station decides");
     rig.msg(Msg::Asked { request: Request::Untested, by: Seat::new(2, "bob on pts/2") });
     assert_eq!(why_untested(&rig.model), None);
-    assert!(rig.events().contains("(screen 2, bob on pts/2)"), "{}", rig.events());
+    rig.expect_event("(screen 2, bob on pts/2)");
 }

@@ -19,7 +19,7 @@ fn a_lost_uplink_is_shown_raises_an_alarm_and_is_no_go() {
     let mut rig = Rig::crewed();
     rig.run(2.0);
     assert!(top(&rig).contains("down 0s up 0s"), "{}", top(&rig));
-    assert!(rig.screen(80, 24).contains(" every arming check passes"));
+    rig.expect_screen(" every arming check passes");
     rig.hears = false;
     rig.run(2.4);
     assert!(top(&rig).contains("down 0s up late 2s"), "{}", top(&rig));
@@ -31,10 +31,10 @@ fn a_lost_uplink_is_shown_raises_an_alarm_and_is_no_go() {
     assert!(screen.contains("▶ it hears us"), "{screen}");
     rig.keys(&ladder());
     assert!(rig.take_commands().is_empty(), "no offer to arm, and so nothing is sent");
-    assert!(rig.events().contains("cannot arm: the uplink is not proven"));
+    rig.expect_event("cannot arm: the uplink is not proven");
     rig.hears = true;
     rig.run(1.0);
-    assert!(rig.screen(80, 24).contains("✓ it hears us"));
+    rig.expect_screen("✓ it hears us");
     rig.keys(&ladder());
     assert!(rig.take_commands().iter().any(is_arm));
 }
@@ -135,8 +135,8 @@ fn an_armed_vehicle_on_the_pad_gets_ten_heartbeats_a_second() {
 fn without_a_link_the_loss_is_unknown() {
     let mut rig = Rig::crewed();
     rig.key(Key::Char('5'));
-    assert!(rig.screen(80, 24).contains("loss 0.0 %"));
+    rig.expect_screen("loss 0.0 %");
     rig.speaks = false;
     rig.run(4.0);
-    assert!(rig.screen(80, 24).contains("loss unknown"), "{}", rig.screen(80, 24));
+    rig.expect_screen("loss unknown");
 }

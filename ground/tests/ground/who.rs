@@ -15,7 +15,7 @@ use protocol::dialect::{
 use protocol::identity::{GROUND, PHASE_BITS};
 
 use crate::keys::ladder;
-use crate::rig::{Rig, SESSION, is_abort, is_arm, settings, typed};
+use crate::rig::{Rig, SESSION, enter, is_abort, is_arm, settings, typed};
 
 const ARM: MavCmd = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM;
 const START: MavCmd = MavCmd::MAV_CMD_MISSION_START;
@@ -80,8 +80,8 @@ fn two_vehicles_under_one_id_are_said_in_the_first_line_and_nothing_moves() {
     rig.interlocks |= TdInterlock::TD_INTERLOCK_ABORT_LATCHED;
     beside(&mut rig, 9, 5);
     assert!(rig.take_commands().iter().filter(|sent| is_abort(sent)).count() > 20);
-    assert!(rig.events().contains("cannot arm: TWO VEHICLES under id 1: switch one off"), "{}", rig.events());
-    assert!(rig.events().contains("the ABORT goes to every vehicle that is heard under id 1"));
+    rig.expect_event("cannot arm: TWO VEHICLES under id 1: switch one off");
+    rig.expect_event("the ABORT goes to every vehicle that is heard under id 1");
 }
 
 /// The crew switches the second vehicle off, whichever is shown.
@@ -93,7 +93,7 @@ fn two_vehicles_end_when_one_is_silent() {
     rig.run(11.0);
     assert!(first_line(&rig, 80, 24).contains("boot 1A2B3C4D"), "{}", first_line(&rig, 80, 24));
     assert!(!rig.events().contains("rebooted"), "{}", rig.events());
-    assert!(rig.screen(80, 24).contains(" every arming check passes"), "{}", rig.screen(80, 24));
+    rig.expect_screen(" every arming check passes");
     rig.take_commands();
     rig.keys(&ladder());
     assert!(rig.take_commands().iter().any(is_arm));
@@ -163,7 +163,7 @@ fn a_second_vehicle_does_not_hide_a_countdown_and_the_station_that_armed_holds_i
     }
     let sent = rig.take_commands();
     assert!(sent.iter().any(|sent| sent.command == MavCmd::MAV_CMD_DO_PAUSE_CONTINUE), "{sent:?}");
-    assert!(rig.events().contains("TWO VEHICLES in the countdown: HOLD"), "{}", rig.events());
+    rig.expect_event("TWO VEHICLES in the countdown: HOLD");
 }
 
 /// It begins with what a station should know first: its mission, its limits.
@@ -208,7 +208,7 @@ fn a_reset_in_the_countdown_is_an_alarm_and_withdraws_what_was_observed() {
         rig.run(2.5);
         let screen = rig.screen(140, 45);
         assert!(screen.contains("REBOOTED in the countdown") && !screen.contains("observed yes"), "{screen}");
-        assert!(rig.events().contains("void since then: START"), "{}", rig.events());
+        rig.expect_event("void since then: START");
     }
 }
 
@@ -220,7 +220,7 @@ fn what_was_observed_and_is_no_longer_so_is_withdrawn() {
     rig.run(1.0);
     rig.countdown_ms = i32::MAX;
     rig.run(2.0);
-    assert!(rig.events().contains("START no longer so: no countdown runs"), "{}", rig.events());
+    rig.expect_event("START no longer so: no countdown runs");
     assert!(!rig.screen(140, 45).contains("observed yes"), "{}", rig.screen(140, 45));
 }
 
@@ -240,10 +240,10 @@ fn a_power_cycle_does_not_end_the_waiting_time_after_an_abort() {
     rig.take_commands();
     rig.keys(&ladder());
     assert_eq!(rig.take_commands(), []);
-    assert!(rig.events().contains("cannot arm: do not approach for 5"), "{}", rig.events());
+    rig.expect_event("cannot arm: do not approach for 5");
     // The motor is live as before; a pin that was seen ends it, and so does an arming.
     rig.run(60.0);
-    assert!(rig.screen(80, 24).contains("one person: pin in"), "{}", rig.screen(80, 24));
+    rig.expect_screen("one person: pin in");
     rig.motor = TdMotor::TD_MOTOR_PIN_IN;
     rig.run(1.0);
     rig.motor = TdMotor::TD_MOTOR_LIVE;
@@ -432,7 +432,7 @@ fn a_screen_of_another_operator_says_beforehand_that_it_only_stops_and_the_stati
         |rig: &Rig| rig.actions.iter().any(|action| matches!(action, Action::Request(Request::Command(_))));
     assert!(!asked(&screen), "{:?}", screen.actions);
     let said = "this screen cannot arm: this station signs as Ann";
-    assert!(screen.events().contains(said), "{}", screen.events());
+    screen.expect_event(said);
     screen.abort();
     assert!(screen.actions.contains(&Action::Request(Request::Command(CommandKind::Abort))));
     // The station does not rely on the screen.
@@ -444,7 +444,7 @@ fn a_screen_of_another_operator_says_beforehand_that_it_only_stops_and_the_stati
         }
     }
     assert_eq!(station.take_commands(), []);
-    assert!(station.events().contains("cannot arm: this station signs as Ann"), "{}", station.events());
+    station.expect_event("cannot arm: this station signs as Ann");
     station.msg(Msg::command(CommandKind::Hold, Seat::new(2, "Bob")));
     station.msg(Msg::command(CommandKind::Abort, Seat::new(2, "Bob")));
     assert_eq!(station.take_commands().len(), 2);
@@ -545,11 +545,7 @@ fn a_copter_is_shown_as_a_copter_and_is_never_armed_from_here() {
         rig.msg(Msg::command(kind, Seat::new(2, "ann")));
     }
     assert!(!rig.take_commands().iter().any(|sent| moves(sent) || sent.command == ARM));
-    assert!(
-        rig.events().contains("cannot arm: not a Touchdown vehicle: ArduPilot quadrotor"),
-        "{}",
-        rig.events()
-    );
+    rig.expect_event("cannot arm: not a Touchdown vehicle: ArduPilot quadrotor");
 }
 
 #[test]
@@ -560,7 +556,7 @@ fn an_abort_of_a_copter_asks_first_and_says_what_it_would_do() {
     assert_eq!(rig.take_commands(), []);
     let screen = rig.screen(80, 24);
     assert!(screen.contains("ArduPilot quadrotor: flight termination CUTS ITS MOTORS"), "{screen}");
-    rig.keys(&[typed("ABORT"), vec![Key::Enter]].concat());
+    rig.keys(&enter("ABORT"));
     assert!(rig.take_commands().iter().any(is_abort));
 }
 
@@ -573,7 +569,7 @@ fn a_heartbeat_alone_does_not_make_a_vehicle_ours() {
     answer_timesync(&mut rig);
     rig.keys(&ladder());
     assert_eq!(rig.take_commands(), []);
-    assert!(rig.events().contains("it has sent no flight status"), "{}", rig.events());
+    rig.expect_event("it has sent no flight status");
     rig.flight_status();
     // Both say that it is simulated: a real one asks for a word about its motor.
     rig.heartbeat();

@@ -313,6 +313,19 @@ impl Rig {
         self.model.events.newest(500).map(|event| event.text.as_str()).collect::<Vec<_>>().join("\n")
     }
 
+    /// These words were said.
+    #[track_caller]
+    pub(crate) fn expect_event(&self, words: impl AsRef<str>) {
+        assert!(self.events().contains(words.as_ref()), "{} in\n{}", words.as_ref(), self.events());
+    }
+
+    /// These words are on the smallest screen that shows everything.
+    #[track_caller]
+    pub(crate) fn expect_screen(&self, words: impl AsRef<str>) {
+        let screen = self.screen(80, 24);
+        assert!(screen.contains(words.as_ref()), "{} in\n{screen}", words.as_ref());
+    }
+
     pub(crate) fn screen(&self, columns: u16, rows: u16) -> String {
         let terminal = self.draw(columns, rows, MONO);
         terminal.backend().to_string()
@@ -387,6 +400,11 @@ pub(crate) fn is_arm(command: &COMMAND_LONG_DATA) -> bool {
 
 pub(crate) fn is_abort(command: &COMMAND_LONG_DATA) -> bool {
     command.command == MavCmd::MAV_CMD_DO_FLIGHTTERMINATION && command.param1 > 0.5
+}
+
+/// A letter or a word, and Enter.
+pub(crate) fn enter(word: &str) -> Vec<Key> {
+    [typed(word), vec![Key::Enter]].concat()
 }
 
 pub(crate) fn typed(word: &str) -> Vec<Key> {

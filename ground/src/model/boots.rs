@@ -1,0 +1,740 @@
+//! Which power-ups of which vehicles are heard under the id, and which one of them the screen shows.
+//!
+//! A *boot* is one vehicle from one power-up on. `TD_FLIGHT_STATUS` tells which one: by the vehicle's unique id, the number of the
+//! boot and the vehicle's clock. A heartbeat and our own messages have the number. What else is heard belongs to the boot whose
+//! clock, or whose sequence numbers, it fits.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use protocol::dialect::TdPhase;
+use protocol::identity::LARGEST_BOOT_NUMBER;
+
+use super::{Foreign, KeepAway, Model, Vehicle, words};
+
+/// Messages of a slow and a fast link mix: a vehicle's clock, ms, may go back by this much.
+const REORDERED_MS: i64 = 5_000;
+/// Two boots of one vehicle follow each other. This much of an overlap, ms, are the delays of its links.
+const OVERLAP_MS: i64 = 500;
+/// Over different links one clock arrives with different delays, up to this, ms; beyond it there are two clocks.
+const LINKS_APART_MS: i64 = 2_000;
+/// Of several vehicles under one id, one that is silent for this long is gone.
+pub const GONE_AFTER: Duration = Duration::from_secs(10);
+/// A vehicle that was shown, and whose next boot is heard from the same source, was reset if it is silent for this long: twenty
+/// reports on a network, and more than one on the slowest line.
+const RESET_AFTER: Duration = Duration::from_secs(2);
+/// How many boots are remembered: the shown one, and a few that stand beside it or came before it.
+const BOOTS_MAX: usize = 4;
+/// How many reports in [`STEADY_WITHIN`] show that a boot goes on: a single frame that anybody may have sent does not.
+const STEADY_REPORTS: usize = 3;
+const STEADY_WITHIN: Duration = Duration::from_secs(3);
+/// How many sources of one boot are distinguished.
+const SOURCES_MAX: usize = 4;
+/// Sequence number and clock of one sender rise together. Reports this near to each other, ms, have fewer than 128 frames
+/// between them.
+const NEAR_MS: i64 = 500;
+/// A source that was heard so recently is where a boot reports.
+const ALIVE_WITHIN: Duration = Duration::from_secs(2);
+/// How often they contradict each other within [`GONE_AFTER`] until they are those of two vehicles.
+const CONTRADICTIONS: usize = 3;
+
+/// What a flight status says of its sender.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct StatusReport {
+    /// The vehicle's unique id; 0: not reported.
+    pub uid: u16,
+    /// The number of its boot; 0: not reported.
+    pub boot: u32,
+    /// The time on its clock, ms.
+    pub clock_ms: u32,
+    /// The sequence number of the frame.
+    pub sequence: u8,
+    /// From where the frame came: a number for each link and address, with that of the link in its upper byte.
+    pub source: u16,
+}
+
+/// Names a boot for as long as the station runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct BootId(u32);
+
+/// The last report of a boot from one source.
+#[derive(Debug, Clone, Copy)]
+struct Source {
+    number: u16,
+    /// When the boot began on our clock, ms, if nothing has been delayed: the least that was found.
+    began_ms: i64,
+    reports: u32,
+    clock_ms: u32,
+    sequence: u8,
+    heard_at: Duration,
+}
+
+impl Source {
+    /// How much later than its last report another one was said, ms.
+    fn clock_by_ms(&self, report: &StatusReport) -> i64 {
+        i64::from(report.clock_ms) - i64::from(self.clock_ms)
+    }
+
+    /// Whether clock and sequence number have risen, or fallen, together since its last report.
+    fn is_in_order(&self, report: &StatusReport) -> bool {
+        let sequence_by = i64::from(report.sequence.wrapping_sub(self.sequence).cast_signed());
+        self.clock_by_ms(report).signum() == sequence_by.signum()
+    }
+}
+
+/// The link of a source.
+const fn link_of(source: u16) -> u16 {
+    source >> 8
+}
+
+#[derive(Debug, Clone)]
+struct HeardBoot {
+    id: BootId,
+    uid: u16,
+    number: u32,
+    sources: Vec<Source>,
+    /// The latest time on its clock, ms.
+    clock_ms: u32,
+    heard_at: Duration,
+    /// When its last reports came.
+    reports_at: VecDeque<Duration>,
+    /// When its clock and its sequence numbers last contradicted each other.
+    contradicted_at: VecDeque<Duration>,
+    /// Armed, in a countdown, in flight, or down and not yet safe.
+    is_busy: bool,
+}
+
+fn ms(time: Duration) -> i64 {
+    i64::try_from(time.as_millis()).unwrap_or(i64::MAX)
+}
+
+fn is_within(at: Duration, limit: Duration, now: Duration) -> bool {
+    now.saturating_sub(at) < limit
+}
+
+impl HeardBoot {
+    fn new(id: BootId, report: &StatusReport, now: Duration) -> Self {
+        let mut boot = Self {
+            id,
+            uid: report.uid,
+            number: report.boot,
+            sources: Vec::new(),
+            clock_ms: report.clock_ms,
+            heard_at: now,
+            reports_at: VecDeque::new(),
+            contradicted_at: VecDeque::new(),
+            is_busy: false,
+        };
+        boot.hear(report, now);
+        boot
+    }
+
+    /// Whether this is its number, as far as a heartbeat has room for it.
+    fn is_number(&self, number: u32) -> bool {
+        (self.number ^ number) & LARGEST_BOOT_NUMBER == 0
+    }
+
+    fn is_heard(&self, now: Duration) -> bool {
+        is_within(self.heard_at, GONE_AFTER, now)
+    }
+
+    /// How far a time on a clock is from where this boot's clock should be by now, ms.
+    fn away_ms(&self, clock_ms: u32, now: Duration) -> i64 {
+        i64::from(clock_ms) - i64::from(self.clock_ms) - ms(now.saturating_sub(self.heard_at))
+    }
+
+    /// Whether a report may be one of this boot.
+    fn fits(&self, report: &StatusReport, now: Duration) -> bool {
+        let is_late = i64::from(report.clock_ms) + REORDERED_MS < i64::from(self.clock_ms);
+        (self.uid, self.number) == (report.uid, report.boot)
+            && !is_late
+            && self.away_ms(report.clock_ms, now) <= REORDERED_MS
+    }
+
+    fn hear(&mut self, report: &StatusReport, now: Duration) {
+        self.heard_at = now;
+        self.clock_ms = self.clock_ms.max(report.clock_ms);
+        self.reports_at.push_back(now);
+        self.reports_at.drain(..self.reports_at.len().saturating_sub(STEADY_REPORTS));
+        let began_ms = ms(now) - i64::from(report.clock_ms);
+        let known = self.sources.iter_mut().find(|source| source.number == report.source);
+        let Some(source) = known else {
+            self.sources.drain(..(self.sources.len() + 1).saturating_sub(SOURCES_MAX));
+            let StatusReport { source: number, clock_ms, sequence, .. } = *report;
+            self.sources.push(Source { number, began_ms, reports: 1, clock_ms, sequence, heard_at: now });
+            return;
+        };
+        let contradicts = source.clock_by_ms(report).abs() <= NEAR_MS && !source.is_in_order(report);
+        source.began_ms = source.began_ms.min(began_ms);
+        source.reports = source.reports.saturating_add(1);
+        (source.clock_ms, source.sequence, source.heard_at) = (report.clock_ms, report.sequence, now);
+        if contradicts {
+            self.contradict(now);
+        }
+    }
+
+    /// Notes that two senders claim to be this boot.
+    fn contradict(&mut self, now: Duration) {
+        self.contradicted_at.push_back(now);
+        self.contradicted_at.drain(..self.contradicted_at.len().saturating_sub(CONTRADICTIONS));
+    }
+
+    /// Whether a report comes from another address of the link over which this boot reports, and does not keep step with it: what
+    /// another way brings of the same vehicle does.
+    fn is_out_of_step(&self, report: &StatusReport, now: Duration) -> bool {
+        let recent = self.sources.iter().filter(|source| is_within(source.heard_at, ALIVE_WITHIN, now));
+        // The newest one: a vehicle that gets another address goes on from there.
+        let Some(usual) = recent.max_by_key(|source| source.heard_at) else { return false };
+        let since_ms = ms(now.saturating_sub(usual.heard_at));
+        let is_on_time = (usual.clock_by_ms(report) - since_ms).abs() <= NEAR_MS;
+        let keeps_step = is_on_time && (since_ms > NEAR_MS || usual.is_in_order(report));
+        usual.number != report.source && link_of(usual.number) == link_of(report.source) && !keeps_step
+    }
+
+    /// How many frames after its last report a sequence number comes.
+    fn behind(&self, sequence: u8) -> i64 {
+        self.sources.iter().map(|source| i64::from(sequence.wrapping_sub(source.sequence))).min().unwrap_or(0)
+    }
+
+    /// When it began, and what its clock has shown last, ms on our clock.
+    fn began_ms(&self) -> i64 {
+        self.sources.iter().map(|source| source.began_ms).min().unwrap_or(0)
+    }
+
+    fn said_ms(&self) -> i64 {
+        self.began_ms() + i64::from(self.clock_ms)
+    }
+
+    fn is_at(&self, source: u16) -> bool {
+        self.sources.iter().any(|known| known.number == source)
+    }
+
+    fn shares_a_source(&self, other: &Self) -> bool {
+        self.sources.iter().any(|source| other.is_at(source.number))
+    }
+
+    /// Whether it may be the same vehicle after its next power-up.
+    fn follows(&self, former: &Self) -> bool {
+        self.uid == former.uid && self.began_ms() + OVERLAP_MS >= former.said_ms()
+    }
+
+    fn is_steady(&self, now: Duration) -> bool {
+        self.reports_at.len() == STEADY_REPORTS
+            && self.reports_at.iter().all(|at| is_within(*at, STEADY_WITHIN, now))
+    }
+
+    /// Whether two vehicles speak with this unique id and this boot: a copied memory card.
+    fn is_of_two(&self, now: Duration) -> bool {
+        let contradicts = self.contradicted_at.len() == CONTRADICTIONS
+            && self.contradicted_at.iter().all(|at| is_within(*at, GONE_AFTER, now));
+        let clocks = || self.sources.iter().filter(|source| source.reports > 5).map(|source| source.began_ms);
+        let apart_ms = clocks().max().zip(clocks().min()).map_or(0, |(last, first)| last - first);
+        contradicts || apart_ms > LINKS_APART_MS
+    }
+}
+
+/// Another vehicle beside the shown one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Beside {
+    /// This boot; its number, 0 if it tells none.
+    Boot(BootId, u32),
+    /// One that has the unique id and the boot of the shown one.
+    Twin,
+}
+
+/// The boots that are heard.
+#[derive(Debug, Clone, Default)]
+pub struct Boots {
+    list: Vec<HeardBoot>,
+    shown: Option<BootId>,
+    /// The boot that the crew has chosen by name.
+    chosen: Option<BootId>,
+    next_id: u32,
+}
+
+impl Boots {
+    fn of(&self, id: BootId) -> Option<&HeardBoot> {
+        self.list.iter().find(|boot| boot.id == id)
+    }
+
+    fn shown_boot(&self) -> Option<&HeardBoot> {
+        self.of(self.shown?)
+    }
+
+    pub fn shown(&self) -> Option<BootId> {
+        self.shown
+    }
+
+    /// Whether this boot may be the shown vehicle after a reset, rather than another vehicle.
+    pub fn follows(&self, id: BootId, former: BootId) -> bool {
+        self.of(id).zip(self.of(former)).is_some_and(|(boot, former)| boot.follows(former))
+    }
+
+    /// Whether a flight status only claims to be of the shown boot. It is noted: two vehicles may have one boot and unique id.
+    pub fn disowns(&mut self, report: &StatusReport, now: Duration) -> bool {
+        let shown = self.shown;
+        let boot = self.list.iter_mut().find(|boot| Some(boot.id) == shown);
+        let Some(boot) = boot.filter(|boot| boot.fits(report, now) && boot.is_out_of_step(report, now))
+        else {
+            return false;
+        };
+        boot.contradict(now);
+        true
+    }
+
+    /// Takes a flight status, and says which boot it comes from. The first one is shown.
+    pub fn hear(&mut self, report: &StatusReport, now: Duration) -> BootId {
+        let fitting = self.list.iter_mut().filter(|boot| boot.fits(report, now));
+        if let Some(boot) = fitting.min_by_key(|boot| boot.away_ms(report.clock_ms, now).abs()) {
+            boot.hear(report, now);
+            return boot.id;
+        }
+        let id = BootId(self.next_id);
+        self.next_id = self.next_id.wrapping_add(1);
+        if self.list.len() == BOOTS_MAX {
+            let kept = [self.shown, self.chosen];
+            let oldest = (0..BOOTS_MAX)
+                .filter(|place| !kept.contains(&Some(self.list[*place].id)))
+                .min_by_key(|place| (self.list[*place].is_busy, self.list[*place].heard_at));
+            self.list.remove(oldest.unwrap_or(0));
+        }
+        self.list.push(HeardBoot::new(id, report, now));
+        self.shown.get_or_insert(id);
+        id
+    }
+
+    /// Which boot another message comes from: the one that it names, or the only one at this source, else by its clock or its sequence
+    /// number; `None` before the first flight status. What fits several goes to the shown one.
+    pub fn speaker(
+        &self,
+        source: u16,
+        (number, clock_ms, sequence): (Option<u32>, Option<u32>, u8),
+        now: Duration,
+    ) -> Option<BootId> {
+        let shown = self.shown_boot()?;
+        let mut named = self.list.iter().filter(|boot| number.is_some_and(|number| boot.is_number(number)));
+        if let (Some(only), None) = (named.next(), named.next()) {
+            return Some(only.id);
+        }
+        let mut here = self.list.iter().filter(|boot| boot.is_heard(now) && boot.is_at(source));
+        if let (Some(only), None) = (here.next(), here.next()) {
+            return Some(only.id);
+        }
+        let off = |boot: &HeardBoot| match clock_ms {
+            Some(clock_ms) => boot.away_ms(clock_ms, now).abs(),
+            None => boot.behind(sequence),
+        };
+        let others = self.list.iter().filter(|boot| boot.id != shown.id && boot.is_steady(now));
+        let nearest = others.min_by_key(|boot| off(boot)).filter(|boot| off(boot) < off(shown));
+        Some(nearest.unwrap_or(shown).id)
+    }
+
+    /// Whether a message names a boot that has not reported yet: it is of somebody who has not said who it is.
+    pub fn is_stray(&self, number: u32) -> bool {
+        self.shown.is_some() && !self.list.iter().any(|boot| boot.is_number(number))
+    }
+
+    /// Whether a source is another address of the link over which the shown boot reports, and no boot has reported from it: somebody
+    /// else speaks there, and has not said yet who it is.
+    pub fn is_strange(&self, source: u16, now: Duration) -> bool {
+        let reports_beside = |boot: &HeardBoot| {
+            let beside = |known: &Source| link_of(known.number) == link_of(source);
+            is_within(boot.heard_at, ALIVE_WITHIN, now) && boot.sources.iter().any(beside)
+        };
+        self.shown_boot().is_some_and(reports_beside) && !self.list.iter().any(|boot| boot.is_at(source))
+    }
+
+    /// Notes whether a boot is armed, in a countdown, in flight, or down and not yet safe.
+    pub fn note(&mut self, id: BootId, is_busy: bool) {
+        if let Some(boot) = self.list.iter_mut().find(|boot| boot.id == id) {
+            boot.is_busy = is_busy;
+        }
+    }
+
+    /// Decides which boot is shown. Returns the one that takes the screen.
+    ///
+    /// The shown one keeps it for as long as it is heard, and a single frame of another one never takes it. It goes to a boot that
+    /// was chosen by name; to the next boot of the same vehicle, after a reset; and from an idle vehicle to one from the same
+    /// source that is armed or flies.
+    pub fn settle(&mut self, now: Duration) -> Option<BootId> {
+        let shown = self.shown_boot()?;
+        let chosen =
+            self.chosen.and_then(|id| self.of(id)).filter(|boot| boot.is_heard(now)).map(|boot| boot.id);
+        let silence = now.saturating_sub(shown.heard_at);
+        let takes = |boot: &&HeardBoot| {
+            let reports = boot.reports_at.iter().filter(|at| **at > shown.heard_at).count();
+            let near = boot.shares_a_source(shown);
+            let after = if near && boot.follows(shown) { RESET_AFTER } else { GONE_AFTER };
+            let is_alone = silence >= after && reports > 1;
+            boot.id != shown.id
+                && boot.is_heard(now)
+                && (is_alone || (near && boot.is_busy && !shown.is_busy && boot.is_steady(now)))
+        };
+        let next = chosen.unwrap_or_else(|| {
+            let taking = self.list.iter().filter(takes);
+            taking.max_by_key(|boot| (boot.is_busy, boot.heard_at)).map_or(shown.id, |boot| boot.id)
+        });
+        self.chosen = chosen;
+        let changed = self.shown.replace(next) != Some(next);
+        changed.then_some(next)
+    }
+
+    /// The crew chooses this boot by name. Returns false if it is not heard, or not the only one of its number.
+    pub fn choose(&mut self, number: u32, now: Duration) -> bool {
+        let named: Vec<BootId> = self
+            .list
+            .iter()
+            .filter(|boot| boot.number == number && boot.is_heard(now))
+            .map(|boot| boot.id)
+            .collect();
+        if let [only] = named[..] {
+            self.chosen = Some(only);
+        }
+        named.len() == 1
+    }
+
+    /// Other vehicles that are heard beside the shown one.
+    pub fn beside(&self, now: Duration) -> Vec<Beside> {
+        let Some(shown) = self.shown_boot().filter(|shown| shown.is_heard(now)) else { return Vec::new() };
+        let is_other = |boot: &&HeardBoot| {
+            let is_same = boot.shares_a_source(shown) && (boot.follows(shown) || shown.follows(boot));
+            boot.id != shown.id && boot.is_heard(now) && !is_same
+        };
+        let others = self.list.iter().filter(is_other).map(|boot| Beside::Boot(boot.id, boot.number));
+        let twin = self.list.iter().any(|boot| boot.is_heard(now) && boot.is_of_two(now));
+        others.chain(twin.then_some(Beside::Twin)).collect()
+    }
+
+    /// Whether the crew has chosen the shown one among several, and a command can name it: its boot has a number that no
+    /// other one has.
+    pub fn is_chosen(&self, now: Duration) -> bool {
+        let Some(shown) = self.shown_boot() else { return false };
+        let same = self.list.iter().filter(|boot| boot.number == shown.number && boot.is_heard(now)).count();
+        self.chosen == self.shown && shown.number > 0 && same == 1 && !shown.is_of_two(now)
+    }
+
+    /// How long ago a boot was heard.
+    pub fn age(&self, id: BootId, now: Duration) -> Option<Duration> {
+        self.of(id).map(|boot| now.saturating_sub(boot.heard_at))
+    }
+
+    /// Whether a boot is still remembered.
+    pub fn knows(&self, id: BootId) -> bool {
+        self.of(id).is_some()
+    }
+}
+
+// The vehicles of these boots: the shown one is the model's, and the others are kept beside it.
+
+impl Model {
+    /// The vehicles that are heard beside the shown one, in words; `None` if it is alone.
+    pub fn beside(&self, now: Duration) -> Option<String> {
+        let is_heard = |at: Duration| is_within(at, GONE_AFTER, now);
+        let ours = self.vehicle.status.as_ref().is_some_and(|status| is_heard(status.received_at));
+        let foreign = self.vehicle.foreign.as_ref().filter(|foreign| ours && is_heard(foreign.heard_at));
+        let words = self.boots.beside(now).into_iter().map(|other| match other {
+            Beside::Boot(_, 0) => "one without a boot number".to_owned(),
+            Beside::Boot(id, boot) => {
+                let state =
+                    self.others.get(&id).map_or_else(String::new, |of| format!(" {}", state_words(of)));
+                format!("boot {}{state}", words::boot(boot))
+            }
+            Beside::Twin => "another one with the same boot and unique id".to_owned(),
+        });
+        let words: Vec<String> = words.chain(foreign.map(Foreign::name)).collect();
+        (!words.is_empty()).then(|| words.join(", "))
+    }
+
+    /// A row for each vehicle while there are several: its boot, phase, whether it is armed, its countdown and its age.
+    pub fn vehicle_rows(&self, now: Duration) -> Vec<String> {
+        let beside = self.boots.beside(now);
+        let row = |lead: &str, vehicle: &Vehicle, age: Option<Duration>| {
+            let boot = vehicle.boot.number().map_or_else(|| "--".to_owned(), words::boot);
+            let age = age.map_or_else(String::new, |age| format!(" {}s", age.as_secs()));
+            format!("{lead} {boot} {}{age}", state_words(vehicle))
+        };
+        let others = beside.iter().filter_map(|other| match other {
+            Beside::Boot(id, _) => Some(row("also", self.others.get(id)?, self.boots.age(*id, now))),
+            Beside::Twin => Some("also one with the same boot and unique id".to_owned()),
+        });
+        let shown = self.boots.shown().filter(|_| !beside.is_empty());
+        let shown = shown.map(|id| row("this", &self.vehicle, self.boots.age(id, now)));
+        shown.into_iter().chain(others).collect()
+    }
+
+    /// Other boots that are heard, which the crew may choose by name.
+    pub fn other_boots(&self, now: Duration) -> Vec<u32> {
+        let boot = |other| match other {
+            Beside::Boot(_, boot) if boot > 0 => Some(boot),
+            _ => None,
+        };
+        self.boots.beside(now).into_iter().filter_map(boot).collect()
+    }
+
+    /// The vehicles that are heard: the shown one, and those beside it.
+    pub fn every_vehicle(&self, now: Duration) -> impl Iterator<Item = &Vehicle> {
+        let heard = self
+            .others
+            .iter()
+            .filter(move |(id, _)| self.boots.age(**id, now).is_some_and(|age| age < GONE_AFTER));
+        std::iter::once(&self.vehicle).chain(heard.map(|(_, vehicle)| vehicle))
+    }
+}
+
+/// Its phase, whether it is armed, and its countdown.
+fn state_words(vehicle: &Vehicle) -> String {
+    let phase = vehicle.phase_now().map_or_else(|| "phase ?".to_owned(), words::phase);
+    let armed = match vehicle.armed() {
+        None => "armed ?",
+        Some(armed) if armed.value => "ARMED",
+        Some(_) => "disarmed",
+    };
+    let left = vehicle.countdown_s().filter(|left| left.value > 0.0);
+    let left = left.map_or_else(String::new, |left| format!(" T-{:.0}", left.value));
+    format!("{phase} {armed}{left}")
+}
+
+/// Whether a vehicle is armed, in a countdown, in flight, or down and not yet safe: then it keeps the screen.
+pub(crate) fn is_busy(vehicle: &Vehicle, now: Duration) -> bool {
+    let is_armed_on_pad = vehicle.phase_now() == Some(TdPhase::TD_PHASE_PAD_ARMED);
+    vehicle.is_armed() || is_armed_on_pad || vehicle.in_flight() || KeepAway::of(vehicle, now).is_some()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn at(ms: u64) -> Duration {
+        Duration::from_millis(ms)
+    }
+
+    /// A vehicle that was switched on at this time, ms.
+    #[derive(Debug, Clone, Copy)]
+    struct Sender {
+        uid: u16,
+        boot: u32,
+        on_ms: u64,
+        source: u16,
+        sequence: u8,
+    }
+
+    impl Sender {
+        const fn new(uid: u16, boot: u32, on_ms: u64) -> Self {
+            Self { uid, boot, on_ms, source: 0, sequence: (on_ms % 251) as u8 }
+        }
+
+        /// Its report of this time; six frames of other kinds lie between two of them.
+        fn report(&mut self, said_ms: u64) -> StatusReport {
+            self.sequence = self.sequence.wrapping_add(7);
+            let clock_ms = (said_ms - self.on_ms) as u32;
+            StatusReport {
+                uid: self.uid,
+                boot: self.boot,
+                clock_ms,
+                sequence: self.sequence,
+                source: self.source,
+            }
+        }
+    }
+
+    fn beside(boots: &Boots, now: Duration) -> usize {
+        boots.beside(now).len()
+    }
+
+    #[test]
+    fn a_second_vehicle_is_one_at_once_and_does_not_take_the_screen() {
+        let mut boots = Boots::default();
+        let [mut first, mut second] = [Sender::new(1, 7, 0), Sender::new(2, 9, 20_000)];
+        let shown = boots.hear(&first.report(10_000), at(10_000));
+        for ms in (10_000..60_000).step_by(100) {
+            boots.hear(&first.report(ms), at(ms));
+            if ms >= 20_000 {
+                boots.hear(&second.report(ms), at(ms));
+                assert_eq!(beside(&boots, at(ms)), 1, "{ms}");
+            }
+            assert_eq!((boots.settle(at(ms)), boots.shown()), (None, Some(shown)));
+        }
+        // The shown one is switched off: 10 s later the other one is alone, and has the screen.
+        for ms in (60_000..71_000).step_by(100) {
+            let heard = boots.hear(&second.report(ms), at(ms));
+            let takes = boots.settle(at(ms));
+            assert_eq!(takes, (ms == 69_900).then_some(heard), "{ms}");
+        }
+        assert_eq!(beside(&boots, at(70_000)), 0);
+    }
+
+    #[test]
+    fn a_reset_with_a_fixed_boot_number_is_seen_by_the_clock() {
+        let mut boots = Boots::default();
+        let [mut before, mut after] = [Sender::new(1, 7, 0), Sender::new(1, 7, 30_500)];
+        for ms in (0..30_000).step_by(100) {
+            boots.hear(&before.report(ms), at(ms));
+        }
+        let taken = (31_000..34_000).step_by(100).find(|ms| {
+            boots.hear(&after.report(*ms), at(*ms));
+            assert_eq!(beside(&boots, at(*ms)), 0, "{ms}");
+            boots.settle(at(*ms)).is_some()
+        });
+        assert_eq!(taken, Some(31_900), "2 s after its last report");
+    }
+
+    #[test]
+    fn two_vehicles_with_one_boot_and_one_unique_id_are_told_by_their_clocks_or_sequence_numbers() {
+        for (apart_ms, sources) in
+            [(0, [0, 0]), (300, [0, 0]), (3_000, [0, 1]), (60_000, [0, 0]), (60_000, [0, 1])]
+        {
+            let mut boots = Boots::default();
+            let mut both = [Sender::new(1, 7, 0), Sender::new(1, 7, apart_ms)];
+            (both[0].source, both[1].source, both[1].sequence) = (sources[0], sources[1], 100);
+            for ms in (100_000..103_000).step_by(100) {
+                let two = &mut both;
+                for sender in two {
+                    boots.hear(&sender.report(ms), at(ms));
+                }
+                boots.settle(at(ms));
+            }
+            assert!(beside(&boots, at(103_000)) > 0, "{apart_ms} {sources:?}");
+            assert!(!boots.choose(7, at(103_000)) || !boots.is_chosen(at(103_000)), "no command can name it");
+        }
+    }
+
+    /// From another address of the same link, with the boot, the unique id and about the clock of the vehicle.
+    #[test]
+    fn a_status_that_only_claims_to_be_the_vehicle_s_is_not_taken_and_seen_as_a_second_one() {
+        let mut boots = Boots::default();
+        let mut ours = Sender { source: 0x101, ..Sender::new(1, 7, 0) };
+        let mut disowned = 0;
+        for ms in (10_000..20_000).step_by(100) {
+            let report = ours.report(ms);
+            assert!(!boots.disowns(&report, at(ms)));
+            boots.hear(&report, at(ms));
+            // The same over another link, and a copy that another way of the same link brings first.
+            for (source, later) in [(0x201, 0), (0x102, 1)] {
+                let copy = StatusReport {
+                    source,
+                    sequence: report.sequence.wrapping_add(later),
+                    clock_ms: report.clock_ms + u32::from(later),
+                    ..report
+                };
+                assert!(!boots.disowns(&copy, at(ms)), "{source}");
+            }
+            if ms % 1_000 == 0 {
+                let forged = StatusReport {
+                    source: 0x103,
+                    clock_ms: report.clock_ms + 20,
+                    sequence: report.sequence.wrapping_add(200),
+                    ..report
+                };
+                disowned += usize::from(boots.disowns(&forged, at(ms)));
+            }
+        }
+        assert_eq!((disowned, beside(&boots, at(20_000))), (10, 1));
+    }
+
+    /// As when a router gives it another port: at once, or after a pause.
+    #[test]
+    fn a_vehicle_that_gets_another_address_stays_one() {
+        for pause_ms in [0, 1_000] {
+            let mut boots = Boots::default();
+            let mut ours = Sender { source: 0x101, ..Sender::new(1, 7, 0) };
+            for ms in (10_000..20_000).step_by(100).filter(|ms| !(15_000..15_000 + pause_ms).contains(ms)) {
+                ours.source = if ms < 15_000 { 0x101 } else { 0x102 };
+                let report = ours.report(ms);
+                assert!(!boots.disowns(&report, at(ms)), "{ms} after {pause_ms}");
+                boots.hear(&report, at(ms));
+                assert_eq!(beside(&boots, at(ms)), 0);
+            }
+        }
+    }
+
+    proptest! {
+        /// Whatever else is heard, in any order and at any rate: the shown vehicle keeps the screen while it is heard.
+        #[test]
+        fn nothing_takes_the_screen_from_a_vehicle_that_is_heard(
+            others in prop::collection::vec(
+                (0_u16..3, 0_u32..4, 0_u64..100_000, 0_u16..2, any::<bool>(), any::<u8>()), 1..300,
+            ),
+            gaps_ms in prop::collection::vec(1_u64..1_900, 20..60),
+            is_busy in any::<bool>(),
+        ) {
+            let mut boots = Boots::default();
+            let mut ours = Sender::new(9, 9, 0);
+            let shown = boots.hear(&ours.report(100_000), at(100_000));
+            boots.note(shown, true);
+            let mut now_ms = 100_000;
+            let mut others = others.iter().cycle();
+            for gap_ms in gaps_ms {
+                let mut left_ms = gap_ms;
+                while left_ms > 0 {
+                    let step_ms = left_ms.min(97);
+                    (left_ms, now_ms) = (left_ms - step_ms, now_ms + step_ms);
+                    if let Some((uid, boot, clock_ms, source, _, sequence)) = others.next() {
+                        let clock_ms = *clock_ms as u32;
+                        let report = StatusReport { uid: *uid, boot: *boot, clock_ms, sequence: *sequence, source: *source };
+                        let heard = boots.hear(&report, at(now_ms));
+                        boots.note(heard, is_busy);
+                        prop_assert_eq!(boots.settle(at(now_ms)), None);
+                    }
+                    prop_assert!(boots.list.len() <= BOOTS_MAX && boots.shown() == Some(shown));
+                }
+                prop_assert_eq!(boots.hear(&ours.report(now_ms), at(now_ms)), shown);
+            }
+        }
+
+        /// An unsigned frame every 4 s that says it is the same vehicle, or another one, with any boot, clock and source.
+        #[test]
+        fn a_forged_frame_now_and_then_takes_nothing(
+            forged in prop::collection::vec((0_u16..2, 0_u32..3, 0_u32..200_000, 0_u16..2, any::<u8>()), 5),
+            is_busy in any::<bool>(),
+        ) {
+            let mut boots = Boots::default();
+            let mut ours = Sender::new(1, 1, 0);
+            let shown = boots.hear(&ours.report(100_000), at(100_000));
+            let mut forged = forged.into_iter();
+            for ms in (100_100..120_000).step_by(100) {
+                if ms % 4_000 == 0 && let Some((uid, boot, clock_ms, source, sequence)) = forged.next() {
+                    let heard = boots.hear(&StatusReport { uid, boot, clock_ms, sequence, source }, at(ms));
+                    if heard != shown {
+                        boots.note(heard, is_busy);
+                    }
+                }
+                let report = ours.report(ms);
+                prop_assert_eq!(boots.hear(&report, at(ms)), shown);
+                // Everything else that ours says is still taken for ours.
+                prop_assert_eq!(boots.speaker(report.source, (None, None, report.sequence.wrapping_add(1)), at(ms)), Some(shown));
+                prop_assert_eq!(boots.settle(at(ms)), None);
+            }
+        }
+
+        /// One vehicle that reboots, over a link that is late by any time up to 4 s and 0.4 s more or less, is never two, and
+        /// its last boot is shown in the end.
+        #[test]
+        fn one_vehicle_is_never_two(
+            boots_s in prop::collection::vec(5_u64..60, 1..6),
+            late_ms in 0_u64..4_000,
+            more_ms in prop::collection::vec(0_u64..400, 100),
+            fixed in any::<bool>(),
+        ) {
+            let mut sent = Vec::new();
+            let mut on_ms = 0;
+            for (number, runs_s) in boots_s.iter().enumerate() {
+                let mut vehicle = Sender::new(1, if fixed { 7 } else { number as u32 + 1 }, on_ms);
+                for said_ms in (on_ms..on_ms + 1_000 * runs_s).step_by(500) {
+                    let more = more_ms[sent.len() % more_ms.len()];
+                    sent.push((at(said_ms + late_ms + more), vehicle.report(said_ms)));
+                }
+                on_ms += 1_000 * runs_s + 600;
+            }
+            let mut boots = Boots::default();
+            for (now, report) in &sent {
+                boots.hear(report, *now);
+                boots.settle(*now);
+                prop_assert_eq!(boots.beside(*now), vec![]);
+            }
+            let (now, report) = sent[sent.len() - 1];
+            let last = boots.hear(&report, now);
+            prop_assert_eq!(boots.shown(), Some(last));
+        }
+    }
+}
