@@ -89,7 +89,7 @@ fn what_a_station_recorded_agrees_with_the_vehicles_own_log() {
         compared.output
     );
     assert!(compared.output.contains("tables are identical"), "{}", compared.output);
-    assert!(compared.output.contains("Compared while both recorded"), "{}", compared.output);
+    assert!(compared.output.contains("compared while both recorded"), "{}", compared.output);
 }
 
 /// What a station records ten times a second, of the vehicle's state: which of its moments it takes depends on the machine.

@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 use std::num::NonZeroUsize;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, ensure};
 use onboard_sim::run::threads;
@@ -85,6 +85,31 @@ pub(crate) fn give(found: &impl Answer, json: bool) -> Result<Outcome> {
         false => found.sentences().iter().try_for_each(|line| writeln!(output, "{}", shown(line))),
     })?;
     Ok(found.outcome())
+}
+
+/// Prints what is found of each file, the only one's as it is and those of several as a list. One that cannot be read does not
+/// hide the others.
+pub(crate) fn give_each<A: Answer>(
+    files: &[PathBuf],
+    json: bool,
+    find: impl Fn(&Path) -> Result<Vec<A>>,
+) -> Result<Outcome> {
+    let (mut all, mut outcome) = (Vec::new(), Outcome::Given);
+    for file in files {
+        match find(file) {
+            Ok(found) => all.extend(found),
+            Err(error) if files.len() == 1 => return Err(error),
+            Err(error) => {
+                say(&format!("{error:#}"));
+                outcome = Outcome::NotAll;
+            }
+        }
+    }
+    let given = match all.as_slice() {
+        [only] if files.len() == 1 => give(only, json)?,
+        _ => give(&all, json)?,
+    };
+    Ok(given.or_worse(outcome))
 }
 
 /// Writes an answer to standard output. A reader that closes the pipe early is not an error.

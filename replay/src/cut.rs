@@ -18,11 +18,10 @@ use protocol::log::record::{
 use serde::Serialize;
 
 use crate::cli::{Answer, Outcome, give};
-use crate::log::{Clock, ClockTime, Clocks, Entry, FlightLog, LogError, Moment, heard_message};
-use crate::output::{Destination, Overwrite, WriteError};
+use crate::log::{Clock, ClockTime, Entry, FlightLog, LogError, Moment};
+use crate::output::{Destination, WriteError};
 use crate::print::counted;
-use crate::recover::scan::Records;
-use crate::recover::write::{Kept, Rescue};
+use crate::recover::{Kept, Records, Rescue};
 
 /// A record of these says nothing without those before it.
 const CHAINED: [&str; 4] = [TOPIC_COMPUTER_START, TOPIC_COMPUTER_FRAME, TOPIC_BOOK, TOPIC_BOOK_HEAD];
@@ -149,14 +148,12 @@ fn words_of(name: &str, Wanted { from, until, topics }: &Wanted) -> String {
 /// The first and the last time that are kept, ns since the Unix epoch.
 fn span_ns(input: &Path, wanted: &Wanted) -> Result<(u64, u64), CutError> {
     let mut log = FlightLog::open(input)?;
-    let (mut clocks, mut first_ns) = (Clocks::default(), None);
+    let mut first_ns = None;
     let mut begins: BTreeMap<Phase, u64> = BTreeMap::new();
     let mut frames_ns: [Option<u64>; 2] = [None; 2];
     while let Some(stamped) = log.next_entry()? {
         let at_ns = stamped.log_time_ns;
-        let since_ns = at_ns.saturating_sub(*first_ns.get_or_insert(at_ns));
-        let message = heard_message(log.channel(stamped.channel_id), &stamped);
-        clocks.note(&stamped, message.as_ref(), since_ns as f64 / 1e9);
+        first_ns.get_or_insert(at_ns);
         let phase = match &stamped.entry {
             Entry::ComputerFrame(frame) => {
                 for (found, moment) in frames_ns.iter_mut().zip([wanted.from, wanted.until]) {
@@ -181,10 +178,12 @@ fn span_ns(input: &Path, wanted: &Wanted) -> Result<(u64, u64), CutError> {
         let found = match moment {
             Moment::Frame(_) => frame_ns,
             Moment::Phase(phase) => begins.get(&phase).copied(),
-            Moment::Time(time) => clocks.convert(time, Clock::Log).map(|ClockTime { time_s, .. }| {
-                // A time before the first record is the beginning.
-                first_ns + (1e9 * time_s.max(0.0)) as u64
-            }),
+            Moment::Time(time) => {
+                log.clocks().convert(time, Clock::Log).map(|ClockTime { time_s, .. }| {
+                    // A time before the first record is the beginning.
+                    first_ns + (1e9 * time_s.max(0.0)) as u64
+                })
+            }
         };
         found.ok_or_else(|| CutError::NoMoment { name: log.name().to_owned(), moment })
     };
@@ -240,7 +239,7 @@ pub(crate) struct Args {
 
 impl Args {
     pub(crate) fn run(self) -> Result<Outcome> {
-        let destination = Destination { path: &self.output, overwrite: Overwrite::if_forced(self.force) };
+        let destination = Destination { path: &self.output, force: self.force };
         let wanted = Wanted { from: self.from, until: self.until, topics: self.topics };
         give(&cut(&self.file, &wanted, destination)?, self.json)
     }

@@ -36,34 +36,9 @@ pub enum EvaluateError {
     /// A recorded frame cannot be executed again.
     #[error(transparent)]
     Frame(#[from] FrameError),
-    /// A timed setting of the estimator, which is set up only once.
-    #[error("{setting}: the estimator's configuration holds from the beginning and cannot change in flight")]
-    TimedEstimator { setting: String },
-    /// A setting whose time comes after the last frame.
-    #[error("{setting}: takes effect after the end of {name}, whose last frame is at T+{last_s:.3} s")]
-    AfterTheEnd {
-        setting: String,
-        /// The file.
-        name: String,
-        /// Time of the last frame, s.
-        last_s: f64,
-    },
-    /// A setting that the controller does not have.
-    #[error(
-        "{path} is not a setting of the controller: on recorded inputs it changes nothing; use refly to fly with it"
-    )]
-    NotTheControllers {
-        /// The setting.
-        path: String,
-    },
-    /// A setting that would change the times of the frames.
-    #[error("{path} cannot be changed on recorded inputs: there is one input every {recorded_s} s")]
-    SampleTime {
-        /// The setting.
-        path: &'static str,
-        /// The recorded value, s.
-        recorded_s: f64,
-    },
+    /// A setting that the controller does not have, or that cannot be changed on recorded inputs.
+    #[error("{setting}: {why}")]
+    Refused { setting: String, why: String },
 }
 
 /// A frame: the recorded decision, and the decision with other settings.
@@ -131,43 +106,28 @@ impl EvaluateReport {
     }
 }
 
-/// Every frame, and how many of them this build decides differently with nothing changed.
-type Evaluated = (Vec<EvaluatedFrame>, usize);
-
-/// Evaluates a recorded flight under other settings.
+/// Evaluates a recorded flight under other settings: two flight computers run on every frame. The recorded decision comes from
+/// the record; what the record leaves out (cost and iterations of a plan) comes from `then`, which runs with the recorded
+/// settings.
 ///
 /// # Errors
 /// See [`EvaluateError`].
 pub fn evaluate(recording: &Recording, settings: &[Setting]) -> Result<EvaluateReport, EvaluateError> {
-    let frames = side_by_side(recording, settings)?;
-    let last_s = frames.0.last().map_or(0.0, |frame| frame.time_s);
-    match settings.iter().find(|setting| setting.at_s.is_some_and(|at_s| at_s > last_s)) {
-        Some(late) => Err(EvaluateError::AfterTheEnd {
-            setting: late.to_string(),
-            name: recording.name.clone(),
-            last_s,
-        }),
-        None => Ok(summarise(recording, settings, frames)),
-    }
-}
-
-/// Runs two flight computers on every frame. The recorded decision comes from the record; what the record leaves out
-/// (cost and iterations of a plan) comes from `then`, which runs with the recorded settings.
-fn side_by_side(recording: &Recording, settings: &[Setting]) -> Result<Evaluated, EvaluateError> {
-    let (start, frames) = recording.replayable_frames()?;
+    let (start, recorded) = recording.replayable_frames()?;
     let toml = recording.profile_toml()?;
     let run = &recording.head.run;
     let mut then = LoggedComputer::recorded(toml, start, run, &[])?;
-    refuse(settings, then.pilot().mission().estimator.frame_s)?;
+    let last_s = recorded.last().map_or(0.0, |frame| frame.input.time_s);
+    refuse(settings, &recording.name, then.pilot().mission().estimator.frame_s, last_s)?;
     let mut now = LoggedComputer::recorded(toml, start, run, settings)?;
-    let mut evaluated = Vec::with_capacity(frames.len());
+    let mut frames = Vec::with_capacity(recorded.len());
     let mut unchanged_different = 0;
-    for frame in frames {
+    for frame in recorded {
         let unchanged = then.run_again(frame)?;
         let again = now.run_again(frame)?;
         let recorded = then.decided(frame);
         unchanged_different += usize::from(then.decided(&unchanged) != recorded);
-        evaluated.push(EvaluatedFrame {
+        frames.push(EvaluatedFrame {
             frame: recording.release_frame + frame.input.frame,
             time_s: frame.input.time_s,
             phase: phase_name(&frame.output),
@@ -175,24 +135,30 @@ fn side_by_side(recording: &Recording, settings: &[Setting]) -> Result<Evaluated
             evaluated: now.decided(&again),
         });
     }
-    Ok((evaluated, unchanged_different))
+    Ok(summarise(recording, settings, frames, unchanged_different))
 }
 
 /// Refuses settings that the flight computer does not have, or that cannot change on recorded inputs.
-fn refuse(settings: &[Setting], recorded_s: f64) -> Result<(), EvaluateError> {
-    for setting in settings {
-        let path = &setting.path;
-        if NOT_THE_PILOTS.iter().any(|section| path.starts_with(section)) {
-            return Err(EvaluateError::NotTheControllers { path: path.clone() });
-        }
-        if path == FRAME {
-            return Err(EvaluateError::SampleTime { path: FRAME, recorded_s });
-        }
-        if setting.at_s.is_some() && path.starts_with("estimator.") {
-            return Err(EvaluateError::TimedEstimator { setting: setting.to_string() });
-        }
+fn refuse(settings: &[Setting], name: &str, recorded_s: f64, last_s: f64) -> Result<(), EvaluateError> {
+    let why_not = |Setting { path, at_s, .. }: &Setting| {
+        let why = if NOT_THE_PILOTS.iter().any(|section| path.starts_with(section)) {
+            "not a setting of the controller: on recorded inputs it changes nothing; use refly to fly with it"
+                .to_owned()
+        } else if path == FRAME {
+            format!("cannot be changed on recorded inputs: there is one input every {recorded_s} s")
+        } else if at_s.is_some() && path.starts_with("estimator.") {
+            "the estimator's configuration holds from the beginning and cannot change in flight".to_owned()
+        } else if at_s.is_some_and(|at_s| at_s > last_s) {
+            format!("takes effect after the end of {name}, whose last frame is at T+{last_s:.3} s")
+        } else {
+            return None;
+        };
+        Some(why)
+    };
+    match settings.iter().find_map(|setting| Some((setting, why_not(setting)?))) {
+        None => Ok(()),
+        Some((setting, why)) => Err(EvaluateError::Refused { setting: setting.to_string(), why }),
     }
-    Ok(())
 }
 
 /// The largest difference of two commands' angles, rad.
@@ -203,39 +169,30 @@ fn apart_rad(a: &[f64], b: &[f64]) -> f64 {
 fn summarise(
     recording: &Recording,
     settings: &[Setting],
-    (frames, unchanged_different): Evaluated,
+    frames: Vec<EvaluatedFrame>,
+    unchanged_different: usize,
 ) -> EvaluateReport {
-    let difference_rad =
-        |frame: &EvaluatedFrame| apart_rad(&frame.recorded.gimbal_rad, &frame.evaluated.gimbal_rad);
-    let landing: Vec<&EvaluatedFrame> = frames
-        .iter()
-        .filter(|frame| matches!(frame.phase, "LAND_ARMED" | "IGNITION" | "POWERED" | "TOUCHDOWN"))
-        .collect();
-    let squares: f64 = landing.iter().map(|frame| difference_rad(frame) * difference_rad(frame)).sum();
-    let largest = frames.iter().max_by(|a, b| difference_rad(a).total_cmp(&difference_rad(b)));
-    let count =
-        |differs: &dyn Fn(&EvaluatedFrame) -> bool| frames.iter().filter(|frame| differs(frame)).count();
-    let bits = |angles: &[f64]| angles.iter().map(|angle| angle.to_bits()).collect::<Vec<_>>();
+    let apart = |frame: &EvaluatedFrame| apart_rad(&frame.recorded.gimbal_rad, &frame.evaluated.gimbal_rad);
+    let lands = |phase: &str| matches!(phase, "LAND_ARMED" | "IGNITION" | "POWERED" | "TOUCHDOWN");
+    let landing: Vec<f64> = frames.iter().filter(|frame| lands(frame.phase)).map(apart).collect();
+    let squares: f64 = landing.iter().map(|apart_rad| apart_rad * apart_rad).sum();
+    let largest = frames.iter().max_by(|a, b| apart(a).total_cmp(&apart(b)));
+    let count = |differs: &dyn Fn(&Decided, &Decided) -> bool| {
+        frames.iter().filter(|frame| differs(&frame.recorded, &frame.evaluated)).count()
+    };
+    let bits = |decided: &Decided| decided.gimbal_rad.iter().map(|angle| angle.to_bits()).collect::<Vec<_>>();
     let fins_rad = |frame: &EvaluatedFrame| apart_rad(&frame.recorded.fins_rad, &frame.evaluated.fins_rad);
     EvaluateReport {
         kind: "open loop: the controller alone on recorded inputs",
         file: recording.name.clone(),
         settings: settings.iter().map(ToString::to_string).collect(),
         unchanged_different,
-        commands_different: count(&|frame| {
-            bits(&frame.recorded.gimbal_rad) != bits(&frame.evaluated.gimbal_rad)
-        }),
-        gimbal_difference_rms_rad: if landing.is_empty() {
-            0.0
-        } else {
-            libm::sqrt(squares / landing.len() as f64)
-        },
-        gimbal_difference_max_rad: largest.map_or(0.0, difference_rad),
-        gimbal_difference_max_frame: largest
-            .filter(|frame| difference_rad(frame) > 0.0)
-            .map(|frame| frame.frame),
+        commands_different: count(&|recorded, evaluated| bits(recorded) != bits(evaluated)),
+        gimbal_difference_rms_rad: libm::sqrt(squares / landing.len().max(1) as f64),
+        gimbal_difference_max_rad: largest.map_or(0.0, apart),
+        gimbal_difference_max_frame: largest.filter(|frame| apart(frame) > 0.0).map(|frame| frame.frame),
         fins_difference_max_rad: frames.iter().map(fins_rad).fold(0.0, f64::max),
-        levels_different: count(&|frame| frame.recorded.level != frame.evaluated.level),
+        levels_different: count(&|recorded, evaluated| recorded.level != evaluated.level),
         phases: phases(&frames),
         frames_compared: frames.len(),
         frames,
@@ -343,42 +300,32 @@ impl EvaluatedFrame {
 /// Every frame of an evaluation as CSV.
 fn csv_of(report: &EvaluateReport) -> Result<String> {
     let mut csv = csv::Writer::from_writer(Vec::new());
-    let angles = |name: &str, angles: &[f64]| -> Vec<String> {
-        // A single angle has no index in its name.
-        if angles.len() == 1 {
-            vec![name.to_owned()]
-        } else {
-            (0..angles.len()).map(|k| format!("{name}_{k}")).collect()
-        }
-    };
-    let mut columns = vec!["frame".to_owned(), "time_s".to_owned()];
-    for (side, Decided { gimbal_rad, fins_rad, .. }) in report
-        .frames
-        .first()
-        .into_iter()
-        .flat_map(|first| [("recorded", &first.recorded), ("evaluated", &first.evaluated)])
+    for (place, EvaluatedFrame { frame, time_s, recorded, evaluated, .. }) in report.frames.iter().enumerate()
     {
-        columns.extend(["phase", "level", "cost", "iterations"].map(|name| format!("{side}_{name}")));
-        columns.extend(angles(&format!("{side}_gimbal_rad"), gimbal_rad));
-        columns.extend((0..fins_rad.len()).map(|fin| format!("{side}_fins_rad_{fin}")));
-    }
-    csv.write_record(columns)?;
-    for frame in &report.frames {
-        let mut cells = vec![frame.frame.to_string(), format!("{:?}", frame.time_s)];
-        for Decided { gimbal_rad, fins_rad, phase, level, cost, iterations, .. } in
-            [&frame.recorded, &frame.evaluated]
-        {
-            cells.extend([
-                (*phase).to_owned(),
-                (*level).to_owned(),
-                format!("{cost:?}"),
-                iterations.to_string(),
-            ]);
-            cells.extend(gimbal_rad.iter().chain(fins_rad).map(|angle| format!("{angle:?}")));
+        if place == 0 {
+            let frame = ["frame", "time_s"].map(str::to_owned).to_vec();
+            csv.write_record([frame, recorded.columns("recorded"), evaluated.columns("evaluated")].concat())?;
         }
-        csv.write_record(cells)?;
+        let frame = vec![frame.to_string(), format!("{time_s:?}")];
+        csv.write_record([frame, recorded.cells(), evaluated.cells()].concat())?;
     }
     Ok(String::from_utf8(csv.into_inner()?)?)
+}
+
+impl Decided {
+    fn columns(&self, side: &str) -> Vec<String> {
+        let words = ["phase", "level", "cost", "iterations"].map(|name| format!("{side}_{name}"));
+        let gimbal = (0..self.gimbal_rad.len()).map(|axis| format!("{side}_gimbal_rad_{axis}"));
+        let fins = (0..self.fins_rad.len()).map(|fin| format!("{side}_fins_rad_{fin}"));
+        words.into_iter().chain(gimbal).chain(fins).collect()
+    }
+
+    fn cells(&self) -> Vec<String> {
+        let Self { gimbal_rad, fins_rad, phase, level, cost, iterations, .. } = self;
+        let words = [(*phase).to_owned(), (*level).to_owned(), format!("{cost:?}"), iterations.to_string()];
+        let angles = gimbal_rad.iter().chain(fins_rad).map(|angle| format!("{angle:?}"));
+        words.into_iter().chain(angles).collect()
+    }
 }
 
 fn yes_no(answer: Option<bool>) -> &'static str {

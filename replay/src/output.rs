@@ -5,43 +5,21 @@ use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use tempfile::NamedTempFile;
-
-/// What to do with an existing file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Overwrite {
-    /// Keep it and fail.
-    #[default]
-    Never,
-    /// Replace it.
-    Always,
-}
-
-impl Overwrite {
-    /// From the flag `--force`.
-    pub fn if_forced(force: bool) -> Self {
-        if force { Self::Always } else { Self::Never }
-    }
-}
+use tempfile::{NamedTempFile, TempPath};
 
 /// The destination of a new file.
 #[derive(Debug, Clone, Copy)]
 pub struct Destination<'a> {
     /// Its name.
     pub path: &'a Path,
-    /// What to do if the file exists.
-    pub overwrite: Overwrite,
+    /// Replace an existing file.
+    pub force: bool,
 }
 
-impl<'a> From<&'a Path> for Destination<'a> {
-    fn from(path: &'a Path) -> Self {
-        Self { path, overwrite: Overwrite::Never }
-    }
-}
-
-impl<'a> From<&'a PathBuf> for Destination<'a> {
-    fn from(path: &'a PathBuf) -> Self {
-        Self::from(path.as_path())
+/// Of a new file.
+impl<'a, P: AsRef<Path> + ?Sized> From<&'a P> for Destination<'a> {
+    fn from(path: &'a P) -> Self {
+        Self { path: path.as_ref(), force: false }
     }
 }
 
@@ -79,15 +57,10 @@ pub fn write_whole(
 #[derive(Debug)]
 pub struct NewFile {
     path: PathBuf,
-    overwrite: Overwrite,
-    place: Place,
-}
-
-#[derive(Debug)]
-enum Place {
-    Beside(NamedTempFile),
-    /// A pipe or a device has no content that could be lost.
-    Device(File),
+    force: bool,
+    file: File,
+    /// Its name until it is complete; a pipe or a device has no content that could be lost.
+    unfinished: Option<TempPath>,
 }
 
 impl NewFile {
@@ -99,23 +72,20 @@ impl NewFile {
         Self::begin(destination, input).map_err(WriteError::at(destination.path))
     }
 
-    fn begin(Destination { path, overwrite }: Destination, input: &Path) -> io::Result<Self> {
+    fn begin(Destination { path, force }: Destination, input: &Path) -> io::Result<Self> {
         if same_file(path, input) {
             let words = "it is the file that is being read, and never overwritten";
             return Err(io::Error::new(io::ErrorKind::AlreadyExists, words));
         }
-        let place = match std::fs::metadata(path) {
-            Ok(found) if !found.is_file() && !found.is_dir() => {
-                Place::Device(File::options().write(true).open(path)?)
-            }
-            _ => {
-                if overwrite == Overwrite::Never && path.symlink_metadata().is_ok() {
-                    return Err(exists());
-                }
-                Place::Beside(beside(path)?)
-            }
-        };
-        Ok(Self { path: path.to_owned(), overwrite, place })
+        if std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
+            let file = File::options().write(true).open(path)?;
+            return Ok(Self { path: path.to_owned(), force, file, unfinished: None });
+        }
+        if !force && path.symlink_metadata().is_ok() {
+            return Err(exists());
+        }
+        let (file, unfinished) = beside(path)?.into_parts();
+        Ok(Self { path: path.to_owned(), force, file, unfinished: Some(unfinished) })
     }
 
     /// The final name of the file.
@@ -128,43 +98,31 @@ impl NewFile {
     /// # Errors
     /// It could not be written to the disk, or a file has appeared there in the meantime that may not be replaced.
     pub fn commit(self) -> Result<(), WriteError> {
-        let Self { path, overwrite, place } = self;
-        let Place::Beside(file) = place else {
-            return Ok(());
-        };
+        let Self { path, force, file, unfinished } = self;
+        let Some(unfinished) = unfinished else { return Ok(()) };
         let failed = WriteError::at(&path);
-        file.as_file().sync_all().map_err(&failed)?;
-        let persisted = match overwrite {
-            Overwrite::Always => file.persist(&path),
-            Overwrite::Never => file.persist_noclobber(&path),
-        };
-        persisted.map(|_| ()).map_err(|error| match error.error.kind() {
+        file.sync_all().map_err(&failed)?;
+        let persisted = if force { unfinished.persist(&path) } else { unfinished.persist_noclobber(&path) };
+        persisted.map_err(|error| match error.error.kind() {
             io::ErrorKind::AlreadyExists => failed(exists()),
             _ => failed(error.error),
         })
-    }
-
-    fn file(&mut self) -> &mut File {
-        match &mut self.place {
-            Place::Beside(file) => file.as_file_mut(),
-            Place::Device(file) => file,
-        }
     }
 }
 
 impl Write for NewFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.file().write(bytes)
+        self.file.write(bytes)
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        self.file().flush()
+        self.file.flush()
     }
 }
 
 impl Seek for NewFile {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        self.file().seek(to)
+        self.file.seek(to)
     }
 }
 
@@ -194,8 +152,8 @@ fn beside(path: &Path) -> io::Result<NamedTempFile> {
 mod tests {
     use super::*;
 
-    fn write(path: &Path, text: &str, overwrite: Overwrite) -> io::Result<()> {
-        let written = write_whole(Destination { path, overwrite }, Path::new("input"), |file| {
+    fn write(path: &Path, text: &str, force: bool) -> io::Result<()> {
+        let written = write_whole(Destination { path, force }, Path::new("input"), |file| {
             file.write_all(text.as_bytes())
         });
         written.map_err(|error| error.source)
@@ -205,18 +163,13 @@ mod tests {
     fn a_file_is_replaced_whole_or_not_at_all() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("file");
-        write(&path, "first", Overwrite::Never).unwrap();
-        assert_eq!(
-            write(&path, "second", Overwrite::Never).unwrap_err().kind(),
-            io::ErrorKind::AlreadyExists
-        );
-        let mut half =
-            NewFile::create(Destination { path: &path, overwrite: Overwrite::Always }, Path::new("input"))
-                .unwrap();
+        write(&path, "first", false).unwrap();
+        assert_eq!(write(&path, "second", false).unwrap_err().kind(), io::ErrorKind::AlreadyExists);
+        let mut half = NewFile::create(Destination { path: &path, force: true }, Path::new("input")).unwrap();
         half.write_all(b"half").unwrap();
         drop(half);
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "first");
-        write(&path, "second", Overwrite::Always).unwrap();
+        write(&path, "second", true).unwrap();
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "second");
         assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 1, "nothing else is left");
     }
@@ -238,8 +191,8 @@ mod tests {
         let input = directory.path().join("log");
         std::fs::write(&input, "log").unwrap();
         let again = directory.path().join(".").join("log");
-        for overwrite in [Overwrite::Never, Overwrite::Always] {
-            let refused = NewFile::create(Destination { path: &again, overwrite }, &input).unwrap_err();
+        for force in [false, true] {
+            let refused = NewFile::create(Destination { path: &again, force }, &input).unwrap_err();
             assert!(refused.source.to_string().contains("is being read"), "{refused}");
         }
     }

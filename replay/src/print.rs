@@ -28,6 +28,13 @@ pub(crate) fn counted(count: u64, noun: &str) -> String {
     if count == 1 { format!("1 {noun}") } else { format!("{count} {noun}s") }
 }
 
+/// The most similar name.
+pub(crate) fn nearest<'a>(given: &str, names: impl Iterator<Item = &'a String>) -> String {
+    let likeness = |name: &str| strsim::jaro_winkler(given, name);
+    let most = names.max_by(|a, b| likeness(a).total_cmp(&likeness(b)).then_with(|| b.cmp(a)));
+    most.cloned().unwrap_or_default()
+}
+
 /// Rows as lines of columns, each as wide as its widest cell: a column begins at the left (`<`) or ends at the right (`>`).
 pub(crate) fn columns<const N: usize>(
     sides: [char; N],

@@ -14,6 +14,8 @@ use clap::Args;
 use flight::vehicle::mission::Mission;
 use sim::world::Truth;
 
+use crate::print::nearest;
+
 /// A value for one key of the mission.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Setting {
@@ -134,21 +136,6 @@ fn collect_leaves(prefix: &str, table: &toml::Table, take: &mut impl FnMut(Strin
     }
 }
 
-/// Puts a value at a path and creates the sections on the way.
-fn insert(table: &mut toml::Table, path: &str, value: toml::Value) {
-    match path.split_once('.') {
-        None => {
-            table.insert(path.to_owned(), value);
-        }
-        Some((section, rest)) => {
-            let inner = table.entry(section).or_insert_with(|| toml::Value::Table(toml::Table::new()));
-            if let toml::Value::Table(inner) = inner {
-                insert(inner, rest, value);
-            }
-        }
-    }
-}
-
 /// The section of the random draw.
 const TRUTH: &str = "truth.";
 
@@ -213,7 +200,7 @@ pub fn truth_with(truth: &Truth, settings: &[Setting]) -> Result<Truth, SettingE
     let of_truth =
         settings.iter().filter_map(|setting| Some((setting.path.strip_prefix(TRUTH)?, &setting.value)));
     for (key, value) in of_truth {
-        insert(&mut table, key, value.clone());
+        table.insert(key.to_owned(), value.clone());
     }
     table.try_into().map_err(|error: toml::de::Error| {
         let known = recorded.keys().map(|key| format!("{TRUTH}{key}")).collect();
@@ -248,10 +235,7 @@ fn refusal(reason: &str, settings: &[Setting], known: &BTreeSet<String>) -> Sett
     let (true, Some(Setting { path: given, .. })) = (reason.contains("unknown field"), unknown) else {
         return SettingError::Mission { settings: listed(settings), reason: reason.to_owned() };
     };
-    let nearest = known.iter().max_by(|a, b| {
-        strsim::jaro_winkler(given, a).total_cmp(&strsim::jaro_winkler(given, b)).then_with(|| b.cmp(a))
-    });
-    SettingError::Unknown { given: given.clone(), nearest: nearest.cloned().unwrap_or_default() }
+    SettingError::Unknown { given: given.clone(), nearest: nearest(given, known.iter()) }
 }
 
 /// A controller's settings over a flight: those of the beginning, and changes at given times.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Parser;
-use replay::output::{Destination, Overwrite};
+use replay::output::Destination;
 use replay_rerun::{ExportError, Exported, export};
 
 /// Turns a flight log into a recording for the Rerun viewer.
@@ -51,7 +51,7 @@ fn main() -> ExitCode {
 
 fn run(cli: &Cli) -> Result<(), ExportError> {
     let output = cli.output.clone().unwrap_or_else(|| cli.log.with_extension("rrd"));
-    let destination = Destination { path: &output, overwrite: Overwrite::if_forced(cli.force) };
+    let destination = Destination { path: &output, force: cli.force };
     let exported = export(&cli.log, cli.with.as_deref(), destination)?;
     let logs = [Some(&cli.log), cli.with.as_ref()].into_iter().flatten();
     logs.zip(&exported).for_each(|(log, exported)| warn(log, exported));

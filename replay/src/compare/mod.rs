@@ -1,7 +1,7 @@
 //! Compares two flights: every table that both have.
 //!
 //! Every number of both logs becomes a signal, named as in [`table`](crate::table) (`computer_frame.output.…`). The
-//! second flight is shifted so that the chosen event of both flights coincides. It is then read at the times of the
+//! second flight is shifted so that the ignition of both coincides, if both have one. It is then read at the times of the
 //! first flight: linear between samples, whole numbers held. Measured solve times are not signals. A signal with more samples
 //! in one of the two differs, because interpolation would hide a lost record.
 //!
@@ -19,36 +19,16 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, ensure};
-use clap::ValueEnum;
 pub(crate) use missions::compared;
 pub use missions::{MissionComparison, SettingDifference};
 use missions::{compare_missions, is_mission};
 use serde::Serialize;
-pub use series::{Align, Anchors, Flown, Series};
+pub use series::{Align, Flown, Series};
 pub use tolerance::SignalDifference;
 pub use tolerance::{Tolerance, ToleranceError, Tolerances};
 
 use crate::cli::{Outcome, give, warn_of_cut, warn_of_damage};
-use crate::log::{RecordingError, VerdictFacts};
-
-/// Why flights cannot be compared.
-#[derive(Debug, thiserror::Error)]
-pub enum CompareError {
-    /// A log cannot be read.
-    #[error(transparent)]
-    Recording(#[from] RecordingError),
-    /// A log has no event to align on.
-    #[error("{name}: has no {event} to align on; --align time needs none")]
-    NoAnchor {
-        /// The log.
-        name: String,
-        /// What is missing.
-        event: &'static str,
-    },
-    /// The tolerances are wrong.
-    #[error(transparent)]
-    Tolerance(#[from] ToleranceError),
-}
+use crate::log::VerdictFacts;
 
 /// One flight against another.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -103,14 +83,13 @@ impl Comparison {
 /// Compares a flight with a baseline.
 ///
 /// # Errors
-/// There is no event to align on, or a tolerance names a signal that neither flight has.
+/// A tolerance names a signal that neither flight has.
 pub fn compare(
     baseline: &Flown,
     other: &Flown,
-    align: Align,
     tolerances: &Tolerances,
-) -> Result<Comparison, CompareError> {
-    let shift_s = align.shift_s(baseline, other)?;
+) -> Result<Comparison, ToleranceError> {
+    let (align, shift_s) = Align::of(baseline, other);
     let over_the_air = baseline.only_one_has_frames(other);
     let both_recorded_s = over_the_air
         .then(|| series::common_s(&baseline.over_the_air, &other.over_the_air, shift_s))
@@ -201,9 +180,6 @@ pub(crate) struct Args {
     /// The other flights, or missions.
     #[arg(required = true)]
     others: Vec<PathBuf>,
-    /// The event on which the flights are aligned [default: ignition if both flights have one, else vehicle time].
-    #[arg(long, value_enum)]
-    align: Option<AlignOn>,
     /// Tolerances, a TOML file.
     ///
     /// [signals."NAME"] with rms and max in the signal's own unit; a * at the end of NAME matches any rest. Before
@@ -217,16 +193,6 @@ pub(crate) struct Args {
     json: bool,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum AlignOn {
-    /// Ignition of the landing motor.
-    Ignition,
-    /// Touchdown.
-    Touchdown,
-    /// Vehicle time itself.
-    Time,
-}
-
 impl Args {
     pub(crate) fn run(self) -> Result<Outcome> {
         if is_mission(&self.baseline) {
@@ -237,13 +203,7 @@ impl Args {
         let mut comparisons = Vec::new();
         for path in &self.others {
             let other = open(path)?;
-            let align = match self.align {
-                None => Align::best_for(&baseline, &other),
-                Some(AlignOn::Ignition) => Align::Ignition,
-                Some(AlignOn::Touchdown) => Align::Touchdown,
-                Some(AlignOn::Time) => Align::Time,
-            };
-            comparisons.push(compare(&baseline, &other, align, &tolerances)?);
+            comparisons.push(compare(&baseline, &other, &tolerances)?);
         }
         give(&comparisons, self.json)
     }

@@ -13,7 +13,6 @@ impl Answer for Comparison {
     fn sentences(&self) -> Vec<String> {
         let aligned = match self.align {
             Align::Ignition => "ignition",
-            Align::Touchdown => "touchdown",
             Align::Time => "vehicle time",
         };
         let mut lines = vec![
@@ -97,9 +96,11 @@ impl SignalDifference {
             (Some(_), true) => "within",
             (Some(_), false) => "EXCEEDED",
         };
+        let [ours, theirs] = self.samples_of;
+        let samples = if ours == theirs { ours.to_string() } else { format!("{ours}, {theirs}") };
         [
             self.signal.clone(),
-            self.samples.to_string(),
+            samples,
             format!("{:.4e}", self.rms),
             format!("{:.4e}", self.max),
             self.max_at_s.map(|at_s| format!("{at_s:.3}")).unwrap_or_default(),

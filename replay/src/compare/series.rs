@@ -6,10 +6,7 @@ use std::path::Path;
 use flight::rules::phase::Phase;
 use serde::Serialize;
 
-use super::CompareError;
-use crate::log::{
-    Cut, Entry, FlightLog, Flights, LogError, RecordingError, VerdictFacts, Verdicts, heard_message,
-};
+use crate::log::{Cut, FlightLog, LogError, RecordingError, VerdictFacts};
 use crate::table::{Cell, FLIGHT_TIME_S, Kind, TableReader, TableShape};
 
 /// Limit on the numbers held for one log; a flight of some minutes has a few hundred thousand.
@@ -85,8 +82,8 @@ pub struct Flown {
     pub(super) words: BTreeMap<String, BTreeMap<String, usize>>,
     /// The log has what the vehicle decided, not only what was heard of it.
     pub has_frames: bool,
-    /// Events to align on.
-    pub anchors: Anchors,
+    /// Ignition of the landing motor, vehicle time, s.
+    pub ignition_s: Option<f64>,
     /// The landing verdict.
     pub verdict: Option<VerdictFacts>,
     /// Why the log could not be read to its end, if so.
@@ -108,34 +105,18 @@ impl Flown {
     /// # Errors
     /// The file is not a flight log, cannot be read, holds several flights or is longer than any flight.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
-        let mut anchors = Anchors::default();
-        let mut verdicts = Verdicts::default();
-        let (mut has_frames, mut first_ns) = (false, None);
         let mut log = FlightLog::open(path)?;
-        let mut flights = Flights::default();
-        while let Some(stamped) = log.next_entry()? {
-            flights.note(&stamped);
-            first_ns.get_or_insert(stamped.log_time_ns);
-            let message = heard_message(log.channel(stamped.channel_id), &stamped);
-            verdicts.note(&stamped, message.as_ref());
-            anchors.note(&stamped.entry);
-            has_frames |= matches!(stamped.entry, Entry::ComputerFrame(_));
-        }
-        let verdict = verdicts.found().as_ref().map(VerdictFacts::found);
         let name = log.name().to_owned();
-        if flights.flown() > 1 {
-            return Err(RecordingError::SeveralFlights { name, flights: flights.flown() });
-        }
-        let damage = log.damage().map(ToString::to_string);
-        anchors.touchdown_s = verdict.as_ref().map(|verdict: &VerdictFacts| verdict.time_s);
-
+        let mut first_ns = None;
         let mut signals: BTreeMap<String, Series> = BTreeMap::new();
         let mut over_the_air: BTreeMap<String, Series> = BTreeMap::new();
         let (mut held, mut out_of_order) = (0_usize, 0_usize);
         let mut words: BTreeMap<String, BTreeMap<String, usize>> = BTreeMap::new();
         let mut reader = TableReader::new();
         reader
-            .read::<_, Stopped>(&mut FlightLog::open(path)?, |shape, row| {
+            .read::<_, Stopped>(&mut log, |shape, row| {
+                let log_ns = row.cells.first().and_then(Cell::number).unwrap_or(0.0);
+                let since_s = (log_ns - *first_ns.get_or_insert(log_ns)) / 1e9;
                 if shape.name == NO_SIGNAL_TABLE {
                     return Ok(());
                 }
@@ -147,8 +128,6 @@ impl Flown {
                         .or_default() += 1;
                     return Ok(());
                 }
-                let log_ns = row.cells.first().and_then(Cell::number).unwrap_or(0.0);
-                let since_s = (log_ns - first_ns.unwrap_or_default() as f64) / 1e9;
                 let (signals, time_s) = if shape.name.starts_with(MESSAGES) {
                     let Some(boot_s) = boot_time_of(shape, &row.cells) else { return Ok(()) };
                     (&mut over_the_air, boot_s)
@@ -178,6 +157,13 @@ impl Flown {
                 Stopped::Log(error) => RecordingError::Log(error),
                 Stopped::TooLong => RecordingError::TooLong { name: name.clone(), kind: "numbers" },
             })?;
+        log.flights().refuse_several(&name)?;
+        let lit = |signal: &str| {
+            let lit = |phase: f64| Phase::from_index(phase as u8).is_some_and(Phase::in_landing_burn);
+            let series = signals.get(signal)?;
+            series.times_s.iter().zip(&series.values).find(|(_, phase)| lit(**phase)).map(|(at_s, _)| *at_s)
+        };
+        let ignition_s = lit("computer_frame.output.phase").or_else(|| lit("telemetry.phase"));
         // Its limits and its times stand beside the signals.
         signals.retain(|name, _| !name.starts_with("verdict."));
         Ok(Self {
@@ -185,11 +171,11 @@ impl Flown {
             signals,
             over_the_air,
             words,
-            has_frames,
-            anchors,
-            verdict,
-            damage,
-            cut: flights.cut(),
+            has_frames: !log.flights().found().is_empty(),
+            ignition_s,
+            verdict: log.verdict().as_ref().map(VerdictFacts::found),
+            damage: log.damage().map(ToString::to_string),
+            cut: log.flights().cut(),
             out_of_order,
         })
     }
@@ -237,62 +223,20 @@ fn time_of(shape: &TableShape, cells: &[Cell]) -> Option<f64> {
 pub enum Align {
     /// Ignition of the landing motor.
     Ignition,
-    /// Touchdown, from the verdict.
-    Touchdown,
     /// Vehicle time itself.
     Time,
 }
 
-/// The moments of a flight to align on, vehicle time, s.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Anchors {
-    /// Ignition of the landing motor.
-    pub ignition_s: Option<f64>,
-    pub touchdown_s: Option<f64>,
-}
-
-impl Anchors {
-    /// Looks for the ignition in a record.
-    pub(super) fn note(&mut self, entry: &Entry) {
-        if self.ignition_s.is_some() {
-            return;
-        }
-        let lit = |phase: u32| {
-            u8::try_from(phase).ok().and_then(Phase::from_index).is_some_and(Phase::in_landing_burn)
-        };
-        match entry {
-            Entry::ComputerFrame(frame) if lit(frame.record.output.phase) => {
-                self.ignition_s = frame.flight_time_s();
-            }
-            Entry::Telemetry(telemetry) if telemetry.phase.is_some_and(lit) => {
-                self.ignition_s = Some(telemetry.time_s);
-            }
-            _ => {}
-        }
-    }
-}
-
 impl Align {
-    /// What to add to the other flight's times, s.
-    pub(super) fn shift_s(self, baseline: &Flown, other: &Flown) -> Result<f64, CompareError> {
-        let (event, anchor): (_, fn(&Anchors) -> Option<f64>) = match self {
-            Self::Time => return Ok(0.0),
-            Self::Ignition => ("ignition", |anchors| anchors.ignition_s),
-            Self::Touchdown => ("touchdown", |anchors| anchors.touchdown_s),
-        };
-        let of = |flown: &Flown| {
-            anchor(&flown.anchors).ok_or(CompareError::NoAnchor { name: flown.name.clone(), event })
-        };
-        Ok(of(baseline)? - of(other)?)
-    }
-
-    /// On ignition if both flights have one, else on time. What went over the air has the vehicle's own time.
-    pub fn best_for(baseline: &Flown, other: &Flown) -> Self {
-        if baseline.only_one_has_frames(other) {
-            return Self::Time;
+    /// On ignition if both flights have one, else on time; and what to add to the other flight's times, s. What went over the
+    /// air has the vehicle's own time.
+    pub(super) fn of(baseline: &Flown, other: &Flown) -> (Self, f64) {
+        match (baseline.ignition_s, other.ignition_s) {
+            (Some(ours_s), Some(theirs_s)) if !baseline.only_one_has_frames(other) => {
+                (Self::Ignition, ours_s - theirs_s)
+            }
+            _ => (Self::Time, 0.0),
         }
-        let both = baseline.anchors.ignition_s.is_some() && other.anchors.ignition_s.is_some();
-        if both { Self::Ignition } else { Self::Time }
     }
 }
 

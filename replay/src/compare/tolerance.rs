@@ -19,6 +19,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::{Flown, Series};
+use crate::print::{counted, nearest};
 
 /// How much one signal may differ, in its own unit.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize)]
@@ -35,8 +36,10 @@ pub struct Tolerance {
 #[serde(deny_unknown_fields)]
 pub struct Tolerances {
     verdict: Option<bool>,
-    missing: Option<usize>,
-    added: Option<usize>,
+    #[serde(default)]
+    missing: usize,
+    #[serde(default)]
+    added: usize,
     #[serde(default)]
     damaged: bool,
     #[serde(default)]
@@ -102,16 +105,12 @@ impl Tolerances {
     }
 
     pub(super) fn count_failures(&self, missing: usize, added: usize) -> Vec<String> {
-        let exceeded =
-            |count: usize, limit: Option<usize>| Some(limit.unwrap_or(0)).filter(|limit| count > *limit);
-        let mut failures = Vec::new();
-        if let Some(limit) = exceeded(missing, self.missing) {
-            failures.push(format!("{} missing (tolerated {limit})", signals_are(missing)));
-        }
-        if let Some(limit) = exceeded(added, self.added) {
-            failures.push(format!("{} added (tolerated {limit})", signals_are(added)));
-        }
-        failures
+        let words = |(word, count, limit): (&str, usize, usize)| {
+            let signals = counted(count as u64, "signal");
+            (count > limit).then(|| format!("{signals} {word} (tolerated {limit})"))
+        };
+        let both = [("missing", missing, self.missing), ("added", added, self.added)];
+        both.into_iter().filter_map(words).collect()
     }
 
     /// Parts of the flights that were not compared because of damage or a missing end.
@@ -119,18 +118,15 @@ impl Tolerances {
         let mut failures = Vec::new();
         for Flown { name, damage, cut, out_of_order, .. } in flights {
             if *out_of_order > 0 {
-                failures
-                    .push(format!("{name}: {out_of_order} numbers are out of order and were not compared"));
+                let words = format!("{name}: {out_of_order} numbers are out of order and were not compared");
+                failures.push(words);
             }
-            if self.damaged {
-                continue;
-            }
+            let damage = damage.as_ref().filter(|_| !self.damaged);
             failures.extend(
-                damage
-                    .as_ref()
-                    .map(|damage| format!("{name} is damaged: {damage}; nothing after that was compared")),
+                damage.map(|damage| format!("{name} is damaged: {damage}; nothing after that was compared")),
             );
-            failures.extend(cut.as_ref().map(|cut| format!("{name} is of an INCOMPLETE flight: it {cut}")));
+            let cut = cut.as_ref().filter(|_| !self.damaged);
+            failures.extend(cut.map(|cut| format!("{name} is of an INCOMPLETE flight: it {cut}")));
         }
         failures.dedup();
         failures
@@ -141,22 +137,11 @@ impl Tolerances {
         &self,
         signals: &(impl Iterator<Item = &'a String> + Clone),
     ) -> Result<(), ToleranceError> {
-        for given in self.signals.keys() {
-            if signals.clone().any(|signal| fits(given, signal)) {
-                continue;
-            }
-            let nearest = signals
-                .clone()
-                .max_by(|a, b| strsim::jaro_winkler(given, a).total_cmp(&strsim::jaro_winkler(given, b)));
-            let nearest = nearest.cloned().unwrap_or_default();
-            return Err(ToleranceError::Unknown { given: given.clone(), nearest });
-        }
-        Ok(())
+        let is_unknown = |given: &&String| !signals.clone().any(|signal| fits(given, signal));
+        self.signals.keys().find(is_unknown).map_or(Ok(()), |given| {
+            Err(ToleranceError::Unknown { given: given.clone(), nearest: nearest(given, signals.clone()) })
+        })
     }
-}
-
-fn signals_are(count: usize) -> String {
-    if count == 1 { "1 signal is".to_owned() } else { format!("{count} signals are") }
 }
 
 /// A `*` at the end matches any rest.

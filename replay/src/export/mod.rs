@@ -15,7 +15,7 @@ pub use tables::{ExportedFile, TableFormat, export_tables};
 
 use crate::cli::{Answer, Outcome, give, warn_of_damage};
 use crate::log::{FlightLog, ImportedTlog, LogError, import_tlog, is_tlog};
-use crate::output::{Destination, Overwrite, WriteError};
+use crate::output::{Destination, WriteError};
 
 /// Why a log could not be exported.
 #[derive(Debug, thiserror::Error)]
@@ -65,7 +65,7 @@ impl Args {
         let format = format.context("--to is missing: csv, parquet or rrd")?;
         let output = self.output.clone().or_else(|| is_tlog.then(|| self.file.with_extension("mcap")));
         let output = output.context("--output is missing: where to write")?;
-        let destination = Destination { path: &output, overwrite: Overwrite::if_forced(self.force) };
+        let destination = Destination { path: &output, force: self.force };
         match format {
             Format::Csv => self.tables(TableFormat::Csv, destination),
             Format::Parquet => self.tables(TableFormat::Parquet, destination),

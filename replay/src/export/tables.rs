@@ -1,12 +1,12 @@
 //! Writes tables into files.
 
 use std::collections::BTreeMap;
-use std::io::{self, BufWriter, Read, Write};
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use ::parquet::basic::{Compression, LogicalType, Repetition, Type as Physical};
-use ::parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int64Type};
+use ::parquet::data_type::{ByteArray, ByteArrayType, DataType, DoubleType, Int64Type};
 use ::parquet::errors::ParquetError;
 use ::parquet::file::metadata::KeyValue;
 use ::parquet::file::properties::WriterProperties;
@@ -36,7 +36,7 @@ pub struct ExportedFile {
 }
 
 enum Table {
-    Csv(CsvTable),
+    Csv(PathBuf, csv::Writer<NewFile>),
     Parquet(Box<ParquetTable>),
 }
 
@@ -65,14 +65,12 @@ pub fn export_tables<'a, R: Read>(
         Ok(table.write(&row)?)
     })?;
     let finished = open.into_values().map(|(file, table)| Ok((file, table.finish()?)));
-    let whole: Vec<(ExportedFile, NewFile)> = finished.collect::<Result<_, ExportError>>()?;
-    let mut whole = whole;
+    let mut whole: Vec<(ExportedFile, NewFile)> = finished.collect::<Result<_, ExportError>>()?;
     if !whole.is_empty() {
         let path = directory.path.join(DICTIONARY);
-        let destination = Destination { path: &path, overwrite: directory.overwrite };
+        let destination = Destination { path: &path, force: directory.force };
         let file = NewFile::create(destination, &input)?;
-        let shapes: Vec<&TableShape> = reader.shapes().iter().collect();
-        let (written, rows) = write_dictionary(file, &shapes)?;
+        let (written, rows) = dictionary(file, reader.shapes()).map_err(WriteError::at(&path))?;
         whole.push((ExportedFile { path, rows, columns: DICTIONARY_COLUMNS.len() }, written));
     }
     let mut files = Vec::new();
@@ -85,7 +83,7 @@ pub fn export_tables<'a, R: Read>(
 
 fn create(
     format: TableFormat,
-    Destination { path: directory, overwrite }: Destination,
+    Destination { path: directory, force }: Destination,
     input: &Path,
     shape: &TableShape,
 ) -> Result<(ExportedFile, Table), ExportError> {
@@ -96,9 +94,14 @@ fn create(
     // The directory is created with the first table, so that a file that is not a flight log leaves nothing behind.
     std::fs::create_dir_all(directory).map_err(WriteError::at(directory))?;
     let path = directory.join(format!("{}.{suffix}", shape.name));
-    let file = NewFile::create(Destination { path: &path, overwrite }, input)?;
+    let file = NewFile::create(Destination { path: &path, force }, input)?;
     let table = match format {
-        TableFormat::Csv => Table::Csv(CsvTable::create(file, shape)?),
+        TableFormat::Csv => {
+            let mut csv = csv::Writer::from_writer(file);
+            let head = csv.write_record(shape.columns.iter().map(|column| &column.name));
+            head.map_err(io::Error::from).map_err(WriteError::at(&path))?;
+            Table::Csv(path.clone(), csv)
+        }
         TableFormat::Parquet => Table::Parquet(Box::new(ParquetTable::create(file, shape)?)),
     };
     Ok((ExportedFile { path, rows: 0, columns: shape.columns.len() }, table))
@@ -107,42 +110,22 @@ fn create(
 impl Table {
     fn write(&mut self, row: &Row) -> Result<(), WriteError> {
         match self {
-            Self::Csv(table) => table.write(row),
+            Self::Csv(path, csv) => {
+                let written = csv.write_record(row.cells.iter().map(text_of));
+                written.map_err(io::Error::from).map_err(WriteError::at(path))
+            }
             Self::Parquet(table) => table.write(row),
         }
     }
 
-    fn finish(self) -> Result<NewFile, WriteError> {
-        match self {
-            Self::Csv(table) => table.finish(),
-            Self::Parquet(table) => table.finish(),
-        }
-    }
-}
-
-struct CsvTable {
-    path: PathBuf,
-    output: BufWriter<NewFile>,
-}
-
-impl CsvTable {
-    fn create(file: NewFile, shape: &TableShape) -> Result<Self, WriteError> {
-        let path = file.path().to_owned();
-        let mut output = BufWriter::new(file);
-        let names: Vec<String> = shape.columns.iter().map(|column| quoted(&column.name)).collect();
-        writeln!(output, "{}", names.join(",")).map_err(WriteError::at(&path))?;
-        Ok(Self { path, output })
-    }
-
-    fn write(&mut self, row: &Row) -> Result<(), WriteError> {
-        let cells: Vec<String> = row.cells.iter().map(text_of).collect();
-        writeln!(self.output, "{}", cells.join(",")).map_err(WriteError::at(&self.path))
-    }
-
     /// The complete file, still under its temporary name.
     fn finish(self) -> Result<NewFile, WriteError> {
-        let file = self.output.into_inner().map_err(io::IntoInnerError::into_error);
-        file.map_err(WriteError::at(&self.path))
+        match self {
+            Self::Csv(path, csv) => {
+                csv.into_inner().map_err(csv::IntoInnerError::into_error).map_err(WriteError::at(&path))
+            }
+            Self::Parquet(table) => table.finish(),
+        }
     }
 }
 
@@ -150,16 +133,8 @@ fn text_of(cell: &Cell) -> String {
     match cell {
         Cell::Float(number) => format!("{number:?}"),
         Cell::Integer(number) => number.to_string(),
-        Cell::Text(text) => quoted(text),
+        Cell::Text(text) => text.clone(),
         Cell::Absent => String::new(),
-    }
-}
-
-fn quoted(text: &str) -> String {
-    if text.contains([',', '"', '\n', '\r']) {
-        format!("\"{}\"", text.replace('"', "\"\""))
-    } else {
-        text.to_owned()
     }
 }
 
@@ -168,29 +143,22 @@ const DICTIONARY: &str = "dictionary.csv";
 const DICTIONARY_COLUMNS: [&str; 6] = ["table", "column", "type", "unit", "meaning", "values"];
 
 /// Writes the dictionary of some tables. Returns the complete file, still under its temporary name, and its rows.
-fn write_dictionary(file: NewFile, shapes: &[&TableShape]) -> Result<(NewFile, u64), WriteError> {
-    let heads = DICTIONARY_COLUMNS.map(|name| Column {
-        name: name.to_owned(),
-        kind: Kind::Text,
-        meaning: Meaning::default(),
-    });
-    let mut table =
-        CsvTable::create(file, &TableShape { name: "dictionary".to_owned(), columns: heads.into() })?;
+fn dictionary(file: NewFile, shapes: &[TableShape]) -> io::Result<(NewFile, u64)> {
+    let mut csv = csv::Writer::from_writer(file);
+    csv.write_record(DICTIONARY_COLUMNS)?;
     let mut rows = 0;
-    for shape in shapes {
-        for Column { name, kind, meaning } in &shape.columns {
-            let kind = match kind {
-                Kind::Float => "number",
-                Kind::Integer => "whole number",
-                Kind::Text => "text",
-            };
-            let cells = [&shape.name, name, kind, &meaning.unit, &meaning.words, &values(meaning)];
-            let cells = cells.map(|text: &str| Cell::Text(text.to_owned()));
-            table.write(&Row { table: 0, cells: cells.into() })?;
-            rows += 1;
-        }
+    for (shape, Column { name, kind, meaning }) in
+        shapes.iter().flat_map(|shape| shape.columns.iter().map(move |column| (shape, column)))
+    {
+        let kind = match kind {
+            Kind::Float => "number",
+            Kind::Integer => "whole number",
+            Kind::Text => "text",
+        };
+        csv.write_record([&shape.name, name, kind, &meaning.unit, &meaning.words, &values(meaning)])?;
+        rows += 1;
     }
-    Ok((table.finish()?, rows))
+    Ok((csv.into_inner().map_err(csv::IntoInnerError::into_error)?, rows))
 }
 
 /// The words for the numbers of a column, as in `9 TD_PHASE_POWERED; 10 TD_PHASE_TOUCHDOWN`.
@@ -268,31 +236,32 @@ fn write_column<'a, I: Iterator<Item = &'a Cell>>(
     cells: impl Fn() -> I,
 ) -> Result<(), ParquetError> {
     match kind {
-        Kind::Float => {
-            let values: Vec<f64> = cells().filter_map(Cell::number).collect();
-            let levels: Vec<i16> = cells().map(|cell| i16::from(cell.number().is_some())).collect();
-            writer.typed::<DoubleType>().write_batch(&values, Some(&levels), None)?;
-        }
-        Kind::Integer => {
-            let whole = |cell: &Cell| match cell {
+        Kind::Float => put::<DoubleType>(writer, cells().map(Cell::number)),
+        Kind::Integer => put::<Int64Type>(
+            writer,
+            cells().map(|cell| match cell {
                 Cell::Integer(number) => Some(*number),
                 _ => None,
-            };
-            let values: Vec<i64> = cells().filter_map(whole).collect();
-            let levels: Vec<i16> = cells().map(|cell| i16::from(whole(cell).is_some())).collect();
-            writer.typed::<Int64Type>().write_batch(&values, Some(&levels), None)?;
-        }
-        Kind::Text => {
-            let text = |cell: &Cell| match cell {
+            }),
+        ),
+        Kind::Text => put::<ByteArrayType>(
+            writer,
+            cells().map(|cell| match cell {
                 Cell::Text(text) => Some(ByteArray::from(text.as_str())),
                 _ => None,
-            };
-            let values: Vec<ByteArray> = cells().filter_map(text).collect();
-            let levels: Vec<i16> = cells().map(|cell| i16::from(text(cell).is_some())).collect();
-            writer.typed::<ByteArrayType>().write_batch(&values, Some(&levels), None)?;
-        }
+            }),
+        ),
     }
-    Ok(())
+}
+
+fn put<T: DataType>(
+    writer: &mut SerializedColumnWriter<'_>,
+    cells: impl Iterator<Item = Option<T::T>>,
+) -> Result<(), ParquetError> {
+    let cells: Vec<Option<T::T>> = cells.collect();
+    let levels: Vec<i16> = cells.iter().map(|cell| i16::from(cell.is_some())).collect();
+    let values: Vec<T::T> = cells.into_iter().flatten().collect();
+    writer.typed::<T>().write_batch(&values, Some(&levels), None).map(|_| ())
 }
 
 /// The unit, the meaning and the words of each column: `COLUMN.unit`, `COLUMN.meaning`, `COLUMN.values`.
@@ -329,13 +298,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_read_back_and_text_is_quoted_only_where_necessary() {
+    fn numbers_read_back() {
         for number in [0.1, -0.0, 1e300, f64::MIN_POSITIVE, 3.0] {
             assert_eq!(text_of(&Cell::Float(number)).parse::<f64>().unwrap().to_bits(), number.to_bits());
         }
-        assert_eq!(text_of(&Cell::Float(f64::NAN)), "NaN");
-        assert_eq!(text_of(&Cell::Absent), "");
-        assert_eq!(quoted("plain"), "plain");
-        assert_eq!(quoted("a \"b\", c"), "\"a \"\"b\"\", c\"");
+        assert_eq!(
+            (text_of(&Cell::Float(f64::NAN)), text_of(&Cell::Absent)),
+            ("NaN".to_owned(), String::new())
+        );
     }
 }

@@ -46,7 +46,7 @@ use self::least_squares::Solution;
 pub use self::trace::{Frame, Trace, TraceError};
 use crate::cli::{Answer, Outcome, give, say, text_of, warn_of_damage};
 use crate::info::utc;
-use crate::output::{Destination, Overwrite, write_whole};
+use crate::output::{Destination, write_whole};
 use crate::print::counted;
 use crate::settings::{Setting, SettingError, mission_toml_with_reasons, mission_with};
 
@@ -632,7 +632,7 @@ fn write_into(path: &Path, log: &Path, trace: &Trace, found: &Fit) -> Result<()>
     });
     let flight = one_line(&format!("flight {flight}{day}"));
     let text = patched(&text, &trace.mission, found, &flight).context("the mission with what was found")?;
-    let destination = Destination { path, overwrite: Overwrite::Always };
+    let destination = Destination { path, force: true };
     write_whole(destination, log, |file| file.write_all(text.as_bytes()))?;
     say(&format!("{name}: --profile of `onboard-sim fly`, `campaign` and `card` takes it"));
     Ok(())

@@ -11,8 +11,7 @@ use protocol::log::reader::LogChannel;
 use serde::Serialize;
 
 use super::{Grade, GradeLevel, ProfileFacts};
-use crate::log::VerdictFacts;
-use crate::log::{Entry, FrameOrder, FrameRanges, Gap, StampedEntry};
+use crate::log::{Entry, FrameOrder, Gap, StampedEntry, VerdictFacts};
 
 /// A channel of a log.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -101,8 +100,11 @@ pub struct FrameFacts {
 /// Counts frames.
 #[derive(Debug, Default)]
 pub(super) struct FrameCounter {
-    frames: FrameRanges,
+    /// The lowest and the highest number.
+    bounds: Option<(u64, u64)>,
     order: FrameOrder,
+    restarts: usize,
+    repeated: u64,
     lost: usize,
     first_lost: Option<Gap>,
     solve_times: SolveTimeCounter,
@@ -117,11 +119,16 @@ impl FrameCounter {
 
     /// Counts a frame; `record` is the sequence number of its record in the channel.
     pub(super) fn count(&mut self, frame: u64, record: u32) {
-        self.frames.insert(frame);
+        let before = self.order.last_frame;
         if let Some(gap) = self.order.note(frame, record) {
             self.lost += 1;
             self.first_lost.get_or_insert(gap);
+        } else if self.bounds.is_some() {
+            self.restarts += usize::from(frame > before.saturating_add(1));
+            self.repeated += u64::from(frame <= before);
         }
+        let (first, last) = self.bounds.unwrap_or((frame, frame));
+        self.bounds = Some((first.min(frame), last.max(frame)));
     }
 
     pub(super) fn time(&mut self, timing: &PilotTiming) {
@@ -129,19 +136,10 @@ impl FrameCounter {
     }
 
     pub(super) fn into_facts(self) -> Option<FrameFacts> {
-        let (first, last) = self.frames.bounds()?;
-        // A loss before the first frame is not a gap between frames.
-        let lost_between = self.lost - usize::from(self.first_lost.is_some_and(|gap| gap.after == 0));
-        Some(FrameFacts {
-            first,
-            last,
-            restarts: self.frames.gaps().count().saturating_sub(lost_between),
-            lost: self.lost,
-            first_lost: self.first_lost,
-            repeated: self.frames.repeated(),
-            start: self.start,
-            solve_time: self.solve_times.into_facts(),
-        })
+        let Self { bounds, restarts, repeated, lost, first_lost, start, .. } = self;
+        let (first, last) = bounds?;
+        let solve_time = self.solve_times.into_facts();
+        Some(FrameFacts { first, last, restarts, lost, first_lost, repeated, start, solve_time })
     }
 }
 
@@ -160,7 +158,7 @@ impl Grade {
 
     /// The grade of a log whose frames can be executed again up to the first loss.
     fn of_replayable_frames(frames: &FrameFacts, mission: &str) -> Self {
-        let FrameFacts { first, last, restarts, lost, first_lost, repeated, .. } = frames;
+        let FrameFacts { first, last, lost, first_lost, repeated, .. } = frames;
         let level = GradeLevel::BitExact;
         let reason = match first_lost {
             Some(Gap { after: 0, before }) => {
@@ -177,16 +175,9 @@ impl Grade {
             None if *repeated > 0 => format!(
                 "frames {first} to {last} of the flight computer up to the first that is there twice; mission {mission}"
             ),
-            None => {
-                let restarted = match restarts {
-                    0 => String::new(),
-                    1 => ", restarted once".to_owned(),
-                    times => format!(", restarted {times} times"),
-                };
-                format!(
-                    "frames {first} to {last} of the flight computer{restarted}, its start and its mission {mission}"
-                )
-            }
+            None => format!(
+                "frames {first} to {last} of the flight computer, its start and its mission {mission}"
+            ),
         };
         Self { level, reason }
     }

@@ -15,14 +15,15 @@ use serde::Serialize;
 use time::OffsetDateTime;
 use time::format_description::well_known::Rfc3339;
 
-use crate::cli::{Answer, Outcome, give, say, warn_of_cut, warn_of_damage};
+use crate::cli::{Answer, Outcome, give_each, warn_of_cut, warn_of_damage};
 use crate::cut::CUT_FROM;
 use crate::findings::{self, FindingFacts};
 use crate::log::{
-    AttachmentFacts, BuildComparison, Clocks, Cut, Entry, FlightLog, Flights, Head, LogError, Recording,
-    SummaryFacts, VerdictFacts, VerdictLimit, Verdicts, heard_message, summary_of,
+    AttachmentFacts, BuildComparison, Clocks, Cut, Entry, FlightLog, Head, LogError, Recording, StampedEntry,
+    VerdictFacts, VerdictLimit,
 };
 use crate::print::counted;
+use crate::recover::{SummaryFacts, summary_of};
 
 /// Describes a log file.
 ///
@@ -54,68 +55,50 @@ pub fn info_of<R: Read>(
     log: &mut FlightLog<R>,
     summary: impl FnOnce() -> Option<SummaryFacts>,
 ) -> Result<Info, LogError> {
-    let mut seen = IndexTotals::default();
+    let mut seen = Seen::default();
     while let Some(stamped) = log.next_entry()? {
-        seen.channels.count(&stamped);
-        seen.span = Some(match seen.span {
-            None => (stamped.log_time_ns, stamped.log_time_ns),
-            Some((first, last)) => (first.min(stamped.log_time_ns), last.max(stamped.log_time_ns)),
-        });
-        seen.flights.note(&stamped);
-        let channel = log.channel(stamped.channel_id);
-        let first_ns = *seen.first_ns.get_or_insert(stamped.log_time_ns);
-        let since_s = stamped.log_time_ns.saturating_sub(first_ns) as f64 / 1e9;
-        let message = heard_message(channel, &stamped);
-        seen.clocks.note(&stamped, message.as_ref(), since_s);
-        seen.verdicts.note(&stamped, message.as_ref());
-        seen.ending.note(&stamped.entry);
-        seen.take(stamped.entry, stamped.sequence);
+        seen.take(&stamped);
     }
     Ok(seen.into_info(log, summary))
 }
 
-/// Facts collected while the log is read.
+/// What was seen while the log was read.
 #[derive(Default)]
-struct IndexTotals {
+struct Seen {
     channels: ChannelCounter,
-    flights: Flights,
     span: Option<(u64, u64)>,
     vehicle_phases: PhaseTracker,
     telemetry_phases: PhaseTracker,
-    first_ns: Option<u64>,
-    clocks: Clocks,
-    verdicts: Verdicts,
     ending: EndingTracker,
     frames: FrameCounter,
     unreadable: Option<String>,
 }
 
-impl IndexTotals {
-    fn take(&mut self, entry: Entry, record: u32) {
-        match entry {
+impl Seen {
+    fn take(&mut self, stamped: &StampedEntry) {
+        self.channels.count(stamped);
+        let at_ns = stamped.log_time_ns;
+        let (first_ns, last_ns) = self.span.unwrap_or((at_ns, at_ns));
+        self.span = Some((first_ns.min(at_ns), last_ns.max(at_ns)));
+        self.ending.note(&stamped.entry);
+        match &stamped.entry {
             Entry::Telemetry(telemetry) => {
                 if let Some(phase) = telemetry.phase {
                     self.telemetry_phases.note(telemetry.time_s, phase);
                 }
             }
             Entry::Unreadable { reason } => {
-                self.unreadable.get_or_insert(reason);
+                self.unreadable.get_or_insert_with(|| reason.clone());
             }
             Entry::ComputerStart(_) => self.frames.start(),
-            Entry::PilotTiming(timing) => self.frames.time(&timing),
+            Entry::PilotTiming(timing) => self.frames.time(timing),
             Entry::ComputerFrame(frame) => {
                 if let Some(time_s) = frame.flight_time_s() {
                     self.vehicle_phases.note(time_s, frame.record.output.phase);
                 }
-                self.frames.count(frame.record.input.frame, record);
+                self.frames.count(frame.record.input.frame, stamped.sequence);
             }
-            Entry::Verdict(_)
-            | Entry::Estimate(_)
-            | Entry::World(_)
-            | Entry::RawFrame
-            | Entry::Operator
-            | Entry::Event(_)
-            | Entry::Other => {}
+            _ => {}
         }
     }
 
@@ -123,12 +106,13 @@ impl IndexTotals {
         let head = log.head();
         let profile = ProfileFacts::of(head);
         let frames = self.frames.into_facts();
-        let span = self.span.map(|(first_ns, last_ns)| Span::new(first_ns, last_ns));
+        let span = self.span.map(|(first_ns, last_ns)| Span {
+            first_ns,
+            last_ns,
+            duration_s: seconds(last_ns.saturating_sub(first_ns)),
+        });
         let channels = self.channels.into_facts(log.channels());
-        let completeness = Completeness::new(log.damage(), span.as_ref(), &channels, summary);
-        let completeness =
-            Completeness { counted: log.is_counted(), ..completeness.with_flights(&self.flights) };
-        let verdict = self.verdicts.found().as_ref().map(VerdictFacts::found);
+        let verdict = log.verdict().as_ref().map(VerdictFacts::found);
         let timelines =
             [(PhaseSource::Vehicle, self.vehicle_phases), (PhaseSource::Telemetry, self.telemetry_phases)];
         Info {
@@ -148,6 +132,7 @@ impl IndexTotals {
             build_comparison: head.compare_build(),
             run: head.run.clone(),
             profile,
+            completeness: Completeness::of(log, span.as_ref(), &channels, summary),
             span,
             channels,
             phases: timelines
@@ -157,9 +142,8 @@ impl IndexTotals {
             ending: self.ending.words(verdict.as_ref()),
             verdict,
             findings: None,
-            clocks: self.clocks,
+            clocks: log.clocks(),
             unreadable: self.unreadable,
-            completeness,
             attachments: head.attachments.clone(),
         }
     }
@@ -307,12 +291,6 @@ pub struct Span {
     pub duration_s: f64,
 }
 
-impl Span {
-    pub(super) fn new(first_ns: u64, last_ns: u64) -> Self {
-        Self { first_ns, last_ns, duration_s: seconds(last_ns.saturating_sub(first_ns)) }
-    }
-}
-
 /// Whether anything is missing.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Completeness {
@@ -341,12 +319,13 @@ impl Completeness {
         warn_of_cut(name, self.cut.as_ref());
     }
 
-    pub(super) fn new(
-        damage: Option<&Damage>,
+    fn of<R: Read>(
+        log: &FlightLog<R>,
         span: Option<&Span>,
         channels: &[ChannelFacts],
         summary: impl FnOnce() -> Option<SummaryFacts>,
     ) -> Self {
+        let (damage, cut) = (log.damage(), log.flights().cut());
         // The summary of a recovered log says nothing about the damaged one.
         let missing_s = damage.filter(|damage| !matches!(damage, Damage::Recovered(_))).and_then(|_| {
             let end_ns = summary()?.last_log_time_ns;
@@ -354,21 +333,15 @@ impl Completeness {
         });
         let messages_lost = channels.iter().map(|channel| channel.lost).sum();
         Self {
-            complete: damage.is_none() && messages_lost == 0,
+            complete: damage.is_none() && messages_lost == 0 && cut.is_none(),
             damage: damage.map(ToString::to_string),
-            counted: false,
+            counted: log.is_counted(),
             readable_until_s: span.map(|span| span.duration_s),
             missing_s,
             messages_lost,
-            flights: 0,
-            cut: None,
+            flights: log.flights().flown(),
+            cut,
         }
-    }
-
-    /// Adds what the flights of the log show.
-    pub(super) fn with_flights(self, flights: &Flights) -> Self {
-        let cut = flights.cut();
-        Self { complete: self.complete && cut.is_none(), flights: flights.flown(), cut, ..self }
     }
 }
 
@@ -625,28 +598,15 @@ pub(crate) struct Args {
 
 impl Args {
     pub(crate) fn run(self) -> Result<Outcome> {
-        let (mut described, mut refused) = (Vec::new(), false);
-        for file in &self.files {
-            match description(file) {
-                Ok(info) => described.push(info),
-                Err(error) if self.files.len() == 1 => return Err(error.into()),
-                // One unreadable log must not hide the others.
-                Err(error) => {
-                    refused = true;
-                    say(&format!("{:#}", anyhow::Error::from(error)));
-                }
-            }
-        }
-        match described.as_slice() {
-            [only] if self.files.len() == 1 => give(only, self.json)?,
-            _ => give(&described, self.json)?,
-        };
-        // On a terminal the description has said it already.
+        // On a terminal the description says it already.
         let said = !self.json && std::io::stdout().is_terminal();
-        for info in described.iter().filter(|_| !said) {
-            info.completeness.warn(&info.file);
-        }
-        Ok(if refused { Outcome::NotAll } else { Outcome::Given })
+        give_each(&self.files, self.json, |file| {
+            let info = description(file)?;
+            if !said {
+                info.completeness.warn(&info.file);
+            }
+            Ok(vec![info])
+        })
     }
 }
 

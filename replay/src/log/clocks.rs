@@ -45,13 +45,6 @@ pub struct ClockTime {
     pub time_s: f64,
 }
 
-/// Why a text is no time.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("`{given}`: must be a time in seconds, as in T+12.9, boot:19.8 or log:19.7")]
-pub struct ClockTimeError {
-    given: String,
-}
-
 /// A moment of a flight, as a person names it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Moment {
@@ -64,25 +57,25 @@ pub enum Moment {
 
 /// Why a text is no moment.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum MomentError {
-    #[error("`{given}`: a frame is a whole number")]
-    Frame { given: String },
-    #[error("{time}, a phase ({}), or frame:NUMBER", Phase::ALL.map(Phase::name).join(", "))]
-    Other { time: ClockTimeError },
+#[error(
+    "`{given}`: must be a time in seconds, as in T+12.9, boot:19.8 or log:19.7, a phase ({}), or frame:NUMBER",
+    Phase::ALL.map(Phase::name).join(", ")
+)]
+pub struct MomentError {
+    given: String,
 }
 
 impl FromStr for Moment {
     type Err = MomentError;
 
     fn from_str(given: &str) -> Result<Self, MomentError> {
-        if let Some(number) = given.strip_prefix("frame:") {
-            let wrong = |_| MomentError::Frame { given: given.to_owned() };
-            return number.parse().map(Self::Frame).map_err(wrong);
-        }
-        if let Some(phase) = Phase::ALL.into_iter().find(|phase| phase.name().eq_ignore_ascii_case(given)) {
-            return Ok(Self::Phase(phase));
-        }
-        given.parse().map(Self::Time).map_err(|time| MomentError::Other { time })
+        let number = |text: &str| text.parse().ok().map(Self::Frame);
+        let phase = || Phase::ALL.into_iter().find(|phase| phase.name().eq_ignore_ascii_case(given));
+        let found = match given.strip_prefix("frame:") {
+            Some(text) => number(text),
+            None => phase().map(Self::Phase).or_else(|| ClockTime::read(given).map(Self::Time)),
+        };
+        found.ok_or_else(|| MomentError { given: given.to_owned() })
     }
 }
 
@@ -96,17 +89,14 @@ impl fmt::Display for Moment {
     }
 }
 
-impl FromStr for ClockTime {
-    type Err = ClockTimeError;
-
-    fn from_str(given: &str) -> Result<Self, ClockTimeError> {
+impl ClockTime {
+    /// `None` if the text is no time.
+    pub fn read(given: &str) -> Option<Self> {
         let prefixes = [("T+", Clock::Flight), ("boot:", Clock::Boot), ("log:", Clock::Log)];
         let named = prefixes.iter().find_map(|(prefix, clock)| Some((*clock, given.strip_prefix(prefix)?)));
         let (clock, number) = named.unwrap_or((Clock::Flight, given));
-        match number.trim().parse::<f64>() {
-            Ok(time_s) if time_s.is_finite() => Ok(Self { clock, time_s }),
-            _ => Err(ClockTimeError { given: given.to_owned() }),
-        }
+        let time_s = number.trim().parse().ok().filter(|time_s: &f64| time_s.is_finite())?;
+        Some(Self { clock, time_s })
     }
 }
 
@@ -203,12 +193,12 @@ mod tests {
     fn a_time_is_read_with_its_clock_and_converted() {
         let clocks = Clocks { flight_zero_s: Some(6.9), boot_zero_s: Some(-0.1), ..Clocks::default() };
         for (given, flight_s) in [("T+12", 12.0), ("12", 12.0), ("boot:19", 12.0), ("log:18.9", 12.0)] {
-            let time: ClockTime = given.parse().unwrap();
+            let time = ClockTime::read(given).unwrap();
             let found = clocks.convert(time, Clock::Flight).unwrap();
             assert!((found.time_s - flight_s).abs() < 1e-9, "{given}: {found}");
         }
         for wrong in ["T-1s", "boot 3", "utc:3", "", "log:inf"] {
-            assert!(wrong.parse::<ClockTime>().is_err(), "{wrong}");
+            assert_eq!(ClockTime::read(wrong), None, "{wrong}");
         }
         let time = ClockTime { clock: Clock::Flight, time_s: 12.0 };
         assert_eq!(clocks.words(time), "T+12.000 s (boot 19.000 s, log 18.900 s)");

@@ -5,7 +5,6 @@
 //! at the release belongs to it. A vehicle records until its flight computer says that the flight is over; a flight that
 //! begins at its release, until it is judged.
 
-use std::collections::BTreeMap;
 use std::fmt;
 
 use avionics::log::frame::phase_of;
@@ -13,7 +12,7 @@ use flight::computer::FRAME_S;
 use flight::rules::phase::Phase;
 use serde::Serialize;
 
-use super::{Clock, ClockTime, Entry, StampedEntry};
+use super::{Clock, ClockTime, Entry, RecordingError, StampedEntry};
 
 /// Tolerance for rounding: times are sums of periods.
 const ROUNDING_S: f64 = 1e-6;
@@ -159,9 +158,7 @@ pub struct Flights {
 }
 
 impl Flights {
-    /// Notes a record. Returns whether a flight begins with it.
-    pub fn note(&mut self, stamped: &StampedEntry) -> bool {
-        let before = self.found.len();
+    pub(super) fn note(&mut self, stamped: &StampedEntry) {
         match &stamped.entry {
             // If the log has the power-up of this flight computer, its release does not begin another flight.
             Entry::ComputerStart(start)
@@ -175,7 +172,7 @@ impl Flights {
                 if self.found.is_empty() {
                     self.found.push(LoggedFlight::default());
                 }
-                let Some(flight) = self.found.last_mut() else { return false };
+                let Some(flight) = self.found.last_mut() else { return };
                 let phase = frame.record.output.phase;
                 flight.over |= frame.record.output.over;
                 flight.framed_ns = flight.framed_ns.max(stamped.log_time_ns);
@@ -192,7 +189,6 @@ impl Flights {
             }
             _ => {}
         }
-        self.found.len() > before
     }
 
     /// Every flight so far, in file order.
@@ -209,12 +205,21 @@ impl Flights {
     pub fn flown(&self) -> usize {
         self.found.iter().filter(|flight| flight.frames > 0).count()
     }
+
+    /// # Errors
+    /// More than one flight has frames.
+    pub(crate) fn refuse_several(&self, name: &str) -> Result<(), RecordingError> {
+        match self.flown() {
+            0 | 1 => Ok(()),
+            flights => Err(RecordingError::SeveralFlights { name: name.to_owned(), flights }),
+        }
+    }
 }
 
 /// Checks the order of frames as they are read from the file.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct FrameOrder {
-    last_frame: u64,
+    pub(crate) last_frame: u64,
     /// The sequence number of the channel's next record if none is lost.
     next_record: u32,
     /// Another flight comes before this one in the log. Sequence numbers may continue or start again, so the number of
@@ -243,14 +248,6 @@ impl FrameOrder {
     }
 }
 
-/// A set of frame numbers, stored as runs.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct FrameRanges {
-    /// First number of each run, and its last.
-    runs: BTreeMap<u64, u64>,
-    repeated: u64,
-}
-
 /// A gap between two frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Gap {
@@ -260,51 +257,9 @@ pub struct Gap {
     pub before: u64,
 }
 
-impl FrameRanges {
-    /// Adds a number.
-    pub fn insert(&mut self, frame: u64) {
-        let left = self.runs.range(..=frame).next_back().map(|(first, last)| (*first, *last));
-        if left.is_some_and(|(_, last)| frame <= last) {
-            self.repeated += 1;
-            return;
-        }
-        let first = match left {
-            Some((first, last)) if last.checked_add(1) == Some(frame) => first,
-            _ => frame,
-        };
-        let behind = frame.checked_add(1).and_then(|next| self.runs.remove(&next));
-        self.runs.insert(first, behind.unwrap_or(frame));
-    }
-
-    /// The lowest and the highest number.
-    pub fn bounds(&self) -> Option<(u64, u64)> {
-        Some((*self.runs.first_key_value()?.0, *self.runs.last_key_value()?.1))
-    }
-
-    pub fn repeated(&self) -> u64 {
-        self.repeated
-    }
-
-    /// The gaps between the lowest and the highest number.
-    pub fn gaps(&self) -> impl Iterator<Item = Gap> {
-        let behind = self.runs.keys().skip(1);
-        self.runs.values().zip(behind).map(|(last, first)| Gap { after: *last, before: *first })
-    }
-}
-
-impl Gap {
-    /// How many frames are missing.
-    pub fn missing(&self) -> u64 {
-        self.before.saturating_sub(self.after).saturating_sub(1)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::collections::BTreeSet;
-
-    use proptest::prelude::*;
 
     fn gaps(frames: &[(u64, u32)]) -> Vec<(u64, u64)> {
         let mut order = FrameOrder::default();
@@ -325,33 +280,5 @@ mod tests {
         assert_eq!((second.note(1, 600), second.note(2, 601)), (None, None));
         assert!(second.note(5, 605).is_some() && FrameOrder::behind_another().note(601, 600).is_some());
         assert_eq!(gaps(&[(1, u32::MAX), (2, u32::MAX)]), [(0, 1)]);
-    }
-
-    proptest! {
-        #[test]
-        fn runs_and_gaps_are_those_of_a_plain_set(numbers in prop::collection::vec(0..40_u64, 1..60)) {
-            let mut ranges = FrameRanges::default();
-            for number in &numbers {
-                ranges.insert(*number);
-            }
-            let set: BTreeSet<u64> = numbers.iter().copied().collect();
-            let (first, last) = ranges.bounds().unwrap();
-            prop_assert_eq!(Some(&first), set.first());
-            prop_assert_eq!(Some(&last), set.last());
-            let missing: BTreeSet<u64> = ranges.gaps().flat_map(|gap| gap.after + 1..gap.before).collect();
-            let expected: BTreeSet<u64> = (first..=last).filter(|number| !set.contains(number)).collect();
-            prop_assert_eq!(missing, expected);
-            prop_assert_eq!(ranges.repeated() as usize, numbers.len() - set.len());
-        }
-    }
-
-    #[test]
-    fn the_ends_of_the_numbers_do_not_overflow() {
-        let mut ranges = FrameRanges::default();
-        for number in [u64::MAX, 0, u64::MAX - 1, u64::MAX] {
-            ranges.insert(number);
-        }
-        assert_eq!(ranges.bounds(), Some((0, u64::MAX)));
-        assert_eq!(ranges.gaps().map(|gap| gap.missing()).sum::<u64>(), u64::MAX - 2);
     }
 }

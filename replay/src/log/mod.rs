@@ -12,28 +12,24 @@ mod tlog;
 mod verdict;
 
 use std::fs::File;
-use std::io::{self, BufReader, BufWriter, Chain, Cursor, Read, Seek as _, SeekFrom};
-use std::path::{Path, PathBuf};
+use std::io::{BufReader, Chain, Cursor, Read};
+use std::path::Path;
 
-pub use clocks::{Clock, ClockTime, ClockTimeError, Clocks, Moment, MomentError};
+pub use clocks::{Clock, ClockTime, Clocks, Moment, MomentError};
 use flights::InFlight;
-pub use flights::{Cut, Flights, FrameOrder, FrameRanges, Gap, LoggedFlight};
+pub use flights::{Cut, Flights, FrameOrder, Gap, LoggedFlight};
 pub use head::{AttachmentFacts, BuildComparison, BuildDifference, Head};
-use mcap::records::{Record as McapRecord, op};
-use protocol::log::reader::{Damage, LogChannel, LogItem, LogReader, parse_record};
-use protocol::log::record::{Record, TOPIC_COMPUTER_FRAME, TOPIC_RAW_RX, TOPIC_TELEMETRY, TOPIC_VERDICT};
-use protocol::log::writer::{LogHeader, LogWriter};
+use protocol::log::reader::{Damage, LogChannel, LogItem, LogReader};
+use protocol::log::record::{TOPIC_COMPUTER_FRAME, TOPIC_RAW_RX, TOPIC_TELEMETRY, TOPIC_VERDICT};
 use protocol::text::printable;
 pub use record::{Entry, LoggedFrame, StampedEntry};
 pub(crate) use record::{frame_descriptor, misread_frame};
 pub use recording::{Recording, RecordingError};
 pub use tlog::{ImportError, ImportedTlog, import_tlog};
 pub(crate) use tlog::{is_tlog, open_log};
-use verdict::contradiction;
+pub(crate) use verdict::frame_of;
+use verdict::{Found, Verdicts, contradiction, heard_message};
 pub use verdict::{VerdictFacts, VerdictLimit};
-pub(crate) use verdict::{Verdicts, frame_of, heard_message};
-
-use crate::output::{Destination, NewFile, WriteError};
 
 /// First bytes of every MCAP file.
 const MCAP_MAGIC: [u8; 8] = [0x89, b'M', b'C', b'A', b'P', b'0', b'\r', b'\n'];
@@ -43,9 +39,6 @@ const BUFFER_BYTES: usize = 1 << 20;
 /// A record may come this long after later ones, ns: writers of several threads do so. Beyond it, a log is not in order.
 pub(crate) const IN_ORDER_NS: u64 = 1_000_000_000;
 
-/// The summary of a log of many hours has some megabytes.
-const SUMMARY_LIMIT_BYTES: u64 = 64 << 20;
-
 /// A log being read.
 pub struct FlightLog<R: Read> {
     name: String,
@@ -53,7 +46,11 @@ pub struct FlightLog<R: Read> {
     head: Head,
     /// Whether a record was found that only flight logs have.
     recognised: bool,
+    first_log_time_ns: Option<u64>,
     last_log_time_ns: Option<u64>,
+    flights: Flights,
+    clocks: Clocks,
+    verdicts: Verdicts,
     /// Its times need not be in order.
     may_go_back: bool,
     in_flight: InFlight,
@@ -112,7 +109,11 @@ impl<R: Read> FlightLog<R> {
             reader: LogReader::new(Cursor::new(start).chain(input)),
             head: Head::default(),
             recognised: false,
+            first_log_time_ns: None,
             last_log_time_ns: None,
+            flights: Flights::default(),
+            clocks: Clocks::default(),
+            verdicts: Verdicts::default(),
             may_go_back: false,
             in_flight: InFlight::default(),
             contradiction: None,
@@ -164,6 +165,26 @@ impl<R: Read> FlightLog<R> {
         self.last_log_time_ns
     }
 
+    /// The flights so far.
+    pub fn flights(&self) -> &Flights {
+        &self.flights
+    }
+
+    /// How its clocks differ, as far as it was read.
+    pub fn clocks(&self) -> Clocks {
+        self.clocks
+    }
+
+    /// Its landing verdict, recorded or heard, as far as it was read.
+    pub(crate) fn verdict(&self) -> Option<Found> {
+        self.verdicts.found()
+    }
+
+    /// So long after the first entry, s.
+    pub fn since_first_s(&self, log_time_ns: u64) -> f64 {
+        log_time_ns.saturating_sub(self.first_log_time_ns.unwrap_or(log_time_ns)) as f64 / 1e9
+    }
+
     /// The next entry.
     ///
     /// # Errors
@@ -201,7 +222,13 @@ impl<R: Read> FlightLog<R> {
                     }
                     self.in_flight.place(&mut entry);
                     self.last_log_time_ns = self.last_log_time_ns.max(Some(log_time_ns));
-                    return Ok(Some(StampedEntry { channel_id, log_time_ns, sequence, data, entry }));
+                    self.first_log_time_ns.get_or_insert(log_time_ns);
+                    let stamped = StampedEntry { channel_id, log_time_ns, sequence, data, entry };
+                    let message = heard_message(self.reader.channel(channel_id), &stamped);
+                    self.flights.note(&stamped);
+                    self.clocks.note(&stamped, message.as_ref(), self.since_first_s(log_time_ns));
+                    self.verdicts.note(&stamped, message.as_ref());
+                    return Ok(Some(stamped));
                 }
                 Some(item) => self.head.take(item),
             }
@@ -296,94 +323,4 @@ fn listed(topics: &[String]) -> String {
         shown.push(format!("{} more", topics.len() - TOPICS_SHOWN));
     }
     format!("the topics {}", shown.join(", "))
-}
-
-/// A log being written; see [`NewFile`].
-pub(crate) struct NewLog {
-    path: PathBuf,
-    writer: LogWriter<BufWriter<NewFile>>,
-}
-
-impl NewLog {
-    pub(crate) fn create(
-        destination: Destination,
-        input: &Path,
-        header: &LogHeader,
-    ) -> Result<Self, WriteError> {
-        let path = destination.path.to_owned();
-        let file = BufWriter::new(NewFile::create(destination, input)?);
-        let writer = LogWriter::new(file, header).map_err(io::Error::other).map_err(WriteError::at(&path))?;
-        Ok(Self { path, writer })
-    }
-
-    pub(crate) fn write(&mut self, record: &Record, time_ns: u64) -> Result<(), WriteError> {
-        let written = self.writer.write(record, time_ns).map_err(io::Error::other);
-        written.map_err(WriteError::at(&self.path))
-    }
-
-    pub(crate) fn finish(self) -> Result<(), WriteError> {
-        let file = self.writer.finish().map_err(io::Error::other);
-        let file = file.and_then(|file| file.into_inner().map_err(io::IntoInnerError::into_error));
-        file.map_err(WriteError::at(&self.path))?.commit()
-    }
-}
-
-/// Facts from a file's summary.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct SummaryFacts {
-    /// Messages in the file.
-    pub message_count: u64,
-    /// Of these, frames of the flight computer.
-    pub frames: u64,
-    /// Time of the last message, ns since the Unix epoch.
-    pub last_log_time_ns: u64,
-}
-
-/// Reads the summary at the end of a file, if possible.
-pub fn summary_of(path: &Path) -> Option<SummaryFacts> {
-    let section = summary_section(path)?;
-    let (mut frame_channels, mut stats) = (Vec::new(), None);
-    let mut rest = section.as_slice();
-    while let Some((opcode, behind)) = rest.split_first()
-        && let Some((length, behind)) = behind.split_first_chunk()
-    {
-        let (body, behind) = behind.split_at_checked(usize::try_from(u64::from_le_bytes(*length)).ok()?)?;
-        match parse_record(*opcode, body).ok()? {
-            McapRecord::Channel(channel) if channel.topic == TOPIC_COMPUTER_FRAME => {
-                frame_channels.push(channel.id);
-            }
-            McapRecord::Statistics(found) => stats = Some(found),
-            // A hole in a file is an endless row of such records.
-            McapRecord::Unknown { opcode: 0, .. } => return None,
-            _ => {}
-        }
-        rest = behind;
-    }
-    let stats = stats?;
-    let counts = stats.channel_message_counts.iter().filter(|(id, _)| frame_channels.contains(id));
-    Some(SummaryFacts {
-        message_count: stats.message_count,
-        frames: counts.map(|(_, count)| *count).fold(0, u64::saturating_add),
-        last_log_time_ns: stats.message_end_time,
-    })
-}
-
-/// The bytes between the end mark of the data and the footer; `None` if there are none, or more than any log has.
-fn summary_section(path: &Path) -> Option<Vec<u8>> {
-    /// The footer with its head, and the magic.
-    const END_BYTES: usize = 9 + 20 + 8;
-    let mut file = File::open(path).ok()?;
-    let end = file.metadata().ok()?.len().checked_sub(END_BYTES as u64)?;
-    file.seek(SeekFrom::Start(end)).ok()?;
-    let mut footer = [0; END_BYTES];
-    file.read_exact(&mut footer).ok()?;
-    if footer[0] != op::FOOTER || !footer.ends_with(&MCAP_MAGIC) {
-        return None;
-    }
-    let start = u64::from_le_bytes(*footer.get(9..)?.first_chunk()?);
-    let length = end.checked_sub(start).filter(|length| start > 0 && *length <= SUMMARY_LIMIT_BYTES)?;
-    file.seek(SeekFrom::Start(start)).ok()?;
-    let mut section = vec![0; usize::try_from(length).ok()?];
-    file.read_exact(&mut section).ok()?;
-    Some(section)
 }

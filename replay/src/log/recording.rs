@@ -9,8 +9,7 @@ use foxglove::messages::Log as EventRecord;
 use protocol::log::computer_v1::{ComputerFrame, ComputerStart};
 use protocol::log::{flight_v1, v1};
 
-use super::verdict::{Verdicts, heard_message};
-use super::{Clocks, Cut, Entry, FlightLog, Flights, FrameOrder, Gap, Head, LogError};
+use super::{Clocks, Cut, Entry, FlightLog, FrameOrder, Gap, Head, LogError};
 
 /// Most records of one kind: seventeen minutes of frames at 200 Hz.
 const RECORDS_MAX: usize = 200_000;
@@ -136,21 +135,15 @@ impl Recording {
     /// As [`open`](Self::open).
     pub fn read<R: std::io::Read>(log: &mut FlightLog<R>) -> Result<Self, RecordingError> {
         let mut recording = Self { name: log.name().to_owned(), ..Self::default() };
-        let mut flights = Flights::default();
-        let mut verdicts = Verdicts::default();
-        let (mut first_ns, mut frame_order, mut frames_lost) = (None, FrameOrder::default(), None);
+        let (mut frame_order, mut frames_lost) = (FrameOrder::default(), None);
         while let Some(stamped) = log.next_entry()? {
-            let since_ns = stamped.log_time_ns.saturating_sub(*first_ns.get_or_insert(stamped.log_time_ns));
-            flights.note(&stamped);
-            let channel = log.channel(stamped.channel_id);
-            let message = heard_message(channel, &stamped);
-            recording.clocks.note(&stamped, message.as_ref(), since_ns as f64 / 1e9);
-            verdicts.note(&stamped, message.as_ref());
             match stamped.entry {
                 Entry::PilotTiming(timing) => recording.timings.push(timing),
                 Entry::World(sample) => recording.world.push(*sample),
                 Entry::Telemetry(telemetry) => recording.telemetry.push(*telemetry),
-                Entry::Event(event) => recording.events.push((since_ns as f64 / 1e9, *event)),
+                Entry::Event(event) => {
+                    recording.events.push((log.since_first_s(stamped.log_time_ns), *event));
+                }
                 Entry::Unreadable { reason } => {
                     recording.unreadable.get_or_insert(reason);
                 }
@@ -179,11 +172,10 @@ impl Recording {
             }
             recording.check_length()?;
         }
-        if flights.flown() > 1 {
-            return Err(RecordingError::SeveralFlights { name: recording.name, flights: flights.flown() });
-        }
-        recording.cut = flights.cut();
-        if let Some(found) = verdicts.found() {
+        log.flights().refuse_several(&recording.name)?;
+        recording.cut = log.flights().cut();
+        recording.clocks = log.clocks();
+        if let Some(found) = log.verdict() {
             recording.verdict_heard = found.heard;
             recording.verdict = Some(found.verdict);
         }
@@ -195,16 +187,10 @@ impl Recording {
     }
 
     fn check_length(&self) -> Result<(), RecordingError> {
-        let kinds = [
-            ("frames of the flight computer", self.frames.len()),
-            ("timings of the flight computer", self.timings.len()),
-            ("estimates of the flight computer", self.estimates.len()),
-            ("records of the world", self.world.len()),
-            ("records of telemetry", self.telemetry.len()),
-            ("events", self.events.len()),
-        ];
-        match kinds.into_iter().find(|(_, count)| *count > RECORDS_MAX) {
-            Some((kind, _)) => Err(RecordingError::TooLong { name: self.name.clone(), kind }),
+        let Self { frames, timings, world, telemetry, events, .. } = self;
+        let lengths = [frames.len(), timings.len(), world.len(), telemetry.len(), events.len()];
+        match lengths.into_iter().max().filter(|most| *most > RECORDS_MAX) {
+            Some(_) => Err(RecordingError::TooLong { name: self.name.clone(), kind: "records of a kind" }),
             None => Ok(()),
         }
     }

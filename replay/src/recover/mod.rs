@@ -5,22 +5,24 @@
 //! the summary is whole. The report lists what is lost, and so does the recovered log itself ([`METADATA_RECOVERY`]). Nothing is
 //! invented: a message is kept unchanged or not at all. A log that is not in order of time is sorted.
 
-pub(crate) mod scan;
-pub(crate) mod write;
+mod scan;
+mod write;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use mcap::records::Metadata;
 use protocol::log::record::{METADATA_RECOVERY, RECOVERY_FAULT_ENTRY};
-use scan::{ChunkName, Contents, Good, Records};
+pub(crate) use scan::Records;
+use scan::{ChunkName, Contents, LostStretch};
+pub use scan::{SummaryFacts, summary_of};
 use serde::Serialize;
-use write::Rescue;
+pub(crate) use write::{Kept, Rescue};
 
 use crate::cli::{Answer, Outcome, give};
 use crate::log::{IN_ORDER_NS, LogError, is_tlog};
-use crate::output::{Destination, Overwrite, WriteError};
+use crate::output::{Destination, WriteError};
 use crate::print::counted;
 
 /// Why nothing could be recovered.
@@ -88,11 +90,6 @@ pub struct Recovery {
 }
 
 impl Recovery {
-    /// Whether the log was whole.
-    pub fn was_whole(&self) -> bool {
-        self.fault().is_none()
-    }
-
     /// What the recovered log says of itself.
     fn about(&self) -> Metadata {
         let lost = self.lost.iter().map(|lost| {
@@ -168,11 +165,11 @@ pub fn recover<'a>(input: &Path, output: impl Into<Destination<'a>>) -> Result<R
     recovery.records_about = kept.records_about;
     recovery.undecodable = kept.undecodable;
     recovery.kept_s = Some(last_ns.saturating_sub(first_ns) as f64 / 1e9);
-    recovery.messages_lost = contents.told.messages.map(|told| told.saturating_sub(kept.messages));
+    let told = contents.told.statistics.as_ref();
+    recovery.messages_lost = told.map(|told| told.message_count.saturating_sub(kept.messages));
     // With every message kept, a chunk that is not there is one whose head was changed.
-    let all = recovery.messages_lost == Some(0);
-    let missing = if all { Vec::new() } else { missing_chunks(&contents.told.chunks, &contents.good) };
-    recovery.lost = lost_of(&contents.lost, &missing, first_ns);
+    let told = if recovery.messages_lost == Some(0) { &[] } else { &contents.told.chunks[..] };
+    recovery.lost = lost_of(&contents, told, first_ns);
     rescue.finish(&recovery.about())?;
     Ok(recovery)
 }
@@ -184,58 +181,32 @@ fn was_changed(contents: &Contents) -> bool {
     !contents.told.chunks.is_empty() && there.any(|there| told.all(|name| *name != there))
 }
 
-/// The chunks of the summary that are not there.
-fn missing_chunks(told: &[(u64, u64, ChunkName)], good: &[Good]) -> Vec<(u64, u64, ChunkName)> {
-    let mut there: BTreeMap<ChunkName, u32> = BTreeMap::new();
-    for name in good.iter().filter_map(|piece| piece.chunk) {
-        *there.entry(name).or_default() += 1;
-    }
-    let is_missing = |(_, _, name): &&(u64, u64, ChunkName)| match there.get_mut(name) {
-        Some(count) if *count > 0 => {
-            *count -= 1;
-            false
-        }
-        _ => true,
-    };
-    told.iter().filter(is_missing).copied().collect()
-}
-
-/// What is lost, with times after the first message kept: the stretches, and the chunks of the summary that no stretch
-/// covers.
-fn lost_of(stretches: &[scan::LostStretch], missing: &[(u64, u64, ChunkName)], first_ns: u64) -> Vec<Lost> {
-    let since_s = |ns: u64| (ns as f64 - first_ns as f64) / 1e9;
-    let mut spans: Vec<Option<(u64, u64)>> = stretches.iter().map(|stretch| stretch.span_ns).collect();
-    let mut uncovered = Vec::new();
-    for (offset, bytes, name) in missing {
+/// What is lost, with times after the first message kept: the stretches that cannot be read, with the times of the chunks of the
+/// summary that lay there, and the chunks that no stretch covers.
+fn lost_of(contents: &Contents, told: &[(u64, u64, ChunkName)], first_ns: u64) -> Vec<Lost> {
+    let there: BTreeSet<ChunkName> = contents.good.iter().filter_map(|piece| piece.chunk).collect();
+    let mut lost = contents.lost.clone();
+    for (offset, bytes, name) in told.iter().filter(|(.., name)| !there.contains(name)) {
         let span = (name.first_ns, name.last_ns);
-        let covers = |(place, stretch): (usize, &scan::LostStretch)| {
-            let holds = (stretch.from_byte..stretch.from_byte + stretch.bytes).contains(offset);
-            (stretch.span_ns == Some(span) || holds).then_some(place)
+        let covers = |stretch: &&mut LostStretch| {
+            stretch.span_ns == Some(span)
+                || (stretch.from_byte..stretch.from_byte + stretch.bytes).contains(offset)
         };
-        match stretches.iter().enumerate().find_map(covers) {
-            Some(place) => {
-                let (from, until) = spans[place].unwrap_or(span);
-                spans[place] = Some((from.min(span.0), until.max(span.1)));
-            }
-            None => uncovered.push((*offset, *bytes, span)),
+        if let Some(stretch) = lost.iter_mut().find(covers) {
+            let (from, until) = stretch.span_ns.unwrap_or(span);
+            stretch.span_ns = Some((from.min(span.0), until.max(span.1)));
+        } else {
+            let reason = "a chunk that the summary names is not there".to_owned();
+            lost.push(LostStretch { from_byte: *offset, bytes: *bytes, span_ns: Some(span), reason });
         }
     }
-    let in_seconds = |(from, until): (u64, u64)| (since_s(from), since_s(until));
-    let found = stretches.iter().zip(spans).map(|(stretch, span_ns)| Lost {
-        from_byte: stretch.from_byte,
-        bytes: stretch.bytes,
-        span_s: span_ns.map(in_seconds),
-        reason: stretch.reason.clone(),
-    });
-    let absent = uncovered.into_iter().map(|(from_byte, bytes, span_ns)| Lost {
-        from_byte,
-        bytes,
-        span_s: Some(in_seconds(span_ns)),
-        reason: "a chunk that the summary names is not there".to_owned(),
-    });
-    let mut lost: Vec<Lost> = found.chain(absent).collect();
-    lost.sort_by_key(|lost| lost.from_byte);
-    lost
+    lost.sort_by_key(|stretch| stretch.from_byte);
+    let since_s = |ns: u64| (ns as f64 - first_ns as f64) / 1e9;
+    let in_seconds = |LostStretch { from_byte, bytes, span_ns, reason }| {
+        let span_s = span_ns.map(|(from, until)| (since_s(from), since_s(until)));
+        Lost { from_byte, bytes, span_s, reason }
+    };
+    lost.into_iter().map(in_seconds).collect()
 }
 
 impl Answer for Recovery {
@@ -283,7 +254,7 @@ pub(crate) struct Args {
 
 impl Args {
     pub(crate) fn run(self) -> Result<Outcome> {
-        let destination = Destination { path: &self.output, overwrite: Overwrite::if_forced(self.force) };
+        let destination = Destination { path: &self.output, force: self.force };
         give(&recover(&self.file, destination)?, self.json)
     }
 }

@@ -8,8 +8,9 @@ use std::fs::File;
 use std::io::{BufReader, Read as _, Seek as _, SeekFrom};
 use std::path::Path;
 
-use mcap::records::{Channel, Record, SchemaHeader, op};
+use mcap::records::{Channel, Record, SchemaHeader, Statistics, op};
 use protocol::log::reader::{RECORD_LIMIT_BYTES, RecordError, parse_record, records_of_chunk};
+use protocol::log::record::TOPIC_COMPUTER_FRAME;
 
 use crate::log::{LogError, open_regular};
 
@@ -75,12 +76,35 @@ pub(crate) struct Contents {
 /// chunks and its count only if it is whole. Its own index is not used: bytes that were lost have shifted it.
 #[derive(Debug, Default)]
 pub(crate) struct WriterReport {
+    /// Who wrote it, from the head of the file.
+    pub(crate) library: String,
     pub(crate) schemas: BTreeMap<u16, (SchemaHeader, Vec<u8>)>,
     pub(crate) channels: BTreeMap<u16, Channel>,
     /// Where each chunk began, its length and its name.
     pub(crate) chunks: Vec<(u64, u64, ChunkName)>,
-    /// How many messages there were; `None` if it is not told.
-    pub(crate) messages: Option<u64>,
+    /// How many messages there were.
+    pub(crate) statistics: Option<Statistics>,
+}
+
+/// What the summary of a file tells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SummaryFacts {
+    /// Frames of the flight computer in the file.
+    pub frames: u64,
+    /// Time of the last message, ns since the Unix epoch.
+    pub last_log_time_ns: u64,
+}
+
+/// What the summary of a file tells, if it is whole. The whole file is read for it.
+pub fn summary_of(path: &Path) -> Option<SummaryFacts> {
+    let WriterReport { channels, statistics, .. } = Records::open(path).ok()?.contents().ok()?.told;
+    let statistics = statistics?;
+    let of_frames = |id: &u16| channels.get(id).is_some_and(|channel| channel.topic == TOPIC_COMPUTER_FRAME);
+    let counts = statistics.channel_message_counts.iter().filter(|(id, _)| of_frames(id));
+    Some(SummaryFacts {
+        frames: counts.map(|(_, count)| *count).fold(0, u64::saturating_add),
+        last_log_time_ns: statistics.message_end_time,
+    })
 }
 
 /// A file being read record by record.
@@ -164,7 +188,7 @@ impl Records {
                 if contents.summary_fault.is_some() {
                     // What is left of a list looks like a shorter one.
                     contents.told.chunks.clear();
-                    contents.told.messages = None;
+                    contents.told.statistics = None;
                 }
                 break;
             }
@@ -202,7 +226,7 @@ impl Records {
         from_byte: u64,
         told: &mut WriterReport,
     ) -> Result<Option<&'static str>, LogError> {
-        let (mut checksum, mut chunks) = (crc32fast::Hasher::new(), None);
+        let mut checksum = crc32fast::Hasher::new();
         let mut at = from_byte;
         while self.begins_record(at)? {
             let Some((opcode, length)) =
@@ -230,10 +254,7 @@ impl Records {
                     };
                     told.chunks.push((index.chunk_start_offset, index.chunk_length, name));
                 }
-                Ok(Record::Statistics(statistics)) => {
-                    told.messages = Some(statistics.message_count);
-                    chunks = Some(statistics.chunk_count as usize);
-                }
+                Ok(Record::Statistics(statistics)) => told.statistics = Some(statistics),
                 Ok(Record::Footer(footer)) => {
                     checksum.update(body.get(..FOOTER_CHECKED_BYTES).unwrap_or_default());
                     // What the bits of a number were cannot be seen from it.
@@ -241,7 +262,8 @@ impl Records {
                         return Ok(Some("the checksum over its summary does not fit"));
                     }
                     // A writer may list no chunk at all.
-                    if !told.chunks.is_empty() && chunks.is_some_and(|count| count != told.chunks.len()) {
+                    let counted = told.statistics.as_ref().map(|statistics| statistics.chunk_count as usize);
+                    if !told.chunks.is_empty() && counted.is_some_and(|count| count != told.chunks.len()) {
                         return Ok(Some("its summary does not list as many chunks as it counts"));
                     }
                     let ends = self.read(at, mcap::MAGIC.len() as u64 + 1)? == mcap::MAGIC;
@@ -356,7 +378,12 @@ impl Contents {
             })
             .map(|()| true),
             op::HEADER | op::SCHEMA | op::CHANNEL | op::MESSAGE | op::METADATA | op::ATTACHMENT => {
-                self.note_time(&parse_record(opcode, body)?);
+                let record = parse_record(opcode, body)?;
+                self.note_time(&record);
+                if let Record::Header(header) = record {
+                    self.told.library = header.library;
+                    return Ok(false);
+                }
                 Ok(true)
             }
             _ => Ok(false),

@@ -23,8 +23,7 @@ pub(crate) struct Rescue<'a> {
     keeps: &'a mut dyn FnMut(&str, u64) -> bool,
     /// What the file's own summary tells of its channels, for messages whose channel record is lost.
     told: &'a WriterReport,
-    /// Created when the library's name is known, which is the first record of a file.
-    state: State,
+    writer: Writer,
     /// The file's schemas and channels by their numbers there.
     schemas: BTreeMap<u16, u16>,
     channels: BTreeMap<u16, (u16, String)>,
@@ -74,12 +73,6 @@ pub(crate) struct Kept {
     pub(crate) undecodable: u64,
 }
 
-enum State {
-    Waiting(NewFile),
-    Writing(Box<Writer>),
-    Gone,
-}
-
 impl<'a> Rescue<'a> {
     /// Copies what can be read of a log and is kept; sorted, if it was not in order of time.
     pub(crate) fn of<E: From<LogError> + From<WriteError>>(
@@ -88,11 +81,17 @@ impl<'a> Rescue<'a> {
         (records, contents): (&mut Records, &'a Contents),
         keeps: &'a mut dyn FnMut(&str, u64) -> bool,
     ) -> Result<Self, E> {
+        let failed = |error: mcap::McapError| WriteError::at(destination.path)(std::io::Error::other(error));
+        let file = BufWriter::new(NewFile::create(destination, input)?);
+        let options = mcap::WriteOptions::new()
+            .compression(Some(mcap::Compression::Lz4))
+            .chunk_size(Some(CHUNK_BYTES))
+            .library(&contents.told.library);
         let mut rescue = Self {
             path: destination.path.to_owned(),
             keeps,
             told: &contents.told,
-            state: State::Waiting(NewFile::create(destination, input)?),
+            writer: options.create(file).map_err(failed)?,
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
             kept: Kept::default(),
@@ -125,17 +124,14 @@ impl<'a> Rescue<'a> {
 
     fn keep_record(&mut self, record: Record<'static>) -> mcap::McapResult<()> {
         match record {
-            Record::Header(header) => {
-                self.writer(&header.library)?;
-            }
             Record::Schema { header, data } => {
-                let id = self.writer("")?.add_schema(&header.name, &header.encoding, &data)?;
+                let id = self.writer.add_schema(&header.name, &header.encoding, &data)?;
                 self.schemas.insert(header.id, id);
             }
             Record::Channel(channel) => {
                 // Schema 0 means no schema.
                 let schema = self.schemas.get(&channel.schema_id).copied().unwrap_or(0);
-                let id = self.writer("")?.add_channel(
+                let id = self.writer.add_channel(
                     schema,
                     &channel.topic,
                     &channel.message_encoding,
@@ -146,11 +142,11 @@ impl<'a> Rescue<'a> {
             Record::Message { header, data } => self.message(header, &data)?,
             Record::Metadata(metadata) => {
                 self.kept.records_about += 1;
-                self.writer("")?.write_metadata(&metadata)?;
+                self.writer.write_metadata(&metadata)?;
             }
             Record::Attachment { header, data, .. } => {
                 self.kept.records_about += 1;
-                self.writer("")?.attach(&mcap::Attachment {
+                self.writer.attach(&mcap::Attachment {
                     log_time: header.log_time,
                     create_time: header.create_time,
                     name: header.name,
@@ -177,7 +173,7 @@ impl<'a> Rescue<'a> {
         if self.sorts {
             self.waiting.push(Waiting { header, data: data.to_vec(), place: Place::of(topic) });
         } else {
-            self.writer("")?.write_to_known_channel(&header, data)?;
+            self.writer.write_to_known_channel(&header, data)?;
         }
         self.kept.messages += 1;
         let (first, last) = self.kept.span_ns.unwrap_or((header.log_time, header.log_time));
@@ -192,40 +188,21 @@ impl<'a> Rescue<'a> {
         }
         let Some(told) = self.told.channels.get(&id) else { return Ok(false) };
         let schema = match self.told.schemas.get(&told.schema_id) {
-            Some((schema, data)) => self.writer("")?.add_schema(&schema.name, &schema.encoding, data)?,
+            Some((schema, data)) => self.writer.add_schema(&schema.name, &schema.encoding, data)?,
             None => 0,
         };
-        let new =
-            self.writer("")?.add_channel(schema, &told.topic, &told.message_encoding, &told.metadata)?;
+        let new = self.writer.add_channel(schema, &told.topic, &told.message_encoding, &told.metadata)?;
         self.channels.insert(id, (new, told.topic.clone()));
         Ok(true)
     }
 
-    /// The writer; created with this library's name if necessary.
-    fn writer(&mut self, library: &str) -> mcap::McapResult<&mut Writer> {
-        self.state = match std::mem::replace(&mut self.state, State::Gone) {
-            State::Waiting(file) => State::Writing(Box::new(
-                mcap::WriteOptions::new()
-                    .compression(Some(mcap::Compression::Lz4))
-                    .chunk_size(Some(CHUNK_BYTES))
-                    .library(library)
-                    .create(BufWriter::new(file))?,
-            )),
-            other => other,
-        };
-        match &mut self.state {
-            State::Writing(writer) => Ok(writer),
-            // It is only absent after a failed creation, whose error has ended the recovery.
-            State::Waiting(_) | State::Gone => Err(mcap::McapError::UnexpectedEof),
-        }
-    }
-
     /// Completes the log with what it is.
-    pub(crate) fn finish(mut self, about: &Metadata) -> Result<(), WriteError> {
-        self.close(about).map_err(|source| self.failed(source))
+    pub(crate) fn finish(self, about: &Metadata) -> Result<(), WriteError> {
+        let path = self.path.clone();
+        self.close(about).map_err(|error| WriteError::at(&path)(std::io::Error::other(error)))
     }
 
-    fn close(&mut self, about: &Metadata) -> mcap::McapResult<()> {
+    fn close(mut self, about: &Metadata) -> mcap::McapResult<()> {
         let mut waiting = std::mem::take(&mut self.waiting);
         let starts = waiting.iter_mut().filter(|message| message.place == Place::Start);
         if let Some(first) = starts.min_by_key(|message| message.header.log_time) {
@@ -233,16 +210,12 @@ impl<'a> Rescue<'a> {
         }
         waiting.sort_by_key(|message| (message.header.log_time, message.place));
         for Waiting { header, data, .. } in waiting {
-            self.writer("")?.write_to_known_channel(&header, &data)?;
+            self.writer.write_to_known_channel(&header, &data)?;
         }
-        let writer = self.writer("")?;
-        writer.write_metadata(about)?;
-        writer.finish()?;
-        if let State::Writing(writer) = std::mem::replace(&mut self.state, State::Gone) {
-            let file = writer.into_inner().into_inner().map_err(std::io::IntoInnerError::into_error)?;
-            file.commit().map_err(|error| error.source)?;
-        }
-        Ok(())
+        self.writer.write_metadata(about)?;
+        self.writer.finish()?;
+        let file = self.writer.into_inner().into_inner().map_err(std::io::IntoInnerError::into_error)?;
+        Ok(file.commit().map_err(|error| error.source)?)
     }
 
     fn failed(&self, error: mcap::McapError) -> WriteError {

@@ -16,9 +16,10 @@
 mod rerun;
 
 use std::collections::BTreeMap;
+use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, Result};
+use anyhow::Result;
 use avionics::log::frame::phase_of;
 use flight::computer::FRAME_S;
 use flight::rules::phase::Phase;
@@ -26,7 +27,7 @@ use prost::Message as _;
 use protocol::log::computer_v1::{ComputerFrame, ComputerInput, ComputerOutput};
 use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::v1;
-use protocol::log::writer::LogHeader;
+use protocol::log::writer::{LogHeader, LogWriter};
 use serde::Serialize;
 use sim::draw::draw;
 use sim::sortie::SetUpError;
@@ -36,25 +37,11 @@ use self::rerun::Rerun;
 use crate::cli::{Answer, Outcome, give, warn_of_what_is_missing};
 use crate::controller::{LoggedComputer, SETTINGS_IN_FLIGHT, phase_name};
 use crate::log::VerdictFacts;
-use crate::log::{Clock, ClockTime, Moment, NewLog, Recording, RecordingError};
-use crate::output::{Destination, Overwrite, WriteError};
+use crate::log::{Clock, ClockTime, Moment, Recording, RecordingError};
+use crate::output::{Destination, WriteError, write_whole};
 use crate::print::{counted, verdict_table};
 use crate::settings::{Setting, SettingArguments, SettingError, mission_with, truth_with};
 use crate::worst_plans::BrokenPlan;
-
-/// Where to begin.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub enum StartAt {
-    /// The first frame of the landing.
-    #[default]
-    Landing,
-    /// Its number in the log.
-    Frame(u64),
-    /// The first frame at or after this vehicle time, s.
-    Time(f64),
-    /// The frame after the one that entered this phase.
-    Phase(Phase),
-}
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct StartState {
@@ -72,8 +59,9 @@ pub struct StartState {
 /// Options of a re-flown flight.
 #[derive(Debug, Clone, Default)]
 pub struct ReflyOptions {
-    /// Where to begin.
-    pub start: StartAt,
+    /// Where to begin: at the frame, at the first one of that time, or at the one after the one that entered the phase. `None`:
+    /// at the landing's first frame.
+    pub start: Option<Moment>,
     /// Settings of controller and plant; timed ones change the controller only.
     pub settings: Vec<Setting>,
     /// Additional settings of the plant only.
@@ -103,24 +91,16 @@ pub enum ReflyError {
     #[error(transparent)]
     Setting(#[from] SettingError),
     /// The log does not say how its flight was flown, this build does not know it, the requested start is not in it, or a fault cannot
-    /// be added or left out.
-    #[error("{name}: {reason}")]
+    /// be added or left out. Or a setting belongs to the controller and not to the plant, or the other way round.
+    #[error("{of}: {reason}")]
     Refused {
-        /// The file.
-        name: String,
-        /// What is missing or unknown, and what the log has.
+        /// The file, or the setting.
+        of: String,
         reason: String,
     },
     /// The flight cannot be set up, or its world cannot be changed this way.
     #[error(transparent)]
     Flight(#[from] SetUpError),
-    /// A setting of the controller given to the plant, or the other way round, or one that does not change in flight.
-    #[error("{setting}: {belongs}")]
-    Misplaced {
-        setting: String,
-        /// Where it belongs.
-        belongs: &'static str,
-    },
 }
 
 /// How the re-flown frames before the start compare with the record.
@@ -206,7 +186,7 @@ pub fn refly_flight(
     refuse_misplaced(options)?;
     let (_, frames) = recording.recorded_frames()?;
     let mut rerun = Rerun::of(recording, &FaultChanges::default())?;
-    let place = find(recording, frames, &options.start)?;
+    let place = find(recording, frames, options.start)?;
     let first_frame = frames[place].input.frame;
     rerun = rerun.fly_before(first_frame);
     let reached = reached(recording, &rerun, &frames[..place]);
@@ -350,63 +330,73 @@ fn change(
 /// The plant takes settings of the airframe and of the draw, from the beginning; the controller takes all but those of the
 /// draw and of its estimator.
 fn refuse_misplaced(options: &ReflyOptions) -> Result<(), ReflyError> {
-    let refused = |settings: &[Setting], is_wrong: fn(&Setting) -> bool, belongs| {
-        let wrong = settings.iter().find(|setting| is_wrong(setting));
-        wrong.map_or(Ok(()), |wrong| Err(ReflyError::Misplaced { setting: wrong.to_string(), belongs }))
-    };
-    let (plant, controller) = (&options.plant_settings, &options.settings);
-    refused(
-        plant,
-        |setting| setting.at_s.is_some(),
-        "the plant's settings hold from the beginning; only the controller's can change in flight",
-    )?;
-    refused(
-        plant,
-        |setting| !(setting.path.starts_with("truth.") || setting.path.starts_with("airframe")),
-        "the plant has airframe.* and truth.*; everything else is the controller's (--set)",
-    )?;
-    refused(
-        controller,
-        |setting| setting.path.starts_with("truth."),
-        "the random draw belongs to the plant alone (--plant)",
-    )?;
-    refused(
-        controller,
-        |setting| setting.path.starts_with("estimator."),
-        "the estimator is set up at apogee; evaluate takes it",
-    )
+    let refused: [(&[Setting], fn(&Setting) -> bool, &'static str); 4] = [
+        (
+            &options.plant_settings,
+            |setting| setting.at_s.is_some(),
+            "the plant's settings hold from the beginning; only the controller's can change in flight",
+        ),
+        (
+            &options.plant_settings,
+            |setting| !(setting.path.starts_with("truth.") || setting.path.starts_with("airframe")),
+            "the plant has airframe.* and truth.*; everything else is the controller's (--set)",
+        ),
+        (
+            &options.settings,
+            |setting| setting.path.starts_with("truth."),
+            "the random draw belongs to the plant alone (--plant)",
+        ),
+        (
+            &options.settings,
+            |setting| setting.path.starts_with("estimator."),
+            "the estimator is set up at apogee; evaluate takes it",
+        ),
+    ];
+    let mut misplaced = refused.into_iter().filter_map(|(settings, is_wrong, belongs)| {
+        let setting = settings.iter().find(|setting| is_wrong(setting))?.to_string();
+        Some(ReflyError::Refused { of: setting, reason: belongs.to_owned() })
+    });
+    misplaced.next().map_or(Ok(()), Err)
 }
 
 /// The index of the frame to start with. For a phase it is the frame after the one that entered it, because changes
 /// cannot act earlier.
-fn find(recording: &Recording, frames: &[ComputerFrame], start: &StartAt) -> Result<usize, ReflyError> {
+fn find(recording: &Recording, frames: &[ComputerFrame], start: Option<Moment>) -> Result<usize, ReflyError> {
     let logged = |frame: &ComputerFrame| recording.release_frame + frame.input.frame;
     let in_phase = |wanted: &dyn Fn(Phase) -> bool| {
         let entered = frames.iter().position(|frame| phase_of(&frame.output).is_some_and(wanted))?;
         Some(entered + 1).filter(|place| *place < frames.len())
     };
-    let [first, last] = [frames.first(), frames.last()].map(|frame| frame.map_or(0, logged));
     let (found, reason) = match start {
-        StartAt::Landing => (
+        None => (
             in_phase(&Phase::is_landing),
             "no frame of a landing to start from; a frame, a time or a phase names another moment".to_owned(),
         ),
-        StartAt::Frame(number) => (
-            frames.iter().position(|frame| logged(frame) == *number),
-            format!("no frame {number}; there are {first} to {last}"),
-        ),
-        StartAt::Time(time_s) => (
-            frames.iter().position(|frame| frame.input.time_s >= *time_s),
-            format!(
-                "no frame at or after {time_s} s; the last is at {:.3} s",
-                frames.last().map_or(0.0, |frame| frame.input.time_s)
+        Some(Moment::Frame(number)) => {
+            let [first, last] = [frames.first(), frames.last()].map(|frame| frame.map_or(0, logged));
+            (
+                frames.iter().position(|frame| logged(frame) == number),
+                format!("no frame {number}; there are {first} to {last}"),
+            )
+        }
+        Some(Moment::Time(time)) => match recording.clocks.convert(time, Clock::Flight) {
+            Some(ClockTime { time_s, .. }) => (
+                frames.iter().position(|frame| frame.input.time_s >= time_s),
+                format!(
+                    "no frame at or after {time_s} s; the last is at {:.3} s",
+                    frames.last().map_or(0.0, |frame| frame.input.time_s)
+                ),
             ),
-        ),
-        StartAt::Phase(phase) => {
-            (in_phase(&|found| found == *phase), format!("no frame in phase {}", phase.name()))
+            None => (
+                None,
+                format!("does not say when T+0 was on the clock of {time}; give the time as T+SECONDS"),
+            ),
+        },
+        Some(Moment::Phase(phase)) => {
+            (in_phase(&|found| found == phase), format!("no frame in phase {}", phase.name()))
         }
     };
-    found.ok_or_else(|| ReflyError::Refused { name: recording.name.clone(), reason })
+    found.ok_or_else(|| ReflyError::Refused { of: recording.name.clone(), reason })
 }
 
 /// The smallest distance to a limit as a fraction of it; see [`ReflyReport::margin`].
@@ -434,11 +424,13 @@ pub fn write_log<'a>(
         profile_toml: recording.profile_toml().ok().map(str::to_owned),
         scenario_toml: recording.head.scenario_toml.clone(),
     };
-    let mut log = NewLog::create(destination.into(), Path::new(&recording.name), &header)?;
-    for (time_s, record) in &flight.records {
-        log.write(record, (time_s * 1e9) as u64)?;
-    }
-    log.finish()
+    write_whole(destination.into(), Path::new(&recording.name), |file| {
+        let mut log = LogWriter::new(BufWriter::new(file), &header).map_err(io::Error::other)?;
+        for (time_s, record) in &flight.records {
+            log.write(record, (time_s * 1e9) as u64).map_err(io::Error::other)?;
+        }
+        log.finish().map_err(io::Error::other)?.flush()
+    })
 }
 
 /// Facts about the run of a re-flown flight.
@@ -569,15 +561,9 @@ pub(crate) struct Args {
 impl Args {
     pub(crate) fn run(self) -> Result<Outcome> {
         let recording = Recording::open(&self.file)?;
-        let start = match self.at {
-            Some(Moment::Frame(frame)) => StartAt::Frame(frame),
-            Some(Moment::Time(time)) => StartAt::Time(flight_time_s(&recording, time)?),
-            Some(Moment::Phase(phase)) => StartAt::Phase(phase),
-            None => StartAt::Landing,
-        };
         warn_of_what_is_missing(&recording);
         let options = ReflyOptions {
-            start,
+            start: self.at,
             settings: self.settings.all()?,
             plant_settings: self.plant,
             seed: self.seed,
@@ -585,17 +571,9 @@ impl Args {
         };
         let (report, flight) = refly_flight(&recording, &options)?;
         if let Some(path) = &self.log {
-            let destination = Destination { path, overwrite: Overwrite::if_forced(self.force) };
+            let destination = Destination { path, force: self.force };
             write_log(destination, &recording, &flight)?;
         }
         give(&report, self.json)
     }
-}
-
-fn flight_time_s(recording: &Recording, time: ClockTime) -> Result<f64> {
-    let converted = recording.clocks.convert(time, Clock::Flight);
-    let name = &recording.name;
-    converted.map(|time| time.time_s).with_context(|| {
-        format!("--at {time}: {name} does not say when its T+0 was on that clock; give the time as T+SECONDS")
-    })
 }

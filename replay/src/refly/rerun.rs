@@ -62,7 +62,7 @@ impl Rerun {
     pub(super) fn of(recording: &Recording, changes: &FaultChanges) -> Result<Self, ReflyError> {
         let (start, frames) = recording.recorded_frames()?;
         let lacking = |reason: String| ReflyError::Refused {
-            name: recording.name.clone(),
+            of: recording.name.clone(),
             reason: format!("cannot be flown again from its start: {reason}"),
         };
         let run = &recording.head.run;
@@ -159,7 +159,7 @@ fn changed(
     recorded: &[TimedFault],
     changes: &FaultChanges,
 ) -> Result<Vec<TimedFault>, ReflyError> {
-    let refused = |reason| ReflyError::Refused { name: recording.name.clone(), reason };
+    let refused = |reason| ReflyError::Refused { of: recording.name.clone(), reason };
     let mut faults = recorded.to_vec();
     for without in &changes.without {
         // `gnss-out` means every one of that name, `gnss-out@5` just that one.

@@ -16,7 +16,7 @@ use track::Flight;
 use crate::cli::{Outcome, answer};
 use crate::info::{Completeness, Info, described};
 use crate::log::{Recording, RecordingError};
-use crate::output::{Destination, Overwrite, same_file, write_whole};
+use crate::output::{Destination, same_file, write_whole};
 
 /// A flight's page.
 #[derive(Debug, Clone)]
@@ -78,7 +78,7 @@ impl Args {
             if self.with.as_deref().is_some_and(|with| same_file(with, &path)) {
                 bail!("{}: is a log that is being read", path.display());
             }
-            let destination = Destination { path: &path, overwrite: Overwrite::if_forced(self.force) };
+            let destination = Destination { path: &path, force: self.force };
             write_whole(destination, &self.file, |file| file.write_all(html))?;
             answer(|output| writeln!(output, "{}", path.display()))?;
         }

@@ -217,22 +217,13 @@ fn element_name(name: &str, element: usize) -> String {
     format!("{}_{}{unit}", name.strip_suffix(unit).unwrap_or(name), element + 1)
 }
 
+/// `None` for what has no cell: messages, enums, bytes.
 fn kind_of(field: &FieldDescriptor) -> Option<Kind> {
-    match field.kind() {
-        FieldKind::Double | FieldKind::Float => Some(Kind::Float),
-        FieldKind::Int32
-        | FieldKind::Int64
-        | FieldKind::Uint32
-        | FieldKind::Uint64
-        | FieldKind::Sint32
-        | FieldKind::Sint64
-        | FieldKind::Fixed32
-        | FieldKind::Fixed64
-        | FieldKind::Sfixed32
-        | FieldKind::Sfixed64
-        | FieldKind::Bool => Some(Kind::Integer),
-        FieldKind::String => Some(Kind::Text),
-        _ => None,
+    match cell_of(&Value::default_value(&field.kind())) {
+        Cell::Float(_) => Some(Kind::Float),
+        Cell::Integer(_) => Some(Kind::Integer),
+        Cell::Text(_) => Some(Kind::Text),
+        Cell::Absent => None,
     }
 }
 

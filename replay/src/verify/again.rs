@@ -7,8 +7,8 @@ use prost::Message as _;
 use protocol::log::v1::LandingVerdict;
 
 use super::parts::Part;
-use crate::log::Recording;
-use crate::refly::{ReflyError, ReflyOptions, StartAt, refly_flight};
+use crate::log::{Moment, Recording};
+use crate::refly::{ReflyError, ReflyOptions, refly_flight};
 
 /// The facts that a simulated flight is drawn from.
 const DRAWN_FROM: [&str; 3] = ["seed", "flight", "dispersion"];
@@ -21,10 +21,8 @@ pub(super) fn compare(path: &Path, simulated: bool, verdict: &mut Part, facts: &
             return Ok(None);
         }
         // Up to its last frame it is compared frame by frame, and then its end.
-        let start = recording
-            .frames
-            .last()
-            .map_or(StartAt::Landing, |last| StartAt::Frame(recording.release_frame + last.input.frame));
+        let start =
+            recording.frames.last().map(|last| Moment::Frame(recording.release_frame + last.input.frame));
         let options = ReflyOptions { start, ..ReflyOptions::default() };
         let (report, reflown) = refly_flight(&recording, &options)?;
         let bytes = |verdict: Option<&LandingVerdict>| verdict.map(LandingVerdict::encode_to_vec);

@@ -15,10 +15,10 @@ use serde::{Deserialize, Serialize};
 use super::{Obstacle, Verification, VerifyReport, verify};
 use crate::cli::{Answer, Outcome, give, say};
 use crate::digest::digest;
-use crate::log::{Entry, FlightLog, LogError, Recording};
-use crate::output::{Destination, Overwrite, write_whole};
+use crate::log::{Entry, FlightLog, LogError, Moment, Recording};
+use crate::output::{Destination, write_whole};
 use crate::print::{columns, counted, print_json};
-use crate::refly::{ReflyOptions, StartAt, margin, refly};
+use crate::refly::{ReflyOptions, margin, refly};
 
 /// A margin that changed by no more than this is the same; 1 is from the middle of the limits to their edge.
 const SAME_MARGIN: f64 = 0.02;
@@ -141,8 +141,7 @@ fn fly(path: &Path) -> Option<Flight> {
     let again = Recording::open(path).map_err(Into::into).and_then(|recording| {
         // From its first frame on, the whole flight is this build's.
         let first = recording.frames.first().map(|first| recording.release_frame + first.input.frame);
-        let start = first.map_or(StartAt::Landing, StartAt::Frame);
-        refly(&recording, &ReflyOptions { start, ..ReflyOptions::default() })
+        refly(&recording, &ReflyOptions { start: first.map(Moment::Frame), ..ReflyOptions::default() })
     });
     let (flown, ending) = match again {
         Ok(report) => (report.reflown, None),
@@ -254,7 +253,7 @@ impl Arguments {
             bail!("nothing is accepted: {log}: {}; mend it or take it out of the directory", flight.words);
         }
         ensure!(!now.is_empty(), "nothing is accepted: none of the logs holds a flight");
-        let destination = Destination { path, overwrite: Overwrite::Always };
+        let destination = Destination { path, force: true };
         write_whole(destination, Path::new(""), |file| print_json(&now, file))?;
         say(&format!("accepted: {}", path.display()));
         Ok(Outcome::Given)

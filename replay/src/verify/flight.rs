@@ -15,19 +15,21 @@ use super::{FlightPlace, Obstacle, Verification, VerifyReport};
 use crate::controller::LoggedComputer;
 use crate::log::{
     Cut, Entry, FlightLog, FrameOrder, Gap, Head, LogError, LoggedFrame, Recording, StampedEntry,
-    VerdictFacts, misread_frame, summary_of,
+    VerdictFacts, misread_frame,
 };
+use crate::recover::summary_of;
 use crate::refly::{ReflyOptions, refly};
 
 /// One flight being verified.
+#[derive(Default)]
 pub(super) struct FlightVerifier {
     computer: Option<LoggedComputer>,
     /// The computer has begun at its power-up, and was not built anew at its release.
     from_power_up: bool,
     /// The log has the power-up.
     has_power_up: bool,
-    /// The computer remembers what the recorded one did.
-    remembers: bool,
+    /// The computer was built at a release, and remembers less than the recorded one.
+    remembers_less: bool,
     order: FrameOrder,
     tally: Tally,
     inputs: Inputs,
@@ -51,6 +53,7 @@ struct Awaited {
 }
 
 /// What was compared beside the frames.
+#[derive(Default)]
 struct Parts {
     inputs: Part,
     digests: u64,
@@ -66,31 +69,8 @@ impl FlightVerifier {
     /// A flight before its first record. `behind_another`: another flight comes before it in the log. `unreadable`: why
     /// a record that may have been its beginning could not be read.
     pub(super) fn new(behind_another: bool, unreadable: Option<String>) -> Self {
-        Self {
-            computer: None,
-            from_power_up: false,
-            has_power_up: false,
-            remembers: true,
-            order: if behind_another { FrameOrder::behind_another() } else { FrameOrder::default() },
-            tally: Tally::default(),
-            inputs: Inputs::default(),
-            awaited: Awaited::default(),
-            parts: Parts {
-                inputs: Part::of("inputs", 0),
-                digests: 0,
-                thoughts: Part::of("estimates", 0),
-                starts: Part::of("starts", 0),
-                verdicts: 0,
-                truth: 0,
-                events: 0,
-                timing: 0,
-            },
-            frames: 0,
-            flies: false,
-            obstacle: None,
-            on_the_pad: None,
-            unreadable,
-        }
+        let order = if behind_another { FrameOrder::behind_another() } else { FrameOrder::default() };
+        Self { order, unreadable, ..Self::default() }
     }
 
     /// Takes a record of the flight.
@@ -148,14 +128,14 @@ impl FlightVerifier {
             Ok(computer) => {
                 // What it begins from decides what it does.
                 starts.compared += 1;
-                self.remembers = !start.released || (self.frames == 0 && start.frame == 0);
-                self.computer = Some(if self.remembers { computer } else { computer.without_digests() });
+                self.remembers_less = start.released && (self.frames > 0 || start.frame > 0);
+                self.computer = Some(if self.remembers_less { computer.without_digests() } else { computer });
                 self.from_power_up = !start.released;
                 self.has_power_up |= self.from_power_up;
                 self.on_the_pad = self.obstacle.take();
                 self.awaited.release.clear();
             }
-            Err(error) => self.obstacle = Some(Obstacle::ProfileUnreadable { reason: error.to_string() }),
+            Err(error) => self.obstacle = Some(Obstacle::ProfileUnreadable(error.to_string())),
         }
         Ok(())
     }
@@ -182,18 +162,18 @@ impl FlightVerifier {
         }
         let obstacle = match (lost.filter(|_| !begins), &mut self.computer) {
             (_, None) => Some(match misread_frame(data) {
-                Some(reason) => Obstacle::Unreadable { reason },
+                Some(reason) => Obstacle::Unreadable(reason),
                 None => Obstacle::NoStart,
             }),
-            (Some(Gap { after: 0, before }), _) => Some(Obstacle::BeginningMissing { first: before }),
-            (Some(Gap { after, before }), _) => Some(Obstacle::Gap { after, before }),
+            (Some(Gap { after: 0, before }), _) => Some(Obstacle::BeginningMissing(before)),
+            (Some(gap), _) => Some(Obstacle::Gap(gap)),
             (None, Some(computer)) => match computer.run_again(&frame.record) {
                 Ok(again) => {
                     if let Err(reason) = self.tally.compare(frame, data, &again) {
-                        self.obstacle = Some(Obstacle::Unreadable { reason });
+                        self.obstacle = Some(Obstacle::Unreadable(reason));
                         return;
                     }
-                    self.parts.digests += u64::from(self.remembers);
+                    self.parts.digests += u64::from(!self.remembers_less);
                     if again.output.released {
                         self.parts.starts.recorded += 1;
                         encode_into(&computer.as_start(), &mut self.awaited.release);
@@ -207,7 +187,7 @@ impl FlightVerifier {
                     None
                 }
                 Err(error) => Some(match misread_frame(data) {
-                    Some(reason) => Obstacle::Unreadable { reason },
+                    Some(reason) => Obstacle::Unreadable(reason),
                     None => Obstacle::Frame(error),
                 }),
             },
@@ -238,8 +218,8 @@ impl FlightVerifier {
         let Tally { compared, different, first, last, .. } = self.tally;
         let obstacle = match (self.obstacle.or(self.on_the_pad), self.unreadable) {
             // An unreadable frame leaves a gap; the reason why it is unreadable says more than the gap.
-            (None | Some(Obstacle::Gap { .. } | Obstacle::BeginningMissing { .. }), Some(reason)) => {
-                Some(Obstacle::Unreadable { reason })
+            (None | Some(Obstacle::Gap(_) | Obstacle::BeginningMissing(_)), Some(reason)) => {
+                Some(Obstacle::Unreadable(reason))
             }
             // If nothing was compared, the result must not be "identical".
             (None, None) if compared == 0 && self.computer.is_some() => Some(Obstacle::NoFrames),
@@ -248,9 +228,9 @@ impl FlightVerifier {
         };
         let head = log.head();
         let obstacle = match obstacle {
-            Some(Obstacle::Unreadable { .. } | Obstacle::NoComputer) => obstacle,
+            Some(Obstacle::Unreadable(_) | Obstacle::NoComputer) => obstacle,
             _ if head.is_of_this_schema() => obstacle,
-            _ => Some(Obstacle::Schema { found: head.schema_version().unwrap_or("none").to_owned() }),
+            _ => Some(Obstacle::Schema(head.schema_version().unwrap_or("none").to_owned())),
         };
         // Damage ends the reading, so it belongs to the last flight.
         let damage = log.damage().filter(|_| flight.is_none_or(|flight| flight.number == flight.of));
@@ -301,12 +281,12 @@ impl FlightVerifier {
             None => Part::of("metadata", 1).because(alone()),
         };
         vec![
-            parts.inputs.clone(),
+            Part { name: "inputs", follows: true, ..parts.inputs.clone() },
             part("frames", tally.compared, tally.different),
             part("outputs", tally.compared, tally.outputs_different),
-            if self.remembers { digests } else { digests.because(remembers_less) },
-            Part { why, ..thoughts.clone() },
-            parts.starts.clone(),
+            if self.remembers_less { digests.because(remembers_less) } else { digests },
+            Part { name: "estimates", why, follows: true, ..thoughts.clone() },
+            Part { name: "starts", follows: true, ..parts.starts.clone() },
             Part::of("verdict", parts.verdicts).because(alone()),
             metadata,
             Part::beside("truth", parts.truth),
@@ -326,7 +306,7 @@ fn text_of<R: Read>(
     };
     Ok(match found {
         None => Err(Obstacle::NoProfile),
-        Some(Err(error)) => Err(Obstacle::ProfileUnreadable { reason: error.to_string() }),
+        Some(Err(error)) => Err(Obstacle::ProfileUnreadable(error.to_string())),
         Some(Ok(text)) => Ok(text),
     })
 }

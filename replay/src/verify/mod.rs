@@ -41,10 +41,10 @@ use protocol::log::reader::Damage;
 use protocol::log::record::{SCHEMA_VERSION, TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START, TOPIC_VERDICT};
 use serde::Serialize;
 
-use crate::cli::{Answer, Outcome, give, say, warn_of_cut, warn_of_damage};
+use crate::cli::{Answer, Outcome, give_each, say, warn_of_cut, warn_of_damage};
 use crate::controller::FrameError;
 use crate::log::{
-    BuildComparison, Cut, Entry, FlightLog, Flights, Head, LogError, LoggedFlight, Recording, VerdictFacts,
+    BuildComparison, Cut, Entry, FlightLog, Gap, Head, LogError, LoggedFlight, Recording, VerdictFacts,
 };
 use crate::print::counted;
 
@@ -116,12 +116,11 @@ pub fn verify_log<R: Read>(
     log: &mut FlightLog<R>,
     whole_head: impl Fn() -> Result<Head, LogError>,
 ) -> Result<Vec<VerifyReport>, LogError> {
-    let mut flights = Flights::default();
     let mut computers: Vec<FlightVerifier> = Vec::new();
     // An unreadable record before the first flight may have been its beginning.
     let mut unreadable = None;
     while let Some(stamped) = log.next_entry()? {
-        if flights.note(&stamped) {
+        if log.flights().found().len() > computers.len() {
             computers.push(FlightVerifier::new(!computers.is_empty(), unreadable.take()));
         }
         let Some(computer) = computers.last_mut() else {
@@ -138,7 +137,7 @@ pub fn verify_log<R: Read>(
     let of = computers.len();
     let report = |(place, computer): (usize, FlightVerifier)| {
         let flight = (of > 1).then_some(FlightPlace { number: place + 1, of });
-        computer.into_report(log, flight, flights.found().get(place).and_then(LoggedFlight::cut))
+        computer.into_report(log, flight, log.flights().found().get(place).and_then(LoggedFlight::cut))
     };
     Ok(computers.into_iter().enumerate().map(report).collect())
 }
@@ -171,32 +170,21 @@ pub enum Obstacle {
     #[error("it has no attachment profile.toml, and without the profile the controller cannot be built")]
     NoProfile,
     /// This build cannot use the profile in the log.
-    #[error("its profile cannot be used by this build: {reason}")]
-    ProfileUnreadable {
-        /// What is wrong with the profile.
-        reason: String,
-    },
-    /// The log does not begin with the first frame.
+    #[error("its profile cannot be used by this build: {0}")]
+    ProfileUnreadable(String),
+    /// The log does not begin with the first frame, but with this one.
     #[error(
-        "it begins with frame {first}, and the frames before it are missing: what the flight computer remembered then is unknown"
+        "it begins with frame {0}, and the frames before it are missing: what the flight computer remembered then is unknown"
     )]
-    BeginningMissing {
-        /// The first frame in the log.
-        first: u64,
-    },
+    BeginningMissing(u64),
     /// Frames are missing.
     #[error(
-        "after frame {after} comes frame {before}: what the flight computer remembered there is unknown, and nothing behind the gap was compared"
+        "after frame {} comes frame {}: what the flight computer remembered there is unknown, and nothing behind the gap was compared",
+        .0.after, .0.before
     )]
-    Gap {
-        /// The last frame before the gap.
-        after: u64,
-        /// The first frame after the gap.
-        before: u64,
-    },
-    /// A record cannot be read.
-    #[error("a record cannot be read: {reason}")]
-    Unreadable { reason: String },
+    Gap(Gap),
+    #[error("a record cannot be read: {0}")]
+    Unreadable(String),
     /// A flight computer was released, and none of its frames follow.
     #[error("it has a record /computer/start and no frame of the flight computer behind it")]
     NoFrames,
@@ -204,11 +192,8 @@ pub enum Obstacle {
     #[error("it has frames of the flight computer and no record /computer/start before them to begin from")]
     NoStart,
     /// The log's contents are of another version.
-    #[error("it says that its contents have version {found}; this build reads {SCHEMA_VERSION}")]
-    Schema {
-        /// What the log says.
-        found: String,
-    },
+    #[error("it says that its contents have version {0}; this build reads {SCHEMA_VERSION}")]
+    Schema(String),
     /// A frame cannot be given to this build's flight computer.
     #[error("{0}")]
     Frame(#[from] FrameError),
@@ -434,7 +419,8 @@ impl Divergence {
         for FieldDifference { path, recorded, recomputed, ulps } in self.fields.iter().take(FIELDS_SHOWN) {
             lines.push(format!("  {path}"));
             for (name, FieldValue { value, bits }) in [("recorded", recorded), ("recomputed", recomputed)] {
-                lines.push(format!("    {name:<10}  {value:<24}  {}", bits.as_deref().unwrap_or_default()));
+                let line = format!("    {name:<10}  {value:<24}  {}", bits.as_deref().unwrap_or_default());
+                lines.push(line.trim_end().to_owned());
             }
             lines.extend(ulps.map(|ulps| format!("    apart       {ulps} ULP")));
         }
@@ -508,34 +494,19 @@ impl Args {
         for file in &self.files {
             if file.is_dir() { files.extend(baseline::logs_of(file)?) } else { files.push(file.clone()) }
         }
-        let (mut reports, mut outcome) = (Vec::new(), Outcome::Given);
-        for file in &files {
+        give_each(&files, self.json, |file| {
             #[expect(clippy::disallowed_methods, reason = "tells the user how fast it was; decides nothing")]
             let started = Instant::now();
-            match if self.strict { verify_strictly(file) } else { verify(file) } {
-                Ok(found) => {
-                    let took = started.elapsed();
-                    for report in &found {
-                        warn_of_damage(&report.file, report.damage.as_deref());
-                        warn_of_cut(&report.file, report.cut.as_ref());
-                        warn_of_build(report);
-                    }
-                    say_speed(&found, took);
-                    reports.extend(found);
-                }
-                Err(error) if files.len() == 1 => return Err(error.into()),
-                // One unreadable log must not hide the results of the others.
-                Err(error) => {
-                    say(&format!("{:#}", anyhow::Error::from(error)));
-                    outcome = Outcome::NotAll;
-                }
+            let found = if self.strict { verify_strictly(file)? } else { verify(file)? };
+            let took = started.elapsed();
+            for report in &found {
+                warn_of_damage(&report.file, report.damage.as_deref());
+                warn_of_cut(&report.file, report.cut.as_ref());
+                warn_of_build(report);
             }
-        }
-        let given = match reports.as_slice() {
-            [report] if files.len() == 1 => give(report, self.json)?,
-            _ => give(&reports, self.json)?,
-        };
-        Ok(given.or_worse(outcome))
+            say_speed(&found, took);
+            Ok(found)
+        })
     }
 }
 

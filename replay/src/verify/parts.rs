@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::print::columns;
 
 /// A part of a record.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
 pub struct Part {
     pub name: &'static str,
     /// How many of it there are, or should be.
@@ -22,7 +22,7 @@ pub struct Part {
 
 impl Part {
     pub(super) fn of(name: &'static str, recorded: u64) -> Self {
-        Self { name, recorded, compared: 0, different: 0, why: None, follows: true }
+        Self { name, recorded, follows: true, ..Self::default() }
     }
 
     /// A part that follows from nothing that is recorded.

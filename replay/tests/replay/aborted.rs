@@ -2,8 +2,8 @@
 
 use avionics::log::frame::accepts_abort;
 use flight::rules::phase::Phase;
-use replay::log::Recording;
-use replay::refly::{ReflyOptions, StartAt, refly_flight};
+use replay::log::{Moment, Recording};
+use replay::refly::{ReflyOptions, refly_flight};
 use replay::verify::{Verification, verify};
 
 use crate::flown::only;
@@ -16,7 +16,7 @@ fn an_aborted_flight_from_apogee_verifies_and_is_reflown_identically() {
     assert_eq!(recording.frames.iter().filter(|frame| accepts_abort(frame)).count(), 1);
     let report = only(verify(&aborted.log).unwrap());
     assert_eq!((report.outcome, report.obstacle), (Verification::Identical, None));
-    let landing = ReflyOptions { start: StartAt::Phase(Phase::Powered), ..ReflyOptions::default() };
+    let landing = ReflyOptions { start: Some(Moment::Phase(Phase::Powered)), ..ReflyOptions::default() };
     let (report, again) = refly_flight(&recording, &landing).unwrap();
     assert_eq!(report.commands_identical, report.frames, "the moment that was drawn is drawn again");
     assert_eq!(again.verdict, recording.verdict);

@@ -4,20 +4,17 @@ use std::io::Write as _;
 use std::process::Stdio;
 
 use replay::log::Recording;
+use serde_json::Value;
 
-use crate::command_line::{replay, run};
+use crate::command_line::{data, refusal, replay, run};
 use crate::from_apogee::LANDED;
 use crate::simulated::{DISPERSED, MK2};
 
 #[test]
 fn another_seed_is_named_in_the_answer_and_in_the_log() {
     let path = DISPERSED.beside("seed.mcap");
-    let (code, stdout, stderr) =
-        run(replay("refly", &DISPERSED.log).args(["--seed", "77", "--log"]).arg(&path));
-    assert!(
-        code == 0 && stdout.contains("plant drawn with seed 77 instead of the recorded one"),
-        "{stdout}{stderr}"
-    );
+    let (code, report) = data(replay("refly", &DISPERSED.log).args(["--seed", "77", "--log"]).arg(&path));
+    assert_eq!((code, &report["seed"]), (0, &77.into()));
     let run_facts = Recording::open(&path).unwrap().head.run;
     assert_eq!(run_facts["seed"], "77");
     assert_eq!(run_facts["reflown_instead_of_seed"], "2");
@@ -25,34 +22,24 @@ fn another_seed_is_named_in_the_answer_and_in_the_log() {
 
 #[test]
 fn a_setting_after_the_end_of_the_flight_is_refused() {
-    for (log, setting) in
-        [(&MK2.log, "powered.weights.theta=90@600"), (&LANDED.log, "powered.weights.theta=9@600")]
-    {
-        let (code, stdout, stderr) = run(replay("evaluate", log).args(["--set", setting]));
-        assert_eq!((code, stdout.as_str()), (2, ""), "{stderr}");
-        assert!(stderr.contains("takes effect after the end of"), "{stderr}");
-        assert!(stderr.contains("whose last frame is at T+"), "{stderr}");
+    for log in [&MK2.log, &LANDED.log] {
+        let refused = refusal(replay("evaluate", log).args(["--set", "powered.weights.theta=90@600"]));
+        assert!(refused.contains("takes effect after the end of"), "{refused}");
     }
 }
 
 #[test]
 fn info_takes_several_logs_and_standard_input() {
-    let (code, stdout, _) = run(replay("info", &MK2.log).arg(&LANDED.log));
-    assert!(code == 0 && stdout.matches("grade ").count() == 2, "{stdout}");
-    let (code, stdout, stderr) = run(replay("info", &MK2.log).arg(MK2.beside("none.mcap")));
-    assert!(
-        code == 2 && stdout.contains("grade ") && stderr.contains("none.mcap: cannot be read"),
-        "{stderr}"
-    );
-    let mut child =
-        replay("info", "-".as_ref()).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+    let (code, found) = data(replay("info", &MK2.log).arg(&LANDED.log));
+    assert_eq!((code, found.as_array().unwrap().len()), (0, 2));
+    let (code, found) = data(replay("info", &MK2.log).arg(MK2.beside("none.mcap")));
+    assert_eq!((code, found.as_array().unwrap().len()), (2, 1));
+    let mut child = replay("info", "-".as_ref());
+    child.arg("--json").stdin(Stdio::piped()).stdout(Stdio::piped());
+    let mut child = child.spawn().unwrap();
     child.stdin.take().unwrap().write_all(&std::fs::read(&MK2.log).unwrap()).unwrap();
-    let output = child.wait_with_output().unwrap();
-    let text = String::from_utf8(output.stdout).unwrap();
-    assert!(
-        output.status.success() && text.starts_with("standard input\n") && text.contains("bit-exact"),
-        "{text}"
-    );
+    let found: Value = serde_json::from_slice(&child.wait_with_output().unwrap().stdout).unwrap();
+    assert_eq!((&found["file"], &found["grade"]["level"]), (&"standard input".into(), &"bit-exact".into()));
 }
 
 /// A message and its cause do not repeat each other.

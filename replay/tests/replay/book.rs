@@ -128,5 +128,5 @@ fn a_file_that_is_no_log_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let text = folder.path().join("a.txt");
     std::fs::write(&text, "no log").unwrap();
-    assert!(audit_logs(&[&text], None).unwrap_err().to_string().contains("not an MCAP file"));
+    assert!(audit_logs(&[&text], None).unwrap_err().to_string().contains("is not a flight log"));
 }

@@ -6,7 +6,7 @@ use foxglove::messages::FrameTransform;
 use prost::Message as _;
 use replay::log::{Clock, ClockTime, Entry, FlightLog};
 
-use crate::command_line::{replay, run};
+use crate::command_line::{data, refusal, replay};
 use crate::from_apogee::LANDED;
 use crate::simulated::MK2;
 
@@ -70,9 +70,7 @@ fn a_flight_is_flown_again_from_a_time_of_any_clock() {
             };
             // Just before the frame, because times in text are rounded.
             let given = format!("{prefix}{:.4}", time_s - 0.002);
-            let (code, stdout, stderr) = run(replay("refly", &MK2.log).args(["--at", &given, "--json"]));
-            assert_eq!(code, 0, "{stderr}");
-            let report: serde_json::Value = serde_json::from_str(&stdout).unwrap();
+            let (_, report) = data(replay("refly", &MK2.log).args(["--at", &given]));
             report["start"]["frame"].as_u64().unwrap()
         })
         .collect();
@@ -80,8 +78,11 @@ fn a_flight_is_flown_again_from_a_time_of_any_clock() {
     let boot_s = clocks.convert(moment, Clock::Boot).unwrap().time_s;
     assert!(boot_s > 15.0, "the countdown and the rehearsal come before it: {boot_s}");
     // A campaign's log does not know when its computer was powered up.
-    let (code, _, stderr) = run(replay("refly", &LANDED.log).args(["--at", "boot:15"]));
-    assert!(code == 2 && stderr.contains("give the time as T+SECONDS"), "{stderr}");
-    let (code, _, stderr) = run(replay("refly", &MK2.log).args(["--at", "utc:15"]));
-    assert!(code == 2 && stderr.contains("as in T+12.9, boot:19.8 or log:19.7"), "{stderr}");
+    for (log, at, words) in [
+        (&LANDED.log, "boot:15", "give the time as T+SECONDS"),
+        (&MK2.log, "utc:15", "as in T+12.9, boot:19.8 or log:19.7"),
+    ] {
+        let refused = refusal(replay("refly", log).args(["--at", at]));
+        assert!(refused.contains(words), "{refused}");
+    }
 }

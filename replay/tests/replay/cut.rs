@@ -63,8 +63,6 @@ fn a_span_keeps_what_later_records_hang_on_and_is_verified_to_its_end() {
     assert!(frames.len() < flown.len() && frames[..] == flown[..frames.len()]);
     let described = info(&made.path).unwrap();
     assert!(described.run["cut_from"].contains("from POWERED, until TOUCHDOWN"));
-    let (_, said, _) = run(&mut replay("info", &made.path));
-    assert!(said.contains("messages cut out or lost; the flight ends"), "{said}");
 }
 
 #[test]
@@ -85,13 +83,15 @@ fn what_cannot_be_cut_is_refused_with_the_reason() {
     let refused = |from, topics: &[&str]| made(from, None, topics).err().unwrap().to_string();
     assert!(refused(Some("BOOST"), &[]).ends_with("has no BOOST"));
     assert!(refused(Some("frame:999999"), &[]).ends_with("has no frame 999999"));
-    assert!(refused(None, &["/nothing"]).contains("it has /"));
+    assert!(
+        matches!(made(None, None, &["/nothing"]), Err(CutError::Nothing { topics, .. }) if topics.len() > 3)
+    );
     let backwards = made(Some("TOUCHDOWN"), Some("POWERED"), &[]).err().unwrap().to_string();
     assert!(backwards.ends_with("POWERED is before TOUCHDOWN: nothing lies between"), "{backwards}");
     let folder = tempfile::tempdir().unwrap();
     let half = folder.path().join("half.mcap");
     let bytes = std::fs::read(&WITH_FRAMES.log).unwrap();
     std::fs::write(&half, &bytes[..bytes.len() / 2]).unwrap();
-    let refused = cut(&half, &Wanted::default(), &folder.path().join("cut.mcap")).unwrap_err();
-    assert!(refused.to_string().contains("replay recover"), "{refused}");
+    let refused = cut(&half, &Wanted::default(), &folder.path().join("cut.mcap"));
+    assert!(matches!(refused, Err(CutError::Damaged { .. })));
 }

@@ -13,7 +13,7 @@ use flight::vehicle::mission::StartPoint;
 use proptest::prelude::*;
 use protocol::log::record::Record;
 use protocol::log::writer::{LogHeader, LogWriter};
-use replay::log::Recording;
+use replay::log::{Gap, Recording};
 use replay::refly::{ReflyOptions, refly};
 use replay::verify::{Obstacle, Verification, VerifyReport, verify};
 use sim::recipe::Recipe;
@@ -321,7 +321,7 @@ fn if_frames_on_the_pad_are_lost_the_pilot_is_still_verified_from_its_release() 
         let whole = flown.folder.path().join("gap.mcap");
         without_frames(&path, &whole, 500..510);
         let report = verify(&whole).unwrap().remove(0);
-        assert_eq!(report.obstacle, Some(Obstacle::Gap { after: 500, before: 511 }));
+        assert_eq!(report.obstacle, Some(Obstacle::Gap(Gap { after: 500, before: 511 })));
         assert_eq!(report.outcome, Verification::NotReplayable);
         assert_eq!(report.frames_different, 0, "{start:?}");
         // Those before the loss, and those from the release on.

@@ -11,7 +11,7 @@ use replay::info::info;
 use replay::log::import_tlog;
 use replay::log::{Clock, ClockTime, Entry, FlightLog, Recording};
 
-use crate::command_line::{replay, run};
+use crate::command_line::{data, replay};
 use crate::simulated::{Simulated, WITH_FRAMES, tlog};
 
 /// The station was started this long before the vehicle, ns.
@@ -63,8 +63,7 @@ static GROUND: LazyLock<PathBuf> = LazyLock::new(|| heard(&WITH_FRAMES));
 #[test]
 fn a_ground_log_has_the_verdict_that_was_heard() {
     {
-        let (log, vehicle) = (&*GROUND, &*WITH_FRAMES);
-        let (heard, own) = (info(log).unwrap(), info(&vehicle.log).unwrap());
+        let (heard, own) = (info(&GROUND).unwrap(), info(&WITH_FRAMES.log).unwrap());
         let (verdict, recorded) = (heard.verdict.unwrap(), own.verdict.unwrap());
         assert_eq!((verdict.landing, verdict.clock), (recorded.landing, Clock::Boot));
         let boot = own.clocks.convert(recorded.contact(), Clock::Boot).unwrap();
@@ -77,9 +76,6 @@ fn a_ground_log_has_the_verdict_that_was_heard() {
         }
         assert!(heard.phases.iter().any(|phases| phases.spans.len() > 3));
     }
-    let (code, stdout, _) = run(&mut replay("info", &GROUND));
-    assert!(code == 0 && stdout.contains("verdict     STANDS UNDAMAGED"), "{stdout}");
-    assert!(stdout.contains("side Table 2"), "{stdout}");
 }
 
 #[test]
@@ -100,9 +96,7 @@ fn every_message_becomes_a_table_with_every_field() {
     let files = export_tables(&mut log, TableFormat::Csv, &directory).unwrap();
     let names: Vec<String> =
         files.iter().map(|file| file.path.file_stem().unwrap().to_string_lossy().into_owned()).collect();
-    for message in ["heartbeat", "attitude_quaternion", "td_flight_status", "td_landing_verdict", "td_fins"] {
-        assert!(names.contains(&format!("mavlink_1_1_{message}")), "{message}: {names:?}");
-    }
+    assert!(names.contains(&"mavlink_1_1_td_fins".to_owned()), "{names:?}");
     let text = std::fs::read_to_string(directory.join("mavlink_1_1_td_landing_verdict.csv")).unwrap();
     let head = text.lines().next().unwrap();
     assert_eq!(
@@ -150,37 +144,19 @@ fn the_crews_clock_is_the_clock_of_the_log() {
     assert!(flown > 10, "{flown}");
 }
 
-/// The same messages at both ends of the link: nothing differs, at the vehicle's own times.
+/// The same messages at both ends of the link: nothing differs, at the vehicle's own times. A station that was started late and
+/// ended early is compared while it heard the vehicle.
 #[test]
-fn a_ground_log_is_compared_with_the_vehicles_own() {
-    {
-        let (log, vehicle) = (&*GROUND, &*WITH_FRAMES);
-        let (code, stdout, stderr) = run(replay("compare", &vehicle.log).arg(log).arg("--json"));
-        assert_eq!(code, 0, "{stdout}{stderr}");
-        let report: serde_json::Value = serde_json::from_str(&stdout).unwrap();
-        let signals: Vec<&str> = report[0]["signals"]
-            .as_array()
-            .unwrap()
-            .iter()
-            .map(|signal| signal["signal"].as_str().unwrap())
-            .collect();
-        assert!(signals.len() > 50 && signals.iter().all(|name| name.starts_with("mavlink_1_1_")));
-        assert!(signals.contains(&"mavlink_1_1_local_position_ned.x"), "{signals:?}");
-    }
-}
-
-/// A station that was started late and ended early is compared while it heard the vehicle.
-#[test]
-fn a_ground_log_is_compared_while_both_recorded() {
+fn a_ground_log_is_compared_with_the_vehicles_own_while_both_recorded() {
     const SECOND_NS: u64 = 1_000_000_000;
-    let vehicle = &WITH_FRAMES;
-    let on = |at_ns| (3 * SECOND_NS..11 * SECOND_NS).contains(&at_ns);
-    let some = heard_while(vehicle, "late", on);
-    let (code, stdout, stderr) = run(replay("compare", &vehicle.log).arg(&some));
-    assert_eq!(code, 1, "only the verdicts differ: {stdout}{stderr}");
-    assert!(
-        stdout.contains("compared while both recorded: ") && stdout.contains("0 missing, 0 added"),
-        "{stdout}"
-    );
-    assert!(stdout.contains("the verdicts differ"), "{stdout}");
+    let late = heard_while(&WITH_FRAMES, "late", |at_ns| (3 * SECOND_NS..11 * SECOND_NS).contains(&at_ns));
+    for (log, expected, failures) in [(&*GROUND, 0, 0), (&late, 1, 1)] {
+        let (code, report) = data(replay("compare", &WITH_FRAMES.log).arg(log));
+        assert_eq!((code, report[0]["failures"].as_array().unwrap().len()), (expected, failures), "{report}");
+        let signals = report[0]["signals"].as_array().unwrap();
+        let names = || signals.iter().map(|signal| signal["signal"].as_str().unwrap());
+        assert!(signals.len() > 50 && names().all(|name| name.starts_with("mavlink_1_1_")));
+        assert!(names().any(|name| name == "mavlink_1_1_local_position_ned.x"));
+        assert!(report[0]["both_recorded_s"].is_array() && report[0]["missing"] == report[0]["added"]);
+    }
 }

@@ -51,7 +51,7 @@ fn a_log_in_another_order_is_called_that_and_is_whole_again_once_sorted() {
             other.write(&log);
             assert_refused_as_unordered(&log, directory.path());
             let recovery = recover(&log, &sorted).unwrap();
-            assert!(recovery.sorted && recovery.was_whole(), "{recovery:?}");
+            assert!(recovery.sorted && recovery.fault().is_none(), "{recovery:?}");
             let again = Held::read(&sorted);
             assert!(again.messages.is_sorted_by_key(|message| message.log_time_ns));
             assert_eq!(again.facts(), held.facts());
@@ -77,5 +77,5 @@ fn records_that_come_a_little_late_are_no_other_order() {
     held.write(&log);
     assert_eq!(only(verify(&log).unwrap()).outcome, Verification::Identical);
     let recovery = recover(&log, &directory.path().join("again.mcap")).unwrap();
-    assert!(!recovery.sorted && recovery.was_whole(), "{recovery:?}");
+    assert!(!recovery.sorted && recovery.fault().is_none(), "{recovery:?}");
 }

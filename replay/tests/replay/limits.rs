@@ -7,10 +7,10 @@ use proptest::prelude::*;
 use protocol::log::computer_v1::{ComputerFrame, Request};
 use protocol::log::record::Record;
 use protocol::log::writer::{LogHeader, LogWriter};
-use replay::compare::{Align, Flown, Tolerances, compare};
+use replay::compare::{Flown, Tolerances, compare};
 use replay::evaluate::evaluate;
-use replay::log::Recording;
-use replay::refly::{ReflyOptions, StartAt, refly};
+use replay::log::{Moment, Recording};
+use replay::refly::{ReflyOptions, refly};
 use replay::report::report;
 use replay::verify::explain::explain;
 
@@ -151,7 +151,7 @@ fn a_hole_is_not_read_as_a_summary() {
     let footer = [&(data.len() as u64).to_le_bytes()[..], &[0; 12]].concat();
     let end = [&record(mcap::records::op::FOOTER, &footer)[..], mcap::MAGIC].concat();
     std::os::unix::fs::FileExt::write_all_at(&file, &end, (data.len() as u64) + (1 << 30)).unwrap();
-    assert_eq!(replay::log::summary_of(&path), None);
+    assert_eq!(replay::recover::summary_of(&path), None);
     let (code, said) = within(200, &["info"], &path);
     assert!(code == 0 && said.contains("type 0, which does not exist"), "{said}");
 }
@@ -318,7 +318,7 @@ proptest! {
         let gimbal_rad = |frame: &replay::evaluate::EvaluatedFrame| frame.evaluated.gimbal_rad.clone();
         prop_assert!(evaluated.frames.iter().flat_map(gimbal_rad).all(f64::is_finite));
         prop_assert_eq!(explain(&recording, 20).unwrap().frame, 20);
-        for start in [StartAt::Landing, StartAt::Frame(12)] {
+        for start in [None, Some(Moment::Frame(12))] {
             let options = ReflyOptions { start, ..ReflyOptions::default() };
             if let Ok(report) = refly(&recording, &options) {
                 prop_assert!(report.frames > 0);
@@ -327,7 +327,7 @@ proptest! {
         prop_assert!(report(&path, None).unwrap().html.ends_with("</html>\n"));
         let flown = Flown::open(&path).unwrap();
         // A flight is equal to itself, in all samples that are in order and before a cut.
-        let compared = compare(&flown, &flown.clone(), Align::Time, &Tolerances::default()).unwrap();
+        let compared = compare(&flown, &flown.clone(), &Tolerances::default()).unwrap();
         let of_record = |failure: &String| failure.contains("are out of order") || failure.contains("INCOMPLETE");
         prop_assert!(compared.failures.iter().all(of_record), "{:?}", compared.failures);
     }

@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 
 use replay::evaluate::evaluate;
 use replay::info::{GradeLevel, info};
-use replay::log::Recording;
+use replay::log::{Gap, Recording, RecordingError};
 use replay::recover::recover;
 use replay::refly::{ReflyOptions, refly};
 use replay::report::report;
@@ -33,7 +33,7 @@ pub(crate) static RECOVERED: LazyLock<PathBuf> = LazyLock::new(|| {
 fn around_the_loss(recording: &Recording) -> (u64, u64, u64) {
     let gap = recording.gap().unwrap();
     let last = recording.frames.last().unwrap().input.frame;
-    assert!(1 < gap.after && gap.missing() > 0 && gap.before < last, "{gap:?}, {last}");
+    assert!(1 < gap.after && gap.after + 1 < gap.before && gap.before < last, "{gap:?}, {last}");
     (gap.after, gap.before, last)
 }
 
@@ -43,7 +43,7 @@ fn verify_ends_at_the_loss() {
     let (after, before, _) = around_the_loss(&recording);
     let report = only(verify(&RECOVERED).unwrap());
     assert_eq!(report.outcome, Verification::NotReplayable, "{report:?}");
-    assert_eq!(report.obstacle, Some(Obstacle::Gap { after, before }));
+    assert_eq!(report.obstacle, Some(Obstacle::Gap(Gap { after, before })));
     assert_eq!((report.first_divergence, report.frames_identical), (None, after));
 }
 
@@ -103,6 +103,6 @@ fn without_its_first_frames_nothing_is_run_again() {
     let mut recording = Recording::open(&LANDED.log).unwrap();
     recording.frames.drain(..100);
     recording.frames_unbroken = 0;
-    let refusal = evaluate(&recording, &[]).unwrap_err().to_string();
-    assert!(refusal.contains("begins with frame 101"), "{refusal}");
+    let refusal = recording.replayable_frames().unwrap_err();
+    assert!(matches!(refusal, RecordingError::BeginningLost { first: 101, .. }), "{refusal}");
 }

@@ -7,7 +7,7 @@ use prost::Message as _;
 use protocol::log::computer_v1::ComputerFrame;
 use replay::evaluate::evaluate;
 use replay::info::{GradeLevel, Info, info, info_of};
-use replay::log::{FlightLog, Recording};
+use replay::log::{FlightLog, Gap, Recording};
 use replay::verify::{Obstacle, Verification, verify};
 
 use crate::flown::{FLIGHT, MISSION, Recipe, WHOLE, only, verify_bytes, verify_frames, write_log};
@@ -40,8 +40,7 @@ fn a_profile_of_another_kind_is_refused() {
     let bytes = write_log(&FLIGHT.frames[..3], &Recipe { profile_toml, ..Recipe::default() }).bytes;
     let report = verify_bytes(&bytes).unwrap();
     assert_eq!(report.outcome, Verification::NotReplayable);
-    let reason = report.obstacle.unwrap().to_string();
-    assert!(reason.contains("profile.toml"), "{reason}");
+    assert!(matches!(report.obstacle, Some(Obstacle::ProfileUnreadable(_))), "{report:?}");
     assert_eq!(info_of_bytes(&bytes).grade.level, GradeLevel::Numeric);
 }
 
@@ -62,7 +61,7 @@ fn lossy(frames: &[ComputerFrame], kept: impl Fn(u64) -> bool) -> (tempfile::Tem
 fn a_log_without_its_first_frames_is_refused() {
     let (_directory, path) = lossy(&FLIGHT.frames[..5], |frame| frame > 2);
     let report = only(verify(&path).unwrap());
-    assert_eq!(report.obstacle, Some(Obstacle::BeginningMissing { first: 3 }));
+    assert_eq!(report.obstacle, Some(Obstacle::BeginningMissing(3)));
     assert_eq!((report.outcome, report.frames_compared), (Verification::NotReplayable, 0));
 }
 
@@ -72,7 +71,7 @@ fn frames_before_a_gap_are_compared() {
     let kept = |frame| !(5..7).contains(&frame);
     let (_directory, path) = lossy(&frames, kept);
     let report = only(verify(&path).unwrap());
-    assert_eq!(report.obstacle, Some(Obstacle::Gap { after: 4, before: 7 }));
+    assert_eq!(report.obstacle, Some(Obstacle::Gap(Gap { after: 4, before: 7 })));
     assert_eq!((report.outcome, report.frames_identical), (Verification::NotReplayable, 4));
 
     let info = info(&path).unwrap();
@@ -91,8 +90,7 @@ fn an_input_of_another_version_is_refused() {
     frames[3].input.fins_rad.pop();
     let report = verify_frames(&frames);
     assert_eq!((report.outcome, report.frames_identical), (Verification::NotReplayable, 3));
-    let reason = report.obstacle.unwrap().to_string();
-    assert!(reason.contains("fin"), "{reason}");
+    assert!(matches!(report.obstacle, Some(Obstacle::Frame(_))), "{report:?}");
 }
 
 /// A frame with an unknown field was decided by code that this build does not have.
@@ -113,14 +111,15 @@ fn a_frame_of_a_newer_version_is_refused() {
     let bytes = writer.into_inner().into_inner();
     let report = verify_bytes(&bytes).unwrap();
     assert_eq!(report.outcome, Verification::NotReplayable);
-    let reason = report.obstacle.unwrap().to_string();
-    assert!(reason.contains("newer version"), "{reason}");
     let recording =
         Recording::read(&mut FlightLog::read("test.mcap".to_owned(), &bytes[..]).unwrap()).unwrap();
-    let reason = evaluate(&recording, &[]).unwrap_err().to_string();
-    assert!(reason.contains("newer version"), "{reason}");
-    let reason = recording.replayable_frames().unwrap_err().to_string();
-    assert!(reason.contains("newer version"), "{reason}");
+    for reason in [
+        report.obstacle.unwrap().to_string(),
+        evaluate(&recording, &[]).unwrap_err().to_string(),
+        recording.replayable_frames().unwrap_err().to_string(),
+    ] {
+        assert!(reason.contains("newer version"), "{reason}");
+    }
 }
 
 #[test]

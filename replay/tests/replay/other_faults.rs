@@ -1,10 +1,11 @@
 //! Tests counterfactuals: a flight flown again with other faults is the flight that had those faults.
 
-use replay::log::Recording;
-use replay::refly::{FaultChanges, ReflyOptions, StartAt, refly_flight, write_log};
+use replay::info::info;
+use replay::log::{Moment, Recording};
+use replay::refly::{FaultChanges, ReflyOptions, refly_flight, write_log};
 use replay::verify::{Verification, verify};
 
-use crate::command_line::{replay, run};
+use crate::command_line::{data, refusal, replay, run};
 use crate::flown::only;
 use crate::from_apogee::{self, LANDED};
 
@@ -23,7 +24,7 @@ fn the_same_flight_with_and_without_a_fault() {
     let broken = from_apogee::fly(&FAULTS);
     let (healthy, broken) = (Recording::open(&LANDED.log).unwrap(), Recording::open(&broken.log).unwrap());
     assert_ne!(healthy.verdict, broken.verdict);
-    for start in [StartAt::Landing, StartAt::Frame(1)] {
+    for start in [None, Some(Moment::Frame(1))] {
         let without = ReflyOptions { start: start.clone(), ..changed(&[], &["weak-motor", "gnss-out@5"]) };
         let (report, flown) = refly_flight(&broken, &without).unwrap();
         assert_eq!(flown.verdict, healthy.verdict, "{start:?}");
@@ -53,22 +54,16 @@ fn a_counterfactual_is_a_log_that_verifies() {
 
 #[test]
 fn a_fault_that_cannot_be_is_refused_with_what_could() {
-    let refused = |log: &std::path::PathBuf, arguments: &[&str], words: &str| {
-        let (code, stdout, stderr) = run(replay("refly", log).args(arguments));
-        assert!(code == 2 && stdout.is_empty() && stderr.contains(words), "{stdout}{stderr}");
-    };
-    refused(
-        &LANDED.log,
-        &["--without-fault", "gnss-out"],
-        "no fault `gnss-out` to leave out; it was flown with no faults",
-    );
-    refused(&LANDED.log, &["--fault", "gnss-gone@5"], "fault `gnss-gone@5`");
-    let (code, stdout, stderr) = run(replay("refly", &LANDED.log).args(["--fault", "no-light@0"]));
-    assert!(
-        code == 0 && stdout.contains("with the fault no-light@0, from the beginning"),
-        "{stdout}{stderr}"
-    );
-    assert!(stdout.contains("the verdict CHANGES"), "{stdout}");
+    for (arguments, words) in [
+        (["--without-fault", "gnss-out"], "no fault `gnss-out` to leave out; it was flown with no faults"),
+        (["--fault", "gnss-gone@5"], "fault `gnss-gone@5`"),
+    ] {
+        let refused = refusal(replay("refly", &LANDED.log).args(arguments));
+        assert!(refused.contains(words), "{refused}");
+    }
+    let (code, report) = data(replay("refly", &LANDED.log).args(["--fault", "no-light@0"]));
+    assert_eq!((code, &report["faults"]["with"][0]), (0, &"no-light@0".into()));
+    assert_eq!(report["verdict_changed"], true);
 }
 
 /// What broke is the first finding, in the description as text and as JSON; a landing with nothing broken has none.
@@ -80,21 +75,21 @@ fn a_description_says_what_went_wrong_first_in_time() {
         ("weak-motor:0.8@ignition", "landing motor's impulse 0.8"),
     ] {
         let broken = from_apogee::fly(&[fault]);
-        let found = replay::info::info(&broken.log).unwrap().findings.unwrap();
+        let found = info(&broken.log).unwrap().findings.unwrap();
         assert!(found[0].words.starts_with(words), "{found:?}");
         let (_, stdout, _) = run(&mut replay("info", &broken.log));
         assert!(stdout.contains(&format!("findings    T+{:.2} s {words}", found[0].since_s)), "{stdout}");
-        let (_, stdout, _) = run(replay("info", &broken.log).arg("--json"));
-        let json: serde_json::Value = serde_json::from_str(&stdout).unwrap();
+        let (_, json) = data(&mut replay("info", &broken.log));
         assert_eq!(json["findings"][0]["words"], found[0].words);
     }
-    let (_, stdout, _) = run(&mut replay("info", &LANDED.log));
-    assert!(stdout.contains("\nfindings    none\n"), "{stdout}");
     let cut = LANDED.beside("cut.mcap");
     let whole = std::fs::read(&LANDED.log).unwrap();
     std::fs::write(&cut, &whole[..whole.len() / 2]).unwrap();
-    let (_, stdout, _) = run(&mut replay("info", &cut));
-    assert!(stdout.contains("\nfindings    none up to where the record ends\n"), "{stdout}");
+    for (log, none) in [(&LANDED.log, "none\n"), (&cut, "none up to where the record ends\n")] {
+        assert_eq!(info(log).unwrap().findings, Some(Vec::new()));
+        let (_, stdout, _) = run(&mut replay("info", log));
+        assert!(stdout.contains(&format!("\nfindings    {none}")), "{stdout}");
+    }
 }
 
 /// A log whose decisions this build does not make has no findings, because they would be about other commands.
@@ -109,10 +104,5 @@ fn findings_are_not_looked_for_where_the_decisions_are_not_made_again() {
     frame.output.fins_rad[0] += 0.1;
     message.data = prost::Message::encode_to_vec(&frame);
     held.write(&path);
-    assert_eq!(replay::info::info(&path).unwrap().findings, None);
-    let (_, stdout, _) = run(&mut replay("info", &path));
-    assert!(
-        stdout.contains("findings    not looked for: no frame in flight, or this build decides"),
-        "{stdout}"
-    );
+    assert_eq!(info(&path).unwrap().findings, None);
 }

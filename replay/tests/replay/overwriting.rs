@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::command_line::{Files, replay, run};
+use crate::command_line::{Files, refusal, replay, run};
 use crate::flown::WHOLE;
 use crate::simulated::{MK2, WITH_FRAMES};
 
@@ -43,9 +43,8 @@ fn no_existing_file_is_overwritten_without_force() {
         let output = directory.path().join(name);
         std::fs::write(&output, OTHERS).unwrap();
         let mut command = replay(arguments[0], &log);
-        let (code, stdout, stderr) = run(command.args(&arguments[1..]).arg(&output));
-        assert_eq!((code, stdout.as_str()), (2, ""), "{arguments:?}: {stderr}");
-        assert!(stderr.contains("exists already") && stderr.contains("--force"), "{arguments:?}: {stderr}");
+        let refused = refusal(command.args(&arguments[1..]).arg(&output));
+        assert!(refused.contains("it exists already; --force replaces it"), "{arguments:?}: {refused}");
         assert_eq!(std::fs::read(&output).unwrap(), OTHERS, "{arguments:?}");
         let (code, stdout, stderr) = run(command.arg("--force"));
         assert_eq!(code, 0, "{arguments:?}: {stdout}{stderr}");
@@ -70,9 +69,7 @@ fn the_log_that_is_read_is_never_written() {
             directory.path().join("../").join(directory.path().file_name().unwrap()).join("flight.mcap"),
         ] {
             for force in [None, Some("--force")] {
-                let (code, stdout, stderr) =
-                    run(replay(arguments[0], &log).args(&arguments[1..]).arg(&output).args(force));
-                assert_eq!((code, stdout.as_str()), (2, ""), "{arguments:?}: {stderr}");
+                refusal(replay(arguments[0], &log).args(&arguments[1..]).arg(&output).args(force));
                 assert_eq!(std::fs::read(&log).unwrap(), before, "{arguments:?}");
             }
         }
@@ -90,8 +87,7 @@ fn tables_and_imports_overwrite_nothing_either() {
         let before = listed(&at("tables"));
         let mut command = replay("export", &log);
         command.args(["--to", format, "--output"]).arg(at("tables"));
-        let (code, _, stderr) = run(&mut command);
-        assert!(code == 2 && stderr.contains("exists already"), "{stderr}");
+        refusal(&mut command);
         assert_eq!(std::fs::read(&table).unwrap(), OTHERS);
         assert_eq!(listed(&at("tables")), before, "no other table is written if one was refused");
         let (code, _, stderr) = run(command.arg("--force"));
@@ -102,11 +98,9 @@ fn tables_and_imports_overwrite_nothing_either() {
     std::fs::copy(crate::simulated::tlog(&WITH_FRAMES, "overwriting.tlog"), &tlog).unwrap();
     let before = std::fs::read(&log).unwrap();
     // Without an output name, the default name is that of the flight's own log.
-    let (code, _, stderr) = run(&mut replay("export", &tlog));
-    assert!(code == 2 && stderr.contains("exists already"), "{stderr}");
+    refusal(&mut replay("export", &tlog));
     assert_eq!(std::fs::read(&log).unwrap(), before);
-    let (code, _, stderr) = run(replay("export", &tlog).arg("--output").arg(&tlog).arg("--force"));
-    assert!(code == 2 && stderr.contains("is being read"), "{stderr}");
+    refusal(replay("export", &tlog).arg("--output").arg(&tlog).arg("--force"));
     let (code, _, stderr) = run(replay("export", &tlog).arg("--output").arg(at("imported.mcap")));
     assert_eq!(code, 0, "{stderr}");
 }
@@ -117,13 +111,12 @@ fn a_report_twice_needs_force() {
     let (_directory, log) = copied(&MK2.log);
     let (code, ..) = run(&mut replay("report", &log));
     assert_eq!(code, 0);
-    let (code, _, stderr) = run(&mut replay("report", &log));
-    assert!(code == 2 && stderr.contains("exists already"), "{stderr}");
+    refusal(&mut replay("report", &log));
     let (code, ..) = run(replay("report", &log).arg("--force"));
     assert_eq!(code, 0);
     // A device has no content that could be lost.
     let (code, stdout, stderr) = run(replay("report", &log).args(["--output", "/dev/stdout"]));
-    assert!(code == 0 && stdout.contains("</html>"), "{stderr}");
+    assert!(code == 0 && stdout.len() > 10_000, "{stderr}");
 }
 
 /// A command that fails keeps the old file and leaves no incomplete one.
@@ -138,9 +131,7 @@ fn a_command_that_fails_replaces_nothing() {
         if arguments[0] == "recover" {
             continue;
         }
-        let (code, _, stderr) =
-            run(replay(arguments[0], &broken).args(&arguments[1..]).arg(&output).arg("--force"));
-        assert_eq!(code, 2, "{arguments:?}: {stderr}");
+        refusal(replay(arguments[0], &broken).args(&arguments[1..]).arg(&output).arg("--force"));
         assert_eq!(std::fs::read(&output).unwrap(), OTHERS, "{arguments:?}");
         assert_eq!(listed(files.directory.path()), ["flight.mcap", "output"], "{arguments:?}");
     }
@@ -157,15 +148,13 @@ fn half_an_output_replaces_nothing() {
         let mut command = Command::new("sh");
         command.args(["-c", "trap '' XFSZ; ulimit -f 8; exec \"$@\"", "sh", env!("CARGO_BIN_EXE_replay")]);
         command.arg(arguments[0]).arg(&log).args(&arguments[1..]).arg(&output).arg("--force");
-        let (code, stdout, stderr) = run(&mut command);
-        assert_eq!((code, stdout.as_str()), (2, ""), "{arguments:?}: {stderr}");
-        assert!(stderr.contains(&format!("{name}: cannot be written")), "{arguments:?}: {stderr}");
+        let refused = refusal(&mut command);
+        assert!(refused.contains(&format!("{name}: cannot be written")), "{arguments:?}: {refused}");
         assert_eq!(std::fs::read(&output).unwrap(), OTHERS, "{arguments:?}");
         let mut expected = vec!["flight.mcap".to_owned(), name.to_owned()];
         expected.sort();
         assert_eq!(listed(directory.path()), expected, "{arguments:?}: nothing else is left");
     }
     let (_directory, log) = copied(&MK2.log);
-    let (code, _, stderr) = run(replay("report", &log).args(["--output", "/dev/full"]));
-    assert!(code == 2 && stderr.contains("cannot be written"), "{stderr}");
+    refusal(replay("report", &log).args(["--output", "/dev/full"]));
 }

@@ -1,8 +1,8 @@
 //! Tests that the log of a re-flown flight from apogee is one flight from its first frame to its last.
 
 use flight::rules::phase::Phase;
-use replay::log::Recording;
-use replay::refly::{ReflyOptions, StartAt, refly_flight, write_log};
+use replay::log::{Moment, Recording};
+use replay::refly::{ReflyOptions, refly_flight, write_log};
 use replay::verify::{Verification, verify};
 
 use crate::asked::{settings, with};
@@ -48,7 +48,7 @@ fn a_log_reflown_from_a_recovered_log_has_no_gap() {
     let again = written(
         "of_a_recovered.mcap",
         &recovered,
-        &ReflyOptions { start: StartAt::Frame(last), ..with(&[]) },
+        &ReflyOptions { start: Some(Moment::Frame(last)), ..with(&[]) },
     );
     assert_whole(&again);
     assert_eq!(again.frames, Recording::open(&LANDED.log).unwrap().frames);
@@ -58,7 +58,7 @@ fn a_log_reflown_from_a_recovered_log_has_no_gap() {
 #[test]
 fn a_setting_timed_before_the_start_applies_from_the_start() {
     let recording = Recording::open(&LANDED.log).unwrap();
-    let start = StartAt::Phase(Phase::AeroDescent);
+    let start = Some(Moment::Phase(Phase::AeroDescent));
     let timed = ReflyOptions { start: start.clone(), ..with(&["ignition.fixed_height_m=80@0.1"]) };
     let again = written("timed_early.mcap", &recording, &timed);
     let lasting = ReflyOptions { start, settings: settings(&["ignition.fixed_height_m=80"]), ..timed };

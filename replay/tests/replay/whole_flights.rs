@@ -6,8 +6,11 @@ use std::path::{Path, PathBuf};
 use prost::Message as _;
 use protocol::log::computer_v1::ComputerFrame;
 use protocol::log::record::{TOPIC_COMPUTER_START, TOPIC_VERDICT};
+use replay::info::info;
+use replay::verify::{Obstacle, Verification, VerifyReport, verify, verify_strictly};
 
-use crate::command_line::{replay, run};
+use crate::command_line::{data, refusal, replay, run};
+use crate::flown::only;
 use crate::from_apogee::LANDED;
 use crate::simulated::MK2;
 use crate::tampered::{Held, Kept};
@@ -31,8 +34,10 @@ fn tamper(message: &mut Kept) {
     message.data = frame.encode_to_vec();
 }
 
-fn verify(path: &Path, arguments: &[&str]) -> (i32, String, String) {
-    run(replay("verify", path).args(arguments))
+/// The number of frames of each flight of a log, and how many of them are identical, with the outcome of each.
+fn flights(path: &Path) -> Vec<(Verification, u64, u64)> {
+    let of = |report: VerifyReport| (report.outcome, report.frames_recorded, report.frames_identical);
+    verify(path).unwrap().into_iter().map(of).collect()
 }
 
 #[test]
@@ -40,10 +45,10 @@ fn a_whole_log_that_was_only_rewritten_is_identical() {
     let directory = tempfile::tempdir().unwrap();
     for log in logs() {
         let held = Held::read(log);
-        let (code, stdout, _) = verify(&written(&held, &directory, "same.mcap"), &["--strict"]);
-        let count = held.frames();
-        assert_eq!(code, 0, "{stdout}");
-        assert!(stdout.contains(&format!("{count} of {count} frames identical\n")), "{stdout}");
+        let count = held.frames() as u64;
+        let path = written(&held, &directory, "same.mcap");
+        assert_eq!(flights(&path), [(Verification::Identical, count, count)]);
+        assert!(verify_strictly(&path).unwrap()[0].is_all_compared());
     }
 }
 
@@ -54,25 +59,19 @@ fn a_start_copied_to_the_end_hides_no_tampered_frame() {
     let mut held = Held::read(&LANDED.log);
     let start = held.messages.iter().find(|message| message.topic == TOPIC_COMPUTER_START).unwrap().clone();
     let last_ns = held.messages.last().unwrap().log_time_ns;
-    let honest = {
-        let mut honest = held.clone();
-        honest.messages.push(start.at(last_ns));
-        written(&honest, &directory, "honest.mcap")
-    };
-    held.messages.iter_mut().filter(|message| message.is_frame()).for_each(tamper);
     held.messages.push(start.at(last_ns));
-    let count = held.frames();
-    let (code, stdout, _) = verify(&written(&held, &directory, "tampered.mcap"), &[]);
-    assert_eq!(code, 1, "{stdout}");
-    assert!(stdout.contains(&format!("DIVERGED: {count} of {count} frames differ")), "{stdout}");
-    assert!(!stdout.contains("0 of 0"), "{stdout}");
-
+    let honest = written(&held, &directory, "honest.mcap");
+    let count = held.frames() as u64;
+    held.messages.iter_mut().filter(|message| message.is_frame()).for_each(tamper);
+    let nothing = (Verification::NotReplayable, 0, 0);
+    let tampered = written(&held, &directory, "tampered.mcap");
+    assert_eq!(flights(&tampered), [(Verification::Diverged, count, 0), nothing]);
     // Nothing follows the copy, so it must not be called "identical".
-    let (code, stdout, _) = verify(&honest, &[]);
-    assert_eq!(code, 2, "{stdout}");
-    assert!(stdout.contains(&format!("flight 1 of 2: {count} of {count} frames identical")), "{stdout}");
-    assert!(stdout.contains("flight 2 of 2: nothing was compared"), "{stdout}");
-    assert!(!stdout.contains("0 of 0"), "{stdout}");
+    assert_eq!(flights(&honest), [(Verification::Identical, count, count), nothing]);
+    for (path, expected) in [(&tampered, 1), (&honest, 2)] {
+        let (code, stdout, _) = run(&mut replay("verify", path));
+        assert!(code == expected && !stdout.contains("0 of 0"), "{stdout}");
+    }
 }
 
 /// The start record again in the middle: the frames after it do not begin a new flight.
@@ -83,10 +82,9 @@ fn a_start_copied_into_the_middle_is_no_flight() {
     let place = held.messages.len() / 2;
     let start = held.messages.iter().find(|message| message.topic == TOPIC_COMPUTER_START).unwrap().clone();
     held.messages.insert(place, start.at(held.messages[place].log_time_ns));
-    let (code, stdout, _) = verify(&written(&held, &directory, "middle.mcap"), &[]);
-    assert_eq!(code, 2, "{stdout}");
-    assert!(stdout.contains("flight 1 of 2") && stdout.contains("INCOMPLETE flight: ends at T+"), "{stdout}");
-    assert!(stdout.contains("flight 2 of 2: nothing was compared: it begins with frame"), "{stdout}");
+    let reports = verify(&written(&held, &directory, "middle.mcap")).unwrap();
+    assert!(reports[0].outcome == Verification::IdenticalReadablePart && reports[0].cut.is_some());
+    assert!(matches!(reports[1].obstacle, Some(Obstacle::BeginningMissing(_))), "{:?}", reports[1]);
 }
 
 #[test]
@@ -94,36 +92,25 @@ fn two_flights_in_one_file_have_two_verdicts_and_the_worst_decides() {
     let directory = tempfile::tempdir().unwrap();
     for log in logs() {
         let (a, mut b) = (Held::read(log), Held::read(log));
-        let (count_a, count_b) = (a.frames(), b.frames());
         let both = |b: &Held, name: &str| {
             let mut both = a.clone();
             both.append(b, 100_000_000_000);
             written(&both, &directory, name)
         };
         let path = both(&b, "both.mcap");
+        let identical = (Verification::Identical, a.frames() as u64, a.frames() as u64);
+        assert_eq!(flights(&path), [identical; 2]);
         // Strictly, each flight would have to be flown again from facts of its own.
-        let (code, stdout, _) = verify(&path, &["--strict"]);
-        assert!(code == 1 && stdout.contains("a file with several flights is not flown again"), "{stdout}");
-        let (code, stdout, _) = verify(&path, &[]);
-        assert_eq!(code, 0, "{stdout}");
-        assert!(
-            stdout.contains(&format!("flight 1 of 2: {count_a} of {count_a} frames identical")),
-            "{stdout}"
-        );
-        assert!(
-            stdout.contains(&format!("flight 2 of 2: {count_b} of {count_b} frames identical")),
-            "{stdout}"
-        );
-        let (_, stdout, _) = verify(&path, &["--json"]);
-        let reports: serde_json::Value = serde_json::from_str(&stdout).unwrap();
+        assert!(verify_strictly(&path).unwrap().iter().all(|report| !report.is_all_compared()));
         assert_eq!(
-            (reports[0]["flight"]["number"].as_u64(), reports[1]["flight"]["of"].as_u64()),
-            (Some(1), Some(2))
+            [run(replay("verify", &path).arg("--strict")).0, run(&mut replay("verify", &path)).0],
+            [1, 0]
         );
+        let (_, reports) = data(&mut replay("verify", &path));
+        assert_eq!((&reports[0]["flight"]["number"], &reports[1]["flight"]["of"]), (&1.into(), &2.into()));
         b.messages.iter_mut().filter(|message| message.is_frame()).skip(30).take(1).for_each(tamper);
-        let (code, stdout, _) = verify(&both(&b, "tampered.mcap"), &[]);
-        assert_eq!(code, 1, "{stdout}");
-        assert!(stdout.contains("flight 2 of 2: DIVERGED"), "{stdout}");
+        let (code, reports) = data(&mut replay("verify", &both(&b, "tampered.mcap")));
+        assert_eq!((code, &reports[1]["outcome"]), (1, &"diverged".into()));
     }
 }
 
@@ -136,17 +123,18 @@ fn commands_for_one_flight_refuse_a_log_with_two() {
         let mut both = a.clone();
         both.append(&a, 100_000_000_000);
         let path = written(&both, &directory, "both.mcap");
-        for arguments in
-            [&["evaluate"][..], &["refly"], &["verify", "--explain", "1"], &["report", "--output", "-"]]
-        {
-            let (code, stdout, stderr) = run(replay(arguments[0], &path).args(&arguments[1..]));
-            assert_eq!((code, stdout.as_str()), (2, ""), "{arguments:?}: {stderr}");
-            assert!(stderr.contains("holds 2 flights"), "{arguments:?}: {stderr}");
+        for arguments in [
+            &["evaluate"][..],
+            &["refly"],
+            &["verify", "--explain", "1"],
+            &["report", "--output", "-"],
+            &["compare"],
+        ] {
+            let mut command = replay(arguments[0], &path);
+            command.args(&arguments[1..]).args((arguments[0] == "compare").then_some(&path));
+            assert!(refusal(&mut command).contains("holds 2 flights"), "{arguments:?}");
         }
-        let (code, _, stderr) = run(replay("compare", &path).arg(&path));
-        assert!(code == 2 && stderr.contains("holds 2 flights"), "{stderr}");
-        let (code, stdout, _) = run(&mut replay("info", &path));
-        assert!(code == 0 && stdout.contains("flights     2"), "{stdout}");
+        assert_eq!(info(&path).unwrap().completeness.flights, 2);
     }
 }
 
@@ -171,26 +159,16 @@ fn a_log_without_its_last_frames_is_not_complete() {
         no_verdict.keep(|message| message.topic != TOPIC_VERDICT);
         for (held, name) in [(frames_only, "frames"), (everything, "all"), (no_verdict, "verdict")] {
             let path = written(&held, &directory, &format!("{name}.mcap"));
-            let count = held.frames();
-            let (code, stdout, _) = verify(&path, &[]);
-            assert_eq!(code, 0, "{name}: {stdout}");
-            assert!(
-                stdout.contains(&format!(
-                    "{count} of {count} frames identical of an INCOMPLETE flight: ends at T+"
-                )),
-                "{name}: {stdout}"
-            );
-            assert!(name == "verdict" || stdout.contains(" in POWERED"), "{name}: {stdout}");
-            let (code, stdout, _) = verify(&path, &["--strict"]);
-            assert_eq!(code, 1, "{name}: {stdout}");
-            let (code, stdout, _) = verify(&path, &["--json"]);
-            let report: serde_json::Value = serde_json::from_str(&stdout).unwrap();
-            assert_eq!((code, report["outcome"].as_str()), (0, Some("identical-readable-part")), "{name}");
-            assert!(report["cut"]["time_s"].is_number(), "{name}: {stdout}");
-            let (_, stdout, _) = run(&mut replay("info", &path));
-            assert!(stdout.contains("complete    NO: the flight ends at T+"), "{name}: {stdout}");
-            let (_, stdout, _) = run(replay("report", &path).args(["--output", "-"]));
-            assert!(stdout.contains("ends at T+"), "{name}");
+            let count = held.frames() as u64;
+            assert_eq!(flights(&path), [(Verification::IdenticalReadablePart, count, count)], "{name}");
+            let cut = only(verify(&path).unwrap()).cut.unwrap();
+            assert!(name == "verdict" || cut.phase == "POWERED", "{name}: {cut}");
+            let codes = [&[][..], &["--strict"]].map(|more| run(replay("verify", &path).args(more)).0);
+            assert_eq!(codes, [0, 1], "{name}");
+            assert!(!info(&path).unwrap().completeness.complete, "{name}");
+            let (_, page, _) = run(replay("report", &path).args(["--output", "-"]));
+            let answers = [run(&mut replay("verify", &path)).1, run(&mut replay("info", &path)).1, page];
+            assert!(answers.iter().all(|said| said.contains(&cut.to_string())), "{name}");
         }
     }
 }

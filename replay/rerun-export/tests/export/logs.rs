@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::v1;
 use protocol::log::writer::LogWriter;
-use replay::output::{Destination, Overwrite};
+use replay::output::Destination;
 use sim::outside::Outside;
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
@@ -56,7 +56,7 @@ pub(crate) fn write_log_from(path: &Path, start_unix_ns: u64) {
 
 /// A recording that may be replaced.
 pub(crate) fn forced(path: &Path) -> Destination<'_> {
-    Destination { path, overwrite: Overwrite::Always }
+    Destination { path, force: true }
 }
 
 /// A place in a log's third chunk, where it may be cut.
