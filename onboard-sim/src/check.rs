@@ -14,11 +14,12 @@ use flight::vehicle::atmosphere::Air;
 use flight::vehicle::burn::Burn;
 use flight::vehicle::fins::{PITCH, YAW};
 use flight::vehicle::mission::Mission;
+use flight::vehicle::thrust_curve::ThrustCurve;
+use flight::vehicles::motors;
 use sim::dispersion::may_be_kinder;
 use sim::recipe::Recipe;
 
-use crate::motors::frame::{Frame, FrameError, changed};
-use crate::motors::source::Found;
+use crate::frame::{Frame, FrameError, changed};
 use crate::row::Row as Flown;
 use crate::run::{RunError, fly};
 use crate::statistics::Landings;
@@ -163,6 +164,25 @@ fn worst(rows: &[Row]) -> Verdict {
     rows.iter().map(|row| row.verdict).max().unwrap_or(Verdict::Ok)
 }
 
+/// A motor to propose.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// What a mission's `airframe.motor` says: the name of a built-in motor, or the text of its file.
+    pub motor: String,
+    pub curve: ThrustCurve,
+    /// Its maker still makes it, as far as is known.
+    pub in_production: bool,
+}
+
+/// The motors that come with the program.
+pub fn built_in() -> Vec<Candidate> {
+    let found = motors::names().filter_map(|name| {
+        let in_production = motors::status(name).is_none_or(|(in_production, _)| in_production);
+        Some(Candidate { motor: name.to_owned(), curve: motors::builtin(name).ok()?, in_production })
+    });
+    found.collect()
+}
+
 /// Why there is no page.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckError {
@@ -179,7 +199,7 @@ pub enum CheckError {
 /// The motor cannot be taken out of the airframe, or a flight cannot be set up.
 pub fn check(
     recipe: &Recipe,
-    motors: &[Found],
+    motors: &[Candidate],
     flights: u64,
     done: &(dyn Fn(usize) + Sync),
 ) -> Result<Page, CheckError> {
@@ -204,7 +224,7 @@ pub fn check(
 }
 
 /// The nearest mass and some motors that make the landing better than `than`.
-fn proposal(recipe: &Recipe, motors: &[Found], than: Verdict) -> Result<String, FrameError> {
+fn proposal(recipe: &Recipe, motors: &[Candidate], than: Verdict) -> Result<String, FrameError> {
     let Mission { airframe, motor_curve, .. } = &recipe.mission;
     let frame = Frame::of(&recipe.mission)?;
     let with = |motor: &str, curve, ballast_kg: f64| {
@@ -218,23 +238,21 @@ fn proposal(recipe: &Recipe, motors: &[Found], than: Verdict) -> Result<String, 
     let mass = mass.map(|kg| format!("{:.2} kg {}", kg.abs(), if kg < 0.0 { "less" } else { "more" }));
     // Files round to a millimetre.
     let widest_m = motor_curve.diameter_m() + 5e-4;
-    let fit = motors
-        .iter()
-        .flatten()
-        .filter(|motor| motor.curve.diameter_m() <= widest_m && motor.curve != *motor_curve);
-    let mut fit: Vec<_> = fit
-        .filter_map(|motor| {
-            let verdict = with(&motor.motor, &motor.curve, 0.0)?;
-            Some((motor.in_production == Some(false), verdict, motor.curve.name()))
-        })
-        .collect();
+    let fit =
+        motors.iter().filter(|other| other.curve.diameter_m() <= widest_m && other.curve != *motor_curve);
+    let fit = fit.filter_map(|other| {
+        Some((!other.in_production, with(&other.motor, &other.curve, 0.0)?, other.curve.name()))
+    });
+    let mut fit: Vec<_> = fit.collect();
     fit.sort();
     let fit = fit.into_iter().take(PROPOSED);
     let fit =
         fit.map(|(gone, _, name)| format!("on {name}{}", if gone { ", out of production" } else { "" }));
     let found: Vec<String> = mass.into_iter().chain(fit).collect();
-    let none = || "no mass of it and no motor of these: another vehicle".to_owned();
-    Ok(if found.is_empty() { none() } else { found.join(", or ") })
+    if found.is_empty() {
+        return Ok("no mass of it and no motor of these: another vehicle".to_owned());
+    }
+    Ok(found.join(", or "))
 }
 
 fn flown(recipe: &Recipe, rows: &[Flown]) -> Row {

@@ -29,6 +29,8 @@ const COLOURS: [RGBColor; 6] = [
     RGBColor(0, 0, 0),
     FAINT,
 ];
+/// The place of black among them.
+pub const BLACK_CURVE: usize = 4;
 const FAINT: RGBColor = RGBColor(130, 130, 130);
 /// Grounds of spans under thrust, and of spans that fall.
 const SHADES: [RGBColor; 2] = [RGBColor(253, 235, 208), RGBColor(232, 236, 245)];
@@ -175,6 +177,19 @@ pub struct Line {
     pub points: Vec<(f64, f64)>,
 }
 
+impl Line {
+    /// A black circle about the origin; nothing without a finite radius.
+    pub fn circle(name: &str, radius: f64, dashed: bool) -> Self {
+        const CORNERS: u32 = 180;
+        let corner = |corner: u32| {
+            let (sin, cos) = libm::sincos(core::f64::consts::TAU * f64::from(corner) / f64::from(CORNERS));
+            (radius * cos, radius * sin)
+        };
+        let points = if radius.is_finite() { (0..=CORNERS).map(corner).collect() } else { Vec::new() };
+        Self { name: name.to_owned(), colour: BLACK_CURVE, dashed, points }
+    }
+}
+
 /// A span of `x` with its name, behind the curves.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Span {
@@ -188,9 +203,13 @@ pub struct Span {
 /// One pair of axes.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Panel {
+    /// Above it; nothing if it is empty.
+    pub title: String,
     pub x_label: String,
     pub y_label: String,
     pub lines: Vec<Line>,
+    /// Places of several kinds, each kind with its name. All panels of a figure have the same kinds.
+    pub kinds: Vec<(String, Vec<(f64, f64)>)>,
     /// Crosses, each with the colour of a curve.
     pub crosses: Vec<(f64, f64, usize)>,
     /// Values of `y`.
@@ -230,14 +249,20 @@ pub fn sized_lines_svg(
             named.push(line);
         }
     }
-    let names = named.iter().map(|line| line.name.clone()).chain(cross_name.map(str::to_owned));
-    let legend = Legend::new(names.collect(), width_px);
+    let kinds = panels.first().map_or(&[][..], |panel| &panel.kinds);
+    let names = kinds.iter().map(|(name, _)| name).chain(named.iter().map(|line| &line.name));
+    let legend = Legend::new(names.cloned().chain(cross_name.map(str::to_owned)).collect(), width_px);
     drawn(title, (width_px, panels_px + legend.height_px()), |root| {
         let (upper, lower) = root.split_vertically(panels_px);
         for (area, panel) in upper.split_evenly((rows, columns)).iter().zip(panels) {
-            draw_panel(area, panel)?;
+            let titled =
+                if panel.title.is_empty() { area.clone() } else { area.titled(&panel.title, TITLE_FONT)? };
+            draw_panel(&titled, panel)?;
         }
-        legend.draw(&lower, |area, entry, place| draw_sample(area, named.get(entry).copied(), place))
+        legend.draw(&lower, |area, entry, (left, middle)| match entry.checked_sub(kinds.len()) {
+            None => Ok(area.draw(&(EmptyElement::at((left + 10, middle)) + mark(entry)))?),
+            Some(line) => draw_sample(area, named.get(line).copied(), (left, middle)),
+        })
     })
 }
 
@@ -245,7 +270,8 @@ pub fn sized_lines_svg(
 pub fn ends(panel: &Panel, (width_px, height_px): (u32, u32)) -> Option<[(f64, f64); 2]> {
     let points = || {
         let of_lines = panel.lines.iter().flat_map(|line| line.points.iter().copied());
-        of_lines.chain(panel.crosses.iter().map(|(x, y, _)| (*x, *y)))
+        let of_kinds = panel.kinds.iter().flat_map(|(_, places)| places.iter().copied());
+        of_lines.chain(of_kinds).chain(panel.crosses.iter().map(|(x, y, _)| (*x, *y)))
     };
     let x = extent(points().map(|point| point.0))?;
     let mut ends = [x, extent(points().map(|point| point.1).chain(panel.limits.iter().copied()))?];
@@ -288,6 +314,10 @@ fn draw_panel(area: &Area<'_>, panel: &Panel) -> Drawn {
         let named = EmptyElement::at((*x, *y)) + Circle::new((0, 0), 3, BLACK.filled());
         named + Text::new(name.clone(), (6, -14), FONT)
     }))?;
+    for (kind, (_, places)) in panel.kinds.iter().enumerate() {
+        let finite = places.iter().filter(|(x, y)| x.is_finite() && y.is_finite());
+        chart.draw_series(finite.map(|place| EmptyElement::at(*place) + mark(kind)))?;
+    }
     for line in &panel.lines {
         let points = line.points.iter().copied();
         if line.dashed {
@@ -338,98 +368,6 @@ fn equalise(ends: &mut [(f64, f64); 2], size_px: [u32; 2]) {
     }
 }
 
-/// Side of the square of places, px: of one of several, and of one alone.
-const SIDE_PX: u32 = 400;
-const LONE_SIDE_PX: u32 = 620;
-/// Corners of a circle.
-const CORNERS: u32 = 180;
-
-/// What to draw: places about the pad, m.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Places<'a> {
-    /// Names of the axes, to the right and up.
-    pub labels: [&'a str; 2],
-    /// Names of the kinds of places, and of the radii.
-    pub kinds: &'a [&'a str],
-    pub radii: &'a [&'a str],
-    /// Name of an arrow up from the pad, if there is one.
-    pub arrow: Option<&'a str>,
-    pub panels: &'a [PlacesPanel],
-}
-
-/// One square of places.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PlacesPanel {
-    pub title: String,
-    /// Of each kind, to the right and up.
-    pub places: Vec<Vec<[f64; 2]>>,
-    /// About the pad.
-    pub radii_m: Vec<f64>,
-}
-
-/// Panels of places as SVG, two in a row, both axes at one scale.
-///
-/// # Errors
-/// A radius is too small.
-pub fn places_svg(title: &str, places: &Places<'_>) -> Result<String, FigureError> {
-    let Places { kinds, radii, arrow, panels, .. } = places;
-    let columns = panels.len().clamp(1, 2);
-    let rows = panels.len().div_ceil(columns).max(1);
-    let side_px = if panels.len() > 1 { SIDE_PX } else { LONE_SIDE_PX };
-    let title_px = if panels.iter().any(|panel| !panel.title.is_empty()) { TITLE_PX } else { 0 };
-    let panel_px = (side_px + ROOM_PX.0, title_px + side_px + ROOM_PX.1);
-    let (width_px, panels_px) = (columns as u32 * panel_px.0, rows as u32 * panel_px.1);
-    let names = kinds.iter().chain(*radii).chain(arrow).map(|name| (*name).to_owned());
-    let legend = Legend::new(names.collect(), width_px);
-    drawn(title, (width_px, panels_px + legend.height_px()), |root| -> Drawn {
-        let (upper, lower) = root.split_vertically(panels_px);
-        for (area, panel) in upper.split_evenly((rows, columns)).iter().zip(*panels) {
-            let area =
-                if panel.title.is_empty() { area.clone() } else { area.titled(&panel.title, TITLE_FONT)? };
-            draw_places(&area, places, panel)?;
-        }
-        legend.draw(&lower, |area, entry, (left, middle)| {
-            match entry.checked_sub(kinds.len()) {
-                None => area.draw(&(EmptyElement::at((left + 10, middle)) + mark(entry)))?,
-                Some(radius) if radius < radii.len() => {
-                    area.draw(&PathElement::new([(left, middle), (left + 20, middle)], line(radius)))?;
-                }
-                Some(_) => {
-                    let arrow = [(10, 9), (10, -9), (6, -3), (10, -9), (14, -3)];
-                    area.draw(&PathElement::new(arrow.map(|(x, y)| (left + x, middle + y)), line(0)))?;
-                }
-            }
-            Ok(())
-        })
-    })
-}
-
-fn draw_places(area: &Area<'_>, Places { labels, arrow, .. }: &Places<'_>, panel: &PlacesPanel) -> Drawn {
-    let radii_m = || panel.radii_m.iter().copied().enumerate().filter(|(_, radius_m)| radius_m.is_finite());
-    let of_places = panel.places.iter().flatten().flatten().map(|m| m.abs()).filter(|m| m.is_finite());
-    let far_m = 1.05 * of_places.chain(radii_m().map(|(_, radius_m)| radius_m)).fold(1.0, f64::max);
-    let mut chart = axes(area, [(-far_m, far_m); 2], *labels)?;
-    for (kind, places) in panel.places.iter().enumerate() {
-        let finite = places.iter().filter(|place| place.iter().all(|m| m.is_finite()));
-        chart.draw_series(finite.map(|[x, y]| EmptyElement::at((*x, *y)) + mark(kind)))?;
-    }
-    for (place, radius_m) in radii_m() {
-        let corner = |k: u32| {
-            let (sin, cos) = libm::sincos(core::f64::consts::TAU * f64::from(k) / f64::from(CORNERS));
-            (radius_m * cos, radius_m * sin)
-        };
-        chart.draw_series([PathElement::new((0..=CORNERS).map(corner).collect::<Vec<_>>(), line(place))])?;
-    }
-    if arrow.is_some() {
-        let tip_m = radii_m().map(|(_, radius_m)| radius_m).next().unwrap_or(far_m);
-        let (back_m, aside_m) = (tip_m - 0.05 * far_m, 0.025 * far_m);
-        let arrow = [(0.0, 0.0), (0.0, tip_m), (-aside_m, back_m), (0.0, tip_m), (aside_m, back_m)];
-        chart.draw_series([PathElement::new(arrow, line(0))])?;
-    }
-    chart.draw_series([Cross::new((0.0, 0.0), 6, BLACK.stroke_width(2))])?;
-    Ok(())
-}
-
 /// The mark of a kind: no meaning is in a colour alone.
 fn mark(kind: usize) -> PathElement<(i32, i32)> {
     const SHAPES: [&[(i32, i32)]; 4] = [
@@ -441,50 +379,11 @@ fn mark(kind: usize) -> PathElement<(i32, i32)> {
     PathElement::new(SHAPES[kind % SHAPES.len()], COLOURS[kind % COLOURS.len()].stroke_width(1))
 }
 
-/// The first is bold, the next thin.
-fn line(radius: usize) -> ShapeStyle {
-    BLACK.stroke_width(if radius == 0 { 2 } else { 1 })
-}
-
-/// Size of the axes' area of bars, px.
-const BARS_PX: (u32, u32) = (720, 500);
-
-/// A bar: from its left to its right end, and its height.
-pub type Bar = ([f64; 2], f64);
-
-/// Bars, and perhaps a value of `x` that is marked, with its name.
-///
-/// # Errors
-/// A bar is not finite.
-pub fn bars_svg(
-    title: &str,
-    labels: [&str; 2],
-    bars: &[Bar],
-    mark: Option<(&str, f64)>,
-) -> Result<String, FigureError> {
-    let (width_px, height_px) = BARS_PX;
-    let legend = Legend::new(mark.iter().map(|(name, _)| (*name).to_owned()).collect(), width_px);
-    drawn(title, (width_px, height_px + legend.height_px()), |root| -> Drawn {
-        let (upper, lower) = root.split_vertically(height_px);
-        let of_mark = mark.map(|(_, value)| value);
-        let x = extent(bars.iter().flat_map(|(x, _)| *x).chain(of_mark)).unwrap_or((0.0, 1.0));
-        let most = bars.iter().map(|(_, height)| *height).fold(0.0, f64::max);
-        let most = if most > 0.0 { most } else { 1.0 };
-        let mut chart = axes(&upper, [x, (0.0, most)], labels)?;
-        chart.draw_series(bars.iter().map(|([left, right], height)| {
-            Rectangle::new([(*left, 0.0), (*right, *height)], COLOURS[0].mix(0.7).filled())
-        }))?;
-        chart.draw_series(of_mark.map(|at| PathElement::new([(at, 0.0), (at, most)], style(1))))?;
-        legend.draw(&lower, |area, _, (left, middle)| {
-            area.draw(&PathElement::new([(left, middle), (left + 20, middle)], style(1)))?;
-            Ok(())
-        })
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const SIZE_PX: (u32, u32) = (720, 500);
 
     #[test]
     fn ticks_have_the_decimals_of_their_axis() {
@@ -503,25 +402,14 @@ mod tests {
     #[test]
     fn a_figure_names_its_axes_and_curves_and_a_curve_without_points_is_refused() {
         let panels = [panel(vec![(0.0, 0.0), (1.0, 2.0)]), panel(vec![(0.0, 1.0), (1.0, 1.0)])];
-        let svg = sized_lines_svg("Fig. 0", &panels, 2, Some("paper"), BARS_PX).unwrap();
+        let svg = sized_lines_svg("Fig. 0", &panels, 2, Some("paper"), SIZE_PX).unwrap();
         for text in ["Fig. 0", "time, s", "height, m", "a &lt; b", "paper"] {
             assert!(svg.contains(text), "{text}");
         }
         assert_eq!(svg.matches("a &lt; b").count(), 1);
         let empty = Panel { crosses: vec![], ..panel(vec![(f64::NAN, 1.0)]) };
-        let error = sized_lines_svg("Fig. 0", &[empty], 1, None, BARS_PX).unwrap_err();
+        let error = sized_lines_svg("Fig. 0", &[empty], 1, None, SIZE_PX).unwrap_err();
         assert_eq!(error.to_string(), "cannot draw the figure 'Fig. 0': no finite point");
-    }
-
-    #[test]
-    fn every_bar_is_drawn_and_the_mark_is_named() {
-        let bars = [([0.0, 1.0], 2.0), ([1.0, 3.0], 1.0)];
-        let svg = bars_svg("T", ["speed, m/s", "flights"], &bars, Some(("limit", 2.0))).unwrap();
-        for text in ["speed, m/s", "flights", "limit"] {
-            assert!(svg.contains(text), "{text}");
-        }
-        assert!(bars_svg("", ["", ""], &[([0.0, f64::INFINITY], 1.0)], None).is_ok());
-        assert!(bars_svg("", ["", ""], &[], None).is_ok());
     }
 
     /// 10 by 110 in a picture that is twice as wide as high: the width becomes 220.
@@ -540,33 +428,29 @@ mod tests {
             places: vec![(0.2, 0.3, "apogee".to_owned())],
             ..panel(vec![(0.0, 0.0), (1.0, 2.0)])
         };
-        let svg = sized_lines_svg("T", &[panel], 1, None, BARS_PX).unwrap();
+        let svg = sized_lines_svg("T", &[panel], 1, None, SIZE_PX).unwrap();
         assert!(svg.contains("ignition") && svg.contains("apogee") && !svg.contains("outside"), "{svg}");
         assert_eq!(svg.matches("#B3261E").count(), 1);
     }
 
     #[test]
-    fn every_wind_has_a_panel_and_the_legend_names_every_mark_and_line() {
-        let panel = |title: &str, keep_out_m| PlacesPanel {
+    fn every_panel_has_its_title_and_the_legend_names_every_kind_and_circle_once() {
+        let panel = |title: &str, radius: f64| Panel {
             title: title.to_owned(),
-            places: vec![vec![[1.0, 2.0], [3.0, f64::NAN]], vec![[-40.0, 5.0]]],
-            radii_m: vec![keep_out_m, 61.0],
+            y_label: "downwind, m".to_owned(),
+            kinds: vec![
+                ("as planned".to_owned(), vec![(1.0, 2.0), (3.0, f64::NAN)]),
+                ("a < b".to_owned(), vec![(-40.0, 5.0)]),
+            ],
+            lines: vec![Line::circle("nobody within", radius, false), Line::circle("NAR", 61.0, true)],
+            equal_scales: true,
+            ..Panel::default()
         };
         let panels = [panel("0 m/s", 150.0), panel("3 m/s", 310.0), panel("6 m/s", f64::NAN)];
-        let places = Places {
-            labels: ["across the wind, m", "downwind, m"],
-            kinds: &["as planned", "a < b"],
-            radii: &["nobody within", "NAR"],
-            arrow: Some("with the wind"),
-            panels: &panels,
-        };
-        let svg = places_svg("mk2", &places).unwrap();
-        for text in
-            ["as planned", "a &lt; b", "nobody within", "NAR", "with the wind", "0 m/s", "3 m/s", "6 m/s"]
-        {
+        let svg = sized_lines_svg("mk2", &panels, 2, None, (400, 400)).unwrap();
+        for text in ["as planned", "a &lt; b", "nobody within", "NAR", "0 m/s", "3 m/s", "6 m/s"] {
             assert_eq!(svg.matches(text).count(), 1, "{text}");
         }
         assert_eq!(svg.matches("downwind, m").count(), 3, "one wind a panel");
-        assert!(places_svg("", &Places { panels: &[], ..places }).is_ok());
     }
 }

@@ -1,9 +1,34 @@
-//! Files that are written whole: each is complete or absent, and replaces an existing one only on request.
+//! Texts that are built in or files; and files that are written whole: each is complete or absent, and replaces an existing one only
+//! on request.
 
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
+
+/// Neither a built-in text nor a file.
+#[derive(Debug, thiserror::Error)]
+#[error("'{name}' is neither a built-in {what} ({known}) nor a readable file")]
+pub struct UnknownText {
+    name: String,
+    what: &'static str,
+    known: String,
+    source: io::Error,
+}
+
+/// The text of what is built in under a name, or of a file.
+///
+/// # Errors
+/// It is neither.
+pub fn text_of(name: &str, builtin: &[(&str, &str)], what: &'static str) -> Result<String, UnknownText> {
+    if let Some((_, text)) = builtin.iter().find(|(known, _)| *known == name) {
+        return Ok((*text).to_owned());
+    }
+    std::fs::read_to_string(name).map_err(|source| {
+        let known = builtin.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
+        UnknownText { name: name.to_owned(), what, known, source }
+    })
+}
 
 /// Why a file is not written.
 #[derive(Debug, thiserror::Error)]

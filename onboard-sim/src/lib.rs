@@ -4,23 +4,25 @@
 //! * [`tally`]: flies one flight of a campaign and collects the values of its [`row`].
 //! * [`run`]: the same work on many things, on several threads; flies the missing flights.
 //! * [`progress`]: how far something long is.
-//! * [`files`]: files that are written whole.
+//! * [`files`]: texts that are built in or files, and files that are written whole.
 //! * [`statistics`], [`summary`]: percentiles, texts and pictures from the rows; [`figure`] draws.
 //! * [`attainable`]: whether a flight could have been landed with perfect information.
 //! * [`hazard`]: where a flight comes down in each way that it can end.
 //! * [`check`]: whether a vehicle that is not built yet will land, and what to change.
-//! * [`motors`]: another motor in an airframe, and the landing card.
+//! * [`frame`]: another motor in an airframe.
+//! * [`card`]: the landing card.
 //! * [`scenario`]: faults, and the expected outcome of a flight with them.
 //!
 //! A flight depends only on its recipe and its number. So a campaign can be divided into shards, stopped, continued and
 //! run on any number of threads with the same results.
 
 pub mod attainable;
+pub mod card;
 pub mod check;
 pub mod figure;
 pub mod files;
+pub mod frame;
 pub mod hazard;
-pub mod motors;
 pub mod progress;
 pub mod row;
 pub mod run;

@@ -8,9 +8,10 @@ use std::process::ExitCode;
 
 use anyhow::Context as _;
 use clap::{CommandFactory as _, Parser, Subcommand};
+use flight::vehicles::mission;
+use onboard_sim::files::text_of;
 use protocol::key_file::KeyFile;
 use protocol::signing::Key;
-use sim::wire::fly::load_flight;
 
 /// Flies the landing controller against a simulated vehicle and streams MAVLink 2.
 #[derive(Parser)]
@@ -148,11 +149,11 @@ fn make_key(file: &Path, of_passphrase: bool) -> anyhow::Result<ExitCode> {
 fn profiles(show: Option<&str>) -> anyhow::Result<ExitCode> {
     let mut out = std::io::stdout().lock();
     if let Some(name) = show {
-        out.write_all(load_flight(name)?.recipe.mission_toml.as_bytes())?;
+        out.write_all(text_of(name, mission::BUILTIN, "mission")?.as_bytes())?;
         return Ok(ExitCode::SUCCESS);
     }
-    for (name, _) in flight::vehicles::mission::BUILTIN {
-        writeln!(out, "{name:<20} {}", load_flight(name)?.recipe.mission.summary)?;
+    for (name, text) in mission::BUILTIN {
+        writeln!(out, "{name:<20} {}", mission::from_toml(text, name)?.summary)?;
     }
     Ok(ExitCode::SUCCESS)
 }

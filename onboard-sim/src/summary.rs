@@ -11,7 +11,7 @@ use flight::vehicle::mission::LegLimits;
 use serde::Serialize;
 
 use crate::attainable::{Window, best_height_m};
-use crate::figure::{Bar, FigureError, Places, PlacesPanel, bars_svg, places_svg};
+use crate::figure::{BLACK_CURVE, FigureError, Line, Panel, sized_lines_svg};
 use crate::row::{COLUMNS, Row};
 use crate::statistics::{Landings, Share, quantile, rank_correlation, sorted};
 use crate::store::{Manifest, Shard};
@@ -390,54 +390,62 @@ pub const PICTURES: [(&str, &str); 4] = [
     ("tilt.svg", "Tilt at contact"),
 ];
 
+/// Size of a histogram and of a map, px.
+const HISTOGRAM_PX: (u32, u32) = (720, 500);
+const MAP_PX: (u32, u32) = (706, 686);
+
 /// Every picture, in the order of [`PICTURES`].
 pub fn pictures(rows: &[Row], legs: &LegLimits) -> [Result<String, FigureError>; 4] {
     let [scatter, speed, height, tilt] = PICTURES.map(|(_, title)| title);
-    let places = |is: fn(&Row) -> bool| {
+    let places = |name: &str, is: fn(&Row) -> bool| {
         let rows = rows.iter().filter(|row| is(row));
-        rows.filter_map(|row| Some([row.touchdown_x_m?, row.touchdown_y_m?])).collect()
+        (name.to_owned(), rows.filter_map(|row| Some((row.touchdown_x_m?, row.touchdown_y_m?))).collect())
     };
-    let touchdowns = PlacesPanel {
-        title: String::new(),
-        places: vec![
-            places(|row| !row.stands),
-            places(|row| row.stands && !row.envelope),
-            places(|row| row.stands && row.envelope),
+    let touchdowns = Panel {
+        x_label: "world x, m from the pad".to_owned(),
+        y_label: "world y, m from the pad".to_owned(),
+        kinds: vec![
+            places("damaged", |row| !row.stands),
+            places("stands, outside the envelope", |row| row.stands && !row.envelope),
+            places("stands, inside", |row| row.stands && row.envelope),
         ],
-        radii_m: Vec::new(),
-    };
-    let touchdowns = Places {
-        labels: ["world x, m from the pad", "world y, m from the pad"],
-        kinds: &["damaged", "stands, outside the envelope", "stands, inside"],
-        radii: &[],
-        arrow: None,
-        panels: &[touchdowns],
+        crosses: vec![(0.0, 0.0, BLACK_CURVE)],
+        equal_scales: true,
+        ..Panel::default()
     };
     let values = |column| sorted(numbers(rows, column).map(f64::abs));
     [
-        places_svg(scatter, &touchdowns),
+        sized_lines_svg(scatter, &[touchdowns], 1, None, MAP_PX),
         histogram(&values("touchdown_vertical_m_s"), speed, "vertical speed, m/s", Some(legs.vertical_m_s)),
         histogram(&values("onset_height_m"), height, "height of the feet, m", None),
         histogram(&values("touchdown_tilt_deg"), tilt, "tilt, degrees", Some(legs.tilt_deg)),
     ]
 }
 
+/// The outline of the bars, and the limit of the legs.
 fn histogram(values: &[f64], title: &str, label: &str, limit: Option<f64>) -> Result<String, FigureError> {
     let tail = libm::floor(TAIL_SHARE * values.len() as f64) as usize;
-    let mark = limit.map(|limit| ("design envelope of the legs", limit));
-    let (Some(from), Some(to)) = (values.get(tail), values.iter().rev().nth(tail)) else {
-        return bars_svg(&format!("{title}: no flight has one"), [label, "flights"], &[], mark);
-    };
+    let (from, to) = values.get(tail).zip(values.iter().rev().nth(tail)).unwrap_or((&0.0, &0.0));
     let width = if to > from { (to - from) / BARS as f64 } else { 1.0 };
-    let mut counts = [0_u32; BARS];
+    let mut counts = [0.0; BARS];
     for value in values {
         let place = (value.clamp(*from, *to) - from) / width;
-        counts[(place as usize).min(BARS - 1)] += 1;
+        counts[(place as usize).min(BARS - 1)] += 1.0;
     }
-    let bar = |(place, count): (usize, &u32)| {
-        let left = from + width * place as f64;
-        ([left, left + width], f64::from(*count))
+    let bar = |(place, count): (usize, &f64)| {
+        let (left, right) = (from + width * place as f64, from + width * (place + 1) as f64);
+        [(left, 0.0), (left, *count), (right, *count), (right, 0.0)]
     };
-    let bars: Vec<Bar> = counts.iter().enumerate().filter(|(_, count)| **count > 0).map(bar).collect();
-    bars_svg(title, [label, "flights"], &bars, mark)
+    let line = |name: &str, colour, points| Line { name: name.to_owned(), colour, dashed: false, points };
+    let most = counts.iter().copied().fold(1.0, f64::max);
+    let limit = limit.map(|limit| line("design envelope of the legs", 1, vec![(limit, 0.0), (limit, most)]));
+    let bars = line("", 0, counts.iter().enumerate().flat_map(bar).collect());
+    let panel = Panel {
+        x_label: label.to_owned(),
+        y_label: "flights".to_owned(),
+        lines: [bars].into_iter().chain(limit).collect(),
+        ..Panel::default()
+    };
+    let none = if values.is_empty() { ": no flight has one" } else { "" };
+    sized_lines_svg(&format!("{title}{none}"), &[panel], 1, None, HISTOGRAM_PX)
 }

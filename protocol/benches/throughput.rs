@@ -49,7 +49,7 @@ fn messages() -> Vec<MavMessage> {
             }),
             3 => MavMessage::TD_CONTROLLER(TD_CONTROLLER_DATA {
                 time_boot_ms,
-                cost: 8_465.0,
+                iterations: 3,
                 ..Default::default()
             }),
             4 => MavMessage::TD_FLIGHT_STATUS(TD_FLIGHT_STATUS_DATA { time_boot_ms, ..Default::default() }),
@@ -60,7 +60,6 @@ fn messages() -> Vec<MavMessage> {
                 MavMessage::TD_FINS(TD_FINS_DATA { time_boot_ms, measured: [9_000; 4], ..Default::default() })
             }
             _ => MavMessage::TD_PREDICTED_PATH(TD_PREDICTED_PATH_DATA {
-                time_boot_ms,
                 altitude: [1_500; 12],
                 count: 12,
                 ..Default::default()

@@ -33,6 +33,9 @@ pub const NETWORK_BUDGET_BYTES_S: u32 = 20_000;
 /// number up to 2^24 exactly.
 pub const LARGEST_BOOT_NUMBER: u32 = 0x00FF_FFFF;
 
+/// The phase has the lowest bits of a vehicle's `custom_mode` (HEARTBEAT), and its boot number the others.
+pub const PHASE_BITS: u32 = 8;
+
 /// The commit that this build was made from; other words in a development build.
 pub const GIT_COMMIT: &str = env!("TOUCHDOWN_GIT_COMMIT");
 

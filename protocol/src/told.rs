@@ -1,12 +1,15 @@
 //! What a vehicle has told of itself, as one record of the log. A station records it as it hears, and `replay` makes the same of
 //! a `.tlog`.
 
+use mavlink::MessageData as _;
 use num_traits::FromPrimitive as _;
 
 use crate::dialect::{
-    HEARTBEAT_DATA, MavAutopilot, MavMessage, MavType, TD_CONTROLLER_DATA, TD_FINS_DATA,
+    HEARTBEAT_DATA, MavAutopilot, MavMessage, MavType, TD_BOOK_KEPT_DATA, TD_CONTROLLER_DATA, TD_FINS_DATA,
     TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TdPhase,
 };
+use crate::frame::Frame;
+use crate::identity::PHASE_BITS;
 use crate::log::v1::Telemetry;
 use crate::motion::{Attitude, Deflection, Motion};
 
@@ -17,12 +20,28 @@ pub fn may_be_ours(beat: &HEARTBEAT_DATA) -> bool {
 
 /// The phase in a HEARTBEAT; `None` if another autopilot has sent it.
 pub fn phase_of(beat: &HEARTBEAT_DATA) -> Option<TdPhase> {
-    phase_from_number(beat.custom_mode).filter(|_| may_be_ours(beat))
+    phase_from_number(beat.custom_mode & ((1 << PHASE_BITS) - 1)).filter(|_| may_be_ours(beat))
 }
 
 /// The phase for the `custom_mode` of a HEARTBEAT; `None` for a number that is not in the dialect.
 pub fn phase_from_number(number: u32) -> Option<TdPhase> {
     TdPhase::from_u32(number)
+}
+
+/// The boot that a frame of a vehicle of ours names: a HEARTBEAT above the phase, our own messages in their first number. `None`
+/// if it names none.
+pub fn boot_of(frame: &Frame) -> Option<u32> {
+    let payload = frame.padded_payload();
+    let number =
+        |at: usize| u32::from_le_bytes([payload[at], payload[at + 1], payload[at + 2], payload[at + 3]]);
+    let boot = match frame.message_id() {
+        HEARTBEAT_DATA::ID => number(0) >> PHASE_BITS,
+        // It begins with 64 bits.
+        TD_BOOK_KEPT_DATA::ID => number(8),
+        54_000..=54_099 => number(0),
+        _ => 0,
+    };
+    (boot > 0).then_some(boot)
 }
 
 /// The last of each message that goes into the record.

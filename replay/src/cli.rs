@@ -5,6 +5,7 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, ensure};
+pub(crate) use onboard_sim::files::text_of;
 use onboard_sim::run::threads;
 use serde::Serialize;
 
@@ -144,17 +145,6 @@ pub(crate) fn refuse_existing(path: &Path) -> Result<()> {
         path.display()
     );
     Ok(())
-}
-
-/// The text of a built-in, or of a file.
-pub(crate) fn text_of(name: &str, builtin: &[(&str, &str)], what: &str) -> Result<String> {
-    if let Some((_, text)) = builtin.iter().find(|(known, _)| *known == name) {
-        return Ok((*text).to_owned());
-    }
-    std::fs::read_to_string(name).with_context(|| {
-        let known = builtin.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
-        format!("'{name}' is neither a built-in {what} ({known}) nor a readable file")
-    })
 }
 
 /// Writes a line to standard error; a closed standard error is ignored.

@@ -99,7 +99,7 @@ def identity(ground):
     ground.beat()
     beat = ground.message("HEARTBEAT")
     check("the vehicle is 1/1, a rocket, generic", (beat.get_srcComponent(), beat.type, beat.autopilot) == (1, 9, 0))
-    check("custom_mode is the phase", beat.custom_mode in (0, 1) and beat.base_mode & 1)
+    check("custom_mode has the phase", beat.custom_mode & 0xFF in (0, 1) and beat.base_mode & 1)
     for request in ((512, 148), (520, 1)):
         assert ground.command(*request) == ACCEPTED
         version = ground.message("AUTOPILOT_VERSION")
@@ -118,10 +118,10 @@ def modes(ground):
     names = {}
     while len(names) < 13:
         mode = ground.message("AVAILABLE_MODES")
-        names[mode.custom_mode] = mode.mode_name
+        names[mode.custom_mode & 0xFF] = mode.mode_name
     check("13 modes have names", names[9] == "POWERED" and mode.number_modes == 13)
     assert ground.command(512, 436) == ACCEPTED
-    check("CURRENT_MODE", ground.message("CURRENT_MODE").custom_mode == 1)
+    check("CURRENT_MODE", ground.message("CURRENT_MODE").custom_mode & 0xFF == 1)
 
 
 def refusals(ground):
@@ -214,7 +214,7 @@ def main():
     # A ground station sends heartbeats; without them the vehicle refuses to arm.
     ground.beats = True
     identity(ground)
-    ground.message("HEARTBEAT", lambda m: m.custom_mode == 1)
+    ground.message("HEARTBEAT", lambda m: m.custom_mode & 0xFF == 1)
     for part in (modes, refusals, intervals, parameters, files, clocks, arming):
         ground.beat()
         part(ground)

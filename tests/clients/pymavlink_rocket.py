@@ -52,7 +52,7 @@ def main():
     estimator = ground.message("ESTIMATOR_STATUS")
     check("the estimator vouches for itself", estimator.flags & 1 and estimator.pos_vert_accuracy < 5)
     check("abort", ground.command(185, 1) == ACCEPTED)
-    ground.message("HEARTBEAT", lambda m: m.custom_mode == 12 and m.system_status == 8)
+    ground.message("HEARTBEAT", lambda m: m.custom_mode & 0xFF == 12 and m.system_status == 8)
     check("it is under its parachute, terminated", True)
     slow = ground.message("TD_DESCENT", lambda m: m.chute == 3)
     check("which carries it", -10 < slow.vertical_speed_m_s < 0)

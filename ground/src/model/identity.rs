@@ -86,7 +86,6 @@ pub(crate) fn time_boot_ms(message: &MavMessage) -> Option<u32> {
         MavMessage::TD_CONTROLLER(data) => Some(data.time_boot_ms),
         MavMessage::TD_TOUCHDOWN_PREDICTION(data) => Some(data.time_boot_ms),
         MavMessage::TD_FLIGHT_STATUS(data) => Some(data.time_boot_ms),
-        MavMessage::TD_UPLINK(data) => Some(data.time_boot_ms),
         MavMessage::ATTITUDE(data) => Some(data.time_boot_ms),
         MavMessage::GLOBAL_POSITION_INT(data) => Some(data.time_boot_ms),
         MavMessage::TIMESYNC(data) if data.tc1 > 0 => u32::try_from(data.tc1 / 1_000_000).ok(),

@@ -45,7 +45,7 @@ impl Quantity {
 }
 
 /// How many quantities there are.
-pub const COUNT: usize = 36;
+pub const COUNT: usize = 35;
 
 const fn quantity(
     name: &'static str,
@@ -88,10 +88,9 @@ pub static ALL: [Quantity; COUNT] = [
     quantity("drag", "x", 3, |m, _| m.vehicle.of_descent(|d| d.drag_scale)),
     quantity("time to touchdown", "s", 1, |m, now| m.vehicle.touchdown_in_s(now)),
     quantity("predicted speed", "m/s", 2, |m, _| m.vehicle.predicted_speed_m_s()),
-    quantity("thrust", "x", 3, |m, _| solver(m, |c| f64::from(c.thrust_scale))),
+    quantity("thrust", "x", 3, |m, _| m.vehicle.of_descent(|d| d.thrust_scale)),
     quantity("solve time", "ms", 2, |m, _| solver(m, |c| f64::from(c.solve_time_us) / 1_000.0)),
     quantity("solver margin", "ms", 1, |m, _| solver(m, |c| f64::from(c.deadline_margin_us) / 1_000.0)),
-    quantity("cost", "", 1, |m, _| solver(m, |c| f64::from(c.cost))),
     quantity("battery", "V", 2, |m, _| {
         m.vehicle.battery().map(|battery| battery.map(|battery| battery.volts))
     }),

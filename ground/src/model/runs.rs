@@ -1,12 +1,14 @@
 //! Which power-ups of which vehicles are heard under the id, and which one of them the screen shows.
 //!
-//! A *run* is one vehicle from one power-up on. Only `TD_FLIGHT_STATUS` names its run: by the vehicle's unique id, the number
-//! of the boot and the vehicle's clock. What else is heard belongs to the run whose clock, or whose sequence numbers, it fits.
+//! A *run* is one vehicle from one power-up on. `TD_FLIGHT_STATUS` names its run: by the vehicle's unique id, the number of the
+//! boot and the vehicle's clock. A heartbeat and our own messages name the boot. What else is heard belongs to the run whose
+//! clock, or whose sequence numbers, it fits.
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
 use protocol::dialect::TdPhase;
+use protocol::identity::LARGEST_BOOT_NUMBER;
 
 use super::{Foreign, KeepAway, Model, Vehicle, words};
 
@@ -26,9 +28,6 @@ const RUNS_MAX: usize = 4;
 /// How many reports in [`STEADY_WITHIN`] show that a run goes on: a single frame that anybody may have sent does not.
 const STEADY_WORDS: usize = 3;
 const STEADY_WITHIN: Duration = Duration::from_secs(3);
-/// Fewer frames than [`STRAY_FROM`] fit into this time.
-const FRESH_WITHIN: Duration = Duration::from_millis(500);
-const STRAY_FROM: i64 = 64;
 /// How many places of one run are distinguished.
 const PLACES_MAX: usize = 4;
 /// Sequence number and clock of one sender rise together. Reports this near to each other, ms, have fewer than 128 frames
@@ -128,6 +127,11 @@ impl Run {
         };
         run.hear(word, now);
         run
+    }
+
+    /// Whether this is its boot number, as far as a heartbeat has room for it.
+    fn is_boot(&self, boot: u32) -> bool {
+        (self.boot ^ boot) & LARGEST_BOOT_NUMBER == 0
     }
 
     fn is_heard(&self, now: Duration) -> bool {
@@ -298,15 +302,19 @@ impl Runs {
         id
     }
 
-    /// Which run another message comes from: the only one at this place, else by its clock or its sequence number; `None` before the
-    /// first flight status. What fits several goes to the shown one.
+    /// Which run another message comes from: that of the boot that it names, or the only one at this place, else by its clock or its
+    /// sequence number; `None` before the first flight status. What fits several goes to the shown one.
     pub fn speaker(
         &self,
         place: u16,
-        (clock_ms, sequence): (Option<u32>, u8),
+        (boot, clock_ms, sequence): (Option<u32>, Option<u32>, u8),
         now: Duration,
     ) -> Option<RunId> {
         let shown = self.shown_run()?;
+        let mut named = self.list.iter().filter(|run| boot.is_some_and(|boot| run.is_boot(boot)));
+        if let (Some(only), None) = (named.next(), named.next()) {
+            return Some(only.id);
+        }
         let mut here = self.list.iter().filter(|run| run.is_heard(now) && run.is_at(place));
         if let (Some(only), None) = (here.next(), here.next()) {
             return Some(only.id);
@@ -320,11 +328,9 @@ impl Runs {
         Some(nearest.unwrap_or(shown).id)
     }
 
-    /// Whether a frame without a clock is of none of these runs: it comes out of sequence while the shown one reports steadily.
-    /// Somebody else beats under this id, and has not said yet who it is.
-    pub fn is_stray(&self, sequence: u8, now: Duration) -> bool {
-        self.shown_run().is_some_and(|shown| is_within(shown.heard_at, FRESH_WITHIN, now))
-            && self.list.iter().filter(|run| run.is_heard(now)).all(|run| run.behind(sequence) > STRAY_FROM)
+    /// Whether a message names a boot that has not reported yet: it is of somebody who has not said who it is.
+    pub fn is_stray(&self, boot: u32) -> bool {
+        self.shown.is_some() && !self.list.iter().any(|run| run.is_boot(boot))
     }
 
     /// Whether a place is another address of the link over which the shown run reports, and no run has reported from it: somebody
@@ -699,7 +705,7 @@ mod tests {
                 let word = ours.word(ms);
                 prop_assert_eq!(runs.hear(&word, at(ms)), shown);
                 // Everything else that ours says is still taken for ours.
-                prop_assert_eq!(runs.speaker(word.place, (None, word.sequence.wrapping_add(1)), at(ms)), Some(shown));
+                prop_assert_eq!(runs.speaker(word.place, (None, None, word.sequence.wrapping_add(1)), at(ms)), Some(shown));
                 prop_assert_eq!(runs.settle(at(ms)), None);
             }
         }

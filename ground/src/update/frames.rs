@@ -8,6 +8,7 @@ use protocol::frame::Frame;
 use protocol::identity::{Address, RADIO};
 use protocol::log::record::EventLevel;
 use protocol::text::Text;
+use protocol::told::boot_of;
 
 use super::{Action, commands, pad, vehicle_changes};
 use crate::model::{Model, Role, RunId, Speaker, Word, is_busy, may_be_ours, telemetry, time_boot_ms};
@@ -81,8 +82,11 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
     let is_nobodys = match &message {
         MavMessage::HEARTBEAT(beat) if !may_be_ours(beat) => false,
         MavMessage::TD_FLIGHT_STATUS(_) | MavMessage::STATUSTEXT(_) => false,
-        MavMessage::HEARTBEAT(_) if model.runs.is_stray(frame.sequence(), now) => true,
-        _ => model.runs.is_strange(model.link.place, now),
+        MavMessage::HEARTBEAT(_) if model.runs.is_stray(boot_of(frame).unwrap_or(0)) => true,
+        _ => {
+            boot_of(frame).is_some_and(|boot| model.runs.is_stray(boot))
+                || model.runs.is_strange(model.link.place, now)
+        }
     };
     if is_nobodys {
         return;
@@ -156,7 +160,10 @@ fn speaker(model: &mut Model, frame: &Frame, message: &MavMessage, now: Duration
         }
         // What another autopilot says beside ours is noted at the shown one.
         MavMessage::HEARTBEAT(beat) if !may_be_ours(beat) => model.runs.shown(),
-        _ => model.runs.speaker(model.link.place, (time_boot_ms(message), frame.sequence()), now),
+        _ => {
+            let said = (boot_of(frame), time_boot_ms(message), frame.sequence());
+            model.runs.speaker(model.link.place, said, now)
+        }
     }
 }
 

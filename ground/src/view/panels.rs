@@ -62,8 +62,6 @@ pub fn controller_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'
     let level = data.map_or_else(|| "--".to_owned(), |d| steered(d.level));
     let status =
         data.map_or_else(|| "--".to_owned(), |d| words::lower_case(&d.solver_status, "TD_SOLVER_STATUS_"));
-    let kkt = data
-        .map_or_else(|| "--".to_owned(), |d| format!("{:.1e} {:.1e}", d.kkt_stationarity, d.kkt_feasibility));
     let missed = data.is_some_and(|d| d.deadline_margin_us < 0);
     let margin = number(data.map(|d| f64::from(d.deadline_margin_us) / 1_000.0));
     vec![
@@ -72,9 +70,7 @@ pub fn controller_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'
         row(theme, "iterations", number(data.map(|d| f64::from(d.iterations))), 0, "", now),
         row(theme, "solve time", number(data.map(|d| f64::from(d.solve_time_us) / 1_000.0)), 2, "ms", now),
         row(theme, if missed { "MISSED BY" } else { "margin" }, margin, 2, "ms", now),
-        row(theme, "cost", number(data.map(|d| f64::from(d.cost))), 1, "", now),
-        wide_text("KKT", kkt, TextRole::Plain),
-        row(theme, "thrust", number(data.map(|d| f64::from(d.thrust_scale))), 3, "x", now),
+        row(theme, "thrust", model.vehicle.of_descent(|d| d.thrust_scale), 3, "x", now),
     ]
 }
 
@@ -260,6 +256,7 @@ mod limit_rows_tests {
     use super::*;
 
     const LIMITS: TD_TOUCHDOWN_LIMITS_DATA = TD_TOUCHDOWN_LIMITS_DATA {
+        boot_number: 0,
         vertical_m_s: 1.5,
         lateral_m_s: 0.6,
         tilt_rad: 7.5_f32.to_radians(),

@@ -48,6 +48,7 @@ fn who_asks_confirms_and_commands_is_entered_with_name_and_key() {
     let mut name = [0; 16];
     name[..3].copy_from_slice(b"Bob");
     rig.hear(&MavMessage::TD_OPERATOR(TD_OPERATOR_DATA {
+        boot_number: 0,
         number: 2,
         role: TdRole::TD_ROLE_FLIGHT,
         name: name.into(),
@@ -96,6 +97,7 @@ fn the_vehicle_is_told_the_end_until_it_confirms_it() {
     assert!((2..=3).contains(&sent.len()), "every 2 s: {}", sent.len());
     assert!(SignedHead::of_message(&sent[0]) == head && sent[0].target_system == 1);
     let kept = TD_BOOK_KEPT_DATA {
+        boot_number: 0,
         book: head.head.book,
         entries: 1,
         target_system: GROUND.system_id,

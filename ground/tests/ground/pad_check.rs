@@ -47,6 +47,7 @@ fn tell(rig: &mut Rig, run: u16, state: State, found: usize) {
 fn tell_values(rig: &mut Rig, run: u16, state: State, values: &[Value]) {
     for (place, (item, value, least, most, verdict)) in values.iter().copied().enumerate() {
         rig.hear(&MavMessage::TD_PAD_CHECK(TD_PAD_CHECK_DATA {
+            boot_number: 0,
             time_boot_ms: rig.boot_ms(),
             value,
             least,

@@ -35,7 +35,7 @@ fn station_of(number: u8, mission: Option<&str>) -> Rig {
         [(ANN, TdRole::TD_ROLE_RANGE_SAFETY, "Ann"), (BOB, TdRole::TD_ROLE_FLIGHT, "Bob")]
     {
         let name = characters::<16>(name).into();
-        rig.hear(&MavMessage::TD_OPERATOR(TD_OPERATOR_DATA { number, role, name }));
+        rig.hear(&MavMessage::TD_OPERATOR(TD_OPERATOR_DATA { boot_number: 0, number, role, name }));
     }
     crew(&mut rig, TD_CREW_DATA::default());
     rig

@@ -8,10 +8,11 @@ use ground::model::{CommandKind, KeyOwner, Role, Seat, Settings};
 use ground::update::{Action, Msg, Request};
 use protocol::dialect::{
     ATTITUDE_DATA, COMMAND_LONG_DATA, GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA, MavAutopilot, MavCmd,
-    MavMessage, MavModeFlag, MavType, TD_CREW_DATA, TD_FLIGHT_STATUS_DATA, TD_MISSION_DATA, TD_OPERATOR_DATA,
-    TD_UPLINK_DATA, TIMESYNC_DATA, TdAct, TdInterlock, TdMotor, TdPhase, TdRole, VFR_HUD_DATA,
+    MavMessage, MavModeFlag, MavType, TD_CREW_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TD_MISSION_DATA,
+    TD_OPERATOR_DATA, TD_UPLINK_DATA, TIMESYNC_DATA, TdAct, TdInterlock, TdMotor, TdPhase, TdRole,
+    VFR_HUD_DATA,
 };
-use protocol::identity::GROUND;
+use protocol::identity::{GROUND, PHASE_BITS};
 
 use crate::keys::ladder;
 use crate::rig::{Rig, SESSION, is_abort, is_arm, settings, typed};
@@ -105,6 +106,36 @@ fn counting() -> Rig {
     rig.run(1.0);
     rig.take_commands();
     rig
+}
+
+/// A spare on the same channel, before its first status and after a single one.
+#[test]
+fn the_first_words_of_a_spare_on_one_channel_are_never_those_of_the_shown_vehicle() {
+    let mut rig = Rig::crewed();
+    for _ in 0..2 {
+        let clock_ms = rig.boot_ms();
+        rig.hear(&MavMessage::HEARTBEAT(HEARTBEAT_DATA {
+            custom_mode: TdPhase::TD_PHASE_POWERED as u32 | 9 << PHASE_BITS,
+            mavtype: MavType::MAV_TYPE_ROCKET,
+            autopilot: MavAutopilot::MAV_AUTOPILOT_GENERIC,
+            ..HEARTBEAT_DATA::default()
+        }));
+        rig.hear(&MavMessage::TD_GIMBAL(TD_GIMBAL_DATA {
+            boot_number: 9,
+            time_boot_ms: clock_ms,
+            pitch_measured: 1_234,
+            ..TD_GIMBAL_DATA::default()
+        }));
+        assert_eq!(rig.model.vehicle.phase_now(), Some(TdPhase::TD_PHASE_PAD_IDLE));
+        let gimbal = rig.model.vehicle.last::<TD_GIMBAL_DATA>();
+        assert!(gimbal.is_none_or(|gimbal| gimbal.value.pitch_measured != 1_234));
+        rig.hear(&MavMessage::TD_FLIGHT_STATUS(TD_FLIGHT_STATUS_DATA {
+            boot_number: 9,
+            vehicle_uid: 5,
+            time_boot_ms: clock_ms,
+            ..TD_FLIGHT_STATUS_DATA::default()
+        }));
+    }
 }
 
 /// A spare is switched on with its clock at zero, on the same channel.
@@ -369,7 +400,12 @@ fn station_of(number: u8, name: &str, role: Role, operator: &str) -> Rig {
     {
         let mut bytes = [0; 16];
         bytes[..3].copy_from_slice(name.as_bytes());
-        rig.hear(&MavMessage::TD_OPERATOR(TD_OPERATOR_DATA { number, role, name: bytes.into() }));
+        rig.hear(&MavMessage::TD_OPERATOR(TD_OPERATOR_DATA {
+            boot_number: 0,
+            number,
+            role,
+            name: bytes.into(),
+        }));
     }
     rig.hear(&MavMessage::TD_CREW(TD_CREW_DATA { people: 2, ..TD_CREW_DATA::default() }));
     rig

@@ -20,7 +20,7 @@ use sim::dispersion;
 use sim::fault::{TimedFault, how_to_write};
 use sim::recipe::Recipe;
 
-use super::{Progress, on_threads, recipe, single};
+use super::{Progress, on_threads, read, recipe, single};
 
 #[derive(Args)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
@@ -113,8 +113,7 @@ fn flights(arguments: &CampaignArguments) -> anyhow::Result<(Recipe, Option<Expe
     let mut recipe = recipe(&arguments.profile, arguments.start, &arguments.dispersion, arguments.seed)?;
     recipe.faults.clone_from(&arguments.faults);
     let Some(path) = &arguments.scenario else { return Ok((recipe, None)) };
-    let text = fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
-    let scenario = Scenario::from_toml(&text, &path.display().to_string())?;
+    let scenario = Scenario::from_toml(&read(path)?, &path.display().to_string())?;
     recipe.faults.extend(scenario.faults);
     Ok((recipe, scenario.expected))
 }

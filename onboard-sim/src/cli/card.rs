@@ -5,13 +5,12 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
+use onboard_sim::card::{Card, Day, Order};
 use onboard_sim::files::{refuse_loss, write_folder};
 use onboard_sim::hazard::Flights;
-use onboard_sim::motors::card::{Card, Day, Order};
 use protocol::mission::MissionHash;
 use sim::dispersion;
 
-use super::hazard::check_winds;
 use super::{in_wind, on_threads, recipe, show_flights};
 
 /// The files of a card.
@@ -55,7 +54,6 @@ pub(crate) struct CardArguments {
 }
 
 pub(crate) fn run(arguments: &CardArguments) -> anyhow::Result<ExitCode> {
-    check_winds(&arguments.winds)?;
     for name in FILES {
         refuse_loss(&arguments.out.join(name), arguments.force)?;
     }

@@ -17,31 +17,12 @@ use protocol::transport::LinkAddress;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::process::getpgrp;
 use rustix::termios::tcgetpgrp;
-use sim::dispersion::{self, Dispersion};
 use sim::fault::{TimedFault, how_to_write};
-use sim::wire::fly::{FlightEnd, FlightSummary, FlyOptions, OnTheWire, Speed, fly_observed, load_flight};
+use sim::wire::fly::{FlightEnd, FlightSummary, FlyOptions, OnTheWire, Speed, fly_observed};
 use sim::wire::vehicle::{RocketFlight, VehicleEvent};
 use tokio::sync::watch;
 
-use super::{in_wind, text_of};
-
-/// The strongest mean wind that can be requested, m/s.
-pub(super) const WIND_MAX_M_S: f64 = 30.0;
-
-/// Which log is wanted.
-#[derive(Debug, Clone, PartialEq)]
-enum LogChoice {
-    None,
-    File(PathBuf),
-}
-
-fn log_choice(given: &str) -> Result<LogChoice, String> {
-    match given {
-        "" => Err("the name of the log is empty; give a file or `none`".to_owned()),
-        "none" => Ok(LogChoice::None),
-        path => Ok(LogChoice::File(path.into())),
-    }
-}
+use super::{in_wind, recipe};
 
 #[derive(Args)]
 #[command(
@@ -86,8 +67,8 @@ pub(crate) struct FlyArguments {
     uid_file: Option<PathBuf>,
     /// Log to write (MCAP), or `none`, as without this option. An existing file is kept: the log then gets the next free name,
     /// and says so.
-    #[arg(long, value_name = "FILE|none", value_parser = log_choice)]
-    log: Option<LogChoice>,
+    #[arg(long, value_name = "FILE|none")]
+    log: Option<PathBuf>,
     /// Seed of the dispersions.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -97,9 +78,9 @@ pub(crate) struct FlyArguments {
     /// Where the flight begins: pad, apogee or drone, if the mission has that start [default: the mission's].
     #[arg(long, value_name = "START")]
     start: Option<StartPoint>,
-    /// Built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh, wild) or TOML file [default: field].
-    #[arg(long, value_name = "NAME|FILE")]
-    dispersion: Option<String>,
+    /// Built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh, wild) or TOML file.
+    #[arg(long, default_value = "field", value_name = "NAME|FILE")]
+    dispersion: String,
     /// Mean wind 10 m above the ground, m/s, instead of the set's.
     #[arg(long, value_name = "M_S")]
     wind: Option<f64>,
@@ -130,21 +111,8 @@ pub(crate) fn run(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
 impl FlyArguments {
     /// The flight that the options describe.
     fn flight(&self) -> anyhow::Result<RocketFlight> {
-        let RocketFlight { mut recipe, .. } = load_flight(&self.profile)?;
-        if let Some(start) = self.start {
-            recipe = recipe.starting_at(start)?;
-        }
-        recipe.seed = self.seed;
-        if let Some(name) = &self.dispersion {
-            recipe.dispersion_toml = text_of(name, dispersion::BUILTIN, "set of dispersions")?;
-            recipe.dispersion = Dispersion::from_toml(&recipe.dispersion_toml, name)?;
-            recipe.dispersion_name.clone_from(name);
-        }
+        let mut recipe = recipe(&self.profile, self.start, &self.dispersion, self.seed)?;
         if let Some(wind_m_s) = self.wind {
-            anyhow::ensure!(
-                (0.0..=WIND_MAX_M_S).contains(&wind_m_s),
-                "--wind {wind_m_s}: must be 0 to {WIND_MAX_M_S} m/s"
-            );
             recipe = in_wind(&recipe, wind_m_s)?;
         }
         recipe.faults.clone_from(&self.faults);
@@ -155,18 +123,17 @@ impl FlyArguments {
 async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
     let flight = arguments.flight()?;
     let crew = arguments.crew.as_deref().map(CrewFile::open).transpose()?;
-    let recorder = match &arguments.log {
-        None | Some(LogChoice::None) => None,
-        Some(LogChoice::File(path)) => {
-            let header = flight.log_header("onboard-sim", unix_ns());
-            let recorder = Recorder::create_under_free_name(path, None, &header)?;
-            if recorder.path() != path {
-                let (asked, log) = (path.display(), recorder.path().display());
-                writeln!(std::io::stdout(), "{asked} exists and is kept; the log is {log}")?;
-            }
-            Some(recorder)
+    let log = arguments.log.as_ref().filter(|path| *path != Path::new("none"));
+    let recorder = log.map(|path| {
+        let header = flight.log_header("onboard-sim", unix_ns());
+        let recorder = Recorder::create_under_free_name(path, None, &header)?;
+        if recorder.path() != path {
+            let (asked, log) = (path.display(), recorder.path().display());
+            writeln!(std::io::stdout(), "{asked} exists and is kept; the log is {log}")?;
         }
-    };
+        anyhow::Ok(recorder)
+    });
+    let recorder = recorder.transpose()?;
     let drawn = OnTheWire::drawn();
     let uid = arguments.uid_file.as_deref().map(|file| kept_uid(file, drawn.uid)).transpose()?;
     let on_the_wire = OnTheWire {
@@ -178,10 +145,6 @@ async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
     // People stand at it: a flight by itself keeps nobody away.
     let crewed = !arguments.auto && !arguments.mavlink.is_empty();
     // Beside the first of these that the vehicle has: they make it the same vehicle when it is switched on again.
-    let log = match &arguments.log {
-        Some(LogChoice::File(path)) => Some(path),
-        None | Some(LogChoice::None) => None,
-    };
     let own = arguments.uid_file.as_ref().or(arguments.key.as_ref()).or(log);
     let abort_file = own.filter(|_| crewed).map(|file| file.with_added_extension("aborted"));
     let options = FlyOptions {
@@ -227,19 +190,8 @@ async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
     Ok(exit_code(&summary.outcome))
 }
 
-/// The text of a set of dispersions with this mean wind. The log keeps the text, and a replay draws from it again.
-pub(super) fn with_wind(toml: &str, wind_m_s: f64) -> String {
-    const KEY: &str = "wind_m_s";
-    let is_wind = |line: &&str| {
-        line.trim_start().strip_prefix(KEY).is_some_and(|rest| rest.trim_start().starts_with('='))
-    };
-    let others: String = toml.split_inclusive('\n').filter(|line| !is_wind(line)).collect();
-    // At the top, before the first table.
-    format!("{KEY} = [{wind_m_s:?}, {wind_m_s:?}]\n{others}")
-}
-
 /// Waits for Ctrl-C or a request to terminate.
-pub(super) async fn interrupted() {
+async fn interrupted() {
     use tokio::signal::unix::{SignalKind, signal};
     let Ok(mut terminate) = signal(SignalKind::terminate()) else {
         let _ = tokio::signal::ctrl_c().await;
@@ -397,18 +349,4 @@ fn exit_code(outcome: &FlightEnd) -> ExitCode {
 fn unix_ns() -> u64 {
     let since_epoch = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
     since_epoch.map_or(0, |since| u64::try_from(since.as_nanos()).unwrap_or(u64::MAX))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_wind_is_set_in_every_set_of_dispersions_and_nothing_else() {
-        for (name, text) in dispersion::BUILTIN {
-            let before = Dispersion::from_toml(text, name).unwrap();
-            let after = Dispersion::from_toml(&with_wind(text, 4.5), name).unwrap();
-            assert_eq!(after, Dispersion { wind_m_s: [4.5; 2], ..before }, "{name}");
-        }
-    }
 }

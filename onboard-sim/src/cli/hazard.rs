@@ -6,14 +6,13 @@ use std::process::ExitCode;
 use clap::Args;
 use flight::rules::verdict::Landing;
 use flight::vehicle::mission::StartPoint;
-use onboard_sim::figure::{Places, PlacesPanel, places_svg};
+use onboard_sim::figure::{BLACK_CURVE, Line, Panel, sized_lines_svg};
 use onboard_sim::files::{refuse_loss, write_all};
 use onboard_sim::hazard::{self, Flights, Impact, Radius, Rule, Way, keep_out_m, landed_as_planned, widest};
 use onboard_sim::statistics::Landings;
 use sim::dispersion::{self, may_be_kinder};
 use sim::recipe::Recipe;
 
-use super::fly::WIND_MAX_M_S;
 use super::{in_wind, mission_text, on_threads, recipe, show_flights};
 
 /// Flights of each kind that the picture shows.
@@ -60,7 +59,6 @@ pub(crate) fn run(arguments: &HazardArguments) -> anyhow::Result<ExitCode> {
     for path in [&arguments.csv, &arguments.svg].into_iter().flatten() {
         refuse_loss(path, arguments.force)?;
     }
-    check_winds(&arguments.winds)?;
     let recipes = recipes(arguments)?;
     let mission = &recipes[0].mission;
     let ways = Way::of(mission);
@@ -77,12 +75,6 @@ pub(crate) fn run(arguments: &HazardArguments) -> anyhow::Result<ExitCode> {
         write_all(&[(path.clone(), study.svg(&rule)?.into_bytes())], arguments.force)?;
     }
     Ok(ExitCode::SUCCESS)
-}
-
-/// Refuses a wind that cannot be flown.
-pub(super) fn check_winds(winds_m_s: &[f64]) -> anyhow::Result<()> {
-    let wrong = winds_m_s.iter().find(|wind_m_s| !(0.0..=WIND_MAX_M_S).contains(*wind_m_s));
-    wrong.map_or(Ok(()), |wind_m_s| anyhow::bail!("--wind {wind_m_s}: must be 0 to {WIND_MAX_M_S} m/s"))
 }
 
 /// The mission in each wind.
@@ -185,36 +177,46 @@ impl Study<'_> {
 
     /// One wind a panel, with its own radius.
     fn svg(&self, rule: &Rule) -> anyhow::Result<String> {
-        let panels = self.arguments.winds.iter().zip(self.impacts).map(|(wind_m_s, impacts)| {
-            let places = KINDS.map(|(_, ways)| {
+        let panel = |(wind_m_s, impacts): (&f64, &Vec<Impact>)| {
+            let places = KINDS.map(|(kind, ways)| {
                 let shown =
                     impacts.iter().filter(|impact| ways.contains(&impact.way) && impact.number < SHOWN);
-                shown.filter_map(Impact::in_wind_m).map(|[along_m, left_m]| [-left_m, along_m]).collect()
+                let places = shown.filter_map(Impact::in_wind_m).map(|[along_m, left_m]| (-left_m, along_m));
+                (kind.to_owned(), places.collect())
             });
             let widest = widest(impacts).map(|(_, radius)| radius);
             let keep_out_m = widest.map_or(f64::NAN, |radius| keep_out_m(&radius, rule));
-            let open = widest.is_none_or(|radius| radius.high_m.is_none());
-            PlacesPanel {
-                title: format!(
-                    "{wind_m_s} m/s: nobody within {}{keep_out_m:.0} m",
-                    if open { "at least " } else { "" }
-                ),
-                places: places.to_vec(),
-                radii_m: vec![keep_out_m, rule.distance_m()],
+            let at_least = if widest.is_none_or(|radius| radius.high_m.is_none()) { "at least " } else { "" };
+            let rule_m = rule.distance_m();
+            let tip_m = if keep_out_m.is_finite() { keep_out_m } else { rule_m };
+            let head = [(0.0, 0.0), (0.0, 1.0), (-0.03, 0.94), (0.0, 1.0), (0.03, 0.94)];
+            let arrow = Line {
+                name: "where the wind blows to".to_owned(),
+                colour: BLACK_CURVE,
+                dashed: false,
+                points: head.map(|(x, y)| (tip_m * x, tip_m * y)).to_vec(),
+            };
+            Panel {
+                title: format!("{wind_m_s} m/s: nobody within {at_least}{keep_out_m:.0} m"),
+                x_label: "across the wind, m".to_owned(),
+                y_label: "downwind, m".to_owned(),
+                kinds: places.to_vec(),
+                lines: vec![
+                    Line::circle("nobody within", keep_out_m, false),
+                    Line::circle(&format!("rule of NAR: {rule_m:.0} m"), rule_m, true),
+                    arrow,
+                ],
+                crosses: vec![(0.0, 0.0, BLACK_CURVE)],
+                equal_scales: true,
+                ..Panel::default()
             }
-        });
-        let rule = format!("rule of NAR: {:.0} m", rule.distance_m());
-        let places = Places {
-            labels: ["across the wind, m", "downwind, m"],
-            kinds: &KINDS.map(|(name, _)| name),
-            radii: &["nobody within", &rule],
-            arrow: Some("where the wind blows to"),
-            panels: &panels.collect::<Vec<_>>(),
         };
+        let panels: Vec<Panel> = self.arguments.winds.iter().zip(self.impacts).map(panel).collect();
         let shown = self.arguments.flights.min(SHOWN);
         let title =
             format!("{}: where it comes down ({shown} flights of each way in each wind)", self.mission);
-        Ok(places_svg(&title, &places)?)
+        let (columns, size_px) = if panels.len() == 1 { (1, (706, 720)) } else { (2, (486, 500)) };
+        Ok(sized_lines_svg(&title, &panels, columns, None, size_px)?)
     }
 }
 

@@ -8,12 +8,16 @@ pub(crate) mod hazard;
 pub(crate) mod new;
 mod single;
 
+use std::path::Path;
+
 use anyhow::Context as _;
 use flight::vehicle::mission::StartPoint;
+use onboard_sim::files::text_of;
 use onboard_sim::progress::Progress;
 use onboard_sim::run::threads;
 use sim::dispersion::{self, Dispersion};
 use sim::recipe::{self, Recipe};
+use toml_edit::{Array, DocumentMut};
 
 /// Does work on so many threads, or on as many as there are processors; the results do not depend on it.
 fn on_threads<T: Send>(
@@ -32,15 +36,11 @@ fn mission_text(profile: &str, start: Option<StartPoint>) -> anyhow::Result<Stri
     })
 }
 
-/// The text of a built-in set, or of a file.
-fn text_of(name: &str, builtin: &[(&str, &str)], what: &str) -> anyhow::Result<String> {
-    if let Some((_, text)) = builtin.iter().find(|(known, _)| *known == name) {
-        return Ok((*text).to_owned());
-    }
-    std::fs::read_to_string(name).with_context(|| {
-        let known = builtin.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
-        format!("'{name}' is neither a built-in {what} ({known}) nor a readable file")
-    })
+/// A file's text; what is not UTF-8 is read as Latin-1, in which some programs export.
+fn read(path: &Path) -> anyhow::Result<String> {
+    let bytes = std::fs::read(path).with_context(|| format!("{}: cannot be read", path.display()))?;
+    Ok(String::from_utf8(bytes)
+        .unwrap_or_else(|error| error.as_bytes().iter().copied().map(char::from).collect()))
 }
 
 /// The flights of a seed: a mission, with a start if one is given, and a set of dispersions, each built in or a file.
@@ -50,10 +50,14 @@ fn recipe(profile: &str, start: Option<StartPoint>, set: &str, seed: u64) -> any
     Ok(Recipe { seed, ..Recipe::from_texts((profile, &mission_toml), (set, &set_toml))? })
 }
 
-/// The same flights in another mean wind, m/s.
+/// The same flights in another mean wind, m/s. The log keeps the text of the set, and a replay draws from it again.
 fn in_wind(recipe: &Recipe, wind_m_s: f64) -> anyhow::Result<Recipe> {
-    let dispersion_name = format!("{} with {wind_m_s} m/s of wind", recipe.dispersion_name);
-    let dispersion_toml = fly::with_wind(&recipe.dispersion_toml, wind_m_s);
+    const MOST_M_S: f64 = 30.0;
+    anyhow::ensure!((0.0..=MOST_M_S).contains(&wind_m_s), "--wind {wind_m_s}: must be 0 to {MOST_M_S} m/s");
+    let mut text: DocumentMut = recipe.dispersion_toml.parse()?;
+    text["wind_m_s"] = toml_edit::value(Array::from_iter([wind_m_s; 2]));
+    let (dispersion_toml, dispersion_name) =
+        (text.to_string(), format!("{} with {wind_m_s} m/s of wind", recipe.dispersion_name));
     let dispersion = Dispersion::from_toml(&dispersion_toml, &dispersion_name)?;
     Ok(Recipe { dispersion, dispersion_name, dispersion_toml, ..recipe.clone() })
 }
@@ -62,4 +66,18 @@ fn in_wind(recipe: &Recipe, wind_m_s: f64) -> anyhow::Result<Recipe> {
 fn show_flights() -> impl Fn(usize, usize) + Sync {
     let progress = Progress::start();
     move |done, of| progress.show(done, of, "flights")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_wind_is_set_in_every_set_of_dispersions_and_nothing_else() {
+        for (name, _) in dispersion::BUILTIN {
+            let before = Recipe::built_in("mk2", name).unwrap();
+            let after = in_wind(&before, 4.5).unwrap();
+            assert_eq!(after.dispersion, Dispersion { wind_m_s: [4.5; 2], ..before.dispersion }, "{name}");
+        }
+    }
 }

@@ -13,10 +13,10 @@ use flight::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use flight::vehicle::mission::Mission;
 use flight::vehicle::thrust_curve::ThrustCurve;
 use flight::vehicles::{mission, motors, openrocket, table, thrust_curve};
-use onboard_sim::files::{refuse_loss, write_all};
+use onboard_sim::files::{refuse_loss, text_of, write_all};
 use toml::Value;
 
-use super::text_of;
+use super::read;
 
 const MASS: &str = "airframe.mass.loaded_kg";
 const LENGTH: &str = "airframe.body.length_m";
@@ -313,13 +313,6 @@ impl Draft {
 /// Four digits of a number.
 fn rounded(number: f64) -> Value {
     Value::Float(format!("{number:.3e}").parse().unwrap_or(number))
-}
-
-/// A file's text; what is not UTF-8 is read as Latin-1, in which some programs export.
-fn read(path: &Path) -> anyhow::Result<String> {
-    let bytes = std::fs::read(path).with_context(|| format!("{}: cannot be read", path.display()))?;
-    Ok(String::from_utf8(bytes)
-        .unwrap_or_else(|error| error.as_bytes().iter().copied().map(char::from).collect()))
 }
 
 /// A number in a unit: of an answer that has the number alone, or another unit behind it, or for an inertia what was measured of

@@ -2,11 +2,11 @@
 
 use flight::rules::verdict::Landing;
 use flight::vehicle::mission::StartPoint;
-use onboard_sim::hazard::{Course, Flights, Impact, Rule, Way, fly, lift_off_kg, studies};
-use onboard_sim::motors::card::{Card, Day, Order};
-use onboard_sim::motors::range_safety::{
+use onboard_sim::card::range_safety::{
     FEWEST, InWind, aborts, calibres, in_winds, limit_m_s, plan, thrust_to_weight,
 };
+use onboard_sim::card::{Card, Day, Order};
+use onboard_sim::hazard::{Course, Flights, Impact, Rule, Way, fly, lift_off_kg, studies};
 use proptest::prelude::*;
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;

@@ -69,7 +69,7 @@ fn a_folder_without_motors_and_a_wrong_value_are_named() {
         refused(&["check", "mk3", "--from", "."])
             .contains(". holds no file that ends in .eng, .rse or .json")
     );
-    assert!(refused(&["check", "mk3", "--from", "no.eng"]).contains("cannot read no.eng"));
+    assert!(refused(&["check", "mk3", "--from", "no.eng"]).contains("no.eng: cannot be read"));
     fs::write(directory.path().join("list.json"), "{}").unwrap();
     assert!(refused(&["check", "mk3", "--from", "list.json"]).contains("list.json: not a list of motors"));
     assert!(refused(&["card", "--wind", "3,40"]).contains("--wind 40: must be 0 to 30 m/s"));

@@ -3,6 +3,8 @@
 use std::fmt;
 use std::fmt::Write as _;
 
+pub(super) use onboard_sim::card::escaped;
+
 use super::section::Section;
 use super::track::Flight;
 use crate::info::Info;
@@ -10,22 +12,6 @@ use crate::info::Info;
 /// Appends to a text in memory, which cannot fail.
 pub(super) fn put(text: &mut String, more: fmt::Arguments<'_>) {
     let _ = text.write_fmt(more);
-}
-
-/// Escapes text from a log for HTML.
-pub(super) fn escaped(text: &str) -> String {
-    let mut safe = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => safe.push_str("&amp;"),
-            '<' => safe.push_str("&lt;"),
-            '>' => safe.push_str("&gt;"),
-            '"' => safe.push_str("&quot;"),
-            c if c.is_control() && c != '\n' => safe.push('\u{fffd}'),
-            c => safe.push(c),
-        }
-    }
-    safe
 }
 
 /// A table: headings, then rows; a heading that begins with `#` marks a column of numbers.

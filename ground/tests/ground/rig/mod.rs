@@ -17,7 +17,7 @@ use protocol::dialect::{
     TdPhase, TdVehicleFlag,
 };
 use protocol::frame::{Encoder, Frame};
-use protocol::identity::{Address, GROUND, VEHICLE};
+use protocol::identity::{Address, GROUND, PHASE_BITS, VEHICLE};
 use protocol::text::chunks;
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
@@ -202,7 +202,7 @@ impl Rig {
         base_mode.set(MavModeFlag::MAV_MODE_FLAG_HIL_ENABLED, self.simulated && self.hil);
         let phase = self.phase as u32;
         self.hear(&MavMessage::HEARTBEAT(HEARTBEAT_DATA {
-            custom_mode: phase,
+            custom_mode: phase | self.boot_number << PHASE_BITS,
             mavtype: MavType::MAV_TYPE_ROCKET,
             autopilot: MavAutopilot::MAV_AUTOPILOT_GENERIC,
             base_mode,
@@ -249,7 +249,6 @@ impl Rig {
 
     pub(crate) fn uplink_of(&mut self, station: Address, accepted_age_ms: u16, commands: bool) {
         self.hear(&MavMessage::TD_UPLINK(TD_UPLINK_DATA {
-            time_boot_ms: self.boot_ms(),
             accepted_age_ms,
             refused_age_ms: u16::MAX,
             target_system: station.system_id,

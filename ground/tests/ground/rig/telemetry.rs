@@ -74,6 +74,7 @@ impl Rig {
     /// Commanded and measured, in the pitch and in the yaw plane.
     pub(crate) fn gimbal(&mut self, [pitch, yaw]: [(i16, i16); 2]) {
         self.hear(&MavMessage::TD_GIMBAL(TD_GIMBAL_DATA {
+            boot_number: self.boot_number,
             time_boot_ms: self.boot_ms(),
             pitch_commanded: pitch.0,
             pitch_measured: pitch.1,
@@ -86,6 +87,7 @@ impl Rig {
     pub(crate) fn actuated_fins(&mut self) {
         let time_boot_ms = self.boot_ms();
         self.hear(&MavMessage::TD_FINS(TD_FINS_DATA {
+            boot_number: self.boot_number,
             time_boot_ms,
             commanded: [9000; 4],
             measured: [9000, 8990, 9000, 8400],
@@ -95,12 +97,8 @@ impl Rig {
     /// The controller level and the state of its solver.
     pub(crate) fn controller(&mut self, level: TdControlLevel) {
         self.hear(&MavMessage::TD_CONTROLLER(TD_CONTROLLER_DATA {
+            boot_number: self.boot_number,
             time_boot_ms: self.boot_ms(),
-            tick: 12,
-            cost: 8465.2,
-            kkt_stationarity: 2.4e-7,
-            kkt_feasibility: 1.1e-9,
-            thrust_scale: 1.0,
             solve_time_us: 1_234,
             deadline_margin_us: 98_766,
             iterations: 3,
@@ -113,6 +111,7 @@ impl Rig {
         let time_boot_ms = self.boot_ms();
         self.controller(TdControlLevel::TD_CONTROL_LEVEL_CONVERGED);
         self.hear(&MavMessage::TD_TOUCHDOWN_PREDICTION(TD_TOUCHDOWN_PREDICTION_DATA {
+            boot_number: self.boot_number,
             time_boot_ms,
             time_to_go_ms: 2_300,
             distance_m: 1.4,
@@ -141,7 +140,7 @@ impl Rig {
             altitude[place] = (100.0 * up).round() as i16;
         }
         self.hear(&MavMessage::TD_PREDICTED_PATH(TD_PREDICTED_PATH_DATA {
-            time_boot_ms: self.boot_ms(),
+            boot_number: self.boot_number,
             x,
             altitude,
             count: points.len() as u8,
@@ -158,6 +157,7 @@ impl Rig {
         let falls_to_m = height_m - 58.0;
         let time_to_ignition_s = if falls_to_m > 0.0 { falls_to_m / -vertical_speed_m_s } else { f32::NAN };
         self.hear(&MavMessage::TD_DESCENT(TD_DESCENT_DATA {
+            boot_number: self.boot_number,
             time_boot_ms: self.boot_ms(),
             height_m,
             vertical_speed_m_s,
@@ -180,6 +180,7 @@ impl Rig {
     /// TD_DESCENT on the way up, with the apogee that is expected: its height, m, and the time until then, s.
     pub(crate) fn ascent(&mut self, booster: TdBooster, apogee_m: f32, time_to_apogee_s: f32) {
         self.hear(&MavMessage::TD_DESCENT(TD_DESCENT_DATA {
+            boot_number: self.boot_number,
             time_boot_ms: self.boot_ms(),
             height_m: 184.8,
             vertical_speed_m_s: 49.4,
@@ -203,6 +204,7 @@ impl Rig {
     /// The design envelope of mk2's legs, and its fence.
     pub(crate) fn limits(&mut self) {
         self.hear(&MavMessage::TD_TOUCHDOWN_LIMITS(TD_TOUCHDOWN_LIMITS_DATA {
+            boot_number: self.boot_number,
             vertical_m_s: 1.0,
             lateral_m_s: 0.7,
             tilt_rad: 10_f32.to_radians(),
@@ -227,6 +229,7 @@ impl Rig {
         let mut characters = [0; 96];
         characters[..text.len()].copy_from_slice(text.as_bytes());
         self.hear(&MavMessage::TD_FINDING(TD_FINDING_DATA {
+            boot_number: self.boot_number,
             time_boot_ms: self.boot_ms(),
             since_s,
             held_s: 1.0,
@@ -242,6 +245,7 @@ impl Rig {
         (self.motor, self.approach_wait_s) = (TdMotor::TD_MOTOR_HOT, 55);
         let [distance_m, tilt_rad, vertical_m_s, lateral_m_s, rate_rad_s] = figures;
         self.hear(&MavMessage::TD_LANDING_VERDICT(TD_LANDING_VERDICT_DATA {
+            boot_number: self.boot_number,
             time_boot_ms: self.boot_ms(),
             contact_ms: self.boot_ms(),
             distance_m,

@@ -135,7 +135,7 @@ pub const STANDARD: &[Standard] = &[
     standard::<ATTITUDE_QUATERNION_DATA>("RATE_ATTITUDE", 8.0).cut_to(32),
     standard::<LOCAL_POSITION_NED_DATA>("RATE_POSITION", 8.0),
     // Without its extensions, which are zero from apogee on. On the way up there is no plan to be sent.
-    standard::<TD_DESCENT_DATA>("RATE_DESCENT", 4.0).cut_to(57),
+    standard::<TD_DESCENT_DATA>("RATE_DESCENT", 4.0).cut_to(61),
     standard::<TD_GIMBAL_DATA>("RATE_GIMBAL", 3.0),
     standard::<TD_CONTROLLER_DATA>("RATE_CONTROLLER", 3.0),
     standard::<TD_FINS_DATA>("RATE_FINS", 2.0),
@@ -520,7 +520,7 @@ pub(super) struct CheckReporter {
 
 impl CheckReporter {
     /// The message to send now.
-    pub(super) fn due(&mut self, vehicle: &VehicleState<'_>, now_s: f64) -> Option<MavMessage> {
+    pub(super) fn due(&mut self, vehicle: &VehicleState<'_>, boot: u32, now_s: f64) -> Option<MavMessage> {
         let check = vehicle.computer.pad_check();
         let mode = vehicle.mode();
         let now = (check.run(), check.state());
@@ -537,7 +537,7 @@ impl CheckReporter {
         let place = self.turn.next(check.findings().len());
         let often = check.is_running() || self.turn.rounds < 2;
         self.due_s = now_s + if often { OFTEN_S } else { SELDOM_S };
-        Some(telemetry::pad_check(check, place, vehicle.time_s))
+        Some(telemetry::pad_check(check, place, vehicle.time_s, boot))
     }
 }
 
@@ -550,7 +550,7 @@ pub(super) struct FindingReporter {
 
 impl FindingReporter {
     /// The message to send now.
-    pub(super) fn due(&mut self, vehicle: &VehicleState<'_>, now_s: f64) -> Option<MavMessage> {
+    pub(super) fn due(&mut self, vehicle: &VehicleState<'_>, boot: u32, now_s: f64) -> Option<MavMessage> {
         let found = vehicle.findings.as_found().len();
         let flew = vehicle.computer.released_at_s().is_some();
         let over =
@@ -560,7 +560,7 @@ impl FindingReporter {
             return None;
         }
         self.due_s = now_s + SELDOM_S;
-        Some(telemetry::finding(vehicle.findings, self.turn.next(found), vehicle.time_s))
+        Some(telemetry::finding(vehicle.findings, self.turn.next(found), vehicle.time_s, boot))
     }
 }
 

@@ -3,7 +3,7 @@
 use alloc::string::String;
 
 use flight::computer::findings::Findings;
-use flight::computer::pilot::{FRAMES_PER_PLAN, touchdown_from_below_m, touchdown_m};
+use flight::computer::pilot::{touchdown_from_below_m, touchdown_m};
 use flight::computer::{Computer, KeptInput};
 use flight::estimation::estimator::Estimate;
 use flight::guidance::powered::{ControlLevel, Plan, PoweredReport};
@@ -189,14 +189,11 @@ impl<'a> VehicleState<'a> {
         self.computer.pilot().report().took_s
     }
 
-    /// Number, level and report of what the controller did last.
-    pub fn controller(&self) -> Option<(u64, ControlLevel, &'a PoweredReport)> {
+    /// Level and report of what the controller did last.
+    pub fn controller(&self) -> Option<(ControlLevel, &'a PoweredReport)> {
         match self.airborne() {
-            Some(air) => {
-                let report = self.computer.pilot().report();
-                Some((air.flown.frame / FRAMES_PER_PLAN, self.computer.level(), report))
-            }
-            None => self.rehearsed.map(|report| (0, ControlLevel::Rehearsal, report)),
+            Some(_) => Some((self.computer.level(), self.computer.pilot().report())),
+            None => self.rehearsed.map(|report| (ControlLevel::Rehearsal, report)),
         }
     }
 

@@ -251,6 +251,7 @@ impl VehicleEndpoint {
             {
                 // The frame itself is in the log already.
                 let kept = TD_BOOK_KEPT_DATA {
+                    boot_number: self.identity.boot_number,
                     book: head.book,
                     entries: head.entries,
                     target_system: frame.source().system_id,
@@ -300,13 +301,16 @@ impl VehicleEndpoint {
             self.say_aloud(Severity::Warning, &words);
         }
         let context = Context { now_s: self.now_s, identity: self.identity };
-        for message in self.stations.due(self.now_s) {
+        let boot = self.identity.boot_number;
+        for message in self.stations.due(boot, self.now_s) {
             for lane in &mut self.lanes {
                 lane.tell_of_uplink(message.clone());
             }
         }
-        let in_turn =
-            [self.check_teller.due(vehicle, self.now_s), self.finding_teller.due(vehicle, self.now_s)];
+        let in_turn = [
+            self.check_teller.due(vehicle, boot, self.now_s),
+            self.finding_teller.due(vehicle, boot, self.now_s),
+        ];
         for message in in_turn.into_iter().flatten() {
             for lane in &mut self.lanes {
                 // A lane without room loses this one: every value comes again.
@@ -514,7 +518,7 @@ impl VehicleEndpoint {
                 let reason = format!("mode {of}: there are {}", Phase::ALL.len());
                 return (MavResult::MAV_RESULT_DENIED, Some(reason));
             }
-            AVAILABLE_MODES_DATA::ID => telemetry::available_modes()
+            AVAILABLE_MODES_DATA::ID => telemetry::available_modes(identity.boot_number)
                 .enumerate()
                 .filter(|(place, _)| of == 0 || of as usize == place + 1)
                 .map(|(_, message)| message)

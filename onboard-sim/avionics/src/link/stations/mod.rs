@@ -353,23 +353,23 @@ impl Stations {
 
     /// The uplink reports that are due: one for each known station, but at most [`MAX_STATIONS`], or one for everybody
     /// while there is none.
-    pub fn due(&mut self, time_s: f64) -> Vec<MavMessage> {
+    pub fn due(&mut self, boot_number: u32, time_s: f64) -> Vec<MavMessage> {
         if time_s < self.tell_at_s {
             return Vec::new();
         }
         let next_s = self.tell_at_s + TELL_EVERY_S;
         self.tell_at_s = if next_s > time_s { next_s } else { time_s + TELL_EVERY_S };
         if self.known.is_empty() {
-            return vec![self.message(None, time_s)];
+            return vec![self.message(None, boot_number, time_s)];
         }
         let told = self.known.len().min(MAX_STATIONS);
         let first = self.next % self.known.len();
         self.next = first + told;
         let known = self.known.iter().cycle().skip(first).take(told);
-        known.map(|known| self.message(Some(known), time_s)).collect()
+        known.map(|known| self.message(Some(known), boot_number, time_s)).collect()
     }
 
-    fn message(&self, to: Option<&Peer>, time_s: f64) -> MavMessage {
+    fn message(&self, to: Option<&Peer>, boot_number: u32, time_s: f64) -> MavMessage {
         let age_ms = |at_s: Option<f64>| {
             at_s.map_or(u16::MAX, |at_s| (1000.0 * (time_s - at_s)).clamp(0.0, 65_534.0) as u16)
         };
@@ -379,7 +379,7 @@ impl Stations {
         let station = to.map(Peer::station);
         let same_ids = station.map_or(0, |station| self.same_ids(station, time_s));
         MavMessage::TD_UPLINK(TD_UPLINK_DATA {
-            time_boot_ms: libm::round(1000.0 * time_s) as u32,
+            boot_number,
             accepted_age_ms: age_ms(to.map(|known| known.accepted_at_s)),
             refused_age_ms: age_ms(refused.map(|refused| refused.at_s)),
             refused_count: self.refused_count,

@@ -50,7 +50,7 @@ fn told(stations: &mut Stations, time_s: f64) -> Vec<(Address, TD_UPLINK_DATA)> 
         }
         other => panic!("{other:?}"),
     };
-    stations.due(time_s).into_iter().map(read).collect()
+    stations.due(1, time_s).into_iter().map(read).collect()
 }
 
 #[test]

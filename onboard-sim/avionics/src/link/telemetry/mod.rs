@@ -30,7 +30,7 @@ use protocol::dialect::{
     TD_MISSION_DATA, TD_OPERATOR_DATA, TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA,
     TD_TOUCHDOWN_PREDICTION_DATA, TdCheck, VFR_HUD_DATA,
 };
-use protocol::identity::GIT_COMMIT;
+use protocol::identity::{GIT_COMMIT, PHASE_BITS};
 use protocol::mission::MissionHash;
 
 pub use self::ours::td_phase;
@@ -42,30 +42,31 @@ const PROTOCOL_VERSION_ID: u32 = 300;
 
 /// The message of this id in the current state, or `None` if the vehicle has no such message or no data for it.
 pub fn message(message_id: u32, state: &VehicleState<'_>, identity: Identity) -> Option<MavMessage> {
+    let boot = identity.boot_number;
     match message_id {
-        HEARTBEAT_DATA::ID => Some(heartbeat(state, identity.kind)),
+        HEARTBEAT_DATA::ID => Some(heartbeat(state, identity)),
         SYS_STATUS_DATA::ID => Some(sys_status(state)),
         EXTENDED_SYS_STATE_DATA::ID => Some(extended_sys_state(state)),
         ATTITUDE_QUATERNION_DATA::ID => Some(attitude(state)),
         LOCAL_POSITION_NED_DATA::ID => Some(position(state)),
         VFR_HUD_DATA::ID => Some(vfr_hud(state)),
-        CURRENT_MODE_DATA::ID => Some(current_mode(state)),
+        CURRENT_MODE_DATA::ID => Some(current_mode(state, boot)),
         AUTOPILOT_VERSION_DATA::ID => Some(autopilot_version(identity.uid)),
         PROTOCOL_VERSION_ID => Some(protocol_version()),
         ACTUATOR_OUTPUT_STATUS_DATA::ID => Some(actuators(state)),
         TD_FLIGHT_STATUS_DATA::ID => Some(ours::flight_status(state, identity)),
-        TD_FINS_DATA::ID => Some(ours::fins(state)),
-        TD_GIMBAL_DATA::ID => Some(ours::gimbal(state)),
-        TD_CONTROLLER_DATA::ID => ours::controller(state),
-        TD_TOUCHDOWN_PREDICTION_DATA::ID => ours::touchdown_prediction(state),
-        TD_PREDICTED_PATH_DATA::ID => ours::predicted_path(state),
-        TD_LANDING_VERDICT_DATA::ID => ours::landing_verdict(state),
-        TD_TOUCHDOWN_LIMITS_DATA::ID => Some(ours::touchdown_limits(state)),
-        TD_CREW_DATA::ID => ours::crew(state),
-        TD_OPERATOR_DATA::ID => ours::operator(state),
+        TD_FINS_DATA::ID => Some(ours::fins(state, boot)),
+        TD_GIMBAL_DATA::ID => Some(ours::gimbal(state, boot)),
+        TD_CONTROLLER_DATA::ID => ours::controller(state, boot),
+        TD_TOUCHDOWN_PREDICTION_DATA::ID => ours::touchdown_prediction(state, boot),
+        TD_PREDICTED_PATH_DATA::ID => ours::predicted_path(state, boot),
+        TD_LANDING_VERDICT_DATA::ID => ours::landing_verdict(state, boot),
+        TD_TOUCHDOWN_LIMITS_DATA::ID => Some(ours::touchdown_limits(state, boot)),
+        TD_CREW_DATA::ID => ours::crew(state, boot),
+        TD_OPERATOR_DATA::ID => ours::operator(state, boot),
         // It matters before the flight only, and there it costs no position.
-        TD_MISSION_DATA::ID => state.phase().on_pad().then(|| ours::mission(state)),
-        TD_DESCENT_DATA::ID => motion::descent(state),
+        TD_MISSION_DATA::ID => state.phase().on_pad().then(|| ours::mission(state, boot)),
+        TD_DESCENT_DATA::ID => motion::descent(state, boot),
         ESTIMATOR_STATUS_DATA::ID => motion::estimator(state),
         HIGHRES_IMU_DATA::ID => Some(motion::imu(state)),
         BATTERY_STATUS_DATA::ID => Some(battery(state)),
@@ -79,11 +80,16 @@ pub fn message(message_id: u32, state: &VehicleState<'_>, identity: Identity) ->
     }
 }
 
+/// The mode of a phase: it is in the lowest byte, and the boot above it.
+fn custom_mode(phase: Phase, boot: u32) -> u32 {
+    u32::from(phase.index()) | boot << PHASE_BITS
+}
+
 /// One AVAILABLE_MODES for each phase.
-pub fn available_modes() -> impl Iterator<Item = MavMessage> {
-    Phase::ALL.into_iter().map(|phase| {
+pub fn available_modes(boot: u32) -> impl Iterator<Item = MavMessage> {
+    Phase::ALL.into_iter().map(move |phase| {
         MavMessage::AVAILABLE_MODES(AVAILABLE_MODES_DATA {
-            custom_mode: u32::from(phase.index()),
+            custom_mode: custom_mode(phase, boot),
             properties: MavModeProperty::MAV_MODE_PROPERTY_NOT_USER_SELECTABLE,
             number_modes: Phase::ALL.len() as u8,
             mode_index: phase.index() + 1,
@@ -93,10 +99,10 @@ pub fn available_modes() -> impl Iterator<Item = MavMessage> {
     })
 }
 
-fn heartbeat(state: &VehicleState<'_>, kind: VehicleKind) -> MavMessage {
+fn heartbeat(state: &VehicleState<'_>, identity: Identity) -> MavMessage {
     let mut base_mode =
         MavModeFlag::MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | MavModeFlag::MAV_MODE_FLAG_AUTO_ENABLED;
-    base_mode.set(MavModeFlag::MAV_MODE_FLAG_HIL_ENABLED, kind == VehicleKind::Simulated);
+    base_mode.set(MavModeFlag::MAV_MODE_FLAG_HIL_ENABLED, identity.kind == VehicleKind::Simulated);
     base_mode.set(MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED, state.mode().interlocks.armed);
     let system_status = match state.phase() {
         _ if state.mode().interlocks.abort_latched => MavState::MAV_STATE_FLIGHT_TERMINATION,
@@ -107,7 +113,7 @@ fn heartbeat(state: &VehicleState<'_>, kind: VehicleKind) -> MavMessage {
         _ => MavState::MAV_STATE_ACTIVE,
     };
     MavMessage::HEARTBEAT(HEARTBEAT_DATA {
-        custom_mode: u32::from(state.phase().index()),
+        custom_mode: custom_mode(state.phase(), identity.boot_number),
         mavtype: MavType::MAV_TYPE_ROCKET,
         autopilot: MavAutopilot::MAV_AUTOPILOT_GENERIC,
         base_mode,
@@ -204,9 +210,9 @@ fn vfr_hud(state: &VehicleState<'_>) -> MavMessage {
     })
 }
 
-fn current_mode(state: &VehicleState<'_>) -> MavMessage {
+fn current_mode(state: &VehicleState<'_>, boot: u32) -> MavMessage {
     MavMessage::CURRENT_MODE(CURRENT_MODE_DATA {
-        custom_mode: u32::from(state.phase().index()),
+        custom_mode: custom_mode(state.phase(), boot),
         standard_mode: MavStandardMode::MAV_STANDARD_MODE_NON_STANDARD,
         ..CURRENT_MODE_DATA::default()
     })

@@ -177,7 +177,7 @@ pub(super) fn sensors(state: &VehicleState<'_>) -> (MavSysStatusSensor, MavSysSt
     (present, silent)
 }
 
-pub(super) fn descent(state: &VehicleState<'_>) -> Option<MavMessage> {
+pub(super) fn descent(state: &VehicleState<'_>, boot_number: u32) -> Option<MavMessage> {
     let air = state.airborne()?;
     let phase = state.phase();
     let pilot = state.computer.pilot();
@@ -192,6 +192,7 @@ pub(super) fn descent(state: &VehicleState<'_>) -> Option<MavMessage> {
         if ascends && phase.before_apogee() { known(apogee.map(value)) } else { 0.0 }
     };
     Some(MavMessage::TD_DESCENT(TD_DESCENT_DATA {
+        boot_number,
         time_boot_ms: boot_ms(state.time_s),
         height_m: air.height_m() as f32,
         vertical_speed_m_s: air.estimate.state.velocity_m_s.z as f32,

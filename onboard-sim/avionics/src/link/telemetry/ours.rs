@@ -129,18 +129,20 @@ pub fn td_phase(phase: Phase) -> TdPhase {
     }
 }
 
-pub(super) fn fins(state: &VehicleState<'_>) -> MavMessage {
+pub(super) fn fins(state: &VehicleState<'_>, boot_number: u32) -> MavMessage {
     MavMessage::TD_FINS(TD_FINS_DATA {
+        boot_number,
         time_boot_ms: boot_ms(state.time_s),
         commanded: state.computer.commands().fins_rad.map(centidegrees),
         measured: state.input().fins_rad.map(centidegrees),
     })
 }
 
-pub(super) fn gimbal(state: &VehicleState<'_>) -> MavMessage {
+pub(super) fn gimbal(state: &VehicleState<'_>, boot_number: u32) -> MavMessage {
     let [pitch_commanded, yaw_commanded] = state.computer.commands().gimbal_rad.map(centidegrees);
     let [pitch_measured, yaw_measured] = state.input().gimbal_rad.map(centidegrees);
     MavMessage::TD_GIMBAL(TD_GIMBAL_DATA {
+        boot_number,
         time_boot_ms: boot_ms(state.time_s),
         pitch_commanded,
         pitch_measured,
@@ -149,18 +151,13 @@ pub(super) fn gimbal(state: &VehicleState<'_>) -> MavMessage {
     })
 }
 
-pub(super) fn controller(state: &VehicleState<'_>) -> Option<MavMessage> {
-    let (tick, level, report) = state.controller()?;
+pub(super) fn controller(state: &VehicleState<'_>, boot_number: u32) -> Option<MavMessage> {
+    let (level, report) = state.controller()?;
     let solve_time_s = state.solve_time_s();
-    let thrust_scale = state.airborne().map_or(1.0, |_| state.computer.pilot().scales()[0]);
     let microseconds = |s: f64| libm::round(1e6 * s);
     Some(MavMessage::TD_CONTROLLER(TD_CONTROLLER_DATA {
+        boot_number,
         time_boot_ms: boot_ms(state.time_s),
-        tick: tick as u32,
-        cost: report.cost as f32,
-        kkt_stationarity: report.kkt_stationarity as f32,
-        kkt_feasibility: report.kkt_feasibility as f32,
-        thrust_scale: thrust_scale as f32,
         solve_time_us: microseconds(solve_time_s) as u32,
         deadline_margin_us: microseconds(PLAN_WITHIN_S - solve_time_s) as i32,
         iterations: u16::try_from(report.iterations).unwrap_or(u16::MAX),
@@ -194,11 +191,12 @@ fn td_status(status: ocp::Status) -> TdSolverStatus {
     }
 }
 
-pub(super) fn touchdown_prediction(state: &VehicleState<'_>) -> Option<MavMessage> {
+pub(super) fn touchdown_prediction(state: &VehicleState<'_>, boot_number: u32) -> Option<MavMessage> {
     let planned = state.planned()?;
     let end = planned.end(state.mission().powered.landing_miss);
     let violated = violations(&LandingVerdict::judge_plan(&state.limits(), &end));
     Some(MavMessage::TD_TOUCHDOWN_PREDICTION(TD_TOUCHDOWN_PREDICTION_DATA {
+        boot_number,
         time_boot_ms: boot_ms(state.time_s),
         time_to_go_ms: libm::round(1000.0 * planned.time_to_go_s) as i32,
         distance_m: end.distance_m as f32,
@@ -211,22 +209,23 @@ pub(super) fn touchdown_prediction(state: &VehicleState<'_>) -> Option<MavMessag
     }))
 }
 
-pub(super) fn predicted_path(state: &VehicleState<'_>) -> Option<MavMessage> {
+pub(super) fn predicted_path(state: &VehicleState<'_>, boot_number: u32) -> Option<MavMessage> {
     let (points_m, count) = state.planned()?.path_from_the_east();
     Some(MavMessage::TD_PREDICTED_PATH(TD_PREDICTED_PATH_DATA {
-        time_boot_ms: boot_ms(state.time_s),
+        boot_number,
         x: points_m.map(|(north_m, _)| centimetres(north_m)),
         altitude: points_m.map(|(_, up_m)| centimetres(up_m)),
         count: count as u8,
     }))
 }
 
-pub(super) fn landing_verdict(state: &VehicleState<'_>) -> Option<MavMessage> {
+pub(super) fn landing_verdict(state: &VehicleState<'_>, boot_number: u32) -> Option<MavMessage> {
     let judged = state.judged.as_ref()?;
     let at = &judged.touchdown;
     let violated = violations(&LandingVerdict::judge(&state.limits(), at));
     let landing = judged.landing.flags().into_iter();
     Some(MavMessage::TD_LANDING_VERDICT(TD_LANDING_VERDICT_DATA {
+        boot_number,
         time_boot_ms: boot_ms(state.time_s),
         contact_ms: boot_ms(judged.time_s),
         distance_m: at.distance_m as f32,
@@ -239,9 +238,10 @@ pub(super) fn landing_verdict(state: &VehicleState<'_>) -> Option<MavMessage> {
     }))
 }
 
-pub(super) fn touchdown_limits(state: &VehicleState<'_>) -> MavMessage {
+pub(super) fn touchdown_limits(state: &VehicleState<'_>, boot_number: u32) -> MavMessage {
     let limits = state.limits();
     MavMessage::TD_TOUCHDOWN_LIMITS(TD_TOUCHDOWN_LIMITS_DATA {
+        boot_number,
         vertical_m_s: limits.vertical_m_s as f32,
         lateral_m_s: limits.lateral_m_s as f32,
         tilt_rad: limits.tilt_rad as f32,
@@ -253,7 +253,7 @@ pub(super) fn touchdown_limits(state: &VehicleState<'_>) -> MavMessage {
 
 // Who commands, what is asked, and which mission flies.
 
-pub(super) fn mission(state: &VehicleState<'_>) -> MavMessage {
+pub(super) fn mission(state: &VehicleState<'_>, boot_number: u32) -> MavMessage {
     let name = characters(&state.name.name);
     let start = match state.name.start {
         None => TdStart::TD_START_UNKNOWN,
@@ -262,6 +262,7 @@ pub(super) fn mission(state: &VehicleState<'_>) -> MavMessage {
         Some(StartPoint::Drone) => TdStart::TD_START_DRONE,
     };
     MavMessage::TD_MISSION(TD_MISSION_DATA {
+        boot_number,
         hash: state.name.hash.0,
         name,
         start,
@@ -269,7 +270,7 @@ pub(super) fn mission(state: &VehicleState<'_>) -> MavMessage {
     })
 }
 
-pub(super) fn crew(state: &VehicleState<'_>) -> Option<MavMessage> {
+pub(super) fn crew(state: &VehicleState<'_>, boot_number: u32) -> Option<MavMessage> {
     let people = state.input().people?;
     let crew = state.computer.crew();
     let (ask, tap) = (crew.two_person.waiting(state.time_s), crew.two_person.tapping());
@@ -277,6 +278,7 @@ pub(super) fn crew(state: &VehicleState<'_>) -> Option<MavMessage> {
     let ms = |left_s: f64| (1000.0 * left_s).clamp(0.0, f64::from(u16::MAX)) as u16;
     let number = |operator: Option<Operator>| operator.map_or(0, |operator| operator.number);
     Some(MavMessage::TD_CREW(TD_CREW_DATA {
+        boot_number,
         time_boot_ms: boot_ms(state.time_s),
         ask_number: ask.map_or(0, |ask| ask.number),
         ask_left_ms: ask.map_or(0, |ask| ms(ask.left_s(state.time_s))),
@@ -303,7 +305,7 @@ pub(super) fn crew(state: &VehicleState<'_>) -> Option<MavMessage> {
 const TURNS_PER_S: f64 = 0.5;
 
 /// Each operator in turn.
-pub(super) fn operator(state: &VehicleState<'_>) -> Option<MavMessage> {
+pub(super) fn operator(state: &VehicleState<'_>, boot_number: u32) -> Option<MavMessage> {
     state.input().people?;
     let count = state.operators.len().max(1);
     let operator = state.operators.get((TURNS_PER_S * state.time_s) as usize % count)?;
@@ -314,6 +316,7 @@ pub(super) fn operator(state: &VehicleState<'_>) -> Option<MavMessage> {
         Role::Pad => TdRole::TD_ROLE_PAD,
     };
     Some(MavMessage::TD_OPERATOR(TD_OPERATOR_DATA {
+        boot_number,
         number: operator.number,
         role,
         name: CharArray::new(*operator.name.bytes()),
@@ -321,9 +324,10 @@ pub(super) fn operator(state: &VehicleState<'_>) -> Option<MavMessage> {
 }
 
 /// What went wrong in the flight: the finding at this place, or that there is none.
-pub(crate) fn finding(findings: &Findings, place: usize, time_s: f64) -> MavMessage {
+pub(crate) fn finding(findings: &Findings, place: usize, time_s: f64, boot_number: u32) -> MavMessage {
     let found = findings.as_found();
     let mut data = TD_FINDING_DATA {
+        boot_number,
         time_boot_ms: boot_ms(time_s),
         found: u8::try_from(found.len()).unwrap_or(u8::MAX),
         ..TD_FINDING_DATA::default()
@@ -339,9 +343,10 @@ pub(crate) fn finding(findings: &Findings, place: usize, time_s: f64) -> MavMess
 // The last check of the vehicle on its pad, value by value.
 
 /// The value at this place, or how the check stands while nothing has been found.
-pub(crate) fn pad_check(check: &PadCheck, place: usize, time_s: f64) -> MavMessage {
+pub(crate) fn pad_check(check: &PadCheck, place: usize, time_s: f64, boot_number: u32) -> MavMessage {
     let findings = check.findings();
     let mut data = TD_PAD_CHECK_DATA {
+        boot_number,
         time_boot_ms: boot_ms(time_s),
         value: f32::NAN,
         least: f32::NAN,

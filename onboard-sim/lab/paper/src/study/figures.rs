@@ -146,27 +146,16 @@ fn panel([x_label, y_label]: [&str; 2], lines: Vec<Line>) -> Panel {
     Panel { x_label: x_label.to_owned(), y_label: y_label.to_owned(), lines, ..Panel::default() }
 }
 
-/// A cross for each fall.
 fn fates(stability: &Stability) -> Result<String, PaperError> {
-    let colour = |fate: Fate| match fate {
-        Fate::Settles => 2,
-        Fate::DependsOnRoll => 1,
-        Fate::Flips => 4,
-    };
-    let named = Fate::ALL.map(|fate| Line {
-        name: fate.name().to_owned(),
-        colour: colour(fate),
-        dashed: false,
-        points: Vec::new(),
-    });
     let starts =
-        OPENINGS_DEG.iter().flat_map(|opening_deg| TILTS_DEG.map(|tilt_deg| (tilt_deg, *opening_deg)));
-    let falls = starts.zip(&stability.fates);
+        || OPENINGS_DEG.iter().flat_map(|opening_deg| TILTS_DEG.map(|tilt_deg| (tilt_deg, *opening_deg)));
+    let falls = |wanted: Fate| {
+        let falls = starts().zip(&stability.fates).filter(|(_, fate)| **fate == wanted);
+        (wanted.name().to_owned(), falls.map(|(start, _)| start).collect())
+    };
     let map = Panel {
-        crosses: falls
-            .map(|((tilt_deg, opening_deg), fate)| (tilt_deg, opening_deg, colour(*fate)))
-            .collect(),
-        ..panel(["tilt at the start, deg", "opening of the fins, deg"], named.to_vec())
+        kinds: Fate::ALL.map(falls).to_vec(),
+        ..panel(["tilt at the start, deg", "opening of the fins, deg"], Vec::new())
     };
     Ok(lines_svg("The paper's vehicle in a passive fall (centre of gravity at 0.52 m)", &[map], 1, None)?)
 }

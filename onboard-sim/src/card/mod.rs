@@ -1,12 +1,16 @@
-//! The landing card: what a team takes to the field for one mission, as it is loaded.
+//! The landing card: what a team takes to the field for one mission, as it is loaded; one side of it is for the [`range_safety`]
+//! officer.
 //!
 //! It is computed, not looked up: the mission is flown in several winds in every way in which a flight can end, and at other masses.
+
+pub mod range_safety;
+mod sheet;
 
 use flight::vehicle::mission::StartPoint;
 use sim::recipe::Recipe;
 
-use super::frame::{Frame, FrameError, changed};
-use super::sheet;
+pub use self::sheet::escaped;
+use crate::frame::{Frame, FrameError, changed};
 use crate::hazard::{self, Flights, HazardError, Impact, Rule, landed_as_planned};
 use crate::row::Row;
 use crate::run::{RunError, fly};

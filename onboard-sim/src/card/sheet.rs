@@ -10,10 +10,10 @@ use flight::vehicle::mission::StartPoint;
 use flight::vehicle::thrust_curve::ThrustCurve;
 use sim::dispersion::may_be_kinder;
 
-use super::card::{Card, NINE_OF_TEN};
 use super::range_safety::{
     Circle, FEWEST, InWind, aborts, calibres, in_winds, limit_m_s, plan, thrust_to_weight,
 };
+use super::{Card, NINE_OF_TEN};
 use crate::hazard::{Impact, Rule, Way, lift_off_kg};
 
 /// One side of a sheet.
@@ -42,7 +42,7 @@ enum Content {
 
 /// The cells of each line of a part of the card's words, with values by their names. A line with a value that is `None` is left out.
 pub(super) fn words_of(part: &str, values: &[(&str, Option<String>)]) -> Vec<Vec<String>> {
-    const WORDS: &str = include_str!("card_words.txt");
+    const WORDS: &str = include_str!("words.txt");
     let lines = WORDS.split("\n# ").find_map(|text| text.strip_prefix(part)).unwrap_or_default();
     let filled = |line: &str| {
         let filled = values.iter().try_fold(line.to_owned(), |line, (name, value)| {
@@ -347,7 +347,7 @@ fn wind_row(wind: &InWind, may_fly: bool) -> Vec<String> {
     ]
 }
 
-const STYLE: &str = include_str!("card.css");
+const STYLE: &str = include_str!("sheet.css");
 
 pub(super) fn text(sides: &[Side]) -> String {
     let mut out = String::new();
@@ -465,7 +465,7 @@ fn write_each<'a>(
 }
 
 /// Text without markup.
-pub(crate) fn escaped(text: &str) -> String {
+pub fn escaped(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
     for c in text.chars() {
         match c {
@@ -473,7 +473,7 @@ pub(crate) fn escaped(text: &str) -> String {
             '<' => safe.push_str("&lt;"),
             '>' => safe.push_str("&gt;"),
             '"' => safe.push_str("&quot;"),
-            c if c.is_control() => safe.push('\u{fffd}'),
+            c if c.is_control() && c != '\n' => safe.push('\u{fffd}'),
             c => safe.push(c),
         }
     }
