@@ -43,7 +43,7 @@ use self::burn::fit_stand;
 use self::calibration::{Calibration, Table};
 use self::day::Learnt;
 use self::least_squares::Solution;
-pub use self::trace::{Frame, Trace, TraceError};
+pub use self::trace::{Frame, Trace};
 use crate::cli::{Answer, Outcome, give, say, text_of, warn_of_damage};
 use crate::info::utc;
 use crate::output::{Destination, write_whole};

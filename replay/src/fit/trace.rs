@@ -3,8 +3,9 @@
 
 use std::path::Path;
 
+use anyhow::{Context as _, Result, anyhow};
 use avionics::log::frame::{commands_from_log, input_from_log, phase_of};
-use avionics::log::logged::{At, Logged, RecordError};
+use avionics::log::logged::{At, Logged};
 use flight::computer::Commands;
 use flight::computer::KeptInput;
 use flight::estimation::estimator::{Estimate, Measurements};
@@ -17,7 +18,7 @@ use nalgebra::Vector3;
 use protocol::log::computer_v1::ComputerFrame;
 use protocol::log::flight_v1 as v1;
 
-use crate::log::{Recording, RecordingError};
+use crate::log::Recording;
 
 /// One frame of the flight computer.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -85,32 +86,6 @@ pub struct Trace {
     pub last_ns: Option<u64>,
 }
 
-/// Why nothing can be learnt from a log.
-#[derive(Debug, thiserror::Error)]
-pub enum TraceError {
-    /// It cannot be read, is no flight log, or holds too much, several flights, or no usable mission.
-    #[error(transparent)]
-    Recording(#[from] RecordingError),
-    /// It has no frames with an inertial unit.
-    #[error(
-        "{name}: has no frames of a flight computer with its sensors and estimates ({found}). A fit needs the vehicle's own \
-         log: at the rates of telemetry neither thrust nor delays nor noises can be found"
-    )]
-    NoFrames {
-        /// The file.
-        name: String,
-        /// What the log has instead.
-        found: &'static str,
-    },
-    /// A record has a value that this build does not know.
-    #[error("{name}: {reason}")]
-    Unknown {
-        /// The file.
-        name: String,
-        reason: String,
-    },
-}
-
 impl Trace {
     /// A flight without frames yet.
     pub fn new(name: &str, mission: Mission, mission_toml: &str) -> Self {
@@ -160,8 +135,8 @@ impl Trace {
     /// Reads a vehicle's log.
     ///
     /// # Errors
-    /// [`TraceError`] says what the log lacks.
-    pub fn open(path: &Path) -> Result<Self, TraceError> {
+    /// It says what the log lacks: it cannot be read, is too long, or has several flights, no usable mission, or no frames.
+    pub fn open(path: &Path) -> Result<Self> {
         Self::of(&Recording::open(path)?)
     }
 
@@ -169,43 +144,47 @@ impl Trace {
     ///
     /// # Errors
     /// As [`open`](Self::open).
-    pub fn of(recording: &Recording) -> Result<Self, TraceError> {
+    pub fn of(recording: &Recording) -> Result<Self> {
         /// What is remembered after so many frames of noise is remembered in no other flight.
         const NAMING_FRAMES: usize = 100;
-        let name = recording.name.clone();
+        let name = &recording.name;
         let found =
             if recording.telemetry.is_empty() { "none of either" } else { "it is a ground station's" };
-        if recording.estimates.is_empty() {
-            return Err(TraceError::NoFrames { name, found });
-        }
+        let nothing = || {
+            anyhow!(
+                "{name}: has no frames of a flight computer with its sensors and estimates ({found}). A fit needs the \
+                 vehicle's own log: at the rates of telemetry neither thrust nor delays nor noises can be found"
+            )
+        };
+        recording.estimates.first().ok_or_else(nothing)?;
         let text = recording.profile_toml()?;
-        let mission = flight::vehicles::mission::from_toml(text, "profile.toml").map_err(|error| {
-            RecordingError::ProfileUnusable { name: name.clone(), reason: error.to_string() }
-        })?;
+        let mission = flight::vehicles::mission::from_toml(text, "profile.toml")
+            .with_context(|| format!("{name}: its profile cannot be used by this build"))?;
         let mut trace = Self {
             damage: recording.damage.clone(),
             landed: recording.verdict.as_ref().map(|verdict| verdict.landing.stands),
             content: recording.frames.iter().take(NAMING_FRAMES).next_back().map(|frame| frame.state_digest),
             last_ns: recording.last_ns,
-            ..Self::new(&name, mission, text)
+            ..Self::new(name, mission, text)
         };
         for (place, estimate) in &recording.estimates {
             let Some(frame) = recording.frames.get(*place) else { continue };
-            let unknown = |reason: String| TraceError::Unknown { name: name.clone(), reason };
-            trace.take(frame, estimate).map_err(unknown)?;
+            trace.take(frame, estimate).with_context(|| name.clone())?;
         }
-        if trace.frames.is_empty() { Err(TraceError::NoFrames { name, found }) } else { Ok(trace) }
+        if trace.frames.is_empty() { Err(nothing()) } else { Ok(trace) }
     }
 
     /// Adds a recorded frame; an error names what this build does not know.
-    fn take(&mut self, frame: &ComputerFrame, estimate: &v1::Estimate) -> Result<(), String> {
-        let ComputerFrame { input, output, .. } = frame;
+    fn take(
+        &mut self,
+        ComputerFrame { input, output, .. }: &ComputerFrame,
+        estimate: &v1::Estimate,
+    ) -> Result<()> {
         let number = input.frame;
-        let words = |error: RecordError| error.to_string();
-        let input = input_from_log(input).map_err(words)?;
-        let commands = commands_from_log(output, number).map_err(words)?;
-        let phase = phase_of(output).ok_or_else(|| format!("frame {number}: unknown phase"))?;
-        let estimate = Logged::from_log(estimate, At { frame: number, field: "estimate" }).map_err(words)?;
+        let input = input_from_log(input)?;
+        let commands = commands_from_log(output, number)?;
+        let phase = phase_of(output).with_context(|| format!("frame {number}: unknown phase"))?;
+        let estimate = Logged::from_log(estimate, At { frame: number, field: "estimate" })?;
         self.push(&input.input(), &commands, phase, &estimate);
         Ok(())
     }
