@@ -6,11 +6,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, ensure};
 use onboard_sim::run::threads;
+use protocol::text::printable;
 use serde::Serialize;
 
 use crate::log::{Cut, Gap, Recording};
 use crate::output::write_whole;
-use crate::print::{print_json, shown};
+use crate::print::print_json;
 
 /// The answer is no: the controller decides differently from the record, or flights differ by more than is tolerated.
 const EXIT_NO: u8 = 1;
@@ -82,7 +83,9 @@ impl<A: Answer> Answer for Vec<A> {
 pub(crate) fn give(found: &impl Answer, json: bool) -> Result<Outcome> {
     answer(|output| match json {
         true => print_json(found, output),
-        false => found.sentences().iter().try_for_each(|line| writeln!(output, "{}", shown(line))),
+        false => {
+            found.sentences().iter().try_for_each(|line| writeln!(output, "{}", printable(line.as_bytes())))
+        }
     })?;
     Ok(found.outcome())
 }
