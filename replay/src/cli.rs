@@ -62,7 +62,7 @@ pub trait Answer: Serialize {
 }
 
 /// Of several answers the worst decides. Those of more than a line stand apart.
-impl<A: Answer> Answer for Vec<A> {
+impl<One: Answer> Answer for Vec<One> {
     fn sentences(&self) -> Vec<String> {
         let mut lines = Vec::new();
         for said in self.iter().map(Answer::sentences) {
@@ -81,11 +81,12 @@ impl<A: Answer> Answer for Vec<A> {
 
 /// Prints an answer.
 pub(crate) fn give(found: &impl Answer, json: bool) -> Result<Outcome> {
-    answer(|output| match json {
-        true => print_json(found, output),
-        false => {
-            found.sentences().iter().try_for_each(|line| writeln!(output, "{}", printable(line.as_bytes())))
+    answer(|output| {
+        if json {
+            return print_json(found, output);
         }
+        let lines = found.sentences();
+        lines.iter().try_for_each(|line| writeln!(output, "{}", printable(line.as_bytes())))
     })?;
     Ok(found.outcome())
 }

@@ -329,7 +329,8 @@ fn change(
 /// The plant takes settings of the airframe and of the draw, from the beginning; the controller takes all but those of the
 /// draw and of its estimator.
 fn refuse_misplaced(options: &ReflyOptions) -> Result<(), ReflyError> {
-    let refused: [(&[Setting], fn(&Setting) -> bool, &'static str); 4] = [
+    type IsWrong = fn(&Setting) -> bool;
+    let refused: [(&[Setting], IsWrong, &str); 4] = [
         (
             &options.plant_settings,
             |setting| setting.at_s.is_some(),

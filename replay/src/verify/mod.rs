@@ -85,7 +85,9 @@ pub fn verify(path: &Path) -> Result<Vec<VerifyReport>, LogError> {
 /// As [`verify`].
 pub fn verify_strictly(path: &Path) -> Result<Vec<VerifyReport>, LogError> {
     let mut reports = verify(path)?;
-    reports.iter_mut().for_each(|report| report.strict = true);
+    for report in &mut reports {
+        report.strict = true;
+    }
     let [report] = reports.as_mut_slice() else {
         let why = "a file with several flights is not flown again";
         for report in &mut reports {
