@@ -291,7 +291,7 @@ impl<T> Schedule<T> {
 /// Other settings than the recorded ones.
 #[derive(Debug, Args)]
 pub(crate) struct SettingArguments {
-    /// Another setting, PATH=VALUE or PATH=VALUE@S, as in the mission.
+    /// Another setting, PATH=VALUE or PATH=VALUE@S.
     ///
     /// With @6.5 it applies from that vehicle time on, s. May be given more than once.
     #[arg(long = "set", value_name = "SETTING")]
