@@ -7,11 +7,12 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, Result, ensure};
 pub(crate) use onboard_sim::files::text_of;
 use onboard_sim::run::threads;
+use protocol::text::printable;
 use serde::Serialize;
 
 use crate::log::{Cut, Gap, Recording};
 use crate::output::write_whole;
-use crate::print::{print_json, shown};
+use crate::print::print_json;
 
 /// The answer is no: the controller decides differently from the record, or flights differ by more than is tolerated.
 const EXIT_NO: u8 = 1;
@@ -62,7 +63,7 @@ pub trait Answer: Serialize {
 }
 
 /// Of several answers the worst decides. Those of more than a line stand apart.
-impl<A: Answer> Answer for Vec<A> {
+impl<One: Answer> Answer for Vec<One> {
     fn sentences(&self) -> Vec<String> {
         let mut lines = Vec::new();
         for said in self.iter().map(Answer::sentences) {
@@ -81,9 +82,12 @@ impl<A: Answer> Answer for Vec<A> {
 
 /// Prints an answer.
 pub(crate) fn give(found: &impl Answer, json: bool) -> Result<Outcome> {
-    answer(|output| match json {
-        true => print_json(found, output),
-        false => found.sentences().iter().try_for_each(|line| writeln!(output, "{}", shown(line))),
+    answer(|output| {
+        if json {
+            return print_json(found, output);
+        }
+        let lines = found.sentences();
+        lines.iter().try_for_each(|line| writeln!(output, "{}", printable(line.as_bytes())))
     })?;
     Ok(found.outcome())
 }

@@ -6,11 +6,11 @@ use protocol::log::computer_v1::ComputerFrame;
 use serde::Serialize;
 
 use crate::controller::{FrameError, LoggedComputer};
-use crate::log::{Recording, VerdictFacts, VerdictLimit};
+use crate::log::{Recording, Verdict, VerdictLimit};
 
 /// One finding.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct FindingFacts {
+pub struct Finding {
     /// When it began, T+, s.
     pub since_s: f64,
     /// How long it lasted altogether, s.
@@ -24,7 +24,7 @@ pub struct FindingFacts {
 
 /// The findings of a recorded flight, first in time; `None` if its computer cannot be run again, or decides otherwise than it
 /// did: what it would have commanded says nothing of surfaces that followed other commands.
-pub(crate) fn of(recording: &Recording, verdict: Option<&VerdictFacts>) -> Option<Vec<FindingFacts>> {
+pub(crate) fn of(recording: &Recording, verdict: Option<&Verdict>) -> Option<Vec<Finding>> {
     let (_, findings) = run_again(recording, LoggedComputer::run_again)?;
     Some(facts(recording, verdict, &findings?))
 }
@@ -50,15 +50,11 @@ pub(crate) fn run_again(
 }
 
 /// The findings of a computer that was run again with the recorded decisions, and the limits that were broken.
-pub(crate) fn facts(
-    recording: &Recording,
-    verdict: Option<&VerdictFacts>,
-    findings: &Findings,
-) -> Vec<FindingFacts> {
-    let mut facts: Vec<FindingFacts> = findings
+pub(crate) fn facts(recording: &Recording, verdict: Option<&Verdict>, findings: &Findings) -> Vec<Finding> {
+    let mut facts: Vec<Finding> = findings
         .found()
         .iter()
-        .map(|finding| FindingFacts {
+        .map(|finding| Finding {
             since_s: finding.since_s,
             lasted_s: finding.held_s,
             words: finding.words(),
@@ -67,7 +63,7 @@ pub(crate) fn facts(
         .collect();
     if let Some(words) = verdict.and_then(|verdict| broken(verdict, findings)) {
         let since_s = recording.contact_s().unwrap_or(f64::NAN);
-        facts.push(FindingFacts { since_s, lasted_s: 0.0, words, section: "findings" });
+        facts.push(Finding { since_s, lasted_s: 0.0, words, section: "findings" });
     }
     facts
 }
@@ -91,7 +87,7 @@ fn section(sign: Sign) -> &'static str {
 }
 
 /// The limits that a landing broke, the worst first, and what the motor still pushed; `None` if it kept all.
-fn broken(verdict: &VerdictFacts, findings: &Findings) -> Option<String> {
+fn broken(verdict: &Verdict, findings: &Findings) -> Option<String> {
     // A vehicle that comes down under its parachute is judged by nothing else.
     let judged = verdict.deciding().all(|limit| limit.maximum > limit.minimum);
     let mut broken: Vec<(&VerdictLimit, f64)> =

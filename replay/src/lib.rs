@@ -3,8 +3,8 @@
 //!
 //! In reading order:
 //!
-//! * [`Cli`]: the command line. A command is one file with its arguments, its answer as data and its printing, and a line
-//!   here. [`cli`] is what they have in common.
+//! * [`Cli`]: the command line. A command is one file with its arguments and its answer ([`cli::Answer`]: data, and
+//!   what it says), and its line here.
 //! * [`log`]: opens a log and streams its records in bounded memory, or holds a whole flight.
 //! * [`info`]: describes what is in a log, how complete it is and what can be done with it.
 //! * [`findings`]: what went wrong in a flight, first in time.
@@ -22,7 +22,7 @@
 //! * [`export`]: converts logs to and from other formats; [`recover`](mod@recover): repairs a damaged log, sorts another;
 //!   [`cut`](mod@cut): makes a shorter one.
 //! * [`output`]: writes files completely or not at all, and overwrites nothing without permission.
-//! * [`print`](mod@print): what answers have in common: text without control characters, JSON.
+//! * [`print`](mod@print): what answers have in common: columns, two verdicts beside each other, JSON.
 
 pub mod cli;
 pub mod compare;
@@ -91,11 +91,11 @@ enum Command {
     ///
     /// The flight computer is built from the profile in the log and run on the recorded inputs, from power-up or from where
     /// the log begins. Outputs, digests of the memory, estimates and the start at the release are compared, and the inputs
-    /// are judged; a table says what was compared. With --strict a simulated flight is also flown again, and its measurements
-    /// and its verdict are compared; truth, events and measured times never are. For a divergence the report says how it grows, and whether the landing would end differently (simulated from the first
-    /// frame that differs).
+    /// are judged; a table says what was compared. With --strict a simulated flight is also flown again, and its
+    /// measurements and its verdict are compared; truth, events and measured times never are. For a divergence the report
+    /// says whether the landing would end differently (simulated from the first frame that differs).
     ///
-    /// With --explain one recorded frame is solved again: cost, residuals, active constraints, warm against cold start,
+    /// With --explain the plan of a recorded frame is solved again and judged: cost, what is broken, warm against cold start,
     /// predicted path. With --baseline a directory of flights is held against one: every flight verified, flown again
     /// and compared; exit code 0 if none got worse, 1 if some did, 2 without an answer. With --book the books of ground
     /// stations are proven (who did what when), or the first broken link is named.
@@ -124,7 +124,7 @@ enum Command {
     /// Writes a flight as one HTML page with its pictures inside: no script, no network.
     #[command(after_help = "Example: replay report flight.mcap")]
     Report(report::Args),
-    /// Writes a log's content as CSV, Parquet, .tlog, a Rerun recording or frames for a board; makes a log of a .tlog.
+    /// Writes a log's content as CSV, Parquet or a Rerun recording; makes a log of a .tlog.
     #[command(
         after_help = "Examples:\n  replay export flight.mcap --to parquet --output tables\n  replay export flight.tlog"
     )]

@@ -7,7 +7,7 @@ use std::io::Write;
 
 use serde::Serialize;
 
-use crate::log::{VerdictFacts, VerdictLimit};
+use crate::log::{Verdict, VerdictLimit};
 
 /// Writes any report as JSON.
 ///
@@ -16,11 +16,6 @@ use crate::log::{VerdictFacts, VerdictLimit};
 pub fn print_json(report: &impl Serialize, output: &mut impl Write) -> io::Result<()> {
     serde_json::to_writer_pretty(&mut *output, report)?;
     writeln!(output)
-}
-
-/// Text from a log, without control characters.
-pub(crate) fn shown(text: &str) -> String {
-    protocol::text::printable(text.as_bytes())
 }
 
 /// `1 frame`, `2 frames`.
@@ -54,7 +49,7 @@ pub(crate) fn columns<const N: usize>(
 }
 
 /// Two verdicts beside each other, and every limit that one of them has.
-pub(crate) fn verdict_table(names: [&str; 2], both: [Option<&VerdictFacts>; 2]) -> Vec<String> {
+pub(crate) fn verdict_table(names: [&str; 2], both: [Option<&Verdict>; 2]) -> Vec<String> {
     let words = both.map(|verdict| {
         verdict.map_or_else(
             || "no verdict".to_owned(),
@@ -62,7 +57,7 @@ pub(crate) fn verdict_table(names: [&str; 2], both: [Option<&VerdictFacts>; 2]) 
         )
     });
     let mut limits: Vec<&VerdictLimit> = Vec::new();
-    for limit in both.into_iter().rev().flatten().flat_map(VerdictFacts::of_the_legs) {
+    for limit in both.into_iter().rev().flatten().flat_map(Verdict::of_the_legs) {
         if !limits.iter().any(|known| known.name == limit.name) {
             limits.push(limit);
         }

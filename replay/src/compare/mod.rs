@@ -28,7 +28,7 @@ pub use tolerance::SignalDifference;
 pub use tolerance::{Tolerance, ToleranceError, Tolerances};
 
 use crate::cli::{Outcome, give, warn_of_cut, warn_of_damage};
-use crate::log::VerdictFacts;
+use crate::log::Verdict;
 
 /// One flight against another.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -44,7 +44,7 @@ pub struct Comparison {
     /// compared.
     pub both_recorded_s: Option<[f64; 2]>,
     /// The two verdicts.
-    pub verdicts: (Option<VerdictFacts>, Option<VerdictFacts>),
+    pub verdicts: (Option<Verdict>, Option<Verdict>),
     /// Signals that both flights have; those that exceed their tolerance first, then by name.
     pub signals: Vec<SignalDifference>,
     /// Signals that only the baseline has.
@@ -126,9 +126,8 @@ pub fn compare(
         failures.push("the logs have no signal in common: nothing was compared".to_owned());
     }
     let verdicts = (baseline.verdict.clone(), other.verdict.clone());
-    let word = |verdict: &Option<VerdictFacts>| {
-        verdict.as_ref().map_or("no verdict", |verdict| verdict.landing.word())
-    };
+    let word =
+        |verdict: &Option<Verdict>| verdict.as_ref().map_or("no verdict", |verdict| verdict.landing.word());
     let (then, now) = (word(&verdicts.0), word(&verdicts.1));
     if tolerances.verdict_must_agree() && then != now {
         failures.push(format!("the verdicts differ: {then} and {now}"));

@@ -6,7 +6,7 @@ use std::path::Path;
 use flight::rules::phase::Phase;
 use serde::Serialize;
 
-use crate::log::{Cut, FlightLog, LogError, RecordingError, VerdictFacts};
+use crate::log::{Cut, FlightLog, LogError, RecordingError, Verdict};
 use crate::table::{Cell, FLIGHT_TIME_S, Kind, TableReader, TableShape};
 
 /// Limit on the numbers held for one log; a flight of some minutes has a few hundred thousand.
@@ -85,7 +85,7 @@ pub struct Flown {
     /// Ignition of the landing motor, vehicle time, s.
     pub ignition_s: Option<f64>,
     /// The landing verdict.
-    pub verdict: Option<VerdictFacts>,
+    pub verdict: Option<Verdict>,
     /// Why the log could not be read to its end, if so.
     pub damage: Option<String>,
     /// Where the record ends, if that is before the end of the flight.
@@ -173,7 +173,7 @@ impl Flown {
             words,
             has_frames: !log.flights().found().is_empty(),
             ignition_s,
-            verdict: log.verdict().as_ref().map(VerdictFacts::found),
+            verdict: log.verdict().as_ref().map(Verdict::found),
             damage: log.damage().map(ToString::to_string),
             cut: log.flights().cut(),
             out_of_order,

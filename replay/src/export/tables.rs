@@ -36,7 +36,7 @@ pub struct ExportedFile {
 }
 
 enum Table {
-    Csv(PathBuf, csv::Writer<NewFile>),
+    Csv(PathBuf, Box<csv::Writer<NewFile>>),
     Parquet(Box<ParquetTable>),
 }
 
@@ -100,7 +100,7 @@ fn create(
             let mut csv = csv::Writer::from_writer(file);
             let head = csv.write_record(shape.columns.iter().map(|column| &column.name));
             head.map_err(io::Error::from).map_err(WriteError::at(&path))?;
-            Table::Csv(path.clone(), csv)
+            Table::Csv(path.clone(), Box::new(csv))
         }
         TableFormat::Parquet => Table::Parquet(Box::new(ParquetTable::create(file, shape)?)),
     };

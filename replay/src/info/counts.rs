@@ -10,12 +10,12 @@ use protocol::log::flight_v1::PilotTiming;
 use protocol::log::reader::LogChannel;
 use serde::Serialize;
 
-use super::{Grade, GradeLevel, ProfileFacts};
-use crate::log::{Entry, FrameOrder, Gap, StampedEntry, VerdictFacts};
+use super::{Grade, GradeLevel, Profile};
+use crate::log::{Entry, FrameOrder, Gap, StampedEntry, Verdict};
 
 /// A channel of a log.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct ChannelFacts {
+pub struct Channel {
     pub topic: String,
     /// How its messages are encoded.
     pub message_encoding: String,
@@ -54,14 +54,14 @@ impl ChannelCounter {
     pub(super) fn into_facts<'a>(
         mut self,
         channels: impl Iterator<Item = (u16, &'a LogChannel)>,
-    ) -> Vec<ChannelFacts> {
-        let mut facts: Vec<ChannelFacts> = channels
+    ) -> Vec<Channel> {
+        let mut facts: Vec<Channel> = channels
             .map(|(id, channel)| {
                 let counts = self.counts.remove(&id).unwrap_or_default();
                 // Sequence numbers start at 0; a writer without numbering leaves 0 everywhere.
                 let numbered =
                     if counts.last_sequence == 0 { 0 } else { u64::from(counts.last_sequence) + 1 };
-                ChannelFacts {
+                Channel {
                     topic: channel.topic.clone(),
                     message_encoding: channel.message_encoding.clone(),
                     schema: channel.schema_name.clone(),
@@ -79,7 +79,7 @@ impl ChannelCounter {
 
 /// The frames of the flight computer.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct FrameFacts {
+pub struct Frames {
     /// The lowest number.
     pub first: u64,
     /// The highest number.
@@ -135,30 +135,30 @@ impl FrameCounter {
         self.solve_times.count(timing.solve_time_s, timing.deadline_s);
     }
 
-    pub(super) fn into_facts(self) -> Option<FrameFacts> {
+    pub(super) fn into_facts(self) -> Option<Frames> {
         let Self { bounds, restarts, repeated, lost, first_lost, start, .. } = self;
         let (first, last) = bounds?;
         let solve_time = self.solve_times.into_facts();
-        Some(FrameFacts { first, last, restarts, lost, first_lost, repeated, start, solve_time })
+        Some(Frames { first, last, restarts, lost, first_lost, repeated, start, solve_time })
     }
 }
 
 impl Grade {
-    pub(super) fn of_frames(frames: &FrameFacts, profile: Option<&ProfileFacts>) -> Self {
+    pub(super) fn of_frames(frames: &Frames, profile: Option<&Profile>) -> Self {
         let numeric = |why: &str| Self { level: GradeLevel::Numeric, reason: format!("frames, but {why}") };
         match profile {
             _ if !frames.start => numeric("no start record of the flight computer"),
             None => numeric("no attachment profile.toml to build the flight computer from"),
-            Some(ProfileFacts { problem: Some(problem), .. }) => numeric(problem),
-            Some(ProfileFacts { name, .. }) => {
+            Some(Profile { problem: Some(problem), .. }) => numeric(problem),
+            Some(Profile { name, .. }) => {
                 Self::of_replayable_frames(frames, name.as_deref().unwrap_or_default())
             }
         }
     }
 
     /// The grade of a log whose frames can be executed again up to the first loss.
-    fn of_replayable_frames(frames: &FrameFacts, mission: &str) -> Self {
-        let FrameFacts { first, last, lost, first_lost, repeated, .. } = frames;
+    fn of_replayable_frames(frames: &Frames, mission: &str) -> Self {
+        let Frames { first, last, lost, first_lost, repeated, .. } = frames;
         let level = GradeLevel::BitExact;
         let reason = match first_lost {
             Some(Gap { after: 0, before }) => {
@@ -301,7 +301,7 @@ impl EndingTracker {
     }
 
     /// The sentence; `None` for a log that ends in flight without saying anything.
-    pub(super) fn words(&self, verdict: Option<&VerdictFacts>) -> Option<String> {
+    pub(super) fn words(&self, verdict: Option<&Verdict>) -> Option<String> {
         if let Some(verdict) = verdict {
             return Some(verdict.ending.clone());
         }
@@ -325,7 +325,7 @@ impl EndingTracker {
 const TIMES_KEPT: usize = 1_000_000;
 
 /// Durations of the frames that solve, as measured on board.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct SolveTimes {
     /// Number of measurements.
     pub count: u64,
@@ -344,32 +344,30 @@ pub struct SolveTimes {
 #[derive(Debug, Default)]
 pub(super) struct SolveTimeCounter {
     times_s: Vec<f64>,
-    count: u64,
-    deadline_s: Option<f64>,
-    over_deadline: u64,
+    /// All but the quantiles.
+    found: Option<SolveTimes>,
 }
 
 impl SolveTimeCounter {
     pub(super) fn count(&mut self, time_s: f64, deadline_s: f64) {
-        self.count += 1;
         if self.times_s.len() < TIMES_KEPT {
             self.times_s.push(time_s);
         }
-        self.deadline_s = Some(self.deadline_s.map_or(deadline_s, |least_s| least_s.min(deadline_s)));
-        self.over_deadline += u64::from(time_s > deadline_s);
+        let SolveTimes { count, deadline_s: least_s, over_deadline, .. } =
+            self.found.unwrap_or(SolveTimes { deadline_s, ..SolveTimes::default() });
+        self.found = Some(SolveTimes {
+            count: count + 1,
+            deadline_s: least_s.min(deadline_s),
+            over_deadline: over_deadline + u64::from(time_s > deadline_s),
+            ..SolveTimes::default()
+        });
     }
 
     /// `None` if nothing was measured.
     pub(super) fn into_facts(mut self) -> Option<SolveTimes> {
         self.times_s.sort_by(f64::total_cmp);
-        Some(SolveTimes {
-            count: self.count,
-            median_s: quantile(&self.times_s, 0.5)?,
-            p99_s: quantile(&self.times_s, 0.99)?,
-            max_s: quantile(&self.times_s, 1.0)?,
-            deadline_s: self.deadline_s?,
-            over_deadline: self.over_deadline,
-        })
+        let [median_s, p99_s, max_s] = [0.5, 0.99, 1.0].map(|share| quantile(&self.times_s, share));
+        Some(SolveTimes { median_s: median_s?, p99_s: p99_s?, max_s: max_s?, ..self.found? })
     }
 }
 

@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 use std::io::{IsTerminal as _, Read};
 use std::path::{Path, PathBuf};
 
+pub use self::counts::{Channel, Frames, PhaseSource, PhaseSpan, PhaseTimeline, SolveTimes};
 use self::counts::{ChannelCounter, EndingTracker, FrameCounter, PhaseTracker};
-pub use self::counts::{ChannelFacts, FrameFacts, PhaseSource, PhaseSpan, PhaseTimeline, SolveTimes};
 use anyhow::Result;
 use protocol::log::reader::Damage;
 use protocol::log::record::SCHEMA_VERSION;
@@ -17,13 +17,13 @@ use time::format_description::well_known::Rfc3339;
 
 use crate::cli::{Answer, Outcome, give_each, warn_of_cut, warn_of_damage};
 use crate::cut::CUT_FROM;
-use crate::findings::{self, FindingFacts};
+use crate::findings::{self, Finding};
 use crate::log::{
-    AttachmentFacts, BuildComparison, Clocks, Cut, Entry, FlightLog, Head, LogError, Recording, StampedEntry,
-    VerdictFacts, VerdictLimit,
+    Attachment, BuildComparison, Clocks, Cut, Entry, FlightLog, Head, LogError, Recording, StampedEntry,
+    Verdict, VerdictLimit,
 };
 use crate::print::counted;
-use crate::recover::{SummaryFacts, summary_of};
+use crate::recover::{Summary, summary_of};
 
 /// Describes a log file.
 ///
@@ -53,7 +53,7 @@ pub(crate) fn described(path: &Path) -> Result<Info, LogError> {
 /// As [`info`].
 pub fn info_of<R: Read>(
     log: &mut FlightLog<R>,
-    summary: impl FnOnce() -> Option<SummaryFacts>,
+    summary: impl FnOnce() -> Option<Summary>,
 ) -> Result<Info, LogError> {
     let mut seen = Seen::default();
     while let Some(stamped) = log.next_entry()? {
@@ -102,9 +102,9 @@ impl Seen {
         }
     }
 
-    fn into_info<R: Read>(self, log: &FlightLog<R>, summary: impl FnOnce() -> Option<SummaryFacts>) -> Info {
+    fn into_info<R: Read>(self, log: &FlightLog<R>, summary: impl FnOnce() -> Option<Summary>) -> Info {
         let head = log.head();
-        let profile = ProfileFacts::of(head);
+        let profile = Profile::of(head);
         let frames = self.frames.into_facts();
         let span = self.span.map(|(first_ns, last_ns)| Span {
             first_ns,
@@ -112,7 +112,7 @@ impl Seen {
             duration_s: seconds(last_ns.saturating_sub(first_ns)),
         });
         let channels = self.channels.into_facts(log.channels());
-        let verdict = log.verdict().as_ref().map(VerdictFacts::found);
+        let verdict = log.verdict().as_ref().map(Verdict::found);
         let timelines =
             [(PhaseSource::Vehicle, self.vehicle_phases), (PhaseSource::Telemetry, self.telemetry_phases)];
         Info {
@@ -123,7 +123,7 @@ impl Seen {
                 None => Grade::without_frames(self.unreadable.as_deref()),
             },
             frames,
-            schema: SchemaFacts {
+            schema: Schema {
                 version: head.schema_version().map(str::to_owned),
                 this_build: SCHEMA_VERSION.to_string(),
             },
@@ -160,35 +160,35 @@ pub struct Info {
     pub grade: Grade,
     /// The library that wrote the file.
     pub library: String,
-    pub schema: SchemaFacts,
+    pub schema: Schema,
     /// Which build wrote it.
     pub build: BTreeMap<String, String>,
     /// Comparison of that build with this one.
     pub build_comparison: BuildComparison,
     pub run: BTreeMap<String, String>,
     /// The profile that was flown.
-    pub profile: Option<ProfileFacts>,
+    pub profile: Option<Profile>,
     /// From the first record to the last.
     pub span: Option<Span>,
     /// Its channels, by topic.
-    pub channels: Vec<ChannelFacts>,
+    pub channels: Vec<Channel>,
     /// The frames of the flight computer from its release on.
-    pub frames: Option<FrameFacts>,
+    pub frames: Option<Frames>,
     /// The phases from each source that records them, the vehicle first.
     pub phases: Vec<PhaseTimeline>,
     /// The landing verdict.
-    pub verdict: Option<VerdictFacts>,
+    pub verdict: Option<Verdict>,
     /// How the flight ended, in one sentence, if the log says so.
     pub ending: Option<String>,
     /// What went wrong, first in time; `None` of a log whose flight this build does not run again as it was.
-    pub findings: Option<Vec<FindingFacts>>,
+    pub findings: Option<Vec<Finding>>,
     /// How the clocks of the log differ.
     pub clocks: Clocks,
     /// Why the first unreadable record could not be read.
     pub unreadable: Option<String>,
     /// Whether anything is missing.
     pub completeness: Completeness,
-    pub attachments: Vec<AttachmentFacts>,
+    pub attachments: Vec<Attachment>,
 }
 
 impl Info {
@@ -200,7 +200,7 @@ impl Info {
 
 /// The version of a log's schema, if it says so, and of this build's.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct SchemaFacts {
+pub struct Schema {
     pub version: Option<String>,
     pub this_build: String,
 }
@@ -248,7 +248,7 @@ impl Grade {
 
 /// The profile in a log.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct ProfileFacts {
+pub struct Profile {
     /// Its name, if it can be used.
     pub name: Option<String>,
     /// Its one-line description, if it can be used.
@@ -259,7 +259,7 @@ pub struct ProfileFacts {
     pub problem: Option<String>,
 }
 
-impl ProfileFacts {
+impl Profile {
     pub(super) fn of(head: &Head) -> Option<Self> {
         let parsed = match head.profile_toml.as_ref()? {
             Ok(text) => flight::vehicles::mission::from_toml(text, "profile.toml")
@@ -322,8 +322,8 @@ impl Completeness {
     fn of<R: Read>(
         log: &FlightLog<R>,
         span: Option<&Span>,
-        channels: &[ChannelFacts],
-        summary: impl FnOnce() -> Option<SummaryFacts>,
+        channels: &[Channel],
+        summary: impl FnOnce() -> Option<Summary>,
     ) -> Self {
         let (damage, cut) = (log.damage(), log.flights().cut());
         // The summary of a recovered log says nothing about the damaged one.
@@ -364,7 +364,7 @@ impl Answer for Info {
         if flights > 1 {
             rows.push(("flights", format!("{flights}; `replay verify` reports on each")));
         }
-        rows.extend(self.frames.iter().flat_map(FrameFacts::rows));
+        rows.extend(self.frames.iter().flat_map(Frames::rows));
         rows.extend(self.origin());
         let schema = &self.schema;
         if schema.version.as_ref() != Some(&schema.this_build) {
@@ -391,8 +391,7 @@ type Row = (&'static str, String);
 impl Info {
     /// How it ended, what was broken, and what went wrong.
     fn ending(&self) -> Vec<Row> {
-        let touchdown =
-            |verdict: &VerdictFacts| format!("touchdown at {}", self.clocks.words(verdict.contact()));
+        let touchdown = |verdict: &Verdict| format!("touchdown at {}", self.clocks.words(verdict.contact()));
         let words = [self.ending.clone(), self.verdict.as_ref().map(touchdown)];
         let words: Vec<String> = words.into_iter().flatten().collect();
         let mut rows = Vec::new();
@@ -470,7 +469,7 @@ impl Info {
         };
         let profile = match &self.profile {
             None => "not attached".to_owned(),
-            Some(ProfileFacts { name: Some(name), summary: Some(summary), .. }) => {
+            Some(Profile { name: Some(name), summary: Some(summary), .. }) => {
                 format!("{name}: {summary}")
             }
             Some(profile) => {
@@ -483,13 +482,13 @@ impl Info {
             ("build", build),
             ("profile", profile),
         ];
-        let controller = self.profile.as_ref().and_then(ProfileFacts::controller);
+        let controller = self.profile.as_ref().and_then(Profile::controller);
         rows.extend(controller.map(|controller| ("controller", controller)));
         rows
     }
 }
 
-impl FrameFacts {
+impl Frames {
     fn rows(&self) -> Vec<Row> {
         let Self { first, last, restarts, lost, repeated, start, solve_time, .. } = self;
         let start = if *start { "" } else { ", start NOT RECORDED" };
@@ -537,11 +536,11 @@ pub(crate) fn solve_time_text(times: &SolveTimes) -> String {
 }
 
 /// How many there are, and which of them lack something.
-fn channels(channels: &[ChannelFacts]) -> String {
+fn channels(channels: &[Channel]) -> String {
     let messages = channels.iter().map(|channel| channel.messages).sum();
     let number = counted(channels.len() as u64, "channel");
     let mut words = vec![format!("{number} with {}", counted(messages, "message"))];
-    for ChannelFacts { topic, lost, unreadable, .. } in channels {
+    for Channel { topic, lost, unreadable, .. } in channels {
         let faults =
             [(lost, "LOST"), (unreadable, "UNREADABLE")].into_iter().filter(|(count, _)| **count > 0);
         words.extend(faults.map(|(count, what)| format!("{topic} {count} {what}")));

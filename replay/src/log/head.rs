@@ -29,14 +29,14 @@ pub struct Head {
     pub profile_toml: Option<Result<String, std::string::FromUtf8Error>>,
     /// The whole text of the dispersions.
     pub scenario_toml: Option<String>,
-    pub attachments: Vec<AttachmentFacts>,
+    pub attachments: Vec<Attachment>,
     /// The log was recovered from one that lacked something.
     pub recovered: Option<Damage>,
 }
 
 /// An attachment, without its content.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct AttachmentFacts {
+pub struct Attachment {
     pub name: String,
     /// Its size.
     pub bytes: usize,
@@ -94,7 +94,7 @@ impl Head {
             }
             LogItem::Attachment { name, data } => {
                 if self.attachments.len() < ATTACHMENTS_MAX {
-                    self.attachments.push(AttachmentFacts { name: name.clone(), bytes: data.len() });
+                    self.attachments.push(Attachment { name: name.clone(), bytes: data.len() });
                 }
                 match name.as_str() {
                     ATTACHMENT_PROFILE => self.profile_toml = Some(String::from_utf8(data)),

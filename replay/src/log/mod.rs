@@ -18,7 +18,7 @@ use std::path::Path;
 pub use clocks::{Clock, ClockTime, Clocks, Moment, MomentError};
 use flights::InFlight;
 pub use flights::{Cut, Flights, FrameOrder, Gap, LoggedFlight};
-pub use head::{AttachmentFacts, BuildComparison, BuildDifference, Head};
+pub use head::{Attachment, BuildComparison, BuildDifference, Head};
 use protocol::log::reader::{Damage, LogChannel, LogItem, LogReader};
 use protocol::log::record::{TOPIC_COMPUTER_FRAME, TOPIC_RAW_RX, TOPIC_TELEMETRY, TOPIC_VERDICT};
 use protocol::text::printable;
@@ -29,7 +29,7 @@ pub use tlog::{ImportError, ImportedTlog, import_tlog};
 pub(crate) use tlog::{is_tlog, open_log};
 pub(crate) use verdict::frame_of;
 use verdict::{Found, Verdicts, contradiction, heard_message};
-pub use verdict::{VerdictFacts, VerdictLimit};
+pub use verdict::{Verdict, VerdictLimit};
 
 /// First bytes of every MCAP file.
 const MCAP_MAGIC: [u8; 8] = [0x89, b'M', b'C', b'A', b'P', b'0', b'\r', b'\n'];

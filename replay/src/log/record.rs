@@ -98,19 +98,28 @@ impl Entry {
             return Self::Other;
         };
         match channel.topic.as_str() {
-            TOPIC_COMPUTER_START => decoded(channel, "ComputerStart", data, Self::ComputerStart),
-            TOPIC_COMPUTER_FRAME => decoded_if(!trusted, channel, "ComputerFrame", data, |record| {
-                Self::ComputerFrame(Box::new(LoggedFrame { record: *record, since_release: None }))
-            }),
-            TOPIC_PILOT_TIMING => decoded::<flight_v1::PilotTiming>(channel, "PilotTiming", data, |timing| {
-                Self::PilotTiming(*timing)
-            }),
-            TOPIC_ESTIMATE => decoded(channel, "Estimate", data, Self::Estimate),
-            TOPIC_TRUTH_SAMPLE => decoded(channel, "TruthSample", data, Self::World),
-            TOPIC_VERDICT => decoded(channel, "LandingVerdict", data, Self::Verdict),
-            TOPIC_TELEMETRY => decoded(channel, "Telemetry", data, Self::Telemetry),
+            TOPIC_COMPUTER_START => {
+                decoded(channel, "touchdown.computer.v1.ComputerStart", data, Self::ComputerStart)
+            }
+            TOPIC_COMPUTER_FRAME => {
+                decoded_if(!trusted, channel, "touchdown.computer.v1.ComputerFrame", data, |record| {
+                    Self::ComputerFrame(Box::new(LoggedFrame { record: *record, since_release: None }))
+                })
+            }
+            TOPIC_PILOT_TIMING => decoded::<flight_v1::PilotTiming>(
+                channel,
+                "touchdown.flight.v1.PilotTiming",
+                data,
+                |timing| Self::PilotTiming(*timing),
+            ),
+            TOPIC_ESTIMATE => decoded(channel, "touchdown.flight.v1.Estimate", data, Self::Estimate),
+            TOPIC_TRUTH_SAMPLE => decoded(channel, "touchdown.flight.v1.TruthSample", data, Self::World),
+            TOPIC_VERDICT => decoded(channel, "touchdown.log.v1.LandingVerdict", data, Self::Verdict),
+            TOPIC_TELEMETRY => decoded(channel, "touchdown.log.v1.Telemetry", data, Self::Telemetry),
             TOPIC_OPERATOR => {
-                decoded::<v1::OperatorAction>(channel, "OperatorAction", data, |_| Self::Operator)
+                decoded::<v1::OperatorAction>(channel, "touchdown.log.v1.OperatorAction", data, |_| {
+                    Self::Operator
+                })
             }
             TOPIC_EVENTS if channel.schema_name == "foxglove.Log" => foxglove::messages::Log::decode(data)
                 .map_or(Self::Other, |event| Self::Event(Box::new(event))),
@@ -125,11 +134,11 @@ const RECORD_MAX_BYTES: usize = 1 << 20;
 
 fn decoded<M: Message + Default>(
     channel: &LogChannel,
-    message_name: &str,
+    accepted: &str,
     data: &[u8],
     kind: impl FnOnce(Box<M>) -> Entry,
 ) -> Entry {
-    decoded_if(true, channel, message_name, data, kind)
+    decoded_if(true, channel, accepted, data, kind)
 }
 
 /// Why a frame's bytes cannot be understood exactly; `None` if they can. Where a frame is encoded again to be compared with
@@ -142,16 +151,10 @@ pub(crate) fn misread_frame(data: &[u8]) -> Option<String> {
 fn decoded_if<M: Message + Default>(
     exactly: bool,
     channel: &LogChannel,
-    message_name: &str,
+    accepted: &str,
     data: &[u8],
     kind: impl FnOnce(Box<M>) -> Entry,
 ) -> Entry {
-    let package = match message_name {
-        "ComputerStart" | "ComputerFrame" => PACKAGE_COMPUTER,
-        "PilotTiming" | "Estimate" | "TruthSample" => PACKAGE_FLIGHT,
-        _ => PACKAGE,
-    };
-    let accepted = format!("{package}.{message_name}");
     if channel.schema_name != accepted {
         // Another program may use the same topic name.
         return if channel.schema_name.starts_with("touchdown.") {
@@ -176,21 +179,12 @@ fn decoded_if<M: Message + Default>(
     // The decoder fills missing fields with zeros and skips unknown ones, so encoding again would give different bytes.
     if exactly
         && message.encode_to_vec() != data
-        && let Some(complaint) = complaint(&accepted, data)
+        && let Some(complaint) = complaint(accepted, data)
     {
         return Entry::Unreadable { reason: format!("{}: {complaint}", channel.topic) };
     }
     kind(Box::new(message))
 }
-
-/// Package of the log's own records.
-pub(super) const PACKAGE: &str = "touchdown.log.v1";
-
-/// Package of what the flight computer thought, and of the truth.
-pub(super) const PACKAGE_FLIGHT: &str = "touchdown.flight.v1";
-
-/// Package of the flight computer's frames.
-pub(super) const PACKAGE_COMPUTER: &str = "touchdown.computer.v1";
 
 static POOL: LazyLock<DescriptorPool> = LazyLock::new(|| {
     let mut pool = DescriptorPool::decode(DESCRIPTORS_V1).unwrap_or_default();
@@ -247,7 +241,7 @@ mod tests {
     #[test]
     fn every_record_is_described() {
         for name in ["LandingVerdict", "Telemetry", "OperatorAction"] {
-            assert!(POOL.get_message_by_name(&format!("{PACKAGE}.{name}")).is_some(), "{name}");
+            assert!(POOL.get_message_by_name(&format!("touchdown.log.v1.{name}")).is_some(), "{name}");
         }
         assert!(frame_descriptor().is_some());
     }

@@ -19,7 +19,7 @@ const NOT_TOLD: f64 = f64::NAN;
 
 /// The landing verdict, as recorded or heard.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct VerdictFacts {
+pub struct Verdict {
     pub landing: Landing,
     /// How the flight ended, in one sentence.
     pub ending: String,
@@ -63,7 +63,7 @@ impl VerdictLimit {
     }
 }
 
-impl VerdictFacts {
+impl Verdict {
     /// A recorded verdict.
     pub fn of(verdict: &v1::LandingVerdict) -> Self {
         let facts = |limits: &[v1::LimitResult]| -> Vec<VerdictLimit> {

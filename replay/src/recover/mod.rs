@@ -16,7 +16,7 @@ use mcap::records::Metadata;
 use protocol::log::record::{METADATA_RECOVERY, RECOVERY_FAULT_ENTRY};
 pub(crate) use scan::Records;
 use scan::{ChunkName, Contents, LostStretch};
-pub use scan::{SummaryFacts, summary_of};
+pub use scan::{Summary, summary_of};
 use serde::Serialize;
 pub(crate) use write::{Kept, Rescue};
 

@@ -88,7 +88,7 @@ pub(crate) struct WriterReport {
 
 /// What the summary of a file tells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct SummaryFacts {
+pub struct Summary {
     /// Frames of the flight computer in the file.
     pub frames: u64,
     /// Time of the last message, ns since the Unix epoch.
@@ -96,12 +96,12 @@ pub struct SummaryFacts {
 }
 
 /// What the summary of a file tells, if it is whole. The whole file is read for it.
-pub fn summary_of(path: &Path) -> Option<SummaryFacts> {
+pub fn summary_of(path: &Path) -> Option<Summary> {
     let WriterReport { channels, statistics, .. } = Records::open(path).ok()?.contents().ok()?.told;
     let statistics = statistics?;
     let of_frames = |id: &u16| channels.get(id).is_some_and(|channel| channel.topic == TOPIC_COMPUTER_FRAME);
     let counts = statistics.channel_message_counts.iter().filter(|(id, _)| of_frames(id));
-    Some(SummaryFacts {
+    Some(Summary {
         frames: counts.map(|(_, count)| *count).fold(0, u64::saturating_add),
         last_log_time_ns: statistics.message_end_time,
     })

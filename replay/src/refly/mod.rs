@@ -36,7 +36,7 @@ use sim::wire::record;
 use self::rerun::Rerun;
 use crate::cli::{Answer, Outcome, give, warn_of_what_is_missing};
 use crate::controller::{LoggedComputer, SETTINGS_IN_FLIGHT, phase_name};
-use crate::log::VerdictFacts;
+use crate::log::Verdict;
 use crate::log::{Clock, ClockTime, Moment, Recording, RecordingError};
 use crate::output::{Destination, WriteError, write_whole};
 use crate::print::{counted, verdict_table};
@@ -135,9 +135,9 @@ pub struct ReflyReport {
     /// True impulse over certified impulse.
     pub thrust_scale: f64,
     /// The recorded verdict.
-    pub recorded: Option<VerdictFacts>,
+    pub recorded: Option<Verdict>,
     /// The verdict now; `None` if the vehicle did not come down in a minute.
-    pub reflown: Option<VerdictFacts>,
+    pub reflown: Option<Verdict>,
     /// Whether one of the two stands undamaged and the other does not; `None` if either is unknown.
     pub verdict_changed: Option<bool>,
     /// The smallest distance to a limit that decides whether it stands undamaged, as a fraction of the limit: 1 far from it, 0 on
@@ -216,9 +216,8 @@ pub fn refly_flight(
     let end_s = rerun.flight.frame() as f64 * FRAME_S;
     let last = verdict.clone().map(|verdict| (end_s, Record::LandingVerdict(Box::new(verdict))));
     rerun.records.extend(last);
-    let [recorded, reflown] =
-        [&recording.verdict, &verdict].map(|verdict| verdict.as_ref().map(VerdictFacts::of));
-    let landed = |verdict: &Option<VerdictFacts>| verdict.as_ref().map(|verdict| verdict.landing.stands);
+    let [recorded, reflown] = [&recording.verdict, &verdict].map(|verdict| verdict.as_ref().map(Verdict::of));
+    let landed = |verdict: &Option<Verdict>| verdict.as_ref().map(|verdict| verdict.landing.stands);
     let listed = |settings: &[Setting]| settings.iter().map(ToString::to_string).collect();
     let mut report = ReflyReport {
         kind: "closed loop: flown again in simulation",
@@ -330,7 +329,8 @@ fn change(
 /// The plant takes settings of the airframe and of the draw, from the beginning; the controller takes all but those of the
 /// draw and of its estimator.
 fn refuse_misplaced(options: &ReflyOptions) -> Result<(), ReflyError> {
-    let refused: [(&[Setting], fn(&Setting) -> bool, &'static str); 4] = [
+    type IsWrong = fn(&Setting) -> bool;
+    let refused: [(&[Setting], IsWrong, &str); 4] = [
         (
             &options.plant_settings,
             |setting| setting.at_s.is_some(),
@@ -400,7 +400,7 @@ fn find(recording: &Recording, frames: &[ComputerFrame], start: Option<Moment>) 
 }
 
 /// The smallest distance to a limit as a fraction of it; see [`ReflyReport::margin`].
-pub fn margin(verdict: &VerdictFacts) -> f64 {
+pub fn margin(verdict: &Verdict) -> f64 {
     let left = verdict.deciding().map(|limit| 1.0 - limit.share());
     // A NaN counts as infinitely far outside.
     left.map(|left| if left.is_nan() { f64::NEG_INFINITY } else { left }).fold(f64::INFINITY, f64::min)

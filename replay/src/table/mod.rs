@@ -393,28 +393,17 @@ impl TableReader {
     }
 
     fn limits_of(&mut self, verdict: &v1::LandingVerdict, time: &Cell) -> Vec<Row> {
-        let columns = [
-            ("standard", Kind::Text),
-            ("limit", Kind::Text),
-            ("unit", Kind::Text),
-            ("value", Kind::Float),
-            ("minimum", Kind::Float),
-            ("maximum", Kind::Float),
-            ("passed", Kind::Integer),
-        ];
         let name = format!("{}_limits", table_name(TOPIC_VERDICT));
-        let table = place_of(&mut self.shapes, &mut self.limits, &name, &columns);
+        let columns = [("standard", Kind::Text), ("limit", Kind::Text), ("unit", Kind::Text)]
+            .into_iter()
+            .chain(["value", "minimum", "maximum"].map(|name| (name, Kind::Float)))
+            .chain([("passed", Kind::Integer)]);
+        let table = place_of(&mut self.shapes, &mut self.limits, &name, &columns.collect::<Vec<_>>());
         let row = |(standard, limit): (&str, &v1::LimitResult)| {
-            let cells = vec![
-                time.clone(),
-                Cell::Text(standard.to_owned()),
-                Cell::Text(limit.name.clone()),
-                Cell::Text(limit.unit.clone()),
-                Cell::Float(limit.value),
-                Cell::Float(limit.minimum),
-                Cell::Float(limit.maximum),
-                Cell::Integer(i64::from(limit.passed)),
-            ];
+            let words = [standard, &limit.name, &limit.unit].map(|word| Cell::Text(word.to_owned()));
+            let numbers = [limit.value, limit.minimum, limit.maximum].map(Cell::Float);
+            let passed = Cell::Integer(i64::from(limit.passed));
+            let cells = std::iter::once(time.clone()).chain(words).chain(numbers).chain([passed]).collect();
             Row { table, cells }
         };
         let [_, _, envelope, table_2] = Landing::COLUMNS;

@@ -206,9 +206,10 @@ impl BookFound {
             Some(key) => format!("  signed with {key}; --public-key says that it is the station's"),
             None => "  not signed: the station had no key".to_owned(),
         });
-        let closed = match self.closed {
-            true => "closed by the station",
-            false => "not closed: the station was stopped, or the book was cut",
+        let closed = if self.closed {
+            "closed by the station"
+        } else {
+            "not closed: the station was stopped, or the book was cut"
         };
         let (signed, witnessed) = (self.signed, self.witnessed);
         lines.push(format!(

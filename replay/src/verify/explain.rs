@@ -56,7 +56,7 @@ pub enum ExplainError {
 
 /// A plan, as the judge counts it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct PlanFacts {
+pub struct CountedPlan {
     /// How its solve ended.
     pub status: &'static str,
     pub iterations: usize,
@@ -79,12 +79,12 @@ pub struct PlanFacts {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Judged {
     /// The plan that flew, or would have.
-    pub flown: PlanFacts,
+    pub flown: CountedPlan,
     /// Newton iterations and merit of the flying solver with a cold start.
     pub cold_iterations: usize,
     pub cold_merit: f64,
     /// The judge's.
-    pub judge: PlanFacts,
+    pub judge: CountedPlan,
     /// How much more the flown plan costs than the judge's, as a share, with the price of what it breaks; negative: less.
     pub flown_dearer: f64,
     /// How far the first gimbal angles are apart, deg.
@@ -248,10 +248,10 @@ fn facts(
     iterations: usize,
     score: &Score,
     (states, inputs): (&[State], &[[f64; ocp::landing::INPUTS]]),
-) -> PlanFacts {
+) -> CountedPlan {
     let [north, west, fins] = inputs.first().copied().unwrap_or([f64::NAN; ocp::landing::INPUTS]);
     let end = states.last().copied().unwrap_or([f64::NAN; ocp::landing::STATES]);
-    PlanFacts {
+    CountedPlan {
         status,
         iterations,
         cost: score.cost,
@@ -289,7 +289,7 @@ impl Answer for FrameReport {
             return lines;
         };
         lines.extend([("flown", &judged.flown), ("judge", &judged.judge)].map(|(name, plan)| {
-            let PlanFacts { status, iterations, cost, merit, broken, gimbal_deg, fins, .. } = plan;
+            let CountedPlan { status, iterations, cost, merit, broken, gimbal_deg, fins, .. } = plan;
             let broken = plan.broken_condition.as_ref().map_or_else(
                 || "nothing broken".to_owned(),
                 |condition| format!("{condition} broken by {broken:.1e}"),

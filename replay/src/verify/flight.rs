@@ -14,8 +14,8 @@ use super::parts::Part;
 use super::{FlightPlace, Obstacle, Verification, VerifyReport};
 use crate::controller::LoggedComputer;
 use crate::log::{
-    Cut, Entry, FlightLog, FrameOrder, Gap, Head, LogError, LoggedFrame, Recording, StampedEntry,
-    VerdictFacts, misread_frame,
+    Cut, Entry, FlightLog, FrameOrder, Gap, Head, LogError, LoggedFrame, Recording, StampedEntry, Verdict,
+    misread_frame,
 };
 use crate::recover::summary_of;
 use crate::refly::{ReflyOptions, refly};
@@ -338,9 +338,9 @@ pub struct Consequence {
     /// The frame from which the flight was flown again.
     pub from_frame: u64,
     /// The recorded verdict.
-    pub recorded: Option<VerdictFacts>,
+    pub recorded: Option<Verdict>,
     /// The verdict with this build's controller; `None` if the vehicle does not come down.
-    pub reflown: Option<VerdictFacts>,
+    pub reflown: Option<Verdict>,
     /// Whether the verdict changed between landed and not landed; `None` if unknown.
     pub changed: Option<bool>,
     /// Why the flight was not flown again.
@@ -360,7 +360,7 @@ impl Consequence {
             },
             Err(error) => Self {
                 from_frame: first_divergence.unwrap_or(recording.release_frame + 1),
-                recorded: recording.verdict.as_ref().map(VerdictFacts::of),
+                recorded: recording.verdict.as_ref().map(Verdict::of),
                 reflown: None,
                 changed: None,
                 obstacle: Some(error.to_string()),

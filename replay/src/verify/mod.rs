@@ -44,7 +44,7 @@ use serde::Serialize;
 use crate::cli::{Answer, Outcome, give_each, say, warn_of_cut, warn_of_damage};
 use crate::controller::FrameError;
 use crate::log::{
-    BuildComparison, Cut, Entry, FlightLog, Gap, Head, LogError, LoggedFlight, Recording, VerdictFacts,
+    BuildComparison, Cut, Entry, FlightLog, Gap, Head, LogError, LoggedFlight, Recording, Verdict,
 };
 use crate::print::counted;
 
@@ -85,7 +85,9 @@ pub fn verify(path: &Path) -> Result<Vec<VerifyReport>, LogError> {
 /// As [`verify`].
 pub fn verify_strictly(path: &Path) -> Result<Vec<VerifyReport>, LogError> {
     let mut reports = verify(path)?;
-    reports.iter_mut().for_each(|report| report.strict = true);
+    for report in &mut reports {
+        report.strict = true;
+    }
     let [report] = reports.as_mut_slice() else {
         let why = "a file with several flights is not flown again";
         for report in &mut reports {
@@ -435,7 +437,7 @@ impl Consequence {
         if let Some(obstacle) = &self.obstacle {
             return format!("verdict: whether it would change is not known: {obstacle}");
         }
-        let word = |verdict: &Option<VerdictFacts>| {
+        let word = |verdict: &Option<Verdict>| {
             verdict.as_ref().map_or("no verdict", |verdict| verdict.landing.word())
         };
         let answer = match self.changed {

@@ -291,6 +291,8 @@ fn a_restart_of_the_computer_in_the_air_verifies() {
     let dead = numbers.windows(2).filter(|pair| pair[1] != pair[0] + 1).count();
     assert_eq!(dead, 1, "it was dead once");
     all_frames_identical(&flown.verified());
+    let frames = replay::info::info(&flown.log()).unwrap().frames.unwrap();
+    assert_eq!((frames.restarts, frames.lost), (1, 0));
 }
 
 #[test]

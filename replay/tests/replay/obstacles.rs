@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use prost::Message as _;
 use protocol::log::computer_v1::ComputerFrame;
+use protocol::log::record::TOPIC_COMPUTER_START;
 use replay::evaluate::evaluate;
 use replay::info::{GradeLevel, Info, info, info_of};
 use replay::log::{FlightLog, Gap, Recording};
@@ -91,6 +92,24 @@ fn an_input_of_another_version_is_refused() {
     let report = verify_frames(&frames);
     assert_eq!((report.outcome, report.frames_identical), (Verification::NotReplayable, 3));
     assert!(matches!(report.obstacle, Some(Obstacle::Frame(_))), "{report:?}");
+}
+
+/// What the computer began from is lost, or a frame is there twice.
+#[test]
+fn a_log_without_its_start_or_with_a_frame_twice_is_refused() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("flight.mcap");
+    std::fs::write(&path, &WHOLE.bytes).unwrap();
+    let mut held = Held::read(&path);
+    held.keep(|message| message.topic != TOPIC_COMPUTER_START);
+    held.write(&path);
+    assert_eq!(only(verify(&path).unwrap()).obstacle, Some(Obstacle::NoStart));
+    assert_eq!(info(&path).unwrap().grade.level, GradeLevel::Numeric);
+    let mut twice = FLIGHT.frames[..9].to_vec();
+    twice.push(twice[8].clone());
+    let report = verify_frames(&twice);
+    assert!(matches!(report.obstacle, Some(Obstacle::Frame(_))), "{report:?}");
+    assert_eq!(report.frames_identical, 9);
 }
 
 /// A frame with an unknown field was decided by code that this build does not have.

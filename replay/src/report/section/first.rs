@@ -3,9 +3,9 @@
 use flight::rules::verdict::Landing;
 use onboard_sim::figure::Panel;
 
-use crate::findings::{FindingFacts, over};
+use crate::findings::{Finding, over};
 use crate::info::{Info, rounded};
-use crate::log::{VerdictFacts, VerdictLimit};
+use crate::log::{Verdict, VerdictLimit};
 use crate::refly::{FaultChanges, ReflyOptions, refly_flight};
 use crate::report::chart::Chart;
 use crate::report::html::{escaped, paragraph, table};
@@ -37,8 +37,8 @@ pub(super) fn html(flight: &Flight, info: &Info, pictures: &[Picture<'_>]) -> St
 fn verdict(info: &Info) -> String {
     let ending = info.ending.as_deref().unwrap_or("No verdict in this log");
     let class = match &info.verdict {
-        Some(VerdictFacts { landing: Landing { stands: false, .. }, .. }) => " bad",
-        Some(VerdictFacts { landing: Landing { envelope: true, .. }, .. }) => " good",
+        Some(Verdict { landing: Landing { stands: false, .. }, .. }) => " bad",
+        Some(Verdict { landing: Landing { envelope: true, .. }, .. }) => " good",
         // It stands, and its legs were not designed for it.
         Some(_) | None => "",
     };
@@ -72,8 +72,8 @@ fn findings(flight: &Flight, info: &Info) -> String {
     if findings.is_empty() {
         html += &paragraph(info.no_findings());
     }
-    let item = |finding: &FindingFacts| {
-        let FindingFacts { since_s, section, words, .. } = finding;
+    let item = |finding: &Finding| {
+        let Finding { since_s, section, words, .. } = finding;
         format!("<li><b>T+{since_s:.2} s</b> <a href=\"#{section}\">{}</a></li>\n", escaped(words))
     };
     let items: String = findings.iter().map(item).collect();

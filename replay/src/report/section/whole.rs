@@ -7,7 +7,7 @@ use flight::vehicles::mission::BUILTIN;
 use super::burn::View;
 use crate::cli::Answer as _;
 use crate::compare::compared;
-use crate::info::{Info, ProfileFacts};
+use crate::info::{Info, Profile};
 use crate::log::{Clock, ClockTime};
 use crate::report::chart::{Chart, line};
 use crate::report::html::{charts, escaped, paragraph, table};
@@ -43,7 +43,7 @@ pub(super) fn mission(flight: &Flight, info: &Info) -> Option<String> {
     let flown = flight.recording.profile_toml().ok()?;
     let profile = info.profile.as_ref();
     let name = profile.and_then(|profile| profile.name.as_deref()).unwrap_or_default();
-    let controller = profile.and_then(ProfileFacts::controller);
+    let controller = profile.and_then(Profile::controller);
     let controller =
         controller.map_or_else(String::new, |controller| paragraph(&format!("Controller: {controller}.")));
     let Some((_, built_in)) = BUILTIN.iter().find(|(known, _)| *known == name) else {
