@@ -45,14 +45,10 @@ impl Window {
 /// gaining speed have such landings, and for them the window is metres wide.
 const TRIED: usize = 24;
 
-/// The flight's vertical motion; `None` if the mission does not know its motor's curve.
-fn vertical(mission: &Mission, drawn: &Draw) -> Option<Vertical> {
-    Some(Vertical::new(&mission.airframe, drawn.truth.curve(mission).ok()?.as_ref(), &drawn.truth))
-}
-
 /// The window of a flight whose fall begins in this state; `None` if it lands from no height.
 pub fn window(mission: &Mission, drawn: &Draw, fall: &RigidState) -> Option<Window> {
-    let vertical = vertical(mission, drawn)?;
+    let curve = drawn.truth.curve(mission).ok()?;
+    let vertical = Vertical::new(&mission.airframe, curve.as_ref(), &drawn.truth);
     let apogee_m = fall.position_m.z - vertical.cg_above_feet_m();
     let vertical_m_s = fall.velocity_m_s.z.min(0.0);
     let fall = Fall::new(&vertical, apogee_m, vertical_m_s, drawn.truth.ignition_delay_s)?;
@@ -142,7 +138,7 @@ const STEP_S: f64 = 0.02;
 const LONGEST_S: f64 = 120.0;
 
 /// Height of the feet, m, and vertical velocity, m/s, at equal times since apogee, past the ground by the igniter's delay.
-pub(super) struct Fall {
+struct Fall {
     states: Vec<(f64, f64)>,
     delay_s: f64,
 }
@@ -150,7 +146,7 @@ pub(super) struct Fall {
 impl Fall {
     /// The fall from a height of the feet, m, and a vertical velocity that is not upwards, m/s. `None` if it does not reach
     /// the ground.
-    pub(super) fn new(vertical: &Vertical, height_m: f64, vertical_m_s: f64, delay_s: f64) -> Option<Self> {
+    fn new(vertical: &Vertical, height_m: f64, vertical_m_s: f64, delay_s: f64) -> Option<Self> {
         let mass_kg = vertical.mass_kg(-1.0);
         let acceleration_m_s2 = |height_m: f64, vertical_m_s: f64| {
             let air = Air::at_height_m(height_m + vertical.cg_above_feet_m());
@@ -177,7 +173,7 @@ impl Fall {
 
     /// Height of the feet, m, and vertical velocity, m/s, at the first thrust after a command at a height of the feet, m,
     /// between the ground and apogee.
-    pub(super) fn onset(&self, command_m: f64) -> (f64, f64) {
+    fn onset(&self, command_m: f64) -> (f64, f64) {
         let after = self.states.partition_point(|(height_m, _)| *height_m > command_m);
         let from = after.saturating_sub(1);
         let (from_m, from_m_s) = self.states[from];
@@ -226,14 +222,14 @@ enum Brake {
 
 /// The least fall from a state.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Least {
-    pub(super) fallen_m: f64,
+struct Least {
+    fallen_m: f64,
     /// Whether a landing ends it. Otherwise it ends where the vehicle is slowest.
-    pub(super) lands: bool,
+    lands: bool,
 }
 
 /// One vehicle in its burn.
-pub(super) struct Braking {
+struct Braking {
     vertical: Vertical,
     /// Mean thrust, N, and mass, kg, of each step.
     steps: Vec<(f64, f64)>,
@@ -251,7 +247,7 @@ pub(super) struct Braking {
 
 impl Braking {
     /// From the largest tilt, rad, and the legs' limit, m/s. `None` if the thrust never exceeds the weight.
-    pub(super) fn new(vertical: Vertical, (tilt_max_rad, leg_m_s): (f64, f64)) -> Option<Self> {
+    fn new(vertical: Vertical, (tilt_max_rad, leg_m_s): (f64, f64)) -> Option<Self> {
         let burn = vertical.burn();
         let count = libm::ceil((burn.lasts_s() + AFTER_S) / STEP_S) as usize;
         let at_s = |step: usize| step as f64 * STEP_S;
@@ -308,8 +304,9 @@ impl Braking {
         let sign = if brake == Brake::Hard { 1.0 } else { -1.0 };
         let [thrust_n, body_n, across_n] =
             [thrust_n, upwards * drag.body_n, upwards * drag.across_n].map(|force_n| sign * force_n);
-        let forces_n = self.tilts.map(|[cos, cos2, sin3]| thrust_n * cos + body_n * cos2 + across_n * sin3);
-        (sign * largest(&forces_n) + upwards * fins_n) / mass_kg - STANDARD_GRAVITY_M_S2
+        let forces_n =
+            self.tilts.map(|[cos, cos2, sin3]| Some(thrust_n * cos + body_n * cos2 + across_n * sin3));
+        (sign * peak(&forces_n).unwrap_or(f64::NAN) + upwards * fins_n) / mass_kg - STANDARD_GRAVITY_M_S2
     }
 
     /// The state after a time within a step, s; a negative time goes back.
@@ -372,7 +369,7 @@ impl Braking {
     }
 
     /// The least fall of a vehicle whose thrust begins in a state.
-    pub(super) fn least_fall(&self, height_m: f64, vertical_m_s: f64) -> Least {
+    fn least_fall(&self, height_m: f64, vertical_m_s: f64) -> Least {
         let from_m = height_m;
         let mut before = (height_m, vertical_m_s);
         if vertical_m_s >= 0.0 {
@@ -419,7 +416,7 @@ impl Braking {
             *(if comes_down(middle_s) { &mut late_s } else { &mut early_s }) = middle_s;
         }
         let ending = self.back_from(late_s, (0.0, 0.0), Brake::Soft);
-        match self.joined_m(0.0, from, Brake::Hard, &ending) {
+        match joined_m(0.0, from, self.onwards(0.0, from, Brake::Hard), &ending) {
             Some(fallen_m) => Least { fallen_m, lands: true },
             // Even the softest braking stops the vehicle too early.
             None => Least { fallen_m, lands: false },
@@ -427,7 +424,7 @@ impl Braking {
     }
 
     /// The greatest fall to a landing from a state at a time, m; `None` if it cannot become slow enough.
-    pub(super) fn most_fall_m(&self, from_s: f64, height_m: f64, vertical_m_s: f64) -> Option<f64> {
+    fn most_fall_m(&self, from_s: f64, height_m: f64, vertical_m_s: f64) -> Option<f64> {
         let from = (height_m, vertical_m_s);
         let soft: Vec<(usize, f64, State)> = self.onwards(from_s, from, Brake::Soft).collect();
         let falls_m: Vec<Option<f64>> = self
@@ -447,11 +444,6 @@ impl Braking {
             })
             .map(|place| height_m - soft[place].2.0);
         peak(&falls_m).into_iter().chain(slow_m).reduce(f64::max)
-    }
-
-    /// The fall from a state until an ending, first braking in one way until the ending's velocity is met.
-    fn joined_m(&self, from_s: f64, from: State, brake: Brake, ending: &[State]) -> Option<f64> {
-        joined_m(from_s, from, self.onwards(from_s, from, brake), ending)
     }
 }
 
@@ -484,32 +476,16 @@ fn joined_m(
     None
 }
 
-/// The largest of values at equal distances, with a parabola through it and its neighbours.
-fn largest(values: &[f64; TILTS]) -> f64 {
-    let (place, most) = values.iter().enumerate().fold((0, f64::NEG_INFINITY), |best, (place, value)| {
-        if *value > best.1 { (place, *value) } else { best }
-    });
-    if place == 0 || place == TILTS - 1 {
-        return most;
-    }
-    most + above_m(values[place - 1], most, values[place + 1])
-}
-
-/// The same of values of which some are missing.
+/// The largest of values at equal distances, of which some are missing, with a parabola through it and its neighbours.
 fn peak(values: &[Option<f64>]) -> Option<f64> {
     let found = values.iter().enumerate().filter_map(|(place, value)| Some((place, (*value)?)));
     let (place, most) = found.reduce(|best, next| if next.1 > best.1 { next } else { best })?;
     let beside = |place: Option<usize>| values.get(place?).copied().flatten();
-    Some(match (beside(place.checked_sub(1)), beside(Some(place + 1))) {
-        (Some(left), Some(right)) => most + above_m(left, most, right),
-        _ => most,
-    })
-}
-
-/// How far the top of a parabola lies above its middle value, which is the largest of three.
-fn above_m(left: f64, middle: f64, right: f64) -> f64 {
-    let curve = 2.0 * middle - left - right;
-    if curve > 0.0 { (right - left) * (right - left) / (8.0 * curve) } else { 0.0 }
+    let (Some(left), Some(right)) = (beside(place.checked_sub(1)), beside(Some(place + 1))) else {
+        return Some(most);
+    };
+    let curve = 2.0 * most - left - right;
+    Some(most + if curve > 0.0 { (right - left) * (right - left) / (8.0 * curve) } else { 0.0 })
 }
 
 /// A zero is found this closely, in the unit of the argument.
@@ -520,7 +496,7 @@ const MOST_VALUES: usize = 60;
 /// Where a function that rises from below zero at `low` passes zero, by false position; the value of an end that stays
 /// twice is halved (the Illinois rule; Dowell and Jarratt, BIT 11, 1971). `None` if it is below zero at `high`; `low` if it
 /// is above zero there.
-pub(super) fn root(value_at: impl Fn(f64) -> f64, low: f64, high: f64) -> Option<f64> {
+fn root(value_at: impl Fn(f64) -> f64, low: f64, high: f64) -> Option<f64> {
     let (mut below, mut above) = ((low, value_at(low)), (high, value_at(high)));
     if below.1 >= 0.0 {
         return Some(low);

@@ -299,17 +299,13 @@ fn draw_panel(area: &Area<'_>, panel: &Panel) -> Drawn {
     }
     let across = panel.limits.iter().map(|limit| PathElement::new([(x.0, *limit), (x.1, *limit)], RED));
     chart.draw_series(across)?;
-    let marks = || panel.marks.iter().filter(|(at, _)| (x.0..=x.1).contains(at));
-    chart.draw_series(marks().map(|(at, _)| PathElement::new([(*at, y.0), (*at, y.1)], FAINT)))?;
-    chart.draw_series(
-        marks().map(|(at, name)| EmptyElement::at((*at, y.1)) + Text::new(name.clone(), (3, 2), FONT)),
-    )?;
-    let signs = || panel.signs.iter().filter(|(at, _)| (x.0..=x.1).contains(at));
-    chart.draw_series(signs().map(|(at, _)| PathElement::new([(*at, y.0), (*at, y.1)], RED)))?;
-    chart.draw_series(signs().map(|(at, number)| {
-        let label = Text::new(number.clone(), (3, 16), FONT.into_font().color(&RED));
-        EmptyElement::at((*at, y.1)) + label
-    }))?;
+    for (named, colour, label, drop_px) in [(&panel.marks, FAINT, BLACK, 2), (&panel.signs, RED, RED, 16)] {
+        for (at, name) in named.iter().filter(|(at, _)| (x.0..=x.1).contains(at)) {
+            chart.draw_series([PathElement::new([(*at, y.0), (*at, y.1)], colour)])?;
+            let name = Text::new(name.clone(), (3, drop_px), FONT.into_font().color(&label));
+            chart.draw_series([EmptyElement::at((*at, y.1)) + name])?;
+        }
+    }
     chart.draw_series(panel.places.iter().map(|(x, y, name)| {
         let named = EmptyElement::at((*x, *y)) + Circle::new((0, 0), 3, BLACK.filled());
         named + Text::new(name.clone(), (6, -14), FONT)

@@ -14,17 +14,9 @@ use toml_edit::{DocumentMut, Item, TomlError, value};
 /// Why a mission's airframe cannot be taken apart, or put together with other parts.
 #[derive(Debug, thiserror::Error)]
 pub enum FrameError {
-    /// The motor is heavier than the vehicle.
-    #[error(
-        "airframe.mass.loaded_kg is {loaded_kg}; more than the {motor_kg} kg of its motor {motor} is accepted"
-    )]
-    NothingLeft { loaded_kg: f64, motor: String, motor_kg: f64 },
-    /// The motor has more inertia than the vehicle.
-    #[error(
-        "airframe.mass.loaded_pitch_inertia_kg_m2 is {found}; more than {motors:.5}, which the motor alone has about \
-         the centre of gravity, is accepted"
-    )]
-    Inertia { found: f64, motors: f64 },
+    /// The motor has more of it than the vehicle.
+    #[error("airframe.mass.{key} is {found}; more than the {motors} of its motor {motor} alone is accepted")]
+    NothingLeft { key: &'static str, found: f64, motor: String, motors: f64 },
     #[error("the mission is not TOML")]
     Text(#[from] TomlError),
     /// The vehicle would not be sound.
@@ -51,9 +43,11 @@ impl Frame {
         let (mass, motor) = (&mission.airframe.mass, &mission.motor_curve);
         let motor_kg = motor.total_mass_kg();
         let mass_kg = mass.loaded_kg - motor_kg;
+        let refused = |key, found, motors| {
+            Err(FrameError::NothingLeft { key, found, motor: motor.name().to_owned(), motors })
+        };
         if mass_kg <= 0.0 {
-            let motor = motor.name().to_owned();
-            return Err(FrameError::NothingLeft { loaded_kg: mass.loaded_kg, motor, motor_kg });
+            return refused("loaded_kg", mass.loaded_kg, motor_kg);
         }
         let (loaded_cg_m, motor_cg_m) = (mass.loaded_cg_station_m, mass.propellant_station_m);
         let cg_station_m = (mass.loaded_kg * loaded_cg_m - motor_kg * motor_cg_m) / mass_kg;
@@ -62,7 +56,7 @@ impl Frame {
         let left_kg_m2 =
             mass.loaded_pitch_inertia_kg_m2 - motors - mass_kg * squared(cg_station_m - loaded_cg_m);
         if left_kg_m2 <= 0.0 {
-            return Err(FrameError::Inertia { found: mass.loaded_pitch_inertia_kg_m2, motors });
+            return refused("loaded_pitch_inertia_kg_m2", mass.loaded_pitch_inertia_kg_m2, motors);
         }
         let (loaded, own_motor) = (*mass, motor.clone());
         Ok(Self { loaded, own_motor, mass_kg, cg_station_m, pitch_inertia_kg_m2: left_kg_m2 })
@@ -202,10 +196,13 @@ mod tests {
         let mut light = mission();
         light.airframe.mass.loaded_kg = 0.4;
         let error = Frame::of(&light).unwrap_err().to_string();
-        assert_eq!(error, "airframe.mass.loaded_kg is 0.4; more than the 0.5 kg of its motor T is accepted");
+        assert_eq!(
+            error,
+            "airframe.mass.loaded_kg is 0.4; more than the 0.5 of its motor T alone is accepted"
+        );
         let mut thin = mission();
         thin.airframe.mass.loaded_pitch_inertia_kg_m2 = 0.01;
-        assert!(Frame::of(&thin).unwrap_err().to_string().contains("kg_m2 is 0.01; more than 0.0817"));
+        assert!(Frame::of(&thin).unwrap_err().to_string().contains("kg_m2 is 0.01; more than the 0.0817"));
     }
 
     fn recipe(name: &str, more: &str) -> Recipe {

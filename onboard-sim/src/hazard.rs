@@ -17,14 +17,14 @@ use flight::vehicle::thrust_curve::ThrustCurve;
 use nalgebra::Vector3;
 use sim::draw::{Chance, draw};
 use sim::fault::TimedFault;
-use sim::recipe::{Recipe, RecipeError};
+use sim::recipe::Recipe;
 use sim::sortie::{SetUpError, Sortie};
 use sim::world::ground::RestOutcome;
 use sim::world::wind::Wind;
 use sim::world::{Actuators, Fault};
 use statrs::distribution::{Binomial, DiscreteCDF as _};
 
-use crate::run::in_parallel;
+use crate::run::{RunError, in_parallel};
 use crate::statistics::Landings;
 
 /// The share of the flights that a radius has to hold.
@@ -80,57 +80,50 @@ impl Way {
         Self::Booster,
     ];
 
+    /// The words of a table, the one start from which it happens, or none if it happens from all, and the faults that make a flight
+    /// end so, or none for what happens to the flight as planned.
+    const fn facts(self) -> (&'static str, Option<StartPoint>, &'static [&'static str]) {
+        const PAD: Option<StartPoint> = Some(StartPoint::Pad);
+        const BALLISTIC: &[&str] = &[
+            "no-light@0",
+            "parachute-fails@0",
+            "fin-stuck:0@0",
+            "fin-stuck:1@0",
+            "fin-stuck:2@0",
+            "fin-stuck:3@0",
+        ];
+        match self {
+            Self::AsPlanned => ("as planned", None, &[]),
+            Self::AbortInAscent => ("aborted in boost, coast", PAD, &[]),
+            Self::ParachuteFromApogee => ("parachute from apogee", Some(StartPoint::Apogee), &[]),
+            Self::AbortInDescent => ("aborted in the descent", None, &[]),
+            Self::AbortTooLow => ("aborted below commit", None, &[]),
+            Self::AbortUnderThrust => ("aborted under thrust", None, &[]),
+            Self::NoLight => ("landing motor not lit", None, &["no-light@0"]),
+            Self::NoSeparation => ("booster stays on", PAD, &["separation-fails@0"]),
+            Self::Uncommanded => ("uncommanded lift-off", PAD, &[]),
+            Self::Ballistic => ("ballistic", None, BALLISTIC),
+            Self::BallisticWithBooster => {
+                ("ballistic, with booster", PAD, &["separation-fails@0", "parachute-fails@0"])
+            }
+            Self::Booster => ("spent booster, ballistic", PAD, &[]),
+        }
+    }
+
     /// The ways that a mission's flights can end.
     pub fn of(mission: &Mission) -> Vec<Self> {
-        let start = mission.start.at;
-        Self::ALL
-            .into_iter()
-            .filter(|way| match way {
-                Self::AbortInAscent
-                | Self::NoSeparation
-                | Self::Uncommanded
-                | Self::BallisticWithBooster
-                | Self::Booster => start == StartPoint::Pad,
-                Self::ParachuteFromApogee => start == StartPoint::Apogee,
-                _ => true,
-            })
-            .collect()
+        let happens = |way: &Self| way.facts().1.is_none_or(|start| start == mission.start.at);
+        Self::ALL.into_iter().filter(happens).collect()
     }
 
     /// The words of a table.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::AsPlanned => "as planned",
-            Self::AbortInAscent => "aborted in boost, coast",
-            Self::ParachuteFromApogee => "parachute from apogee",
-            Self::AbortInDescent => "aborted in the descent",
-            Self::AbortTooLow => "aborted below commit",
-            Self::AbortUnderThrust => "aborted under thrust",
-            Self::NoLight => "landing motor not lit",
-            Self::NoSeparation => "booster stays on",
-            Self::Uncommanded => "uncommanded lift-off",
-            Self::Ballistic => "ballistic",
-            Self::BallisticWithBooster => "ballistic, with booster",
-            Self::Booster => "spent booster, ballistic",
-        }
+        self.facts().0
     }
 
-    /// The faults that make a flight end so; `None` for what happens to the flight as planned.
-    fn faults(self) -> Option<&'static [&'static str]> {
-        match self {
-            Self::NoLight => Some(&["no-light@0"]),
-            Self::NoSeparation => Some(&["separation-fails@0"]),
-            Self::Ballistic => Some(&[
-                "no-light@0",
-                "parachute-fails@0",
-                "fin-stuck:0@0",
-                "fin-stuck:1@0",
-                "fin-stuck:2@0",
-                "fin-stuck:3@0",
-            ]),
-            Self::BallisticWithBooster => Some(&["separation-fails@0", "parachute-fails@0"]),
-            _ => None,
-        }
+    /// It is a flight of its own, and no part of the one as planned.
+    fn is_alone(self) -> bool {
+        self == Self::Uncommanded || !self.facts().2.is_empty()
     }
 
     /// What a flight as planned tells of it is told at apogee.
@@ -298,7 +291,7 @@ pub fn studies(
     recipes: &[Recipe],
     flights: Flights,
     done: &(dyn Fn(usize, usize) + Sync),
-) -> Result<Vec<Vec<Impact>>, HazardError> {
+) -> Result<Vec<Vec<Impact>>, RunError> {
     let mut before = 0;
     let of_each = recipes.iter().enumerate().map(|(place, recipe)| {
         let left = recipes.len() - place;
@@ -318,7 +311,7 @@ pub fn study(
     recipe: &Recipe,
     flights: Flights,
     done: &(dyn Fn(usize, usize) + Sync),
-) -> Result<Vec<Impact>, HazardError> {
+) -> Result<Vec<Impact>, RunError> {
     let Flights { survey, of_widest } = Flights { survey: flights.survey.min(flights.of_widest), ..flights };
     let ways = Way::of(&recipe.mission);
     let (surveyed, more) = (survey as usize * ways.len(), (of_widest - survey) as usize);
@@ -329,8 +322,8 @@ pub fn study(
         let flown = numbers
             .iter()
             .zip(flown)
-            .map(|(number, flown)| flown.map_err(|source| HazardError::Flight { number: *number, source }));
-        Ok::<_, HazardError>(flown.collect::<Result<Vec<_>, _>>()?.concat())
+            .map(|(number, flown)| flown.map_err(|source| RunError::Fly { number: *number, source }));
+        Ok::<_, RunError>(flown.collect::<Result<Vec<_>, _>>()?.concat())
     };
     done(0, surveyed + more);
     let mut impacts = fly_some(&ways, 0..survey, &|flown| done(flown, surveyed + more))?;
@@ -359,21 +352,6 @@ pub fn keep_out_m(radius: &Radius, rule: &Rule) -> f64 {
     10.0 * libm::ceil(radius.outside_m().max(rule.distance_m()) / 10.0)
 }
 
-/// Why there is no hazard area.
-#[derive(Debug, thiserror::Error)]
-pub enum HazardError {
-    /// A flight cannot be set up.
-    #[error("flight {number}")]
-    Flight {
-        number: u64,
-        #[source]
-        source: SetUpError,
-    },
-    /// The mission has not what its start needs.
-    #[error(transparent)]
-    Recipe(#[from] RecipeError),
-}
-
 /// Flies flight `number` of a recipe in some ways.
 ///
 /// # Errors
@@ -385,8 +363,7 @@ pub fn fly(recipe: &Recipe, ways: &[Way], number: u64) -> Result<Vec<Impact>, Se
     let mut add = |way: Way, (place_m, course), landing| {
         impacts.push(Impact { way, number, place_m, downwind_rad, landing, course });
     };
-    let (alone, beside): (Vec<Way>, Vec<Way>) =
-        ways.iter().partition(|way| way.faults().is_some() || **way == Way::Uncommanded);
+    let (alone, beside): (Vec<Way>, Vec<Way>) = ways.iter().partition(|way| way.is_alone());
     if !beside.is_empty() {
         let mut branches: Vec<Branch> = beside.iter().map(|way| Branch::new(*way)).collect();
         let mut chance = Chance::of(recipe.seed ^ OF_HAZARD, number);
@@ -424,12 +401,12 @@ pub fn fly(recipe: &Recipe, ways: &[Way], number: u64) -> Result<Vec<Impact>, Se
         }
     }
     for way in alone {
-        let mut flight = match way.faults() {
-            Some(faults) => {
-                let faults: Vec<TimedFault> = faults.iter().filter_map(|fault| fault.parse().ok()).collect();
-                Sortie::new(&Recipe { faults, ..recipe.clone() }, number)?
-            }
-            None => uncommanded(recipe, number)?,
+        let mut flight = if way == Way::Uncommanded {
+            uncommanded(recipe, number)?
+        } else {
+            let (_, _, faults) = way.facts();
+            let faults: Vec<TimedFault> = faults.iter().filter_map(|fault| fault.parse().ok()).collect();
+            Sortie::new(&Recipe { faults, ..recipe.clone() }, number)?
         };
         let down = come_down(&mut flight, |_| true);
         add(way, down, flight.outcome().landing);

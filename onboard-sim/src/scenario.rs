@@ -1,9 +1,10 @@
 //! Scenarios: faults and the expected outcome of the flight, as data.
 
-use serde::Deserialize;
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer};
+use sim::fault::TimedFault;
 
 use crate::row::Row;
-use sim::fault::{FaultError, TimedFault};
 
 /// The expected outcome of a flight with a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
@@ -52,57 +53,20 @@ impl Expected {
 }
 
 /// The faults of a flight, from a file.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Scenario {
     pub name: String,
     /// What breaks.
+    #[serde(deserialize_with = "parsed")]
     pub faults: Vec<TimedFault>,
     /// The expected outcome.
     pub expected: Option<Expected>,
 }
 
-/// Why a scenario cannot be used.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum ScenarioError {
-    /// The text is not a scenario.
-    #[error("{origin}: {message}")]
-    Parse {
-        /// Where the text came from.
-        origin: String,
-        /// The parser's words.
-        message: String,
-    },
-    /// The text of a fault is wrong.
-    #[error("{origin}")]
-    Fault {
-        /// Where the text came from.
-        origin: String,
-        #[source]
-        source: FaultError,
-    },
-}
-
-impl Scenario {
-    /// Reads a scenario from TOML: `name`, `faults` (a list of texts) and, if wanted, `expected`.
-    ///
-    /// # Errors
-    /// [`ScenarioError`] names the key or the fault.
-    pub fn from_toml(text: &str, origin: &str) -> Result<Self, ScenarioError> {
-        #[derive(Deserialize)]
-        #[serde(deny_unknown_fields)]
-        struct File {
-            name: String,
-            faults: Vec<String>,
-            expected: Option<Expected>,
-        }
-        let file: File = toml::from_str(text).map_err(|error| ScenarioError::Parse {
-            origin: origin.to_owned(),
-            message: error.to_string(),
-        })?;
-        let faults = file.faults.iter().map(|fault| fault.parse()).collect::<Result<Vec<_>, _>>();
-        let faults = faults.map_err(|source| ScenarioError::Fault { origin: origin.to_owned(), source })?;
-        Ok(Self { name: file.name, faults, expected: file.expected })
-    }
+fn parsed<'de, D: Deserializer<'de>>(faults: D) -> Result<Vec<TimedFault>, D::Error> {
+    let faults = Vec::<String>::deserialize(faults)?;
+    faults.iter().map(|fault| fault.parse().map_err(D::Error::custom)).collect()
 }
 
 #[cfg(test)]
@@ -113,11 +77,11 @@ mod tests {
     fn a_scenario_is_parsed_and_errors_name_the_key() {
         let text =
             "name = \"dark\"\nfaults = [\"gnss-out@5\", \"no-light@ignition\"]\nexpected = \"inhibit\"";
-        let scenario = Scenario::from_toml(text, "dark.toml").unwrap();
+        let scenario: Scenario = toml::from_str(text).unwrap();
         assert_eq!((scenario.faults.len(), scenario.expected), (2, Some(Expected::Inhibit)));
-        let error = Scenario::from_toml(&text.replace("gnss-out", "gps"), "dark.toml").unwrap_err();
-        assert_eq!(error.to_string(), "dark.toml");
-        let error = Scenario::from_toml(&text.replace("faults", "fault"), "dark.toml").unwrap_err();
-        assert!(error.to_string().contains("fault"), "{error}");
+        for (from, to, words) in [("gnss-out", "gps", "`gps"), ("faults", "fault", "unknown field `fault`")] {
+            let error = toml::from_str::<Scenario>(&text.replace(from, to)).unwrap_err().to_string();
+            assert!(error.contains(words), "{error}");
+        }
     }
 }

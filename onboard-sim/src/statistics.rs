@@ -97,33 +97,6 @@ pub fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
     values
 }
 
-/// Spearman's rank correlation. Equal values get their mean rank. The result is 0 if one side does not vary.
-pub fn rank_correlation(pairs: &[(f64, f64)]) -> f64 {
-    let ranks = |values: Vec<f64>| {
-        let mut order: Vec<usize> = (0..values.len()).collect();
-        order.sort_by(|one, two| values[*one].total_cmp(&values[*two]));
-        let mut ranks = vec![0.0; values.len()];
-        let mut from = 0;
-        while from < order.len() {
-            let same = |place: &usize| values[order[*place]].total_cmp(&values[order[from]]).is_eq();
-            let to = (from..order.len()).take_while(same).last().unwrap_or(from);
-            for place in from..=to {
-                ranks[order[place]] = 0.5 * (from + to) as f64;
-            }
-            from = to + 1;
-        }
-        ranks
-    };
-    let one = ranks(pairs.iter().map(|(one, _)| *one).collect());
-    let two = ranks(pairs.iter().map(|(_, two)| *two).collect());
-    let mean = (pairs.len() as f64 - 1.0) / 2.0;
-    let sum = |left: &[f64], right: &[f64]| -> f64 {
-        left.iter().zip(right).map(|(left, right)| (left - mean) * (right - mean)).sum()
-    };
-    let spread = libm::sqrt(sum(&one, &one) * sum(&two, &two));
-    if spread > 0.0 { sum(&one, &two) / spread } else { 0.0 }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -147,16 +120,5 @@ mod tests {
         assert_eq!(quantile(&values, 0.25), Some(1.75));
         assert_eq!(quantile(&values, 1.0), Some(4.0));
         assert_eq!(quantile(&[], 0.5), None);
-    }
-
-    /// Ranks 1 2 3 4 5 against 2 1 4 3 5: 1 - 6 * 4 / (5 * 24) = 0.8.
-    #[test]
-    fn val_rank_correlation_by_hand() {
-        let pairs = [(10.0, 0.2), (20.0, 0.1), (30.0, 0.4), (40.0, 0.3), (50.0, 9.0)];
-        assert!((rank_correlation(&pairs) - 0.8).abs() < 1e-12);
-        assert!(rank_correlation(&[(1.0, 2.0), (1.0, 3.0)]).abs() < 1e-15);
-        // Ties: ranks 0.5 0.5 2 against 0 1 2.
-        let tied = [(1.0, 1.0), (1.0, 2.0), (2.0, 3.0)];
-        assert!((rank_correlation(&tied) - 0.866_025_403_784).abs() < 1e-9);
     }
 }

@@ -13,7 +13,7 @@ use serde::Serialize;
 use crate::attainable::{Window, best_height_m};
 use crate::figure::{BLACK_CURVE, FigureError, Line, Panel, sized_lines_svg};
 use crate::row::{COLUMNS, Row};
-use crate::statistics::{Landings, Share, quantile, rank_correlation, sorted};
+use crate::statistics::{Landings, Share, quantile, sorted};
 use crate::store::{Manifest, Shard};
 
 /// Columns whose percentiles are in the summary.
@@ -146,8 +146,6 @@ pub struct Sensitivity {
     pub inner: Share,
     /// The same fraction of the outer half.
     pub outer: Share,
-    /// Spearman's rank correlation between the deviation and the largest fraction of the legs' design envelope used at contact.
-    pub rank_correlation: f64,
 }
 
 impl Sensitivity {
@@ -235,10 +233,7 @@ fn sensitivity(rows: &[Row]) -> Vec<Sensitivity> {
         )
     };
     let mut found: Vec<Sensitivity> = Row::DRAWN.iter().filter_map(to).collect();
-    found.sort_by(|one, two| {
-        let cost = two.cost().total_cmp(&one.cost());
-        cost.then_with(|| two.rank_correlation.total_cmp(&one.rank_correlation))
-    });
+    found.sort_by(|one, two| two.cost().total_cmp(&one.cost()));
     found
 }
 
@@ -258,15 +253,7 @@ fn sensitivity_to(
         let mine = || flights.iter().filter(|(deviation, _)| (*deviation > median) == outer);
         Share::new(mine().filter(|(_, row)| row.stands).count() as u64, mine().count() as u64)
     };
-    let pairs: Vec<_> =
-        flights.iter().filter_map(|(deviation, row)| Some((*deviation, row.leg_use?))).collect();
-    Some(Sensitivity {
-        column,
-        median_deviation: median,
-        inner: half(false),
-        outer: half(true),
-        rank_correlation: rank_correlation(&pairs),
-    })
+    Some(Sensitivity { column, median_deviation: median, inner: half(false), outer: half(true) })
 }
 
 /// The summary as plain text.

@@ -7,44 +7,31 @@ pub mod range_safety;
 mod sheet;
 
 use flight::vehicle::mission::StartPoint;
-use sim::recipe::Recipe;
+use protocol::mission::MissionHash;
+use sim::recipe::{Recipe, RecipeError};
 
 pub use self::sheet::escaped;
 use crate::frame::{Frame, FrameError, changed};
-use crate::hazard::{self, Flights, HazardError, Impact, Rule, landed_as_planned};
+use crate::hazard::{self, Flights, Impact, Rule, landed_as_planned};
 use crate::row::Row;
 use crate::run::{RunError, fly};
 use crate::statistics::Landings;
 use crate::summary::failures;
-
-/// What a card is made for.
-pub struct Order<'a> {
-    pub recipe: &'a Recipe,
-    /// How a vehicle and its station show the mission's text.
-    pub hash: &'a str,
-    /// Mean winds, rising.
-    pub winds: &'a [Day],
-    /// Flights in each wind.
-    pub flights: Flights,
-    /// Where the wind of the day comes from, degrees clockwise from north, if it is known.
-    pub wind_from_deg: Option<f64>,
-}
 
 /// A card.
 #[derive(Debug, Clone)]
 pub struct Card {
     /// With the mission that was given.
     pub recipe: Recipe,
-    pub(super) hash: String,
     /// Where the flights begin: on the pad if the mission has a booster.
-    pub(super) start: StartPoint,
-    /// The mean winds, rising, m/s, and where the flights in each came down.
+    start: StartPoint,
+    /// The mean winds 10 m above the ground, rising, m/s, and where the flights in each came down.
     pub flown: Vec<(f64, Vec<Impact>)>,
     /// How flights land in the least wind, by mass with the motor full, kg, rising.
     pub masses: Vec<(f64, Landings)>,
-    pub(super) flights: Flights,
-    pub(super) rule: Rule,
-    pub(super) wind_from_deg: Option<f64>,
+    flights: Flights,
+    rule: Rule,
+    wind_from_deg: Option<f64>,
 }
 
 /// Why there is no card.
@@ -62,62 +49,46 @@ pub enum CardError {
     NoWind,
     #[error(transparent)]
     Fly(#[from] RunError),
-    #[error("where it comes down")]
-    Hazard(#[from] HazardError),
+    /// The mission has not what its start needs.
+    #[error(transparent)]
+    Recipe(#[from] RecipeError),
 }
 
 impl Card {
-    /// Computes a card.
+    /// Computes the card of a recipe from its flights in each mean wind, m/s, rising. `wind_from_deg` is where the wind of the day comes
+    /// from, degrees clockwise from north, if it is known.
     ///
     /// # Errors
     /// The vehicle does not land, or what was asked for cannot be had.
-    pub fn new(order: &Order<'_>, told: &(dyn Fn(usize, usize) + Sync)) -> Result<Self, CardError> {
-        let recipe = order.recipe;
-        let days = order.winds.iter().map(|day| day.flies(recipe)).collect::<Result<Vec<_>, _>>()?;
+    pub fn new(
+        recipe: &Recipe,
+        winds: Vec<(f64, Recipe)>,
+        flights: Flights,
+        wind_from_deg: Option<f64>,
+        told: &(dyn Fn(usize, usize) + Sync),
+    ) -> Result<Self, CardError> {
+        let from_the_pad = recipe.mission.launch.is_some() && recipe.mission.start.at == StartPoint::Apogee;
+        let (winds_m_s, days): (Vec<f64>, Vec<Recipe>) = winds.into_iter().unzip();
+        let begin = |day: Recipe| if from_the_pad { day.starting_at(StartPoint::Pad) } else { Ok(day) };
+        let days = days.into_iter().map(begin).collect::<Result<Vec<_>, _>>()?;
         let calmest = days.first().ok_or(CardError::NoWind)?;
         refuse_without_a_landing(calmest, told)?;
-        let impacts = hazard::studies(&days, order.flights, told)?;
-        let own = impacts
-            .first()
-            .map_or_else(|| Landings::of(core::iter::empty()), |impacts| landed_as_planned(impacts));
+        let impacts = hazard::studies(&days, flights, told)?;
+        let own = landed_as_planned(impacts.first().map_or(&[], Vec::as_slice));
         Ok(Self {
             recipe: recipe.clone(),
-            hash: order.hash.to_owned(),
             start: calmest.mission.start.at,
-            flown: order.winds.iter().map(|day| day.wind_m_s).zip(impacts).collect(),
-            masses: masses(calmest, own, order.flights.survey, told)?,
-            flights: order.flights,
+            flown: winds_m_s.into_iter().zip(impacts).collect(),
+            masses: masses(calmest, own, flights.survey, told)?,
+            flights,
             rule: Rule::of(&calmest.mission),
-            wind_from_deg: order.wind_from_deg,
+            wind_from_deg,
         })
     }
 
-    /// The card as text.
-    pub fn text(&self) -> String {
-        sheet::text(&self.sides())
-    }
-
-    /// The card as HTML: two pages, for the two sides of a sheet.
-    pub fn html(&self) -> String {
-        sheet::html(&self.sides())
-    }
-}
-
-/// A mean wind and the flights in it.
-#[derive(Debug, Clone)]
-pub struct Day {
-    /// Mean wind 10 m above the ground, m/s.
-    pub wind_m_s: f64,
-    pub recipe: Recipe,
-}
-
-impl Day {
-    /// The flights of a card's mission on this day, from its pad if it has a booster.
-    fn flies(&self, recipe: &Recipe) -> Result<Recipe, HazardError> {
-        let Recipe { mission, mission_toml, .. } = recipe.clone();
-        let from_the_pad = mission.launch.is_some() && mission.start.at == StartPoint::Apogee;
-        let recipe = Recipe { mission, mission_toml, ..self.recipe.clone() };
-        Ok(if from_the_pad { recipe.starting_at(StartPoint::Pad)? } else { recipe })
+    /// How a vehicle and its station show the mission's text.
+    fn hash(&self) -> String {
+        MissionHash::of(&self.recipe.mission_toml).to_string()
     }
 }
 
@@ -129,8 +100,7 @@ fn refuse_without_a_landing(recipe: &Recipe, told: &(dyn Fn(usize, usize) + Sync
     if rows.iter().any(|row| row.stands) {
         return Ok(());
     }
-    let reason =
-        failures(&rows).into_iter().next().map_or_else(|| "unknown".to_owned(), |failure| failure.reason);
+    let reason = failures(&rows).into_iter().next().map_or_else(|| "unknown".to_owned(), |most| most.reason);
     Err(CardError::NoneLanded { flights: FIRST, set: recipe.dispersion_name.clone(), reason })
 }
 
@@ -167,4 +137,4 @@ fn masses(
 }
 
 /// A mass at which so many land is one to fly with.
-pub(super) const NINE_OF_TEN: f64 = 0.9;
+const NINE_OF_TEN: f64 = 0.9;

@@ -1,8 +1,6 @@
 //! What stands on a card, as text and as HTML. Both show the same sheet of two sides: the front for the range safety officer,
 //! the back for whoever prepares the vehicle.
 
-use core::fmt::{self, Write};
-
 use flight::rules::phase::{HOLD_LIMIT_S, MISFIRE_WAIT_S, MOTOR_HOT_S, PAD_ABORT_WAIT_S};
 use flight::vehicle::atmosphere::Air;
 use flight::vehicle::launch::Launch;
@@ -17,7 +15,7 @@ use super::{Card, NINE_OF_TEN};
 use crate::hazard::{Impact, Rule, Way, lift_off_kg};
 
 /// One side of a sheet.
-pub(super) struct Side {
+struct Side {
     title: String,
     subtitle: String,
     sections: Vec<Section>,
@@ -80,9 +78,24 @@ fn span([low, high]: [f64; 2]) -> String {
 
 impl Card {
     /// The front and the back.
-    pub(super) fn sides(&self) -> [Side; 2] {
+    fn sides(&self) -> [Side; 2] {
         let winds = in_winds(&self.flown, &self.rule);
         [self.front(&winds), self.back(&winds)]
+    }
+
+    /// The card as text.
+    pub fn text(&self) -> String {
+        self.sides().map(|side| text(&side)).concat()
+    }
+
+    /// The card as HTML: two pages, for the two sides of a sheet.
+    pub fn html(&self) -> String {
+        let sides = self.sides();
+        let (title, sides) = (escaped(&sides[0].title), sides.each_ref().map(html).concat());
+        format!(
+            "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"/><title>{title}</title>\n\
+             <style>{STYLE}</style></head><body>\n{sides}</body></html>\n"
+        )
     }
 
     fn front(&self, winds: &[InWind]) -> Side {
@@ -111,7 +124,7 @@ impl Card {
 
     /// The mission and what tells it from others.
     fn named(&self) -> String {
-        format!("{}, mission {}", self.recipe.mission.name, self.hash)
+        format!("{}, mission {}", self.recipe.mission.name, self.hash())
     }
 
     /// The flights in the winds to fly in, or in all.
@@ -154,7 +167,7 @@ impl Card {
             ("rail", if_so(launch.is_some())),
             ("no rail", if_so(launch.is_none())),
             ("name", Some(mission.name.clone())),
-            ("hash", Some(self.hash.clone())),
+            ("hash", Some(self.hash())),
             ("controller", Some(mission.changed.join(", ")).filter(|changed| !changed.is_empty())),
             ("ascent", launch.map(|launch| motor(&launch.booster.motor_curve))),
             ("landing", Some(motor(&mission.motor_curve))),
@@ -349,119 +362,80 @@ fn wind_row(wind: &InWind, may_fly: bool) -> Vec<String> {
 
 const STYLE: &str = include_str!("sheet.css");
 
-pub(super) fn text(sides: &[Side]) -> String {
-    let mut out = String::new();
-    // Writing to a String cannot fail.
-    let _ = sides.iter().try_for_each(|side| write_text(side, &mut out));
-    out
+fn text(side: &Side) -> String {
+    let sections = side.sections.iter().map(|Section { title, content }| {
+        let lines: Vec<String> = match content {
+            Content::Table(heads, rows) => aligned(heads, rows),
+            Content::Checks(checks) => checks.iter().map(|check| format!("[ ] {check}")).collect(),
+            Content::Plan(_, words) => words.clone(),
+            Content::Blanks(rows) => rows.iter().map(|row| row.join(" ______ ") + " ______").collect(),
+        };
+        lines.iter().fold(format!("\n{title}\n"), |text, line| text + "  " + line + "\n")
+    });
+    let notes = side.notes.iter().map(|note| format!("{note}\n"));
+    let parts: Vec<String> = sections.chain(["\n".to_owned()]).chain(notes).collect();
+    format!("{}\n{}\n{}\n", side.title, side.subtitle, parts.concat())
 }
 
-fn write_text(side: &Side, out: &mut String) -> fmt::Result {
-    writeln!(out, "{}\n{}", side.title, side.subtitle)?;
-    for Section { title, content } in &side.sections {
-        writeln!(out, "\n{title}")?;
-        match content {
-            Content::Table(heads, rows) => write_table(heads, rows, out)?,
-            Content::Checks(checks) => checks.iter().try_for_each(|check| writeln!(out, "  [ ] {check}"))?,
-            Content::Plan(_, words) => words.iter().try_for_each(|words| writeln!(out, "  {words}"))?,
-            Content::Blanks(rows) => {
-                rows.iter().try_for_each(|row| writeln!(out, "  {} ______", row.join(" ______ ")))?;
-            }
-        }
-    }
-    writeln!(out)?;
-    side.notes.iter().try_for_each(|note| writeln!(out, "{note}"))?;
-    writeln!(out)
-}
-
-fn write_table(heads: &[&str], rows: &[Vec<String>], out: &mut String) -> fmt::Result {
-    let blank = |cell: &String| if cell.is_empty() { "______".to_owned() } else { cell.clone() };
-    let heads: Vec<String> = heads.iter().map(|head| (*head).to_owned()).collect();
-    let heads = Some(heads).filter(|heads| !heads.is_empty());
-    let shown: Vec<Vec<String>> =
-        heads.iter().chain(rows).map(|row| row.iter().map(blank).collect()).collect();
+/// Rows with columns as wide as their widest cell.
+fn aligned(heads: &[&str], rows: &[Vec<String>]) -> Vec<String> {
+    let head = Some(heads.iter().map(|head| (*head).to_owned()).collect()).filter(|_| !heads.is_empty());
+    let rows: Vec<&Vec<String>> = head.iter().chain(rows).collect();
+    let shown = |cell: &String| if cell.is_empty() { "______".to_owned() } else { cell.clone() };
     let width = |column: usize| {
-        shown
-            .iter()
-            .filter_map(|row| row.get(column))
-            .map(|cell| cell.chars().count())
-            .max()
-            .unwrap_or_default()
+        let cells = rows.iter().filter_map(|row| row.get(column));
+        cells.map(|cell| shown(cell).chars().count()).max().unwrap_or_default()
     };
-    for row in &shown {
-        let cells = row.iter().enumerate().map(|(column, cell)| format!("{cell:<0$}  ", width(column)));
-        writeln!(out, "  {}", cells.collect::<String>().trim_end())?;
-    }
-    Ok(())
+    let line = |row: &&Vec<String>| {
+        let cells = row.iter().enumerate();
+        let cells: Vec<_> =
+            cells.map(|(column, cell)| format!("{:<1$}  ", shown(cell), width(column))).collect();
+        cells.concat().trim_end().to_owned()
+    };
+    rows.iter().map(line).collect()
 }
 
-pub(super) fn html(sides: &[Side]) -> String {
-    let mut out = String::new();
-    // Writing to a String cannot fail.
-    let _ = write_html(sides, &mut out);
-    out
-}
-
-fn write_html(sides: &[Side], out: &mut String) -> fmt::Result {
-    let title = sides.first().map_or_else(String::new, |side| escaped(&side.title));
-    writeln!(
-        out,
-        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"/><title>{title}</title>"
-    )?;
-    writeln!(out, "<style>{STYLE}</style></head><body>")?;
-    for side in sides {
-        writeln!(out, "<section>\n<h1>{}</h1>\n<p>{}</p>", escaped(&side.title), escaped(&side.subtitle))?;
-        for Section { title, content } in &side.sections {
-            writeln!(out, "<h2>{}</h2>", escaped(title))?;
-            write_content(content, out)?;
-        }
-        side.notes.iter().try_for_each(|note| writeln!(out, "<small>{}</small>", escaped(note)))?;
-        writeln!(out, "</section>")?;
-    }
-    writeln!(out, "</body></html>")
-}
-
-fn write_content(content: &Content, out: &mut String) -> fmt::Result {
-    match content {
-        Content::Table(heads, rows) => {
-            writeln!(out, "<table class=\"c{}\">", rows.first().map_or(0, Vec::len))?;
-            if !heads.is_empty() {
-                write!(out, "<tr>")?;
-                write_each(out, ["<th>", "</th>"], heads.iter().copied())?;
-                writeln!(out, "</tr>")?;
+fn html(side: &Side) -> String {
+    let sections = side.sections.iter().map(|Section { title, content }| {
+        let content = match content {
+            Content::Table(heads, rows) => {
+                let row = |cells: String| format!("<tr>{cells}</tr>\n");
+                let head =
+                    if heads.is_empty() { String::new() } else { row(each(["<th>", "</th>"], *heads)) };
+                let body: Vec<String> =
+                    rows.iter().map(|cells| row(each(["<td>", "</td>"], cells))).collect();
+                let columns = rows.first().map_or(0, Vec::len);
+                format!("<table class=\"c{columns}\">\n{head}{}</table>\n", body.concat())
             }
-            for row in rows {
-                write!(out, "<tr>")?;
-                write_each(out, ["<td>", "</td>"], row.iter().map(String::as_str))?;
-                writeln!(out, "</tr>")?;
+            Content::Checks(checks) => format!("<ul>\n{}</ul>\n", each(["<li>", "</li>\n"], checks)),
+            Content::Plan(plan, words) => {
+                let (plan, words) = (plan.as_deref().unwrap_or_default(), each(["<p>", "</p>\n"], words));
+                format!("<div class=\"plan\">{plan}<div>{words}</div></div>\n")
             }
-            writeln!(out, "</table>")
-        }
-        Content::Checks(checks) => {
-            writeln!(out, "<ul>")?;
-            write_each(out, ["<li>", "</li>\n"], checks.iter().map(String::as_str))?;
-            writeln!(out, "</ul>")
-        }
-        Content::Plan(plan, words) => {
-            write!(out, "<div class=\"plan\">{}<div>", plan.as_deref().unwrap_or_default())?;
-            write_each(out, ["<p>", "</p>\n"], words.iter().map(String::as_str))?;
-            writeln!(out, "</div></div>")
-        }
-        Content::Blanks(rows) => rows.iter().try_for_each(|row| {
-            write!(out, "<div class=\"b\">")?;
-            write_each(out, ["<span>", "</span><i></i>"], row.iter().map(String::as_str))?;
-            writeln!(out, "</div>")
-        }),
-    }
+            Content::Blanks(rows) => {
+                let blanks = |row| each(["<span>", "</span><i></i>"], row);
+                rows.iter()
+                    .map(|row| format!("<div class=\"b\">{}</div>\n", blanks(row)))
+                    .collect::<Vec<_>>()
+                    .concat()
+            }
+        };
+        format!("<h2>{}</h2>\n{content}", escaped(title))
+    });
+    let sections: Vec<String> = sections.collect();
+    format!(
+        "<section>\n<h1>{}</h1>\n<p>{}</p>\n{}{}</section>\n",
+        escaped(&side.title),
+        escaped(&side.subtitle),
+        sections.concat(),
+        each(["<small>", "</small>\n"], &side.notes)
+    )
 }
 
-/// Writes each text between two tags.
-fn write_each<'a>(
-    out: &mut String,
-    tags: [&str; 2],
-    mut texts: impl Iterator<Item = &'a str>,
-) -> fmt::Result {
-    texts.try_for_each(|text| write!(out, "{}{}{}", tags[0], escaped(text), tags[1]))
+/// Each text between two tags.
+fn each(tags: [&str; 2], texts: impl IntoIterator<Item = impl AsRef<str>>) -> String {
+    let texts = texts.into_iter().map(|text| escaped(text.as_ref()));
+    texts.fold(String::new(), |html, text| html + tags[0] + &text + tags[1])
 }
 
 /// Text without markup.

@@ -113,7 +113,7 @@ fn flights(arguments: &CampaignArguments) -> anyhow::Result<(Recipe, Option<Expe
     let mut recipe = recipe(&arguments.profile, arguments.start, &arguments.dispersion, arguments.seed)?;
     recipe.faults.clone_from(&arguments.faults);
     let Some(path) = &arguments.scenario else { return Ok((recipe, None)) };
-    let scenario = Scenario::from_toml(&read(path)?, &path.display().to_string())?;
+    let scenario: Scenario = toml::from_str(&read(path)?).with_context(|| path.display().to_string())?;
     recipe.faults.extend(scenario.faults);
     Ok((recipe, scenario.expected))
 }

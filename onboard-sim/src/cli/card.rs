@@ -5,10 +5,9 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use onboard_sim::card::{Card, Day, Order};
+use onboard_sim::card::Card;
 use onboard_sim::files::{refuse_loss, write_folder};
 use onboard_sim::hazard::Flights;
-use protocol::mission::MissionHash;
 use sim::dispersion;
 
 use super::{in_wind, on_threads, recipe, show_flights};
@@ -61,21 +60,13 @@ pub(crate) fn run(arguments: &CardArguments) -> anyhow::Result<ExitCode> {
     let mut winds_m_s = arguments.winds.clone();
     winds_m_s.sort_by(f64::total_cmp);
     winds_m_s.dedup();
-    let days = winds_m_s
-        .into_iter()
-        .map(|wind_m_s| Ok(Day { wind_m_s, recipe: in_wind(&recipe, wind_m_s)? }))
-        .collect::<anyhow::Result<Vec<_>>>()?;
-    let order = Order {
-        recipe: &recipe,
-        hash: &MissionHash::of(&recipe.mission_toml).to_string(),
-        winds: &days,
-        flights: Flights {
-            survey: arguments.flights,
-            of_widest: arguments.hazard_flights.max(arguments.flights),
-        },
-        wind_from_deg: arguments.wind_from,
-    };
-    let card = on_threads(arguments.jobs, || Ok(Card::new(&order, &show_flights())?))?;
+    let winds = winds_m_s.into_iter().map(|wind_m_s| Ok((wind_m_s, in_wind(&recipe, wind_m_s)?)));
+    let winds = winds.collect::<anyhow::Result<Vec<_>>>()?;
+    let (survey, of_widest) = (arguments.flights, arguments.hazard_flights.max(arguments.flights));
+    let flights = Flights { survey, of_widest };
+    let card = on_threads(arguments.jobs, || {
+        Ok(Card::new(&recipe, winds, flights, arguments.wind_from, &show_flights())?)
+    })?;
     let [html, text, mission_file] = FILES;
     let page = card.text();
     let files = [(html, card.html()), (text, page.clone()), (mission_file, card.recipe.mission_toml)];

@@ -13,7 +13,7 @@ use onboard_sim::statistics::Landings;
 use sim::dispersion::{self, may_be_kinder};
 use sim::recipe::Recipe;
 
-use super::{in_wind, mission_text, on_threads, recipe, show_flights};
+use super::{in_wind, on_threads, recipe, show_flights};
 
 /// Flights of each kind that the picture shows.
 const SHOWN: u64 = 30;
@@ -79,10 +79,10 @@ pub(crate) fn run(arguments: &HazardArguments) -> anyhow::Result<ExitCode> {
 
 /// The mission in each wind.
 fn recipes(arguments: &HazardArguments) -> anyhow::Result<Vec<Recipe>> {
-    let own =
-        flight::vehicles::mission::from_toml(&mission_text(&arguments.profile, None)?, &arguments.profile)?;
-    let start = arguments.start.or_else(|| own.launch.is_some().then_some(StartPoint::Pad));
-    let recipe = recipe(&arguments.profile, start, &arguments.dispersion, arguments.seed)?;
+    let mut recipe = recipe(&arguments.profile, arguments.start, &arguments.dispersion, arguments.seed)?;
+    if arguments.start.is_none() && recipe.mission.launch.is_some() {
+        recipe = recipe.starting_at(StartPoint::Pad)?;
+    }
     arguments.winds.iter().map(|wind_m_s| in_wind(&recipe, *wind_m_s)).collect()
 }
 

@@ -12,11 +12,12 @@ use std::path::Path;
 
 use anyhow::Context as _;
 use flight::vehicle::mission::StartPoint;
+use flight::vehicles::mission;
 use onboard_sim::files::text_of;
 use onboard_sim::progress::Progress;
 use onboard_sim::run::threads;
 use sim::dispersion::{self, Dispersion};
-use sim::recipe::{self, Recipe};
+use sim::recipe::Recipe;
 use toml_edit::{Array, DocumentMut};
 
 /// Does work on so many threads, or on as many as there are processors; the results do not depend on it.
@@ -25,15 +26,6 @@ fn on_threads<T: Send>(
     work: impl FnOnce() -> anyhow::Result<T> + Send,
 ) -> anyhow::Result<T> {
     threads(jobs).context("a thread could not be started")?.install(work)
-}
-
-/// The text of a built-in mission or of a file, with the flights' start if one is given.
-fn mission_text(profile: &str, start: Option<StartPoint>) -> anyhow::Result<String> {
-    let text = text_of(profile, flight::vehicles::mission::BUILTIN, "mission")?;
-    Ok(match start {
-        Some(start) => recipe::toml_starting_at(&text, profile, start)?,
-        None => text,
-    })
 }
 
 /// A file's text; what is not UTF-8 is read as Latin-1, in which some programs export.
@@ -45,9 +37,13 @@ fn read(path: &Path) -> anyhow::Result<String> {
 
 /// The flights of a seed: a mission, with a start if one is given, and a set of dispersions, each built in or a file.
 fn recipe(profile: &str, start: Option<StartPoint>, set: &str, seed: u64) -> anyhow::Result<Recipe> {
-    let mission_toml = mission_text(profile, start)?;
+    let mission_toml = text_of(profile, mission::BUILTIN, "mission")?;
     let set_toml = text_of(set, dispersion::BUILTIN, "set of dispersions")?;
-    Ok(Recipe { seed, ..Recipe::from_texts((profile, &mission_toml), (set, &set_toml))? })
+    let recipe = Recipe { seed, ..Recipe::from_texts((profile, &mission_toml), (set, &set_toml))? };
+    Ok(match start {
+        Some(start) => recipe.starting_at(start)?,
+        None => recipe,
+    })
 }
 
 /// The same flights in another mean wind, m/s. The log keeps the text of the set, and a replay draws from it again.
@@ -56,8 +52,8 @@ fn in_wind(recipe: &Recipe, wind_m_s: f64) -> anyhow::Result<Recipe> {
     anyhow::ensure!((0.0..=MOST_M_S).contains(&wind_m_s), "--wind {wind_m_s}: must be 0 to {MOST_M_S} m/s");
     let mut text: DocumentMut = recipe.dispersion_toml.parse()?;
     text["wind_m_s"] = toml_edit::value(Array::from_iter([wind_m_s; 2]));
-    let (dispersion_toml, dispersion_name) =
-        (text.to_string(), format!("{} with {wind_m_s} m/s of wind", recipe.dispersion_name));
+    let dispersion_toml = text.to_string();
+    let dispersion_name = format!("{} with {wind_m_s} m/s of wind", recipe.dispersion_name);
     let dispersion = Dispersion::from_toml(&dispersion_toml, &dispersion_name)?;
     Ok(Recipe { dispersion, dispersion_name, dispersion_toml, ..recipe.clone() })
 }

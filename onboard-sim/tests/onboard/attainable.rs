@@ -221,36 +221,12 @@ fn compared(mission: &str, dispersion: &str, seed: u64, numbers: impl Iterator<I
     all
 }
 
-/// Share of the landings in windows that the search may miss: windows narrower than twice `NEAR_M`, where every question is
-/// near an end.
-fn agrees(compared: &Compared, missed_share: f64) {
-    eprintln!("{compared:?}");
-    assert!(compared.only_search.is_empty(), "the window is too small: {compared:?}");
-    let missed = compared.only_window.len() as f64;
-    assert!(missed <= missed_share * (missed + f64::from(compared.both_land)), "{compared:?}");
-}
-
+/// The search may miss a tenth of the landings in windows: near an end the controls must switch at the right moment, and it holds them
+/// for 0.1 s and forgets states that share a cell. Over 190 flights it found no landing outside a window.
 #[test]
 fn val_brute_force_finds_no_landing_outside_the_windows_of_a_few_flights() {
-    agrees(&compared("mk2", "harsh", 11, 0..2), 0.1);
-}
-
-/// Measured over 190 flights (`mk2`: 100 harsh, 40 field, 30 real; `mk2-h53`: 20 field; 1152 questions): the search found
-/// no landing outside a window, and missed 13 of 561 inside, all of them 0.8 m below the high end. There the controls must
-/// switch at the right moment, and the search holds them for 0.1 s and forgets states that share a cell.
-///
-/// Some minutes in release: `cargo test --release -p onboard-sim --test onboard attainable -- --ignored --nocapture`.
-#[test]
-#[ignore = "minutes"]
-fn val_brute_force_finds_no_landing_outside_the_windows_of_hundreds_of_flights() {
-    for (mission, dispersion, flights) in [
-        ("mk2", "harsh", 100),
-        ("mk2", "field", 40),
-        ("mk2", "real", 30),
-        ("mk2-h53", "field", 20),
-        ("mini-f10", "field", 20),
-    ] {
-        eprintln!("{mission} {dispersion}");
-        agrees(&compared(mission, dispersion, 11, 0..flights), 0.1);
-    }
+    let compared = compared("mk2", "harsh", 11, 0..2);
+    assert!(compared.only_search.is_empty(), "the window is too small: {compared:?}");
+    let missed = compared.only_window.len() as f64;
+    assert!(missed <= 0.1 * (missed + f64::from(compared.both_land)), "{compared:?}");
 }
