@@ -283,7 +283,7 @@ mod tests {
     fn falling() -> Computer {
         let mut computer = powered_up().released(0);
         for frame in 1..=40 {
-            computer.step(&sample::alone(sample::input(frame, 0.005 * frame as f64)));
+            computer.step(&sample::alone(&sample::input(frame, 0.005 * frame as f64)));
         }
         computer
     }
@@ -330,7 +330,7 @@ mod tests {
         here.restart(0.3);
         assert_eq!(here.digest(), there.digest());
         for frame in 61..=100 {
-            let input = sample::alone(sample::input(frame, 0.005 * frame as f64));
+            let input = sample::alone(&sample::input(frame, 0.005 * frame as f64));
             assert_eq!(here.step(&input), there.step(&input));
             assert_eq!(here.digest(), there.digest(), "frame {frame}");
         }

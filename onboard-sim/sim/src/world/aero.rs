@@ -320,7 +320,7 @@ mod tests {
         };
         let mut parachute = Parachute::new(&data);
         parachute.step(100.0, 50.0);
-        assert!(parachute.drag_area_m2().abs() < 1e-15 && !parachute.ejected_s().is_some());
+        assert!(parachute.drag_area_m2().abs() < 1e-15 && parachute.ejected_s().is_none());
         parachute.eject(0.0);
         for (step, expected) in [(1000, 0.0), (1250, 0.25), (1500, 1.0), (3000, 1.0)] {
             let mut parachute = parachute.clone();
@@ -333,6 +333,6 @@ mod tests {
         broken.break_down();
         broken.eject(0.0);
         broken.step(100.0, 50.0);
-        assert!(broken.drag_area_m2().abs() < 1e-15 && !broken.ejected_s().is_some());
+        assert!(broken.drag_area_m2().abs() < 1e-15 && broken.ejected_s().is_none());
     }
 }

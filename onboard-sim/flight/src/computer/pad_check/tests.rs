@@ -106,12 +106,12 @@ const SOUND: KeptInput = KeptInput {
 fn reading(
     [pitch, yaw, one, two, three, four]: [f64; SURFACES],
     measured: Measurements,
-    switches: KeptInput,
+    switches: &KeptInput,
 ) -> KeptInput {
-    KeptInput { gimbal_rad: [pitch, yaw], fins_rad: [one, two, three, four], measured, ..switches }
+    KeptInput { gimbal_rad: [pitch, yaw], fins_rad: [one, two, three, four], measured, ..*switches }
 }
 
-fn checked(wrong: Wrong, noise: f64, switches: KeptInput, moves: bool) -> PadCheck {
+fn checked(wrong: Wrong, noise: f64, switches: &KeptInput, moves: bool) -> PadCheck {
     let mission = mission();
     let mut bench = Bench::new(&mission.airframe, wrong);
     let mut check = PadCheck::default();
@@ -138,7 +138,7 @@ fn failing(check: &PadCheck) -> Vec<Item> {
 
 #[test]
 fn a_sound_vehicle_passes_and_every_item_has_its_value() {
-    let check = checked(NOTHING_WRONG, 1.0, SOUND, true);
+    let check = checked(NOTHING_WRONG, 1.0, &SOUND, true);
     assert_eq!((check.state(), check.run(), check.progress_percent()), (CheckState::Passed, 1, 100));
     assert_eq!(check.findings().len(), 3 * SURFACES + 9 + 6);
     for found in check.findings() {
@@ -156,7 +156,7 @@ fn a_sound_vehicle_passes_and_every_item_has_its_value() {
 
 #[test]
 fn without_motion_no_surface_is_told_to_move() {
-    let check = checked(NOTHING_WRONG, 1.0, SOUND, false);
+    let check = checked(NOTHING_WRONG, 1.0, &SOUND, false);
     assert_eq!(check.state(), CheckState::Passed);
     assert_eq!(check.findings().len(), 9 + 6);
 }
@@ -164,7 +164,7 @@ fn without_motion_no_surface_is_told_to_move() {
 #[test]
 fn each_wrong_surface_is_named_with_what_is_wrong() {
     for surface in 0..SURFACES {
-        let of = |wrong: Wrong| failing(&checked(Wrong { surface, ..wrong }, 1.0, SOUND, true));
+        let of = |wrong: Wrong| failing(&checked(Wrong { surface, ..wrong }, 1.0, &SOUND, true));
         let all = [Item::Range(surface), Item::Error(surface), Item::Lag(surface)];
         assert_eq!(of(Wrong { stuck: true, ..NOTHING_WRONG }), all, "stuck");
         assert_eq!(of(Wrong { later_s: 0.04, ..NOTHING_WRONG }), [Item::Lag(surface)], "late");
@@ -177,7 +177,7 @@ fn each_wrong_surface_is_named_with_what_is_wrong() {
 
 #[test]
 fn each_sensor_and_switch_is_judged() {
-    let still = |noise, switches| failing(&checked(NOTHING_WRONG, noise, switches, false));
+    let still = |noise, switches: KeptInput| failing(&checked(NOTHING_WRONG, noise, &switches, false));
     assert_eq!(still(3.0, SOUND), [Item::GyroNoise, Item::AccelerometerNoise, Item::BarometerNoise]);
     assert_eq!(still(1.0, KeptInput { igniter_continuity: false, ..SOUND }), [Item::IgniterContinuity]);
     assert_eq!(still(1.0, KeptInput { battery_v: Some(7.3), ..SOUND }), [Item::BatteryVoltage]);
@@ -224,7 +224,7 @@ fn a_mount_that_leans_further_than_stated_fails() {
 
 #[test]
 fn no_two_items_have_the_same_number() {
-    let check = checked(NOTHING_WRONG, 1.0, SOUND, true);
+    let check = checked(NOTHING_WRONG, 1.0, &SOUND, true);
     let mut numbers: Vec<u8> = check.findings().iter().map(|found| found.item.number()).collect();
     numbers.sort_unstable();
     numbers.dedup();
@@ -242,7 +242,7 @@ proptest! {
         for frame in 0..4000_usize {
             let surfaces_rad = core::array::from_fn(|surface| feedback[(frame + 7 * surface) % 64]);
             let measured = at_rest(0, 1.0);
-            let seen = reading(surfaces_rad, measured, SOUND);
+            let seen = reading(surfaces_rad, measured, &SOUND);
             match check.step(&seen, &mission, &mission.arming) {
                 Some((0..2, angle_rad)) => prop_assert!(angle_rad.abs() <= limit_rad),
                 Some((surface, angle_rad)) => {

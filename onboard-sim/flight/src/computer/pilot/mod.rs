@@ -353,8 +353,8 @@ pub(super) mod sample {
     }
 
     /// A frame's input without requests, rehearsal and plan.
-    pub(crate) fn alone(kept: KeptInput) -> Input<'static> {
-        Input { kept, requests: &[], rehearsed: None, plan_ready: false }
+    pub(crate) fn alone(kept: &KeptInput) -> Input<'static> {
+        Input { kept: *kept, requests: &[], rehearsed: None, plan_ready: false }
     }
 
     /// The input of a frame with almost no specific force, turning at a rate, of a computer that was released at once.

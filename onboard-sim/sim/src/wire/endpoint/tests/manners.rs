@@ -162,7 +162,7 @@ impl Wire {
             target_component: 1,
             ..COMMAND_LONG_DATA::default()
         };
-        self.tell(MavMessage::COMMAND_LONG(command));
+        self.tell(&MavMessage::COMMAND_LONG(command));
         self.run(0.1).iter().filter_map(CommandAnswer::from_frame).collect()
     }
 }
@@ -396,7 +396,7 @@ fn the_rates_of_every_kind_of_link_fit_it() {
 const ARM: u16 = 400;
 
 fn tell(wire: &mut Wire, head: TD_BOOK_HEAD_DATA) -> Vec<TD_BOOK_KEPT_DATA> {
-    wire.tell(MavMessage::TD_BOOK_HEAD(head));
+    wire.tell(&MavMessage::TD_BOOK_HEAD(head));
     let sent = wire.run(0.5);
     let kept = decoded!(sent, TD_BOOK_KEPT);
     kept.collect()
@@ -433,7 +433,7 @@ fn a_flood_of_ends_is_answered_within_the_budget() {
             target_component: 1,
             ..TD_BOOK_HEAD_DATA::default()
         };
-        wire.tell(MavMessage::TD_BOOK_HEAD(head));
+        wire.tell(&MavMessage::TD_BOOK_HEAD(head));
     }
     let sent = wire.run(1.0);
     let bytes: usize = sent.iter().map(|frame| frame.as_bytes().len()).sum();
@@ -456,7 +456,7 @@ fn arm_for(wire: &mut Wire, params: [f32; 3]) -> (u8, String) {
         target_component: 1,
         ..COMMAND_LONG_DATA::default()
     };
-    wire.tell(MavMessage::COMMAND_LONG(arm));
+    wire.tell(&MavMessage::COMMAND_LONG(arm));
     let sent = wire.run(0.5);
     let answers: Vec<_> = sent.iter().filter_map(CommandAnswer::from_frame).collect();
     assert_eq!((answers.len(), answers[0].command), (1, ARM));

@@ -122,13 +122,13 @@ impl Wire {
     }
 
     /// The ground station sends a message.
-    fn tell(&mut self, message: MavMessage) {
-        let frame = self.ground.encode(&message);
+    fn tell(&mut self, message: &MavMessage) {
+        let frame = self.ground.encode(message);
         self.endpoint.on_frame(0, &frame, &self.vehicle.state());
     }
 
     fn beat(&mut self) {
-        self.tell(MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
+        self.tell(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
     }
 
     /// Sends a command from a ground station that is heard.
@@ -240,7 +240,7 @@ fn a_command_for_somebody_else_is_left_alone() {
             target_component: 1,
             ..COMMAND_LONG_DATA::default()
         };
-        wire.tell(MavMessage::COMMAND_LONG(command));
+        wire.tell(&MavMessage::COMMAND_LONG(command));
     }
     let sent = wire.run(0.5);
     assert_eq!(count(&sent, 77), 0);
@@ -338,7 +338,7 @@ fn a_new_phase_is_sent_at_once_and_only_once() {
 fn a_new_station_gets_the_limits() {
     let mut wire = Wire::new();
     wire.run(1.0);
-    wire.tell(MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
+    wire.tell(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
     let limits = decoded!(wire.run(0.1), TD_TOUCHDOWN_LIMITS).next();
     let legs = flight::vehicles::mission::builtin("mk2").unwrap().unwrap().leg_limits;
     assert!((f64::from(limits.unwrap().vertical_m_s) - legs.vertical_m_s).abs() < 1e-6, "of the legs");
@@ -349,7 +349,7 @@ fn time_is_told_to_those_who_ask_this_vehicle() {
     let mut wire = Wire::new();
     for (target_system, answered) in [(0, true), (1, true), (2, false)] {
         let sync = TIMESYNC_DATA { ts1: 77, target_system, ..TIMESYNC_DATA::default() };
-        wire.tell(MavMessage::TIMESYNC(sync));
+        wire.tell(&MavMessage::TIMESYNC(sync));
         assert_eq!(count(&wire.run(0.1), TIMESYNC_DATA::ID) == 1, answered, "target {target_system}");
     }
 }

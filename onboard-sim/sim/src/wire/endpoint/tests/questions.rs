@@ -31,7 +31,7 @@ fn values(frames: &[Frame]) -> Vec<PARAM_VALUE_DATA> {
 
 impl Wire {
     fn set(&mut self, id: &str, value: f32, param_type: MavParamType) -> (Vec<PARAM_VALUE_DATA>, String) {
-        self.tell(MavMessage::PARAM_SET(PARAM_SET_DATA {
+        self.tell(&MavMessage::PARAM_SET(PARAM_SET_DATA {
             param_value: value,
             target_system: 1,
             target_component: 1,
@@ -52,7 +52,7 @@ impl Wire {
 #[test]
 fn the_list_is_whole_in_order_and_does_not_crowd_out_telemetry() {
     let mut wire = Wire::new();
-    wire.tell(MavMessage::PARAM_REQUEST_LIST(PARAM_REQUEST_LIST_DATA {
+    wire.tell(&MavMessage::PARAM_REQUEST_LIST(PARAM_REQUEST_LIST_DATA {
         target_system: 1,
         target_component: 0,
     }));
@@ -76,12 +76,12 @@ fn a_parameter_is_read_by_name_or_index_and_a_missing_one_is_reported() {
             param_id,
         })
     };
-    wire.tell(read(name("NMPC_W_THETA"), -1));
-    wire.tell(read(name("ignored"), 0));
+    wire.tell(&read(name("NMPC_W_THETA"), -1));
+    wire.tell(&read(name("ignored"), 0));
     let found: Vec<f32> = values(&wire.run(0.5)).iter().map(|value| value.param_value).collect();
     assert_eq!(found, [200.0, 1.0]);
-    wire.tell(read(name("NO_SUCH"), -1));
-    wire.tell(read(name(""), 999));
+    wire.tell(&read(name("NO_SUCH"), -1));
+    wire.tell(&read(name(""), 999));
     let errors = wire.run(0.5).into_iter().filter(|frame| {
         matches!(frame.decode(), Ok(MavMessage::PARAM_ERROR(error))
             if error.error == MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST)
@@ -183,11 +183,11 @@ fn a_rate_beyond_the_budget_is_refused_in_flight_as_on_the_pad() {
 #[test]
 fn questions_for_another_system_are_left_alone() {
     let mut wire = Wire::new();
-    wire.tell(MavMessage::PARAM_REQUEST_LIST(PARAM_REQUEST_LIST_DATA {
+    wire.tell(&MavMessage::PARAM_REQUEST_LIST(PARAM_REQUEST_LIST_DATA {
         target_system: 2,
         target_component: 1,
     }));
-    wire.tell(MavMessage::FILE_TRANSFER_PROTOCOL(FILE_TRANSFER_PROTOCOL_DATA {
+    wire.tell(&MavMessage::FILE_TRANSFER_PROTOCOL(FILE_TRANSFER_PROTOCOL_DATA {
         target_system: 2,
         target_component: 1,
         ..FILE_TRANSFER_PROTOCOL_DATA::default()
@@ -201,7 +201,7 @@ fn a_file_request_is_declined_at_once() {
     let mut wire = Wire::new();
     let mut payload = [0; 251];
     payload[3] = 4;
-    wire.tell(MavMessage::FILE_TRANSFER_PROTOCOL(FILE_TRANSFER_PROTOCOL_DATA {
+    wire.tell(&MavMessage::FILE_TRANSFER_PROTOCOL(FILE_TRANSFER_PROTOCOL_DATA {
         target_system: 1,
         target_component: 1,
         payload,
