@@ -11,10 +11,10 @@ use std::time::Duration;
 use protocol::log::recorder::Recorder;
 use protocol::log::writer::LogHeader;
 use protocol::transport::LinkAddress;
-use simulated_vehicle::fly;
-use simulated_vehicle::fly::{FlyOptions, OnTheWire};
-pub use simulated_vehicle::fly::{LogClock, Speed};
-use simulated_vehicle::vehicle::RocketFlight;
+use sim::wire::fly;
+use sim::wire::fly::{FlyOptions, OnTheWire};
+pub use sim::wire::fly::{LogClock, Speed};
+use sim::wire::vehicle::RocketFlight;
 use tokio::sync::{oneshot, watch};
 
 use crate::cli::StationArgs;

@@ -32,7 +32,7 @@ use protocol::log::writer::LogHeader;
 use protocol::mission::MissionHash;
 use protocol::signing::Signing;
 use protocol::transport::LinkAddress;
-use simulated_vehicle::fly::load_flight;
+use sim::wire::fly::load_flight;
 
 use crate::attach::OPERATOR_MAX;
 use crate::cli::{Cli, Command, ConfigArgs, ConfigCommand, LinkArgs, LogChoice, Seconds, StationArgs};
