@@ -162,7 +162,8 @@ mod tests {
     #[test]
     fn the_example_contains_every_key() {
         let keys = example_keys();
-        let uncommented: String = keys.iter().map(|(key, value)| format!("{key} = {value}\n")).collect();
+        let lines: Vec<String> = keys.iter().map(|(key, value)| format!("{key} = {value}")).collect();
+        let uncommented = lines.join("\n");
         let mut config = Config::parse(&uncommented).unwrap();
         assert!(!config.flags.link.connect.is_empty() && config.alarm_command.is_some());
         assert_eq!(Config::parse(EXAMPLE), Ok(Config::default()));

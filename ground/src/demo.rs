@@ -65,21 +65,24 @@ pub struct Demo {
 }
 
 impl Demo {
-    /// Starts a vehicle on `link` that sets `log_clock` to its time.
+    /// Starts a vehicle that speaks to where the station listens, and sets `log_clock` to its time.
     ///
     /// # Errors
-    /// The thread or its runtime cannot be started.
+    /// The station does not listen on UDP, or the thread or its runtime cannot be started.
     pub fn start(
         options: &DemoOptions,
-        link: LinkAddress,
+        station: Option<&LinkAddress>,
         recorder: Option<Recorder>,
         log_clock: LogClock,
     ) -> io::Result<Self> {
+        let Some(LinkAddress::UdpIn(station)) = station else {
+            return Err(io::Error::other("the demonstration listens on UDP alone"));
+        };
         let (pin_out, pin) = watch::channel(true);
         let fly_options = FlyOptions {
             flight: options.flight.clone(),
             system_id: options.system_id,
-            links: vec![link],
+            links: vec![LinkAddress::UdpOut(station.clone())],
             key_file: None,
             crew: None,
             recorder,

@@ -13,7 +13,6 @@ use tokio::time::{MissedTickBehavior, interval, timeout};
 use super::clock::{Clock, Signals};
 use super::files::{read_unfinished, write_unfinished};
 use super::output::{Lines, Output, print};
-use super::replaying::Again;
 use super::server::read_one;
 use super::stations;
 use crate::attach::codec::{CodecError, decode_to_screen, encode_to_station};
@@ -74,7 +73,6 @@ pub async fn session(
     let mut ticks = interval(TICK);
     ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
     let mut look_again_at: Option<Duration> = None;
-    let mut again = Again::default();
     let mut unsent_is_kept = false;
     loop {
         let (redraw_at, chord_at) = (output.redraw_at(), model.abort_chord.acts_at());
@@ -90,11 +88,8 @@ pub async fn session(
                 if matches!(msg, Msg::Terminate(_)) {
                     break;
                 }
-                let (mut actions, rest) = again.take(msg);
-                if let Some(msg) = rest {
-                    actions.extend(update(&mut model, msg, times.theirs(clock.now())));
-                }
-                actions
+                let rest = output.typed(msg);
+                rest.map_or_else(Vec::new, |msg| update(&mut model, msg, times.theirs(clock.now())))
             }
             () = clock.sleep_until(chord_at) => update(&mut model, Msg::ScreenTick, times.theirs(clock.now())),
             told = link.told.recv(), if look_again_at.is_none() => {
@@ -139,23 +134,16 @@ pub async fn session(
                 if output.answers(clock.now()) {
                     link.ask(&ToStation::Here).await;
                 }
-                again.pass(&mut model, &mut output, clock.now(), times.theirs(clock.now()));
+                output.pass(&mut model, clock.now(), times.theirs(clock.now()));
                 update(&mut model, Msg::ScreenTick, times.theirs(clock.now()))
             }
             () = clock.sleep_until(redraw_at) => Vec::new(),
         };
-        if actions.contains(&Action::ReplayFlight) {
-            again.begin(&mut model, times.theirs(clock.now()));
-        }
-        if actions.iter().any(|action| matches!(action, Action::Alarm(_))) {
-            again.leave(&mut output);
-        }
         let quit = act(actions, &mut model, &mut link, &mut output, times.theirs(clock.now())).await;
         let unix_s = clock.unix_ns() / 1_000_000_000;
         keep_unsent(&mut unsent_is_kept, &mut model, unix_s, times.theirs(clock.now()));
         let now = clock.now();
-        let (shown, shown_now) = again.shown().unwrap_or((&model, times.theirs(now)));
-        output.show(shown, now, shown_now)?;
+        output.show(&model, now, times.theirs(now))?;
         if quit {
             break;
         }
@@ -223,6 +211,8 @@ async fn act(
                     model.warn(now, ended.to_string());
                 }
             }
+            Action::ReplayFlight => output.again.begin(model, now),
+            Action::Alarm(_) => output.leave_replay(),
             Action::Quit => quit = true,
             // The station itself sends, records and reports.
             _ => {}

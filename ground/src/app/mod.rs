@@ -47,7 +47,6 @@ use clock::{Clock, LogTime};
 use files::{LogGuard, SpaceWatch, newest_place, open_checklist, open_log, other_name, read_unfinished};
 use next_log::NextLog;
 use output::{Output, print};
-use replaying::Again;
 use server::{Server, hello};
 use station::{Answers, Station};
 use wire::Wire;
@@ -220,14 +219,8 @@ async fn start(
     };
     let demo = match (&demo_options, vehicle_clock) {
         (Some(options), Some(vehicle_clock)) => {
-            let Some(LinkAddress::UdpIn(address)) = wire.endpoints().next() else {
-                anyhow::bail!("the demonstration listens on UDP alone");
-            };
-            let link = LinkAddress::UdpOut(address.clone());
-            Some(
-                Demo::start(options, link, recorder.clone(), vehicle_clock)
-                    .context("starting the simulator")?,
-            )
+            let demo = Demo::start(options, wire.endpoints().next(), recorder.clone(), vehicle_clock);
+            Some(demo.context("starting the simulator")?)
         }
         _ => None,
     };
@@ -265,14 +258,8 @@ async fn start(
         time_limit: time_limit.or(auto.then_some(AUTO_TIME_LIMIT)),
         ..Settings::on_screen(links.join(" and "))
     });
-    if let Some(name) = &model.settings.vehicle_name {
-        let by_whom = if auto { "it arms and starts itself" } else { "you arm and start it" };
-        let text = format!("demonstration: a simulated vehicle in this program flies {name}; {by_whom}");
-        model.info(clock.now(), text);
-    }
-    if let Some(words) = other_name(args.flags.log.as_ref(), recorder.as_ref().map(Recorder::path)) {
-        model.warn(clock.now(), words);
-    }
+    let renamed = other_name(args.flags.log.as_ref(), recorder.as_ref().map(Recorder::path));
+    announce(&mut model, auto, renamed, clock.now());
     let signatures = checklist.map(|(list, file, told)| {
         model.checklist = Some(list);
         for text in told {
@@ -280,21 +267,7 @@ async fn start(
         }
         file
     });
-    // What an earlier run has kept beside its log. A demonstration has another vehicle.
-    let folder = recorder.as_ref().and_then(|log| log.path().parent());
-    model.place = newest_place(folder, start_unix_s);
-    if let Some(kept) = read_unfinished(folder, start_unix_s).filter(|_| demo.is_none()) {
-        model.take_unfinished(kept, clock.now());
-    }
-    if model.place.is_some() {
-        model.info(clock.now(), "the last place of a vehicle is kept from before: page Find");
-    }
-    if demo.is_some()
-        && !is_daemon
-        && let Some(line) = stations::running_beside().await
-    {
-        model.info(clock.now(), line);
-    }
+    go_on_with_what_is_kept(&mut model, recorder.as_ref(), is_daemon, clock.now()).await;
     let server = serve(args, &mut model, duty, &clock).await?;
     let output = Output::open(interactive, config)?;
     model.repeats_reported = output.reports_repeats();
@@ -312,7 +285,6 @@ async fn start(
         own: Answers::default(),
         signatures,
         book: None,
-        again: Again::default(),
         report: None,
         place_failed: false,
         report_at: Duration::ZERO,
@@ -321,6 +293,37 @@ async fn start(
     station.open_book(&model, "");
     station.publish_kept(&model, clock.now());
     Ok((station, model, wire))
+}
+
+/// Says what the demonstration is, before anything else, and if the log has another name than was asked for.
+fn announce(model: &mut Model, auto: bool, renamed: Option<String>, now: Duration) {
+    if let Some(name) = &model.settings.vehicle_name {
+        let by_whom = if auto { "it arms and starts itself" } else { "you arm and start it" };
+        let text = format!("demonstration: a simulated vehicle in this program flies {name}; {by_whom}");
+        model.info(now, text);
+    }
+    if let Some(words) = renamed {
+        model.warn(now, words);
+    }
+}
+
+/// Takes what an earlier run has kept beside its log, and says which stations run beside a demonstration, which has another
+/// vehicle.
+async fn go_on_with_what_is_kept(model: &mut Model, log: Option<&Recorder>, is_daemon: bool, now: Duration) {
+    let (folder, unix_s) = (log.and_then(|log| log.path().parent()), model.settings.start_unix_s);
+    model.place = newest_place(folder, unix_s);
+    if let Some(kept) = read_unfinished(folder, unix_s).filter(|_| !model.settings.demonstration) {
+        model.take_unfinished(kept, now);
+    }
+    if model.place.is_some() {
+        model.info(now, "the last place of a vehicle is kept from before: page Find");
+    }
+    if model.settings.demonstration
+        && !is_daemon
+        && let Some(line) = stations::running_beside().await
+    {
+        model.info(now, line);
+    }
 }
 
 /// Opens the socket for screens: for a station with a real vehicle and for every daemon. A demonstration on a

@@ -10,6 +10,7 @@ use protocol::log::record::EventLevel;
 use protocol::log::recorder::RecorderError;
 
 use super::programs::VoiceEnded;
+use super::replaying::Again;
 use super::screen::Screen;
 use crate::config::Config;
 use crate::model::{Ending, Event, Model, Speaker, Verdict};
@@ -22,6 +23,8 @@ use crate::view::widgets::fixed;
 pub(super) struct Output {
     pub(super) screen: Option<Box<Screen>>,
     pub(super) lines: Lines,
+    /// The flight just flown, again on this screen.
+    pub(super) again: Again,
 }
 
 impl Output {
@@ -31,7 +34,12 @@ impl Output {
     /// The terminal cannot be prepared.
     pub(super) fn open(interactive: bool, config: &Config) -> anyhow::Result<Self> {
         let screen = interactive.then(|| Screen::open(config).map(Box::new)).transpose()?;
-        Ok(Self { screen, lines: Lines::default() })
+        Ok(Self { screen, ..Self::lines(Lines::default()) })
+    }
+
+    /// Lines without a screen.
+    pub(super) fn lines(lines: Lines) -> Self {
+        Self { screen: None, lines, again: Again::default() }
     }
 
     /// Whether the terminal distinguishes a held key's repeats from presses.
@@ -81,8 +89,37 @@ impl Output {
         None
     }
 
+    /// What was typed, for the live model: a replay takes its own keys.
+    pub(super) fn typed(&mut self, msg: Msg) -> Option<Msg> {
+        if self.again.shown().is_some() {
+            self.mark_changed();
+        }
+        let (actions, rest) = self.again.take(msg);
+        for action in actions {
+            self.act(&action);
+        }
+        rest
+    }
+
+    /// Lets time pass for a replay; `model_now` is the same moment on the model's clock.
+    pub(super) fn pass(&mut self, model: &mut Model, now: Duration, model_now: Duration) {
+        match self.again.pass(model, now) {
+            Ok(true) => self.mark_changed(),
+            Ok(false) => {}
+            Err(why) => model.warn(model_now, format!("no replay: {why}")),
+        }
+    }
+
+    /// The live screen comes back.
+    pub(super) fn leave_replay(&mut self) {
+        if self.again.end() {
+            self.mark_changed();
+        }
+    }
+
     /// Shows the present state; `model_now` is the same moment on the model's clock.
     pub(super) fn show(&mut self, model: &Model, now: Duration, model_now: Duration) -> anyhow::Result<()> {
+        let (model, model_now) = self.again.shown().unwrap_or((model, model_now));
         match &mut self.screen {
             Some(screen) => screen.show(model, now, model_now).context("drawing on the terminal")?,
             None => self.lines.show(model),

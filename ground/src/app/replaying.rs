@@ -188,23 +188,8 @@ impl Again {
         }
     }
 
-    /// Lets time pass; `model_now` is the same moment on the model's clock.
-    pub(super) fn pass(
-        &mut self,
-        model: &mut Model,
-        output: &mut Output,
-        now: Duration,
-        model_now: Duration,
-    ) {
-        match self.moved(model, now) {
-            Ok(true) => output.mark_changed(),
-            Ok(false) => {}
-            Err(why) => model.warn(model_now, format!("no replay: {why}")),
-        }
-    }
-
     /// Lets time pass. Returns whether the screen has to be drawn.
-    fn moved(&mut self, model: &Model, now: Duration) -> Result<bool, String> {
+    pub(super) fn pass(&mut self, model: &Model, now: Duration) -> Result<bool, String> {
         if model.is_at_risk() {
             return Ok(self.end());
         }
@@ -226,15 +211,8 @@ impl Again {
         Ok(true)
     }
 
-    /// The live screen comes back.
-    pub(super) fn leave(&mut self, output: &mut Output) {
-        if self.end() {
-            output.mark_changed();
-        }
-    }
-
     /// Ends the replay. Returns whether there was one.
-    fn end(&mut self) -> bool {
+    pub(super) fn end(&mut self) -> bool {
         self.loading = None;
         self.playing.take().is_some()
     }

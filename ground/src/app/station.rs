@@ -14,7 +14,6 @@ use super::clock::{Clock, LogTime, Signals};
 use super::files::{SignatureFile, SpaceWatch, StationBook};
 use super::next_log::NextLog;
 use super::output::{Lines, Output};
-use super::replaying::Again;
 use super::server::{Server, ServerEvent, hello};
 use super::wire::Wire;
 use super::{files, programs, screen, stations};
@@ -47,8 +46,6 @@ pub(super) struct Station {
     pub(super) alarm_command: Option<String>,
     /// The files of the last place could not be written.
     pub(super) place_failed: bool,
-    /// The flight just flown, again on the station's own screen.
-    pub(super) again: Again,
     /// The report that is being written.
     pub(super) report: Option<programs::Writing>,
     /// Who did what; `None` without a log.
@@ -122,12 +119,12 @@ impl Station {
                 biased;
                 signal = signals.next() => vec![Msg::Terminate(signal)],
                 news = server_hears(server) => self.hear(news, model),
-                msg = self.output.input() => self.typed(msg),
+                msg = self.output.input() => self.output.typed(msg).into_iter().collect(),
                 () = self.clock.sleep_until(wakes_at) => vec![Msg::Tick],
                 failure = demo_ended(demo) => vec![Msg::SimulatorEnded(failure)],
                 _ = ticks.tick() => {
                     let now = self.clock.now();
-                    self.again.pass(model, &mut self.output, now, now);
+                    self.output.pass(model, now, now);
                     self.count_silence(now);
                     self.tell_crew(model, wire);
                     self.tick_msgs(model)
@@ -154,9 +151,7 @@ impl Station {
                 next = self.step(model, wire, Msg::ScreenQuit);
             }
             let now = self.clock.now();
-            let shown = self.again.shown();
-            let (shown, shown_now) = shown.unwrap_or((&*model, now));
-            if let Err(gone) = self.output.show(shown, now, shown_now) {
+            if let Err(gone) = self.output.show(model, now, now) {
                 if !self.outlives_its_screen() {
                     return Err(gone);
                 }
@@ -219,7 +214,7 @@ impl Station {
 
     /// Continues without the full screen, and serves attached screens from now on.
     async fn lose_screen(&mut self, lines: Lines, model: &Model) {
-        self.output = Output { screen: None, lines };
+        self.output = Output::lines(lines);
         if self.server.is_none() {
             // If another station uses the path, this one continues without a socket.
             self.server = Server::open(self.socket.as_deref(), hello(model), 2).await.ok();
@@ -337,10 +332,10 @@ impl Station {
                     }
                 }
                 Action::Alarm(words) => {
-                    self.again.leave(&mut self.output);
+                    self.output.leave_replay();
                     self.tell_alarm(&words);
                 }
-                Action::ReplayFlight => self.again.begin(model, now),
+                Action::ReplayFlight => self.output.again.begin(model, now),
                 Action::WriteReport => self.write_report(model, now),
                 Action::MovePin(out) => self.demo.iter().for_each(|demo| demo.move_pin(out)),
                 Action::Request(request) => {
@@ -351,19 +346,6 @@ impl Station {
             }
         }
         next
-    }
-
-    /// What was typed, for the live model; a replay takes its own keys.
-    fn typed(&mut self, msg: Msg) -> Vec<Msg> {
-        let was_shown = self.again.shown().is_some();
-        let (actions, rest) = self.again.take(msg);
-        if was_shown {
-            self.output.mark_changed();
-        }
-        for action in actions {
-            self.output.act(&action);
-        }
-        rest.into_iter().collect()
     }
 
     fn write_report(&mut self, model: &mut Model, now: Duration) {

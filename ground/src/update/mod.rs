@@ -237,13 +237,13 @@ fn on_request(model: &mut Model, request: Request, by: Seat, now: Duration) {
     match request {
         Request::Command(kind) => commands::command(model, kind, &by, now),
         Request::Acknowledge(kind) => keys::acknowledge(model, kind, now),
-        Request::Report => match why_nothing_flown(model) {
-            Some(why) => model.info(now, format!("no report: {why}")),
-            None => {
-                model.info(now, "the report is being written");
-                model.outbox.push(Action::WriteReport);
+        Request::Report => {
+            if let Some(why) = why_nothing_flown(model) {
+                return model.info(now, format!("no report: {why}"));
             }
-        },
+            model.info(now, "the report is being written");
+            model.outbox.push(Action::WriteReport);
+        }
         Request::Choose(boot) => vehicle_changes::choose(model, boot, &by, now),
         Request::RangeTest => pad::begin_range_test(model, by, now),
         Request::WithoutLog => commands::without_log(model, &by, now),
