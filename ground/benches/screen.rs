@@ -38,7 +38,7 @@ fn position(encoder: &mut Encoder, point: f32) -> Msg {
     Msg::Frame(encoder.encode(&MavMessage::LOCAL_POSITION_NED(position)))
 }
 
-#[divan::bench(args = ['1', '2', '3', '4', '5', '6', '9'])]
+#[divan::bench(args = ['1', '2', '3', '4', '5', '6', '9', 't'])]
 fn frame_80x24(bencher: Bencher, page: char) {
     frame(bencher, page, 80, 24);
 }
@@ -54,12 +54,7 @@ fn frame(bencher: Bencher, page: char, columns: u16, rows: u16) {
     let mut terminal = Terminal::new(TestBackend::new(columns, rows)).expect("memory");
     let theme = Theme { palette: Palette::Dark, ascii: false };
     bencher.bench_local(|| {
-        terminal
-            .draw(|frame| {
-                draw(&model, theme, NOW, frame);
-            })
-            .map(|drawn| drawn.count)
-            .expect("memory")
+        terminal.draw(|frame| draw(&model, theme, NOW, frame)).map(|drawn| drawn.count).expect("memory")
     });
 }
 

@@ -433,7 +433,7 @@ mod tests {
                 assert!(given.ends_with(value), "{given}: {value}");
             }
         }
-        let keys = Config::parse("keys = { theme = \"w\", path = \"m\" }").unwrap().table();
-        assert!(keys.contains("theme=w") && keys.contains("path=m"), "{keys}");
+        let keys = Config::parse("keys = { theme = \"w\", plot = \"m\" }").unwrap().table();
+        assert!(keys.contains("theme=w") && keys.contains("plot=m"), "{keys}");
     }
 }

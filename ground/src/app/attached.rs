@@ -96,7 +96,7 @@ pub async fn session(
             () = clock.sleep_until(chord_at) => update(&mut model, Msg::ScreenTick, times.theirs(clock.now())),
             told = link.told.recv(), if look_again_at.is_none() => {
                 match &told {
-                    Some((ToScreen::Msg(msg), _)) => output.mark_message(msg, &model),
+                    Some((ToScreen::Msg(msg), _)) => output.mark_message(msg),
                     _ => output.mark_changed(),
                 }
                 if let Some((told, at)) = told {

@@ -56,9 +56,9 @@ impl Output {
         self.screen.as_mut().is_some_and(|screen| screen.answers(now))
     }
 
-    pub(super) fn mark_message(&mut self, msg: &Msg, model: &Model) {
+    pub(super) fn mark_message(&mut self, msg: &Msg) {
         if let Some(screen) = &mut self.screen {
-            screen.pace.mark_message(msg, model);
+            screen.pace.mark_message(msg);
         }
     }
 

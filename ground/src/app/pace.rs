@@ -1,38 +1,21 @@
-//! Decides when the screen is drawn: soon after an input, less often otherwise, and rarely enough for a slow line. Important
-//! changes are drawn at once in any case, but the pictures of a flight, which are most of the bytes, once a second.
+//! Decides when the screen is drawn: soon after an input and at once after an important change, otherwise rarely enough for a slow
+//! line and for the eye.
 
-use std::collections::VecDeque;
 use std::time::Duration;
 
 use protocol::dialect::TdPhase;
-use ratatui::backend::Backend;
-use ratatui::buffer::Buffer;
-use ratatui::layout::Rect;
-use ratatui::{CompletedFrame, Terminal};
 
 use crate::model::{Acknowledgement, CommandKind, Model, Page};
 use crate::update::Msg;
-use crate::view::{self, Theme};
 
 /// The shortest time between two frames, for input and important changes.
 const FRAME: Duration = Duration::from_millis(100);
-/// The same in flight, for telemetry: numbers that change faster cannot be read.
-const FLIGHT_FRAME: Duration = Duration::from_millis(200);
-/// The same on the pad and after a flight, for telemetry, to save a slow line.
-const CALM_FRAME: Duration = Duration::from_millis(500);
+/// The same for telemetry: numbers that change faster cannot be read.
+const TELEMETRY_FRAME: Duration = Duration::from_millis(200);
+/// So many bytes a frame of telemetry may write for each millisecond before it.
+const BYTES_PER_MS: f64 = 1.2;
 /// The longest time between two frames, because ages grow even if nothing arrives.
 const IDLE_FRAME: Duration = Duration::from_secs(1);
-/// The shortest time between two drawings of the pictures of a flight.
-const PICTURES: Duration = Duration::from_secs(1);
-
-/// The bytes written are counted over this time.
-const WINDOW: Duration = Duration::from_secs(1);
-/// Cells of an 80x24 terminal.
-const SMALL_CELLS: u32 = 80 * 24;
-/// How many bytes per second frames that can wait may use: numbers and pictures once a second. The rest of the 5 kB (80x24) or 8 kB
-/// per second is left for a frame that cannot wait: a change of page takes up to 3 kB at 80x24.
-const SMALL_ROOM_BYTES: usize = 1_200;
-const LARGE_ROOM_BYTES: usize = 1_400;
 
 /// The state whose changes are drawn at once.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,52 +43,28 @@ impl Urgent {
     }
 }
 
-/// The pictures of a flight, as they were drawn.
-#[derive(Debug)]
-struct Pictures {
-    place: (Page, Rect),
-    drawn_at: Duration,
-    cells: Buffer,
-}
-
-/// Computes when the next frame is due, from what has happened and how much was written.
+/// Computes when the next frame is due.
 #[derive(Debug, Default)]
 pub struct Pace {
     wait: Duration,
+    /// The wait for telemetry after the frame that was drawn last.
+    telemetry: Duration,
     drawn_at: Option<Duration>,
     drawn: Option<Urgent>,
-    /// Whether the next frame is drawn although the line is busy.
-    urgent: bool,
-    /// Whether it has new pictures in any case.
-    whole: bool,
-    pictures: Option<Pictures>,
-    cells: u32,
-    /// The frames of the last second: when they were drawn, and their bytes.
-    written: VecDeque<(Duration, usize)>,
 }
 
 impl Pace {
     /// A person has done something and waits for the result.
     pub fn mark_changed(&mut self) {
-        self.mark_urgent();
-        self.whole = true;
-    }
-
-    fn mark_urgent(&mut self) {
         self.wait = self.wait.min(FRAME);
-        self.urgent = true;
     }
 
     /// A message was taken into the model; its kind decides how soon it must be drawn.
-    pub fn mark_message(&mut self, msg: &Msg, model: &Model) {
-        let counting = model.vehicle.countdown_s().is_some_and(|time| time.value > 0.0);
+    pub fn mark_message(&mut self, msg: &Msg) {
         match msg {
+            Msg::Frame(_) | Msg::Received { .. } => self.wait = self.wait.min(self.telemetry),
             // These change nothing that must be drawn within the next second.
             Msg::Tick | Msg::Sent { .. } | Msg::Links { .. } | Msg::HeardOver(_) | Msg::HeardFrom(_) => {}
-            Msg::Frame(_) | Msg::Received { .. } if model.vehicle.in_flight() || counting => {
-                self.wait = self.wait.min(FLIGHT_FRAME);
-            }
-            Msg::Frame(_) | Msg::Received { .. } => self.wait = self.wait.min(CALM_FRAME),
             _ => self.mark_changed(),
         }
     }
@@ -113,59 +72,13 @@ impl Pace {
     /// Checks whether an important state has changed.
     pub fn check_urgent(&mut self, model: &Model) {
         if self.drawn != Some(Urgent::of(model)) {
-            self.mark_urgent();
+            self.mark_changed();
         }
-    }
-
-    /// Draws a frame, with the pictures of the one before if they wait. `model_now` is the same moment on the model's clock.
-    ///
-    /// # Errors
-    /// The terminal cannot be written.
-    pub fn draw<'t, B: Backend>(
-        &mut self,
-        terminal: &'t mut Terminal<B>,
-        model: &Model,
-        theme: Theme,
-        (now, model_now): (Duration, Duration),
-    ) -> Result<CompletedFrame<'t>, B::Error> {
-        terminal.draw(|frame| {
-            let place = view::draw(model, theme, model_now, frame).map(|area| (model.page(), area));
-            let waits = |before: &Pictures| Some(before.place) == place && now < before.drawn_at + PICTURES;
-            self.pictures = match self.pictures.take().filter(|before| !self.whole && waits(before)) {
-                Some(before) => {
-                    frame.buffer_mut().merge(&before.cells);
-                    Some(before)
-                }
-                None => place.map(|place| {
-                    let cells = place.1.positions().map(|at| frame.buffer_mut()[at].clone());
-                    let cells = Buffer { area: place.1, content: cells.collect() };
-                    Pictures { place, drawn_at: now, cells }
-                }),
-            };
-        })
     }
 
     /// When the next frame is due.
     pub fn redraw_at(&self) -> Duration {
-        let Some(drawn_at) = self.drawn_at else { return Duration::ZERO };
-        let due = drawn_at + self.wait;
-        if self.urgent { due } else { due.max(self.room_at()) }
-    }
-
-    /// When the line has room for another frame.
-    fn room_at(&self) -> Duration {
-        let room = if self.cells > SMALL_CELLS { LARGE_ROOM_BYTES } else { SMALL_ROOM_BYTES };
-        let mut left: usize = self.written.iter().map(|(_, bytes)| bytes).sum();
-        let next = self.written.iter().map(|(_, bytes)| *bytes).min().unwrap_or(0);
-        let mut room_at = Duration::ZERO;
-        for (at, bytes) in &self.written {
-            if left + next <= room {
-                break;
-            }
-            left -= bytes;
-            room_at = *at + WINDOW;
-        }
-        room_at
+        self.drawn_at.map_or(Duration::ZERO, |drawn_at| drawn_at + self.wait)
     }
 
     /// The terminal has not taken the previous frame yet, so drawing is postponed.
@@ -173,15 +86,9 @@ impl Pace {
         (self.drawn_at, self.wait) = (Some(now), FRAME);
     }
 
-    /// A frame of this many cells and bytes was drawn.
-    pub fn drew(&mut self, model: &Model, cells: u32, bytes: usize, now: Duration) {
-        (self.drawn_at, self.wait) = (Some(now), IDLE_FRAME);
-        (self.urgent, self.whole) = (false, false);
-        self.drawn = Some(Urgent::of(model));
-        self.cells = cells;
-        self.written.push_back((now, bytes));
-        while self.written.front().is_some_and(|(at, _)| *at + WINDOW <= now) {
-            self.written.pop_front();
-        }
+    /// A frame of so many bytes was drawn.
+    pub fn drew(&mut self, model: &Model, bytes: usize, now: Duration) {
+        self.telemetry = TELEMETRY_FRAME.max(Duration::from_millis((bytes as f64 / BYTES_PER_MS) as u64));
+        (self.drawn_at, self.wait, self.drawn) = (Some(now), IDLE_FRAME, Some(Urgent::of(model)));
     }
 }

@@ -150,7 +150,7 @@ impl Station {
                     }
                     msg => msg,
                 };
-                self.output.mark_message(&msg, model);
+                self.output.mark_message(&msg);
                 next = next.max(self.step(model, wire, msg));
             }
             if next == Next::LeaveScreen {

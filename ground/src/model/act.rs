@@ -77,7 +77,7 @@ const fn define(act: Act, name: &'static str, usual: char, words: &'static str) 
 }
 
 /// Every action; the most important first.
-pub const DEFINITIONS: [Definition; 41] = [
+pub const DEFINITIONS: [Definition; 39] = [
     define(Act::Arm, "arm", 'A', "arm: then type ARM and Enter within 10 s"),
     define(Act::Start, "start", 'S', "start the countdown: then type START and Enter within 10 s"),
     define(Act::Disarm, "disarm", 'D', "disarm: then Enter within 5 s"),
@@ -101,7 +101,6 @@ pub const DEFINITIONS: [Definition; 41] = [
     define(Act::Show(Page::Parameters), "parameters", '7', "page: parameters of the vehicle"),
     define(Act::Show(Page::Log), "log", '8', "page: the recording"),
     define(Act::Show(Page::Alarms), "alarms", '9', "page: every alarm"),
-    define(Act::Show(Page::Path), "path", 'p', "page: the flight from two sides and from above"),
     define(Act::Show(Page::Find), "find", 'f', "page: where to look for the vehicle, and the way there"),
     define(
         Act::Show(Page::Checks),
@@ -109,14 +108,13 @@ pub const DEFINITIONS: [Definition; 41] = [
         'x',
         "page: checks on the pad, radio range, battery and storage",
     ),
-    define(Act::Show(Page::Values), "values", 'v', "page: every value, with the solver's residuals"),
-    define(Act::Show(Page::Plot), "plot", 't', "page: one number over time"),
+    define(Act::Show(Page::Plot), "plot", 't', "page: every number, and one of them over time"),
     define(Act::Show(Page::Help), "help", '?', "page: the keys that work now"),
     define(Act::Hold, "hold", 'h', "hold this page, or follow the flight again"),
     define(Act::Follow, "follow", '0', "follow the flight again (Esc does too)"),
     define(Act::Filter, "filter", '/', "show only events, messages or parameters with a text"),
     define(Act::Palette, "palette", ':', "list every action; type a part of its words"),
-    define(Act::NextTheme, "theme", 'c', "colours: dark, light for sunlight, 16, none, contrast"),
+    define(Act::NextTheme, "theme", 'c', "colours: dark, light for sunlight, none"),
     define(Act::ReplayFlight, "replay", 'R', "the flight just flown, again on this screen; q ends it"),
     define(Act::Report, "report", 'W', "write the report of the flight beside the log"),
     define(Act::Download, "download", 'L', "fetch the vehicle's own log; disarmed on the ground"),
@@ -437,7 +435,7 @@ mod tests {
         assert!(refused("theme=Enter").contains("one printable ASCII character"));
         assert!(refused("theme=").contains("theme: ``"));
         assert!(refused("arm=a").contains("no capital letter"));
-        assert!(refused("theme=p").contains("path and theme have the same key `p`"));
+        assert!(refused("theme=t").contains("plot and theme have the same key `t`"));
     }
 
     #[test]
@@ -445,7 +443,7 @@ mod tests {
         let keys = chosen(&[("theme", "a"), ("hold", "J")]).unwrap();
         assert_eq!(keys.act(Key::Char('a')), Some(Act::NextTheme));
         assert_eq!(keys.act(Key::Char('A')), Some(Act::Arm));
-        assert_eq!(keys.act(Key::Char('P')), Some(Act::Show(Page::Path)));
+        assert_eq!(keys.act(Key::Char('T')), Some(Act::Tap));
         assert_eq!(keys.act(Key::Char('j')), None);
         assert_eq!(keys.meant_as_capital('d'), Some(Act::Disarm));
         assert_eq!(keys.meant_as_capital('h'), Some(Act::HoldCountdown));

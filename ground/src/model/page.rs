@@ -28,15 +28,11 @@ pub enum Page {
     Log,
     /// Every alarm, to be acknowledged one by one.
     Alarms,
-    /// The flight from two sides and from above.
-    Path,
     /// Where to look for the vehicle.
     Find,
     /// The checks on the pad.
     Checks,
-    /// Every value, with the solver's residuals.
-    Values,
-    /// One quantity over time.
+    /// Every number, and one of them over time.
     Plot,
     Help,
 }
@@ -55,8 +51,7 @@ impl Page {
         Self::Alarms,
     ];
     /// The pages with a letter or a mark.
-    pub const LETTERED: [Self; 6] =
-        [Self::Path, Self::Find, Self::Checks, Self::Values, Self::Plot, Self::Help];
+    pub const LETTERED: [Self; 4] = [Self::Find, Self::Checks, Self::Plot, Self::Help];
 
     /// The page whose key shows this one: ascent and descent share one.
     #[must_use]
@@ -87,10 +82,8 @@ impl Page {
             Self::Parameters => "Params",
             Self::Log => "Log",
             Self::Alarms => "Alarms",
-            Self::Path => "Path",
             Self::Find => "Find",
             Self::Checks => "Check",
-            Self::Values => "Values",
             Self::Plot => "Plot",
             Self::Help => "Help",
         }

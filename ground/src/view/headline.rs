@@ -202,21 +202,20 @@ fn of_flight(model: &Model, now: Duration) -> (Item, Vec<Item>) {
         return lost(model, now);
     }
     let phase = vehicle.phase_now();
-    let height = || number("height m", vehicle.height_m(), 0, 3, now).with_trend("height");
+    let height = || number("height m", vehicle.height_m(), 0, 3, now);
     let vertical = vehicle.vertical_m_s();
-    let sink =
-        || number("sink m/s", vertical.map(|up| up.map(|m_s| -m_s)), 0, 3, now).with_trend("vertical speed");
-    let climb = || number("climb m/s", vertical, 0, 3, now).with_trend("vertical speed");
-    let tilt = || number("tilt °", vehicle.tilt_deg(), 0, 3, now).with_trend("tilt");
+    let sink = || number("sink m/s", vertical.map(|up| up.map(|m_s| -m_s)), 0, 3, now);
+    let climb = || number("climb m/s", vertical, 0, 3, now);
+    let tilt = || number("tilt °", vehicle.tilt_deg(), 0, 3, now);
     let off_pad = comes_down(model, now).map(|at| Sample::new(libm::hypot(at.east_m, at.north_m), now));
-    let lands_off = || number("lands off m", off_pad, 0, 3, now).predicted().with_trend("touchdown north");
+    let lands_off = || number("lands off m", off_pad, 0, 3, now).predicted();
     let apogee_s =
         vehicle.of_descent(|d| d.time_to_apogee_s).map(|left| left.map(|s| s - left.age(now).as_secs_f64()));
     match phase {
         Some(phase) if is_burning(phase) => {
             let lands = number("lands at m/s", vehicle.predicted_speed_m_s(), 1, 3, now).predicted();
             let main = number("s to touchdown", vehicle.touchdown_in_s(now), 1, 4, now).predicted();
-            (main, vec![lands.with_trend("predicted speed"), height(), sink()])
+            (main, vec![lands, height(), sink()])
         }
         Some(P::TD_PHASE_AERO_DESCENT | P::TD_PHASE_LAND_ARMED) if vehicle.may_light() => (
             number("s to ignition", vehicle.ignition_in_s(now), 1, 4, now).predicted(),
@@ -245,7 +244,7 @@ pub fn draw_flight_band(
         return area;
     }
     let (main, others) = of_flight(model, now);
-    draw_band(model, (&main, below, &others), theme, now, frame, area)
+    draw_band((&main, below, &others), theme, frame, area)
 }
 
 /// Whether the large words stand on the shown page instead of its band.

@@ -240,7 +240,8 @@ fn crew(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
 /// In flight, a command whose effect is not observed is shown instead of the next event for this long, and on the pad an
 /// answered one instead of a NO-GO. Its alarm stays.
 const OPEN_SHOWN: Duration = Duration::from_secs(10);
-pub const ABORT_KEY: &str = "Ctrl-X Enter";
+const ABORT_KEY: &str = "Ctrl-X Enter";
+pub const ABORT_LABEL: &str = " abort now: ";
 
 /// The key that aborts from this screen, or why none does.
 pub fn abort_key(model: &Model) -> String {
@@ -360,7 +361,7 @@ pub fn abort(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line
     if let Some(track) = model.commands.of(CommandKind::Abort) {
         return command_facts(track, columns, theme, now);
     }
-    let mut spans = vec![theme.label(" abort now: "), theme.plain(effect)];
+    let mut spans = vec![theme.label(ABORT_LABEL), theme.plain(effect)];
     spans.extend(hold_until(model, now).map(|words| theme.span(words, TextRole::Caution)));
     Line::from(spans)
 }

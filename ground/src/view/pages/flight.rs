@@ -1,4 +1,4 @@
-//! The pages of ascent and descent: the band, height over time with what is to come, the place from above, the vehicle from two
+//! The pages of ascent, descent and burn: the band, height over time with what is to come, the place from above, the vehicle from two
 //! sides; on a larger screen values, fins and events below.
 
 use std::time::Duration;
@@ -18,42 +18,61 @@ use crate::view::{TextRole, Theme, age_mark, bars, fixed, headline, panels, row,
 /// Columns of the vehicle from one side at 80 columns.
 const SIDE_COLUMNS: u16 = 18;
 /// The same for its predicted position.
-pub const LOST_COLUMNS: u16 = 28;
+const LOST_COLUMNS: u16 = 28;
+/// From this width on a title has a legend beside it.
+const LEGEND_COLUMNS: u16 = 34;
+/// Columns and rows of the six limits with their borders.
+const LIMIT_COLUMNS: u16 = 32;
+pub const LIMIT_ROWS: u16 = 8;
 /// Rows of the panels under the pictures, with their borders.
 const BELOW_ROWS: u16 = 11;
 
-/// Draws the page of the ascent or of the descent. Returns where its pictures are.
-pub fn draw_flying(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) -> Rect {
+/// Draws the page of the ascent, of the descent or of the burn.
+pub fn draw_flying(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let (title, values) = match model.page() {
         Page::Ascent => ("ascent", ascent_values(model, theme, now)),
+        Page::Landing => ("touchdown", vec![panels::burn_row(model, theme, now)]),
         _ => ("descent", descent_values(model, theme, now)),
     };
+    let burns = model.page() == Page::Landing;
     let room = Room::of(frame.area());
     // What the newest report means, under the number.
     let below = values.first().cloned().unwrap_or_default();
     let area = headline::draw_flight_band(model, below, theme, now, frame, area);
     if room == Room::Small {
-        let right = if panels::is_lost(model, now) { LOST_COLUMNS } else { SIDE_COLUMNS };
-        let [left, middle, right] = columns(area, [Fill(5), Fill(3), Length(right)]);
+        let side = Length(if panels::is_lost(model, now) { LOST_COLUMNS } else { SIDE_COLUMNS });
+        let (left, place, side) = if burns {
+            let [left, side, right] = columns(area, [Fill(1), side, Length(LIMIT_COLUMNS)]);
+            let [limits, place] = rows(right, [Length(LIMIT_ROWS), Fill(1)]);
+            bars::draw_limits(model, theme, now, frame, limits);
+            (left, place, side)
+        } else {
+            let [left, place, side] = columns(area, [Fill(5), Fill(3), side]);
+            (left, place, side)
+        };
         height(model, theme, now, frame, left);
-        map(model, theme, now, frame, middle);
-        side_or_lost(model, Side::South, theme, now, frame, right);
-        return area;
+        map(model, theme, now, frame, place);
+        return side_or_lost(model, Side::South, theme, now, frame, side);
     }
     let [above, below] = rows(area, [Fill(1), Length(BELOW_ROWS)]);
     let [left, sides, right] = columns(above, [Percentage(40), Percentage(32), Fill(1)]);
     height(model, theme, now, frame, left);
     both_sides_or_lost(model, theme, now, frame, sides);
     map(model, theme, now, frame, right);
-    let [left, middle, right] = columns(below, [Percentage(33), Percentage(30), Fill(1)]);
-    table(title, &values, theme, frame, left);
+    let [left, middle, right] = columns(below, [Percentage(40), Percentage(30), Fill(1)]);
+    if burns {
+        bars::draw_limits(model, theme, now, frame, left);
+    } else {
+        table(title, &values, theme, frame, left);
+    }
     bars::draw_surfaces(model, theme, now, frame, middle);
     events(model, theme, frame, right);
-    area
 }
 
-fn height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let inside = framed("height m", bars::flown_legend(theme), theme, frame, area);
+/// A panel with the height over time.
+pub fn height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let legend = if area.width < LEGEND_COLUMNS { Line::default() } else { bars::flown_legend(theme) };
+    let inside = framed("height m", legend, theme, frame, area);
     draw_height(model, theme, now, frame, inside);
 }
 
@@ -64,7 +83,7 @@ pub fn map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: 
 }
 
 /// The vehicle from a side; after the loss of the link its predicted position instead.
-pub fn side_or_lost(model: &Model, side: Side, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+fn side_or_lost(model: &Model, side: Side, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     if panels::is_lost(model, now) {
         table("PREDICTED", &panels::lost_rows(model, theme, now), theme, frame, area);
     } else {
@@ -73,7 +92,7 @@ pub fn side_or_lost(model: &Model, side: Side, theme: Theme, now: Duration, fram
 }
 
 /// The vehicle from both sides; after the loss of the link its predicted position instead.
-pub fn both_sides_or_lost(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+fn both_sides_or_lost(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     if panels::is_lost(model, now) {
         return side_or_lost(model, Side::South, theme, now, frame, area);
     }

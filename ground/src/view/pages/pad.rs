@@ -15,10 +15,7 @@ use crate::model::{
 };
 use crate::view::band::{Item, draw_band, word};
 use crate::view::pictures::map::draw_map;
-use crate::view::{
-    STALE_MARK, TextRole, Theme, age_mark, draw_lines, fixed, headline, lists, panels, status_lines,
-    top_lines,
-};
+use crate::view::{STALE_MARK, TextRole, Theme, age_mark, draw_lines, fixed, headline, lists, top_lines};
 
 /// Columns of the checks.
 const CHECK_COLUMNS: u16 = 49;
@@ -62,13 +59,7 @@ pub fn draw_pad(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
     if model.checklist.is_some() {
         draw_checklist(model, theme, now, frame, middle);
     }
-    if room == Room::Large && model.checklist.is_none() {
-        let [right, supplies] = columns(right, [Fill(1), Length(46)]);
-        events(model, theme, frame, right);
-        draw_now(model, theme, now, frame, supplies);
-    } else {
-        events(model, theme, frame, right);
-    }
+    events(model, theme, frame, right);
 }
 
 /// Whether the checks are more important than the pictures.
@@ -102,7 +93,7 @@ fn draw_go(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: 
     });
     let (words, role) = told.map_or((words, role), |told| (told, TextRole::Plain));
     let (words, role) = if counts { (hold(model, now), TextRole::Plain) } else { (words, role) };
-    draw_band(model, (&headline::pad(model, now), theme.line(words, role), &others), theme, now, frame, area)
+    draw_band((&headline::pad(model, now), theme.line(words, role), &others), theme, frame, area)
 }
 
 /// What still stops a countdown.
@@ -133,14 +124,6 @@ fn draw_checks(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, ar
     if below.height > 2 {
         events(model, theme, frame, below);
     }
-}
-
-/// The state of the vehicle and of the link.
-fn draw_now(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let inside = framed("now", Line::default(), theme, frame, area);
-    let mut lines = panels::flight_rows(model, theme, now);
-    lines.push(status_lines::link_line(model, theme, now, usize::from(inside.width)));
-    draw_lines(frame, inside, &lines);
 }
 
 fn draw_checklist(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {

@@ -1,4 +1,4 @@
-//! The landing page (the burn) and the review page after it.
+//! The page after a flight: verdict, limits, what went wrong, greatest values, height and place.
 
 use std::time::Duration;
 
@@ -7,53 +7,14 @@ use ratatui::layout::Constraint::{Fill, Length, Percentage};
 use ratatui::layout::Rect;
 use ratatui::text::Line;
 
-use super::flight::{LOST_COLUMNS, both_sides_or_lost, map, side_or_lost};
-use super::{Room, Side, columns, events, framed, rows, table};
+use super::flight::{LIMIT_ROWS, height, map};
+use super::{Room, columns, events, rows, table};
 use crate::model::{Act, Model, RED_AFTER};
 use crate::view::band::draw_band;
-use crate::view::pictures::height::{draw_height, draw_sink};
 use crate::view::{TextRole, Theme, bars, draw_line, fixed, headline, lists, panels, stacked};
 
-/// Rows of the six limits with their borders; under pictures with room for more.
-const LIMIT_ROWS: u16 = 8;
-const BELOW_ROWS: u16 = 10;
-
-/// Draws the band, height over sink, the vehicle, the limits and the place. Returns where the pictures are.
-pub fn draw_landing(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) -> Rect {
-    let room = Room::of(frame.area());
-    let below = panels::controller_rows(model, theme, now).into_iter().next().unwrap_or_default();
-    let area = headline::draw_flight_band(model, below, theme, now, frame, area);
-    if room == Room::Small {
-        let middle = if panels::is_lost(model, now) { LOST_COLUMNS } else { 17 };
-        let [left, middle, right] = columns(area, [Fill(1), Length(middle), Length(32)]);
-        sink(model, theme, now, frame, left);
-        side_or_lost(model, Side::South, theme, now, frame, middle);
-        let [limits, place] = rows(right, [Length(LIMIT_ROWS), Fill(1)]);
-        bars::draw_limits(model, theme, now, frame, limits);
-        if place.height > 5 {
-            map(model, theme, now, frame, place);
-        }
-        return area;
-    }
-    let [above, below] = rows(area, [Fill(1), Length(BELOW_ROWS)]);
-    let [left, sides, right] = columns(above, [Percentage(40), Percentage(32), Fill(1)]);
-    sink(model, theme, now, frame, left);
-    both_sides_or_lost(model, theme, now, frame, sides);
-    map(model, theme, now, frame, right);
-    let [left, middle, right] = columns(below, [Percentage(42), Percentage(30), Fill(1)]);
-    bars::draw_limits(model, theme, now, frame, left);
-    bars::draw_surfaces(model, theme, now, frame, middle);
-    events(model, theme, frame, right);
-    area
-}
-
-fn sink(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let legend = if area.width < 44 { Line::default() } else { bars::flown_legend(theme) };
-    let inside = framed("height m over sink", legend, theme, frame, area);
-    draw_sink(model, theme, now, frame, inside);
-}
-
-// The review page after a flight: verdict, limits and greatest values.
+/// Rows of the panels under the pictures.
+const BELOW_ROWS: u16 = 12;
 
 /// Columns of the time before a finding.
 const FINDING_TIME_COLUMNS: usize = 10;
@@ -79,11 +40,7 @@ pub fn draw_review(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
         draw_line(frame, line, sentence);
         below
     } else {
-        draw_band(model, (&headline::verdict(model, now), sentence, &[]), theme, now, frame, area)
-    };
-    let height = |frame: &mut Frame, area: Rect| {
-        let inside = framed("height m", Line::default(), theme, frame, area);
-        draw_height(model, theme, now, frame, inside);
+        draw_band((&headline::verdict(model, now), sentence, &[]), theme, frame, area)
     };
     if room == Room::Small {
         let [left, mut right] = columns(area, [Fill(6), Fill(5)]);
@@ -99,18 +56,18 @@ pub fn draw_review(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
         let [limits, below] = rows(left, [Length(LIMIT_ROWS.min(area.height)), Fill(1)]);
         bars::draw_limits(model, theme, now, frame, limits);
         if below.height > 5 {
-            height(frame, below);
+            height(model, theme, now, frame, below);
             map(model, theme, now, frame, right);
         } else {
             let [place, flight] = columns(right, [Fill(1), Fill(1)]);
             map(model, theme, now, frame, place);
-            height(frame, flight);
+            height(model, theme, now, frame, flight);
         }
         return;
     }
-    let [above, below] = rows(area, [Fill(1), Length(BELOW_ROWS + 2)]);
+    let [above, below] = rows(area, [Fill(1), Length(BELOW_ROWS)]);
     let [left, right] = columns(above, [Percentage(60), Fill(1)]);
-    height(frame, left);
+    height(model, theme, now, frame, left);
     map(model, theme, now, frame, right);
     let [left, middle, right] = columns(below, [Percentage(42), Percentage(30), Fill(1)]);
     bars::draw_limits(model, theme, now, frame, left);
@@ -130,13 +87,6 @@ fn ended(model: &Model, now: Duration) -> (String, TextRole) {
         Some((ending, role)) => (ending.sentence(&model.vehicle), role),
         None => ("no verdict received yet".to_owned(), TextRole::Caution),
     }
-}
-
-/// The verdict, and what went wrong.
-pub fn review_lines(model: &Model, theme: Theme, now: Duration, columns: usize) -> Vec<Line<'static>> {
-    let (words, role) = ended(model, now);
-    let verdict = theme.line(format!(" {words}"), role);
-    std::iter::once(verdict).chain(findings(model, theme, columns)).collect()
 }
 
 /// What the vehicle says went wrong, each with its T+; nothing if it has not said anything of it.
