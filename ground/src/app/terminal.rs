@@ -140,7 +140,7 @@ mod tests {
         let mut written = Vec::new();
         let mut terminal = DiffBackend { terminal: CrosstermBackend::new(&mut written) };
         terminal.draw(cells.iter().map(|(column, row, cell)| (*column, *row, cell))).unwrap();
-        let first = "\x1b[2;4H\x1b[38;5;75;48;5;233ma\x1b[1C \x1b[3Cc";
+        let first = "\x1b[2;4H\x1b[38;5;75;48;5;233ma\x1b[C \x1b[3Cc";
         let second = "\x1b[2;5H\x1b[38;5;79mb\x1b[3;1H\x1b[0;1;38;5;79;48;5;233md\x1b[m";
         assert_eq!(String::from_utf8(written).unwrap(), format!("{first}{second}"));
     }

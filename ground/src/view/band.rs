@@ -136,20 +136,18 @@ pub fn draw_band(
     rest
 }
 
-/// Draws a word as large as the area allows, and another of the same size beside it. Returns the rows taken.
-pub fn draw_word(item: &Item, beside: Option<&Item>, theme: Theme, frame: &mut Frame, area: Rect) -> u16 {
-    let needed = item.letters + beside.map_or(0, |beside| beside.letters + 1);
-    let size = [LARGEST, WIDE, NARROW]
-        .into_iter()
-        .find(|size| needed * size.columns < area.width && size.rows * 5 <= area.height)
-        .unwrap_or(NARROW);
+/// Draws a word as large as the area allows. Returns the rows taken.
+pub fn draw_word(item: &Item, theme: Theme, frame: &mut Frame, area: Rect) -> u16 {
+    let fits = |size: &Size| item.letters * size.columns < area.width && size.rows * 5 <= area.height;
+    let size = [LARGEST, WIDE, NARROW].into_iter().find(fits).unwrap_or(NARROW);
     let rows = size.rows.min(area.height);
-    let at = Rect { x: area.x + 1, width: area.width.saturating_sub(1), height: rows, ..area };
-    big(item, size, theme, frame, at);
-    if let Some(beside) = beside {
-        let columns = (beside.letters * size.columns).min(area.width);
-        big(beside, size, theme, frame, Rect { x: area.right() - columns, width: columns, ..at });
-    }
+    big(
+        item,
+        size,
+        theme,
+        frame,
+        Rect { x: area.x + 1, width: area.width.saturating_sub(1), height: rows, ..area },
+    );
     rows
 }
 
@@ -158,13 +156,13 @@ fn width(item: &Item, size: Size) -> u16 {
 }
 
 fn letters(item: &Item, size: Size, theme: Theme, frame: &mut Frame, at: Rect) {
-    draw_line(frame, at, Line::styled(item.label.clone(), label_style(theme)));
+    draw_line(
+        frame,
+        at,
+        Line::styled(item.label.clone(), theme.raised().patch(theme.style(TextRole::Label))),
+    );
     let below = Rect { y: at.y + 1, height: at.height.saturating_sub(1).min(size.rows), ..at };
     big(item, size, theme, frame, below);
-}
-
-fn label_style(theme: Theme) -> ratatui::style::Style {
-    theme.raised().patch(theme.style(TextRole::Label))
 }
 
 fn big(item: &Item, size: Size, theme: Theme, frame: &mut Frame, at: Rect) {

@@ -14,7 +14,7 @@ use super::pictures::map::comes_down;
 use super::top_lines::{level, readiness};
 use super::{STALE_MARK, TextRole, Theme};
 use crate::model::{
-    AlarmKind, Approach, Ending, Model, Page, Sample, Spot,
+    AlarmKind, Approach, Ending, Model, Sample, Spot,
     dead_reckoning::{is_unheard, may_have_left, predict_position},
     hold_words, is_burning, is_liftoff_by_itself, is_on_pad, why_not_here,
 };
@@ -114,8 +114,7 @@ pub fn draw_banner(
 ) -> Rect {
     let letters = u16::try_from(banner.words.chars().count()).unwrap_or(u16::MAX);
     let item = word("", banner.words, letters, banner.role);
-    let verdict = verdict_beside(model, now, frame.area().width);
-    let rows = draw_word(&item, verdict.as_ref(), theme, frame, area);
+    let rows = draw_word(&item, theme, frame, area);
     let level = theme.level(level(model, now));
     frame.buffer_mut().set_style(Rect { height: rows, ..area }, level);
     Rect { y: area.y + rows, height: area.height - rows, ..area }
@@ -240,26 +239,12 @@ pub fn draw_flight_band(
     frame: &mut Frame,
     area: Rect,
 ) -> Rect {
-    if replaces_band(model, now) {
+    if banner(model, now).is_some() {
         return area;
     }
     let (main, others) = of_flight(model, now);
     draw_band((&main, below, &others), theme, frame, area)
 }
-
-/// Whether the large words stand on the shown page instead of its band.
-pub fn replaces_band(model: &Model, now: Duration) -> bool {
-    banner(model, now).is_some()
-}
-
-/// The verdict, if it stands beside the large words, as large as they are: on Review, where the screen is wide enough.
-pub fn verdict_beside(model: &Model, now: Duration, columns: u16) -> Option<Item> {
-    let beside = model.page() == Page::Review && columns >= BESIDE_COLUMNS && replaces_band(model, now);
-    beside.then(|| verdict(model, now))
-}
-
-/// Columns of the longest words and the longest verdict.
-const BESIDE_COLUMNS: u16 = 112;
 
 /// The verdict.
 pub fn verdict(model: &Model, now: Duration) -> Item {

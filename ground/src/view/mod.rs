@@ -30,7 +30,7 @@ use ratatui::widgets::{Paragraph, Wrap};
 use crate::model::Model;
 pub use theme::{Ink, TextRole, Theme};
 use top_lines::ABORT_LABEL;
-use widgets::{STALE_MARK, age_mark, fixed, row, seconds, shortest, text_row};
+use widgets::{STALE_MARK, age_mark, fixed, quantity_row, seconds, shortest, text_row};
 
 /// The smallest screen with panels: 80x24 without the lines of a multiplexer.
 const WIDE_COLUMNS: u16 = 80;

@@ -5,45 +5,32 @@ use std::time::Duration;
 use protocol::dialect::{TD_CONTROLLER_DATA, TD_TOUCHDOWN_LIMITS_DATA, TdControlLevel, TdLanding, TdLimit};
 use ratatui::text::Line;
 
-use super::{TextRole, Theme, age_mark, fixed, seconds, shortest};
+use super::{TextRole, Theme, age_mark, fixed, seconds, shortest, text_row};
 use crate::model::{
     Ending, LIMITS, Model, Sample, Touchdown, Verdict,
-    dead_reckoning::{Basis, is_unheard, predict_position},
+    dead_reckoning::{Basis, predict_position},
     words,
 };
 
 /// What steers the burn.
 pub fn burn_row(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
-    let told = model.vehicle.last::<TD_CONTROLLER_DATA>();
-    let (mark, age) = told.as_ref().map_or((" ", TextRole::Label), |told| age_mark(told, now));
-    let (text, role) = told.map_or_else(
-        || ("--".to_owned(), age),
-        |told| (steered(told.value.level), level_role(told.value.level)),
-    );
-    let role = if age == TextRole::Stale { age } else { role };
-    Line::from(vec![theme.label(" burn  "), theme.span(format!("{mark}{text:>17.17}"), role)])
+    let Some(told) = model.vehicle.last::<TD_CONTROLLER_DATA>() else {
+        return text_row(theme, "burn", (" ", TextRole::Label), "--", "");
+    };
+    let (mark, age) = age_mark(&told, now);
+    let (words, role) = steered(told.value.level);
+    text_row(theme, "burn", (mark, if age == TextRole::Stale { age } else { role }), &words, "")
 }
 
-/// What steers the burn, in words.
-fn steered(level: TdControlLevel) -> String {
-    match level {
-        TdControlLevel::TD_CONTROL_LEVEL_CONVERGED => "on its plan".to_owned(),
-        TdControlLevel::TD_CONTROL_LEVEL_BEST_FEASIBLE => "near its plan".to_owned(),
-        TdControlLevel::TD_CONTROL_LEVEL_SHIFTED_PLAN => "on its last plan".to_owned(),
-        TdControlLevel::TD_CONTROL_LEVEL_STABILISER => "UPRIGHT, NO PLAN".to_owned(),
-        other => words::lower_case(&other, "TD_CONTROL_LEVEL_"),
-    }
-}
-
-fn level_role(level: TdControlLevel) -> TextRole {
-    match level {
-        TdControlLevel::TD_CONTROL_LEVEL_CONVERGED => TextRole::Good,
-        TdControlLevel::TD_CONTROL_LEVEL_BEST_FEASIBLE | TdControlLevel::TD_CONTROL_LEVEL_SHIFTED_PLAN => {
-            TextRole::Caution
-        }
-        TdControlLevel::TD_CONTROL_LEVEL_STABILISER => TextRole::Alarm,
-        _ => TextRole::Plain,
-    }
+fn steered(level: TdControlLevel) -> (String, TextRole) {
+    let (words, role) = match level {
+        TdControlLevel::TD_CONTROL_LEVEL_CONVERGED => ("on its plan", TextRole::Good),
+        TdControlLevel::TD_CONTROL_LEVEL_BEST_FEASIBLE => ("near its plan", TextRole::Caution),
+        TdControlLevel::TD_CONTROL_LEVEL_SHIFTED_PLAN => ("on its last plan", TextRole::Caution),
+        TdControlLevel::TD_CONTROL_LEVEL_STABILISER => ("UPRIGHT, NO PLAN", TextRole::Alarm),
+        other => return (words::lower_case(&other, "TD_CONTROL_LEVEL_"), TextRole::Plain),
+    };
+    (words.to_owned(), role)
 }
 
 /// How the flight ended.
@@ -112,16 +99,8 @@ pub(super) fn decimals(value: f64) -> usize {
 
 // The panel of the predicted position after the link is lost in flight.
 
-/// Whether the position of a vehicle in flight is stale.
-pub fn is_lost(model: &Model, now: Duration) -> bool {
-    is_unheard(&model.vehicle, now)
-}
-
-/// The rows of the prediction; none while the vehicle is heard.
+/// The rows of the prediction.
 pub fn lost_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    if !is_lost(model, now) {
-        return Vec::new();
-    }
     let Some(at) = predict_position(&model.vehicle, now) else {
         return vec![
             theme.line(" position unknown:", TextRole::Alarm),

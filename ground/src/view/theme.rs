@@ -30,19 +30,6 @@ pub enum TextRole {
     Key,
 }
 
-impl TextRole {
-    pub const ALL: [Self; 8] = [
-        Self::Plain,
-        Self::Label,
-        Self::Stale,
-        Self::Title,
-        Self::Good,
-        Self::Caution,
-        Self::Alarm,
-        Self::Key,
-    ];
-}
-
 /// A part of a picture: what was measured, what is predicted and what limits have one colour each, everywhere.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ink {
@@ -227,10 +214,8 @@ impl Theme {
             TextRole::Caution => ink(colours.caution),
             TextRole::Alarm => on(colours.alarm.0, colours.alarm.1),
         });
-        let style = match role {
-            TextRole::Alarm => coloured.unwrap_or_else(reversed),
-            _ => coloured.unwrap_or_default(),
-        };
+        let style =
+            coloured.unwrap_or_else(|| if role == TextRole::Alarm { reversed() } else { Style::new() });
         match role {
             TextRole::Plain | TextRole::Label | TextRole::Good => style,
             TextRole::Stale => style.add_modifier(Modifier::ITALIC),

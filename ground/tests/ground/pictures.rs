@@ -247,7 +247,9 @@ fn every_theme_shows_the_same_text_with_enough_contrast() {
 #[test]
 fn the_light_theme_is_dark_on_white_without_yellow() {
     let theme = Theme { palette: Palette::Light, ascii: false };
-    let styles = TextRole::ALL.map(|role| theme.ground().patch(theme.style(role)));
+    use TextRole::{Alarm, Caution, Good, Key, Label, Plain, Stale, Title};
+    let roles = [Plain, Label, Stale, Title, Good, Caution, Alarm, Key];
+    let styles = roles.map(|role| theme.ground().patch(theme.style(role)));
     let inks = Ink::ALL.map(|ink| theme.ground().fg(theme.ink(ink)));
     assert_eq!(rgb(theme.back()), Some([255; 3]), "white");
     for style in styles.into_iter().chain(inks) {

@@ -135,9 +135,9 @@ fn stale_values_are_marked_without_colour() {
     rig.state(0.0, 12.0, 0.0, -4.0, 90.0);
     rig.key(Key::Char('t'));
     let height = |rig: &Rig| rig.screen(80, 24).lines().nth(4).map(|row| row[1..32].trim_end().to_owned());
-    assert_eq!(height(&rig).as_deref(), Some("> height                12.0 m"));
+    assert_eq!(height(&rig).as_deref(), Some(">height                 12.0 m"));
     rig.run(2.0);
-    assert_eq!(height(&rig).as_deref(), Some("> height           ~    12.0 m"));
+    assert_eq!(height(&rig).as_deref(), Some(">height           ~     12.0 m"));
 }
 
 #[test]

@@ -249,7 +249,7 @@ fn a_quantity_has_one_value_on_a_screen() {
     rig.state(4.0, 125.5, -0.6, -21.5, 88.0);
     let small = rig.screen(40, 12);
     assert!(small.contains(" next IGNITION in 3.1 s"), "{small}");
-    assert!(rig.screen(140, 45).contains("ignite in        3.1 s"), "{}", rig.screen(140, 45));
+    assert!(rig.screen(140, 45).contains("time to ignition        3.1 s"), "{}", rig.screen(140, 45));
     let mut rig = powered();
     rig.run(0.4);
     assert!(rig.screen(40, 12).contains(" next touchdown in 1.9 s"), "{}", rig.screen(40, 12));

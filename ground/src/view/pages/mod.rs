@@ -17,7 +17,6 @@ use ratatui::text::Line;
 use ratatui::widgets::{Block, Borders};
 
 use super::band::Room;
-use super::pictures::attitude::{Side, draw_attitude, tilt_words};
 use super::{TextRole, Theme, draw_lines};
 use crate::model::{Model, Page};
 
@@ -85,17 +84,6 @@ pub fn framed(title: &str, right: Line<'static>, theme: Theme, frame: &mut Frame
     let inside = block.inner(area);
     frame.render_widget(block, area.intersection(frame.area()));
     inside
-}
-
-/// A panel with the vehicle from a side.
-fn attitude(model: &Model, side: Side, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let tilt = if side == Side::South { tilt_words(model, now) } else { String::new() };
-    // A narrow panel has room for the number.
-    let tilt = if area.width < 21 { tilt.trim_start_matches("tilt ").to_owned() } else { tilt };
-    let right =
-        if tilt.is_empty() { Line::default() } else { theme.line(format!(" {tilt} "), TextRole::Plain) };
-    let inside = framed(side.title(), right, theme, frame, area);
-    draw_attitude(model, side, theme, now, frame, inside);
 }
 
 /// A panel with the newest events.

@@ -11,10 +11,11 @@ use ratatui::widgets::{Axis, Chart, Dataset, GraphType};
 
 use super::titled;
 use crate::model::{
-    Model, is_on_pad,
+    Model,
     quantity::{ALL, Quantity},
 };
-use crate::view::{Ink, TextRole, Theme, age_mark, draw_line, draw_lines, fixed, side_by_side, widgets};
+use crate::view::footer::flight_began;
+use crate::view::{Ink, TextRole, Theme, draw_line, draw_lines, fixed, quantity_row, side_by_side, widgets};
 
 /// Columns of the list of quantities.
 const LIST_COLUMNS: u16 = 35;
@@ -37,21 +38,17 @@ fn values(model: &Model, theme: Theme, now: Duration, rows: usize) -> Vec<Line<'
     let chosen = model.pages.plotted;
     let start = (chosen.place() + 1).saturating_sub(rows / 2 + 1).min(ALL.len().saturating_sub(rows));
     let line = |quantity: &'static Quantity| {
-        let (pointer, name) = if quantity == chosen { (">", TextRole::Key) } else { (" ", TextRole::Label) };
-        let sample = quantity.read(model, now);
-        let (mark, role) = sample.as_ref().map_or((" ", TextRole::Label), |sample| age_mark(sample, now));
-        let value = sample.map_or_else(|| "--".to_owned(), |sample| fixed(sample.value, quantity.decimals));
-        Line::from(vec![
-            theme.span(format!("{pointer} {:<17}", quantity.name), name),
-            theme.span(format!("{mark}{value:>8} "), role),
-            theme.label(quantity.unit),
-        ])
+        let mut line = quantity_row(quantity, model, theme, now);
+        if quantity == chosen {
+            line.spans[0] = theme.key(format!(">{}", &line.spans[0].content[1..]));
+        }
+        line
     };
     ALL.iter().skip(start).take(rows).map(line).collect()
 }
 
 fn draw_plot(quantity: &Quantity, model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let first = model.history.timeline.iter().find(|(phase, _)| !is_on_pad(*phase)).map(|(_, at)| *at);
+    let first = flight_began(model);
     let from = first.unwrap_or_else(|| now.saturating_sub(CALM_SPAN)).saturating_sub(BEFORE_FLIGHT);
     let zero_s = first.unwrap_or(now).as_secs_f64();
     let points: Vec<(f64, f64)> = model
@@ -72,8 +69,7 @@ fn draw_plot(quantity: &Quantity, model: &Model, theme: Theme, now: Duration, fr
     let axis = |(least, most): (f64, f64), parts: usize| {
         let span = (most - least).max(1e-6);
         let step = widgets::tick_step(span, parts);
-        let (low, high) =
-            (libm::floor(least / step) * step, (libm::ceil(most / step) * step).max(low_end(least, step)));
+        let (low, high) = (libm::floor(least / step) * step, (libm::floor(most / step) + 1.0) * step);
         let labels: Vec<String> = widgets::ticks(low - step / 2.0, high + step / 2.0, step)
             .map(|tick| fixed(tick, widgets::tick_decimals(step)))
             .collect();
@@ -89,9 +85,4 @@ fn draw_plot(quantity: &Quantity, model: &Model, theme: Theme, now: Duration, fr
         .x_axis(axis(of(|point| point.0), usize::from(area.width / 16)).title("s"))
         .y_axis(axis(of(|point| point.1), usize::from(area.height / 3)).title(quantity.unit));
     frame.render_widget(chart, area);
-}
-
-/// The least upper end of a scale that begins at or below a value.
-fn low_end(least: f64, step: f64) -> f64 {
-    (libm::floor(least / step) + 1.0) * step
 }

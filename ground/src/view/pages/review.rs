@@ -7,11 +7,11 @@ use ratatui::layout::Constraint::{Fill, Length, Percentage};
 use ratatui::layout::Rect;
 use ratatui::text::Line;
 
-use super::flight::{LIMIT_ROWS, height, map};
+use super::flight::{FROM_ABOVE, LIMIT_ROWS, height, map};
 use super::{Room, columns, events, rows, table};
-use crate::model::{Act, Model, RED_AFTER};
+use crate::model::{Act, Model, RED_AFTER, quantity::Quantity};
 use crate::view::band::draw_band;
-use crate::view::{TextRole, Theme, bars, draw_line, fixed, headline, lists, panels, stacked};
+use crate::view::{TextRole, Theme, bars, fixed, headline, lists, panels};
 
 /// Rows of the panels under the pictures.
 const BELOW_ROWS: u16 = 12;
@@ -35,13 +35,7 @@ pub fn draw_review(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     // A small screen has no room behind a long sentence.
     let room_for = usize::from(area.width.saturating_sub(sentence.width() as u16));
     sentence.extend(again.filter(|again| again.width() <= room_for));
-    let area = if headline::verdict_beside(model, now, frame.area().width).is_some() {
-        let [line, below] = stacked(area, [Length(1), Fill(1)]);
-        draw_line(frame, line, sentence);
-        below
-    } else {
-        draw_band((&headline::verdict(model, now), sentence, &[]), theme, frame, area)
-    };
+    let area = draw_band((&headline::verdict(model, now), sentence, &[]), theme, frame, area);
     if room == Room::Small {
         let [left, mut right] = columns(area, [Fill(6), Fill(5)]);
         let found = findings(model, theme, usize::from(right.width.saturating_sub(2)));
@@ -57,10 +51,10 @@ pub fn draw_review(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
         bars::draw_limits(model, theme, now, frame, limits);
         if below.height > 5 {
             height(model, theme, now, frame, below);
-            map(model, theme, now, frame, right);
+            map(FROM_ABOVE, model, theme, now, frame, right);
         } else {
             let [place, flight] = columns(right, [Fill(1), Fill(1)]);
-            map(model, theme, now, frame, place);
+            map(FROM_ABOVE, model, theme, now, frame, place);
             height(model, theme, now, frame, flight);
         }
         return;
@@ -68,13 +62,13 @@ pub fn draw_review(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     let [above, below] = rows(area, [Fill(1), Length(BELOW_ROWS)]);
     let [left, right] = columns(above, [Percentage(60), Fill(1)]);
     height(model, theme, now, frame, left);
-    map(model, theme, now, frame, right);
+    map(FROM_ABOVE, model, theme, now, frame, right);
     let [left, middle, right] = columns(below, [Percentage(42), Percentage(30), Fill(1)]);
     bars::draw_limits(model, theme, now, frame, left);
     let found = findings(model, theme, usize::from(middle.width.saturating_sub(2)));
-    let (title, greatest) = maxima(model, theme, now);
+    let (title, values) = extremes(model, theme, now);
     if found.is_empty() {
-        table(title, &greatest, theme, frame, middle);
+        table(title, &values, theme, frame, middle);
     } else {
         table(FINDINGS_TITLE, &found, theme, frame, middle);
     }
@@ -123,31 +117,40 @@ fn unheard(model: &Model, now: Duration) -> Option<String> {
     Some(format!("silent for {} s of the flight", fixed(silence_s, 1)))
 }
 
-/// The title and the greatest values: what happened in a silence is not known.
-fn maxima(model: &Model, theme: Theme, now: Duration) -> (&'static str, Vec<Line<'static>>) {
+/// What the last table shows of a flight.
+const EXTREMES: [&str; 9] = [
+    "height",
+    "vertical speed",
+    "distance",
+    "tilt",
+    "turn rate",
+    "gimbal pitch",
+    "gimbal yaw",
+    "solve time",
+    "solver margin",
+];
+
+/// The title, and least and greatest values: what happened in a silence is not known.
+fn extremes(model: &Model, theme: Theme, now: Duration) -> (&'static str, Vec<Line<'static>>) {
     let extremes = &model.history.extremes;
     let title =
-        if unheard(model, now).is_some() { "greatest values heard" } else { "greatest values in flight" };
-    let row = |label: &str, value: Option<f64>, decimals: usize, unit: &'static str| {
-        let text = value.map_or_else(|| "--".to_owned(), |value| fixed(value, decimals));
+        if unheard(model, now).is_some() { "least, greatest heard" } else { "least, greatest in flight" };
+    let row = |name: &str, text: String, unit: &'static str| {
         Line::from(vec![
-            theme.label(format!(" {label:<18}")),
-            theme.plain(format!("{text:>9}")),
+            theme.label(format!(" {name:<15}")),
+            theme.plain(text),
             theme.label(format!(" {unit}")),
         ])
     };
-    let [least, greatest] = [0, 1].map(|end| move |name: &str| extremes.of(name).map(|ends| ends[end]));
-    let gimbal = ["gimbal pitch", "gimbal yaw"].into_iter().filter_map(|name| extremes.of(name)).flatten();
-    let lines = vec![
-        row("altitude", greatest("height"), 2, "m"),
-        row("descent speed", least("vertical speed").map(|up| -up), 2, "m/s"),
-        row("distance", greatest("distance"), 1, "m"),
-        row("tilt", greatest("tilt"), 2, "deg"),
-        row("turn rate", greatest("turn rate"), 2, "deg/s"),
-        row("gimbal", gimbal.map(f64::abs).reduce(f64::max), 2, "deg"),
-        row("solve time", greatest("solve time"), 2, "ms"),
-        row("least margin", least("solver margin"), 2, "ms"),
-        row("silence", extremes.silence_s, 1, "s"),
-    ];
+    let known = EXTREMES.into_iter().filter_map(Quantity::named);
+    let mut lines: Vec<Line> = known
+        .map(|quantity| {
+            let ends = extremes.of(quantity.name).map(|ends| ends.map(|end| fixed(end, quantity.decimals)));
+            let [least, greatest] = ends.unwrap_or_else(|| ["--", "--"].map(str::to_owned));
+            row(quantity.name, format!("{least:>7} {greatest:>7}"), quantity.unit)
+        })
+        .collect();
+    let silence = extremes.silence_s.map_or_else(|| "--".to_owned(), |silence_s| fixed(silence_s, 1));
+    lines.push(row("silence", format!("{silence:>15}"), "s"));
     (title, lines)
 }

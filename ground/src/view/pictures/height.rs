@@ -18,21 +18,11 @@ const TOP_MIN_M: f64 = 10.0;
 const TICK_ROWS: u16 = 3;
 const TICK_COLUMNS: u16 = 7;
 
-/// When the lift-off was, or the beginning of a flight that has none.
-fn zero(model: &Model, now: Duration) -> Duration {
-    flight_began(model).unwrap_or(now)
-}
-
-/// The heights flown until now, with their time since lift-off.
-fn flown(model: &Model, now: Duration) -> Vec<(f64, f64)> {
-    let from = zero(model, now);
+/// The heights flown until now, with their time since the lift-off.
+fn flown(model: &Model, from: Duration, now: Duration) -> Vec<(f64, f64)> {
     let Some(height) = Quantity::named("height") else { return Vec::new() };
-    model
-        .history
-        .trace
-        .values(height, from, now)
-        .map(|(at, height_m)| (seconds_since(at, from), height_m))
-        .collect()
+    let values = model.history.trace.values(height, from, now);
+    values.map(|(at, height_m)| (seconds_since(at, from), height_m)).collect()
 }
 
 /// The lines between which a picture is told: a tick every so often.
@@ -47,7 +37,8 @@ pub fn draw_height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
         return;
     }
     let vehicle = &model.vehicle;
-    let (from, flown) = (zero(model, now), flown(model, now));
+    let from = flight_began(model).unwrap_or(now);
+    let flown = flown(model, from, now);
     let present_s = seconds_since(now, from);
     let to_come: Vec<(f64, f64)> = course(vehicle, now)
         .into_iter()
@@ -89,11 +80,11 @@ pub fn draw_height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     let ink = |ink| theme.ground().fg(theme.ink(ink));
     if let Some((low_m, high_m)) = band {
         let words = format!("band {}..{}", fixed(low_m, 0), fixed(high_m, 0));
-        plane.write_right(frame, f64::midpoint(low_m, high_m), &words, good);
+        plane.write(frame, (length_s, f64::midpoint(low_m, high_m)), &words, good);
     }
     if let Some(commit_m) = commit_m {
         let above = (commit_m + 4.0 * plane.dot()).min(top);
-        plane.write_right(frame, above, &format!("commit {}", fixed(commit_m, 0)), ink(Ink::Limit));
+        plane.write(frame, (length_s, above), &format!("commit {}", fixed(commit_m, 0)), ink(Ink::Limit));
     }
     marks(model, (from, &flown), apogee_m, theme, frame, &plane);
     if let Some((at, _)) = to_come.last().filter(|(_, height_m)| *height_m < 1.0) {

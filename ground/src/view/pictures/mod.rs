@@ -57,11 +57,6 @@ impl Plane {
         frame.buffer_mut().set_string(column, row, words, style);
     }
 
-    /// The same at the right end.
-    fn write_right(&self, frame: &mut Frame, y: f64, words: &str, style: Style) {
-        self.write(frame, (self.x[1], y), words, style);
-    }
-
     fn draw(&self, theme: Theme, frame: &mut Frame, paint: impl Fn(&mut Context)) {
         let canvas = Canvas::default().marker(Marker::Braille).background_color(theme.back());
         frame.render_widget(canvas.x_bounds(self.x).y_bounds(self.y).paint(paint), self.area);
