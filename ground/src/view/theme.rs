@@ -359,5 +359,6 @@ mod ascii_tests {
         flatten(&mut buffer);
         let text: String = buffer.content.iter().map(ratatui::buffer::Cell::symbol).collect();
         assert_eq!(text, "a-|+<#. ?#z ");
+        assert_eq!(Theme { palette: Palette::None, ascii: true }.either_side("±1 m"), "+-1 m");
     }
 }
