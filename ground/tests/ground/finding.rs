@@ -176,20 +176,6 @@ fn any_number_can_be_plotted() {
 }
 
 #[test]
-fn the_plot_has_round_ticks() {
-    let mut rig = descending();
-    for k in 0..40_u16 {
-        rig.state(4.0, 130.0 - f32::from(k), 0.0, -10.0, 88.0);
-        rig.run(0.1);
-    }
-    choose(&mut rig, "plot height");
-    let screen = rig.screen(80, 24);
-    for tick in ["140│m", "120│", "60 │"] {
-        assert!(screen.contains(tick), "{tick}\n{screen}");
-    }
-}
-
-#[test]
 fn help_shows_only_the_keys_that_work_now() {
     let mut rig = on_the_pad();
     rig.key(Key::Char('?'));
