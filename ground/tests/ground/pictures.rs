@@ -246,9 +246,9 @@ fn every_theme_shows_the_same_text_with_enough_contrast() {
 /// Yellow and pale letters vanish in the sun.
 #[test]
 fn the_light_theme_is_dark_on_white_without_yellow() {
+    use TextRole::{Alarm, Caution, Good, Key as OfKeys, Label, Plain, Stale, Title};
     let theme = Theme { palette: Palette::Light, ascii: false };
-    use TextRole::{Alarm, Caution, Good, Key, Label, Plain, Stale, Title};
-    let roles = [Plain, Label, Stale, Title, Good, Caution, Alarm, Key];
+    let roles = [Plain, Label, Stale, Title, Good, Caution, Alarm, OfKeys];
     let styles = roles.map(|role| theme.ground().patch(theme.style(role)));
     let inks = Ink::ALL.map(|ink| theme.ground().fg(theme.ink(ink)));
     assert_eq!(rgb(theme.back()), Some([255; 3]), "white");

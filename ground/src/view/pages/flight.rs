@@ -38,9 +38,8 @@ pub fn draw_flying(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
         _ => ("descent", band_word(model, theme, now), &DESCENT),
     };
     let burns = model.page() == Page::Landing;
-    let room = Room::of(frame.area());
     let area = headline::draw_flight_band(model, below, theme, now, frame, area);
-    if room == Room::Small {
+    if Room::of(frame.area()) == Room::Small {
         let side = Length(if is_unheard(&model.vehicle, now) { LOST_COLUMNS } else { SIDE_COLUMNS });
         let (left, place, side) = if burns {
             let [left, side, right] = columns(area, [Fill(1), side, Length(LIMIT_COLUMNS)]);

@@ -28,11 +28,10 @@ const BELOW_ROWS: u16 = 12;
 /// Draws GO or what fails, the next step, the steps; and the vehicle with the place where it will land, or the checks while
 /// something is amiss.
 pub fn draw_pad(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let room = Room::of(frame.area());
     let area =
         if headline::banner(model, now).is_some() { area } else { draw_go(model, theme, now, frame, area) };
     let ladder = ladder(model, theme, now);
-    if room == Room::Small {
+    if Room::of(frame.area()) == Room::Small {
         let [left, right] = columns(area, [Length(STEP_COLUMNS[0]), Fill(1)]);
         table("steps", &ladder, theme, frame, left);
         if model.checklist.is_some() && model.pages.checklist {

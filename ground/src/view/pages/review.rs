@@ -23,7 +23,6 @@ const FINDINGS_TITLE: &str = "what went wrong";
 
 /// Draws the verdict in large letters with its sentence, the limits as bars, the whole flight and the place.
 pub fn draw_review(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let room = Room::of(frame.area());
     let (words, role) = ended(model, now);
     let silent = unheard(model, now).map_or_else(String::new, |words| format!("; {words}"));
     let keys = &model.settings.keys;
@@ -36,7 +35,7 @@ pub fn draw_review(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     let room_for = usize::from(area.width.saturating_sub(sentence.width() as u16));
     sentence.extend(again.filter(|again| again.width() <= room_for));
     let area = draw_band((&headline::verdict(model, now), sentence, &[]), theme, frame, area);
-    if room == Room::Small {
+    if Room::of(frame.area()) == Room::Small {
         let [left, mut right] = columns(area, [Fill(6), Fill(5)]);
         let found = findings(model, theme, usize::from(right.width.saturating_sub(2)));
         if model.vehicle.findings.count.is_some_and(|count| count > 0) {
