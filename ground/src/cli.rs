@@ -10,7 +10,7 @@ use protocol::dialect::TdPhase;
 use protocol::identity::{Address, GROUND, VEHICLE};
 use protocol::transport::LinkAddress;
 use serde::Deserialize;
-use simulated_vehicle::fly::StartPoint;
+use sim::wire::fly::StartPoint;
 
 use crate::demo::Speed;
 use crate::exit;
@@ -18,7 +18,7 @@ use crate::model::words;
 use crate::view::theme::Palette;
 
 /// The profile that the demonstration flies by default.
-const DEMO_PROFILE: &str = simulated_vehicle::fly::DEFAULT_MISSION;
+const DEMO_PROFILE: &str = sim::wire::fly::DEFAULT_MISSION;
 const DEMO_SEED: u64 = 1;
 
 /// Terminal ground station for a rocket that lands on its own thrust.

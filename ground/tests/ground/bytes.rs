@@ -22,8 +22,8 @@ use ratatui::backend::CrosstermBackend;
 use ratatui::buffer::{Buffer, Cell};
 use ratatui::layout::Rect;
 use ratatui::{Terminal, TerminalOptions, Viewport};
-use simulated_vehicle::endpoint::{VehicleEndpoint, VehicleKind, step};
-use simulated_vehicle::fly::load_flight;
+use sim::wire::endpoint::{VehicleEndpoint, VehicleKind, step};
+use sim::wire::fly::load_flight;
 
 use crate::rig::settings;
 
