@@ -38,7 +38,7 @@ fn position(encoder: &mut Encoder, point: f32) -> Msg {
     Msg::Frame(encoder.encode(&MavMessage::LOCAL_POSITION_NED(position)))
 }
 
-#[divan::bench(args = ['1', '2', '3', '4', '5', '6', '9'])]
+#[divan::bench(args = ['1', '2', '3', '4', '5', '6', '9', 't'])]
 fn frame_80x24(bencher: Bencher, page: char) {
     frame(bencher, page, 80, 24);
 }

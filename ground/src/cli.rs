@@ -403,14 +403,8 @@ pub enum ThemeChoice {
     Dark,
     /// Black on white, for sunlight
     Light,
-    /// The terminal's own
-    #[serde(rename = "16")]
-    #[value(name = "16")]
-    Sixteen,
     /// No colours
     None,
-    /// High contrast
-    Contrast,
 }
 
 impl ThemeChoice {
@@ -420,9 +414,7 @@ impl ThemeChoice {
             Self::Auto => return None,
             Self::Dark => Palette::Dark,
             Self::Light => Palette::Light,
-            Self::Sixteen => Palette::Sixteen,
             Self::None => Palette::None,
-            Self::Contrast => Palette::Contrast,
         })
     }
 }

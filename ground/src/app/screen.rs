@@ -29,13 +29,13 @@ use rustix::termios::QueueSelector;
 use super::answers;
 use super::pace::Pace;
 use super::programs::{Voice, VoiceEnded};
-use super::terminal::Thrifty;
+use super::terminal::DiffBackend;
 use crate::cli::Characters;
 use crate::config::Config;
 use crate::key::Key;
 use crate::model::Model;
 use crate::update::Msg;
-use crate::view::theme::Theme;
+use crate::view::Theme;
 
 /// The most keys passed on at once, so that a paste does not delay link and clock.
 const TOGETHER_MAX: usize = 1_024;
@@ -60,7 +60,7 @@ static KEYBOARD_ENHANCED: AtomicBool = AtomicBool::new(false);
 pub struct Screen {
     /// Never dropped: its own clean-up would print to a terminal that may be gone, and panic. [`restore`] does the
     /// clean-up.
-    terminal: ManuallyDrop<Terminal<Thrifty<FrameBuffer>>>,
+    terminal: ManuallyDrop<Terminal<DiffBackend<FrameBuffer>>>,
     writer: TerminalWriter,
     events: EventStream,
     theme: Theme,
@@ -230,14 +230,14 @@ fn theme(config: &Config) -> Theme {
     Theme { palette, ascii }
 }
 
-fn take_terminal() -> io::Result<(Terminal<Thrifty<FrameBuffer>>, TerminalWriter)> {
+fn take_terminal() -> io::Result<(Terminal<DiffBackend<FrameBuffer>>, TerminalWriter)> {
     TAKEN.store(true, Ordering::Relaxed);
     enable_raw_mode()?;
     answers::begin()?;
     execute!(io::stdout(), EnterAlternateScreen, EnableBracketedPaste)?;
     request_repeat_reports()?;
     let (writer, buffer) = TerminalWriter::new()?;
-    Ok((Terminal::new(Thrifty::new(CrosstermBackend::new(buffer)))?, writer))
+    Ok((Terminal::new(DiffBackend::new(CrosstermBackend::new(buffer)))?, writer))
 }
 
 /// Asks the terminal to distinguish a held key's repeats from presses, if it supports that.

@@ -18,7 +18,7 @@ use ratatui::text::Span;
 
 /// ratatui's own backend, except for the cells.
 #[derive(Debug)]
-pub struct Thrifty<W: Write> {
+pub struct DiffBackend<W: Write> {
     pub terminal: CrosstermBackend<W>,
     /// The rightmost column that was ever drawn. Behind the last one of the terminal the cursor stands where it likes.
     rightmost: u16,
@@ -27,7 +27,7 @@ pub struct Thrifty<W: Write> {
     shown: BTreeMap<Place, Cell>,
 }
 
-impl<W: Write> Thrifty<W> {
+impl<W: Write> DiffBackend<W> {
     pub fn new(terminal: CrosstermBackend<W>) -> Self {
         Self { terminal, rightmost: 0, cursor_is_hidden: false, shown: BTreeMap::new() }
     }
@@ -250,7 +250,7 @@ fn between(shown: &BTreeMap<Place, Cell>, cursor: Option<Place>, (row, to): Plac
     cells.unwrap_or_default().into_iter().map(Cell::symbol).collect()
 }
 
-impl<W: Write> Backend for Thrifty<W> {
+impl<W: Write> Backend for DiffBackend<W> {
     type Error = io::Error;
 
     fn draw<'a, I: Iterator<Item = (u16, u16, &'a Cell)>>(&mut self, content: I) -> io::Result<()> {
@@ -361,7 +361,7 @@ mod tests {
         // The b between the two is written again, which is shorter than a step of the cursor.
         let beside_b = [((3, 1), &x), ((5, 1), &y)];
         let mut written = Vec::new();
-        let mut terminal = Thrifty::new(CrosstermBackend::new(&mut written));
+        let mut terminal = DiffBackend::new(CrosstermBackend::new(&mut written));
         terminal.draw(places.into_iter().zip(&cells).map(|((x, y), cell)| (x, y, cell))).unwrap();
         terminal.draw(beside_b.into_iter().map(|((x, y), cell)| (x, y, cell))).unwrap();
         let first = "\x1b[38;5;75;48;5;233m\x1b[2;4Ha\x1b[5Cc\x1b[38;5;79m\x1b[2;5Hb \x1b[1m\n\x1b[6Dd\x1b[m";

@@ -98,7 +98,7 @@ const fn acts(act: Act, name: &'static str, usual: char, words: &'static str) ->
 }
 
 /// Every action; the most important first.
-pub const DEFINITIONS: [Definition; 37] = [
+pub const DEFINITIONS: [Definition; 35] = [
     asks(Act::Arm, "arm", 'A', "arm: then type ARM and Enter within 10 s"),
     asks(Act::Start, "start", 'S', "start the countdown: then type START and Enter within 10 s"),
     asks(Act::Disarm, "disarm", 'D', "disarm: then Enter within 5 s"),
@@ -121,7 +121,6 @@ pub const DEFINITIONS: [Definition; 37] = [
     shows(Act::Show(Page::Messages), "texts", '6', "page: events and messages"),
     shows(Act::Show(Page::Log), "log", '7', "page: the recording"),
     shows(Act::Show(Page::Alarms), "alarms", '8', "page: every alarm"),
-    shows(Act::Show(Page::Path), "path", 'p', "page: the flight from two sides and from above"),
     shows(Act::Show(Page::Find), "find", 'f', "page: where to look for the vehicle, and the way there"),
     shows(
         Act::Show(Page::Checks),
@@ -129,13 +128,12 @@ pub const DEFINITIONS: [Definition; 37] = [
         'x',
         "page: checks on the pad, radio range, battery and storage",
     ),
-    shows(Act::Show(Page::Values), "values", 'v', "page: every value, with the solver's residuals"),
-    shows(Act::Show(Page::Plot), "plot", 't', "page: one number over time"),
+    shows(Act::Show(Page::Plot), "plot", 't', "page: every number, and one of them over time"),
     shows(Act::Show(Page::Help), "help", '?', "page: the keys that work now"),
     shows(Act::Hold, "hold", 'h', "hold this page, or follow the flight again"),
     shows(Act::Follow, "follow", '0', "follow the flight again (Esc does too)"),
     shows(Act::Palette, "palette", ':', "list every action; type a part of its words"),
-    shows(Act::NextTheme, "theme", 'c', "colours: dark, light for sunlight, 16, none, contrast"),
+    shows(Act::NextTheme, "theme", 'c', "colours: dark, light for sunlight, none"),
     acts(Act::ReplayFlight, "replay", 'R', "the flight just flown, again on this screen; q ends it"),
     acts(Act::Report, "report", 'W', "write the report of the flight beside the log"),
     acts(Act::MovePin, "pin", 'I', "demonstration: put the vehicle's pin in, or pull it, by hand"),
@@ -423,7 +421,7 @@ mod tests {
         assert!(refused("theme=Enter").contains("one printable ASCII character"));
         assert!(refused("theme=").contains("theme: ``"));
         assert!(refused("arm=a").contains("no capital letter"));
-        assert!(refused("theme=p").contains("path and theme have the same key `p`"));
+        assert!(refused("theme=t").contains("plot and theme have the same key `t`"));
     }
 
     #[test]
@@ -431,7 +429,7 @@ mod tests {
         let keys = chosen(&[("theme", "a"), ("hold", "J")]).unwrap();
         assert_eq!(keys.act(Key::Char('a')), Some(Act::NextTheme));
         assert_eq!(keys.act(Key::Char('A')), Some(Act::Arm));
-        assert_eq!(keys.act(Key::Char('P')), Some(Act::Show(Page::Path)));
+        assert_eq!(keys.act(Key::Char('T')), Some(Act::Tap));
         assert_eq!(keys.act(Key::Char('j')), None);
         assert_eq!(keys.meant_as_capital('d'), Some(Act::Disarm));
         assert_eq!(keys.meant_as_capital('h'), Some(Act::HoldCountdown));

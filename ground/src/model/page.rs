@@ -27,22 +27,18 @@ pub enum Page {
     Log,
     /// Every alarm, to be acknowledged one by one.
     Alarms,
-    /// The flight from two sides and from above.
-    Path,
     /// Where to look for the vehicle.
     Find,
     /// The checks on the pad.
     Checks,
-    /// Every value, with the solver's residuals.
-    Values,
-    /// One quantity over time.
+    /// Every number, and one of them over time.
     Plot,
     Help,
 }
 
 impl Page {
     /// Every page that a key shows: those with a digit in that order, then those with a letter or a mark.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 12] = [
         Self::Pad,
         Self::Descent,
         Self::Landing,
@@ -51,10 +47,8 @@ impl Page {
         Self::Messages,
         Self::Log,
         Self::Alarms,
-        Self::Path,
         Self::Find,
         Self::Checks,
-        Self::Values,
         Self::Plot,
         Self::Help,
     ];
@@ -76,10 +70,8 @@ impl Page {
             Self::Messages => "Texts",
             Self::Log => "Log",
             Self::Alarms => "Alarms",
-            Self::Path => "Path",
             Self::Find => "Find",
             Self::Checks => "Check",
-            Self::Values => "Values",
             Self::Plot => "Plot",
             Self::Help => "Help",
         }

@@ -45,7 +45,7 @@ impl Quantity {
 }
 
 /// How many quantities there are.
-pub const COUNT: usize = 35;
+pub const COUNT: usize = 38;
 
 const fn quantity(
     name: &'static str,
@@ -79,6 +79,9 @@ pub static ALL: [Quantity; COUNT] = [
     quantity("fin 3", "deg", 1, |m, _| fin(&m.vehicle, 2)),
     quantity("fin 4", "deg", 1, |m, _| fin(&m.vehicle, 3)),
     quantity("apogee", "m", 0, |m, _| m.vehicle.of_descent(|d| d.apogee_m)),
+    quantity("time to apogee", "s", 1, |m, _| m.vehicle.of_descent(|d| d.time_to_apogee_s)),
+    quantity("band low", "m", 1, |m, _| m.vehicle.of_descent(|d| d.band_low_m)),
+    quantity("band high", "m", 1, |m, _| m.vehicle.of_descent(|d| d.band_high_m)),
     quantity("ignition height", "m", 1, |m, _| m.vehicle.of_descent(|d| d.chosen_height_m)),
     quantity("commit height", "m", 1, |m, _| m.vehicle.of_descent(|d| d.commit_height_m)),
     quantity("time to ignition", "s", 1, |m, now| m.vehicle.ignition_in_s(now)),

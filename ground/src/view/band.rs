@@ -1,26 +1,21 @@
-//! The band of a page: the one number or word of the present moment in large letters, and beside it two or three others with their
-//! last ten seconds.
+//! The band of a page: the one number or word of the present moment in large letters, and beside it two or three others.
 
 use std::time::Duration;
 
 use ratatui::Frame;
 use ratatui::layout::Rect;
-use ratatui::symbols::Marker;
 use ratatui::text::Line;
-use ratatui::widgets::canvas::{self, Canvas};
 use tui_big_text::{BigText, PixelSize};
 
 use super::theme::Ink;
 use super::{STALE_MARK, TextRole, Theme, draw_line, fixed};
-use crate::model::{Model, Sample, quantity::Quantity};
+use crate::model::Sample;
 
 /// Rows of the band on a small, a middling and a large screen.
 const ROWS: [u16; 3] = [6, 7, 9];
 /// From these columns and rows on a screen counts as middling, and as large.
 const MIDDLING: (u16, u16) = (116, 34);
 const LARGE: (u16, u16) = (180, 46);
-/// How far back a trend reaches.
-const TREND: Duration = Duration::from_secs(10);
 /// Columns between two numbers, at least.
 const GAP: u16 = 2;
 
@@ -54,13 +49,12 @@ pub struct Item {
     pub role: TextRole,
     /// A prediction has its colour.
     is_predicted: bool,
-    trend: Option<&'static Quantity>,
 }
 
 /// A word, and what it is, in so many letters.
 pub fn word(label: &str, text: &str, letters: u16, role: TextRole) -> Item {
     let (label, text) = (label.to_owned(), text.to_owned());
-    Item { label, text, letters, role, is_predicted: false, trend: None }
+    Item { label, text, letters, role, is_predicted: false }
 }
 
 /// A number with its name and unit; the name of a stale one is marked.
@@ -81,19 +75,13 @@ pub fn number(
     let fits = |text: &String| text.len() <= usize::from(letters);
     let text = Some(text(decimals)).filter(fits).or_else(|| Some(text(0)).filter(fits));
     let text = text.unwrap_or_else(|| "many".to_owned());
-    Item { label: format!("{mark}{label}"), text, letters, role, is_predicted: false, trend: None }
+    Item { label: format!("{mark}{label}"), text, letters, role, is_predicted: false }
 }
 
 impl Item {
     #[must_use]
     pub fn predicted(self) -> Self {
         Self { is_predicted: true, ..self }
-    }
-
-    /// With its last ten seconds under it.
-    #[must_use]
-    pub fn with_trend(self, name: &str) -> Self {
-        Self { trend: Quantity::named(name), ..self }
     }
 }
 
@@ -111,10 +99,8 @@ const NARROW: Size = Size { pixels: PixelSize::Quadrant, columns: 4, rows: 4 };
 
 /// Draws the main item at the left with the line under it, the others to its right, and returns the area below.
 pub fn draw_band(
-    model: &Model,
     (main, below, others): (&Item, Line<'static>, &[Item]),
     theme: Theme,
-    now: Duration,
     frame: &mut Frame,
     area: Rect,
 ) -> Rect {
@@ -145,31 +131,23 @@ pub fn draw_band(
         let columns = width(item, other_size);
         let at = Rect { x, width: columns, ..band }.intersection(band);
         letters(item, other_size, theme, frame, at);
-        // At 80x24 the line is a slow one, and every cell of a trend changes all the time.
-        if room != Room::Small {
-            let under = 1 + other_size.rows;
-            let trend = Rect { y: band.y + under, height: rows.saturating_sub(under), ..at };
-            draw_trend(model, item, theme, now, frame, trend);
-        }
         x += columns + gap;
     }
     rest
 }
 
-/// Draws a word as large as the area allows, and another of the same size beside it. Returns the rows taken.
-pub fn draw_word(item: &Item, beside: Option<&Item>, theme: Theme, frame: &mut Frame, area: Rect) -> u16 {
-    let needed = item.letters + beside.map_or(0, |beside| beside.letters + 1);
-    let size = [LARGEST, WIDE, NARROW]
-        .into_iter()
-        .find(|size| needed * size.columns < area.width && size.rows * 5 <= area.height)
-        .unwrap_or(NARROW);
+/// Draws a word as large as the area allows. Returns the rows taken.
+pub fn draw_word(item: &Item, theme: Theme, frame: &mut Frame, area: Rect) -> u16 {
+    let fits = |size: &Size| item.letters * size.columns < area.width && size.rows * 5 <= area.height;
+    let size = [LARGEST, WIDE, NARROW].into_iter().find(fits).unwrap_or(NARROW);
     let rows = size.rows.min(area.height);
-    let at = Rect { x: area.x + 1, width: area.width.saturating_sub(1), height: rows, ..area };
-    big(item, size, theme, frame, at);
-    if let Some(beside) = beside {
-        let columns = (beside.letters * size.columns).min(area.width);
-        big(beside, size, theme, frame, Rect { x: area.right() - columns, width: columns, ..at });
-    }
+    big(
+        item,
+        size,
+        theme,
+        frame,
+        Rect { x: area.x + 1, width: area.width.saturating_sub(1), height: rows, ..area },
+    );
     rows
 }
 
@@ -178,13 +156,13 @@ fn width(item: &Item, size: Size) -> u16 {
 }
 
 fn letters(item: &Item, size: Size, theme: Theme, frame: &mut Frame, at: Rect) {
-    draw_line(frame, at, Line::styled(item.label.clone(), label_style(theme)));
+    draw_line(
+        frame,
+        at,
+        Line::styled(item.label.clone(), theme.raised().patch(theme.style(TextRole::Label))),
+    );
     let below = Rect { y: at.y + 1, height: at.height.saturating_sub(1).min(size.rows), ..at };
     big(item, size, theme, frame, below);
-}
-
-fn label_style(theme: Theme) -> ratatui::style::Style {
-    theme.raised().patch(theme.style(TextRole::Label))
 }
 
 fn big(item: &Item, size: Size, theme: Theme, frame: &mut Frame, at: Rect) {
@@ -201,37 +179,4 @@ fn big(item: &Item, size: Size, theme: Theme, frame: &mut Frame, at: Rect) {
     let line = Line::raw(item.text.clone());
     let big = BigText::builder().pixel_size(size.pixels).style(style).lines([line]).build();
     frame.render_widget(big, at);
-}
-
-/// The last ten seconds of a number, as a line.
-fn draw_trend(model: &Model, item: &Item, theme: Theme, now: Duration, frame: &mut Frame, at: Rect) {
-    let Some(quantity) = item.trend.filter(|_| !at.is_empty()) else { return };
-    // Steps of a dot, so that the line does not tremble while time passes.
-    let dot_s = TREND.as_secs_f64() / f64::from(2 * at.width);
-    let end_s = libm::floor(now.as_secs_f64() / dot_s) * dot_s;
-    let from = now.saturating_sub(TREND);
-    let points: Vec<(f64, f64)> = model
-        .history
-        .trace
-        .values(quantity, from, now)
-        .map(|(time, value)| (time.as_secs_f64() - end_s, value))
-        .collect();
-    let values = || points.iter().map(|(_, value)| *value);
-    let (least, most) = (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
-    if points.len() < 2 || least >= most {
-        return;
-    }
-    let ink = if item.is_predicted { Ink::Predicted } else { Ink::Measured };
-    let canvas = Canvas::default()
-        .marker(Marker::Braille)
-        .background_color(theme.raised().bg.unwrap_or_default())
-        .x_bounds([-TREND.as_secs_f64(), 0.0])
-        .y_bounds([least, most])
-        .paint(|context| {
-            for pair in points.windows(2) {
-                let ((x1, y1), (x2, y2)) = (pair[0], pair[1]);
-                context.draw(&canvas::Line { x1, y1, x2, y2, color: theme.ink(ink) });
-            }
-        });
-    frame.render_widget(canvas, at);
 }

@@ -7,7 +7,7 @@ use ratatui::layout::Rect;
 use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 
-use super::panels::{LimitRow, decimals, limit_rows};
+use super::panels::{decimals, limit_rows};
 use super::theme::Ink;
 use super::{TextRole, Theme, age_mark, draw_line, fixed, pages};
 use crate::model::{Deflection, Model};
@@ -74,44 +74,31 @@ pub fn draw_limits(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     let inside = pages::framed(title, words, theme, frame, area);
     let (mark, role) = if is_judged { (" ", TextRole::Plain) } else { age_mark(&at, now) };
     let ink = theme.ground().fg(theme.ink(if is_judged { Ink::Measured } else { Ink::Predicted }));
+    let limit_ink = theme.ground().fg(theme.ink(Ink::Limit));
+    let limit_columns = if inside.width < NARROW { 0 } else { LIMIT_COLUMNS };
     let rows = limit_rows(&at.value, vehicle.limits().as_ref());
     for (row, y) in rows.into_iter().zip(inside.top()..inside.bottom()) {
-        limit(&row, (mark, role, ink), theme, frame, Rect { y, height: 1, ..inside });
+        let at = Rect { y, height: 1, ..inside };
+        let (word, word_role) = if row.kept { ("ok", TextRole::Good) } else { ("NO", TextRole::Alarm) };
+        let value = format!("{mark}{:>5}", fixed(row.value, decimals(row.value)));
+        let name = theme.label(format!(" {:<8}", row.name));
+        draw_line(
+            frame,
+            at,
+            Line::from(vec![theme.span(word, word_role), name, theme.span(value, strong(role))]),
+        );
+        let room = at.width.saturating_sub(BEFORE_BAR + limit_columns);
+        let mark = row.used.is_finite().then_some((LIMIT_AT, limit_ink));
+        bar([0.0, LIMIT_AT * row.used], ink, mark, frame, Rect { x: at.x + BEFORE_BAR, width: room, ..at });
+        let words = theme.either_side(&format!(" {}", row.limit));
+        let beside = Rect { x: at.right() - limit_columns, width: limit_columns, ..at };
+        draw_line(frame, beside, Line::styled(words, limit_ink));
     }
 }
 
-fn limit(
-    row: &LimitRow,
-    (mark, role, ink): (&'static str, TextRole, Style),
-    theme: Theme,
-    frame: &mut Frame,
-    at: Rect,
-) {
-    let (word, word_role) = if row.kept { ("ok", TextRole::Good) } else { ("NO", TextRole::Alarm) };
-    let role = if role == TextRole::Plain { TextRole::Title } else { role };
-    draw_line(
-        frame,
-        at,
-        Line::from(vec![
-            theme.span(word, word_role),
-            theme.label(format!(" {:<8}", row.name)),
-            theme.span(format!("{mark}{:>5}", fixed(row.value, decimals(row.value))), role),
-        ]),
-    );
-    let limit_columns = if at.width < NARROW { 0 } else { LIMIT_COLUMNS };
-    let style = theme.ground().fg(theme.ink(Ink::Limit));
-    let bar_at =
-        Rect { x: at.x + BEFORE_BAR, width: at.width.saturating_sub(BEFORE_BAR + limit_columns), ..at };
-    let mark = row.used.is_finite().then_some((LIMIT_AT, style));
-    bar([0.0, LIMIT_AT * row.used], ink, mark, frame, bar_at);
-    if limit_columns > 0 {
-        let words = theme.either_side(&format!(" {}", row.limit));
-        draw_line(
-            frame,
-            Rect { x: at.right() - limit_columns, width: limit_columns, ..at },
-            Line::styled(words, style),
-        );
-    }
+/// The role of a value beside its bar.
+fn strong(role: TextRole) -> TextRole {
+    if role == TextRole::Plain { TextRole::Title } else { role }
 }
 
 /// Draws fins and gimbal: the measured angle as a bar, the commanded one as a mark.
@@ -134,10 +121,9 @@ pub fn draw_surfaces(model: &Model, theme: Theme, now: Duration, frame: &mut Fra
         let degrees = |pick: fn(&Deflection) -> f64| angles.map(|angles| pick(&angles.value).to_degrees());
         let (commanded, measured) = (degrees(|d| d.commanded_rad), degrees(|d| d.measured_rad));
         let text = measured.map_or_else(|| "--".to_owned(), |deg| fixed(deg, digits));
-        let role = if role == TextRole::Plain { TextRole::Title } else { role };
         let words = vec![
             theme.label(format!(" {name:<6}")),
-            theme.span(format!("{mark}{text:>5}"), role),
+            theme.span(format!("{mark}{text:>5}"), strong(role)),
             theme.label("°"),
         ];
         draw_line(frame, at, Line::from(words));

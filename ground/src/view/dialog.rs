@@ -16,16 +16,6 @@ use crate::model::{
 
 const BOX_COLUMNS: u16 = 68;
 
-/// What a person says who has seen a check: title, lines above and below.
-fn seen(theme: Theme) -> (&'static str, Vec<Line<'static>>, Vec<Line<'static>>) {
-    let saw = SURFACES.map(|(_, _, words)| theme.line(words, TextRole::Plain));
-    (
-        "SEEN, in this order and nothing else?",
-        saw.to_vec(),
-        vec![theme.line("It takes two people.", TextRole::Plain)],
-    )
-}
-
 /// Title and lines of the open dialog; `None` if none is open.
 pub fn dialog_lines(
     model: &Model,
@@ -47,15 +37,12 @@ pub fn dialog_lines(
         return Some(("DID YOU TYPE THIS?", lines));
     }
     let any_other_key = || plain("Any other key cancels. Nothing is sent before Enter.".to_owned());
+    let next = || next_person(model).map(plain).into_iter().chain([any_other_key()]);
     // What stands above and below the line of the word.
     let (title, above, below) = match dialog.prompt {
-        Prompt::Arm => {
-            let next = next_person(model).map(plain).into_iter().chain([any_other_key()]);
-            ("ARM, step 2 of 2", Vec::new(), next.chain(checks(model, theme)).collect())
-        }
+        Prompt::Arm => ("ARM, step 2 of 2", Vec::new(), next().chain(checks(model, theme)).collect()),
         Prompt::Start => {
-            let next = next_person(model).map(plain).into_iter().chain([any_other_key()]);
-            ("START the countdown", Vec::new(), next.chain(model.loss_in_words().map(plain)).collect())
+            ("START the countdown", Vec::new(), next().chain(model.loss_in_words().map(plain)).collect())
         }
         Prompt::Confirm(ask) => {
             let asks = plain(format!("{} asks to {}.", model.operator(ask.by), ask.act_name()));
@@ -111,7 +98,11 @@ pub fn dialog_lines(
             let then = ["Then the sensors are watched for 5 s: touch nothing.", "Any other key cancels."];
             ("CHECK the vehicle", vec![strong(begins)], then.map(|words| plain(words.to_owned())).to_vec())
         }
-        Prompt::Seen => seen(theme),
+        Prompt::Seen => {
+            let saw = SURFACES.map(|(_, _, words)| plain(words.to_owned()));
+            let below = vec![plain("It takes two people.".to_owned())];
+            ("SEEN, in this order and nothing else?", saw.to_vec(), below)
+        }
         Prompt::Sign { step: number, void } => {
             let step = model.checklist.as_ref().and_then(|list| list.steps.get(number));
             let words = step.map(|step| step.words.clone()).unwrap_or_default();
@@ -136,8 +127,7 @@ pub fn dialog_lines(
 /// What somebody else has to do after this dialog.
 fn next_person(model: &Model) -> Option<String> {
     let own = model.role_of(model.own_number()).filter(|_| model.people() == Some(2))?;
-    let words = format!("This only asks: {} must confirm within 10 s.", other_roles(own));
-    Some(words)
+    Some(format!("This only asks: {} must confirm within 10 s.", other_roles(own)))
 }
 
 /// The other roles that may command.

@@ -24,7 +24,8 @@ pub fn message_rows(model: &Model, theme: Theme, now: Duration, columns: u16) ->
         let message = message.filter(|_| !model.vehicle.in_flight());
         return message.into_iter().chain([alarm]).collect();
     }
-    let flight = || shows_flight(model).then(|| timeline(model, theme, now, columns));
+    let is_flown = model.playing.is_some() || flight_began(model).is_some();
+    let flight = || is_flown.then(|| timeline(model, theme, now, columns));
     let row = message.or_else(flight).or_else(|| newest_event(model, theme));
     vec![row.unwrap_or_default()]
 }
@@ -51,11 +52,6 @@ const EXPECTED: char = '○';
 const EVENT: char = '!';
 const PASSED: char = '━';
 const TO_COME: char = '┄';
-
-/// Whether there is a flight to show.
-fn shows_flight(model: &Model) -> bool {
-    model.playing.is_some() || flight_began(model).is_some()
-}
 
 /// When the flight began.
 pub fn flight_began(model: &Model) -> Option<Duration> {
@@ -216,23 +212,17 @@ fn pages(model: &Model, theme: Theme, room: u16) -> Line<'static> {
             theme.label(format!(" {key}{}", page.name()))
         }
     };
-    let is_shown = |page: &Page| *page == shown.keyed();
-    let needed: usize = more.width()
-        + word.len()
-        + Page::ALL.into_iter().filter(is_shown).map(|page| of(page).width()).sum::<usize>();
+    let needed = more.width() + word.len() + of(shown.keyed()).width();
     let mut left = usize::from(room).saturating_sub(needed);
-    let mut spans: Vec<Span> = Vec::new();
-    for page in Page::ALL {
-        let span = of(page);
-        if is_shown(&page) {
-            spans.push(span);
-        } else if span.width() <= left {
-            left -= span.width();
-            spans.push(span);
-        } else {
-            left = 0;
+    // Those that fit, in their order, and in any case the shown one.
+    let fits = |page: &Page| {
+        let width = of(*page).width();
+        let fits = width <= left || *page == shown.keyed();
+        if *page != shown.keyed() {
+            left = if fits { left - width } else { 0 };
         }
-    }
-    spans.extend([more, theme.span(word, role)]);
-    Line::from(spans)
+        fits
+    };
+    let pages = Page::ALL.into_iter().filter(fits).map(of);
+    Line::from(pages.chain([more.clone(), theme.span(word, role)]).collect::<Vec<_>>())
 }

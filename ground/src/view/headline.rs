@@ -14,7 +14,7 @@ use super::pictures::map::comes_down;
 use super::top_lines::{level, readiness};
 use super::{STALE_MARK, TextRole, Theme};
 use crate::model::{
-    AlarmKind, Approach, Ending, Model, Page, Sample, Spot,
+    AlarmKind, Approach, Ending, Model, Sample, Spot,
     dead_reckoning::{is_unheard, may_have_left, predict_position},
     hold_words, is_burning, is_liftoff_by_itself, is_on_pad, why_not_here,
 };
@@ -114,8 +114,7 @@ pub fn draw_banner(
 ) -> Rect {
     let letters = u16::try_from(banner.words.chars().count()).unwrap_or(u16::MAX);
     let item = word("", banner.words, letters, banner.role);
-    let verdict = verdict_beside(model, now, frame.area().width);
-    let rows = draw_word(&item, verdict.as_ref(), theme, frame, area);
+    let rows = draw_word(&item, theme, frame, area);
     let level = theme.level(level(model, now));
     frame.buffer_mut().set_style(Rect { height: rows, ..area }, level);
     Rect { y: area.y + rows, height: area.height - rows, ..area }
@@ -202,21 +201,20 @@ fn of_flight(model: &Model, now: Duration) -> (Item, Vec<Item>) {
         return lost(model, now);
     }
     let phase = vehicle.phase_now();
-    let height = || number("height m", vehicle.height_m(), 0, 3, now).with_trend("height");
+    let height = || number("height m", vehicle.height_m(), 0, 3, now);
     let vertical = vehicle.vertical_m_s();
-    let sink =
-        || number("sink m/s", vertical.map(|up| up.map(|m_s| -m_s)), 0, 3, now).with_trend("vertical speed");
-    let climb = || number("climb m/s", vertical, 0, 3, now).with_trend("vertical speed");
-    let tilt = || number("tilt °", vehicle.tilt_deg(), 0, 3, now).with_trend("tilt");
+    let sink = || number("sink m/s", vertical.map(|up| up.map(|m_s| -m_s)), 0, 3, now);
+    let climb = || number("climb m/s", vertical, 0, 3, now);
+    let tilt = || number("tilt °", vehicle.tilt_deg(), 0, 3, now);
     let off_pad = comes_down(model, now).map(|at| Sample::new(libm::hypot(at.east_m, at.north_m), now));
-    let lands_off = || number("lands off m", off_pad, 0, 3, now).predicted().with_trend("touchdown north");
+    let lands_off = || number("lands off m", off_pad, 0, 3, now).predicted();
     let apogee_s =
         vehicle.of_descent(|d| d.time_to_apogee_s).map(|left| left.map(|s| s - left.age(now).as_secs_f64()));
     match phase {
         Some(phase) if is_burning(phase) => {
             let lands = number("lands at m/s", vehicle.predicted_speed_m_s(), 1, 3, now).predicted();
             let main = number("s to touchdown", vehicle.touchdown_in_s(now), 1, 4, now).predicted();
-            (main, vec![lands.with_trend("predicted speed"), height(), sink()])
+            (main, vec![lands, height(), sink()])
         }
         Some(P::TD_PHASE_AERO_DESCENT | P::TD_PHASE_LAND_ARMED) if vehicle.may_light() => (
             number("s to ignition", vehicle.ignition_in_s(now), 1, 4, now).predicted(),
@@ -241,26 +239,12 @@ pub fn draw_flight_band(
     frame: &mut Frame,
     area: Rect,
 ) -> Rect {
-    if replaces_band(model, now) {
+    if banner(model, now).is_some() {
         return area;
     }
     let (main, others) = of_flight(model, now);
-    draw_band(model, (&main, below, &others), theme, now, frame, area)
+    draw_band((&main, below, &others), theme, frame, area)
 }
-
-/// Whether the large words stand on the shown page instead of its band.
-pub fn replaces_band(model: &Model, now: Duration) -> bool {
-    banner(model, now).is_some()
-}
-
-/// The verdict, if it stands beside the large words, as large as they are: on Review, where the screen is wide enough.
-pub fn verdict_beside(model: &Model, now: Duration, columns: u16) -> Option<Item> {
-    let beside = model.page() == Page::Review && columns >= BESIDE_COLUMNS && replaces_band(model, now);
-    beside.then(|| verdict(model, now))
-}
-
-/// Columns of the longest words and the longest verdict.
-const BESIDE_COLUMNS: u16 = 112;
 
 /// The verdict.
 pub fn verdict(model: &Model, now: Duration) -> Item {

@@ -15,21 +15,10 @@ const NARROW_COLUMNS: usize = 50;
 /// Narrower than this, a text is cut rather than wrapped.
 const WRAP_COLUMNS_MIN: usize = 20;
 
-/// So many events leave a list at once, if it has at least so many rows: a list that moves is written anew.
-const EVENTS_STEP: u64 = 2;
-const STEPS_FROM_ROWS: usize = 6;
-
 /// The newest events, oldest first, in this many lines of this width. Long texts wrap, because the end of a refusal
 /// is its reason.
 pub fn events(model: &Model, theme: Theme, columns: usize, rows: usize) -> Vec<Line<'static>> {
-    let mut events = chosen(model, theme, columns, rows);
-    let before = model.events.total() - events.len() as u64;
-    let begins = |place: &usize| {
-        let fits = events[*place..].iter().map(Vec::len).sum::<usize>() <= rows;
-        fits && (before + *place as u64).is_multiple_of(EVENTS_STEP) && rows >= STEPS_FROM_ROWS
-    };
-    let shown = events.split_off((0..events.len()).find(begins).unwrap_or(0));
-    newest_lines(shown, columns, rows)
+    newest_lines(chosen(model, theme, columns, rows), columns, rows)
 }
 
 /// All of them.
@@ -213,6 +202,7 @@ fn below(step: &Step) -> String {
         .as_ref()
         .map_or_else(String::new, |limits| format!(": {} {}", limits.quantity.name, limits.words()));
     let who = step.role.map_or("anybody", role_name);
+    let signer = |by: &str| if by.is_empty() { "somebody".to_owned() } else { by.to_owned() };
     match &step.mark {
         Mark::Open => format!("{who} signs{limits}"),
         Mark::Signed(signature) => {
@@ -222,10 +212,6 @@ fn below(step: &Step) -> String {
             format!("voided by {}, {}; {who} signs", signer(&signature.by), clock(signature.unix_s))
         }
     }
-}
-
-fn signer(by: &str) -> &str {
-    if by.is_empty() { "somebody" } else { by }
 }
 
 /// Hours and minutes of the day, UTC.
@@ -259,21 +245,6 @@ mod tests {
         assert_eq!(shown(1), ["    7.0 ! arming refused: pin…"]);
         assert_eq!(shown(2), whole);
         assert_eq!(shown(3), ["    7.0   SAFED", whole[0], whole[1]]);
-    }
-
-    #[test]
-    fn a_full_list_moves_at_every_second_event() {
-        let mut model = Model::new(Settings::on_screen("udpin:127.0.0.1:14550"));
-        let theme = Theme { palette: Palette::None, ascii: false };
-        let mut shown = |name: u32| {
-            model.events.push(Duration::ZERO, Speaker::Vehicle, EventLevel::Info, name.to_string());
-            let lines = events(&model, theme, TIME_COLUMNS + 3 + 20, 6);
-            let names =
-                lines.iter().map(|line| line.to_string().split_whitespace().last().map(str::to_owned));
-            names.flatten().collect::<Vec<String>>().join(" ")
-        };
-        let lists: Vec<String> = (1..=9).map(&mut shown).collect();
-        assert_eq!(lists[5..], ["1 2 3 4 5 6", "3 4 5 6 7", "3 4 5 6 7 8", "5 6 7 8 9"]);
     }
 
     #[test]

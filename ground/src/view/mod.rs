@@ -3,7 +3,7 @@
 //! Every page has the same frame: [`top_lines`] (identity, link, recording; the state and what an abort would do in the
 //! colour of the danger), the page, and [`footer`] (the flight along its time, the keys). [`pages`] has the pages; [`panels`], [`pictures`],
 //! [`lists`] and [`widgets`] are what they are made of. From 80x22 on, the panels are side by side; on smaller terminals
-//! there are plain lines, the most important first. For terminals without Unicode, [`theme`] converts the result.
+//! there are plain lines: state, abort, alarm and messages, and the pages that are lines. For terminals without Unicode, [`theme`] converts the result.
 
 pub mod band;
 pub mod bars;
@@ -27,24 +27,24 @@ use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Paragraph, Wrap};
 
-use crate::model::{CommandKind, Model};
+use crate::model::Model;
 pub use theme::{Ink, TextRole, Theme};
-use widgets::{STALE_MARK, age_mark, fixed, row, seconds, shortest, text_row};
+use top_lines::ABORT_LABEL;
+use widgets::{STALE_MARK, age_mark, fixed, quantity_row, seconds, shortest, text_row};
 
 /// The smallest screen with panels: 80x24 without the lines of a multiplexer.
 const WIDE_COLUMNS: u16 = 80;
 const WIDE_ROWS: u16 = 22;
 
-/// Draws the screen. Returns where the pictures of a flight are, which may be older than the numbers above them.
+/// Draws the screen.
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame) -> Option<Rect> {
     let area = frame.area();
     frame.buffer_mut().set_style(area, theme.ground());
-    let pictures = if area.width >= WIDE_COLUMNS && area.height >= WIDE_ROWS {
-        draw_wide(model, theme, now, frame, area)
-    } else {
-        draw_compact(model, theme, now, frame, area);
-        None
-    };
+    let is_wide = area.width >= WIDE_COLUMNS && area.height >= WIDE_ROWS;
+    let pictures = if is_wide { draw_wide(model, theme, now, frame, area) } else { None };
+    if !is_wide {
+        draw_small(model, theme, now, frame, area);
+    }
     if theme.ascii {
         theme::flatten(frame.buffer_mut());
     }
@@ -79,12 +79,6 @@ fn stacked<const N: usize>(area: Rect, rows: [Constraint; N]) -> [Rect; N] {
     area.layout(&Layout::vertical(rows))
 }
 
-/// The pieces of a line, with its style.
-fn styled(line: Line<'static>) -> impl Iterator<Item = Span<'static>> {
-    let style = line.style;
-    line.spans.into_iter().map(move |span| span.patch_style(style))
-}
-
 /// Draws one line.
 fn draw_line(frame: &mut Frame, area: Rect, line: Line) {
     draw_lines(frame, Rect { height: area.height.min(1), ..area }, &[line]);
@@ -93,7 +87,7 @@ fn draw_line(frame: &mut Frame, area: Rect, line: Line) {
 // The layout from 80x22 on, the same on every page: who and what is seen; the state in the colour of its danger; the words on
 // approaching; the page; the flight along its time, or an alarm; the keys.
 
-pub fn draw_wide(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) -> Option<Rect> {
+fn draw_wide(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) -> Option<Rect> {
     let banner = headline::banner(model, now);
     let messages = footer::message_rows(model, theme, now, area.width);
     let state_rows = if area.width < top_lines::ONE_ROW_COLUMNS { 2 } else { 1 };
@@ -127,66 +121,53 @@ pub fn draw_wide(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
     pictures.filter(|_| !is_covered)
 }
 
-// The layout for terminals smaller than 80x22: plain lines, the most important first. Of a page of panels little is left.
+// The layout for terminals smaller than 80x22: plain lines, the most important first. Of a page of panels nothing is left.
 
 /// With fewer rows an open dialog replaces the line of countdown and link.
 const DIALOG_ROWS: u16 = 8;
 /// From this many rows on, the last one has the keys.
 const KEYS_ROWS: u16 = 10;
 
-/// Draws the lines that fit.
-pub fn draw_compact(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+fn draw_small(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let columns = usize::from(area.width);
+    let banner = headline::banner(model, now);
     let mut lines = vec![top_lines::identity(model, theme, now)];
-    lines.extend(
-        headline::banner(model, now).map(|words| theme.line(format!(" {}", words.sentence()), words.role)),
-    );
-    lines.push(Line::from(vec![
-        top_lines::phase(model, theme, now),
-        Span::raw(" "),
-        top_lines::armed(model, theme, now),
-    ]));
+    lines.extend(banner.map(|words| theme.line(format!(" {}", words.sentence()), words.role)));
+    let (phase, armed) = (top_lines::phase(model, theme, now), top_lines::armed(model, theme, now));
+    lines.push(Line::from(vec![phase, Span::raw(" "), armed]));
     let open = dialog::dialog_lines(model, theme, now);
     if open.is_none() || area.height >= DIALOG_ROWS {
-        let mut line = vec![top_lines::countdown(model, theme, now), Span::raw(" ")];
+        let mut line = Line::from(vec![top_lines::countdown(model, theme, now), Span::raw(" ")]);
         let link = top_lines::link(model, theme, now);
-        line.extend(styled(link));
-        lines.push(Line::from(line));
+        line.extend(link.spans.into_iter().map(|span| span.patch_style(link.style)));
+        lines.push(line);
     }
-    lines.push(compact_abort(model, theme, now, area.width));
-    let keys = u16::from(open.is_none() && area.height >= KEYS_ROWS);
+    let mut abort = top_lines::abort(model, theme, now, columns);
+    let commands = model.settings.role.why_not_command().is_none();
+    if let Some(label) = abort.spans.first_mut().filter(|label| label.content == ABORT_LABEL && commands) {
+        *label = theme.key(" ^X^X ABORT: ");
+    }
+    lines.push(abort);
     if open.is_none() {
         let hands_off = top_lines::hands_off(model, theme, now);
-        let columns = usize::from(area.width);
         let message = top_lines::message(model, theme, now, columns).filter(|_| hands_off.is_none());
         let next = status_lines::next_event(model, now, false);
         let ready = top_lines::readiness(model, now).filter(|_| next.is_none());
         let ready = ready.map(|(words, role)| theme.line(format!(" {words}"), role));
-        let alarm = status_lines::alarm_text(model, theme, now, columns);
         lines.extend(hands_off);
         lines.extend(next.map(|words| theme.line(words, TextRole::Title)));
-        lines.extend(alarm.filter(|_| model.playing.is_none()));
+        lines
+            .extend(status_lines::alarm_text(model, theme, now, columns).filter(|_| model.playing.is_none()));
         lines.extend(message.or(ready));
     }
+    let keys = u16::from(open.is_none() && area.height >= KEYS_ROWS);
     let [top, page, keys] = stacked(area, [Length(lines.len() as u16), Fill(1), Length(keys)]);
     draw_lines(frame, top, &lines);
     if let Some((_, text)) = open {
         return frame.render_widget(Paragraph::new(text).wrap(Wrap { trim: false }), page);
     }
     let palette = dialog::palette_lines(model, theme, now, usize::from(page.height).saturating_sub(1));
-    let lines =
-        if palette.is_empty() { pages::lines(model, model.page(), theme, now, page) } else { palette };
+    let lines = if palette.is_empty() { pages::lines(model, theme, now, page) } else { palette };
     draw_lines(frame, page, &lines);
     footer::draw_keys(model, theme, now, frame, keys);
-}
-
-fn compact_abort(model: &Model, theme: Theme, now: Duration, columns: u16) -> Line<'static> {
-    let line = top_lines::abort(model, theme, now, usize::from(columns));
-    let acts = model.abort_chord.is_begun(now) || model.link.why_abort_not_sent(now).is_some();
-    if acts || model.commands.of(CommandKind::Abort).is_some() {
-        return line;
-    }
-    let key = if model.settings.role.why_not_command().is_none() { " ^X^X ABORT:" } else { " abort:" };
-    let mut spans = vec![theme.key(key)];
-    spans.extend(line.spans.into_iter().skip(1).flat_map(|span| [Span::raw(" "), span]));
-    Line::from(spans)
 }

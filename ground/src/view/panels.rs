@@ -1,147 +1,36 @@
-//! The panels of the pages: flight, controller, actuators, touchdown, and the predicted position of a lost vehicle.
+//! Rows of the pages: what steers the burn, the limits of a touchdown, and the predicted position of a lost vehicle.
 
 use std::time::Duration;
 
-use protocol::dialect::{
-    TD_CONTROLLER_DATA, TD_TOUCHDOWN_LIMITS_DATA, TdControlLevel, TdLanding, TdLimit, TdSolverStatus,
-};
+use protocol::dialect::{TD_CONTROLLER_DATA, TD_TOUCHDOWN_LIMITS_DATA, TdControlLevel, TdLanding, TdLimit};
 use ratatui::text::Line;
 
-use super::{TextRole, Theme, age_mark, fixed, row, seconds, shortest};
+use super::{TextRole, Theme, age_mark, fixed, seconds, shortest, text_row};
 use crate::model::{
-    BodySpeed, Deflection, Ending, Gimbal, LIMITS, Model, Motion, Sample, Touchdown, Verdict,
-    dead_reckoning::{Basis, is_unheard, predict_position},
+    Ending, LIMITS, Model, Sample, Touchdown, Verdict,
+    dead_reckoning::{Basis, predict_position},
     words,
 };
 
-/// Title and rows: altitude, speeds and attitude; after the loss of the link the predicted position.
-pub fn flight_panel(model: &Model, theme: Theme, now: Duration) -> (&'static str, Vec<Line<'static>>) {
-    if is_lost(model, now) {
-        return ("PREDICTED, not heard", lost_rows(model, theme, now));
-    }
-    ("Flight", flight_rows(model, theme, now))
-}
-
-/// Altitude, speeds and attitude.
-pub fn flight_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    let vehicle = &model.vehicle;
-    let of_body = |pick: fn(&BodySpeed) -> f64| vehicle.body_speed().map(|known| known.map(pick));
-    let line = |label, value, decimals, unit| row(theme, label, value, decimals, unit, now);
-    vec![
-        line("altitude", vehicle.of_motion(|m| m.altitude_m), 2, "m"),
-        line("vertical", vehicle.of_motion(|m| m.climb_m_s), 2, "m/s"),
-        line("horizontal", vehicle.of_motion(Motion::horizontal_m_s), 2, "m/s"),
-        line("distance", vehicle.of_motion(Motion::distance_m), 1, "m"),
-        line("along axis", of_body(|b| b.u_m_s), 2, "m/s"),
-        line("across", of_body(BodySpeed::lateral_m_s), 3, "m/s"),
-        line("tilt", vehicle.tilt_deg(), 2, "deg"),
-        line("turn rate", vehicle.of_attitude(|a| a.turn_rate_rad_s().to_degrees()), 2, "deg/s"),
-    ]
-}
-
-// The panel of the landing controller (NMPC).
-
-/// The panel's rows.
-pub fn controller_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    let told = model.vehicle.last::<TD_CONTROLLER_DATA>();
-    let controller = told.as_ref();
-    let number = |value: Option<f64>| {
-        value
-            .zip(controller.map(|controller| controller.received_at))
-            .map(|(value, received_at)| Sample { value, received_at })
+/// What steers the burn.
+pub fn burn_row(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
+    let Some(told) = model.vehicle.last::<TD_CONTROLLER_DATA>() else {
+        return text_row(theme, "burn", (" ", TextRole::Label), "--", "");
     };
-    let data = controller.map(|controller| &controller.value);
-    let (mark, age_role) = controller.map_or((" ", TextRole::Label), |controller| age_mark(controller, now));
-    let wide_text = |label: &str, text: String, role: TextRole| {
-        let role = if age_role == TextRole::Stale { age_role } else { role };
-        Line::from(vec![
-            theme.label(format!(" {label:<6}")),
-            theme.span(format!("{mark}{text:>17.17}"), role),
-        ])
+    let (mark, age) = age_mark(&told, now);
+    let (words, role) = steered(told.value.level);
+    text_row(theme, "burn", (mark, if age == TextRole::Stale { age } else { role }), &words, "")
+}
+
+fn steered(level: TdControlLevel) -> (String, TextRole) {
+    let (words, role) = match level {
+        TdControlLevel::TD_CONTROL_LEVEL_CONVERGED => ("on its plan", TextRole::Good),
+        TdControlLevel::TD_CONTROL_LEVEL_BEST_FEASIBLE => ("near its plan", TextRole::Caution),
+        TdControlLevel::TD_CONTROL_LEVEL_SHIFTED_PLAN => ("on its last plan", TextRole::Caution),
+        TdControlLevel::TD_CONTROL_LEVEL_STABILISER => ("UPRIGHT, NO PLAN", TextRole::Alarm),
+        other => return (words::lower_case(&other, "TD_CONTROL_LEVEL_"), TextRole::Plain),
     };
-    let level = data.map_or_else(|| "--".to_owned(), |d| steered(d.level));
-    let status =
-        data.map_or_else(|| "--".to_owned(), |d| words::lower_case(&d.solver_status, "TD_SOLVER_STATUS_"));
-    let missed = data.is_some_and(|d| d.deadline_margin_us < 0);
-    let margin = number(data.map(|d| f64::from(d.deadline_margin_us) / 1_000.0));
-    vec![
-        wide_text("burn", level, data.map_or(TextRole::Label, |d| level_role(d.level))),
-        wide_text("solver", status, data.map_or(TextRole::Label, |d| status_role(d.solver_status))),
-        row(theme, "iterations", number(data.map(|d| f64::from(d.iterations))), 0, "", now),
-        row(theme, "solve time", number(data.map(|d| f64::from(d.solve_time_us) / 1_000.0)), 2, "ms", now),
-        row(theme, if missed { "MISSED BY" } else { "margin" }, margin, 2, "ms", now),
-        row(theme, "thrust", model.vehicle.of_descent(|d| d.thrust_scale), 3, "x", now),
-    ]
-}
-
-/// What steers the burn, in words.
-fn steered(level: TdControlLevel) -> String {
-    match level {
-        TdControlLevel::TD_CONTROL_LEVEL_CONVERGED => "on its plan".to_owned(),
-        TdControlLevel::TD_CONTROL_LEVEL_BEST_FEASIBLE => "near its plan".to_owned(),
-        TdControlLevel::TD_CONTROL_LEVEL_SHIFTED_PLAN => "on its last plan".to_owned(),
-        TdControlLevel::TD_CONTROL_LEVEL_STABILISER => "UPRIGHT, NO PLAN".to_owned(),
-        other => words::lower_case(&other, "TD_CONTROL_LEVEL_"),
-    }
-}
-
-fn level_role(level: TdControlLevel) -> TextRole {
-    match level {
-        TdControlLevel::TD_CONTROL_LEVEL_CONVERGED => TextRole::Good,
-        TdControlLevel::TD_CONTROL_LEVEL_BEST_FEASIBLE | TdControlLevel::TD_CONTROL_LEVEL_SHIFTED_PLAN => {
-            TextRole::Caution
-        }
-        TdControlLevel::TD_CONTROL_LEVEL_STABILISER => TextRole::Alarm,
-        _ => TextRole::Plain,
-    }
-}
-
-fn status_role(status: TdSolverStatus) -> TextRole {
-    match status {
-        TdSolverStatus::TD_SOLVER_STATUS_CONVERGED => TextRole::Good,
-        TdSolverStatus::TD_SOLVER_STATUS_NOT_RUN => TextRole::Plain,
-        _ => TextRole::Caution,
-    }
-}
-
-// The panels of fins and gimbal: commanded and measured angles.
-
-/// One row for each of the four fins.
-pub fn fin_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    let fin = |k: usize| model.vehicle.fins().map(|fins| fins.map(|fins| fins[k]));
-    (0..4).map(|k| deflection(&format!(" fin {} ", k + 1), fin(k), " deg", theme, now)).collect()
-}
-
-/// A row for each of the gimbal's two planes, with its stop.
-pub fn gimbal_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    let limit = model.vehicle.limits().map(|limits| f64::from(limits.gimbal_limit_rad).to_degrees());
-    let limit = limit.filter(|limit| limit.is_finite() && *limit > 0.0);
-    let stop = limit.map_or_else(String::new, |limit| theme.either_side(&format!(" ±{}", shortest(limit))));
-    let plane = |name: &str, pick: fn(&Gimbal) -> Deflection| {
-        let angle = model.vehicle.gimbal().map(|gimbal| gimbal.map(pick));
-        deflection(name, angle, &format!("{stop}°"), theme, now)
-    };
-    vec![plane(" pitch", |g| g.pitch), plane(" yaw  ", |g| g.yaw)]
-}
-
-/// An angle as commanded and as measured.
-fn deflection(
-    name: &str,
-    angle: Option<Sample<Deflection>>,
-    unit: &str,
-    theme: Theme,
-    now: Duration,
-) -> Line<'static> {
-    let (mark, role) = angle.map_or((" ", TextRole::Label), |angle| age_mark(&angle, now));
-    let degrees = |pick: fn(&Deflection) -> f64| {
-        angle.map_or_else(|| "--".to_owned(), |angle| fixed(pick(&angle.value).to_degrees(), 1))
-    };
-    let (commanded, measured) = (degrees(|d| d.commanded_rad), degrees(|d| d.measured_rad));
-    Line::from(vec![
-        theme.label(name.to_owned()),
-        theme.span(format!("{mark}{commanded:>6} | {measured:>5}"), role),
-        theme.label(unit.to_owned()),
-    ])
+    (words.to_owned(), role)
 }
 
 /// How the flight ended.
@@ -210,16 +99,8 @@ pub(super) fn decimals(value: f64) -> usize {
 
 // The panel of the predicted position after the link is lost in flight.
 
-/// Whether the position of a vehicle in flight is stale.
-pub fn is_lost(model: &Model, now: Duration) -> bool {
-    is_unheard(&model.vehicle, now)
-}
-
-/// The rows of the prediction; none while the vehicle is heard.
+/// The rows of the prediction.
 pub fn lost_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    if !is_lost(model, now) {
-        return Vec::new();
-    }
     let Some(at) = predict_position(&model.vehicle, now) else {
         return vec![
             theme.line(" position unknown:", TextRole::Alarm),

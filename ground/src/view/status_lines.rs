@@ -125,7 +125,6 @@ pub fn link_line(model: &Model, theme: Theme, now: Duration, columns: usize) -> 
         None => "--".to_owned(),
     };
     let loss = model.link.loss(now);
-    let loss_role = |loss: Option<f64>| if loss > Some(0.05) { TextRole::Caution } else { TextRole::Plain };
     let unsigned = model.link.signing.map_or(0, |signing| signing.rejected());
     let rejected =
         model.link.framing.crc_errors + model.link.framing.unknown_ids + model.link.undecodable + unsigned;
@@ -157,6 +156,11 @@ pub fn link_line(model: &Model, theme: Theme, now: Duration, columns: usize) -> 
         used <= columns
     };
     Line::from(pieces.into_iter().take_while(fits).collect::<Vec<_>>())
+}
+
+/// A loss of more than a twentieth is marked.
+pub fn loss_role(loss: Option<f64>) -> TextRole {
+    if loss > Some(0.05) { TextRole::Caution } else { TextRole::Plain }
 }
 
 /// A loss in percent; unknown while nothing arrives.
@@ -196,16 +200,6 @@ pub fn recording(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
     theme.span(words, if model.log.dropped > 0 { TextRole::Caution } else { TextRole::Plain })
 }
 
-/// How much is heard, and how much of it is lost.
-pub fn rates(model: &Model, now: Duration) -> String {
-    let rate_kb_s = model.link.stats.figures(now).rx_bytes_s / 1e3;
-    let capacity = model
-        .settings
-        .link_capacity_bytes_s
-        .map_or_else(String::new, |most| format!("/{:.1}", f64::from(most) / 1e3));
-    format!("{rate_kb_s:.1}{capacity} kB/s, {} lost  ", percent(model.link.loss(now)))
-}
-
 // The alarm line above the page names, with the foremost alarm or the newest event.
 
 /// The key that acknowledges the shown alarm.
@@ -241,7 +235,7 @@ pub fn alarm_text(model: &Model, theme: Theme, now: Duration, columns: usize) ->
         count => format!(" (+{})", count - 1),
     };
     let key = if alarm.acknowledged || columns < KEY_FROM_COLUMNS { "" } else { KEY };
-    let AlarmState { word, age, role } = alarm_state(alarm, now);
+    let (word, age, role) = alarm_state(alarm, now);
     let taken = 1 + word.len() + 1 + 1 + age.len() + more.len() + key.len();
     // On the narrowest screens the text is more important than its age.
     let room = columns.saturating_sub(taken).max(TEXT_COLUMNS_MIN);
@@ -255,18 +249,9 @@ pub fn alarm_text(model: &Model, theme: Theme, now: Duration, columns: usize) ->
     Some(Line::from(spans))
 }
 
-/// The present state of an alarm, for showing.
-pub struct AlarmState {
-    /// Says whether the alarm holds and whether a person has seen it.
-    pub word: &'static str,
-    /// How long the alarm has held, or how long ago it ended; in whole seconds.
-    pub age: String,
-    pub role: TextRole,
-}
-
-/// Describes the present state of an alarm.
-pub fn alarm_state(alarm: &Alarm, now: Duration) -> AlarmState {
-    let since = |at: Duration| now.saturating_sub(at).as_secs();
+/// Whether an alarm holds and a person has seen it; for how long it has held, or how long ago it ended, in whole seconds.
+pub fn alarm_state(alarm: &Alarm, now: Duration) -> (&'static str, String, TextRole) {
+    let since_s = |at: Duration| now.saturating_sub(at).as_secs();
     let (word, role) = match alarm.ended_at {
         None if alarm.acknowledged => ("alarm seen:", TextRole::Caution),
         None => ("ALARM", TextRole::Alarm),
@@ -274,10 +259,10 @@ pub fn alarm_state(alarm: &Alarm, now: Duration) -> AlarmState {
         Some(_) => ("ended alarm:", TextRole::Caution),
     };
     let age = match alarm.ended_at {
-        None => format!("{} s", since(alarm.raised_at)),
-        Some(at) => format!("ended {} s ago", since(at)),
+        None => format!("{} s", since_s(alarm.raised_at)),
+        Some(at) => format!("ended {} s ago", since_s(at)),
     };
-    AlarmState { word, age, role }
+    (word, age, role)
 }
 
 /// Shortens a text to this many columns; a shortened text ends in `..`. Whole words are kept, unless that would lose more

@@ -1,8 +1,8 @@
 //! Gives each role of a text, and each part of a picture, its style. Colour only repeats what a word or a mark
 //! already says.
 //!
-//! Dark, light and high contrast paint their own background, in colours whose values are fixed (the upper 240 of the
-//! 256 of xterm), so that their contrast is known. In the sun only the light theme can be read.
+//! Dark and light paint their own background, in colours whose values are fixed (the upper 240 of the 256 of xterm), so that their
+//! contrast is known. In the sun only the light theme can be read.
 
 use std::borrow::Cow;
 
@@ -28,19 +28,6 @@ pub enum TextRole {
     /// A wrong or dangerous state.
     Alarm,
     Key,
-}
-
-impl TextRole {
-    pub const ALL: [Self; 8] = [
-        Self::Plain,
-        Self::Label,
-        Self::Stale,
-        Self::Title,
-        Self::Good,
-        Self::Caution,
-        Self::Alarm,
-        Self::Key,
-    ];
 }
 
 /// A part of a picture: what was measured, what is predicted and what limits have one colour each, everywhere.
@@ -88,21 +75,16 @@ pub enum Palette {
     Dark,
     /// Black on white, without yellow, for sunlight.
     Light,
-    /// The terminal's own background and its 16 colours.
-    Sixteen,
-    /// No colours.
+    /// No colours but the terminal's own two.
     None,
-    /// White on black, the fewest and brightest colours.
-    Contrast,
 }
 
 impl Palette {
-    pub const ALL: [Self; 5] = [Self::Dark, Self::Light, Self::Sixteen, Self::None, Self::Contrast];
+    pub const ALL: [Self; 3] = [Self::Dark, Self::Light, Self::None];
 
     #[must_use]
     pub fn next(self) -> Self {
-        let place = Self::ALL.iter().position(|palette| *palette == self).unwrap_or(0);
-        Self::ALL[(place + 1) % Self::ALL.len()]
+        Self::ALL[(self as usize + 1) % Self::ALL.len()]
     }
 
     /// `None` if the background is the terminal's own.
@@ -110,8 +92,7 @@ impl Palette {
         match self {
             Self::Dark => Some(&DARK),
             Self::Light => Some(&LIGHT),
-            Self::Contrast => Some(&CONTRAST),
-            Self::Sixteen | Self::None => None,
+            Self::None => None,
         }
     }
 }
@@ -158,18 +139,6 @@ const LIGHT: Colours = Colours {
     inks: [19, 88, 90, 16, 88, 239],
     levels: [(231, 240), (16, 214), (231, 124), (231, 22)],
 };
-const CONTRAST: Colours = Colours {
-    back: 16,
-    raised: 16,
-    plain: 231,
-    label: 231,
-    good: 46,
-    caution: 226,
-    alarm: (16, 231),
-    border: 231,
-    inks: [51, 226, 225, 231, 226, 231],
-    levels: [(231, 16), (16, 226), (16, 231), (16, 46)],
-};
 
 /// What the terminal can show, and in which colours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -185,12 +154,9 @@ impl Theme {
     pub fn of_environment(variable: impl Fn(&str) -> Option<String>) -> Self {
         let set = |name: &str| variable(name).filter(|value| !value.is_empty());
         let term = set("TERM").unwrap_or_default();
-        // Terminals without colour.
-        let grey = ["vt1", "vt2", "vt3", "ansi-m", "linux-m", "xterm-mono"];
-        let palette = if set("NO_COLOR").is_some() || grey.iter().any(|name| term.starts_with(name)) {
+        let has_colours = term.contains("256color") || set("COLORTERM").is_some();
+        let palette = if set("NO_COLOR").is_some() || !has_colours {
             Palette::None
-        } else if !term.contains("256color") && set("COLORTERM").is_none() {
-            Palette::Sixteen
         } else if set("COLORFGBG").is_some_and(|colours| colours.ends_with(";15")) {
             Palette::Light
         } else {
@@ -211,9 +177,7 @@ impl Theme {
 
     /// The style of an empty cell.
     pub fn ground(self) -> Style {
-        self.palette.colours().map_or_else(Style::new, |colours| {
-            Style::new().fg(Color::Indexed(colours.plain)).bg(Color::Indexed(colours.back))
-        })
+        self.palette.colours().map_or_else(Style::new, |colours| on(colours.plain, colours.back))
     }
 
     /// The background of an empty cell.
@@ -223,62 +187,35 @@ impl Theme {
 
     /// The style of the header, the large numbers and the keys, which stand out a little.
     pub fn raised(self) -> Style {
-        self.palette.colours().map_or_else(Style::new, |colours| {
-            Style::new().fg(Color::Indexed(colours.plain)).bg(Color::Indexed(colours.raised))
-        })
+        self.palette.colours().map_or_else(Style::new, |colours| on(colours.plain, colours.raised))
     }
 
     /// The style of the lines between panels: nothing depends on them.
     pub fn border(self) -> Style {
-        let colours = self.palette.colours();
-        colours.map_or_else(Style::new, |colours| Style::new().fg(Color::Indexed(colours.border)))
+        self.palette.colours().map_or_else(Style::new, |colours| ink(colours.border))
     }
 
     /// The style of the rows of the state.
     pub fn level(self, level: Level) -> Style {
-        let bold = Style::new().add_modifier(Modifier::BOLD);
-        if let Some(colours) = self.palette.colours() {
+        let style = self.palette.colours().map_or_else(reversed, |colours| {
             let (fore, back) = colours.levels[level as usize];
-            return bold.fg(Color::Indexed(fore)).bg(Color::Indexed(back));
-        }
-        let colour = match level {
-            Level::Calm => None,
-            Level::Armed => Some(Color::Yellow),
-            Level::Danger => Some(Color::Red),
-            Level::Free => Some(Color::Green),
-        };
-        bold.patch(self.reversed(colour))
-    }
-
-    /// Letters on one of the sixteen colours. They have a colour, too: the terminal's own background may be as bright or as dark.
-    fn reversed(self, colour: Option<Color>) -> Style {
-        let fg = colour.filter(|_| self.palette == Palette::Sixteen);
-        let bg = fg.map(|colour| if colour == Color::Red { Color::White } else { Color::Black });
-        Style { fg, bg, ..Style::new().add_modifier(Modifier::REVERSED) }
+            on(fore, back)
+        });
+        style.add_modifier(Modifier::BOLD)
     }
 
     /// The style of a role. A letter's weight and slant say the same without colour.
     pub fn style(self, role: TextRole) -> Style {
-        let plain = Style::new();
-        let style = if let Some(colours) = self.palette.colours() {
-            let on_back = |colour| plain.fg(Color::Indexed(colour));
-            match role {
-                TextRole::Plain | TextRole::Stale | TextRole::Title | TextRole::Key => on_back(colours.plain),
-                // Paler than a value, and still readable in the sun: 7:1.
-                TextRole::Label => on_back(colours.label),
-                TextRole::Good => on_back(colours.good),
-                TextRole::Caution => on_back(colours.caution),
-                TextRole::Alarm => on_back(colours.alarm.0).bg(Color::Indexed(colours.alarm.1)),
-            }
-        } else {
-            let colour = match role {
-                TextRole::Alarm => return self.reversed(Some(Color::Red)).add_modifier(Modifier::BOLD),
-                TextRole::Good => Some(Color::Green),
-                TextRole::Caution => Some(Color::Yellow),
-                _ => None,
-            };
-            Style { fg: colour.filter(|_| self.palette == Palette::Sixteen), ..plain }
-        };
+        let coloured = self.palette.colours().map(|colours| match role {
+            TextRole::Plain | TextRole::Stale | TextRole::Title | TextRole::Key => ink(colours.plain),
+            // Paler than a value, and still readable in the sun: 7:1.
+            TextRole::Label => ink(colours.label),
+            TextRole::Good => ink(colours.good),
+            TextRole::Caution => ink(colours.caution),
+            TextRole::Alarm => on(colours.alarm.0, colours.alarm.1),
+        });
+        let style =
+            coloured.unwrap_or_else(|| if role == TextRole::Alarm { reversed() } else { Style::new() });
         match role {
             TextRole::Plain | TextRole::Label | TextRole::Good => style,
             TextRole::Stale => style.add_modifier(Modifier::ITALIC),
@@ -312,17 +249,20 @@ impl Theme {
 
     /// The colour of a part of a picture.
     pub fn ink(self, ink: Ink) -> Color {
-        if let Some(colours) = self.palette.colours() {
-            return Color::Indexed(colours.inks[ink as usize]);
-        }
-        match ink {
-            _ if self.palette == Palette::None => Color::Reset,
-            Ink::Measured => Color::Cyan,
-            Ink::Predicted | Ink::Flame => Color::Yellow,
-            Ink::Limit => Color::Magenta,
-            Ink::Body | Ink::Scale => Color::Reset,
-        }
+        self.palette.colours().map_or(Color::Reset, |colours| Color::Indexed(colours.inks[ink as usize]))
     }
+}
+
+fn ink(colour: u8) -> Style {
+    Style::new().fg(Color::Indexed(colour))
+}
+
+fn on(fore: u8, back: u8) -> Style {
+    ink(fore).bg(Color::Indexed(back))
+}
+
+fn reversed() -> Style {
+    Style::new().add_modifier(Modifier::REVERSED)
 }
 
 // Converts a drawn screen to ASCII, cell by cell, for terminals without Unicode (`LANG=C`, a vt100).
@@ -378,40 +318,31 @@ fn ascii(c: char) -> char {
 mod theme_tests {
     use super::*;
 
-    fn of(set: &[(&str, &str)]) -> Theme {
-        Theme::of_environment(|name| {
-            set.iter().find(|(known, _)| *known == name).map(|(_, value)| (*value).to_owned())
-        })
-    }
-
     #[test]
     fn the_environment_says_what_the_terminal_can_show() {
-        let full = Theme { palette: Palette::Dark, ascii: false };
-        assert_eq!(of(&[("TERM", "xterm-256color"), ("LANG", "C.UTF-8")]), full);
-        let few = Theme { palette: Palette::Sixteen, ascii: false };
-        assert_eq!(of(&[("TERM", "tmux"), ("LC_ALL", "de_DE.utf8"), ("LANG", "C")]), few);
-        assert!(of(&[("LANG", "en_US.UTF-8"), ("LC_ALL", "C")]).ascii);
-        assert!(of(&[("LANG", "C")]).ascii && of(&[]).ascii);
-        assert_eq!(of(&[("NO_COLOR", "1"), ("TERM", "xterm-256color")]).palette, Palette::None);
-        assert_eq!(of(&[("NO_COLOR", ""), ("TERM", "xterm-256color")]).palette, Palette::Dark);
-        let white = [("TERM", "rxvt-256color"), ("COLORFGBG", "0;15")];
-        assert_eq!(of(&white).palette, Palette::Light);
-        let console = Theme { palette: Palette::Sixteen, ascii: true };
-        assert_eq!(of(&[("TERM", "linux"), ("LANG", "C.UTF-8")]), console);
-        assert_eq!(
-            of(&[("TERM", "vt100"), ("LANG", "C.UTF-8")]),
-            Theme { palette: Palette::None, ascii: true }
-        );
+        for (set, palette, ascii) in [
+            (vec![("TERM", "xterm-256color"), ("LANG", "C.UTF-8")], Palette::Dark, false),
+            (vec![("TERM", "tmux"), ("LC_ALL", "de_DE.utf8"), ("LANG", "C")], Palette::None, false),
+            (vec![("TERM", "tmux"), ("COLORTERM", "truecolor")], Palette::Dark, true),
+            (vec![("TERM", "xterm-256color"), ("LANG", "en_US.UTF-8"), ("LC_ALL", "C")], Palette::Dark, true),
+            (vec![], Palette::None, true),
+            (vec![("NO_COLOR", "1"), ("TERM", "xterm-256color")], Palette::None, true),
+            (vec![("NO_COLOR", ""), ("TERM", "xterm-256color")], Palette::Dark, true),
+            (vec![("TERM", "rxvt-256color"), ("COLORFGBG", "0;15")], Palette::Light, true),
+            (vec![("TERM", "linux"), ("LANG", "C.UTF-8")], Palette::None, true),
+        ] {
+            let found = Theme::of_environment(|name| {
+                set.iter().find(|(known, _)| *known == name).map(|(_, value)| (*value).to_owned())
+            });
+            assert_eq!(found, Theme { palette, ascii }, "{set:?}");
+        }
     }
 
     #[test]
     fn the_next_palette_reaches_every_palette() {
-        let mut seen = vec![Palette::Dark];
-        while seen.len() < Palette::ALL.len() {
-            seen.push(seen[seen.len() - 1].next());
-        }
-        assert_eq!(seen, Palette::ALL);
-        assert_eq!(seen[4].next(), Palette::Dark);
+        let reached: Vec<_> =
+            std::iter::successors(Some(Palette::Dark), |palette| Some(palette.next())).take(4).collect();
+        assert_eq!(reached, [Palette::Dark, Palette::Light, Palette::None, Palette::Dark]);
     }
 }
 
@@ -428,5 +359,6 @@ mod ascii_tests {
         flatten(&mut buffer);
         let text: String = buffer.content.iter().map(ratatui::buffer::Cell::symbol).collect();
         assert_eq!(text, "a-|+<#. ?#z ");
+        assert_eq!(Theme { palette: Palette::None, ascii: true }.either_side("±1 m"), "+-1 m");
     }
 }

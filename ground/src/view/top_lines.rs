@@ -20,22 +20,20 @@ use crate::model::{
 };
 
 /// Columns of the state: armed, phase, clock, each in its place.
-const ARMED_COLUMNS: u16 = 9;
-const PHASE_COLUMNS: u16 = 15;
-const CLOCK_COLUMNS: u16 = 9;
+const STATE_COLUMNS: [u16; 3] = [9, 15, 9];
 /// From this width on the state and what an abort would do, with its key, stand in one row, otherwise in two.
 pub const ONE_ROW_COLUMNS: u16 = 160;
 const ABORT_COLUMNS: u16 = 84;
 /// From this width on the rate and the loss of the link are shown beside its ages.
 const RATES_COLUMNS: u16 = 110;
+const RATES_WITHIN: usize = 32;
 
 /// Draws who and what is seen, how well it is heard, and whether that is recorded.
 pub fn draw_identity(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let mut right = if area.width < RATES_COLUMNS {
-        Vec::new()
-    } else {
-        vec![theme.label(status_lines::rates(model, now))]
-    };
+    let shows_rates = area.width >= RATES_COLUMNS && model.link.trouble.is_none();
+    let rates = status_lines::link_line(model, theme, now, if shows_rates { RATES_WITHIN } else { 0 });
+    let mut right = rates.spans;
+    right.push(Span::raw("  "));
     right.extend(link(model, theme, now).spans);
     right.push(status_lines::recording(model, theme, now));
     let right = Line::from(right);
@@ -68,25 +66,17 @@ pub fn level(model: &Model, now: Duration) -> Level {
 /// its key.
 pub fn draw_state(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     frame.buffer_mut().set_style(area, theme.level(level(model, now)));
-    let plain = |span: Span<'static>| Line::from(span.content);
     let first = Rect { height: area.height.min(1), ..area };
-    let [armed_area, phase_area, clock_area, middle, abort_area] = side_by_side(
-        first,
-        [
-            Length(ARMED_COLUMNS),
-            Length(PHASE_COLUMNS),
-            Length(CLOCK_COLUMNS),
-            Fill(1),
-            Length(if area.height > 1 { 0 } else { ABORT_COLUMNS }),
-        ],
+    let abort_columns = if area.height > 1 { 0 } else { ABORT_COLUMNS };
+    let [state, middle, abort_area] =
+        side_by_side(first, [Length(STATE_COLUMNS.iter().sum()), Fill(1), Length(abort_columns)]);
+    let words = [armed(model, theme, now), phase(model, theme, now), countdown(model, theme, now)];
+    let in_place = |(words, columns): (Span, u16)| format!("{:1$.1$}", words.content, usize::from(columns));
+    draw_line(
+        frame,
+        state,
+        Line::from(words.into_iter().zip(STATE_COLUMNS).map(in_place).collect::<String>()),
     );
-    for (at, part) in [
-        (armed_area, armed(model, theme, now)),
-        (phase_area, phase(model, theme, now)),
-        (clock_area, countdown(model, theme, now)),
-    ] {
-        draw_line(frame, at, plain(part));
-    }
     if let Some(line) = in_the_middle(model, theme, now, usize::from(middle.width)) {
         draw_line(frame, middle, line);
     }
@@ -134,9 +124,8 @@ fn draw_abort(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, are
 
 /// Who is seen, and who commands.
 pub fn identity(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
-    let space = Span::raw(" ");
-    let [vehicle, crew] = [vehicle, crew].map(|of| of(model, theme, now));
-    Line::from(vec![mode(model, theme), space.clone(), vehicle, space, crew])
+    let (space, vehicle) = (Span::raw(" "), vehicle(model, theme, now));
+    Line::from(vec![mode(model, theme), space.clone(), vehicle, space, crew(model, theme, now)])
 }
 
 /// A vehicle counts as real unless it has always reported to be simulated.
@@ -182,11 +171,6 @@ fn vehicle(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
     theme.plain(format!("{system}{name}boot {boot}"))
 }
 
-/// Whether other screens than this one can command.
-fn others_can_command(model: &Model) -> bool {
-    model.crew.seats().iter().any(|seat| *seat != model.settings.seat)
-}
-
 /// Each name once, with how many screens have it.
 fn counted(names: Vec<String>) -> Vec<String> {
     let mut found: Vec<(String, usize)> = Vec::new();
@@ -228,7 +212,9 @@ fn crew(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
         // First, whoever else sits at this station: the silence of this station holds the countdown.
         _ if model.link.uplink.armed_by_us && model.link.state(now).carries() => "armed here".to_owned(),
         _ if model.link.uplink.armed_by_us => "~armed here".to_owned(),
-        _ if others_can_command(model) => format!("by {}", counted(model.crew.names()).join(",")),
+        _ if model.crew.seats().iter().any(|seat| *seat != model.settings.seat) => {
+            format!("by {}", counted(model.crew.names()).join(","))
+        }
         Role::Watching => "watches only".to_owned(),
         _ => "commands here".to_owned(),
     };
@@ -240,7 +226,8 @@ fn crew(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
 /// In flight, a command whose effect is not observed is shown instead of the next event for this long, and on the pad an
 /// answered one instead of a NO-GO. Its alarm stays.
 const OPEN_SHOWN: Duration = Duration::from_secs(10);
-pub const ABORT_KEY: &str = "Ctrl-X Enter";
+const ABORT_KEY: &str = "Ctrl-X Enter";
+pub const ABORT_LABEL: &str = " abort now: ";
 
 /// The key that aborts from this screen, or why none does.
 pub fn abort_key(model: &Model) -> String {
@@ -360,7 +347,7 @@ pub fn abort(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line
     if let Some(track) = model.commands.of(CommandKind::Abort) {
         return command_facts(track, columns, theme, now);
     }
-    let mut spans = vec![theme.label(" abort now: "), theme.plain(effect)];
+    let mut spans = vec![theme.label(ABORT_LABEL), theme.plain(effect)];
     spans.extend(hold_until(model, now).map(|words| theme.span(words, TextRole::Caution)));
     Line::from(spans)
 }
@@ -416,12 +403,6 @@ pub fn hands_off(model: &Model, theme: Theme, now: Duration) -> Option<Line<'sta
     Some(theme.line(words, TextRole::Caution))
 }
 
-/// The line of a held countdown: why, and what happens next.
-fn hold(model: &Model, theme: Theme) -> Option<Line<'static>> {
-    let words = hold_words(&model.vehicle, model.link.uplink.armed_by_us)?;
-    Some(theme.line(words, TextRole::Alarm))
-}
-
 /// The three facts of a command, in as many columns: commanded, acknowledged, observed. First its time is left out.
 fn command_facts(track: &TrackedCommand, columns: usize, theme: Theme, now: Duration) -> Line<'static> {
     // Other names are longer.
@@ -474,27 +455,20 @@ fn refusal(result: u8) -> &'static str {
 /// What the row above the keys says instead of the flight: that a check moves the surfaces, a command, or a hold.
 pub fn message(model: &Model, theme: Theme, now: Duration, columns: usize) -> Option<Line<'static>> {
     let latest = model.commands.tracks.iter().rfind(|track| track.kind != CommandKind::Abort);
-    let shown = latest.filter(|track| !answered_long_ago(track, now) || open_command(model, now).is_some());
+    let is_past = |at: Duration| now.saturating_sub(at) >= OPEN_SHOWN;
+    let is_open = |track: &&TrackedCommand| {
+        track.observed_at.is_none() && !track.is_withdrawn && !is_past(track.commanded_at)
+    };
+    let is_news = |track: &&TrackedCommand| {
+        let answered = matches!(track.acknowledged, Acknowledgement::Answered(_) | Acknowledgement::GivenUp);
+        !answered || !is_past(track.acknowledged_at.unwrap_or(track.commanded_at))
+    };
     let facts = |track| command_facts(track, columns, theme, now);
+    let hold = || hold_words(&model.vehicle, model.link.uplink.armed_by_us);
     hands_off(model, theme, now)
-        .or_else(|| open_command(model, now).map(facts))
-        .or_else(|| hold(model, theme))
-        .or_else(|| shown.map(facts))
-}
-
-fn answered_long_ago(track: &TrackedCommand, now: Duration) -> bool {
-    let answered = matches!(track.acknowledged, Acknowledgement::Answered(_) | Acknowledgement::GivenUp);
-    answered && now.saturating_sub(track.acknowledged_at.unwrap_or(track.commanded_at)) >= OPEN_SHOWN
-}
-
-/// The latest command other than an abort, while its effect is not observed yet.
-pub fn open_command(model: &Model, now: Duration) -> Option<&TrackedCommand> {
-    let latest = model.commands.tracks.iter().rfind(|track| track.kind != CommandKind::Abort);
-    latest.filter(|track| {
-        track.observed_at.is_none()
-            && !track.is_withdrawn
-            && now.saturating_sub(track.commanded_at) < OPEN_SHOWN
-    })
+        .or_else(|| latest.filter(is_open).map(facts))
+        .or_else(|| hold().map(|words| theme.line(words, TextRole::Alarm)))
+        .or_else(|| latest.filter(is_news).map(facts))
 }
 
 /// Whether the vehicle may be armed: GO only if every check passes and the uplink is proven. `None` before the

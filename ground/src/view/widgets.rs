@@ -5,45 +5,33 @@ use std::time::Duration;
 use ratatui::text::Line;
 
 use super::{TextRole, Theme};
-use crate::model::Sample;
 pub use crate::model::words::{fixed, shortest};
+use crate::model::{Model, Sample, quantity::Quantity};
 
 /// The mark before a value that is too old.
 pub const STALE_MARK: &str = "~";
 /// The width of a value in a row, without its mark.
 const VALUE_WIDTH: usize = 9;
-const LABEL_WIDTH: usize = 10;
+const LABEL_WIDTH: usize = 17;
 
 /// The mark and the role of a value by its age.
 pub fn age_mark<T>(sample: &Sample<T>, now: Duration) -> (&'static str, TextRole) {
     if sample.is_stale(now) { (STALE_MARK, TextRole::Stale) } else { (" ", TextRole::Plain) }
 }
 
-/// A row with label, value and unit. A stale value is marked; a missing one is `--`.
-pub fn row(
-    theme: Theme,
-    label: &str,
-    value: Option<Sample<f64>>,
-    decimals: usize,
-    unit: &'static str,
-    now: Duration,
-) -> Line<'static> {
-    let text = value.map_or_else(|| "--".to_owned(), |sample| fixed(sample.value, decimals));
-    let (mark, role) = value.map_or((" ", TextRole::Label), |sample| age_mark(&sample, now));
-    text_row(theme, label, mark, &text, role, unit)
+/// A row with the name, the value and the unit of a quantity. A stale value is marked; a missing one is `--`.
+pub fn quantity_row(quantity: &Quantity, model: &Model, theme: Theme, now: Duration) -> Line<'static> {
+    let value = quantity.read(model, now);
+    let text = value.map_or_else(|| "--".to_owned(), |sample| fixed(sample.value, quantity.decimals));
+    let age = value.map_or((" ", TextRole::Label), |sample| age_mark(&sample, now));
+    text_row(theme, quantity.name, age, &text, quantity.unit)
 }
 
-/// A row with label and text, aligned like the numbers.
-pub fn text_row(
-    theme: Theme,
-    label: &str,
-    mark: &'static str,
-    text: &str,
-    role: TextRole,
-    unit: &'static str,
-) -> Line<'static> {
+/// A row with label, text and unit; before the text stands its mark.
+pub fn text_row(theme: Theme, label: &str, age: (&str, TextRole), text: &str, unit: &str) -> Line<'static> {
+    let (mark, role) = age;
     Line::from(vec![
-        theme.label(format!(" {label:<LABEL_WIDTH$.LABEL_WIDTH$}")),
+        theme.label(format!(" {label:<LABEL_WIDTH$}")),
         theme.span(format!("{mark}{text:>VALUE_WIDTH$}"), role),
         theme.label(format!(" {unit}")),
     ])

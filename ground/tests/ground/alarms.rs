@@ -233,22 +233,6 @@ fn an_abort_that_would_arrive_too_late_says_so() {
     rig.expect_screen("abort now: lands here");
 }
 
-#[test]
-fn after_the_loss_of_the_link_the_position_is_a_prediction_that_grows_uncertain() {
-    let mut rig = Rig::crewed();
-    rig.phase = TdPhase::TD_PHASE_AERO_DESCENT;
-    rig.run(1.0);
-    rig.state(1.0, 60.0, 0.0, -5.0, 90.0);
-    rig.speaks = false;
-    rig.run(2.0);
-    let early = rig.screen(80, 24);
-    assert!(early.contains("┬ PREDICTED ─") && early.contains("free fall"), "{early}");
-    // 60 - 5 t - g t^2 / 2 at 2 s, and 1.5 + 0.5 t + 2.5 t^2: the drag is not known.
-    assert!(early.contains("30.4 ±12.5 m"), "{early}");
-    rig.run(1.0);
-    rig.expect_screen("0.9 ±25.5 m");
-}
-
 /// With two alarms, one Space acknowledges one of them; the list marks which, and another can be chosen.
 #[test]
 fn alarms_are_listed_and_acknowledged_one_by_one() {

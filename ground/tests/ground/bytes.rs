@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use flight::computer::LogState;
 use ground::app::pace::Pace;
-use ground::app::terminal::Thrifty;
+use ground::app::terminal::DiffBackend;
 use ground::model::Model;
 use ground::update::{Action, Msg, update};
 use ground::view;
@@ -63,7 +63,7 @@ fn flight(profile: &str, columns: u16, rows: u16) -> Vec<(Duration, usize, TdPha
     let mut emulator = vt100::Parser::new(size(rows), size(columns), 0);
     let line = Line::default();
     let options = TerminalOptions { viewport: Viewport::Fixed(Rect::new(0, 0, columns, rows)) };
-    let mut terminal = Terminal::with_options(Thrifty::new(CrosstermBackend::new(line.clone())), options)
+    let mut terminal = Terminal::with_options(DiffBackend::new(CrosstermBackend::new(line.clone())), options)
         .expect("a terminal of memory");
     let (mut pace, mut drawn) = (Pace::default(), Vec::new());
     let mut fresh = Terminal::new(TestBackend::new(columns, rows)).expect("a terminal of memory");

@@ -38,15 +38,15 @@ fn the_palette_lists_every_action_with_its_key() {
 #[test]
 fn an_entry_is_found_by_parts_of_its_words_and_does_what_its_key_does() {
     let mut rig = on_the_pad();
-    rig.keys(&[typed(":"), typed("two SIDES")].concat());
+    rig.keys(&[typed(":"), typed("look FOR the")].concat());
     let screen = rig.screen(80, 24);
-    assert!(screen.contains(":two SIDES_") && screen.contains("1 found"), "{screen}");
+    assert!(screen.contains(":look FOR the_") && screen.contains("1 found"), "{screen}");
     rig.key(Key::Enter);
-    assert_eq!(rig.model.page(), Page::Path);
+    assert_eq!(rig.model.page(), Page::Find);
     choose(&mut rig, "colours");
     assert!(rig.actions.contains(&Action::NextTheme));
     rig.keys(&[typed(":"), vec![Key::Escape]].concat());
-    assert_eq!((rig.model.pages.entry.clone(), rig.model.page()), (None, Page::Path), "Esc only closes it");
+    assert_eq!((rig.model.pages.entry.clone(), rig.model.page()), (None, Page::Find), "Esc only closes it");
 }
 
 /// The palette opens the dialog of a ladder and goes no further: the word and Enter are still to be typed.
@@ -94,7 +94,7 @@ fn the_palette_only_tells_how_to_abort() {
 fn the_abort_works_in_the_palette() {
     for opened in [typed(":"), typed(":arm"), typed("t")] {
         let mut settings = settings(false, true);
-        settings.keys = chosen(&[("theme", "m"), ("path", "M")]);
+        settings.keys = chosen(&[("theme", "m"), ("plot", "M")]);
         let mut rig = Rig::new(settings);
         rig.run(1.0);
         rig.keys(&opened);
@@ -154,20 +154,6 @@ fn any_number_can_be_plotted() {
     }
     rig.key(Key::Up);
     assert_eq!(rig.model.pages.plotted.place(), quantity::COUNT - 2);
-}
-
-#[test]
-fn the_plot_has_round_ticks() {
-    let mut rig = descending();
-    for k in 0..40_u16 {
-        rig.state(4.0, 130.0 - f32::from(k), 0.0, -10.0, 88.0);
-        rig.run(0.1);
-    }
-    choose(&mut rig, "plot height");
-    let screen = rig.screen(80, 24);
-    for tick in ["│m", "50│", "100│", "150│"] {
-        assert!(screen.contains(tick), "{tick}\n{screen}");
-    }
 }
 
 #[test]

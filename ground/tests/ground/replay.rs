@@ -321,6 +321,6 @@ fn palette_filter_and_theme_work_in_a_replay() {
     }
     player.pass(S(3));
     assert_eq!(player.position(), S(3), "the space did not pause it");
-    player.on_key(Key::Char('p'));
-    assert_eq!(player.model.page(), Page::Path);
+    player.on_key(Key::Char('f'));
+    assert_eq!(player.model.page(), Page::Find);
 }

@@ -3,11 +3,12 @@
 use ground::key::Key;
 use ground::model::{Prompt, Seat};
 use ground::update::{Action, Msg};
+use ground::view::top_lines;
 use protocol::dialect::{MavMessage, TD_UPLINK_DATA, TIMESYNC_DATA, TdFrameRefusal, TdPhase};
 use protocol::identity::{Address, GROUND};
 
 use crate::keys::ladder;
-use crate::rig::{Rig, is_arm};
+use crate::rig::{MONO, Rig, is_arm};
 
 fn top(rig: &Rig) -> String {
     rig.screen(80, 24).lines().next().unwrap_or_default().to_owned()
@@ -90,23 +91,26 @@ fn an_answer_proves_the_uplink_of_a_vehicle_that_does_not_report_it() {
 #[test]
 fn who_armed_the_vehicle_is_on_the_screen() {
     let mut rig = Rig::crewed();
-    let identity = |rig: &Rig| rig.screen(80, 24).lines().next().unwrap_or_default().to_owned();
-    assert!(identity(&rig).contains("commands here"));
+    let who = |rig: &Rig| {
+        let line = top_lines::identity(&rig.model, MONO, rig.now).to_string();
+        line.split("boot 1A2B3C4D  ").nth(1).map(str::to_owned)
+    };
+    assert_eq!(who(&rig).as_deref(), Some("commands here"));
     rig.armed = true;
     rig.phase = TdPhase::TD_PHASE_PAD_ARMED;
     rig.run(1.0);
-    assert!(identity(&rig).contains("armed here"), "{}", identity(&rig));
+    assert_eq!(who(&rig).as_deref(), Some("armed here"));
     // Whoever else sits here: the silence of this station holds the countdown.
     let seats = |names: &[&str]| (1..).zip(names).map(|(number, name)| Seat::new(number, *name)).collect();
     rig.msg(Msg::Crew { seats: seats(&["ann", "ann", "bob", "ann", "ann", "ann"]), silent: Vec::new() });
-    assert!(identity(&rig).contains("armed here"), "{}", identity(&rig));
+    assert_eq!(who(&rig).as_deref(), Some("armed here"));
     rig.armed = false;
     rig.phase = TdPhase::TD_PHASE_PAD_IDLE;
     rig.run(1.0);
-    assert!(identity(&rig).contains("by ann x5,bob"), "{}", identity(&rig));
+    assert_eq!(who(&rig).as_deref(), Some("by ann x5,bob"));
     let mut rig = Rig::crewed();
     rig.uplink_of(Address { system_id: 254, component_id: 190 }, 100, true);
-    assert!(identity(&rig).contains("armed 254/190"), "{}", identity(&rig));
+    assert_eq!(who(&rig).as_deref(), Some("armed 254/190"));
 }
 
 fn heartbeats_in(rig: &mut Rig, seconds: f64) -> usize {

@@ -2,7 +2,7 @@
 
 use std::num::NonZero;
 
-use ground::app::terminal::Thrifty;
+use ground::app::terminal::DiffBackend;
 use ground::key::Key;
 use ground::model::{Seat, Settings};
 use ground::update::Msg;
@@ -22,7 +22,7 @@ fn on_a_terminal(rig: &mut Rig, keys: &[Key]) -> (Vec<String>, Vec<String>) {
     let (columns, rows) = SIZE;
     let mut bytes = Vec::new();
     let viewport = Viewport::Fixed(Rect::new(0, 0, columns, rows));
-    let backend = Thrifty::new(CrosstermBackend::new(&mut bytes));
+    let backend = DiffBackend::new(CrosstermBackend::new(&mut bytes));
     let mut terminal = Terminal::with_options(backend, TerminalOptions { viewport }).expect("a terminal");
     for key in keys {
         rig.key(*key);

@@ -7,8 +7,8 @@ use protocol::dialect::{TD_PAD_CHECK_DATA, TdPadCheckItem, TdPadCheckState, TdPa
 use ratatui::text::{Line, Span};
 
 use crate::model::{
-    Act, LOSS_MOST, LastPlace, MARGIN_LEAST_DB, Model, PadCheck, RangeTest, RangeTestResult, SURFACES, Spot,
-    Standing, dead_reckoning::may_have_left, shown, standing,
+    Act, Degrees, LOSS_MOST, LastPlace, MARGIN_LEAST_DB, Model, PadCheck, SURFACES, Sample, Spot, Standing,
+    dead_reckoning::may_have_left, shown, standing,
 };
 use crate::view::{TextRole, Theme, fixed, seconds};
 
@@ -33,7 +33,7 @@ pub fn checks_lines(model: &Model, theme: Theme, now: Duration, columns: usize) 
         let cells = (0..beside).filter_map(|column| others.get(row + column * rows));
         lines.push(Line::from(cells.flat_map(|value| cell(value, theme)).collect::<Vec<_>>()));
     }
-    lines.extend(radio(model, theme, now));
+    lines.push(radio(model, theme, now));
     lines
 }
 
@@ -71,11 +71,8 @@ fn headline(model: &Model, check: Option<&PadCheck>, theme: Theme, now: Duration
         _ => (format!(" CHECK {} STOPPED early", check.told.run), TextRole::Caution, begin),
     };
     let told = seconds(now.saturating_sub(check.told_at));
-    let by = if check.told.asked_by > 0 {
-        format!(", {}", model.operator(check.told.asked_by))
-    } else {
-        String::new()
-    };
+    let by = Some(check.told.asked_by).filter(|number| *number > 0);
+    let by = by.map_or_else(String::new, |number| format!(", {}", model.operator(number)));
     Line::from(vec![
         theme.span(words, role),
         theme.label(format!(" (told {told} ago{by})")),
@@ -85,24 +82,15 @@ fn headline(model: &Model, check: Option<&PadCheck>, theme: Theme, now: Duration
 
 /// Battery and storage, outside of a check too.
 fn supply(model: &Model, theme: Theme) -> Line<'static> {
-    let battery = model.vehicle.battery().map_or_else(
-        || "not told".to_owned(),
-        |battery| {
-            let left = battery.value.percent.map_or_else(String::new, |percent| format!(", {percent} %"));
-            format!("{} V{left}", fixed(battery.value.volts, 2))
-        },
-    );
-    let space = model
-        .vehicle
-        .log_space_mib()
-        .map_or_else(|| "not told".to_owned(), |space| format!("{} MiB free", fixed(space.value, 0)));
-    let (label, plain) = (theme.style(TextRole::Label), theme.style(TextRole::Plain));
-    Line::from(vec![
-        Span::styled(" battery ", label),
-        Span::styled(battery, plain),
-        Span::styled("   vehicle's log ", label),
-        Span::styled(space, plain),
-    ])
+    let not_told = || "not told".to_owned();
+    let battery = model.vehicle.battery().map_or_else(not_told, |battery| {
+        let left = battery.value.percent.map_or_else(String::new, |percent| format!(", {percent} %"));
+        format!("{} V{left}", fixed(battery.value.volts, 2))
+    });
+    let free = |space: Sample<f64>| format!("{} MiB free", fixed(space.value, 0));
+    let space = model.vehicle.log_space_mib().map_or_else(not_told, free);
+    let [battery, space] = [battery, space].map(|words| theme.plain(words));
+    Line::from(vec![theme.label(" battery "), battery, theme.label("   vehicle's log "), space])
 }
 
 fn role_of(verdict: TdPadCheckVerdict) -> (&'static str, TextRole) {
@@ -148,16 +136,15 @@ fn cell(value: &TD_PAD_CHECK_DATA, theme: Theme) -> Vec<Span<'static>> {
     let (mark, role) = role_of(value.verdict);
     let (name, unit, factor, decimals) = shown(value);
     let number = |number: f32| fixed(factor * f64::from(number), decimals);
-    let found = match value.item {
-        item if is_switch(item) => if value.value > 0.5 { "yes" } else { "no" }.to_owned(),
-        _ => format!("{} {unit}", number(value.value)),
-    };
+    let is_switch = unit.is_empty() && value.item != TdPadCheckItem::TD_PAD_CHECK_ITEM_GNSS_FIXES;
+    let yes_no = if value.value > 0.5 { "yes" } else { "no" };
+    let found = if is_switch { yes_no.to_owned() } else { format!("{} {unit}", number(value.value)) };
     let limits = match (value.least.is_finite(), value.most.is_finite()) {
-        _ if is_switch(value.item) => String::new(),
+        (false, false) => String::new(),
+        _ if is_switch => String::new(),
         (true, true) => format!("{}..{}", number(value.least), number(value.most)),
         (true, false) => format!("least {}", number(value.least)),
         (false, true) => format!("most {}", number(value.most)),
-        (false, false) => String::new(),
     };
     vec![
         theme.span(format!(" {mark}"), role),
@@ -167,55 +154,34 @@ fn cell(value: &TD_PAD_CHECK_DATA, theme: Theme) -> Vec<Span<'static>> {
     ]
 }
 
-fn is_switch(item: TdPadCheckItem) -> bool {
-    use TdPadCheckItem as I;
-    matches!(
-        item,
-        I::TD_PAD_CHECK_ITEM_IGNITER_CONTINUITY
-            | I::TD_PAD_CHECK_ITEM_BOOSTER_WIRE
-            | I::TD_PAD_CHECK_ITEM_PIN_OUT
-            | I::TD_PAD_CHECK_ITEM_LOG_RUNNING
-    )
-}
-
-/// The radio range test: what was found with its limits.
-fn radio(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    let label = theme.style(TextRole::Label);
-    let key = model.settings.keys.name(Act::RangeTest);
+/// The radio range test in one line, because the smallest whole screen has no more: what was found with its limits.
+fn radio(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     let Some(test) = model.range_test.as_ref() else {
-        return vec![Line::from(vec![
-            theme.plain(" radio: no range test yet"),
-            Span::styled(format!("  {key} begins one: 30 s, antennas as in flight"), label),
-        ])];
+        let begins =
+            format!("  {} begins one: 30 s, antennas as in flight", model.settings.keys.name(Act::RangeTest));
+        return Line::from(vec![theme.plain(" radio: no range test yet"), theme.label(begins)]);
     };
     let found = test.found.unwrap_or_else(|| test.so_far(None));
-    vec![result(test, &found, theme, now)]
-}
-
-/// In one line: the smallest whole screen has no more.
-fn result(test: &RangeTest, found: &RangeTestResult, theme: Theme, now: Duration) -> Line<'static> {
     let (words, role) = match (test.is_running(), found.stopped, found.passed()) {
         (true, ..) => (format!("RUNS {:.0} s", test.left(now).as_secs_f64()), TextRole::Caution),
         (false, Some(_), _) => ("STOPPED".to_owned(), TextRole::Caution),
         (false, None, true) => ("PASSED".to_owned(), TextRole::Good),
         (false, None, false) => ("FAILED".to_owned(), TextRole::Alarm),
     };
+    let judged = |is_kept: bool, words: String| {
+        let (mark, role) = if is_kept { ("ok", TextRole::Good) } else { ("NO", TextRole::Alarm) };
+        theme.span(format!(" {mark} {words}"), role)
+    };
+    let loss =
+        |name: &str, loss: f64| judged(loss <= LOSS_MOST, format!("{name} {} %", fixed(100.0 * loss, 1)));
     let mut spans = vec![theme.span(format!(" RADIO {words}"), role)];
-    let judged = |ok: bool| if ok { ("ok ", TextRole::Good) } else { ("NO ", TextRole::Alarm) };
-    for (name, loss) in [("lost down", found.loss_down), ("up", found.loss_up)] {
-        let (mark, role) = judged(loss <= LOSS_MOST);
-        spans.push(theme.span(format!(" {mark}{name} {} %", fixed(100.0 * loss, 1)), role));
-    }
+    spans.extend([loss("lost down", found.loss_down), loss("up", found.loss_up)]);
     spans.push(theme.label(format!(" most {:.0}", 100.0 * LOSS_MOST)));
-    match found.margin_db {
-        Some(margin_db) => {
-            let (mark, role) = judged(margin_db >= MARGIN_LEAST_DB);
-            spans.push(theme.span(format!(" {mark}margin {} dB", fixed(margin_db, 1)), role));
-            let least = format!(" least {MARGIN_LEAST_DB:.0}");
-            spans.push(theme.label(least));
-        }
-        None => spans.push(theme.label(" no margin told")),
+    if let Some(margin_db) = found.margin_db {
+        spans.push(judged(margin_db >= MARGIN_LEAST_DB, format!("margin {} dB", fixed(margin_db, 1))));
     }
+    let least = || format!(" least {MARGIN_LEAST_DB:.0}");
+    spans.push(theme.label(found.margin_db.map_or_else(|| " no margin told".to_owned(), |_| least())));
     Line::from(spans)
 }
 
@@ -224,15 +190,14 @@ fn result(test: &RangeTest, found: &RangeTestResult, theme: Theme, now: Duration
 /// The places and the ways to them.
 pub fn find_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let place = model.last_place(now).or(model.place);
-    let label = |words: &'static str| theme.line(words, TextRole::Label);
     if may_have_left(&model.vehicle, now).is_some() {
         return may_have_left_lines(model, theme);
     }
+    let label = |words: &'static str| theme.line(words, TextRole::Label);
     let Some(place) = place else {
         if model.vehicle.left_pad_at.is_some() {
-            return vec![
-                theme.line(" The vehicle has left the pad, and has not told its place.", TextRole::Caution),
-            ];
+            let words = " The vehicle has left the pad, and has not told its place.";
+            return vec![theme.line(words, TextRole::Caution)];
         }
         return vec![
             label(" The vehicle has not left the pad."),
@@ -254,33 +219,31 @@ pub fn find_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'stati
     lines.push(row("heard", format!("{ago} s ago, boot {:08X}", place.boot), theme));
     lines.push(Line::default());
     if place.pad.is_none() {
-        let words = " Latitude, longitude and KML need the pad's place: `pad` in the settings";
-        lines.push(theme.line(words, TextRole::Label));
+        lines.push(label(" Latitude, longitude and KML need the pad's place: `pad` in the settings"));
     } else if model.settings.here.is_none() {
-        let words = " The way from this station needs its place: `here` in the settings";
-        lines.push(theme.line(words, TextRole::Label));
+        lines.push(label(" The way from this station needs its place: `here` in the settings"));
     }
     lines
 }
 
 /// It was last heard on the pad, in a countdown that must have ended.
 fn may_have_left_lines(model: &Model, theme: Theme) -> Vec<Line<'static>> {
-    let words = " MAY BE IN THE AIR since T-0".to_owned();
-    let mut lines = vec![theme.line(words, TextRole::Alarm)];
+    let caution = |words: &'static str| theme.line(words, TextRole::Caution);
+    let mut lines = vec![theme.line(" MAY BE IN THE AIR since T-0", TextRole::Alarm)];
     let Some(meant) = model.meant_to_come_down() else {
-        let words = " It has not told the fence of its mission: look around the pad.";
-        lines.push(theme.line(words, TextRole::Caution));
+        lines.push(caution(" It has not told the fence of its mission: look around the pad."));
         return lines;
     };
     let (north, east) = (fixed(meant.north_m, 0), fixed(meant.east_m, 0));
     lines.push(row("meant to land", format!("north {north} m, east {east} m of the pad"), theme));
     lines.push(row("within", format!("{} m, the fence of its mission", fixed(meant.error_m, 0)), theme));
-    if let Some(at) = model.settings.pad.map(|pad| pad.moved(meant.north_m, meant.east_m)) {
-        lines.push(row("degrees", format!("{:.6}, {:.6}", at.latitude, at.longitude), theme));
-    }
-    let words = " Under a parachute, or without its landing motor, it may come down farther away.";
-    lines.push(theme.line(words, TextRole::Caution));
+    lines.extend(degrees(model.settings.pad.map(|pad| pad.moved(meant.north_m, meant.east_m)), theme));
+    lines.push(caution(" Under a parachute, or without its landing motor, it may come down farther away."));
     lines
+}
+
+fn degrees(at: Option<Degrees>, theme: Theme) -> Option<Line<'static>> {
+    at.map(|at| row("degrees", format!("{:.6}, {:.6}", at.latitude, at.longitude), theme))
 }
 
 fn row(label: &str, value: String, theme: Theme) -> Line<'static> {
@@ -293,17 +256,11 @@ fn spot(model: &Model, place: &LastPlace, spot: &Spot, theme: Theme) -> Vec<Line
     // 359.6 is 000, as on a compass.
     let bearing_deg = way.bearing_deg.round() as u32 % 360;
     let plus_minus = theme.either_side(&format!("±{} m", fixed(spot.error_m, 0)));
-    let mut rows = vec![
-        row(from, format!("{} m, bearing {bearing_deg:03} deg", fixed(way.distance_m, 0)), theme),
-        row(
-            "pad frame",
-            format!("north {} m, east {} m", fixed(spot.north_m, 1), fixed(spot.east_m, 1)),
-            theme,
-        ),
+    let (way_m, north_m, east_m) = (fixed(way.distance_m, 0), fixed(spot.north_m, 1), fixed(spot.east_m, 1));
+    let rows = [
+        row(from, format!("{way_m} m, bearing {bearing_deg:03} deg"), theme),
+        row("pad frame", format!("north {north_m} m, east {east_m} m"), theme),
         row("19 of 20 cases", plus_minus, theme),
     ];
-    if let Some(at) = place.degrees(spot) {
-        rows.push(row("degrees", format!("{:.6}, {:.6}", at.latitude, at.longitude), theme));
-    }
-    rows
+    rows.into_iter().chain(degrees(place.degrees(spot), theme)).collect()
 }

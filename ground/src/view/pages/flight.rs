@@ -1,4 +1,4 @@
-//! The pages of ascent and descent: the band, height over time with what is to come, the place from above, the vehicle from two
+//! The pages of ascent, descent and burn: the band, height over time with what is to come, the place from above, the vehicle from two
 //! sides; on a larger screen values, fins and events below.
 
 use std::time::Duration;
@@ -9,169 +9,154 @@ use ratatui::layout::Constraint::{Fill, Length, Percentage};
 use ratatui::layout::Rect;
 use ratatui::text::Line;
 
-use super::{Room, Side, attitude, columns, events, framed, rows, table};
-use crate::model::{Model, Motion, Page, Sample, words};
+use super::{Room, columns, events, framed, rows, table};
+use crate::model::{Model, Page, dead_reckoning::is_unheard, quantity::Quantity, words};
+use crate::view::pictures::attitude::{Side, draw_attitude};
 use crate::view::pictures::height::draw_height;
 use crate::view::pictures::map::draw_map;
-use crate::view::{TextRole, Theme, age_mark, bars, fixed, headline, panels, row, text_row};
+use crate::view::{TextRole, Theme, age_mark, bars, headline, panels, quantity_row, text_row};
 
 /// Columns of the vehicle from one side at 80 columns.
 const SIDE_COLUMNS: u16 = 18;
 /// The same for its predicted position.
-pub const LOST_COLUMNS: u16 = 28;
+const LOST_COLUMNS: u16 = 28;
+pub const FROM_ABOVE: &str = "from above";
+/// From this width on a title has a legend beside it.
+const LEGEND_COLUMNS: u16 = 34;
+/// Columns and rows of the six limits with their borders.
+const LIMIT_COLUMNS: u16 = 32;
+pub const LIMIT_ROWS: u16 = 8;
 /// Rows of the panels under the pictures, with their borders.
 const BELOW_ROWS: u16 = 11;
 
-/// Draws the page of the ascent or of the descent. Returns where its pictures are.
+/// Draws the page of the ascent, of the descent or of the burn. Returns where the pictures are.
 pub fn draw_flying(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) -> Rect {
-    let (title, values) = match model.page() {
-        Page::Ascent => ("ascent", ascent_values(model, theme, now)),
-        _ => ("descent", descent_values(model, theme, now)),
-    };
-    let room = Room::of(frame.area());
     // What the newest report means, under the number.
-    let below = values.first().cloned().unwrap_or_default();
+    let (title, below, names): (_, _, &[&str]) = match model.page() {
+        Page::Ascent => ("ascent", state("booster", booster, model, theme, now), &ASCENT),
+        Page::Landing => ("touchdown", panels::burn_row(model, theme, now), &[]),
+        _ => ("descent", band_word(model, theme, now), &DESCENT),
+    };
+    let burns = model.page() == Page::Landing;
     let area = headline::draw_flight_band(model, below, theme, now, frame, area);
-    if room == Room::Small {
-        let right = if panels::is_lost(model, now) { LOST_COLUMNS } else { SIDE_COLUMNS };
-        let [left, middle, right] = columns(area, [Fill(5), Fill(3), Length(right)]);
+    if Room::of(frame.area()) == Room::Small {
+        let side = Length(if is_unheard(&model.vehicle, now) { LOST_COLUMNS } else { SIDE_COLUMNS });
+        let (left, place, side) = if burns {
+            let [left, side, right] = columns(area, [Fill(1), side, Length(LIMIT_COLUMNS)]);
+            let [limits, place] = rows(right, [Length(LIMIT_ROWS), Fill(1)]);
+            bars::draw_limits(model, theme, now, frame, limits);
+            (left, place, side)
+        } else {
+            let [left, place, side] = columns(area, [Fill(5), Fill(3), side]);
+            (left, place, side)
+        };
         height(model, theme, now, frame, left);
-        map(model, theme, now, frame, middle);
-        side_or_lost(model, Side::South, theme, now, frame, right);
+        map(FROM_ABOVE, model, theme, now, frame, place);
+        vehicle(model, [Side::South], theme, now, frame, side);
         return area;
     }
     let [above, below] = rows(area, [Fill(1), Length(BELOW_ROWS)]);
     let [left, sides, right] = columns(above, [Percentage(40), Percentage(32), Fill(1)]);
     height(model, theme, now, frame, left);
-    both_sides_or_lost(model, theme, now, frame, sides);
-    map(model, theme, now, frame, right);
-    let [left, middle, right] = columns(below, [Percentage(33), Percentage(30), Fill(1)]);
-    table(title, &values, theme, frame, left);
+    vehicle(model, [Side::South, Side::East], theme, now, frame, sides);
+    map(FROM_ABOVE, model, theme, now, frame, right);
+    let [left, middle, right] = columns(below, [Percentage(40), Percentage(30), Fill(1)]);
+    if burns {
+        bars::draw_limits(model, theme, now, frame, left);
+    } else {
+        let mut lines = values(model, theme, now, names);
+        lines.insert(0, state("chute", chute, model, theme, now));
+        table(title, &lines, theme, frame, left);
+    }
     bars::draw_surfaces(model, theme, now, frame, middle);
     events(model, theme, frame, right);
     area
 }
 
-fn height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let inside = framed("height m", bars::flown_legend(theme), theme, frame, area);
+/// A panel with the height over time.
+pub fn height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let legend = if area.width < LEGEND_COLUMNS { Line::default() } else { bars::flown_legend(theme) };
+    let inside = framed("height m", legend, theme, frame, area);
     draw_height(model, theme, now, frame, inside);
 }
 
 /// A panel with the place from above.
-pub fn map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let inside = framed("from above", Line::default(), theme, frame, area);
+pub fn map(title: &str, model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let inside = framed(title, Line::default(), theme, frame, area);
     draw_map(model, theme, now, frame, inside);
 }
 
-/// The vehicle from a side; after the loss of the link its predicted position instead.
-pub fn side_or_lost(model: &Model, side: Side, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    if panels::is_lost(model, now) {
-        table("PREDICTED", &panels::lost_rows(model, theme, now), theme, frame, area);
-    } else {
-        attitude(model, side, theme, now, frame, area);
+/// The vehicle from each of these sides; after the loss of the link its predicted position instead.
+fn vehicle<const N: usize>(
+    model: &Model,
+    sides: [Side; N],
+    theme: Theme,
+    now: Duration,
+    frame: &mut Frame,
+    area: Rect,
+) {
+    if is_unheard(&model.vehicle, now) {
+        return table("PREDICTED", &panels::lost_rows(model, theme, now), theme, frame, area);
+    }
+    for (side, at) in sides.into_iter().zip(columns(area, [Fill(1); N])) {
+        draw_attitude(model, side, theme, now, frame, at);
     }
 }
 
-/// The vehicle from both sides; after the loss of the link its predicted position instead.
-pub fn both_sides_or_lost(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    if panels::is_lost(model, now) {
-        return side_or_lost(model, Side::South, theme, now, frame, area);
-    }
-    let [south, east] = columns(area, [Fill(1), Fill(1)]);
-    attitude(model, Side::South, theme, now, frame, south);
-    attitude(model, Side::East, theme, now, frame, east);
+/// The values of the ascent and of the descent beside their states, the most important first.
+static ASCENT: [&str; 7] =
+    ["apogee", "time to apogee", "tilt", "horizontal speed", "distance", "touchdown north", "touchdown east"];
+static DESCENT: [&str; 12] = [
+    "time to ignition",
+    "ignition height",
+    "band low",
+    "band high",
+    "commit height",
+    "distance",
+    "horizontal speed",
+    "tilt",
+    "wind",
+    "drag",
+    "touchdown north",
+    "touchdown east",
+];
+
+fn values(model: &Model, theme: Theme, now: Duration, names: &[&str]) -> Vec<Line<'static>> {
+    // Where it lights says nothing of a motor that will not.
+    let counts = |name: &&&str| **name != "ignition height" || model.vehicle.may_light();
+    let known = names.iter().filter(counts).filter_map(|name| Quantity::named(name));
+    known.map(|quantity| quantity_row(quantity, model, theme, now)).collect()
 }
 
-// The ascent page.
-
-/// The values, the most important first.
-fn ascent_values(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    let mut lines = vec![motor(model, theme, now)];
-    let of = |pick| model.vehicle.of_descent(pick);
-    lines.push(row(theme, "apogee at", of(|d| d.apogee_m), 0, "m", now));
-    lines.push(row(theme, "apogee in", of(|d| d.time_to_apogee_s), 1, "s", now));
-    lines.push(row(theme, "tilt", model.vehicle.tilt_deg(), 1, "deg", now));
-    lines.push(booster(model, theme, now));
-    lines.push(row(theme, "horizontal", model.vehicle.of_motion(Motion::horizontal_m_s), 1, "m/s", now));
-    lines.push(row(theme, "distance", model.vehicle.of_motion(Motion::distance_m), 1, "m", now));
-    lines.push(row(theme, "lands N", of(|d| d.touchdown_x_m), 0, "m", now));
-    lines.push(row(theme, "lands E", of(|d| d.touchdown_y_m), 0, "m", now));
-    lines
-}
-
-/// What carries the vehicle up, in words.
-fn motor(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
-    let Some(phase) = model.vehicle.phase() else {
-        return theme.line(" no data", TextRole::Caution);
+/// A state of the newest report, in words.
+fn state(
+    label: &str,
+    words: fn(&TD_DESCENT_DATA) -> (String, TextRole),
+    model: &Model,
+    theme: Theme,
+    now: Duration,
+) -> Line<'static> {
+    let Some(descent) = model.vehicle.descent() else {
+        return text_row(theme, label, (" ", TextRole::Label), "no data", "");
     };
-    let (mark, role) = age_mark(&phase, now);
-    let text = match phase.value {
-        TdPhase::TD_PHASE_BOOST => "ascent motor: no cut-off",
-        TdPhase::TD_PHASE_COAST => "coasting",
-        _ => "not rising",
-    };
-    theme.line(format!("{mark}{text}"), role)
+    let (mark, age) = age_mark(&descent, now);
+    let (text, role) = words(&descent.value);
+    text_row(theme, label, (mark, if age == TextRole::Stale { age } else { role }), &text, "")
 }
 
-fn booster(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
-    let Some(descent) = model.vehicle.descent() else { return no_state("booster", theme) };
-    let role = match descent.value.booster {
+fn booster(descent: &TD_DESCENT_DATA) -> (String, TextRole) {
+    let role = match descent.booster {
         TdBooster::TD_BOOSTER_SEPARATING => TextRole::Caution,
         TdBooster::TD_BOOSTER_SEPARATED => TextRole::Good,
         TdBooster::TD_BOOSTER_NONE | TdBooster::TD_BOOSTER_ATTACHED => TextRole::Plain,
     };
-    let text = words::lower_case(&descent.value.booster, "TD_BOOSTER_");
-    state_row("booster", &descent, &text, role, theme, now)
+    (words::lower_case(&descent.booster, "TD_BOOSTER_"), role)
 }
 
-fn no_state(label: &str, theme: Theme) -> Line<'static> {
-    text_row(theme, label, " ", "no data", TextRole::Label, "")
-}
-
-fn state_row(
-    label: &str,
-    descent: &Sample<TD_DESCENT_DATA>,
-    text: &str,
-    role: TextRole,
-    theme: Theme,
-    now: Duration,
-) -> Line<'static> {
-    let (mark, stale) = age_mark(descent, now);
-    text_row(theme, label, mark, text, if stale == TextRole::Stale { stale } else { role }, "")
-}
-
-// The descent page.
-
-/// The values, the most important first.
-fn descent_values(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    let mut lines = vec![band_word(model, theme, now)];
-    let of = |pick| model.vehicle.of_descent(pick);
-    let of_motion = |pick| model.vehicle.of_motion(pick).filter(|sample| !sample.value.is_nan());
-    let lights = |sample: Option<Sample<f64>>| sample.filter(|_| model.vehicle.may_light());
-    lines.push(row(theme, "ignite in", model.vehicle.ignition_in_s(now), 1, "s", now));
-    lines.push(row(theme, "ignite at", lights(of(|d| d.chosen_height_m)), 1, "m", now));
-    lines.push(band(model.vehicle.descent().as_ref(), theme, now));
-    lines.push(row(theme, "commit at", of(|d| d.commit_height_m), 1, "m", now));
-    lines.push(chute(model, theme, now));
-    lines.push(row(theme, "distance", of_motion(Motion::distance_m), 1, "m", now));
-    lines.push(row(theme, "horizontal", of_motion(Motion::horizontal_m_s), 1, "m/s", now));
-    lines.push(row(theme, "tilt", model.vehicle.tilt_deg(), 1, "deg", now));
-    let (wind, from) = wind(model);
-    lines.push(row(theme, "wind", wind, 1, "m/s", now));
-    lines.push(row(theme, "wind from", from, 0, "deg", now));
-    lines.push(row(theme, "drag", of(|d| d.drag_scale), 2, "x", now));
-    lines.push(row(theme, "lands N", of(|d| d.touchdown_x_m), 1, "m", now));
-    lines.push(row(theme, "lands E", of(|d| d.touchdown_y_m), 1, "m", now));
-    lines
-}
-
-/// The heights from which a burn lands.
-fn band(descent: Option<&Sample<TD_DESCENT_DATA>>, theme: Theme, now: Duration) -> Line<'static> {
-    let known = descent.filter(|d| d.value.band_low_m.is_finite() && d.value.band_high_m.is_finite());
-    let Some(descent) = known else { return text_row(theme, "band", " ", "--", TextRole::Label, "m") };
-    let (mark, role) = age_mark(descent, now);
-    let (low_m, high_m) = (f64::from(descent.value.band_low_m), f64::from(descent.value.band_high_m));
-    text_row(theme, "band", mark, &format!("{}..{}", fixed(low_m, 0), fixed(high_m, 0)), role, "m")
+fn chute(descent: &TD_DESCENT_DATA) -> (String, TextRole) {
+    let is_out = matches!(descent.chute, TdChute::TD_CHUTE_FIRED | TdChute::TD_CHUTE_OPEN);
+    let role = if is_out { TextRole::Caution } else { TextRole::Plain };
+    (words::lower_case(&descent.chute, "TD_CHUTE_"), role)
 }
 
 /// Compares the height with the ignition band and the commit height, in words.
@@ -209,24 +194,4 @@ fn parachute_may_fly(model: &Model, chute: TdChute) -> bool {
     let ordered = model.vehicle.phase_now() == Some(TdPhase::TD_PHASE_CHUTE);
     let now = TdAbortEffect::TD_ABORT_EFFECT_CHUTE_NOW;
     out || ordered || model.vehicle.status.as_ref().is_some_and(|status| status.value.abort_effect == now)
-}
-
-fn chute(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
-    let Some(descent) = model.vehicle.descent() else { return no_state("chute", theme) };
-    let role = match descent.value.chute {
-        TdChute::TD_CHUTE_FIRED | TdChute::TD_CHUTE_OPEN => TextRole::Caution,
-        _ => TextRole::Plain,
-    };
-    state_row("chute", &descent, &words::lower_case(&descent.value.chute, "TD_CHUTE_"), role, theme, now)
-}
-
-/// The wind's speed, and the direction that it comes from, as in weather reports: 0 is north, 90 is east.
-fn wind(model: &Model) -> (Option<Sample<f64>>, Option<Sample<f64>>) {
-    let (north, east) =
-        (model.vehicle.of_descent(|d| d.wind_x_m_s), model.vehicle.of_descent(|d| d.wind_y_m_s));
-    let Some((north, Sample { value: east, received_at })) = north.zip(east) else { return (None, None) };
-    let from_deg = libm::atan2(-east, -north.value).to_degrees().rem_euclid(360.0);
-    let speed = libm::hypot(north.value, east);
-    let sample = |value| Sample { value, received_at };
-    (Some(sample(speed)), (speed > 0.0).then(|| sample(from_deg)))
 }

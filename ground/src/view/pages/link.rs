@@ -9,11 +9,9 @@ use ratatui::text::{Line, Span};
 
 use super::window;
 use crate::model::{LinkReport, LinkState, Model, STALE_AFTER, refusal};
-use crate::view::status_lines::{link_line, percent};
+use crate::view::status_lines::{link_line, loss_role, percent};
 use crate::view::{STALE_MARK, TextRole, Theme, seconds};
 
-/// A loss above this share is marked.
-const LOSS_MARKED: f64 = 0.05;
 const NAME_WIDTH: usize = 27;
 /// The width of a message name with its age and rate: two beside each other on the smallest whole screen.
 const MESSAGE_CELL_WIDTH: usize = 40;
@@ -39,7 +37,11 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize, rows: u
     let mut lines = vec![link_line(model, theme, now, columns)];
     lines.push(directions(model, theme, now));
     lines.extend(rejected(model, theme));
-    lines.push(heading(theme));
+    let heading = format!(
+        " {:<NAME_WIDTH$}{:>11}{:>6}{:>9}{:>8}{:>8}{:>9}",
+        "Over 10 s", "rx B/s", "tx", "frames/s", "loss", "copies", "age"
+    );
+    lines.push(theme.line(heading, TextRole::Title));
     for report in reports(model, now) {
         lines.push(report_line(&report, theme));
         lines.extend(report.sources.iter().map(|source| source_line(source, model.settings.vehicle, theme)));
@@ -134,14 +136,6 @@ fn reports(model: &Model, now: Duration) -> Vec<LinkReport> {
     std::iter::once(all).chain(each).collect()
 }
 
-fn heading(theme: Theme) -> Line<'static> {
-    let text = format!(
-        " {:<NAME_WIDTH$}{:>11}{:>6}{:>9}{:>8}{:>8}{:>9}",
-        "Over 10 s", "rx B/s", "tx", "frames/s", "loss", "copies", "age"
-    );
-    theme.line(text, TextRole::Title)
-}
-
 fn report_line(report: &LinkReport, theme: Theme) -> Line<'static> {
     let name = &report.name;
     if let Some(why) = &report.trouble {
@@ -183,10 +177,6 @@ fn what(address: Address, vehicle: Address) -> &'static str {
         Address { component_id: 68, .. } => "radio",
         _ => "",
     }
-}
-
-fn loss_role(loss: Option<f64>) -> TextRole {
-    if loss.is_some_and(|loss| loss > LOSS_MARKED) { TextRole::Caution } else { TextRole::Plain }
 }
 
 /// Age and rate of each message, in as many columns as fit.

@@ -6,7 +6,7 @@ use ratatui::text::Line;
 
 use super::window;
 use crate::model::{ABORT_WORDS, Act, DEFINITIONS, Model, Role};
-use crate::view::status_lines::{AlarmState, alarm_state, cut};
+use crate::view::status_lines::{alarm_state, cut};
 use crate::view::{TextRole, Theme, lists, seconds};
 
 /// Columns of `ended alarm: ` and shorter words.
@@ -40,7 +40,7 @@ pub fn alarms_lines(
             if is_chosen {
                 marked = place;
             }
-            let AlarmState { word, age, role } = alarm_state(alarm, now);
+            let (word, age, role) = alarm_state(alarm, now);
             let lasted = alarm.ended_at.map(|at| at.saturating_sub(alarm.raised_at).as_secs());
             let lasted = lasted.map_or_else(String::new, |held_s| format!(", held {held_s} s"));
             let mark = if is_chosen { ">" } else { " " };
@@ -87,11 +87,6 @@ fn book(model: &Model) -> String {
     format!("{entries} entries, head {hash}, {is_signed}; {} at the vehicle", model.book.kept)
 }
 
-/// The space that is left for the log, and how fast it grows.
-fn space(model: &Model) -> String {
-    model.log.space.map_or_else(|| "not known".to_owned(), |space| space.words())
-}
-
 /// The state of the recording, its files and counts.
 pub fn log_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let row = |label: &str, value: String, role: TextRole| {
@@ -115,7 +110,11 @@ pub fn log_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static
         state,
         row("log", model.settings.log_path.clone().unwrap_or_else(none), TextRole::Plain),
         row("telemetry log", model.settings.tlog_path.clone().unwrap_or_else(none), TextRole::Plain),
-        row("space", space(model), TextRole::Plain),
+        row(
+            "space",
+            model.log.space.map_or_else(|| "not known".to_owned(), |space| space.words()),
+            TextRole::Plain,
+        ),
         row("running for", seconds(now), TextRole::Plain),
         row("events", model.events.total().to_string(), TextRole::Plain),
         row("book", book(model), TextRole::Plain),

@@ -1,12 +1,12 @@
-//! The pages: of panels, or of lines, which also a small terminal shows.
+//! The pages: of panels, or of lines.
 
 pub mod checks;
 pub mod flight;
-pub mod landing;
 pub mod link;
 pub mod lists;
 pub mod pad;
-pub mod plots;
+pub mod plot;
+pub mod review;
 
 use std::time::Duration;
 
@@ -17,50 +17,42 @@ use ratatui::text::Line;
 use ratatui::widgets::{Block, Borders};
 
 use super::band::Room;
-use super::pictures::attitude::{Side, draw_attitude, tilt_words};
-use super::{TextRole, Theme, draw_lines, panels};
+use super::{TextRole, Theme, draw_lines};
 use crate::model::{Model, Page};
 
 /// Draws the present page between the top lines and the alarm line. Returns where the pictures of a flight are.
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) -> Option<Rect> {
-    match model.page() {
-        Page::Ascent | Page::Descent => return Some(flight::draw_flying(model, theme, now, frame, area)),
-        Page::Landing => return Some(landing::draw_landing(model, theme, now, frame, area)),
+    let page = model.page();
+    match page {
+        Page::Ascent | Page::Descent | Page::Landing => {
+            return Some(flight::draw_flying(model, theme, now, frame, area));
+        }
         Page::Pad if model.vehicle.as_foreign().is_none() => pad::draw_pad(model, theme, now, frame, area),
-        Page::Review => landing::draw_review(model, theme, now, frame, area),
-        Page::Path => plots::draw_path(model, theme, now, frame, area),
-        Page::Values => plots::draw_values(model, theme, now, frame, area),
-        Page::Plot => plots::draw_plot_page(model, theme, now, frame, area),
-        page => {
+        Page::Review => review::draw_review(model, theme, now, frame, area),
+        Page::Plot => plot::draw_plot_page(model, theme, now, frame, area),
+        _ => {
             let inside = titled(page.name(), theme, frame, area);
-            draw_lines(frame, inside, &lines(model, page, theme, now, inside));
+            draw_lines(frame, inside, &lines(model, theme, now, inside));
         }
     }
     None
 }
 
-/// The page as lines. Of a page of panels it is what must be seen where there is no room for them.
-pub fn lines(model: &Model, page: Page, theme: Theme, now: Duration, area: Rect) -> Vec<Line<'static>> {
+/// A page of lines, which also a small terminal shows; instead of a page of panels the newest events.
+pub fn lines(model: &Model, theme: Theme, now: Duration, area: Rect) -> Vec<Line<'static>> {
     let (columns, rows) = (usize::from(area.width), usize::from(area.height));
-    match page {
+    match model.page() {
         Page::Pad if let Some(vehicle) = model.vehicle.as_foreign() => {
             pad::foreign_lines(model, vehicle, theme, now, (columns, rows))
         }
-        Page::Pad if model.pages.checklist && model.checklist.is_some() => {
-            super::lists::checklist_rows(model, theme, now, (columns, rows))
-        }
-        Page::Pad => pad::checks(model, theme, now),
-        Page::Review => landing::review_lines(model, theme, now, columns),
         Page::Link => link::lines(model, theme, now, columns, rows),
         Page::Messages => lists::messages_lines(model, theme, columns, rows),
         Page::Log => lists::log_lines(model, theme, now),
         Page::Alarms => lists::alarms_lines(model, theme, now, columns, rows),
         Page::Find => checks::find_lines(model, theme, now),
         Page::Checks => checks::checks_lines(model, theme, now, columns),
-        Page::Ascent | Page::Descent | Page::Landing | Page::Path | Page::Values | Page::Plot => {
-            panels::flight_panel(model, theme, now).1
-        }
         Page::Help => lists::help_lines(model, theme, now),
+        _ => super::lists::events(model, theme, columns, rows),
     }
 }
 
@@ -94,17 +86,6 @@ pub fn framed(title: &str, right: Line<'static>, theme: Theme, frame: &mut Frame
     inside
 }
 
-/// A panel with the vehicle from a side.
-fn attitude(model: &Model, side: Side, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let tilt = if side == Side::South { tilt_words(model, now) } else { String::new() };
-    // A narrow panel has room for the number.
-    let tilt = if area.width < 21 { tilt.trim_start_matches("tilt ").to_owned() } else { tilt };
-    let right =
-        if tilt.is_empty() { Line::default() } else { theme.line(format!(" {tilt} "), TextRole::Plain) };
-    let inside = framed(side.title(), right, theme, frame, area);
-    draw_attitude(model, side, theme, now, frame, inside);
-}
-
 /// A panel with the newest events.
 fn events(model: &Model, theme: Theme, frame: &mut Frame, area: Rect) {
     let inside = framed("events", Line::default(), theme, frame, area);
@@ -117,12 +98,6 @@ fn table(title: &str, lines: &[Line], theme: Theme, frame: &mut Frame, area: Rec
     let inside = framed(title, Line::default(), theme, frame, area);
     // The most important first; the rest is on the page of all values.
     draw_lines(frame, inside, &lines[..lines.len().min(usize::from(inside.height))]);
-}
-
-/// Draws lines with a title and a rule above them.
-fn panel(title: &str, lines: &[Line], theme: Theme, frame: &mut Frame, area: Rect) {
-    let inside = titled(title, theme, frame, area);
-    draw_lines(frame, inside, lines);
 }
 
 /// This many lines from a start line on.

@@ -8,17 +8,15 @@ use ratatui::layout::Constraint::{Fill, Length, Percentage};
 use ratatui::layout::Rect;
 use ratatui::text::Line;
 
-use super::{Room, Side, attitude, columns, events, framed, rows, table};
+use super::flight::map;
+use super::{Room, columns, events, framed, rows, table};
 use crate::model::{
     Act, Deflection, Foreign, LogStanding, Model, Vehicle, hold_words, is_on_pad, unheard_hints,
     why_not_here, why_untested, words,
 };
 use crate::view::band::{Item, draw_band, word};
-use crate::view::pictures::map::draw_map;
-use crate::view::{
-    STALE_MARK, TextRole, Theme, age_mark, draw_lines, fixed, headline, lists, panels, status_lines,
-    top_lines,
-};
+use crate::view::pictures::attitude::{Side, draw_attitude};
+use crate::view::{STALE_MARK, TextRole, Theme, age_mark, draw_lines, fixed, headline, lists, top_lines};
 
 /// Columns of the checks.
 const CHECK_COLUMNS: u16 = 49;
@@ -30,11 +28,10 @@ const BELOW_ROWS: u16 = 12;
 /// Draws GO or what fails, the next step, the steps; and the vehicle with the place where it will land, or the checks while
 /// something is amiss.
 pub fn draw_pad(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let room = Room::of(frame.area());
     let area =
-        if headline::replaces_band(model, now) { area } else { draw_go(model, theme, now, frame, area) };
+        if headline::banner(model, now).is_some() { area } else { draw_go(model, theme, now, frame, area) };
     let ladder = ladder(model, theme, now);
-    if room == Room::Small {
+    if Room::of(frame.area()) == Room::Small {
         let [left, right] = columns(area, [Length(STEP_COLUMNS[0]), Fill(1)]);
         table("steps", &ladder, theme, frame, left);
         if model.checklist.is_some() && model.pages.checklist {
@@ -43,8 +40,8 @@ pub fn draw_pad(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
             draw_checks(model, theme, now, frame, right);
         } else {
             let [middle, right] = columns(right, [Length(18), Fill(1)]);
-            attitude(model, Side::South, theme, now, frame, middle);
-            place(model, theme, now, frame, right);
+            draw_attitude(model, Side::South, theme, now, frame, middle);
+            map("where it lands", model, theme, now, frame, right);
         }
         return;
     }
@@ -52,9 +49,9 @@ pub fn draw_pad(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
     let [left, south, east, right] =
         columns(above, [Length(STEP_COLUMNS[1]), Percentage(17), Percentage(17), Fill(1)]);
     table("steps", &ladder, theme, frame, left);
-    attitude(model, Side::South, theme, now, frame, south);
-    attitude(model, Side::East, theme, now, frame, east);
-    place(model, theme, now, frame, right);
+    draw_attitude(model, Side::South, theme, now, frame, south);
+    draw_attitude(model, Side::East, theme, now, frame, east);
+    map("where it lands", model, theme, now, frame, right);
     let list = if model.checklist.is_some() { Percentage(40) } else { Length(1) };
     let [left, middle, right] = columns(below, [Length(CHECK_COLUMNS + 4), list, Fill(1)]);
     let lines = checks(model, theme, now);
@@ -62,13 +59,7 @@ pub fn draw_pad(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
     if model.checklist.is_some() {
         draw_checklist(model, theme, now, frame, middle);
     }
-    if room == Room::Large && model.checklist.is_none() {
-        let [right, supplies] = columns(right, [Fill(1), Length(46)]);
-        events(model, theme, frame, right);
-        draw_now(model, theme, now, frame, supplies);
-    } else {
-        events(model, theme, frame, right);
-    }
+    events(model, theme, frame, right);
 }
 
 /// Whether the checks are more important than the pictures.
@@ -102,7 +93,7 @@ fn draw_go(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: 
     });
     let (words, role) = told.map_or((words, role), |told| (told, TextRole::Plain));
     let (words, role) = if counts { (hold(model, now), TextRole::Plain) } else { (words, role) };
-    draw_band(model, (&headline::pad(model, now), theme.line(words, role), &others), theme, now, frame, area)
+    draw_band((&headline::pad(model, now), theme.line(words, role), &others), theme, frame, area)
 }
 
 /// What still stops a countdown.
@@ -120,11 +111,6 @@ fn counted(model: &Model) -> String {
     format!(", {} of {all}", all - model.vehicle.failing().len())
 }
 
-fn place(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let inside = framed("where it lands", Line::default(), theme, frame, area);
-    draw_map(model, theme, now, frame, inside);
-}
-
 /// The checks, and the newest events below.
 fn draw_checks(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let lines = checks(model, theme, now);
@@ -133,14 +119,6 @@ fn draw_checks(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, ar
     if below.height > 2 {
         events(model, theme, frame, below);
     }
-}
-
-/// The state of the vehicle and of the link.
-fn draw_now(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let inside = framed("now", Line::default(), theme, frame, area);
-    let mut lines = panels::flight_rows(model, theme, now);
-    lines.push(status_lines::link_line(model, theme, now, usize::from(inside.width)));
-    draw_lines(frame, inside, &lines);
 }
 
 fn draw_checklist(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
@@ -206,19 +184,23 @@ pub fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> 
 /// Whether burns of its lot confirm the landing motor, once the vehicle has said which mission it flies.
 fn motor(model: &Model, theme: Theme) -> Option<Line<'static>> {
     let burns = model.vehicle.mission()?.motor_burns;
-    let (word, role, found) = match burns {
-        0 if why_untested(model).is_some() => (" NO ", TextRole::Alarm, "UNCONFIRMED: no burn of its lot"),
-        0 if model.vehicle.is_simulated() => ("    ", TextRole::Plain, "certified, no burn of its lot"),
-        0 => (" !! ", TextRole::Caution, "overruled: UNCONFIRMED, no burn of its lot"),
-        _ => ("    ", TextRole::Plain, "confirmed, burns of its lot:"),
+    let (word, found) = match burns {
+        0 if why_untested(model).is_some() => (" NO ", "UNCONFIRMED: no burn of its lot".to_owned()),
+        0 if model.vehicle.is_simulated() => ("    ", "certified, no burn of its lot".to_owned()),
+        0 => (" !! ", "overruled: UNCONFIRMED, no burn of its lot".to_owned()),
+        _ => ("    ", format!("confirmed, burns of its lot: {burns}")),
     };
-    let count = if burns > 0 { format!(" {burns}") } else { String::new() };
-    let found_role = if word == "    " { TextRole::Plain } else { TextRole::Caution };
-    Some(Line::from(vec![
-        theme.span(word, role),
-        theme.plain(" motor       "),
-        theme.span(format!("{found}{count}"), found_role),
-    ]))
+    Some(of_the_station(word, " motor       ", found, theme))
+}
+
+/// A check that the station makes.
+fn of_the_station(word: &'static str, name: &'static str, found: String, theme: Theme) -> Line<'static> {
+    let (role, found_role) = match word {
+        " NO " => (TextRole::Alarm, TextRole::Caution),
+        " !! " => (TextRole::Caution, TextRole::Caution),
+        _ => (TextRole::Plain, TextRole::Plain),
+    };
+    Line::from(vec![theme.span(word, role), theme.plain(name), theme.span(found, found_role)])
 }
 
 /// Whether the checks pass, in words.
@@ -245,19 +227,14 @@ fn summary(model: &Model, now: Duration) -> (String, TextRole) {
 /// Whether the station's own log fails as a check, and its row.
 fn station_log(model: &Model, theme: Theme, now: Duration) -> (bool, Line<'static>) {
     let space = model.log.space.map_or_else(|| "running".to_owned(), |space| space.words());
-    let (word, role, found) = match model.station_log(now) {
-        LogStanding::None => ("    ", TextRole::Label, "none (--log none)".to_owned()),
-        LogStanding::Fine => ("    ", TextRole::Plain, space),
-        LogStanding::Warned(words) => (" !! ", TextRole::Caution, words),
-        LogStanding::Unfit(_, words) if model.why_no_log(now).is_some() => (" NO ", TextRole::Alarm, words),
-        LogStanding::Unfit(_, words) => (" !! ", TextRole::Caution, format!("overruled: {words}")),
+    let (word, found) = match model.station_log(now) {
+        LogStanding::None => ("    ", "none (--log none)".to_owned()),
+        LogStanding::Fine => ("    ", space),
+        LogStanding::Warned(words) => (" !! ", words),
+        LogStanding::Unfit(_, words) if model.why_no_log(now).is_some() => (" NO ", words),
+        LogStanding::Unfit(_, words) => (" !! ", format!("overruled: {words}")),
     };
-    let line = Line::from(vec![
-        theme.span(word, role),
-        theme.plain(" station log "),
-        theme.span(found, if word == "    " { TextRole::Plain } else { TextRole::Caution }),
-    ]);
-    (word == " NO ", line)
+    (word == " NO ", of_the_station(word, " station log ", found, theme))
 }
 
 /// The value that telemetry shows for a check; empty if there is none.

@@ -5,11 +5,12 @@ use std::time::Duration;
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::style::Color;
-use ratatui::widgets::canvas::{Context, Line};
+use ratatui::text::Line;
+use ratatui::widgets::canvas::{self, Context};
 
 use super::{DOTS_ACROSS, DOTS_UP, Ink, Plane, TextRole, Theme};
 use crate::model::{Attitude, Gimbal, Model, NorthEastUp, is_burning};
-use crate::view::fixed;
+use crate::view::{draw_line, fixed, pages::framed};
 
 /// From where the vehicle is seen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,18 +29,11 @@ impl Side {
         }
     }
 
-    /// The directions at the left and at the right.
-    fn ends(self) -> [&'static str; 2] {
+    /// Its title, and the directions at the left and at the right.
+    fn words(self) -> [&'static str; 3] {
         match self {
-            Self::South => ["W", "E"],
-            Self::East => ["S", "N"],
-        }
-    }
-
-    pub fn title(self) -> &'static str {
-        match self {
-            Self::South => "from S",
-            Self::East => "from E",
+            Self::South => ["from S", "W", "E"],
+            Self::East => ["from E", "S", "N"],
         }
     }
 }
@@ -77,11 +71,19 @@ fn on_body(attitude: &Attitude, [x, y, z]: [f64; 3]) -> NorthEastUp {
     std::array::from_fn(|axis| x * nose[axis] + y * body_y[axis] + z * body_z[axis])
 }
 
-/// Draws the vehicle; without an attitude, that there is none.
+/// A panel with the vehicle from a side; without an attitude, that there is none.
 pub fn draw_attitude(model: &Model, side: Side, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let vehicle = &model.vehicle;
+    let [title, left, right] = side.words();
+    let tilt = vehicle.tilt_deg().filter(|tilt| side == Side::South && !tilt.is_stale(now));
+    let tilt = tilt.map_or_else(Line::default, |tilt| {
+        // A narrow panel has room for the number.
+        let word = if area.width < 21 { "" } else { "tilt " };
+        theme.line(format!(" {word}{}° ", fixed(tilt.value, 0)), TextRole::Plain)
+    });
+    let area = framed(title, tilt, theme, frame, area);
     let Some(attitude) = vehicle.attitude.filter(|attitude| !attitude.is_stale(now)) else {
-        return super::super::draw_line(frame, area, theme.line(" not known", TextRole::Label));
+        return draw_line(frame, area, theme.line(" not known", TextRole::Label));
     };
     if area.width < 8 || area.height < 5 {
         return;
@@ -96,7 +98,7 @@ pub fn draw_attitude(model: &Model, side: Side, theme: Theme, now: Duration, fra
     let seen = |place: [f64; 3]| side.sees(on_body(&attitude, place));
     let stroke = |context: &mut Context, from: [f64; 3], to: [f64; 3], color: Color| {
         let ((x1, y1), (x2, y2)) = (seen(from), seen(to));
-        context.draw(&Line { x1, y1, x2, y2, color });
+        context.draw(&canvas::Line { x1, y1, x2, y2, color });
     };
     let burning = vehicle.phase_now().is_some_and(is_burning);
     let gimbal = vehicle.gimbal().map_or_else(Gimbal::default, |gimbal| gimbal.value);
@@ -147,7 +149,13 @@ pub fn draw_attitude(model: &Model, side: Side, theme: Theme, now: Duration, fra
         }
         if near_ground {
             let y = LEG[1] - per_dot;
-            context.draw(&Line { x1: -half[0], y1: y, x2: half[0], y2: y, color: theme.ink(Ink::Scale) });
+            context.draw(&canvas::Line {
+                x1: -half[0],
+                y1: y,
+                x2: half[0],
+                y2: y,
+                color: theme.ink(Ink::Scale),
+            });
         }
         let motion =
             vehicle.best_motion().map(|motion| motion.value).filter(|motion| motion.speed_m_s() > 1.0);
@@ -157,18 +165,11 @@ pub fn draw_attitude(model: &Model, side: Side, theme: Theme, now: Duration, fra
         }
     });
     let label = theme.style(TextRole::Label);
-    let [left, right] = side.ends();
     plane.write(frame, (-half[0], half[1]), left, label);
     plane.write(frame, (half[0], half[1]), right, label);
     if vehicle.best_motion().is_some_and(|motion| motion.value.speed_m_s() > 1.0) {
         plane.write(frame, (0.72 * half[0], 0.42), "v", theme.ground().fg(theme.ink(Ink::Measured)));
     }
-}
-
-/// The tilt in words, for the title.
-pub fn tilt_words(model: &Model, now: Duration) -> String {
-    let tilt = model.vehicle.tilt_deg().filter(|tilt| !tilt.is_stale(now));
-    tilt.map_or_else(String::new, |tilt| format!("tilt {}°", fixed(tilt.value, 0)))
 }
 
 fn arc(context: &mut Context, limit_rad: Option<f64>, per_dot: f64, theme: Theme) {
@@ -177,10 +178,10 @@ fn arc(context: &mut Context, limit_rad: Option<f64>, per_dot: f64, theme: Theme
         (radius * sin, radius * cos)
     };
     let dots: Vec<(f64, f64)> = (-8..=8_i32).map(|k| at(ARC_REACH * f64::from(k) / 8.0, ARC)).collect();
-    context.draw(&ratatui::widgets::canvas::Points { coords: &dots, color: theme.ink(Ink::Scale) });
+    context.draw(&canvas::Points { coords: &dots, color: theme.ink(Ink::Scale) });
     for angle in limit_rad.into_iter().flat_map(|limit| [-limit, limit]) {
         let ((x1, y1), (x2, y2)) = (at(angle, ARC - 3.0 * per_dot), at(angle, ARC + 3.0 * per_dot));
-        context.draw(&Line { x1, y1, x2, y2, color: theme.ink(Ink::Limit) });
+        context.draw(&canvas::Line { x1, y1, x2, y2, color: theme.ink(Ink::Limit) });
     }
 }
 
@@ -196,7 +197,7 @@ fn body(context: &mut Context, seen: &impl Fn([f64; 3]) -> (f64, f64), per_dot: 
         let end = SHOULDER + (NOSE - SHOULDER) * (1.0 - out.abs());
         let shift = out * HALF_WIDTH;
         let share = end - TAIL;
-        context.draw(&Line {
+        context.draw(&canvas::Line {
             x1: x1 + shift * side_x,
             y1: y1 + shift * side_y,
             x2: x1 + share * (x2 - x1) + shift * side_x,
@@ -239,11 +240,11 @@ fn arrow(
     let (dy, dx) = libm::sincos((libm::atan2(along_y, along_x) / eighth).round() * eighth);
     let (half, head) = (0.16, (4.0 * per_dot).min(0.1));
     let (tip_x, tip_y) = (x + half * dx, y + half * dy);
-    context.draw(&Line { x1: x - half * dx, y1: y - half * dy, x2: tip_x, y2: tip_y, color });
+    context.draw(&canvas::Line { x1: x - half * dx, y1: y - half * dy, x2: tip_x, y2: tip_y, color });
     for turn in [2.5_f64, -2.5] {
         let (sin, cos) = libm::sincos(turn);
         let (x2, y2) = (tip_x + head * (cos * dx - sin * dy), tip_y + head * (sin * dx + cos * dy));
-        context.draw(&Line { x1: tip_x, y1: tip_y, x2, y2, color });
+        context.draw(&canvas::Line { x1: tip_x, y1: tip_y, x2, y2, color });
     }
 }
 

@@ -1,4 +1,4 @@
-//! Height over time with what is to come, and in the burn height over sink.
+//! Height over time with what is to come.
 
 use std::time::Duration;
 
@@ -8,7 +8,7 @@ use ratatui::layout::Rect;
 use ratatui::widgets::canvas::Line;
 
 use super::{Ink, TextRole, Theme, scales, seconds_since};
-use crate::model::{Model, dead_reckoning::course, is_burning, is_on_pad, quantity::Quantity};
+use crate::model::{Model, dead_reckoning::course, is_burning, quantity::Quantity};
 use crate::view::footer::{LENGTHS_S, flight_began};
 use crate::view::{fixed, widgets};
 
@@ -18,21 +18,11 @@ const TOP_MIN_M: f64 = 10.0;
 const TICK_ROWS: u16 = 3;
 const TICK_COLUMNS: u16 = 7;
 
-/// When the lift-off was, or the beginning of a flight that has none.
-fn zero(model: &Model, now: Duration) -> Duration {
-    flight_began(model).unwrap_or(now)
-}
-
-/// The heights flown until now, with their time since lift-off.
-fn flown(model: &Model, now: Duration) -> Vec<(f64, f64)> {
-    let from = zero(model, now);
+/// The heights flown until now, with their time since the lift-off.
+fn flown(model: &Model, from: Duration, now: Duration) -> Vec<(f64, f64)> {
     let Some(height) = Quantity::named("height") else { return Vec::new() };
-    model
-        .history
-        .trace
-        .values(height, from, now)
-        .map(|(at, height_m)| (seconds_since(at, from), height_m))
-        .collect()
+    let values = model.history.trace.values(height, from, now);
+    values.map(|(at, height_m)| (seconds_since(at, from), height_m)).collect()
 }
 
 /// The lines between which a picture is told: a tick every so often.
@@ -47,7 +37,8 @@ pub fn draw_height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
         return;
     }
     let vehicle = &model.vehicle;
-    let (from, flown) = (zero(model, now), flown(model, now));
+    let from = flight_began(model).unwrap_or(now);
+    let flown = flown(model, from, now);
     let present_s = seconds_since(now, from);
     let to_come: Vec<(f64, f64)> = course(vehicle, now)
         .into_iter()
@@ -89,11 +80,11 @@ pub fn draw_height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     let ink = |ink| theme.ground().fg(theme.ink(ink));
     if let Some((low_m, high_m)) = band {
         let words = format!("band {}..{}", fixed(low_m, 0), fixed(high_m, 0));
-        plane.write_right(frame, f64::midpoint(low_m, high_m), &words, good);
+        plane.write(frame, (length_s, f64::midpoint(low_m, high_m)), &words, good);
     }
     if let Some(commit_m) = commit_m {
         let above = (commit_m + 4.0 * plane.dot()).min(top);
-        plane.write_right(frame, above, &format!("commit {}", fixed(commit_m, 0)), ink(Ink::Limit));
+        plane.write(frame, (length_s, above), &format!("commit {}", fixed(commit_m, 0)), ink(Ink::Limit));
     }
     marks(model, (from, &flown), apogee_m, theme, frame, &plane);
     if let Some((at, _)) = to_come.last().filter(|(_, height_m)| *height_m < 1.0) {
@@ -146,94 +137,4 @@ fn marks(
             );
         }
     }
-}
-
-/// A height on the scale of the burn: a steady braking is a straight line to the ground, and the last metres have the most room.
-fn root(height_m: f64) -> f64 {
-    libm::sqrt(height_m.max(0.0))
-}
-
-/// Draws height over sink in the burn: flown, planned to the ground, and what the legs stand there.
-pub fn draw_sink(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    if area.width < 16 || area.height < 4 {
-        return;
-    }
-    let vehicle = &model.vehicle;
-    let lit = model.history.timeline.iter().find(|(phase, _)| is_burning(*phase)).map(|(_, at)| *at);
-    let Some(lit) = lit else { return draw_height(model, theme, now, frame, area) };
-    let names = ["vertical speed", "height"].map(Quantity::named);
-    let [Some(sink), Some(height)] = names else { return };
-    let trace = &model.history.trace;
-    let values = |quantity| trace.values(quantity, lit, now);
-    let mut flown: Vec<(f64, f64)> =
-        values(sink).zip(values(height)).map(|((_, up_m_s), (_, height_m))| (-up_m_s, height_m)).collect();
-    let heard = vehicle.vertical_m_s().zip(vehicle.height_m()).filter(|(up, _)| !up.is_stale(now));
-    let present = heard.map(|(up, height)| (-up.value, height.value)).filter(|_| vehicle.in_flight());
-    flown.extend(present);
-    let plan = planned(model);
-    let all = || flown.iter().chain(&plan);
-    let fastest = all().map(|(sink, _)| *sink).fold(5.0, f64::max) * 1.05;
-    let highest = all().map(|(_, height_m)| *height_m).fold(5.0, f64::max) * 1.05;
-    let heights = [0.0, 1.0, 2.0, 5.0, 10.0, 20.0, 40.0, 60.0, 80.0, 100.0, 150.0, 200.0];
-    let mut up: Vec<(f64, f64)> = Vec::new();
-    let rows = f64::from(area.height - 1);
-    for height_m in heights.into_iter().filter(|height_m| *height_m <= highest) {
-        let at = root(height_m);
-        // Two rows apart.
-        let apart = up.last().is_none_or(|(_, before)| (at - before) / root(highest) * rows >= 1.9);
-        if apart {
-            up.push((height_m, at));
-        }
-    }
-    let across = ticks(fastest, area.width / TICK_COLUMNS);
-    let bounds = ([-0.02 * fastest, fastest], [-0.02 * root(highest), root(highest)]);
-    let plane = scales(bounds, (&across, &up), "sink m/s", theme, frame, area);
-    let on_scale = |path: &[(f64, f64)]| {
-        path.iter().map(|(sink, height_m)| (*sink, root(*height_m))).collect::<Vec<_>>()
-    };
-    let (flown, plan) = (on_scale(&flown), on_scale(&plan));
-    let legs_m_s =
-        vehicle.limits().map(|limits| f64::from(limits.vertical_m_s)).filter(|most| most.is_finite());
-    plane.draw(theme, frame, |context| {
-        if let Some(x) = legs_m_s {
-            context.draw(&Line {
-                x1: x,
-                y1: bounds.1[0],
-                x2: x,
-                y2: 4.0 * plane.dot(),
-                color: theme.ink(Ink::Limit),
-            });
-        }
-        plane.predicted(context, &plan, theme.ink(Ink::Predicted));
-        plane.measured(context, &flown, theme.ink(Ink::Measured));
-    });
-    let ink = |ink| theme.ground().fg(theme.ink(ink));
-    if let Some(most) = legs_m_s {
-        let beside = most + 3.0 * (bounds.0[1] - bounds.0[0]) / f64::from(plane.area.width);
-        plane.write(frame, (beside, 0.0), &format!("limit {}", widgets::shortest(most)), ink(Ink::Limit));
-    }
-    if let Some((sink, height)) = flown.first() {
-        plane.write(frame, (*sink, *height), "▲", ink(Ink::Flame));
-    }
-    if let Some((sink, height_m)) = present {
-        plane.write(frame, (sink, root(height_m)), "●", theme.style(TextRole::Title));
-    }
-}
-
-/// Sink and height along the plan, whose points are evenly spaced in time.
-fn planned(model: &Model) -> Vec<(f64, f64)> {
-    let vehicle = &model.vehicle;
-    let path = vehicle.planned();
-    let in_the_air = !vehicle.phase_now().is_some_and(is_on_pad);
-    let Some(prediction) = vehicle.prediction.filter(|_| path.len() > 1 && in_the_air) else {
-        return Vec::new();
-    };
-    let step_s = prediction.value.time_to_go_s / (path.len() - 1) as f64;
-    if step_s.partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater) {
-        return Vec::new();
-    }
-    let between =
-        path.windows(2).map(|pair| ((pair[0].1 - pair[1].1) / step_s, f64::midpoint(pair[0].1, pair[1].1)));
-    let end = (-prediction.value.touchdown.vertical_m_s, prediction.value.touchdown.height_m);
-    between.chain([end]).collect()
 }

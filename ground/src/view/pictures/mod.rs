@@ -1,4 +1,4 @@
-//! The pictures: the vehicle from two sides, height over time and over sink, the place from above, the whole flight from a side.
+//! The pictures: the vehicle from two sides, height over time, the place from above.
 //!
 //! What was measured is a thick line, what is predicted are dots, limits are thin, everywhere. A picture is drawn in braille
 //! dots over its scales; its words are written into cells afterwards, so that no dot hides a letter.
@@ -6,7 +6,6 @@
 pub mod attitude;
 pub mod height;
 pub mod map;
-pub mod side;
 
 use std::time::Duration;
 
@@ -56,11 +55,6 @@ impl Plane {
         let Some((column, row)) = self.cell(x, y).filter(|_| length <= self.area.width) else { return };
         let column = column.min(self.area.right() - length);
         frame.buffer_mut().set_string(column, row, words, style);
-    }
-
-    /// The same at the right end.
-    fn write_right(&self, frame: &mut Frame, y: f64, words: &str, style: Style) {
-        self.write(frame, (self.x[1], y), words, style);
     }
 
     fn draw(&self, theme: Theme, frame: &mut Frame, paint: impl Fn(&mut Context)) {

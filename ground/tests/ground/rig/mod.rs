@@ -331,62 +331,44 @@ impl Rig {
         terminal.backend().to_string()
     }
 
-    /// The styles of the same screen, one letter per cell, with a legend of the letters that occur. Plain cells at
-    /// the end of a line are left out.
+    /// The styles of the same screen in the dark theme, one letter per cell, with a legend. Plain cells at the end of a line are left
+    /// out.
     pub(crate) fn styles(&self, columns: u16, rows: u16) -> String {
-        let terminal = self.draw(columns, rows, Theme { palette: Palette::Sixteen, ascii: false });
-        let cells = &terminal.backend().buffer().content;
-        let letters: Vec<String> =
-            cells.chunks(usize::from(columns)).map(|line| line.iter().map(letter).collect()).collect();
-        let legend = LEGEND.iter().filter(|(known, _)| letters.iter().any(|line| line.contains(*known)));
-        let legend = legend.map(|(letter, meaning)| format!("{letter} {meaning}"));
-        let legend = format!("\nLegend: {}", legend.collect::<Vec<_>>().join(", "));
-        let lines = letters.iter().map(|line| line.trim_end_matches('.').to_owned());
-        lines.chain([legend]).collect::<Vec<_>>().join("\n")
+        let terminal = self.draw(columns, rows, Theme { palette: Palette::Dark, ascii: false });
+        let rows = terminal.backend().buffer().content.chunks(usize::from(columns));
+        let letters =
+            rows.map(|row| row.iter().map(letter).collect::<String>().trim_end_matches('.').to_owned());
+        letters.chain([LEGEND.to_owned()]).collect::<Vec<_>>().join("\n")
     }
 
     pub(crate) fn draw(&self, columns: u16, rows: u16, theme: Theme) -> Terminal<TestBackend> {
         let mut terminal = Terminal::new(TestBackend::new(columns, rows)).expect("a test terminal");
-        terminal
-            .draw(|frame| {
-                draw(&self.model, theme, self.now, frame);
-            })
-            .expect("drawing in memory");
+        let draws = |frame: &mut ratatui::Frame| {
+            draw(&self.model, theme, self.now, frame);
+        };
+        terminal.draw(draws).expect("drawing in memory");
         terminal
     }
 }
 
 /// The letters of [`Rig::styles`] and what they mean.
-const LEGEND: [(char, &str); 15] = [
-    ('.', "plain"),
-    ('b', "bold"),
-    ('d', "dim"),
-    ('s', "dim italic"),
-    ('!', "reversed"),
-    ('c', "cyan"),
-    ('C', "bold cyan"),
-    ('g', "green"),
-    ('G', "bold green"),
-    ('m', "magenta"),
-    ('M', "bold magenta"),
-    ('r', "red"),
-    ('R', "bold red"),
-    ('y', "yellow"),
-    ('Y', "bold yellow"),
-];
+const LEGEND: &str = "\nLegend: . plain, b bold, s stale, l label, g good, c caution or flame, ! alarm or danger, ^ another state, \
+                      m measured, p predicted, x limit";
 
 fn letter(cell: &Cell) -> char {
-    let (bold, dim) = (cell.modifier.contains(Modifier::BOLD), cell.modifier.contains(Modifier::DIM));
-    let letter = match cell.fg {
-        _ if cell.modifier.contains(Modifier::REVERSED) => '!',
+    match (cell.fg, cell.bg) {
+        (_, Color::Indexed(124)) => '!',
+        (_, Color::Indexed(238 | 214 | 79)) => '^',
+        (Color::Indexed(249), _) => 'l',
+        (Color::Indexed(79), _) => 'g',
+        (Color::Indexed(215), _) => 'c',
+        (Color::Indexed(75), _) => 'm',
+        (Color::Indexed(221), _) => 'p',
+        (Color::Indexed(218), _) => 'x',
         _ if cell.modifier.contains(Modifier::ITALIC) => 's',
-        Color::Reset if bold => 'b',
-        Color::Reset if dim => 'd',
-        Color::Reset => '.',
-        Color::DarkGray => 'd',
-        other => other.to_string().to_lowercase().chars().next().unwrap_or('?'),
-    };
-    if bold && cell.fg != Color::Reset { letter.to_ascii_uppercase() } else { letter }
+        _ if cell.modifier.contains(Modifier::BOLD) => 'b',
+        _ => '.',
+    }
 }
 
 pub(crate) fn settings(auto: bool, interactive: bool) -> Settings {

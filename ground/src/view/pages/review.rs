@@ -1,0 +1,155 @@
+//! The page after a flight: verdict, limits, what went wrong, greatest values, height and place.
+
+use std::time::Duration;
+
+use ratatui::Frame;
+use ratatui::layout::Constraint::{Fill, Length, Percentage};
+use ratatui::layout::Rect;
+use ratatui::text::Line;
+
+use super::flight::{FROM_ABOVE, LIMIT_ROWS, height, map};
+use super::{Room, columns, events, rows, table};
+use crate::model::{Act, Model, RED_AFTER, quantity::Quantity};
+use crate::view::band::draw_band;
+use crate::view::{TextRole, Theme, bars, fixed, headline, lists, panels};
+
+/// Rows of the panels under the pictures.
+const BELOW_ROWS: u16 = 12;
+
+/// Columns of the time before a finding.
+const FINDING_TIME_COLUMNS: usize = 10;
+
+const FINDINGS_TITLE: &str = "what went wrong";
+
+/// Draws the verdict in large letters with its sentence, the limits as bars, the whole flight and the place.
+pub fn draw_review(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let (words, role) = ended(model, now);
+    let silent = unheard(model, now).map_or_else(String::new, |words| format!("; {words}"));
+    let keys = &model.settings.keys;
+    let again = Act::ReplayFlight.works(model, now).then(|| {
+        let [again, report] = [Act::ReplayFlight, Act::Report].map(|act| keys.name(act));
+        theme.label(format!("  {again} shows it again, {report} writes the report"))
+    });
+    let mut sentence = Line::from(theme.span(format!(" {words}{silent}"), role));
+    // A small screen has no room behind a long sentence.
+    let room_for = usize::from(area.width.saturating_sub(sentence.width() as u16));
+    sentence.extend(again.filter(|again| again.width() <= room_for));
+    let area = draw_band((&headline::verdict(model, now), sentence, &[]), theme, frame, area);
+    if Room::of(frame.area()) == Room::Small {
+        let [left, mut right] = columns(area, [Fill(6), Fill(5)]);
+        let found = findings(model, theme, usize::from(right.width.saturating_sub(2)));
+        if model.vehicle.findings.count.is_some_and(|count| count > 0) {
+            // What went wrong first: half of the panel's height at most, or all of it where the map has no room.
+            let wanted = u16::try_from(found.len()).unwrap_or(u16::MAX).saturating_add(2);
+            let most = if area.height < 14 { area.height } else { area.height / 2 };
+            let [above, below] = rows(right, [Length(wanted.min(most)), Fill(1)]);
+            table(FINDINGS_TITLE, &found, theme, frame, above);
+            right = below;
+        }
+        let [limits, below] = rows(left, [Length(LIMIT_ROWS.min(area.height)), Fill(1)]);
+        bars::draw_limits(model, theme, now, frame, limits);
+        if below.height > 5 {
+            height(model, theme, now, frame, below);
+            map(FROM_ABOVE, model, theme, now, frame, right);
+        } else {
+            let [place, flight] = columns(right, [Fill(1), Fill(1)]);
+            map(FROM_ABOVE, model, theme, now, frame, place);
+            height(model, theme, now, frame, flight);
+        }
+        return;
+    }
+    let [above, below] = rows(area, [Fill(1), Length(BELOW_ROWS)]);
+    let [left, right] = columns(above, [Percentage(60), Fill(1)]);
+    height(model, theme, now, frame, left);
+    map(FROM_ABOVE, model, theme, now, frame, right);
+    let [left, middle, right] = columns(below, [Percentage(42), Percentage(30), Fill(1)]);
+    bars::draw_limits(model, theme, now, frame, left);
+    let found = findings(model, theme, usize::from(middle.width.saturating_sub(2)));
+    let (title, values) = extremes(model, theme, now);
+    if found.is_empty() {
+        table(title, &values, theme, frame, middle);
+    } else {
+        table(FINDINGS_TITLE, &found, theme, frame, middle);
+    }
+    events(model, theme, frame, right);
+}
+
+/// How the flight ended, in words.
+fn ended(model: &Model, now: Duration) -> (String, TextRole) {
+    match panels::ending_role(model, now) {
+        Some((ending, role)) => (ending.sentence(&model.vehicle), role),
+        None => ("no verdict received yet".to_owned(), TextRole::Caution),
+    }
+}
+
+/// What the vehicle says went wrong, each with its T+; nothing if it has not said anything of it.
+fn findings(model: &Model, theme: Theme, columns: usize) -> Vec<Line<'static>> {
+    let findings = &model.vehicle.findings;
+    let Some(count) = findings.count else { return Vec::new() };
+    if count == 0 {
+        return vec![theme.line(" nothing found", TextRole::Label)];
+    }
+    let arrived = findings.in_time();
+    let missing = usize::from(count).saturating_sub(arrived.len());
+    let room = columns.saturating_sub(FINDING_TIME_COLUMNS).max(8);
+    let mut lines = Vec::new();
+    for (since_s, words) in arrived {
+        let time = format!(" T+{:<7}", fixed(since_s, 1));
+        for (row, part) in lists::wrap(words, room).into_iter().enumerate() {
+            let time = if row == 0 { time.clone() } else { " ".repeat(FINDING_TIME_COLUMNS) };
+            lines.push(Line::from(vec![theme.label(time), theme.span(part, TextRole::Caution)]));
+        }
+    }
+    if missing > 0 {
+        lines.push(theme.line(format!(" {missing} more not heard yet"), TextRole::Label));
+    }
+    lines
+}
+
+/// For how long nothing was heard of a flight, if it was long enough to count.
+fn unheard(model: &Model, now: Duration) -> Option<String> {
+    let silence_s =
+        model.history.extremes.silence_s.filter(|silence_s| *silence_s > RED_AFTER.as_secs_f64())?;
+    if model.vehicle.in_flight() && !model.link.state(now).carries() {
+        return Some("link LOST before touchdown".to_owned());
+    }
+    Some(format!("silent for {} s of the flight", fixed(silence_s, 1)))
+}
+
+/// What the last table shows of a flight.
+const EXTREMES: [&str; 9] = [
+    "height",
+    "vertical speed",
+    "distance",
+    "tilt",
+    "turn rate",
+    "gimbal pitch",
+    "gimbal yaw",
+    "solve time",
+    "solver margin",
+];
+
+/// The title, and least and greatest values: what happened in a silence is not known.
+fn extremes(model: &Model, theme: Theme, now: Duration) -> (&'static str, Vec<Line<'static>>) {
+    let extremes = &model.history.extremes;
+    let title =
+        if unheard(model, now).is_some() { "least, greatest heard" } else { "least, greatest in flight" };
+    let row = |name: &str, text: String, unit: &'static str| {
+        Line::from(vec![
+            theme.label(format!(" {name:<15}")),
+            theme.plain(text),
+            theme.label(format!(" {unit}")),
+        ])
+    };
+    let known = EXTREMES.into_iter().filter_map(Quantity::named);
+    let mut lines: Vec<Line> = known
+        .map(|quantity| {
+            let ends = extremes.of(quantity.name).map(|ends| ends.map(|end| fixed(end, quantity.decimals)));
+            let [least, greatest] = ends.unwrap_or_else(|| ["--", "--"].map(str::to_owned));
+            row(quantity.name, format!("{least:>7} {greatest:>7}"), quantity.unit)
+        })
+        .collect();
+    let silence = extremes.silence_s.map_or_else(|| "--".to_owned(), |silence_s| fixed(silence_s, 1));
+    lines.push(row("silence", format!("{silence:>15}"), "s"));
+    (title, lines)
+}
