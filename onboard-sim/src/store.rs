@@ -64,7 +64,7 @@ impl Manifest {
     fn read(directory: &Path) -> Result<Self, StoreError> {
         let path = directory.join(MANIFEST);
         let text = fs::read(&path).map_err(unreadable(&path))?;
-        serde_json::from_slice(&text).map_err(|error| StoreError::content(&path, error))
+        serde_json::from_slice(&text).map_err(|error| StoreError::content(&path, &error))
     }
 
     /// Refuses a directory with another manifest, and names the first difference.
@@ -116,7 +116,7 @@ impl core::fmt::Display for Shard {
 
 /// SHA-256 as lower-case hexadecimal digits.
 pub fn sha256(bytes: impl AsRef<[u8]>) -> String {
-    sha2::Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+    sha2::Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().concat()
 }
 
 /// Why a directory cannot be used.
@@ -147,7 +147,7 @@ pub enum StoreError {
 }
 
 impl StoreError {
-    fn content(path: &Path, error: impl ToString) -> Self {
+    fn content(path: &Path, error: &dyn ToString) -> Self {
         Self::Content { path: path.to_owned(), message: error.to_string() }
     }
 }
@@ -182,7 +182,7 @@ impl Store {
         } else {
             refuse_foreign(path)?;
             let text =
-                serde_json::to_vec_pretty(&manifest).map_err(|error| StoreError::content(path, error))?;
+                serde_json::to_vec_pretty(&manifest).map_err(|error| StoreError::content(path, &error))?;
             write_folder(path, vec![(MANIFEST, text)], true)?;
         }
         let rows = read_rows(path)?;
@@ -210,7 +210,7 @@ impl Store {
     pub fn add(&self, row: Row) -> Result<(), StoreError> {
         let (rows, writer) = &mut *self.rows.lock().unwrap_or_else(PoisonError::into_inner);
         let written = writer.serialize(&row).and_then(|()| Ok(writer.flush()?));
-        written.map_err(|error| StoreError::content(&self.path.join(FLIGHTS), error))?;
+        written.map_err(|error| StoreError::content(&self.path.join(FLIGHTS), &error))?;
         rows.insert(row.number, row);
         Ok(())
     }
@@ -225,11 +225,11 @@ impl Store {
         let rows: Vec<Row> = rows.into_values().collect();
         let summary = Summary::new(&self.manifest, &rows);
         let json = serde_json::to_vec_pretty(&summary);
-        let json = json.map_err(|error| StoreError::content(&self.path.join("summary.json"), error))?;
+        let json = json.map_err(|error| StoreError::content(&self.path.join("summary.json"), &error))?;
         let markdown = to_markdown(&summary).into_bytes();
         let mut files = vec![(FLIGHTS, table), ("summary.json", json), ("summary.md", markdown)];
         for ((name, _), picture) in PICTURES.iter().zip(pictures(&rows, legs)) {
-            let picture = picture.map_err(|error| StoreError::content(&self.path.join(name), error))?;
+            let picture = picture.map_err(|error| StoreError::content(&self.path.join(name), &error))?;
             files.push((name, picture.into_bytes()));
         }
         write_folder(&self.path, files, true)?;
@@ -256,15 +256,15 @@ fn read_rows(directory: &Path) -> Result<BTreeMap<u64, Row>, StoreError> {
     let whole = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1);
     let rows = csv::Reader::from_reader(&bytes[..whole]).into_deserialize();
     let rows = rows.map(|row: csv::Result<Row>| row.map(|row| (row.number, row)));
-    rows.collect::<Result<_, _>>().map_err(|error| StoreError::content(&path, error))
+    rows.collect::<Result<_, _>>().map_err(|error| StoreError::content(&path, &error))
 }
 
 /// With a header, if there is a row.
 fn to_csv(rows: &BTreeMap<u64, Row>) -> Result<Vec<u8>, StoreError> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     let written = rows.values().try_for_each(|row| writer.serialize(row));
-    written.map_err(|error| StoreError::content(Path::new(FLIGHTS), error))?;
-    writer.into_inner().map_err(|error| StoreError::content(Path::new(FLIGHTS), error))
+    written.map_err(|error| StoreError::content(Path::new(FLIGHTS), &error))?;
+    writer.into_inner().map_err(|error| StoreError::content(Path::new(FLIGHTS), &error))
 }
 
 /// Merges the parts of a campaign into one directory.
@@ -294,7 +294,7 @@ pub fn merge(parts: &[PathBuf], out: &Path) -> Result<Summary, StoreError> {
     };
     let (mission, dispersion) = (read(MISSION)?, read(DISPERSION)?);
     let recipe = Recipe::from_texts((MISSION, &mission), (&whole.dispersion, &dispersion));
-    let recipe = recipe.map_err(|error| StoreError::content(first, error))?;
+    let recipe = recipe.map_err(|error| StoreError::content(first, &error))?;
     let store = Store::open(out, &recipe, whole)?;
     rows.into_values().try_for_each(|row| store.add(row))?;
     store.publish(&recipe.mission.leg_limits)

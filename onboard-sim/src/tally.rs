@@ -106,7 +106,9 @@ impl Tally {
                 ControlLevel::ShiftedPlan => Some(&mut row.plans_shifted),
                 ControlLevel::Stabiliser => Some(&mut row.plans_stabiliser),
             };
-            plans.into_iter().for_each(|plans| *plans += 1);
+            if let Some(plans) = plans {
+                *plans += 1;
+            }
             row.solver_iterations += report.iterations as u64;
             let solved = matches!(report.status, Status::Converged | Status::NotRun);
             row.solver_failures += u64::from(!solved);
