@@ -3,7 +3,7 @@
 //!
 //! In reading order:
 //!
-//! * [`Cli`]: the command line. A command is one file with its arguments and its answer ([`cli::Answer`]: data, and
+//! * [`Cli`] and [`cli`]: the command line. A command is one file with its arguments and its answer ([`cli::Answer`]: data, and
 //!   what it says), and its line here.
 //! * [`log`]: opens a log and streams its records in bounded memory, or holds a whole flight.
 //! * [`info`]: describes what is in a log, how complete it is and what can be done with it.

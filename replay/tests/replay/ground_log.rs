@@ -101,7 +101,7 @@ fn every_message_becomes_a_table_with_every_field() {
     let head = text.lines().next().unwrap();
     assert_eq!(
         head,
-        "log_time_ns,recorded_by,direction,link,frame_sequence,time_boot_ms,contact_ms,distance_m,\
+        "log_time_ns,recorded_by,direction,link,frame_sequence,boot_number,time_boot_ms,contact_ms,distance_m,\
          vertical_m_s,lateral_m_s,tilt_rad,rate_rad_s,limits_violated,landing"
     );
     // As many rows as frames of the dialect.
