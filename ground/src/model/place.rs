@@ -1,79 +1,16 @@
 //! Where to look for the vehicle after a flight: the last place where it was heard, the predicted one, and their files.
 
-use std::str::FromStr;
 use std::time::Duration;
 
+pub use protocol::motion::Degrees;
 use serde::{Deserialize, Serialize};
 
 use serde_json::{Value, json};
 
 use super::{Model, Sample, dead_reckoning::predict_position};
 
-/// The Earth's equatorial radius, m, and its first eccentricity squared (WGS 84).
-const EQUATORIAL_RADIUS_M: f64 = 6_378_137.0;
-const ECCENTRICITY_SQUARED: f64 = 6.694_379_990_14e-3;
-/// The greatest latitude, degrees: close to a pole a path to the east circles the pole.
-const LATITUDE_MAX_DEG: f64 = 85.0;
 /// The error of a place where the vehicle was heard, m: usual for a satellite receiver.
 const HEARD_ERROR_M: f64 = 1.5;
-
-/// A point on the Earth, degrees, north and east positive.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Degrees {
-    pub latitude: f64,
-    pub longitude: f64,
-}
-
-impl FromStr for Degrees {
-    type Err = String;
-
-    fn from_str(given: &str) -> Result<Self, String> {
-        let wrong =
-            || format!("`{given}` is no place; give latitude,longitude in degrees, as in 35.347,-117.809");
-        let (latitude, longitude) = given.split_once(',').ok_or_else(wrong)?;
-        let number = |text: &str| text.trim().parse::<f64>().map_err(|_no_number| wrong());
-        let (latitude, longitude) = (number(latitude)?, number(longitude)?);
-        let valid = latitude.abs() <= LATITUDE_MAX_DEG && longitude.abs() <= 180.0;
-        if valid { Ok(Self { latitude, longitude }) } else { Err(wrong()) }
-    }
-}
-
-impl Degrees {
-    /// Metres per degree of latitude and of longitude here.
-    fn metres_per_degree(self) -> (f64, f64) {
-        let latitude_rad = self.latitude.to_radians();
-        let flattened = 1.0 - ECCENTRICITY_SQUARED * libm::pow(libm::sin(latitude_rad), 2.0);
-        let across_m = EQUATORIAL_RADIUS_M / libm::sqrt(flattened);
-        let along_m = across_m * (1.0 - ECCENTRICITY_SQUARED) / flattened;
-        (along_m.to_radians(), (across_m * libm::cos(latitude_rad)).to_radians())
-    }
-
-    /// The point at a distance north and east of this one, m; exact to a millimetre within a kilometre.
-    #[must_use]
-    pub fn moved(self, north_m: f64, east_m: f64) -> Self {
-        let (north_m_deg, east_m_deg) = self.metres_per_degree();
-        Self {
-            latitude: self.latitude + north_m / north_m_deg,
-            longitude: wrapped(self.longitude + east_m / east_m_deg),
-        }
-    }
-
-    /// How far north and east another point is, m.
-    pub fn to(self, other: Self) -> (f64, f64) {
-        let (north_m_deg, east_m_deg) = self.metres_per_degree();
-        let east_deg = wrapped(other.longitude - self.longitude);
-        ((other.latitude - self.latitude) * north_m_deg, east_deg * east_m_deg)
-    }
-}
-
-/// Degrees from -180 to 180.
-fn wrapped(degrees: f64) -> f64 {
-    match degrees {
-        east if east > 180.0 => east - 360.0,
-        west if west < -180.0 => west + 360.0,
-        degrees => degrees,
-    }
-}
 
 /// A place over the ground, from the pad, and how wrong it may be.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]

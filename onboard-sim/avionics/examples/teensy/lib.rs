@@ -36,9 +36,9 @@ use flight::computer::{Commands, Computer, FRAME_S, KeptInput, LogState, flight_
 use flight::estimation::estimator::{GnssFix, ImuSample, Measurements};
 use flight::rules::outputs::PyroOutput;
 use flight::vehicle::atmosphere::{Air, pressure_altitude_m};
-use flight::vehicle::site::Site;
 use nalgebra::Vector3;
 use prost::Message as _;
+use protocol::motion::Degrees;
 use protocol::records::computer_v1::ComputerFrame;
 
 pub use self::barometer::Barometer;
@@ -167,7 +167,7 @@ pub struct TeensyBoard<W: Wiring> {
     build: Build,
     gnss: Framer<{ gnss::FRAME_BYTES }>,
     lidar: Framer<{ lidar::FRAME_BYTES }>,
-    site: Site,
+    pad: Degrees,
     /// Where the centre of gravity is while the vehicle stands, world, m.
     stands_m: Vector3<f64>,
     height: Zero,
@@ -220,7 +220,7 @@ pub fn start<W: Wiring>(
         build,
         gnss,
         lidar,
-        site,
+        pad: Degrees { latitude: site.latitude_deg, longitude: site.longitude_deg },
         stands_m,
         height,
         place,
@@ -263,7 +263,7 @@ impl<W: Wiring> TeensyBoard<W> {
 
     /// A fix on the flight computer's clock, relative to the pad: the vehicle stands where its mission says.
     fn located(&mut self, fix: &gnss::Fix) -> Option<GnssFix> {
-        let (north_m, east_m) = self.site.place_m(fix.latitude_deg, fix.longitude_deg);
+        let (north_m, east_m) = self.pad.to(Degrees { latitude: fix.latitude_deg, longitude: fix.longitude_deg });
         let place_m = turned(&WORLD_FROM_NED, [north_m, east_m, -fix.height_m]);
         Some(GnssFix {
             position_m: self.stands_m + self.place.from(ZERO_FIXES, place_m)?,

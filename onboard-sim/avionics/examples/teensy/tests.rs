@@ -17,6 +17,7 @@ use flight::rules::arming::Uplink;
 use flight::rules::phase::Phase;
 use flight::vehicle::mission::{Mission, StartPoint};
 use prost::bytes::Buf;
+use protocol::motion::Degrees;
 use protocol::records::computer_v1::ComputerStart;
 use sim::draw::draw;
 use sim::recipe::Recipe;
@@ -212,7 +213,7 @@ fn at_power_up(mission: &Mission) -> Computer {
 struct Bench {
     world: World,
     sensors: Sensors,
-    site: Site,
+    pad: Degrees,
     frame: u64,
     measured: Option<Measurements>,
     /// In the place of what the world gives: accelerometer and gyro, counts.
@@ -248,7 +249,7 @@ impl Bench {
         let bench = Self {
             world,
             sensors: Sensors::new(&params, drawn.flight_seed, 1.0).unwrap(),
-            site: mission.site,
+            pad: Degrees { latitude: mission.site.latitude_deg, longitude: mission.site.longitude_deg },
             frame: 0,
             measured: None,
             imu: None,
@@ -282,8 +283,8 @@ impl Bench {
         }
         let Measurements { gnss, lidar_range_m, .. } = self.measured.unwrap();
         if let Some(GnssFix { position_m, velocity_m_s, .. }) = gnss {
-            let (latitude_deg, longitude_deg) = self.site.at_deg(position_m.x, -position_m.y);
-            let place_1e7 = [latitude_deg, longitude_deg].map(|deg| (deg * 1e7).round() as i32);
+            let place = self.pad.moved(position_m.x, -position_m.y);
+            let place_1e7 = [place.latitude, place.longitude].map(|deg| (deg * 1e7).round() as i32);
             let ned_m_s = [velocity_m_s.x, -velocity_m_s.y, -velocity_m_s.z];
             let ned_mm_s = ned_m_s.map(|part_m_s| (part_m_s * 1e3).round() as i32);
             let height_mm = ((position_m.z + PAD_M) * 1e3).round() as i32;

@@ -13,8 +13,10 @@ use flight::rules::verdict::{Landing, LandingVerdict, Limits, Touchdown};
 use flight::vehicle::airframe::MassModel;
 use flight::vehicle::burn::Burn;
 use flight::vehicle::mission::{Mission, StartPoint};
+use flight::vehicle::site::Site;
 use flight::vehicle::rigid::RigidState;
 use nalgebra::{Quaternion, UnitQuaternion, Vector2, Vector3};
+use protocol::motion::Degrees;
 use protocol::mission::MissionHash;
 
 /// Under a parachute that carries the fall is slower than this, m/s (canopies are sized for 6, an open fall is 20 to 40),
@@ -187,6 +189,12 @@ impl<'a> VehicleState<'a> {
     /// How long the last plan took, s; 0 before the first.
     pub fn solve_time_s(&self) -> f64 {
         self.computer.pilot().report().took_s
+    }
+
+    /// The pad on the Earth.
+    pub fn pad(&self) -> Degrees {
+        let Site { latitude_deg: latitude, longitude_deg: longitude } = self.mission().site;
+        Degrees { latitude, longitude }
     }
 
     /// Level and report of what the controller did last.

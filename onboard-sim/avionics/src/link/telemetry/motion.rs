@@ -73,8 +73,8 @@ pub(super) fn attitude(state: &VehicleState<'_>) -> MavMessage {
 
 /// Latitude and longitude, 1e-7 degrees, of a point at this distance north and east of the pad, m.
 fn degrees_e7(state: &VehicleState<'_>, north_m: f64, east_m: f64) -> (i32, i32) {
-    let (latitude_deg, longitude_deg) = state.mission().site.at_deg(north_m, east_m);
-    (libm::round(1e7 * latitude_deg) as i32, libm::round(1e7 * longitude_deg) as i32)
+    let at = state.pad().moved(north_m, east_m);
+    (libm::round(1e7 * at.latitude) as i32, libm::round(1e7 * at.longitude) as i32)
 }
 
 fn millimetres(length_m: f64) -> i32 {
