@@ -79,8 +79,7 @@ fn without_changes_the_flight_is_the_same_bit_for_bit() {
     ];
     for start in starts {
         let (report, flown) =
-            refly_flight(&recording, &ReflyOptions { start: start.clone(), ..ReflyOptions::default() })
-                .unwrap();
+            refly_flight(&recording, &ReflyOptions { start, ..ReflyOptions::default() }).unwrap();
         assert!(report.kind.starts_with("closed loop"));
         let reached = report.reached;
         assert_eq!((reached.identical, reached.first_different), (reached.frames, None), "{start:?}");

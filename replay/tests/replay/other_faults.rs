@@ -25,7 +25,7 @@ fn the_same_flight_with_and_without_a_fault() {
     let (healthy, broken) = (Recording::open(&LANDED.log).unwrap(), Recording::open(&broken.log).unwrap());
     assert_ne!(healthy.verdict, broken.verdict);
     for start in [None, Some(Moment::Frame(1))] {
-        let without = ReflyOptions { start: start.clone(), ..changed(&[], &["weak-motor", "gnss-out@5"]) };
+        let without = ReflyOptions { start, ..changed(&[], &["weak-motor", "gnss-out@5"]) };
         let (report, flown) = refly_flight(&broken, &without).unwrap();
         assert_eq!(flown.verdict, healthy.verdict, "{start:?}");
         assert!(report.recorded.is_some() && report.faults == without.faults);

@@ -59,7 +59,7 @@ fn a_log_reflown_from_a_recovered_log_has_no_gap() {
 fn a_setting_timed_before_the_start_applies_from_the_start() {
     let recording = Recording::open(&LANDED.log).unwrap();
     let start = Some(Moment::Phase(Phase::AeroDescent));
-    let timed = ReflyOptions { start: start.clone(), ..with(&["ignition.fixed_height_m=80@0.1"]) };
+    let timed = ReflyOptions { start, ..with(&["ignition.fixed_height_m=80@0.1"]) };
     let again = written("timed_early.mcap", &recording, &timed);
     let lasting = ReflyOptions { start, settings: settings(&["ignition.fixed_height_m=80"]), ..timed };
     let lasting = refly_flight(&recording, &lasting).unwrap().1;

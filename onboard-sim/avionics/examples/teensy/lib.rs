@@ -263,7 +263,8 @@ impl<W: Wiring> TeensyBoard<W> {
 
     /// A fix on the flight computer's clock, relative to the pad: the vehicle stands where its mission says.
     fn located(&mut self, fix: &gnss::Fix) -> Option<GnssFix> {
-        let (north_m, east_m) = self.pad.to(Degrees { latitude: fix.latitude_deg, longitude: fix.longitude_deg });
+        let (north_m, east_m) =
+            self.pad.to(Degrees { latitude: fix.latitude_deg, longitude: fix.longitude_deg });
         let place_m = turned(&WORLD_FROM_NED, [north_m, east_m, -fix.height_m]);
         Some(GnssFix {
             position_m: self.stands_m + self.place.from(ZERO_FIXES, place_m)?,

@@ -13,11 +13,11 @@ use flight::rules::verdict::{Landing, LandingVerdict, Limits, Touchdown};
 use flight::vehicle::airframe::MassModel;
 use flight::vehicle::burn::Burn;
 use flight::vehicle::mission::{Mission, StartPoint};
-use flight::vehicle::site::Site;
 use flight::vehicle::rigid::RigidState;
+use flight::vehicle::site::Site;
 use nalgebra::{Quaternion, UnitQuaternion, Vector2, Vector3};
-use protocol::motion::Degrees;
 use protocol::mission::MissionHash;
+use protocol::motion::Degrees;
 
 /// Under a parachute that carries the fall is slower than this, m/s (canopies are sized for 6, an open fall is 20 to 40),
 /// and more than this share of the weight is felt: right after apogee the fall is slow, too, but free.

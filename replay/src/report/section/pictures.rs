@@ -55,6 +55,13 @@ impl<'a> Picture<'a> {
 
 /// The pictures, in the order of their sections.
 pub(super) fn all(flight: &Flight) -> Vec<Picture<'_>> {
+    let mut pictures = of_landing(flight);
+    pictures.extend(of_the_rest(flight));
+    pictures
+}
+
+/// Those of the burn and of where it leads.
+fn of_landing(flight: &Flight) -> Vec<Picture<'_>> {
     let mission = flight.pilot.as_ref().map(Pilot::mission);
     let over = |section, part, title: &str| Picture::new(flight, section, part, title);
     let predicted = |title: &str, actual: Option<f64>, value: &dyn Fn(&Thought) -> Option<f64>| {
@@ -116,7 +123,12 @@ pub(super) fn all(flight: &Flight) -> Vec<Picture<'_>> {
                 .line("inferred", "a", flight.thought(|thought| thought.thrust_n)),
         );
     }
+    pictures
+}
 
+/// Those of solver, descent, sensors, battery and link.
+fn of_the_rest(flight: &Flight) -> Vec<Picture<'_>> {
+    let over = |section, part, title: &str| Picture::new(flight, section, part, title);
     let iterations = |thought: &Thought| thought.plan.as_ref().map(|_| thought.iterations as f64);
     let timings = &flight.recording.timings;
     let took = timings.iter().map(|timing| (flight.axis_s(timing.time_s), 1e3 * timing.solve_time_s));
@@ -141,7 +153,7 @@ pub(super) fn all(flight: &Flight) -> Vec<Picture<'_>> {
     let ratio = |aid: Option<AidStatus>| Some(aid?.test_ratio.min(3.0));
     let estimated =
         |value: fn(&Estimate) -> f64| flight.thought(|thought| thought.estimate.as_ref().map(value));
-    pictures.extend([
+    vec![
         over("solver", Burn, "Newton iterations of each plan").only(flight.thought(iterations)),
         over("solver", Whole, "From the frame that posed each plan to the one that took it over, ms")
             .limits(timings.first().map(|timing| 1e3 * timing.deadline_s))
@@ -194,8 +206,7 @@ pub(super) fn all(flight: &Flight) -> Vec<Picture<'_>> {
         over("link", Whole, "Age of the last heartbeat, s").only(flight.heard(|told| told.link_age_s)),
         over("link", Whole, "Frames lost, %").only(flight.heard(|told| Some(100.0 * told.link_loss?))),
         over("link", Whole, "Received, bytes/s").only(flight.heard(|told| told.link_rx_bytes_s)),
-    ]);
-    pictures
+    ]
 }
 
 /// Actual and commanded angle of a gimbal's axis, deg.
