@@ -82,7 +82,7 @@ socket.bind(Number(port), host, async () => {
     const attitude = await message(common.AttitudeQuaternion)
     // The nose's share of the down axis, whatever its heading.
     check('upright', 2 * (attitude.q1 * attitude.q3 - attitude.q2 * attitude.q4) > 0.99)
-    await message(minimal.Heartbeat, data => data.customMode === 1)
+    await message(minimal.Heartbeat, data => (data.customMode & 0xFF) === 1)
     check('START before arming is denied', (await command(300, 0)) === 2)
     check('an unknown command is unsupported', (await command(31000, 0)) === 3)
     const list = new common.ParamRequestList()

@@ -180,7 +180,7 @@ fn val_mavproxy_shows_arms_and_terminates() {
     proxy.wait_for_line("start refused: cannot start in PAD_IDLE");
     types(&mut operator, "arm throttle");
     // This is what HEARTBEAT says, not what was acknowledged.
-    proxy.wait_for_line("Mode(2)");
+    proxy.wait_for_line("ARMED");
     types(&mut operator, "disarm");
     proxy.wait_for_line("DISARMED");
     types(&mut operator, "long 185 1");
