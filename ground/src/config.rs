@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{ArgMatches, CommandFactory as _, FromArgMatches as _, Parser as _};
+use clap::{ArgAction, ArgMatches, CommandFactory as _, FromArgMatches as _};
 use serde::{Deserialize, Deserializer, de};
 use toml::{Table, Value};
 
@@ -48,6 +48,13 @@ fn command<'de, D: Deserializer<'de>>(from: D) -> Result<Option<String>, D::Erro
     Ok(Some(command).filter(|command| command != "none"))
 }
 
+/// What clap says of a value, without its advice on command lines.
+fn reason(error: &clap::Error) -> String {
+    let text = error.to_string();
+    let words = text.strip_prefix("error: ").unwrap_or(&text);
+    words.split("\n\nFor more information").next().unwrap_or(words).trim().to_owned()
+}
+
 /// Why a settings file cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
@@ -80,18 +87,24 @@ impl Config {
     /// The text is invalid; the error says where.
     pub fn parse(text: &str) -> Result<Self, String> {
         let mut table: Table = toml::from_str(text).map_err(|error| error.to_string())?;
-        let mut flags = vec!["settings".to_owned()];
+        let mut flags = Flags::default();
         for argument in Flags::command().get_arguments() {
             let (key, flag) = (argument.get_id().as_str(), argument.get_long().unwrap_or_default());
             let values = match table.remove(key) {
                 None => continue,
-                Some(Value::Array(values)) => values,
+                Some(Value::Array(values)) if matches!(argument.get_action(), ArgAction::Append) => values,
                 Some(value) => vec![value],
             };
-            let text = |value: Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
-            flags.extend(values.into_iter().map(|value| format!("--{flag}={}", text(value))));
+            let as_flag = |value| match value {
+                Value::String(text) => Ok(format!("--{flag}={text}")),
+                Value::Integer(number) => Ok(format!("--{flag}={number}")),
+                other => Err(format!("{key}: `{other}` is neither a text nor a number")),
+            };
+            let words = values.into_iter().map(as_flag).collect::<Result<Vec<_>, _>>()?;
+            let given = Flags::command().no_binary_name(true).try_get_matches_from(words);
+            let filled = given.and_then(|given| flags.update_from_arg_matches(&given));
+            filled.map_err(|error| format!("{key}: {}", reason(&error)))?;
         }
-        let flags = Flags::try_parse_from(flags).map_err(|error| error.to_string())?;
         let config = table.try_into().map_err(|error: toml::de::Error| error.to_string())?;
         Ok(Self { flags, ..config })
     }
@@ -184,7 +197,10 @@ mod tests {
             ("connect = [\"tcp\"]", "connect", "udpin:ADDRESS:PORT"),
             ("theme = \"blue\"", "theme", "light"),
             ("sysid = 0", "sysid", "1..=255"),
-            ("vehicle_sysid = 256", "vehicle-sysid", "1..=255"),
+            ("vehicle_sysid = 256", "vehicle_sysid", "1..=255"),
+            ("key = []", "key", "a text"),
+            ("log = true", "log", "a text"),
+            ("connect = [1.5]", "connect", "a text"),
             ("log = \"\"", "log", "give a file or `none`"),
             ("pad = \"here\"", "pad", "`here` is no place"),
             ("voice = \"\"", "voice", "\"none\""),

@@ -1,4 +1,5 @@
-//! Position, velocity and attitude of a vehicle, and places on the Earth; converted from north-east-down on the wire to north, east and up.
+//! Position, velocity and attitude of a vehicle, converted from north-east-down on the wire to north, east and up; and places on
+//! the Earth.
 
 use alloc::format;
 use alloc::string::String;
@@ -30,12 +31,16 @@ impl FromStr for Degrees {
         let (latitude, longitude) = given.split_once(',').ok_or_else(wrong)?;
         let number = |text: &str| text.trim().parse::<f64>().map_err(|_no_number| wrong());
         let (latitude, longitude) = (number(latitude)?, number(longitude)?);
-        let valid = latitude.abs() <= LATITUDE_MAX_DEG && longitude.abs() <= 180.0;
-        if valid { Ok(Self { latitude, longitude }) } else { Err(wrong()) }
+        Some(Self { latitude, longitude }).filter(|place| place.is_valid()).ok_or_else(wrong)
     }
 }
 
 impl Degrees {
+    /// Whether it is a place, and not close to a pole.
+    pub fn is_valid(self) -> bool {
+        self.latitude.abs() <= LATITUDE_MAX_DEG && self.longitude.abs() <= 180.0
+    }
+
     /// Metres per degree of latitude and of longitude here.
     fn metres_per_degree(self) -> (f64, f64) {
         let latitude_rad = self.latitude.to_radians();

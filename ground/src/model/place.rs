@@ -203,7 +203,8 @@ pub fn kml(place: &LastPlace) -> Option<String> {
 /// Reads what [`geojson`] has written; `None` for anything else.
 pub fn read_geojson(text: &str) -> Option<LastPlace> {
     let mut collection: Value = serde_json::from_str(text).ok()?;
-    serde_json::from_value(collection.get_mut("touchdown")?.take()).ok()
+    let place: LastPlace = serde_json::from_value(collection.get_mut("touchdown")?.take()).ok()?;
+    Some(LastPlace { pad: place.pad.filter(|pad| pad.is_valid()), ..place })
 }
 
 #[cfg(test)]

@@ -80,13 +80,15 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
         model.link.undecodable += 1;
         return;
     };
+    let named = boot_of(frame);
     // Of somebody who has not said yet who it is only texts are taken, and that another autopilot beats.
     let is_nobodys = match &message {
         MavMessage::HEARTBEAT(beat) if !may_be_ours(beat) => false,
         MavMessage::TD_FLIGHT_STATUS(_) | MavMessage::STATUSTEXT(_) => false,
-        MavMessage::HEARTBEAT(_) if model.boots.is_stray(boot_of(frame).unwrap_or(0)) => true,
-        _ => {
-            boot_of(frame).is_some_and(|boot| model.boots.is_stray(boot))
+        message => {
+            // Our heartbeats always name a boot: without one it is another's.
+            let named = named.or(matches!(message, MavMessage::HEARTBEAT(_)).then_some(0));
+            named.is_some_and(|boot| model.boots.is_stray(boot))
                 || model.boots.is_strange(model.link.source, now)
         }
     };
@@ -98,7 +100,7 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
     {
         return;
     }
-    let speaker = speaker(model, frame, &message, now);
+    let speaker = speaker(model, frame, (&message, named), now);
     if let Some(other) = speaker.filter(|boot| model.boots.shown() != Some(*boot)) {
         // Answers and texts are the crew's, whoever sends them; all else of another vehicle is kept beside.
         if !matches!(message, MavMessage::STATUSTEXT(_)) {
@@ -155,7 +157,12 @@ fn report(status: &TD_FLIGHT_STATUS_DATA, frame: &Frame, source: u16) -> StatusR
 }
 
 /// Which vehicle has sent a message, and since which power-up; `None` before the first flight status.
-fn speaker(model: &mut Model, frame: &Frame, message: &MavMessage, now: Duration) -> Option<BootId> {
+fn speaker(
+    model: &mut Model,
+    frame: &Frame,
+    (message, named): (&MavMessage, Option<u32>),
+    now: Duration,
+) -> Option<BootId> {
     match message {
         MavMessage::TD_FLIGHT_STATUS(status) => {
             Some(model.boots.hear(&report(status, frame, model.link.source), now))
@@ -163,7 +170,7 @@ fn speaker(model: &mut Model, frame: &Frame, message: &MavMessage, now: Duration
         // What another autopilot says beside ours is noted at the shown one.
         MavMessage::HEARTBEAT(beat) if !may_be_ours(beat) => model.boots.shown(),
         _ => {
-            let said = (boot_of(frame), time_boot_ms(message), frame.sequence());
+            let said = (named, time_boot_ms(message), frame.sequence());
             model.boots.speaker(model.link.source, said, now)
         }
     }

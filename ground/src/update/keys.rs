@@ -208,12 +208,22 @@ fn confirmed(model: &mut Model, prompt: Prompt, now: Duration) {
             model.pages.step = None;
         }
         // A live station must keep running without its screen; a demonstration or an attached screen may end.
-        _ => {
+        Prompt::Quit => {
             let stays = model.settings.role == Role::Station && !model.settings.demonstration;
             let leave =
                 if stays && why_not_quit(model, now).is_some() { Action::LeaveScreen } else { Action::Quit };
             model.outbox.push(leave);
         }
+        // Each is a command.
+        Prompt::Arm
+        | Prompt::Start
+        | Prompt::Confirm(_)
+        | Prompt::TakeCommand
+        | Prompt::Disarm
+        | Prompt::AbortForeign
+        | Prompt::Hold
+        | Prompt::Check { .. }
+        | Prompt::Seen => {}
     }
 }
 

@@ -19,7 +19,7 @@ pub(super) struct Announced {
     phase: Option<TdPhase>,
     armed: Option<bool>,
     counting: bool,
-    /// The phase by the flight status, which names its run, and whether it counted down. A heartbeat may be of another run.
+    /// The phase by the flight status, which names its boot, and whether it counted down. A heartbeat may be of another boot.
     status: Option<(TdPhase, bool)>,
     aborted: bool,
     hold: Option<TdHold>,
@@ -64,7 +64,7 @@ impl Announced {
 /// A waiting time is kept anew if it differs by more than this from what is kept, s.
 const KEPT_WITHIN_S: u16 = 2;
 
-/// Shows another run if one takes the screen.
+/// Shows another boot if one takes the screen.
 pub(super) fn settle(model: &mut Model, now: Duration) {
     let Some(former) = model.boots.shown() else { return };
     let Some(shown) = model.boots.settle(now) else { return };
@@ -137,7 +137,7 @@ pub(super) fn hear_of_reset(model: &mut Model, text: &str, now: Duration) {
     }
 }
 
-/// Another run has the screen: after a reset, and what the vehicle did then, or of another vehicle.
+/// Another boot has the screen: after a reset, and what the vehicle did then, or of another vehicle.
 fn on_shown(model: &mut Model, reset: Option<&'static str>, now: Duration) {
     let number = model.vehicle.boot.number();
     let which = number.map_or_else(String::new, |number| format!(", boot {}", words::boot(number)));

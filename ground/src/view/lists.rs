@@ -21,11 +21,6 @@ pub fn events(model: &Model, theme: Theme, columns: usize, rows: usize) -> Vec<L
     newest_lines(chosen(model, theme, columns, rows), columns, rows)
 }
 
-/// All of them.
-pub fn every(model: &Model, theme: Theme, columns: usize, rows: usize) -> Vec<Line<'static>> {
-    newest_lines(chosen(model, theme, columns, rows), columns, rows)
-}
-
 /// The lines of each of the newest events.
 fn chosen(model: &Model, theme: Theme, columns: usize, rows: usize) -> Vec<Vec<Line<'static>>> {
     // In a narrow panel the speaker is left out.

@@ -36,7 +36,7 @@ use widgets::{STALE_MARK, age_mark, fixed, quantity_row, seconds, shortest, text
 const WIDE_COLUMNS: u16 = 80;
 const WIDE_ROWS: u16 = 22;
 
-/// Draws the screen.
+/// Draws the screen. Returns where the pictures of a flight are, which may be older than the numbers above them.
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame) -> Option<Rect> {
     let area = frame.area();
     frame.buffer_mut().set_style(area, theme.ground());

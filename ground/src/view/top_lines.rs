@@ -31,9 +31,11 @@ const RATES_WITHIN: usize = 32;
 /// Draws who and what is seen, how well it is heard, and whether that is recorded.
 pub fn draw_identity(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let shows_rates = area.width >= RATES_COLUMNS && model.link.trouble.is_none();
-    let rates = status_lines::link_line(model, theme, now, if shows_rates { RATES_WITHIN } else { 0 });
-    let mut right = rates.spans;
-    right.push(Span::raw("  "));
+    let mut right = Vec::new();
+    if shows_rates {
+        right.extend(status_lines::link_line(model, theme, now, RATES_WITHIN).spans);
+        right.push(Span::raw("  "));
+    }
     right.extend(link(model, theme, now).spans);
     right.push(status_lines::recording(model, theme, now));
     let right = Line::from(right);

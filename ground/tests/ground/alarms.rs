@@ -39,6 +39,11 @@ fn the_loss_of_the_link_rings_until_it_is_acknowledged() {
     rig.speaks = true;
     rig.run(1.1);
     assert!(rig.model.alarms.list().is_empty());
+    // It comes back: nobody has seen that one.
+    rig.speaks = false;
+    rig.run(5.0);
+    assert_eq!(rig.model.alarms.unacknowledged(), 1);
+    assert!(bells(&rig) > 2);
 }
 
 #[test]
@@ -272,6 +277,8 @@ fn a_long_alarm_text_never_hides_the_key_that_acknowledges() {
         let line = screen.lines().find(|line| line.contains("ALARM LINK DOWN")).unwrap_or_default();
         assert!(line.trim_end_matches('"').ends_with(" Space: seen "), "{screen}");
         assert!(line.contains(".. 1 s "), "the age is not cut either: {screen}");
+        let identity = screen.lines().next().unwrap_or_default();
+        assert!(identity.contains("boot 1A2B3C4D"), "nor is who it is: {screen}");
     }
 }
 

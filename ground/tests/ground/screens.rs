@@ -111,15 +111,9 @@ pub(crate) fn descending() -> Rig {
 /// Every page by its digit, during a flight.
 #[test]
 fn regress_every_page_by_its_digit() {
-    for (digit, name) in [
-        ('4', "review"),
-        ('5', "link"),
-        ('6', "messages"),
-        ('7', "parameters"),
-        ('8', "log"),
-        ('9', "alarms"),
-        ('1', "pad_held"),
-    ] {
+    for (digit, name) in
+        [('4', "review"), ('5', "link"), ('6', "messages"), ('7', "log"), ('8', "alarms"), ('1', "pad_held")]
+    {
         let mut rig = powered();
         rig.key(Key::Char(digit));
         snapshot(&format!("screen_{name}"), &rig);

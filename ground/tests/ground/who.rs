@@ -184,6 +184,11 @@ fn what_a_spare_says_before_its_first_status_is_not_shown_as_the_vehicle_s() {
 fn one_of_two_vehicles_is_chosen_by_name_and_then_armed() {
     let mut rig = Rig::crewed();
     beside(&mut rig, 9, 1);
+    // Nobody is heard with that one.
+    rig.msg(Msg::Asked { request: Request::Choose(8), by: Seat::default() });
+    beside(&mut rig, 9, 1);
+    assert!(![Some(8), Some(9)].contains(&rig.model.vehicle.boot.number()));
+    assert!(ground::model::why_nothing_moves(&rig.model, rig.now).is_some());
     rig.keys(&[vec![Key::Char(':')], typed("choose boot 00000009"), vec![Key::Enter]].concat());
     beside(&mut rig, 9, 1);
     assert_eq!(rig.model.vehicle.boot.number(), Some(9), "{}", rig.screen(80, 24));

@@ -65,7 +65,7 @@ const EVERY_LINE: usize = 4_000;
 
 /// The newest events, or older ones when scrolled back.
 pub fn messages_lines(model: &Model, theme: Theme, columns: usize, rows: usize) -> Vec<Line<'static>> {
-    let all = lists::every(model, theme, columns, EVERY_LINE);
+    let all = lists::events(model, theme, columns, EVERY_LINE);
     let room = rows.saturating_sub(1);
     let back = model.pages.scroll.min(all.len().saturating_sub(room));
     let start = all.len().saturating_sub(room + back);
