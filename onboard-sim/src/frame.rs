@@ -56,6 +56,7 @@ impl Frame {
         let left_kg_m2 =
             mass.loaded_pitch_inertia_kg_m2 - motors - mass_kg * squared(cg_station_m - loaded_cg_m);
         if left_kg_m2 <= 0.0 {
+            let motors = libm::round(1e5 * motors) / 1e5;
             return refused("loaded_pitch_inertia_kg_m2", mass.loaded_pitch_inertia_kg_m2, motors);
         }
         let (loaded, own_motor) = (*mass, motor.clone());

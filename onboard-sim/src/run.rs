@@ -87,13 +87,15 @@ pub fn run(recipe: &Recipe, store: &Store, progress: &(dyn Fn(&Counts) + Sync)) 
     let total = Mutex::new(Counts { of: missing.len() as u64, ..Counts::default() });
     missing.par_iter().with_max_len(1).try_for_each(|number| {
         let row = fly_caught(recipe, *number)?;
-        // Only `progress` can panic with the lock held, and then the counts are still valid.
-        let mut total = total.lock().unwrap_or_else(PoisonError::into_inner);
-        total.flown += 1;
-        total.stands += u64::from(row.stands);
-        total.envelope += u64::from(row.envelope);
-        total.flight_time_ms += (row.flight_time_s * 1e3) as u64;
-        progress(&total);
+        {
+            // Only `progress` can panic with the lock held, and then the counts are still valid.
+            let mut total = total.lock().unwrap_or_else(PoisonError::into_inner);
+            total.flown += 1;
+            total.stands += u64::from(row.stands);
+            total.envelope += u64::from(row.envelope);
+            total.flight_time_ms += (row.flight_time_s * 1e3) as u64;
+            progress(&total);
+        }
         Ok::<_, RunError>(store.add(row)?)
     })?;
     Ok(total.into_inner().unwrap_or_else(PoisonError::into_inner))

@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
-use std::io;
+use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
@@ -15,13 +15,15 @@ use sha2::Digest as _;
 use sim::recipe::Recipe;
 
 use crate::files::{WriteError, write_folder};
-use crate::row::Row;
+use crate::row::{COLUMNS, Row};
 use crate::summary::{PICTURES, Summary, pictures, to_markdown};
 
 const MANIFEST: &str = "manifest.json";
 const MISSION: &str = "mission.toml";
 const DISPERSION: &str = "dispersion.toml";
 const FLIGHTS: &str = "flights.csv";
+/// After so many rows the disk has them, also if the power fails.
+const SYNCED_ROWS: usize = 10;
 
 /// Everything that the results in a directory depend on.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -69,12 +71,14 @@ impl Manifest {
 
     /// Refuses a directory with another manifest, and names the first difference.
     fn refuse_other(&self, directory: &Path, other: &Self) -> Result<(), StoreError> {
+        if self == other {
+            return Ok(());
+        }
         let [here, there] = [self, other].map(|manifest| serde_json::to_value(manifest).unwrap_or_default());
         let differs = here.as_object().into_iter().flatten().find(|(key, here)| there[*key] != **here);
-        differs.map_or(Ok(()), |(key, here)| {
-            let difference = format!("its {key} is {}, this run's is {here}", there[key]);
-            Err(StoreError::OtherCampaign { path: directory.to_owned(), difference })
-        })
+        let words = |(key, here): (&String, _)| format!("its {key} is {}, this run's is {here}", there[key]);
+        let difference = differs.map_or_else(|| format!("another {MANIFEST}"), words);
+        Err(StoreError::OtherCampaign { path: directory.to_owned(), difference })
     }
 }
 
@@ -97,14 +101,19 @@ impl Shard {
     }
 }
 
-impl core::str::FromStr for Shard {
-    type Err = String;
+/// Why the text of a shard is wrong.
+#[derive(Debug, thiserror::Error)]
+#[error("shard `{0}` is not I/N with 1 <= I <= N")]
+pub struct ShardError(String);
 
-    fn from_str(text: &str) -> Result<Self, String> {
+impl core::str::FromStr for Shard {
+    type Err = ShardError;
+
+    fn from_str(text: &str) -> Result<Self, ShardError> {
         text.split_once('/')
             .and_then(|(index, count)| Some(Self { index: index.parse().ok()?, count: count.parse().ok()? }))
             .filter(|shard| (1..=shard.count).contains(&shard.index))
-            .ok_or_else(|| format!("shard `{text}` is not I/N with 1 <= I <= N"))
+            .ok_or_else(|| ShardError(text.to_owned()))
     }
 }
 
@@ -163,7 +172,7 @@ pub struct Store {
     path: PathBuf,
     manifest: Manifest,
     /// The rows so far, by their flights' numbers, and the file that has them.
-    rows: Mutex<(BTreeMap<u64, Row>, csv::Writer<File>)>,
+    rows: Mutex<(BTreeMap<u64, Row>, File)>,
     /// Locked as long as the directory is in use.
     _lock: File,
 }
@@ -185,15 +194,14 @@ impl Store {
                 serde_json::to_vec_pretty(&manifest).map_err(|error| StoreError::content(path, &error))?;
             write_folder(path, vec![(MANIFEST, text)], true)?;
         }
-        let rows = read_rows(path)?;
+        let rows = read_rows(path, &manifest)?;
         let texts = [(MISSION, &recipe.mission_toml), (DISPERSION, &recipe.dispersion_toml)];
         let mut files = texts.map(|(name, text)| (name, text.clone().into_bytes())).to_vec();
-        files.push((FLIGHTS, to_csv(&rows)?));
+        files.push((FLIGHTS, to_csv(rows.values(), true)?));
         write_folder(path, files, true)?;
         let file = path.join(FLIGHTS);
         let file = File::options().append(true).open(&file).map_err(unreadable(&file))?;
-        let writer = csv::WriterBuilder::new().has_headers(rows.is_empty()).from_writer(file);
-        Ok(Self { path: path.to_owned(), manifest, rows: Mutex::new((rows, writer)), _lock: lock })
+        Ok(Self { path: path.to_owned(), manifest, rows: Mutex::new((rows, file)), _lock: lock })
     }
 
     /// The numbers of the flights that are not flown yet.
@@ -203,14 +211,22 @@ impl Store {
         (0..self.manifest.flights).filter(is_missing).collect()
     }
 
-    /// Writes the row of a flight.
+    /// Writes the row of a flight, whole or not at all.
     ///
     /// # Errors
     /// It cannot be written.
     pub fn add(&self, row: Row) -> Result<(), StoreError> {
-        let (rows, writer) = &mut *self.rows.lock().unwrap_or_else(PoisonError::into_inner);
-        let written = writer.serialize(&row).and_then(|()| Ok(writer.flush()?));
-        written.map_err(|error| StoreError::content(&self.path.join(FLIGHTS), &error))?;
+        let (rows, file) = &mut *self.rows.lock().unwrap_or_else(PoisonError::into_inner);
+        let path = self.path.join(FLIGHTS);
+        let line = to_csv([&row], rows.is_empty())?;
+        let before = file.metadata().map_err(unreadable(&path))?.len();
+        let synced =
+            |file: &File| if (rows.len() + 1) % SYNCED_ROWS == 0 { file.sync_data() } else { Ok(()) };
+        file.write_all(&line).and_then(|()| synced(file)).map_err(|error| {
+            // What cannot be taken back is cut off when the campaign goes on: it has no line's end.
+            let _ = file.set_len(before);
+            StoreError::content(&path, &error)
+        })?;
         rows.insert(row.number, row);
         Ok(())
     }
@@ -221,7 +237,7 @@ impl Store {
     /// A file cannot be written.
     pub fn publish(self, legs: &LegLimits) -> Result<Summary, StoreError> {
         let (rows, _) = self.rows.into_inner().unwrap_or_else(PoisonError::into_inner);
-        let table = to_csv(&rows)?;
+        let table = to_csv(rows.values(), true)?;
         let rows: Vec<Row> = rows.into_values().collect();
         let summary = Summary::new(&self.manifest, &rows);
         let json = serde_json::to_vec_pretty(&summary);
@@ -246,23 +262,36 @@ fn refuse_foreign(directory: &Path) -> Result<(), StoreError> {
     found.map_or(Ok(()), |path| Err(StoreError::Foreign(path)))
 }
 
-/// The rows in a directory, but for a last line that was cut.
-fn read_rows(directory: &Path) -> Result<BTreeMap<u64, Row>, StoreError> {
+/// The rows in a directory, but for a last line that was cut. They have this program's columns and the manifest's flights.
+fn read_rows(directory: &Path, manifest: &Manifest) -> Result<BTreeMap<u64, Row>, StoreError> {
     let path = directory.join(FLIGHTS);
     let bytes = match fs::read(&path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
         read => read.map_err(unreadable(&path))?,
     };
     let whole = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1);
-    let rows = csv::Reader::from_reader(&bytes[..whole]).into_deserialize();
-    let rows = rows.map(|row: csv::Result<Row>| row.map(|row| (row.number, row)));
-    rows.collect::<Result<_, _>>().map_err(|error| StoreError::content(&path, &error))
+    let mut reader = csv::Reader::from_reader(&bytes[..whole]);
+    let header = reader.headers().map_err(|error| StoreError::content(&path, &error))?;
+    if whole > 0 && !header.iter().eq(COLUMNS.iter().map(|column| column.name)) {
+        return Err(StoreError::content(&path, &"has the columns of another version of this program"));
+    }
+    let rows = reader.into_deserialize().map(|row: csv::Result<Row>| {
+        let row = row.map_err(|error| StoreError::content(&path, &error))?;
+        if row.number >= manifest.flights || !manifest.shard.has(row.number) {
+            return Err(StoreError::content(
+                &path,
+                &format!("has flight {}, which is not of it", row.number),
+            ));
+        }
+        Ok((row.number, row))
+    });
+    rows.collect()
 }
 
-/// With a header, if there is a row.
-fn to_csv(rows: &BTreeMap<u64, Row>) -> Result<Vec<u8>, StoreError> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    let written = rows.values().try_for_each(|row| writer.serialize(row));
+/// With a header if it is wanted and there is a row.
+fn to_csv<'a>(rows: impl IntoIterator<Item = &'a Row>, has_header: bool) -> Result<Vec<u8>, StoreError> {
+    let mut writer = csv::WriterBuilder::new().has_headers(has_header).from_writer(Vec::new());
+    let written = rows.into_iter().try_for_each(|row| writer.serialize(row));
     written.map_err(|error| StoreError::content(Path::new(FLIGHTS), &error))?;
     writer.into_inner().map_err(|error| StoreError::content(Path::new(FLIGHTS), &error))
 }
@@ -273,13 +302,13 @@ fn to_csv(rows: &BTreeMap<u64, Row>) -> Result<Vec<u8>, StoreError> {
 /// The parts belong to different campaigns, contradict each other, or some flights are missing.
 pub fn merge(parts: &[PathBuf], out: &Path) -> Result<Summary, StoreError> {
     let first = parts.first().ok_or(StoreError::Missing(0))?;
-    let manifest =
-        |part: &Path| Manifest::read(part).map(|manifest| Manifest { shard: Shard::WHOLE, ..manifest });
-    let whole = manifest(first)?;
+    let whole = Manifest { shard: Shard::WHOLE, ..Manifest::read(first)? };
     let mut rows = BTreeMap::new();
     for part in parts {
-        whole.refuse_other(part, &manifest(part)?)?;
-        for (number, row) in read_rows(part)? {
+        let manifest = Manifest::read(part)?;
+        let rows_of_part = read_rows(part, &manifest)?;
+        whole.refuse_other(part, &Manifest { shard: Shard::WHOLE, ..manifest })?;
+        for (number, row) in rows_of_part {
             if rows.insert(number, row.clone()).is_some_and(|known| known != row) {
                 return Err(StoreError::Contradiction { path: part.clone(), number });
             }

@@ -1,6 +1,4 @@
-//! Prints reports as text for people and as JSON for programs.
-//!
-//! Control characters are removed from the text of a log first, because a log may come from anywhere.
+//! What answers have in common: columns, two verdicts beside each other, JSON. `cli` removes what steers a terminal.
 
 use std::io;
 use std::io::Write;

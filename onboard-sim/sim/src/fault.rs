@@ -44,7 +44,7 @@ pub enum When {
 /// A fault of a flight.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TimedFault {
-    /// As it was written, without its time.
+    /// Name and value, without its time.
     what: String,
     /// What breaks.
     pub breakage: Breakage,
@@ -256,7 +256,13 @@ impl FromStr for TimedFault {
                 format!("its value must be {unit}")
             })
         })?;
-        Ok(Self { what: what.to_owned(), breakage, when })
+        // Two words for one thing.
+        let name = match breakage {
+            Breakage::Sensor(Sensor::Gyro | Sensor::Accelerometer, _) => name.replace("-step", "-bias"),
+            _ => name.replace("-bias", "-step"),
+        };
+        let what = value.map_or(name.clone(), |value| format!("{name}:{value}"));
+        Ok(Self { what, breakage, when })
     }
 }
 

@@ -77,6 +77,7 @@ fn read_motors(path: &Path, motors: &mut Vec<Candidate>) -> anyhow::Result<()> {
                 "{origin}: not a list of motors: a JSON array of objects, as in the npm package thrustcurve-db, is accepted"
             )
         })?;
+        anyhow::ensure!(!list.is_empty(), "{origin}: the list holds no motor");
         return list.into_iter().try_for_each(|entry| {
             let name = entry["designation"].as_str().unwrap_or("an entry").to_owned();
             take(&name, of_entry(entry))

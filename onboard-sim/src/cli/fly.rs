@@ -97,7 +97,7 @@ pub(crate) struct FlyArguments {
     #[arg(long)]
     stay: bool,
     /// The flight computer of a board decides every frame, too, over the pipes `frames` and `answers` in this
-    /// folder, and speaks MAVLink on its own radio (onboard-sim/board/emulate). A frame that it decides otherwise ends the
+    /// folder, and speaks MAVLink on its own radio (onboard-sim/lab/cortex-m7/emulate). A frame that it decides otherwise ends the
     /// flight.
     #[arg(long, value_name = "FOLDER", conflicts_with_all = ["mavlink", "key", "auto"])]
     board: Option<PathBuf>,

@@ -50,6 +50,20 @@ fn regress_flights_with_an_abort_in_the_burn_land_as_often_as_without() {
     assert!(otherwise.count() >= 3 * 35, "an abort ends the homing to the pad");
 }
 
+/// Right after the command to light, where an abort used to cost most landings.
+#[test]
+fn an_abort_right_after_the_ignition_lands() {
+    let recipe = recipe(Some("abort@ignition+0.3"));
+    for number in 0..3 {
+        let mut tally = Tally::new(&recipe, number).unwrap();
+        while tally.step() {}
+        let locks = tally.flight().computer().mode().interlocks;
+        assert!(locks.abort_latched && locks.lands_in_place);
+        let row = tally.row();
+        assert!(row.stands, "{number}: {} {:?} m/s", row.failure, row.touchdown_vertical_m_s);
+    }
+}
+
 /// Too low for the parachute, at the first moment that the gate is open: the motor is lit at the height that was chosen. A fall
 /// would end at about 37 m/s.
 #[test]

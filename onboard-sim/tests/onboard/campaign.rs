@@ -9,6 +9,7 @@ use onboard_sim::row::Row;
 use onboard_sim::run::{run, threads};
 use onboard_sim::store::{Manifest, Shard, Store, StoreError, merge};
 use onboard_sim::summary::PICTURES;
+use onboard_sim::tally;
 use sim::dispersion;
 use sim::recipe::Recipe;
 
@@ -70,8 +71,8 @@ fn the_results_do_not_depend_on_threads_shards_or_a_stop() {
     fly(&self::recipe(2), Shard { index: 2, count: 2 }, 1, &at("other"));
     let error = merge(&[at("part-1"), at("other")], &at("both")).unwrap_err().to_string();
     assert!(error.ends_with("its seed is 2, this run's is 1; give another directory"), "{error}");
-    let forged = csv.replace(",true,", ",false,");
-    fs::write(at("part-1").join("flights.csv"), forged).unwrap();
+    let rows = at("part-1").join("flights.csv");
+    fs::write(&rows, fs::read_to_string(&rows).unwrap().replace(",true,", ",false,")).unwrap();
     let error = merge(&[at("one"), at("part-1")], &at("forged")).unwrap_err();
     assert!(matches!(error, StoreError::Contradiction { number: 0, .. }), "{error}");
 
@@ -124,6 +125,27 @@ fn a_directory_of_another_campaign_or_in_use_is_refused_with_the_reason() {
     assert!(error.contains("its mission_sha256 is "), "{error}");
 }
 
+/// Rows with the columns of another program, and a flight that another part or campaign has.
+#[test]
+fn rows_that_are_not_of_the_campaign_are_refused() {
+    let root = tempfile::tempdir().unwrap();
+    let (own, half) = (recipe(1), Shard { index: 1, count: 2 });
+    let store = open(root.path(), &own, "test", half).unwrap();
+    store.add(tally::fly(&own, 0).unwrap()).unwrap();
+    drop(store);
+    let path = root.path().join("flights.csv");
+    let text = fs::read_to_string(&path).unwrap();
+    for (wrong, why) in [
+        (text.replacen("\n0,", "\n1,", 1), "flight 1, which is not of it"),
+        (text.replacen("\n0,", "\n1000000,", 1), "flight 1000000, which is not of it"),
+        (text.replacen("attainable_", "reachable_", 1), "the columns of another version"),
+    ] {
+        fs::write(&path, wrong).unwrap();
+        let error = open(root.path(), &own, "test", half).unwrap_err().to_string();
+        assert!(error.contains(why), "{error}");
+    }
+}
+
 /// A directory with files of the same names from another program.
 #[test]
 fn files_that_no_campaign_wrote_are_never_overwritten() {
@@ -145,6 +167,6 @@ fn a_flight_is_in_one_shard() {
     }
     for wrong in ["", "0/2", "3/2", "1", "a/b", "1/0"] {
         let error = wrong.parse::<Shard>().unwrap_err();
-        assert_eq!(error, format!("shard `{wrong}` is not I/N with 1 <= I <= N"));
+        assert_eq!(error.to_string(), format!("shard `{wrong}` is not I/N with 1 <= I <= N"));
     }
 }

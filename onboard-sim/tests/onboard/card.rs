@@ -63,6 +63,17 @@ proptest! {
     }
 
     #[test]
+    fn a_rate_is_the_share_of_the_flights_as_planned_and_nothing_else(flown in flown(FEWEST as usize..200)) {
+        for ((_, impacts), wind) in flown.iter().zip(in_winds(&flown, &rule())) {
+            let landed = wind.landed.unwrap().stands;
+            let planned = impacts.iter().filter(|impact| impact.way == Way::AsPlanned);
+            prop_assert_eq!(landed.of, planned.clone().count() as u64);
+            prop_assert_eq!(landed.count, planned.filter(|impact| impact.landing.stands).count() as u64);
+            prop_assert!(landed.low <= landed.share && landed.share <= landed.high);
+        }
+    }
+
+    #[test]
     fn fewer_than_a_hundred_flights_tell_no_rate_no_radius_and_no_wind_to_fly_in(flown in flown(0..FEWEST as usize)) {
         let winds = in_winds(&flown, &rule());
         prop_assert!(winds.iter().all(|wind| wind.landed.is_none() && wind.circle.is_none()));

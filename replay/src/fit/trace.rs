@@ -3,9 +3,8 @@
 
 use std::path::Path;
 
-use anyhow::{Context as _, Result, anyhow};
 use avionics::log::frame::{commands_from_log, input_from_log, phase_of};
-use avionics::log::logged::{At, Logged};
+use avionics::log::logged::{At, Logged, RecordError};
 use flight::computer::Commands;
 use flight::computer::KeptInput;
 use flight::estimation::estimator::{Estimate, Measurements};
@@ -18,7 +17,21 @@ use nalgebra::Vector3;
 use protocol::log::computer_v1::ComputerFrame;
 use protocol::log::flight_v1 as v1;
 
-use crate::log::Recording;
+use crate::log::{Recording, RecordingError};
+
+/// Why a log gives nothing to a fit.
+#[derive(Debug, thiserror::Error)]
+pub enum TraceError {
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    #[error(
+        "{name}: has no frames of a flight computer with its sensors and estimates ({found}). A fit needs the vehicle's own log: at \
+         the rates of telemetry neither thrust nor delays nor noises can be found"
+    )]
+    Nothing { name: String, found: &'static str },
+    #[error("{name}")]
+    Frame { name: String, source: RecordError },
+}
 
 /// One frame of the flight computer.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -136,7 +149,7 @@ impl Trace {
     ///
     /// # Errors
     /// It says what the log lacks: it cannot be read, is too long, or has several flights, no usable mission, or no frames.
-    pub fn open(path: &Path) -> Result<Self> {
+    pub fn open(path: &Path) -> Result<Self, TraceError> {
         Self::of(&Recording::open(path)?)
     }
 
@@ -144,22 +157,18 @@ impl Trace {
     ///
     /// # Errors
     /// As [`open`](Self::open).
-    pub fn of(recording: &Recording) -> Result<Self> {
+    pub fn of(recording: &Recording) -> Result<Self, TraceError> {
         /// What is remembered after so many frames of noise is remembered in no other flight.
         const NAMING_FRAMES: usize = 100;
         let name = &recording.name;
         let found =
             if recording.telemetry.is_empty() { "none of either" } else { "it is a ground station's" };
-        let nothing = || {
-            anyhow!(
-                "{name}: has no frames of a flight computer with its sensors and estimates ({found}). A fit needs the \
-                 vehicle's own log: at the rates of telemetry neither thrust nor delays nor noises can be found"
-            )
-        };
+        let nothing = || TraceError::Nothing { name: name.clone(), found };
         recording.estimates.first().ok_or_else(nothing)?;
         let text = recording.profile_toml()?;
-        let mission = flight::vehicles::mission::from_toml(text, "profile.toml")
-            .with_context(|| format!("{name}: its profile cannot be used by this build"))?;
+        let mission = flight::vehicles::mission::from_toml(text, "profile.toml").map_err(|error| {
+            RecordingError::ProfileUnusable { name: name.clone(), reason: error.to_string() }
+        })?;
         let mut trace = Self {
             damage: recording.damage.clone(),
             landed: recording.verdict.as_ref().map(|verdict| verdict.landing.stands),
@@ -169,7 +178,8 @@ impl Trace {
         };
         for (place, estimate) in &recording.estimates {
             let Some(frame) = recording.frames.get(*place) else { continue };
-            trace.take(frame, estimate).with_context(|| name.clone())?;
+            let taken = trace.take(frame, estimate);
+            taken.map_err(|source| TraceError::Frame { name: name.clone(), source })?;
         }
         if trace.frames.is_empty() { Err(nothing()) } else { Ok(trace) }
     }
@@ -179,11 +189,16 @@ impl Trace {
         &mut self,
         ComputerFrame { input, output, .. }: &ComputerFrame,
         estimate: &v1::Estimate,
-    ) -> Result<()> {
+    ) -> Result<(), RecordError> {
         let number = input.frame;
         let input = input_from_log(input)?;
         let commands = commands_from_log(output, number)?;
-        let phase = phase_of(output).with_context(|| format!("frame {number}: unknown phase"))?;
+        let phase = phase_of(output).ok_or(RecordError::Unknown {
+            frame: number,
+            field: "phase",
+            found: output.phase,
+            most: Phase::ALL.len() - 1,
+        })?;
         let estimate = Logged::from_log(estimate, At { frame: number, field: "estimate" })?;
         self.push(&input.input(), &commands, phase, &estimate);
         Ok(())

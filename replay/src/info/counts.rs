@@ -125,8 +125,9 @@ impl FrameCounter {
             self.first_lost.get_or_insert(gap);
         } else if self.bounds.is_some() {
             self.restarts += usize::from(frame > before.saturating_add(1));
-            self.repeated += u64::from(frame <= before);
         }
+        // A number that is not above every one before it.
+        self.repeated += u64::from(self.bounds.is_some_and(|(_, last)| frame <= last));
         let (first, last) = self.bounds.unwrap_or((frame, frame));
         self.bounds = Some((first.min(frame), last.max(frame)));
     }

@@ -187,8 +187,9 @@ impl Recording {
     }
 
     fn check_length(&self) -> Result<(), RecordingError> {
-        let Self { frames, timings, world, telemetry, events, .. } = self;
-        let lengths = [frames.len(), timings.len(), world.len(), telemetry.len(), events.len()];
+        let Self { frames, timings, estimates, world, telemetry, events, .. } = self;
+        let lengths =
+            [frames.len(), timings.len(), estimates.len(), world.len(), telemetry.len(), events.len()];
         match lengths.into_iter().max().filter(|most| *most > RECORDS_MAX) {
             Some(_) => Err(RecordingError::TooLong { name: self.name.clone(), kind: "records of a kind" }),
             None => Ok(()),

@@ -149,7 +149,7 @@ pub fn recover<'a>(input: &Path, output: impl Into<Destination<'a>>) -> Result<R
         output: destination.path.to_owned(),
         ended: contents.ended,
         changed: was_changed(&contents),
-        sorted: contents.back_ns > IN_ORDER_NS,
+        sorted: is_sorted_anew(&contents),
         summary_fault: contents.summary_fault,
         ..Recovery::default()
     };
@@ -166,8 +166,10 @@ pub fn recover<'a>(input: &Path, output: impl Into<Destination<'a>>) -> Result<R
     recovery.undecodable = kept.undecodable;
     recovery.kept_s = Some(last_ns.saturating_sub(first_ns) as f64 / 1e9);
     let told = contents.told.statistics.as_ref();
+    // What is there twice, or of another log, makes up for nothing.
+    let told = told.filter(|_| !recovery.changed);
     recovery.messages_lost = told.map(|told| told.message_count.saturating_sub(kept.messages));
-    // With every message kept, a chunk that is not there is one whose head was changed.
+    // With every message kept, no chunk is lost.
     let told = if recovery.messages_lost == Some(0) { &[] } else { &contents.told.chunks[..] };
     recovery.lost = lost_of(&contents, told, first_ns);
     rescue.finish(&recovery.about())?;
@@ -179,6 +181,11 @@ fn was_changed(contents: &Contents) -> bool {
     let mut told = contents.told.chunks.iter().map(|(.., name)| name);
     let mut there = contents.good.iter().filter_map(|piece| piece.chunk);
     !contents.told.chunks.is_empty() && there.any(|there| told.all(|name| *name != there))
+}
+
+/// Whether the messages are out of order. A chunk is moved by less than what a log of ours may go back, too.
+pub(crate) fn is_sorted_anew(contents: &Contents) -> bool {
+    contents.back_ns > if was_changed(contents) { 0 } else { IN_ORDER_NS }
 }
 
 /// What is lost, with times after the first message kept: the stretches that cannot be read, with the times of the chunks of the

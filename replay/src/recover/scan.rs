@@ -362,6 +362,14 @@ impl Records {
 }
 
 impl Contents {
+    /// Whether a chunk is of another log: the summary does not name it, and misses none of its size, whose head was changed.
+    pub(crate) fn is_foreign(&self, name: &ChunkName) -> bool {
+        let is_there = |told: &ChunkName| self.good.iter().any(|piece| piece.chunk == Some(*told));
+        let sizes = |name: &ChunkName| (name.uncompressed_bytes, name.compressed_bytes);
+        let could_be = |told: &ChunkName| told == name || (sizes(told) == sizes(name) && !is_there(told));
+        !self.told.chunks.is_empty() && !self.told.chunks.iter().any(|(_, _, told)| could_be(told))
+    }
+
     /// What is wrong with the file, if something is.
     pub(crate) fn fault(&self) -> Option<String> {
         let lost = self.lost.first().map(|lost| format!("byte {}: {}", lost.from_byte, lost.reason));

@@ -2,14 +2,16 @@
 
 use std::collections::BTreeMap;
 use std::io::BufWriter;
+use std::mem::take;
 use std::path::{Path, PathBuf};
 
 use mcap::records::{MessageHeader, Metadata, Record, op};
 use protocol::log::reader::{RecordError, parse_record, records_of_chunk};
 use protocol::log::record::{TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START};
 
+use super::is_sorted_anew;
 use super::scan::{Contents, Records, WriterReport};
-use crate::log::{IN_ORDER_NS, LogError};
+use crate::log::LogError;
 use crate::output::{Destination, NewFile, WriteError};
 
 /// Chunk size as in the recorder's own logs.
@@ -27,6 +29,8 @@ pub(crate) struct Rescue<'a> {
     /// The file's schemas and channels by their numbers there.
     schemas: BTreeMap<u16, u16>,
     channels: BTreeMap<u16, (u16, String)>,
+    /// The chunk at hand is of another log.
+    is_foreign: bool,
     kept: Kept,
     /// Messages wait until the end, and are then written in order of time.
     sorts: bool,
@@ -94,13 +98,21 @@ impl<'a> Rescue<'a> {
             writer: options.create(file).map_err(failed)?,
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
+            is_foreign: false,
             kept: Kept::default(),
-            sorts: contents.back_ns > IN_ORDER_NS,
+            sorts: is_sorted_anew(contents),
             waiting: Vec::new(),
         };
         for piece in &contents.good {
             let body = records.body(piece.at)?;
+            // A chunk of another log has numbers of channels of its own.
+            let is_foreign = piece.chunk.is_some_and(|name| contents.is_foreign(&name));
+            let own = is_foreign.then(|| (take(&mut rescue.schemas), take(&mut rescue.channels)));
+            rescue.is_foreign = is_foreign;
             rescue.keep(piece.opcode, &body)?;
+            if let Some(own) = own {
+                (rescue.schemas, rescue.channels) = own;
+            }
         }
         Ok(rescue)
     }
@@ -186,7 +198,7 @@ impl<'a> Rescue<'a> {
         if self.channels.contains_key(&id) {
             return Ok(true);
         }
-        let Some(told) = self.told.channels.get(&id) else { return Ok(false) };
+        let Some(told) = self.told.channels.get(&id).filter(|_| !self.is_foreign) else { return Ok(false) };
         let schema = match self.told.schemas.get(&told.schema_id) {
             Some((schema, data)) => self.writer.add_schema(&schema.name, &schema.encoding, data)?,
             None => 0,
@@ -203,7 +215,7 @@ impl<'a> Rescue<'a> {
     }
 
     fn close(mut self, about: &Metadata) -> mcap::McapResult<()> {
-        let mut waiting = std::mem::take(&mut self.waiting);
+        let mut waiting = take(&mut self.waiting);
         let starts = waiting.iter_mut().filter(|message| message.place == Place::Start);
         if let Some(first) = starts.min_by_key(|message| message.header.log_time) {
             first.place = Place::PowerUp;

@@ -5,7 +5,7 @@
 
 use flight::computer::{FRAME_S, flight_time_s};
 use protocol::log::computer_v1::ComputerInput;
-use protocol::log::flight_v1::{GnssFix, Measurements, Vector3};
+use protocol::log::flight_v1::{Measurements, Vector3};
 
 /// No servo turns further, rad.
 const ANGLE_MAX_RAD: f64 = 2.0;
@@ -81,37 +81,37 @@ fn out_of_range(input: &ComputerInput, release_frame: Option<u64>) -> Option<Str
     // Fixes are on the clock of the flight: from power-up, and from the release on T+.
     let clock_s = flight_time_s(input.frame.saturating_sub(release_frame.unwrap_or(0)));
     let Measurements { imu, pressure_altitude_m, gnss, lidar_range_m } = &input.measured;
-    let one = |value: Option<f64>| value.into_iter().collect();
     let within = |most: f64| [-most, most];
     let uplinks = input.requests.iter().map(|request| &request.uplink).chain([&input.uplink]);
-    let uplink_ages = uplinks.filter_map(|uplink| uplink.as_ref()?.age_s).collect();
-    let fix = |of: fn(&GnssFix) -> Vec<f64>| gnss.as_ref().map(of).unwrap_or_default();
+    let uplink_ages: Vec<f64> = uplinks.filter_map(|uplink| uplink.as_ref()?.age_s).collect();
+    let commander_age_s = input.commander.as_ref().map(|commander| commander.age_s);
+    let [gyro, force] = [imu.gyro_rad_s, imu.specific_force_m_s2].map(vector);
+    let [place, velocity] =
+        [gnss.map(|fix| vector(fix.position_m)), gnss.map(|fix| vector(fix.velocity_m_s))];
+    let fix_s = gnss.map(|fix| fix.valid_at_s);
     let ages = [-ROUNDING_S, f64::MAX];
-    let rows: [(&str, Vec<f64>, [f64; 2]); 11] = [
-        ("angle of a servo, rad,", [&*input.gimbal_rad, &input.fins_rad].concat(), within(ANGLE_MAX_RAD)),
-        ("battery, V,", one(input.battery_v), [0.0, BATTERY_MAX_V]),
-        ("age of the uplink, s,", uplink_ages, ages),
-        ("age of the commander, s,", one(input.commander.as_ref().map(|commander| commander.age_s)), ages),
-        ("gyro, rad/s,", vector(imu.gyro_rad_s), within(RATE_MAX_RAD_S)),
-        ("accelerometer, m/s2,", vector(imu.specific_force_m_s2), within(FORCE_MAX_M_S2)),
-        ("pressure altitude, m,", one(*pressure_altitude_m), within(PLACE_MAX_M)),
-        ("lidar range, m,", one(*lidar_range_m), [-1.0, RANGE_MAX_M]),
-        ("position of GNSS, m,", fix(|fix| vector(fix.position_m)), within(PLACE_MAX_M)),
-        ("velocity of GNSS, m/s,", fix(|fix| vector(fix.velocity_m_s)), within(SPEED_MAX_M_S)),
-        (
-            "time of a fix, s,",
-            fix(|fix| vec![fix.valid_at_s]),
-            [clock_s - FIX_AGE_MAX_S, clock_s + ROUNDING_S],
-        ),
+    let rows: [(&str, &[f64], [f64; 2]); 12] = [
+        ("angle of a servo, rad,", &input.gimbal_rad, within(ANGLE_MAX_RAD)),
+        ("angle of a servo, rad,", &input.fins_rad, within(ANGLE_MAX_RAD)),
+        ("battery, V,", input.battery_v.as_slice(), [0.0, BATTERY_MAX_V]),
+        ("age of the uplink, s,", &uplink_ages, ages),
+        ("age of the commander, s,", commander_age_s.as_slice(), ages),
+        ("gyro, rad/s,", &gyro, within(RATE_MAX_RAD_S)),
+        ("accelerometer, m/s2,", &force, within(FORCE_MAX_M_S2)),
+        ("pressure altitude, m,", pressure_altitude_m.as_slice(), within(PLACE_MAX_M)),
+        ("lidar range, m,", lidar_range_m.as_slice(), [-1.0, RANGE_MAX_M]),
+        ("position of GNSS, m,", place.as_ref().map_or(&[], |place| place), within(PLACE_MAX_M)),
+        ("velocity of GNSS, m/s,", velocity.as_ref().map_or(&[], |velocity| velocity), within(SPEED_MAX_M_S)),
+        ("time of a fix, s,", fix_s.as_slice(), [clock_s - FIX_AGE_MAX_S, clock_s + ROUNDING_S]),
     ];
     rows.into_iter().find_map(|(what, values, [lowest, highest])| {
-        let outside = values.into_iter().find(|value| !(lowest..=highest).contains(value))?;
+        let outside = values.iter().find(|value| !(lowest..=highest).contains(*value))?;
         Some(format!("{what} {outside:?}: can be {lowest} to {highest}"))
     })
 }
 
-fn vector(Vector3 { x, y, z }: Vector3) -> Vec<f64> {
-    vec![x, y, z]
+fn vector(Vector3 { x, y, z }: Vector3) -> [f64; 3] {
+    [x, y, z]
 }
 
 fn out_of_order(before: &LastInput, now: &LastInput) -> Option<String> {

@@ -316,7 +316,7 @@ fn harmed(original: &Original, harm: Harm, chunk: usize, place: usize) -> Vec<u8
 }
 
 /// Recovers a harmed log, and asserts what has to hold of every recovery.
-fn assert_nothing_is_laundered(original: &Original, bytes: &[u8], what: &str) {
+fn assert_nothing_is_laundered(original: &Original, bytes: &[u8], is_spliced: bool, what: &str) {
     let directory = tempfile::tempdir().unwrap();
     let (input, output) = (directory.path().join("in.mcap"), directory.path().join("out.mcap"));
     std::fs::write(&input, bytes).unwrap();
@@ -324,12 +324,12 @@ fn assert_nothing_is_laundered(original: &Original, bytes: &[u8], what: &str) {
     assert_ne!(strictly(&input), 0, "{what}: the harmed log itself");
     let Ok(recovery) = recover(&input, &output) else { return };
     let (kept, damage) = messages_of(&output);
-    assert!(recovery.changed || kept.is_subset(&original.messages), "{what}: something was invented");
+    assert!(is_spliced || kept.is_subset(&original.messages), "{what}: something was invented");
     assert!(recovery.fault().is_some(), "{what}: {recovery:?}");
     assert!(matches!(damage, Some(Damage::Recovered(_))), "{what}: {damage:?}");
     assert!(!info(&output).unwrap().completeness.complete, "{what}");
     assert_ne!(strictly(&output), 0, "{what}: the recovered log");
-    if recovery.changed {
+    if is_spliced {
         return;
     }
     let lost = original.messages.len() - kept.len();
@@ -358,7 +358,7 @@ fn a_chunk_that_is_gone_is_told_wherever_it_was() {
         for chunk in [0, original.chunks.len() / 2, original.chunks.len() - 2] {
             for harm in [Harm::Gone, Harm::Twice, Harm::Swapped] {
                 let bytes = harmed(original, harm, chunk, 0);
-                assert_nothing_is_laundered(original, &bytes, &format!("chunk {chunk} {harm:?}"));
+                assert_nothing_is_laundered(original, &bytes, false, &format!("chunk {chunk} {harm:?}"));
             }
         }
     }
@@ -382,7 +382,8 @@ fn harm_in_ways(cases: u32) {
     let ended = runner.run(&ways, |(log, harm, chunk, place)| {
         let original = &ORIGINALS[log];
         let what = format!("{log} {harm:?} {chunk} {place}");
-        assert_nothing_is_laundered(original, &harmed(original, harm, chunk, place), &what);
+        let is_spliced = matches!(harm, Harm::Spliced);
+        assert_nothing_is_laundered(original, &harmed(original, harm, chunk, place), is_spliced, &what);
         Ok(())
     });
     ended.unwrap();

@@ -124,7 +124,7 @@ pub fn commands_from_log(output: &v1::ComputerOutput, frame: u64) -> Result<Comm
     Ok(Commands {
         gimbal_rad: Logged::from_log(&output.gimbal_rad, At { frame, field: "gimbal_rad" })?,
         fins_rad: Logged::from_log(&output.fins_rad, At { frame, field: "fins_rad" })?,
-        outputs: Outputs::of(|line| match line {
+        outputs: Outputs::of(|which| match which {
             PyroOutput::LandingIgniter => output.ignite,
             PyroOutput::Parachute => output.parachute,
             PyroOutput::AscentIgniter => output.ignite_booster,

@@ -135,7 +135,12 @@ pub(super) fn event_of(
         Asked::Start => Event::StartRequested { countdown_s, checks_passed: arming::all_passed(checks) },
         Asked::Hold => Event::Hold { cause: HoldCause::Commanded, start },
         Asked::Abort => abort,
-        _ => return None,
+        Asked::Tap
+        | Asked::TakeCommand
+        | Asked::Check
+        | Asked::CheckStill
+        | Asked::EndCheck
+        | Asked::Seen => return None,
     })
 }
 
@@ -433,7 +438,15 @@ fn act_of(asked: Asked) -> Option<Act> {
     match asked {
         Asked::Arm => Some(Act::Arm),
         Asked::Start => Some(Act::Start),
-        _ => None,
+        Asked::Disarm
+        | Asked::Hold
+        | Asked::Abort
+        | Asked::Tap
+        | Asked::TakeCommand
+        | Asked::Check
+        | Asked::CheckStill
+        | Asked::EndCheck
+        | Asked::Seen => None,
     }
 }
 

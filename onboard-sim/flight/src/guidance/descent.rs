@@ -2,11 +2,11 @@
 //!
 //! The fins' drag acts along the wind and gives no lift, but the body gives lift: when its nose leans away from the
 //! wind by an angle of attack, the air on its side pushes it the other way, by `1/2 rho V^2 S_n sin^2` (H. J. Allen and E. W.
-//! Perkins, NACA Report 1048, 1951). The law
-//! computes the horizontal acceleration that brings the vehicle to rest over the pad at ignition (the least-effort law
-//! `a = -(6 p / t^2 + 4 v / t)`; C. N. D'Souza, "An optimal guidance law for planetary landing", AIAA 97-3709). It turns the acceleration into a lean and the lean into a moment, and the
-//! [allocation](crate::control::fins) finds four openings. The lean is limited, because the body's own moment grows
-//! with it and the fins' moment does not.
+//! Perkins, NACA Report 1048, 1951). The law computes the horizontal acceleration that brings the vehicle to rest over the pad
+//! at ignition (the least-effort law `a = -(6 p / t^2 + 4 v / t)`; C. N. D'Souza, "An optimal guidance law for planetary
+//! landing", AIAA 97-3709). It turns the acceleration into a lean and the lean into a moment, and the
+//! [allocation](crate::control::fins) finds four openings. The lean is limited, because the body's own moment grows with it
+//! and the fins' moment does not.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};

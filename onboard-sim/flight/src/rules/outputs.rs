@@ -19,6 +19,11 @@ pub enum PyroOutput {
     Separation,
 }
 
+impl PyroOutput {
+    /// Each at the place of its number, which is its place in [`Outputs`] and in the digest.
+    pub const ALL: [Self; 4] = [Self::LandingIgniter, Self::Parachute, Self::AscentIgniter, Self::Separation];
+}
+
 /// What the outputs depend on besides the mode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FlightProgress {
@@ -92,8 +97,7 @@ impl Outputs {
 
     /// The outputs that a log or a board tells of.
     pub fn of(is_on: impl Fn(PyroOutput) -> bool) -> Self {
-        use PyroOutput as P;
-        Self([P::LandingIgniter, P::Parachute, P::AscentIgniter, P::Separation].map(is_on))
+        Self(PyroOutput::ALL.map(is_on))
     }
 
     /// Whether an output has current.
@@ -127,8 +131,13 @@ mod tests {
     }
 
     #[test]
+    fn every_output_is_at_the_place_of_its_number() {
+        assert!(PyroOutput::ALL.iter().enumerate().all(|(place, output)| *output as usize == place));
+    }
+
+    #[test]
     fn each_output_that_is_off_names_every_reason() {
-        let reasons = |line, mode: &Mode, progress| why_not(line, mode, progress).collect::<Vec<_>>();
+        let reasons = |output, mode: &Mode, progress| why_not(output, mode, progress).collect::<Vec<_>>();
         assert!(reasons(PyroOutput::AscentIgniter, &boosting(), SEEN).is_empty());
         let risen = FlightProgress { lifted_off: true, ..SEEN };
         assert_eq!(reasons(PyroOutput::AscentIgniter, &boosting(), risen), ["the vehicle has lifted off"]);

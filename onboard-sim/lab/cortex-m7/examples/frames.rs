@@ -3,12 +3,11 @@
 //!
 //! `cargo run --release -p board --example frames -- LOG FOLDER`
 
-use std::fs::File;
-use std::io::Write as _;
 use std::path::PathBuf;
 
-use anyhow::{Context as _, bail, ensure};
+use anyhow::{bail, ensure};
 use avionics::board::stream::{Answer, Begin, Frame, put};
+use onboard_sim::files::write_folder;
 use protocol::log::computer_v1::{ComputerFrame, ComputerStart};
 use replay::controller::SETTINGS_IN_FLIGHT;
 use replay::log::{Entry, FlightLog};
@@ -42,14 +41,7 @@ fn main() -> anyhow::Result<()> {
     }
     ensure!(log.damage().is_none(), "{} is damaged", log.name());
     ensure!(written > 0, "{} has no frames of a flight computer from its start on", log.name());
-    std::fs::create_dir_all(&folder)?;
-    for (name, bytes) in [("frames", frames), ("recorded", recorded)] {
-        let path = folder.join(name);
-        // An existing file is not overwritten.
-        let written = File::create_new(&path).and_then(|mut file| file.write_all(&bytes));
-        written.with_context(|| path.display().to_string())?;
-    }
-    Ok(())
+    Ok(write_folder(&folder, vec![("frames", frames), ("recorded", recorded)], false)?)
 }
 
 /// What the computer of a log is built from, besides its record of the start.

@@ -313,8 +313,7 @@ fn failing(state: &VehicleState<'_>) -> MavSysStatusSensor {
 
 /// mV, cA and percent of the battery; `UINT16_MAX`, -1 and -1: not known.
 fn figures(state: &VehicleState<'_>) -> (u16, i16, i8) {
-    let BatteryFacts { volts, current_a, left } =
-        state.battery.unwrap_or(BatteryFacts { volts: f64::INFINITY, current_a: None, left: None });
+    let Some(BatteryFacts { volts, current_a, left }) = state.battery else { return (u16::MAX, -1, -1) };
     let hundred = |value: Option<f64>| value.map_or(-1.0, |value| libm::round(100.0 * value));
     (libm::round(1000.0 * volts) as u16, hundred(current_a) as i16, hundred(left) as i8)
 }

@@ -324,28 +324,26 @@ mod tests {
         }
     }
 
+    /// The same of every variant: one that is not named here does not compile.
+    macro_rules! every {
+        ($theirs:ty, $ours:ident, $number:expr, $prefix:literal: $($variant:ident),*) => {
+            agree::<$theirs, $ours>(&[$($ours::$variant),*], $number, $prefix);
+            let _ = |ours: $ours| match ours { $($ours::$variant => (),)* };
+        };
+    }
+
     #[test]
     fn every_number_means_the_same_in_the_dialect() {
-        use CheckState as C;
-        use HoldCause as H;
-        use Latch as L;
-        use MotorStatus as M;
         agree::<TdPhase, _>(&Phase::ALL, Phase::index, "TdPhase");
         agree::<TdControlLevel, _>(&ControlLevel::ALL, ControlLevel::index, "TdControlLevel");
         agree::<TdRole, _>(&Role::ALL, Role::index, "TdRole");
         agree::<TdStart, _>(&StartPoint::ALL, |start| start.index() + 1, "TdStart");
-        agree::<TdAct, _>(&[Act::Arm, Act::Start], |act| act as u8, "TdAct");
-        let states = [C::NotRun, C::Running, C::Passed, C::Failed, C::Stopped];
-        agree::<TdPadCheckState, _>(&states, |state| state as u8, "TdPadCheckState");
-        let verdicts = [Verdict::NotJudged, Verdict::Ok, Verdict::NotOk];
-        agree::<TdPadCheckVerdict, _>(&verdicts, |verdict| verdict as u8, "TdPadCheckVerdict");
-        let holds = [H::UplinkSilent, H::Commanded, H::TapOverdue, H::StationDeaf, H::CheckFailed];
-        agree::<TdHold, _>(&holds, |cause| cause as u8, "TdHold");
-        let latches = [L::Commanded, L::UncommandedLiftOff, L::UncommandedRelease, L::NoSeparation, L::Gate];
-        agree::<TdLatch, _>(&latches, |latch| latch as u8, "TdLatch");
-        agree::<TdLatch, _>(&[L::NoLight, L::Other], |latch| latch as u8, "TdLatch");
-        let motors = [M::PinIn, M::Live, M::Burning, M::Hot, M::Burnt];
-        agree::<TdMotor, _>(&motors, |status| status as u8 + 1, "TdMotor");
+        every!(TdAct, Act, |act| act as u8, "TdAct": Arm, Start);
+        every!(TdPadCheckState, CheckState, |state| state as u8, "TdPadCheckState": NotRun, Running, Passed, Failed, Stopped);
+        every!(TdPadCheckVerdict, Verdict, |verdict| verdict as u8, "TdPadCheckVerdict": NotJudged, Ok, NotOk);
+        every!(TdHold, HoldCause, |cause| cause as u8, "TdHold": UplinkSilent, Commanded, TapOverdue, StationDeaf, CheckFailed);
+        every!(TdLatch, Latch, |latch| latch as u8, "TdLatch": Commanded, UncommandedLiftOff, UncommandedRelease, NoSeparation, Gate, NoLight, Other);
+        every!(TdMotor, MotorStatus, |status| status as u8 + 1, "TdMotor": PinIn, Live, Burning, Hot, Burnt);
     }
 
     #[test]

@@ -299,7 +299,7 @@ impl Item {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[repr(u8)]
 pub enum Verdict {
-    /// SurfaceShown only: here nothing is wrong with any value.
+    /// Shown only: here nothing is wrong with any value.
     NotJudged = 0,
     Ok = 1,
     NotOk = 2,

@@ -27,7 +27,7 @@ const EXPECTED_S: f64 = 0.025;
 
 /// Instructions that a Cortex-M7 executes in a frame: 600 MHz, and 0.67 instructions a cycle, which is assumed.
 const INSTRUCTIONS_PER_FRAME: u64 = 400_000 * FRAME_MS as u64;
-/// Instructions on an emulated Cortex-M7 (onboard-sim/board/README.md): of 3,347 predictions the dearest, and of a landing the line in
+/// Instructions on an emulated Cortex-M7 (onboard-sim/lab/cortex-m7/README.md): of 3,347 predictions the dearest, and of a landing the line in
 /// the passes of its search above which 39 of 3,994 plans lie.
 const PREDICTION: u64 = 13_600_000;
 const LANDING: u64 = 5_170_000;

@@ -163,7 +163,7 @@ impl Formulas<'_> {
         self.of_controller("ignition.burn_time_scales", &mut ignition.burn_time_scales, scales);
         let intervals = libm::ceil((carried_s + powered.latest_after_s) / powered.interval_s).min(60.0);
         // Above that a plan takes more than the 40 million instructions for which a Cortex-M7 has 100 ms
-        // (onboard-sim/board/README.md).
+        // (onboard-sim/lab/cortex-m7/README.md).
         let passes = (76.0 * intervals).clamp(2_200.0, 2_890.0) as usize;
         self.of_controller("powered.max_passes", &mut powered.max_passes, Some(passes));
 

@@ -53,6 +53,9 @@ impl SensorParams {
                     (found > 0.0 && found % f64::from(FRAME_MS) == 0.0, "a multiple of 5 above 0")
                 }
                 "lidar.tilt_max_deg" => ((0.0..90.0).contains(&found), "0 to below 90"),
+                "imu.accelerometer_scale_share" | "imu.accelerometer_cross_axis_share" => {
+                    (is_finite && found >= 0.0, "a finite number not below 0")
+                }
                 share if share.ends_with("_share") => ((0.0..=1.0).contains(&found), "0 to 1"),
                 _ => (is_finite && found >= 0.0, "a finite number not below 0"),
             };
@@ -72,6 +75,23 @@ mod tests {
     fn a_parameter_out_of_range_is_named_in_the_error() {
         let good = SensorParams::default();
         assert_eq!(good.validate(), Ok(()));
+        // A name that no parameter has would check nothing.
+        let names: Vec<String> = numbers(&good).into_iter().map(|(name, _)| name).collect();
+        for name in [
+            "imu.gyro_range_deg_s",
+            "imu.accelerometer_range_g",
+            "imu.accelerometer_scale_share",
+            "imu.accelerometer_cross_axis_share",
+            "gnss.wander_correlation_s",
+            "gnss.velocity_wander_correlation_s",
+            "gnss.delay_ms",
+            "barometer.period_ms",
+            "lidar.period_ms",
+            "lidar.range_max_m",
+            "lidar.tilt_max_deg",
+        ] {
+            assert!(names.iter().any(|known| known == name), "{name}");
+        }
         let of = |params: SensorParams| params.validate().unwrap_err().to_string();
         assert_eq!(
             of(SensorParams { imu: ImuParams { gyro_bias_deg_s: -0.1, ..good.imu }, ..good }),

@@ -250,6 +250,15 @@ mod tests {
     const IGNITED: Actuators =
         Actuators { gimbal_rad: [0.02, -0.01], fins_rad: [0.4; 4], ignite: true, ..Actuators::NONE };
 
+    /// A key that no truth has would accept anything.
+    #[test]
+    fn every_key_with_a_range_is_one_of_a_truth() {
+        let known = numbers(&Truth::default());
+        for key in ACCEPTED.iter().flat_map(|(_, keys)| keys.iter()) {
+            assert!(known.iter().any(|(name, _)| name == key), "{key}");
+        }
+    }
+
     fn airframe() -> Airframe {
         flight::vehicles::mission::builtin_airframe("mk2").unwrap()
     }

@@ -382,7 +382,8 @@ fn the_rates_of_every_kind_of_link_fit_it() {
             let rate = |message_id| streams.rate_hz(message_id);
             let position = rate(LOCAL_POSITION_NED_DATA::ID);
             assert!(rate(HEARTBEAT_DATA::ID) >= 1.0 && rate(TD_FLIGHT_STATUS_DATA::ID) >= 1.0, "{words}");
-            assert!(position >= 0.45, "{words}: {position} Hz");
+            let least_hz = if capacity_bytes_s >= RADIO_BUDGET_BYTES_S { 3.0 } else { 0.45 };
+            assert!(position >= least_hz, "{words}: {position} Hz");
             if capacity_bytes_s >= NETWORK_BUDGET_BYTES_S {
                 assert!(OF_EVERY_VEHICLE.iter().all(|id| rate(*id) >= 1.0), "{words}");
                 assert!(rate(BATTERY_STATUS_DATA::ID) >= 1.0);

@@ -2,7 +2,7 @@
 
 use flight::computer::FRAME_S;
 use flight::rules::arming::UPLINK_CHECK;
-use flight::rules::phase::{LAST_HOLD_S, UPLINK_PROVEN_S, UPLINK_SILENT_S};
+use flight::rules::phase::{HOLD_LIMIT_S, LAST_HOLD_S, UPLINK_PROVEN_S, UPLINK_SILENT_S};
 use protocol::dialect::{
     COMMAND_CANCEL_DATA, MavState, MavType, TD_UPLINK_DATA, TdFrameRefusal, TdHold, TdLatch, TdMotor,
 };
@@ -348,6 +348,23 @@ fn a_latched_abort_has_its_reason_on_the_wire() {
     assert_eq!(pad.status().latch, TdLatch::TD_LATCH_NONE);
     assert_eq!(pad.ask(CREW, ABORT, 1.0), ACCEPTED);
     assert_eq!(pad.status().latch, TdLatch::TD_LATCH_COMMANDED);
+}
+
+#[test]
+fn a_held_vehicle_disarms_after_a_minute() {
+    for pad in [Pad::rocket, Pad::hanging] {
+        let mut pad = pad();
+        pad.count_down();
+        pad.speaking.clear();
+        pad.run(UPLINK_SILENT_S + 0.2);
+        assert_eq!(pad.vehicle.phase(), Phase::PadArmed);
+        pad.run(HOLD_LIMIT_S - 1.0);
+        assert_eq!(pad.vehicle.phase(), Phase::PadArmed);
+        pad.run(1.1);
+        assert_eq!(pad.vehicle.phase(), Phase::PadIdle);
+        assert!(!pad.vehicle.aborted() && pad.said("held for 60 s without a new start") == 1);
+        assert_eq!(pad.status().hold, TdHold::TD_HOLD_NONE);
+    }
 }
 
 #[test]

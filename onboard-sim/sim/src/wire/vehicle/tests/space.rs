@@ -5,6 +5,7 @@ use flight::computer::AbortEffect;
 use flight::computer::pilot::FRAMES_PER_PLAN;
 use flight::rules::outputs::PyroOutput;
 use flight::rules::phase::MotorStatus;
+use protocol::dialect::TdChute;
 use protocol::log::record::Record;
 
 use super::*;
@@ -373,6 +374,25 @@ fn an_abort_on_the_pad_disarms_latches_and_lets_nothing_go() {
         assert_eq!(rocket.phase(), Phase::PadIdle);
         assert!(rocket.computer().released_at_s().is_none() && rocket.is_over());
         assert_ne!(rocket.request(Asked::Arm).ending, Ending::Accepted);
+    }
+}
+
+#[test]
+fn an_abort_with_room_left_opens_the_parachute_and_lights_nothing() {
+    let flight = flight_of("field", &[]);
+    for phase in [Phase::Deploy, Phase::AeroDescent, Phase::LandArmed] {
+        let mut rocket = in_phase(&flight, phase);
+        rocket.run_until(|rocket| rocket.computer().abort_effect() == AbortEffect::ChuteNow);
+        assert_eq!(rocket.descent().chute, TdChute::TD_CHUTE_STOWED);
+        assert_eq!(rocket.request(Asked::Abort).ending, Ending::Accepted);
+        let events = rocket.run_until(Vehicle::is_over);
+        assert_eq!(phases(&events), [Phase::Chute, Phase::Touchdown]);
+        assert!(said(&events, "parachute deployed") && said(&events, "landing motor inhibited"));
+        assert!(rocket.aborted());
+        let judged = rocket.judged().unwrap();
+        assert!(!judged.landing.stands, "under the parachute it is not a landing");
+        assert!(judged.touchdown.vertical_m_s.abs() < 10.0, "{judged:?}");
+        assert_eq!(rocket.descent().chute, TdChute::TD_CHUTE_OPEN);
     }
 }
 
