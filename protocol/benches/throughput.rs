@@ -9,8 +9,7 @@ use std::hint::black_box;
 use std::io::{Read, Write as _};
 use std::time::{Duration, Instant};
 
-use mavlink::MavlinkReader;
-use mavlink::{MavHeader, write_v2_msg};
+use mavlink::{MavHeader, MavlinkReader, write_v2_msg};
 use protocol::dialect::{
     ATTITUDE_QUATERNION_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, MavMessage, TD_CONTROLLER_DATA,
     TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TD_PREDICTED_PATH_DATA,

@@ -3,8 +3,7 @@
 use ground::key::Key;
 use ground::model::{Act, AlarmKind, CommandKind};
 use ground::view::headline::pad;
-use protocol::dialect::MavMessage;
-use protocol::dialect::{MavSeverity, TD_MISSION_DATA, TdCheck, TdHold, TdPhase, TdStart};
+use protocol::dialect::{MavMessage, MavSeverity, TD_MISSION_DATA, TdCheck, TdHold, TdPhase, TdStart};
 
 use crate::rig::{Rig, typed};
 

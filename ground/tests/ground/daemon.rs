@@ -10,8 +10,7 @@ use std::time::Duration;
 use ground::attach::codec::{decode_to_screen, encode_to_station, length};
 use ground::attach::{ToScreen, ToStation};
 use ground::model::{CommandKind, Model, Role, Seat, Settings, TrackedCommand};
-use ground::update::Request;
-use ground::update::{Msg, update};
+use ground::update::{Msg, Request, update};
 use protocol::dialect::TdPhase;
 use protocol::log::reader::{LogItem, LogReader};
 

@@ -8,9 +8,8 @@ use ground::model::{Seat, Settings};
 use ground::update::Msg;
 use ground::view::draw;
 use ground::view::theme::{Palette, Theme};
-use ratatui::Terminal;
 use ratatui::backend::CrosstermBackend;
-use ratatui::{TerminalOptions, Viewport, layout::Rect};
+use ratatui::{Terminal, TerminalOptions, Viewport, layout::Rect};
 
 use crate::rig::{Rig, settings};
 

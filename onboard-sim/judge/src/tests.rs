@@ -1,7 +1,6 @@
 use super::*;
 use crate::landing::{Column, Tangent};
-use ocp::landing::SolverLimits;
-use ocp::landing::{Drag, End, Push, Weights, Workspace};
+use ocp::landing::{Drag, End, Push, SolverLimits, Weights, Workspace};
 
 const GRAVITY_M_S2: f64 = 9.806_65;
 

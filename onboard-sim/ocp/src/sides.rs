@@ -3,8 +3,7 @@
 use alloc::vec::Vec;
 
 use crate::barrier::{Elastic, LAST_BARRIER, Limits};
-use crate::intervals::Curvature;
-use crate::intervals::Intervals;
+use crate::intervals::{Curvature, Intervals};
 use crate::iterate::{Residual, larger, push_nodes};
 use crate::model::{InputRange, Model};
 use crate::solver::Workspace;

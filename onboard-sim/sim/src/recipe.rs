@@ -1,7 +1,6 @@
 //! Everything that a flight is made from. The same recipe and flight number give the same flight, bit for bit.
 
-use flight::vehicle::mission::Mission;
-use flight::vehicle::mission::StartPoint;
+use flight::vehicle::mission::{Mission, StartPoint};
 use flight::vehicles::file_error::FileError;
 use flight::vehicles::mission::MissionError;
 

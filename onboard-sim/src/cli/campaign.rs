@@ -1,10 +1,9 @@
 //! `onboard-sim campaign`: a mission flown many times.
 
-use std::fmt;
-use std::fs;
 use std::io::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::{fmt, fs};
 
 use anyhow::Context as _;
 use clap::{Args, Subcommand};

@@ -19,8 +19,7 @@ use nalgebra::{Matrix2, Vector2};
 use sim::world::wind::gusts::GustScales;
 
 use super::burn::{Burn, SHAPE_TERMS, shape_sigmas};
-use super::least_squares::{NoiseStep, Whitener, lowest};
-use super::least_squares::{Prior, Solution, inflate, solve, solve_from};
+use super::least_squares::{NoiseStep, Prior, Solution, Whitener, inflate, lowest, solve, solve_from};
 use super::trace::{Frame, Trace};
 
 /// The fall counts from this speed on, m/s: a slower vehicle lies across a wind that is not known yet. From 5 m/s on, 4 of 60

@@ -5,8 +5,7 @@ use std::path::Path;
 
 use avionics::log::frame::{commands_from_log, input_from_log, phase_of};
 use avionics::log::logged::{At, Logged, RecordError};
-use flight::computer::Commands;
-use flight::computer::KeptInput;
+use flight::computer::{Commands, KeptInput};
 use flight::estimation::estimator::{Estimate, Measurements};
 use flight::rules::outputs::PyroOutput;
 use flight::rules::phase::Phase;

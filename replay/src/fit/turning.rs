@@ -15,8 +15,7 @@ use flight::vehicle::fins::ROLL;
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::along::{Along, BLOCK, FINS, IMPULSE, falling, follows, white_variance};
-use super::least_squares::{NoiseStep, Whitener, lowest};
-use super::least_squares::{Prior, Solution, inflate, solve_from};
+use super::least_squares::{NoiseStep, Prior, Solution, Whitener, inflate, lowest, solve_from};
 use super::servo::{PARTS, ServoModel};
 use super::trace::Trace;
 

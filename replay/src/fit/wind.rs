@@ -13,8 +13,7 @@ use sim::world::wind::{EXPONENT, REFERENCE_HEIGHT_M};
 
 use super::Parameter;
 use super::along::{Along, fall_and_burn};
-use super::least_squares::{NoiseStep, Whitener};
-use super::least_squares::{Prior, solve};
+use super::least_squares::{NoiseStep, Prior, Whitener, solve};
 use super::trace::{Frame, Trace};
 
 /// Frames of one sample of the wind.

@@ -7,8 +7,7 @@ use protocol::dialect::XML_FILES;
 use protocol::frame::Frame;
 use roxmltree::{Document, Node};
 
-use super::Cell;
-use super::{Column, Kind, Meaning, TableShape};
+use super::{Cell, Column, Kind, Meaning, TableShape};
 
 /// The dialect.
 static DIALECT: LazyLock<Dialect> = LazyLock::new(|| {

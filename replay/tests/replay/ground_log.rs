@@ -8,8 +8,7 @@ use protocol::log::record::{Direction, RawFrame, Record};
 use protocol::log::writer::{LogHeader, LogWriter};
 use replay::export::{TableFormat, export_tables};
 use replay::info::info;
-use replay::log::import_tlog;
-use replay::log::{Clock, ClockTime, Entry, FlightLog, Recording};
+use replay::log::{Clock, ClockTime, Entry, FlightLog, Recording, import_tlog};
 
 use crate::command_line::{data, replay};
 use crate::simulated::{Simulated, WITH_FRAMES, tlog};

@@ -7,8 +7,7 @@ use proptest::prelude::*;
 use replay::compare::{Align, Flown, Tolerances, compare};
 use replay::export::{TableFormat, export_tables};
 use replay::info::{GradeLevel, info};
-use replay::log::{FlightLog, Recording};
-use replay::log::{ImportError, import_tlog};
+use replay::log::{FlightLog, ImportError, Recording, import_tlog};
 use replay::refly::{ReflyOptions, refly_flight, write_log};
 use replay::verify::{Verification, verify};
 

@@ -11,8 +11,7 @@ use flight::guidance::powered::ControlLevel;
 use flight::rules::outputs::{Outputs, PyroOutput};
 use flight::rules::phase::Phase;
 use flight::vehicle::mission::StartPoint;
-use protocol::records::computer_v1 as v1;
-use protocol::records::flight_v1;
+use protocol::records::{computer_v1 as v1, flight_v1};
 
 use crate::log::logged::{At, Logged, RecordError};
 

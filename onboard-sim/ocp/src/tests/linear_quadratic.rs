@@ -5,9 +5,8 @@ use core::array::from_fn;
 use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
 
-use super::Optimality;
 use super::polynomial::{Polynomial, Term, at_least, equals, within};
-use super::{Kept, solved};
+use super::{Kept, Optimality, solved};
 use crate::{Model, Status};
 
 const INTERVALS: usize = 12;

@@ -1,8 +1,7 @@
 //! The table of a test stand: the columns `time` and `thrust`, each with its unit.
 
-use alloc::format;
-use alloc::vec;
 use alloc::vec::Vec;
+use alloc::{format, vec};
 
 use crate::vehicle::thrust_curve::{ThrustCurve, ThrustPoint};
 use crate::vehicles::table::{self, TableError};

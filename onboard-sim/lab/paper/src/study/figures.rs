@@ -5,8 +5,7 @@
 
 use core::f64::consts::FRAC_PI_2;
 
-use super::fall::{ANGLES_DEG, Fate, OPENINGS_DEG, Stability, TILTS_DEG};
-use super::fall::{Moment, Vehicle};
+use super::fall::{ANGLES_DEG, Fate, Moment, OPENINGS_DEG, Stability, TILTS_DEG, Vehicle};
 use super::{PaperError, Row, Sample, Table};
 use onboard_sim::figure::{FigureError, Line, Panel, sized_lines_svg};
 

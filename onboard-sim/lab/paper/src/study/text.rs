@@ -4,8 +4,7 @@ use std::io::{self, Write};
 
 use paper::plane::dynamics::PlanarState;
 
-use super::fall::HEIGHT_M;
-use super::fall::{ANGLES_DEG, Fate, OPENINGS_DEG, ROLLS_DEG, Stability, TILTS_DEG};
+use super::fall::{ANGLES_DEG, Fate, HEIGHT_M, OPENINGS_DEG, ROLLS_DEG, Stability, TILTS_DEG};
 use super::objective::chord;
 use super::{AsPrinted, Experiments, Finish, Objective, Row, Table};
 
