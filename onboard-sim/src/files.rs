@@ -77,7 +77,9 @@ pub fn write_all(files: &[(PathBuf, Vec<u8>)], force: bool) -> Result<(), WriteE
         if is_device(path) {
             std::fs::write(path, bytes).map_err(failed(path))?;
         } else {
-            complete.push((unfinished(path, bytes).map_err(failed(path))?, path));
+            let mut file = unfinished(path).map_err(failed(path))?;
+            file.write_all(bytes).and_then(|()| file.as_file().sync_all()).map_err(failed(path))?;
+            complete.push((file, path));
         }
     }
     complete.into_iter().try_for_each(|(file, path)| {
@@ -92,7 +94,10 @@ fn failed(path: &Path) -> impl FnOnce(io::Error) -> WriteError {
 }
 
 /// A file beside another, which disappears unless it is kept.
-fn unfinished(beside: &Path, bytes: &[u8]) -> io::Result<NamedTempFile> {
+///
+/// # Errors
+/// It cannot be created in that folder.
+pub fn unfinished(beside: &Path) -> io::Result<NamedTempFile> {
     let mut unfinished = tempfile::Builder::new();
     unfinished.prefix(".unfinished-");
     #[cfg(unix)]
@@ -102,8 +107,5 @@ fn unfinished(beside: &Path, bytes: &[u8]) -> io::Result<NamedTempFile> {
         unfinished.permissions(std::fs::Permissions::from_mode(0o666));
     }
     let folder = beside.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut file = unfinished.tempfile_in(folder)?;
-    file.write_all(bytes)?;
-    file.as_file().sync_all()?;
-    Ok(file)
+    unfinished.tempfile_in(folder)
 }

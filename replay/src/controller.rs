@@ -13,8 +13,32 @@ use flight::vehicle::mission::Mission;
 use ocp::Status;
 use protocol::log::computer_v1::{ComputerFrame, ComputerOutput, ComputerStart};
 use serde::Serialize;
+use sim::sortie::SetUpError;
 
+use crate::log::RecordingError;
 use crate::settings::{Schedule, Setting, SettingError, mission_with};
+
+/// Why the frames of a log cannot be executed again, or its flight be flown again.
+#[derive(Debug, thiserror::Error)]
+pub enum AgainError {
+    /// The log lacks the records that are needed.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// A setting is wrong, or the log names one that this build does not have.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
+    /// A recorded frame cannot be executed again.
+    #[error(transparent)]
+    Frame(#[from] FrameError),
+    /// The flight cannot be set up, or its world cannot be changed this way.
+    #[error(transparent)]
+    Flight(#[from] SetUpError),
+    #[error("{name}: no frame {frame} that can be re-executed; there are {first} to {last}")]
+    NoFrame { name: String, frame: u64, first: u64, last: u64 },
+    /// What is asked for cannot be had: `of` is the file or the setting.
+    #[error("{of}: {reason}")]
+    Refused { of: String, reason: String },
+}
 
 /// Summary of a frame's decision.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -12,10 +12,10 @@ use serde::Serialize;
 
 use crate::cli::{Answer, Outcome, give, refuse_existing, warn_of_what_is_missing, write_new};
 pub use crate::controller::Decided;
-use crate::controller::{FrameError, LoggedComputer, phase_name};
-use crate::log::{Recording, RecordingError};
+use crate::controller::{AgainError, LoggedComputer, phase_name};
+use crate::log::Recording;
 use crate::print::columns;
-use crate::settings::{Setting, SettingArguments, SettingError};
+use crate::settings::{Setting, SettingArguments};
 use crate::verify::explain::degrees;
 
 /// Sections that a flight computer never sees: the limits of the verdict, and the random draw.
@@ -23,23 +23,6 @@ const NOT_THE_PILOTS: [&str; 2] = ["leg_limits.", "truth."];
 
 /// The time between frames.
 const FRAME: &str = "estimator.frame_s";
-
-/// Why a flight cannot be evaluated.
-#[derive(Debug, thiserror::Error)]
-pub enum EvaluateError {
-    /// The log lacks the records that are needed.
-    #[error(transparent)]
-    Recording(#[from] RecordingError),
-    /// A setting is wrong.
-    #[error(transparent)]
-    Setting(#[from] SettingError),
-    /// A recorded frame cannot be executed again.
-    #[error(transparent)]
-    Frame(#[from] FrameError),
-    /// A setting that the controller does not have, or that cannot be changed on recorded inputs.
-    #[error("{setting}: {why}")]
-    Refused { setting: String, why: String },
-}
 
 /// A frame: the recorded decision, and the decision with other settings.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -111,8 +94,8 @@ impl EvaluateReport {
 /// settings.
 ///
 /// # Errors
-/// See [`EvaluateError`].
-pub fn evaluate(recording: &Recording, settings: &[Setting]) -> Result<EvaluateReport, EvaluateError> {
+/// See [`AgainError`].
+pub fn evaluate(recording: &Recording, settings: &[Setting]) -> Result<EvaluateReport, AgainError> {
     let (start, recorded) = recording.replayable_frames()?;
     let toml = recording.profile_toml()?;
     let run = &recording.head.run;
@@ -139,7 +122,7 @@ pub fn evaluate(recording: &Recording, settings: &[Setting]) -> Result<EvaluateR
 }
 
 /// Refuses settings that the flight computer does not have, or that cannot change on recorded inputs.
-fn refuse(settings: &[Setting], name: &str, recorded_s: f64, last_s: f64) -> Result<(), EvaluateError> {
+fn refuse(settings: &[Setting], name: &str, recorded_s: f64, last_s: f64) -> Result<(), AgainError> {
     let why_not = |Setting { path, at_s, .. }: &Setting| {
         let why = if NOT_THE_PILOTS.iter().any(|section| path.starts_with(section)) {
             "not a setting of the controller: on recorded inputs it changes nothing; use refly to fly with it"
@@ -157,7 +140,7 @@ fn refuse(settings: &[Setting], name: &str, recorded_s: f64, last_s: f64) -> Res
     };
     match settings.iter().find_map(|setting| Some((setting, why_not(setting)?))) {
         None => Ok(()),
-        Some((setting, why)) => Err(EvaluateError::Refused { setting: setting.to_string(), why }),
+        Some((setting, why)) => Err(AgainError::Refused { of: setting.to_string(), reason: why }),
     }
 }
 

@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use tempfile::{NamedTempFile, TempPath};
+use tempfile::TempPath;
 
 /// The destination of a new file.
 #[derive(Debug, Clone, Copy)]
@@ -84,7 +84,7 @@ impl NewFile {
         if !force && path.symlink_metadata().is_ok() {
             return Err(exists());
         }
-        let (file, unfinished) = beside(path)?.into_parts();
+        let (file, unfinished) = onboard_sim::files::unfinished(path)?.into_parts();
         Ok(Self { path: path.to_owned(), force, file, unfinished: Some(unfinished) })
     }
 
@@ -133,19 +133,6 @@ fn exists() -> io::Error {
 /// Whether two paths name the same file; a missing file is never the same as another.
 pub fn same_file(a: &Path, b: &Path) -> bool {
     matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
-}
-
-fn beside(path: &Path) -> io::Result<NamedTempFile> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut unfinished = tempfile::Builder::new();
-    unfinished.prefix(".unfinished-");
-    #[cfg(unix)]
-    let unfinished = {
-        use std::os::unix::fs::PermissionsExt as _;
-        // Apply the user's umask as for any new file; a temporary file would be readable by its owner only.
-        unfinished.permissions(std::fs::Permissions::from_mode(0o666))
-    };
-    unfinished.tempfile_in(folder)
 }
 
 #[cfg(test)]

@@ -31,8 +31,8 @@ const WINDOW: Duration = Duration::from_secs(1);
 const SMALL_CELLS: u32 = 80 * 24;
 /// How many bytes per second frames that can wait may use: numbers and pictures once a second. The rest of the 5 kB (80x24) or 8 kB
 /// per second is left for a frame that cannot wait: a change of page takes up to 3 kB at 80x24.
-const SMALL_ROOM_BYTES: usize = 1_200;
-const LARGE_ROOM_BYTES: usize = 1_400;
+const SMALL_ROOM_BYTES: usize = 1_000;
+const LARGE_ROOM_BYTES: usize = 1_200;
 
 /// The state whose changes are drawn at once.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -18,20 +18,6 @@ use protocol::log::flight_v1 as v1;
 
 use crate::log::{Recording, RecordingError};
 
-/// Why a log gives nothing to a fit.
-#[derive(Debug, thiserror::Error)]
-pub enum TraceError {
-    #[error(transparent)]
-    Recording(#[from] RecordingError),
-    #[error(
-        "{name}: has no frames of a flight computer with its sensors and estimates ({found}). A fit needs the vehicle's own log: at \
-         the rates of telemetry neither thrust nor delays nor noises can be found"
-    )]
-    Nothing { name: String, found: &'static str },
-    #[error("{name}")]
-    Frame { name: String, source: RecordError },
-}
-
 /// One frame of the flight computer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Frame {
@@ -148,7 +134,7 @@ impl Trace {
     ///
     /// # Errors
     /// It says what the log lacks: it cannot be read, is too long, or has several flights, no usable mission, or no frames.
-    pub fn open(path: &Path) -> Result<Self, TraceError> {
+    pub fn open(path: &Path) -> Result<Self, RecordingError> {
         Self::of(&Recording::open(path)?)
     }
 
@@ -156,13 +142,13 @@ impl Trace {
     ///
     /// # Errors
     /// As [`open`](Self::open).
-    pub fn of(recording: &Recording) -> Result<Self, TraceError> {
+    pub fn of(recording: &Recording) -> Result<Self, RecordingError> {
         /// What is remembered after so many frames of noise is remembered in no other flight.
         const NAMING_FRAMES: usize = 100;
         let name = &recording.name;
         let found =
             if recording.telemetry.is_empty() { "none of either" } else { "it is a ground station's" };
-        let nothing = || TraceError::Nothing { name: name.clone(), found };
+        let nothing = || RecordingError::NoTrace { name: name.clone(), found };
         recording.estimates.first().ok_or_else(nothing)?;
         let text = recording.profile_toml()?;
         let mission = flight::vehicles::mission::from_toml(text, "profile.toml").map_err(|error| {
@@ -178,7 +164,7 @@ impl Trace {
         for (place, estimate) in &recording.estimates {
             let Some(frame) = recording.frames.get(*place) else { continue };
             let taken = trace.take(frame, estimate);
-            taken.map_err(|source| TraceError::Frame { name: name.clone(), source })?;
+            taken.map_err(|source| RecordingError::Frame { name: name.clone(), source })?;
         }
         if trace.frames.is_empty() { Err(nothing()) } else { Ok(trace) }
     }

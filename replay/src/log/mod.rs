@@ -87,26 +87,28 @@ impl FlightLog<BufReader<File>> {
     }
 }
 
+/// Reads the first bytes of an MCAP file.
+pub(crate) fn take_magic(name: &str, input: &mut impl Read) -> Result<(), LogError> {
+    let mut found = Vec::new();
+    let read = input.take(MCAP_MAGIC.len() as u64).read_to_end(&mut found);
+    match (read, &found[..]) {
+        (Err(source), _) => Err(LogError::Read { name: name.to_owned(), source }),
+        (Ok(_), []) => Err(LogError::Empty { name: name.to_owned() }),
+        (Ok(_), start) if start == MCAP_MAGIC => Ok(()),
+        (Ok(_), _) => Err(LogError::NotMcap { name: name.to_owned(), found }),
+    }
+}
+
 impl<R: Read> FlightLog<R> {
     /// Reads a log from anywhere; `name` is used in messages only.
     ///
     /// # Errors
     /// The input cannot be read, or is not an MCAP file.
     pub fn read(name: String, mut input: R) -> Result<Self, LogError> {
-        let mut start = Vec::with_capacity(MCAP_MAGIC.len());
-        let read = input.by_ref().take(MCAP_MAGIC.len() as u64).read_to_end(&mut start);
-        if let Err(source) = read {
-            return Err(LogError::Read { name, source });
-        }
-        if start.is_empty() {
-            return Err(LogError::Empty { name });
-        }
-        if start != MCAP_MAGIC {
-            return Err(LogError::NotMcap { name, found: start });
-        }
+        take_magic(&name, &mut input)?;
         Ok(Self {
             name,
-            reader: LogReader::new(Cursor::new(start).chain(input)),
+            reader: LogReader::new(Cursor::new(MCAP_MAGIC.to_vec()).chain(input)),
             head: Head::default(),
             recognised: false,
             first_log_time_ns: None,

@@ -5,6 +5,7 @@
 
 use std::path::Path;
 
+use avionics::log::logged::RecordError;
 use foxglove::messages::Log as EventRecord;
 use protocol::log::computer_v1::{ComputerFrame, ComputerStart};
 use protocol::log::{flight_v1, v1};
@@ -60,6 +61,13 @@ pub enum RecordingError {
         name: String,
         flights: usize,
     },
+    #[error(
+        "{name}: has no frames of a flight computer with its sensors and estimates ({found}). A fit needs the vehicle's own log: at \
+         the rates of telemetry neither thrust nor delays nor noises can be found"
+    )]
+    NoTrace { name: String, found: &'static str },
+    #[error("{name}")]
+    Frame { name: String, source: RecordError },
     /// The log has no profile to build the controller from.
     #[error("{name}: has no attachment profile.toml, and without the profile the controller cannot be built")]
     NoProfile {

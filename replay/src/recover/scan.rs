@@ -12,7 +12,7 @@ use mcap::records::{Channel, Record, SchemaHeader, Statistics, op};
 use protocol::log::reader::{RECORD_LIMIT_BYTES, RecordError, parse_record, records_of_chunk};
 use protocol::log::record::TOPIC_COMPUTER_FRAME;
 
-use crate::log::{LogError, open_regular};
+use crate::log::{LogError, open_regular, take_magic};
 
 /// Size of the type and length before every record.
 const HEAD_BYTES: usize = 9;
@@ -122,14 +122,7 @@ impl Records {
         let file = open_regular(path).map_err(read)?;
         let size = file.metadata().map_err(read)?.len();
         let mut input = BufReader::with_capacity(1 << 16, file);
-        let mut found = Vec::new();
-        input.by_ref().take(mcap::MAGIC.len() as u64).read_to_end(&mut found).map_err(read)?;
-        if found.is_empty() {
-            return Err(LogError::Empty { name });
-        }
-        if found != mcap::MAGIC {
-            return Err(LogError::NotMcap { name, found });
-        }
+        take_magic(&name, &mut input)?;
         Ok(Self { name, input, size })
     }
 

@@ -35,11 +35,11 @@ use sim::wire::record;
 
 use self::rerun::Rerun;
 use crate::cli::{Answer, Outcome, give, warn_of_what_is_missing};
-use crate::controller::{LoggedComputer, SETTINGS_IN_FLIGHT, phase_name};
-use crate::log::{Clock, ClockTime, Moment, Recording, RecordingError, Verdict};
+use crate::controller::{AgainError, LoggedComputer, SETTINGS_IN_FLIGHT, phase_name};
+use crate::log::{Clock, ClockTime, Moment, Recording, Verdict};
 use crate::output::{Destination, WriteError, write_whole};
 use crate::print::{counted, verdict_table};
-use crate::settings::{Setting, SettingArguments, SettingError, mission_with, truth_with};
+use crate::settings::{Setting, SettingArguments, mission_with, truth_with};
 use crate::worst_plans::BrokenPlan;
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -78,28 +78,6 @@ pub struct FaultChanges {
     pub with: Vec<String>,
     /// Recorded faults that do not happen: each by its name, or in full as it was given; `all` for every one.
     pub without: Vec<String>,
-}
-
-/// Why a flight cannot be flown again.
-#[derive(Debug, thiserror::Error)]
-pub enum ReflyError {
-    /// The log lacks the records that are needed.
-    #[error(transparent)]
-    Recording(#[from] RecordingError),
-    /// A setting is wrong.
-    #[error(transparent)]
-    Setting(#[from] SettingError),
-    /// The log does not say how its flight was flown, this build does not know it, the requested start is not in it, or a fault cannot
-    /// be added or left out. Or a setting belongs to the controller and not to the plant, or the other way round.
-    #[error("{of}: {reason}")]
-    Refused {
-        /// The file, or the setting.
-        of: String,
-        reason: String,
-    },
-    /// The flight cannot be set up, or its world cannot be changed this way.
-    #[error(transparent)]
-    Flight(#[from] SetUpError),
 }
 
 /// How the re-flown frames before the start compare with the record.
@@ -168,8 +146,8 @@ pub struct ReflownFlight {
 /// Flies a recorded flight again.
 ///
 /// # Errors
-/// See [`ReflyError`].
-pub fn refly(recording: &Recording, options: &ReflyOptions) -> Result<ReflyReport, ReflyError> {
+/// See [`AgainError`].
+pub fn refly(recording: &Recording, options: &ReflyOptions) -> Result<ReflyReport, AgainError> {
     Ok(refly_flight(recording, options)?.0)
 }
 
@@ -177,11 +155,11 @@ pub fn refly(recording: &Recording, options: &ReflyOptions) -> Result<ReflyRepor
 /// recorded frames may come from another build or be partly lost, and the flight after the start would not continue them.
 ///
 /// # Errors
-/// See [`ReflyError`].
+/// See [`AgainError`].
 pub fn refly_flight(
     recording: &Recording,
     options: &ReflyOptions,
-) -> Result<(ReflyReport, ReflownFlight), ReflyError> {
+) -> Result<(ReflyReport, ReflownFlight), AgainError> {
     refuse_misplaced(options)?;
     let (_, frames) = recording.recorded_frames()?;
     let mut rerun = Rerun::of(recording, &FaultChanges::default())?;
@@ -304,7 +282,7 @@ fn change(
     options: &ReflyOptions,
     in_flight: &[Setting],
     rerun: &mut Rerun,
-) -> Result<(), ReflyError> {
+) -> Result<(), AgainError> {
     let toml = recording.profile_toml()?;
     rerun.schedule = Some(LoggedComputer::schedule(toml, recording.recorded_frames()?.0, in_flight)?);
     let (of_truth, of_mission): (Vec<Setting>, Vec<Setting>) =
@@ -327,7 +305,7 @@ fn change(
 
 /// The plant takes settings of the airframe and of the draw, from the beginning; the controller takes all but those of the
 /// draw and of its estimator.
-fn refuse_misplaced(options: &ReflyOptions) -> Result<(), ReflyError> {
+fn refuse_misplaced(options: &ReflyOptions) -> Result<(), AgainError> {
     type IsWrong = fn(&Setting) -> bool;
     let refused: [(&[Setting], IsWrong, &str); 4] = [
         (
@@ -353,14 +331,14 @@ fn refuse_misplaced(options: &ReflyOptions) -> Result<(), ReflyError> {
     ];
     let mut misplaced = refused.into_iter().filter_map(|(settings, is_wrong, belongs)| {
         let setting = settings.iter().find(|setting| is_wrong(setting))?.to_string();
-        Some(ReflyError::Refused { of: setting, reason: belongs.to_owned() })
+        Some(AgainError::Refused { of: setting, reason: belongs.to_owned() })
     });
     misplaced.next().map_or(Ok(()), Err)
 }
 
 /// The index of the frame to start with. For a phase it is the frame after the one that entered it, because changes
 /// cannot act earlier.
-fn find(recording: &Recording, frames: &[ComputerFrame], start: Option<Moment>) -> Result<usize, ReflyError> {
+fn find(recording: &Recording, frames: &[ComputerFrame], start: Option<Moment>) -> Result<usize, AgainError> {
     let logged = |frame: &ComputerFrame| recording.release_frame + frame.input.frame;
     let in_phase = |wanted: &dyn Fn(Phase) -> bool| {
         let entered = frames.iter().position(|frame| phase_of(&frame.output).is_some_and(wanted))?;
@@ -395,7 +373,7 @@ fn find(recording: &Recording, frames: &[ComputerFrame], start: Option<Moment>) 
             (in_phase(&|found| found == phase), format!("no frame in phase {}", phase.name()))
         }
     };
-    found.ok_or_else(|| ReflyError::Refused { of: recording.name.clone(), reason })
+    found.ok_or_else(|| AgainError::Refused { of: recording.name.clone(), reason })
 }
 
 /// The smallest distance to a limit as a fraction of it; see [`ReflyReport::margin`].

@@ -12,8 +12,8 @@ use sim::recipe::Recipe;
 use sim::sortie::Sortie;
 use sim::wire::record::{self as sortie_log, LastFrame};
 
-use super::{FaultChanges, ReflyError};
-use crate::controller::LoggedComputer;
+use super::FaultChanges;
+use crate::controller::{AgainError, LoggedComputer};
 use crate::log::Recording;
 use crate::settings::Schedule;
 use crate::worst_plans::{BrokenPlan, worst};
@@ -59,9 +59,9 @@ impl Rerun {
     /// # Errors
     /// The log lacks a part of its recipe, or this build does not know it; a fault to leave out is not there, or a fault to
     /// add is unknown.
-    pub(super) fn of(recording: &Recording, changes: &FaultChanges) -> Result<Self, ReflyError> {
+    pub(super) fn of(recording: &Recording, changes: &FaultChanges) -> Result<Self, AgainError> {
         let (start, frames) = recording.recorded_frames()?;
-        let lacking = |reason: String| ReflyError::Refused {
+        let lacking = |reason: String| AgainError::Refused {
             of: recording.name.clone(),
             reason: format!("cannot be flown again from its start: {reason}"),
         };
@@ -158,8 +158,8 @@ fn changed(
     recording: &Recording,
     recorded: &[TimedFault],
     changes: &FaultChanges,
-) -> Result<Vec<TimedFault>, ReflyError> {
-    let refused = |reason| ReflyError::Refused { of: recording.name.clone(), reason };
+) -> Result<Vec<TimedFault>, AgainError> {
+    let refused = |reason| AgainError::Refused { of: recording.name.clone(), reason };
     let mut faults = recorded.to_vec();
     for without in &changes.without {
         // `gnss-out` means every one of that name, `gnss-out@5` just that one.

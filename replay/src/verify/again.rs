@@ -7,15 +7,16 @@ use prost::Message as _;
 use protocol::log::v1::LandingVerdict;
 
 use super::parts::Part;
+use crate::controller::AgainError;
 use crate::log::{Moment, Recording};
-use crate::refly::{ReflyError, ReflyOptions, refly_flight};
+use crate::refly::{ReflyOptions, refly_flight};
 
 /// The facts that a simulated flight is drawn from.
 const DRAWN_FROM: [&str; 3] = ["seed", "flight", "dispersion"];
 
 /// Compares the verdict and the run facts of a log of one flight.
 pub(super) fn compare(path: &Path, simulated: bool, verdict: &mut Part, facts: &mut Part) {
-    let flown = Recording::open(path).map_err(ReflyError::from).and_then(|recording| {
+    let flown = Recording::open(path).map_err(AgainError::from).and_then(|recording| {
         let is_drawn = DRAWN_FROM.iter().any(|fact| recording.head.run.contains_key(*fact));
         if !simulated && !is_drawn {
             return Ok(None);

@@ -3,7 +3,7 @@
 //! A log of a station holds its book. A log of the vehicle holds the ends of books that stations sent: whoever changes a
 //! station's log cannot change those.
 
-use std::io::BufReader;
+use std::io::{BufReader, Read as _};
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
@@ -11,13 +11,13 @@ use clap::Args;
 use prost::Message as _;
 use protocol::book::{Audit, PublicKey, RecordedHead, SignedHead, audit, shown as shown_hash};
 use protocol::dialect::MavMessage;
-use protocol::log::reader::{Damage, LogChannel, LogItem, LogReader};
+use protocol::log::reader::{LogChannel, LogItem, LogReader};
 use protocol::log::record::{TOPIC_BOOK, TOPIC_BOOK_HEAD, TOPIC_RAW_RX};
 use protocol::log::v1::{BookEntry, BookHead};
 use serde::Serialize;
 
 use crate::cli::{Answer, Outcome, give};
-use crate::log::{frame_of, open_log};
+use crate::log::{LogError, frame_of, open_log, take_magic};
 
 /// The result for one book.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -71,7 +71,7 @@ impl AuditFound {
 ///
 /// # Errors
 /// A log cannot be read.
-pub fn audit_logs(paths: &[impl AsRef<Path>], trusted: Option<PublicKey>) -> Result<AuditFound, ReadError> {
+pub fn audit_logs(paths: &[impl AsRef<Path>], trusted: Option<PublicKey>) -> Result<AuditFound, LogError> {
     let logs = paths.iter().map(|path| read(path.as_ref())).collect::<Result<Vec<_>, _>>()?;
     let by_vehicle: Vec<&RecordedHead> =
         logs.iter().flat_map(|log| &log.heads).filter(|head| head.by_vehicle).collect();
@@ -122,16 +122,6 @@ fn told(entry: &BookEntry) -> String {
     format!("{hour:02}:{minute:02}:{second:02} {}: {}{who}", entry.kind, entry.text)
 }
 
-/// Why a log cannot be audited. A book is read from any log: one that is out of order, or damaged from its first message on, does not
-/// hide the books of the others.
-#[derive(Debug, thiserror::Error)]
-pub enum ReadError {
-    #[error("{}: cannot be read", path.display())]
-    Read { path: PathBuf, source: std::io::Error },
-    #[error("{}: not an MCAP file", path.display())]
-    NotALog { path: PathBuf },
-}
-
 /// What one log holds of books.
 #[derive(Debug, Clone, Default)]
 struct Contents {
@@ -147,19 +137,19 @@ struct Contents {
 ///
 /// # Errors
 /// The file cannot be read, or is no log.
-fn read(path: &Path) -> Result<Contents, ReadError> {
-    let failed = |source| ReadError::Read { path: path.to_owned(), source };
-    let mut reader = LogReader::new(BufReader::new(open_log(path).map_err(failed)?.0));
-    let mut contents = Contents { name: path.display().to_string(), ..Contents::default() };
+fn read(path: &Path) -> Result<Contents, LogError> {
+    let name = path.display().to_string();
+    let failed = |source| LogError::Read { name: name.clone(), source };
+    let mut log = BufReader::new(open_log(path).map_err(failed)?.0);
+    take_magic(&name, &mut log)?;
+    let mut reader = LogReader::new(mcap::MAGIC.chain(log));
+    let mut contents = Contents { name: name.clone(), ..Contents::default() };
     while let Some(item) = reader.next_item().map_err(failed)? {
         if let LogItem::Message { channel_id, data, .. } = item
             && let Some(channel) = reader.channel(channel_id)
         {
             contents.take(channel, &data);
         }
-    }
-    if reader.damage() == Some(&Damage::NotMcap) {
-        return Err(ReadError::NotALog { path: path.to_owned() });
     }
     contents.damage = reader.damage().map(ToString::to_string);
     Ok(contents)

@@ -19,40 +19,13 @@ use protocol::log::computer_v1::ComputerFrame;
 use serde::Serialize;
 
 use crate::cli::{Answer, Outcome, give, warn_of_what_is_missing};
-use crate::controller::{FrameError, LoggedComputer, phase_name};
-use crate::log::{Recording, RecordingError};
+use crate::controller::{AgainError, LoggedComputer, phase_name};
+use crate::log::Recording;
 use crate::print::columns;
-use crate::settings::SettingError;
 
 /// Plans whose costs differ by less than this share, and whose first gimbal angles by less than this, are the same.
 const SAME_SHARE: f64 = 0.01;
 const SAME_DEG: f64 = 0.5;
-
-/// Why a frame cannot be solved again.
-#[derive(Debug, thiserror::Error)]
-pub enum ExplainError {
-    /// The log lacks the records that are needed.
-    #[error(transparent)]
-    Recording(#[from] RecordingError),
-    /// The log names settings that this build does not have.
-    #[error(transparent)]
-    Setting(#[from] SettingError),
-    /// A recorded frame cannot be executed again.
-    #[error(transparent)]
-    Frame(#[from] FrameError),
-    /// The log has no such frame.
-    #[error("{name}: no frame {frame} that can be re-executed; there are {first} to {last}")]
-    NoFrame {
-        /// The file.
-        name: String,
-        /// The request.
-        frame: u64,
-        /// The first frame in the log.
-        first: u64,
-        /// The last frame in the log.
-        last: u64,
-    },
-}
 
 /// A plan, as the judge counts it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -127,7 +100,7 @@ struct Explained {
 }
 
 /// Runs a recorded flight again, up to a frame or to its end, and solves what the frame, or each, planned.
-fn inspected(recording: &Recording, only: Option<u64>) -> Result<Vec<Explained>, ExplainError> {
+fn inspected(recording: &Recording, only: Option<u64>) -> Result<Vec<Explained>, AgainError> {
     let (start, frames) = recording.replayable_frames()?;
     let computer = LoggedComputer::recorded(recording.profile_toml()?, start, &recording.head.run, &[])?;
     let mut controller = if recording.from_power_up { computer.without_digests() } else { computer };
@@ -172,7 +145,7 @@ fn inspected(recording: &Recording, only: Option<u64>) -> Result<Vec<Explained>,
         Some(frame) => {
             let bound = |frame: Option<&ComputerFrame>| frame.map_or(0, logged);
             let (first, last) = (bound(frames.first()), bound(frames.last()));
-            Err(ExplainError::NoFrame { name: recording.name.clone(), frame, first, last })
+            Err(AgainError::NoFrame { name: recording.name.clone(), frame, first, last })
         }
     }
 }
@@ -185,8 +158,8 @@ pub(crate) fn plans(frame: &ComputerFrame) -> bool {
 /// Solves one recorded frame again.
 ///
 /// # Errors
-/// See [`ExplainError`].
-pub fn explain(recording: &Recording, number: u64) -> Result<FrameReport, ExplainError> {
+/// See [`AgainError`].
+pub fn explain(recording: &Recording, number: u64) -> Result<FrameReport, AgainError> {
     // Without that frame it is an error.
     let Explained { report, solved } = inspected(recording, Some(number))?.swap_remove(0);
     Ok(FrameReport { judged: solved.as_ref().map(judged), ..report })
@@ -195,8 +168,8 @@ pub fn explain(recording: &Recording, number: u64) -> Result<FrameReport, Explai
 /// Solves every frame again that planned a landing.
 ///
 /// # Errors
-/// See [`ExplainError`].
-pub fn explain_all(recording: &Recording) -> Result<Vec<FrameReport>, ExplainError> {
+/// See [`AgainError`].
+pub fn explain_all(recording: &Recording) -> Result<Vec<FrameReport>, AgainError> {
     let explained = inspected(recording, None)?;
     let progress = Progress::start();
     let one =

@@ -4,10 +4,11 @@ use flight::rules::phase::Phase;
 use prost::Message as _;
 use protocol::log::computer_v1::ComputerFrame;
 use protocol::log::record::Record;
-use replay::evaluate::{EvaluateError, evaluate};
+use replay::controller::AgainError;
+use replay::evaluate::evaluate;
 use replay::log::{Clock, ClockTime, Moment, Recording};
-use replay::refly::{ReflyError, ReflyOptions, refly, refly_flight, write_log};
-use replay::verify::explain::{ExplainError, explain};
+use replay::refly::{ReflyOptions, refly, refly_flight, write_log};
+use replay::verify::explain::explain;
 use replay::verify::{Verification, verify};
 
 use crate::asked::{settings, with, with_plant};
@@ -62,7 +63,7 @@ fn a_setting_that_the_flight_computer_does_not_have_is_refused() {
     for given in
         ["leg_limits.tilt_deg=3.0", "truth.wind_m_s=3.0", "estimator.frame_s=0.01", "estimator.frame=1@3"]
     {
-        assert!(matches!(refused(given), EvaluateError::Refused { setting, .. } if setting == given));
+        assert!(matches!(refused(given), AgainError::Refused { of, .. } if of == given));
     }
 }
 
@@ -172,7 +173,7 @@ fn a_flight_flown_again_is_a_log_that_verifies() {
         let again = Recording::open(&path).unwrap();
         assert_eq!(again.verdict, flown.verdict, "{name}");
         assert!(evaluate(&again, &[]).unwrap().commands_different == 0, "{name}");
-        assert!(matches!(refly(&again, &ReflyOptions::default()), Err(ReflyError::Refused { .. })), "{name}");
+        assert!(matches!(refly(&again, &ReflyOptions::default()), Err(AgainError::Refused { .. })), "{name}");
     }
 }
 
@@ -203,7 +204,7 @@ fn every_plan_solved_again_is_the_flown_one() {
     assert!(between.identical && between.judged.is_none() && between.path.is_empty());
     let nearest = explain(&recording, between.nearest_planned.unwrap()).unwrap();
     assert!(nearest.judged.is_some() && nearest.nearest_planned == Some(nearest.frame));
-    assert!(matches!(explain(&recording, 99_999), Err(ExplainError::NoFrame { first: 1, .. })));
+    assert!(matches!(explain(&recording, 99_999), Err(AgainError::NoFrame { first: 1, .. })));
 }
 
 /// The record claims another command; this build, flying on from there, lands as the vehicle did.

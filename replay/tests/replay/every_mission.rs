@@ -10,7 +10,8 @@ use flight::vehicle::mission::StartPoint;
 use flight::vehicles::mission::BUILTIN;
 use protocol::log::computer_v1::ComputerFrame;
 use replay::cli::Answer as _;
-use replay::evaluate::{EvaluateError, evaluate};
+use replay::controller::AgainError;
+use replay::evaluate::evaluate;
 use replay::info::info;
 use replay::settings::Setting;
 use replay::verify::explain::explain;
@@ -356,7 +357,7 @@ fn a_setting_of_the_landing_acts_or_the_answer_says_that_it_did_not() {
             let acts = |setting: &Setting| {
                 let report = match evaluate(&recording, std::slice::from_ref(setting)) {
                     Ok(report) => report,
-                    Err(refusal @ (EvaluateError::Frame(_) | EvaluateError::Setting(_))) => {
+                    Err(refusal @ (AgainError::Frame(_) | AgainError::Setting(_))) => {
                         let key = setting.path.rsplit('.').next().unwrap();
                         assert!(refusal.to_string().contains(key), "{refusal}");
                         return None;

@@ -3,13 +3,14 @@
 use std::path::PathBuf;
 use std::sync::LazyLock;
 
+use replay::controller::AgainError;
 use replay::evaluate::evaluate;
 use replay::info::{GradeLevel, info};
 use replay::log::{Gap, Recording, RecordingError};
 use replay::recover::recover;
 use replay::refly::{ReflyOptions, refly};
 use replay::report::report;
-use replay::verify::explain::{ExplainError, explain};
+use replay::verify::explain::explain;
 use replay::verify::{Obstacle, Verification, verify};
 
 use crate::command_line::{replay, run};
@@ -65,7 +66,7 @@ fn a_frame_after_the_loss_is_refused() {
     let (after, before, _) = around_the_loss(&recording);
     assert!(explain(&recording, after).unwrap().identical);
     let refusal = explain(&recording, before).unwrap_err();
-    assert!(matches!(refusal, ExplainError::NoFrame { last, .. } if last == after), "{refusal}");
+    assert!(matches!(refusal, AgainError::NoFrame { last, .. } if last == after), "{refusal}");
 }
 
 #[test]
