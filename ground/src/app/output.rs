@@ -103,6 +103,7 @@ impl Output {
 
     /// Lets time pass for a replay; `model_now` is the same moment on the model's clock.
     pub(super) fn pass(&mut self, model: &mut Model, now: Duration, model_now: Duration) {
+        model.screen_late = self.screen.as_ref().map_or(Duration::ZERO, |screen| screen.pace.late(now));
         match self.again.pass(model, now) {
             Ok(true) => self.mark_changed(),
             Ok(false) => {}

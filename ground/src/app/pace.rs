@@ -25,6 +25,11 @@ const IDLE_FRAME: Duration = Duration::from_secs(1);
 /// The shortest time between two drawings of the pictures of a flight.
 const PICTURES: Duration = Duration::from_secs(1);
 
+/// While the terminal has not taken what was written so long ago, nothing new is drawn: it would be seen late.
+const LATE: Duration = Duration::from_millis(500);
+/// An answer that has not come for so long is lost: a whole page of 140x45 takes 3.2 s over 2 kB/s.
+const LOST_AFTER: Duration = Duration::from_secs(5);
+
 /// The bytes written are counted over this time.
 const WINDOW: Duration = Duration::from_secs(1);
 /// Cells of an 80x24 terminal.
@@ -80,6 +85,9 @@ pub struct Pace {
     whole: bool,
     pictures: Option<Pictures>,
     cells: u32,
+    /// When the terminal was asked, if it has not answered yet; and how long its last answer took.
+    asked: Option<Duration>,
+    took: Option<Duration>,
     /// The frames of the last second: when they were drawn, and their bytes.
     written: VecDeque<(Duration, usize)>,
 }
@@ -166,6 +174,34 @@ impl Pace {
             room_at = *at + WINDOW;
         }
         room_at
+    }
+
+    /// Whether the terminal is to be asked, behind all that was written, to answer: one question at a time, so that a lost answer
+    /// is only lost.
+    pub fn asks(&mut self, now: Duration) -> bool {
+        let asks = self.waits(now).is_none_or(|waits| waits > LOST_AFTER);
+        self.asked = if asks { Some(now) } else { self.asked };
+        asks
+    }
+
+    /// The terminal has answered.
+    pub fn answered(&mut self, now: Duration) {
+        self.took = Some(self.waits(now).unwrap_or(Duration::ZERO));
+        self.asked = None;
+    }
+
+    fn waits(&self, now: Duration) -> Option<Duration> {
+        self.asked.map(|asked| now.saturating_sub(asked))
+    }
+
+    /// How old what the terminal shows is; zero for one that has never answered.
+    pub fn late(&self, now: Duration) -> Duration {
+        self.took.map_or(Duration::ZERO, |took| took.max(self.waits(now).unwrap_or(Duration::ZERO)))
+    }
+
+    /// Whether so much of what was written waits that a new frame would only wait behind it.
+    pub fn waits_for_terminal(&self, now: Duration) -> bool {
+        self.took.is_some() && self.waits(now).is_some_and(|waits| (LATE..LOST_AFTER).contains(&waits))
     }
 
     /// The terminal has not taken the previous frame yet, so drawing is postponed.

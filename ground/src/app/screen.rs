@@ -111,7 +111,7 @@ impl Screen {
         if now < self.pace.redraw_at() {
             return Ok(());
         }
-        if self.writer.is_busy()? {
+        if self.writer.is_busy()? || self.pace.waits_for_terminal(now) {
             self.pace.postpone(now);
             return Ok(());
         }
@@ -124,7 +124,7 @@ impl Screen {
         let drawn = self.pace.draw(&mut self.terminal, model, self.theme, (now, model_now))?;
         let cells = drawn.area.area();
         self.pace.drew(model, cells, self.writer.waiting(), now);
-        self.writer.send();
+        self.ask(now);
         Ok(())
     }
 
@@ -155,13 +155,24 @@ impl Screen {
     /// Whether the terminal has answered since the last call. Asks it again if that is due, and if it has taken what was written.
     pub fn answers(&mut self, now: Duration) -> bool {
         if now >= self.ask_at && matches!(self.writer.is_busy(), Ok(false)) {
+            self.ask(now);
+        }
+        let has_answered = answers::has_answered();
+        if has_answered {
+            self.pace.answered(now);
+        }
+        has_answered
+    }
+
+    /// Sends what was drawn, and asks behind it whether the terminal has taken it.
+    fn ask(&mut self, now: Duration) {
+        if self.pace.asks(now) {
             self.ask_at = now + ASK_EVERY;
             // Writing to a buffer in memory cannot fail.
             let _ = io::Write::write_all(&mut self.terminal.backend_mut().terminal, answers::QUESTION);
             answers::note_question();
-            self.writer.send();
         }
-        answers::has_answered()
+        self.writer.send();
     }
 
     /// Rings the terminal's bell.
@@ -237,7 +248,10 @@ fn take_terminal() -> io::Result<(Terminal<DiffBackend<FrameBuffer>>, TerminalWr
     execute!(io::stdout(), EnterAlternateScreen, EnableBracketedPaste)?;
     request_repeat_reports()?;
     let (writer, buffer) = TerminalWriter::new()?;
-    Ok((Terminal::new(DiffBackend::new(CrosstermBackend::new(buffer)))?, writer))
+    let mut backend = DiffBackend::new(CrosstermBackend::new(buffer));
+    // GNU Screen sets it.
+    backend.erases = std::env::var_os("STY").is_none();
+    Ok((Terminal::new(backend)?, writer))
 }
 
 /// Asks the terminal to distinguish a held key's repeats from presses, if it supports that.

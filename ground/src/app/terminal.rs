@@ -8,6 +8,8 @@
 use std::io;
 use std::io::Write;
 
+use crossterm::queue;
+use crossterm::terminal::{BeginSynchronizedUpdate, EndSynchronizedUpdate};
 use ratatui::backend::{Backend, ClearType, CrosstermBackend, WindowSize};
 use ratatui::buffer::{Cell, CellWidth as _};
 use ratatui::layout::{Position, Size};
@@ -20,11 +22,13 @@ pub struct DiffBackend<W: Write> {
     /// The rightmost column that was ever drawn. Behind the last one of the terminal the cursor stands where it likes.
     rightmost: u16,
     cursor_is_hidden: bool,
+    /// Whether the terminal erases with the background that was said last, as all do but GNU Screen.
+    pub erases: bool,
 }
 
 impl<W: Write> DiffBackend<W> {
     pub fn new(terminal: CrosstermBackend<W>) -> Self {
-        Self { terminal, rightmost: 0, cursor_is_hidden: false }
+        Self { terminal, rightmost: 0, cursor_is_hidden: false, erases: true }
     }
 }
 
@@ -144,6 +148,26 @@ fn way(cursor: Option<(u16, u16)>, (row, column): (u16, u16)) -> String {
     along.filter(|along| along.len() < at_once.len()).unwrap_or(at_once)
 }
 
+/// From so many blanks on it is shorter to erase the cells and to step over them (ECMA-48, ECH and CUF).
+const ERASED_FROM: usize = 12;
+
+/// Writes letters, and erases many blanks.
+fn write_symbols(out: &mut impl Write, symbols: &str, erases: bool) -> io::Result<()> {
+    if !erases {
+        return out.write_all(symbols.as_bytes());
+    }
+    let letters = symbols.trim_start_matches(' ');
+    let blanks = symbols.len() - letters.len();
+    if blanks >= ERASED_FROM {
+        write!(out, "\x1b[{blanks}X\x1b[{blanks}C")?;
+    } else {
+        out.write_all(&symbols.as_bytes()[..blanks])?;
+    }
+    let end = letters.find(&" ".repeat(ERASED_FROM)).unwrap_or(letters.len());
+    out.write_all(&letters.as_bytes()[..end])?;
+    if end < letters.len() { write_symbols(out, &letters[end..], erases) } else { Ok(()) }
+}
+
 impl<W: Write> Backend for DiffBackend<W> {
     type Error = io::Error;
 
@@ -160,6 +184,7 @@ impl<W: Write> Backend for DiffBackend<W> {
         }
         self.rightmost = runs.iter().map(|run| run.from.1 + run.columns - 1).fold(self.rightmost, u16::max);
         let out = &mut self.terminal;
+        queue!(out, BeginSynchronizedUpdate)?;
         let mut said = Style { fore: Color::Reset, back: Color::Reset, modifier: Modifier::empty() };
         let mut cursor = None;
         // The next style is the one that takes the fewest codes.
@@ -171,7 +196,8 @@ impl<W: Write> Backend for DiffBackend<W> {
             }
             said = style;
             for run in runs.iter().filter(|run| run.style == style) {
-                write!(out, "{}{}", way(cursor, run.from), run.symbols)?;
+                out.write_all(way(cursor, run.from).as_bytes())?;
+                write_symbols(out, &run.symbols, self.erases)?;
                 let (row, column) = run.from;
                 // Behind a letter that terminals do not all give the same columns the place is not sure, either.
                 let is_sure = column + run.columns <= self.rightmost
@@ -179,7 +205,8 @@ impl<W: Write> Backend for DiffBackend<W> {
                 cursor = is_sure.then_some((row, column + run.columns));
             }
         }
-        write!(out, "\x1b[m")
+        write!(out, "\x1b[m")?;
+        queue!(out, EndSynchronizedUpdate)
     }
 
     fn hide_cursor(&mut self) -> io::Result<()> {
@@ -250,8 +277,9 @@ mod tests {
         let mut terminal = DiffBackend::new(CrosstermBackend::new(&mut written));
         terminal.draw(places.into_iter().zip(&cells).map(|((x, y), cell)| (x, y, cell))).unwrap();
         terminal.draw(beside_b.into_iter().map(|((x, y), cell)| (x, y, cell))).unwrap();
+        let (begin, end) = ("\x1b[?2026h", "\x1b[?2026l");
         let first = "\x1b[38;5;75;48;5;233m\x1b[2;4Ha\x1b[5Cc\x1b[38;5;79m\x1b[2;5Hb \x1b[1m\n\x1b[6Dd\x1b[m";
         let second = "\x1b[38;5;79;48;5;233m\x1b[2;4Hx\x1b[Cy\x1b[m";
-        assert_eq!(String::from_utf8(written).unwrap(), format!("{first}{second}"));
+        assert_eq!(String::from_utf8(written).unwrap(), format!("{begin}{first}{end}{begin}{second}{end}"));
     }
 }

@@ -26,12 +26,18 @@ pub const ONE_ROW_COLUMNS: u16 = 160;
 const ABORT_COLUMNS: u16 = 84;
 /// From this width on the rate and the loss of the link are shown beside its ages.
 const RATES_COLUMNS: u16 = 110;
+/// A screen that is less late than this is read as live.
+const LATE_SHOWN: Duration = Duration::from_secs(1);
 const RATES_WITHIN: usize = 32;
 
 /// Draws who and what is seen, how well it is heard, and whether that is recorded.
 pub fn draw_identity(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let shows_rates = area.width >= RATES_COLUMNS && model.link.trouble.is_none();
     let mut right = Vec::new();
+    if model.screen_late >= LATE_SHOWN {
+        let words = format!(" screen late {} s ", model.screen_late.as_secs());
+        right.extend([theme.span(words, TextRole::Alarm), Span::raw(" ")]);
+    }
     if shows_rates {
         right.extend(status_lines::link_line(model, theme, now, RATES_WITHIN).spans);
         right.push(Span::raw("  "));

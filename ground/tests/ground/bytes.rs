@@ -51,8 +51,44 @@ fn shown_by(emulator: &vt100::Parser) -> Vec<String> {
     emulator.screen().rows(0, columns.get()).map(|row| row.trim_end().to_owned()).collect()
 }
 
+/// A terminal behind a line that takes so many bytes a second, and answers what it is asked.
+struct SlowTerminal {
+    bytes_per_s: f64,
+    /// When it has taken all that was written.
+    free_at: Duration,
+    answers_at: Option<Duration>,
+}
+
+impl SlowTerminal {
+    /// Takes a frame that is drawn now, and perhaps a question behind it. Returns when it will have been taken.
+    fn take(&mut self, bytes: usize, asks: bool, now: Duration) -> Duration {
+        self.free_at = self.free_at.max(now) + Duration::from_secs_f64(bytes as f64 / self.bytes_per_s);
+        self.answers_at = if asks { Some(self.free_at) } else { self.answers_at };
+        self.free_at
+    }
+
+    fn answers(&mut self, now: Duration) -> bool {
+        self.answers_at.take_if(|at| *at <= now).is_some()
+    }
+}
+
 /// The drawn frames of a flight from arming on: time, bytes and phase.
 fn flight(profile: &str, columns: u16, rows: u16) -> Vec<(Duration, usize, TdPhase)> {
+    flight_over(profile, columns, rows, None)
+}
+
+/// The same on a terminal of so many bytes a second. Every frame there says how late it is.
+fn flight_over(
+    profile: &str,
+    columns: u16,
+    rows: u16,
+    bytes_per_s: Option<f64>,
+) -> Vec<(Duration, usize, TdPhase)> {
+    let mut slow = bytes_per_s.map(|bytes_per_s| SlowTerminal {
+        bytes_per_s,
+        free_at: Duration::ZERO,
+        answers_at: None,
+    });
     let mut vehicle = load_flight(profile).expect("built in").vehicle().expect("sound");
     vehicle.set_pin_out(true);
     vehicle.set_log_state(LogState { running: true, space_bytes: u64::MAX });
@@ -90,7 +126,15 @@ fn flight(profile: &str, columns: u16, rows: u16) -> Vec<(Duration, usize, TdPha
             }
         }
         pace.check_urgent(&model);
-        if now >= pace.redraw_at() {
+        if let Some(slow) = &mut slow {
+            if slow.answers(now) {
+                pace.answered(now);
+            }
+            model.screen_late = pace.late(now);
+        }
+        if now >= pace.redraw_at() && pace.waits_for_terminal(now) {
+            pace.postpone(now);
+        } else if now >= pace.redraw_at() {
             let theme = Theme { palette: Palette::Dark, ascii: false };
             let buffer = pace.draw(&mut terminal, &model, theme, (now, now)).expect("memory takes it");
             let raw = std::mem::take(&mut *line.0.borrow_mut());
@@ -106,6 +150,17 @@ fn flight(profile: &str, columns: u16, rows: u16) -> Vec<(Duration, usize, TdPha
             fresh_at = if old.is_empty() { now } else { fresh_at };
             assert!(now < fresh_at + Duration::from_secs(2), "{now:?}: old pictures");
             pace.drew(&model, u32::from(columns) * u32::from(rows), bytes, now);
+            if let Some(slow) = &mut slow {
+                let late = slow.take(bytes, pace.asks(now), now).saturating_sub(now);
+                // A whole page of this size takes 3.5 s on this line; nothing waits behind more than half a second of another.
+                assert!(late < Duration::from_secs(4), "{now:?}: {late:?}");
+                let first: String = symbols_of(buffer.buffer).remove(0);
+                assert_eq!(
+                    first.contains("screen late"),
+                    model.screen_late >= Duration::from_secs(1),
+                    "{first}"
+                );
+            }
             let phase = model.vehicle.phase().map_or(TdPhase::TD_PHASE_SAFE, |phase| phase.value);
             drawn.push((now, bytes, phase));
         }
@@ -137,9 +192,9 @@ fn worst(frames: &[(Duration, usize, TdPhase)]) -> (usize, Duration, TdPhase) {
 
 #[test]
 fn no_second_of_a_landing_writes_more_than_a_slow_line_carries() {
-    // At 140x45 the goal is 8,000. Measured: 8,925, of which 6,965 are one frame, the change of page at the touchdown, which may
+    // At 140x45 the goal is 8,000. Measured: 8,336, of which 6,372 are one frame, the change of page at the touchdown, which may
     // not be delayed.
-    for (columns, rows, most) in [(80, 24, 4_200), (140, 45, 8_950)] {
+    for (columns, rows, most) in [(80, 24, 3_800), (140, 45, 8_400)] {
         let frames = flight("mk2", columns, rows);
         // The first frame is the whole screen, before any flight.
         let (bytes, at, phase) = worst(&frames[1..]);
@@ -158,4 +213,10 @@ fn no_second_of_a_landing_writes_more_than_a_slow_line_carries() {
         assert!(bytes < most, "{told}");
         assert!(flown.len() as f64 / span_s > 1.0, "it must still move: {told}");
     }
+}
+
+#[test]
+fn a_slow_terminal_is_not_far_behind_and_says_so() {
+    let frames = flight_over("mk2", 140, 45, Some(2_000.0));
+    assert!(frames.len() > 20, "it must still move: {} frames", frames.len());
 }
