@@ -196,9 +196,9 @@ async fn act(
     for action in actions {
         match action {
             Action::Request(request) => {
-                let is_sent = link.ask(&ToStation::Request(request)).await;
+                let is_sent = link.ask(&ToStation::Request(request.clone())).await;
                 if !is_sent {
-                    report_unsent(model, request, now);
+                    report_unsent(model, &request, now);
                 } else if request == Request::Command(CommandKind::Abort) {
                     model.link.abort_asked_at.get_or_insert(now);
                 }
@@ -247,17 +247,18 @@ fn keep_unsent(is_kept: &mut bool, model: &mut Model, unix_s: u64, now: Duration
 }
 
 /// Tells the crew that a request has not reached any station.
-fn report_unsent(model: &mut Model, request: Request, now: Duration) {
-    let what = match request {
+fn report_unsent(model: &mut Model, request: &Request, now: Duration) {
+    let what = match *request {
         Request::Command(kind) => &format!("{} NOT SENT", kind.name()),
         Request::Acknowledge(kind) => {
             model.alarms.acknowledge(kind);
             return;
         }
         Request::Sign { step, .. } => &format!("step {} NOT SIGNED", u32::from(step) + 1),
+        Request::Note(_) => "the note is NOT KEPT",
         _ => "nothing is done",
     };
-    let is_abort = request == Request::Command(CommandKind::Abort);
+    let is_abort = *request == Request::Command(CommandKind::Abort);
     // Stays in the alarm line of every page until there is a station again.
     model.link.abort_unsent |= is_abort;
     let later = if is_abort { "; asked again as soon as there is one" } else { "" };

@@ -237,7 +237,9 @@ impl<W: Write> Backend for DiffBackend<W> {
     }
 
     fn size(&self) -> io::Result<Size> {
-        self.terminal.size()
+        let size = self.terminal.size()?;
+        // A terminal that does not know its size, as some serial consoles, has that of a VT100.
+        Ok(if size.width == 0 || size.height == 0 { Size::new(80, 24) } else { size })
     }
 
     fn window_size(&mut self) -> io::Result<WindowSize> {

@@ -10,14 +10,14 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-use super::{OPERATOR_MAX, ToScreen, ToStation, VERSION};
+use super::{NOTE_MAX, OPERATOR_MAX, ToScreen, ToStation, VERSION};
 use crate::model::Request;
 use crate::update::Msg;
 
 /// The longest accepted message, bytes.
 const LENGTH_MAX: usize = 64 * 1024;
-/// The longest name of a key, in characters.
-const KEY_MAX: usize = 8;
+/// The longest word and key that ends it, in characters.
+const KEY_MAX: usize = NOTE_MAX + 12;
 /// Bytes of the length that stands before every message, and of the version after it.
 const PREFIX_LEN: usize = 4;
 
@@ -63,6 +63,7 @@ pub fn decode_to_station(bytes: &[u8]) -> Result<ToStation, CodecError> {
             *text = words(text, OPERATOR_MAX);
         }
         ToStation::Key(name) => *name = words(name, KEY_MAX),
+        ToStation::Request(Request::Note(text)) => *text = words(text, NOTE_MAX),
         ToStation::Status | ToStation::Request(_) | ToStation::Here => {}
     }
     Ok(asked)

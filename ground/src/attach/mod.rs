@@ -15,9 +15,11 @@ use crate::update::Msg;
 // What a station and its screens say to each other.
 
 /// The version of the encoding. A program of another version is refused with an explanation.
-pub const VERSION: u32 = 13;
+pub const VERSION: u32 = 14;
 /// The longest name of an operator, in characters.
 pub(crate) const OPERATOR_MAX: usize = 40;
+/// The longest note, in characters: a line of the smallest terminal with its name.
+pub(crate) const NOTE_MAX: usize = 60;
 
 /// What the station is; the first message to a screen.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]

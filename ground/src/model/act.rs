@@ -54,6 +54,8 @@ pub enum Act {
     Hold,
     Follow,
     Palette,
+    /// Type a note for the log and the book.
+    Note,
     NextTheme,
     Redraw,
     Quit,
@@ -98,7 +100,7 @@ const fn acts(act: Act, name: &'static str, usual: char, words: &'static str) ->
 }
 
 /// Every action; the most important first.
-pub const DEFINITIONS: [Definition; 35] = [
+pub const DEFINITIONS: [Definition; 36] = [
     asks(Act::Arm, "arm", 'A', "arm: then type ARM and Enter within 10 s"),
     asks(Act::Start, "start", 'S', "start the countdown: then type START and Enter within 10 s"),
     asks(Act::Disarm, "disarm", 'D', "disarm: then Enter within 5 s"),
@@ -133,6 +135,7 @@ pub const DEFINITIONS: [Definition; 35] = [
     shows(Act::Hold, "hold", 'h', "hold this page, or follow the flight again"),
     shows(Act::Follow, "follow", '0', "follow the flight again (Esc does too)"),
     shows(Act::Palette, "palette", ':', "list every action; type a part of its words"),
+    shows(Act::Note, "note", 'n', "a note into log and book: type it, then Enter"),
     shows(Act::NextTheme, "theme", 'c', "colours: dark, light for sunlight, none"),
     acts(Act::ReplayFlight, "replay", 'R', "the flight just flown, again on this screen; q ends it"),
     acts(Act::Report, "report", 'W', "write the report of the flight beside the log"),
@@ -162,6 +165,7 @@ impl Act {
             }
             Self::Tap => acts && model.tapping(now).is_some_and(|(by, _)| by == model.own_number()),
             Self::TakeCommand => acts && why_not_take(model, now).is_none(),
+            Self::Note => commands,
             Self::RangeTest => commands && why_not_check(model, now).is_none(),
             Self::Seen => acts && why_not_seen(model, now).is_none(),
             Self::Check | Self::CheckStill => acts && why_not_check(model, now).is_none(),

@@ -303,7 +303,9 @@ impl Model {
         text: impl Into<String>,
     ) {
         let text = text.into();
-        self.enter(if matches!(speaker, Speaker::Vehicle) { "vehicle says" } else { "event" }, "", &text);
+        let is_vehicle = matches!(speaker, Speaker::Vehicle);
+        let who = if is_vehicle { self.boot_beside_others(now) } else { String::new() };
+        self.enter(if is_vehicle { "vehicle says" } else { "event" }, &who, &text);
         self.tell(now, speaker, level, text);
     }
 
@@ -336,6 +338,12 @@ impl Model {
         self.tell(now, Speaker::Ground, level, text);
     }
 
+    /// The boot of the vehicle that is shown, while others are heard beside it; else nothing.
+    pub(crate) fn boot_beside_others(&self, now: Duration) -> String {
+        let boot = self.vehicle.boot.number().filter(|_| self.beside(now).is_some());
+        boot.map_or_else(String::new, |boot| format!("boot {}", words::boot(boot)))
+    }
+
     /// Enters a line into the book.
     pub(crate) fn enter(&mut self, kind: &str, who: &str, text: &str) {
         self.outbox.push(Action::Enter(BookLine {
@@ -357,7 +365,7 @@ impl Model {
 // What the model asks of the run loop: messages to send, records to write, requests to the station.
 
 /// What a screen in another process asks its station to do.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Request {
     /// The crew has completed every step of this command: send it.
     Command(CommandKind),
@@ -375,6 +383,8 @@ pub enum Request {
     Untested,
     /// The crew has signed or voided this step of the checklist, counted from zero.
     Sign { step: u8, void: bool },
+    /// Keep this note in the log and the book.
+    Note(String),
 }
 
 /// A line of the book: who did what. The run loop adds the time and the number.

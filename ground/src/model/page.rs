@@ -109,6 +109,8 @@ pub struct Pages {
     pub step: Option<usize>,
     /// A text that is being typed.
     pub entry: Option<TextEntry>,
+    /// The letters of a word that have been typed and not recorded yet.
+    pub(crate) word: String,
 }
 
 /// A text that is being typed; the keys go to it.
@@ -120,6 +122,8 @@ pub enum TextEntry {
         /// The recording has no such time or phase.
         refused: bool,
     },
+    /// A note for the log and the book.
+    Note { typed: String },
     Palette {
         typed: String,
         /// The place of the marked entry among those found.
@@ -137,6 +141,7 @@ impl Default for Pages {
             checklist: false,
             step: None,
             entry: None,
+            word: String::new(),
         }
     }
 }

@@ -141,7 +141,7 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
         model.boots.note(shown, is_busy(&model.vehicle, now));
     }
     vehicle_changes::on_change(model, before, now);
-    vehicle_changes::enter_crew_changes(model, &crew_before);
+    vehicle_changes::enter_crew_changes(model, &crew_before, now);
     pad::enter_check(model, now);
     commands::observe(model, now);
 }

@@ -14,9 +14,9 @@ use super::{Action, Request, on_request, pad};
 use crate::key::Key;
 use crate::model::{
     AGAIN_AFTER, AGAIN_KEY, Act, AlarmKind, CommandKind, Dialog, FINGERS_APART, KeyOrigin, Model, Page,
-    PaletteAction, Prompt, RestOfWord, Role, Standing, TextEntry, overruled_by, palette_entries, quantity,
-    standing, why_not_arm, why_not_check, why_not_confirm, why_not_here, why_not_quit, why_not_seen,
-    why_not_start, why_not_take, why_nothing_moves,
+    PaletteAction, Prompt, RestOfWord, Role, Standing, TextEntry, hold_words, overruled_by, palette_entries,
+    quantity, standing, why_not_arm, why_not_check, why_not_confirm, why_not_here, why_not_quit,
+    why_not_seen, why_not_start, why_not_take, why_nothing_moves,
 };
 use crate::update;
 
@@ -48,7 +48,7 @@ pub(super) fn on_paste(model: &mut Model, now: Duration) {
 
 fn on_key(model: &mut Model, key: Key, touch: KeyOrigin, now: Duration) {
     if touch != KeyOrigin::Dropped || matches!(key, Key::CtrlX | Key::Enter) {
-        model.record_operator(now, "key", &model.settings.seat.clone(), &key.name());
+        record_key(model, key, now);
     }
     expire(model, now);
     if touch != KeyOrigin::Repeat {
@@ -80,6 +80,17 @@ fn on_key(model: &mut Model, key: Key, touch: KeyOrigin, now: Duration) {
         None => on_free_key(model, key, touch, now),
         Some(dialog) => on_dialog_key(model, dialog, key, touch, now),
     }
+}
+
+/// Records a key. The letters of a word that is being typed are one line, with the key that ends it.
+fn record_key(model: &mut Model, key: Key, now: Duration) {
+    let types = model.pages.entry.is_some() || model.dialog.is_some();
+    let told = match key {
+        Key::Char(letter) if types => return model.pages.word.push(letter),
+        _ if model.pages.word.is_empty() => key.name(),
+        _ => format!("{} {}", std::mem::take(&mut model.pages.word), key.name()),
+    };
+    model.record_operator(now, "key", &model.settings.seat.clone(), &told);
 }
 
 /// Swallows what is left of a word that is no longer wanted, and says again why. Returns whether the key was part of it.
@@ -324,7 +335,11 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
             model.warn(now, "too late for a hold: Ctrl-X, then Enter, aborts");
         }
         Act::HoldCountdown if act.works(model, now) => open(model, Prompt::Hold, now),
-        Act::HoldCountdown => model.info(now, "no countdown runs"),
+        Act::HoldCountdown => {
+            let held = hold_words(&model.vehicle, model.link.uplink.armed_by_us);
+            let held = held.map(|words| words.replacen("HOLD", "HELD already", 1));
+            model.info(now, held.unwrap_or_else(|| "no countdown runs".to_owned()));
+        }
         Act::Tap => ask(model, CommandKind::Tap, now),
         Act::TakeCommand => {
             open_unless(model, Prompt::TakeCommand, "take command", why_not_take(model, now), now);
@@ -377,6 +392,10 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
         Act::Hold if model.pages.held.is_some() => model.pages.hold(None),
         Act::Hold => model.pages.hold(Some(shown)),
         Act::Follow => model.pages.hold(None),
+        Act::Note if act.works(model, now) => {
+            model.pages.entry = Some(TextEntry::Note { typed: String::new() });
+        }
+        Act::Note => model.info(now, "this screen only looks on; it keeps no notes"),
         Act::Palette => {
             model.pages.entry = Some(TextEntry::Palette { typed: String::new(), chosen: 0 });
         }
@@ -456,7 +475,7 @@ fn ask(model: &mut Model, kind: CommandKind, now: Duration) {
 /// Does what the crew has asked for and tells the other screens, or asks the station to.
 pub(super) fn request(model: &mut Model, request: Request, now: Duration) {
     if model.settings.role.why_not_command().is_none() {
-        model.outbox.push(Action::Request(request));
+        model.outbox.push(Action::Request(request.clone()));
     }
     if model.settings.role == Role::Station {
         on_request(model, request, model.settings.seat.clone(), now);
@@ -513,12 +532,25 @@ fn quit(model: &mut Model, now: Duration) {
 // The keys while a part of an action's words is typed in the palette.
 
 /// The longest text.
-const TYPED_MAX: usize = 30;
+const TYPED_MAX: usize = crate::attach::NOTE_MAX;
 
 /// A key while a text is typed. Esc gives up; the keys of the abort never come here.
 fn on_entry_key(model: &mut Model, key: Key, now: Duration) {
-    // Only a replay asks where to jump, and takes those keys itself.
-    let Some(TextEntry::Palette { mut typed, mut chosen }) = model.pages.entry.take() else { return };
+    let (mut typed, mut chosen) = match model.pages.entry.take() {
+        Some(TextEntry::Palette { typed, chosen }) => (typed, chosen),
+        Some(TextEntry::Note { mut typed }) => {
+            return match key {
+                Key::Enter if !typed.trim().is_empty() => request(model, Request::Note(typed), now),
+                Key::Enter | Key::Escape => {}
+                _ => {
+                    edit(&mut typed, key);
+                    model.pages.entry = Some(TextEntry::Note { typed });
+                }
+            };
+        }
+        // Only a replay asks where to jump, and takes those keys itself.
+        Some(TextEntry::Jump { .. }) | None => return,
+    };
     match key {
         Key::Escape => return,
         Key::Enter => {

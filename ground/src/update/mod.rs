@@ -249,6 +249,9 @@ fn on_request(model: &mut Model, request: Request, by: Seat, now: Duration) {
         Request::WithoutLog => commands::without_log(model, &by, now),
         Request::Untested => commands::untested(model, &by, now),
         Request::Sign { step, void } => pad::sign(model, (step.into(), void), &by, now),
+        Request::Note(text) => {
+            model.tell_act(now, "note", &by, EventLevel::Info, format!("note{}: {text}", by.in_brackets()));
+        }
     }
 }
 

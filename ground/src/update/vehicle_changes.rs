@@ -307,7 +307,7 @@ impl CrewReport {
 }
 
 /// Enters what has changed.
-pub(super) fn enter_crew_changes(model: &mut Model, before: &CrewReport) {
+pub(super) fn enter_crew_changes(model: &mut Model, before: &CrewReport, now: Duration) {
     let CrewReport { crew: after, mission } = CrewReport::of(model);
     let (before, former) = (&before.crew, &before.mission);
     let mut lines: Vec<(u8, String)> = Vec::new();
@@ -333,7 +333,8 @@ pub(super) fn enter_crew_changes(model: &mut Model, before: &CrewReport) {
         lines.push((0, format!("it flies the mission {} {}", mission.in_words(), mission.hash)));
     }
     for (by, words) in lines {
-        let who = if by > 0 { model.operator(by) } else { String::new() };
+        let boot = model.boot_beside_others(now);
+        let who = if by > 0 { format!("{} {boot}", model.operator(by)).trim_end().to_owned() } else { boot };
         let text = if by > 0 { format!("key {by}: {words}") } else { words };
         model.enter("vehicle says", &who, &text);
     }

@@ -230,19 +230,32 @@ const FRAME_ROWS: u16 = 3;
 const KEY_COLUMNS: usize = 7;
 
 pub fn draw_palette(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    if !matches!(model.pages.entry, Some(TextEntry::Palette { .. })) {
-        return;
-    }
+    let title = match model.pages.entry {
+        Some(TextEntry::Palette { .. }) => "Every action",
+        Some(TextEntry::Note { .. }) => "Note for log and book",
+        _ => return,
+    };
     let width = PALETTE_COLUMNS.min(area.width);
+    // A note leaves the page to be seen.
+    let rows =
+        if matches!(model.pages.entry, Some(TextEntry::Note { .. })) { FRAME_ROWS + 1 } else { area.height };
+    let area = Rect { y: area.bottom().saturating_sub(rows), height: rows, ..area };
     let at = Rect { x: area.x + (area.width - width) / 2, width, ..area }.intersection(frame.area());
-    let inside = pop_up("Every action", theme, frame, at);
+    let inside = pop_up(title, theme, frame, at);
     let rows = usize::from(at.height.saturating_sub(FRAME_ROWS));
     draw_lines(frame, inside, &palette_lines(model, theme, now, rows));
 }
 
 /// The typed text and this many of the actions found, the marked one among them. Empty while it is closed.
 pub fn palette_lines(model: &Model, theme: Theme, now: Duration, rows: usize) -> Vec<Line<'static>> {
-    let Some(TextEntry::Palette { typed, chosen }) = &model.pages.entry else { return Vec::new() };
+    let (typed, chosen) = match &model.pages.entry {
+        Some(TextEntry::Palette { typed, chosen }) => (typed, chosen),
+        Some(TextEntry::Note { typed }) => {
+            let keys = theme.label(" Enter keeps it, Esc does not");
+            return vec![Line::from(theme.key(format!(" {typed}_"))), Line::from(keys)];
+        }
+        _ => return Vec::new(),
+    };
     let entries = palette_entries(model, typed, now);
     let head = Line::from(vec![
         theme.key(format!(" :{typed}_")),

@@ -5,7 +5,8 @@ use ground::model::BookLine;
 use ground::update::{Action, Msg};
 use protocol::book::{Book, Line, SignedHead};
 use protocol::dialect::{
-    MavCmd, MavMessage, TD_BOOK_HEAD_DATA, TD_BOOK_KEPT_DATA, TD_CREW_DATA, TD_OPERATOR_DATA, TdAct, TdRole,
+    MavCmd, MavMessage, TD_BOOK_HEAD_DATA, TD_BOOK_KEPT_DATA, TD_CREW_DATA, TD_OPERATOR_DATA, TdAct, TdHold,
+    TdPhase, TdRole,
 };
 use protocol::identity::GROUND;
 
@@ -32,7 +33,9 @@ fn keys_commands_answers_and_what_the_vehicle_shows_are_entered_once() {
     rig.armed = true;
     rig.run(2.0);
     rig.text("pin is out");
-    assert_eq!(has(&rig, "key", "Enter"), 1);
+    let keys: Vec<String> =
+        entered(&rig).into_iter().filter(|line| line.kind == "key").map(|line| line.text).collect();
+    assert_eq!(keys, ["A", "ARM Enter"], "a typed word is one line");
     assert_eq!(has(&rig, "commanded", "ARM commanded, attempt 1"), 1);
     assert_eq!(has(&rig, "acknowledged", "ARM acknowledged"), 1);
     assert_eq!(has(&rig, "observed", "ARM observed"), 1);
@@ -123,4 +126,45 @@ fn the_vehicle_is_told_the_end_until_it_confirms_it() {
     rig.reboot();
     rig.run(3.0);
     assert!(!heads(&mut rig).is_empty());
+}
+
+#[test]
+fn what_the_vehicle_says_has_its_boot_while_another_one_is_heard() {
+    let mut rig = Rig::crewed();
+    rig.text("alone");
+    crate::who::beside(&mut rig, 9, 2);
+    rig.text("one of two");
+    let who = |words: &str| entered(&rig).into_iter().find(|line| line.text == words).unwrap().who;
+    let boot = rig.model.vehicle.boot.number().unwrap();
+    assert_eq!((who("alone"), who("one of two")), (String::new(), format!("boot {boot:08X}")));
+}
+
+/// Typed while a vehicle falls: the page stays, no letter of it acts, and the abort works.
+#[test]
+fn a_note_goes_into_log_and_book_with_who_wrote_it() {
+    let mut rig = Rig::crewed();
+    rig.model.settings.seat = ground::model::Seat::new(1, "Ann");
+    (rig.phase, rig.armed) = (TdPhase::TD_PHASE_AERO_DESCENT, true);
+    rig.run(1.0);
+    rig.actions.clear();
+    rig.keys(&enter("nDog on the field"));
+    rig.keys(&[&crate::rig::typed("nnot this")[..], &[Key::Escape]].concat());
+    assert_eq!(has(&rig, "note", ""), 1);
+    let note = entered(&rig).into_iter().find(|line| line.kind == "note").unwrap();
+    assert_eq!((note.who.as_str(), note.text.ends_with(": Dog on the field")), ("Ann", true), "{note:?}");
+    rig.expect_event("Dog on the field");
+    assert!(rig.take_commands().is_empty());
+    rig.keys(&crate::rig::typed("nab"));
+    rig.abort();
+    assert!(rig.take_commands().iter().any(crate::rig::is_abort));
+}
+
+#[test]
+fn a_hold_that_the_vehicle_chose_is_said_with_its_reason() {
+    let mut rig = Rig::crewed();
+    (rig.phase, rig.armed) = (TdPhase::TD_PHASE_PAD_ARMED, true);
+    (rig.hold, rig.countdown_ms) = (TdHold::TD_HOLD_CHECK_FAILED, i32::MAX);
+    rig.run(1.0);
+    rig.key(Key::Char('H'));
+    rig.expect_event("HELD already: a check of the vehicle fails");
 }

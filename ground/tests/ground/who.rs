@@ -37,7 +37,7 @@ fn first_line(rig: &Rig, columns: u16, rows: u16) -> String {
 }
 
 /// The vehicle of the rig and a second one under its id, for some seconds.
-fn beside(rig: &mut Rig, boot_number: u32, seconds: u32) {
+pub(crate) fn beside(rig: &mut Rig, boot_number: u32, seconds: u32) {
     for _ in 0..10 * seconds {
         rig.run(0.1);
         rig.hear(&MavMessage::TD_FLIGHT_STATUS(TD_FLIGHT_STATUS_DATA {

@@ -214,7 +214,9 @@ impl BookFound {
         lines.push(match &self.public_key {
             Some(key) if self.key_is_trusted => format!("  signed with the given key {key}"),
             Some(key) => format!("  signed with {key}; --public-key says that it is the station's"),
-            None => "  not signed: the station had no key".to_owned(),
+            None => {
+                "  not signed: the station had no key, and only a key proves the end of a book".to_owned()
+            }
         });
         let closed = if self.closed {
             "closed by the station"
