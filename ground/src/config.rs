@@ -21,8 +21,6 @@ pub struct Config {
     #[serde(skip)]
     pub flags: Flags,
     #[serde(deserialize_with = "place")]
-    pub pad: Option<Degrees>,
-    #[serde(deserialize_with = "place")]
     pub here: Option<Degrees>,
     pub bell: Option<bool>,
     #[serde(deserialize_with = "command")]
@@ -202,7 +200,7 @@ mod tests {
             ("log = true", "log", "a text"),
             ("connect = [1.5]", "connect", "a text"),
             ("log = \"\"", "log", "give a file or `none`"),
-            ("pad = \"here\"", "pad", "`here` is no place"),
+            ("here = \"home\"", "here", "`home` is no place"),
             ("voice = \"\"", "voice", "\"none\""),
             ("talk = \"loud\"", "talk", "few"),
             ("talk_every_s = 0.0", "talk_every_s", "from 0.1 to 86400"),

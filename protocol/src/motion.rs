@@ -41,6 +41,13 @@ impl Degrees {
         self.latitude.abs() <= LATITUDE_MAX_DEG && self.longitude.abs() <= 180.0
     }
 
+    /// A place in ten millionths of a degree, as messages have it; 0, 0 stands for none.
+    pub fn of_e7(latitude: i32, longitude: i32) -> Option<Self> {
+        let [latitude, longitude] = [latitude, longitude].map(|e7| f64::from(e7) * 1e-7);
+        let is_told = latitude != 0.0 || longitude != 0.0;
+        Some(Self { latitude, longitude }).filter(|place| is_told && place.is_valid())
+    }
+
     /// Metres per degree of latitude and of longitude here.
     fn metres_per_degree(self) -> (f64, f64) {
         let latitude_rad = self.latitude.to_radians();

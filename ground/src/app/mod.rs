@@ -246,7 +246,6 @@ async fn start(
         start: args.start.filter(|_| mission.is_some()).map(|start| start.name().to_owned()),
         mission: mission.map(|mission| MissionHash::of(&mission.recipe.mission_toml)),
         crew_roles: roles,
-        pad: config.pad,
         here: config.here,
         start_unix_s,
         demonstration: demo.is_some(),

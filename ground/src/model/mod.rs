@@ -96,9 +96,7 @@ pub struct Settings {
     /// The people of the crew file by name, with their roles; empty without one.
     #[serde(skip)]
     pub crew_roles: Vec<(String, TdRole)>,
-    /// Where the pad is on the Earth, and where the station is; `None` if nobody has said it.
-    #[serde(skip)]
-    pub pad: Option<Degrees>,
+    /// Where the station is on the Earth; `None` if nobody has said it.
     #[serde(skip)]
     pub here: Option<Degrees>,
     /// When the run started: seconds since 1970, UTC.

@@ -102,7 +102,7 @@ impl Model {
             heard,
             height_m,
             predicted,
-            pad: self.settings.pad,
+            pad: self.vehicle.pad,
         })
     }
 

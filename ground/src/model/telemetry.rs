@@ -9,6 +9,7 @@ use protocol::dialect::{
     TD_PREDICTED_PATH_DATA, TdLimit, TdPhase, TdStart,
 };
 use protocol::mission::MissionHash;
+use protocol::motion::Degrees;
 pub use protocol::told::{phase_from_number, phase_of};
 
 use super::{
@@ -51,6 +52,14 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) {
         }
         MavMessage::GLOBAL_POSITION_INT(data) => {
             vehicle.hud = Some(Sample::new(Motion::of_global(data), now));
+            // Until the vehicle tells its pad: both are of the same quarter of a second.
+            let pad = vehicle.motion.and_then(|Sample { value, .. }| {
+                Some(Degrees::of_e7(data.lat, data.lon)?.moved(-value.x_m, -value.y_m))
+            });
+            vehicle.pad = vehicle.pad.or(pad);
+        }
+        MavMessage::HOME_POSITION(data) => {
+            vehicle.pad = Degrees::of_e7(data.latitude, data.longitude).or(vehicle.pad);
         }
         MavMessage::TD_TOUCHDOWN_PREDICTION(data) => {
             let [distance, height, rate] = [data.distance_m, data.height_m, data.rate_rad_s];

@@ -9,6 +9,7 @@ use protocol::dialect::{
     TdInterlock, TdLanding, TdPhase, TdRole,
 };
 use protocol::mission::MissionHash;
+use protocol::motion::Degrees;
 use protocol::told::Told;
 
 use super::{
@@ -123,6 +124,8 @@ pub struct Vehicle {
     pub told: Told,
     /// `GLOBAL_POSITION_INT`: height above the pad and climb, for a vehicle that sends no local position.
     pub hud: Option<Sample<Motion>>,
+    /// `HOME_POSITION`: where its pad is on the Earth.
+    pub pad: Option<Degrees>,
     pub prediction: Option<Sample<Prediction>>,
     /// `TD_PREDICTED_PATH`: x and altitude, m.
     pub path: Option<Sample<Vec<(f64, f64)>>>,

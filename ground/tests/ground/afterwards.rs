@@ -3,16 +3,21 @@
 use ground::key::Key;
 use ground::model::{Degrees, LastPlace, Role, Settings};
 use ground::update::{Action, Msg, Request};
-use protocol::dialect::TdPhase;
+use protocol::dialect::{GLOBAL_POSITION_INT_DATA, HOME_POSITION_DATA, MavMessage, TdPhase};
 
 use crate::rig::{Rig, settings};
 
 const PAD: Degrees = Degrees { latitude: 35.347, longitude: -117.809 };
 
 fn station(role: Role) -> Rig {
-    let mut rig =
-        Rig::new(Settings { role, pad: Some(PAD), start_unix_s: 1_800_000_000, ..settings(false, true) });
+    let mut rig = Rig::new(Settings { role, start_unix_s: 1_800_000_000, ..settings(false, true) });
     rig.run(1.0);
+    let (latitude, longitude) = (353_470_000, -1_178_090_000);
+    rig.hear(&MavMessage::HOME_POSITION(HOME_POSITION_DATA {
+        latitude,
+        longitude,
+        ..HOME_POSITION_DATA::default()
+    }));
     rig
 }
 
@@ -134,12 +139,28 @@ fn a_place_from_before_a_restart_is_shown_with_the_way_from_the_station() {
     let place = *kept(&falling(Role::Station)).last().unwrap();
     // 40 m south of the pad.
     let here = Some(PAD.moved(-40.0, 5.0));
-    let mut rig =
-        Rig::new(Settings { pad: Some(PAD), here, start_unix_s: 1_800_000_100, ..settings(false, true) });
+    let mut rig = Rig::new(Settings { here, start_unix_s: 1_800_000_100, ..settings(false, true) });
     rig.msg(Msg::Place(Box::new(place)));
     rig.run(1.0);
     rig.key(Key::Char('f'));
     let screen = rig.screen(80, 24);
     assert!(screen.contains("from here") && screen.contains("70 m, bearing 000 deg"), "{screen}");
     assert!(screen.contains("boot 1A2B3C4D"), "{screen}");
+}
+
+/// A station that was switched on after the touchdown: the vehicle's own place is enough.
+#[test]
+fn the_place_of_a_vehicle_that_has_not_told_its_pad_is_known() {
+    let mut rig = Rig::new(settings(false, true));
+    rig.phase = TdPhase::TD_PHASE_AERO_DESCENT;
+    rig.run(1.0);
+    rig.state_in_space([30.0, 5.0, 2.0], [0.0; 3], (200.0, 4.0));
+    let there = PAD.moved(30.0, 5.0);
+    let [lat, lon] = [there.latitude, there.longitude].map(|degrees| (degrees * 1e7).round() as i32);
+    rig.hear(&MavMessage::GLOBAL_POSITION_INT(GLOBAL_POSITION_INT_DATA { lat, lon, ..Default::default() }));
+    rig.run(1.0);
+    let place = rig.model.last_place(rig.now).unwrap();
+    let (north_m, east_m) = there.to(place.degrees(&place.heard).unwrap());
+    assert!(north_m.abs() < 0.1 && east_m.abs() < 0.1, "{place:?}");
+    assert!(place.pad.is_some_and(|pad| (pad.latitude - PAD.latitude).abs() < 1e-6), "{place:?}");
 }

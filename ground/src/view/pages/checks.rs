@@ -219,7 +219,7 @@ pub fn find_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'stati
     lines.push(row("heard", format!("{ago} s ago, boot {:08X}", place.boot), theme));
     lines.push(Line::default());
     if place.pad.is_none() {
-        lines.push(label(" Latitude, longitude and KML need the pad's place: `pad` in the settings"));
+        lines.push(label(" The vehicle has not told where its pad is: no latitude, longitude or KML"));
     } else if model.settings.here.is_none() {
         lines.push(label(" The way from this station needs its place: `here` in the settings"));
     }
@@ -237,7 +237,7 @@ fn may_have_left_lines(model: &Model, theme: Theme) -> Vec<Line<'static>> {
     let (north, east) = (fixed(meant.north_m, 0), fixed(meant.east_m, 0));
     lines.push(row("meant to land", format!("north {north} m, east {east} m of the pad"), theme));
     lines.push(row("within", format!("{} m, the fence of its mission", fixed(meant.error_m, 0)), theme));
-    lines.extend(degrees(model.settings.pad.map(|pad| pad.moved(meant.north_m, meant.east_m)), theme));
+    lines.extend(degrees(model.vehicle.pad.map(|pad| pad.moved(meant.north_m, meant.east_m)), theme));
     lines.push(caution(" Under a parachute, or without its landing motor, it may come down farther away."));
     lines
 }

@@ -171,7 +171,8 @@ fn what_went_wrong_is_told() {
     assert!((first.0, first.1) == (0, 1) && first.2.starts_with(lost), "{first:?}");
     let after = findings(&airborne.run(10.0));
     let count = usize::from(after[0].1);
-    assert!((9..=11).contains(&after.len()), "{after:?}");
+    // One a second, and what waited for room in the second before.
+    assert!((9..=12).contains(&after.len()), "{after:?}");
     assert!((0..count).all(|place| after.iter().any(|told| usize::from(told.0) == place)), "{after:?}");
 
     // Here are sensors that are nearly exact.
