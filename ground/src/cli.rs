@@ -109,6 +109,14 @@ pub struct LinkArgs {
     pub operator: OperatorArgs,
 }
 
+/// The host and port of a listener.
+fn listener(given: &str) -> Result<String, String> {
+    match given.parse() {
+        Ok(LinkAddress::UdpOut(host)) => Ok(host),
+        _ => Err("give udpout:HOST:PORT".to_owned()),
+    }
+}
+
 /// The flags of a station that are keys of its settings file, too.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Parser)]
 pub struct Flags {
@@ -137,6 +145,11 @@ pub struct Flags {
     /// Default: with --connect the name of the log with this extension; the demonstration writes none.
     #[arg(long, value_name = "FILE|none")]
     pub tlog: Option<LogChoice>,
+
+    /// Send every frame that is heard on to udpout:HOST:PORT, for a map, an antenna tracker or an overlay; may be given more
+    /// than once. One way: what comes back is never read.
+    #[arg(long, value_name = "LINK", value_parser = listener)]
+    pub forward: Vec<String>,
 }
 
 /// What holds the links, with or without a screen.
@@ -460,6 +473,7 @@ mod tests {
             Cli::try_parse_from([&["ground"], arguments].concat()).unwrap_err().to_string()
         };
         assert!(refuse(&["--connect", "tcp:host:1"]).contains("udpin:ADDRESS:PORT"));
+        assert!(refuse(&["--forward", "tcpout:host:1"]).contains("udpout:HOST:PORT"));
         assert!(refuse(&["--timeout-s", "-1"]).contains("from 0.1 to 86400"));
         assert!(refuse(&["--sysid", "0"]).contains("1..=255"));
         assert!(refuse(&["--speed", "0"]).contains("0.01"));

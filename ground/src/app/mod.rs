@@ -213,10 +213,11 @@ async fn start(
     let opened =
         Wire::open((link.us(), link.vehicle()), endpoints, key, clock, recorder.clone(), log_time.clone())
             .await;
-    let wire = match opened {
+    let mut wire = match opened {
         Ok(wire) => wire,
         Err(error) => return Err(stations::explain(error, &link.connect).await),
     };
+    wire.forward_to(&args.flags.forward)?;
     let demo = match (&demo_options, vehicle_clock) {
         (Some(options), Some(vehicle_clock)) => {
             let demo = Demo::start(options, wire.endpoints().next(), recorder.clone(), vehicle_clock);

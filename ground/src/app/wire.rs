@@ -1,8 +1,10 @@
 //! The open links: turns bytes into messages and back, and records every frame.
 
 use std::collections::VecDeque;
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, ToSocketAddrs as _, UdpSocket};
 use std::time::Duration;
 
+use anyhow::Context as _;
 use protocol::dialect::{MavCmd, MavMessage};
 use protocol::frame::{Encoder, Frame, FramerCounters};
 use protocol::hub::{HubLink, LinkEvent, Origin, Received};
@@ -44,6 +46,8 @@ pub struct Wire {
     clock: Clock,
     recorder: Option<Recorder>,
     log_time: LogTime,
+    /// Who is sent what is heard; nothing is ever read from them.
+    listeners: Vec<UdpSocket>,
     /// Bytes that left and are not reported yet.
     sent_bytes: usize,
 }
@@ -109,8 +113,29 @@ impl Wire {
             clock,
             recorder,
             log_time,
+            listeners: Vec::new(),
             sent_bytes: 0,
         })
+    }
+
+    /// Sends what is heard on to these hosts and ports, too.
+    ///
+    /// # Errors
+    /// A host is unknown.
+    pub fn forward_to(&mut self, hosts: &[String]) -> anyhow::Result<()> {
+        for host in hosts {
+            let to = host.to_socket_addrs().ok().and_then(|mut found| found.next());
+            let to = to.with_context(|| format!("forward: `{host}` is not known"))?;
+            let any: IpAddr =
+                if to.is_ipv4() { Ipv4Addr::UNSPECIFIED.into() } else { Ipv6Addr::UNSPECIFIED.into() };
+            let socket = UdpSocket::bind((any, 0)).and_then(|socket| {
+                socket.connect(to)?;
+                socket.set_nonblocking(true)?;
+                Ok(socket)
+            });
+            self.listeners.push(socket.with_context(|| format!("forward to {host}"))?);
+        }
+        Ok(())
     }
 
     /// Records into this log from now on.
@@ -184,6 +209,10 @@ impl Wire {
                 LinkEvent::Frame(frame) => {
                     self.lockouts.accepted(&frame);
                     self.record(Direction::Rx, &name, &frame);
+                    for listener in &self.listeners {
+                        // Nobody may listen there yet.
+                        let _ = listener.send(frame.as_bytes());
+                    }
                     if now.time < self.old_until {
                         continue;
                     }
@@ -402,5 +431,40 @@ mod tests {
         }
         assert!(told_drops > 0 && recorded > 0, "{told_drops} dropped, {recorded} recorded");
         assert_eq!((recorded + told_drops, bytes), (FRAMES, told_bytes));
+    }
+
+    /// A phone's map gets what the station hears, and nothing that it sends comes in.
+    #[test]
+    fn a_listener_hears_the_vehicle_and_is_never_heard() {
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+        runtime.block_on(async {
+            let clock = Clock::start();
+            let link = vec![LinkAddress::UdpIn("127.0.0.1:0".to_owned())];
+            let time = LogTime::Run(clock);
+            let mut wire = Wire::open((GROUND, VEHICLE), link, None, clock, None, time).await.unwrap();
+            let phone = UdpSocket::bind("127.0.0.1:0").unwrap();
+            wire.forward_to(&[phone.local_addr().unwrap().to_string()]).unwrap();
+            let Some(LinkAddress::UdpIn(station)) = wire.endpoints().next().cloned() else { panic!() };
+            let vehicle = UdpSocket::bind("127.0.0.1:0").unwrap();
+            let (mut said, mut stranger) = (Encoder::new(VEHICLE), Encoder::new(GROUND));
+            for _ in 0..3 {
+                let frame = said.encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
+                vehicle.send_to(frame.as_bytes(), &station).unwrap();
+                let mut heard = Vec::new();
+                while heard.is_empty() {
+                    let received = wire.receive().await;
+                    let msgs = wire.take(received).into_iter();
+                    heard.extend(
+                        msgs.filter_map(|msg| if let Msg::Frame(frame) = msg { Some(frame) } else { None }),
+                    );
+                }
+                assert_eq!(heard, std::slice::from_ref(&frame));
+                let mut bytes = [0; 300];
+                let (count, from) = phone.recv_from(&mut bytes).unwrap();
+                assert_eq!(&bytes[..count], frame.as_bytes());
+                let answer = stranger.encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
+                phone.send_to(answer.as_bytes(), from).unwrap();
+            }
+        });
     }
 }

@@ -6,6 +6,7 @@
 pub mod attitude;
 pub mod height;
 pub mod map;
+pub mod qr;
 
 use std::time::Duration;
 
