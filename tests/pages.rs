@@ -95,7 +95,7 @@ fn every_command_on_a_page_is_understood_by_its_program() {
             }
         }
     }
-    assert!(commands > 110, "only {commands} commands were found");
+    assert!(commands > 100, "only {commands} commands were found");
     assert!(refused.is_empty(), "{}", refused.join("\n"));
 }
 
@@ -160,7 +160,6 @@ struct Rate {
     dispersion: String,
     flights: u32,
     stands: u32,
-    upright: u32,
     envelope: u32,
     table_2: u32,
 }
@@ -173,9 +172,9 @@ fn rates() -> Vec<Rate> {
         let [mission, dispersion, _seed, ref counts @ .., _commit] = cells[..] else { panic!("{row}") };
         let count = |cell: &&str| cell.parse().unwrap_or_else(|_| panic!("{row}"));
         let counts: Vec<u32> = counts.iter().map(count).collect();
-        let [flights, stands, upright, envelope, table_2] = counts[..] else { panic!("{row}") };
+        let [flights, stands, _upright, envelope, table_2] = counts[..] else { panic!("{row}") };
         let (mission, dispersion) = (mission.to_owned(), dispersion.to_owned());
-        Rate { mission, dispersion, flights, stands, upright, envelope, table_2 }
+        Rate { mission, dispersion, flights, stands, envelope, table_2 }
     })
     .collect()
 }
@@ -205,60 +204,35 @@ fn cells(page: &str, first: &str) -> Vec<String> {
     row.trim_matches('|').split('|').map(|cell| cell.trim().to_owned()).collect()
 }
 
+/// Each mission has its row on one page: the README has three, the engineer's page the others.
 #[test]
 fn the_landing_rates_on_the_pages_are_the_measured_ones() {
-    let (readme, mk3) = (page("README.md"), page("MK3.md"));
+    let (missions, mk3) = (page("README.md") + &page("ENGINEER.md"), page("MK3.md"));
     for rate in rates().iter().filter(|rate| matches!(rate.dispersion.as_str(), "field" | "real")) {
         let of = if rate.flights == 1_000 { "1,000".to_owned() } else { rate.flights.to_string() };
-        let row = cells(&readme, &format!("`{}` |", rate.mission));
+        let row = cells(&missions, &format!("`{}` |", rate.mission));
         let column = if rate.dispersion == "field" { 2 } else { 3 };
         let Rate { stands, envelope, table_2, .. } = rate;
-        assert_eq!(row[column], format!("{stands}, {envelope}, {table_2} of {of}"), "README.md: {rate:?}");
+        assert_eq!(row[column], format!("{stands}, {envelope}, {table_2} of {of}"), "{rate:?}");
     }
     for dispersion in ["field", "real", "harsh", "real-harsh"] {
         for mission in ["mk2", "mk3"] {
             let row = cells(&mk3, &format!("`{dispersion}`, {mission} |"));
-            let Rate { flights, stands, upright, envelope, table_2, .. } = rate(mission, dispersion);
-            let told = [stands, upright, envelope, table_2]
+            let Rate { flights, stands, envelope, .. } = rate(mission, dispersion);
+            let told = [stands, envelope]
                 .map(|count| format!("{} ({})", percent(count, flights), interval(count, flights)));
             assert_eq!(row[1..], told, "MK3.md {dispersion}, {mission}");
         }
     }
+    let Rate { flights, stands, .. } = rate("mk3", "wild");
+    let wild = format!("{stands} of {flights} stand");
+    assert!(mk3.replace(',', "").contains(&wild), "MK3.md does not say: {wild}");
 }
 
-/// Every figure of a sentence about rates in the text of a page.
+/// Every figure of a sentence about rates on the page for the range safety officer.
 #[test]
-fn what_the_pages_say_of_landing_rates_agrees_with_the_measured_ones() {
-    let [field, real, harsh, real_harsh] =
-        ["field", "real", "harsh", "real-harsh"].map(|dispersion| rate("mk2", dispersion));
-    let readme = prose("README.md");
-    let [field_3, real_3] = ["field", "real"].map(|dispersion| rate("mk3", dispersion));
-    let both = |before: &str, [field, real]: [u32; 2]| {
-        let [field, real] = [interval(field, field_3.flights), interval(real, real_3.flights)];
-        format!("{before} in `field` {field} %, in `real` {real} %")
-    };
-    for words in [
-        both("95 % intervals of mk3: stands", [field_3.stands, real_3.stands]),
-        both("envelope", [field_3.envelope, real_3.envelope]),
-        format!("`field` {} %, `real` {} %", interval(field.stands, 1_000), interval(real.stands, 1_000)),
-        format!("`harsh` {} of {}", harsh.stands, harsh.flights),
-        format!("`real-harsh` {} of {}", real_harsh.stands, real_harsh.flights),
-    ] {
-        assert!(readme.contains(&words), "README.md does not say: {words}");
-    }
-    // What other errors are worth is measured on MK3.md's flights.
-    let study = |first: &str| -> u32 {
-        let cell = cells(&page("MK3.md"), first).swap_remove(1);
-        let count = cell.split(':').next().and_then(|count| count.parse().ok());
-        count.unwrap_or_else(|| panic!("{first}: {cell}"))
-    };
-    let (known, as_real) = (study("both |"), study("as in `real` |"));
-    assert!(readme.contains(&format!("{known} of 300 `real` flights instead of {as_real}")));
-    let exact = study("errors of the sensors beyond those of `field`");
-    let mk3 = page("MK3.md");
-    let nothing = mk3.lines().find_map(|line| line.strip_prefix("| nothing | ")?.split_once(':'));
-    let (nothing, _) = nothing.expect("the same flights with every error");
-    assert!(readme.contains(&format!("exact sensors ({exact} instead of {nothing})")));
+fn what_the_safety_page_says_of_landing_rates_agrees_with_the_measured_ones() {
+    let [field, real] = ["field", "real"].map(|dispersion| rate("mk2", dispersion));
     let safety = prose("SAFETY.md");
     let said: Vec<&str> =
         safety.split(". ").filter(|sentence| sentence.contains("landing rate of")).collect();
