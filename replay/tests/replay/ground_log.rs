@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::LazyLock;
 
-use protocol::log::record::{Direction, RawFrame, Record};
+use protocol::log::record::{Direction, Event, EventLevel, RawFrame, Record};
 use protocol::log::writer::{LogHeader, LogWriter};
 use replay::export::{TableFormat, export_tables};
 use replay::info::info;
@@ -31,7 +31,7 @@ fn heard_while(flight: &Simulated, name: &str, hears: impl Fn(u64) -> bool) -> P
         LogHeader { writer: "ground".to_owned(), start_unix_ns: START_UNIX_NS, ..LogHeader::default() };
     let mut log = LogWriter::new(std::fs::File::create(&path).unwrap(), &header).unwrap();
     let mut from = FlightLog::open(&imported).unwrap();
-    let mut first_ns = None;
+    let (mut first_ns, mut noted) = (None, false);
     while let Some(stamped) = from.next_entry().unwrap() {
         let since_ns = stamped.log_time_ns - *first_ns.get_or_insert(stamped.log_time_ns);
         if !hears(since_ns) {
@@ -52,10 +52,18 @@ fn heard_while(flight: &Simulated, name: &str, hears: impl Fn(u64) -> bool) -> P
             _ => continue,
         };
         log.write(&record, at_ns).unwrap();
+        if !noted && since_ns > NOTED_NS {
+            let (name, message) = ("ground".to_owned(), "note (screen 1, Ann): a gust".to_owned());
+            log.write(&Record::Event(Event { level: EventLevel::Info, name, message }), at_ns).unwrap();
+            noted = true;
+        }
     }
     log.finish().unwrap();
     path
 }
+
+/// In the burn.
+const NOTED_NS: u64 = 22_000_000_000;
 
 static GROUND: LazyLock<PathBuf> = LazyLock::new(|| heard(&WITH_FRAMES));
 /// The verdict that was heard is the vehicle's own, to the precision of a message.
@@ -86,6 +94,8 @@ fn the_report_of_a_ground_log_marks_the_touchdown_on_its_own_clock() {
     assert!((contact_s - own_s - EARLIER_NS as f64 / 1e9).abs() < 0.2, "{contact_s} {own_s}");
     let page = replay::report::report(&GROUND, None).unwrap().html;
     assert!(page.contains("STANDS UNDAMAGED") && page.contains("\ntouchdown\n"));
+    // The crew's note stands in the pictures, too.
+    assert!(page.matches("\nnote (screen 1, Ann): a gust\n").count() > 2);
 }
 
 #[test]

@@ -8,9 +8,13 @@ use protocol::log::flight_v1::{AidStatus, Measurements, TruthSample, Vector3};
 use super::burn::{AHEAD_S, tracking_errors};
 use super::estimate::vibration;
 use super::{COMPONENTS, DEGREES, HEIGHT};
+use crate::log::{Clock, ClockTime};
 use crate::report::chart::{Chart, line};
 use crate::report::track::Part::{Air, Burn, Whole};
 use crate::report::track::{Flight, Part, Series, Thought, planned};
+
+/// As much of a crew's note as stands beside its mark; the events have all of it.
+const NOTE_LETTERS: usize = 40;
 
 /// A picture of a section.
 pub(super) struct Picture<'a> {
@@ -25,9 +29,18 @@ impl<'a> Picture<'a> {
     fn new(flight: &'a Flight, section: &'static str, part: Part, title: &str) -> Self {
         let mark = |at_s: Option<f64>, name: &str| Some((flight.axis_s(at_s?), name.to_owned()));
         let marks = [mark(flight.ignition_s, "ignition"), mark(flight.touchdown_s, "touchdown")];
+        let (events, clocks) = (&flight.recording.events, &flight.recording.clocks);
+        let notes =
+            events.iter().filter(|(_, event)| event.name == "ground" && event.message.starts_with("note"));
+        let notes = notes.map(|(log_s, event)| {
+            let at = clocks.convert(ClockTime { clock: Clock::Log, time_s: *log_s }, Clock::Flight);
+            // A station's flight is on the clock of its log.
+            let at_s = at.map_or_else(|| flight.axis_s(*log_s), |at| at.time_s);
+            (at_s, event.message.chars().take(NOTE_LETTERS).collect())
+        });
         let panel = Panel {
             x_label: flight.axis_name().to_owned(),
-            marks: marks.into_iter().flatten().collect(),
+            marks: marks.into_iter().flatten().chain(notes).collect(),
             signs: flight.signs.clone(),
             ..Panel::default()
         };
