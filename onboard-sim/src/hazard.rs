@@ -125,11 +125,6 @@ impl Way {
         self == Self::Uncommanded || !self.facts().2.is_empty()
     }
 
-    /// What a flight as planned tells of it is told at apogee.
-    fn is_over_at_apogee(self) -> bool {
-        matches!(self, Self::AbortInAscent | Self::ParachuteFromApogee | Self::Booster)
-    }
-
     /// The abort of a flight at this moment would end it so.
     fn aborts(self, phase: Phase, effect: AbortEffect) -> bool {
         match self {
@@ -368,7 +363,9 @@ pub fn fly(recipe: &Recipe, ways: &[Way], number: u64) -> Result<Vec<Impact>, Se
         let mut chance = Chance::of(recipe.seed ^ OF_HAZARD, number);
         let mut flight = Sortie::new(recipe, number)?;
         let (mut attached, mut booster) = (flight.world().booster_attached(), None);
-        let to_the_ground = beside.iter().any(|way| !way.is_over_at_apogee());
+        let to_the_ground = beside
+            .iter()
+            .any(|way| !matches!(way, Way::AbortInAscent | Way::ParachuteFromApogee | Way::Booster));
         let planned = come_down(&mut flight, |flight| {
             let computer = flight.computer();
             let (phase, effect) = (computer.mode().phase, computer.abort_effect());

@@ -265,7 +265,7 @@ pub struct Audit {
 /// trusts; without it the key in the first entry is taken.
 pub fn audit(entries: &[v1::BookEntry], heads: &[RecordedHead], trusted: Option<PublicKey>) -> Audit {
     let mut audit = Audit {
-        key: entries.first().and_then(|first| key_in(&first.text)),
+        key: entries.first().and_then(|first| first.text.split_whitespace().find_map(PublicKey::from_hex)),
         closed: entries.last().is_some_and(|entry| entry.kind == CLOSED),
         ..Audit::default()
     };
@@ -319,9 +319,4 @@ fn check(
         }
     }
     Ok(())
-}
-
-/// The key in the text of the first entry.
-fn key_in(text: &str) -> Option<PublicKey> {
-    text.split_whitespace().find_map(PublicKey::from_hex)
 }

@@ -165,11 +165,6 @@ impl FrameView<'_> {
             Err(error) => Err(DecodeError { message_id: self.message_id(), reason: error.to_string() }),
         }
     }
-
-    /// Copies the frame.
-    pub fn to_frame(&self) -> Frame {
-        Frame { bytes: self.bytes.to_vec() }
-    }
 }
 
 /// A frame with a correct CRC whose fields could not be decoded.
@@ -328,7 +323,7 @@ impl Framer {
 
     /// Returns the next whole frame, or `None` until more bytes arrive.
     pub fn next_frame(&mut self) -> Option<Frame> {
-        self.next_view().map(|view| view.to_frame())
+        self.next_view().map(|view| Frame { bytes: view.bytes.to_vec() })
     }
 
     /// As [`Framer::next_frame`], without a copy.

@@ -3,7 +3,6 @@
 
 use alloc::format;
 use alloc::string::String;
-use core::f64::consts::FRAC_PI_2;
 use core::str::FromStr;
 
 use crate::dialect::{ATTITUDE_QUATERNION_DATA, GLOBAL_POSITION_INT_DATA, LOCAL_POSITION_NED_DATA};
@@ -180,11 +179,6 @@ impl Attitude {
     pub fn turn_rate_rad_s(&self) -> f64 {
         libm::hypot(self.pitch_rate_rad_s, self.yaw_rate_rad_s)
     }
-
-    /// Elevation of the nose above the horizontal, rad; pi/2 is upright.
-    pub fn elevation_rad(&self) -> f64 {
-        FRAC_PI_2 - self.tilt_rad
-    }
 }
 
 impl Motion {
@@ -263,7 +257,6 @@ mod tests {
         let half = std::f64::consts::FRAC_1_SQRT_2;
         let leaning = rotation([cos * half, sin * half, cos * half, sin * half]);
         close(leaning.tilt_rad.to_degrees(), 10.0);
-        close(leaning.elevation_rad().to_degrees(), 80.0);
         let [north, east, up] = leaning.axes[0];
         close(north, 0.0);
         close(east, libm::sin(10.0_f64.to_radians()));

@@ -347,8 +347,12 @@ impl WrittenStep {
             (None, ..) => return Err("least and most need a value".to_owned()),
             (Some(_), None, None) => return Err("a value needs least, most or both".to_owned()),
             (Some(name), least, most) => {
-                let quantity = Quantity::named(&name)
-                    .ok_or_else(|| format!("`{name}` is no value; give one of {}", quantity_names()))?;
+                let quantity = Quantity::named(&name).ok_or_else(|| {
+                    format!(
+                        "`{name}` is no value; give one of {}",
+                        quantity::ALL.each_ref().map(|quantity| quantity.name).join(", ")
+                    )
+                })?;
                 let ordered = least.zip(most).is_none_or(|(least, most)| least <= most);
                 let finite = [least, most].into_iter().flatten().all(f64::is_finite);
                 if !(ordered && finite) {
@@ -364,10 +368,6 @@ impl WrittenStep {
         }
         Ok(Step { words: printable(&self.words), role, value, mark: Mark::Open })
     }
-}
-
-fn quantity_names() -> String {
-    quantity::ALL.iter().map(|quantity| quantity.name).collect::<Vec<_>>().join(", ")
 }
 
 /// What a list of signatures holds for a checklist.

@@ -116,7 +116,8 @@ fn in_short(text: &str, check: TdCheck) -> String {
         Some((what, time)) if time.ends_with(" s") => what,
         _ => text,
     };
-    let whose = if words::is_of_the_log(check) { "vehicle " } else { "" };
+    let whose =
+        if (TdCheck::TD_CHECK_LOG | TdCheck::TD_CHECK_LOG_SPACE).contains(check) { "vehicle " } else { "" };
     format!("{whose}{}", text.replacen(": found ", " ", 1))
 }
 

@@ -2,7 +2,7 @@
 
 use std::fmt::Debug;
 
-use protocol::dialect::{TD_FLIGHT_STATUS_DATA, TdAbortEffect, TdCheck, TdInterlock, TdPhase};
+use protocol::dialect::{TD_FLIGHT_STATUS_DATA, TdAbortEffect, TdInterlock, TdPhase};
 
 use super::telemetry::phase_from_number;
 
@@ -106,11 +106,6 @@ pub fn check(name: &str) -> String {
 /// The name of a check in the words of the vehicle.
 pub fn lower_case_name(name: &str) -> String {
     name.trim_start_matches("TD_CHECK_").to_lowercase().replace('_', " ")
-}
-
-/// Whether a check is of the vehicle's log.
-pub fn is_of_the_log(check: TdCheck) -> bool {
-    (TdCheck::TD_CHECK_LOG | TdCheck::TD_CHECK_LOG_SPACE).contains(check)
 }
 
 /// A number with fixed decimals; `--` for NaN and infinity.

@@ -479,7 +479,7 @@ fn why_unfit(model: &Model, now: Duration) -> Option<&'static str> {
     if model.beside(now).is_some() && !model.boots.is_chosen(now) {
         return Some("TWO VEHICLES in the countdown");
     }
-    let fault = model.log_fault(now).filter(|fault| *fault != LogFault::Full);
+    let fault = model.unfit_log(now).map(|(fault, _)| fault).filter(|fault| *fault != LogFault::Full);
     fault.map(|_| "the station's log fails in the countdown")
 }
 

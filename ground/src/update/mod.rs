@@ -211,7 +211,11 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
                 model.outcome.error = Some(why);
             }
         }
-        Msg::Terminate("SIGINT") if outlives_ctrl_c(model) => {
+        Msg::Terminate("SIGINT")
+            if model.settings.role == Role::Station
+                && !model.settings.demonstration
+                && model.is_at_risk() =>
+        {
             let ends = "SIGTERM or `ground stop --force` ends it";
             model.warn(now, format!("SIGINT: the station continues while armed or in flight; {ends}"));
         }
@@ -264,11 +268,6 @@ fn on_station_tick(model: &mut Model, now: Duration) {
         model.info(now, "the station answers again");
     }
     model.link.station_at = Some(now);
-}
-
-/// Whether SIGINT is ignored: a Ctrl-C may be a mistake while a live vehicle is armed or in flight.
-fn outlives_ctrl_c(model: &Model) -> bool {
-    model.settings.role == Role::Station && !model.settings.demonstration && model.is_at_risk()
 }
 
 fn on_reports(model: &mut Model, links: Vec<LinkReport>, signing: Option<SigningCounters>, now: Duration) {

@@ -150,7 +150,9 @@ impl Line {
         self.waiting.retain(|old| !replaces(&frame, old));
         self.waiting.push_back(frame);
         let most = HOLDS.as_secs_f64() * self.bytes_s;
-        while self.waiting.len() > 1 && self.waiting_bytes() as f64 > most {
+        while self.waiting.len() > 1
+            && self.waiting.iter().map(|frame| self.len_of(frame)).sum::<usize>() as f64 > most
+        {
             let oldest = self.waiting.iter().position(|frame| rank(frame) == Rank::Telemetry);
             let place = match oldest {
                 Some(place) => place,
@@ -160,10 +162,6 @@ impl Line {
             self.waiting.remove(place);
             self.dropped += 1;
         }
-    }
-
-    fn waiting_bytes(&self) -> usize {
-        self.waiting.iter().map(|frame| self.len_of(frame)).sum()
     }
 
     /// When the next frame may leave; `None` if none waits.

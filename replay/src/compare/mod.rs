@@ -76,7 +76,7 @@ impl Comparison {
 
     /// Number of tables whose signals both flights have.
     pub fn tables(&self) -> usize {
-        self.signals.iter().map(|signal| table_of(&signal.signal)).collect::<BTreeSet<_>>().len()
+        self.signals.iter().map(|signal| signal.signal.split('.').next()).collect::<BTreeSet<_>>().len()
     }
 }
 
@@ -145,11 +145,6 @@ pub fn compare(
         words: words_of_one(baseline, other),
         failures,
     })
-}
-
-/// The table of a signal.
-fn table_of(signal: &str) -> &str {
-    signal.split('.').next().unwrap_or_default()
 }
 
 /// The rows of words that only one log has, of the tables that both have.

@@ -391,11 +391,6 @@ pub fn patched(mission_toml: &str, flown: &Mission, fit: &Fit, flight: &str) -> 
     Ok(text)
 }
 
-/// Text for a comment: without line breaks and control characters.
-fn one_line(text: &str) -> String {
-    protocol::text::printable(text.as_bytes())
-}
-
 /// A parameter over several flights.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Pooled {
@@ -630,7 +625,7 @@ fn write_into(path: &Path, log: &Path, trace: &Trace, found: &Fit) -> Result<()>
     let day = trace.last_ns.map_or_else(String::new, |last_ns| {
         format!(", {}", utc(last_ns).split('T').next().unwrap_or_default())
     });
-    let flight = one_line(&format!("flight {flight}{day}"));
+    let flight = protocol::text::printable(format!("flight {flight}{day}").as_bytes());
     let text = patched(&text, &trace.mission, found, &flight).context("the mission with what was found")?;
     let destination = Destination { path, force: true };
     write_whole(destination, log, |file| file.write_all(text.as_bytes()))?;

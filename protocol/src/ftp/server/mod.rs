@@ -155,7 +155,8 @@ impl Server {
         self.sessions.retain(|session| now.saturating_sub(session.used_at) < IDLE);
         let of_file = matches!(packet.opcode, Opcode::ReadFile | Opcode::BurstReadFile)
             || (!packet.path().is_empty() && place_of(packet.path(), files).is_some())
-            || (packet.opcode == Opcode::ListDirectory && is_log_directory(packet.path()));
+            || (packet.opcode == Opcode::ListDirectory
+                && matches!(parts(packet.path())[..], [directory] if names_log(directory)));
         if !open && of_file {
             self.answer(link, *client, packet.nak(Refusal::Busy));
             return Taken::NotNow;
@@ -378,10 +379,6 @@ fn parts(path: &str) -> Vec<&str> {
 /// Whether a part of a path names the directory of the log. `@MAV_LOG` is the name that clients know for it.
 fn names_log(part: &str) -> bool {
     part == "@MAV_LOG" || parts(LOG_DIRECTORY) == [part]
-}
-
-fn is_log_directory(path: &str) -> bool {
-    matches!(parts(path)[..], [directory] if names_log(directory))
 }
 
 fn place_of(path: &str, files: &dyn Files) -> Option<usize> {

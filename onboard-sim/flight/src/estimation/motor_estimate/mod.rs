@@ -289,7 +289,7 @@ impl MotorEstimate {
             }
         }
         // Rising thrust must not be mistaken for air force.
-        if !self.detector.suspects() && air_n.abs() > SMALLEST_AIR_N {
+        if self.detector.crossed_s.is_none() && air_n.abs() > SMALLEST_AIR_N {
             self.learn(sample, Vector5::new(0.0, 0.0, 0.0, air_n, 0.0), thrust_n, 0.0);
         }
     }
@@ -456,11 +456,6 @@ struct Detector {
 }
 
 impl Detector {
-    /// Whether the last frame was above the threshold; the next frame then decides.
-    fn suspects(&self) -> bool {
-        self.crossed_s.is_some()
-    }
-
     /// Takes a frame's mean thrust. Returns when the thrust rose through the threshold, s, if this is the second frame above it.
     fn take(&mut self, mark_n: f64, middle_s: f64, thrust_n: f64) -> Option<f64> {
         let before = self.last.replace((middle_s, thrust_n));
