@@ -87,11 +87,15 @@ const COURSE_STEP_S: f64 = 0.5;
 const COURSE_LONGEST_S: f64 = 120.0;
 
 /// Where the vehicle is expected to be: times from now, s, and places, to the ground as far as that can be told. On the way up
-/// only to apogee: nobody has told yet how it falls. Under the ascent motor, whose thrust is not known, nothing.
+/// only to apogee: nobody has told yet how it falls. Under the ascent motor, whose thrust is not known, and under a parachute that
+/// still fills, nothing.
 pub fn course(vehicle: &Vehicle, now: Duration) -> Vec<(f64, NorthEastUp)> {
     let (Some(motion), Some(phase)) = (vehicle.best_motion(), vehicle.phase_now()) else { return Vec::new() };
     let left_pad = vehicle.left_pad_at.is_some_and(|at| motion.received_at >= at);
-    let untold = matches!(phase, TdPhase::TD_PHASE_BOOST | TdPhase::TD_PHASE_DEPLOY);
+    let untold = match phase {
+        TdPhase::TD_PHASE_CHUTE => !is_carried(vehicle),
+        _ => matches!(phase, TdPhase::TD_PHASE_BOOST | TdPhase::TD_PHASE_DEPLOY),
+    };
     if !vehicle.in_flight() || !left_pad || untold {
         return Vec::new();
     }
@@ -137,13 +141,18 @@ pub fn is_unheard(vehicle: &Vehicle, now: Duration) -> bool {
     vehicle.in_flight() && in_silence
 }
 
+/// Whether its canopy is open and carries it; on the ground it does not.
+fn is_carried(vehicle: &Vehicle) -> bool {
+    let open = vehicle.descent().is_some_and(|descent| descent.value.chute == TdChute::TD_CHUTE_OPEN);
+    open && vehicle.phase_now() == Some(TdPhase::TD_PHASE_CHUTE)
+}
+
 fn acceleration_error_m_s2(vehicle: &Vehicle, phase: TdPhase, basis: Basis) -> f64 {
-    let chute = vehicle.descent().map(|descent| descent.value.chute);
     match phase {
         TdPhase::TD_PHASE_BOOST => LIFTED_ERROR_M_S2,
         _ if basis == Basis::FreeFall => OPENING_ERROR_M_S2,
         TdPhase::TD_PHASE_COAST | TdPhase::TD_PHASE_DEPLOY => OPENING_ERROR_M_S2,
-        TdPhase::TD_PHASE_CHUTE if chute != Some(TdChute::TD_CHUTE_OPEN) => OPENING_ERROR_M_S2,
+        TdPhase::TD_PHASE_CHUTE if !is_carried(vehicle) => OPENING_ERROR_M_S2,
         _ => STEERED_ERROR_M_S2,
     }
 }
@@ -251,13 +260,6 @@ enum Forces {
     Brake,
 }
 
-/// The end of an extrapolation.
-struct Endpoint {
-    place: NorthEastUp,
-    landed_after_s: Option<f64>,
-    burning_s: f64,
-}
-
 impl LastMotion {
     /// Collects the last reports of the vehicle.
     pub(super) fn of(vehicle: &Vehicle, phase: TdPhase, motion: &Motion) -> Self {
@@ -277,10 +279,12 @@ impl LastMotion {
             _ => {
                 let chosen_m = descent.map(|d| f64::from(d.chosen_height_m));
                 let burn_from_m = chosen_m.filter(|height_m| *height_m > 0.0 && vehicle.may_light());
-                Forces::Air {
-                    drag_per_m: change.and_then(|change| drag_per_m(&change, &wind_m_s)),
-                    burn_from_m,
-                }
+                let drag_per_m = if is_carried(vehicle) {
+                    canopy_drag_per_m(-velocity_m_s[2])
+                } else {
+                    change.and_then(|change| drag_per_m(&change, &wind_m_s))
+                };
+                Forces::Air { drag_per_m, burn_from_m }
             }
         };
         Self { at_m: [motion.x_m, motion.y_m, motion.altitude_m], velocity_m_s, wind_m_s, forces }
@@ -288,12 +292,12 @@ impl LastMotion {
 
     /// The expected state after this time, s.
     pub(super) fn after(&self, seconds: f64) -> Extrapolated {
-        let Endpoint { place, landed_after_s, burning_s } = self.follow(seconds);
+        let (place, landed_after_s, burning_s) = self.follow(seconds);
         let (or_else_m, basis) = match self.forces {
             Forces::Thrust { .. } | Forces::Brake => (0.0, Basis::LastThrust),
             Forces::Air { burn_from_m: Some(_), drag_per_m } => {
                 let unlit = Self { forces: Forces::Air { drag_per_m, burn_from_m: None }, ..*self };
-                let fallen = unlit.follow(seconds).place;
+                let fallen = unlit.follow(seconds).0;
                 ((place[2].max(0.0) - fallen[2].max(0.0)).abs(), Basis::FallThenBurn)
             }
             Forces::Air { drag_per_m: Some(_), .. } => (0.0, Basis::Fall),
@@ -303,8 +307,9 @@ impl LastMotion {
         Extrapolated { x_m, y_m, altitude_m, or_else_m, burning_s, landed_after_s, basis }
     }
 
-    /// Integrates with the midpoint rule: exact for free fall, second order for drag.
-    fn follow(&self, seconds: f64) -> Endpoint {
+    /// Place, when it landed, s, and for how long the motor burnt, s. Integrates with the midpoint rule: exact for free fall, second
+    /// order for drag.
+    fn follow(&self, seconds: f64) -> (NorthEastUp, Option<f64>, f64) {
         let (mut place, mut velocity) = (self.at_m, self.velocity_m_s);
         let mut braking = None;
         let (mut passed_s, mut burning_s) = (0.0, 0.0);
@@ -325,10 +330,10 @@ impl LastMotion {
             // Braked to rest, close to the ground as far as the last values were right; or on the ground.
             let stands = burns && velocity[2] >= 0.0 && self.velocity_m_s[2] < 0.0;
             if stands || place[2] <= 0.0 {
-                return Endpoint { place, landed_after_s: Some(passed_s), burning_s };
+                return (place, Some(passed_s), burning_s);
             }
         }
-        Endpoint { place, landed_after_s: None, burning_s }
+        (place, None, burning_s)
     }
 
     fn acceleration_m_s2_at(
@@ -368,6 +373,11 @@ fn drag_per_m(change: &Change, wind: &NorthEastUp) -> Option<f64> {
     let against: f64 = felt.iter().zip(&through_air).map(|(felt, through)| -felt * through).sum();
     let drag = against / (speed * speed * speed);
     drag.is_finite().then(|| drag.clamp(0.0, DRAG_MAX_PER_M))
+}
+
+/// The drag with which a canopy carries the weight at this sink, 1/m: it is slower than drag is seen at. `None` without sink.
+fn canopy_drag_per_m(sinks_m_s: f64) -> Option<f64> {
+    (sinks_m_s > 0.0).then(|| (GRAVITY_M_S2 / (sinks_m_s * sinks_m_s)).min(DRAG_MAX_PER_M))
 }
 
 /// The constant deceleration that ends at rest on the ground, m/s2.
@@ -529,6 +539,37 @@ mod tests {
         vehicle.status = Some(Sample::new(status, SEEN));
         assert_eq!(after(&vehicle, 2.5).basis, Basis::Fall);
         assert_eq!(after(&vehicle, 2.6).altitude_m.to_bits(), 0);
+    }
+
+    /// A vehicle under its canopy, in this wind to the north, m/s.
+    fn carried(sinks_m_s: f64, wind_x_m_s: f32) -> Vehicle {
+        let phase = TdPhase::TD_PHASE_CHUTE;
+        let mut vehicle = moving(phase, [f64::from(wind_x_m_s), 0.0, -sinks_m_s], Some([0.0; 3]));
+        let chute = TdChute::TD_CHUTE_OPEN;
+        let descent =
+            TD_DESCENT_DATA { chute, wind_x_m_s, chosen_height_m: f32::NAN, ..TD_DESCENT_DATA::default() };
+        vehicle.keep(&MavMessage::TD_DESCENT(descent), SEEN);
+        vehicle
+    }
+
+    /// It sinks as it does and drifts with the wind: 100 m at 6 m/s take 16.7 s, at 7 m/s 14.3 s.
+    #[test]
+    fn val_under_its_canopy_it_keeps_its_sink_and_drifts_with_the_wind() {
+        for (sinks_m_s, wind_m_s) in [(6.0, 5.0_f32), (7.0, -3.0)] {
+            let course = course(&carried(sinks_m_s, wind_m_s), SEEN);
+            let (lands_s, [north_m, ..]) = *course.last().expect("a course to the ground");
+            assert!((lands_s - 100.0 / sinks_m_s).abs() < 0.5, "{lands_s} s");
+            assert!((north_m - 1.0 - f64::from(wind_m_s) * lands_s).abs() < 1.0, "{north_m} m");
+        }
+    }
+
+    /// Until the canopy carries it, nobody can tell when it lands.
+    #[test]
+    fn before_its_canopy_carries_it_no_course_is_told() {
+        let mut vehicle = carried(30.0, 0.0);
+        let fired = TD_DESCENT_DATA { chute: TdChute::TD_CHUTE_FIRED, ..TD_DESCENT_DATA::default() };
+        vehicle.keep(&MavMessage::TD_DESCENT(fired), SEEN);
+        assert_eq!(course(&vehicle, SEEN), []);
     }
 
     proptest! {
