@@ -129,7 +129,7 @@ const DARK: Colours = Colours {
 };
 const LIGHT: Colours = Colours {
     back: 231,
-    raised: 231,
+    raised: 195,
     plain: 16,
     label: 239,
     good: 22,
