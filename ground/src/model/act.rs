@@ -158,7 +158,7 @@ impl Act {
         match self {
             Self::Arm => acts && why_not_arm(model, now).is_none(),
             Self::Start => acts && why_not_start(model, now).is_none(),
-            Self::Disarm => acts && model.every_vehicle(now).any(Vehicle::is_armed),
+            Self::Disarm => acts && model.every_vehicle(now).any(|v| v.is_armed() && !v.in_flight()),
             Self::HoldCountdown => {
                 let counts = |vehicle: &Vehicle| vehicle.countdown_s().is_some_and(|left| left.value > 0.0);
                 commands && model.every_vehicle(now).any(counts)
@@ -188,6 +188,7 @@ impl Act {
         match self {
             Self::Acknowledge => "seen",
             Self::HoldCountdown => "hold",
+            Self::Hold => "hold page",
             Self::RangeTest => "radio test",
             act => act.definition().map_or("", |definition| definition.name),
         }

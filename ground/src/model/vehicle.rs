@@ -336,12 +336,6 @@ impl Vehicle {
         let speed = BodySpeed::of(&attitude.value, &motion.value);
         Some(Sample::new(speed, attitude.received_at.min(motion.received_at)))
     }
-
-    /// The planned path while it is current: under thrust, and during the rehearsal on the pad.
-    pub fn planned(&self) -> &[(f64, f64)] {
-        let counts = self.phase().is_some_and(|phase| is_burning(phase.value) || is_on_pad(phase.value));
-        self.path.as_ref().filter(|_| counts && self.verdict().is_none()).map_or(&[], |path| &path.value)
-    }
 }
 
 /// The first of two sources, unless the other is later than it by more than this.

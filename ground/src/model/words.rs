@@ -36,7 +36,7 @@ pub fn event(phase: TdPhase) -> Option<&'static str> {
         TdPhase::TD_PHASE_SAFED => "over",
         TdPhase::TD_PHASE_BOOST => "lift-off",
         TdPhase::TD_PHASE_COAST => "burn-out",
-        TdPhase::TD_PHASE_DEPLOY => "fins",
+        TdPhase::TD_PHASE_DEPLOY => "apogee",
         TdPhase::TD_PHASE_AERO_DESCENT => "falls",
         TdPhase::TD_PHASE_LAND_ARMED => "ready",
         TdPhase::TD_PHASE_IGNITION => "ignition",

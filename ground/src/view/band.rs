@@ -5,14 +5,13 @@ use std::time::Duration;
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::text::Line;
-use tui_big_text::{BigText, PixelSize};
 
 use super::theme::Ink;
 use super::{STALE_MARK, TextRole, Theme, draw_line, fixed};
 use crate::model::Sample;
 
-/// Rows of the band on a small, a middling and a large screen.
-const ROWS: [u16; 3] = [6, 7, 9];
+/// Rows of the band on a small, a middling and a large screen: a label, the letters, a line.
+const ROWS: [u16; 3] = [6, 7, 10];
 /// From these columns and rows on a screen counts as middling, and as large.
 const MIDDLING: (u16, u16) = (116, 34);
 const LARGE: (u16, u16) = (180, 46);
@@ -44,17 +43,18 @@ pub struct Item {
     /// What it is and its unit; may be empty.
     pub label: String,
     pub text: String,
-    /// The most letters, so that nothing moves when a number changes.
-    letters: u16,
+    /// Its width; of a number the greatest, so that nothing moves when it changes.
+    pixels: u16,
     pub role: TextRole,
     /// A prediction has its colour.
     is_predicted: bool,
 }
 
-/// A word, and what it is, in so many letters.
-pub fn word(label: &str, text: &str, letters: u16, role: TextRole) -> Item {
-    let (label, text) = (label.to_owned(), text.to_owned());
-    Item { label, text, letters, role, is_predicted: false }
+/// A word, and what it is.
+pub fn word(label: &str, text: &str, role: TextRole) -> Item {
+    let (label, text) = (label.to_owned(), text.to_uppercase());
+    let pixels = columns(&text).count() as u16;
+    Item { label, text, pixels, role, is_predicted: false }
 }
 
 /// A number with its name and unit; the name of a stale one is marked.
@@ -75,7 +75,8 @@ pub fn number(
     let fits = |text: &String| text.len() <= usize::from(letters);
     let text = Some(text(decimals)).filter(fits).or_else(|| Some(text(0)).filter(fits));
     let text = text.unwrap_or_else(|| "many".to_owned());
-    Item { label: format!("{mark}{label}"), text, letters, role, is_predicted: false }
+    let label = format!("{mark}{label}");
+    Item { label, text: text.to_uppercase(), pixels: letters * DIGIT_PIXELS, role, is_predicted: false }
 }
 
 impl Item {
@@ -85,17 +86,34 @@ impl Item {
     }
 }
 
-/// Size of a letter: columns, rows.
-#[derive(Debug, Clone, Copy)]
-struct Size {
-    pixels: PixelSize,
-    columns: u16,
-    rows: u16,
+/// The alphabet: each letter as often as it is wide, and under it its five rows of pixels. A zero is open, so that it is no eight.
+const ALPHABET: &str = include_str!("letters.txt");
+/// Pixels of a digit with the gap behind it.
+const DIGIT_PIXELS: u16 = 5;
+
+/// The columns of pixels of a text, each with a gap between two letters behind its last one.
+fn columns(text: &str) -> impl Iterator<Item = [bool; 5]> {
+    let mut lines = ALPHABET.lines().map(str::as_bytes);
+    let names = lines.next().unwrap_or_default();
+    let rows: [&[u8]; 5] = std::array::from_fn(|_| lines.next().unwrap_or_default());
+    let column = move |place: usize| rows.map(|row| row.get(place) == Some(&b'#'));
+    let blank = |letter: u8| if letter == b' ' { b'_' } else { letter };
+    text.bytes().map(blank).flat_map(move |letter| {
+        let of_it = (0..names.len()).filter(move |place| names[*place] == letter);
+        of_it.map(column).chain([[false; 5]])
+    })
 }
 
-const LARGEST: Size = Size { pixels: PixelSize::Full, columns: 8, rows: 8 };
-const WIDE: Size = Size { pixels: PixelSize::HalfHeight, columns: 8, rows: 4 };
-const NARROW: Size = Size { pixels: PixelSize::Quadrant, columns: 4, rows: 4 };
+/// Size of a pixel: columns, and halves of a row.
+type Size = (u16, u16);
+const NARROW: Size = (1, 1);
+/// The main item and the others on a small, a middling and a large screen.
+const SIZES: [[Size; 2]; 3] = [[(2, 1), NARROW], [(2, 2), NARROW], [(3, 3), (2, 2)]];
+
+/// Rows of a letter.
+fn rows_of((_, halves): Size) -> u16 {
+    (5 * halves).div_ceil(2)
+}
 
 /// Draws the main item at the left with the line under it, the others to its right, and returns the area below.
 pub fn draw_band(
@@ -112,18 +130,17 @@ pub fn draw_band(
     if rows < ROWS[0] {
         return rest;
     }
-    let (size, other_size) = match room {
-        Room::Large => (LARGEST, WIDE),
-        Room::Middling | Room::Small => (WIDE, NARROW),
-    };
+    let [size, other_size] = SIZES[room as usize];
     let others_columns: u16 = others.iter().map(|item| width(item, other_size) + GAP).sum();
-    let size = [size, WIDE, NARROW]
-        .into_iter()
-        .find(|size| 1 + main.letters * size.columns + GAP + others_columns <= area.width)
-        .unwrap_or(NARROW);
+    let fits = |size: &Size| 1 + main.pixels * size.0 + GAP + others_columns <= area.width;
+    // Beside three others at 80 columns it is taller, not wider.
+    let size = [size, (1, 2)].into_iter().find(fits).unwrap_or(NARROW);
     letters(main, size, theme, frame, Rect { x: band.x + 1, width: band.width - 1, ..band });
-    draw_line(frame, Rect { x: band.x, y: band.bottom() - 1, height: 1, ..band }, below);
-    let begin = 1 + (main.letters * size.columns).max(main.label.chars().count() as u16) + GAP;
+    let begin = 1 + width(main, size) + GAP;
+    // The last row is below the letters, or behind tall ones.
+    let behind = if 1 + rows_of(size) < rows { 0 } else { begin };
+    let at = Rect { x: band.x + behind, y: band.bottom() - 1, width: band.width - behind, height: 1 };
+    draw_line(frame, at, below);
     let spare = area.width.saturating_sub(begin + others_columns);
     let gap = GAP + spare / (others.len() as u16 + 1);
     let mut x = area.x + begin + spare / (others.len() as u16 + 1);
@@ -138,30 +155,22 @@ pub fn draw_band(
 
 /// Draws a word as large as the area allows. Returns the rows taken.
 pub fn draw_word(item: &Item, theme: Theme, frame: &mut Frame, area: Rect) -> u16 {
-    let fits = |size: &Size| item.letters * size.columns < area.width && size.rows * 5 <= area.height;
-    let size = [LARGEST, WIDE, NARROW].into_iter().find(fits).unwrap_or(NARROW);
-    let rows = size.rows.min(area.height);
-    big(
-        item,
-        size,
-        theme,
-        frame,
-        Rect { x: area.x + 1, width: area.width.saturating_sub(1), height: rows, ..area },
-    );
+    let fits = |size: &Size| item.pixels * size.0 <= area.width && rows_of(*size) * 5 <= area.height;
+    let size = [(3, 3), (2, 2), (1, 2)].into_iter().find(fits).unwrap_or(NARROW);
+    let rows = rows_of(size).min(area.height);
+    let at = Rect { x: area.x + 1, width: area.width.saturating_sub(1), height: rows, ..area };
+    big(item, size, theme, frame, at);
     rows
 }
 
 fn width(item: &Item, size: Size) -> u16 {
-    (item.letters * size.columns).max(item.label.chars().count() as u16)
+    (item.pixels * size.0).max(item.label.chars().count() as u16)
 }
 
 fn letters(item: &Item, size: Size, theme: Theme, frame: &mut Frame, at: Rect) {
-    draw_line(
-        frame,
-        at,
-        Line::styled(item.label.clone(), theme.raised().patch(theme.style(TextRole::Label))),
-    );
-    let below = Rect { y: at.y + 1, height: at.height.saturating_sub(1).min(size.rows), ..at };
+    let style = theme.raised().patch(theme.style(TextRole::Label));
+    draw_line(frame, at, Line::styled(item.label.clone(), style));
+    let below = Rect { y: at.y + 1, height: at.height.saturating_sub(1).min(rows_of(size)), ..at };
     big(item, size, theme, frame, below);
 }
 
@@ -170,13 +179,41 @@ fn big(item: &Item, size: Size, theme: Theme, frame: &mut Frame, at: Rect) {
     if item.is_predicted && item.role == TextRole::Title {
         style = style.fg(theme.ink(Ink::Predicted));
     }
-    if theme.ascii && size.pixels == PixelSize::Quadrant {
-        // Quarter blocks cannot be distinguished in ASCII.
-        let spaced: String = item.text.chars().flat_map(|c| [c, ' ']).collect();
-        let middle = Rect { y: at.y + 1, height: 1, ..at };
-        return frame.render_widget(Line::styled(spaced, style), middle.intersection(at));
+    let (width, halves) = size;
+    if item.pixels * width > at.width + width || (theme.ascii && size == NARROW) {
+        // Small halves of a row cannot be told apart in ASCII.
+        let spaced: String = item.text.chars().flat_map(|letter| [letter, ' ']).collect();
+        return draw_line(frame, Rect { y: at.y + 1, height: 1, ..at }, Line::styled(spaced, style));
     }
-    let line = Line::raw(item.text.clone());
-    let big = BigText::builder().pixel_size(size.pixels).style(style).lines([line]).build();
-    frame.render_widget(big, at);
+    for (place, column) in columns(&item.text).enumerate() {
+        let pixel = |half: u16| column.get(usize::from(half / halves)) == Some(&true);
+        for row in 0..at.height {
+            let symbol = match (pixel(2 * row), pixel(2 * row + 1)) {
+                (true, true) => "█",
+                (true, false) => "▀",
+                (false, true) => "▄",
+                (false, false) => continue,
+            };
+            let x = at.x + place as u16 * width;
+            frame.buffer_mut().set_string(x, at.y + row, symbol.repeat(width.into()), style);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// From afar a zero must not look like an eight, and every letter of the large words is in the alphabet.
+    #[test]
+    fn no_two_letters_look_alike_but_zero_and_o() {
+        let all: Vec<char> = ('0'..='9').chain('A'..='Z').chain(".-+:?".chars()).collect();
+        let drawn = |letter: char| columns(&letter.to_string()).collect::<Vec<_>>();
+        for (place, one) in all.iter().enumerate() {
+            assert!(drawn(*one).len() > 1, "{one} is drawn");
+            let alike: Vec<_> =
+                all[place + 1..].iter().filter(|other| drawn(**other) == drawn(*one)).collect();
+            assert_eq!(alike, if *one == '0' { vec![&'O'] } else { Vec::new() }, "{one}");
+        }
+    }
 }

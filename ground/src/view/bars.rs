@@ -69,8 +69,8 @@ pub fn draw_limits(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
         None => theme.line(" inside the envelope ", TextRole::Good),
         Some(names) => theme.line(format!(" OUTSIDE {names} "), TextRole::Alarm),
     };
-    let words =
-        if words.width() + title.len() + 4 <= usize::from(area.width) { words } else { Line::default() };
+    let words = Some(words).filter(|words| words.width() + title.len() + 4 <= usize::from(area.width));
+    let words = words.unwrap_or_default();
     let inside = pages::framed(title, words, theme, frame, area);
     let (mark, role) = if is_judged { (" ", TextRole::Plain) } else { age_mark(&at, now) };
     let ink = theme.ground().fg(theme.ink(if is_judged { Ink::Measured } else { Ink::Predicted }));
@@ -82,11 +82,8 @@ pub fn draw_limits(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
         let (word, word_role) = if row.kept { ("ok", TextRole::Good) } else { ("NO", TextRole::Alarm) };
         let value = format!("{mark}{:>5}", fixed(row.value, decimals(row.value)));
         let name = theme.label(format!(" {:<8}", row.name));
-        draw_line(
-            frame,
-            at,
-            Line::from(vec![theme.span(word, word_role), name, theme.span(value, strong(role))]),
-        );
+        let words = [theme.span(word, word_role), name, theme.span(value, strong(role))];
+        draw_line(frame, at, Line::from_iter(words));
         let room = at.width.saturating_sub(BEFORE_BAR + limit_columns);
         let mark = row.used.is_finite().then_some((LIMIT_AT, limit_ink));
         bar([0.0, LIMIT_AT * row.used], ink, mark, frame, Rect { x: at.x + BEFORE_BAR, width: room, ..at });
@@ -103,8 +100,8 @@ fn strong(role: TextRole) -> TextRole {
 
 /// Draws fins and gimbal: the measured angle as a bar, the commanded one as a mark.
 pub fn draw_surfaces(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let area =
-        pages::framed("fins, gimbal", legend([" ▄", " is "], ["│", " asked "], theme), theme, frame, area);
+    let legend = legend([" ▄", " is "], ["│", " asked "], theme);
+    let area = pages::framed("fins, gimbal", legend, theme, frame, area);
     let (fins, gimbal) = (model.vehicle.fins(), model.vehicle.gimbal());
     let limit_deg = model.vehicle.limits().map(|limits| f64::from(limits.gimbal_limit_rad).to_degrees());
     let limit_deg = limit_deg.filter(|limit| limit.is_finite() && *limit > 0.0).unwrap_or(20.0);
@@ -121,22 +118,13 @@ pub fn draw_surfaces(model: &Model, theme: Theme, now: Duration, frame: &mut Fra
         let degrees = |pick: fn(&Deflection) -> f64| angles.map(|angles| pick(&angles.value).to_degrees());
         let (commanded, measured) = (degrees(|d| d.commanded_rad), degrees(|d| d.measured_rad));
         let text = measured.map_or_else(|| "--".to_owned(), |deg| fixed(deg, digits));
-        let words = vec![
-            theme.label(format!(" {name:<6}")),
-            theme.span(format!("{mark}{text:>5}"), strong(role)),
-            theme.label("°"),
-        ];
-        draw_line(frame, at, Line::from(words));
+        let (name, text) = (theme.label(format!(" {name:<6}")), format!("{mark}{text:>5}"));
+        draw_line(frame, at, Line::from_iter([name, theme.span(text, strong(role)), theme.label("°")]));
         let share = |deg: f64| (deg - low) / (high - low);
         let asked = theme.ground().fg(theme.ink(Ink::Predicted));
         let bar_at = Rect { x: at.x + 16, width: at.width.saturating_sub(17), ..at };
         let ink = theme.ground().fg(theme.ink(Ink::Measured));
-        bar(
-            [share(0.0), measured.map_or(share(0.0), share)],
-            ink,
-            commanded.map(|deg| (share(deg), asked)),
-            frame,
-            bar_at,
-        );
+        let mark = commanded.map(|deg| (share(deg), asked));
+        bar([share(0.0), measured.map_or(share(0.0), share)], ink, mark, frame, bar_at);
     }
 }

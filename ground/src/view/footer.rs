@@ -11,23 +11,30 @@ use ratatui::text::{Line, Span};
 
 use super::status_lines::{alarm_text, replay_line};
 use super::{Ink, TextRole, Theme, draw_line, side_by_side, top_lines};
-use crate::model::{Act, Model, Page, dead_reckoning::course, is_burning, is_on_pad, words};
+use crate::model::{Act, Model, Page, dead_reckoning::course, is_burning, is_flight, is_on_pad, words};
+
+/// From this width on the flight has a second row, for the names of its events with their times.
+const TWO_ROWS_COLUMNS: usize = 120;
 
 /// The rows above the keys: an alarm that nobody has seen; else a message, the flight along its time, or the newest event. While an
-/// alarm rings, a message has a row of its own.
+/// alarm rings, a message has a row of its own. Where the flight has two rows, an alarm or a message takes the second.
 pub fn message_rows(model: &Model, theme: Theme, now: Duration, columns: u16) -> Vec<Line<'static>> {
     let columns = usize::from(columns);
-    let message = top_lines::message(model, theme, now, columns);
     let rings = model.alarms.unacknowledged() > 0 && model.playing.is_none();
-    if let Some(alarm) = alarm_text(model, theme, now, columns).filter(|_| rings) {
-        // In flight nothing moves for it.
-        let message = message.filter(|_| !model.vehicle.in_flight());
-        return message.into_iter().chain([alarm]).collect();
-    }
+    let alarm = alarm_text(model, theme, now, columns).filter(|_| rings);
+    // In flight nothing moves for it.
+    let hidden = alarm.is_some() && model.vehicle.in_flight();
+    let message = top_lines::message(model, theme, now, columns).filter(|_| !hidden);
     let is_flown = model.playing.is_some() || flight_began(model).is_some();
-    let flight = || is_flown.then(|| timeline(model, theme, now, columns));
-    let row = message.or_else(flight).or_else(|| newest_event(model, theme));
-    vec![row.unwrap_or_default()]
+    let mut over: Vec<_> = message.into_iter().chain(alarm).collect();
+    let rows = if is_flown && columns >= TWO_ROWS_COLUMNS { 2 } else { 1 };
+    if is_flown && over.len() < rows {
+        over.splice(0..0, timeline(model, theme, now, columns, over.len() + 2 == rows));
+    }
+    if over.is_empty() {
+        over.push(newest_event(model, theme).unwrap_or_default());
+    }
+    over
 }
 
 fn newest_event(model: &Model, theme: Theme) -> Option<Line<'static>> {
@@ -53,9 +60,18 @@ const EVENT: char = '!';
 const PASSED: char = '━';
 const TO_COME: char = '┄';
 
+/// The pictures of a flight stand still this long after the touchdown.
+const STILL_AFTER: Duration = Duration::from_secs(2);
+
 /// When the flight began.
 pub fn flight_began(model: &Model) -> Option<Duration> {
     model.history.timeline.iter().find(|(phase, _)| !is_on_pad(*phase)).map(|(_, at)| *at)
+}
+
+/// A flight is shown to this moment: to now, and on the ground not much longer than it lasted.
+pub fn shown_until(model: &Model, now: Duration) -> Duration {
+    let mut flown = model.history.timeline.iter().skip_while(|(phase, _)| is_on_pad(*phase));
+    flown.find(|(phase, _)| !is_flight(*phase)).map_or(now, |(_, at)| now.min(*at + STILL_AFTER))
 }
 
 /// What the vehicle has told that will come, with its time.
@@ -77,7 +93,9 @@ pub fn expected(model: &Model, now: Duration) -> Vec<(&'static str, Duration)> {
     known.map(|(name, left_s)| (name, now + Duration::from_secs_f64(left_s))).collect()
 }
 
-fn timeline(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line<'static> {
+/// The flight along its time in a row, and from some width on the names in a second one.
+fn timeline(model: &Model, theme: Theme, now: Duration, columns: usize, is_wide: bool) -> Vec<Line<'static>> {
+    let now = if model.playing.is_some() { now } else { shown_until(model, now) };
     let columns = columns.saturating_sub(2).max(1);
     let to_come = expected(model, now);
     let (phases, from, length_s): (&[(TdPhase, Duration)], Duration, f64) =
@@ -94,23 +112,26 @@ fn timeline(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line<
         let share = at.saturating_sub(from).as_secs_f64() / length_s;
         ((share * columns as f64) as usize).min(columns - 1)
     };
-    let mut cells: Vec<(char, Ink)> = (0..columns)
-        .map(|place| {
-            let passed = place <= column(now) || model.playing.is_some();
-            if passed { (PASSED, Ink::Measured) } else { (TO_COME, Ink::Predicted) }
-        })
-        .collect();
+    let here = column(now);
+    let mut rows = vec![vec![(' ', Ink::Body); columns]; 1 + usize::from(is_wide)];
+    for (place, cell) in rows[0].iter_mut().enumerate() {
+        let passed = place <= here || model.playing.is_some();
+        *cell = if passed { (PASSED, Ink::Measured) } else { (TO_COME, Ink::Predicted) };
+    }
     for event in model.events.newest(usize::MAX) {
         if event.level != EventLevel::Info && event.at >= from {
-            cells[column(event.at)] = (EVENT, Ink::Body);
+            rows[0][column(event.at)] = (EVENT, Ink::Body);
         }
     }
     let been = phases.iter().enumerate().filter_map(|(place, (phase, at))| {
         let after = phases.get(place + 1).map(|(phase, _)| *phase);
         let has_lifted = after.map_or(model.vehicle.has_lifted, |after| !is_on_pad(after));
         let is_told = *phase == TdPhase::TD_PHASE_BOOST && !has_lifted;
-        let name = if is_told { "commanded to light" } else { words::event(*phase)? };
-        Some((name, *at, BEEN, Ink::Measured))
+        // Apogee and fall are one event, and so are ignition and burn.
+        let before = place.checked_sub(1).map(|before| phases[before].0);
+        let again = matches!(before, Some(TdPhase::TD_PHASE_DEPLOY | TdPhase::TD_PHASE_IGNITION));
+        let name = if is_told { "commanded to light" } else { words::event(*phase).filter(|_| !again)? };
+        Some((name, *at, *at, BEEN, Ink::Measured))
     });
     // In steps, so that it does not tremble; never in the past.
     let step_s = length_s * EXPECTED_STEP;
@@ -118,43 +139,60 @@ fn timeline(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line<
         let steps = libm::round(at.saturating_sub(from).as_secs_f64() / step_s);
         (from + Duration::from_secs_f64(steps * step_s)).max(now)
     };
-    let to_come = to_come.iter().map(|(name, at)| (*name, steady(*at), EXPECTED, Ink::Predicted));
+    let to_come = to_come.iter().map(|(name, at)| (*name, steady(*at), *at, EXPECTED, Ink::Predicted));
     let marks: Vec<_> = been.chain(to_come).filter(|(_, at, ..)| *at >= from).collect();
-    for (place, (name, at, mark, ink)) in marks.iter().enumerate() {
+    let lift_off = phases.iter().find(|(phase, _)| !is_on_pad(*phase)).map_or(from, |(_, at)| *at);
+    for (_, at, _, mark, ink) in &marks {
+        rows[0][column(*at)] = (*mark, *ink);
+    }
+    // A name stands under its mark, else beside it, where nothing else is; without room it goes.
+    for (name, at, exactly, _, ink) in &marks {
         let begin = column(*at);
-        let end = marks.get(place + 1).map_or(columns, |(_, next, ..)| column(*next));
-        cells[begin] = (*mark, *ink);
-        let before = place.checked_sub(1).map_or(0, |before| column(marks[before].1) + 1);
-        let here = column(now).max(before) + 1;
-        let at = match () {
-            () if begin + 1 + name.len() < end => begin + 1,
-            // At the end of the line its name stands before it.
-            () if begin >= here + name.len() && place + 1 == marks.len() => begin - name.len(),
-            () => continue,
+        let time_s = exactly.as_secs_f64() - lift_off.as_secs_f64();
+        let name = if is_wide { format!("{name} {time_s:.1}") } else { (*name).to_owned() };
+        let length = name.len();
+        // Before its mark only where that is its alone.
+        let beside = [(0, Some(begin + 1), 0), (0, begin.checked_sub(length), 1)];
+        let under = [(1, Some(begin), 0), (1, (begin + 1).checked_sub(length), 0)];
+        let places = under.into_iter().filter(|_| is_wide).chain(beside);
+        let is_free = |row: &[(char, Ink)], at: usize, before: usize| {
+            let letter = |place: usize| row.get(place).map_or(' ', |(letter, _)| *letter);
+            let blank = |place| [' ', PASSED, TO_COME, EVENT].contains(&letter(place));
+            let apart =
+                [at.wrapping_sub(1), at + length].iter().all(|place| !letter(*place).is_alphanumeric());
+            apart && at + length <= columns && (at.saturating_sub(before)..at + length).all(blank)
         };
-        for (cell, letter) in cells[at..].iter_mut().zip(name.chars()) {
-            *cell = (letter, *ink);
+        let free = |(row, at, before): (usize, Option<usize>, usize)| {
+            at.filter(|at| is_free(&rows[row], *at, before)).map(|at| (row, at))
+        };
+        if let Some((row, at)) = places.into_iter().find_map(free) {
+            for (cell, letter) in rows[row][at..].iter_mut().zip(name.chars()) {
+                *cell = (letter, *ink);
+            }
         }
     }
-    let here = column(now);
-    if !cells[here].0.is_alphabetic() {
-        cells[here] = (NOW, Ink::Body);
+    if !rows[0][here].0.is_alphanumeric() {
+        rows[0][here] = (NOW, Ink::Body);
     }
     let span = |run: &[(char, Ink)]| {
         let text: String = run.iter().map(|(letter, _)| *letter).collect();
         Span::styled(text, theme.ground().fg(theme.ink(run[0].1)))
     };
-    let runs = cells.chunk_by(|(_, one), (_, next)| one == next).map(span);
-    Line::from(std::iter::once(Span::raw(" ")).chain(runs).collect::<Vec<_>>())
+    let line = |cells: Vec<(char, Ink)>| {
+        let runs = cells.chunk_by(|(_, one), (_, next)| one == next).map(span);
+        Line::from(std::iter::once(Span::raw(" ")).chain(runs).collect::<Vec<_>>())
+    };
+    rows.into_iter().map(line).collect()
 }
 
 // The keys that count now, and the pages.
 
 /// The keys come in this order.
-const KEYS: [Act; 14] = [
+const KEYS: [Act; 15] = [
     Act::Tap,
     Act::HoldCountdown,
     Act::Acknowledge,
+    Act::Hold,
     Act::Arm,
     Act::Start,
     Act::Disarm,
@@ -180,7 +218,10 @@ pub fn draw_keys(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
     }
     let keys = &model.settings.keys;
     let rings = model.alarms.unacknowledged() > 0;
-    let works = |act: &Act| act.works(model, now) && (*act != Act::Acknowledge || rings);
+    // In flight no command but the abort does anything, and the page matters.
+    let holds = model.vehicle.in_flight() && model.pages.held.is_none();
+    let matters = |act: &Act| (*act != Act::Acknowledge || rings) && (*act != Act::Hold || holds);
+    let works = |act: &Act| matters(act) && act.works(model, now);
     let mut room = usize::from(left.width);
     let spans = KEYS
         .into_iter()

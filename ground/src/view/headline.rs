@@ -6,9 +6,8 @@ use std::time::Duration;
 use protocol::dialect::TdPhase;
 use ratatui::Frame;
 use ratatui::layout::Rect;
-use ratatui::text::Line;
 
-use super::band::{Item, draw_band, draw_word, number, word};
+use super::band::{Item, draw_word, number, word};
 use super::panels::ending_role;
 use super::pictures::map::comes_down;
 use super::top_lines::{level, readiness};
@@ -112,8 +111,7 @@ pub fn draw_banner(
     frame: &mut Frame,
     area: Rect,
 ) -> Rect {
-    let letters = u16::try_from(banner.words.chars().count()).unwrap_or(u16::MAX);
-    let item = word("", banner.words, letters, banner.role);
+    let item = word("", banner.words, banner.role);
     let rows = draw_word(&item, theme, frame, area);
     let level = theme.level(level(model, now));
     frame.buffer_mut().set_style(Rect { height: rows, ..area }, level);
@@ -122,24 +120,16 @@ pub fn draw_banner(
 
 // The large number or word of each phase.
 
-/// The most letters of a word on the pad, as in `NO DATA`.
-const PAD_LETTERS: u16 = 8;
-/// The most letters of a check beside it, as in `ACCELEROMETER`.
-const CHECK_LETTERS: u16 = 13;
-
 /// Whether the vehicle may be armed; on the way to the start, how far it is.
 pub fn pad(model: &Model, now: Duration) -> Item {
     let (text, role) = pad_word(model, now);
-    let letters = if pad_check(model).is_some() { text.len() as u16 } else { PAD_LETTERS };
-    word("", &text, letters, role)
+    word("", &text, role)
 }
 
-/// The name of the check for which the countdown is held, or the armed vehicle is NO-GO: it stands beside the word, if it is
-/// short enough for 80 columns.
+/// The name of the check for which the countdown is held, or the armed vehicle is NO-GO: it stands beside the word.
 pub fn pad_check(model: &Model) -> Option<Item> {
     let (name, _) = model.vehicle.held_for().or_else(|| model.vehicle.unfit_while_armed())?;
-    let letters = name.len() as u16;
-    (letters <= CHECK_LETTERS).then(|| word("", &name.to_uppercase(), letters, TextRole::Alarm))
+    Some(word("", &name, TextRole::Alarm))
 }
 
 fn pad_word(model: &Model, now: Duration) -> (String, TextRole) {
@@ -194,7 +184,7 @@ fn lost(model: &Model, now: Duration) -> (Item, Vec<Item>) {
 }
 
 /// The number of the present phase, and two or three others.
-fn of_flight(model: &Model, now: Duration) -> (Item, Vec<Item>) {
+pub fn of_flight(model: &Model, now: Duration) -> (Item, Vec<Item>) {
     use TdPhase as P;
     let vehicle = &model.vehicle;
     if is_unheard(vehicle, now) {
@@ -230,22 +220,6 @@ fn of_flight(model: &Model, now: Duration) -> (Item, Vec<Item>) {
     }
 }
 
-/// Draws the band of a flight, with a line under its number, and returns the area below; nothing while large words stand there.
-pub fn draw_flight_band(
-    model: &Model,
-    below: Line<'static>,
-    theme: Theme,
-    now: Duration,
-    frame: &mut Frame,
-    area: Rect,
-) -> Rect {
-    if banner(model, now).is_some() {
-        return area;
-    }
-    let (main, others) = of_flight(model, now);
-    draw_band((&main, below, &others), theme, frame, area)
-}
-
 /// The verdict.
 pub fn verdict(model: &Model, now: Duration) -> Item {
     let (ending, role) = ending_role(model, now).unzip();
@@ -258,5 +232,5 @@ pub fn verdict(model: &Model, now: Duration) -> Item {
         None => "NO VERDICT",
     };
     let role = role.unwrap_or(TextRole::Caution);
-    word("", text, text.len() as u16, role)
+    word("", text, role)
 }

@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
-use protocol::dialect::{TD_CONTROLLER_DATA, TD_TOUCHDOWN_LIMITS_DATA, TdControlLevel, TdLanding, TdLimit};
+use protocol::dialect::{TD_TOUCHDOWN_LIMITS_DATA, TdControlLevel, TdLanding, TdLimit};
 use ratatui::text::Line;
 
-use super::{TextRole, Theme, age_mark, fixed, seconds, shortest, text_row};
+use super::{TextRole, Theme, fixed, seconds, shortest};
 use crate::model::{
     Ending, LIMITS, Model, Sample, Touchdown, Verdict,
     dead_reckoning::{Basis, predict_position},
@@ -13,16 +13,7 @@ use crate::model::{
 };
 
 /// What steers the burn.
-pub fn burn_row(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
-    let Some(told) = model.vehicle.last::<TD_CONTROLLER_DATA>() else {
-        return text_row(theme, "burn", (" ", TextRole::Label), "--", "");
-    };
-    let (mark, age) = age_mark(&told, now);
-    let (words, role) = steered(told.value.level);
-    text_row(theme, "burn", (mark, if age == TextRole::Stale { age } else { role }), &words, "")
-}
-
-fn steered(level: TdControlLevel) -> (String, TextRole) {
+pub fn steered(level: TdControlLevel) -> (String, TextRole) {
     let (words, role) = match level {
         TdControlLevel::TD_CONTROL_LEVEL_CONVERGED => ("on its plan", TextRole::Good),
         TdControlLevel::TD_CONTROL_LEVEL_BEST_FEASIBLE => ("near its plan", TextRole::Caution),
@@ -108,13 +99,8 @@ pub fn lost_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static
         ];
     };
     let row = |label: &str, value: f64| {
-        Line::from(vec![
-            theme.label(format!(" {label:<6}pred")),
-            theme.span(
-                theme.either_side(&format!("{:>7} ±{} m", fixed(value, 1), fixed(at.error_m, 1))),
-                TextRole::Stale,
-            ),
-        ])
+        let words = theme.either_side(&format!("{:>7} ±{} m", fixed(value, 1), fixed(at.error_m, 1)));
+        Line::from_iter([theme.label(format!(" {label:<6}pred")), theme.span(words, TextRole::Stale)])
     };
     let source = match at.basis {
         Basis::Plan => "along the last plan",

@@ -3,6 +3,7 @@
 use ground::model::dead_reckoning::{Basis, predict_position};
 use ground::model::quantity::Quantity;
 use protocol::dialect::{TdAbortEffect, TdChute, TdLanding, TdLimit, TdPhase};
+use protocol::motion::Degrees;
 
 use crate::rig::Rig;
 use crate::screens::{armed, descending, powered, snapshot};
@@ -58,15 +59,26 @@ fn pad_and_vehicle_are_on_the_map_at_every_bearing() {
         let (east, north) = libm::sincos(f64::from(bearing_deg).to_radians());
         let (north, east) = ((-40.0 * north) as f32, (-40.0 * east) as f32);
         rig.state_in_space([north, east, 120.0], [0.0, 0.0, -21.5], (0.0, 3.0));
-        for (columns, rows) in [(80, 24), (140, 45), (200, 60)] {
+        for (columns, rows, points) in [(80, 24, 3), (140, 45, 4), (200, 60, 4)] {
             let screen = rig.screen(columns, rows);
             for mark in ["+", "pad", "fence 120 m"] {
                 assert!(screen.contains(mark), "{mark} {bearing_deg} deg\n{screen}");
             }
-            // One in the header, one on the height and one on the map.
-            assert_eq!(screen.matches('●').count(), 3, "{bearing_deg} deg\n{screen}");
+            // One in the header, one on the height and one on the map; where it is wide, the begin of the flight along its time.
+            assert_eq!(screen.matches('●').count(), points, "{bearing_deg} deg\n{screen}");
         }
     }
+}
+
+/// On the pad the map shows where the crew stands, once both places are known: 0.001 degrees of latitude are 111 m.
+#[test]
+fn the_map_of_the_pad_shows_the_crew() {
+    let mut rig = crate::screens::on_the_pad();
+    let pad = Degrees { latitude: 45.0, longitude: 10.0 };
+    let here = Degrees { latitude: 45.001, ..pad };
+    assert_eq!(rig.screen(140, 45).matches("crew").count(), 0);
+    (rig.model.settings.pad, rig.model.settings.here) = (Some(pad), Some(here));
+    assert_eq!(rig.screen(140, 45).matches("crew 111 m").count(), 1, "{}", rig.screen(140, 45));
 }
 
 /// A flight in space from 300 m to the landing burn.

@@ -10,11 +10,11 @@ use std::path::Path;
 use std::time::Duration;
 
 use ground::key::Key;
-use ground::model::{Page, Seat};
+use ground::model::{Act, Page, Seat};
 use ground::replay::recording::{RecordedEvent, Recording};
 use ground::update::{Msg, Request};
-use ground::view::CUT_MARK;
 use ground::view::theme::{Ink, Palette, TextRole, Theme};
+use ground::view::{CUT_MARK, footer};
 use protocol::dialect::{
     MavMessage, TD_FLIGHT_STATUS_DATA, TdBooster, TdCheck, TdChute, TdHold, TdLimit, TdPhase,
 };
@@ -22,7 +22,7 @@ use ratatui::buffer::Buffer;
 use ratatui::style::{Color, Modifier};
 
 use crate::rig::svg::{colours, moving_picture, picture, rgb};
-use crate::rig::{Rig, settings};
+use crate::rig::{MONO, Rig, settings};
 use crate::screens::{armed, counting, on_the_pad};
 
 const SIZES: [(u16, u16); 3] = [(80, 24), (140, 45), (200, 60)];
@@ -295,6 +295,56 @@ fn the_headline_shows_no_old_height() {
         lost.key(Key::Char(page));
         let band = labels(&lost);
         assert!(!band.contains("height m") && band.contains("PREDICTED m up"), "{band}");
+    }
+}
+
+/// The names in the timeline: whole ones alone, at every width.
+#[test]
+fn no_name_in_the_timeline_overwrites_another() {
+    const NAMES: [&str; 12] = [
+        "lift",
+        "off",
+        "burn",
+        "out",
+        "apogee",
+        "falls",
+        "ready",
+        "ignition",
+        "burns",
+        "touchdown",
+        "over",
+        "parachute",
+    ];
+    for until in [TdPhase::TD_PHASE_AERO_DESCENT, TdPhase::TD_PHASE_POWERED, TdPhase::TD_PHASE_TOUCHDOWN] {
+        let rig = flying(until);
+        for columns in 60..240 {
+            let rows = footer::message_rows(&rig.model, MONO, rig.now, columns);
+            assert_eq!(rows.len(), if columns < 120 { 1 } else { 2 });
+            let text: String = rows.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ");
+            let words = text.split(|letter: char| !letter.is_ascii_alphabetic());
+            let cut: Vec<_> = words.filter(|word| !word.is_empty() && !NAMES.contains(word)).collect();
+            assert!(cut.is_empty(), "{columns}: {cut:?} in {text}");
+        }
+    }
+}
+
+/// While people wait beside a vehicle that has landed, the flight does not shrink.
+#[test]
+fn the_flight_stands_still_after_the_touchdown() {
+    let mut rig = flying(TdPhase::TD_PHASE_TOUCHDOWN);
+    rig.run(3.0);
+    let until = footer::shown_until(&rig.model, rig.now);
+    rig.run(60.0);
+    assert_eq!(footer::shown_until(&rig.model, rig.now), until);
+    assert!(until + Duration::from_mins(1) < rig.now);
+}
+
+/// The row of the keys names none that the vehicle refuses.
+#[test]
+fn no_key_disarms_in_flight() {
+    for (name, rig) in states() {
+        let armed = ["armed", "counting", "unfit", "held"].contains(&name);
+        assert_eq!(Act::Disarm.works(&rig.model, rig.now), armed, "{name}");
     }
 }
 

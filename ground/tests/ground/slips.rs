@@ -90,7 +90,7 @@ fn nothing_says_lift_off_before_the_vehicle_has_moved() {
         // Neither an alarm nor a command hides the flight along its time.
         (0..5).for_each(|_| rig.key(Key::Char(' ')));
         let phase = top_lines::phase(&rig.model, MONO, rig.now).content.trim().to_owned();
-        let row = footer::message_rows(&rig.model, MONO, rig.now, 120)[0].to_string();
+        let row = footer::message_rows(&rig.model, MONO, rig.now, 119)[0].to_string();
         (phase, row.split('●').nth(1).map(|mark| mark.trim_end_matches(['━', '┄', '◆']).to_owned()))
     };
     rig.run(10.0);

@@ -3,18 +3,21 @@
 
 use std::time::Duration;
 
-use protocol::dialect::{TD_DESCENT_DATA, TdAbortEffect, TdBooster, TdChute, TdPhase};
+use protocol::dialect::{TD_CONTROLLER_DATA, TD_DESCENT_DATA, TdAbortEffect, TdBooster, TdChute, TdPhase};
 use ratatui::Frame;
 use ratatui::layout::Constraint::{Fill, Length, Percentage};
 use ratatui::layout::Rect;
 use ratatui::text::Line;
 
 use super::{Room, columns, events, framed, rows, table};
-use crate::model::{Model, Page, dead_reckoning::is_unheard, quantity::Quantity, words};
+use crate::model::{Deflection, Model, Page, Sample, dead_reckoning::is_unheard, quantity::Quantity, words};
+use crate::view::band::draw_band;
 use crate::view::pictures::attitude::{Side, draw_attitude};
 use crate::view::pictures::height::draw_height;
 use crate::view::pictures::map::draw_map;
-use crate::view::{TextRole, Theme, age_mark, bars, headline, panels, quantity_row, text_row};
+use crate::view::{
+    TextRole, Theme, age_mark, bars, draw_lines, fixed, headline, panels, quantity_row, text_row,
+};
 
 /// Columns of the vehicle from one side at 80 columns.
 const SIDE_COLUMNS: u16 = 18;
@@ -32,13 +35,22 @@ const BELOW_ROWS: u16 = 11;
 /// Draws the page of the ascent, of the descent or of the burn. Returns where the pictures are.
 pub fn draw_flying(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) -> Rect {
     // What the newest report means, under the number.
-    let (title, below, names): (_, _, &[&str]) = match model.page() {
-        Page::Ascent => ("ascent", state("booster", booster, model, theme, now), &ASCENT),
-        Page::Landing => ("touchdown", panels::burn_row(model, theme, now), &[]),
-        _ => ("descent", band_word(model, theme, now), &DESCENT),
+    let descent = model.vehicle.descent();
+    let below = match model.page() {
+        Page::Ascent => state("booster", descent.as_ref().map(|told| told.clone().map(booster)), theme, now),
+        Page::Landing => {
+            let told = model.vehicle.last::<TD_CONTROLLER_DATA>();
+            state("burn", told.map(|told| told.map(|told| panels::steered(told.level))), theme, now)
+        }
+        _ => band_word(model, theme, now),
     };
     let burns = model.page() == Page::Landing;
-    let area = headline::draw_flight_band(model, below, theme, now, frame, area);
+    let (main, others) = headline::of_flight(model, now);
+    // Large words of danger stand in its place.
+    let area = match headline::banner(model, now) {
+        Some(_) => area,
+        None => draw_band((&main, below, &others), theme, frame, area),
+    };
     if Room::of(frame.area()) == Room::Small {
         let side = Length(if is_unheard(&model.vehicle, now) { LOST_COLUMNS } else { SIDE_COLUMNS });
         let (left, place, side) = if burns {
@@ -63,10 +75,16 @@ pub fn draw_flying(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     let [left, middle, right] = columns(below, [Percentage(40), Percentage(30), Fill(1)]);
     if burns {
         bars::draw_limits(model, theme, now, frame, left);
+    } else if model.page() == Page::Descent
+        && model.vehicle.may_light()
+        && let Some((open, lines)) = gate(model, theme, now)
+    {
+        let inside = framed("ignition gate", open, theme, frame, left);
+        draw_lines(frame, inside, &lines);
     } else {
-        let mut lines = values(model, theme, now, names);
-        lines.insert(0, state("chute", chute, model, theme, now));
-        table(title, &lines, theme, frame, left);
+        let mut lines = values(model, theme, now, &VALUES);
+        lines.insert(0, state("chute", descent.map(|told| told.map(chute)), theme, now));
+        table("flight", &lines, theme, frame, left);
     }
     bars::draw_surfaces(model, theme, now, frame, middle);
     events(model, theme, frame, right);
@@ -103,45 +121,71 @@ fn vehicle<const N: usize>(
     }
 }
 
-/// The values of the ascent and of the descent beside their states, the most important first.
-static ASCENT: [&str; 7] =
-    ["apogee", "time to apogee", "tilt", "horizontal speed", "distance", "touchdown north", "touchdown east"];
-static DESCENT: [&str; 12] = [
-    "time to ignition",
-    "ignition height",
-    "band low",
-    "band high",
-    "commit height",
-    "distance",
-    "horizontal speed",
-    "tilt",
-    "wind",
-    "drag",
-    "touchdown north",
-    "touchdown east",
-];
+/// The values beside the state of the parachute, the most important first.
+static VALUES: [&str; 7] =
+    ["tilt", "horizontal speed", "distance", "touchdown north", "touchdown east", "wind", "drag"];
+
+/// A fin follows if it is nearer to its command than this, degrees: the 0.1 rad of the vehicle's own gate.
+const FOLLOWS_DEG: f64 = 5.7;
+
+/// What the vehicle tells of the gate of its ignition with the limits that it tells, and how many of them hold. It checks more itself.
+fn gate(model: &Model, theme: Theme, now: Duration) -> Option<(Line<'static>, Vec<Line<'static>>)> {
+    let vehicle = &model.vehicle;
+    let descent = vehicle.descent()?;
+    let d = &descent.value;
+    let (mark, age) = age_mark(&descent, now);
+    let height_m = vehicle.height_m()?.value;
+    let (low_m, high_m) = (f64::from(d.band_low_m), f64::from(d.band_high_m));
+    let off_m = f64::from(libm::hypotf(d.touchdown_x_m, d.touchdown_y_m));
+    let fence_m = vehicle.limits().map_or(f64::NAN, |limits| f64::from(limits.fence_m));
+    let sinks_m_s = -vehicle.vertical_m_s()?.value;
+    let follows = |fins: Sample<[Deflection; 4]>| fins.value.map(|fin| fin.error_deg() < FOLLOWS_DEG);
+    let fins = vehicle.fins().map_or(0, |fins| follows(fins).into_iter().filter(|it| *it).count());
+    let whole = |value: f64| fixed(value, 0);
+    let armed = vehicle.phase_now() == Some(TdPhase::TD_PHASE_LAND_ARMED);
+    let (chute, _) = chute(d);
+    let stowed = d.chute == TdChute::TD_CHUTE_STOWED;
+    let motor = if armed { "armed" } else { "not armed" }.to_owned();
+    let rows = [
+        (
+            "height",
+            (low_m..=high_m).contains(&height_m),
+            whole(height_m),
+            format!("in {}..{} m", whole(low_m), whole(high_m)),
+        ),
+        ("lands off", off_m <= fence_m, whole(off_m), format!("of {} m", whole(fence_m))),
+        ("sinks", sinks_m_s > 0.0, whole(sinks_m_s), "m/s".to_owned()),
+        ("fins follow", fins == 4, fins.to_string(), "of 4".to_owned()),
+        ("parachute", stowed, chute, String::new()),
+        ("motor", armed, motor, String::new()),
+    ];
+    let open = rows.iter().filter(|(_, holds, ..)| *holds).count();
+    let role = |holds: bool| if holds { TextRole::Good } else { TextRole::Caution };
+    let title = theme.line(format!(" {open} of {} told ", rows.len()), role(open == rows.len()));
+    let lines = rows.into_iter().map(|(name, holds, text, unit)| {
+        let label = format!("{:<5}{name}", if holds { "ok" } else { "wait" });
+        let role = if age == TextRole::Stale { age } else { role(holds) };
+        text_row(theme, &label, (mark, role), &text, &unit)
+    });
+    let others = values(model, theme, now, &["tilt", "turn rate"]);
+    Some((title, lines.chain(others).collect()))
+}
 
 fn values(model: &Model, theme: Theme, now: Duration, names: &[&str]) -> Vec<Line<'static>> {
-    // Where it lights says nothing of a motor that will not.
-    let counts = |name: &&&str| **name != "ignition height" || model.vehicle.may_light();
-    let known = names.iter().filter(counts).filter_map(|name| Quantity::named(name));
+    let known = names.iter().filter_map(|name| Quantity::named(name));
     known.map(|quantity| quantity_row(quantity, model, theme, now)).collect()
 }
 
 /// A state of the newest report, in words.
 fn state(
     label: &str,
-    words: fn(&TD_DESCENT_DATA) -> (String, TextRole),
-    model: &Model,
+    told: Option<Sample<(String, TextRole)>>,
     theme: Theme,
     now: Duration,
 ) -> Line<'static> {
-    let Some(descent) = model.vehicle.descent() else {
-        return text_row(theme, label, (" ", TextRole::Label), "no data", "");
-    };
-    let (mark, age) = age_mark(&descent, now);
-    let (text, role) = words(&descent.value);
-    text_row(theme, label, (mark, if age == TextRole::Stale { age } else { role }), &text, "")
+    let Some(told) = told else { return text_row(theme, label, (" ", TextRole::Label), "no data", "") };
+    let ((mark, age), (text, role)) = (age_mark(&told, now), &told.value);
+    text_row(theme, label, (mark, if age == TextRole::Stale { age } else { *role }), text, "")
 }
 
 fn booster(descent: &TD_DESCENT_DATA) -> (String, TextRole) {
@@ -162,7 +206,10 @@ fn chute(descent: &TD_DESCENT_DATA) -> (String, TextRole) {
 /// Compares the height with the ignition band and the commit height, in words.
 fn band_word(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     if model.vehicle.in_flight() && model.vehicle.interlocks().is_some() && !model.vehicle.may_light() {
-        return theme.line(" NO BURN: motor inhibited", TextRole::Alarm);
+        // Without a parachute the row of the state says it.
+        let under_chute = model.vehicle.phase_now() == Some(TdPhase::TD_PHASE_CHUTE);
+        let words = if under_chute { " NO BURN: motor inhibited" } else { "" };
+        return theme.line(words, TextRole::Alarm);
     }
     let Some(descent) = model.vehicle.descent() else {
         return theme.line(" ignition band: no data", TextRole::Caution);

@@ -41,7 +41,7 @@ pub fn draw_pad(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
         } else {
             let [middle, right] = columns(right, [Length(18), Fill(1)]);
             draw_attitude(model, Side::South, theme, now, frame, middle);
-            map("where it lands", model, theme, now, frame, right);
+            map("around the pad", model, theme, now, frame, right);
         }
         return;
     }
@@ -51,7 +51,7 @@ pub fn draw_pad(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
     table("steps", &ladder, theme, frame, left);
     draw_attitude(model, Side::South, theme, now, frame, south);
     draw_attitude(model, Side::East, theme, now, frame, east);
-    map("where it lands", model, theme, now, frame, right);
+    map("around the pad", model, theme, now, frame, right);
     let list = if model.checklist.is_some() { Percentage(40) } else { Length(1) };
     let [left, middle, right] = columns(below, [Length(CHECK_COLUMNS + 4), list, Fill(1)]);
     let lines = checks(model, theme, now);
@@ -73,42 +73,34 @@ fn is_amiss(model: &Model, now: Duration) -> bool {
 fn draw_go(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) -> Rect {
     let keys = &model.settings.keys;
     let counts = model.vehicle.countdown_s().is_some_and(|left| left.value > 0.0);
+    let (words, role) = summary(model, now);
     let next = [(Act::Arm, "ARM"), (Act::Start, "START")].into_iter().find(|(act, _)| act.works(model, now));
-    let good = top_lines::readiness(model, now).is_some_and(|(_, role)| role == TextRole::Good);
-    let next = next.filter(|_| good && !counts);
-    let others: Vec<Item> = next
-        .map(|(act, typed)| {
-            let text = format!("{} {typed}", keys.name(act));
-            word("next: press, then type, Enter", &text, text.len() as u16, TextRole::Title)
-        })
-        .into_iter()
-        .chain(headline::pad_check(model))
-        .collect();
-    let (words, role) = match summary(model, now) {
-        (_, TextRole::Good) => (format!(" every arming check passes{}", counted(model)), TextRole::Good),
-        (words, role) => (format!(" {words}"), role),
-    };
-    let told = next.filter(|_| model.settings.demonstration).map(|(act, typed)| {
-        format!(" A demonstration, simulated here: press {}, type {typed}, press Enter", keys.name(act))
+    let next = next.filter(|_| role == TextRole::Good && !counts).map(|(act, typed)| (keys.name(act), typed));
+    let step = next.as_ref().map(|(key, typed)| {
+        word("next: press, then type, Enter", &format!("{key} {typed}"), TextRole::Title)
     });
-    let (words, role) = told.map_or((words, role), |told| (told, TextRole::Plain));
-    let (words, role) = if counts { (hold(model, now), TextRole::Plain) } else { (words, role) };
-    draw_band((&headline::pad(model, now), theme.line(words, role), &others), theme, frame, area)
-}
-
-/// What still stops a countdown.
-fn hold(model: &Model, now: Duration) -> String {
-    let key = model.settings.keys.name(Act::HoldCountdown);
-    if model.is_past_hold(now) {
-        return " seconds to the release; only the ABORT ends it now".to_owned();
-    }
-    format!(" seconds to the release; {key} Enter holds")
-}
-
-/// How many checks pass.
-fn counted(model: &Model) -> String {
-    let all = model.vehicle.checks_made().iter().count();
-    format!(", {} of {all}", all - model.vehicle.failing().len())
+    let others: Vec<Item> = step.into_iter().chain(headline::pad_check(model)).collect();
+    let (words, role) = match next {
+        _ if counts && model.is_past_hold(now) => {
+            ("seconds to the release; only the ABORT ends it now".to_owned(), TextRole::Plain)
+        }
+        _ if counts => {
+            let key = keys.name(Act::HoldCountdown);
+            (format!("seconds to the release; {key} Enter holds"), TextRole::Plain)
+        }
+        Some((key, typed)) if model.settings.demonstration => {
+            let words = "A demonstration, simulated here: press";
+            (format!("{words} {key}, type {typed}, press Enter"), TextRole::Plain)
+        }
+        _ if role == TextRole::Good => {
+            let all = model.vehicle.checks_made().iter().count();
+            let pass = all - model.vehicle.failing().len();
+            (format!("every arming check passes, {pass} of {all}"), role)
+        }
+        _ => (words, role),
+    };
+    let below = theme.line(format!(" {words}"), role);
+    draw_band((&headline::pad(model, now), below, &others), theme, frame, area)
 }
 
 /// The checks, and the newest events below.

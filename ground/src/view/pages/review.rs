@@ -11,10 +11,7 @@ use super::flight::{FROM_ABOVE, LIMIT_ROWS, height, map};
 use super::{Room, columns, events, rows, table};
 use crate::model::{Act, Model, RED_AFTER, quantity::Quantity};
 use crate::view::band::draw_band;
-use crate::view::{TextRole, Theme, bars, fixed, headline, lists, panels};
-
-/// Rows of the panels under the pictures.
-const BELOW_ROWS: u16 = 12;
+use crate::view::{TextRole, Theme, bars, fixed, headline, lists, panels, text_row};
 
 /// Columns of the time before a finding.
 const FINDING_TIME_COLUMNS: usize = 10;
@@ -58,19 +55,20 @@ pub fn draw_review(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
         }
         return;
     }
-    let [above, below] = rows(area, [Fill(1), Length(BELOW_ROWS)]);
+    let [above, below] = rows(area, [Fill(1), Length(LIMIT_ROWS)]);
     let [left, right] = columns(above, [Percentage(60), Fill(1)]);
     height(model, theme, now, frame, left);
     map(FROM_ABOVE, model, theme, now, frame, right);
     let [left, middle, right] = columns(below, [Percentage(42), Percentage(30), Fill(1)]);
     bars::draw_limits(model, theme, now, frame, left);
-    let found = findings(model, theme, usize::from(middle.width.saturating_sub(2)));
-    let (title, values) = extremes(model, theme, now);
-    if found.is_empty() {
-        table(title, &values, theme, frame, middle);
+    let mut lines = findings(model, theme, usize::from(middle.width.saturating_sub(2)));
+    let title = if model.vehicle.findings.count.is_some_and(|count| count > 0) {
+        FINDINGS_TITLE
     } else {
-        table(FINDINGS_TITLE, &found, theme, frame, middle);
-    }
+        lines.extend(extremes(model, theme));
+        "least, greatest heard"
+    };
+    table(title, &lines, theme, frame, middle);
     events(model, theme, frame, right);
 }
 
@@ -116,40 +114,15 @@ fn unheard(model: &Model, now: Duration) -> Option<String> {
     Some(format!("silent for {} s of the flight", fixed(silence_s, 1)))
 }
 
-/// What the last table shows of a flight.
-const EXTREMES: [&str; 9] = [
-    "height",
-    "vertical speed",
-    "distance",
-    "tilt",
-    "turn rate",
-    "gimbal pitch",
-    "gimbal yaw",
-    "solve time",
-    "solver margin",
-];
+/// What the last table shows of a flight; the height is in its picture.
+const EXTREMES: [&str; 4] = ["vertical speed", "tilt", "turn rate", "solver margin"];
 
-/// The title, and least and greatest values: what happened in a silence is not known.
-fn extremes(model: &Model, theme: Theme, now: Duration) -> (&'static str, Vec<Line<'static>>) {
-    let extremes = &model.history.extremes;
-    let title =
-        if unheard(model, now).is_some() { "least, greatest heard" } else { "least, greatest in flight" };
-    let row = |name: &str, text: String, unit: &'static str| {
-        Line::from(vec![
-            theme.label(format!(" {name:<15}")),
-            theme.plain(text),
-            theme.label(format!(" {unit}")),
-        ])
-    };
-    let known = EXTREMES.into_iter().filter_map(Quantity::named);
-    let mut lines: Vec<Line> = known
-        .map(|quantity| {
-            let ends = extremes.of(quantity.name).map(|ends| ends.map(|end| fixed(end, quantity.decimals)));
-            let [least, greatest] = ends.unwrap_or_else(|| ["--", "--"].map(str::to_owned));
-            row(quantity.name, format!("{least:>7} {greatest:>7}"), quantity.unit)
-        })
-        .collect();
-    let silence = extremes.silence_s.map_or_else(|| "--".to_owned(), |silence_s| fixed(silence_s, 1));
-    lines.push(row("silence", format!("{silence:>15}"), "s"));
-    (title, lines)
+/// Least and greatest values: what happened in a silence is not known.
+fn extremes(model: &Model, theme: Theme) -> impl Iterator<Item = Line<'static>> {
+    EXTREMES.into_iter().filter_map(Quantity::named).map(move |quantity| {
+        let ends = model.history.extremes.of(quantity.name).unwrap_or([f64::NAN; 2]);
+        let [least, greatest] = ends.map(|end| fixed(end, quantity.decimals));
+        let text = format!("{least} {greatest:>7}");
+        text_row(theme, quantity.name, (" ", TextRole::Plain), &text, quantity.unit)
+    })
 }

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use protocol::dialect::TdChute;
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::style::Color;
@@ -51,6 +52,8 @@ const LEG: [f64; 3] = [-0.28, -0.62, 0.24];
 const HINGE: f64 = 0.22;
 const FIN: f64 = 0.3;
 const FLAME: f64 = 0.28;
+/// The canopy over the nose: how far out and how high its hem and its top are, while it fills and when it is open.
+const CANOPY: [[f64; 3]; 2] = [[0.07, 0.66, 0.8], [0.34, 0.64, 0.8]];
 /// The arc with the limit of the tilt, over the nose, and how far it reaches to either side, rad.
 const ARC: f64 = 0.72;
 const ARC_REACH: f64 = 0.7;
@@ -97,19 +100,25 @@ pub fn draw_attitude(model: &Model, side: Side, theme: Theme, now: Duration, fra
     let plane = Plane { area, x: [-half[0], half[0]], y: [-half[1], half[1]] };
     let seen = |place: [f64; 3]| side.sees(on_body(&attitude, place));
     let stroke = |context: &mut Context, from: [f64; 3], to: [f64; 3], color: Color| {
-        let ((x1, y1), (x2, y2)) = (seen(from), seen(to));
-        context.draw(&canvas::Line { x1, y1, x2, y2, color });
+        line(context, seen(from), seen(to), color);
     };
     let burning = vehicle.phase_now().is_some_and(is_burning);
     let gimbal = vehicle.gimbal().map_or_else(Gimbal::default, |gimbal| gimbal.value);
     let limit_rad =
         vehicle.limits().map(|limits| f64::from(limits.tilt_rad)).filter(|limit| *limit < ARC_REACH);
     let near_ground = vehicle.height_m().is_some_and(|height| height.value < 2.0);
+    let chute = vehicle.descent().map(|descent| descent.value.chute).filter(|_| vehicle.in_flight());
     plane.draw(theme, frame, |context| {
-        arc(context, limit_rad, per_dot, theme);
-        // The pointer to the arc, along the nose.
         let (nose, tip) = (seen([NOSE, 0.0, 0.0]), seen([ARC, 0.0, 0.0]));
-        plane.predicted(context, &[nose, tip], theme.ink(Ink::Measured));
+        match chute {
+            Some(TdChute::TD_CHUTE_FIRED) => canopy(context, nose, CANOPY[0], theme),
+            Some(TdChute::TD_CHUTE_OPEN) => canopy(context, nose, CANOPY[1], theme),
+            _ => {
+                arc(context, limit_rad, per_dot, theme);
+                // The pointer to the arc, along the nose.
+                plane.predicted(context, &[nose, tip], theme.ink(Ink::Measured));
+            }
+        }
         for azimuth in 0..4_u32 {
             let (sin, cos) = libm::sincos(f64::from(azimuth).mul_add(std::f64::consts::FRAC_PI_2, 0.6));
             let out = |x: f64, out: f64| [x, out * sin, out * cos];
@@ -124,38 +133,27 @@ pub fn draw_attitude(model: &Model, side: Side, theme: Theme, now: Duration, fra
                 let (sin, cos) = libm::sincos((opening_rad / FIN_STEP).round() * FIN_STEP);
                 place(HINGE - length * cos, HALF_WIDTH + per_dot + length * sin)
             };
+            let (asked, is) = (theme.ink(Ink::Predicted), theme.ink(Ink::Measured));
             if fin.error_deg() > APART_DEG {
-                stroke(
-                    context,
-                    at(fin.commanded_rad, 0.0),
-                    at(fin.commanded_rad, FIN),
-                    theme.ink(Ink::Predicted),
-                );
+                stroke(context, at(fin.commanded_rad, 0.0), at(fin.commanded_rad, FIN), asked);
             }
             for beside in [0.0, per_dot] {
                 let [x, y, z] = at(fin.measured_rad, FIN);
-                stroke(
-                    context,
-                    place(HINGE + beside, HALF_WIDTH),
-                    [x + beside, y, z],
-                    theme.ink(Ink::Measured),
-                );
+                stroke(context, place(HINGE + beside, HALF_WIDTH), [x + beside, y, z], is);
             }
         }
         // Of two colours in a cell the last counts.
         body(context, &seen, per_dot, theme);
-        if burning {
-            flame(context, &stroke, &gimbal, per_dot, theme);
+        // The flame goes against the thrust, which a positive angle turns towards y, and away from z.
+        let (pitch, yaw) = (libm::sin(gimbal.pitch.measured_rad), libm::sin(gimbal.yaw.measured_rad));
+        for (shift, share) in [(-per_dot, 0.7), (0.0, 1.0), (per_dot, 0.7)].into_iter().filter(|_| burning) {
+            let length = share * FLAME;
+            let end = [TAIL - length, shift - length * yaw, shift + length * pitch];
+            stroke(context, [TAIL, shift, shift], end, theme.ink(Ink::Flame));
         }
         if near_ground {
             let y = LEG[1] - per_dot;
-            context.draw(&canvas::Line {
-                x1: -half[0],
-                y1: y,
-                x2: half[0],
-                y2: y,
-                color: theme.ink(Ink::Scale),
-            });
+            context.draw(&canvas::Line::new(-half[0], y, half[0], y, theme.ink(Ink::Scale)));
         }
         let motion =
             vehicle.best_motion().map(|motion| motion.value).filter(|motion| motion.speed_m_s() > 1.0);
@@ -172,6 +170,10 @@ pub fn draw_attitude(model: &Model, side: Side, theme: Theme, now: Duration, fra
     }
 }
 
+fn line(context: &mut Context, (x1, y1): (f64, f64), (x2, y2): (f64, f64), color: Color) {
+    context.draw(&canvas::Line { x1, y1, x2, y2, color });
+}
+
 fn arc(context: &mut Context, limit_rad: Option<f64>, per_dot: f64, theme: Theme) {
     let at = |angle: f64, radius: f64| {
         let (sin, cos) = libm::sincos(angle);
@@ -180,8 +182,22 @@ fn arc(context: &mut Context, limit_rad: Option<f64>, per_dot: f64, theme: Theme
     let dots: Vec<(f64, f64)> = (-8..=8_i32).map(|k| at(ARC_REACH * f64::from(k) / 8.0, ARC)).collect();
     context.draw(&canvas::Points { coords: &dots, color: theme.ink(Ink::Scale) });
     for angle in limit_rad.into_iter().flat_map(|limit| [-limit, limit]) {
-        let ((x1, y1), (x2, y2)) = (at(angle, ARC - 3.0 * per_dot), at(angle, ARC + 3.0 * per_dot));
-        context.draw(&canvas::Line { x1, y1, x2, y2, color: theme.ink(Ink::Limit) });
+        line(context, at(angle, ARC - 3.0 * per_dot), at(angle, ARC + 3.0 * per_dot), theme.ink(Ink::Limit));
+    }
+}
+
+/// The canopy over the vehicle that hangs from it: a half of an ellipse, and its lines to the nose.
+fn canopy(context: &mut Context, (nose_x, nose_y): (f64, f64), [out, hem, top]: [f64; 3], theme: Theme) {
+    let color = theme.ink(Ink::Measured);
+    let at = |k: i32| {
+        let (sin, cos) = libm::sincos(f64::from(k) * std::f64::consts::PI / 16.0);
+        (nose_x + out * cos, hem + (top - hem) * sin)
+    };
+    for k in 0..16 {
+        line(context, at(k), at(k + 1), color);
+    }
+    for k in [0, 5, 11, 16] {
+        line(context, (nose_x, nose_y), (at(k).0, hem), color);
     }
 }
 
@@ -190,61 +206,29 @@ fn body(context: &mut Context, seen: &impl Fn([f64; 3]) -> (f64, f64), per_dot: 
     let ((x1, y1), (x2, y2)) = (seen([TAIL, 0.0, 0.0]), seen([NOSE, 0.0, 0.0]));
     let length = libm::hypot(x2 - x1, y2 - y1).max(per_dot);
     let (side_x, side_y) = (-(y2 - y1) / length, (x2 - x1) / length);
-    let lines = (HALF_WIDTH / per_dot).round().max(1.0) as i32;
+    // Twice as close as dots, so that none is left out where the body leans.
+    let lines = (2.0 * HALF_WIDTH / per_dot).round().max(1.0) as i32;
     for k in -lines..=lines {
         let out = f64::from(k) / f64::from(lines);
         // It tapers from the shoulder to the nose.
         let end = SHOULDER + (NOSE - SHOULDER) * (1.0 - out.abs());
-        let shift = out * HALF_WIDTH;
-        let share = end - TAIL;
-        context.draw(&canvas::Line {
-            x1: x1 + shift * side_x,
-            y1: y1 + shift * side_y,
-            x2: x1 + share * (x2 - x1) + shift * side_x,
-            y2: y1 + share * (y2 - y1) + shift * side_y,
-            color: theme.ink(Ink::Body),
-        });
-    }
-}
-
-/// The flame goes against the thrust, which a positive angle turns towards y, and away from z.
-fn flame(
-    context: &mut Context,
-    stroke: &impl Fn(&mut Context, [f64; 3], [f64; 3], Color),
-    gimbal: &Gimbal,
-    per_dot: f64,
-    theme: Theme,
-) {
-    let (pitch, yaw) = (gimbal.pitch.measured_rad, gimbal.yaw.measured_rad);
-    for (shift, length) in [(-per_dot, 0.7), (0.0, 1.0), (per_dot, 0.7)] {
-        let end =
-            [TAIL - length * FLAME, -length * FLAME * libm::sin(yaw), length * FLAME * libm::sin(pitch)];
-        let from = [TAIL, shift, shift];
-        stroke(context, from, [end[0], end[1] + shift, end[2] + shift], theme.ink(Ink::Flame));
+        let (x, y) = (x1 + out * HALF_WIDTH * side_x, y1 + out * HALF_WIDTH * side_y);
+        let top = (x + (end - TAIL) * (x2 - x1), y + (end - TAIL) * (y2 - y1));
+        line(context, (x, y), top, theme.ink(Ink::Body));
     }
 }
 
 /// An arrow of fixed length.
-fn arrow(
-    context: &mut Context,
-    (x, y): (f64, f64),
-    (along_x, along_y): (f64, f64),
-    color: Color,
-    per_dot: f64,
-) {
-    let size = libm::hypot(along_x, along_y);
-    if size <= 0.0 {
-        return;
-    }
+fn arrow(context: &mut Context, (x, y): (f64, f64), along: (f64, f64), color: Color, per_dot: f64) {
     let eighth = std::f64::consts::FRAC_PI_8;
-    let (dy, dx) = libm::sincos((libm::atan2(along_y, along_x) / eighth).round() * eighth);
+    let (dy, dx) = libm::sincos((libm::atan2(along.1, along.0) / eighth).round() * eighth);
     let (half, head) = (0.16, (4.0 * per_dot).min(0.1));
     let (tip_x, tip_y) = (x + half * dx, y + half * dy);
-    context.draw(&canvas::Line { x1: x - half * dx, y1: y - half * dy, x2: tip_x, y2: tip_y, color });
+    line(context, (x - half * dx, y - half * dy), (tip_x, tip_y), color);
     for turn in [2.5_f64, -2.5] {
         let (sin, cos) = libm::sincos(turn);
-        let (x2, y2) = (tip_x + head * (cos * dx - sin * dy), tip_y + head * (sin * dx + cos * dy));
-        context.draw(&canvas::Line { x1: tip_x, y1: tip_y, x2, y2, color });
+        let end = (tip_x + head * (cos * dx - sin * dy), tip_y + head * (sin * dx + cos * dy));
+        line(context, (tip_x, tip_y), end, color);
     }
 }
 

@@ -9,7 +9,7 @@ use ratatui::widgets::canvas::Line;
 
 use super::{Ink, TextRole, Theme, scales, seconds_since};
 use crate::model::{Model, dead_reckoning::course, is_burning, quantity::Quantity};
-use crate::view::footer::{LENGTHS_S, flight_began};
+use crate::view::footer::{LENGTHS_S, flight_began, shown_until};
 use crate::view::{fixed, widgets};
 
 /// The least height and time that the picture shows.
@@ -31,19 +31,19 @@ fn ticks(span: f64, parts: u16) -> Vec<(f64, f64)> {
     widgets::ticks(0.0, span, step).map(|at| (at, at)).collect()
 }
 
-/// Draws height over time: flown, predicted to the touchdown, where lighting lands, and the height below which no parachute opens.
+/// Draws height over time: flown, predicted to the touchdown, where lighting lands, where it will be lit, and the height below which
+/// no parachute opens.
 pub fn draw_height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     if area.width < 16 || area.height < 4 {
         return;
     }
     let vehicle = &model.vehicle;
     let from = flight_began(model).unwrap_or(now);
-    let flown = flown(model, from, now);
-    let present_s = seconds_since(now, from);
-    let to_come: Vec<(f64, f64)> = course(vehicle, now)
-        .into_iter()
-        .map(|(ahead_s, [_, _, height_m])| (present_s + ahead_s, height_m))
-        .collect();
+    let until = shown_until(model, now);
+    let flown = flown(model, from, until);
+    let present_s = seconds_since(until, from);
+    let course = course(vehicle, now).into_iter();
+    let to_come: Vec<(f64, f64)> = course.map(|(ahead_s, [.., up_m])| (present_s + ahead_s, up_m)).collect();
     let known = |height: Option<f64>| height.filter(|height_m| height_m.is_finite() && *height_m > 0.0);
     let of = |pick| known(vehicle.of_descent(pick).map(|sample| sample.value));
     let falls = matches!(
@@ -58,83 +58,71 @@ pub fn draw_height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     let top =
         [apogee_m, commit_m, band.map(|band| band.1)].into_iter().flatten().fold(reached, f64::max) * 1.08;
     let last_s = to_come.last().map_or(present_s, |(at, _)| *at).max(flown.last().map_or(0.0, |(at, _)| *at));
-    let length_s = LENGTHS_S.into_iter().find(|length_s| last_s < *length_s).unwrap_or(last_s);
+    let lengths_s = LENGTHS_S.into_iter().find(|length_s| last_s < *length_s);
+    // Of a flight that is over as long as it was.
+    let length_s = lengths_s.filter(|_| until == now).unwrap_or(last_s);
     let bounds = ([0.0, length_s], [-0.02 * top, top]);
     let across = ticks(length_s, area.width / TICK_COLUMNS);
     let plane = scales(bounds, (&across, &ticks(top, area.height / TICK_ROWS)), "T+ s", theme, frame, area);
     let height_m = vehicle.height_m().filter(|height| !height.is_stale(now) && vehicle.in_flight());
+    let highest = flown.iter().copied().reduce(|best, next| if next.1 > best.1 { next } else { best });
+    // From the highest point on, so that neither they nor their names move.
+    let since_s = highest.map_or(0.0, |(at, _)| at);
+    let lights_m = of(|d| d.chosen_height_m).filter(|_| lights);
+    let lights_at = lights_m.and_then(|lights_m| {
+        let passes = |pair: &&[(f64, f64)]| pair[0].1 > lights_m && pair[1].1 <= lights_m;
+        let [(before_s, before_m), (after_s, after_m)] = to_come.windows(2).find(passes)?.try_into().ok()?;
+        let share = (before_m - lights_m) / (before_m - after_m);
+        Some((before_s + share * (after_s - before_s), lights_m))
+    });
+    // The lines begin before it, with room for their names.
+    let since_s = lights_at.map_or(since_s, |(at, _)| since_s.max(at - 0.2 * length_s));
     let good = theme.style(TextRole::Good);
     plane.draw(theme, frame, |context| {
-        let ahead = |height_m: f64| [(present_s, height_m), (length_s, height_m)];
-        if let Some((low_m, high_m)) = band {
-            for edge in [low_m, high_m] {
-                plane.predicted(context, &ahead(edge), good.fg.unwrap_or_default());
-            }
+        for edge in band.into_iter().flat_map(|(low_m, high_m)| [low_m, high_m]) {
+            plane.predicted(context, &[(since_s, edge), (length_s, edge)], good.fg.unwrap_or_default());
         }
         if let Some(y) = commit_m {
-            context.draw(&Line { x1: present_s, y1: y, x2: length_s, y2: y, color: theme.ink(Ink::Limit) });
+            context.draw(&Line { x1: since_s, y1: y, x2: length_s, y2: y, color: theme.ink(Ink::Limit) });
         }
         plane.predicted(context, &to_come, theme.ink(Ink::Predicted));
         plane.measured(context, &flown, theme.ink(Ink::Measured));
     });
     let ink = |ink| theme.ground().fg(theme.ink(ink));
-    if let Some((low_m, high_m)) = band {
-        let words = format!("band {}..{}", fixed(low_m, 0), fixed(high_m, 0));
-        plane.write(frame, (length_s, f64::midpoint(low_m, high_m)), &words, good);
-    }
-    if let Some(commit_m) = commit_m {
-        let above = (commit_m + 4.0 * plane.dot()).min(top);
-        plane.write(frame, (length_s, above), &format!("commit {}", fixed(commit_m, 0)), ink(Ink::Limit));
-    }
-    marks(model, (from, &flown), apogee_m, theme, frame, &plane);
-    if let Some((at, _)) = to_come.last().filter(|(_, height_m)| *height_m < 1.0) {
-        plane.write(frame, (*at, 0.0), "×", ink(Ink::Predicted));
-    }
-    if let Some(height_m) = height_m {
-        plane.write(frame, (present_s, height_m.value.max(0.0)), "●", theme.style(TextRole::Title));
-    }
-}
-
-/// The highest point, expected or reached, and where the motor was lit.
-fn marks(
-    model: &Model,
-    (from, flown): (Duration, &[(f64, f64)]),
-    expected_m: Option<f64>,
-    theme: Theme,
-    frame: &mut Frame,
-    plane: &super::Plane,
-) {
-    let highest = flown.iter().copied().reduce(|best, next| if next.1 > best.1 { next } else { best });
-    let rises = matches!(model.vehicle.phase_now(), Some(TdPhase::TD_PHASE_BOOST | TdPhase::TD_PHASE_COAST));
-    match highest {
-        Some((at, _)) if rises => {
-            if let Some(apogee_m) = expected_m {
-                let words = format!("apogee {}", fixed(apogee_m, 0));
-                let ink = theme.ground().fg(theme.ink(Ink::Predicted));
-                plane.write(frame, (at.max(plane.x[0]), apogee_m), &words, ink);
-            }
-        }
-        Some((at, height_m)) if at > 0.0 => {
-            let below = (height_m - 6.0 * plane.dot()).max(0.0);
-            let words = format!("{} m", fixed(height_m, 0));
-            let begin = (at - 0.04 * plane.x[1]).max(plane.x[0]);
-            plane.write(frame, (begin, below), &words, theme.style(TextRole::Label));
-        }
-        _ => {}
-    }
+    let (label, predicted) = (theme.style(TextRole::Label), ink(Ink::Predicted));
     let lit = model.history.timeline.iter().find(|(phase, _)| is_burning(*phase));
-    if let Some((_, at)) = lit {
-        let at_s = seconds_since(*at, from);
-        let height_m = flown.iter().find(|(time_s, _)| *time_s >= at_s).map(|(_, height_m)| *height_m);
-        if let Some(height_m) = height_m {
-            let style = theme.ground().fg(theme.ink(Ink::Flame));
-            plane.write(frame, (at_s, height_m), "▲", style);
-            plane.write(
-                frame,
-                (at_s + 0.04 * plane.x[1], height_m),
-                &fixed(height_m, 0),
-                theme.style(TextRole::Label),
-            );
-        }
+    let lit_s = lit.map(|(_, at)| seconds_since(*at, from));
+    let lit_at = lit_s.and_then(|lit_s| flown.iter().copied().find(|(at, _)| *at >= lit_s));
+    let lands_at = to_come.last().filter(|(_, height_m)| *height_m < 1.0).map(|(at, _)| (*at, 0.0));
+    let here = height_m.map(|height_m| (present_s, height_m.value.max(0.0)));
+    let marks = [
+        (lit_at, "▲", ink(Ink::Flame)),
+        (lands_at, "×", predicted),
+        (lights_at, "▲", predicted),
+        (here, "●", theme.style(TextRole::Title)),
+    ];
+    for (at, mark, style) in marks.into_iter().filter_map(|(at, mark, style)| Some((at?, mark, style))) {
+        plane.write(frame, at, mark, style);
+    }
+    let whole = |value: f64| fixed(value, 0);
+    let words = |name: &str, (at_s, height_m): (f64, f64)| {
+        let (height, time) = (format!("{} m", whole(height_m)), format!(", T+{}", fixed(at_s, 1)));
+        vec![format!("{name}{height}{time}"), format!("{height}{time}"), height]
+    };
+    let rises = matches!(vehicle.phase_now(), Some(TdPhase::TD_PHASE_BOOST | TdPhase::TD_PHASE_COAST));
+    let top = highest.filter(|(at, _)| *at > 0.0);
+    let labels = [
+        lights_at.map(|at| ((since_s, at.1), words("lights ", at), predicted)),
+        band.filter(|_| lights_at.is_none()).map(|(low_m, high_m)| {
+            let words = format!("band {}..{}", whole(low_m), whole(high_m));
+            ((since_s, f64::midpoint(low_m, high_m)), vec![words], good)
+        }),
+        commit_m.map(|m| ((since_s, m), vec![format!("commit {}", whole(m))], ink(Ink::Limit))),
+        apogee_m.filter(|_| rises).map(|m| ((since_s, m), vec![format!("apogee {}", whole(m))], predicted)),
+        top.filter(|_| !rises).map(|at| (at, words("", at), label)),
+        lit_at.map(|at| (at, words("lit ", at), label)),
+    ];
+    for (at, words, style) in labels.into_iter().flatten() {
+        plane.beside(frame, at, &words, style);
     }
 }

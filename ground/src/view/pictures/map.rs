@@ -5,10 +5,12 @@ use std::time::Duration;
 use protocol::dialect::TdPhase;
 use ratatui::Frame;
 use ratatui::layout::Rect;
-use ratatui::widgets::canvas::Line;
+use ratatui::widgets::canvas::Circle;
 
 use super::{DOTS_ACROSS, DOTS_UP, Ink, Plane, TextRole, Theme, circle};
-use crate::model::{Model, dead_reckoning::predict_position, is_burning, is_on_pad, quantity::Quantity};
+use crate::model::{
+    Model, Spot, dead_reckoning::predict_position, is_burning, is_on_pad, quantity::Quantity,
+};
 use crate::view::{fixed, shortest, widgets};
 
 /// The least that the picture shows to every side, m; in the burn the scale of the last 30 m.
@@ -23,20 +25,13 @@ const EDGE: f64 = 1.15;
 const FENCE_COST_MAX: f64 = 15.0;
 /// The steps of the place and the radius of the circle of the uncertainty, in reaches.
 const SPREAD_STEP: f64 = 1.0 / 6.0;
+/// A rail that leans less than this is taken as upright, degrees.
+const RAIL_LEANS_DEG: f64 = 0.5;
 /// How far back predictions of the touchdown count for its uncertainty.
 const SCATTER_OVER: Duration = Duration::from_secs(5);
 
-/// Where the vehicle will come down: east and north of the pad and the radius of the uncertainty, m.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ComesDown {
-    pub east_m: f64,
-    pub north_m: f64,
-    /// How far the prediction has moved within five seconds.
-    pub radius_m: f64,
-}
-
-/// The predicted touchdown in flight; `None` while it is unknown or stale.
-pub fn comes_down(model: &Model, now: Duration) -> Option<ComesDown> {
+/// The predicted touchdown in flight, and how far it has moved within five seconds; `None` while it is unknown or stale.
+pub fn comes_down(model: &Model, now: Duration) -> Option<Spot> {
     if !model.vehicle.in_flight() {
         return None;
     }
@@ -49,17 +44,10 @@ pub fn comes_down(model: &Model, now: Duration) -> Option<ComesDown> {
     let from = now.saturating_sub(SCATTER_OVER);
     let trace = &model.history.trace;
     let past = trace.values(north, from, now).zip(trace.values(east, from, now));
-    let radius_m = past
+    let error_m = past
         .map(|((_, past_north), (_, past_east))| libm::hypot(past_north - north_m, past_east - east_m))
         .fold(0.0, f64::max);
-    Some(ComesDown { east_m, north_m, radius_m })
-}
-
-/// The landing that is rehearsed on the pad: east and north, m.
-fn rehearsed(model: &Model) -> Option<(f64, f64)> {
-    let on_pad = model.vehicle.phase_now().is_some_and(is_on_pad);
-    let (north_m, _) = model.vehicle.planned().last().filter(|_| on_pad)?;
-    Some((0.0, *north_m))
+    Some(Spot { north_m, east_m, error_m })
 }
 
 /// The middle of the picture and how far it reaches, m: both in steps, so that the ground stands still while the vehicle moves
@@ -103,23 +91,22 @@ pub fn draw_map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
     let burns = phase.is_some_and(is_burning);
     let here = vehicle.best_motion().filter(|motion| motion.value.x_m.is_finite() && !motion.is_stale(now));
     let here = here.map(|motion| (motion.value.y_m, motion.value.x_m)).filter(|_| vehicle.in_flight());
-    let rehearsed = rehearsed(model);
     let around =
         |at: (f64, f64), radius: f64| [(at.0 - radius, at.1 - radius), (at.0 + radius, at.1 + radius)];
-    let mut points: Vec<(f64, f64)> = here.into_iter().chain(stands).collect();
+    let on_pad = phase.is_some_and(is_on_pad);
+    let crew = model.settings.pad.zip(model.settings.here).filter(|_| on_pad).map(|(pad, here)| pad.to(here));
+    let crew = crew.map(|(north_m, east_m)| (east_m, north_m));
+    let mut points: Vec<(f64, f64)> = here.into_iter().chain(stands).chain(crew).collect();
     points.extend(lost.iter().flat_map(|at| around((at.y_m, at.x_m), at.error_m.min(500.0))));
     points.extend(down.iter().map(|at| (at.east_m, at.north_m)));
     if !burns || points.is_empty() {
         points.push((0.0, 0.0));
-        points.extend(rehearsed);
     }
     let (mut middle, mut reach_m) = box_around(&points, if burns { BURN_REACH_M } else { REACH_MIN_M });
     // The whole fence, unless it would make everything small; on the ground only the way to the vehicle matters.
-    let whole =
-        fence_m.filter(|fence_m| stands.is_none() && !burns && *fence_m < FENCE_COST_MAX * reach_m.max(30.0));
-    if let Some(fence_m) =
-        whole.filter(|fence_m| points.iter().all(|(x, y)| libm::hypot(*x, *y) < 1.2 * fence_m))
-    {
+    let is_small = |fence_m: f64| fence_m < FENCE_COST_MAX * reach_m.max(30.0) && stands.is_none() && !burns;
+    let holds = |fence_m: f64| points.iter().all(|(x, y)| libm::hypot(*x, *y) < 1.2 * fence_m);
+    if let Some(fence_m) = fence_m.filter(|fence_m| is_small(*fence_m) && holds(*fence_m)) {
         (middle, reach_m) = ((0.0, 0.0), 1.08 * fence_m);
     }
     let (across, up) = (f64::from(area.width) * DOTS_ACROSS, f64::from(area.height) * DOTS_UP);
@@ -129,21 +116,30 @@ pub fn draw_map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
         Plane { area, x: [middle.0 - half_x, middle.0 + half_x], y: [middle.1 - half_y, middle.1 + half_y] };
     // In whole steps, so that it does not tremble.
     let step_m = SPREAD_STEP * reach_m;
-    let spread = down.map(|at| {
+    // What has not settled yet has none.
+    let spread = down.filter(|at| at.error_m < reach_m).map(|at| {
         let [east_m, north_m] = [at.east_m, at.north_m].map(|place_m| (place_m / step_m).round() * step_m);
-        circle((east_m, north_m), ((at.radius_m / step_m).round() * step_m).max(step_m))
+        circle((east_m, north_m), ((at.error_m / step_m).round() * step_m).max(step_m))
+    });
+    // A vehicle on its rail leans with it.
+    let lean = vehicle.attitude.map(|attitude| attitude.value).filter(|_| on_pad);
+    let rail = lean.filter(|attitude| attitude.tilt_rad.to_degrees() > RAIL_LEANS_DEG).map(|attitude| {
+        let [north, east, _] =
+            attitude.axes[0].map(|part| 0.4 * reach_m * part / libm::sin(attitude.tilt_rad));
+        ((east, north), attitude.tilt_rad.to_degrees())
     });
     let error = lost.map(|at| circle((at.y_m, at.x_m), at.error_m));
     plane.draw(theme, frame, |context| {
         if let Some(fence_m) = fence_m {
-            for pair in circle((0.0, 0.0), fence_m).windows(2) {
-                let ((x1, y1), (x2, y2)) = (pair[0], pair[1]);
-                context.draw(&Line { x1, y1, x2, y2, color: theme.ink(Ink::Limit) });
-            }
+            let (x, y, color) = (0.0, 0.0, theme.ink(Ink::Limit));
+            context.draw(&Circle { x, y, radius: fence_m, color });
         }
         plane.measured(context, &flown, theme.ink(Ink::Measured));
         for dotted in [&spread, &error].into_iter().flatten() {
             plane.predicted(context, dotted, theme.ink(Ink::Predicted));
+        }
+        if let Some((at, _)) = rail {
+            plane.measured(context, &[(0.0, 0.0), at], theme.ink(Ink::Body));
         }
         if let Some(at) = stands {
             plane.predicted(context, &[(0.0, 0.0), at], theme.ink(Ink::Body));
@@ -153,20 +149,12 @@ pub fn draw_map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
     let beside = |x: f64| x + 2.0 * DOTS_ACROSS * per_dot;
     let strong = theme.style(TextRole::Title);
     plane.write(frame, (0.0, 0.0), "+", strong);
-    // Beside it, where nothing else is.
-    let to_the_east = here.or(stands).is_some_and(|(east_m, _)| east_m > 0.0);
-    let pad_x = if to_the_east { -4.0 * DOTS_ACROSS * per_dot } else { beside(0.0) };
-    plane.write(frame, (pad_x, 0.0), "pad", theme.style(TextRole::Label));
-    if let Some((east_m, north_m)) = rehearsed {
-        plane.write(frame, (east_m, north_m), "×", ink(Ink::Predicted));
-        plane.write(frame, (east_m, north_m - DOTS_UP * per_dot), "rehearsed", ink(Ink::Predicted));
-    }
     if let Some(at) = down {
         plane.write(frame, (at.east_m, at.north_m), "×", ink(Ink::Predicted));
     }
     if let Some(at) = lost {
         plane.write(frame, (at.y_m, at.x_m), "+", ink(Ink::Predicted));
-        plane.write(frame, (beside(at.y_m), at.x_m), "PREDICTED", ink(Ink::Predicted));
+        plane.beside(frame, (at.y_m, at.x_m), &["PREDICTED".to_owned()], ink(Ink::Predicted));
     } else if let Some(at) = here {
         plane.write(frame, at, "●", strong);
     }
@@ -176,6 +164,17 @@ pub fn draw_map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
         plane.write(frame, (beside(x / 2.0), y / 2.0), &words, strong);
     }
     words(model, (fence_m, per_dot), theme, frame, &plane);
+    let label = |frame: &mut Frame, at, words: &str| {
+        plane.beside(frame, at, &[words.to_owned()], theme.style(TextRole::Label));
+    };
+    label(frame, (0.0, 0.0), "pad");
+    if let Some(at) = crew {
+        plane.write(frame, at, "o", strong);
+        label(frame, at, &format!("crew {} m", fixed(libm::hypot(at.0, at.1), 0)));
+    }
+    if let Some((at, tilt_deg)) = rail {
+        label(frame, at, &format!("rail {}°", fixed(tilt_deg, 0)));
+    }
 }
 
 /// What stands at the edges: north, the wind, the fence, the scale.

@@ -11,7 +11,7 @@ pub mod qr;
 use std::time::Duration;
 
 use ratatui::Frame;
-use ratatui::layout::Rect;
+use ratatui::layout::{Position, Rect};
 use ratatui::style::{Color, Style};
 use ratatui::symbols::Marker;
 use ratatui::widgets::canvas::{Canvas, Context, Line, Points};
@@ -56,6 +56,24 @@ impl Plane {
         let Some((column, row)) = self.cell(x, y).filter(|_| length <= self.area.width) else { return };
         let column = column.min(self.area.right() - length);
         frame.buffer_mut().set_string(column, row, words, style);
+    }
+
+    /// Writes the first of some words that has room beside a place, on its row or one near it, where nothing else stands.
+    fn beside(&self, frame: &mut Frame, (x, y): (f64, f64), words: &[String], style: Style) {
+        let Some((column, row)) = self.cell(x, y) else { return };
+        let buffer = frame.buffer_mut();
+        let is_blank = |at: Position| [" ", "\u{2800}"].contains(&buffer[at].symbol());
+        let places = words.iter().flat_map(|words| {
+            let width = words.chars().count() as u16;
+            let columns = [column.checked_sub(width + 1), Some(column + 2), column.checked_sub(width / 2)];
+            let rows = (0..4).flat_map(move |k| [row.checked_sub(k), Some(row + k)]);
+            let places = rows.flat_map(move |row| columns.map(|column| Some((column?, row?))));
+            places.flatten().map(move |(x, y)| (words, Rect { x, y, width, height: 1 }))
+        });
+        let free = |at: &Rect| self.area.union(*at) == self.area && at.positions().all(is_blank);
+        if let Some((words, at)) = places.into_iter().find(|(_, at)| free(at)) {
+            buffer.set_string(at.x, at.y, words, style);
+        }
     }
 
     fn draw(&self, theme: Theme, frame: &mut Frame, paint: impl Fn(&mut Context)) {
