@@ -77,7 +77,7 @@ fn the_map_of_the_pad_shows_the_crew() {
     let pad = Degrees { latitude: 45.0, longitude: 10.0 };
     let here = Degrees { latitude: 45.001, ..pad };
     assert_eq!(rig.screen(140, 45).matches("crew").count(), 0);
-    (rig.model.settings.pad, rig.model.settings.here) = (Some(pad), Some(here));
+    (rig.model.vehicle.pad, rig.model.settings.here) = (Some(pad), Some(here));
     assert_eq!(rig.screen(140, 45).matches("crew 111 m").count(), 1, "{}", rig.screen(140, 45));
 }
 

@@ -94,7 +94,7 @@ pub fn draw_map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
     let around =
         |at: (f64, f64), radius: f64| [(at.0 - radius, at.1 - radius), (at.0 + radius, at.1 + radius)];
     let on_pad = phase.is_some_and(is_on_pad);
-    let crew = model.settings.pad.zip(model.settings.here).filter(|_| on_pad).map(|(pad, here)| pad.to(here));
+    let crew = vehicle.pad.zip(model.settings.here).filter(|_| on_pad).map(|(pad, here)| pad.to(here));
     let crew = crew.map(|(north_m, east_m)| (east_m, north_m));
     let mut points: Vec<(f64, f64)> = here.into_iter().chain(stands).chain(crew).collect();
     points.extend(lost.iter().flat_map(|at| around((at.y_m, at.x_m), at.error_m.min(500.0))));
