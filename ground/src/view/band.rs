@@ -132,13 +132,16 @@ pub fn draw_band(
     }
     let [size, other_size] = SIZES[room as usize];
     let others_columns: u16 = others.iter().map(|item| width(item, other_size) + GAP).sum();
-    let fits = |size: &Size| 1 + main.pixels * size.0 + GAP + others_columns <= area.width;
+    let begin = |size| 1 + width(main, size) + GAP;
+    // The last row is below the letters, or behind tall ones.
+    let behind = |size: Size| if 1 + rows_of(size) < rows { 0 } else { begin(size) };
+    let fits = |size: &Size| {
+        begin(*size) + others_columns <= area.width && behind(*size) + below.width() as u16 <= area.width
+    };
     // Beside three others at 80 columns it is taller, not wider.
     let size = [size, (1, 2)].into_iter().find(fits).unwrap_or(NARROW);
     letters(main, size, theme, frame, Rect { x: band.x + 1, width: band.width - 1, ..band });
-    let begin = 1 + width(main, size) + GAP;
-    // The last row is below the letters, or behind tall ones.
-    let behind = if 1 + rows_of(size) < rows { 0 } else { begin };
+    let (begin, behind) = (begin(size), behind(size));
     let at = Rect { x: band.x + behind, y: band.bottom() - 1, width: band.width - behind, height: 1 };
     draw_line(frame, at, below);
     let spare = area.width.saturating_sub(begin + others_columns);
