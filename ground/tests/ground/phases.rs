@@ -113,6 +113,20 @@ fn regress_land_armed() {
     snapshot("land_armed", &rig);
 }
 
+/// What the vehicle tells of its gate: above the band, with a fin that is 6 degrees behind, and not yet armed it waits for three.
+#[test]
+fn the_gate_waits_for_what_the_vehicle_tells() {
+    let mut rig = descending();
+    rig.limits();
+    let waits = |rig: &Rig| rig.screen(120, 36).matches("wait ").count();
+    assert_eq!(waits(&rig), 3, "{}", rig.screen(120, 36));
+    rig.phase = TdPhase::TD_PHASE_LAND_ARMED;
+    rig.run(0.2);
+    rig.state(4.0, 60.0, -0.6, -21.5, 88.0);
+    rig.descent(60.0);
+    assert_eq!(waits(&rig), 1, "{}", rig.screen(120, 36));
+}
+
 /// Below the commit height, with the ignition gate shut, an abort still throws out the parachute.
 #[test]
 fn with_the_parachute_still_to_come_no_burn_is_committed_to() {
