@@ -251,6 +251,8 @@ fn take_terminal() -> io::Result<(Terminal<DiffBackend<FrameBuffer>>, TerminalWr
     let mut backend = DiffBackend::new(CrosstermBackend::new(buffer));
     // GNU Screen sets it.
     backend.erases = std::env::var_os("STY").is_none();
+    backend.has_true_colour =
+        std::env::var("COLORTERM").is_ok_and(|says| ["truecolor", "24bit"].contains(&says.as_str()));
     Ok((Terminal::new(backend)?, writer))
 }
 

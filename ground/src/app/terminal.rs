@@ -15,10 +15,14 @@ use ratatui::buffer::{Cell, CellWidth as _};
 use ratatui::layout::{Position, Size};
 use ratatui::style::{Color, Modifier};
 
+use crate::view::theme::true_colour;
+
 /// ratatui's own backend, except for the cells.
 #[derive(Debug)]
 pub struct DiffBackend<W: Write> {
     pub terminal: CrosstermBackend<W>,
+    /// Whether the terminal shows colours of 24 bits.
+    pub has_true_colour: bool,
     /// The rightmost column that was ever drawn. Behind the last one of the terminal the cursor stands where it likes.
     rightmost: u16,
     cursor_is_hidden: bool,
@@ -28,7 +32,7 @@ pub struct DiffBackend<W: Write> {
 
 impl<W: Write> DiffBackend<W> {
     pub fn new(terminal: CrosstermBackend<W>) -> Self {
-        Self { terminal, rightmost: 0, cursor_is_hidden: false, erases: true }
+        Self { terminal, has_true_colour: false, rightmost: 0, cursor_is_hidden: false, erases: true }
     }
 }
 
@@ -40,14 +44,10 @@ const MODIFIERS: [(Modifier, u8, u8); 3] =
 fn codes(colour: Color, base: u8) -> Vec<u8> {
     match colour {
         Color::Indexed(number) => vec![base + 8, 5, number],
+        Color::Rgb(red, green, blue) => vec![base + 8, 2, red, green, blue],
         Color::Black => vec![base],
         Color::White => vec![base + 67],
-        Color::Red => vec![base + 1],
-        Color::Green => vec![base + 2],
-        Color::Yellow => vec![base + 3],
-        Color::Magenta => vec![base + 5],
-        Color::Cyan => vec![base + 6],
-        // No theme has others.
+        // No theme and no picture has others.
         _ => vec![base + 9],
     }
 }
@@ -93,10 +93,10 @@ struct Run {
 }
 
 /// The cells as runs, from row to row. Blanks belong to the letters beside them, whatever colour these have.
-fn runs<'a>(content: impl Iterator<Item = (u16, u16, &'a Cell)>) -> Vec<Run> {
+fn runs<'a>(content: impl Iterator<Item = (u16, u16, &'a Cell)>, shown: fn(Color) -> Color) -> Vec<Run> {
     let mut runs: Vec<Run> = Vec::new();
     for (column, row, cell) in content {
-        let style = Style { fore: cell.fg, back: cell.bg, modifier: cell.modifier };
+        let style = Style { fore: shown(cell.fg), back: shown(cell.bg), modifier: cell.modifier };
         let is_blank = cell.symbol() == " " && !cell.modifier.contains(Modifier::REVERSED);
         let columns = cell.cell_width().max(1);
         let beside = runs.last_mut().filter(|run| {
@@ -172,7 +172,7 @@ impl<W: Write> Backend for DiffBackend<W> {
     type Error = io::Error;
 
     fn draw<'a, I: Iterator<Item = (u16, u16, &'a Cell)>>(&mut self, content: I) -> io::Result<()> {
-        let runs = runs(content);
+        let runs = runs(content, if self.has_true_colour { true_colour } else { std::convert::identity });
         if runs.is_empty() {
             return Ok(());
         }
@@ -254,6 +254,18 @@ impl<W: Write> Backend for DiffBackend<W> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_terminal_of_24_bits_gets_the_parts_of_a_colour() {
+        let mut cell = Cell::default();
+        cell.set_symbol("x").set_style(ratatui::style::Style::new().fg(Color::Indexed(75)));
+        let mut written = Vec::new();
+        let mut terminal = DiffBackend::new(CrosstermBackend::new(&mut written));
+        terminal.has_true_colour = true;
+        terminal.draw([(0, 0, &cell)].into_iter()).unwrap();
+        let written = String::from_utf8(written).unwrap();
+        assert!(written.contains("\x1b[38;2;116;192;255m\x1b[1;1Hx\x1b[m"), "{written:?}");
+    }
 
     #[test]
     fn only_what_is_new_is_said() {

@@ -325,7 +325,7 @@ impl TryFrom<BTreeMap<String, String>> for Bindings {
 // The palette: every action with its key, and every number to plot; found by a part of its words.
 
 /// How to abort.
-pub const ABORT_WORDS: &str = "abort, from anywhere: Enter within 2 s of Ctrl-X (or Ctrl-X twice)";
+pub const ABORT_WORDS: &str = "abort, anywhere: Enter within 2 s of Ctrl-X, or Ctrl-X twice";
 
 /// What an entry of the palette does.
 #[derive(Debug, Clone, Copy, PartialEq)]

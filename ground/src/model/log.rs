@@ -205,7 +205,7 @@ impl Events {
     }
 
     /// The newest `count` events, oldest first.
-    pub fn newest(&self, count: usize) -> impl Iterator<Item = &Event> {
+    pub fn newest(&self, count: usize) -> impl DoubleEndedIterator<Item = &Event> {
         self.kept.iter().skip(self.kept.len().saturating_sub(count))
     }
 

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use protocol::dialect::TD_CONTROLLER_DATA;
+use protocol::link_stats::LinkFigures;
 
 use super::{BodySpeed, Model, Motion, Sample, Vehicle};
 
@@ -45,7 +46,7 @@ impl Quantity {
 }
 
 /// How many quantities there are.
-pub const COUNT: usize = 38;
+pub const COUNT: usize = 40;
 
 const fn quantity(
     name: &'static str,
@@ -86,8 +87,8 @@ pub static ALL: [Quantity; COUNT] = [
     quantity("commit height", "m", 1, |m, _| m.vehicle.of_descent(|d| d.commit_height_m)),
     quantity("time to ignition", "s", 1, |m, now| m.vehicle.ignition_in_s(now)),
     quantity("wind", "m/s", 1, |m, _| m.vehicle.of_descent(|d| libm::hypotf(d.wind_x_m_s, d.wind_y_m_s))),
-    quantity("touchdown north", "m", 1, |m, _| m.vehicle.of_descent(|d| d.touchdown_x_m)),
-    quantity("touchdown east", "m", 1, |m, _| m.vehicle.of_descent(|d| d.touchdown_y_m)),
+    quantity("touchdown north", "m", 1, |m, _| m.vehicle.of_touchdown(|d| d.touchdown_x_m)),
+    quantity("touchdown east", "m", 1, |m, _| m.vehicle.of_touchdown(|d| d.touchdown_y_m)),
     quantity("drag", "x", 3, |m, _| m.vehicle.of_descent(|d| d.drag_scale)),
     quantity("time to touchdown", "s", 1, |m, now| m.vehicle.touchdown_in_s(now)),
     quantity("predicted speed", "m/s", 2, |m, _| m.vehicle.predicted_speed_m_s()),
@@ -106,11 +107,17 @@ pub static ALL: [Quantity; COUNT] = [
         let check = m.vehicle.pad_check.as_ref().filter(|check| check.is_judged())?;
         Some(Sample::new(check.failing().count() as f64, check.told_at))
     }),
-    quantity("link rate", "B/s", 0, |m, now| {
-        m.link.heard_at.map(|_| Sample::new(m.link.stats.figures(now).rx_bytes_s, now))
+    quantity("link rate", "B/s", 0, |m, now| link(m, now, |figures| figures.rx_bytes_s)),
+    quantity("link sent", "B/s", 0, |m, now| link(m, now, |figures| figures.tx_bytes_s)),
+    quantity("round trip", "ms", 0, |m, now| {
+        m.link.round_trip.map(|trip| Sample::new(1_000.0 * trip.as_secs_f64(), now))
     }),
     quantity("link loss", "%", 1, |m, now| m.link.loss(now).map(|loss| Sample::new(100.0 * loss, now))),
 ];
+
+fn link(model: &Model, now: Duration, pick: fn(&LinkFigures) -> f64) -> Option<Sample<f64>> {
+    model.link.heard_at.map(|_| Sample::new(pick(&model.link.stats.figures(now)), now))
+}
 
 fn body(model: &Model, pick: fn(&BodySpeed) -> f64) -> Option<Sample<f64>> {
     model.vehicle.body_speed().map(|body| body.map(pick))

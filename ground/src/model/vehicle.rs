@@ -299,6 +299,14 @@ impl Vehicle {
         Some(sample).filter(|sample| sample.value.is_finite())
     }
 
+    /// A coordinate of the predicted touchdown. At the beginning of the fall, until the vehicle knows its ignition band, it follows
+    /// from a sink rate of nearly zero and is far off: that counts as not known.
+    pub fn of_touchdown(&self, pick: fn(&TD_DESCENT_DATA) -> f32) -> Option<Sample<f64>> {
+        use TdPhase as P;
+        let begins = matches!(self.phase_now(), Some(P::TD_PHASE_DEPLOY | P::TD_PHASE_AERO_DESCENT));
+        self.of_descent(pick).filter(|_| !begins || self.of_descent(|d| d.band_low_m).is_some())
+    }
+
     /// A number of the position and velocity.
     pub fn of_motion(&self, pick: fn(&Motion) -> f64) -> Option<Sample<f64>> {
         self.best_motion().map(|motion| motion.map(pick))

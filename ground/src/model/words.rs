@@ -1,10 +1,11 @@
 //! Turns values of the dialect, and numbers, into words for the crew. A number has a bounded width for every value.
 
+use std::borrow::Cow;
 use std::fmt::Debug;
 
 use protocol::dialect::{TD_FLIGHT_STATUS_DATA, TdAbortEffect, TdInterlock, TdPhase};
 
-use super::telemetry::phase_from_number;
+use super::{is_on_pad, telemetry::phase_from_number};
 
 /// The phase's name, as in `PAD_IDLE`.
 pub fn phase(phase: TdPhase) -> String {
@@ -44,6 +45,21 @@ pub fn event(phase: TdPhase) -> Option<&'static str> {
         TdPhase::TD_PHASE_TOUCHDOWN => "touchdown",
         TdPhase::TD_PHASE_CHUTE => "parachute",
     })
+}
+
+/// What an event says to the crew; `None` if it tells them nothing that other events or the state do not. The log keeps its own
+/// words.
+pub fn of_event(text: &str) -> Option<Cow<'_, str>> {
+    if let Some(phases) = text.strip_prefix("phase ") {
+        // The vehicle itself says what lights, and on the pad the crew does it.
+        let phase = phase_from_name(phases.rsplit(' ').next()?)?;
+        return (phase != TdPhase::TD_PHASE_BOOST && !is_on_pad(phase)).then(|| doing(phase).into());
+    }
+    match text.strip_prefix("controller level ") {
+        Some("CONVERGED") => None,
+        Some(level) => Some(format!("steered: {}", level.to_lowercase().replace('_', " ")).into()),
+        None => Some(text.trim_end_matches(" (HEARTBEAT)").into()),
+    }
 }
 
 /// A boot number as eight hexadecimal digits.
@@ -166,6 +182,23 @@ mod tests {
         let impact = TdAbortEffect::TD_ABORT_EFFECT_IMPACT;
         assert_eq!(words(impact, 37), "IMPACT at about 37 m/s, too low for a chute");
         assert_eq!(words(impact, u8::MAX), "IMPACT, too low for a chute", "unknown is no speed");
+    }
+
+    #[test]
+    fn an_event_has_the_words_of_the_crew_or_none() {
+        for (text, words) in [
+            ("phase DEPLOY -> AERO_DESCENT", Some("Falling")),
+            ("phase SAFED", Some("Flight over")),
+            ("phase PAD_IDLE -> PAD_ARMED", None),
+            ("phase PAD_ARMED -> BOOST", None),
+            ("controller level CONVERGED", None),
+            ("controller level SHIFTED_PLAN", Some("steered: shifted plan")),
+            ("disarmed (HEARTBEAT)", Some("disarmed")),
+            ("phase 3 of the moon", None),
+            ("landing motor commanded to light", Some("landing motor commanded to light")),
+        ] {
+            assert_eq!(of_event(text).as_deref(), words, "{text}");
+        }
     }
 
     #[test]

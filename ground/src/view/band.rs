@@ -114,6 +114,8 @@ const SIZES: [[Size; 2]; 3] = [[(2, 1), NARROW], [(2, 2), NARROW], [(3, 3), (2, 
 fn rows_of((_, halves): Size) -> u16 {
     (5 * halves).div_ceil(2)
 }
+/// Columns and rows of the smallest letter.
+pub const LETTER: (u16, u16) = (DIGIT_PIXELS, 3);
 
 /// Draws the main item at the left with the line under it, the others to its right, and returns the area below.
 pub fn draw_band(

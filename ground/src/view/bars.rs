@@ -118,11 +118,15 @@ pub fn draw_surfaces(model: &Model, theme: Theme, now: Duration, frame: &mut Fra
         let degrees = |pick: fn(&Deflection) -> f64| angles.map(|angles| pick(&angles.value).to_degrees());
         let (commanded, measured) = (degrees(|d| d.commanded_rad), degrees(|d| d.measured_rad));
         let text = measured.map_or_else(|| "--".to_owned(), |deg| fixed(deg, digits));
-        let (name, text) = (theme.label(format!(" {name:<6}")), format!("{mark}{text:>5}"));
-        draw_line(frame, at, Line::from_iter([name, theme.span(text, strong(role)), theme.label("°")]));
+        let words = [
+            theme.label(format!(" {name:<6}")),
+            theme.span(format!("{mark}{text:>5}"), strong(role)),
+            theme.label(" deg"),
+        ];
+        draw_line(frame, at, Line::from_iter(words));
         let share = |deg: f64| (deg - low) / (high - low);
         let asked = theme.ground().fg(theme.ink(Ink::Predicted));
-        let bar_at = Rect { x: at.x + 16, width: at.width.saturating_sub(17), ..at };
+        let bar_at = Rect { x: at.x + 19, width: at.width.saturating_sub(20), ..at };
         let ink = theme.ground().fg(theme.ink(Ink::Measured));
         let mark = commanded.map(|deg| (share(deg), asked));
         bar([share(0.0), measured.map_or(share(0.0), share)], ink, mark, frame, bar_at);

@@ -9,6 +9,7 @@ use ratatui::layout::Constraint::{Fill, Length};
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
+use super::lists::said;
 use super::status_lines::{alarm_text, replay_line};
 use super::{Ink, TextRole, Theme, draw_line, side_by_side, top_lines};
 use crate::model::{Act, Model, Page, dead_reckoning::course, is_burning, is_flight, is_on_pad, words};
@@ -38,11 +39,9 @@ pub fn message_rows(model: &Model, theme: Theme, now: Duration, columns: u16) ->
 }
 
 fn newest_event(model: &Model, theme: Theme) -> Option<Line<'static>> {
-    model.events.newest(1).next().map(|event| {
-        let role = if event.level == EventLevel::Info { TextRole::Label } else { TextRole::Plain };
-        let head = format!(" {:.1} ", event.at.as_secs_f64());
-        theme.line(format!("{head}{}{}", event.mark().trim_start(), event.text), role)
-    })
+    let (event, text) = said(model).next()?;
+    let role = if event.level == EventLevel::Info { TextRole::Label } else { TextRole::Plain };
+    Some(theme.line(format!(" {:.1} {}{text}", event.at.as_secs_f64(), event.mark().trim_start()), role))
 }
 
 // The flight along its time: what has been, what is expected, warnings and errors, and the shown moment.

@@ -195,9 +195,16 @@ pub fn of_flight(model: &Model, now: Duration) -> (Item, Vec<Item>) {
     let vertical = vehicle.vertical_m_s();
     let sink = || number("sink m/s", vertical.map(|up| up.map(|m_s| -m_s)), 0, 3, now);
     let climb = || number("climb m/s", vertical, 0, 3, now);
-    let tilt = || number("tilt °", vehicle.tilt_deg(), 0, 3, now);
+    let tilt = || number("tilt deg", vehicle.tilt_deg(), 0, 3, now);
     let off_pad = comes_down(model, now).map(|at| Sample::new(libm::hypot(at.east_m, at.north_m), now));
-    let lands_off = || number("lands off m", off_pad, 0, 3, now).predicted();
+    let fence_m = vehicle.limits().map(|limits| f64::from(limits.fence_m));
+    let lands_off = || {
+        let mut lands = number("lands off m", off_pad, 0, 3, now).predicted();
+        if off_pad.zip(fence_m).is_some_and(|(off_pad, fence_m)| off_pad.value > fence_m) {
+            (lands.label, lands.role) = ("BEYOND FENCE".to_owned(), TextRole::Caution);
+        }
+        lands
+    };
     let apogee_s =
         vehicle.of_descent(|d| d.time_to_apogee_s).map(|left| left.map(|s| s - left.age(now).as_secs_f64()));
     match phase {

@@ -1,12 +1,14 @@
 //! Lists of lines: the newest events, the checklist, and the filter above a list.
 
+use std::borrow::Cow;
 use std::time::Duration;
 
 use protocol::log::record::EventLevel;
 use ratatui::text::{Line, Span};
+use textwrap::{Options, WordSeparator, WordSplitter};
 
-use super::{CUT_MARK, TextRole, Theme, fixed};
-use crate::model::{Act, Mark, Model, Step, StepState, role_name};
+use super::{TextRole, Theme, fixed, footer::flight_began};
+use crate::model::{Act, Event, Mark, Model, Step, StepState, role_name, words};
 
 /// Columns before the text of an event: time, speaker and mark.
 const TIME_COLUMNS: usize = 7;
@@ -15,89 +17,59 @@ const NARROW_COLUMNS: usize = 50;
 /// Narrower than this, a text is cut rather than wrapped.
 const WRAP_COLUMNS_MIN: usize = 20;
 
-/// The newest events, oldest first, in this many lines of this width. Long texts wrap, because the end of a refusal
-/// is its reason.
+/// The newest events, oldest first, in this many lines of this width. Long texts wrap, because the end of a refusal is its reason.
+/// The newest is whole: if it alone has more lines, its beginning is drawn.
 pub fn events(model: &Model, theme: Theme, columns: usize, rows: usize) -> Vec<Line<'static>> {
-    newest_lines(chosen(model, theme, columns, rows), columns, rows)
-}
-
-/// The lines of each of the newest events.
-fn chosen(model: &Model, theme: Theme, columns: usize, rows: usize) -> Vec<Vec<Line<'static>>> {
     // In a narrow panel the speaker is left out.
     let is_narrow = columns < NARROW_COLUMNS;
     let before = if is_narrow { TIME_COLUMNS + 3 } else { BEFORE_TEXT };
     let text_columns = columns.saturating_sub(before);
-    model
-        .events
-        .newest(rows)
-        .map(|event| {
+    let lift_off = flight_began(model);
+    let mut lines: Vec<Vec<Line>> = said(model)
+        .take(rows)
+        .map(|(event, text)| {
             let role = match event.level {
                 EventLevel::Info => TextRole::Plain,
                 EventLevel::Warning => TextRole::Caution,
                 EventLevel::Error | EventLevel::Fatal => TextRole::Alarm,
             };
-            let time = format!("{:>TIME_COLUMNS$.1} ", event.at.as_secs_f64());
+            let time = format!("{:>TIME_COLUMNS$} ", clock_time(event.at, lift_off));
             let head = if is_narrow { time } else { format!("{time}{:<7} ", event.speaker.name()) };
-            let mark = event.mark();
-            let pieces = if text_columns < WRAP_COLUMNS_MIN {
-                vec![event.text.clone()]
-            } else {
-                wrap(&event.text, text_columns)
-            };
-            let mut pieces = pieces.into_iter();
-            let first = pieces.next().unwrap_or_default();
-            let first = Line::from(vec![theme.label(head), theme.span(format!("{mark}{first}"), role)]);
+            let columns = if text_columns < WRAP_COLUMNS_MIN { usize::MAX } else { text_columns };
+            let mut pieces = wrap(&text, columns).into_iter();
+            let first = format!("{}{}", event.mark(), pieces.next().unwrap_or_default());
+            let first = Line::from(vec![theme.label(head), theme.span(first, role)]);
             let rest = pieces
                 .map(move |piece| Line::from(vec![Span::raw(" ".repeat(before)), theme.span(piece, role)]));
             std::iter::once(first).chain(rest).collect()
         })
-        .collect()
+        .collect();
+    let newest = lines.first().map_or(0, Vec::len);
+    lines.reverse();
+    let mut lines = lines.concat();
+    lines.drain(..lines.len().saturating_sub(rows.max(newest)));
+    lines
 }
 
-/// As many of the last lines as there are rows. If the newest event alone has more, its beginning stays, with a mark where it
-/// is cut.
-fn newest_lines(mut events: Vec<Vec<Line<'static>>>, columns: usize, rows: usize) -> Vec<Line<'static>> {
-    if let Some(newest) = events.last_mut().filter(|newest| newest.len() > rows) {
-        newest.truncate(rows);
-        let cut = newest.last_mut().map(|line| (line.width(), line.spans.last_mut()));
-        if let Some((width, Some(text))) = cut {
-            let mut words = text.content.to_string();
-            if width >= columns {
-                words.pop();
-            }
-            words.push(CUT_MARK);
-            text.content = words.into();
-        }
-    }
-    let mut lines = events.concat();
-    lines.drain(..lines.len().saturating_sub(rows));
-    lines
+/// The events that tell the crew something, the newest first, each in the words of the crew.
+pub fn said(model: &Model) -> impl Iterator<Item = (&Event, Cow<'_, str>)> {
+    let newest = model.events.newest(usize::MAX).rev();
+    newest.filter_map(|event| Some((event, words::of_event(&event.text)?)))
+}
+
+/// The time of an event: from the lift-off once there was one, otherwise since the start of the run. The longest lose their tenth.
+pub fn clock_time(at: Duration, lift_off: Option<Duration>) -> String {
+    let Some(lift_off) = lift_off else { return format!("{:.1}", at.as_secs_f64()) };
+    let since_s = at.as_secs_f64() - lift_off.as_secs_f64();
+    let decimals = usize::from(since_s.abs() < 999.0);
+    format!("T{since_s:+.decimals$}")
 }
 
 /// Breaks a text at spaces; a word longer than a line is broken at the end of the line.
 pub fn wrap(text: &str, columns: usize) -> Vec<String> {
-    let mut lines = Vec::new();
-    let (mut line, mut used) = (String::new(), 0);
-    for word in text.split(' ') {
-        let length = word.chars().count();
-        if used > 0 && used + 1 + length > columns {
-            lines.push(std::mem::take(&mut line));
-            used = 0;
-        } else if used > 0 {
-            line.push(' ');
-            used += 1;
-        }
-        for c in word.chars() {
-            if used == columns {
-                lines.push(std::mem::take(&mut line));
-                used = 0;
-            }
-            line.push(c);
-            used += 1;
-        }
-    }
-    lines.push(line);
-    lines
+    let options = Options::new(columns).word_separator(WordSeparator::AsciiSpace);
+    let lines = textwrap::wrap(text, options.word_splitter(WordSplitter::NoHyphenation));
+    lines.into_iter().map(Cow::into_owned).collect()
 }
 
 // The checklist as rows: which step counts, who signed it, and the value found.
@@ -236,10 +208,17 @@ mod tests {
         // In a panel this narrow the speaker is left out.
         let gap = " ".repeat(TIME_COLUMNS + 3);
         let whole = ["    7.0 ! arming refused: pin:", &format!("{gap}found in the vehicle")];
-        assert_eq!(shown(0), [""; 0]);
-        assert_eq!(shown(1), ["    7.0 ! arming refused: pin…"]);
+        assert_eq!(shown(1), whole, "its end is cut where it is drawn");
         assert_eq!(shown(2), whole);
         assert_eq!(shown(3), ["    7.0   SAFED", whole[0], whole[1]]);
+    }
+
+    #[test]
+    fn an_event_has_the_time_since_the_lift_off() {
+        let [start, lift_off, late] = [0.0, 30.25, 1_530.2].map(Duration::from_secs_f64);
+        assert_eq!(clock_time(lift_off, None), "30.2");
+        let times = [start, lift_off, late].map(|at| clock_time(at, Some(lift_off)));
+        assert_eq!(times, ["T-30.2", "T+0.0", "T+1500"]);
     }
 
     #[test]

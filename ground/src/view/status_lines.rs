@@ -3,13 +3,11 @@
 use std::time::Duration;
 
 use protocol::dialect::{TdBooster, TdChute, TdMotor, TdPhase};
-use protocol::link_stats::LinkFigures;
 use ratatui::text::{Line, Span};
+use unicode_truncate::UnicodeTruncateStr as _;
 
 use super::{STALE_MARK, TextRole, Theme, fixed, shortest};
-use crate::model::{
-    Alarm, GRAVITY_M_S2, Model, Page, Playback, RADIO_FRESH, Role, TextEntry, Vehicle, latch_cause,
-};
+use crate::model::{Alarm, GRAVITY_M_S2, Model, Page, Playback, Role, TextEntry, Vehicle, latch_cause};
 
 /// How long until the next event is shown large, so that the line needs not say it.
 fn is_large(page: Page, phase: TdPhase) -> bool {
@@ -112,50 +110,14 @@ fn within(left_s: Option<f64>) -> String {
         .map_or_else(String::new, |left_s| format!(" in {} s", fixed(left_s, 1)))
 }
 
-// One line about the link: rates, loss, rejected frames, each of several links, radio.
+// One line about the link.
 
-/// The line in this width. Parts that do not fit are left out whole, because half a number would be wrong.
-pub fn link_line(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line<'static> {
-    if let Some(why) = &model.link.trouble {
-        return theme.line(format!(" LINK DOWN {why}"), TextRole::Alarm);
-    }
-    let figures = model.link.stats.figures(now);
-    let round_trip = match model.link.round_trip {
-        Some(round_trip) => format!("{:.0} ms", round_trip.as_secs_f64() * 1_000.0),
-        None => "--".to_owned(),
-    };
-    let loss = model.link.loss(now);
-    let unsigned = model.link.signing.map_or(0, |signing| signing.rejected());
-    let rejected =
-        model.link.framing.crc_errors + model.link.framing.unknown_ids + model.link.undecodable + unsigned;
-    let span = |text: String, role: TextRole| theme.span(text, role);
+/// What arrives, and how much is lost.
+pub fn link_line(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     let capacity = model.settings.link_capacity_bytes_s.map_or_else(String::new, |most| format!("/{most}"));
-    let received = span(format!(" rx {:.0}{capacity} B/s", figures.rx_bytes_s), TextRole::Plain);
-    let refused = (rejected > 0 || model.link.send_drops > 0)
-        .then(|| span(format!("  rejected {rejected}  unsent {}", model.link.send_drops), TextRole::Caution));
-    // The most important parts first, so that they fit into the narrowest panel.
-    let mut pieces = vec![received, span(format!("  loss {}", percent(loss)), loss_role(loss))];
-    pieces.extend(refused);
-    let several = model.link.reports.iter().filter(|_| model.link.reports.len() > 1);
-    pieces.extend(several.map(|report| {
-        let kind = report.name.split(':').next().unwrap_or_default();
-        if report.trouble.is_some() {
-            return span(format!("  {kind} DOWN"), TextRole::Alarm);
-        }
-        let LinkFigures { rx_bytes_s, rx_frames_s, loss, .. } = report.figures;
-        let known = (rx_frames_s > 0.0).then_some(loss);
-        let capacity = report.capacity_bytes_s.map_or_else(String::new, |most| format!("/{most}"));
-        span(format!("  {kind} {rx_bytes_s:.0}{capacity} B/s {}", percent(known)), loss_role(known))
-    }));
-    pieces.push(span(format!("  rtt {round_trip}"), TextRole::Plain));
-    pieces.extend(radio(model, now).map(|words| span(words, TextRole::Plain)));
-    pieces.push(span(format!("  tx {:.0} B/s", figures.tx_bytes_s), TextRole::Plain));
-    let mut used = 0;
-    let fits = |piece: &Span| {
-        used += piece.width();
-        used <= columns
-    };
-    Line::from(pieces.into_iter().take_while(fits).collect::<Vec<_>>())
+    let received = format!(" rx {:.0}{capacity} B/s", model.link.stats.figures(now).rx_bytes_s);
+    let loss = model.link.loss(now);
+    Line::from(vec![theme.plain(received), theme.span(format!("  loss {}", percent(loss)), loss_role(loss))])
 }
 
 /// A loss of more than a twentieth is marked.
@@ -166,22 +128,6 @@ pub fn loss_role(loss: Option<f64>) -> TextRole {
 /// A loss in percent; unknown while nothing arrives.
 pub fn percent(share: Option<f64>) -> String {
     share.map_or_else(|| "unknown".to_owned(), |share| format!("{:.1} %", share * 100.0))
-}
-
-/// A radio's report about itself: signal and noise at both ends, in its own units.
-fn radio(model: &Model, now: Duration) -> Option<String> {
-    let (radio, at) = model.link.radio.as_ref()?;
-    let fresh = now.saturating_sub(*at) < RADIO_FRESH;
-    fresh.then(|| {
-        let [rssi, remote, noise, remote_noise] =
-            [radio.rssi, radio.remrssi, radio.noise, radio.remnoise].map(signal_or_unknown);
-        format!("  rssi {rssi}/{remote} noise {noise}/{remote_noise}")
-    })
-}
-
-/// 255 means unknown.
-fn signal_or_unknown(value: u8) -> String {
-    if value == u8::MAX { "--".to_owned() } else { value.to_string() }
 }
 
 /// Whether the log records, and for how long.
@@ -272,18 +218,11 @@ pub fn cut(text: &str, columns: usize) -> String {
         return text.to_owned();
     }
     let room = columns.saturating_sub(2);
-    let fits = beginning(text, room);
+    let (fits, _) = text.unicode_truncate(room);
     let ends_a_word = text[fits.len()..].starts_with(' ');
     let words = fits.rsplit_once(' ').map(|(words, _)| words).filter(|_| !ends_a_word);
     let kept = words.filter(|words| 3 * Span::raw(*words).width() >= 2 * room).unwrap_or(fits);
     format!("{}..", kept.trim_end())
-}
-
-/// As much of a text as fits into so many columns; some letters take two.
-pub fn beginning(text: &str, columns: usize) -> &str {
-    let ends = text.char_indices().map(|(at, letter)| at + letter.len_utf8());
-    let fitting = ends.take_while(|end| Span::raw(&text[..*end]).width() <= columns).last();
-    &text[..fitting.unwrap_or(0)]
 }
 
 #[cfg(test)]

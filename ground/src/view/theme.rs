@@ -1,8 +1,8 @@
 //! Gives each role of a text, and each part of a picture, its style. Colour only repeats what a word or a mark
 //! already says.
 //!
-//! Dark and light paint their own background, in colours whose values are fixed (the upper 240 of the 256 of xterm), so that their
-//! contrast is known. In the sun only the light theme can be read.
+//! Dark and light paint their own background, in colours whose values are fixed (the upper 240 of the 256 of xterm, and what a
+//! terminal of 24 bits shows for them), so that their contrast is known. In the sun only the light theme can be read.
 
 use std::borrow::Cow;
 
@@ -106,8 +106,6 @@ struct Colours {
     label: u8,
     good: u8,
     caution: u8,
-    /// Text and background.
-    alarm: (u8, u8),
     border: u8,
     /// In the order of [`Ink::ALL`].
     inks: [u8; 6],
@@ -122,7 +120,6 @@ const DARK: Colours = Colours {
     label: 249,
     good: 79,
     caution: 215,
-    alarm: (231, 124),
     border: 240,
     inks: [75, 221, 218, 255, 215, 249],
     levels: [(231, 238), (16, 214), (231, 124), (16, 79)],
@@ -134,11 +131,26 @@ const LIGHT: Colours = Colours {
     label: 239,
     good: 22,
     caution: 88,
-    alarm: (231, 124),
     border: 246,
-    inks: [19, 88, 90, 16, 88, 239],
-    levels: [(231, 240), (16, 214), (231, 124), (231, 22)],
+    inks: [19, 23, 90, 16, 88, 239],
+    levels: [(231, 239), (16, 214), (231, 124), (231, 22)],
 };
+
+/// The numbers of the palettes, and what a terminal of 24 bits shows for each: red, green and blue.
+const NUMBERS: [u8; 22] =
+    [16, 19, 22, 23, 75, 79, 88, 90, 124, 195, 214, 215, 218, 221, 233, 234, 238, 239, 240, 246, 249, 255];
+#[expect(clippy::unreadable_literal, reason = "two digits each for red, green and blue")]
+const TRUE_COLOURS: [u32; NUMBERS.len()] = [
+    0x0b0f14, 0x00449e, 0x005c38, 0x7a4300, 0x74c0ff, 0x63d8a4, 0x7d4000, 0x8c1273, 0xa31a14, 0xeef2f5,
+    0xffb000, 0xffb454, 0xf2a0d8, 0xffd866, 0x0b0f14, 0x141b23, 0x3b4753, 0x44505b, 0x44525f, 0x98a4af,
+    0xa3b0bd, 0xf0f4f8,
+];
+
+/// A colour on a terminal of 24 bits.
+pub fn true_colour(colour: Color) -> Color {
+    let place = NUMBERS.iter().position(|number| Color::Indexed(*number) == colour);
+    place.map_or(colour, |place| Color::from_u32(TRUE_COLOURS[place]))
+}
 
 /// What the terminal can show, and in which colours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -177,7 +189,7 @@ impl Theme {
 
     /// The style of an empty cell.
     pub fn ground(self) -> Style {
-        self.palette.colours().map_or_else(Style::new, |colours| on(colours.plain, colours.back))
+        self.palette.colours().map_or_else(Style::new, |colours| on((colours.plain, colours.back)))
     }
 
     /// The background of an empty cell.
@@ -187,7 +199,7 @@ impl Theme {
 
     /// The style of the header, the large numbers and the keys, which stand out a little.
     pub fn raised(self) -> Style {
-        self.palette.colours().map_or_else(Style::new, |colours| on(colours.plain, colours.raised))
+        self.palette.colours().map_or_else(Style::new, |colours| on((colours.plain, colours.raised)))
     }
 
     /// The style of the lines between panels: nothing depends on them.
@@ -197,10 +209,8 @@ impl Theme {
 
     /// The style of the rows of the state.
     pub fn level(self, level: Level) -> Style {
-        let style = self.palette.colours().map_or_else(reversed, |colours| {
-            let (fore, back) = colours.levels[level as usize];
-            on(fore, back)
-        });
+        let colours = self.palette.colours();
+        let style = colours.map_or_else(reversed, |colours| on(colours.levels[level as usize]));
         style.add_modifier(Modifier::BOLD)
     }
 
@@ -212,7 +222,7 @@ impl Theme {
             TextRole::Label => ink(colours.label),
             TextRole::Good => ink(colours.good),
             TextRole::Caution => ink(colours.caution),
-            TextRole::Alarm => on(colours.alarm.0, colours.alarm.1),
+            TextRole::Alarm => on(colours.levels[Level::Danger as usize]),
         });
         let style =
             coloured.unwrap_or_else(|| if role == TextRole::Alarm { reversed() } else { Style::new() });
@@ -257,7 +267,7 @@ fn ink(colour: u8) -> Style {
     Style::new().fg(Color::Indexed(colour))
 }
 
-fn on(fore: u8, back: u8) -> Style {
+fn on((fore, back): (u8, u8)) -> Style {
     ink(fore).bg(Color::Indexed(back))
 }
 
@@ -290,7 +300,6 @@ fn ascii(c: char) -> char {
         '█' | '▙' | '▛' | '▜' | '▟' | '▇' => '#',
         '▀' => '"',
         '▄' | '▁' | '▂' | '▃' => '_',
-        '°' => 'd',
         '·' | '▖' | '▗' | '▘' | '▝' | '┄' => '.',
         '•' | '●' => '*',
         '○' => 'o',

@@ -12,7 +12,7 @@ use ratatui::style::Modifier;
 use ratatui::text::{Line, Span};
 
 use super::theme::Level;
-use super::{STALE_MARK, TextRole, Theme, age_mark, draw_line, shortest, side_by_side, status_lines};
+use super::{STALE_MARK, TextRole, Theme, age_mark, draw_line, lists, shortest, side_by_side, status_lines};
 use crate::model::{
     Acknowledgement, AlarmKind, Approach, CommandKind, Ending, Event, Foreign, LinkState, Model, Page, Role,
     Standing, TrackedCommand, abort_too_late, dead_reckoning::may_have_left, hold_words,
@@ -23,12 +23,11 @@ use crate::model::{
 const STATE_COLUMNS: [u16; 3] = [9, 15, 9];
 /// From this width on the state and what an abort would do, with its key, stand in one row, otherwise in two.
 pub const ONE_ROW_COLUMNS: u16 = 160;
-const ABORT_COLUMNS: u16 = 84;
+const ABORT_COLUMNS: u16 = 87;
 /// From this width on the rate and the loss of the link are shown beside its ages.
 const RATES_COLUMNS: u16 = 110;
 /// A screen that is less late than this is read as live.
 const LATE_SHOWN: Duration = Duration::from_secs(1);
-const RATES_WITHIN: usize = 32;
 
 /// Draws who and what is seen, how well it is heard, and whether that is recorded.
 pub fn draw_identity(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
@@ -39,7 +38,7 @@ pub fn draw_identity(model: &Model, theme: Theme, now: Duration, frame: &mut Fra
         right.extend([theme.span(words, TextRole::Alarm), Span::raw(" ")]);
     }
     if shows_rates {
-        right.extend(status_lines::link_line(model, theme, now, RATES_WITHIN).spans);
+        right.extend(status_lines::link_line(model, theme, now).spans);
         right.push(Span::raw("  "));
     }
     right.extend(link(model, theme, now).spans);
@@ -104,9 +103,9 @@ fn in_the_middle(model: &Model, theme: Theme, now: Duration, columns: usize) -> 
     let is_pad = model.page() == Page::Pad;
     let ready = || readiness(model, now).filter(|_| !is_pad).map(|(words, _)| format!(" {words}"));
     let said = || {
-        let fresh = |event: &&Event| now.saturating_sub(event.at) < SAID_SHOWN;
-        let event = model.events.newest(1).next().filter(fresh)?;
-        Some(format!(" {}{}", event.mark().trim_start(), event.text))
+        let fresh = |(event, _): &(&Event, _)| now.saturating_sub(event.at) < SAID_SHOWN;
+        let (event, text) = lists::said(model).next().filter(fresh)?;
+        Some(format!(" {}{text}", event.mark().trim_start()))
     };
     // Of an abort that was seen, what comes after it counts.
     let aborted = model.alarms.foremost().is_some_and(|alarm| alarm.kind == AlarmKind::Aborted);
@@ -480,9 +479,9 @@ pub fn message(model: &Model, theme: Theme, now: Duration, columns: usize) -> Op
 }
 
 /// Whether the vehicle may be armed: GO only if every check passes and the uplink is proven. `None` before the
-/// vehicle has reported its checks.
+/// vehicle has reported its checks, and off the pad, where it makes none.
 pub fn readiness(model: &Model, now: Duration) -> Option<(String, TextRole)> {
-    let status = model.vehicle.status.as_ref()?;
+    let status = model.vehicle.status.as_ref().filter(|status| is_on_pad(status.value.phase))?;
     if status.is_stale(now) {
         return Some((format!("{STALE_MARK}checks: no longer received"), TextRole::Stale));
     }

@@ -6,7 +6,9 @@ use ground::key::Key;
 use ground::model::{Bindings, DEFINITIONS, Page, PaletteAction, Prompt, palette_entries, quantity};
 use ground::update::{Action, Msg};
 use proptest::prelude::*;
+use protocol::dialect::TdPhase;
 
+use crate::pictures::flying;
 use crate::rig::{Rig, is_abort, is_arm, settings, typed};
 use crate::screens::{armed, descending, on_the_pad, powered};
 
@@ -188,4 +190,33 @@ fn a_paste_into_the_palette_does_nothing() {
     rig.msg(Msg::Pasted);
     assert_eq!(rig.model.pages.entry, None);
     assert!(rig.take_commands().is_empty());
+}
+
+/// A vehicle that stands a hand below zero has no tick at -100 m, and ticks are as far apart as what they tell.
+#[test]
+fn the_ticks_of_a_plot_are_at_their_places() {
+    let mut rig = flying(TdPhase::TD_PHASE_TOUCHDOWN);
+    rig.state_in_space([1.0, 0.0, -0.01], [0.0; 3], (0.0, 0.0));
+    rig.run(1.0);
+    choose(&mut rig, "plot height");
+    for (columns, rows) in [(80, 24), (120, 36), (200, 50)] {
+        let screen = rig.screen(columns, rows);
+        let ticks: Vec<(usize, f64)> = screen
+            .lines()
+            .enumerate()
+            .filter_map(|(row, line)| {
+                let words: String = line.chars().skip(37).take(6).collect();
+                Some((row, words.trim_end_matches(['┄', '─']).trim().parse().ok()?))
+            })
+            .collect();
+        let pairs: Vec<f64> =
+            ticks.windows(2).map(|pair| (pair[0].1 - pair[1].1) / (pair[1].0 - pair[0].0) as f64).collect();
+        assert!(ticks.len() >= 2 && ticks.iter().all(|(_, tick)| *tick >= 0.0), "{ticks:?}\n{screen}");
+        // A row is the least that a place can be off.
+        let [least, most] = [
+            pairs.iter().fold(f64::INFINITY, |a, b| a.min(*b)),
+            pairs.iter().fold(0.0, |a: f64, b| a.max(*b)),
+        ];
+        assert!(most < 2.0 * least, "{pairs:?}\n{screen}");
+    }
 }

@@ -6,12 +6,12 @@ use ground::key::Key;
 use ground::model::LinkReport;
 use ground::update::Msg;
 use protocol::dialect::{HEARTBEAT_DATA, MavMessage, RADIO_STATUS_DATA, SYS_STATUS_DATA};
-use protocol::frame::Encoder;
+use protocol::frame::{Encoder, FramerCounters};
 use protocol::identity::{Address, VEHICLE};
 use protocol::link_stats::{LinkFigures, SourceFigures};
 use protocol::signing::SigningCounters;
 
-use crate::rig::Rig;
+use crate::rig::{MONO, Rig};
 
 /// A telemetry radio reports about itself with its own ids.
 const RADIO: Address = Address { system_id: 51, component_id: 68 };
@@ -42,9 +42,9 @@ fn several_links_are_shown_side_by_side_and_an_answer_names_its_own() {
     };
     rig.msg(links(None));
     let screen = rig.screen(140, 40);
-    assert!(screen.contains("all links") && screen.contains("serial 1590/5760 B/s 12.5 %"), "{screen}");
+    assert!(screen.contains("all links") && screen.contains(" 1590/5760 "), "{screen}");
     rig.msg(links(Some("unplugged")));
-    assert!(rig.screen(140, 40).contains("serial DOWN"));
+    assert!(rig.screen(140, 40).contains("serial:/dev/x:57600 DOWN unplugged"));
     rig.msg(Msg::LinkSays("one link down: /dev/x: unplugged".to_owned()));
     rig.expect_event("one link down");
     assert!(!rig.screen(140, 40).contains("LINK DOWN"), "the other still works");
@@ -63,12 +63,13 @@ fn frames_with_bad_signatures_are_reported_and_counted() {
     rig.msg(counted(4));
     assert_eq!(rig.events().matches("frames refused: 0 unsigned, 3 wrongly signed").count(), 1);
     rig.key(Key::Char('5'));
-    assert!(rig.screen(140, 40).contains("rejected 4"));
+    assert!(rig.screen(140, 40).contains(" wrong 4 "));
 }
 
 /// The lines of a screen, with single spaces.
 fn lines(rig: &Rig) -> Vec<String> {
-    let squeezed = |line: &str| line.trim_matches('"').split_whitespace().collect::<Vec<_>>().join(" ");
+    let squeezed =
+        |line: &str| line.trim_matches(['"', '│']).split_whitespace().collect::<Vec<_>>().join(" ");
     rig.screen(80, 40).lines().map(squeezed).collect()
 }
 
@@ -148,5 +149,28 @@ fn the_link_screen_scrolls() {
     }
     assert!(rig.screen(40, 12).contains("TD_PREDICTED_PATH"), "{}", rig.screen(40, 12));
     rig.key(Key::Home);
-    assert!(rig.screen(40, 12).contains("rx 0 B/s"), "{}", rig.screen(40, 12));
+    assert!(rig.screen(40, 12).contains("rejected checksum"), "{}", rig.screen(40, 12));
+}
+
+/// The rates of the link are bars over time: a rate that grows has higher bars at the right.
+#[test]
+fn the_rates_are_bars_over_time() {
+    let mut rig = Rig::crewed();
+    rig.key(Key::Char('5'));
+    for second in 0..8 {
+        rig.msg(Msg::Received { bytes: 400 * second, framing: FramerCounters::default() });
+        rig.run(1.0);
+    }
+    for (columns, rows) in [(80, 24), (120, 36), (200, 50)] {
+        let terminal = rig.draw(columns, rows, MONO);
+        let cells = &terminal.backend().buffer().content;
+        let is_bar = |cell: &ratatui::buffer::Cell| "▁▂▃▄▅▆▇█".contains(cell.symbol());
+        // At 80 columns the first panel of four, otherwise the topmost.
+        let (from, to, most) = if columns == 80 { (1, 20, 8) } else { (80, usize::from(columns) - 1, 11) };
+        let heights: Vec<usize> = (from..to)
+            .map(|column| (3..most).filter(|row| is_bar(&cells[row * usize::from(columns) + column])).count())
+            .collect();
+        let risen: Vec<usize> = heights.into_iter().filter(|height| *height > 0).collect();
+        assert!(risen.len() >= 5 && risen.is_sorted(), "{columns}: {risen:?}\n{}", rig.screen(columns, rows));
+    }
 }

@@ -131,12 +131,12 @@ fn what_only_people_see_is_on_the_page_and_takes_a_letter_and_a_word() {
     rig.expect_event("no check of servos that tell nothing has passed");
     rig.run(3.0);
     tell_values(&mut rig, 1, State::TD_PAD_CHECK_STATE_RUNNING, &silent[..1]);
-    let words = "gimbal pitch  nozzle swings towards fins 1 and 4, then towards 2 and 3";
+    let words = "gimbal pitch nozzle swings towards fins 1 and 4, then towards 2 and 3";
     rig.expect_screen(words);
     tell_values(&mut rig, 1, State::TD_PAD_CHECK_STATE_PASSED, &silent);
     let screen = rig.screen(80, 24);
     assert!(screen.contains("CHECK 1 PASSED but for what only people see"), "{screen}");
-    assert!(screen.contains("fin 4         fin 4 alone opens fully, then closes"), "{screen}");
+    assert!(screen.contains("fin 4        fin 4 alone opens fully, then closes"), "{screen}");
     assert!(checks(&mut rig).is_empty());
     rig.key(Key::Char('Y'));
     let screen = rig.screen(80, 24);

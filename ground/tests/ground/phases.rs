@@ -2,7 +2,9 @@
 
 use ground::key::Key;
 use ground::model::{Page, quantity::Quantity};
-use ground::view::status_lines;
+use ground::view::pictures::map::comes_down;
+use ground::view::theme::{Palette, TextRole, Theme};
+use ground::view::{status_lines, top_lines};
 use protocol::dialect::{TdAbortEffect, TdBooster, TdCheck, TdChute, TdInterlock, TdLimit, TdPhase};
 
 use crate::rig::{Rig, settings, typed};
@@ -166,4 +168,43 @@ fn in_flight_no_arming_check_is_shown_as_passed() {
     let screen = rig.screen(80, 24);
     assert!(screen.contains("off the pad nothing is checked for arming"), "{screen}");
     assert!(!screen.contains(" GO ") && screen.contains("▶ every check passes"), "{screen}");
+}
+
+/// Whether something on the page between the rows of the state and those of the keys looks like a fault.
+fn looks_wrong(rig: &Rig) -> bool {
+    let theme = Theme { palette: Palette::Dark, ascii: false };
+    let (caution, alarm) = (theme.style(TextRole::Caution).fg, theme.style(TextRole::Alarm).bg);
+    let terminal = rig.draw(80, 24, theme);
+    let page = &terminal.backend().buffer().content[3 * 80..22 * 80];
+    page.iter().any(|cell| Some(cell.fg) == caution || Some(cell.bg) == alarm)
+}
+
+/// At the beginning of the fall the vehicle predicts its touchdown from a sink rate of nearly zero, hundreds of metres off, and
+/// knows no band. Neither counts until it knows one; only then a touchdown beyond the fence is one.
+#[test]
+fn what_has_not_settled_is_no_fault() {
+    let mut rig = coasting();
+    rig.limits();
+    let lands_east_m = |rig: &Rig| comes_down(&rig.model, rig.now).map(|at| at.east_m);
+    assert_eq!(lands_east_m(&rig), Some(-3.0), "on the way up");
+    rig.phase = TdPhase::TD_PHASE_AERO_DESCENT;
+    rig.run(0.2);
+    rig.ascent(TdBooster::TD_BOOSTER_SEPARATED, 0.0, 0.0);
+    assert_eq!((lands_east_m(&rig), looks_wrong(&rig)), (None, false), "{}", rig.screen(80, 24));
+    rig.descent(132.0);
+    assert_eq!((lands_east_m(&rig).map(f64::round), looks_wrong(&rig)), (Some(-1.0), false));
+    rig.descent_to([350.0, 0.0]);
+    assert!(looks_wrong(&rig), "beyond the fence");
+}
+
+/// After the flight the band is not named, and nothing is said of arming.
+#[test]
+fn after_the_flight_no_page_judges_its_fall() {
+    let mut rig = descending();
+    rig.phase = TdPhase::TD_PHASE_SAFED;
+    rig.run(1.0);
+    rig.state(4.0, 0.0, 0.0, 0.0, 88.0);
+    rig.key(Key::Char('2'));
+    assert!(!looks_wrong(&rig), "{}", rig.screen(80, 24));
+    assert_eq!(top_lines::readiness(&rig.model, rig.now), None);
 }

@@ -13,7 +13,7 @@ use ground::key::Key;
 use ground::model::{Act, Page, Seat};
 use ground::replay::recording::{RecordedEvent, Recording};
 use ground::update::{Msg, Request};
-use ground::view::theme::{Ink, Palette, TextRole, Theme};
+use ground::view::theme::{Ink, Level, Palette, TextRole, Theme, true_colour};
 use ground::view::{CUT_MARK, footer};
 use protocol::dialect::{
     MavMessage, TD_FLIGHT_STATUS_DATA, TdBooster, TdCheck, TdChute, TdHold, TdLimit, TdPhase,
@@ -30,7 +30,7 @@ const SIZES: [(u16, u16); 3] = [(80, 24), (140, 45), (200, 60)];
 const LESS_ROWS: [(u16, u16); 2] = [(80, 23), (80, 22)];
 
 /// The least contrast of text and of pictures: the strictest level of WCAG 2.2.
-const CONTRAST_MIN: f64 = 7.0;
+pub(crate) const CONTRAST_MIN: f64 = 7.0;
 
 fn no_go() -> Rig {
     let mut rig = with_events();
@@ -208,6 +208,10 @@ fn no_page_cuts_what_it_shows() {
         for row in rows.iter().filter(|row| row.contains(CUT_MARK) && !row.contains("A last … is")) {
             cut.push(format!("{name}: {row}"));
         }
+        // An angle has one unit everywhere, which a terminal without Unicode has, too.
+        cut.extend(
+            rows.iter().filter(|row| row.chars().any(|c| c == '°')).map(|row| format!("{name}: {row}")),
+        );
     });
     assert!(cut.is_empty(), "{}", cut.join("\n"));
 }
@@ -243,20 +247,52 @@ fn every_theme_shows_the_same_text_with_enough_contrast() {
     });
 }
 
-/// Yellow and pale letters vanish in the sun.
+/// Yellow and pale letters vanish in the sun, and a prediction is no fault.
 #[test]
 fn the_light_theme_is_dark_on_white_without_yellow() {
-    use TextRole::{Alarm, Caution, Good, Key as OfKeys, Label, Plain, Stale, Title};
     let theme = Theme { palette: Palette::Light, ascii: false };
-    let roles = [Plain, Label, Stale, Title, Good, Caution, Alarm, OfKeys];
-    let styles = roles.map(|role| theme.ground().patch(theme.style(role)));
-    let inks = Ink::ALL.map(|ink| theme.ground().fg(theme.ink(ink)));
     assert_eq!(rgb(theme.back()), Some([255; 3]), "white");
-    for style in styles.into_iter().chain(inks) {
-        let [red, green, blue] = style.fg.and_then(rgb).unwrap();
+    for fore in inks(theme) {
+        let [red, green, blue] = rgb(fore).unwrap();
         let yellow = red > 80 && green > 80 && blue < red.min(green) / 2;
-        assert!(!yellow && !style.add_modifier.contains(Modifier::DIM), "{style:?}");
-        assert!(contrast([red, green, blue], style.bg.and_then(rgb).unwrap()) >= 7.0, "{style:?}");
+        assert!(!yellow, "{fore}");
+    }
+    let [predicted, alarm] = [Some(theme.ink(Ink::Predicted)), theme.style(TextRole::Alarm).bg];
+    let is_red = |colour: Option<Color>| {
+        let [red, green, _] = colour.and_then(rgb).unwrap();
+        red > 100 && green < 50
+    };
+    assert!(is_red(alarm) && !is_red(predicted), "{predicted:?}");
+    assert!(!is_red(predicted.map(true_colour)));
+}
+
+/// Every colour of letters and pictures of a theme.
+fn inks(theme: Theme) -> Vec<Color> {
+    use TextRole::{Caution, Good, Key as OfKeys, Label, Plain, Stale, Title};
+    let roles = [Plain, Label, Stale, Title, Good, Caution, OfKeys];
+    let styles = roles.map(|role| theme.style(role).fg.expect("a colour"));
+    Ink::ALL.into_iter().map(|ink| theme.ink(ink)).chain(styles).collect()
+}
+
+/// Every colour can be read on every ground of its theme, on terminals of 256 colours and of 24 bits.
+#[test]
+fn every_colour_of_a_theme_can_be_read() {
+    for palette in [Palette::Dark, Palette::Light] {
+        let theme = Theme { palette, ascii: false };
+        let grounds = [theme.ground(), theme.raised()].map(|style| style.bg.unwrap());
+        let on_grounds = inks(theme).into_iter().flat_map(|fore| grounds.map(|back| (fore, back)));
+        let levels = Level::ALL.into_iter().map(|level| theme.level(level));
+        let whole = levels.chain([theme.style(TextRole::Alarm)]).map(|s| (s.fg.unwrap(), s.bg.unwrap()));
+        for (fore, back) in on_grounds.chain(whole) {
+            for shown in [std::convert::identity, true_colour] {
+                let found = contrast(rgb(shown(fore)).unwrap(), rgb(shown(back)).unwrap());
+                assert!(found >= CONTRAST_MIN, "{palette:?} {} on {}: {found:.2}", shown(fore), shown(back));
+            }
+            for colour in [fore, back] {
+                let is_grey = matches!(colour, Color::Indexed(231));
+                assert!(is_grey || matches!(true_colour(colour), Color::Rgb(..)), "{colour} has no 24 bits");
+            }
+        }
     }
 }
 

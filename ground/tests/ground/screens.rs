@@ -71,7 +71,7 @@ fn the_links_capacity_is_shown_beside_its_rate() {
     rig.key(Key::Char('5'));
     rig.run(1.0);
     rig.msg(Msg::Received { bytes: 1_600, framing: FramerCounters::default() });
-    assert!(rig.screen(80, 24).contains(" rx 1600/5760 B/s "), "{}", rig.screen(80, 24));
+    assert!(rig.screen(80, 24).contains(" 1600/5760 "), "{}", rig.screen(80, 24));
 }
 
 #[test]

@@ -73,7 +73,7 @@ fn a_vehicle_that_accepts_nothing_says_why() {
     assert!(screen.contains("UP NOT PROVEN"), "{screen}");
     assert!(screen.contains("it refuses frames of 255/190: not signed"), "{screen}");
     rig.key(Key::Char('5'));
-    assert!(rig.screen(140, 45).contains("up never ago; it refused 7 of 255/190"), "{}", rig.screen(140, 45));
+    assert!(rig.screen(140, 45).contains("refused  7 of 255/190 by the vehicle"), "{}", rig.screen(140, 45));
 }
 
 /// A vehicle that does not report its uplink still answers TIMESYNC.
@@ -142,5 +142,5 @@ fn without_a_link_the_loss_is_unknown() {
     rig.expect_screen("loss 0.0 %");
     rig.speaks = false;
     rig.run(4.0);
-    rig.expect_screen("loss unknown");
+    rig.expect_screen("loss -- %");
 }

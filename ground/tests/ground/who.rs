@@ -589,7 +589,7 @@ fn a_copter_beside_our_vehicle_under_its_id_is_a_second_vehicle() {
     rig.hear(&copter(1));
     rig.run(0.1);
     assert!(first_line(&rig, 80, 24).contains("TWO VEHICLES under id 1"), "{}", first_line(&rig, 80, 24));
-    assert!(rig.screen(80, 24).contains("PAD_IDLE"), "what ours tells stays");
+    assert!(rig.screen(80, 24).contains("On the pad"), "what ours tells stays");
     rig.keys(&ladder());
     assert_eq!(rig.take_commands(), []);
     rig.abort();

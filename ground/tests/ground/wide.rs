@@ -84,9 +84,8 @@ fn a_text_and_a_name_of_wide_letters_leave_nothing_of_the_page_before() {
 /// An alarm with wide letters keeps its key at the right end.
 #[test]
 fn a_line_is_cut_by_columns_and_not_by_letters() {
-    use ground::view::status_lines::{beginning, cut};
-    assert_eq!(beginning("点火ゲート", 5), "点火");
-    assert_eq!(beginning("点火", 4), "点火");
+    use ground::view::status_lines::cut;
+    assert_eq!(cut("点火ゲート", 7), "点火..");
     assert_eq!(cut("点火ゲートが閉じています", 12), "点火ゲート..");
     assert_eq!(cut("点火", 4), "点火");
 }

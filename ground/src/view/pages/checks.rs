@@ -4,13 +4,22 @@
 use std::time::Duration;
 
 use protocol::dialect::{TD_PAD_CHECK_DATA, TdPadCheckItem, TdPadCheckState, TdPadCheckVerdict};
+use ratatui::Frame;
+use ratatui::layout::Constraint::{Fill, Length};
+use ratatui::layout::{Layout, Rect};
+use ratatui::symbols::Marker;
 use ratatui::text::{Line, Span};
+use ratatui::widgets::canvas::{self, Canvas};
+use ratatui::widgets::{Paragraph, Wrap};
 
+use super::{Room, columns, flight, framed, rows};
 use crate::model::{
     Act, Degrees, LOSS_MOST, LastPlace, MARGIN_LEAST_DB, Model, PadCheck, SURFACES, Sample, Spot, Standing,
-    dead_reckoning::may_have_left, shown, standing,
+    Way, dead_reckoning::may_have_left, shown, standing,
 };
-use crate::view::{TextRole, Theme, fixed, seconds};
+use crate::view::band::{LETTER, draw_word, word};
+use crate::view::pictures::qr;
+use crate::view::{Ink, TextRole, Theme, draw_line, draw_lines, fixed, seconds};
 
 /// Columns of one value beside others.
 const VALUE_COLUMNS: usize = 39;
@@ -18,9 +27,9 @@ const VALUE_COLUMNS: usize = 39;
 /// How the check stands, its values, the radio.
 pub fn checks_lines(model: &Model, theme: Theme, now: Duration, columns: usize) -> Vec<Line<'static>> {
     let check = model.vehicle.pad_check.as_ref();
-    let mut lines = vec![headline(model, check, theme, now), supply(model, theme)];
+    let mut lines = vec![headline(model, check, theme, now)];
     lines.push(theme.line(
-        format!(" {:<14}{:>24}{:>20}{:>20}", "surface", "range, least", "error, most", "lag, most"),
+        format!(" {:<13}{:>24}{:>20}{:>20}", "surface", "range, least", "error, most", "lag, most"),
         TextRole::Label,
     ));
     lines.extend(SURFACES.map(|of| surface(check, of, theme)));
@@ -73,15 +82,11 @@ fn headline(model: &Model, check: Option<&PadCheck>, theme: Theme, now: Duration
     let told = seconds(now.saturating_sub(check.told_at));
     let by = Some(check.told.asked_by).filter(|number| *number > 0);
     let by = by.map_or_else(String::new, |number| format!(", {}", model.operator(number)));
-    Line::from(vec![
-        theme.span(words, role),
-        theme.label(format!(" (told {told} ago{by})")),
-        theme.label(then),
-    ])
+    Line::from(vec![theme.span(words, role), theme.label(format!(" ({told} ago{by})")), theme.label(then)])
 }
 
 /// Battery and storage, outside of a check too.
-fn supply(model: &Model, theme: Theme) -> Line<'static> {
+pub fn supply(model: &Model, theme: Theme) -> Line<'static> {
     let not_told = || "not told".to_owned();
     let battery = model.vehicle.battery().map_or_else(not_told, |battery| {
         let left = battery.value.percent.map_or_else(String::new, |percent| format!(", {percent} %"));
@@ -90,7 +95,13 @@ fn supply(model: &Model, theme: Theme) -> Line<'static> {
     let free = |space: Sample<f64>| format!("{} MiB free", fixed(space.value, 0));
     let space = model.vehicle.log_space_mib().map_or_else(not_told, free);
     let [battery, space] = [battery, space].map(|words| theme.plain(words));
-    Line::from(vec![theme.label(" battery "), battery, theme.label("   vehicle's log "), space])
+    Line::from(vec![
+        theme.label(" battery "),
+        battery,
+        theme.label("   vehicle's log "),
+        space,
+        theme.label(" "),
+    ])
 }
 
 fn role_of(verdict: TdPadCheckVerdict) -> (&'static str, TextRole) {
@@ -106,7 +117,7 @@ fn surface(check: Option<&PadCheck>, (name, first, seen): (&str, u32, &str), the
     let values: Vec<Option<&TD_PAD_CHECK_DATA>> = (first..first + 3)
         .map(|item| check.and_then(|check| check.values().find(|value| value.item as u32 == item)))
         .collect();
-    let mut spans = vec![theme.plain(format!(" {name:<14}"))];
+    let mut spans = vec![theme.plain(format!(" {name:<13}"))];
     let tells = values
         .iter()
         .flatten()
@@ -187,6 +198,71 @@ fn radio(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
 
 // The page that helps to find the vehicle: where it was last heard, where it is predicted, and the way there.
 
+/// Columns of the arrow at 80 columns, and of the words.
+const ARROW_COLUMNS: u16 = 14;
+const WORD_COLUMNS: u16 = 33;
+/// Rows of the words above the arrow.
+const WORD_ROWS: u16 = 15;
+
+/// Draws an arrow that points to where it is, what is known of the place, and the way over the ground.
+pub fn draw_find(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let (walk, middle, right) = if Room::of(frame.area()) == Room::Small {
+        columns(area, [Length(ARROW_COLUMNS), Length(WORD_COLUMNS), Fill(1)]).into()
+    } else {
+        let [left, right] = columns(area, [Length(WORD_COLUMNS), Fill(1)]);
+        let [words, walk] = rows(left, [Length(WORD_ROWS), Fill(1)]);
+        (walk, words, right)
+    };
+    let inside = framed("place", Line::default(), theme, frame, middle);
+    let words = Paragraph::new(find_lines(model, theme, now)).wrap(Wrap { trim: false });
+    frame.render_widget(words, inside);
+    let place = model.last_place(now).or(model.place);
+    let way = place.map(|place| place.way(&place.best(), model.settings.here));
+    let inside = framed("walk", theme.line(" N up ", TextRole::Label), theme, frame, walk);
+    match way.filter(|_| may_have_left(&model.vehicle, now).is_none()) {
+        Some(way) => draw_way(way, theme, frame, inside),
+        None => draw_line(frame, inside, theme.line(" --", TextRole::Label)),
+    }
+    let flies = model.vehicle.in_flight() && place.is_some_and(|place| place.predicted.is_none());
+    let at = place.and_then(|place| place.degrees(&place.best())).filter(|_| !flies && !theme.ascii);
+    let code = at.map_or_else(Vec::new, |at| qr::code(at, right.height));
+    // A phone walks better than a map of 30 columns.
+    let code_columns = if code.is_empty() { 0 } else { qr::COLUMNS };
+    let [over_ground, beside] = columns(right, [Fill(1), Length(code_columns)]);
+    if over_ground.width > code_columns / 2 {
+        flight::map(flight::FROM_ABOVE, model, theme, now, frame, over_ground);
+    }
+    draw_lines(frame, beside, &code);
+}
+
+/// An arrow with the distance under it in large letters, where there is room for both.
+fn draw_way(way: Way, theme: Theme, frame: &mut Frame, area: Rect) {
+    let text = format!("{} m", fixed(way.distance_m, 0));
+    let letters = text.len() as u16;
+    let is_large = area.height >= 4 * LETTER.1 && letters * LETTER.0 < area.width;
+    let rows = [Fill(1), Length(if is_large { LETTER.1 } else { 0 })];
+    let [above, below] = area.layout(&Layout::vertical(rows));
+    draw_word(&word("", &text, TextRole::Title), theme, frame, below);
+    // In dots, of which a cell has two across and four up: an arrow has the same shape wherever it points.
+    let (across, up) = (f64::from(above.width), 2.0 * f64::from(above.height));
+    let reach = across.min(up) / 2.0 - 1.0;
+    let (sin, cos) = libm::sincos(way.bearing_deg.to_radians());
+    let at =
+        |along: f64, aside: f64| (reach * (along * sin + aside * cos), reach * (along * cos - aside * sin));
+    let canvas = Canvas::default().marker(Marker::Braille).background_color(theme.back());
+    let canvas = canvas.x_bounds([-across / 2.0, across / 2.0]).y_bounds([-up / 2.0, up / 2.0]);
+    let canvas = canvas.paint(|context| {
+        for step in -20..=20 {
+            let aside = f64::from(step) / 33.0;
+            for (from, to) in [(at(0.0, aside), at(1.0, 0.0)), (at(-1.0, aside / 5.0), at(0.0, aside / 5.0))]
+            {
+                context.draw(&canvas::Line::new(from.0, from.1, to.0, to.1, theme.ink(Ink::Measured)));
+            }
+        }
+    });
+    frame.render_widget(canvas, above);
+}
+
 /// The places and the ways to them.
 pub fn find_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let place = model.last_place(now).or(model.place);
@@ -195,33 +271,31 @@ pub fn find_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'stati
     }
     let label = |words: &'static str| theme.line(words, TextRole::Label);
     let Some(place) = place else {
-        if model.vehicle.left_pad_at.is_some() {
-            let words = " The vehicle has left the pad, and has not told its place.";
-            return vec![theme.line(words, TextRole::Caution)];
-        }
-        return vec![
-            label(" The vehicle has not left the pad."),
-            label(" In flight its last place is kept beside the log, for maps"),
-            label(" (GeoJSON, and KML with the pad's place)."),
-        ];
+        return vec![if model.vehicle.left_pad_at.is_some() {
+            theme.line(" The vehicle has left the pad, and has not told its place.", TextRole::Caution)
+        } else {
+            label(
+                " The vehicle has not left the pad. In flight its last place is kept beside the log, for maps.",
+            )
+        }];
     };
     let now_unix_s = model.settings.start_unix_s + now.as_secs();
     let mut lines = Vec::new();
     if let Some(predicted) = &place.predicted {
         lines.push(theme.line(" PREDICTED: look here first", TextRole::Caution));
         lines.extend(spot(model, &place, predicted, theme));
-        lines.push(Line::default());
     }
-    lines.push(theme.line(" Last heard", TextRole::Title));
+    let from = if place.way(&place.heard, model.settings.here).from_station { "here" } else { "the pad" };
+    lines.push(theme.line(format!(" Last heard, from {from}"), TextRole::Title));
     lines.extend(spot(model, &place, &place.heard, theme));
-    lines.push(row("height then", format!("{} m", fixed(place.height_m, 1)), theme));
     let ago = now_unix_s.saturating_sub(place.heard_unix_s);
-    lines.push(row("heard", format!("{ago} s ago, boot {:08X}", place.boot), theme));
-    lines.push(Line::default());
+    lines.push(Line::from(format!("  {ago} s ago, {} m up", fixed(place.height_m, 1))));
+    lines.push(Line::from(format!("  boot {:08X}", place.boot)));
+    lines.push(supply(model, theme));
     if place.pad.is_none() {
         lines.push(label(" The vehicle has not told where its pad is: no latitude, longitude or KML"));
     } else if model.settings.here.is_none() {
-        lines.push(label(" The way from this station needs its place: `here` in the settings"));
+        lines.push(label(" The way from here needs this place: `here` in the settings"));
     }
     lines
 }
@@ -235,32 +309,28 @@ fn may_have_left_lines(model: &Model, theme: Theme) -> Vec<Line<'static>> {
         return lines;
     };
     let (north, east) = (fixed(meant.north_m, 0), fixed(meant.east_m, 0));
-    lines.push(row("meant to land", format!("north {north} m, east {east} m of the pad"), theme));
-    lines.push(row("within", format!("{} m, the fence of its mission", fixed(meant.error_m, 0)), theme));
-    lines.extend(degrees(model.vehicle.pad.map(|pad| pad.moved(meant.north_m, meant.east_m)), theme));
+    lines.push(Line::from(format!(" meant to land north {north} m, east {east} m of the pad, within")));
+    lines.push(Line::from(format!(" {} m, the fence of its mission", fixed(meant.error_m, 0))));
+    lines.extend(degrees(model.vehicle.pad.map(|pad| pad.moved(meant.north_m, meant.east_m))));
     lines.push(caution(" Under a parachute, or without its landing motor, it may come down farther away."));
     lines
 }
 
-fn degrees(at: Option<Degrees>, theme: Theme) -> Option<Line<'static>> {
-    at.map(|at| row("degrees", format!("{:.6}, {:.6}", at.latitude, at.longitude), theme))
+fn degrees(at: Option<Degrees>) -> Option<Line<'static>> {
+    at.map(|at| Line::from(format!("  {:.6}, {:.6}", at.latitude, at.longitude)))
 }
 
-fn row(label: &str, value: String, theme: Theme) -> Line<'static> {
-    Line::from(vec![theme.label(format!("   {label:<16}")), theme.plain(value)])
-}
-
+/// The way to a spot, where it is from the pad, and how wrong that may be.
 fn spot(model: &Model, place: &LastPlace, spot: &Spot, theme: Theme) -> Vec<Line<'static>> {
     let way = place.way(spot, model.settings.here);
-    let from = if way.from_station { "from here" } else { "from the pad" };
     // 359.6 is 000, as on a compass.
     let bearing_deg = way.bearing_deg.round() as u32 % 360;
-    let plus_minus = theme.either_side(&format!("±{} m", fixed(spot.error_m, 0)));
     let (way_m, north_m, east_m) = (fixed(way.distance_m, 0), fixed(spot.north_m, 1), fixed(spot.east_m, 1));
-    let rows = [
-        row(from, format!("{way_m} m, bearing {bearing_deg:03} deg"), theme),
-        row("pad frame", format!("north {north_m} m, east {east_m} m"), theme),
-        row("19 of 20 cases", plus_minus, theme),
+    let mut lines = vec![
+        theme.line(format!("  {way_m} m, bearing {bearing_deg:03} deg"), TextRole::Title),
+        Line::from(format!("  north {north_m} m, east {east_m} m")),
+        Line::from(theme.either_side(&format!("  ±{} m in 19 of 20 cases", fixed(spot.error_m, 0)))),
     ];
-    rows.into_iter().chain(degrees(place.degrees(spot), theme)).collect()
+    lines.extend(degrees(place.degrees(spot)));
+    lines
 }

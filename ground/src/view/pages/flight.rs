@@ -105,7 +105,7 @@ pub fn map(title: &str, model: &Model, theme: Theme, now: Duration, frame: &mut 
 }
 
 /// The vehicle from each of these sides; after the loss of the link its predicted position instead.
-fn vehicle<const N: usize>(
+pub fn vehicle<const N: usize>(
     model: &Model,
     sides: [Side; N],
     theme: Theme,
@@ -211,15 +211,16 @@ fn band_word(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
         let words = if under_chute { " NO BURN: motor inhibited" } else { "" };
         return theme.line(words, TextRole::Alarm);
     }
-    let Some(descent) = model.vehicle.descent() else {
-        return theme.line(" ignition band: no data", TextRole::Caution);
+    // Before the fall, and after it, there is nothing to compare.
+    let Some(descent) = model.vehicle.descent().filter(|_| model.vehicle.in_flight()) else {
+        return theme.line(" band --", TextRole::Label);
     };
     let (mark, stale) = age_mark(&descent, now);
     let d = &descent.value;
     let height_m = model.vehicle.height_m().map_or(f64::NAN, |height| height.value);
     let (low_m, high_m) = (f64::from(d.band_low_m), f64::from(d.band_high_m));
     let (words, role) = if !(height_m.is_finite() && low_m.is_finite() && high_m.is_finite()) {
-        ("band not known", TextRole::Caution)
+        ("band -- until it falls fast enough", TextRole::Label)
     } else if low_m > high_m {
         ("NO HEIGHT LANDS", TextRole::Alarm)
     } else if height_m < low_m {

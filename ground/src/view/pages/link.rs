@@ -5,84 +5,87 @@ use std::time::Duration;
 use protocol::dialect::message_name;
 use protocol::identity::Address;
 use protocol::link_stats::{LinkFigures, MessageFigures, SourceFigures};
+use ratatui::Frame;
+use ratatui::layout::Constraint::Fill;
+use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
+use ratatui::widgets::Sparkline;
 
-use super::window;
-use crate::model::{LinkReport, LinkState, Model, STALE_AFTER, refusal};
-use crate::view::status_lines::{link_line, loss_role, percent};
-use crate::view::{STALE_MARK, TextRole, Theme, seconds};
+use super::{columns, framed, rows};
+use crate::model::{LinkReport, Model, RADIO_FRESH, STALE_AFTER, quantity::Quantity, refusal};
+use crate::view::status_lines::{loss_role, percent};
+use crate::view::{Ink, STALE_MARK, TextRole, Theme, fixed, seconds};
 
-const NAME_WIDTH: usize = 27;
+const NAME_WIDTH: usize = 26;
 /// The width of a message name with its age and rate: two beside each other on the smallest whole screen.
-const MESSAGE_CELL_WIDTH: usize = 40;
+const MESSAGE_CELL_WIDTH: usize = 39;
 /// The messages that the vehicle sends regularly.
-const REGULAR: [&str; 13] = [
-    "HEARTBEAT",
-    "SYS_STATUS",
-    "EXTENDED_SYS_STATE",
-    "TD_FLIGHT_STATUS",
-    "ATTITUDE_QUATERNION",
-    "LOCAL_POSITION_NED",
-    "VFR_HUD",
-    "TD_FINS",
-    "TD_GIMBAL",
-    "TD_DESCENT",
-    "TD_CONTROLLER",
-    "TD_TOUCHDOWN_PREDICTION",
-    "TD_PREDICTED_PATH",
-];
+const REGULAR: &str = "HEARTBEAT SYS_STATUS EXTENDED_SYS_STATE TD_FLIGHT_STATUS ATTITUDE_QUATERNION \
+    LOCAL_POSITION_NED VFR_HUD TD_FINS TD_GIMBAL TD_DESCENT TD_CONTROLLER TD_TOUCHDOWN_PREDICTION TD_PREDICTED_PATH";
 
-/// The rates of all links together, of each link and of each component; then age and rate of every message.
+/// What the panels of bars show.
+const OVER_TIME: [&str; 4] = ["link rate", "link sent", "link loss", "round trip"];
+/// The most that fills a bar of loss at least, %.
+const LOSS_MOST: f64 = 10.0;
+/// The history has a value a little less often than once a second.
+const KEPT_WITHIN: Duration = Duration::from_millis(1_500);
+/// From this width on bars stand apart.
+const APART_COLUMNS: u16 = 60;
+
+/// Draws the figures of the link over time, beside each other or one below the other.
+pub fn draw_over_time(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let is_wide = area.width > 4 * area.height;
+    let panels = if is_wide { columns(area, [Fill(1); 4]) } else { rows(area, [Fill(1); 4]) };
+    for (quantity, at) in OVER_TIME.iter().filter_map(|name| Quantity::named(name)).zip(panels) {
+        draw_bars(quantity, model, theme, now, frame, at);
+    }
+}
+
+/// A panel with a quantity of the link: its present value, and a bar for each second.
+fn draw_bars(quantity: &Quantity, model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let value = quantity.read(model, now);
+    let value = value.map_or_else(|| "--".to_owned(), |value| fixed(value.value, quantity.decimals));
+    let title = format!("{} {value} {}", quantity.name.trim_start_matches("link "), quantity.unit);
+    let inside = framed(&title, Line::default(), theme, frame, area);
+    let apart = if inside.width < APART_COLUMNS { 1 } else { 2 };
+    let values: Vec<(Duration, f64)> = model.history.trace.values(quantity, Duration::ZERO, now).collect();
+    let bar = |column: u16| {
+        let ago = Duration::from_secs((column / apart).into());
+        let at = now.checked_sub(ago).filter(|_| column.is_multiple_of(apart))?;
+        let (kept_at, value) = values.iter().rfind(|(kept_at, _)| *kept_at <= at)?;
+        // In thousandths, because the widget draws whole numbers.
+        (at.saturating_sub(*kept_at) < KEPT_WITHIN).then_some((1_000.0 * value) as u64)
+    };
+    let bars: Vec<Option<u64>> = (0..inside.width).rev().map(bar).collect();
+    let least = if quantity.unit == "%" { LOSS_MOST } else { 0.0 };
+    let most = bars.iter().flatten().copied().fold((1_000.0 * least) as u64, u64::max);
+    let style = theme.ground().fg(theme.ink(Ink::Measured));
+    frame.render_widget(Sparkline::default().data(bars).max(most).style(style), inside);
+}
+
+/// What was rejected and by whom; the rates of all links together, of each link and of each component; age and rate of every message.
 pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize, rows: usize) -> Vec<Line<'static>> {
-    let mut lines = vec![link_line(model, theme, now, columns)];
-    lines.push(directions(model, theme, now));
-    lines.extend(rejected(model, theme));
-    let heading = format!(
-        " {:<NAME_WIDTH$}{:>11}{:>6}{:>9}{:>8}{:>8}{:>9}",
-        "Over 10 s", "rx B/s", "tx", "frames/s", "loss", "copies", "age"
-    );
+    let mut lines = rejected(model, theme, now);
+    let heading = cells(["over 10 s", "rx B/s", "tx", "frames/s", "loss", "copies", "age"]);
     lines.push(theme.line(heading, TextRole::Title));
     for report in reports(model, now) {
         lines.push(report_line(&report, theme));
         lines.extend(report.sources.iter().map(|source| source_line(source, model.settings.vehicle, theme)));
     }
-    lines.push(theme.line(
-        format!(" Age and rate of what the vehicle says; {STALE_MARK} older than {}", seconds(STALE_AFTER)),
-        TextRole::Title,
-    ));
+    let older = format!(" what the vehicle says; {STALE_MARK} older than {}", seconds(STALE_AFTER));
+    lines.push(theme.line(older, TextRole::Title));
     lines.extend(message_lines(model, theme, now, columns));
     // Scrolling up goes towards the first line.
     let start = lines.len().saturating_sub(rows).min(model.pages.scroll);
-    window(lines, start, rows)
+    lines.into_iter().skip(start).take(rows).collect()
 }
 
-/// The age of the last frame in both directions, and what the vehicle refuses.
-fn directions(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
-    let age = |state: LinkState| match state {
-        LinkState::NeverHeard => "never".to_owned(),
-        LinkState::Alive(age) | LinkState::Doubtful(age) | LinkState::Lost(age) => seconds(age),
-    };
-    let uplink = &model.link.uplink;
-    let refused = uplink.refused.map_or_else(String::new, |refused| {
-        let (Address { system_id, component_id }, why) = (refused.source, refusal(refused.why));
-        let since = seconds(now.saturating_sub(refused.at));
-        format!("; it refused {} of {system_id}/{component_id}, {since} ago: {why}", refused.count)
-    });
-    Line::from(vec![
-        theme.label(" heard    "),
-        theme.plain(format!(
-            "down {} ago, up {} ago{refused}",
-            age(model.link.state(now)),
-            age(uplink.state(now))
-        )),
-    ])
+fn cells([name, rx, tx, frames, loss, copies, age]: [&str; 7]) -> String {
+    format!(" {name:<NAME_WIDTH$.NAME_WIDTH$}{rx:>11}{tx:>6}{frames:>9}{loss:>8}{copies:>8}{age:>9}")
 }
 
-/// Counts of rejected frames by reason.
-fn rejected(model: &Model, theme: Theme) -> Vec<Line<'static>> {
-    let row = |label: &str, value: String| {
-        Line::from(vec![theme.label(format!(" {label:<9}")), theme.plain(value)])
-    };
+/// Counts of rejected frames by reason, what the vehicle refuses, and what a radio reports about itself.
+fn rejected(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let framing = &model.link.framing;
     let unreadable = format!(
         "checksum {}  id {}  cut {}  flags {}  fields {}  garbage {} B",
@@ -93,9 +96,8 @@ fn rejected(model: &Model, theme: Theme) -> Vec<Line<'static>> {
         model.link.undecodable,
         framing.garbage_bytes
     );
-    let mut lines = vec![row("rejected", unreadable)];
-    if let Some(signing) = model.link.signing {
-        let counts = format!(
+    let signed = model.link.signing.map(|signing| {
+        format!(
             "good {}  unsigned {}  wrong {}  replayed {}  old {}  new {}",
             signing.accepted,
             signing.unsigned,
@@ -103,13 +105,31 @@ fn rejected(model: &Model, theme: Theme) -> Vec<Line<'static>> {
             signing.replayed,
             signing.too_old,
             signing.too_new
-        );
-        lines.push(row("signed", counts));
-    }
-    if model.link.send_drops > 0 {
-        lines.push(row("unsent", format!("{} writes found no room", model.link.send_drops)));
-    }
-    lines
+        )
+    });
+    let drops = model.link.send_drops;
+    let refused = model.link.uplink.refused.map(|refused| {
+        let (Address { system_id, component_id }, why) = (refused.source, refusal(refused.why));
+        let since = seconds(now.saturating_sub(refused.at));
+        format!("{} of {system_id}/{component_id} by the vehicle, {since} ago: {why}", refused.count)
+    });
+    let radio = model.link.radio.as_ref().filter(|(_, at)| now.saturating_sub(*at) < RADIO_FRESH);
+    let radio = radio.map(|(radio, _)| {
+        let known = |value: u8| if value == u8::MAX { "--".to_owned() } else { value.to_string() };
+        let [rssi, remote, noise, far] = [radio.rssi, radio.remrssi, radio.noise, radio.remnoise].map(known);
+        format!("rssi {rssi}/{remote} noise {noise}/{far}")
+    });
+    let rows = [
+        ("rejected", Some(unreadable)),
+        ("signed", signed),
+        ("unsent", (drops > 0).then(|| format!("{drops} writes found no room"))),
+        ("refused", refused),
+        ("radio", radio),
+    ];
+    let known = rows.into_iter().filter_map(|(label, value)| Some((label, value?)));
+    known
+        .map(|(label, value)| Line::from(vec![theme.label(format!(" {label:<9}")), theme.plain(value)]))
+        .collect()
 }
 
 /// All links together; if there are several, also each link as last reported.
@@ -144,39 +164,26 @@ fn report_line(report: &LinkReport, theme: Theme) -> Line<'static> {
     let LinkFigures { rx_bytes_s, tx_bytes_s, rx_frames_s, loss } = report.figures;
     let loss = (rx_frames_s > 0.0).then_some(loss);
     let capacity = report.capacity_bytes_s.map_or_else(String::new, |most| format!("/{most}"));
-    let rx = format!("{rx_bytes_s:.0}{capacity}");
-    let (loss_words, copies) = (percent(loss), report.copies);
-    let text = format!(
-        " {name:<NAME_WIDTH$.NAME_WIDTH$}{rx:>11}{tx_bytes_s:>6.0}{rx_frames_s:>9.1}{loss_words:>8}{copies:>8}"
-    );
-    theme.line(text, loss_role(loss))
+    let [rx, tx, frames] = [fixed(rx_bytes_s, 0) + &capacity, fixed(tx_bytes_s, 0), fixed(rx_frames_s, 1)];
+    let row = cells([name, &rx, &tx, &frames, &percent(loss), &report.copies.to_string(), ""]);
+    theme.line(row, loss_role(loss))
 }
 
 fn source_line(source: &SourceFigures, vehicle: Address, theme: Theme) -> Line<'static> {
     let SourceFigures { source: address, age, rx_frames_s, loss } = *source;
     let loss = (rx_frames_s > 0.0).then_some(loss);
     let Address { system_id, component_id } = address;
-    let name = format!("  {system_id}/{component_id} {}", what(address, vehicle));
-    let (loss_words, age_words) = (percent(loss), seconds(age));
-    let mark = if age > STALE_AFTER { STALE_MARK } else { " " };
-    let text = format!(
-        " {name:<NAME_WIDTH$.NAME_WIDTH$}{:>17}{rx_frames_s:>9.1}{loss_words:>8}{:>8}{:>9}",
-        "",
-        "",
-        format!("{mark}{age_words}")
-    );
-    let role = if age > STALE_AFTER { TextRole::Stale } else { loss_role(loss) };
-    theme.line(text, role)
-}
-
-/// What a component is, by its ids (MAVLink's `MAV_COMPONENT`).
-fn what(address: Address, vehicle: Address) -> &'static str {
-    match address {
+    // By MAVLink's `MAV_COMPONENT`.
+    let what = match component_id {
         _ if address == vehicle => "vehicle",
-        Address { component_id: 190, .. } => "ground station",
-        Address { component_id: 68, .. } => "radio",
+        190 => "ground station",
+        68 => "radio",
         _ => "",
-    }
+    };
+    let name = format!("  {system_id}/{component_id} {what}");
+    let (mark, role) = if age > STALE_AFTER { (STALE_MARK, TextRole::Stale) } else { ("", loss_role(loss)) };
+    let age = format!("{mark}{}", seconds(age));
+    theme.line(cells([&name, "", "", &fixed(rx_frames_s, 1), &percent(loss), "", &age]), role)
 }
 
 /// Age and rate of each message, in as many columns as fit.
@@ -194,30 +201,26 @@ fn message_lines(model: &Model, theme: Theme, now: Duration, columns: usize) -> 
 
 fn message_cell(name: &str, heard: Option<MessageFigures>, theme: Theme) -> [Span<'static>; 2] {
     let (text, role) = match heard {
-        None => ("   never".to_owned(), TextRole::Label),
+        None => ("  never".to_owned(), TextRole::Label),
         Some(MessageFigures { age, rx_frames_s, .. }) => {
             let (mark, role) =
                 if age > STALE_AFTER { (STALE_MARK, TextRole::Stale) } else { (" ", TextRole::Plain) };
-            (format!("{:>8}{rx_frames_s:>6.1}/s", format!("{mark}{}", seconds(age))), role)
+            (format!("{:>7}{rx_frames_s:>6.1}/s", format!("{mark}{}", seconds(age))), role)
         }
     };
-    [theme.label(format!(" {name:<23.23}")), theme.span(format!("{text:<16}"), role)]
+    [theme.label(format!(" {name:<23.23}")), theme.span(format!("{text:<15}"), role)]
 }
 
 /// The regular messages, received or not; then every other message that was received, by its id.
 fn messages(model: &Model, now: Duration) -> Vec<(&'static str, Option<MessageFigures>)> {
-    let heard: Vec<(&'static str, MessageFigures)> = model
-        .link
-        .stats
-        .messages(now)
-        .filter(|figures| figures.source == model.settings.vehicle)
-        .filter_map(|figures| Some((message_name(figures.message_id)?, figures)))
-        .collect();
-    let figures = |name| heard.iter().find(|(known, _)| *known == name).map(|(_, figures)| *figures);
-    let others = heard.iter().filter(|(name, _)| !REGULAR.contains(name));
-    REGULAR
-        .iter()
-        .map(|name| (*name, figures(*name)))
-        .chain(others.map(|(name, figures)| (*name, Some(*figures))))
-        .collect()
+    let mut messages: Vec<(&str, _)> = REGULAR.split_whitespace().map(|name| (name, None)).collect();
+    for figures in model.link.stats.messages(now) {
+        let name = message_name(figures.message_id).filter(|_| figures.source == model.settings.vehicle);
+        let Some(name) = name else { continue };
+        match messages.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, heard)) => *heard = Some(figures),
+            None => messages.push((name, Some(figures))),
+        }
+    }
+    messages
 }

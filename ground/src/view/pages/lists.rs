@@ -4,8 +4,7 @@ use std::time::Duration;
 
 use ratatui::text::Line;
 
-use super::window;
-use crate::model::{ABORT_WORDS, Act, DEFINITIONS, Model, Role};
+use crate::model::{ABORT_WORDS, Act, Alarm, DEFINITIONS, Model, Role};
 use crate::view::status_lines::{alarm_state, cut};
 use crate::view::{TextRole, Theme, lists, seconds};
 
@@ -24,38 +23,31 @@ pub fn alarms_lines(
     if list.is_empty() {
         return vec![theme.line(" no active or unacknowledged alarm", TextRole::Good)];
     }
-    let chosen = model.pointed_at().map(|alarm| alarm.kind);
+    let chosen =
+        model.pointed_at().and_then(|chosen| list.iter().position(|alarm| alarm.kind == chosen.kind));
     let head = Line::from(vec![
         theme.key(" Space"),
         theme.label(" acknowledges the marked one; "),
         theme.key("Up Down"),
         theme.label(format!(" choose; {} of {} not seen", model.alarms.unacknowledged(), list.len())),
     ]);
-    let mut marked = 0;
-    let lines: Vec<Line> = list
-        .iter()
-        .enumerate()
-        .map(|(place, alarm)| {
-            let is_chosen = Some(alarm.kind) == chosen;
-            if is_chosen {
-                marked = place;
-            }
-            let (word, age, role) = alarm_state(alarm, now);
-            let lasted = alarm.ended_at.map(|at| at.saturating_sub(alarm.raised_at).as_secs());
-            let lasted = lasted.map_or_else(String::new, |held_s| format!(", held {held_s} s"));
-            let mark = if is_chosen { ">" } else { " " };
-            let room = columns.saturating_sub(1 + WORD_COLUMNS + age.len() + lasted.len() + 1);
-            let text = cut(&alarm.text, room);
-            Line::from(vec![
-                theme.key(mark),
-                theme.span(format!("{word:<WORD_COLUMNS$}"), role),
-                theme.plain(format!("{text:<room$} {age}{lasted}")),
-            ])
-        })
-        .collect();
+    let line = |(place, alarm): (usize, &Alarm)| {
+        let (word, age, role) = alarm_state(alarm, now);
+        let lasted = alarm.ended_at.map(|at| at.saturating_sub(alarm.raised_at).as_secs());
+        let lasted = lasted.map_or_else(String::new, |held_s| format!(", held {held_s} s"));
+        let mark = if Some(place) == chosen { ">" } else { " " };
+        let room = columns.saturating_sub(1 + WORD_COLUMNS + age.len() + lasted.len() + 1);
+        let text = cut(&alarm.text, room);
+        Line::from(vec![
+            theme.key(mark),
+            theme.span(format!("{word:<WORD_COLUMNS$}"), role),
+            theme.plain(format!("{text:<room$} {age}{lasted}")),
+        ])
+    };
     let room = rows.saturating_sub(1);
-    let start = (marked + 1).saturating_sub(room);
-    std::iter::once(head).chain(window(lines, start, room)).collect()
+    let start = (chosen.unwrap_or(0) + 1).saturating_sub(room);
+    let lines = list.iter().enumerate().map(line).skip(start).take(room);
+    std::iter::once(head).chain(lines).collect()
 }
 
 // The texts page: the list of events, newest at the bottom.
@@ -66,15 +58,12 @@ const EVERY_LINE: usize = 4_000;
 /// The newest events, or older ones when scrolled back.
 pub fn messages_lines(model: &Model, theme: Theme, columns: usize, rows: usize) -> Vec<Line<'static>> {
     let all = lists::events(model, theme, columns, EVERY_LINE);
-    let room = rows.saturating_sub(1);
-    let back = model.pages.scroll.min(all.len().saturating_sub(room));
-    let start = all.len().saturating_sub(room + back);
-    let count = all.len();
-    let mut lines = window(all, start, room);
+    let (count, room) = (all.len(), rows.saturating_sub(1));
+    let back = model.pages.scroll.min(count.saturating_sub(room));
     let place = if back == 0 { String::new() } else { format!(", {back} below") };
     let text = format!(" {} events, {count} lines{place}; Up and Down scroll", model.events.total());
-    lines.insert(0, theme.line(text, TextRole::Label));
-    lines
+    let shown = all.into_iter().skip(count.saturating_sub(room + back)).take(room);
+    std::iter::once(theme.line(text, TextRole::Label)).chain(shown).collect()
 }
 
 // The log page: whether the flight is recorded, and where.
@@ -106,23 +95,17 @@ pub fn log_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static
         (Some(_), false, lost) => row("state", format!("recording; {lost} records LOST"), TextRole::Caution),
     };
     let none = || "none".to_owned();
+    let space = model.log.space.map_or_else(|| "not known".to_owned(), |space| space.words());
     vec![
         state,
         row("log", model.settings.log_path.clone().unwrap_or_else(none), TextRole::Plain),
         row("telemetry log", model.settings.tlog_path.clone().unwrap_or_else(none), TextRole::Plain),
-        row(
-            "space",
-            model.log.space.map_or_else(|| "not known".to_owned(), |space| space.words()),
-            TextRole::Plain,
-        ),
+        row("space", space, TextRole::Plain),
         row("running for", seconds(now), TextRole::Plain),
         row("events", model.events.total().to_string(), TextRole::Plain),
         row("book", book(model), TextRole::Plain),
         Line::default(),
-        theme.line(
-            " Both directions of the link, every key, command and event are recorded.",
-            TextRole::Label,
-        ),
+        theme.line(" Both directions of the link and all that the crew does are recorded.", TextRole::Label),
         theme.line(" Records older than 0.2 s are on disk, even if this program crashes.", TextRole::Label),
     ]
 }
@@ -130,10 +113,7 @@ pub fn log_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static
 // The help page: the keys that work now, and the marks.
 
 /// Columns of a key.
-const KEY_COLUMNS: usize = 13;
-
-/// Columns for the names of pages, on the smallest whole screen.
-const PAGES_COLUMNS: usize = 80 - KEY_COLUMNS - 1;
+const KEY_COLUMNS: usize = 12;
 
 const REPLAY: [(&str, &str); 5] = [
     ("Space", "pause, or go on"),
@@ -143,17 +123,14 @@ const REPLAY: [(&str, &str); 5] = [
     ("+ -", "faster or slower"),
 ];
 
-const MARKS: [&str; 4] = [
-    "~ older than 1.5 s; o command, # actual; line flown, dots planned; * computed",
-    "on the ground. Commanded, acknowledged and observed are three facts; armed is",
-    "what HEARTBEAT says. Without link, + is the PREDICTED position, its circle",
-    "contains it in 19 of 20 cases. A last … is a cut line; a wider screen has more.",
-];
+const MARKS: &str = "~ older than 1.5 s; o command, # actual; line flown, dots planned; * computed on the ground. \
+    Commanded, acknowledged and observed are three facts; armed is what HEARTBEAT says. Without link, + is the PREDICTED \
+    position, its circle contains it in 19 of 20 cases. A last … is a cut line; a wider screen has more.";
 
 /// The actions whose keys do something now; those that show a page in one line.
-pub fn help_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+pub fn help_lines(model: &Model, theme: Theme, now: Duration, columns: usize) -> Vec<Line<'static>> {
     let line = |key: String, words: &str| {
-        Line::from(vec![theme.key(format!(" {key:<KEY_COLUMNS$}")), theme.plain(words.to_owned())])
+        Line::from(vec![theme.key(format!(" {key:<KEY_COLUMNS$} ")), theme.plain(words.to_owned())])
     };
     let mut lines = Vec::new();
     if model.settings.role.why_not_command().is_none() {
@@ -171,17 +148,13 @@ pub fn help_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'stati
         lines.push(line(keys.name(definition.act), definition.words));
     }
     let pages = DEFINITIONS.iter().filter_map(|definition| match definition.act {
-        Act::Show(page) => Some(format!("{} {}", keys.name(definition.act), page.name())),
+        Act::Show(page) => Some(format!("{}{}", keys.name(definition.act), page.name())),
         _ => None,
     });
-    let mut rows: Vec<String> = Vec::new();
-    for page in pages {
-        match rows.last_mut().filter(|row| row.len() + 2 + page.len() <= PAGES_COLUMNS) {
-            Some(row) => *row = format!("{row}  {page}"),
-            None => rows.push(page),
-        }
-    }
-    lines.extend(rows.iter().map(|row| line("pages".to_owned(), row)));
-    lines.extend(MARKS.map(|mark| theme.line(format!(" {mark}"), TextRole::Label)));
+    let pages = pages.collect::<Vec<_>>().join(" ");
+    let room = columns.saturating_sub(KEY_COLUMNS + 2);
+    lines.extend(lists::wrap(&pages, room).iter().map(|row| line("pages".to_owned(), row)));
+    let marks = lists::wrap(MARKS, columns.saturating_sub(1)).into_iter();
+    lines.extend(marks.map(|mark| theme.line(format!(" {mark}"), TextRole::Label)));
     lines
 }

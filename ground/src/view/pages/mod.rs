@@ -11,13 +11,16 @@ pub mod review;
 use std::time::Duration;
 
 use ratatui::Frame;
-use ratatui::layout::{Constraint, Layout, Rect, Spacing};
+use ratatui::layout::Constraint::{Fill, Length, Percentage};
+use ratatui::layout::{Constraint, Layout, Margin, Rect, Spacing};
 use ratatui::symbols::merge::MergeStrategy;
 use ratatui::text::Line;
-use ratatui::widgets::{Block, Borders};
+use ratatui::widgets::Block;
 
 use super::band::Room;
-use super::{TextRole, Theme, draw_lines};
+use super::footer::flight_began;
+use super::pictures::attitude::Side;
+use super::{TextRole, Theme, bars, draw_lines};
 use crate::model::{Model, Page};
 
 /// Draws the present page between the top lines and the alarm line. Returns where the pictures of a flight are.
@@ -30,12 +33,62 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
         Page::Pad if model.vehicle.as_foreign().is_none() => pad::draw_pad(model, theme, now, frame, area),
         Page::Review => review::draw_review(model, theme, now, frame, area),
         Page::Plot => plot::draw_plot_page(model, theme, now, frame, area),
-        _ => {
-            let inside = titled(page.name(), theme, frame, area);
-            draw_lines(frame, inside, &lines(model, theme, now, inside));
-        }
+        Page::Find => checks::draw_find(model, theme, now, frame, area),
+        _ => return draw_list(model, theme, now, frame, area),
     }
     None
+}
+
+/// Columns of the tables of link and checks beside their pictures.
+const TABLE_COLUMNS: u16 = 80;
+/// Rows of the bars of the link at 80 columns, and of fins and gimbal, with their borders.
+const BARS_ROWS: [u16; 2] = [5, 8];
+/// Rows of the newest events under a list, with their borders, at least.
+const EVENTS_ROWS: u16 = 5;
+
+/// A page of lines, with the newest events under a short one. A larger screen has pictures beside it; returns where.
+fn draw_list(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) -> Option<Rect> {
+    let page = model.page();
+    let has_pictures = Room::of(frame.area()) != Room::Small;
+    let share =
+        if matches!(page, Page::Link | Page::Checks) { Length(TABLE_COLUMNS) } else { Percentage(60) };
+    let [mut area, right] = columns(area, if has_pictures { [share, Fill(1)] } else { [Fill(1), Length(1)] });
+    match page {
+        Page::Link if has_pictures => link::draw_over_time(model, theme, now, frame, right),
+        Page::Link => {
+            let [bars, below] = rows(area, [Length(BARS_ROWS[0]), Fill(1)]);
+            link::draw_over_time(model, theme, now, frame, bars);
+            area = below;
+        }
+        _ if has_pictures => {
+            // A check moves fins and gimbal, and on the pad there is no flight to show.
+            let is_check = page == Page::Checks;
+            let surfaces = if is_check { Length(BARS_ROWS[1]) } else { Fill(1) };
+            let [above, below] = rows(right, [Fill(1), surfaces]);
+            if is_check || flight_began(model).is_none() {
+                flight::vehicle(model, [Side::South, Side::East], theme, now, frame, above);
+            } else {
+                flight::height(model, theme, now, frame, above);
+            }
+            if is_check {
+                bars::draw_surfaces(model, theme, now, frame, below);
+            } else {
+                flight::map(flight::FROM_ABOVE, model, theme, now, frame, below);
+            }
+        }
+        _ => {}
+    }
+    let lines = lines(model, theme, now, area.inner(Margin::new(1, 1)));
+    let room = (area.height + 1).saturating_sub(lines.len() as u16 + 2);
+    let has_events = room >= EVENTS_ROWS && page != Page::Messages;
+    let [list, below] = rows(area, [Fill(1), Length(if has_events { room } else { 1 })]);
+    let beside = if page == Page::Checks { checks::supply(model, theme) } else { Line::default() };
+    let inside = framed(page.name(), beside, theme, frame, list);
+    draw_lines(frame, inside, &lines);
+    if has_events {
+        events(model, theme, frame, below);
+    }
+    has_pictures.then_some(right)
 }
 
 /// A page of lines, which also a small terminal shows; instead of a page of panels the newest events.
@@ -51,18 +104,9 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, area: Rect) -> Vec<Line
         Page::Alarms => lists::alarms_lines(model, theme, now, columns, rows),
         Page::Find => checks::find_lines(model, theme, now),
         Page::Checks => checks::checks_lines(model, theme, now, columns),
-        Page::Help => lists::help_lines(model, theme, now),
+        Page::Help => lists::help_lines(model, theme, now, columns),
         _ => super::lists::events(model, theme, columns, rows),
     }
-}
-
-/// Draws a title with a rule and returns the area below it.
-pub fn titled(title: &str, theme: Theme, frame: &mut Frame, area: Rect) -> Rect {
-    let title = theme.line(format!(" {title} "), TextRole::Title);
-    let block = Block::new().borders(Borders::TOP).border_style(theme.style(TextRole::Label)).title(title);
-    let inside = block.inner(area);
-    frame.render_widget(block, area.intersection(frame.area()));
-    inside
 }
 
 /// Splits an area into panels beside each other, which share a border.
@@ -78,8 +122,8 @@ fn rows<const N: usize>(area: Rect, rows: [Constraint; N]) -> [Rect; N] {
 /// Draws the border of a panel with its title, and what stands at the right end of it. Returns its inside.
 pub fn framed(title: &str, right: Line<'static>, theme: Theme, frame: &mut Frame, area: Rect) -> Rect {
     let title = theme.line(format!(" {title} "), TextRole::Title);
-    let block =
-        Block::bordered().border_style(theme.border()).merge_borders(MergeStrategy::Exact).title(title);
+    let block = Block::bordered().border_style(theme.border()).merge_borders(MergeStrategy::Exact);
+    let block = block.title(title);
     let block = if right.width() == 0 { block } else { block.title(right.right_aligned()) };
     let inside = block.inner(area);
     frame.render_widget(block, area.intersection(frame.area()));
@@ -98,9 +142,4 @@ fn table(title: &str, lines: &[Line], theme: Theme, frame: &mut Frame, area: Rec
     let inside = framed(title, Line::default(), theme, frame, area);
     // The most important first; the rest is on the page of all values.
     draw_lines(frame, inside, &lines[..lines.len().min(usize::from(inside.height))]);
-}
-
-/// This many lines from a start line on.
-fn window(lines: Vec<Line<'static>>, start: usize, rows: usize) -> Vec<Line<'static>> {
-    lines.into_iter().skip(start).take(rows).collect()
 }

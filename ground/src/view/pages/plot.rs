@@ -5,32 +5,32 @@ use std::time::Duration;
 use ratatui::Frame;
 use ratatui::layout::Constraint::{Fill, Length};
 use ratatui::layout::Rect;
-use ratatui::symbols::Marker;
 use ratatui::text::Line;
-use ratatui::widgets::{Axis, Chart, Dataset, GraphType};
 
-use super::titled;
+use super::{columns, framed};
 use crate::model::{
     Model,
     quantity::{ALL, Quantity},
 };
 use crate::view::footer::flight_began;
-use crate::view::{Ink, TextRole, Theme, draw_line, draw_lines, fixed, quantity_row, side_by_side, widgets};
+use crate::view::pictures::scales;
+use crate::view::{Ink, TextRole, Theme, draw_line, draw_lines, fixed, quantity_row, widgets};
 
 /// Columns of the list of quantities.
-const LIST_COLUMNS: u16 = 35;
+const LIST_COLUMNS: u16 = 36;
+/// Columns and rows from one tick to the next, at least.
+const TICK_COLUMNS: u16 = 9;
+const TICK_ROWS: u16 = 3;
 /// Without a flight this much of the past is shown; in flight all of it, and this much before.
 const CALM_SPAN: Duration = Duration::from_mins(2);
 const BEFORE_FLIGHT: Duration = Duration::from_secs(5);
 
 /// Draws the list of quantities and the plot of the chosen one.
 pub fn draw_plot_page(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let [list, right] = side_by_side(area, [Length(LIST_COLUMNS), Fill(1)]);
-    let quantity = model.pages.plotted;
-    let inside = titled("Up Down choose", theme, frame, list);
+    let [list, right] = columns(area, [Length(LIST_COLUMNS), Fill(1)]);
+    let inside = framed("Up Down choose", Line::default(), theme, frame, list);
     draw_lines(frame, inside, &values(model, theme, now, usize::from(inside.height)));
-    let inside = titled(&format!("{} over time", quantity.name), theme, frame, right);
-    draw_plot(quantity, model, theme, now, frame, inside);
+    draw_plot(model.pages.plotted, model, theme, now, frame, right);
 }
 
 /// The quantities around the chosen one, which is marked, each with its present value.
@@ -47,42 +47,33 @@ fn values(model: &Model, theme: Theme, now: Duration, rows: usize) -> Vec<Line<'
     ALL.iter().skip(start).take(rows).map(line).collect()
 }
 
+/// A panel with the chosen quantity: its present value in the title, and the ticks at their places.
 fn draw_plot(quantity: &Quantity, model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let first = flight_began(model);
     let from = first.unwrap_or_else(|| now.saturating_sub(CALM_SPAN)).saturating_sub(BEFORE_FLIGHT);
     let zero_s = first.unwrap_or(now).as_secs_f64();
-    let points: Vec<(f64, f64)> = model
-        .history
-        .trace
-        .values(quantity, from, now)
-        .map(|(at, value)| (at.as_secs_f64() - zero_s, value))
-        .collect();
-    if points.len() < 2 {
-        return draw_line(frame, area, theme.line(" nothing to plot yet", TextRole::Label));
-    }
-    let of = |pick: fn(&(f64, f64)) -> f64| {
+    let trace = model.history.trace.values(quantity, from, now);
+    let points: Vec<(f64, f64)> = trace.map(|(at, value)| (at.as_secs_f64() - zero_s, value)).collect();
+    let bounds = |pick: fn(&(f64, f64)) -> f64| {
         let least = points.iter().map(pick).fold(f64::INFINITY, f64::min);
-        let most = points.iter().map(pick).fold(f64::NEG_INFINITY, f64::max);
-        (least, most)
+        [least, points.iter().map(pick).fold(f64::NEG_INFINITY, f64::max)]
     };
-    let label = theme.style(TextRole::Label);
-    let axis = |(least, most): (f64, f64), parts: usize| {
-        let span = (most - least).max(1e-6);
-        let step = widgets::tick_step(span, parts);
-        let (low, high) = (libm::floor(least / step) * step, (libm::floor(most / step) + 1.0) * step);
-        let labels: Vec<String> = widgets::ticks(low - step / 2.0, high + step / 2.0, step)
-            .map(|tick| fixed(tick, widgets::tick_decimals(step)))
-            .collect();
-        Axis::default().style(label).bounds([low, high]).labels(labels)
+    let (across, [least, most]) = (bounds(|point| point.0), bounds(|point| point.1));
+    let words = format!(" {} to {} ", fixed(least, quantity.decimals), fixed(most, quantity.decimals));
+    let right = theme.line(words, TextRole::Label);
+    let inside = framed(&format!("{} {}", quantity.name, quantity.unit), right, theme, frame, area);
+    if points.len() < 2 {
+        return draw_line(frame, inside, theme.line(" nothing to plot yet", TextRole::Label));
+    }
+    // A little room around the line, and for a value that does not change that of its last digit.
+    let margin = ((most - least) / 20.0).max(libm::exp10(-(quantity.decimals as f64)));
+    let up = [least - margin, most + margin];
+    let ticks = |[low, high]: [f64; 2], parts: u16| {
+        let step = widgets::tick_step(high - low, usize::from(parts));
+        widgets::ticks(low, high, step).map(|at| (at, at)).collect::<Vec<_>>()
     };
-    let dataset = Dataset::default()
-        .marker(Marker::Braille)
-        .graph_type(GraphType::Line)
-        .style(theme.ground().fg(theme.ink(Ink::Measured)))
-        .data(&points);
-    let chart = Chart::new(vec![dataset])
-        .style(theme.ground())
-        .x_axis(axis(of(|point| point.0), usize::from(area.width / 16)).title("s"))
-        .y_axis(axis(of(|point| point.1), usize::from(area.height / 3)).title(quantity.unit));
-    frame.render_widget(chart, area);
+    let marks = (&*ticks(across, inside.width / TICK_COLUMNS), &*ticks(up, inside.height / TICK_ROWS));
+    let unit = if first.is_some() { "T+ s" } else { "s" };
+    let plane = scales((across, up), marks, unit, theme, frame, inside);
+    plane.draw(theme, frame, |context| plane.measured(context, &points, theme.ink(Ink::Measured)));
 }

@@ -81,8 +81,8 @@ pub fn draw_attitude(model: &Model, side: Side, theme: Theme, now: Duration, fra
     let tilt = vehicle.tilt_deg().filter(|tilt| side == Side::South && !tilt.is_stale(now));
     let tilt = tilt.map_or_else(Line::default, |tilt| {
         // A narrow panel has room for the number.
-        let word = if area.width < 21 { "" } else { "tilt " };
-        theme.line(format!(" {word}{}° ", fixed(tilt.value, 0)), TextRole::Plain)
+        let word = if area.width < 24 { "" } else { "tilt " };
+        theme.line(format!(" {word}{} deg ", fixed(tilt.value, 0)), TextRole::Plain)
     });
     let area = framed(title, tilt, theme, frame, area);
     let Some(attitude) = vehicle.attitude.filter(|attitude| !attitude.is_stale(now)) else {

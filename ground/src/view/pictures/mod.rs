@@ -26,7 +26,7 @@ const DOT_PERIOD: f64 = 4.0;
 
 /// An area whose cells have places in a plane.
 #[derive(Debug, Clone, Copy)]
-struct Plane {
+pub struct Plane {
     area: Rect,
     x: [f64; 2],
     y: [f64; 2],
@@ -51,7 +51,7 @@ impl Plane {
     }
 
     /// Writes a sign or words that begin at a place; moved to the left where they would not fit.
-    fn write(&self, frame: &mut Frame, (x, y): (f64, f64), words: &str, style: Style) {
+    pub fn write(&self, frame: &mut Frame, (x, y): (f64, f64), words: &str, style: Style) {
         let length = words.chars().count() as u16;
         let Some((column, row)) = self.cell(x, y).filter(|_| length <= self.area.width) else { return };
         let column = column.min(self.area.right() - length);
@@ -76,13 +76,13 @@ impl Plane {
         }
     }
 
-    fn draw(&self, theme: Theme, frame: &mut Frame, paint: impl Fn(&mut Context)) {
+    pub fn draw(&self, theme: Theme, frame: &mut Frame, paint: impl Fn(&mut Context)) {
         let canvas = Canvas::default().marker(Marker::Braille).background_color(theme.back());
         frame.render_widget(canvas.x_bounds(self.x).y_bounds(self.y).paint(paint), self.area);
     }
 
     /// What was measured: a line two dots thick.
-    fn measured(&self, context: &mut Context, path: &[(f64, f64)], color: Color) {
+    pub fn measured(&self, context: &mut Context, path: &[(f64, f64)], color: Color) {
         for pair in path.windows(2) {
             let ((x1, y1), (x2, y2)) = (pair[0], pair[1]);
             let (dx, dy) = if (x2 - x1).abs() * self.dot_ratio() > (y2 - y1).abs() {
@@ -136,11 +136,11 @@ fn circle((x, y): (f64, f64), radius: f64) -> Vec<(f64, f64)> {
 const SCALE_COLUMNS: u16 = 5;
 
 /// A number beside a scale, and its place.
-type Tick = (f64, f64);
+pub type Tick = (f64, f64);
 
 /// Draws the scales of a picture of one number over another: ticks with their numbers, and thin lines. Returns the plane inside.
 /// `ticks` are the numbers at the left and under it, each with its place.
-fn scales(
+pub fn scales(
     (x, y): ([f64; 2], [f64; 2]),
     (across, up): (&[Tick], &[Tick]),
     unit: &str,

@@ -6,20 +6,27 @@ use ratatui::text::Line;
 
 use crate::model::Degrees;
 
-/// Light modules around the code. The standard asks for 4; a phone's camera needs 2, and a terminal is small.
-const MARGIN: usize = 2;
+/// Rows of the code with a margin of two light modules, and with one. The standard asks for 4; a phone's camera needs fewer, and a
+/// terminal is small.
+const ROWS: [u16; 2] = [15, 14];
+/// Its columns with the wider margin.
+pub const COLUMNS: u16 = 29;
 
-/// The code of a place as a `geo:` address (RFC 5870), two modules of height in a row: 29 columns, 15 rows. Black on white
+/// The code of a place as a `geo:` address (RFC 5870), two modules of height in a row; empty without so many rows. Black on white
 /// whatever the theme is, because a camera expects that.
-pub fn code(place: Degrees) -> Vec<Line<'static>> {
+pub fn code(place: Degrees, rows: u16) -> Vec<Line<'static>> {
+    let margin = match ROWS.iter().position(|needs| *needs <= rows) {
+        Some(narrower) => 2 - narrower,
+        None => return Vec::new(),
+    };
     let address = format!("geo:{:.6},{:.6}", place.latitude, place.longitude);
     let Ok(code) = QrCode::with_error_correction_level(address, EcLevel::L) else { return Vec::new() };
     let (modules, width) = (code.to_colors(), code.width());
     let is_dark = |column: usize, row: usize| {
-        let place = column.checked_sub(MARGIN).zip(row.checked_sub(MARGIN));
+        let place = column.checked_sub(margin).zip(row.checked_sub(margin));
         place.is_some_and(|(x, y)| x < width && modules.get(y * width + x) == Some(&Module::Dark))
     };
-    let side = width + 2 * MARGIN;
+    let side = width + 2 * margin;
     let row = |row: usize| {
         let cell = |column| match (is_dark(column, row), is_dark(column, row + 1)) {
             (true, true) => '█',
@@ -45,7 +52,7 @@ mod tests {
             (-0.5, 179.999_999_6, "geo:-0.500000,180.000000"),
             (-84.123_456_7, -179.5, "geo:-84.123457,-179.500000"),
         ] {
-            let rows: Vec<Vec<char>> = code(Degrees { latitude, longitude })
+            let rows: Vec<Vec<char>> = code(Degrees { latitude, longitude }, 20)
                 .iter()
                 .map(|line| line.to_string().chars().collect())
                 .collect();

@@ -46,13 +46,9 @@ pub(crate) fn rgb(colour: Color) -> Option<[u8; 3]> {
             Some([level(place / 36), level(place / 6 % 6), level(place % 6)])
         }
         Color::Indexed(number) => Some(SIXTEEN[usize::from(number)]),
+        Color::Rgb(red, green, blue) => Some([red, green, blue]),
         Color::Black => Some(SIXTEEN[0]),
         Color::White => Some(SIXTEEN[15]),
-        Color::Red => Some(SIXTEEN[1]),
-        Color::Green => Some(SIXTEEN[2]),
-        Color::Yellow => Some(SIXTEEN[3]),
-        Color::Magenta => Some(SIXTEEN[5]),
-        Color::Cyan => Some(SIXTEEN[6]),
         other => panic!("no theme uses {other}"),
     }
 }

@@ -154,6 +154,15 @@ impl Rig {
 
     /// The same with a vertical speed, up, m/s, and a state of the parachute.
     pub(crate) fn descent_with(&mut self, height_m: f32, vertical_speed_m_s: f32, chute: TdChute) {
+        self.falls(height_m, vertical_speed_m_s, chute, [0.8, -1.1]);
+    }
+
+    /// The same at 100 m with another touchdown: north and east of the pad, m.
+    pub(crate) fn descent_to(&mut self, touchdown_m: [f32; 2]) {
+        self.falls(100.0, -21.5, TdChute::TD_CHUTE_STOWED, touchdown_m);
+    }
+
+    fn falls(&mut self, height_m: f32, vertical_speed_m_s: f32, chute: TdChute, touchdown_m: [f32; 2]) {
         let falls_to_m = height_m - 58.0;
         let time_to_ignition_s = if falls_to_m > 0.0 { falls_to_m / -vertical_speed_m_s } else { f32::NAN };
         self.hear(&MavMessage::TD_DESCENT(TD_DESCENT_DATA {
@@ -170,8 +179,8 @@ impl Rig {
             wind_y_m_s: -1.8,
             drag_scale: 1.042,
             thrust_scale: 0.985,
-            touchdown_x_m: 0.8,
-            touchdown_y_m: -1.1,
+            touchdown_x_m: touchdown_m[0],
+            touchdown_y_m: touchdown_m[1],
             chute,
             ..TD_DESCENT_DATA::default()
         }));
