@@ -1,6 +1,5 @@
 //! Which vehicle is heard: which of its boots, whether it is simulated, whether it is one of ours at all.
 
-use std::collections::BTreeMap;
 use std::num::NonZeroU32;
 use std::time::Duration;
 
@@ -10,7 +9,7 @@ use protocol::dialect::{
 use protocol::identity::LARGEST_BOOT_NUMBER;
 pub use protocol::told::may_be_ours;
 
-use super::{Model, Sample, words};
+use super::{Model, words};
 
 /// What a vehicle tells of itself and its boot.
 #[derive(Debug, Clone, Copy, Default)]
@@ -112,9 +111,9 @@ impl Model {
     }
 }
 
-// A vehicle with another autopilot: it is shown as what its standard messages say, and never armed or started from here.
+// A vehicle with another autopilot: it is shown as what its heartbeat says, and never armed or started from here.
 
-/// What another autopilot tells in standard messages.
+/// What another autopilot tells in its heartbeat.
 #[derive(Debug, Clone)]
 pub struct Foreign {
     pub autopilot: MavAutopilot,
@@ -123,60 +122,17 @@ pub struct Foreign {
     custom_mode: u32,
     /// The last heartbeat.
     pub heard_at: Duration,
-    /// The newest text of each message, with its name.
-    pub told: BTreeMap<&'static str, Sample<String>>,
 }
 
 impl Foreign {
-    pub(crate) fn of(beat: &HEARTBEAT_DATA, before: Option<Self>, now: Duration) -> Self {
-        let same =
-            before.filter(|before| (before.autopilot, before.mavtype) == (beat.autopilot, beat.mavtype));
-        let told = same.map_or_else(BTreeMap::new, |same| same.told);
+    pub(crate) fn of(beat: &HEARTBEAT_DATA, now: Duration) -> Self {
         Self {
             autopilot: beat.autopilot,
             mavtype: beat.mavtype,
             armed: beat.base_mode.contains(MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED),
             custom_mode: beat.custom_mode,
             heard_at: now,
-            told,
         }
-    }
-
-    /// Takes another standard message.
-    pub(crate) fn hear(&mut self, message: &MavMessage, now: Duration) {
-        let degrees = |rad: f32| f64::from(rad).to_degrees();
-        let (name, text) = match message {
-            MavMessage::ATTITUDE(data) => {
-                let [roll, pitch, yaw] = [data.roll, data.pitch, data.yaw].map(degrees);
-                ("attitude", format!("roll {roll:.0} deg, pitch {pitch:.0} deg, yaw {yaw:.0} deg"))
-            }
-            MavMessage::GLOBAL_POSITION_INT(data) => {
-                let [latitude, longitude] = [data.lat, data.lon].map(|e7| f64::from(e7) * 1e-7);
-                let [above_home_m, above_sea_m] =
-                    [data.relative_alt, data.alt].map(|mm| f64::from(mm) * 1e-3);
-                let place = format!("{latitude:.6}, {longitude:.6}");
-                ("position", format!("{place}, {above_home_m:.1} m above home, {above_sea_m:.0} m above sea"))
-            }
-            MavMessage::VFR_HUD(data) => {
-                let (speed, climb, throttle) = (data.groundspeed, data.climb, data.throttle);
-                ("speed", format!("{speed:.1} m/s over ground, climbs {climb:.1} m/s, throttle {throttle} %"))
-            }
-            MavMessage::GPS_RAW_INT(data) => {
-                let fix = words::lower_case(&data.fix_type, "GPS_FIX_TYPE_");
-                ("GNSS", format!("{fix}, {} satellites", data.satellites_visible))
-            }
-            MavMessage::SYS_STATUS(data) => {
-                ("battery", battery(data.voltage_battery, data.battery_remaining))
-            }
-            MavMessage::BATTERY_STATUS(data) => {
-                let cells = data.voltages.iter().filter(|millivolts| **millivolts != u16::MAX);
-                let millivolts = cells.fold(0_u16, |sum, cell| sum.saturating_add(*cell));
-                let known = if millivolts == 0 { u16::MAX } else { millivolts };
-                ("battery", battery(known, data.battery_remaining))
-            }
-            _ => return,
-        };
-        self.told.insert(name, Sample::new(text, now));
     }
 
     /// As in `ArduPilot quadrotor`.
@@ -203,15 +159,6 @@ impl Foreign {
             _ => "ends its flight as it is set to: it may fall",
         }
     }
-}
-
-fn battery(millivolts: u16, percent: i8) -> String {
-    let volts = if millivolts == u16::MAX {
-        "voltage not told".to_owned()
-    } else {
-        format!("{:.2} V", f64::from(millivolts) * 1e-3)
-    };
-    if percent < 0 { volts } else { format!("{volts}, {percent} % left") }
 }
 
 fn turns_rotors(mavtype: MavType) -> bool {

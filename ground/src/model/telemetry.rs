@@ -176,17 +176,11 @@ fn hear_foreign(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) -> b
                 *vehicle = Vehicle { boot: std::mem::take(&mut vehicle.boot), foreign, ..Vehicle::default() };
                 vehicle.heartbeat = Some(Sample::new(heartbeat(beat), now));
             }
-            vehicle.foreign = Some(Foreign::of(beat, vehicle.foreign.take(), now));
+            vehicle.foreign = Some(Foreign::of(beat, now));
             true
         }
         MavMessage::HEARTBEAT(_) | MavMessage::TD_FLIGHT_STATUS(_) => false,
-        _ if vehicle.as_foreign().is_some() => {
-            if let Some(foreign) = &mut vehicle.foreign {
-                foreign.hear(message, now);
-            }
-            true
-        }
-        _ => false,
+        _ => vehicle.as_foreign().is_some(),
     }
 }
 

@@ -96,7 +96,7 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, area: Rect) -> Vec<Line
     let (columns, rows) = (usize::from(area.width), usize::from(area.height));
     match model.page() {
         Page::Pad if let Some(vehicle) = model.vehicle.as_foreign() => {
-            pad::foreign_lines(model, vehicle, theme, now, (columns, rows))
+            pad::foreign_lines(model, vehicle, theme, (columns, rows))
         }
         Page::Link => link::lines(model, theme, now, columns, rows),
         Page::Messages => lists::messages_lines(model, theme, columns, rows),

@@ -16,7 +16,7 @@ use crate::model::{
 };
 use crate::view::band::{Item, draw_band, word};
 use crate::view::pictures::attitude::{Side, draw_attitude};
-use crate::view::{STALE_MARK, TextRole, Theme, age_mark, draw_lines, fixed, headline, lists, top_lines};
+use crate::view::{STALE_MARK, TextRole, Theme, draw_lines, fixed, headline, lists, top_lines};
 
 /// Columns of the checks.
 const CHECK_COLUMNS: u16 = 49;
@@ -357,14 +357,13 @@ fn ladder(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     lines
 }
 
-// What is shown instead of the Pad page while the vehicle is none of ours: its standard telemetry.
+// What is shown instead of the Pad page while the vehicle is none of ours.
 
-/// The telemetry, and below it the newest events: why something was refused is one of them.
+/// What it is, and below it the newest events: why something was refused is one of them.
 pub fn foreign_lines(
     model: &Model,
     foreign: &Foreign,
     theme: Theme,
-    now: Duration,
     (columns, rows): (usize, usize),
 ) -> Vec<Line<'static>> {
     let plain = |text: String| theme.line(text, TextRole::Plain);
@@ -374,14 +373,6 @@ pub fn foreign_lines(
         plain(" Nothing is armed or started there from here.".to_owned()),
         theme.line(format!(" An abort {}.", foreign.termination()), TextRole::Caution),
     ];
-    lines.extend(foreign.told.iter().map(|(name, text)| {
-        let (mark, role) = age_mark(text, now);
-        let role = if role == TextRole::Stale { role } else { TextRole::Plain };
-        Line::from(vec![
-            theme.label(format!(" {name:<9}")),
-            theme.span(format!("{mark}{}", text.value), role),
-        ])
-    }));
     let room = rows.saturating_sub(lines.len());
     lines.extend(lists::events(model, theme, columns, room));
     lines
