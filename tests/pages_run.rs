@@ -78,7 +78,7 @@ const SAID: [(&str, &str); 20] = [
     ("replay compare mk2 mk3", "mk3 differs from mk2 in"),
     ("replay refly flight.mcap --without-fault gnss-out", "flown again"),
     ("replay compare flight.mcap without.mcap --tolerances tolerances.toml", "without.mcap"),
-    ("replay export flight.mcap --to parquet", "tables"),
+    ("replay export flight.mcap --to csv", "tables"),
     ("replay fit flight.mcap ", "drag"),
     ("replay fit fits.json --mission mk3 --flights", "GO"),
     ("replay verify logs --baseline baseline.json --accept", "new"),

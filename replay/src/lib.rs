@@ -124,9 +124,9 @@ enum Command {
     /// Writes a flight as one HTML page with its pictures inside: no script, no network.
     #[command(after_help = "Example: replay report flight.mcap")]
     Report(report::Args),
-    /// Writes a log's content as CSV, Parquet or a Rerun recording; makes a log of a .tlog.
+    /// Writes a log's content as CSV or a Rerun recording; makes a log of a .tlog.
     #[command(
-        after_help = "Examples:\n  replay export flight.mcap --to parquet --output tables\n  replay export flight.tlog"
+        after_help = "Examples:\n  replay export flight.mcap --to csv --output tables\n  replay export flight.tlog"
     )]
     Export(export::Args),
     /// Recovers a whole log from a damaged one, and says what was kept and what time span is lost; sorts one that is not in order

@@ -1,6 +1,6 @@
 //! Writes the content of a log in the formats of other programs.
 //!
-//! * [`export_tables`]: CSV or Parquet, one file a table; see [`table`](crate::table).
+//! * [`export_tables`]: CSV, one file a table; see [`table`](crate::table).
 //!
 //! A separate program exports to Rerun, because Rerun costs more to compile than all the rest.
 
@@ -11,7 +11,7 @@ use std::process::Command;
 
 use anyhow::{Context as _, Result, bail, ensure};
 use clap::ValueEnum;
-pub use tables::{ExportedFile, TableFormat, export_tables};
+pub use tables::{ExportedFile, export_tables};
 
 use crate::cli::{Answer, Outcome, give, warn_of_damage};
 use crate::log::{FlightLog, ImportedTlog, LogError, import_tlog, is_tlog};
@@ -34,7 +34,7 @@ pub(crate) struct Args {
     /// The format; a .tlog becomes a log.
     #[arg(long, value_enum)]
     to: Option<Format>,
-    /// Output: a directory for csv and parquet (one file for each table), otherwise a file; of a .tlog its name with .mcap
+    /// Output: a directory for csv (one file for each table), otherwise a file; of a .tlog its name with .mcap
     /// if left out.
     #[arg(long, short, value_name = "PATH")]
     output: Option<PathBuf>,
@@ -50,8 +50,6 @@ pub(crate) struct Args {
 enum Format {
     /// Comma-separated values.
     Csv,
-    /// Apache Parquet.
-    Parquet,
     /// Rerun; a separate program writes it.
     Rrd,
     /// A log, of a .tlog.
@@ -62,21 +60,20 @@ impl Args {
     pub(crate) fn run(self) -> Result<Outcome> {
         let is_tlog = is_tlog(&self.file).with_context(|| self.file.display().to_string())?;
         let format = self.to.or(is_tlog.then_some(Format::Mcap));
-        let format = format.context("--to is missing: csv, parquet or rrd")?;
+        let format = format.context("--to is missing: csv or rrd")?;
         let output = self.output.clone().or_else(|| is_tlog.then(|| self.file.with_extension("mcap")));
         let output = output.context("--output is missing: where to write")?;
         let destination = Destination { path: &output, force: self.force };
         match format {
-            Format::Csv => self.tables(TableFormat::Csv, destination),
-            Format::Parquet => self.tables(TableFormat::Parquet, destination),
+            Format::Csv => self.tables(destination),
             Format::Rrd => self.rerun(&output),
             Format::Mcap => give(&import_tlog(&self.file, destination)?, self.json),
         }
     }
 
-    fn tables(&self, format: TableFormat, destination: Destination) -> Result<Outcome> {
+    fn tables(&self, destination: Destination) -> Result<Outcome> {
         let mut log = FlightLog::open(&self.file)?;
-        let files = export_tables(&mut log, format, destination)?;
+        let files = export_tables(&mut log, destination)?;
         let outcome = give(&files, self.json)?;
         warn_of_damage(log.name(), log.damage().map(ToString::to_string).as_deref());
         Ok(outcome)

@@ -133,12 +133,10 @@ fn val_judge_finds_no_better_plan_than_the_one_that_flew() {
 fn the_command_exports_and_imports_logs() {
     let directory = tempfile::tempdir().unwrap();
     let at = |name: &str| directory.path().join(name);
-    for format in ["csv", "parquet"] {
-        let export = &mut replay("export", &WITH_FRAMES.log);
-        let (code, files) = data(export.args(["--to", format, "--output"]).arg(at(format)));
-        assert!(code == 0 && files.as_array().unwrap().len() > 5, "{files}");
-        assert!(at(format).join(format!("computer_frame.{format}")).exists());
-    }
+    let export = &mut replay("export", &WITH_FRAMES.log);
+    let (code, files) = data(export.args(["--to", "csv", "--output"]).arg(at("csv")));
+    assert!(code == 0 && files.as_array().unwrap().len() > 5, "{files}");
+    assert!(at("csv").join("computer_frame.csv").exists());
     let tlog = at("flight.tlog");
     std::fs::rename(crate::simulated::tlog(&WITH_FRAMES, "export.tlog"), &tlog).unwrap();
     let (code, imported) = data(&mut replay("export", &tlog));

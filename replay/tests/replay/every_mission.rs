@@ -56,7 +56,7 @@ const SAME_MISSION: Answer = (0, &["{mission} is the same mission as {mission}"]
 const REPLAY: &str = env!("CARGO_BIN_EXE_replay");
 
 /// Rows are asked in this order: some read what a row before them wrote.
-const TABLE: [Row; 22] = [
+const TABLE: [Row; 21] = [
     row(
         "info {log}",
         (
@@ -135,7 +135,6 @@ const TABLE: [Row; 22] = [
         (0, &["REFUSED: controller warm", "{mission}", "!NaN"]),
     ),
     row("export {log} --to csv --output {dir}/csv", TABLES, TABLES, TABLES),
-    row("export {log} --to parquet --output {dir}/parquet", TABLES, TABLES, TABLES),
     row("export {log} --to rrd --output {dir}/flight.rrd", NO_RERUN, NO_RERUN, NO_RERUN),
     row("export {dir}/told.tlog", HEARD, HEARD, HEARD),
     row(

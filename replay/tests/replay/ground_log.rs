@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 
 use protocol::log::record::{Direction, Event, EventLevel, RawFrame, Record};
 use protocol::log::writer::{LogHeader, LogWriter};
-use replay::export::{TableFormat, export_tables};
+use replay::export::export_tables;
 use replay::info::info;
 use replay::log::{Clock, ClockTime, Entry, FlightLog, Recording, import_tlog};
 
@@ -102,7 +102,7 @@ fn the_report_of_a_ground_log_marks_the_touchdown_on_its_own_clock() {
 fn every_message_becomes_a_table_with_every_field() {
     let directory = WITH_FRAMES.beside("messages");
     let mut log = FlightLog::open(&GROUND).unwrap();
-    let files = export_tables(&mut log, TableFormat::Csv, &directory).unwrap();
+    let files = export_tables(&mut log, &directory).unwrap();
     let names: Vec<String> =
         files.iter().map(|file| file.path.file_stem().unwrap().to_string_lossy().into_owned()).collect();
     assert!(names.contains(&"mavlink_1_1_td_fins".to_owned()), "{names:?}");
@@ -135,7 +135,7 @@ fn the_crews_clock_is_the_clock_of_the_log() {
     let clocks = info(&WITH_FRAMES.log).unwrap().clocks;
     let directory = WITH_FRAMES.beside("clocks");
     let mut log = FlightLog::open(&WITH_FRAMES.log).unwrap();
-    export_tables(&mut log, TableFormat::Csv, &directory).unwrap();
+    export_tables(&mut log, &directory).unwrap();
     let mut table = csv::Reader::from_path(directory.join("mavlink_1_1_td_flight_status.csv")).unwrap();
     let mut flown = 0;
     for row in table.deserialize() {

@@ -2,10 +2,9 @@
 
 use std::path::Path;
 
-use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use proptest::prelude::*;
 use replay::compare::{Align, Flown, Tolerances, compare};
-use replay::export::{TableFormat, export_tables};
+use replay::export::export_tables;
 use replay::info::{GradeLevel, info};
 use replay::log::{FlightLog, ImportError, Recording, import_tlog};
 use replay::refly::{ReflyOptions, refly_flight, write_log};
@@ -96,17 +95,17 @@ fn different_verdicts_fail_unless_they_are_tolerated() {
     assert!(found.failures.is_empty(), "{:?}", found.failures);
 }
 
-fn export(flight: &Simulated, format: TableFormat, name: &str) -> std::path::PathBuf {
+fn export(flight: &Simulated, name: &str) -> std::path::PathBuf {
     let directory = flight.beside(name);
     let mut log = FlightLog::open(&flight.log).unwrap();
-    export_tables(&mut log, format, &directory).unwrap();
+    export_tables(&mut log, &directory).unwrap();
     directory
 }
 
 /// Every number of the CSV reads back as the recorded one.
 #[test]
 fn the_csv_holds_the_recorded_numbers_bit_for_bit() {
-    let directory = export(&MK2, TableFormat::Csv, "csv");
+    let directory = export(&MK2, "csv");
     let text = read_text(&directory.join("computer_frame.csv"));
     let mut lines = text.lines();
     let names: Vec<&str> = lines.next().unwrap().split(',').collect();
@@ -136,20 +135,17 @@ fn the_csv_holds_the_recorded_numbers_bit_for_bit() {
 }
 
 #[test]
-fn the_parquet_holds_the_recorded_numbers_bit_for_bit() {
-    let directory = export(&DISPERSED, TableFormat::Parquet, "parquet");
-    let file = std::fs::File::open(directory.join("vehicle_truth3d.parquet")).unwrap();
-    let reader = SerializedFileReader::new(file).unwrap();
+fn a_table_holds_the_recorded_numbers_bit_for_bit() {
+    let directory = export(&DISPERSED, "numbers");
+    let mut table = csv::Reader::from_path(directory.join("vehicle_truth3d.csv")).unwrap();
+    let names = table.headers().unwrap().clone();
     let recording = DISPERSED.recording();
-    let rows: Vec<_> = reader.get_row_iter(None).unwrap().map(Result::unwrap).collect();
+    let rows: Vec<_> = table.records().map(Result::unwrap).collect();
     assert_eq!(rows.len(), recording.world.len());
     for (row, truth) in rows.iter().zip(&recording.world) {
         let field = |name: &str| {
-            let found = row.get_column_iter().find(|(known, _)| *known == name).unwrap();
-            match found.1 {
-                parquet::record::Field::Double(number) => number.to_bits(),
-                other => panic!("{name}: {other:?}"),
-            }
+            let place = names.iter().position(|known| known == name).unwrap();
+            row[place].parse::<f64>().unwrap().to_bits()
         };
         assert_eq!(field("state.position_m.z"), truth.state.position_m.z.to_bits());
         assert_eq!(field("thrust_n"), truth.thrust_n.to_bits());
@@ -199,7 +195,7 @@ fn a_tlog_is_read_like_the_log_made_of_it() {
     }
     let rows = |log: &Path, name: &str| {
         let directory = WITH_FRAMES.beside(name);
-        export_tables(&mut FlightLog::open(log).unwrap(), TableFormat::Csv, &directory).unwrap();
+        export_tables(&mut FlightLog::open(log).unwrap(), &directory).unwrap();
         read_text(&directory.join("telemetry.csv"))
     };
     assert_eq!(rows(&named_otherwise, "of-tlog"), rows(&imported, "of-mcap"));
@@ -267,38 +263,33 @@ proptest! {
     }
 }
 
-/// The dictionary has every column of every table; units, meanings and words are also in the Parquet files.
+/// The dictionary has every column of every table, with units, meanings and words.
 #[test]
-fn every_column_is_in_the_dictionary_and_parquet_knows_units_and_words() {
-    let directory = export(&WITH_FRAMES, TableFormat::Parquet, "dictionary");
+fn every_column_is_in_the_dictionary_with_its_unit_and_words() {
+    let directory = export(&WITH_FRAMES, "dictionary");
     let text = read_text(&directory.join("dictionary.csv"));
     let mut columns = 0;
     for entry in std::fs::read_dir(&directory).unwrap().map(|entry| entry.unwrap().path()) {
-        if entry.extension().is_none_or(|ending| ending != "parquet") {
+        let table = entry.file_stem().unwrap().to_string_lossy().into_owned();
+        if table == "dictionary" {
             continue;
         }
-        let reader = SerializedFileReader::new(std::fs::File::open(&entry).unwrap()).unwrap();
-        let table = entry.file_stem().unwrap().to_string_lossy().into_owned();
-        for column in reader.metadata().file_metadata().schema_descr().columns() {
+        for column in csv::Reader::from_path(&entry).unwrap().headers().unwrap() {
             columns += 1;
-            assert!(text.contains(&format!("\n{table},{},", column.path().parts()[0])), "{table} {column:?}");
+            assert!(text.contains(&format!("\n{table},{column},")), "{table} {column}");
         }
     }
     assert_eq!(text.lines().count(), columns + 1);
     for row in [
         "computer_frame,input.time_s,number,s,,\n",
+        "computer_frame,output.gimbal_1_rad,number,rad,",
         "mavlink_1_1_td_flight_status,time_boot_ms,whole number,ms,Time since boot.,\n",
     ] {
         assert!(text.contains(row), "{row}");
     }
-    let file = std::fs::File::open(directory.join("computer_frame.parquet")).unwrap();
-    let reader = SerializedFileReader::new(file).unwrap();
-    let facts = reader.metadata().file_metadata().key_value_metadata().unwrap();
-    let fact =
-        |key: &str| facts.iter().find(|fact| fact.key == key).and_then(|fact| fact.value.clone()).unwrap();
-    assert_eq!(fact("output.gimbal_1_rad.unit"), "rad");
-    assert_eq!(fact("output.phase.meaning"), "Index of the flight phase, as in the dialect's TD_PHASE.");
-    assert!(fact("output.phase.values").contains("9 TD_PHASE_POWERED"));
+    let phase = text.lines().find(|row| row.starts_with("computer_frame,output.phase,")).unwrap();
+    let meaning = "Index of the flight phase, as in the dialect's TD_PHASE.";
+    assert!(phase.contains(meaning) && phase.contains("9 TD_PHASE_POWERED"), "{phase}");
 }
 
 /// The components of a vector have the vector's unit and meaning.
@@ -306,7 +297,7 @@ fn every_column_is_in_the_dictionary_and_parquet_knows_units_and_words() {
 fn a_component_of_a_vector_has_the_unit_of_the_vector() {
     let directory = crate::from_apogee::LANDED.beside("vectors");
     let mut log = FlightLog::open(&crate::from_apogee::LANDED.log).unwrap();
-    export_tables(&mut log, TableFormat::Csv, &directory).unwrap();
+    export_tables(&mut log, &directory).unwrap();
     let text = read_text(&directory.join("dictionary.csv"));
     for row in [
         "vehicle_truth3d,state.velocity_m_s.x,number,m/s,In the world.,\n",

@@ -3,13 +3,13 @@ import sys
 
 import pandas
 import polars
-import pyarrow.parquet
+import pyarrow.csv
 
 path, column = sys.argv[1], sys.argv[2]
 frames = {
-    "pandas": pandas.read_parquet(path),
-    "polars": polars.read_parquet(path),
-    "pyarrow": pyarrow.parquet.read_table(path),
+    "pandas": pandas.read_csv(path, float_precision="round_trip"),
+    "polars": polars.read_csv(path, infer_schema_length=None),
+    "pyarrow": pyarrow.csv.read_csv(path),
 }
 for name, frame in frames.items():
     value = frame[column][len(frame) - 1]

@@ -1,4 +1,4 @@
-//! Runs other people's programs: MAVLink ground stations and libraries, Wireshark, readers of MCAP and Parquet, a
+//! Runs other people's programs: MAVLink ground stations and libraries, Wireshark, readers of MCAP and of tables, a
 //! browser.
 //!
 //! Python and Node packages are installed with pinned versions into `target/clients` and nowhere else. Other programs

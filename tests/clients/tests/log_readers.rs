@@ -12,7 +12,7 @@ use std::process::Command;
 use std::sync::LazyLock;
 
 use clients::{FOXGLOVE, NODE_MCAP, READERS, RERUN, file, found};
-use replay::export::{TableFormat, export_tables};
+use replay::export::export_tables;
 use replay::info::info;
 use replay::log::{Entry, FlightLog, Recording};
 use replay::recover::recover;
@@ -147,10 +147,10 @@ fn logs_pass_rerun_mcap_check() {
 }
 
 #[test]
-fn parquet_is_read_by_pandas_polars_and_pyarrow() {
+fn a_table_is_read_by_pandas_polars_and_pyarrow() {
     let check = |log: &Path, directory: PathBuf, table: &str, rows: usize, values: &[(&str, f64)]| {
         let mut opened = FlightLog::open(log).unwrap();
-        let files = export_tables(&mut opened, TableFormat::Parquet, &directory).unwrap();
+        let files = export_tables(&mut opened, &directory).unwrap();
         let path = directory.join(table);
         let columns = files.iter().find(|file| file.path == path).unwrap().columns;
         for (column, value) in values {
@@ -165,11 +165,11 @@ fn parquet_is_read_by_pandas_polars_and_pyarrow() {
     let last = recording.world.last().unwrap();
     let values =
         [("state.position_m.y", last.state.position_m.y), ("fins_actual_2_rad", last.fins_actual_rad[1])];
-    check(&MK2.log, MK2.beside("tables"), "vehicle_truth3d.parquet", recording.world.len(), &values);
+    check(&MK2.log, MK2.beside("tables"), "vehicle_truth3d.csv", recording.world.len(), &values);
     let recording = Recording::open(&LANDED.log).unwrap();
     let last = recording.world.last().unwrap();
     let values = [("state.position_m.x", last.state.position_m.x), ("height_m", last.height_m)];
-    check(&LANDED.log, LANDED.beside("tables"), "vehicle_truth3d.parquet", recording.world.len(), &values);
+    check(&LANDED.log, LANDED.beside("tables"), "vehicle_truth3d.csv", recording.world.len(), &values);
 }
 
 #[test]
