@@ -11,7 +11,7 @@ use crate::report::chart::Chart;
 use crate::report::html::{escaped, paragraph, table};
 use crate::report::track::Flight;
 
-use super::pictures::Picture;
+use super::pictures::{IGNITION, Picture, TOUCHDOWN};
 use super::whole::{FROM_ABOVE, view};
 
 pub(super) fn html(flight: &Flight, info: &Info, pictures: &[Picture<'_>]) -> String {
@@ -22,7 +22,9 @@ pub(super) fn html(flight: &Flight, info: &Info, pictures: &[Picture<'_>]) -> St
     html += "</div>\n<div class=\"charts\">\n";
     for picture in pictures.iter().filter(|picture| picture.section == "first") {
         let panel = &picture.chart.panel;
-        let panel = Panel { spans: flight.spans.clone(), marks: Vec::new(), ..panel.clone() };
+        let mut panel = Panel { spans: flight.spans.clone(), ..panel.clone() };
+        // The backgrounds say what the phases' marks would; a crew's notes stay.
+        panel.marks.retain(|(_, name)| ![IGNITION, TOUCHDOWN].contains(&&**name));
         html += &Chart { panel, ..picture.chart.clone() }.svg();
     }
     html += &view(flight, FROM_ABOVE, true);

@@ -16,6 +16,9 @@ use crate::report::track::{Flight, Part, Series, Thought, planned};
 /// As much of a crew's note as stands beside its mark; the events have all of it.
 const NOTE_LETTERS: usize = 40;
 
+pub(super) const IGNITION: &str = "ignition";
+pub(super) const TOUCHDOWN: &str = "touchdown";
+
 /// A picture of a section.
 pub(super) struct Picture<'a> {
     flight: &'a Flight,
@@ -28,7 +31,7 @@ impl<'a> Picture<'a> {
     /// A picture over a part of the flight, with what happened and what went wrong in it.
     fn new(flight: &'a Flight, section: &'static str, part: Part, title: &str) -> Self {
         let mark = |at_s: Option<f64>, name: &str| Some((flight.axis_s(at_s?), name.to_owned()));
-        let marks = [mark(flight.ignition_s, "ignition"), mark(flight.touchdown_s, "touchdown")];
+        let marks = [mark(flight.ignition_s, IGNITION), mark(flight.touchdown_s, TOUCHDOWN)];
         let (events, clocks) = (&flight.recording.events, &flight.recording.clocks);
         let notes =
             events.iter().filter(|(_, event)| event.name == "ground" && event.message.starts_with("note"));
@@ -36,7 +39,8 @@ impl<'a> Picture<'a> {
             let at = clocks.convert(ClockTime { clock: Clock::Log, time_s: *log_s }, Clock::Flight);
             // A station's flight is on the clock of its log.
             let at_s = at.map_or_else(|| flight.axis_s(*log_s), |at| at.time_s);
-            (at_s, event.message.chars().take(NOTE_LETTERS).collect())
+            let (_, text) = event.message.split_once(": ").unwrap_or_default();
+            (at_s, text.chars().take(NOTE_LETTERS).collect())
         });
         let panel = Panel {
             x_label: flight.axis_name().to_owned(),
