@@ -83,7 +83,7 @@ const LINES: [&str; 20] = [
     "ground --key flight.key --connect",
     "ground download",
     "replay verify vehicle1-flight.mcap",
-    "onboard-sim fly --profile mk3 --key",
+    "onboard-sim fly --mission mk3 --key",
     "ground --key flight.key --crew crew.toml --operator Ann",
     "ground --key flight.key --crew crew.toml --operator Bob",
     "replay verify --book ground.mcap vehicle.mcap",
@@ -175,7 +175,7 @@ fn the_two_people_of_the_crews_page_see_a_vehicle_that_is_ready() {
         keygen(folder.path(), key);
     }
     fs::write(folder.path().join("crew.toml"), crew_file()).unwrap();
-    let _vehicle = Running::start(&mut places.command(folder.path(), "onboard-sim fly --profile mk3 --key"));
+    let _vehicle = Running::start(&mut places.command(folder.path(), "onboard-sim fly --mission mk3 --key"));
     for operator in ["Ann", "Bob"] {
         // Each laptop remembers its own time stamps.
         let laptop = folder.path().join(operator);

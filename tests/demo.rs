@@ -35,11 +35,11 @@ fn the_demonstration_lands_and_its_log_replays_bit_for_bit() {
 #[test]
 fn an_impossible_landing_is_refused_with_the_reason() {
     let folder = tempfile::tempdir().unwrap();
-    let listed = Running::to_end(program(Program::OnboardSim).args(["profiles", "--show", "mk2"]));
+    let listed = Running::to_end(program(Program::OnboardSim).args(["missions", "--show", "mk2"]));
     let height = listed.output.lines().find(|line| line.starts_with("height_m = ")).unwrap();
     // Far below the band of heights from which the motor stops it.
     std::fs::write(folder.path().join("low.toml"), listed.output.replace(height, "height_m = 10.0")).unwrap();
-    let arguments = ["--profile", "low.toml", "--start", "apogee"];
+    let arguments = ["--mission", "low.toml", "--start", "apogee"];
     let refused = Running::to_end(program(Program::Ground).args(arguments).current_dir(folder.path()));
     assert_eq!(refused.code, Some(4), "{}", refused.output);
     assert!(refused.output.contains("controller warm: found"), "{}", refused.output);
@@ -50,7 +50,7 @@ fn a_wrong_argument_is_refused_with_the_valid_forms() {
     let folder = tempfile::tempdir().unwrap();
     for (program_of, arguments, words) in [
         (Program::Ground, &["--connect", "tcp:x:1"][..], "udpin:ADDRESS:PORT"),
-        (Program::OnboardSim, &["fly", "--profile", "nonsense"][..], "mk2, "),
+        (Program::OnboardSim, &["fly", "--mission", "nonsense"][..], "mk2, "),
         (Program::OnboardSim, &["fly", "--speed", "0"][..], "must be `max` or a factor"),
     ] {
         let ended = Running::to_end(program(program_of).args(arguments).current_dir(folder.path()));

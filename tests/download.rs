@@ -11,7 +11,7 @@ use protocol::dialect::TdPhase;
 
 fn download(folder: &Path, link: &str) -> Command {
     let mut command = program(Program::Ground);
-    command.args(["download", "--connect", link, "--to", "."]).current_dir(folder);
+    command.args(["download", "--connect", link, "--out", "."]).current_dir(folder);
     command
 }
 
@@ -47,7 +47,7 @@ fn the_log_of_a_landed_vehicle_is_fetched_over_signed_udp_and_replays_bit_for_bi
 fn the_log_is_refused_in_flight() {
     let folder = tempfile::tempdir().unwrap();
     let mut command = program(Program::OnboardSim);
-    command.args(["fly", "--profile", "mk2", "--auto", "--stay", "--speed", "0.2"]);
+    command.args(["fly", "--mission", "mk2", "--auto", "--stay", "--speed", "0.2"]);
     command.args(["--log", "flight.mcap", "--mavlink", "udpin:127.0.0.1:0"]).current_dir(folder.path());
     let mut vehicle = Running::start(&mut command);
     let link = format!("udpout:127.0.0.1:{}", vehicle.bound_port(Bound::Udp));

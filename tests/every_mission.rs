@@ -9,7 +9,7 @@ use flight::vehicles::mission::BUILTIN;
 fn shown(folder: &Path, mission: &str) {
     let log = format!("{mission}.mcap");
     let mut fly = program(Program::OnboardSim);
-    fly.args(["fly", "--profile", mission, "--seed", "2", "--auto", "--speed", "max"]);
+    fly.args(["fly", "--mission", mission, "--seed", "2", "--auto", "--speed", "max"]);
     fly.args(["--mavlink", "udpout:127.0.0.1:9"]);
     let flown = Running::to_end(fly.args(["--log", &log]).current_dir(folder));
     assert_eq!(flown.code, Some(0), "{mission}: {}", flown.output);

@@ -37,7 +37,7 @@ fn what_a_station_recorded_agrees_with_the_vehicles_own_log() {
     let mut station = auto_ground(folder, &["udpin:127.0.0.1:0"]);
     let mut ground = Running::start(station.args(["--tlog", "ground.tlog"]));
     let mut fly = vehicle(folder, &[&ground.udp_link()]);
-    let flight = Running::start(fly.args(["--profile", "mk2"]));
+    let flight = Running::start(fly.args(["--mission", "mk2"]));
     expect_landing(flight, ground);
 
     // The same verdict, in the words for what a station can know.
@@ -58,7 +58,7 @@ fn what_a_station_recorded_agrees_with_the_vehicles_own_log() {
 
     // Each row of the station's tables is a row that the vehicle's log says it sent.
     for log in ["vehicle", "ground"] {
-        replay(folder, &["export", &format!("{log}.mcap"), "--to", "csv", "--output", log]);
+        replay(folder, &["export", &format!("{log}.mcap"), "--to", "csv", "--out", log]);
     }
     for (table, value) in [
         ("mavlink_1_1_local_position_ned", "z"),
@@ -130,7 +130,7 @@ fn told_by_each_frame(tlog: &Path) -> Vec<[Option<f64>; 8]> {
 /// What the station recorded, and what `replay` makes of its `.tlog`, is the vehicle's state after one of the frames that the
 /// station received, and the later record after the later frame. The vehicle rolls as it falls.
 fn its_tlog_tells_the_same(folder: &Path) {
-    replay(folder, &["export", "ground.tlog", "--to", "csv", "--output", "tlog"]);
+    replay(folder, &["export", "ground.tlog", "--to", "csv", "--out", "tlog"]);
     let told = told_by_each_frame(&folder.join("ground.tlog"));
     for log in ["ground", "tlog"] {
         let table = folder.join(log).join("telemetry.csv");

@@ -18,7 +18,7 @@ impl Countdown {
         let proxy = UdpProxy::new();
         let mut ground = BareGround::through(&proxy);
         let mut command = vehicle(folder.path(), &[&proxy.vehicle_link()]);
-        let vehicle = Running::start(command.args(["--stay", "--profile", profile]));
+        let vehicle = Running::start(command.args(["--stay", "--mission", profile]));
         ground.wait_until_ready();
         assert_eq!(ground.command(ARM, 1.0), ACCEPTED);
         assert_eq!(ground.command(START, 0.0), ACCEPTED);

@@ -11,7 +11,7 @@ const BOOT: &str = "4242";
 /// A vehicle on its pad that listens.
 fn listening(folder: &std::path::Path) -> Running {
     let mut fly = program(Program::OnboardSim);
-    fly.args(["fly", "--profile", "mk2", "--stay", "--mavlink", "udpin:127.0.0.1:0", "--boot-number", BOOT])
+    fly.args(["fly", "--mission", "mk2", "--stay", "--mavlink", "udpin:127.0.0.1:0", "--boot-number", BOOT])
         .current_dir(folder);
     Running::start(&mut fly)
 }

@@ -20,7 +20,7 @@ fn station(folder: &Path) -> Terminal {
 fn vehicle(folder: &Path, link: &str, more: &[&str]) -> Running {
     let mut command = program(Program::OnboardSim);
     command
-        .args(["fly", "--profile", "mk2", "--stay", "--key", "flight.key", "--log", "vehicle.mcap"])
+        .args(["fly", "--mission", "mk2", "--stay", "--key", "flight.key", "--log", "vehicle.mcap"])
         .args(["--mavlink", link])
         .args(more)
         .current_dir(folder);

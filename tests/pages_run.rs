@@ -86,7 +86,7 @@ const SAID: [(&str, &str); 20] = [
     ("onboard-sim check mini-f10 ", "flights stand"),
     ("onboard-sim new drawn", "`onboard-sim check drawn.toml` says whether it will land"),
     ("onboard-sim check drawn.toml", "drawn: 1.900 kg on G33"),
-    ("replay fit drawn/first.mcap --write drawn.toml", "drawn.toml"),
+    ("replay fit drawn/first.mcap --out drawn.toml", "drawn.toml"),
     ("onboard-sim card --mission drawn.toml", "drawn-card/card.html"),
 ];
 

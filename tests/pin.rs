@@ -26,7 +26,7 @@ fn a_crew_practises_from_the_start_to_may_be_approached_with_the_pin_in_its_hand
     let mut screen = Terminal::start(&command, SIZE, false);
     let link = format!("udpout:127.0.0.1:{}", screen.bound_port(Bound::Udp));
     let mut command = vehicle(folder.path(), &[&link]);
-    command.args(["--stay", "--profile", "mk2", "--start", "pad", "--dispersion", "none"]);
+    command.args(["--stay", "--mission", "mk2", "--start", "pad", "--dispersion", "none"]);
     command.args(["--speed", "4", "--fault", "abort@descent"]);
     let (mut hand, mut vehicle) = Running::start_with_input(&mut command);
     screen.wait_for("every arming check passes");

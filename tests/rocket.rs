@@ -10,7 +10,7 @@ use protocol::dialect::{MavMessage, MavState, TdAbortEffect, TdChute, TdInterloc
 fn a_rocket_without_a_ground_lands_and_its_log_replays_bit_for_bit() {
     let folder = tempfile::tempdir().unwrap();
     let mut fly = program(Program::OnboardSim);
-    fly.args(["fly", "--profile", "mk2", "--speed", "max", "--log", "flight.mcap"])
+    fly.args(["fly", "--mission", "mk2", "--speed", "max", "--log", "flight.mcap"])
         .current_dir(folder.path());
     let flight = Running::to_end(&mut fly);
     assert_eq!(flight.code, Some(0), "{}", flight.output);
@@ -25,7 +25,7 @@ fn a_rocket_without_a_ground_lands_and_its_log_replays_bit_for_bit() {
 fn the_demonstration_of_the_ground_flies_the_same_mission_from_the_pad() {
     let folder = tempfile::tempdir().unwrap();
     let mut ground = program(Program::Ground);
-    ground.args(["--profile", "mk2", "--speed", "max", "--log", "both.mcap"]).current_dir(folder.path());
+    ground.args(["--mission", "mk2", "--speed", "max", "--log", "both.mcap"]).current_dir(folder.path());
     let flight = Running::to_end(&mut ground);
     assert_eq!(flight.code, Some(0), "{}", flight.output);
     for words in ["phase PAD_ARMED -> BOOST", "LIFT-OFF", "APOGEE at", "STANDS UNDAMAGED"] {
@@ -41,7 +41,7 @@ fn a_lift_off_that_nobody_asked_for_is_flown_to_the_parachute() {
     let mut ground = BareGround::new();
     let mut command = vehicle(folder.path(), &[&ground.link()]);
     let fault = ["--fault", "ascent-self-lights@pad+5"];
-    let flight = ["--profile", "mk2", "--start", "pad", "--stay", "--speed", "2"];
+    let flight = ["--mission", "mk2", "--start", "pad", "--stay", "--speed", "2"];
     let vehicle = Running::start(command.args(flight).args(fault));
     ground.wait_for_status("a boost", |status| status.phase == TdPhase::TD_PHASE_BOOST);
     let down = ground.wait_for_status("the parachute", |status| status.phase == TdPhase::TD_PHASE_CHUTE);
@@ -58,7 +58,7 @@ fn over_a_serial_radio_it_lands_within_its_budget() {
     let folder = tempfile::tempdir().unwrap();
     let line = SerialLine::new(57_600);
     let mut vehicle = vehicle(folder.path(), &[&line.near_link()]);
-    let vehicle = Running::start(vehicle.args(["--profile", "mk2"]));
+    let vehicle = Running::start(vehicle.args(["--mission", "mk2"]));
     let ground = Running::start(&mut auto_ground(folder.path(), &[&line.far_link()]));
     let (flight, _) = expect_landing(vehicle, ground);
     let [down, _] = line.carried();
@@ -74,7 +74,7 @@ fn an_abort_in_the_descent_opens_the_parachute() {
     let folder = tempfile::tempdir().unwrap();
     let mut ground = BareGround::new();
     let mut command = vehicle(folder.path(), &[&ground.link()]);
-    let vehicle = Running::start(command.args(["--profile", "mk2", "--stay", "--speed", "2"]));
+    let vehicle = Running::start(command.args(["--mission", "mk2", "--stay", "--speed", "2"]));
     ground.wait_until_ready();
     assert_eq!(ground.command(ARM, 1.0), ACCEPTED);
     assert_eq!(ground.command(START, 0.0), ACCEPTED);

@@ -45,7 +45,7 @@ impl Launch {
         }
         std::fs::write(folder.path().join("crew.toml"), CREW).unwrap();
         let mut fly = program(Program::OnboardSim);
-        fly.args(["fly", "--profile", "mk2", "--stay", "--mavlink", "udpin:127.0.0.1:0"])
+        fly.args(["fly", "--mission", "mk2", "--stay", "--mavlink", "udpin:127.0.0.1:0"])
             .args(["--key", "flight.key", "--crew", "crew.toml"])
             .current_dir(folder.path());
         let mut vehicle = Running::start(&mut fly);

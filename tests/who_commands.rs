@@ -96,7 +96,7 @@ fn two_vehicles_at_one_station_get_nothing_but_an_abort() {
     let vehicles = ["one", "two"].map(|name| {
         let folder = folder.path().join(name);
         std::fs::create_dir(&folder).unwrap();
-        Running::start(vehicle(&folder, &[&link]).args(["--stay", "--profile", "mk2"]))
+        Running::start(vehicle(&folder, &[&link]).args(["--stay", "--mission", "mk2"]))
     });
     screen.wait_until("two vehicles", |window| {
         let rows = window.rows();
@@ -123,12 +123,12 @@ fn a_second_vehicle_does_not_hide_a_countdown_which_its_station_holds() {
     let folder = tempfile::tempdir().unwrap();
     let (mut screen, port) = listening(folder.path());
     let link = format!("udpout:127.0.0.1:{port}");
-    let mut first = Running::start(vehicle(folder.path(), &[&link]).args(["--stay", "--profile", "mk2"]));
+    let mut first = Running::start(vehicle(folder.path(), &[&link]).args(["--stay", "--mission", "mk2"]));
     screen.wait_for("every arming check passes");
     screen.type_until(b"0AARM\r", " ARMED ");
     screen.type_until(b"0SSTART\r", "START  commanded");
     screen.wait_for_fact("START", "observed yes");
-    let spare = Running::start(vehicle(folder.path(), &[&link]).args(["--stay", "--profile", "mk3"]));
+    let spare = Running::start(vehicle(folder.path(), &[&link]).args(["--stay", "--mission", "mk3"]));
     screen.wait_until("two vehicles and the one that is armed", |window| {
         let rows = window.rows();
         assert!(!window.shows("REBOOTED") && !rows[1].contains(" disarmed "), "{rows:?}");
@@ -152,7 +152,7 @@ fn two_vehicles_with_one_boot_number_are_two() {
     let (mut screen, port) = listening(folder.path());
     let link = format!("udpout:127.0.0.1:{port}");
     std::fs::write(folder.path().join("uid"), "4711\n").unwrap();
-    let copy = ["--stay", "--profile", "mk2", "--boot-number", "42", "--uid-file", "uid"];
+    let copy = ["--stay", "--mission", "mk2", "--boot-number", "42", "--uid-file", "uid"];
     let first = Running::start(vehicle(folder.path(), &[&link]).args(copy));
     screen.wait_for("every arming check passes");
     let second = Running::start(vehicle(folder.path(), &[&link]).args(copy));
@@ -182,7 +182,7 @@ fn commands_go_only_to_where_the_shown_vehicle_is_heard() {
         port,
     );
     let link = format!("udpout:127.0.0.1:{port}");
-    let vehicle = Running::start(vehicle(folder.path(), &[&link]).args(["--stay", "--profile", "mk2"]));
+    let vehicle = Running::start(vehicle(folder.path(), &[&link]).args(["--stay", "--mission", "mk2"]));
     screen.wait_for("every arming check passes");
     screen.type_until(b"0AARM\r", "ARM acknowledged: accepted");
     assert!(!other.was_sent(ARM), "the other vehicle was armed, too");
@@ -235,7 +235,7 @@ fn nobody_is_two_people_through_a_screen_of_the_other_one_s_station() {
     }
     std::fs::write(folder.path().join("crew.toml"), CREW).unwrap();
     let mut fly = vehicle(folder.path(), &["udpin:127.0.0.1:0"]);
-    fly.args(["--profile", "mk2", "--stay", "--key", "flight.key", "--crew", "crew.toml"]);
+    fly.args(["--mission", "mk2", "--stay", "--key", "flight.key", "--crew", "crew.toml"]);
     let mut vehicle = Running::start(&mut fly);
     let link = vehicle.udp_link();
     let laptop = |operator: &str| {
@@ -291,7 +291,7 @@ fn nobody_is_two_people_through_a_screen_of_the_other_one_s_station() {
 fn a_screen_whose_daemon_was_killed_claims_nothing_and_keeps_an_unsent_abort_until_it_is_cancelled() {
     let folder = tempfile::tempdir().unwrap();
     let mut command = vehicle(folder.path(), &["udpin:127.0.0.1:0"]);
-    let mut vehicle = Running::start(command.args(["--stay", "--profile", "mk2"]));
+    let mut vehicle = Running::start(command.args(["--stay", "--mission", "mk2"]));
     let link = vehicle.udp_link();
     let mut daemon =
         Running::start(&mut ground(folder.path(), &["daemon", "--connect", &link, "--log", "none"]));
@@ -373,7 +373,7 @@ fn a_second_station_under_the_same_id_neither_commands_nor_keeps_a_countdown_ali
     let slow = profile.replace("[start]\n", "[start]\ncountdown_s = 300.0\n");
     std::fs::write(folder.path().join("slow.toml"), slow).unwrap();
     let mut command = vehicle(folder.path(), &["udpin:127.0.0.1:0"]);
-    let mut vehicle = Running::start(command.args(["--stay", "--profile", "slow.toml"]));
+    let mut vehicle = Running::start(command.args(["--stay", "--mission", "slow.toml"]));
     let link = vehicle.udp_link();
     let station =
         || Terminal::start(&ground(folder.path(), &["--connect", &link, "--log", "none"]), SIZE, false);

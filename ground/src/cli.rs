@@ -35,7 +35,7 @@ pub struct Cli {
 
     /// Show a recorded flight (MCAP or .tlog) on the same screens instead; `last` is the newest
     /// touchdown-*.mcap in the current directory.
-    #[arg(long, value_name = "FILE|last", conflicts_with_all = ["connect", "log", "auto", "profile", "start", "seed", "speed"])]
+    #[arg(long, value_name = "FILE|last", conflicts_with_all = ["connect", "log", "auto", "mission", "start", "seed", "speed"])]
     pub replay: Option<PathBuf>,
 
     /// Replay: where to start: seconds since the first frame, or a phase such as `POWERED`.
@@ -126,8 +126,9 @@ pub struct Flags {
     #[command(flatten)]
     pub socket: SocketArgs,
 
-    /// The mission that the vehicle should fly (built-in name or file): arming is refused if it flies another one.
-    #[arg(long, value_name = "NAME|FILE")]
+    /// The mission, built-in name or file. The demonstration flies it; default: mk3. A vehicle over --connect has to fly it: arming is
+    /// refused if it flies another one.
+    #[arg(long, value_name = "NAME|FILE", alias = "profile")]
     pub mission: Option<String>,
 
     /// Checklist (TOML): arming is refused until every step is signed. `checklist-example.toml` is one.
@@ -161,12 +162,8 @@ pub struct StationArgs {
     #[command(flatten)]
     pub config: ConfigArgs,
 
-    /// Demonstration: built-in mission or profile, or TOML file. Default: mk3.
-    #[arg(long, value_name = "NAME|FILE", conflicts_with = "connect")]
-    pub profile: Option<String>,
-
-    /// Demonstration: where it begins: pad, apogee or drone, if the mission has that start. Default: the pad, if it has one. With
-    /// --mission: where that flight should begin; arming is refused if it begins elsewhere.
+    /// Where the demonstration begins: pad, apogee or drone, if the mission has that start. Default: the pad, if it has one. With
+    /// --connect and --mission: where that flight should begin; arming is refused if it begins elsewhere.
     #[arg(long, value_name = "START")]
     pub start: Option<StartPoint>,
 
@@ -202,7 +199,7 @@ pub enum Command {
     /// The log is checked, and an existing one is not overwritten. What has arrived is kept: the same command goes on with
     /// it. A station that holds a serial line has to end first.
     #[command(
-        after_help = "Example: ground download --connect serial:/dev/ttyUSB0:57600 --key touchdown.key --to logs"
+        after_help = "Example: ground download --connect serial:/dev/ttyUSB0:57600 --key touchdown.key --out logs"
     )]
     Download(DownloadArgs),
     /// List your stations: socket, process, link, vehicle, phase, log and screens.
@@ -260,8 +257,8 @@ pub struct DownloadArgs {
     #[arg(value_name = "NAME")]
     pub name: Option<String>,
     /// Folder to write into.
-    #[arg(long, value_name = "FOLDER", default_value = ".")]
-    pub to: PathBuf,
+    #[arg(long, alias = "to", value_name = "FOLDER", default_value = ".")]
+    pub out: PathBuf,
     #[command(flatten)]
     pub link: LinkArgs,
     #[command(flatten)]
@@ -297,16 +294,13 @@ impl LinkArgs {
 
 impl StationArgs {
     /// What the demonstration flies: a built-in name or a file.
-    pub fn profile(&self) -> &str {
-        self.profile.as_deref().unwrap_or(sim::wire::fly::DEFAULT_MISSION)
+    pub fn mission(&self) -> &str {
+        self.flags.mission.as_deref().unwrap_or(sim::wire::fly::DEFAULT_MISSION)
     }
 
     /// Whether the flags describe a demonstration, so that links in the settings do not apply.
     pub fn describes_demonstration(&self) -> bool {
-        self.profile.is_some()
-            || (self.start.is_some() && self.flags.mission.is_none())
-            || self.seed.is_some()
-            || self.speed.is_some()
+        (self.start.is_some() && self.flags.mission.is_none()) || self.seed.is_some() || self.speed.is_some()
     }
 
     /// Whether the automatic mode starts the flight.
@@ -454,7 +448,6 @@ mod tests {
             "--sysid",
             "--vehicle-sysid",
             "--log",
-            "--profile",
             "--start",
             "--seed",
             "--speed",
@@ -483,7 +476,7 @@ mod tests {
     #[test]
     fn a_demonstration_without_a_screen_starts_by_itself() {
         let demo = Cli::try_parse_from(["ground"]).unwrap().station;
-        assert_eq!(demo.profile(), "mk3");
+        assert_eq!(demo.mission(), "mk3");
         assert!(demo.starts_by_itself(false) && !demo.starts_by_itself(true));
         let live = Cli::try_parse_from(["ground", "--connect", "udpin:0.0.0.0:14550"]).unwrap().station;
         assert!(!live.starts_by_itself(false));
@@ -497,7 +490,7 @@ mod tests {
         };
         assert_eq!(flags("stop"), ["force", "socket"]);
         assert_eq!(flags("status"), ["json"]);
-        let link = ["to", "connect", "sysid", "vehicle-sysid", "key", "crew", "operator", "config"];
+        let link = ["out", "connect", "sysid", "vehicle-sysid", "key", "crew", "operator", "config"];
         assert_eq!(flags("download"), link);
         assert!(Cli::try_parse_from(["ground", "--timeout-s", "3", "attach"]).is_err());
     }

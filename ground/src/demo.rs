@@ -40,10 +40,10 @@ impl DemoOptions {
     /// # Errors
     /// There is no mission of that name, or it is invalid.
     pub fn load(args: &StationArgs) -> anyhow::Result<Self> {
-        let mut flight = fly::load_flight(args.profile())?.starting_at(args.start)?;
+        let mut flight = fly::load_flight(args.mission())?.starting_at(args.start)?;
         flight.recipe.seed = args.seed.unwrap_or(DEMO_SEED);
         // Nobody has named a mission, so nobody waits for the countdown that it says.
-        if args.profile.is_none() && args.flags.mission.is_none() {
+        if args.flags.mission.is_none() {
             flight.recipe = flight.recipe.counting_down(QUICK_COUNTDOWN_S)?;
         }
         let system_id = args.flags.link.vehicle().system_id;

@@ -18,7 +18,7 @@ use protocol::signing::Key;
 #[command(
     version,
     arg_required_else_help = true,
-    after_help = "Example: onboard-sim fly --profile mk3 --log flight.mcap"
+    after_help = "Example: onboard-sim fly --mission mk3 --log flight.mcap"
 )]
 struct Arguments {
     #[command(subcommand)]
@@ -34,12 +34,12 @@ enum Command {
     /// Exit codes: 0 landed inside every limit (from apogee: on its legs); 1 error; 2 usage; 3 ended
     /// outside a limit; 4 refused or aborted; 5 stopped before its end.
     #[command(
-        after_help = "Examples:\n  onboard-sim fly --profile mk3 --log flight.mcap\n  onboard-sim fly --mavlink udpout:127.0.0.1:14550 --seed 7"
+        after_help = "Examples:\n  onboard-sim fly --mission mk3 --log flight.mcap\n  onboard-sim fly --mavlink udpout:127.0.0.1:14550 --seed 7"
     )]
     Fly(cli::fly::FlyArguments),
     /// Fly a mission many times, from apogee to the ground, each time with another vehicle, motor and weather.
     #[command(
-        after_help = "Example: onboard-sim campaign --profile mk3 --dispersion real --flights 1000 --out mk3-real"
+        after_help = "Example: onboard-sim campaign --mission mk3 --dispersion real --flights 1000 --out mk3-real"
     )]
     Campaign(cli::campaign::CampaignArguments),
     /// Say whether the vehicle of a mission will land, and what to change if not: one page, before anything is built.
@@ -58,7 +58,7 @@ enum Command {
     ///
     /// Landed or not, aborted in each part of the flight, without its landing motor, with its booster, lifted off by itself,
     /// ballistic; and the spent booster. Beside it stands the rule of a national association; the larger distance counts.
-    #[command(after_help = "Example: onboard-sim hazard --profile mk3 --wind 0,3,6 --svg hazard.svg")]
+    #[command(after_help = "Example: onboard-sim hazard --mission mk3 --wind 0,3,6 --svg hazard.svg")]
     Hazard(cli::hazard::HazardArguments),
     /// Make a signing key: a new file that only you can read, for --key of vehicle and ground.
     #[command(after_help = "Example: onboard-sim keygen touchdown.key")]
@@ -79,10 +79,10 @@ enum Command {
         after_help = "Examples:\n  onboard-sim new ours\n  onboard-sim new ours --from openrocket.csv --length 0.7\n  onboard-sim new ours --motor stand.csv --motor-data ours 38 200 0.19 0.365"
     )]
     New(cli::new::NewArguments),
-    /// List the built-in profiles, or print one as a file to start from.
-    #[command(after_help = "Example: onboard-sim profiles --show mk3")]
-    Profiles {
-        /// Print this profile's TOML.
+    /// List the built-in missions, or print one as a file to start from.
+    #[command(alias = "profiles", after_help = "Example: onboard-sim missions --show mk3")]
+    Missions {
+        /// Print this mission's TOML.
         #[arg(long, value_name = "NAME")]
         show: Option<String>,
     },
@@ -113,7 +113,7 @@ fn run(arguments: Arguments) -> anyhow::Result<ExitCode> {
         Command::Hazard(arguments) => cli::hazard::run(&arguments),
         Command::Keygen { file, passphrase } => make_key(&file, passphrase),
         Command::New(arguments) => cli::new::run(&arguments),
-        Command::Profiles { show } => profiles(show.as_deref()),
+        Command::Missions { show } => missions(show.as_deref()),
         Command::Fly(arguments) => cli::fly::run(arguments),
         Command::Manual { shell } => manual(Arguments::command(), shell),
     }
@@ -146,7 +146,7 @@ fn make_key(file: &Path, of_passphrase: bool) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn profiles(show: Option<&str>) -> anyhow::Result<ExitCode> {
+fn missions(show: Option<&str>) -> anyhow::Result<ExitCode> {
     let mut out = std::io::stdout().lock();
     if let Some(name) = show {
         out.write_all(text_of(name, mission::BUILTIN, "mission")?.as_bytes())?;

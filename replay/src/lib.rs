@@ -126,7 +126,7 @@ enum Command {
     Report(report::Args),
     /// Writes a log's content as CSV or a Rerun recording; makes a log of a .tlog.
     #[command(
-        after_help = "Examples:\n  replay export flight.mcap --to csv --output tables\n  replay export flight.tlog"
+        after_help = "Examples:\n  replay export flight.mcap --to csv --out tables\n  replay export flight.tlog"
     )]
     Export(export::Args),
     /// Recovers a whole log from a damaged one, and says what was kept and what time span is lost; sorts one that is not in order
@@ -149,7 +149,7 @@ enum Command {
     /// gets an interval: GO (exit code 0) if the probability of a rate below the limit is at most the risk that is taken,
     /// NO-GO (exit code 1) if not.
     #[command(
-        after_help = "Examples:\n  replay fit flight.mcap --write ours.toml\n  replay fit stand.csv --motor H45W\n  replay fit fits.json --mission mk3 --day day --flights 1000"
+        after_help = "Examples:\n  replay fit flight.mcap --out ours.toml\n  replay fit stand.csv --motor H45W\n  replay fit fits.json --mission mk3 --day day --flights 1000"
     )]
     Fit(fit::Args),
     /// Prints a shell's completions.

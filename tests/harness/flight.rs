@@ -26,7 +26,7 @@ pub fn auto_ground(folder: &Path, links: &[&str]) -> Command {
 /// this folder, and its simulated time runs so fast that its motor is cold after seconds.
 pub fn landed_vehicle(folder: &Path, profile: &str, link: &str, more: &[&str]) -> Running {
     let mut command = program(Program::OnboardSim);
-    command.args(["fly", "--profile", profile, "--seed", "1", "--auto", "--stay", "--speed", "20"]);
+    command.args(["fly", "--mission", profile, "--seed", "1", "--auto", "--stay", "--speed", "20"]);
     command.args(["--network-budget", "20000", "--log", "flight.mcap", "--mavlink", link]);
     let mut vehicle = Running::start(command.args(more).current_dir(folder));
     vehicle.wait_for_line("TOUCHDOWN to SAFED");

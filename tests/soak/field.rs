@@ -87,7 +87,7 @@ impl Field {
         let log = format!("vehicle-{number}.mcap");
         let start = if number.is_multiple_of(2) { "apogee" } else { "pad" };
         let mut vehicle = program(Program::OnboardSim);
-        vehicle.args(["fly", "--profile", "mk2", "--stay", "--seed", "11", "--start", start, "--log", &log]);
+        vehicle.args(["fly", "--mission", "mk2", "--stay", "--seed", "11", "--start", start, "--log", &log]);
         vehicle.args(["--flight", &number.to_string(), "--mavlink", &self.proxy.vehicle_link()]);
         let mut vehicle = Running::start(vehicle.args(["--key", KEY]).current_dir(&self.folder));
         vehicle.wait_for_line("PAD_IDLE");

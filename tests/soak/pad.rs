@@ -54,7 +54,7 @@ impl Pad {
         crate::make_key(&folder)?;
         let proxy = UdpProxy::new();
         let mut vehicle = program(Program::OnboardSim);
-        vehicle.args(["fly", "--profile", "mk2", "--stay", "--key", KEY, "--log", "vehicle.mcap"]);
+        vehicle.args(["fly", "--mission", "mk2", "--stay", "--key", KEY, "--log", "vehicle.mcap"]);
         vehicle.args(["--mavlink", &proxy.vehicle_link()]).current_dir(&folder);
         let vehicle = Running::start(&mut vehicle);
         // A disk of its own, which no other process sees.

@@ -122,7 +122,7 @@ fn a_vehicle_killed_in_its_descent_and_restarted_waits_disarmed_for_new_commands
     let address = unshared_address();
     let vehicle = || {
         let mut command = program(Program::OnboardSim);
-        command.args(["fly", "--stay", "--profile", "mk2", "--mavlink", &format!("udpin:{address}")]);
+        command.args(["fly", "--stay", "--mission", "mk2", "--mavlink", &format!("udpin:{address}")]);
         command.arg("--uid-file").arg(folder.path().join("vehicle.uid"));
         Running::start(&mut command)
     };

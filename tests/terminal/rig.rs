@@ -143,7 +143,7 @@ impl Pad {
 /// It keeps its unique id, so that it is known again after a reboot.
 fn vehicle(profile: &str, proxy: &UdpProxy, folder: &Path) -> Command {
     let mut command = program(Program::OnboardSim);
-    command.args(["fly", "--stay", "--profile", profile, "--mavlink", &proxy.vehicle_link()]);
+    command.args(["fly", "--stay", "--mission", profile, "--mavlink", &proxy.vehicle_link()]);
     command.arg("--uid-file").arg(folder.join("vehicle.uid"));
     command
 }

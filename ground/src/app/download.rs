@@ -29,7 +29,7 @@ const SHOW_EVERY: Duration = Duration::from_millis(500);
 /// # Errors
 /// The link cannot be opened, the vehicle refuses, or a file cannot be written.
 pub(in crate::app) async fn run_download(args: &DownloadArgs) -> anyhow::Result<Exit> {
-    let DownloadArgs { name, to, link, .. } = args;
+    let DownloadArgs { name, out, link, .. } = args;
     let (us, vehicle) = (link.us(), link.vehicle());
     anyhow::ensure!(!link.connect.is_empty(), "no link to a vehicle: give --connect");
     let KeyRing { key, .. } = KeyRing::open(link)?;
@@ -63,7 +63,7 @@ pub(in crate::app) async fn run_download(args: &DownloadArgs) -> anyhow::Result<
             match download.take(&packet, now) {
                 Some(DownloadEvent::Opened { crc }) => {
                     let name = download.name().unwrap_or_default();
-                    let (opened, bytes) = Kept::open(to, vehicle.system_id, name, crc)?;
+                    let (opened, bytes) = Kept::open(out, vehicle.system_id, name, crc)?;
                     kept = Some(opened);
                     download.resume(bytes);
                 }

@@ -66,7 +66,7 @@ struct Duty {
 /// Runs the ground station until its end.
 ///
 /// # Errors
-/// A socket, a file or the terminal failed, or the profile is wrong.
+/// A socket, a file or the terminal failed, or the mission is wrong.
 pub fn run(given: &ArgMatches) -> anyhow::Result<Exit> {
     let cli = Cli::from_arg_matches(given)?;
     let given = given.subcommand().map_or(given, |(_, given)| given);
@@ -207,7 +207,9 @@ async fn start(
     let start_unix_s = clock.start_unix_ns() / 1_000_000_000;
     let checklist =
         args.flags.checklist.as_deref().map(|path| open_checklist(path, start_unix_s)).transpose()?;
-    let mission = args.flags.mission.as_deref().map(load_flight).transpose()?;
+    // A demonstration flies it, so it cannot fly another.
+    let named = args.flags.mission.as_deref().filter(|_| demo_options.is_none());
+    let mission = named.map(load_flight).transpose()?;
     let vehicle_clock = demo_options.as_ref().map(|_| LogClock::new());
     let log_time = vehicle_clock.clone().map_or(LogTime::Run(clock), LogTime::Vehicle);
     let opened =
@@ -230,7 +232,7 @@ async fn start(
     let mut model = Model::new(Settings {
         // With several links, each has its own.
         link_capacity_bytes_s: wire.capacity_bytes_s(),
-        vehicle_name: demo.as_ref().map(|_| args.profile().to_owned()),
+        vehicle_name: demo.as_ref().map(|_| args.mission().to_owned()),
         log_path: recorder.as_ref().map(|recorder| recorder.path().display().to_string()),
         tlog_path: recorder.as_ref().and_then(Recorder::tlog_path).map(|path| path.display().to_string()),
         us: link.us(),

@@ -137,7 +137,7 @@ fn write_report(log: &Path, page: &Path) -> Result<String, String> {
     let beside = std::env::current_exe().ok().map(|own| own.with_file_name("replay"));
     let program = beside.filter(|program| program.exists()).unwrap_or_else(|| PathBuf::from("replay"));
     let ran = Command::new(&program)
-        .args(["report".as_ref(), log.as_os_str(), "--output".as_ref(), page.as_os_str()])
+        .args(["report".as_ref(), log.as_os_str(), "--out".as_ref(), page.as_os_str()])
         .stdin(Stdio::null())
         .output()
         .map_err(|error| format!("{}: {error}", program.display()))?;

@@ -27,8 +27,8 @@ pub(crate) struct CampaignArguments {
     #[command(subcommand)]
     command: Option<CampaignCommand>,
     /// Built-in mission or TOML file.
-    #[arg(long, default_value = flight::vehicles::mission::DEFAULT, value_name = "NAME|FILE")]
-    profile: String,
+    #[arg(long, alias = "profile", default_value = flight::vehicles::mission::DEFAULT, value_name = "NAME|FILE")]
+    mission: String,
     /// Where the flights begin: pad, apogee or drone, if the mission has that start [default: the mission's].
     #[arg(long, value_name = "START")]
     start: Option<StartPoint>,
@@ -53,15 +53,13 @@ pub(crate) struct CampaignArguments {
     /// Inject the faults of a scenario file.
     #[arg(long, value_name = "FILE")]
     scenario: Option<PathBuf>,
-    /// Directory of the results. If it holds part of the same campaign, the campaign is continued.
-    #[arg(long, value_name = "DIR", required_unless_present = "only")]
+    /// Directory of the results. If it holds part of the same campaign, the campaign is continued. With --only: the flight's log
+    /// (MCAP); an existing file is kept.
+    #[arg(long, alias = "log", value_name = "PATH", required_unless_present = "only")]
     out: Option<PathBuf>,
     /// Fly only this flight, and print its row.
-    #[arg(long, value_name = "NUMBER", conflicts_with_all = ["out", "shard", "jobs"])]
+    #[arg(long, value_name = "NUMBER", conflicts_with_all = ["shard", "jobs"])]
     only: Option<u64>,
-    /// Log of that flight (MCAP). An existing file is not overwritten.
-    #[arg(long, value_name = "FILE", requires = "only")]
-    log: Option<PathBuf>,
 }
 
 #[derive(Subcommand)]
@@ -87,7 +85,7 @@ pub(crate) fn run(arguments: &CampaignArguments) -> anyhow::Result<ExitCode> {
     }
     let (recipe, expected) = flights(arguments)?;
     if let Some(number) = arguments.only {
-        return single::fly(&recipe, number, expected, arguments.log.as_deref());
+        return single::fly(&recipe, number, expected, arguments.out.as_deref());
     }
     let out = arguments.out.as_deref().context("--out is missing")?;
     let manifest = Manifest::of(&recipe, arguments.flights, &program()?, arguments.shard);
@@ -109,7 +107,7 @@ pub(crate) fn run(arguments: &CampaignArguments) -> anyhow::Result<ExitCode> {
 
 /// What is flown, and how it should end.
 fn flights(arguments: &CampaignArguments) -> anyhow::Result<(Recipe, Option<Expected>)> {
-    let mut recipe = recipe(&arguments.profile, arguments.start, &arguments.dispersion, arguments.seed)?;
+    let mut recipe = recipe(&arguments.mission, arguments.start, &arguments.dispersion, arguments.seed)?;
     recipe.faults.clone_from(&arguments.faults);
     let Some(path) = &arguments.scenario else { return Ok((recipe, None)) };
     let scenario: Scenario = toml::from_str(&read(path)?).with_context(|| path.display().to_string())?;

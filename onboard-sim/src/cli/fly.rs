@@ -32,8 +32,8 @@ use super::{in_wind, recipe};
 )]
 pub(crate) struct FlyArguments {
     /// Built-in mission or TOML file.
-    #[arg(long, default_value = flight::vehicles::mission::DEFAULT, value_name = "NAME|FILE")]
-    profile: String,
+    #[arg(long, alias = "profile", default_value = flight::vehicles::mission::DEFAULT, value_name = "NAME|FILE")]
+    mission: String,
     /// Link to serve: udpout:HOST:PORT, udpin:ADDRESS:PORT, tcpin:ADDRESS:PORT, tcpout:HOST:PORT or
     /// serial:DEVICE:BAUD; may be given more than once.
     #[arg(long, value_name = "LINK")]
@@ -111,7 +111,7 @@ pub(crate) fn run(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
 impl FlyArguments {
     /// The flight that the options describe.
     fn flight(&self) -> anyhow::Result<RocketFlight> {
-        let mut recipe = recipe(&self.profile, self.start, &self.dispersion, self.seed)?;
+        let mut recipe = recipe(&self.mission, self.start, &self.dispersion, self.seed)?;
         if let Some(wind_m_s) = self.wind {
             recipe = in_wind(&recipe, wind_m_s)?;
         }

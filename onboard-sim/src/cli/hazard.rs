@@ -21,8 +21,8 @@ const SHOWN: u64 = 30;
 #[derive(Args)]
 pub(crate) struct HazardArguments {
     /// Built-in mission or TOML file.
-    #[arg(long, default_value = flight::vehicles::mission::DEFAULT, value_name = "NAME|FILE")]
-    profile: String,
+    #[arg(long, alias = "profile", default_value = flight::vehicles::mission::DEFAULT, value_name = "NAME|FILE")]
+    mission: String,
     /// Where the flights begin: pad, apogee or drone [default: pad if the mission has a booster, else the mission's].
     #[arg(long, value_name = "START")]
     start: Option<StartPoint>,
@@ -79,7 +79,7 @@ pub(crate) fn run(arguments: &HazardArguments) -> anyhow::Result<ExitCode> {
 
 /// The mission in each wind.
 fn recipes(arguments: &HazardArguments) -> anyhow::Result<Vec<Recipe>> {
-    let mut recipe = recipe(&arguments.profile, arguments.start, &arguments.dispersion, arguments.seed)?;
+    let mut recipe = recipe(&arguments.mission, arguments.start, &arguments.dispersion, arguments.seed)?;
     if arguments.start.is_none() && recipe.mission.launch.is_some() {
         recipe = recipe.starting_at(StartPoint::Pad)?;
     }

@@ -36,10 +36,10 @@ fn read(path: &Path) -> anyhow::Result<String> {
 }
 
 /// The flights of a seed: a mission, with a start if one is given, and a set of dispersions, each built in or a file.
-fn recipe(profile: &str, start: Option<StartPoint>, set: &str, seed: u64) -> anyhow::Result<Recipe> {
-    let mission_toml = text_of(profile, mission::BUILTIN, "mission")?;
+fn recipe(mission_name: &str, start: Option<StartPoint>, set: &str, seed: u64) -> anyhow::Result<Recipe> {
+    let mission_toml = text_of(mission_name, mission::BUILTIN, "mission")?;
     let set_toml = text_of(set, dispersion::BUILTIN, "set of dispersions")?;
-    let recipe = Recipe { seed, ..Recipe::from_texts((profile, &mission_toml), (set, &set_toml))? };
+    let recipe = Recipe { seed, ..Recipe::from_texts((mission_name, &mission_toml), (set, &set_toml))? };
     Ok(match start {
         Some(start) => recipe.starting_at(start)?,
         None => recipe,

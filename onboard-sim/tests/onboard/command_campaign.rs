@@ -37,7 +37,7 @@ fn a_logged_flight_flies_again_bit_for_bit() {
     let directory = tempfile::tempdir().unwrap();
     let flown = campaign(
         directory.path(),
-        &["--only", "3", "--log", "k.mcap", "--fault", "gnss-out@6", "--fault", "reboot:0.1@descent+2"],
+        &["--only", "3", "--out", "k.mcap", "--fault", "gnss-out@6", "--fault", "reboot:0.1@descent+2"],
     );
     assert!(matches!(flown.status.code(), Some(0 | 3)), "{}", stderr(&flown));
 
@@ -88,7 +88,7 @@ fn a_wrong_request_is_refused_with_the_reason() {
     let directory = tempfile::tempdir().unwrap();
     for (arguments, words) in [
         (&["--out", "x", "--dispersion", "windy"][..], "neither a built-in set of dispersions"),
-        (&["--out", "x", "--profile", "mk9"], "neither a built-in mission (mk2"),
+        (&["--out", "x", "--mission", "mk9"], "neither a built-in mission (mk2"),
         (&["--out", "x", "--shard", "3/2"], "I/N"),
         (&["--out", "x", "--fault", "gnss@5"], "no fault is named"),
         (&["--only", "1", "--out", "x"], "cannot be used with"),

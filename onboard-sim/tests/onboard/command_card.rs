@@ -119,7 +119,7 @@ fn a_card_is_written_whole_shows_what_is_left_and_names_no_rate_of_two_flights()
 #[test]
 fn where_a_vehicle_comes_down_is_told_with_set_flights_interval_and_rule() {
     let directory = tempfile::tempdir().unwrap();
-    let few = ["hazard", "--profile", "vlr", "--wind", "0,4", "--flights", "1", "--hazard-flights", "2"];
+    let few = ["hazard", "--mission", "vlr", "--wind", "0,4", "--flights", "1", "--hazard-flights", "2"];
     let hazard = |more: &[&str]| run(directory.path(), &[&few, more].concat());
     let written = hazard(&["--csv", "hazard.csv", "--svg", "hazard.svg"]);
     assert_eq!(written.status.code(), Some(0), "{}", stderr(&written));

@@ -36,8 +36,8 @@ pub(crate) struct Args {
     to: Option<Format>,
     /// Output: a directory for csv (one file for each table), otherwise a file; of a .tlog its name with .mcap
     /// if left out.
-    #[arg(long, short, value_name = "PATH")]
-    output: Option<PathBuf>,
+    #[arg(long, short, alias = "output", value_name = "PATH")]
+    out: Option<PathBuf>,
     /// Replace existing files.
     #[arg(long)]
     force: bool,
@@ -61,8 +61,8 @@ impl Args {
         let is_tlog = is_tlog(&self.file).with_context(|| self.file.display().to_string())?;
         let format = self.to.or(is_tlog.then_some(Format::Mcap));
         let format = format.context("--to is missing: csv or rrd")?;
-        let output = self.output.clone().or_else(|| is_tlog.then(|| self.file.with_extension("mcap")));
-        let output = output.context("--output is missing: where to write")?;
+        let output = self.out.clone().or_else(|| is_tlog.then(|| self.file.with_extension("mcap")));
+        let output = output.context("--out is missing: where to write")?;
         let destination = Destination { path: &output, force: self.force };
         match format {
             Format::Csv => self.tables(destination),
@@ -88,12 +88,12 @@ impl Args {
         if !program.exists() {
             bail!(
                 "the export to Rerun is not built (it takes some ten minutes): \
-                 cargo run --release -p replay-rerun -- {log} --output {recording}"
+                 cargo run --release -p replay-rerun -- {log} --out {recording}"
             );
         }
         let status = Command::new(&program)
             .arg(&self.file)
-            .arg("--output")
+            .arg("--out")
             .arg(output)
             .args(self.force.then_some("--force"))
             .status()

@@ -511,7 +511,7 @@ impl Arguments {
             write_new(&directory.join(FILES[0]), &learnt.day.mission_toml)?;
             write_new(&directory.join(FILES[1]), &learnt.day.dispersion_toml)?;
             say(&format!(
-                "onboard-sim campaign --profile {name}/mission.toml --dispersion {name}/dispersion.toml --out flights"
+                "onboard-sim campaign --mission {name}/mission.toml --dispersion {name}/dispersion.toml --out flights"
             ));
         }
         Ok(learnt)

@@ -532,8 +532,8 @@ pub(crate) struct Args {
     motor: Option<String>,
     /// Put what was found in the only log into this mission's file; its comments stay. If there is no such file, it gets the
     /// mission that was flown.
-    #[arg(long, value_name = "FILE.toml")]
-    write: Option<PathBuf>,
+    #[arg(long, alias = "write", value_name = "FILE.toml")]
+    out: Option<PathBuf>,
     #[command(flatten)]
     day: day::Arguments,
     /// Answer in JSON.
@@ -549,10 +549,10 @@ struct Earlier {
 
 impl Args {
     pub(crate) fn run(self) -> Result<Outcome> {
-        if self.write.is_some()
+        if self.out.is_some()
             && (self.files.len() != 1 || ["csv", "json"].contains(&ending(&self.files[0]).as_str()))
         {
-            bail!("--write takes the log of one flight: its mission is changed");
+            bail!("--out takes the log of one flight: its mission is changed");
         }
         if let Some(motor) = &self.motor
             && !self.files.iter().any(|file| ending(file) == "csv")
@@ -602,7 +602,7 @@ impl Args {
         }
         let trace = Trace::open(file)?;
         let found = fit(&trace);
-        if let Some(path) = &self.write {
+        if let Some(path) = &self.out {
             write_into(path, file, &trace, &found)?;
         }
         flown.get_or_insert(trace.mission_toml);
@@ -629,7 +629,7 @@ fn write_into(path: &Path, log: &Path, trace: &Trace, found: &Fit) -> Result<()>
     let text = patched(&text, &trace.mission, found, &flight).context("the mission with what was found")?;
     let destination = Destination { path, force: true };
     write_whole(destination, log, |file| file.write_all(text.as_bytes()))?;
-    say(&format!("{name}: --profile of `onboard-sim fly`, `campaign` and `card` takes it"));
+    say(&format!("{name}: --mission of `onboard-sim fly`, `campaign` and `card` takes it"));
     Ok(())
 }
 

@@ -525,10 +525,10 @@ pub(crate) struct Args {
     #[arg(long, value_name = "WHERE")]
     at: Option<Moment>,
     /// Write the flight as a new log.
-    #[arg(long, value_name = "FILE")]
-    log: Option<PathBuf>,
+    #[arg(long, alias = "log", value_name = "FILE")]
+    out: Option<PathBuf>,
     /// Replace an existing file, but never the log that is flown again.
-    #[arg(long, requires = "log", hide_short_help = true)]
+    #[arg(long, requires = "out", hide_short_help = true)]
     force: bool,
     /// Answer in JSON.
     #[arg(long)]
@@ -547,7 +547,7 @@ impl Args {
             faults: FaultChanges { with: self.faults, without: self.without_fault },
         };
         let (report, flight) = refly_flight(&recording, &options)?;
-        if let Some(path) = &self.log {
+        if let Some(path) = &self.out {
             let destination = Destination { path, force: self.force };
             write_log(destination, &recording, &flight)?;
         }

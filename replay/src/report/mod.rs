@@ -56,8 +56,8 @@ pub(crate) struct Args {
     /// The log, an MCAP file.
     file: PathBuf,
     /// The page to write, or - for standard output; the log's name with .html if left out.
-    #[arg(long, short, value_name = "FILE")]
-    output: Option<PathBuf>,
+    #[arg(long, short, alias = "output", value_name = "FILE")]
+    out: Option<PathBuf>,
     /// Another log, whose flight is drawn into the same pictures.
     #[arg(long, value_name = "LOG")]
     with: Option<PathBuf>,
@@ -70,7 +70,7 @@ impl Args {
     pub(crate) fn run(self) -> Result<Outcome> {
         use std::io::Write as _;
         let page = report(&self.file, self.with.as_deref())?;
-        let path = self.output.unwrap_or_else(|| self.file.with_extension("html"));
+        let path = self.out.unwrap_or_else(|| self.file.with_extension("html"));
         let html = page.html.as_bytes();
         if path.as_os_str() == "-" {
             answer(|output| output.write_all(html))?;

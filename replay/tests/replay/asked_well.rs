@@ -13,7 +13,7 @@ use crate::simulated::{DISPERSED, MK2};
 #[test]
 fn another_seed_is_named_in_the_answer_and_in_the_log() {
     let path = DISPERSED.beside("seed.mcap");
-    let (code, report) = data(replay("refly", &DISPERSED.log).args(["--seed", "77", "--log"]).arg(&path));
+    let (code, report) = data(replay("refly", &DISPERSED.log).args(["--seed", "77", "--out"]).arg(&path));
     assert_eq!((code, &report["seed"]), (0, &77.into()));
     let run_facts = Recording::open(&path).unwrap().head.run;
     assert_eq!(run_facts["seed"], "77");

@@ -133,8 +133,8 @@ fn a_question_without_an_answer_exits_2_with_the_reason() {
         &["evaluate"],
         &["refly"],
         &["verify", "--explain", "1"],
-        &["report", "--output", "-"],
-        &["export", "--to", "csv", "--output", &output],
+        &["report", "--out", "-"],
+        &["export", "--to", "csv", "--out", &output],
         &["compare"],
     ];
     for bytes in [&b""[..], b"\x89PNG\r\n\x1a\n", &foreign_mcap("/pose"), b"\x89MCAP0\r\n"] {

@@ -134,7 +134,7 @@ fn the_command_exports_and_imports_logs() {
     let directory = tempfile::tempdir().unwrap();
     let at = |name: &str| directory.path().join(name);
     let export = &mut replay("export", &WITH_FRAMES.log);
-    let (code, files) = data(export.args(["--to", "csv", "--output"]).arg(at("csv")));
+    let (code, files) = data(export.args(["--to", "csv", "--out"]).arg(at("csv")));
     assert!(code == 0 && files.as_array().unwrap().len() > 5, "{files}");
     assert!(at("csv").join("computer_frame.csv").exists());
     let tlog = at("flight.tlog");

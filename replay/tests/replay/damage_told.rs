@@ -43,7 +43,7 @@ fn a_log_cut_before_its_first_message_has_no_answer() {
     let path = directory.path().join("cut.mcap");
     let tables = directory.path().join("csv").display().to_string();
     let questions: [&[&str]; 4] =
-        [&["info"], &["verify"], &["evaluate"], &["export", "--to", "csv", "--output", &tables]];
+        [&["info"], &["verify"], &["evaluate"], &["export", "--to", "csv", "--out", &tables]];
     for log in [&LANDED.log, &MK2.log] {
         std::fs::write(&path, &std::fs::read(log).unwrap()[..100]).unwrap();
         for question in questions {
@@ -68,10 +68,10 @@ fn no_command_is_silent_about_damage() {
         &["info"],
         &["verify"],
         &["evaluate"],
-        &["refly", "--log", &again],
+        &["refly", "--out", &again],
         &["verify", "--explain", "20"],
-        &["report", "--output", &html],
-        &["export", "--to", "csv", "--output", &csv],
+        &["report", "--out", &html],
+        &["export", "--to", "csv", "--out", &csv],
         &["recover", &whole],
         &["compare", path.to_str().unwrap()],
     ];

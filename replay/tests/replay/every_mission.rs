@@ -129,13 +129,13 @@ const TABLE: [Row; 21] = [
     ),
     row("compare {mission} {mission}", SAME_MISSION, SAME_MISSION, SAME_MISSION),
     row(
-        "report {log} --output -",
+        "report {log} --out -",
         (0, &["STANDS UNDAMAGED", "{mission}", "The landing from above", "!NaN"]),
         (0, &["ABORTED", "{mission}", "abort of the crew", "!NaN"]),
         (0, &["REFUSED: controller warm", "{mission}", "!NaN"]),
     ),
-    row("export {log} --to csv --output {dir}/csv", TABLES, TABLES, TABLES),
-    row("export {log} --to rrd --output {dir}/flight.rrd", NO_RERUN, NO_RERUN, NO_RERUN),
+    row("export {log} --to csv --out {dir}/csv", TABLES, TABLES, TABLES),
+    row("export {log} --to rrd --out {dir}/flight.rrd", NO_RERUN, NO_RERUN, NO_RERUN),
     row("export {dir}/told.tlog", HEARD, HEARD, HEARD),
     row(
         "info {dir}/told.mcap",

@@ -127,7 +127,7 @@ fn what_was_found_goes_into_the_missions_file() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("ours.toml");
     let log = LANDED.log.to_str().unwrap();
-    let write = ["--write", path.to_str().unwrap()];
+    let write = ["--out", path.to_str().unwrap()];
     // Without a file, the flown mission; then that file again, which has got heavier and a remark.
     let (found, _) = fits(&[[log].as_slice(), &write].concat());
     let text = std::fs::read_to_string(&path).unwrap();

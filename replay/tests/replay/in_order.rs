@@ -30,8 +30,8 @@ fn assert_refused_as_unordered(log: &Path, directory: &Path) {
         &["verify", "--strict"],
         &["evaluate"],
         &["refly"],
-        &["report", "--output", page],
-        &["export", "--to", "csv", "--output", csv],
+        &["report", "--out", page],
+        &["export", "--to", "csv", "--out", csv],
     ];
     for question in questions {
         let (code, stdout, stderr) = run(replay(question[0], log).args(&question[1..]));

@@ -44,7 +44,7 @@ fn a_hollow_log_is_used_up_to_its_hole() {
         (&["verify"], format!("{frames} of {frames} frames identical of the readable part")),
         (&["evaluate"], "open loop".to_owned()),
         (&["refly", "--at", "frame:12"], "closed loop".to_owned()),
-        (&["report", "--output", "-"], "type 0, which does not exist".to_owned()),
+        (&["report", "--out", "-"], "type 0, which does not exist".to_owned()),
     ] {
         let (code, said) = within(200, arguments, &path);
         assert_eq!(code, 0, "{said}");
@@ -129,7 +129,7 @@ fn what_is_too_large_is_passed_over_by_its_length() {
         let hole_ends = file.metadata().unwrap().len() + LENGTH;
         std::os::unix::fs::FileExt::write_all_at(&file, &[&data[first..], &ending].concat(), hole_ends)
             .unwrap();
-        for arguments in [&["info"][..], &["verify"], &["report", "--output", "-"]] {
+        for arguments in [&["info"][..], &["verify"], &["report", "--out", "-"]] {
             let (code, said) = within(200, arguments, &path);
             assert_eq!(code, 0, "{arguments:?}: {said}");
             assert_eq!(said.contains("was passed over"), opcode == mcap::records::op::CHUNK, "{said}");
@@ -261,7 +261,7 @@ fn a_hundred_megabytes_are_exported_in_bounded_memory() {
     let path = directory.path().join("long.mcap");
     let frames = write_long_log(&path, 100 << 20);
     let tables = directory.path().join("tables");
-    let arguments = ["export", "--to", "csv", "--output", tables.to_str().unwrap()];
+    let arguments = ["export", "--to", "csv", "--out", tables.to_str().unwrap()];
     let (code, said) = within(64, &arguments, &path);
     assert_eq!(code, 0, "{said}");
     let table = std::fs::read_to_string(tables.join("computer_frame.csv")).unwrap();

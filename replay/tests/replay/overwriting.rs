@@ -12,8 +12,8 @@ const OTHERS: &[u8] = b"somebody else's bytes";
 /// The commands that write a file, with the name of that file.
 fn writers() -> Vec<(&'static [&'static str], &'static str)> {
     vec![
-        (&["report", "--output"], "page.html"),
-        (&["refly", "--log"], "again.mcap"),
+        (&["report", "--out"], "page.html"),
+        (&["refly", "--out"], "again.mcap"),
         (&["recover"], "whole.mcap"),
     ]
 }
@@ -85,7 +85,7 @@ fn tables_and_imports_overwrite_nothing_either() {
     std::fs::write(&table, OTHERS).unwrap();
     let before = listed(&at("tables"));
     let mut command = replay("export", &log);
-    command.args(["--to", "csv", "--output"]).arg(at("tables"));
+    command.args(["--to", "csv", "--out"]).arg(at("tables"));
     refusal(&mut command);
     assert_eq!(std::fs::read(&table).unwrap(), OTHERS);
     assert_eq!(listed(&at("tables")), before, "no other table is written if one was refused");
@@ -98,8 +98,8 @@ fn tables_and_imports_overwrite_nothing_either() {
     // Without an output name, the default name is that of the flight's own log.
     refusal(&mut replay("export", &tlog));
     assert_eq!(std::fs::read(&log).unwrap(), before);
-    refusal(replay("export", &tlog).arg("--output").arg(&tlog).arg("--force"));
-    let (code, _, stderr) = run(replay("export", &tlog).arg("--output").arg(at("imported.mcap")));
+    refusal(replay("export", &tlog).arg("--out").arg(&tlog).arg("--force"));
+    let (code, _, stderr) = run(replay("export", &tlog).arg("--out").arg(at("imported.mcap")));
     assert_eq!(code, 0, "{stderr}");
 }
 
@@ -113,7 +113,7 @@ fn a_report_twice_needs_force() {
     let (code, ..) = run(replay("report", &log).arg("--force"));
     assert_eq!(code, 0);
     // A device has no content that could be lost.
-    let (code, stdout, stderr) = run(replay("report", &log).args(["--output", "/dev/stdout"]));
+    let (code, stdout, stderr) = run(replay("report", &log).args(["--out", "/dev/stdout"]));
     assert!(code == 0 && stdout.len() > 10_000, "{stderr}");
 }
 
@@ -154,5 +154,5 @@ fn half_an_output_replaces_nothing() {
         assert_eq!(listed(directory.path()), expected, "{arguments:?}: nothing else is left");
     }
     let (_directory, log) = copied(&MK2.log);
-    refusal(replay("report", &log).args(["--output", "/dev/full"]));
+    refusal(replay("report", &log).args(["--out", "/dev/full"]));
 }

@@ -25,7 +25,7 @@ fn flights_with_nothing_in_common_are_not_within_tolerance() {
 fn a_foreign_file_exports_to_no_folder() {
     let (foreign, tables) = (MK2.beside("foreign.mcap"), MK2.beside("no-tables"));
     std::fs::write(&foreign, foreign_mcap("/pose")).unwrap();
-    refusal(replay("export", &foreign).args(["--to", "csv", "--output"]).arg(&tables));
+    refusal(replay("export", &foreign).args(["--to", "csv", "--out"]).arg(&tables));
     assert!(!tables.exists());
 }
 

@@ -217,12 +217,12 @@ fn frames_without_times_are_refused_as_what_they_are() {
     for begin in [0, 5] {
         std::fs::write(&raw, &frames[begin..]).unwrap();
         for question in [
-            &["export", "--to", "mcap", "--output", log_name][..],
+            &["export", "--to", "mcap", "--out", log_name][..],
             &["export"],
-            &["export", "--to", "csv", "--output", log_name],
+            &["export", "--to", "csv", "--out", log_name],
             &["info"],
             &["verify"],
-            &["report", "--output", log_name],
+            &["report", "--out", log_name],
         ] {
             let (code, stdout, stderr) = run(replay(question[0], &raw).args(&question[1..]));
             assert_eq!((code, stdout.as_str(), log.exists()), (2, "", false), "{question:?}: {stderr}");

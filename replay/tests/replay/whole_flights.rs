@@ -127,7 +127,7 @@ fn commands_for_one_flight_refuse_a_log_with_two() {
             &["evaluate"][..],
             &["refly"],
             &["verify", "--explain", "1"],
-            &["report", "--output", "-"],
+            &["report", "--out", "-"],
             &["compare"],
         ] {
             let mut command = replay(arguments[0], &path);
@@ -166,7 +166,7 @@ fn a_log_without_its_last_frames_is_not_complete() {
             let codes = [&[][..], &["--strict"]].map(|more| run(replay("verify", &path).args(more)).0);
             assert_eq!(codes, [0, 1], "{name}");
             assert!(!info(&path).unwrap().completeness.complete, "{name}");
-            let (_, page, _) = run(replay("report", &path).args(["--output", "-"]));
+            let (_, page, _) = run(replay("report", &path).args(["--out", "-"]));
             let answers = [run(&mut replay("verify", &path)).1, run(&mut replay("info", &path)).1, page];
             assert!(answers.iter().all(|said| said.contains(&cut.to_string())), "{name}");
         }

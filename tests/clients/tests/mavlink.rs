@@ -78,7 +78,7 @@ fn val_pymavlink_flies_a_rocket_and_aborts_its_descent() {
     let serial = line.near_link();
     for link in ["udpin:127.0.0.1:0", &serial] {
         let folder = tempfile::tempdir().unwrap();
-        let mut vehicle = vehicle(folder.path(), &["--profile", "mk2", "--mavlink", link]);
+        let mut vehicle = vehicle(folder.path(), &["--mission", "mk2", "--mavlink", link]);
         let mut client = pymavlink("pymavlink_rocket.py");
         if link == serial {
             client.arg(&line.far).arg("57600");

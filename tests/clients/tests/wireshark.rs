@@ -49,7 +49,7 @@ fn dissected(folder: &Path, profile: &str) -> BTreeSet<u32> {
     let log = format!("{profile}.mcap");
     let flown = Running::to_end(
         program(Program::OnboardSim)
-            .args(["fly", "--profile", profile, "--speed", "max", "--auto", "--log", &log])
+            .args(["fly", "--mission", profile, "--speed", "max", "--auto", "--log", &log])
             .args(["--mavlink", &BareGround::new().link()])
             .current_dir(folder),
     );

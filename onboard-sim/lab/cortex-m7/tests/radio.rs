@@ -36,7 +36,7 @@ impl Chain {
         board.arg(env!("CARGO_BIN_EXE_board")).arg(&radio.near).current_dir(folder);
         let board = Running::start(&mut board);
         let mut world = program(Program::OnboardSim);
-        world.args(["fly", "--profile", "mk2", "--start", "pad", "--speed", "4", "--board", "."]);
+        world.args(["fly", "--mission", "mk2", "--start", "pad", "--speed", "4", "--board", "."]);
         let world = Running::start(world.args(["--log", "vehicle.mcap"]).current_dir(folder));
         Self { world, board, radio }
     }
@@ -106,7 +106,7 @@ fn a_bad_wire_to_a_board_changes_nothing() {
         "fly",
         "--start",
         "drone",
-        "--profile",
+        "--mission",
         "vlr",
         "--speed",
         "max",
