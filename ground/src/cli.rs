@@ -196,7 +196,7 @@ pub enum Command {
     Attach(AttachArgs),
     /// Fetch the log that the vehicle has written itself, over --connect, when it is disarmed on the ground.
     ///
-    /// The log is checked, and an existing one is not overwritten. What has arrived is kept: the same command goes on with
+    /// The log is checked; a file that exists is kept, and it gets the next free name. What has arrived is kept: the same command goes on with
     /// it. A station that holds a serial line has to end first.
     #[command(
         after_help = "Example: ground download --connect serial:/dev/ttyUSB0:57600 --key touchdown.key --out logs"

@@ -1,9 +1,10 @@
-//! Texts that are built in or files; and files that are written whole: each is complete or absent, and replaces an existing one only
-//! on request.
+//! Texts that are built in or files; and files that are written whole: each is complete or absent. What exists is kept: a new file or
+//! folder gets the next free name.
 
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
+use protocol::log::recorder::{free_name, other_name};
 use tempfile::NamedTempFile;
 
 /// Neither a built-in text nor a file.
@@ -30,67 +31,71 @@ pub fn text_of(name: &str, builtin: &[(&str, &str)], what: &'static str) -> Resu
     })
 }
 
-/// Why a file is not written.
+/// A file cannot be written.
 #[derive(Debug, thiserror::Error)]
-pub enum WriteError {
-    #[error("{} exists already; --force replaces it", .0.display())]
-    Exists(PathBuf),
-    #[error("cannot write {}", path.display())]
-    Io {
-        path: PathBuf,
-        #[source]
-        source: io::Error,
-    },
+#[error("{}: cannot be written", path.display())]
+pub struct WriteError {
+    pub path: PathBuf,
+    /// Error from the operating system, or from the writer of a format.
+    pub source: io::Error,
 }
 
-/// A pipe or a device has no content that could be lost.
-///
-/// # Errors
-/// The file exists, and nobody asked to replace it.
-pub fn refuse_loss(path: &Path, force: bool) -> Result<(), WriteError> {
-    let there = path.symlink_metadata().is_ok_and(|found| found.is_file() || found.is_symlink());
-    if there && !force && !is_device(path) { Err(WriteError::Exists(path.to_owned())) } else { Ok(()) }
-}
-
-fn is_device(path: &Path) -> bool {
-    std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
-}
-
-/// Writes the files of a folder, which is made if it is not there, as [`write_all`].
-///
-/// # Errors
-/// A file exists, or cannot be written.
-pub fn write_folder(folder: &Path, files: Vec<(&str, Vec<u8>)>, force: bool) -> Result<(), WriteError> {
-    std::fs::create_dir_all(folder).map_err(failed(folder))?;
-    let files = files.into_iter().map(|(name, bytes)| (folder.join(name), bytes));
-    write_all(&files.collect::<Vec<_>>(), force)
-}
-
-/// Writes all files or none, under hidden temporary names first.
-///
-/// # Errors
-/// A file exists, or cannot be written.
-pub fn write_all(files: &[(PathBuf, Vec<u8>)], force: bool) -> Result<(), WriteError> {
-    files.iter().try_for_each(|(path, _)| refuse_loss(path, force))?;
-    let mut complete = Vec::with_capacity(files.len());
-    for (path, bytes) in files {
-        if is_device(path) {
-            std::fs::write(path, bytes).map_err(failed(path))?;
-        } else {
-            let mut file = unfinished(path).map_err(failed(path))?;
-            file.write_all(bytes).and_then(|()| file.as_file().sync_all()).map_err(failed(path))?;
-            complete.push((file, path));
-        }
+impl WriteError {
+    /// The error at a path.
+    pub fn at(path: &Path) -> impl Fn(io::Error) -> Self {
+        |source| Self { path: path.to_owned(), source }
     }
-    complete.into_iter().try_for_each(|(file, path)| {
-        let kept = if force { file.persist(path) } else { file.persist_noclobber(path) };
-        kept.map(drop).map_err(|error| failed(path)(error.error))
+}
+
+/// The name of a new file or folder: the next free one. Says so if it is not the one that was asked for.
+pub fn new_name(asked: &Path) -> PathBuf {
+    let free = free_name(asked);
+    if let Some(words) = other_name(asked, &free) {
+        // If nobody reads it, the file is written anyway.
+        let _ = writeln!(io::stderr(), "{words}");
+    }
+    free
+}
+
+/// Writes a new file under the next free name, and returns that name.
+///
+/// # Errors
+/// It cannot be written.
+pub fn write_new(asked: &Path, bytes: &[u8]) -> Result<PathBuf, WriteError> {
+    let path = new_name(asked);
+    if std::fs::metadata(&path).is_ok_and(|found| !found.is_dir()) {
+        // A pipe or a device.
+        std::fs::write(&path, bytes).map_err(WriteError::at(&path))?;
+    } else {
+        let kept = complete(&path, bytes)?.persist_noclobber(&path);
+        kept.map_err(|error| WriteError::at(&path)(error.error))?;
+    }
+    Ok(path)
+}
+
+/// Writes the files of a folder, which is made if it is not there: all or none, under hidden temporary names first. They replace those
+/// of an earlier part of the same work.
+///
+/// # Errors
+/// A file cannot be written.
+pub fn write_folder(folder: &Path, files: Vec<(&str, Vec<u8>)>) -> Result<(), WriteError> {
+    std::fs::create_dir_all(folder).map_err(WriteError::at(folder))?;
+    let files = files.into_iter().map(|(name, bytes)| {
+        let path = folder.join(name);
+        Ok((complete(&path, &bytes)?, path))
+    });
+    files.collect::<Result<Vec<_>, _>>()?.into_iter().try_for_each(|(file, path)| {
+        file.persist(&path).map(drop).map_err(|error| WriteError::at(&path)(error.error))
     })
 }
 
-fn failed(path: &Path) -> impl FnOnce(io::Error) -> WriteError {
-    let path = path.to_owned();
-    |source| WriteError::Io { path, source }
+/// The whole content on the disk, without its name yet.
+fn complete(path: &Path, bytes: &[u8]) -> Result<NamedTempFile, WriteError> {
+    let written = unfinished(path).and_then(|mut file| {
+        file.write_all(bytes)?;
+        file.as_file().sync_all().map(|()| file)
+    });
+    written.map_err(WriteError::at(path))
 }
 
 /// A file beside another, which disappears unless it is kept.

@@ -23,6 +23,9 @@ use protocol::signing::Key;
 struct Arguments {
     #[command(subcommand)]
     command: Command,
+    /// Nothing is replaced any more, so it has no effect.
+    #[arg(long = "force", global = true, hide = true)]
+    _force: bool,
 }
 
 #[derive(Subcommand)]
@@ -63,7 +66,7 @@ enum Command {
     /// Make a signing key: a new file that only you can read, for --key of vehicle and ground.
     #[command(after_help = "Example: onboard-sim keygen touchdown.key")]
     Keygen {
-        /// The file; an existing one is not overwritten.
+        /// The file. If it exists there is no second key: give another name.
         #[arg(value_name = "FILE")]
         file: PathBuf,
         /// Derive it from a passphrase, read as a line from standard input, as MAVProxy's `signing key` does (SHA-256).

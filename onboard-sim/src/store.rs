@@ -192,13 +192,13 @@ impl Store {
             refuse_foreign(path)?;
             let text =
                 serde_json::to_vec_pretty(&manifest).map_err(|error| StoreError::content(path, &error))?;
-            write_folder(path, vec![(MANIFEST, text)], true)?;
+            write_folder(path, vec![(MANIFEST, text)])?;
         }
         let rows = read_rows(path, &manifest)?;
         let texts = [(MISSION, &recipe.mission_toml), (DISPERSION, &recipe.dispersion_toml)];
         let mut files = texts.map(|(name, text)| (name, text.clone().into_bytes())).to_vec();
         files.push((FLIGHTS, to_csv(rows.values(), true)?));
-        write_folder(path, files, true)?;
+        write_folder(path, files)?;
         let file = path.join(FLIGHTS);
         let file = File::options().append(true).open(&file).map_err(unreadable(&file))?;
         Ok(Self { path: path.to_owned(), manifest, rows: Mutex::new((rows, file)), _lock: lock })
@@ -248,7 +248,7 @@ impl Store {
             let picture = picture.map_err(|error| StoreError::content(&self.path.join(name), &error))?;
             files.push((name, picture.into_bytes()));
         }
-        write_folder(&self.path, files, true)?;
+        write_folder(&self.path, files)?;
         Ok(summary)
     }
 }

@@ -24,6 +24,8 @@ pub enum KeyFileError {
         /// The system's error.
         source: io::Error,
     },
+    #[error("key file {path} exists already and is kept; use it, or give another name for a second key")]
+    Exists { path: PathBuf },
     /// Other users may read or change it.
     #[error("key file {path}: mode {mode:03o} gives other users access to the key; run `chmod 600 {path}`")]
     Permissions { path: PathBuf, mode: u32 },
@@ -63,8 +65,11 @@ impl KeyFile {
     /// The file exists, or cannot be written.
     pub fn create_with(path: &Path, key: &Key) -> Result<(), KeyFileError> {
         let failed = |source| KeyFileError::Io { path: path.to_owned(), source };
-        let mut file =
-            OpenOptions::new().write(true).create_new(true).mode(OWNER_ONLY).open(path).map_err(failed)?;
+        let opened = OpenOptions::new().write(true).create_new(true).mode(OWNER_ONLY).open(path);
+        let mut file = opened.map_err(|source| match source.kind() {
+            io::ErrorKind::AlreadyExists => KeyFileError::Exists { path: path.to_owned() },
+            _ => failed(source),
+        })?;
         writeln!(file, "{}", key.to_hex()).and_then(|()| file.sync_all()).map_err(failed)
     }
 
@@ -164,7 +169,7 @@ mod tests {
         assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o600);
         let text = fs::read_to_string(&path).unwrap();
         assert!(Key::from_hex(text.trim_end()).is_some());
-        assert!(matches!(KeyFile::create(&path), Err(KeyFileError::Io { .. })));
+        assert!(matches!(KeyFile::create(&path), Err(KeyFileError::Exists { .. })));
         assert_eq!(fs::read_to_string(&path).unwrap(), text);
         for mode in [0o640, 0o604, 0o620, 0o602, 0o610] {
             fs::set_permissions(&path, fs::Permissions::from_mode(mode)).unwrap();

@@ -4,14 +4,13 @@ use std::io::{self, Write};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, Result, ensure};
+use anyhow::{Context as _, Result};
 pub(crate) use onboard_sim::files::text_of;
 use onboard_sim::run::threads;
 use protocol::text::printable;
 use serde::Serialize;
 
 use crate::log::{Cut, Gap, Recording};
-use crate::output::write_whole;
 use crate::print::print_json;
 
 /// The answer is no: the controller decides differently from the record, or flights differ by more than is tolerated.
@@ -133,22 +132,6 @@ fn harmless(text: &[u8]) -> String {
     let steers = |c: &char| c.is_control() && !matches!(c, '\n' | '\t');
     let text = String::from_utf8_lossy(text);
     text.chars().map(|c| if steers(&c) { char::REPLACEMENT_CHARACTER } else { c }).collect()
-}
-
-/// Writes a new file; an existing one is kept.
-pub(crate) fn write_new(path: &Path, text: &str) -> Result<()> {
-    refuse_existing(path)?;
-    Ok(write_whole(path.into(), Path::new(""), |file| file.write_all(text.as_bytes()))?)
-}
-
-/// Refuses a path where a file is, before the work for it is done.
-pub(crate) fn refuse_existing(path: &Path) -> Result<()> {
-    ensure!(
-        path.symlink_metadata().is_err(),
-        "{}: exists already, and nothing is overwritten",
-        path.display()
-    );
-    Ok(())
 }
 
 /// Writes a line to standard error; a closed standard error is ignored.

@@ -19,7 +19,7 @@ use serde::Serialize;
 
 use crate::cli::{Answer, Outcome, give};
 use crate::log::{Clock, ClockTime, Entry, FlightLog, LogError, Moment};
-use crate::output::{Destination, WriteError};
+use crate::output::WriteError;
 use crate::print::counted;
 use crate::recover::{Kept, Records, Rescue};
 
@@ -87,12 +87,7 @@ pub struct CutOut {
 ///
 /// # Errors
 /// See [`CutError`].
-pub fn cut<'a>(
-    input: &Path,
-    wanted: &Wanted,
-    output: impl Into<Destination<'a>>,
-) -> Result<CutOut, CutError> {
-    let destination = output.into();
+pub fn cut(input: &Path, wanted: &Wanted, output: &Path) -> Result<CutOut, CutError> {
     let name = input.display().to_string();
     let mut records = Records::open(input)?;
     let contents = records.contents()?;
@@ -115,7 +110,7 @@ pub fn cut<'a>(
         }
         is_kept
     };
-    let rescue = Rescue::of::<CutError>(destination, input, (&mut records, &contents), &mut keeps)?;
+    let rescue = Rescue::of::<CutError>(output, (&mut records, &contents), &mut keeps)?;
     let Kept { messages, left_out, .. } = rescue.kept();
     if messages == 0 {
         // A topic may have a channel a link.
@@ -124,11 +119,11 @@ pub fn cut<'a>(
         return Err(CutError::Nothing { name, topics: topics.into_iter().collect() });
     }
     let facts = BTreeMap::from([(CUT_FROM.to_owned(), words_of(&name, wanted))]);
-    rescue.finish(&Metadata { name: METADATA_RUN.to_owned(), metadata: facts })?;
+    let output = rescue.finish(&Metadata { name: METADATA_RUN.to_owned(), metadata: facts })?;
     let has = |topics: [&str; 2]| topics.iter().all(|topic| kept_topics.contains(*topic));
     Ok(CutOut {
         input: name,
-        output: destination.path.to_owned(),
+        output,
         messages,
         left_out,
         chained,
@@ -229,9 +224,6 @@ pub(crate) struct Args {
     /// End here, in the same words.
     #[arg(long, value_name = "WHERE")]
     until: Option<Moment>,
-    /// Replace an existing file, but never the log that is cut.
-    #[arg(long)]
-    force: bool,
     /// Answer in JSON.
     #[arg(long)]
     json: bool,
@@ -239,8 +231,7 @@ pub(crate) struct Args {
 
 impl Args {
     pub(crate) fn run(self) -> Result<Outcome> {
-        let destination = Destination { path: &self.output, force: self.force };
         let wanted = Wanted { from: self.from, until: self.until, topics: self.topics };
-        give(&cut(&self.file, &wanted, destination)?, self.json)
+        give(&cut(&self.file, &wanted, &self.output)?, self.json)
     }
 }

@@ -10,13 +10,14 @@ use std::path::PathBuf;
 use anyhow::Result;
 use serde::Serialize;
 
-use crate::cli::{Answer, Outcome, give, refuse_existing, warn_of_what_is_missing, write_new};
+use crate::cli::{Answer, Outcome, give, warn_of_what_is_missing};
 pub use crate::controller::Decided;
 use crate::controller::{AgainError, LoggedComputer, phase_name};
 use crate::log::Recording;
 use crate::print::columns;
 use crate::settings::{Setting, SettingArguments};
 use crate::verify::explain::degrees;
+use onboard_sim::files::write_new;
 
 /// Sections that a flight computer never sees: the limits of the verdict, and the random draw.
 const NOT_THE_PILOTS: [&str; 2] = ["leg_limits.", "truth."];
@@ -337,10 +338,9 @@ impl Args {
     pub(crate) fn run(self) -> Result<Outcome> {
         let recording = Recording::open(&self.file)?;
         warn_of_what_is_missing(&recording);
-        self.csv.as_deref().map_or(Ok(()), refuse_existing)?;
         let report = evaluate(&recording, &self.settings.all()?)?;
         if let Some(path) = &self.csv {
-            write_new(path, &csv_of(&report)?)?;
+            write_new(path, csv_of(&report)?.as_bytes())?;
         }
         give(&report, self.json)
     }

@@ -21,7 +21,7 @@
 //! * [`report`](mod@report): writes a flight as one HTML page.
 //! * [`export`]: converts logs to and from other formats; [`recover`](mod@recover): repairs a damaged log, sorts another;
 //!   [`cut`](mod@cut): makes a shorter one.
-//! * [`output`]: writes files completely or not at all, and overwrites nothing without permission.
+//! * [`output`]: writes files completely or not at all, each new one under a name that is free.
 //! * [`print`](mod@print): what answers have in common: columns, two verdicts beside each other, JSON.
 
 pub mod cli;
@@ -80,6 +80,9 @@ use crate::cli::{Outcome, answer};
 pub struct Cli {
     #[command(subcommand)]
     command: Command,
+    /// Nothing is replaced any more, so it has no effect.
+    #[arg(long = "force", global = true, hide = true)]
+    _force: bool,
 }
 
 #[derive(Debug, Subcommand)]

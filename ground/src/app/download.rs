@@ -10,11 +10,13 @@ use std::time::Duration;
 use anyhow::Context as _;
 use protocol::ftp::download::{Download, DownloadEvent, Progress};
 use protocol::ftp::{Packet, crc};
+use protocol::log::recorder::{free_name, other_name};
 use tokio::time::{MissedTickBehavior, interval};
 
 use super::KeyRing;
 use super::clock::{Clock, LogTime, Signals};
 use super::output::print;
+use super::stations::explain;
 use super::wire::Wire;
 use crate::cli::DownloadArgs;
 use crate::exit::Exit;
@@ -35,7 +37,11 @@ pub(in crate::app) async fn run_download(args: &DownloadArgs) -> anyhow::Result<
     let KeyRing { key, .. } = KeyRing::open(link)?;
     let clock = Clock::start();
     let log_time = LogTime::Run(clock);
-    let mut wire = Wire::open((us, vehicle), link.connect.clone(), key, clock, None, log_time).await?;
+    let opened = Wire::open((us, vehicle), link.connect.clone(), key, clock, None, log_time).await;
+    let mut wire = match opened {
+        Ok(wire) => wire,
+        Err(error) => return Err(explain(error, &link.connect).await),
+    };
     // Another number every millisecond: its requests differ from those of an earlier download.
     let mut download = Download::new(name.as_deref(), (clock.start_unix_ns() >> 20) as u16);
     let mut kept: Option<Kept> = None;
@@ -134,7 +140,7 @@ fn in_words(progress: &Progress) -> String {
 }
 
 // The files of a download: the beginning of the log that has arrived, with the checksum of the whole in its name
-// (`.1A2B3C4D.part`), and the log once it is whole. An existing log is never overwritten.
+// (`.1A2B3C4D.part`), and the log once it is whole. An existing log is kept.
 
 /// Bytes read at once for a checksum.
 const READ_AT_ONCE: usize = 256 * 1024;
@@ -152,17 +158,14 @@ impl Kept {
     /// Opens the file for the vehicle's log of this name and checksum, and returns how much an earlier download has left.
     ///
     /// # Errors
-    /// The log is here already, or a file cannot be made.
+    /// This log is here already, or a file cannot be made.
     fn open(folder: &Path, vehicle: u8, name: &str, crc: u32) -> anyhow::Result<(Self, u32)> {
         // The name comes over the air: it must not lead out of the folder.
         let is_plain = |letter: &char| letter.is_ascii_alphanumeric() || "._-".contains(*letter);
         let plain: String = name.chars().filter(is_plain).collect();
         let whole = folder.join(format!("vehicle{vehicle}-{plain}"));
-        anyhow::ensure!(
-            whole.symlink_metadata().is_err(),
-            "{} is here already; it is not overwritten",
-            whole.display()
-        );
+        let is_it = |mut file| checksum(&mut file).is_ok_and(|here| here == crc);
+        anyhow::ensure!(!File::open(&whole).is_ok_and(is_it), "{} is this log already", whole.display());
         let beginning = folder.join(format!("vehicle{vehicle}-{plain}.{crc:08X}.part"));
         let opened = File::options().create(true).read(true).append(true).open(&beginning);
         let file = opened.with_context(|| format!("opening {}", beginning.display()))?;
@@ -170,10 +173,10 @@ impl Kept {
         Ok((Self { whole, beginning, file, crc }, bytes))
     }
 
-    /// The log is whole: gives it its name.
+    /// The log is whole: gives it its name, or the next free one.
     ///
     /// # Errors
-    /// It is not what the vehicle has, there is a file of this name by now, or the disk fails.
+    /// It is not what the vehicle has, or the disk fails.
     fn finish(self) -> anyhow::Result<PathBuf> {
         let Self { whole, beginning, mut file, crc } = self;
         if checksum(&mut file)? != crc {
@@ -181,20 +184,17 @@ impl Kept {
             anyhow::bail!("what arrived is not what the vehicle has: the checksums differ; fetch it again");
         }
         file.sync_all()?;
-        // A link fails if the name is taken; a rename would overwrite.
-        if std::fs::hard_link(&beginning, &whole).is_ok() {
+        let free = free_name(&whole);
+        // A link fails if the name is taken; a rename would overwrite. Some file systems have no such links.
+        if std::fs::hard_link(&beginning, &free).is_ok() {
             std::fs::remove_file(&beginning)?;
         } else {
-            // Some file systems have no such links.
-            anyhow::ensure!(
-                whole.symlink_metadata().is_err(),
-                "{} is here by now; the download is in {}",
-                whole.display(),
-                beginning.display()
-            );
-            std::fs::rename(&beginning, &whole)?;
+            std::fs::rename(&beginning, &free)?;
         }
-        Ok(whole)
+        if let Some(words) = other_name(&whole, &free) {
+            print(format!("{words}\n").as_bytes())?;
+        }
+        Ok(free)
     }
 }
 
@@ -236,17 +236,17 @@ mod kept_tests {
         assert_eq!(whole, folder.path().join("vehicle1-..flight.mcap"));
         assert_eq!(std::fs::read(&whole).unwrap(), b"abcdefg");
         let refused = open(folder.path(), crc).unwrap_err();
-        assert!(refused.to_string().contains("is here already"), "{refused}");
+        assert!(refused.to_string().contains("is this log already"), "{refused}");
     }
 
     #[test]
-    fn a_log_that_appears_meanwhile_stays() {
+    fn another_log_of_the_name_stays() {
         let folder = tempfile::tempdir().unwrap();
         let (mut kept, _) = open(folder.path(), crc::continued(0, b"new")).unwrap();
         kept.file.write_all(b"new").unwrap();
         let whole = folder.path().join("vehicle1-..flight.mcap");
         std::fs::write(&whole, "old").unwrap();
-        assert!(kept.finish().is_err());
+        assert_eq!(std::fs::read(kept.finish().unwrap()).unwrap(), b"new");
         assert_eq!(std::fs::read(whole).unwrap(), b"old");
     }
 

@@ -11,7 +11,7 @@ use std::time::Duration;
 use anyhow::Context as _;
 use protocol::book::{Book, BookKey, Head, Line, OPENED, SignedHead};
 use protocol::log::record::Record;
-use protocol::log::recorder::{Recorder, RecorderError, TlogName};
+use protocol::log::recorder::{self, Recorder, RecorderError, TlogName};
 use protocol::log::writer::LogHeader;
 use time::OffsetDateTime;
 use time::macros::format_description;
@@ -48,7 +48,7 @@ pub fn open_log(
 /// What to say if the log has another name than it was given.
 pub(super) fn other_name(choice: Option<&LogChoice>, log: Option<&Path>) -> Option<String> {
     let (Some(LogChoice::File(asked)), Some(log)) = (choice, log) else { return None };
-    (asked != log).then(|| format!("{} exists and is kept; the log is {}", asked.display(), log.display()))
+    recorder::other_name(asked, log)
 }
 
 fn tlog_name(tlog: Option<&LogChoice>) -> Option<TlogName<'_>> {
@@ -490,7 +490,7 @@ mod log_tests {
         assert_eq!(fs::read(&asked).unwrap(), before);
         let said = other_name(choice.as_ref(), Some(&free)).unwrap();
         assert!(
-            said.contains("flight.mcap exists and is kept; the log is ") && said.ends_with("flight-3.mcap")
+            said.contains("flight.mcap exists and is kept; ") && said.ends_with("flight-3.mcap is written")
         );
     }
 

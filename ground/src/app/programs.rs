@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 
+use protocol::log::recorder::free_name;
+
 /// How many callouts wait for the command; further ones are dropped, because late words mislead.
 const WAITING_MAX: usize = 4;
 
@@ -107,29 +109,17 @@ pub(super) fn in_a_thread<T: Send + 'static>(
     std::thread::Builder::new().name(name.to_owned()).spawn(work).map(|_| told)
 }
 
-/// Reports of one log.
-const REPORTS_MAX: u32 = 100;
-
 /// A report that is being written: where it is, or why it is not.
 pub(super) type Writing = Receiver<Result<String, String>>;
 
 /// Starts to write the report beside the log, under a name that is free.
 ///
 /// # Errors
-/// There is no free name, or no thread can be started.
+/// No thread can be started.
 pub(super) fn begin_report(log: &Path) -> Result<Writing, String> {
-    let page = free_name(log).ok_or("there are a hundred reports of this log already")?;
+    let page = free_name(&log.with_extension("html"));
     let log = log.to_owned();
     in_a_thread("report", move || write_report(&log, &page)).map_err(|error| error.to_string())
-}
-
-/// `flight.html`, then `flight-2.html`: nothing is overwritten.
-fn free_name(log: &Path) -> Option<PathBuf> {
-    let stem = log.file_stem()?.to_string_lossy().into_owned();
-    (1..=REPORTS_MAX)
-        .map(|number| if number == 1 { format!("{stem}.html") } else { format!("{stem}-{number}.html") })
-        .map(|name| log.with_file_name(name))
-        .find(|page| page.symlink_metadata().is_err())
 }
 
 fn write_report(log: &Path, page: &Path) -> Result<String, String> {
@@ -195,9 +185,8 @@ mod report_tests {
     fn a_report_gets_a_free_name_and_a_wrong_log_is_told() {
         let folder = tempfile::tempdir().unwrap();
         let log = folder.path().join("flight.mcap");
-        assert_eq!(free_name(&log), Some(folder.path().join("flight.html")));
         std::fs::write(folder.path().join("flight.html"), "").unwrap();
-        assert_eq!(free_name(&log), Some(folder.path().join("flight-2.html")));
+        assert_eq!(free_name(&log.with_extension("html")), folder.path().join("flight-2.html"));
         let told = begin_report(&log).unwrap().recv().unwrap();
         assert!(told.is_err(), "there is no such log: {told:?}");
         assert_eq!(std::fs::read_to_string(folder.path().join("flight.html")).unwrap(), "");

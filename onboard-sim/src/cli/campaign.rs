@@ -54,7 +54,7 @@ pub(crate) struct CampaignArguments {
     #[arg(long, value_name = "FILE")]
     scenario: Option<PathBuf>,
     /// Directory of the results. If it holds part of the same campaign, the campaign is continued. With --only: the flight's log
-    /// (MCAP); an existing file is kept.
+    /// (MCAP); a file that exists is kept, and the log gets the next free name.
     #[arg(long, alias = "log", value_name = "PATH", required_unless_present = "only")]
     out: Option<PathBuf>,
     /// Fly only this flight, and print its row.
@@ -98,7 +98,7 @@ pub(crate) fn run(arguments: &CampaignArguments) -> anyhow::Result<ExitCode> {
     let summary = store.publish(&recipe.mission.leg_limits)?;
     write!(stdout, "{}", to_text(&summary))?;
     if cost.flights > 0 {
-        write_folder(out, vec![("cost.json", serde_json::to_vec_pretty(&cost)?)], true)?;
+        write_folder(out, vec![("cost.json", serde_json::to_vec_pretty(&cost)?)])?;
         writeln!(stdout, "\n{cost}")?;
     }
     writeln!(stdout, "results {}", out.display())?;

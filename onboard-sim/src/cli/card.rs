@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use onboard_sim::card::Card;
-use onboard_sim::files::{refuse_loss, write_folder};
+use onboard_sim::files::{new_name, write_folder};
 use onboard_sim::hazard::Flights;
 use sim::dispersion;
 
@@ -44,18 +44,12 @@ pub(crate) struct CardArguments {
     /// Flights in each wind of the ways that come down farthest. Below 368 the interval has no upper end.
     #[arg(long, default_value_t = 400, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=CARD_FLIGHTS_MAX))]
     hazard_flights: u64,
-    /// Folder of the card.
+    /// Folder of the card; one that exists is kept, and the card gets the next free name.
     #[arg(long, default_value = "card", value_name = "DIR")]
     out: PathBuf,
-    /// Replace existing files.
-    #[arg(long)]
-    force: bool,
 }
 
 pub(crate) fn run(arguments: &CardArguments) -> anyhow::Result<ExitCode> {
-    for name in FILES {
-        refuse_loss(&arguments.out.join(name), arguments.force)?;
-    }
     let recipe = recipe(&arguments.mission, None, &arguments.dispersion, arguments.seed)?;
     let mut winds_m_s = arguments.winds.clone();
     winds_m_s.sort_by(f64::total_cmp);
@@ -70,12 +64,9 @@ pub(crate) fn run(arguments: &CardArguments) -> anyhow::Result<ExitCode> {
     let [html, text, mission_file] = FILES;
     let page = card.text();
     let files = [(html, card.html()), (text, page.clone()), (mission_file, card.recipe.mission_toml)];
-    write_folder(
-        &arguments.out,
-        files.map(|(name, text)| (name, text.into_bytes())).to_vec(),
-        arguments.force,
-    )?;
-    writeln!(std::io::stdout().lock(), "{page}card {}", arguments.out.join(html).display())?;
+    let out = new_name(&arguments.out);
+    write_folder(&out, files.map(|(name, text)| (name, text.into_bytes())).to_vec())?;
+    writeln!(std::io::stdout().lock(), "{page}card {}", out.join(html).display())?;
     Ok(ExitCode::SUCCESS)
 }
 

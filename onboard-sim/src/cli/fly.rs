@@ -22,7 +22,7 @@ use sim::wire::fly::{FlightEnd, FlightSummary, FlyOptions, OnTheWire, Speed, fly
 use sim::wire::vehicle::{RocketFlight, VehicleEvent};
 use tokio::sync::watch;
 
-use super::{in_wind, recipe};
+use super::{in_wind, logging, recipe};
 
 #[derive(Args)]
 #[command(
@@ -124,15 +124,7 @@ async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
     let flight = arguments.flight()?;
     let crew = arguments.crew.as_deref().map(CrewFile::open).transpose()?;
     let log = arguments.log.as_ref().filter(|path| *path != Path::new("none"));
-    let recorder = log.map(|path| {
-        let header = flight.log_header("onboard-sim", unix_ns());
-        let recorder = Recorder::create_under_free_name(path, None, &header)?;
-        if recorder.path() != path {
-            let (asked, log) = (path.display(), recorder.path().display());
-            writeln!(std::io::stdout(), "{asked} exists and is kept; the log is {log}")?;
-        }
-        anyhow::Ok(recorder)
-    });
+    let recorder = log.map(|path| logging(path, &flight.log_header("onboard-sim", unix_ns())));
     let recorder = recorder.transpose()?;
     let drawn = OnTheWire::drawn();
     let uid = arguments.uid_file.as_deref().map(|file| kept_uid(file, drawn.uid)).transpose()?;

@@ -7,7 +7,7 @@ use clap::Args;
 use flight::rules::verdict::Landing;
 use flight::vehicle::mission::StartPoint;
 use onboard_sim::figure::{BLACK_CURVE, Line, Panel, sized_lines_svg};
-use onboard_sim::files::{refuse_loss, write_all};
+use onboard_sim::files::write_new;
 use onboard_sim::hazard::{self, Flights, Impact, Radius, Rule, Way, keep_out_m, landed_as_planned, widest};
 use onboard_sim::statistics::Landings;
 use sim::dispersion::{self, may_be_kinder};
@@ -50,15 +50,9 @@ pub(crate) struct HazardArguments {
     /// Write the places and the radii as a picture (SVG), one wind a panel.
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
-    /// Replace existing files.
-    #[arg(long)]
-    force: bool,
 }
 
 pub(crate) fn run(arguments: &HazardArguments) -> anyhow::Result<ExitCode> {
-    for path in [&arguments.csv, &arguments.svg].into_iter().flatten() {
-        refuse_loss(path, arguments.force)?;
-    }
     let recipes = recipes(arguments)?;
     let mission = &recipes[0].mission;
     let ways = Way::of(mission);
@@ -69,10 +63,10 @@ pub(crate) fn run(arguments: &HazardArguments) -> anyhow::Result<ExitCode> {
         Study { arguments, mission: &mission.name, start: mission.start.at, ways: &ways, impacts: &impacts };
     study.write_text(&rule, mission.gate.fence_radius_m, &mut std::io::stdout().lock())?;
     if let Some(path) = &arguments.csv {
-        write_all(&[(path.clone(), study.csv()?)], arguments.force)?;
+        write_new(path, &study.csv()?)?;
     }
     if let Some(path) = &arguments.svg {
-        write_all(&[(path.clone(), study.svg(&rule)?.into_bytes())], arguments.force)?;
+        write_new(path, study.svg(&rule)?.as_bytes())?;
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -8,6 +8,7 @@ pub(crate) mod hazard;
 pub(crate) mod new;
 mod single;
 
+use std::io::Write as _;
 use std::path::Path;
 
 use anyhow::Context as _;
@@ -16,6 +17,8 @@ use flight::vehicles::mission;
 use onboard_sim::files::text_of;
 use onboard_sim::progress::Progress;
 use onboard_sim::run::threads;
+use protocol::log::recorder::{Recorder, other_name};
+use protocol::log::writer::LogHeader;
 use sim::dispersion::{self, Dispersion};
 use sim::recipe::Recipe;
 use toml_edit::{Array, DocumentMut};
@@ -26,6 +29,15 @@ fn on_threads<T: Send>(
     work: impl FnOnce() -> anyhow::Result<T> + Send,
 ) -> anyhow::Result<T> {
     threads(jobs).context("a thread could not be started")?.install(work)
+}
+
+/// Begins a log, under the next free name.
+fn logging(path: &Path, header: &LogHeader) -> anyhow::Result<Recorder> {
+    let recorder = Recorder::create_under_free_name(path, None, header)?;
+    if let Some(words) = other_name(path, recorder.path()) {
+        writeln!(std::io::stdout(), "{words}")?;
+    }
+    Ok(recorder)
 }
 
 /// A file's text; what is not UTF-8 is read as Latin-1, in which some programs export.

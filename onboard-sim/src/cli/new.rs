@@ -13,7 +13,7 @@ use flight::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use flight::vehicle::mission::Mission;
 use flight::vehicle::thrust_curve::ThrustCurve;
 use flight::vehicles::{mission, motors, openrocket, table, thrust_curve};
-use onboard_sim::files::{refuse_loss, text_of, write_all};
+use onboard_sim::files::{text_of, write_new};
 use toml::Value;
 
 use super::read;
@@ -47,9 +47,6 @@ pub(crate) struct NewArguments {
     /// The file [default: NAME.toml].
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Replace an existing file.
-    #[arg(long)]
-    force: bool,
 }
 
 /// Shows a question, and gives what is typed.
@@ -57,7 +54,6 @@ type Ask<'a> = &'a mut dyn FnMut(&str) -> anyhow::Result<String>;
 
 pub(crate) fn run(arguments: &NewArguments) -> anyhow::Result<ExitCode> {
     let path = arguments.out.clone().unwrap_or_else(|| format!("{}.toml", arguments.name).into());
-    refuse_loss(&path, arguments.force)?;
     let (mut stdin, mut stderr) = (std::io::stdin().lock(), std::io::stderr());
     let terminal = stdin.is_terminal();
     let mut ask = |question: &str| {
@@ -72,7 +68,7 @@ pub(crate) fn run(arguments: &NewArguments) -> anyhow::Result<ExitCode> {
         writeln!(stderr, "no terminal on which to ask: what is not told is {}'s", mission::DEFAULT)?;
     }
     let text = made(arguments, asks && terminal, &mut ask, &path.display().to_string())?;
-    write_all(&[(path.clone(), text.into_bytes())], arguments.force)?;
+    let path = write_new(&path, text.as_bytes())?;
     writeln!(stderr, "{0} is written; `onboard-sim check {0}` says whether it will land", path.display())?;
     Ok(ExitCode::SUCCESS)
 }

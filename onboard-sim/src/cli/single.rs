@@ -1,7 +1,7 @@
 //! Flies one flight of a campaign, by its number, and writes its log.
 
 use std::io::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::Context as _;
@@ -9,10 +9,11 @@ use onboard_sim::row::{COLUMNS, Row};
 use onboard_sim::scenario::Expected;
 use onboard_sim::tally::Tally;
 use protocol::log::record::Record;
-use protocol::log::recorder::Recorder;
 use serde_json::Value;
 use sim::recipe::Recipe;
 use sim::wire::record::{self, LastFrame};
+
+use super::logging;
 
 /// Flies it and prints its row, one column on each line.
 ///
@@ -25,10 +26,13 @@ pub(super) fn fly(
     log: Option<&Path>,
 ) -> anyhow::Result<ExitCode> {
     let mut tally = Tally::new(recipe, number)?;
-    match log {
-        None => while tally.step() {},
-        Some(path) => fly_logged(recipe, number, &mut tally, path)?,
-    }
+    let log = match log {
+        None => {
+            while tally.step() {}
+            None
+        }
+        Some(path) => Some(fly_logged(recipe, number, &mut tally, path)?),
+    };
     let row = tally.row();
     let mut stdout = std::io::stdout().lock();
     print_row(&row, &mut stdout)?;
@@ -56,8 +60,8 @@ fn print_row(row: &Row, out: &mut impl std::io::Write) -> std::io::Result<()> {
     })
 }
 
-fn fly_logged(recipe: &Recipe, number: u64, tally: &mut Tally, path: &Path) -> anyhow::Result<()> {
-    let recorder = Recorder::create(path, &record::campaign_header(recipe, number))?;
+fn fly_logged(recipe: &Recipe, number: u64, tally: &mut Tally, path: &Path) -> anyhow::Result<PathBuf> {
+    let recorder = logging(path, &record::campaign_header(recipe, number))?;
     recorder.record(Record::ComputerStart(Box::new(record::start(tally.flight()))), 0);
     let mut last = LastFrame::default();
     let mut phase = tally.flight().computer().mode().phase;
@@ -77,6 +81,5 @@ fn fly_logged(recipe: &Recipe, number: u64, tally: &mut Tally, path: &Path) -> a
     if let Some(verdict) = record::verdict(flight) {
         recorder.record(Record::LandingVerdict(Box::new(verdict)), record::time_ns(flight));
     }
-    recorder.finish().context("the flight is over, but its log is incomplete")?;
-    Ok(())
+    recorder.finish().context("the flight is over, but its log is incomplete")
 }

@@ -91,7 +91,7 @@ fn a_wrong_request_is_refused_with_the_reason() {
         (&["--out", "x", "--mission", "mk9"], "neither a built-in mission (mk2"),
         (&["--out", "x", "--shard", "3/2"], "I/N"),
         (&["--out", "x", "--fault", "gnss@5"], "no fault is named"),
-        (&["--only", "1", "--out", "x"], "cannot be used with"),
+        (&["--only", "1", "--jobs", "2"], "cannot be used with"),
         (&[], "--out"),
         (&["merge", "nowhere", "--out", "x"], "nowhere"),
     ] {

@@ -30,6 +30,6 @@ fn fly_keeps_a_log_that_exists_and_says_the_free_name() {
     let directory = tempfile::tempdir().unwrap();
     fs::write(directory.path().join("flight.mcap"), "a flight").unwrap();
     let said = fly(directory.path(), "flight.mcap");
-    assert_eq!(said, "flight.mcap exists and is kept; the log is flight-2.mcap\n");
+    assert_eq!(said, "flight.mcap exists and is kept; flight-2.mcap is written\n");
     assert_eq!(fs::read_to_string(directory.path().join("flight.mcap")).unwrap(), "a flight");
 }

@@ -8,7 +8,7 @@
 //! The system reports a disk error once for an open file: the sync after it succeeds although data is lost. So every failure is
 //! kept where it happens, and [`Recorder::is_whole`] and [`Recorder::finish`] read what was kept.
 
-use std::fs::File;
+use std::fs::{File, Metadata};
 use std::io::{self, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -109,6 +109,27 @@ pub enum TlogName<'a> {
     /// As the log, with the extension `.tlog`.
     OfTheLog,
     Own(&'a Path),
+}
+
+/// The first of `flight.mcap`, `flight-2.mcap`, `flight-3.mcap` and so on under which nothing is that could be lost; the last one if
+/// all are taken.
+pub fn free_name(asked: &Path) -> PathBuf {
+    // A pipe and a device keep nothing.
+    let keeps = |found: Metadata| found.is_file() || (found.is_dir() && !is_empty(asked));
+    if std::fs::metadata(asked).is_ok_and(|found| !keeps(found)) {
+        return asked.to_owned();
+    }
+    let mut names = (1..NAMES_MAX).map(|number| numbered(asked, number));
+    names.find(|name| name.symlink_metadata().is_err()).unwrap_or_else(|| numbered(asked, NAMES_MAX))
+}
+
+fn is_empty(folder: &Path) -> bool {
+    std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_none())
+}
+
+/// What to say if the name is not the one that was asked for.
+pub fn other_name(asked: &Path, free: &Path) -> Option<String> {
+    (asked != free).then(|| format!("{} exists and is kept; {} is written", asked.display(), free.display()))
 }
 
 /// `flight.mcap` for 1, `flight-2.mcap` for 2.

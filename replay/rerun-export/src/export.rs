@@ -8,7 +8,7 @@ use flight::vehicle::mission::Mission;
 use re_lenses::{CastTo, Lens, LensBuilderError, LensError, Lenses, OutputMode, Selector, default_runtime};
 use re_mcap::{DecoderRegistry, McapFile, TopicFilter};
 use replay::log::{Entry, FlightLog, LogError};
-use replay::output::{Destination, NewFile, WriteError, same_file};
+use replay::output::{NewFile, WriteError};
 use rerun::archetypes::{LineStrips3D, Points3D, Transform3D};
 use rerun::components::Radius;
 use rerun::datatypes::Rgba32;
@@ -71,12 +71,9 @@ pub struct Exported {
 ///
 /// # Errors
 /// A log cannot be used, or the recording cannot be written.
-pub fn export(log: &Path, beside: Option<&Path>, to: Destination<'_>) -> Result<Vec<Exported>, ExportError> {
-    let cannot_write = WriteError::at(to.path);
-    if beside.is_some_and(|beside| same_file(beside, to.path)) {
-        return Err(cannot_write(std::io::Error::other("it is one of the logs")).into());
-    }
-    let mut file = NewFile::create(to, log)?;
+pub fn export(log: &Path, beside: Option<&Path>, to: &Path) -> Result<Vec<Exported>, ExportError> {
+    let cannot_write = WriteError::at(to);
+    let mut file = NewFile::create(to)?;
     let own = Survey::of(log)?;
     let stem = log.file_stem().unwrap_or_default().to_string_lossy();
     let (recording, messages) = RecordingStreamBuilder::new(APPLICATION)

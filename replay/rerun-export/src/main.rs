@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Parser;
-use replay::output::Destination;
+use replay::output::new_name;
 use replay_rerun::{ExportError, Exported, export};
 
 /// Turns a flight log into a recording for the Rerun viewer.
@@ -22,14 +22,14 @@ struct Cli {
     /// The log, an MCAP file.
     log: PathBuf,
     /// The recording [default: the log's name with .rrd].
-    #[arg(short, long, value_name = "FILE")]
+    #[arg(short, long = "out", alias = "output", value_name = "FILE")]
     output: Option<PathBuf>,
     /// Another log, whose flight is drawn into the same space and plots.
     #[arg(long, value_name = "LOG")]
     with: Option<PathBuf>,
-    /// Overwrite an existing recording.
-    #[arg(long)]
-    force: bool,
+    /// Nothing is replaced any more, so it has no effect.
+    #[arg(long = "force", hide = true)]
+    _force: bool,
 }
 
 const EXAMPLES: &str = "Examples:
@@ -50,9 +50,8 @@ fn main() -> ExitCode {
 }
 
 fn run(cli: &Cli) -> Result<(), ExportError> {
-    let output = cli.output.clone().unwrap_or_else(|| cli.log.with_extension("rrd"));
-    let destination = Destination { path: &output, force: cli.force };
-    let exported = export(&cli.log, cli.with.as_deref(), destination)?;
+    let output = new_name(&cli.output.clone().unwrap_or_else(|| cli.log.with_extension("rrd")));
+    let exported = export(&cli.log, cli.with.as_deref(), &output)?;
     let logs = [Some(&cli.log), cli.with.as_ref()].into_iter().flatten();
     logs.zip(&exported).for_each(|(log, exported)| warn(log, exported));
     let (poses, events) = exported.first().map_or((0, 0), |own| (own.poses, own.events));

@@ -15,7 +15,7 @@ pub use tables::{ExportedFile, export_tables};
 
 use crate::cli::{Answer, Outcome, give, warn_of_damage};
 use crate::log::{FlightLog, ImportedTlog, LogError, import_tlog, is_tlog};
-use crate::output::{Destination, WriteError};
+use crate::output::WriteError;
 
 /// Why a log could not be exported.
 #[derive(Debug, thiserror::Error)]
@@ -38,9 +38,6 @@ pub(crate) struct Args {
     /// if left out.
     #[arg(long, short, alias = "output", value_name = "PATH")]
     out: Option<PathBuf>,
-    /// Replace existing files.
-    #[arg(long)]
-    force: bool,
     /// Answer in JSON.
     #[arg(long)]
     json: bool,
@@ -63,17 +60,16 @@ impl Args {
         let format = format.context("--to is missing: csv or rrd")?;
         let output = self.out.clone().or_else(|| is_tlog.then(|| self.file.with_extension("mcap")));
         let output = output.context("--out is missing: where to write")?;
-        let destination = Destination { path: &output, force: self.force };
         match format {
-            Format::Csv => self.tables(destination),
+            Format::Csv => self.tables(&output),
             Format::Rrd => self.rerun(&output),
-            Format::Mcap => give(&import_tlog(&self.file, destination)?, self.json),
+            Format::Mcap => give(&import_tlog(&self.file, &output)?, self.json),
         }
     }
 
-    fn tables(&self, destination: Destination) -> Result<Outcome> {
+    fn tables(&self, output: &Path) -> Result<Outcome> {
         let mut log = FlightLog::open(&self.file)?;
-        let files = export_tables(&mut log, destination)?;
+        let files = export_tables(&mut log, output)?;
         let outcome = give(&files, self.json)?;
         warn_of_damage(log.name(), log.damage().map(ToString::to_string).as_deref());
         Ok(outcome)
@@ -95,7 +91,6 @@ impl Args {
             .arg(&self.file)
             .arg("--out")
             .arg(output)
-            .args(self.force.then_some("--force"))
             .status()
             .with_context(|| format!("{}", program.display()))?;
         ensure!(status.success(), "{}: the export to Rerun failed ({status})", self.file.display());

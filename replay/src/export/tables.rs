@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::ExportError;
 use crate::log::FlightLog;
-use crate::output::{Destination, NewFile, WriteError};
+use crate::output::{NewFile, WriteError, new_name};
 use crate::table::{Cell, Column, Kind, Meaning, TableReader, TableShape};
 
 /// A file that was written.
@@ -19,25 +19,22 @@ pub struct ExportedFile {
     pub columns: usize,
 }
 
-/// Writes every table of a log into a directory, which is created if needed. Memory does not grow with the log. The
+/// Writes every table of a log into a new directory. Memory does not grow with the log. The
 /// files get their names when all of them are complete.
 ///
 /// # Errors
-/// The log cannot be read, a file cannot be written, or a file exists and may not be replaced.
-pub fn export_tables<'a, R: Read>(
+/// The log cannot be read, or a file cannot be written.
+pub fn export_tables<R: Read>(
     log: &mut FlightLog<R>,
-    directory: impl Into<Destination<'a>>,
+    directory: &Path,
 ) -> Result<Vec<ExportedFile>, ExportError> {
-    let directory = directory.into();
-    let input = PathBuf::from(log.name());
+    let directory = &new_name(directory);
     let mut open: BTreeMap<usize, (ExportedFile, csv::Writer<NewFile>)> = BTreeMap::new();
     let mut reader = TableReader::new();
     reader.read::<R, ExportError>(log, |shape, row| {
         let (file, csv) = match open.entry(row.table) {
             std::collections::btree_map::Entry::Occupied(entry) => entry.into_mut(),
-            std::collections::btree_map::Entry::Vacant(entry) => {
-                entry.insert(create(directory, &input, shape)?)
-            }
+            std::collections::btree_map::Entry::Vacant(entry) => entry.insert(create(directory, shape)?),
         };
         file.rows += 1;
         let written = csv.write_record(row.cells.iter().map(text_of));
@@ -50,9 +47,8 @@ pub fn export_tables<'a, R: Read>(
     });
     let mut whole: Vec<(ExportedFile, NewFile)> = finished.collect::<Result<_, ExportError>>()?;
     if !whole.is_empty() {
-        let path = directory.path.join(DICTIONARY);
-        let destination = Destination { path: &path, force: directory.force };
-        let file = NewFile::create(destination, &input)?;
+        let path = directory.join(DICTIONARY);
+        let file = NewFile::create(&path)?;
         let (written, rows) = dictionary(file, reader.shapes()).map_err(WriteError::at(&path))?;
         whole.push((ExportedFile { path, rows, columns: DICTIONARY_COLUMNS.len() }, written));
     }
@@ -64,15 +60,11 @@ pub fn export_tables<'a, R: Read>(
     Ok(files)
 }
 
-fn create(
-    Destination { path: directory, force }: Destination,
-    input: &Path,
-    shape: &TableShape,
-) -> Result<(ExportedFile, csv::Writer<NewFile>), ExportError> {
+fn create(directory: &Path, shape: &TableShape) -> Result<(ExportedFile, csv::Writer<NewFile>), ExportError> {
     // The directory is created with the first table, so that a file that is not a flight log leaves nothing behind.
     std::fs::create_dir_all(directory).map_err(WriteError::at(directory))?;
     let path = directory.join(format!("{}.csv", shape.name));
-    let mut csv = csv::Writer::from_writer(NewFile::create(Destination { path: &path, force }, input)?);
+    let mut csv = csv::Writer::from_writer(NewFile::create(&path)?);
     let head = csv.write_record(shape.columns.iter().map(|column| &column.name));
     head.map_err(io::Error::from).map_err(WriteError::at(&path))?;
     Ok((ExportedFile { path, rows: 0, columns: shape.columns.len() }, csv))

@@ -26,9 +26,10 @@ use statrs::distribution::{Beta, Binomial, ContinuousCDF as _, DiscreteCDF as _}
 
 use super::lot::{Prediction, Trial, burnt, draw_next, predict};
 use super::{Basis, Fit, Parameter, Pooled, Z_95, pooled};
-use crate::cli::{Answer, in_pool, refuse_existing, say, text_of, write_new};
+use crate::cli::{Answer, in_pool, say, text_of};
 use crate::print::counted;
 use crate::settings::{Setting, mission_toml_with, mission_with};
+use onboard_sim::files::{new_name, write_folder};
 
 /// A lot's property before the next burn.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -450,8 +451,8 @@ impl Answer for Learnt {
 #[group(id = "learnt")]
 pub(super) struct Arguments {
     /// Learn the motor lot, the airframe and the site, and write mission.toml and dispersion.toml of the next day into this
-    /// directory, for `onboard-sim campaign`. Existing files are kept.
-    #[arg(long, value_name = "DIR", conflicts_with = "write")]
+    /// directory, for `onboard-sim campaign`. If it exists, it is kept, and the next free name is taken.
+    #[arg(long, value_name = "DIR", conflicts_with = "out")]
     day: Option<PathBuf>,
     /// Simulate this many flights of the next day for the landing rate, and GO or NO-GO; a thousand take some minutes.
     #[arg(long, value_name = "N")]
@@ -490,7 +491,7 @@ impl Arguments {
         for (name, share) in [("--limit", self.limit), ("--risk", self.risk)] {
             ensure!((0.0..=1.0).contains(&share), "{name} {share}: must be 0 to 1");
         }
-        self.day.iter().try_for_each(|day| FILES.iter().try_for_each(|name| refuse_existing(&day.join(name))))
+        Ok(())
     }
 
     /// What the fits tell of the next day; `flown` is the mission of the first log.
@@ -506,10 +507,11 @@ impl Arguments {
         }
         let learnt = in_pool(self.jobs, || learn(fits, self, &mission_toml, &set))??;
         if let Some(directory) = &self.day {
+            let directory = new_name(directory);
             let name = directory.display();
-            std::fs::create_dir_all(directory).with_context(|| format!("{name}: cannot be made"))?;
-            write_new(&directory.join(FILES[0]), &learnt.day.mission_toml)?;
-            write_new(&directory.join(FILES[1]), &learnt.day.dispersion_toml)?;
+            let texts = [&learnt.day.mission_toml, &learnt.day.dispersion_toml];
+            let files = FILES.into_iter().zip(texts.map(|text| text.clone().into_bytes()));
+            write_folder(&directory, files.collect())?;
             say(&format!(
                 "onboard-sim campaign --mission {name}/mission.toml --dispersion {name}/dispersion.toml --out flights"
             ));

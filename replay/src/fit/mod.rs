@@ -46,7 +46,7 @@ use self::least_squares::Solution;
 pub use self::trace::{Frame, Trace};
 use crate::cli::{Answer, Outcome, give, say, text_of, warn_of_damage};
 use crate::info::utc;
-use crate::output::{Destination, write_whole};
+use crate::output::NewFile;
 use crate::print::counted;
 use crate::settings::{Setting, SettingError, mission_toml_with_reasons, mission_with};
 
@@ -627,8 +627,7 @@ fn write_into(path: &Path, log: &Path, trace: &Trace, found: &Fit) -> Result<()>
     });
     let flight = protocol::text::printable(format!("flight {flight}{day}").as_bytes());
     let text = patched(&text, &trace.mission, found, &flight).context("the mission with what was found")?;
-    let destination = Destination { path, force: true };
-    write_whole(destination, log, |file| file.write_all(text.as_bytes()))?;
+    NewFile::replace(path)?.fill(|file| file.write_all(text.as_bytes()))?;
     say(&format!("{name}: --mission of `onboard-sim fly`, `campaign` and `card` takes it"));
     Ok(())
 }

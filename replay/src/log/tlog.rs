@@ -20,7 +20,7 @@ use serde::Serialize;
 
 use super::open_regular;
 use super::verdict::frame_of;
-use crate::output::{Destination, NewFile, WriteError};
+use crate::output::{NewFile, WriteError};
 
 /// A frame of a `.tlog` follows a time of this length.
 const TIME_BYTES: usize = 8;
@@ -122,23 +122,20 @@ fn is_raw(bytes: &[u8]) -> bool {
 ///
 /// # Errors
 /// See [`ImportError`].
-pub fn import_tlog<'a>(
-    input: &Path,
-    output: impl Into<Destination<'a>>,
-) -> Result<ImportedTlog, ImportError> {
-    let destination = output.into();
+pub fn import_tlog(input: &Path, output: &Path) -> Result<ImportedTlog, ImportError> {
     let read = |source| ImportError::Read { path: input.to_owned(), source };
-    let failed = WriteError::at(destination.path);
     is_tlog(input).map_err(read)?;
     let file = open_regular(input).map_err(read)?;
-    let new = BufWriter::new(NewFile::create(destination, input)?);
-    let (log, imported) = convert(file, input, new).map_err(|stopped| match stopped {
+    let new = NewFile::create(output)?;
+    let output = new.path().to_owned();
+    let failed = WriteError::at(&output);
+    let (log, imported) = convert(file, input, BufWriter::new(new)).map_err(|stopped| match stopped {
         Stopped::Read(source) => read(source),
         Stopped::NoFrames => ImportError::NoFrames { path: input.to_owned() },
         Stopped::Write(error) => failed(io::Error::other(error)).into(),
     })?;
-    log.into_inner().map_err(|error| failed(error.into_error()))?.commit()?;
-    Ok(ImportedTlog { output: destination.path.to_owned(), ..imported })
+    let output = log.into_inner().map_err(|error| failed(error.into_error()))?.commit()?;
+    Ok(ImportedTlog { output, ..imported })
 }
 
 enum Stopped {

@@ -22,7 +22,7 @@ pub(crate) use write::{Kept, Rescue};
 
 use crate::cli::{Answer, Outcome, give};
 use crate::log::{IN_ORDER_NS, LogError, is_tlog};
-use crate::output::{Destination, WriteError};
+use crate::output::WriteError;
 use crate::print::counted;
 
 /// Why nothing could be recovered.
@@ -135,10 +135,8 @@ impl Recovery {
 /// Recovers a log into a new file.
 ///
 /// # Errors
-/// The input is not an MCAP file, cannot be read, or holds no message that can be kept; the output exists and may not be
-/// replaced, or cannot be written.
-pub fn recover<'a>(input: &Path, output: impl Into<Destination<'a>>) -> Result<Recovery, RecoverError> {
-    let destination = output.into();
+/// The input is not an MCAP file, cannot be read, or holds no message that can be kept; or the output cannot be written.
+pub fn recover(input: &Path, output: &Path) -> Result<Recovery, RecoverError> {
     if is_tlog(input).unwrap_or_default() {
         return Err(RecoverError::Tlog { path: input.to_owned() });
     }
@@ -146,7 +144,6 @@ pub fn recover<'a>(input: &Path, output: impl Into<Destination<'a>>) -> Result<R
     let contents = records.contents()?;
     let mut recovery = Recovery {
         input: input.display().to_string(),
-        output: destination.path.to_owned(),
         ended: contents.ended,
         changed: was_changed(&contents),
         sorted: is_sorted_anew(&contents),
@@ -154,7 +151,7 @@ pub fn recover<'a>(input: &Path, output: impl Into<Destination<'a>>) -> Result<R
         ..Recovery::default()
     };
     let mut keeps_all = |_: &str, _: u64| true;
-    let rescue = Rescue::of::<RecoverError>(destination, input, (&mut records, &contents), &mut keeps_all)?;
+    let rescue = Rescue::of::<RecoverError>(output, (&mut records, &contents), &mut keeps_all)?;
     let kept = rescue.kept();
     let Some((first_ns, last_ns)) = kept.span_ns else {
         let reason = contents.lost.first().map(|lost| lost.reason.clone());
@@ -172,7 +169,7 @@ pub fn recover<'a>(input: &Path, output: impl Into<Destination<'a>>) -> Result<R
     // With every message kept, no chunk is lost.
     let told = if recovery.messages_lost == Some(0) { &[] } else { &contents.told.chunks[..] };
     recovery.lost = lost_of(&contents, told, first_ns);
-    rescue.finish(&recovery.about())?;
+    recovery.output = rescue.finish(&recovery.about())?;
     Ok(recovery)
 }
 
@@ -251,9 +248,6 @@ pub(crate) struct Args {
     file: PathBuf,
     /// The log to write.
     output: PathBuf,
-    /// Replace an existing file, but never the damaged log itself.
-    #[arg(long)]
-    force: bool,
     /// Answer in JSON.
     #[arg(long)]
     json: bool,
@@ -261,7 +255,6 @@ pub(crate) struct Args {
 
 impl Args {
     pub(crate) fn run(self) -> Result<Outcome> {
-        let destination = Destination { path: &self.output, force: self.force };
-        give(&recover(&self.file, destination)?, self.json)
+        give(&recover(&self.file, &self.output)?, self.json)
     }
 }

@@ -12,7 +12,7 @@ use protocol::log::record::{TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START};
 use super::is_sorted_anew;
 use super::scan::{Contents, Records, WriterReport};
 use crate::log::LogError;
-use crate::output::{Destination, NewFile, WriteError};
+use crate::output::{NewFile, WriteError};
 
 /// Chunk size as in the recorder's own logs.
 const CHUNK_BYTES: u64 = 64 * 1024;
@@ -80,22 +80,23 @@ pub(crate) struct Kept {
 impl<'a> Rescue<'a> {
     /// Copies what can be read of a log and is kept; sorted, if it was not in order of time.
     pub(crate) fn of<E: From<LogError> + From<WriteError>>(
-        destination: Destination,
-        input: &Path,
+        output: &Path,
         (records, contents): (&mut Records, &'a Contents),
         keeps: &'a mut dyn FnMut(&str, u64) -> bool,
     ) -> Result<Self, E> {
-        let failed = |error: mcap::McapError| WriteError::at(destination.path)(std::io::Error::other(error));
-        let file = BufWriter::new(NewFile::create(destination, input)?);
+        let file = NewFile::create(output)?;
+        let path = file.path().to_owned();
         let options = mcap::WriteOptions::new()
             .compression(Some(mcap::Compression::Lz4))
             .chunk_size(Some(CHUNK_BYTES))
             .library(&contents.told.library);
         let mut rescue = Self {
-            path: destination.path.to_owned(),
             keeps,
             told: &contents.told,
-            writer: options.create(file).map_err(failed)?,
+            writer: options
+                .create(BufWriter::new(file))
+                .map_err(|error| WriteError::at(&path)(std::io::Error::other(error)))?,
+            path,
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
             is_foreign: false,
@@ -209,9 +210,10 @@ impl<'a> Rescue<'a> {
     }
 
     /// Completes the log with what it is.
-    pub(crate) fn finish(self, about: &Metadata) -> Result<(), WriteError> {
+    pub(crate) fn finish(self, about: &Metadata) -> Result<PathBuf, WriteError> {
         let path = self.path.clone();
-        self.close(about).map_err(|error| WriteError::at(&path)(std::io::Error::other(error)))
+        self.close(about).map_err(|error| WriteError::at(&path)(std::io::Error::other(error)))?;
+        Ok(path)
     }
 
     fn close(mut self, about: &Metadata) -> mcap::McapResult<()> {
@@ -227,7 +229,8 @@ impl<'a> Rescue<'a> {
         self.writer.write_metadata(about)?;
         self.writer.finish()?;
         let file = self.writer.into_inner().into_inner().map_err(std::io::IntoInnerError::into_error)?;
-        Ok(file.commit().map_err(|error| error.source)?)
+        file.commit().map_err(|error| error.source)?;
+        Ok(())
     }
 
     fn failed(&self, error: mcap::McapError) -> WriteError {

@@ -37,7 +37,7 @@ use self::rerun::Rerun;
 use crate::cli::{Answer, Outcome, give, warn_of_what_is_missing};
 use crate::controller::{AgainError, LoggedComputer, SETTINGS_IN_FLIGHT, phase_name};
 use crate::log::{Clock, ClockTime, Moment, Recording, Verdict};
-use crate::output::{Destination, WriteError, write_whole};
+use crate::output::{WriteError, write_whole};
 use crate::print::{counted, verdict_table};
 use crate::settings::{Setting, SettingArguments, mission_with, truth_with};
 use crate::worst_plans::BrokenPlan;
@@ -386,12 +386,12 @@ pub fn margin(verdict: &Verdict) -> f64 {
 /// Writes a re-flown flight as a log that every command accepts.
 ///
 /// # Errors
-/// The file exists and may not be replaced, or cannot be created or written.
-pub fn write_log<'a>(
-    destination: impl Into<Destination<'a>>,
+/// The file cannot be created or written.
+pub fn write_log(
+    output: &Path,
     recording: &Recording,
     flight: &ReflownFlight,
-) -> Result<(), WriteError> {
+) -> Result<PathBuf, WriteError> {
     let start = recording.head.run.get("start_unix_ns").and_then(|text| text.parse().ok());
     let header = LogHeader {
         writer: "replay".to_owned(),
@@ -401,7 +401,7 @@ pub fn write_log<'a>(
         profile_toml: recording.profile_toml().ok().map(str::to_owned),
         scenario_toml: recording.head.scenario_toml.clone(),
     };
-    write_whole(destination.into(), Path::new(&recording.name), |file| {
+    write_whole(output, |file| {
         let mut log = LogWriter::new(BufWriter::new(file), &header).map_err(io::Error::other)?;
         for (time_s, record) in &flight.records {
             log.write(record, (time_s * 1e9) as u64).map_err(io::Error::other)?;
@@ -527,9 +527,6 @@ pub(crate) struct Args {
     /// Write the flight as a new log.
     #[arg(long, alias = "log", value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Replace an existing file, but never the log that is flown again.
-    #[arg(long, requires = "out", hide_short_help = true)]
-    force: bool,
     /// Answer in JSON.
     #[arg(long)]
     json: bool,
@@ -548,8 +545,7 @@ impl Args {
         };
         let (report, flight) = refly_flight(&recording, &options)?;
         if let Some(path) = &self.out {
-            let destination = Destination { path, force: self.force };
-            write_log(destination, &recording, &flight)?;
+            write_log(path, &recording, &flight)?;
         }
         give(&report, self.json)
     }

@@ -10,13 +10,13 @@ mod track;
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 use track::Flight;
 
 use crate::cli::{Outcome, answer};
 use crate::info::{Completeness, Info, described};
 use crate::log::{Recording, RecordingError};
-use crate::output::{Destination, same_file, write_whole};
+use crate::output::write_whole;
 
 /// A flight's page.
 #[derive(Debug, Clone)]
@@ -61,9 +61,6 @@ pub(crate) struct Args {
     /// Another log, whose flight is drawn into the same pictures.
     #[arg(long, value_name = "LOG")]
     with: Option<PathBuf>,
-    /// Replace an existing file, but never the log.
-    #[arg(long)]
-    force: bool,
 }
 
 impl Args {
@@ -75,11 +72,7 @@ impl Args {
         if path.as_os_str() == "-" {
             answer(|output| output.write_all(html))?;
         } else {
-            if self.with.as_deref().is_some_and(|with| same_file(with, &path)) {
-                bail!("{}: is a log that is being read", path.display());
-            }
-            let destination = Destination { path: &path, force: self.force };
-            write_whole(destination, &self.file, |file| file.write_all(html))?;
+            let path = write_whole(&path, |file| file.write_all(html))?;
             answer(|output| writeln!(output, "{}", path.display()))?;
         }
         page.completeness.warn(&page.name);

@@ -16,7 +16,7 @@ use super::{Obstacle, Verification, VerifyReport, verify};
 use crate::cli::{Answer, Outcome, give, say};
 use crate::digest::digest;
 use crate::log::{Entry, FlightLog, LogError, Moment, Recording};
-use crate::output::{Destination, write_whole};
+use crate::output::NewFile;
 use crate::print::{columns, counted, print_json};
 use crate::refly::{ReflyOptions, margin, refly};
 
@@ -253,8 +253,7 @@ impl Arguments {
             bail!("nothing is accepted: {log}: {}; mend it or take it out of the directory", flight.words);
         }
         ensure!(!now.is_empty(), "nothing is accepted: none of the logs holds a flight");
-        let destination = Destination { path, force: true };
-        write_whole(destination, Path::new(""), |file| print_json(&now, file))?;
+        NewFile::replace(path)?.fill(|file| print_json(&now, file))?;
         say(&format!("accepted: {}", path.display()));
         Ok(Outcome::Given)
     }

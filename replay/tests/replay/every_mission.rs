@@ -49,7 +49,6 @@ const UNFLOWN: Answer =
 const TABLES: Answer = (0, &["computer_frame.", ": {frames} rows of "]);
 const HEARD: Answer = (0, &["told.mcap: ", " frames, 0 of them not understood"]);
 const HEARD_ONLY: Answer = (2, &["nothing was compared: it has no frames of a flight computer"]);
-const EXISTS: Answer = (2, &["whole.mcap: cannot be written: it exists already"]);
 const WHOLE: Answer = (0, &["the log was whole: nothing is lost", "!warning"]);
 const SAME_MISSION: Answer = (0, &["{mission} is the same mission as {mission}"]);
 
@@ -154,7 +153,7 @@ const TABLE: [Row; 21] = [
     row("verify {dir}/cut.mcap", (0, &["{frames} of {frames} frames identical"]), NO_FILE, NO_FILE),
     row("recover {log} {dir}/whole.mcap", WHOLE, WHOLE, WHOLE),
     row("verify {dir}/whole.mcap", IDENTICAL, IDENTICAL, UNFLOWN),
-    row("recover {log} {dir}/whole.mcap", EXISTS, EXISTS, EXISTS),
+    row("recover {log} {dir}/whole.mcap", WHOLE, WHOLE, WHOLE),
 ];
 
 #[derive(Clone, Copy, Debug, PartialEq)]

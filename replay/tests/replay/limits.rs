@@ -204,7 +204,7 @@ fn a_pipe_is_refused() {
         &["verify", "--book"],
         &["evaluate"],
         &["report"],
-        &["recover", "--force", output.to_str().unwrap()],
+        &["recover", output.to_str().unwrap()],
     ] {
         // Of `recover` the pipe is the second file; both are refused.
         let (code, said) = within(400, arguments, &pipe);

@@ -36,82 +36,66 @@ fn copied(log: &Path) -> (tempfile::TempDir, PathBuf) {
     (directory, path)
 }
 
+/// A file that is there is kept, also the log that is read, under any of its names; a script that still says --force is understood.
 #[test]
-fn no_existing_file_is_overwritten_without_force() {
+fn what_exists_is_kept_and_the_next_free_name_is_said() {
     for (arguments, name) in writers() {
         let (directory, log) = copied(&WITH_FRAMES.log);
-        let output = directory.path().join(name);
-        std::fs::write(&output, OTHERS).unwrap();
-        let mut command = replay(arguments[0], &log);
-        let refused = refusal(command.args(&arguments[1..]).arg(&output));
-        assert!(refused.contains("it exists already; --force replaces it"), "{arguments:?}: {refused}");
-        assert_eq!(std::fs::read(&output).unwrap(), OTHERS, "{arguments:?}");
-        let (code, stdout, stderr) = run(command.arg("--force"));
-        assert_eq!(code, 0, "{arguments:?}: {stdout}{stderr}");
-        assert_ne!(std::fs::read(&output).unwrap(), OTHERS, "{arguments:?}");
-        let mut expected = vec!["flight.mcap".to_owned(), name.to_owned()];
+        let at = |name: &str| directory.path().join(name);
+        std::fs::write(at(name), OTHERS).unwrap();
+        let before = std::fs::read(&log).unwrap();
+        std::os::unix::fs::symlink(&log, at("linked.mcap")).unwrap();
+        let (stem, ending) = name.split_once('.').unwrap();
+        let written = [
+            (name, format!("{stem}-2.{ending}")),
+            (name, format!("{stem}-3.{ending}")),
+            ("flight.mcap", "flight-2.mcap".to_owned()),
+            ("linked.mcap", "linked-2.mcap".to_owned()),
+        ];
+        for (asked, free) in &written {
+            let mut command = replay(arguments[0], &log);
+            let (code, stdout, stderr) = run(command.args(&arguments[1..]).arg(at(asked)).arg("--force"));
+            assert_eq!(code, 0, "{arguments:?}: {stdout}{stderr}");
+            let said =
+                format!("{} exists and is kept; {} is written", at(asked).display(), at(free).display());
+            assert!(stderr.contains(&said), "{arguments:?}: {stderr}");
+        }
+        assert_eq!(std::fs::read(at(name)).unwrap(), OTHERS, "{arguments:?}");
+        assert_eq!(std::fs::read(&log).unwrap(), before, "{arguments:?}");
+        let kept = ["flight.mcap", "linked.mcap", name].map(str::to_owned);
+        let mut expected: Vec<_> = kept.into_iter().chain(written.map(|(_, free)| free)).collect();
         expected.sort();
         assert_eq!(listed(directory.path()), expected, "{arguments:?}: nothing else is left");
     }
 }
 
-/// Not even with --force or under another name of the same file.
 #[test]
-fn the_log_that_is_read_is_never_written() {
-    for (arguments, _) in writers() {
-        let (directory, log) = copied(&WITH_FRAMES.log);
-        let before = std::fs::read(&log).unwrap();
-        let linked = directory.path().join("linked.mcap");
-        std::os::unix::fs::symlink(&log, &linked).unwrap();
-        for output in [
-            log.clone(),
-            linked,
-            directory.path().join("../").join(directory.path().file_name().unwrap()).join("flight.mcap"),
-        ] {
-            for force in [None, Some("--force")] {
-                refusal(replay(arguments[0], &log).args(&arguments[1..]).arg(&output).args(force));
-                assert_eq!(std::fs::read(&log).unwrap(), before, "{arguments:?}");
-            }
-        }
-    }
-}
-
-#[test]
-fn tables_and_imports_overwrite_nothing_either() {
+fn tables_get_a_folder_of_their_own_and_an_import_a_free_name() {
     let (directory, log) = copied(&WITH_FRAMES.log);
     let at = |name: &str| directory.path().join(name);
-    let table = at("tables").join("vehicle_truth3d.csv");
     std::fs::create_dir_all(at("tables")).unwrap();
-    std::fs::write(&table, OTHERS).unwrap();
-    let before = listed(&at("tables"));
-    let mut command = replay("export", &log);
-    command.args(["--to", "csv", "--out"]).arg(at("tables"));
-    refusal(&mut command);
-    assert_eq!(std::fs::read(&table).unwrap(), OTHERS);
-    assert_eq!(listed(&at("tables")), before, "no other table is written if one was refused");
-    let (code, _, stderr) = run(command.arg("--force"));
+    std::fs::write(at("tables").join("notes.txt"), OTHERS).unwrap();
+    let (code, _, stderr) = run(replay("export", &log).args(["--to", "csv", "--out"]).arg(at("tables")));
     assert_eq!(code, 0, "{stderr}");
-    assert_ne!(std::fs::read(&table).unwrap(), OTHERS);
+    assert_eq!(listed(&at("tables")), ["notes.txt"]);
+    assert!(at("tables-2").join("vehicle_truth3d.csv").is_file());
     let tlog = at("flight.tlog");
     std::fs::copy(crate::simulated::tlog(&WITH_FRAMES, "overwriting.tlog"), &tlog).unwrap();
     let before = std::fs::read(&log).unwrap();
     // Without an output name, the default name is that of the flight's own log.
-    refusal(&mut replay("export", &tlog));
+    let (code, _, stderr) = run(&mut replay("export", &tlog));
+    assert!(code == 0 && at("flight-2.mcap").is_file(), "{stderr}");
     assert_eq!(std::fs::read(&log).unwrap(), before);
-    refusal(replay("export", &tlog).arg("--out").arg(&tlog).arg("--force"));
-    let (code, _, stderr) = run(replay("export", &tlog).arg("--out").arg(at("imported.mcap")));
-    assert_eq!(code, 0, "{stderr}");
 }
 
 /// A page with the default name does not replace a page that was edited.
 #[test]
-fn a_report_twice_needs_force() {
-    let (_directory, log) = copied(&MK2.log);
-    let (code, ..) = run(&mut replay("report", &log));
-    assert_eq!(code, 0);
-    refusal(&mut replay("report", &log));
-    let (code, ..) = run(replay("report", &log).arg("--force"));
-    assert_eq!(code, 0);
+fn a_report_twice_is_two_pages() {
+    let (directory, log) = copied(&MK2.log);
+    for name in ["flight.html", "flight-2.html"] {
+        let (code, stdout, _) = run(&mut replay("report", &log));
+        assert_eq!((code, stdout), (0, format!("{}\n", directory.path().join(name).display())));
+    }
     // A device has no content that could be lost.
     let (code, stdout, stderr) = run(replay("report", &log).args(["--out", "/dev/stdout"]));
     assert!(code == 0 && stdout.len() > 10_000, "{stderr}");
@@ -129,7 +113,7 @@ fn a_command_that_fails_replaces_nothing() {
         if arguments[0] == "recover" {
             continue;
         }
-        refusal(replay(arguments[0], &broken).args(&arguments[1..]).arg(&output).arg("--force"));
+        refusal(replay(arguments[0], &broken).args(&arguments[1..]).arg(&output));
         assert_eq!(std::fs::read(&output).unwrap(), OTHERS, "{arguments:?}");
         assert_eq!(listed(files.directory.path()), ["flight.mcap", "output"], "{arguments:?}");
     }
@@ -145,9 +129,9 @@ fn half_an_output_replaces_nothing() {
         // File size is limited to a few kilobytes; writing more fails.
         let mut command = Command::new("sh");
         command.args(["-c", "trap '' XFSZ; ulimit -f 8; exec \"$@\"", "sh", env!("CARGO_BIN_EXE_replay")]);
-        command.arg(arguments[0]).arg(&log).args(&arguments[1..]).arg(&output).arg("--force");
+        command.arg(arguments[0]).arg(&log).args(&arguments[1..]).arg(&output);
         let refused = refusal(&mut command);
-        assert!(refused.contains(&format!("{name}: cannot be written")), "{arguments:?}: {refused}");
+        assert!(refused.contains(": cannot be written"), "{arguments:?}: {refused}");
         assert_eq!(std::fs::read(&output).unwrap(), OTHERS, "{arguments:?}");
         let mut expected = vec!["flight.mcap".to_owned(), name.to_owned()];
         expected.sort();

@@ -10,7 +10,6 @@ use proptest::test_runner::TestRunner;
 use protocol::log::reader::Damage;
 use replay::info::info;
 use replay::log::{FlightLog, Recording};
-use replay::output::Destination;
 use replay::recover::recover;
 use replay::verify::{Verification, verify};
 
@@ -135,16 +134,17 @@ fn a_log_cut_at_any_byte_behind_its_chunks_keeps_every_message() {
         let messages = Held::read(&input).facts();
         for cut in (chunks_end..bytes.len()).step_by(step) {
             std::fs::write(&input, &bytes[..cut]).unwrap();
-            let destination = Destination { path: &output, force: true };
-            let recovery = recover(&input, destination).unwrap();
+            let recovery = recover(&input, &output).unwrap();
             assert_eq!(Held::read(&output).facts(), messages, "cut at {cut}: {recovery:?}");
             assert_eq!((recovery.changed, recovery.messages_lost), (false, None), "{cut}");
             assert!(recovery.fault().is_some(), "{cut}");
             assert!(recovery.lost.iter().all(|lost| lost.from_byte >= chunks_end as u64), "{recovery:?}");
+            std::fs::remove_file(&output).unwrap();
         }
         std::fs::write(&input, &bytes[..bytes.len() - 60]).unwrap();
-        let (code, stdout, _) = run(replay("recover", &input).arg(&output).arg("--force"));
+        let (code, stdout, _) = run(replay("recover", &input).arg(&output));
         assert!(code == 0 && stdout.contains("DAMAGED: "), "{stdout}");
+        std::fs::remove_file(&output).unwrap();
     }
 }
 

@@ -6,7 +6,7 @@ use re_lenses::Selector;
 use replay_rerun::{FLIGHT_TIME, PLOTS, component, export};
 
 use crate::flown::{MK2, WITH_FRAMES, tlog};
-use crate::logs::{FRAMES, START_UNIX_NS, folder, forced, write_log, write_log_from};
+use crate::logs::{FRAMES, START_UNIX_NS, cleared, folder, write_log, write_log_from};
 use crate::read_back::Recording;
 
 #[test]
@@ -69,7 +69,7 @@ fn every_plot_of_the_layout_has_its_fields() {
             "/telemetry" => &station,
             _ => &log,
         };
-        export(log, None, forced(&rrd)).unwrap();
+        export(log, None, cleared(&rrd)).unwrap();
         let recording = Recording::read(&rrd);
         for field in fields {
             let selector: Selector = field.parse().unwrap();

@@ -2,7 +2,7 @@
 
 use replay_rerun::export;
 
-use crate::logs::{FRAMES, folder, forced, in_the_third_chunk, write_log};
+use crate::logs::{FRAMES, cleared, folder, in_the_third_chunk, write_log};
 use crate::read_back::Recording;
 
 #[test]
@@ -14,7 +14,7 @@ fn the_readable_part_of_a_cut_log_is_exported() {
     let cuts = (30..100).step_by(5).map(|percent| bytes.len() * percent / 100);
     for cut in cuts.chain([in_the_third_chunk(&bytes)]) {
         std::fs::write(&log, &bytes[..cut]).unwrap();
-        let exported = match export(&log, None, forced(&rrd)) {
+        let exported = match export(&log, None, cleared(&rrd)) {
             Ok(exported) => exported,
             Err(refused) => {
                 assert!(refused.to_string().contains("before its first message"), "{cut}: {refused}");
@@ -31,19 +31,18 @@ fn the_readable_part_of_a_cut_log_is_exported() {
 }
 
 #[test]
-fn nothing_is_overwritten_without_force_and_no_log_ever() {
+fn what_exists_is_kept_and_a_recording_gets_the_next_free_name() {
     let (folder, log, rrd) = folder();
     let other = folder.path().join("other.mcap");
     write_log(&log);
     write_log(&other);
     std::fs::write(&rrd, "precious").unwrap();
-    let to = [(&rrd).into(), forced(&log), forced(&other)];
-    for to in to {
-        let before = std::fs::read(to.path).unwrap();
-        export(&log, Some(&other), to).unwrap_err();
-        assert_eq!(std::fs::read(to.path).unwrap(), before);
+    for to in [&rrd, &log, &other] {
+        let before = std::fs::read(to).unwrap();
+        export(&log, Some(&other), to).unwrap();
+        assert_eq!(std::fs::read(to).unwrap(), before);
     }
-    export(&log, None, forced(&rrd)).unwrap();
+    export(&log, None, cleared(&rrd)).unwrap();
     assert_eq!(Recording::read(&rrd).layouts, 1);
 }
 

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::v1;
 use protocol::log::writer::LogWriter;
-use replay::output::Destination;
 use sim::outside::Outside;
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
@@ -54,9 +53,10 @@ pub(crate) fn write_log_from(path: &Path, start_unix_ns: u64) {
     log.finish().unwrap();
 }
 
-/// A recording that may be replaced.
-pub(crate) fn forced(path: &Path) -> Destination<'_> {
-    Destination { path, force: true }
+/// Makes way for another recording.
+pub(crate) fn cleared(path: &Path) -> &Path {
+    let _ = std::fs::remove_file(path);
+    path
 }
 
 /// A place in a log's third chunk, where it may be cut.
