@@ -8,14 +8,20 @@ use clap::builder::NonEmptyStringValueParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use protocol::dialect::TdPhase;
 use protocol::identity::{Address, GROUND, VEHICLE};
+use protocol::program::{EXIT_CODES, Manual};
 use protocol::transport::LinkAddress;
 use serde::Deserialize;
 use sim::wire::fly::StartPoint;
 
 use crate::demo::Speed;
-use crate::exit;
 use crate::model::words;
 use crate::view::theme::Palette;
+
+const EXAMPLES: &str = "\
+Examples:
+  ground
+  ground --connect serial:/dev/ttyUSB0:57600 --key touchdown.key
+  ground --replay last";
 
 /// Terminal ground station for a rocket that lands on its own thrust.
 ///
@@ -24,7 +30,7 @@ use crate::view::theme::Palette;
 /// terminal it prints one line per event and the landing verdict; the exit code tells how the flight ended. Colours,
 /// keys, voice and bell stand in the settings (`ground config example`).
 #[derive(Debug, Clone, Parser)]
-#[command(name = "ground", version, after_help = exit::HELP, args_conflicts_with_subcommands = true)]
+#[command(name = "ground", version, after_help = format!("{EXAMPLES}\n\n{EXIT_CODES}"), args_conflicts_with_subcommands = true)]
 pub struct Cli {
     /// What to run instead of a station with its screen.
     #[command(subcommand)]
@@ -225,15 +231,8 @@ pub enum Command {
         #[command(subcommand)]
         command: ConfigCommand,
     },
-    /// Print a shell's completions.
-    #[command(after_help = "Example: ground completions bash")]
-    Completions {
-        /// The shell.
-        shell: clap_complete::Shell,
-    },
-    /// Print the manual page (roff).
-    #[command(after_help = "Example: ground man")]
-    Man,
+    #[command(flatten)]
+    Manual(Manual),
 }
 
 /// A screen for a station in another process.
@@ -457,7 +456,7 @@ mod tests {
         ] {
             assert!(help.contains(word), "{word}");
         }
-        assert!(help.contains(exit::HELP));
+        assert!(help.contains(EXIT_CODES));
     }
 
     #[test]

@@ -11,24 +11,17 @@ use ground::exit::Exit;
 fn main() -> ExitCode {
     let given = match Cli::command().try_get_matches() {
         Ok(given) => given,
-        Err(message) => {
-            // Help and version are printed here, too. A failure to print them is ignored.
-            let _ = message.print();
-            return if message.use_stderr() { code(Exit::Usage) } else { ExitCode::SUCCESS };
-        }
+        Err(message) => return Exit::unread(&message).into(),
     };
     // While it unwound, the panic has printed its message, restored the terminal and finished the log.
     let ended = std::panic::catch_unwind(AssertUnwindSafe(|| ground::app::run(&given)));
     match ended {
-        Ok(Ok(exit)) => code(exit),
+        Ok(Ok(exit)) => exit,
         Ok(Err(error)) => {
             let _ = writeln!(std::io::stderr(), "error: {error:#}");
-            code(Exit::Error)
+            Exit::Error
         }
-        Err(_panic) => code(Exit::Error),
+        Err(_panic) => Exit::Error,
     }
-}
-
-fn code(exit: Exit) -> ExitCode {
-    ExitCode::from(exit as u8)
+    .into()
 }

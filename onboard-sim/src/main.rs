@@ -11,6 +11,7 @@ use clap::{CommandFactory as _, Parser, Subcommand};
 use flight::vehicles::mission;
 use onboard_sim::files::text_of;
 use protocol::key_file::KeyFile;
+use protocol::program::{EXIT_CODES, Exit, Manual};
 use protocol::signing::Key;
 
 /// Flies the landing controller against a simulated vehicle and streams MAVLink 2.
@@ -18,7 +19,7 @@ use protocol::signing::Key;
 #[command(
     version,
     arg_required_else_help = true,
-    after_help = "Example: onboard-sim fly --mission mk3 --log flight.mcap"
+    after_help = format!("Example: onboard-sim fly --mission mk3 --log flight.mcap\n\n{EXIT_CODES}")
 )]
 struct Arguments {
     #[command(subcommand)]
@@ -34,8 +35,7 @@ enum Command {
     ///
     /// Without --mavlink the vehicle arms and starts itself; with it, it waits for a ground station.
     ///
-    /// Exit codes: 0 landed inside every limit (from apogee: on its legs); 1 error; 2 usage; 3 ended
-    /// outside a limit; 4 refused or aborted; 5 stopped before its end.
+    /// Exit code 0 if it landed inside every limit (from apogee: on its legs), 3 if it ended outside a limit.
     #[command(
         after_help = "Examples:\n  onboard-sim fly --mission mk3 --log flight.mcap\n  onboard-sim fly --mavlink udpout:127.0.0.1:14550 --seed 7"
     )]
@@ -47,7 +47,7 @@ enum Command {
     Campaign(cli::campaign::CampaignArguments),
     /// Say whether the vehicle of a mission will land, and what to change if not: one page, before anything is built.
     ///
-    /// Exit codes: 0 ok or tight; 1 no, or an error; 2 usage.
+    /// Exit code 0 if it is ok or tight, 3 if the answer is no.
     #[command(after_help = "Example: onboard-sim check mk3")]
     Check(cli::check::CheckArguments),
     /// Write the sheet that a team takes to the field, and the mission to load; refused for what cannot land.
@@ -89,26 +89,22 @@ enum Command {
         #[arg(long, value_name = "NAME")]
         show: Option<String>,
     },
-    /// Print a shell's completions, or without a shell the manual page (roff).
-    #[command(hide = true)]
-    Manual {
-        /// The shell.
-        shell: Option<clap_complete::Shell>,
-    },
+    #[command(flatten)]
+    Manual(Manual),
 }
 
 fn main() -> ExitCode {
-    match run(Arguments::parse()) {
-        Ok(code) => code,
-        Err(error) => {
+    let ended = Arguments::try_parse().map_or_else(|message| Ok(Exit::unread(&message)), run);
+    ended
+        .unwrap_or_else(|error| {
             // If writing fails here, there is nothing left to do.
             let _ = writeln!(std::io::stderr(), "error: {error:#}");
-            ExitCode::from(1)
-        }
-    }
+            Exit::Error
+        })
+        .into()
 }
 
-fn run(arguments: Arguments) -> anyhow::Result<ExitCode> {
+fn run(arguments: Arguments) -> anyhow::Result<Exit> {
     match arguments.command {
         Command::Campaign(arguments) => cli::campaign::run(&arguments),
         Command::Check(arguments) => cli::check::run(&arguments),
@@ -118,25 +114,14 @@ fn run(arguments: Arguments) -> anyhow::Result<ExitCode> {
         Command::New(arguments) => cli::new::run(&arguments),
         Command::Missions { show } => missions(show.as_deref()),
         Command::Fly(arguments) => cli::fly::run(arguments),
-        Command::Manual { shell } => manual(Arguments::command(), shell),
+        Command::Manual(manual) => Ok(manual.print(Arguments::command())?),
     }
 }
 
-/// The command line in other forms: a shell's completions, or the manual page.
-fn manual(mut command: clap::Command, shell: Option<clap_complete::Shell>) -> anyhow::Result<ExitCode> {
-    let mut text = Vec::new();
-    match shell {
-        Some(shell) => clap_complete::generate(shell, &mut command, "onboard-sim", &mut text),
-        None => clap_mangen::Man::new(command).render(&mut text)?,
-    }
-    std::io::stdout().lock().write_all(&text)?;
-    Ok(ExitCode::SUCCESS)
-}
-
-fn make_key(file: &Path, of_passphrase: bool) -> anyhow::Result<ExitCode> {
+fn make_key(file: &Path, of_passphrase: bool) -> anyhow::Result<Exit> {
     if !of_passphrase {
         KeyFile::create(file)?;
-        return Ok(ExitCode::SUCCESS);
+        return Ok(Exit::Yes);
     }
     if std::io::stdin().is_terminal() {
         write!(std::io::stderr(), "passphrase, shown as you type it: ")?;
@@ -146,17 +131,17 @@ fn make_key(file: &Path, of_passphrase: bool) -> anyhow::Result<ExitCode> {
     let passphrase = line.trim_end_matches(['\n', '\r']);
     anyhow::ensure!(!passphrase.is_empty(), "the passphrase is empty");
     KeyFile::create_with(file, &Key::from_passphrase(passphrase))?;
-    Ok(ExitCode::SUCCESS)
+    Ok(Exit::Yes)
 }
 
-fn missions(show: Option<&str>) -> anyhow::Result<ExitCode> {
+fn missions(show: Option<&str>) -> anyhow::Result<Exit> {
     let mut out = std::io::stdout().lock();
     if let Some(name) = show {
         out.write_all(text_of(name, mission::BUILTIN, "mission")?.as_bytes())?;
-        return Ok(ExitCode::SUCCESS);
+        return Ok(Exit::Yes);
     }
     for (name, text) in mission::BUILTIN {
         writeln!(out, "{name:<20} {}", mission::from_toml(text, name)?.summary)?;
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(Exit::Yes)
 }

@@ -21,7 +21,8 @@
 //! * [`motion`]: where a vehicle is and how it turns, from its messages; `told`: all of it as a record of the log;
 //! * [`book`]: who did what, with a signed hash over all of it;
 //! * [`records`]: the records of the flight log, generated;
-//! * [`log`]: the flight log.
+//! * [`log`]: the flight log;
+//! * `program` (a feature): exit codes, completions and manual pages of the programs.
 //!
 //! # On a flight computer
 //!
@@ -92,6 +93,8 @@ pub mod log;
 pub mod mission;
 pub mod motion;
 pub mod parameter;
+#[cfg(feature = "program")]
+pub mod program;
 pub mod records;
 pub mod signing;
 pub mod text;

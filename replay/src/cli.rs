@@ -7,48 +7,16 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, Result};
 pub(crate) use onboard_sim::files::text_of;
 use onboard_sim::run::threads;
+use protocol::program::Exit;
 use protocol::text::printable;
 use serde::Serialize;
 
 use crate::log::{Cut, Gap, Recording};
 use crate::print::print_json;
 
-/// The answer is no: the controller decides differently from the record, or flights differ by more than is tolerated.
-const EXIT_NO: u8 = 1;
-/// There is no answer: wrong usage, an unreadable file, not a flight log, or not replayable.
-pub const EXIT_NO_ANSWER: u8 = 2;
-
-/// How an answer turned out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Outcome {
-    /// There is an answer.
-    Given,
-    /// Some of the logs could not be read, or not be run again.
-    NotAll,
-    /// Yes or no.
-    Decided { yes: bool },
-}
-
-impl Outcome {
-    /// The exit code of the program.
-    pub fn exit_code(&self) -> u8 {
-        match self {
-            Self::Given | Self::Decided { yes: true } => 0,
-            Self::Decided { yes: false } => EXIT_NO,
-            Self::NotAll => EXIT_NO_ANSWER,
-        }
-    }
-
-    /// The worse of two: a no, then what could not be answered.
-    #[must_use]
-    pub fn or_worse(self, other: Self) -> Self {
-        let rank = |outcome: Self| match outcome.exit_code() {
-            EXIT_NO => 2,
-            EXIT_NO_ANSWER => 1,
-            _ => 0,
-        };
-        if rank(other) > rank(self) { other } else { self }
-    }
+/// The worse of two answers: a no, then what could not be answered.
+pub(crate) fn worse(one: Exit, other: Exit) -> Exit {
+    if one == Exit::No || other == Exit::Yes { one } else { other }
 }
 
 /// What a command has found: data for programs, sentences for people.
@@ -56,8 +24,8 @@ pub trait Answer: Serialize {
     /// What it says, a line each.
     fn sentences(&self) -> Vec<String>;
 
-    fn outcome(&self) -> Outcome {
-        Outcome::Given
+    fn outcome(&self) -> Exit {
+        Exit::Yes
     }
 }
 
@@ -74,13 +42,13 @@ impl<One: Answer> Answer for Vec<One> {
         lines
     }
 
-    fn outcome(&self) -> Outcome {
-        self.iter().map(Answer::outcome).fold(Outcome::Given, Outcome::or_worse)
+    fn outcome(&self) -> Exit {
+        self.iter().map(Answer::outcome).fold(Exit::Yes, worse)
     }
 }
 
 /// Prints an answer.
-pub(crate) fn give(found: &impl Answer, json: bool) -> Result<Outcome> {
+pub(crate) fn give(found: &impl Answer, json: bool) -> Result<Exit> {
     answer(|output| {
         if json {
             return print_json(found, output);
@@ -97,15 +65,15 @@ pub(crate) fn give_each<A: Answer>(
     files: &[PathBuf],
     json: bool,
     find: impl Fn(&Path) -> Result<Vec<A>>,
-) -> Result<Outcome> {
-    let (mut all, mut outcome) = (Vec::new(), Outcome::Given);
+) -> Result<Exit> {
+    let (mut all, mut outcome) = (Vec::new(), Exit::Yes);
     for file in files {
         match find(file) {
             Ok(found) => all.extend(found),
             Err(error) if files.len() == 1 => return Err(error),
             Err(error) => {
                 say(&format!("{error:#}"));
-                outcome = Outcome::NotAll;
+                outcome = Exit::NotSeen;
             }
         }
     }
@@ -113,7 +81,7 @@ pub(crate) fn give_each<A: Answer>(
         [only] if files.len() == 1 => give(only, json)?,
         _ => give(&all, json)?,
     };
-    Ok(given.or_worse(outcome))
+    Ok(worse(given, outcome))
 }
 
 /// Writes an answer to standard output. A reader that closes the pipe early is not an error.

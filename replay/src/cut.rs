@@ -15,9 +15,10 @@ use mcap::records::Metadata;
 use protocol::log::record::{
     METADATA_RUN, TOPIC_BOOK, TOPIC_BOOK_HEAD, TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START,
 };
+use protocol::program::Exit;
 use serde::Serialize;
 
-use crate::cli::{Answer, Outcome, give};
+use crate::cli::{Answer, give};
 use crate::log::{Clock, ClockTime, Entry, FlightLog, LogError, Moment};
 use crate::output::WriteError;
 use crate::print::counted;
@@ -230,7 +231,7 @@ pub(crate) struct Args {
 }
 
 impl Args {
-    pub(crate) fn run(self) -> Result<Outcome> {
+    pub(crate) fn run(self) -> Result<Exit> {
         let wanted = Wanted { from: self.from, until: self.until, topics: self.topics };
         give(&cut(&self.file, &wanted, &self.output)?, self.json)
     }

@@ -8,9 +8,10 @@
 use std::path::PathBuf;
 
 use anyhow::Result;
+use protocol::program::Exit;
 use serde::Serialize;
 
-use crate::cli::{Answer, Outcome, give, warn_of_what_is_missing};
+use crate::cli::{Answer, give, warn_of_what_is_missing};
 pub use crate::controller::Decided;
 use crate::controller::{AgainError, LoggedComputer, phase_name};
 use crate::log::Recording;
@@ -335,7 +336,7 @@ pub(crate) struct Args {
 }
 
 impl Args {
-    pub(crate) fn run(self) -> Result<Outcome> {
+    pub(crate) fn run(self) -> Result<Exit> {
         let recording = Recording::open(&self.file)?;
         warn_of_what_is_missing(&recording);
         let report = evaluate(&recording, &self.settings.all()?)?;

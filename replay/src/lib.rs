@@ -45,37 +45,28 @@ pub mod table;
 pub mod verify;
 pub mod worst_plans;
 
-use std::io::Write as _;
-
 use anyhow::Result;
 use clap::{CommandFactory as _, Parser, Subcommand};
-
-use crate::cli::{Outcome, answer};
+use protocol::program::{EXIT_CODES, Exit, Manual};
 
 /// Describes flight logs, runs their flights again, and compares them.
 ///
 /// Answers go to standard output, warnings and errors to standard error.
 ///
-/// Exit codes:
-///   0  success: the log is described, or every frame that could be read is identical
-///   1  verify: something differs or cannot be, or with --strict not all that can be compared was; with --baseline some
-///      flight got worse, lands no longer, diverged or is lost; with --book a book is broken, or its end is not proven;
-///      compare: more differs or is missing than is tolerated, or the verdicts differ;
-///      fit: NO-GO
-///   2  no answer: wrong usage, the file cannot be read or is no flight log, or verify cannot re-execute
-///      some frame (no frames, no profile, frames missing) and all others are identical;
-///      or a file would be overwritten
+/// The answer is no, and the exit code 3: of verify, if something differs or cannot be, or with --strict not all that can be
+/// compared was; with --baseline, if some flight got worse, lands no longer, diverged or is lost; with --book, if a book is broken,
+/// or its end is not proven; of compare, if more differs or is missing than is tolerated, or the verdicts differ; of fit, if it is
+/// NO-GO. It is 5 if verify cannot re-execute some frame (no frames, no profile, frames missing) and all others are identical, and
+/// if some of several logs could not be read.
 ///
-/// A damaged log is used up to the damage, with a warning and exit code 0, except by verify --strict
-/// and by compare.
+/// A damaged log is used up to the damage, with a warning and exit code 0, except by verify --strict and by compare.
 #[derive(Debug, Parser)]
 #[command(
     name = "replay",
     version,
     about,
     long_about,
-    verbatim_doc_comment,
-    after_help = "Example: replay verify flight.mcap"
+    after_help = format!("Example: replay verify flight.mcap\n\n{EXIT_CODES}")
 )]
 pub struct Cli {
     #[command(subcommand)]
@@ -100,7 +91,7 @@ enum Command {
     ///
     /// With --explain the plan of a recorded frame is solved again and judged: cost, what is broken, warm against cold start,
     /// predicted path. With --baseline a directory of flights is held against one: every flight verified, flown again
-    /// and compared; exit code 0 if none got worse, 1 if some did, 2 without an answer. With --book the books of ground
+    /// and compared; exit code 0 if none got worse, 3 if some did. With --book the books of ground
     /// stations are proven (who did what when), or the first broken link is named.
     #[command(
         after_help = "Examples:\n  replay verify flight.mcap\n  replay verify flight.mcap --explain 6400\n  replay verify logs --baseline baseline.json\n  replay verify --book ground.mcap vehicle.mcap"
@@ -118,8 +109,8 @@ enum Command {
     Refly(refly::Args),
     /// Compares flights: the answer in one sentence, then verdicts, signals (RMS, maximum and when), words.
     ///
-    /// Signals are named as in an export. Exit code 1 if a tolerance is exceeded or the verdicts differ. Two missions are compared
-    /// setting by setting; exit code 1 if one differs.
+    /// Signals are named as in an export. Exit code 3 if a tolerance is exceeded or the verdicts differ. Two missions are compared
+    /// setting by setting; exit code 3 if one differs.
     #[command(
         after_help = "Examples:\n  replay compare old.mcap new.mcap\n  replay compare mk3 day/mission.toml"
     )]
@@ -150,20 +141,13 @@ enum Command {
     /// With --day a motor lot, an airframe and a site are learnt from all flights so far, and mission and dispersions of the
     /// next day are written. With --flights that day is simulated with motors that the lot may have, and the landing rate
     /// gets an interval: GO (exit code 0) if the probability of a rate below the limit is at most the risk that is taken,
-    /// NO-GO (exit code 1) if not.
+    /// NO-GO (exit code 3) if not.
     #[command(
         after_help = "Examples:\n  replay fit flight.mcap --out ours.toml\n  replay fit stand.csv --motor H45W\n  replay fit fits.json --mission mk3 --day day --flights 1000"
     )]
     Fit(fit::Args),
-    /// Prints a shell's completions.
-    #[command(after_help = "Example: replay completions bash")]
-    Completions {
-        /// The shell.
-        shell: clap_complete::Shell,
-    },
-    /// Prints the manual page (roff).
-    #[command(after_help = "Example: replay man")]
-    Man,
+    #[command(flatten)]
+    Manual(Manual),
 }
 
 impl Cli {
@@ -171,7 +155,7 @@ impl Cli {
     ///
     /// # Errors
     /// There is no answer.
-    pub fn run(self) -> Result<Outcome> {
+    pub fn run(self) -> Result<Exit> {
         match self.command {
             Command::Info(args) => args.run(),
             Command::Verify(args) => args.run(),
@@ -183,16 +167,7 @@ impl Cli {
             Command::Recover(args) => args.run(),
             Command::Cut(args) => args.run(),
             Command::Fit(args) => args.run(),
-            Command::Completions { shell } => {
-                let mut script = Vec::new();
-                clap_complete::generate(shell, &mut Self::command(), "replay", &mut script);
-                answer(|output| output.write_all(&script))?;
-                Ok(Outcome::Given)
-            }
-            Command::Man => {
-                answer(|output| clap_mangen::Man::new(Self::command()).render(output))?;
-                Ok(Outcome::Given)
-            }
+            Command::Manual(manual) => Ok(manual.print(Self::command())?),
         }
     }
 }

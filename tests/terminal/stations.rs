@@ -74,7 +74,7 @@ fn stations_are_listed_and_stopped_and_an_armed_one_only_by_force() {
     screen.type_until(b"AARM\r", " ARMED ");
     assert!(station.run(&["status"]).output.contains("PAD_ARMED ARMED"));
     let refused = station.run(&["stop"]);
-    assert_eq!(refused.code, Some(1));
+    assert_eq!(refused.code, Some(4));
     assert!(refused.output.contains("armed or in flight; --force"), "{}", refused.output);
     let stopped = station.run(&["stop", "--force"]);
     assert_eq!(stopped.code, Some(0), "{}", stopped.output);

@@ -91,7 +91,7 @@ pub(in crate::app) async fn run_download(args: &DownloadArgs) -> anyhow::Result<
             let path = kept.context("the vehicle's log has no content")?.finish()?;
             wire.save_timestamps();
             print(format!("log {}\n", path.display()).as_bytes())?;
-            return Ok(Exit::Landed);
+            return Ok(Exit::Yes);
         }
     }
 }

@@ -73,7 +73,7 @@ pub fn run(given: &ArgMatches) -> anyhow::Result<Exit> {
     let dumb = std::env::var_os("TERM").is_none_or(|term| term.is_empty() || term == "dumb");
     let interactive = std::io::stdout().is_terminal() && !cli.headless && !dumb;
     let load = |args: &ConfigArgs| Config::load(args.config.as_deref());
-    let said = |bytes: &[u8]| print(bytes).map(|()| Exit::Landed);
+    let said = |bytes: &[u8]| print(bytes).map(|()| Exit::Yes);
     let runtime =
         tokio::runtime::Builder::new_current_thread().enable_all().build().context("making the run loop")?;
     match cli.command {
@@ -84,16 +84,7 @@ pub fn run(given: &ArgMatches) -> anyhow::Result<Exit> {
             let none = || "no settings file: the defaults of `ground config example` hold\n".to_owned();
             said(file.map_or_else(none, |path| format!("{}: valid\n", path.display())).as_bytes())
         }
-        Some(Command::Completions { shell }) => {
-            let mut script = Vec::new();
-            clap_complete::generate(shell, &mut Cli::command(), "ground", &mut script);
-            said(&script)
-        }
-        Some(Command::Man) => {
-            let mut page = Vec::new();
-            clap_mangen::Man::new(Cli::command()).render(&mut page).context("writing the manual page")?;
-            said(&page)
-        }
+        Some(Command::Manual(manual)) => manual.print(Cli::command()).context("printing the manual"),
         Some(Command::Status { json }) => runtime.block_on(stations::list(json)),
         Some(Command::Stop { force, socket }) => {
             let config = Config::load(None)?;

@@ -228,13 +228,13 @@ pub async fn list(as_json: bool) -> anyhow::Result<Exit> {
         _ => listed(&found),
     };
     print(text.as_bytes())?;
-    Ok(Exit::Landed)
+    Ok(Exit::Yes)
 }
 
 /// `ground stop`: asks the station to end and waits until it has.
 ///
 /// # Errors
-/// No station runs, several run, or the station refuses.
+/// No station runs, or several run.
 pub async fn stop(named: Option<&Path>, force: bool, operator: String) -> anyhow::Result<Exit> {
     let path = the_station(named).await?;
     let asked = ToStation::Stop { force, operator };
@@ -242,11 +242,14 @@ pub async fn stop(named: Option<&Path>, force: bool, operator: String) -> anyhow
     let ToScreen::Stopping { stops, words } = told else {
         anyhow::bail!("{} sent an unexpected answer", path.display());
     };
-    anyhow::ensure!(stops, "refused: {words}");
+    if !stops {
+        print(format!("refused: {words}\n").as_bytes())?;
+        return Ok(Exit::RefusedOrAborted);
+    }
     for _ in 0..ENDS_WITHIN.as_millis() / LOOK_AGAIN_AFTER.as_millis() {
         if socket::connect(&path).await.is_err() {
             print(format!("the station has ended; {words}\n").as_bytes())?;
-            return Ok(Exit::Landed);
+            return Ok(Exit::Yes);
         }
         tokio::time::sleep(LOOK_AGAIN_AFTER).await;
     }

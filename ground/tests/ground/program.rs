@@ -27,7 +27,7 @@ fn err(output: &Output) -> String {
 fn what_cannot_be_run_has_its_code_and_is_named() {
     let directory = tempfile::tempdir().unwrap();
     let output = ground(directory.path(), &["--help"]);
-    assert!(output.status.code() == Some(0) && out(&output).contains(ground::exit::HELP));
+    assert!(output.status.code() == Some(0) && out(&output).contains(protocol::program::EXIT_CODES));
     for (arguments, code, named) in [
         (&["--connect", "tcp:host:1"][..], 2, "udpin:ADDRESS:PORT"),
         (&["--mission", "no-such"], 1, "no-such"),
@@ -166,6 +166,12 @@ fn completions_and_the_manual_name_the_commands() {
     let manual = ground(directory.path(), &["man"]);
     assert!(out(&manual).starts_with(".ie") || out(&manual).contains(".TH ground"));
     assert!(out(&manual).contains("Exit codes"));
+    let of_a_command = ground(directory.path(), &["man", "config", "check"]);
+    assert!(
+        out(&of_a_command).contains("ground\\-config\\-check")
+            || out(&of_a_command).contains(".TH ground-config-check")
+    );
+    assert_eq!(ground(directory.path(), &["man", "land"]).status.code(), Some(1));
 }
 
 /// The log and the telemetry log of a demonstration contain the same flight.

@@ -143,7 +143,7 @@ fn a_run_without_auto_sends_no_command() {
 #[test]
 fn a_run_without_a_screen_ends_after_the_verdict() {
     for (landed, violated, expected) in
-        [(true, TdLimit::empty(), Exit::Landed), (false, TdLimit::TD_LIMIT_VERTICAL_SPEED, Exit::NotLanded)]
+        [(true, TdLimit::empty(), Exit::Yes), (false, TdLimit::TD_LIMIT_VERTICAL_SPEED, Exit::No)]
     {
         let mut rig = Rig::new(settings(false, false));
         rig.phase = TdPhase::TD_PHASE_POWERED;

@@ -2,7 +2,6 @@
 
 use std::io::Write as _;
 use std::path::PathBuf;
-use std::process::ExitCode;
 use std::{fmt, fs};
 
 use anyhow::Context as _;
@@ -14,6 +13,7 @@ use onboard_sim::scenario::{Expected, Scenario};
 use onboard_sim::store::{Manifest, Shard, Store, merge, sha256};
 use onboard_sim::summary::to_text;
 use protocol::log::build::build_info;
+use protocol::program::Exit;
 use serde::Serialize;
 use sim::dispersion;
 use sim::fault::{TimedFault, how_to_write};
@@ -76,12 +76,12 @@ enum CampaignCommand {
     },
 }
 
-pub(crate) fn run(arguments: &CampaignArguments) -> anyhow::Result<ExitCode> {
+pub(crate) fn run(arguments: &CampaignArguments) -> anyhow::Result<Exit> {
     let mut stdout = std::io::stdout().lock();
     if let Some(CampaignCommand::Merge { parts, out }) = &arguments.command {
         let summary = merge(parts, out)?;
         writeln!(stdout, "{}results {}", to_text(&summary), out.display())?;
-        return Ok(ExitCode::SUCCESS);
+        return Ok(Exit::Yes);
     }
     let (recipe, expected) = flights(arguments)?;
     if let Some(number) = arguments.only {
@@ -102,7 +102,7 @@ pub(crate) fn run(arguments: &CampaignArguments) -> anyhow::Result<ExitCode> {
         writeln!(stdout, "\n{cost}")?;
     }
     writeln!(stdout, "results {}", out.display())?;
-    Ok(ExitCode::SUCCESS)
+    Ok(Exit::Yes)
 }
 
 /// What is flown, and how it should end.

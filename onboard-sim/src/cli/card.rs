@@ -2,12 +2,12 @@
 
 use std::io::Write as _;
 use std::path::PathBuf;
-use std::process::ExitCode;
 
 use clap::Args;
 use onboard_sim::card::Card;
 use onboard_sim::files::{new_name, write_folder};
 use onboard_sim::hazard::Flights;
+use protocol::program::Exit;
 use sim::dispersion;
 
 use super::{in_wind, on_threads, recipe, show_flights};
@@ -49,7 +49,7 @@ pub(crate) struct CardArguments {
     out: PathBuf,
 }
 
-pub(crate) fn run(arguments: &CardArguments) -> anyhow::Result<ExitCode> {
+pub(crate) fn run(arguments: &CardArguments) -> anyhow::Result<Exit> {
     let recipe = recipe(&arguments.mission, None, &arguments.dispersion, arguments.seed)?;
     let mut winds_m_s = arguments.winds.clone();
     winds_m_s.sort_by(f64::total_cmp);
@@ -67,7 +67,7 @@ pub(crate) fn run(arguments: &CardArguments) -> anyhow::Result<ExitCode> {
     let out = new_name(&arguments.out);
     write_folder(&out, files.map(|(name, text)| (name, text.into_bytes())).to_vec())?;
     writeln!(std::io::stdout().lock(), "{page}card {}", out.join(html).display())?;
-    Ok(ExitCode::SUCCESS)
+    Ok(Exit::Yes)
 }
 
 /// A direction.

@@ -2,12 +2,12 @@
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
 use anyhow::{Context as _, ensure};
 use clap::Args;
 use flight::vehicles::thrust_curve;
 use onboard_sim::check::{Candidate, Verdict, built_in, check};
+use protocol::program::Exit;
 use serde::Deserialize;
 
 use super::{on_threads, read, recipe, show_flights};
@@ -35,7 +35,7 @@ pub(crate) struct CheckArguments {
     jobs: Option<usize>,
 }
 
-pub(crate) fn run(arguments: &CheckArguments) -> anyhow::Result<ExitCode> {
+pub(crate) fn run(arguments: &CheckArguments) -> anyhow::Result<Exit> {
     let recipe = recipe(&arguments.mission, None, &arguments.dispersion, arguments.seed)?;
     let mut motors = if arguments.from.is_empty() { built_in() } else { Vec::new() };
     arguments.from.iter().try_for_each(|path| read_motors(path, &mut motors))?;
@@ -43,7 +43,7 @@ pub(crate) fn run(arguments: &CheckArguments) -> anyhow::Result<ExitCode> {
     let told = |done| show(done, flights as usize);
     let page = on_threads(arguments.jobs, || Ok(check(&recipe, &motors, flights, &told)?))?;
     write!(std::io::stdout().lock(), "{page}")?;
-    Ok(ExitCode::from(u8::from(page.verdict() == Verdict::No)))
+    Ok(Exit::of(page.verdict() != Verdict::No))
 }
 
 /// Reads a motor file, the files of a folder in the order of their names, or a list. It says which motor cannot be used, and why.

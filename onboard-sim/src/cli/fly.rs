@@ -3,7 +3,6 @@
 use std::io::{BufRead as _, Write as _};
 use std::num::{NonZeroU16, NonZeroU32};
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
 use anyhow::Context as _;
 use clap::Args;
@@ -13,6 +12,7 @@ use protocol::crew_file::CrewFile;
 use protocol::identity::{LARGEST_BOOT_NUMBER, NETWORK_BUDGET_BYTES_S, RADIO_BUDGET_BYTES_S, VEHICLE};
 use protocol::log::recorder::Recorder;
 use protocol::log::v1::LimitResult;
+use protocol::program::Exit;
 use protocol::transport::LinkAddress;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::process::getpgrp;
@@ -103,7 +103,7 @@ pub(crate) struct FlyArguments {
     board: Option<PathBuf>,
 }
 
-pub(crate) fn run(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
+pub(crate) fn run(arguments: FlyArguments) -> anyhow::Result<Exit> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     runtime.block_on(fly(arguments))
 }
@@ -120,7 +120,7 @@ impl FlyArguments {
     }
 }
 
-async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
+async fn fly(arguments: FlyArguments) -> anyhow::Result<Exit> {
     let flight = arguments.flight()?;
     let crew = arguments.crew.as_deref().map(CrewFile::open).transpose()?;
     let log = arguments.log.as_ref().filter(|path| *path != Path::new("none"));
@@ -179,7 +179,7 @@ async fn fly(arguments: FlyArguments) -> anyhow::Result<ExitCode> {
     if let Some(path) = log_path.context("the flight is over, but its log is incomplete")? {
         writeln!(std::io::stdout(), "log {}", path.display())?;
     }
-    Ok(exit_code(&summary.outcome))
+    Ok(exit(&summary.outcome))
 }
 
 /// Waits for Ctrl-C or a request to terminate.
@@ -328,13 +328,13 @@ fn print_limits(out: &mut impl std::io::Write, limits: &[LimitResult]) -> std::i
     Ok(())
 }
 
-fn exit_code(outcome: &FlightEnd) -> ExitCode {
-    ExitCode::from(match outcome {
-        FlightEnd::Landed => 0,
-        FlightEnd::NotLanded => 3,
-        FlightEnd::Aborted | FlightEnd::Refused(_) => 4,
-        FlightEnd::Stopped => 5,
-    })
+fn exit(outcome: &FlightEnd) -> Exit {
+    match outcome {
+        FlightEnd::Landed => Exit::Yes,
+        FlightEnd::NotLanded => Exit::No,
+        FlightEnd::Aborted | FlightEnd::Refused(_) => Exit::RefusedOrAborted,
+        FlightEnd::Stopped => Exit::NotSeen,
+    }
 }
 
 #[expect(clippy::disallowed_methods, reason = "a log says when it was begun")]

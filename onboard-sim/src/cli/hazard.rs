@@ -1,7 +1,6 @@
 //! `onboard-sim hazard`: how near people may stand.
 
 use std::path::PathBuf;
-use std::process::ExitCode;
 
 use clap::Args;
 use flight::rules::verdict::Landing;
@@ -10,6 +9,7 @@ use onboard_sim::figure::{BLACK_CURVE, Line, Panel, sized_lines_svg};
 use onboard_sim::files::write_new;
 use onboard_sim::hazard::{self, Flights, Impact, Radius, Rule, Way, keep_out_m, landed_as_planned, widest};
 use onboard_sim::statistics::Landings;
+use protocol::program::Exit;
 use sim::dispersion::{self, may_be_kinder};
 use sim::recipe::Recipe;
 
@@ -52,7 +52,7 @@ pub(crate) struct HazardArguments {
     svg: Option<PathBuf>,
 }
 
-pub(crate) fn run(arguments: &HazardArguments) -> anyhow::Result<ExitCode> {
+pub(crate) fn run(arguments: &HazardArguments) -> anyhow::Result<Exit> {
     let recipes = recipes(arguments)?;
     let mission = &recipes[0].mission;
     let ways = Way::of(mission);
@@ -68,7 +68,7 @@ pub(crate) fn run(arguments: &HazardArguments) -> anyhow::Result<ExitCode> {
     if let Some(path) = &arguments.svg {
         write_new(path, study.svg(&rule)?.as_bytes())?;
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(Exit::Yes)
 }
 
 /// The mission in each wind.

@@ -6,7 +6,6 @@ use std::f64::consts::PI;
 use std::fmt::Write as _;
 use std::io::{BufRead as _, IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
 use anyhow::{Context as _, bail, ensure};
 use flight::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
@@ -14,6 +13,7 @@ use flight::vehicle::mission::Mission;
 use flight::vehicle::thrust_curve::ThrustCurve;
 use flight::vehicles::{mission, motors, openrocket, table, thrust_curve};
 use onboard_sim::files::{text_of, write_new};
+use protocol::program::Exit;
 use toml::Value;
 
 use super::read;
@@ -52,7 +52,7 @@ pub(crate) struct NewArguments {
 /// Shows a question, and gives what is typed.
 type Ask<'a> = &'a mut dyn FnMut(&str) -> anyhow::Result<String>;
 
-pub(crate) fn run(arguments: &NewArguments) -> anyhow::Result<ExitCode> {
+pub(crate) fn run(arguments: &NewArguments) -> anyhow::Result<Exit> {
     let path = arguments.out.clone().unwrap_or_else(|| format!("{}.toml", arguments.name).into());
     let (mut stdin, mut stderr) = (std::io::stdin().lock(), std::io::stderr());
     let terminal = stdin.is_terminal();
@@ -70,7 +70,7 @@ pub(crate) fn run(arguments: &NewArguments) -> anyhow::Result<ExitCode> {
     let text = made(arguments, asks && terminal, &mut ask, &path.display().to_string())?;
     let path = write_new(&path, text.as_bytes())?;
     writeln!(stderr, "{0} is written; `onboard-sim check {0}` says whether it will land", path.display())?;
-    Ok(ExitCode::SUCCESS)
+    Ok(Exit::Yes)
 }
 
 /// The text of the mission, which can be loaded; asks for everything if `asks`, else only for what must be told.

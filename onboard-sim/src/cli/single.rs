@@ -2,13 +2,13 @@
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
 use anyhow::Context as _;
 use onboard_sim::row::{COLUMNS, Row};
 use onboard_sim::scenario::Expected;
 use onboard_sim::tally::Tally;
 use protocol::log::record::Record;
+use protocol::program::Exit;
 use serde_json::Value;
 use sim::recipe::Recipe;
 use sim::wire::record::{self, LastFrame};
@@ -24,7 +24,7 @@ pub(super) fn fly(
     number: u64,
     expected: Option<Expected>,
     log: Option<&Path>,
-) -> anyhow::Result<ExitCode> {
+) -> anyhow::Result<Exit> {
     let mut tally = Tally::new(recipe, number)?;
     let log = match log {
         None => {
@@ -43,7 +43,7 @@ pub(super) fn fly(
     if let Some(path) = log {
         writeln!(stdout, "log {}", path.display())?;
     }
-    Ok(ExitCode::from(if met { 0 } else { 3 }))
+    Ok(Exit::of(met))
 }
 
 fn print_row(row: &Row, out: &mut impl std::io::Write) -> std::io::Result<()> {

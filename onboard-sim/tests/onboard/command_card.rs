@@ -48,7 +48,7 @@ fn a_check_answers_with_its_worst_word_and_names_motors_that_cannot_be_used() {
     fs::write(directory.path().join("heavy.toml"), mk3.replace("loaded_kg = 3.7", "loaded_kg = 5.0"))
         .unwrap();
     let heavy = run(directory.path(), &[&["check", "heavy.toml"], &none[..]].concat());
-    assert_eq!(heavy.status.code(), Some(1), "{}", stderr(&heavy));
+    assert_eq!(heavy.status.code(), Some(3), "{}", stderr(&heavy));
     let page = stdout(&heavy);
     assert!(page.contains("no    impulse    too heavy for its motor") && page.ends_with("\nno\n"), "{page}");
     fs::write(directory.path().join("weak.toml"), mk3.replace("force_n = 90.0", "force_n = 10.0")).unwrap();

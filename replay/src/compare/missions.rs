@@ -5,9 +5,10 @@ use std::path::Path;
 
 use anyhow::{Result, ensure};
 use flight::vehicles::mission::BUILTIN;
+use protocol::program::Exit;
 use serde::Serialize;
 
-use crate::cli::{Answer, Outcome, text_of};
+use crate::cli::{Answer, text_of};
 use crate::print::{columns, counted};
 use crate::settings::{SettingError, settings_of_mission};
 
@@ -95,7 +96,7 @@ impl Answer for MissionComparison {
         lines
     }
 
-    fn outcome(&self) -> Outcome {
-        Outcome::Decided { yes: self.differences.is_empty() }
+    fn outcome(&self) -> Exit {
+        Exit::of(self.differences.is_empty())
     }
 }

@@ -22,12 +22,13 @@ use anyhow::{Context as _, Result, ensure};
 pub(crate) use missions::compared;
 pub use missions::{MissionComparison, SettingDifference};
 use missions::{compare_missions, is_mission};
+use protocol::program::Exit;
 use serde::Serialize;
 pub use series::{Align, Flown, Series};
 pub use tolerance::SignalDifference;
 pub use tolerance::{Tolerance, ToleranceError, Tolerances};
 
-use crate::cli::{Outcome, give, warn_of_cut, warn_of_damage};
+use crate::cli::{give, warn_of_cut, warn_of_damage};
 use crate::log::Verdict;
 
 /// One flight against another.
@@ -188,7 +189,7 @@ pub(crate) struct Args {
 }
 
 impl Args {
-    pub(crate) fn run(self) -> Result<Outcome> {
+    pub(crate) fn run(self) -> Result<Exit> {
         if is_mission(&self.baseline) {
             return self.missions();
         }
@@ -202,7 +203,7 @@ impl Args {
         give(&comparisons, self.json)
     }
 
-    fn missions(&self) -> Result<Outcome> {
+    fn missions(&self) -> Result<Exit> {
         ensure!(self.tolerances.is_none(), "missions are compared without tolerances");
         let others: Vec<&Path> = self.others.iter().map(PathBuf::as_path).collect();
         give(&compare_missions(&self.baseline, &others)?, self.json)

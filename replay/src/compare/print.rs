@@ -1,8 +1,9 @@
 //! A comparison for people.
 
 use super::{Align, Comparison, SignalDifference, WordsOfOne};
-use crate::cli::{Answer, Outcome};
+use crate::cli::Answer;
 use crate::print::{columns, counted, verdict_table};
+use protocol::program::Exit;
 
 /// Most signals listed that differ within their tolerance or have no tolerance.
 const SIGNALS_SHOWN: usize = 60;
@@ -62,8 +63,8 @@ impl Answer for Comparison {
         lines
     }
 
-    fn outcome(&self) -> Outcome {
-        Outcome::Decided { yes: self.failures.is_empty() }
+    fn outcome(&self) -> Exit {
+        Exit::of(self.failures.is_empty())
     }
 }
 

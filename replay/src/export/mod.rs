@@ -13,9 +13,10 @@ use anyhow::{Context as _, Result, bail, ensure};
 use clap::ValueEnum;
 pub use tables::{ExportedFile, export_tables};
 
-use crate::cli::{Answer, Outcome, give, warn_of_damage};
+use crate::cli::{Answer, give, warn_of_damage};
 use crate::log::{FlightLog, ImportedTlog, LogError, import_tlog, is_tlog};
 use crate::output::WriteError;
+use protocol::program::Exit;
 
 /// Why a log could not be exported.
 #[derive(Debug, thiserror::Error)]
@@ -54,7 +55,7 @@ enum Format {
 }
 
 impl Args {
-    pub(crate) fn run(self) -> Result<Outcome> {
+    pub(crate) fn run(self) -> Result<Exit> {
         let is_tlog = is_tlog(&self.file).with_context(|| self.file.display().to_string())?;
         let format = self.to.or(is_tlog.then_some(Format::Mcap));
         let format = format.context("--to is missing: csv or rrd")?;
@@ -67,7 +68,7 @@ impl Args {
         }
     }
 
-    fn tables(&self, output: &Path) -> Result<Outcome> {
+    fn tables(&self, output: &Path) -> Result<Exit> {
         let mut log = FlightLog::open(&self.file)?;
         let files = export_tables(&mut log, output)?;
         let outcome = give(&files, self.json)?;
@@ -77,7 +78,7 @@ impl Args {
 
     /// Rerun costs more to compile than all the rest, so a separate program does this export. If it was built, it lies
     /// beside this one.
-    fn rerun(&self, output: &Path) -> Result<Outcome> {
+    fn rerun(&self, output: &Path) -> Result<Exit> {
         let program =
             std::env::current_exe().context("where this program lies")?.with_file_name("replay-rerun");
         let (log, recording) = (self.file.display(), output.display());
@@ -94,7 +95,7 @@ impl Args {
             .status()
             .with_context(|| format!("{}", program.display()))?;
         ensure!(status.success(), "{}: the export to Rerun failed ({status})", self.file.display());
-        Ok(Outcome::Given)
+        Ok(Exit::Yes)
     }
 }
 

@@ -35,6 +35,7 @@ use anyhow::{Context as _, Result, bail};
 use flight::vehicle::mission::Mission;
 use flight::vehicle::thrust_curve::ThrustCurve;
 use flight::vehicles::motors;
+use protocol::program::Exit;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
@@ -44,7 +45,7 @@ use self::calibration::{Calibration, Table};
 use self::day::Learnt;
 use self::least_squares::Solution;
 pub use self::trace::{Frame, Trace};
-use crate::cli::{Answer, Outcome, give, say, text_of, warn_of_damage};
+use crate::cli::{Answer, give, say, text_of, warn_of_damage};
 use crate::info::utc;
 use crate::output::NewFile;
 use crate::print::counted;
@@ -482,9 +483,9 @@ impl Answer for FitReport {
         said
     }
 
-    fn outcome(&self) -> Outcome {
+    fn outcome(&self) -> Exit {
         let go = self.day.as_ref().and_then(|day| day.go);
-        go.map_or(Outcome::Given, |yes| Outcome::Decided { yes })
+        go.map_or(Exit::Yes, |yes| Exit::of(yes))
     }
 }
 
@@ -548,7 +549,7 @@ struct Earlier {
 }
 
 impl Args {
-    pub(crate) fn run(self) -> Result<Outcome> {
+    pub(crate) fn run(self) -> Result<Exit> {
         if self.out.is_some()
             && (self.files.len() != 1 || ["csv", "json"].contains(&ending(&self.files[0]).as_str()))
         {
@@ -581,7 +582,7 @@ impl Args {
         let day = self.day.is_asked().then(|| self.day.learn(&fits, flown)).transpose()?;
         let report = FitReport { together: pooled(&fits), fits, day };
         let outcome = give(&report, self.json)?;
-        Ok(if refused { Outcome::NotAll } else { outcome })
+        Ok(if refused { Exit::NotSeen } else { outcome })
     }
 
     /// The fits of a file; notes the mission of the first log.

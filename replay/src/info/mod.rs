@@ -11,11 +11,12 @@ use self::counts::{ChannelCounter, EndingTracker, FrameCounter, PhaseTracker};
 use anyhow::Result;
 use protocol::log::reader::Damage;
 use protocol::log::record::SCHEMA_VERSION;
+use protocol::program::Exit;
 use serde::Serialize;
 use time::OffsetDateTime;
 use time::format_description::well_known::Rfc3339;
 
-use crate::cli::{Answer, Outcome, give_each, warn_of_cut, warn_of_damage};
+use crate::cli::{Answer, give_each, warn_of_cut, warn_of_damage};
 use crate::cut::CUT_FROM;
 use crate::findings::{self, Finding};
 use crate::log::{
@@ -596,7 +597,7 @@ pub(crate) struct Args {
 }
 
 impl Args {
-    pub(crate) fn run(self) -> Result<Outcome> {
+    pub(crate) fn run(self) -> Result<Exit> {
         // On a terminal the description says it already.
         let said = !self.json && std::io::stdout().is_terminal();
         give_each(&self.files, self.json, |file| {

@@ -14,13 +14,14 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use mcap::records::Metadata;
 use protocol::log::record::{METADATA_RECOVERY, RECOVERY_FAULT_ENTRY};
+use protocol::program::Exit;
 pub(crate) use scan::Records;
 use scan::{ChunkName, Contents, LostStretch};
 pub use scan::{Summary, summary_of};
 use serde::Serialize;
 pub(crate) use write::{Kept, Rescue};
 
-use crate::cli::{Answer, Outcome, give};
+use crate::cli::{Answer, give};
 use crate::log::{IN_ORDER_NS, LogError, is_tlog};
 use crate::output::WriteError;
 use crate::print::counted;
@@ -254,7 +255,7 @@ pub(crate) struct Args {
 }
 
 impl Args {
-    pub(crate) fn run(self) -> Result<Outcome> {
+    pub(crate) fn run(self) -> Result<Exit> {
         give(&recover(&self.file, &self.output)?, self.json)
     }
 }

@@ -28,13 +28,14 @@ use protocol::log::computer_v1::{ComputerFrame, ComputerInput, ComputerOutput};
 use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::v1;
 use protocol::log::writer::{LogHeader, LogWriter};
+use protocol::program::Exit;
 use serde::Serialize;
 use sim::draw::draw;
 use sim::sortie::SetUpError;
 use sim::wire::record;
 
 use self::rerun::Rerun;
-use crate::cli::{Answer, Outcome, give, warn_of_what_is_missing};
+use crate::cli::{Answer, give, warn_of_what_is_missing};
 use crate::controller::{AgainError, LoggedComputer, SETTINGS_IN_FLIGHT, phase_name};
 use crate::log::{Clock, ClockTime, Moment, Recording, Verdict};
 use crate::output::{WriteError, write_whole};
@@ -533,7 +534,7 @@ pub(crate) struct Args {
 }
 
 impl Args {
-    pub(crate) fn run(self) -> Result<Outcome> {
+    pub(crate) fn run(self) -> Result<Exit> {
         let recording = Recording::open(&self.file)?;
         warn_of_what_is_missing(&recording);
         let options = ReflyOptions {

@@ -11,9 +11,10 @@ mod track;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
+use protocol::program::Exit;
 use track::Flight;
 
-use crate::cli::{Outcome, answer};
+use crate::cli::answer;
 use crate::info::{Completeness, Info, described};
 use crate::log::{Recording, RecordingError};
 use crate::output::write_whole;
@@ -64,7 +65,7 @@ pub(crate) struct Args {
 }
 
 impl Args {
-    pub(crate) fn run(self) -> Result<Outcome> {
+    pub(crate) fn run(self) -> Result<Exit> {
         use std::io::Write as _;
         let page = report(&self.file, self.with.as_deref())?;
         let path = self.out.unwrap_or_else(|| self.file.with_extension("html"));
@@ -76,6 +77,6 @@ impl Args {
             answer(|output| writeln!(output, "{}", path.display()))?;
         }
         page.completeness.warn(&page.name);
-        Ok(Outcome::Given)
+        Ok(Exit::Yes)
     }
 }

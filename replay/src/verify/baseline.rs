@@ -10,10 +10,11 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail, ensure};
 use onboard_sim::run::in_parallel;
+use protocol::program::Exit;
 use serde::{Deserialize, Serialize};
 
 use super::{Obstacle, Verification, VerifyReport, verify};
-use crate::cli::{Answer, Outcome, give, say};
+use crate::cli::{Answer, give, say};
 use crate::digest::digest;
 use crate::log::{Entry, FlightLog, LogError, Moment, Recording};
 use crate::output::NewFile;
@@ -234,7 +235,7 @@ pub(super) struct Arguments {
 }
 
 impl Arguments {
-    pub(super) fn run(&self, path: &Path, directory: &Path, json: bool) -> Result<Outcome> {
+    pub(super) fn run(&self, path: &Path, directory: &Path, json: bool) -> Result<Exit> {
         let before = if self.accept && !path.exists() { Flights::new() } else { read(path)? };
         let logs = logs_of(directory)?;
         let flown = in_parallel(&logs, |log| fly(log), &|_| {});
@@ -255,7 +256,7 @@ impl Arguments {
         ensure!(!now.is_empty(), "nothing is accepted: none of the logs holds a flight");
         NewFile::replace(path)?.fill(|file| print_json(&now, file))?;
         say(&format!("accepted: {}", path.display()));
-        Ok(Outcome::Given)
+        Ok(Exit::Yes)
     }
 }
 
@@ -298,8 +299,8 @@ impl Answer for Comparison<'_> {
         lines
     }
 
-    fn outcome(&self) -> Outcome {
-        Outcome::Decided { yes: !self.judged.iter().any(|judged| judged.change.fails(self.may_diverge)) }
+    fn outcome(&self) -> Exit {
+        Exit::of(!self.judged.iter().any(|judged| judged.change.fails(self.may_diverge)))
     }
 }
 

@@ -14,9 +14,10 @@ use protocol::dialect::MavMessage;
 use protocol::log::reader::{LogChannel, LogItem, LogReader};
 use protocol::log::record::{TOPIC_BOOK, TOPIC_BOOK_HEAD, TOPIC_RAW_RX};
 use protocol::log::v1::{BookEntry, BookHead};
+use protocol::program::Exit;
 use serde::Serialize;
 
-use crate::cli::{Answer, Outcome, give};
+use crate::cli::{Answer, give};
 use crate::log::{LogError, frame_of, open_log, take_magic};
 
 /// The result for one book.
@@ -196,8 +197,8 @@ impl Answer for AuditFound {
         lines
     }
 
-    fn outcome(&self) -> Outcome {
-        if self.books.is_empty() { Outcome::NotAll } else { Outcome::Decided { yes: self.is_proven() } }
+    fn outcome(&self) -> Exit {
+        if self.books.is_empty() { Exit::NotSeen } else { Exit::of(self.is_proven()) }
     }
 }
 
@@ -250,7 +251,7 @@ fn public_key(text: &str) -> Result<PublicKey, String> {
 }
 
 impl Arguments {
-    pub(super) fn run(self, files: &[PathBuf], json: bool) -> Result<Outcome> {
+    pub(super) fn run(self, files: &[PathBuf], json: bool) -> Result<Exit> {
         give(&audit_logs(files, self.public_key)?, json)
     }
 }

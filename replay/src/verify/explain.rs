@@ -16,9 +16,10 @@ use onboard_sim::progress::Progress;
 use onboard_sim::run::in_parallel;
 use prost::Message as _;
 use protocol::log::computer_v1::ComputerFrame;
+use protocol::program::Exit;
 use serde::Serialize;
 
-use crate::cli::{Answer, Outcome, give, warn_of_what_is_missing};
+use crate::cli::{Answer, give, warn_of_what_is_missing};
 use crate::controller::{AgainError, LoggedComputer, phase_name};
 use crate::log::Recording;
 use crate::print::columns;
@@ -341,7 +342,7 @@ impl Answer for Plans {
     }
 }
 
-pub(super) fn run(file: &Path, frame: &str, json: bool) -> Result<Outcome> {
+pub(super) fn run(file: &Path, frame: &str, json: bool) -> Result<Exit> {
     let recording = Recording::open(file)?;
     warn_of_what_is_missing(&recording);
     if frame == "all" {

@@ -39,9 +39,10 @@ pub use difference::{Divergence, FieldDifference, FieldValue, differences, ulp_d
 pub use parts::Part;
 use protocol::log::reader::Damage;
 use protocol::log::record::{SCHEMA_VERSION, TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START, TOPIC_VERDICT};
+use protocol::program::Exit;
 use serde::Serialize;
 
-use crate::cli::{Answer, Outcome, give_each, say, warn_of_cut, warn_of_damage};
+use crate::cli::{Answer, give_each, say, warn_of_cut, warn_of_damage};
 use crate::controller::FrameError;
 use crate::log::{
     BuildComparison, Cut, Entry, FlightLog, Gap, Head, LogError, LoggedFlight, Recording, Verdict,
@@ -318,13 +319,13 @@ const ONLY_STRICTLY: [&str; 2] = ["verdict", "metadata"];
 const FIELDS_SHOWN: usize = 5;
 
 impl Answer for VerifyReport {
-    fn outcome(&self) -> Outcome {
+    fn outcome(&self) -> Exit {
         match self.outcome {
-            Verification::Identical | Verification::IdenticalReadablePart => Outcome::Decided {
-                yes: !self.strict || self.outcome == Verification::Identical && self.is_all_compared(),
-            },
-            Verification::Impossible | Verification::Diverged => Outcome::Decided { yes: false },
-            Verification::NotReplayable => Outcome::NotAll,
+            Verification::Identical | Verification::IdenticalReadablePart => {
+                Exit::of(!self.strict || self.outcome == Verification::Identical && self.is_all_compared())
+            }
+            Verification::Impossible | Verification::Diverged => Exit::No,
+            Verification::NotReplayable => Exit::NotSeen,
         }
     }
 
@@ -462,7 +463,7 @@ pub(crate) struct Args {
     /// Answer in JSON: a report, or a list of reports for several logs.
     #[arg(long)]
     json: bool,
-    /// Exit code 1 unless all that can be compared was: damaged logs fail, logs that end before their flight did, and
+    /// Exit code 3 unless all that can be compared was: damaged logs fail, logs that end before their flight did, and
     /// logs that lack a part. A simulated flight is flown again, and its verdict compared.
     #[arg(long)]
     strict: bool,
@@ -476,7 +477,7 @@ pub(crate) struct Args {
 }
 
 impl Args {
-    pub(crate) fn run(self) -> Result<Outcome> {
+    pub(crate) fn run(self) -> Result<Exit> {
         if self.book.book {
             return self.book.run(&self.files, self.json);
         }
@@ -491,7 +492,7 @@ impl Args {
         self.verify()
     }
 
-    fn verify(&self) -> Result<Outcome> {
+    fn verify(&self) -> Result<Exit> {
         let mut files = Vec::new();
         for file in &self.files {
             if file.is_dir() { files.extend(baseline::logs_of(file)?) } else { files.push(file.clone()) }

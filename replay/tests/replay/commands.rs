@@ -21,7 +21,7 @@ fn several_logs_are_verified_at_once_and_the_worst_decides() {
     let (code, reports) = data(replay("verify", &good).arg(&bad));
     assert_eq!(
         (code, reports.as_array().unwrap().len(), &reports[0]["outcome"]),
-        (1, 2, &"identical".into())
+        (3, 2, &"identical".into())
     );
     let first = &reports[1]["first_divergence"];
     assert_eq!((&first["frame"], &first["fields"][0]["path"]), (&7.into(), &"output.gimbal_rad[1]".into()));
@@ -30,11 +30,11 @@ fn several_logs_are_verified_at_once_and_the_worst_decides() {
     // One unreadable log is a separate error, and the others are still verified.
     let none = files.directory.path().join("none.mcap");
     let (code, reports) = data(replay("verify", &none).arg(&good));
-    assert_eq!((code, &reports[0]["outcome"]), (2, &"identical".into()));
+    assert_eq!((code, &reports[0]["outcome"]), (5, &"identical".into()));
 }
 
 #[test]
-fn a_comparison_exits_1_outside_its_tolerance() {
+fn a_comparison_exits_3_outside_its_tolerance() {
     let (code, found) = data(replay("compare", &MK2.log).arg(&MK2.log));
     assert_eq!((code, &found[0]["failures"]), (0, &Value::Array(Vec::new())));
     let tolerances = MK2.beside("tolerances.toml");
@@ -46,18 +46,18 @@ fn a_comparison_exits_1_outside_its_tolerance() {
     std::fs::write(&tolerances, "[signals.\"vehicle_truth3d.state.position_m.x\"]\nmax = 1e-6\n").unwrap();
     let (code, stdout, _) = run(&mut compare());
     let row = stdout.lines().find(|line| line.starts_with("vehicle_truth3d.state.position_m.x ")).unwrap();
-    assert!(code == 1 && row.ends_with("EXCEEDED"), "{stdout}");
+    assert!(code == 3 && row.ends_with("EXCEEDED"), "{stdout}");
     let (code, found) = data(&mut compare());
     assert_eq!(
         (code, &found[0]["align"], &found[0]["signals"][0]["passed"]),
-        (1, &"ignition".into(), &false.into())
+        (3, &"ignition".into(), &false.into())
     );
     std::fs::write(&tolerances, "[signals.\"vehicle_truth3d.stat.position_m.x\"]\nmax = 1e-6\n").unwrap();
     assert!(refusal(&mut compare()).contains("the nearest is `vehicle_truth3d.state.position_m.x`"));
 }
 
 #[test]
-fn reports_say_open_or_closed_loop_and_unknown_names_exit_2() {
+fn reports_say_open_or_closed_loop_and_unknown_names_exit_1() {
     let log = &MK2.log;
     for (question, kind) in [("evaluate", "open loop"), ("refly", "closed loop")] {
         let (code, report) = data(replay(question, log).args(["--set", "powered.weights.theta=75"]));
@@ -155,7 +155,7 @@ fn a_recovered_log_is_not_whole() {
     assert_eq!((code, &report["frames_identical"]), (0, &frames.into()));
     assert_eq!(report["outcome"], "identical-readable-part");
     let (code, _, _) = run(replay("verify", &output).arg("--strict"));
-    assert_eq!(code, 1, "the repair does not make a whole flight of it");
+    assert_eq!(code, 3, "the repair does not make a whole flight of it");
     let other = files.directory.path().join("x");
     assert!(refusal(replay("recover", &files.file(b"nothing")).arg(other)).contains("is not a flight log"));
 }

@@ -67,7 +67,7 @@ fn a_lost_topic_does_not_pass() {
     held.write(&path);
     for (a, b, word) in [(&MK2.log, &path, "missing"), (&path, &MK2.log, "added")] {
         let (code, found) = data(replay("compare", a).arg(b));
-        assert!(code == 1 && found[0][word].as_array().unwrap().len() > 10, "{found}");
+        assert!(code == 3 && found[0][word].as_array().unwrap().len() > 10, "{found}");
     }
 }
 
@@ -79,7 +79,7 @@ fn a_damaged_log_does_not_pass_unless_that_is_tolerated() {
     let path = directory.path().join("cut.mcap");
     std::fs::write(&path, &WHOLE.bytes[..usize::try_from(at).unwrap() + 5]).unwrap();
     let (code, found) = data(replay("compare", &path).arg(&path));
-    assert!(code == 1 && found[0]["failures"][0].as_str().unwrap().contains("is damaged"), "{found}");
+    assert!(code == 3 && found[0]["failures"][0].as_str().unwrap().contains("is damaged"), "{found}");
     let tolerances = directory.path().join("tolerances.toml");
     std::fs::write(&tolerances, "damaged = true\n").unwrap();
     let (code, stdout, _) = run(replay("compare", &path).arg(&path).arg("--tolerances").arg(&tolerances));

@@ -23,7 +23,7 @@ fn missions_are_compared_setting_by_setting() {
     std::fs::write(&file, changed).unwrap();
     let (code, found) = against_mk2(&file);
     let differences = found[0]["differences"].as_array().unwrap();
-    assert_eq!((code, differences.len()), (1, 1));
+    assert_eq!((code, differences.len()), (3, 1));
     let [before, after] = ["baseline", "other"].map(|side| differences[0][side].as_str().unwrap());
     assert_eq!(format!("1{before}"), after);
     let (_, said, _) = run(replay("compare", Path::new("mk2")).arg(&file));
@@ -32,7 +32,7 @@ fn missions_are_compared_setting_by_setting() {
     // The airframe is compared, too, and a mission is no log.
     let (code, found) = against_mk2(Path::new("mk3"));
     let of_airframe = |difference: &Value| difference["setting"].as_str().unwrap().starts_with("airframe.");
-    assert!(code == 1 && found[0]["differences"].as_array().unwrap().iter().any(of_airframe), "{found}");
+    assert!(code == 3 && found[0]["differences"].as_array().unwrap().iter().any(of_airframe), "{found}");
     refusal(replay("compare", Path::new("mk2")).arg("flight.mcap"));
 }
 

@@ -16,7 +16,7 @@ fn flights_with_nothing_in_common_are_not_within_tolerance() {
     std::fs::write(&nothing, write_log(&[], &Recipe { with_frames: false, ..Recipe::default() }).bytes)
         .unwrap();
     let (code, found) = data(replay("compare", &MK2.log).arg(&nothing));
-    assert_eq!((code, found[0]["signals"].as_array().unwrap().len()), (1, 0));
+    assert_eq!((code, found[0]["signals"].as_array().unwrap().len()), (3, 0));
     assert!(found[0]["verdicts"][0]["landing"]["stands"] == true, "the verdict is still told: {found}");
 }
 

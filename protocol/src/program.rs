@@ -1,0 +1,106 @@
+//! What the three programs have in common: how they end, and their command lines in other forms.
+
+use std::io::{self, Write as _};
+use std::process::ExitCode;
+
+use clap::{Command, Subcommand};
+use clap_complete::Shell;
+
+/// How a run ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Exit {
+    /// It stands undamaged, it is the same, it is done; or the crew closed the screen before a flight began.
+    Yes = 0,
+    /// Something failed: a file, a socket, the simulator.
+    Error = 1,
+    /// The command line was not understood.
+    Usage = 2,
+    /// The flight ended otherwise, decisions differ, more differs than is tolerated.
+    No = 3,
+    /// Arming or start was refused, or the flight was aborted.
+    RefusedOrAborted = 4,
+    /// The end of the flight was not seen, or not all that was asked could be answered.
+    NotSeen = 5,
+}
+
+impl Exit {
+    /// The answer to a question.
+    pub fn of(yes: bool) -> Self {
+        if yes { Self::Yes } else { Self::No }
+    }
+
+    /// How a command line ended that was not run: help and version are an answer. Prints it; if nobody reads it, nothing is lost.
+    pub fn unread(message: &clap::Error) -> Self {
+        let _ = message.print();
+        if message.use_stderr() { Self::Usage } else { Self::Yes }
+    }
+}
+
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> Self {
+        Self::from(exit as u8)
+    }
+}
+
+/// The exit codes as `--help` of each program lists them.
+pub const EXIT_CODES: &str = "\
+Exit codes:
+  0  yes: it stands undamaged, all is the same, it is done; or a screen closed before a flight
+  1  an error: a file, a socket, the simulator
+  2  the command line was not understood
+  3  the answer is no: it does not stand, decisions differ, outside tolerance, NO-GO
+  4  refused or aborted
+  5  not seen to the end, or not all could be answered";
+
+/// The commands that print the command line in another form.
+#[derive(Debug, Clone, Subcommand)]
+pub enum Manual {
+    /// Print a shell's completions.
+    Completions {
+        /// The shell.
+        shell: Shell,
+    },
+    /// Print the manual page (roff) of the program, or of a command.
+    Man {
+        /// The command, as in `man config check`.
+        command: Vec<String>,
+    },
+}
+
+impl Manual {
+    /// Prints it for a program.
+    ///
+    /// # Errors
+    /// There is no such command, or nobody reads it.
+    pub fn print(&self, mut program: Command) -> io::Result<Exit> {
+        let (mut text, name) = (Vec::new(), program.get_name().to_owned());
+        match self {
+            Self::Completions { shell } => clap_complete::generate(*shell, &mut program, name, &mut text),
+            Self::Man { command } => {
+                program.build();
+                let mut page = &program;
+                for word in command {
+                    let none = || io::Error::other(format!("{name} has no command `{}`", command.join(" ")));
+                    page = page.find_subcommand(word).ok_or_else(none)?;
+                }
+                clap_mangen::Man::new(page.clone()).render(&mut text)?;
+            }
+        }
+        io::stdout().lock().write_all(&text).map(|()| Exit::Yes)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_list_has_every_code() {
+        use Exit::{Error, No, NotSeen, RefusedOrAborted, Usage, Yes};
+        let listed: Vec<&str> = EXIT_CODES.lines().skip(1).map(|line| line.trim_start()).collect();
+        for (exit, line) in [Yes, Error, Usage, No, RefusedOrAborted, NotSeen].into_iter().zip(listed) {
+            assert!(line.starts_with(&format!("{}  ", exit as u8)), "{line}");
+        }
+    }
+}
