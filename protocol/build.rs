@@ -48,6 +48,9 @@ fn generate_records(out_dir: &Path, package: &str) -> Result<()> {
         // What it imports is generated already.
         config.extern_path(".touchdown.flight.v1", "crate::records::flight_v1");
     }
+    for judged in ["LandingVerdict", "Landing", "LimitResult"] {
+        config.type_attribute(judged, "#[cfg_attr(feature = \"program\", derive(serde::Serialize))]");
+    }
     config.compile_fds(descriptors).with_context(|| file.clone())
 }
 

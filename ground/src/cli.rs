@@ -8,7 +8,7 @@ use clap::builder::NonEmptyStringValueParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use protocol::dialect::TdPhase;
 use protocol::identity::{Address, GROUND, VEHICLE};
-use protocol::program::{EXIT_CODES, Manual};
+use protocol::program::{EXIT_CODES, Manual, Shown};
 use protocol::transport::LinkAddress;
 use serde::Deserialize;
 use sim::wire::fly::StartPoint;
@@ -41,22 +41,29 @@ pub struct Cli {
 
     /// Show a recorded flight (MCAP or .tlog) on the same screens instead; `last` is the newest
     /// touchdown-*.mcap in the current directory.
-    #[arg(long, value_name = "FILE|last", conflicts_with_all = ["connect", "log", "auto", "mission", "start", "seed", "speed"])]
+    #[arg(long, value_name = "FILE|last", conflicts_with_all = ["connect", "log", "auto", "mission", "start", "seed", "speed"], help_heading = "Replay")]
     pub replay: Option<PathBuf>,
 
     /// Replay: where to start: seconds since the first frame, or a phase such as `POWERED`.
-    #[arg(long, value_name = "SECONDS|PHASE", requires = "replay")]
+    #[arg(long, value_name = "SECONDS|PHASE", requires = "replay", help_heading = "Replay")]
     pub from: Option<ReplayFrom>,
 
     /// Print lines instead of the full screen, even on a terminal.
-    #[arg(long)]
+    #[arg(long, help_heading = "Without a screen")]
     pub headless: bool,
+
+    /// Print how the flight ended and where the log is, as one JSON object, and nothing else; without a screen.
+    #[arg(long, conflicts_with = "replay", help_heading = "Without a screen")]
+    pub json: bool,
 
     /// Without a screen: give up if the flight has not ended after this time.
     ///
     /// Default: 120 s if the flight is started automatically, otherwise never.
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Without a screen")]
     pub timeout_s: Option<Seconds>,
+
+    #[command(flatten)]
+    pub shown: Shown,
 }
 
 /// The settings file.
@@ -87,6 +94,7 @@ pub struct SocketArgs {
 
 /// The links to the vehicle, and whose frames they carry.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Args)]
+#[command(next_help_heading = "Link and vehicle")]
 pub struct LinkArgs {
     /// Link to a vehicle: udpin:ADDRESS:PORT, udpout:HOST:PORT, tcpin:ADDRESS:PORT, tcpout:HOST:PORT or
     /// serial:DEVICE:BAUD; may be given more than once for several links to the same vehicle.
@@ -125,6 +133,7 @@ fn listener(given: &str) -> Result<String, String> {
 
 /// The flags of a station that are keys of its settings file, too.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Parser)]
+#[command(next_help_heading = "Station")]
 pub struct Flags {
     #[command(flatten)]
     pub link: LinkArgs,
@@ -161,6 +170,7 @@ pub struct Flags {
 
 /// What holds the links, with or without a screen.
 #[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Demonstration")]
 pub struct StationArgs {
     #[command(flatten)]
     pub flags: Flags,
@@ -365,10 +375,7 @@ impl FromStr for Seconds {
     type Err = String;
 
     fn from_str(given: &str) -> Result<Self, String> {
-        match given.parse::<f64>() {
-            Ok(seconds) => Self::try_from(seconds),
-            Err(_) => Err(wrong_seconds(given)),
-        }
+        given.parse::<f64>().map_err(|_wrong| wrong_seconds(given)).and_then(Self::try_from)
     }
 }
 
@@ -452,6 +459,7 @@ mod tests {
             "--speed",
             "--auto",
             "--headless",
+            "--json",
             "--timeout-s",
         ] {
             assert!(help.contains(word), "{word}");

@@ -7,9 +7,10 @@ use std::process::ExitCode;
 use clap::CommandFactory as _;
 use ground::cli::Cli;
 use ground::exit::Exit;
+use protocol::program;
 
 fn main() -> ExitCode {
-    let given = match Cli::command().try_get_matches() {
+    let given = match program::read(Cli::command()) {
         Ok(given) => given,
         Err(message) => return Exit::unread(&message).into(),
     };

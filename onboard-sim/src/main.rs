@@ -7,11 +7,11 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::Context as _;
-use clap::{CommandFactory as _, Parser, Subcommand};
+use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 use flight::vehicles::mission;
 use onboard_sim::files::text_of;
 use protocol::key_file::KeyFile;
-use protocol::program::{EXIT_CODES, Exit, Manual};
+use protocol::program::{self, EXIT_CODES, Exit, Manual, Shown};
 use protocol::signing::Key;
 
 /// Flies the landing controller against a simulated vehicle and streams MAVLink 2.
@@ -27,6 +27,8 @@ struct Arguments {
     /// Nothing is replaced any more, so it has no effect.
     #[arg(long = "force", global = true, hide = true)]
     _force: bool,
+    #[command(flatten)]
+    _shown: Shown,
 }
 
 #[derive(Subcommand)]
@@ -94,7 +96,8 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let ended = Arguments::try_parse().map_or_else(|message| Ok(Exit::unread(&message)), run);
+    let read = program::read(Arguments::command()).and_then(|given| Arguments::from_arg_matches(&given));
+    let ended = read.map_or_else(|message| Ok(Exit::unread(&message)), run);
     ended
         .unwrap_or_else(|error| {
             // If writing fails here, there is nothing left to do.

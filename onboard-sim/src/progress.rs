@@ -7,6 +7,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
+use protocol::program::is_quiet;
 
 /// Time between two lines where no terminal is.
 const LINE_EVERY: Duration = Duration::from_secs(10);
@@ -36,6 +37,9 @@ impl Progress {
         if done == 0 {
             *times = (now(), now());
             self.bar.reset();
+        }
+        if is_quiet() {
+            return;
         }
         if !self.bar.is_hidden() {
             self.bar.set_length(of as u64);

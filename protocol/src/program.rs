@@ -2,8 +2,9 @@
 
 use std::io::{self, Write as _};
 use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
 
-use clap::{Command, Subcommand};
+use clap::{ArgMatches, Args, ColorChoice, Command, Subcommand};
 use clap_complete::Shell;
 
 /// How a run ended.
@@ -52,6 +53,46 @@ Exit codes:
   3  the answer is no: it does not stand, decisions differ, outside tolerance, NO-GO
   4  refused or aborted
   5  not seen to the end, or not all could be answered";
+
+/// What every command takes.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct Shown {
+    /// Colours: always, never, or auto: on a terminal, unless NO_COLOR is set.
+    #[arg(
+        long,
+        global = true,
+        value_name = "WHEN",
+        default_value = "auto",
+        hide_default_value = true,
+        hide_possible_values = true
+    )]
+    pub color: ColorChoice,
+    /// Leave out progress, warnings and what happens on the way: answers and errors alone.
+    #[arg(short, long, global = true)]
+    pub quiet: bool,
+}
+
+static QUIET: AtomicBool = AtomicBool::new(false);
+
+/// Whether --quiet was given to this process.
+pub fn is_quiet() -> bool {
+    QUIET.load(Ordering::Relaxed)
+}
+
+/// Reads the command line of this process. Help and errors are coloured as it asks for, too.
+///
+/// # Errors
+/// It is not understood, or asks for help or the version.
+pub fn read(program: Command) -> Result<ArgMatches, clap::Error> {
+    let words = std::env::args_os().filter_map(|word| word.into_string().ok());
+    let mut words = words.skip_while(|word| !word.starts_with("--color"));
+    let first = words.next().unwrap_or_default();
+    let when = first.strip_prefix("--color=").map(str::to_owned).or_else(|| words.next());
+    let color = when.and_then(|when| when.parse().ok()).unwrap_or_default();
+    let given = program.color(color).try_get_matches()?;
+    QUIET.store(given.get_flag("quiet"), Ordering::Relaxed);
+    Ok(given)
+}
 
 /// The commands that print the command line in another form.
 #[derive(Debug, Clone, Subcommand)]

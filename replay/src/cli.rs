@@ -1,13 +1,11 @@
 //! What all commands have in common: how they ended, what they print, how they stop.
 
 use std::io::{self, Write};
-use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result};
 pub(crate) use onboard_sim::files::text_of;
-use onboard_sim::run::threads;
-use protocol::program::Exit;
+use protocol::program::{Exit, is_quiet};
 use protocol::text::printable;
 use serde::Serialize;
 
@@ -72,7 +70,7 @@ pub(crate) fn give_each<A: Answer>(
             Ok(found) => all.extend(found),
             Err(error) if files.len() == 1 => return Err(error),
             Err(error) => {
-                say(&format!("{error:#}"));
+                say_anyway(&format!("{error:#}"));
                 outcome = Exit::NotSeen;
             }
         }
@@ -102,8 +100,15 @@ fn harmless(text: &[u8]) -> String {
     text.chars().map(|c| if steers(&c) { char::REPLACEMENT_CHARACTER } else { c }).collect()
 }
 
+/// Says on standard error what is no error, unless --quiet is given.
+pub(crate) fn say(text: &str) {
+    if !is_quiet() {
+        say_anyway(text);
+    }
+}
+
 /// Writes a line to standard error; a closed standard error is ignored.
-pub fn say(text: &str) {
+pub fn say_anyway(text: &str) {
     let _ = writeln!(io::stderr(), "replay: {}", harmless(text.as_bytes()));
 }
 
@@ -131,11 +136,6 @@ pub(crate) fn warn_of_cut(file: &str, cut: Option<&Cut>) {
     if let Some(cut) = cut {
         say(&format!("warning: {file}: the flight {cut}"));
     }
-}
-
-/// Does work on so many threads, or on as many as there are processors.
-pub(crate) fn in_pool<R: Send>(jobs: Option<NonZeroUsize>, work: impl FnOnce() -> R + Send) -> Result<R> {
-    Ok(threads(jobs.map(NonZeroUsize::get)).context("cannot start threads")?.install(work))
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@
 //! for the [closed loop](mod@crate::refly). For example, a flight computer that lights its motor earlier than in flight
 //! measures no thrust until the recorded ignition.
 
+use std::io::Write as _;
 use std::path::PathBuf;
 
 use anyhow::Result;
@@ -15,10 +16,10 @@ use crate::cli::{Answer, give, warn_of_what_is_missing};
 pub use crate::controller::Decided;
 use crate::controller::{AgainError, LoggedComputer, phase_name};
 use crate::log::Recording;
+use crate::output::NewFile;
 use crate::print::columns;
 use crate::settings::{Setting, SettingArguments};
 use crate::verify::explain::degrees;
-use onboard_sim::files::write_new;
 
 /// Sections that a flight computer never sees: the limits of the verdict, and the random draw.
 const NOT_THE_PILOTS: [&str; 2] = ["leg_limits.", "truth."];
@@ -341,7 +342,8 @@ impl Args {
         warn_of_what_is_missing(&recording);
         let report = evaluate(&recording, &self.settings.all()?)?;
         if let Some(path) = &self.csv {
-            write_new(path, csv_of(&report)?.as_bytes())?;
+            let csv = csv_of(&report)?;
+            NewFile::create(path)?.fill(|file| file.write_all(csv.as_bytes()))?;
         }
         give(&report, self.json)
     }

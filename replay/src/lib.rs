@@ -21,7 +21,7 @@
 //! * [`report`](mod@report): writes a flight as one HTML page.
 //! * [`export`]: converts logs to and from other formats; [`recover`](mod@recover): repairs a damaged log, sorts another;
 //!   [`cut`](mod@cut): makes a shorter one.
-//! * [`output`]: writes files completely or not at all, each new one under a name that is free.
+//! * [`output`](onboard_sim::files): writes files completely or not at all, each new one under a name that is free.
 //! * [`print`](mod@print): what answers have in common: columns, two verdicts beside each other, JSON.
 
 pub mod cli;
@@ -29,13 +29,13 @@ pub mod compare;
 pub mod controller;
 pub mod cut;
 mod digest;
+pub use onboard_sim::files as output;
 pub mod evaluate;
 pub mod export;
 pub mod findings;
 pub mod fit;
 pub mod info;
 pub mod log;
-pub mod output;
 pub mod print;
 pub mod recover;
 pub mod refly;
@@ -47,7 +47,7 @@ pub mod worst_plans;
 
 use anyhow::Result;
 use clap::{CommandFactory as _, Parser, Subcommand};
-use protocol::program::{EXIT_CODES, Exit, Manual};
+use protocol::program::{EXIT_CODES, Exit, Manual, Shown};
 
 /// Describes flight logs, runs their flights again, and compares them.
 ///
@@ -74,6 +74,8 @@ pub struct Cli {
     /// Nothing is replaced any more, so it has no effect.
     #[arg(long = "force", global = true, hide = true)]
     _force: bool,
+    #[command(flatten)]
+    _shown: Shown,
 }
 
 #[derive(Debug, Subcommand)]

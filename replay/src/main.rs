@@ -2,15 +2,16 @@
 
 use std::process::ExitCode;
 
-use clap::Parser as _;
-use protocol::program::Exit;
+use clap::{CommandFactory as _, FromArgMatches as _};
+use protocol::program::{self, Exit};
 use replay::{Cli, cli};
 
 fn main() -> ExitCode {
-    let answered = Cli::try_parse().map_or_else(|message| Ok(Exit::unread(&message)), Cli::run);
+    let read = program::read(Cli::command()).and_then(|given| Cli::from_arg_matches(&given));
+    let answered = read.map_or_else(|message| Ok(Exit::unread(&message)), Cli::run);
     answered
         .unwrap_or_else(|error| {
-            cli::say(&format!("{error:#}"));
+            cli::say_anyway(&format!("{error:#}"));
             Exit::Error
         })
         .into()

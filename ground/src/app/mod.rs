@@ -22,7 +22,7 @@ use std::io::IsTerminal as _;
 use std::time::Duration;
 
 use anyhow::Context as _;
-use clap::{ArgMatches, CommandFactory as _, FromArgMatches as _};
+use clap::{ArgMatches, ColorChoice, CommandFactory as _, FromArgMatches as _};
 use protocol::book::BookKey;
 use protocol::crew_file::CrewFile;
 use protocol::dialect::TdRole;
@@ -46,7 +46,7 @@ use attached::Viewer;
 use clock::{Clock, LogTime};
 use files::{LogGuard, SpaceWatch, newest_place, open_checklist, open_log, other_name, read_unfinished};
 use next_log::NextLog;
-use output::{Output, print};
+use output::{Lines, Output, print};
 use server::{Server, hello};
 use station::{Answers, Station};
 use wire::Wire;
@@ -61,6 +61,8 @@ struct Duty {
     /// It has a screen of its own.
     interactive: bool,
     time_limit: Option<Duration>,
+    /// It prints one object at its end, and nothing else.
+    json: bool,
 }
 
 /// Runs the ground station until its end.
@@ -71,8 +73,12 @@ pub fn run(given: &ArgMatches) -> anyhow::Result<Exit> {
     let cli = Cli::from_arg_matches(given)?;
     let given = given.subcommand().map_or(given, |(_, given)| given);
     let dumb = std::env::var_os("TERM").is_none_or(|term| term.is_empty() || term == "dumb");
-    let interactive = std::io::stdout().is_terminal() && !cli.headless && !dumb;
-    let load = |args: &ConfigArgs| Config::load(args.config.as_deref());
+    let interactive = std::io::stdout().is_terminal() && !cli.headless && !cli.json && !dumb;
+    let load = |args: &ConfigArgs| -> anyhow::Result<Config> {
+        let config = Config::load(args.config.as_deref())?;
+        let without = (cli.shown.color == ColorChoice::Never).then_some(crate::cli::ThemeChoice::None);
+        Ok(Config { theme: without.unwrap_or(config.theme), ..config })
+    };
     let said = |bytes: &[u8]| print(bytes).map(|()| Exit::Yes);
     let runtime =
         tokio::runtime::Builder::new_current_thread().enable_all().build().context("making the run loop")?;
@@ -114,7 +120,7 @@ pub fn run(given: &ArgMatches) -> anyhow::Result<Exit> {
         Some(Command::Daemon { mut station }) => {
             let config = load(&station.config)?;
             config.fill(&mut station, given, true)?;
-            let duty = Duty { is_daemon: true, interactive: false, time_limit: None };
+            let duty = Duty { is_daemon: true, interactive: false, time_limit: None, json: false };
             runtime.block_on(Box::pin(session(&station, &config, duty)))
         }
         None => {
@@ -128,7 +134,7 @@ pub fn run(given: &ArgMatches) -> anyhow::Result<Exit> {
             }
             config.fill(&mut station, given, false)?;
             let time_limit = cli.timeout_s.map(|Seconds(limit)| limit);
-            let duty = Duty { is_daemon: false, interactive, time_limit };
+            let duty = Duty { is_daemon: false, interactive, time_limit, json: cli.json };
             runtime.block_on(Box::pin(session(&station, &config, duty)))
         }
     }
@@ -172,9 +178,15 @@ async fn session(args: &StationArgs, config: &Config, duty: Duty) -> anyhow::Res
     station.close(&model).await;
     let log_path = log_guard.finish();
     ran?;
-    output::closing(&model, duty.interactive, log_path.as_ref(), clock.now());
+    let exit = exit::decide(&model.outcome, duty.interactive);
+    if duty.json {
+        let log = log_path.as_ref().ok().and_then(Option::as_ref);
+        print(output::ended(&model, exit, log, clock.now()).as_bytes())?;
+    } else {
+        output::closing(&model, duty.interactive, log_path.as_ref(), clock.now());
+    }
     log_path.context("the log")?;
-    Ok(exit::decide(&model.outcome, duty.interactive))
+    Ok(exit)
 }
 
 /// Opens everything that a station needs, except its log.
@@ -185,7 +197,7 @@ async fn start(
     (clock, demo_options): (Clock, Option<DemoOptions>),
     mut next_log: NextLog,
 ) -> anyhow::Result<(Station, Model, Wire)> {
-    let Duty { is_daemon, interactive, time_limit } = duty;
+    let Duty { is_daemon, interactive, time_limit, json } = duty;
     let recorder = next_log.present();
     let link = &args.flags.link;
     // The demonstration uses any free port, so that it can run beside a real ground station.
@@ -262,7 +274,10 @@ async fn start(
     });
     go_on_with_what_is_kept(&mut model, recorder.as_ref(), is_daemon, clock.now()).await;
     let server = serve(args, &mut model, duty, &clock).await?;
-    let output = Output::open(interactive, config)?;
+    let mut output = Output::open(interactive, config)?;
+    if json {
+        output.lines = Lines::closed();
+    }
     model.repeats_reported = output.reports_repeats();
     let mut station = Station {
         clock,

@@ -185,7 +185,7 @@ mod tests {
             let clock = Clock::start();
             let header = LogHeader { start_unix_ns: clock.start_unix_ns(), ..LogHeader::default() };
             let guard = LogGuard::new(open_log(args.flags.log.as_ref(), None, &header).unwrap());
-            let duty = Duty { is_daemon: true, interactive: false, time_limit: None };
+            let duty = Duty { is_daemon: true, interactive: false, time_limit: None, json: false };
             let next_log = NextLog::new(&args, header, guard.log());
             let config = Config::default();
             let started = Box::pin(start(&args, &config, duty, (clock, None), next_log)).await;

@@ -28,30 +28,28 @@ const LOOK_AGAIN_AFTER: Duration = Duration::from_millis(50);
 pub(super) fn of(model: &Model, screens: &[Attached]) -> StationStatus {
     let settings = &model.settings;
     let vehicle = &model.vehicle;
-    let boot = vehicle.status.as_ref().map_or(0, |status| status.value.boot_number);
-    let boot = if boot == 0 { String::new() } else { format!(" boot {boot:08X}") };
     let kind = match settings.demonstration {
         true => "DEMO",
         false if vehicle.is_simulated() => "SIM",
         false => "LIVE",
     };
-    let heard = vehicle.heartbeat.is_some();
-    let named = format!("{}/{} {kind}{boot}", settings.vehicle.system_id, settings.vehicle.component_id);
-    let armed = vehicle.is_armed();
-    let phase = vehicle.phase().map_or_else(|| "phase unknown".to_owned(), |phase| words::phase(phase.value));
     let watching =
         screens.iter().filter(|screen| screen.watch).map(|screen| format!("{} (watches)", screen.seat));
     let silent = model.crew.silent().iter().map(|seat| format!("{seat} (does not answer)"));
     let screens = model.crew.seats().iter().map(Seat::to_string).chain(silent).chain(watching);
+    let ids = format!("{}/{}", settings.vehicle.system_id, settings.vehicle.component_id);
     StationStatus {
         pid: std::process::id(),
         link: settings.link_name.clone(),
         demonstration: settings.demonstration,
-        vehicle: if heard { named } else { "not heard".to_owned() },
-        phase: format!("{phase} {}", if armed { "ARMED" } else { "disarmed" }),
+        kind: kind.to_owned(),
+        vehicle: vehicle.heartbeat.as_ref().map(|_| ids),
+        boot_number: vehicle.status.as_ref().map_or(0, |status| status.value.boot_number),
+        phase: vehicle.phase().map_or_else(|| "phase unknown".to_owned(), |phase| words::phase(phase.value)),
+        armed: vehicle.is_armed(),
         at_risk: model.is_at_risk(),
-        log: settings.log_path.as_deref().map(absolute).unwrap_or_default(),
-        screens: screens.collect::<Vec<_>>().join("; "),
+        log: settings.log_path.as_deref().map(absolute),
+        screens: screens.collect(),
     }
 }
 
@@ -133,17 +131,24 @@ pub(super) async fn station_over(links: &str) -> Option<PathBuf> {
     same.next().filter(|_| same.next().is_none()).map(|(path, _)| path)
 }
 
+/// As in `PAD_IDLE disarmed`.
+fn phase_of(StationStatus { phase, armed, .. }: &StationStatus) -> String {
+    format!("{phase} {}", if *armed { "ARMED" } else { "disarmed" })
+}
+
 fn listed(found: &[Found]) -> String {
     let mut text = String::new();
     for (path, status) in found {
         // Writing into a String cannot fail.
         let _ = match status {
             Ok(status) => {
-                let or = |text: &str, other: &str| {
-                    if text.is_empty() { other.to_owned() } else { text.to_owned() }
-                };
-                let StationStatus { pid, link, vehicle, phase, log, screens, .. } = status;
-                let (log, screens) = (or(log, "none"), or(screens, "none"));
+                let StationStatus { pid, link, kind, vehicle, log, screens, .. } = status;
+                let boot = Some(status.boot_number).filter(|boot| *boot > 0);
+                let boot = boot.map_or_else(String::new, |boot| format!(" boot {boot:08X}"));
+                let named = vehicle.as_ref().map(|ids| format!("{ids} {kind}{boot}"));
+                let vehicle = named.as_deref().unwrap_or("not heard");
+                let (phase, log) = (phase_of(status), log.as_deref().unwrap_or("none"));
+                let screens = if screens.is_empty() { "none".to_owned() } else { screens.join("; ") };
                 writeln!(
                     text,
                     "pid {pid}  {link}  vehicle {vehicle}  {phase}\n  socket {}\n  log {log}\n  screens {screens}",
@@ -202,8 +207,9 @@ pub(super) async fn explain(error: anyhow::Error, endpoints: &[LinkAddress]) -> 
         links.any(|link| places.contains(&kind_and_port(link))).then_some(status)
     });
     match holder {
-        Some(StationStatus { pid, link, phase, .. }) => error.context(format!(
-            "your ground station pid {pid} ({phase}) uses {link}: `ground attach` shows it, `ground stop` ends it"
+        Some(status @ StationStatus { pid, link, .. }) => error.context(format!(
+            "your ground station pid {pid} ({}) uses {link}: `ground attach` shows it, `ground stop` ends it",
+            phase_of(status)
         )),
         None => error.context("another program uses the address; none of your ground stations does"),
     }

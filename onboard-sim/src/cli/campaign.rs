@@ -15,35 +15,25 @@ use onboard_sim::summary::to_text;
 use protocol::log::build::build_info;
 use protocol::program::Exit;
 use serde::Serialize;
-use sim::dispersion;
+
 use sim::fault::{TimedFault, how_to_write};
 use sim::recipe::Recipe;
 
-use super::{Progress, on_threads, read, recipe, single};
+use super::{Asked, Progress, on_threads, read, single};
 
 #[derive(Args)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 pub(crate) struct CampaignArguments {
     #[command(subcommand)]
     command: Option<CampaignCommand>,
-    /// Built-in mission or TOML file.
-    #[arg(long, alias = "profile", default_value = flight::vehicles::mission::DEFAULT, value_name = "NAME|FILE")]
-    mission: String,
+    #[command(flatten)]
+    asked: Asked,
     /// Where the flights begin: pad, apogee or drone, if the mission has that start [default: the mission's].
     #[arg(long, value_name = "START")]
     start: Option<StartPoint>,
-    /// Built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh, wild) or TOML file.
-    #[arg(long, default_value = dispersion::DEFAULT, value_name = "NAME|FILE")]
-    dispersion: String,
     /// Number of flights; they are numbered from 0.
     #[arg(long, default_value_t = 1000, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     flights: u64,
-    /// Seed of everything random.
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Flights at the same time; the results do not depend on it.
-    #[arg(long, value_name = "N")]
-    jobs: Option<usize>,
     /// Fly only this part of the flights, counted from 1.
     #[arg(long, default_value = "1/1", value_name = "I/N")]
     shard: Shard,
@@ -91,7 +81,7 @@ pub(crate) fn run(arguments: &CampaignArguments) -> anyhow::Result<Exit> {
     let manifest = Manifest::of(&recipe, arguments.flights, &program()?, arguments.shard);
     let store = Store::open(out, &recipe, manifest)?;
     let progress = Progress::start();
-    let cost = on_threads(arguments.jobs, || {
+    let cost = on_threads(arguments.asked.jobs, || {
         let flown = run::run(&recipe, &store, &|flown| show(&progress, flown))?;
         Ok(Cost::of(&flown, progress.elapsed_s()))
     })?;
@@ -107,7 +97,7 @@ pub(crate) fn run(arguments: &CampaignArguments) -> anyhow::Result<Exit> {
 
 /// What is flown, and how it should end.
 fn flights(arguments: &CampaignArguments) -> anyhow::Result<(Recipe, Option<Expected>)> {
-    let mut recipe = recipe(&arguments.mission, arguments.start, &arguments.dispersion, arguments.seed)?;
+    let mut recipe = arguments.asked.recipe(arguments.start)?;
     recipe.faults.clone_from(&arguments.faults);
     let Some(path) = &arguments.scenario else { return Ok((recipe, None)) };
     let scenario: Scenario = toml::from_str(&read(path)?).with_context(|| path.display().to_string())?;

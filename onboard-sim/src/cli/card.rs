@@ -8,9 +8,8 @@ use onboard_sim::card::Card;
 use onboard_sim::files::{new_name, write_folder};
 use onboard_sim::hazard::Flights;
 use protocol::program::Exit;
-use sim::dispersion;
 
-use super::{in_wind, on_threads, recipe, show_flights};
+use super::{Asked, in_wind, on_threads, show_flights};
 
 /// The files of a card.
 const FILES: [&str; 3] = ["card.html", "card.txt", "mission.toml"];
@@ -19,18 +18,8 @@ const CARD_FLIGHTS_MAX: u64 = 10_000;
 
 #[derive(Args)]
 pub(crate) struct CardArguments {
-    /// Built-in mission or TOML file.
-    #[arg(long, default_value = flight::vehicles::mission::DEFAULT, value_name = "NAME|FILE")]
-    mission: String,
-    /// Built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh, wild) or TOML file.
-    #[arg(long, default_value = dispersion::DEFAULT, value_name = "NAME|FILE")]
-    dispersion: String,
-    /// Seed of everything random.
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Flights at the same time; the results do not depend on it.
-    #[arg(long, value_name = "N")]
-    jobs: Option<usize>,
+    #[command(flatten)]
+    asked: Asked,
     /// Mean winds 10 m above the ground, m/s, each with a radius and a rate of its own.
     #[arg(long = "wind", value_delimiter = ',', default_value = "0,3,6,10", value_name = "M/S,...")]
     winds: Vec<f64>,
@@ -50,7 +39,7 @@ pub(crate) struct CardArguments {
 }
 
 pub(crate) fn run(arguments: &CardArguments) -> anyhow::Result<Exit> {
-    let recipe = recipe(&arguments.mission, None, &arguments.dispersion, arguments.seed)?;
+    let recipe = arguments.asked.recipe(None)?;
     let mut winds_m_s = arguments.winds.clone();
     winds_m_s.sort_by(f64::total_cmp);
     winds_m_s.dedup();
@@ -58,7 +47,7 @@ pub(crate) fn run(arguments: &CardArguments) -> anyhow::Result<Exit> {
     let winds = winds.collect::<anyhow::Result<Vec<_>>>()?;
     let (survey, of_widest) = (arguments.flights, arguments.hazard_flights.max(arguments.flights));
     let flights = Flights { survey, of_widest };
-    let card = on_threads(arguments.jobs, || {
+    let card = on_threads(arguments.asked.jobs, || {
         Ok(Card::new(&recipe, winds, flights, arguments.wind_from, &show_flights())?)
     })?;
     let [html, text, mission_file] = FILES;

@@ -12,11 +12,12 @@ use protocol::crew_file::CrewFile;
 use protocol::identity::{LARGEST_BOOT_NUMBER, NETWORK_BUDGET_BYTES_S, RADIO_BUDGET_BYTES_S, VEHICLE};
 use protocol::log::recorder::Recorder;
 use protocol::log::v1::LimitResult;
-use protocol::program::Exit;
+use protocol::program::{Exit, is_quiet};
 use protocol::transport::LinkAddress;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::process::getpgrp;
 use rustix::termios::tcgetpgrp;
+use serde_json::{Value, json};
 use sim::fault::{TimedFault, how_to_write};
 use sim::wire::fly::{FlightEnd, FlightSummary, FlyOptions, OnTheWire, Speed, fly_observed};
 use sim::wire::vehicle::{RocketFlight, VehicleEvent};
@@ -101,6 +102,9 @@ pub(crate) struct FlyArguments {
     /// flight.
     #[arg(long, value_name = "FOLDER", conflicts_with_all = ["mavlink", "key", "auto"])]
     board: Option<PathBuf>,
+    /// Print how the flight ended and where its log is, as one JSON object, and nothing else.
+    #[arg(long)]
+    json: bool,
 }
 
 pub(crate) fn run(arguments: FlyArguments) -> anyhow::Result<Exit> {
@@ -121,11 +125,10 @@ impl FlyArguments {
 }
 
 async fn fly(arguments: FlyArguments) -> anyhow::Result<Exit> {
-    let flight = arguments.flight()?;
+    let (flight, as_json_object) = (arguments.flight()?, arguments.json);
     let crew = arguments.crew.as_deref().map(CrewFile::open).transpose()?;
     let log = arguments.log.as_ref().filter(|path| *path != Path::new("none"));
-    let recorder = log.map(|path| logging(path, &flight.log_header("onboard-sim", unix_ns())));
-    let recorder = recorder.transpose()?;
+    let recorder = log.map(|path| logging(path, &flight.log_header("onboard-sim", unix_ns()))).transpose()?;
     let drawn = OnTheWire::drawn();
     let uid = arguments.uid_file.as_deref().map(|file| kept_uid(file, drawn.uid)).transpose()?;
     let on_the_wire = OnTheWire {
@@ -160,10 +163,12 @@ async fn fly(arguments: FlyArguments) -> anyhow::Result<Exit> {
         interrupted().await;
         let _ = stop.send(true);
     });
-    let mut began = false;
+    let (mut began, quiet) = (false, as_json_object || is_quiet());
     let observe = |time_s: f64, event: &VehicleEvent| {
         began = true;
-        report_event(time_s, event);
+        if !quiet {
+            report_event(time_s, event);
+        }
     };
     let flown = Box::pin(fly_observed(options, stopped, observe)).await;
     if flown.is_err()
@@ -175,8 +180,14 @@ async fn fly(arguments: FlyArguments) -> anyhow::Result<Exit> {
     }
     let log_path = recorder.as_ref().map(Recorder::finish).transpose();
     let summary = flown?;
+    let log_path = log_path.context("the flight is over, but its log is incomplete");
+    if as_json_object {
+        let log = log_path.as_ref().ok().and_then(Option::as_ref);
+        writeln!(std::io::stdout(), "{:#}", as_json(&summary, log))?;
+        return log_path.map(|_| exit(&summary.outcome));
+    }
     print_summary(&summary)?;
-    if let Some(path) = log_path.context("the flight is over, but its log is incomplete")? {
+    if let Some(path) = log_path? {
         writeln!(std::io::stdout(), "log {}", path.display())?;
     }
     Ok(exit(&summary.outcome))
@@ -305,6 +316,15 @@ fn print_summary(summary: &FlightSummary) -> anyhow::Result<()> {
         }
     }
     Ok(())
+}
+
+/// How a flight ended and where its log is, for programs.
+fn as_json(summary: &FlightSummary, log: Option<&PathBuf>) -> Value {
+    let refusal = if let FlightEnd::Refused(reason) = &summary.outcome { Some(reason) } else { None };
+    json!({
+        "exit_code": exit(&summary.outcome) as u8, "phase": summary.phase.name(), "time_s": summary.time_s, "refusal": refusal,
+        "verdict": summary.verdict, "log": log,
+    })
 }
 
 /// Rounds away the error of converting degrees to radians and back.

@@ -1,34 +1,31 @@
 //! `onboard-sim hazard`: how near people may stand.
 
+use std::io::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
 use flight::rules::verdict::Landing;
 use flight::vehicle::mission::StartPoint;
 use onboard_sim::figure::{BLACK_CURVE, Line, Panel, sized_lines_svg};
-use onboard_sim::files::write_new;
+use onboard_sim::files::NewFile;
 use onboard_sim::hazard::{self, Flights, Impact, Radius, Rule, Way, keep_out_m, landed_as_planned, widest};
 use onboard_sim::statistics::Landings;
 use protocol::program::Exit;
-use sim::dispersion::{self, may_be_kinder};
+use sim::dispersion::may_be_kinder;
 use sim::recipe::Recipe;
 
-use super::{in_wind, on_threads, recipe, show_flights};
+use super::{Asked, in_wind, on_threads, show_flights};
 
 /// Flights of each kind that the picture shows.
 const SHOWN: u64 = 30;
 
 #[derive(Args)]
 pub(crate) struct HazardArguments {
-    /// Built-in mission or TOML file.
-    #[arg(long, alias = "profile", default_value = flight::vehicles::mission::DEFAULT, value_name = "NAME|FILE")]
-    mission: String,
+    #[command(flatten)]
+    asked: Asked,
     /// Where the flights begin: pad, apogee or drone [default: pad if the mission has a booster, else the mission's].
     #[arg(long, value_name = "START")]
     start: Option<StartPoint>,
-    /// Built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh, wild) or TOML file.
-    #[arg(long, default_value = dispersion::DEFAULT, value_name = "NAME|FILE")]
-    dispersion: String,
     /// Mean winds 10 m above the ground, m/s.
     #[arg(long = "wind", value_delimiter = ',', default_value = "0,3,6,10", value_name = "M/S,...")]
     winds: Vec<f64>,
@@ -38,12 +35,6 @@ pub(crate) struct HazardArguments {
     /// Flights in each wind of the ways that come down farthest. 368 are needed for an upper end of the interval.
     #[arg(long, default_value_t = 400, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
     hazard_flights: u64,
-    /// Seed of everything random.
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Flights at the same time; the results do not depend on it.
-    #[arg(long, value_name = "N")]
-    jobs: Option<usize>,
     /// Write where each flight came down (CSV).
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
@@ -57,23 +48,26 @@ pub(crate) fn run(arguments: &HazardArguments) -> anyhow::Result<Exit> {
     let mission = &recipes[0].mission;
     let ways = Way::of(mission);
     let flights = Flights { survey: arguments.flights, of_widest: arguments.hazard_flights };
-    let impacts = on_threads(arguments.jobs, || Ok(hazard::studies(&recipes, flights, &show_flights())?))?;
+    let impacts =
+        on_threads(arguments.asked.jobs, || Ok(hazard::studies(&recipes, flights, &show_flights())?))?;
     let rule = Rule::of(mission);
     let study =
         Study { arguments, mission: &mission.name, start: mission.start.at, ways: &ways, impacts: &impacts };
     study.write_text(&rule, mission.gate.fence_radius_m, &mut std::io::stdout().lock())?;
     if let Some(path) = &arguments.csv {
-        write_new(path, &study.csv()?)?;
+        let csv = study.csv()?;
+        NewFile::create(path)?.fill(|file| file.write_all(&csv))?;
     }
     if let Some(path) = &arguments.svg {
-        write_new(path, study.svg(&rule)?.as_bytes())?;
+        let svg = study.svg(&rule)?;
+        NewFile::create(path)?.fill(|file| file.write_all(svg.as_bytes()))?;
     }
     Ok(Exit::Yes)
 }
 
 /// The mission in each wind.
 fn recipes(arguments: &HazardArguments) -> anyhow::Result<Vec<Recipe>> {
-    let mut recipe = recipe(&arguments.mission, arguments.start, &arguments.dispersion, arguments.seed)?;
+    let mut recipe = arguments.asked.recipe(arguments.start)?;
     if arguments.start.is_none() && recipe.mission.launch.is_some() {
         recipe = recipe.starting_at(StartPoint::Pad)?;
     }
@@ -96,7 +90,7 @@ impl Study<'_> {
     }
 
     fn write_text(&self, rule: &Rule, fence_m: f64, out: &mut impl std::io::Write) -> std::io::Result<()> {
-        let HazardArguments { dispersion, seed, winds, .. } = self.arguments;
+        let HazardArguments { asked: Asked { dispersion, seed, .. }, winds, .. } = self.arguments;
         let start = match self.start {
             StartPoint::Apogee => "apogee; how it got there is not in it",
             other => other.name(),

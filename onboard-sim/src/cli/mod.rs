@@ -12,6 +12,7 @@ use std::io::Write as _;
 use std::path::Path;
 
 use anyhow::Context as _;
+use clap::Args;
 use flight::vehicle::mission::StartPoint;
 use flight::vehicles::mission;
 use onboard_sim::files::text_of;
@@ -22,6 +23,29 @@ use protocol::log::writer::LogHeader;
 use sim::dispersion::{self, Dispersion};
 use sim::recipe::Recipe;
 use toml_edit::{Array, DocumentMut};
+
+/// What flies, under what chance.
+#[derive(Args)]
+pub(crate) struct Asked {
+    /// Built-in mission or TOML file.
+    #[arg(long, alias = "profile", default_value = mission::DEFAULT, value_name = "NAME|FILE")]
+    mission: String,
+    /// Built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh, wild) or TOML file.
+    #[arg(long, default_value = dispersion::DEFAULT, value_name = "NAME|FILE")]
+    dispersion: String,
+    /// Seed of everything random.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Flights at the same time; the results do not depend on it.
+    #[arg(long, value_name = "N")]
+    jobs: Option<usize>,
+}
+
+impl Asked {
+    fn recipe(&self, start: Option<StartPoint>) -> anyhow::Result<Recipe> {
+        recipe(&self.mission, start, &self.dispersion, self.seed)
+    }
+}
 
 /// Does work on so many threads, or on as many as there are processors; the results do not depend on it.
 fn on_threads<T: Send>(
@@ -35,7 +59,7 @@ fn on_threads<T: Send>(
 fn logging(path: &Path, header: &LogHeader) -> anyhow::Result<Recorder> {
     let recorder = Recorder::create_under_free_name(path, None, header)?;
     if let Some(words) = other_name(path, recorder.path()) {
-        writeln!(std::io::stdout(), "{words}")?;
+        writeln!(std::io::stderr(), "{words}")?;
     }
     Ok(recorder)
 }

@@ -12,7 +12,7 @@ use flight::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use flight::vehicle::mission::Mission;
 use flight::vehicle::thrust_curve::ThrustCurve;
 use flight::vehicles::{mission, motors, openrocket, table, thrust_curve};
-use onboard_sim::files::{text_of, write_new};
+use onboard_sim::files::{NewFile, text_of};
 use protocol::program::Exit;
 use toml::Value;
 
@@ -68,7 +68,7 @@ pub(crate) fn run(arguments: &NewArguments) -> anyhow::Result<Exit> {
         writeln!(stderr, "no terminal on which to ask: what is not told is {}'s", mission::DEFAULT)?;
     }
     let text = made(arguments, asks && terminal, &mut ask, &path.display().to_string())?;
-    let path = write_new(&path, text.as_bytes())?;
+    let path = NewFile::create(&path)?.fill(|file| file.write_all(text.as_bytes()))?;
     writeln!(stderr, "{0} is written; `onboard-sim check {0}` says whether it will land", path.display())?;
     Ok(Exit::Yes)
 }

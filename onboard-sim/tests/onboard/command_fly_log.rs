@@ -5,13 +5,15 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-/// What `fly` prints with this log. A key that does not exist ends it before the flight.
+/// What `fly` says with this log besides its error. A key that does not exist ends it before the flight.
 fn fly(directory: &Path, log: &str) -> String {
     let program = env!("CARGO_BIN_EXE_onboard-sim");
     let arguments = ["fly", "--log", log, "--key", "missing.key"];
     let output = Command::new(program).current_dir(directory).args(arguments).output().unwrap();
     assert_eq!(output.status.code(), Some(1));
-    String::from_utf8_lossy(&output.stdout).into_owned()
+    assert!(output.stdout.is_empty());
+    let said = String::from_utf8(output.stderr).unwrap();
+    said.split_inclusive('\n').filter(|line| !line.starts_with("error: ")).collect()
 }
 
 #[test]
@@ -32,4 +34,17 @@ fn fly_keeps_a_log_that_exists_and_says_the_free_name() {
     let said = fly(directory.path(), "flight.mcap");
     assert_eq!(said, "flight.mcap exists and is kept; flight-2.mcap is written\n");
     assert_eq!(fs::read_to_string(directory.path().join("flight.mcap")).unwrap(), "a flight");
+}
+
+/// A program reads one object: how the flight ended, and where its log is.
+#[test]
+fn the_end_of_a_flight_is_one_object() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut fly = Command::new(env!("CARGO_BIN_EXE_onboard-sim"));
+    fly.current_dir(directory.path())
+        .args(["fly", "--json", "--start", "apogee", "--speed", "max", "--log", "f.mcap"]);
+    let told: serde_json::Value = serde_json::from_slice(&fly.output().unwrap().stdout).unwrap();
+    assert_eq!((&told["exit_code"], &told["log"]), (&0.into(), &"f.mcap".into()), "{told}");
+    let verdict = &told["verdict"];
+    assert!(verdict["landing"]["stands"] == true && verdict["envelope"][0]["passed"] == true, "{told}");
 }

@@ -114,17 +114,14 @@ pub enum TlogName<'a> {
 /// The first of `flight.mcap`, `flight-2.mcap`, `flight-3.mcap` and so on under which nothing is that could be lost; the last one if
 /// all are taken.
 pub fn free_name(asked: &Path) -> PathBuf {
-    // A pipe and a device keep nothing.
-    let keeps = |found: Metadata| found.is_file() || (found.is_dir() && !is_empty(asked));
+    // A pipe, a device and an empty folder keep nothing.
+    let has_entries = || std::fs::read_dir(asked).is_ok_and(|mut entries| entries.next().is_some());
+    let keeps = |found: Metadata| found.is_file() || (found.is_dir() && has_entries());
     if std::fs::metadata(asked).is_ok_and(|found| !keeps(found)) {
         return asked.to_owned();
     }
     let mut names = (1..NAMES_MAX).map(|number| numbered(asked, number));
     names.find(|name| name.symlink_metadata().is_err()).unwrap_or_else(|| numbered(asked, NAMES_MAX))
-}
-
-fn is_empty(folder: &Path) -> bool {
-    std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_none())
 }
 
 /// What to say if the name is not the one that was asked for.

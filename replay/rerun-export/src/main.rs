@@ -27,9 +27,6 @@ struct Cli {
     /// Another log, whose flight is drawn into the same space and plots.
     #[arg(long, value_name = "LOG")]
     with: Option<PathBuf>,
-    /// Nothing is replaced any more, so it has no effect.
-    #[arg(long = "force", hide = true)]
-    _force: bool,
 }
 
 const EXAMPLES: &str = "Examples:

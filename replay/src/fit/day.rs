@@ -26,10 +26,11 @@ use statrs::distribution::{Beta, Binomial, ContinuousCDF as _, DiscreteCDF as _}
 
 use super::lot::{Prediction, Trial, burnt, draw_next, predict};
 use super::{Basis, Fit, Parameter, Pooled, Z_95, pooled};
-use crate::cli::{Answer, in_pool, say, text_of};
+use crate::cli::{Answer, say, text_of};
 use crate::print::counted;
 use crate::settings::{Setting, mission_toml_with, mission_with};
 use onboard_sim::files::{new_name, write_folder};
+use onboard_sim::run::threads;
 
 /// A lot's property before the next burn.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -505,7 +506,8 @@ impl Arguments {
         if let Some(flights) = self.flights {
             say(&format!("simulates {flights} flights of the day; a thousand take some minutes"));
         }
-        let learnt = in_pool(self.jobs, || learn(fits, self, &mission_toml, &set))??;
+        let learnt =
+            threads(self.jobs.map(NonZeroUsize::get))?.install(|| learn(fits, self, &mission_toml, &set))?;
         if let Some(directory) = &self.day {
             let directory = new_name(directory);
             let name = directory.display();

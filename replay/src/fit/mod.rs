@@ -45,7 +45,7 @@ use self::calibration::{Calibration, Table};
 use self::day::Learnt;
 use self::least_squares::Solution;
 pub use self::trace::{Frame, Trace};
-use crate::cli::{Answer, give, say, text_of, warn_of_damage};
+use crate::cli::{Answer, give, say, say_anyway, text_of, warn_of_damage};
 use crate::info::utc;
 use crate::output::NewFile;
 use crate::print::counted;
@@ -571,7 +571,7 @@ impl Args {
                 // One unreadable log must not hide the others.
                 Err(error) => {
                     refused = true;
-                    say(&format!("{error:#}"));
+                    say_anyway(&format!("{error:#}"));
                 }
             }
         }

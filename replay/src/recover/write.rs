@@ -85,7 +85,7 @@ impl<'a> Rescue<'a> {
         keeps: &'a mut dyn FnMut(&str, u64) -> bool,
     ) -> Result<Self, E> {
         let file = NewFile::create(output)?;
-        let path = file.path().to_owned();
+        let path = file.path.clone();
         let options = mcap::WriteOptions::new()
             .compression(Some(mcap::Compression::Lz4))
             .chunk_size(Some(CHUNK_BYTES))

@@ -38,7 +38,7 @@ use self::rerun::Rerun;
 use crate::cli::{Answer, give, warn_of_what_is_missing};
 use crate::controller::{AgainError, LoggedComputer, SETTINGS_IN_FLIGHT, phase_name};
 use crate::log::{Clock, ClockTime, Moment, Recording, Verdict};
-use crate::output::{WriteError, write_whole};
+use crate::output::{NewFile, WriteError};
 use crate::print::{counted, verdict_table};
 use crate::settings::{Setting, SettingArguments, mission_with, truth_with};
 use crate::worst_plans::BrokenPlan;
@@ -402,7 +402,7 @@ pub fn write_log(
         profile_toml: recording.profile_toml().ok().map(str::to_owned),
         scenario_toml: recording.head.scenario_toml.clone(),
     };
-    write_whole(output, |file| {
+    NewFile::create(output)?.fill(|file| {
         let mut log = LogWriter::new(BufWriter::new(file), &header).map_err(io::Error::other)?;
         for (time_s, record) in &flight.records {
             log.write(record, (time_s * 1e9) as u64).map_err(io::Error::other)?;

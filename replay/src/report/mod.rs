@@ -17,7 +17,7 @@ use track::Flight;
 use crate::cli::answer;
 use crate::info::{Completeness, Info, described};
 use crate::log::{Recording, RecordingError};
-use crate::output::write_whole;
+use crate::output::NewFile;
 
 /// A flight's page.
 #[derive(Debug, Clone)]
@@ -73,7 +73,7 @@ impl Args {
         if path.as_os_str() == "-" {
             answer(|output| output.write_all(html))?;
         } else {
-            let path = write_whole(&path, |file| file.write_all(html))?;
+            let path = NewFile::create(&path)?.fill(|file| file.write_all(html))?;
             answer(|output| writeln!(output, "{}", path.display()))?;
         }
         page.completeness.warn(&page.name);

@@ -185,7 +185,7 @@ fn many_facts_and_many_limits_do_not_fill_the_memory() {
         std::fs::write(&path, bytes).unwrap();
         for question in ["info", "verify"] {
             let (code, said) = within(200, &[question], &path);
-            assert!((0..=2).contains(&code), "{question}: {said}");
+            assert!([0, 1, 5].contains(&code), "{question}: {said}");
         }
     }
 }
