@@ -72,7 +72,7 @@ pub struct ConfigArgs {
     /// Settings file (TOML); `ground config example` prints one.
     ///
     /// Default: touchdown/ground.toml in $XDG_CONFIG_HOME or ~/.config, if there is one.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Station")]
     pub config: Option<PathBuf>,
 }
 
@@ -80,7 +80,7 @@ pub struct ConfigArgs {
 #[derive(Debug, Clone, Default, PartialEq, Eq, Args)]
 pub struct OperatorArgs {
     /// Who sits at this screen, for the log. Default: the user and the terminal, or the address of the SSH client.
-    #[arg(long, value_name = "NAME", value_parser = NonEmptyStringValueParser::new())]
+    #[arg(long, value_name = "NAME", value_parser = NonEmptyStringValueParser::new(), help_heading = "Link and vehicle")]
     pub operator: Option<String>,
 }
 
@@ -88,7 +88,7 @@ pub struct OperatorArgs {
 #[derive(Debug, Clone, Default, PartialEq, Eq, Args)]
 pub struct SocketArgs {
     /// Socket between a station and its screens. Default: one socket per station; `ground status` lists them.
-    #[arg(long, value_name = "PATH")]
+    #[arg(long, value_name = "PATH", help_heading = "Station")]
     pub socket: Option<PathBuf>,
 }
 
@@ -133,7 +133,6 @@ fn listener(given: &str) -> Result<String, String> {
 
 /// The flags of a station that are keys of its settings file, too.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Parser)]
-#[command(next_help_heading = "Station")]
 pub struct Flags {
     #[command(flatten)]
     pub link: LinkArgs,
@@ -143,34 +142,33 @@ pub struct Flags {
 
     /// The mission, built-in name or file. The demonstration flies it; default: mk3. A vehicle over --connect has to fly it: arming is
     /// refused if it flies another one.
-    #[arg(long, value_name = "NAME|FILE", alias = "profile")]
+    #[arg(long, value_name = "NAME|FILE", alias = "profile", help_heading = "Station")]
     pub mission: Option<String>,
 
     /// Checklist (TOML): arming is refused until every step is signed. `checklist-example.toml` is one.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Station")]
     pub checklist: Option<PathBuf>,
 
     /// Log to write (MCAP), or `none`. An existing file is kept: the log then gets the next free name, and says so.
     ///
     /// Default: touchdown-YYYYMMDD-HHMMSS.mcap (UTC) in the current directory.
-    #[arg(long, value_name = "FILE|none")]
+    #[arg(long, value_name = "FILE|none", help_heading = "Station")]
     pub log: Option<LogChoice>,
 
     /// Telemetry log to write beside the log (`.tlog`, for other ground stations), or `none`.
     ///
     /// Default: with --connect the name of the log with this extension; the demonstration writes none.
-    #[arg(long, value_name = "FILE|none")]
+    #[arg(long, value_name = "FILE|none", help_heading = "Station")]
     pub tlog: Option<LogChoice>,
 
     /// Send every frame that is heard on to udpout:HOST:PORT, for a map, an antenna tracker or an overlay; may be given more
     /// than once. One way: what comes back is never read.
-    #[arg(long, value_name = "LINK", value_parser = listener)]
+    #[arg(long, value_name = "LINK", value_parser = listener, help_heading = "Station")]
     pub forward: Vec<String>,
 }
 
 /// What holds the links, with or without a screen.
 #[derive(Debug, Clone, Args)]
-#[command(next_help_heading = "Demonstration")]
 pub struct StationArgs {
     #[command(flatten)]
     pub flags: Flags,
@@ -180,19 +178,19 @@ pub struct StationArgs {
 
     /// Where the demonstration begins: pad, apogee or drone, if the mission has that start. Default: the pad, if it has one. With
     /// --connect and --mission: where that flight should begin; arming is refused if it begins elsewhere.
-    #[arg(long, value_name = "START")]
+    #[arg(long, value_name = "START", help_heading = "Demonstration")]
     pub start: Option<StartPoint>,
 
     /// Demonstration: seed of its dispersions. Default: 1.
-    #[arg(long, value_name = "NUMBER", conflicts_with = "connect")]
+    #[arg(long, value_name = "NUMBER", conflicts_with = "connect", help_heading = "Demonstration")]
     pub seed: Option<u64>,
 
     /// Demonstration: speed of simulated time, a factor or `max`. Default: 1.
-    #[arg(long, value_name = "FACTOR|max", conflicts_with = "connect")]
+    #[arg(long, value_name = "FACTOR|max", conflicts_with = "connect", help_heading = "Demonstration")]
     pub speed: Option<Speed>,
 
     /// Arm and start automatically; only with a simulated vehicle. The demonstration without a screen always does.
-    #[arg(long)]
+    #[arg(long, help_heading = "Demonstration")]
     pub auto: bool,
 }
 

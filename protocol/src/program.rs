@@ -57,18 +57,11 @@ Exit codes:
 /// What every command takes.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct Shown {
-    /// Colours: always, never, or auto: on a terminal, unless NO_COLOR is set.
-    #[arg(
-        long,
-        global = true,
-        value_name = "WHEN",
-        default_value = "auto",
-        hide_default_value = true,
-        hide_possible_values = true
-    )]
+    /// Colours; auto: on a terminal, unless NO_COLOR is set.
+    #[arg(long, global = true, value_name = "WHEN", default_value = "auto", help_heading = "Output")]
     pub color: ColorChoice,
     /// Leave out progress, warnings and what happens on the way: answers and errors alone.
-    #[arg(short, long, global = true)]
+    #[arg(short, long, global = true, help_heading = "Output")]
     pub quiet: bool,
 }
 

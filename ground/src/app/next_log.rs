@@ -200,7 +200,7 @@ mod tests {
             assert_eq!(model.settings.log_path.as_deref(), Some(&*log), "a short log goes on");
             station.change_log(&mut model, &mut wire);
             say(&mut wire);
-            assert_eq!(super::super::stations::of(&model, &[]).log, path("flight-2.mcap"));
+            assert_eq!(super::super::stations::of(&model, &[]).log, Some(path("flight-2.mcap")));
             station.change_log(&mut model, &mut wire);
             say(&mut wire);
             station.close_book("the station ends", &mut model, &mut wire);
