@@ -58,10 +58,17 @@ Exit codes:
 #[derive(Debug, Clone, Copy, Args)]
 pub struct Shown {
     /// Colours; auto: on a terminal, unless NO_COLOR is set.
-    #[arg(long, global = true, value_name = "WHEN", default_value = "auto", help_heading = "Output")]
+    #[arg(
+        long,
+        global = true,
+        value_name = "WHEN",
+        default_value = "auto",
+        hide_short_help = true,
+        help_heading = "Output"
+    )]
     pub color: ColorChoice,
     /// Leave out progress, warnings and what happens on the way: answers and errors alone.
-    #[arg(short, long, global = true, help_heading = "Output")]
+    #[arg(short, long, global = true, hide_short_help = true, help_heading = "Output")]
     pub quiet: bool,
 }
 
