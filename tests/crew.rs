@@ -205,6 +205,6 @@ fn the_book_is_proven_as_the_crews_page_says() {
     places.answer(folder, "replay verify --book ground.mcap vehicle.mcap", "PROVEN");
     // The key on the page is another station's.
     let other = Running::to_end(&mut places.command(folder, "replay verify --book ground.mcap --public-key"));
-    assert_eq!(other.code, Some(1), "{}", other.output);
+    assert_eq!(other.code, Some(3), "{}", other.output);
     assert!(other.output.contains("signed with"), "{}", other.output);
 }

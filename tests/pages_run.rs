@@ -113,8 +113,8 @@ fn has_answered(line: &str, code: Option<i32>) -> bool {
         ["onboard-sim fly", "onboard-sim campaign --only"].iter().any(|begin| line.starts_with(begin));
     match code {
         Some(0) => true,
-        Some(1) => line.starts_with("replay "),
-        Some(3 | 4) => flies,
+        Some(3) => flies || line.starts_with("replay "),
+        Some(4) => flies,
         _ => false,
     }
 }

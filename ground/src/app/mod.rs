@@ -274,10 +274,7 @@ async fn start(
     });
     go_on_with_what_is_kept(&mut model, recorder.as_ref(), is_daemon, clock.now()).await;
     let server = serve(args, &mut model, duty, &clock).await?;
-    let mut output = Output::open(interactive, config)?;
-    if json {
-        output.lines = Lines::closed();
-    }
+    let output = if json { Output::lines(Lines::closed()) } else { Output::open(interactive, config)? };
     model.repeats_reported = output.reports_repeats();
     let mut station = Station {
         clock,

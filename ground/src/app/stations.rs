@@ -207,10 +207,10 @@ pub(super) async fn explain(error: anyhow::Error, endpoints: &[LinkAddress]) -> 
         links.any(|link| places.contains(&kind_and_port(link))).then_some(status)
     });
     match holder {
-        Some(status @ StationStatus { pid, link, .. }) => error.context(format!(
+        Some(status @ StationStatus { pid, link, .. }) => anyhow::anyhow!(
             "your ground station pid {pid} ({}) uses {link}: `ground attach` shows it, `ground stop` ends it",
             phase_of(status)
-        )),
+        ),
         None => error.context("another program uses the address; none of your ground stations does"),
     }
 }

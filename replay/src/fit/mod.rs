@@ -485,7 +485,7 @@ impl Answer for FitReport {
 
     fn outcome(&self) -> Exit {
         let go = self.day.as_ref().and_then(|day| day.go);
-        go.map_or(Exit::Yes, |yes| Exit::of(yes))
+        go.map_or(Exit::Yes, Exit::of)
     }
 }
 
