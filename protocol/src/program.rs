@@ -139,7 +139,7 @@ mod tests {
     #[test]
     fn the_list_has_every_code() {
         use Exit::{Error, No, NotSeen, RefusedOrAborted, Usage, Yes};
-        let listed: Vec<&str> = EXIT_CODES.lines().skip(1).map(|line| line.trim_start()).collect();
+        let listed: Vec<&str> = EXIT_CODES.lines().skip(1).map(str::trim_start).collect();
         for (exit, line) in [Yes, Error, Usage, No, RefusedOrAborted, NotSeen].into_iter().zip(listed) {
             assert!(line.starts_with(&format!("{}  ", exit as u8)), "{line}");
         }
