@@ -58,7 +58,7 @@ fn a_file_that_is_not_a_log_is_named_and_leaves_nothing_behind() {
         (&missing, &rrd, "none.mcap: cannot be read"),
         (&log, &nowhere, "flight.rrd: cannot be written"),
     ] {
-        let error = export(log, None, to.into()).unwrap_err().to_string();
+        let error = export(log, None, to).unwrap_err().to_string();
         assert!(error.contains(words), "{error}");
     }
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2, "the log and the table");
