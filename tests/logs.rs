@@ -87,7 +87,7 @@ fn a_file_that_is_no_log_is_refused_by_name() {
     let picture = folder.path().join("picture.mcap");
     std::fs::write(&picture, b"\x89PNG\r\n\x1a\n and so on").unwrap();
     let refused = verify(&picture, None);
-    assert_eq!(refused.code, Some(2), "{}", refused.output);
+    assert_eq!(refused.code, Some(1), "{}", refused.output);
     assert!(
         refused.output.contains("not a flight log") && refused.output.contains("picture.mcap"),
         "{}",

@@ -22,7 +22,7 @@ fn over_udp_they_land_and_the_log_of_the_vehicle_replays() {
     // The ground's log has no controller ticks, and `replay verify` says so.
     let mut verify = program(Program::Replay);
     let telemetry_only = Running::to_end(verify.args(["verify", "ground.mcap"]).current_dir(folder.path()));
-    assert_eq!(telemetry_only.code, Some(2), "{}", telemetry_only.output);
+    assert_eq!(telemetry_only.code, Some(5), "{}", telemetry_only.output);
 }
 
 #[test]

@@ -89,6 +89,11 @@ pub fn read(program: Command) -> Result<ArgMatches, clap::Error> {
     let first = words.next().unwrap_or_default();
     let when = first.strip_prefix("--color=").map(str::to_owned).or_else(|| words.next());
     let color = when.and_then(|when| when.parse().ok()).unwrap_or_default();
+    let name = program.get_name().to_owned();
+    let program = ["completions bash", "man"].into_iter().fold(program, |program, words| {
+        let command = words.split(' ').next().unwrap_or_default().to_owned();
+        program.mut_subcommand(command, |command| command.after_help(format!("Example: {name} {words}")))
+    });
     let given = program.color(color).try_get_matches()?;
     QUIET.store(given.get_flag("quiet"), Ordering::Relaxed);
     Ok(given)
