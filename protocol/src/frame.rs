@@ -19,7 +19,7 @@ const HEADER_LEN: usize = 10;
 const CRC_LEN: usize = 2;
 /// Length of a signature, bytes: link id, six bytes of timestamp, six of hash.
 pub const SIGNATURE_LEN: usize = 13;
-const INCOMPAT_SIGNED: u8 = 0x01;
+pub(crate) const INCOMPAT_SIGNED: u8 = 0x01;
 /// The message SETUP_SIGNING, which contains a key in the clear.
 const SETUP_SIGNING_ID: u32 = 256;
 
@@ -88,11 +88,6 @@ impl Frame {
         self.signature().map_or(0, |signature| crate::signing::key_number(signature[0]))
     }
 
-    /// Returns the same frame marked as signed, without its signature, which must follow.
-    pub(crate) fn marked_signed(&self) -> Self {
-        self.with_flags(INCOMPAT_SIGNED)
-    }
-
     /// Appends a signature to a frame that is marked as signed.
     pub(crate) fn push_signature(&mut self, signature: &[u8; SIGNATURE_LEN]) {
         self.bytes.extend_from_slice(signature);
@@ -119,7 +114,7 @@ impl Frame {
         Some(cut.unwrap_or_else(|| self.without_signature().bytes))
     }
 
-    fn with_flags(&self, flags: u8) -> Self {
+    pub(crate) fn with_flags(&self, flags: u8) -> Self {
         let crc_at = HEADER_LEN + usize::from(self.bytes[1]);
         let mut bytes = self.bytes[..crc_at].to_vec();
         bytes[2] = flags;

@@ -16,7 +16,7 @@ use core::time::Duration;
 
 use sha2::{Digest as _, Sha256};
 
-use crate::frame::{Frame, SIGNATURE_LEN};
+use crate::frame::{Frame, INCOMPAT_SIGNED, SIGNATURE_LEN};
 use crate::identity::Address;
 
 /// A new stream may begin at most this far behind our own time: one minute.
@@ -224,7 +224,8 @@ impl Signing {
     pub fn sign(&mut self, frame: &Frame, link_id: u8, clock: u64) -> Frame {
         self.memory.ours = clock.max(self.memory.ours + 1).min(MAX_STAMP);
         self.memory.clock = self.memory.clock.max(clock);
-        let mut signed = frame.marked_signed();
+        // Without its signature, which must follow.
+        let mut signed = frame.with_flags(INCOMPAT_SIGNED);
         let mut signature = [0; SIGNATURE_LEN];
         signature[0] = link_id;
         signature[1..7].copy_from_slice(&self.memory.ours.to_le_bytes()[..6]);

@@ -172,7 +172,7 @@ impl Server {
                     if let Some(session) = self.session_of(*client, packet.session)
                         && packet.opcode == Opcode::BurstReadFile
                     {
-                        session.end_burst();
+                        session.burst = None;
                     }
                     self.answer(link, *client, packet.nak(Refusal::EndOfFile));
                 }
@@ -491,10 +491,6 @@ impl Session {
         } else if self.reads.len() < MAX_READS && !self.reads.contains(request) {
             self.reads.push_back(request.clone());
         }
-    }
-
-    fn end_burst(&mut self) {
-        self.burst = None;
     }
 
     /// The next packet. Single pieces and a burst take turns, so that neither waits for the other.
