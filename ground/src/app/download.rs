@@ -16,7 +16,7 @@ use tokio::time::{MissedTickBehavior, interval};
 use super::KeyRing;
 use super::clock::{Clock, LogTime, Signals};
 use super::output::print;
-use super::stations::explain;
+use super::stations::explained;
 use super::wire::Wire;
 use crate::cli::DownloadArgs;
 use crate::exit::Exit;
@@ -38,10 +38,7 @@ pub(in crate::app) async fn run_download(args: &DownloadArgs) -> anyhow::Result<
     let clock = Clock::start();
     let log_time = LogTime::Run(clock);
     let opened = Wire::open((us, vehicle), link.connect.clone(), key, clock, None, log_time).await;
-    let mut wire = match opened {
-        Ok(wire) => wire,
-        Err(error) => return Err(explain(error, &link.connect).await),
-    };
+    let mut wire = explained(opened, &link.connect).await?;
     // Another number every millisecond: its requests differ from those of an earlier download.
     let mut download = Download::new(name.as_deref(), (clock.start_unix_ns() >> 20) as u16);
     let mut kept: Option<Kept> = None;
@@ -189,6 +186,12 @@ impl Kept {
         if std::fs::hard_link(&beginning, &free).is_ok() {
             std::fs::remove_file(&beginning)?;
         } else {
+            anyhow::ensure!(
+                free.symlink_metadata().is_err(),
+                "{} is here by now; the download is in {}",
+                free.display(),
+                beginning.display()
+            );
             std::fs::rename(&beginning, &free)?;
         }
         if let Some(words) = other_name(&whole, &free) {

@@ -218,10 +218,7 @@ async fn start(
     let opened =
         Wire::open((link.us(), link.vehicle()), endpoints, key, clock, recorder.clone(), log_time.clone())
             .await;
-    let mut wire = match opened {
-        Ok(wire) => wire,
-        Err(error) => return Err(stations::explain(error, &link.connect).await),
-    };
+    let mut wire = stations::explained(opened, &link.connect).await?;
     wire.forward_to(&args.flags.forward)?;
     let demo = match (&demo_options, vehicle_clock) {
         (Some(options), Some(vehicle_clock)) => {

@@ -6,8 +6,6 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 
-use protocol::log::recorder::free_name;
-
 /// How many callouts wait for the command; further ones are dropped, because late words mislead.
 const WAITING_MAX: usize = 4;
 
@@ -112,27 +110,26 @@ pub(super) fn in_a_thread<T: Send + 'static>(
 /// A report that is being written: where it is, or why it is not.
 pub(super) type Writing = Receiver<Result<String, String>>;
 
-/// Starts to write the report beside the log, under a name that is free.
+/// Starts to write the report beside the log; `replay` gives it a name that is free.
 ///
 /// # Errors
 /// No thread can be started.
 pub(super) fn begin_report(log: &Path) -> Result<Writing, String> {
-    let page = free_name(&log.with_extension("html"));
     let log = log.to_owned();
-    in_a_thread("report", move || write_report(&log, &page)).map_err(|error| error.to_string())
+    in_a_thread("report", move || write_report(&log)).map_err(|error| error.to_string())
 }
 
-fn write_report(log: &Path, page: &Path) -> Result<String, String> {
+fn write_report(log: &Path) -> Result<String, String> {
     // The program beside this one, otherwise the one that the shell would find.
     let beside = std::env::current_exe().ok().map(|own| own.with_file_name("replay"));
     let program = beside.filter(|program| program.exists()).unwrap_or_else(|| PathBuf::from("replay"));
     let ran = Command::new(&program)
-        .args(["report".as_ref(), log.as_os_str(), "--out".as_ref(), page.as_os_str()])
+        .args(["report".as_ref(), log.as_os_str()])
         .stdin(Stdio::null())
         .output()
         .map_err(|error| format!("{}: {error}", program.display()))?;
     if ran.status.success() {
-        return Ok(page.display().to_string());
+        return Ok(protocol::text::printable(ran.stdout.trim_ascii()));
     }
     let words = protocol::text::printable(&ran.stderr);
     Err(words.lines().last().unwrap_or("replay report failed").to_owned())
@@ -180,6 +177,7 @@ mod voice_tests {
 #[cfg(test)]
 mod report_tests {
     use super::*;
+    use protocol::log::recorder::free_name;
 
     #[test]
     fn a_report_gets_a_free_name_and_a_wrong_log_is_told() {

@@ -191,14 +191,18 @@ pub(super) async fn running_beside() -> Option<String> {
     }
 }
 
-/// Explains why a link could not be opened; if the address is in use, by which station.
-pub(super) async fn explain(error: anyhow::Error, endpoints: &[LinkAddress]) -> anyhow::Error {
+/// What was opened, or why it could not be; if the address is in use, by which station.
+///
+/// # Errors
+/// It was not opened.
+pub(super) async fn explained<T>(opened: anyhow::Result<T>, endpoints: &[LinkAddress]) -> anyhow::Result<T> {
     let in_use = |cause: &(dyn std::error::Error + 'static)| {
         cause.downcast_ref::<io::Error>().is_some_and(|error| error.kind() == ErrorKind::AddrInUse)
     };
-    if !error.chain().any(in_use) {
-        return error;
-    }
+    let error = match opened {
+        Err(error) if error.chain().any(in_use) => error,
+        opened => return opened,
+    };
     let places: Vec<String> = endpoints.iter().map(|endpoint| kind_and_port(&endpoint.to_string())).collect();
     let found = stations().await.unwrap_or_default();
     let holder = found.iter().find_map(|(_, status)| {
@@ -206,13 +210,13 @@ pub(super) async fn explain(error: anyhow::Error, endpoints: &[LinkAddress]) -> 
         let mut links = status.link.split(" and ");
         links.any(|link| places.contains(&kind_and_port(link))).then_some(status)
     });
-    match holder {
+    Err(match holder {
         Some(status @ StationStatus { pid, link, .. }) => anyhow::anyhow!(
             "your ground station pid {pid} ({}) uses {link}: `ground attach` shows it, `ground stop` ends it",
             phase_of(status)
         ),
         None => error.context("another program uses the address; none of your ground stations does"),
-    }
+    })
 }
 
 /// Kind and port of a link: a port can be opened only once, whatever the address.

@@ -92,6 +92,13 @@ struct Run {
     symbols: String,
 }
 
+impl Run {
+    /// Whether every terminal gives it the same columns: not a letter of two, which is a run of its own.
+    fn is_narrow(&self) -> bool {
+        self.symbols.chars().count() == usize::from(self.columns)
+    }
+}
+
 /// The cells as runs, from row to row. Blanks belong to the letters beside them, whatever colour these have.
 fn runs<'a>(content: impl Iterator<Item = (u16, u16, &'a Cell)>, shown: fn(Color) -> Color) -> Vec<Run> {
     let mut runs: Vec<Run> = Vec::new();
@@ -102,7 +109,9 @@ fn runs<'a>(content: impl Iterator<Item = (u16, u16, &'a Cell)>, shown: fn(Color
         let beside = runs.last_mut().filter(|run| {
             let one_back = run.style.back == style.back
                 && !(run.style.modifier | style.modifier).contains(Modifier::REVERSED);
-            run.from == (row, column.wrapping_sub(run.columns))
+            columns == 1
+                && run.is_narrow()
+                && run.from == (row, column.wrapping_sub(run.columns))
                 && (run.style == style || one_back && (is_blank || run.is_blank))
         });
         match beside {
@@ -199,9 +208,7 @@ impl<W: Write> Backend for DiffBackend<W> {
                 out.write_all(way(cursor, run.from).as_bytes())?;
                 write_symbols(out, &run.symbols, self.erases)?;
                 let (row, column) = run.from;
-                // Behind a letter that terminals do not all give the same columns the place is not sure, either.
-                let is_sure = column + run.columns <= self.rightmost
-                    && run.symbols.chars().count() == usize::from(run.columns);
+                let is_sure = column + run.columns <= self.rightmost && run.is_narrow();
                 cursor = is_sure.then_some((row, column + run.columns));
             }
         }

@@ -322,5 +322,5 @@ fn the_review_says_what_went_wrong() {
     let mut rig = judged([0.4, 0.1], TdLanding::all(), TdLimit::empty(), TdChute::TD_CHUTE_STOWED);
     rig.finding(0, 0, 0.0, "");
     rig.key(Key::Char('4'));
-    assert!(rig.screen(120, 36).contains("nothing found"), "{}", rig.screen(120, 36));
+    assert!(rig.screen(120, 36).contains("nothing went wrong"), "{}", rig.screen(120, 36));
 }
