@@ -6,7 +6,7 @@ use protocol::log::computer_v1::ComputerFrame;
 use serde::Serialize;
 
 use crate::controller::{FrameError, LoggedComputer};
-use crate::log::{Recording, Verdict, VerdictLimit};
+use crate::log::{Recording, Verdict, worst_first};
 
 /// One finding.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -90,10 +90,7 @@ fn section(sign: Sign) -> &'static str {
 fn broken(verdict: &Verdict, findings: &Findings) -> Option<String> {
     // A vehicle that comes down under its parachute is judged by nothing else.
     let judged = verdict.deciding().all(|limit| limit.maximum > limit.minimum);
-    let mut broken: Vec<(&VerdictLimit, f64)> =
-        verdict.deciding().filter(|limit| !limit.passed).map(|limit| (limit, limit.share())).collect();
-    broken.retain(|_| judged);
-    broken.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let broken = worst_first(verdict.deciding().filter(|limit| judged && !limit.passed));
     let ((worst, share), others) = broken.split_first()?;
     let also: Vec<String> =
         others.iter().map(|(limit, share)| format!("{} {}", limit.name, over(*share))).collect();

@@ -3,9 +3,10 @@
 use std::io;
 use std::io::Write;
 
+use protocol::log::v1::LimitResult;
 use serde::Serialize;
 
-use crate::log::{Verdict, VerdictLimit};
+use crate::log::Verdict;
 
 /// Writes any report as JSON.
 ///
@@ -54,19 +55,19 @@ pub(crate) fn verdict_table(names: [&str; 2], both: [Option<&Verdict>; 2]) -> Ve
             |verdict| format!("{} at {}", verdict.landing.word(), verdict.contact()),
         )
     });
-    let mut limits: Vec<&VerdictLimit> = Vec::new();
+    let mut limits: Vec<&LimitResult> = Vec::new();
     for limit in both.into_iter().rev().flatten().flat_map(Verdict::of_the_legs) {
         if !limits.iter().any(|known| known.name == limit.name) {
             limits.push(limit);
         }
     }
-    let row = |limit: &VerdictLimit| {
+    let row = |limit: &LimitResult| {
         let [first, second] = both.map(|verdict| {
             let found =
                 verdict.and_then(|verdict| verdict.of_the_legs().find(|found| found.name == limit.name));
             found.map_or_else(
                 || "-".to_owned(),
-                |VerdictLimit { value, unit, passed, .. }| {
+                |LimitResult { value, unit, passed, .. }| {
                     format!("{value:.4} {unit}{}", if *passed { "" } else { " OUTSIDE" })
                         .trim_end()
                         .to_owned()

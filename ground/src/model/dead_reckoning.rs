@@ -104,17 +104,21 @@ pub fn course(vehicle: &Vehicle, now: Duration) -> Vec<(f64, NorthEastUp)> {
     let mut course: Vec<(f64, NorthEastUp)> = Vec::new();
     for step in 0..(COURSE_LONGEST_S / COURSE_STEP_S) as u32 {
         let ahead_s = f64::from(step) * COURSE_STEP_S;
-        let at = along_plan(vehicle, phase, now + Duration::from_secs_f64(ahead_s))
-            .unwrap_or_else(|| last.after(age_s + ahead_s));
-        let falls = course.last().is_some_and(|(_, before)| before[2] > at.altitude_m);
+        let planned = along_plan(vehicle, phase, now + Duration::from_secs_f64(ahead_s));
+        let planned = planned.map(|at| ([at.x_m, at.y_m, at.altitude_m], at.landed_after_s));
+        let ([x_m, y_m, altitude_m], landed_after_s) = planned.unwrap_or_else(|| {
+            let (place, landed_after_s, _) = last.follow(age_s + ahead_s);
+            (place, landed_after_s)
+        });
+        let falls = course.last().is_some_and(|(_, before)| before[2] > altitude_m);
         if phase == TdPhase::TD_PHASE_COAST && falls {
             break;
         }
         course.push((
-            at.landed_after_s.map_or(ahead_s, |landed_s| (landed_s - age_s).clamp(0.0, ahead_s)),
-            [at.x_m, at.y_m, at.altitude_m.max(0.0)],
+            landed_after_s.map_or(ahead_s, |landed_s| (landed_s - age_s).clamp(0.0, ahead_s)),
+            [x_m, y_m, altitude_m.max(0.0)],
         ));
-        if at.landed_after_s.is_some() {
+        if landed_after_s.is_some() {
             break;
         }
     }

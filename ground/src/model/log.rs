@@ -123,6 +123,7 @@ impl Model {
         self.unfit_log(now).map(|(_, words)| format!("station log {words}"))
     }
 
+    /// What is wrong with the log; `None` if it is fit, or if the crew goes on without it.
     pub(crate) fn unfit_log(&self, now: Duration) -> Option<(LogFault, String)> {
         match self.station_log(now) {
             LogStanding::Unfit(fault, words) if self.without_log != Some(fault) => Some((fault, words)),

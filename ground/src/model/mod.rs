@@ -197,7 +197,7 @@ pub struct Model {
     pub crew: Crew,
     /// Whether the terminal distinguishes a held key's repeats from presses, so that repeats never arrive here.
     pub repeats_reported: bool,
-    /// How old what the terminal of this screen shows is.
+    /// How late the terminal shows what was drawn.
     pub screen_late: Duration,
     pub events: Events,
     pub outcome: FlightSoFar,

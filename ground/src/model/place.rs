@@ -17,7 +17,7 @@ const HEARD_ERROR_M: f64 = 1.5;
 pub struct Spot {
     pub north_m: f64,
     pub east_m: f64,
-    /// The radius of the circle that contains the vehicle in 19 of 20 cases, m.
+    /// The radius around it in which it may be, m; of a place where it was or is, in 19 of 20 cases.
     pub error_m: f64,
 }
 
@@ -109,16 +109,15 @@ impl Model {
     /// Where a vehicle that left the pad unheard is meant to come down: at the touchdown that it predicted, else at the pad,
     /// anywhere inside the fence of its mission. `None` if it has reported no fence.
     pub fn meant_to_come_down(&self) -> Option<Spot> {
-        let fence_m = f64::from(self.vehicle.limits()?.fence_m);
+        let fence_m = self.vehicle.fence_m()?;
         let predicted = self.vehicle.descent().map(|descent| descent.value);
         let known =
             |value: Option<f32>| value.map(f64::from).filter(|value| value.is_finite()).unwrap_or(0.0);
-        let spot = Spot {
+        Some(Spot {
             north_m: known(predicted.as_ref().map(|descent| descent.touchdown_x_m)),
             east_m: known(predicted.map(|descent| descent.touchdown_y_m)),
             error_m: fence_m,
-        };
-        (fence_m.is_finite() && fence_m > 0.0).then_some(spot)
+        })
     }
 }
 

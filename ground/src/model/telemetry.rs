@@ -52,11 +52,11 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) {
         }
         MavMessage::GLOBAL_POSITION_INT(data) => {
             vehicle.hud = Some(Sample::new(Motion::of_global(data), now));
-            // Until the vehicle tells its pad: both are of the same quarter of a second.
-            let pad = vehicle.motion.and_then(|Sample { value, .. }| {
-                Some(Degrees::of_e7(data.lat, data.lon)?.moved(-value.x_m, -value.y_m))
+            // Until the vehicle tells its pad. The two positions are at most a quarter of a second apart.
+            vehicle.pad = vehicle.pad.or_else(|| {
+                let motion = vehicle.motion?.value;
+                Some(Degrees::of_e7(data.lat, data.lon)?.moved(-motion.x_m, -motion.y_m))
             });
-            vehicle.pad = vehicle.pad.or(pad);
         }
         MavMessage::HOME_POSITION(data) => {
             vehicle.pad = Degrees::of_e7(data.latitude, data.longitude).or(vehicle.pad);
@@ -172,8 +172,7 @@ fn hear_foreign(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) -> b
         MavMessage::HEARTBEAT(beat) if !may_be_ours(beat) => {
             // Beside one of ours it is a second vehicle, and what ours tells stays.
             if vehicle.status.is_none() {
-                let foreign = vehicle.foreign.take();
-                *vehicle = Vehicle { boot: std::mem::take(&mut vehicle.boot), foreign, ..Vehicle::default() };
+                *vehicle = Vehicle { boot: std::mem::take(&mut vehicle.boot), ..Vehicle::default() };
                 vehicle.heartbeat = Some(Sample::new(heartbeat(beat), now));
             }
             vehicle.foreign = Some(Foreign::of(beat, now));

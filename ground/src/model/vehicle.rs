@@ -124,7 +124,7 @@ pub struct Vehicle {
     pub told: Told,
     /// `GLOBAL_POSITION_INT`: height above the pad and climb, for a vehicle that sends no local position.
     pub hud: Option<Sample<Motion>>,
-    /// `HOME_POSITION`: where its pad is on the Earth.
+    /// Where its pad is on the Earth: by `HOME_POSITION`, before that by its two positions.
     pub pad: Option<Degrees>,
     pub prediction: Option<Sample<Prediction>>,
     /// `TD_PREDICTED_PATH`: x and altitude, m.
@@ -297,6 +297,11 @@ impl Vehicle {
         let descent = self.descent()?;
         let sample = Sample::new(f64::from(pick(&descent.value)), descent.received_at);
         Some(sample).filter(|sample| sample.value.is_finite())
+    }
+
+    /// The radius of the fence of its mission, m; `None` if it has told none.
+    pub fn fence_m(&self) -> Option<f64> {
+        self.limits().map(|limits| f64::from(limits.fence_m)).filter(|m| m.is_finite() && *m > 0.0)
     }
 
     /// A coordinate of the predicted touchdown. At the beginning of the fall, until the vehicle knows its ignition band, it follows

@@ -57,8 +57,19 @@ pub fn of_event(text: &str) -> Option<Cow<'_, str>> {
     }
     match text.strip_prefix("controller level ") {
         Some("CONVERGED") => None,
-        Some(level) => Some(format!("steered: {}", level.to_lowercase().replace('_', " ")).into()),
+        Some(level) => Some(format!("burn {}", steered(level)).into()),
         None => Some(text.trim_end_matches(" (HEARTBEAT)").into()),
+    }
+}
+
+/// What steers the burn, by the name of its level, as in `SHIFTED_PLAN`.
+pub fn steered(level: &str) -> String {
+    match level {
+        "CONVERGED" => "on its plan".to_owned(),
+        "BEST_FEASIBLE" => "near its plan".to_owned(),
+        "SHIFTED_PLAN" => "on its last plan".to_owned(),
+        "STABILISER" => "UPRIGHT, NO PLAN".to_owned(),
+        other => other.to_lowercase().replace('_', " "),
     }
 }
 
@@ -79,7 +90,7 @@ pub fn lower_case(value: &impl Debug, prefix: &str) -> String {
     without_prefix(value, prefix).to_lowercase().replace('_', " ")
 }
 
-fn without_prefix(value: &impl Debug, prefix: &str) -> String {
+pub(crate) fn without_prefix(value: &impl Debug, prefix: &str) -> String {
     let name = format!("{value:?}");
     name.strip_prefix(prefix).unwrap_or(&name).to_owned()
 }
@@ -192,7 +203,7 @@ mod tests {
             ("phase PAD_IDLE -> PAD_ARMED", None),
             ("phase PAD_ARMED -> BOOST", None),
             ("controller level CONVERGED", None),
-            ("controller level SHIFTED_PLAN", Some("steered: shifted plan")),
+            ("controller level SHIFTED_PLAN", Some("burn on its last plan")),
             ("disarmed (HEARTBEAT)", Some("disarmed")),
             ("phase 3 of the moon", None),
             ("landing motor commanded to light", Some("landing motor commanded to light")),

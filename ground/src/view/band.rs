@@ -111,11 +111,12 @@ const NARROW: Size = (1, 1);
 const SIZES: [[Size; 2]; 3] = [[(2, 1), NARROW], [(2, 2), NARROW], [(3, 3), (2, 2)]];
 
 /// Rows of a letter.
-fn rows_of((_, halves): Size) -> u16 {
+const fn rows_of((_, halves): Size) -> u16 {
     (5 * halves).div_ceil(2)
 }
+
 /// Columns and rows of the smallest letter.
-pub const LETTER: (u16, u16) = (DIGIT_PIXELS, 3);
+pub const LETTER: (u16, u16) = (DIGIT_PIXELS, rows_of(NARROW));
 
 /// Draws the main item at the left with the line under it, the others to its right, and returns the area below.
 pub fn draw_band(
@@ -188,7 +189,8 @@ fn big(item: &Item, size: Size, theme: Theme, frame: &mut Frame, at: Rect) {
     if item.pixels * width > at.width + width || (theme.ascii && size == NARROW) {
         // Small halves of a row cannot be told apart in ASCII.
         let spaced: String = item.text.chars().flat_map(|letter| [letter, ' ']).collect();
-        return draw_line(frame, Rect { y: at.y + 1, height: 1, ..at }, Line::styled(spaced, style));
+        let middle = Rect { y: at.y + 1, height: 1, ..at }.intersection(at);
+        return draw_line(frame, middle, Line::styled(spaced, style));
     }
     for (place, column) in columns(&item.text).enumerate() {
         let pixel = |half: u16| column.get(usize::from(half / halves)) == Some(&true);

@@ -230,15 +230,13 @@ const FRAME_ROWS: u16 = 3;
 const KEY_COLUMNS: usize = 7;
 
 pub fn draw_palette(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let title = match model.pages.entry {
-        Some(TextEntry::Palette { .. }) => "Every action",
-        Some(TextEntry::Note { .. }) => "Note for log and book",
+    // A note leaves the page to be seen.
+    let (title, rows) = match model.pages.entry {
+        Some(TextEntry::Palette { .. }) => ("Every action", area.height),
+        Some(TextEntry::Note { .. }) => ("Note for log and book", FRAME_ROWS + 1),
         _ => return,
     };
     let width = PALETTE_COLUMNS.min(area.width);
-    // A note leaves the page to be seen.
-    let rows =
-        if matches!(model.pages.entry, Some(TextEntry::Note { .. })) { FRAME_ROWS + 1 } else { area.height };
     let area = Rect { y: area.bottom().saturating_sub(rows), height: rows, ..area };
     let at = Rect { x: area.x + (area.width - width) / 2, width, ..area }.intersection(frame.area());
     let inside = pop_up(title, theme, frame, at);

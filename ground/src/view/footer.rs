@@ -13,6 +13,7 @@ use super::lists::said;
 use super::status_lines::{alarm_text, replay_line};
 use super::{Ink, TextRole, Theme, draw_line, side_by_side, top_lines};
 use crate::model::{Act, Model, Page, dead_reckoning::course, is_burning, is_flight, is_on_pad, words};
+use crate::view::pictures::seconds_since;
 
 /// From this width on the flight has a second row, for the names of its events with their times.
 const TWO_ROWS_COLUMNS: usize = 120;
@@ -147,7 +148,7 @@ fn timeline(model: &Model, theme: Theme, now: Duration, columns: usize, is_wide:
     // A name stands under its mark, else beside it, where nothing else is; without room it goes.
     for (name, at, exactly, _, ink) in &marks {
         let begin = column(*at);
-        let time_s = exactly.as_secs_f64() - lift_off.as_secs_f64();
+        let time_s = seconds_since(*exactly, lift_off);
         let name = if is_wide { format!("{name} {time_s:.1}") } else { (*name).to_owned() };
         let length = name.len();
         // Before its mark only where that is its alone.

@@ -197,7 +197,7 @@ pub fn of_flight(model: &Model, now: Duration) -> (Item, Vec<Item>) {
     let climb = || number("climb m/s", vertical, 0, 3, now);
     let tilt = || number("tilt deg", vehicle.tilt_deg(), 0, 3, now);
     let off_pad = comes_down(model, now).map(|at| Sample::new(libm::hypot(at.east_m, at.north_m), now));
-    let fence_m = vehicle.limits().map(|limits| f64::from(limits.fence_m));
+    let fence_m = vehicle.fence_m();
     let lands_off = || {
         let mut lands = number("lands off m", off_pad, 0, 3, now).predicted();
         if off_pad.zip(fence_m).is_some_and(|(off_pad, fence_m)| off_pad.value > fence_m) {

@@ -1,4 +1,4 @@
-//! Lists of lines: the newest events, the checklist, and the filter above a list.
+//! Lists of lines: the newest events and the checklist.
 
 use std::borrow::Cow;
 use std::time::Duration;
@@ -9,6 +9,7 @@ use textwrap::{Options, WordSeparator, WordSplitter};
 
 use super::{TextRole, Theme, fixed, footer::flight_began};
 use crate::model::{Act, Event, Mark, Model, Step, StepState, role_name, words};
+use crate::view::pictures::seconds_since;
 
 /// Columns before the text of an event: time, speaker and mark.
 const TIME_COLUMNS: usize = 7;
@@ -60,7 +61,7 @@ pub fn said(model: &Model) -> impl Iterator<Item = (&Event, Cow<'_, str>)> {
 /// The time of an event: from the lift-off once there was one, otherwise since the start of the run. The longest lose their tenth.
 pub fn clock_time(at: Duration, lift_off: Option<Duration>) -> String {
     let Some(lift_off) = lift_off else { return format!("{:.1}", at.as_secs_f64()) };
-    let since_s = at.as_secs_f64() - lift_off.as_secs_f64();
+    let since_s = seconds_since(at, lift_off);
     let decimals = usize::from(since_s.abs() < 999.0);
     format!("T{since_s:+.decimals$}")
 }

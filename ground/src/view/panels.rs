@@ -14,14 +14,15 @@ use crate::model::{
 
 /// What steers the burn.
 pub fn steered(level: TdControlLevel) -> (String, TextRole) {
-    let (words, role) = match level {
-        TdControlLevel::TD_CONTROL_LEVEL_CONVERGED => ("on its plan", TextRole::Good),
-        TdControlLevel::TD_CONTROL_LEVEL_BEST_FEASIBLE => ("near its plan", TextRole::Caution),
-        TdControlLevel::TD_CONTROL_LEVEL_SHIFTED_PLAN => ("on its last plan", TextRole::Caution),
-        TdControlLevel::TD_CONTROL_LEVEL_STABILISER => ("UPRIGHT, NO PLAN", TextRole::Alarm),
-        other => return (words::lower_case(&other, "TD_CONTROL_LEVEL_"), TextRole::Plain),
+    let role = match level {
+        TdControlLevel::TD_CONTROL_LEVEL_CONVERGED => TextRole::Good,
+        TdControlLevel::TD_CONTROL_LEVEL_BEST_FEASIBLE | TdControlLevel::TD_CONTROL_LEVEL_SHIFTED_PLAN => {
+            TextRole::Caution
+        }
+        TdControlLevel::TD_CONTROL_LEVEL_STABILISER => TextRole::Alarm,
+        _ => TextRole::Plain,
     };
-    (words.to_owned(), role)
+    (words::steered(&words::without_prefix(&level, "TD_CONTROL_LEVEL_")), role)
 }
 
 /// How the flight ended.

@@ -72,7 +72,7 @@ fn event(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> Option<(String, St
 }
 
 /// Whether the vehicle says that its landing motor will not light.
-fn is_inhibited(vehicle: &Vehicle) -> bool {
+pub fn is_inhibited(vehicle: &Vehicle) -> bool {
     vehicle.interlocks().is_some() && !vehicle.may_light()
 }
 

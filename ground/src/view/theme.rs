@@ -136,7 +136,7 @@ const LIGHT: Colours = Colours {
     levels: [(231, 239), (16, 214), (231, 124), (231, 22)],
 };
 
-/// The numbers of the palettes, and what a terminal of 24 bits shows for each: red, green and blue.
+/// The numbers of the palettes but 231, which stays white, and what a terminal of 24 bits shows for each: red, green and blue.
 const NUMBERS: [u8; 22] =
     [16, 19, 22, 23, 75, 79, 88, 90, 124, 195, 214, 215, 218, 221, 233, 234, 238, 239, 240, 246, 249, 255];
 #[expect(clippy::unreadable_literal, reason = "two digits each for red, green and blue")]
@@ -293,19 +293,15 @@ pub fn flatten(buffer: &mut Buffer) {
 fn ascii(c: char) -> char {
     match c {
         '─' | '━' => '-',
-        '│' | '┃' | '▐' | '▌' => '|',
-        '┌' | '┐' | '└' | '┘' | '├' | '┤' | '┬' | '┴' | '┼' | '╭' | '╮' | '╰' | '╯' | '✓' => {
-            '+'
-        }
-        '█' | '▙' | '▛' | '▜' | '▟' | '▇' => '#',
+        '│' => '|',
+        '┌' | '┐' | '└' | '┘' | '├' | '┤' | '┬' | '┴' | '┼' | '✓' => '+',
+        '█' | '▇' => '#',
         '▀' => '"',
         '▄' | '▁' | '▂' | '▃' => '_',
-        '·' | '▖' | '▗' | '▘' | '▝' | '┄' => '.',
-        '•' | '●' => '*',
+        '·' | '┄' => '.',
+        '●' => '*',
         '○' => 'o',
         '×' => 'x',
-        '┊' => ':',
-        '▚' | '▞' => '%',
         '▅' | '▆' => '=',
         '↑' | '◆' | '▲' => '^',
         '↓' => 'v',

@@ -63,11 +63,6 @@ pub fn ticks(from: f64, to: f64, step: f64) -> impl Iterator<Item = f64> {
     (0..count).map(move |k| (first + f64::from(k)) * step)
 }
 
-/// The decimals that a step needs.
-pub fn tick_decimals(step: f64) -> usize {
-    (-libm::floor(libm::log10(step))).clamp(0.0, 6.0) as usize
-}
-
 #[cfg(test)]
 mod ticks_tests {
     use super::*;
@@ -93,6 +88,5 @@ mod ticks_tests {
         assert_eq!(ticks(-12.0, 31.0, 10.0).collect::<Vec<_>>(), [-10.0, 0.0, 10.0, 20.0, 30.0]);
         assert_eq!(ticks(1.0, 4.0, 5.0).count(), 0);
         assert_eq!(ticks(0.0, 1e9, 1e-9).count(), 1_000);
-        assert_eq!([tick_decimals(0.2), tick_decimals(5.0), tick_decimals(0.05)], [1, 0, 2]);
     }
 }

@@ -11,6 +11,7 @@ use self::counts::{ChannelCounter, EndingTracker, FrameCounter, PhaseTracker};
 use anyhow::Result;
 use protocol::log::reader::Damage;
 use protocol::log::record::SCHEMA_VERSION;
+use protocol::log::v1::LimitResult;
 use protocol::program::Exit;
 use serde::Serialize;
 use time::OffsetDateTime;
@@ -21,7 +22,7 @@ use crate::cut::CUT_FROM;
 use crate::findings::{self, Finding};
 use crate::log::{
     Attachment, BuildComparison, Clocks, Cut, Entry, FlightLog, Head, LogError, Recording, StampedEntry,
-    Verdict, VerdictLimit,
+    Verdict,
 };
 use crate::print::counted;
 use crate::recover::{Summary, summary_of};
@@ -404,7 +405,7 @@ impl Info {
                 [("", &verdict.borne), ("envelope: ", &verdict.envelope), ("Table 2: ", &verdict.table_2)]
             {
                 rows.extend(limits.iter().filter(|limit| !limit.passed).map(|limit| {
-                    let VerdictLimit { name, value, unit, .. } = limit;
+                    let LimitResult { name, value, unit, .. } = limit;
                     let (minimum, maximum) = (rounded(limit.minimum), rounded(limit.maximum));
                     ("", format!("{whose}{name} {value:.4} {unit} is OUTSIDE {minimum} to {maximum}"))
                 }));

@@ -29,7 +29,7 @@ pub use tlog::{ImportError, ImportedTlog, import_tlog};
 pub(crate) use tlog::{is_tlog, open_log};
 pub(crate) use verdict::frame_of;
 use verdict::{Found, Verdicts, contradiction, heard_message};
-pub use verdict::{Verdict, VerdictLimit};
+pub use verdict::{Verdict, share, worst_first};
 
 /// First bytes of every MCAP file.
 const MCAP_MAGIC: [u8; 8] = [0x89, b'M', b'C', b'A', b'P', b'0', b'\r', b'\n'];

@@ -7,7 +7,7 @@ use protocol::dialect::{
 use protocol::frame::{Frame, Framer};
 use protocol::log::reader::LogChannel;
 use protocol::log::record::TOPIC_RAW_RX;
-use protocol::log::v1;
+use protocol::log::v1::{self, LimitResult};
 use sim::wire::record::limits_to_log;
 
 use serde::Serialize;
@@ -28,70 +28,53 @@ pub struct Verdict {
     /// What the time counts from: T+0, or power-up if a ground station heard the verdict.
     pub clock: Clock,
     /// At contact, by the design envelope of the legs.
-    pub envelope: Vec<VerdictLimit>,
+    pub envelope: Vec<LimitResult>,
     /// What legs that can give way have borne, and what else went wrong; a ground station hears nothing of it.
-    pub borne: Vec<VerdictLimit>,
+    pub borne: Vec<LimitResult>,
     /// At contact, by the landing paper's Table 2; a ground station hears no limits of it.
-    pub table_2: Vec<VerdictLimit>,
+    pub table_2: Vec<LimitResult>,
 }
 
-/// A limit of the landing verdict.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct VerdictLimit {
-    /// Name of the judged quantity.
-    pub name: String,
-    pub value: f64,
-    /// The lowest allowed.
-    pub minimum: f64,
-    /// The highest allowed.
-    pub maximum: f64,
-    /// Unit of value and limits.
-    pub unit: String,
-    /// Whether the value is inside the limits.
-    pub passed: bool,
-}
-
-impl VerdictLimit {
-    /// The value over the limit on its side of 0: above 1 it is outside. A limit of 0 has no shares: outside of it the value
-    /// counts over the width of the range.
-    pub fn share(&self) -> f64 {
-        let limit = if self.value < 0.0 { self.minimum } else { self.maximum };
-        if limit == 0.0 && self.value != 0.0 {
-            return 1.0 + (self.value / (self.maximum - self.minimum)).abs();
-        }
-        if self.value == 0.0 { 0.0 } else { (self.value / limit).abs() }
+/// The value over the limit on its side of 0: above 1 it is outside. A limit of 0 has no shares: outside of it the value counts over
+/// the width of the range.
+pub fn share(limit: &LimitResult) -> f64 {
+    let LimitResult { value, minimum, maximum, .. } = *limit;
+    let end = if value < 0.0 { minimum } else { maximum };
+    if end == 0.0 && value != 0.0 {
+        return 1.0 + (value / (maximum - minimum)).abs();
     }
+    if value == 0.0 { 0.0 } else { (value / end).abs() }
+}
+
+/// Limits with their shares, the worst first.
+pub fn worst_first<'a>(limits: impl Iterator<Item = &'a LimitResult>) -> Vec<(&'a LimitResult, f64)> {
+    let mut sorted: Vec<(&LimitResult, f64)> = limits.map(|limit| (limit, share(limit))).collect();
+    sorted.sort_by(|a, b| b.1.total_cmp(&a.1));
+    sorted
 }
 
 impl Verdict {
     /// A recorded verdict.
     pub fn of(verdict: &v1::LandingVerdict) -> Self {
-        let facts = |limits: &[v1::LimitResult]| -> Vec<VerdictLimit> {
-            let limits = limits.iter().cloned().map(|limit| {
-                let v1::LimitResult { name, value, minimum, maximum, unit, passed } = limit;
-                VerdictLimit { name, value, minimum, maximum, unit, passed }
-            });
-            limits.collect()
-        };
         Self {
             landing: landing_of(verdict.landing),
             ending: verdict.ending.clone().unwrap_or_default(),
             time_s: verdict.time_s,
             clock: Clock::Flight,
-            envelope: facts(&verdict.envelope),
-            borne: facts(&verdict.borne),
-            table_2: facts(&verdict.table_2),
+            envelope: verdict.envelope.clone(),
+            borne: verdict.borne.clone(),
+            table_2: verdict.table_2.clone(),
         }
     }
 
     /// The limits that decide whether it stands undamaged: of legs that can give way what they bore, else their envelope.
-    pub fn deciding(&self) -> impl Iterator<Item = &VerdictLimit> {
+    pub fn deciding(&self) -> impl Iterator<Item = &LimitResult> {
         let give_way = self.borne.iter().any(|limit| limit.maximum > limit.minimum);
         self.envelope.iter().filter(move |_| !give_way).chain(&self.borne)
     }
 
     /// The limits of the legs at contact, and what they bore then.
-    pub(crate) fn of_the_legs(&self) -> impl Iterator<Item = &VerdictLimit> {
+    pub(crate) fn of_the_legs(&self) -> impl Iterator<Item = &LimitResult> {
         self.envelope.iter().chain(&self.borne)
     }
 
@@ -217,17 +200,17 @@ pub(super) fn contradiction(verdict: &v1::LandingVerdict) -> Option<String> {
         return Some("it has no limits".to_owned());
     }
     let wrong = envelope.iter().chain(borne).chain(table_2).find(|limit| {
-        let v1::LimitResult { value, minimum, maximum, passed, .. } = limit;
+        let LimitResult { value, minimum, maximum, passed, .. } = limit;
         // What breaks at a limit may be outside in the moment it reaches it.
         let inside =
             if *passed { minimum <= value && value <= maximum } else { minimum < value && value < maximum };
         ![value, minimum, maximum].into_iter().all(|number| number.is_finite()) || inside != *passed
     });
-    if let Some(v1::LimitResult { name, value, minimum, maximum, passed, .. }) = wrong {
+    if let Some(LimitResult { name, value, minimum, maximum, passed, .. }) = wrong {
         let said = if *passed { "inside" } else { "outside" };
         return Some(format!("{name} {value:?} is said to be {said} {minimum:?} to {maximum:?}"));
     }
-    let kept = |limits: &[v1::LimitResult]| limits.iter().all(|limit| limit.passed);
+    let kept = |limits: &[LimitResult]| limits.iter().all(|limit| limit.passed);
     // Legs that cannot give way have borne nothing that is told: their envelope decides.
     let sound = kept(borne) && (!borne.is_empty() || landing.envelope);
     let told = [sound && landing.upright, landing.upright, kept(envelope), kept(table_2)];

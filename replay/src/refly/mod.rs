@@ -37,7 +37,7 @@ use sim::wire::record;
 use self::rerun::Rerun;
 use crate::cli::{Answer, give, warn_of_what_is_missing};
 use crate::controller::{AgainError, LoggedComputer, SETTINGS_IN_FLIGHT, phase_name};
-use crate::log::{Clock, ClockTime, Moment, Recording, Verdict};
+use crate::log::{Clock, ClockTime, Moment, Recording, Verdict, share};
 use crate::output::{NewFile, WriteError};
 use crate::print::{counted, verdict_table};
 use crate::settings::{Setting, SettingArguments, mission_with, truth_with};
@@ -379,7 +379,7 @@ fn find(recording: &Recording, frames: &[ComputerFrame], start: Option<Moment>) 
 
 /// The smallest distance to a limit as a fraction of it; see [`ReflyReport::margin`].
 pub fn margin(verdict: &Verdict) -> f64 {
-    let left = verdict.deciding().map(|limit| 1.0 - limit.share());
+    let left = verdict.deciding().map(|limit| 1.0 - share(limit));
     // A NaN counts as infinitely far outside.
     left.map(|left| if left.is_nan() { f64::NEG_INFINITY } else { left }).fold(f64::INFINITY, f64::min)
 }

@@ -2,10 +2,10 @@
 
 use flight::rules::verdict::Landing;
 use protocol::log::record::{Event, EventLevel, Record};
+use protocol::log::v1::LimitResult;
 use protocol::log::writer::{LogHeader, LogWriter};
 use replay::cli::Answer as _;
 use replay::info::info;
-use replay::log::VerdictLimit;
 use replay::report::report;
 
 use crate::from_apogee::{LANDED, fly};
@@ -27,7 +27,7 @@ fn both_verdicts_are_known_and_only_broken_limits_are_shown() {
         let info = info(log).unwrap();
         let verdict = info.verdict.as_ref().unwrap();
         let names =
-            |limits: &[VerdictLimit]| limits.iter().map(|limit| limit.name.clone()).collect::<Vec<_>>();
+            |limits: &[LimitResult]| limits.iter().map(|limit| limit.name.clone()).collect::<Vec<_>>();
         let of_legs = ["vertical speed", "lateral speed", "tilt", "rotation rate"];
         assert_eq!(names(&verdict.envelope), of_legs);
         assert_eq!(names(&verdict.table_2), [&["distance", "height"], &of_legs[..]].concat());

@@ -7,17 +7,18 @@ use protocol::dialect::{TD_PAD_CHECK_DATA, TdPadCheckItem, TdPadCheckState, TdPa
 use ratatui::Frame;
 use ratatui::layout::Constraint::{Fill, Length};
 use ratatui::layout::{Layout, Rect};
-use ratatui::symbols::Marker;
 use ratatui::text::{Line, Span};
-use ratatui::widgets::canvas::{self, Canvas};
+use ratatui::widgets::canvas;
 use ratatui::widgets::{Paragraph, Wrap};
 
 use super::{Room, columns, flight, framed, rows};
+use crate::model::words;
 use crate::model::{
     Act, Degrees, LOSS_MOST, LastPlace, MARGIN_LEAST_DB, Model, PadCheck, SURFACES, Sample, Spot, Standing,
     Way, dead_reckoning::may_have_left, shown, standing,
 };
 use crate::view::band::{LETTER, draw_word, word};
+use crate::view::pictures::Plane;
 use crate::view::pictures::qr;
 use crate::view::{Ink, TextRole, Theme, draw_line, draw_lines, fixed, seconds};
 
@@ -204,7 +205,7 @@ const WORD_COLUMNS: u16 = 33;
 /// Rows of the words above the arrow.
 const WORD_ROWS: u16 = 15;
 
-/// Draws an arrow that points to where it is, what is known of the place, and the way over the ground.
+/// Draws an arrow that points to where it is, what is known of the place, the way over the ground, and the code for a phone.
 pub fn draw_find(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let (walk, middle, right) = if Room::of(frame.area()) == Room::Small {
         columns(area, [Length(ARROW_COLUMNS), Length(WORD_COLUMNS), Fill(1)]).into()
@@ -214,9 +215,9 @@ pub fn draw_find(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
         (walk, words, right)
     };
     let inside = framed("place", Line::default(), theme, frame, middle);
-    let words = Paragraph::new(find_lines(model, theme, now)).wrap(Wrap { trim: false });
-    frame.render_widget(words, inside);
     let place = model.last_place(now).or(model.place);
+    let words = Paragraph::new(find_lines(model, place, theme, now)).wrap(Wrap { trim: false });
+    frame.render_widget(words, inside);
     let way = place.map(|place| place.way(&place.best(), model.settings.here));
     let inside = framed("walk", theme.line(" N up ", TextRole::Label), theme, frame, walk);
     match way.filter(|_| may_have_left(&model.vehicle, now).is_none()) {
@@ -226,7 +227,7 @@ pub fn draw_find(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
     let flies = model.vehicle.in_flight() && place.is_some_and(|place| place.predicted.is_none());
     let at = place.and_then(|place| place.degrees(&place.best())).filter(|_| !flies && !theme.ascii);
     let code = at.map_or_else(Vec::new, |at| qr::code(at, right.height));
-    // A phone walks better than a map of 30 columns.
+    // A phone shows the way better than a map of 30 columns.
     let code_columns = if code.is_empty() { 0 } else { qr::COLUMNS };
     let [over_ground, beside] = columns(right, [Fill(1), Length(code_columns)]);
     if over_ground.width > code_columns / 2 {
@@ -243,15 +244,13 @@ fn draw_way(way: Way, theme: Theme, frame: &mut Frame, area: Rect) {
     let rows = [Fill(1), Length(if is_large { LETTER.1 } else { 0 })];
     let [above, below] = area.layout(&Layout::vertical(rows));
     draw_word(&word("", &text, TextRole::Title), theme, frame, below);
-    // In dots, of which a cell has two across and four up: an arrow has the same shape wherever it points.
-    let (across, up) = (f64::from(above.width), 2.0 * f64::from(above.height));
-    let reach = across.min(up) / 2.0 - 1.0;
+    // An arrow has the same shape wherever it points.
+    let plane = Plane::around(above, (0.0, 0.0), 1.0);
+    let reach = 1.0 - 2.0 * plane.dot();
     let (sin, cos) = libm::sincos(way.bearing_deg.to_radians());
     let at =
         |along: f64, aside: f64| (reach * (along * sin + aside * cos), reach * (along * cos - aside * sin));
-    let canvas = Canvas::default().marker(Marker::Braille).background_color(theme.back());
-    let canvas = canvas.x_bounds([-across / 2.0, across / 2.0]).y_bounds([-up / 2.0, up / 2.0]);
-    let canvas = canvas.paint(|context| {
+    plane.draw(theme, frame, |context| {
         for step in -20..=20 {
             let aside = f64::from(step) / 33.0;
             for (from, to) in [(at(0.0, aside), at(1.0, 0.0)), (at(-1.0, aside / 5.0), at(0.0, aside / 5.0))]
@@ -260,12 +259,15 @@ fn draw_way(way: Way, theme: Theme, frame: &mut Frame, area: Rect) {
             }
         }
     });
-    frame.render_widget(canvas, above);
 }
 
 /// The places and the ways to them.
-pub fn find_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    let place = model.last_place(now).or(model.place);
+pub fn find_lines(
+    model: &Model,
+    place: Option<LastPlace>,
+    theme: Theme,
+    now: Duration,
+) -> Vec<Line<'static>> {
     if may_have_left(&model.vehicle, now).is_some() {
         return may_have_left_lines(model, theme);
     }
@@ -290,7 +292,7 @@ pub fn find_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'stati
     lines.extend(spot(model, &place, &place.heard, theme));
     let ago = now_unix_s.saturating_sub(place.heard_unix_s);
     lines.push(Line::from(format!("  {ago} s ago, {} m up", fixed(place.height_m, 1))));
-    lines.push(Line::from(format!("  boot {:08X}", place.boot)));
+    lines.push(Line::from(format!("  boot {}", words::boot(place.boot))));
     lines.push(supply(model, theme));
     if place.pad.is_none() {
         lines.push(label(" The vehicle has not told where its pad is: no latitude, longitude or KML"));

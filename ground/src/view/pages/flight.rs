@@ -14,7 +14,9 @@ use crate::model::{Deflection, Model, Page, Sample, dead_reckoning::is_unheard, 
 use crate::view::band::draw_band;
 use crate::view::pictures::attitude::{Side, draw_attitude};
 use crate::view::pictures::height::draw_height;
+use crate::view::pictures::map::comes_down;
 use crate::view::pictures::map::draw_map;
+use crate::view::status_lines;
 use crate::view::{
     TextRole, Theme, age_mark, bars, draw_lines, fixed, headline, panels, quantity_row, text_row,
 };
@@ -45,11 +47,12 @@ pub fn draw_flying(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
         _ => band_word(model, theme, now),
     };
     let burns = model.page() == Page::Landing;
-    let (main, others) = headline::of_flight(model, now);
     // Large words of danger stand in its place.
-    let area = match headline::banner(model, now) {
-        Some(_) => area,
-        None => draw_band((&main, below, &others), theme, frame, area),
+    let area = if headline::banner(model, now).is_some() {
+        area
+    } else {
+        let (main, others) = headline::of_flight(model, now);
+        draw_band((&main, below, &others), theme, frame, area)
     };
     if Room::of(frame.area()) == Room::Small {
         let side = Length(if is_unheard(&model.vehicle, now) { LOST_COLUMNS } else { SIDE_COLUMNS });
@@ -136,11 +139,11 @@ fn gate(model: &Model, theme: Theme, now: Duration) -> Option<(Line<'static>, Ve
     let (mark, age) = age_mark(&descent, now);
     let height_m = vehicle.height_m()?.value;
     let (low_m, high_m) = (f64::from(d.band_low_m), f64::from(d.band_high_m));
-    let off_m = f64::from(libm::hypotf(d.touchdown_x_m, d.touchdown_y_m));
-    let fence_m = vehicle.limits().map_or(f64::NAN, |limits| f64::from(limits.fence_m));
+    let off_m = comes_down(model, now).map_or(f64::NAN, |at| libm::hypot(at.east_m, at.north_m));
+    let fence_m = vehicle.fence_m().unwrap_or(f64::NAN);
     let sinks_m_s = -vehicle.vertical_m_s()?.value;
-    let follows = |fins: Sample<[Deflection; 4]>| fins.value.map(|fin| fin.error_deg() < FOLLOWS_DEG);
-    let fins = vehicle.fins().map_or(0, |fins| follows(fins).into_iter().filter(|it| *it).count());
+    let follows = |fin: &&Deflection| fin.error_deg() < FOLLOWS_DEG;
+    let fins = vehicle.fins().map_or(0, |fins| fins.value.iter().filter(follows).count());
     let whole = |value: f64| fixed(value, 0);
     let armed = vehicle.phase_now() == Some(TdPhase::TD_PHASE_LAND_ARMED);
     let (chute, _) = chute(d);
@@ -161,7 +164,7 @@ fn gate(model: &Model, theme: Theme, now: Duration) -> Option<(Line<'static>, Ve
     ];
     let open = rows.iter().filter(|(_, holds, ..)| *holds).count();
     let role = |holds: bool| if holds { TextRole::Good } else { TextRole::Caution };
-    let title = theme.line(format!(" {open} of {} told ", rows.len()), role(open == rows.len()));
+    let title = theme.line(format!(" {open} of {} hold ", rows.len()), role(open == rows.len()));
     let lines = rows.into_iter().map(|(name, holds, text, unit)| {
         let label = format!("{:<5}{name}", if holds { "ok" } else { "wait" });
         let role = if age == TextRole::Stale { age } else { role(holds) };
@@ -205,7 +208,7 @@ fn chute(descent: &TD_DESCENT_DATA) -> (String, TextRole) {
 
 /// Compares the height with the ignition band and the commit height, in words.
 fn band_word(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
-    if model.vehicle.in_flight() && model.vehicle.interlocks().is_some() && !model.vehicle.may_light() {
+    if model.vehicle.in_flight() && status_lines::is_inhibited(&model.vehicle) {
         // Without a parachute the row of the state says it.
         let under_chute = model.vehicle.phase_now() == Some(TdPhase::TD_PHASE_CHUTE);
         let words = if under_chute { " NO BURN: motor inhibited" } else { "" };

@@ -25,9 +25,9 @@ const REGULAR: &str = "HEARTBEAT SYS_STATUS EXTENDED_SYS_STATE TD_FLIGHT_STATUS 
 
 /// What the panels of bars show.
 const OVER_TIME: [&str; 4] = ["link rate", "link sent", "link loss", "round trip"];
-/// The most that fills a bar of loss at least, %.
-const LOSS_MOST: f64 = 10.0;
-/// The history has a value a little less often than once a second.
+/// A full bar of loss is at least this much, %.
+const LOSS_FULL_PERCENT: f64 = 10.0;
+/// A value counts for so long: the history keeps one about every second.
 const KEPT_WITHIN: Duration = Duration::from_millis(1_500);
 /// From this width on bars stand apart.
 const APART_COLUMNS: u16 = 60;
@@ -48,7 +48,8 @@ fn draw_bars(quantity: &Quantity, model: &Model, theme: Theme, now: Duration, fr
     let title = format!("{} {value} {}", quantity.name.trim_start_matches("link "), quantity.unit);
     let inside = framed(&title, Line::default(), theme, frame, area);
     let apart = if inside.width < APART_COLUMNS { 1 } else { 2 };
-    let values: Vec<(Duration, f64)> = model.history.trace.values(quantity, Duration::ZERO, now).collect();
+    let from = now.saturating_sub(Duration::from_secs((inside.width / apart).into()) + KEPT_WITHIN);
+    let values: Vec<(Duration, f64)> = model.history.trace.values(quantity, from, now).collect();
     let bar = |column: u16| {
         let ago = Duration::from_secs((column / apart).into());
         let at = now.checked_sub(ago).filter(|_| column.is_multiple_of(apart))?;
@@ -57,7 +58,7 @@ fn draw_bars(quantity: &Quantity, model: &Model, theme: Theme, now: Duration, fr
         (at.saturating_sub(*kept_at) < KEPT_WITHIN).then_some((1_000.0 * value) as u64)
     };
     let bars: Vec<Option<u64>> = (0..inside.width).rev().map(bar).collect();
-    let least = if quantity.unit == "%" { LOSS_MOST } else { 0.0 };
+    let least = if quantity.unit == "%" { LOSS_FULL_PERCENT } else { 0.0 };
     let most = bars.iter().flatten().copied().fold((1_000.0 * least) as u64, u64::max);
     let style = theme.ground().fg(theme.ink(Ink::Measured));
     frame.render_widget(Sparkline::default().data(bars).max(most).style(style), inside);

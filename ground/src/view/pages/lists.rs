@@ -1,4 +1,4 @@
-//! The pages that are lists: alarms, texts, parameters, the recording, help.
+//! The pages that are lists: alarms, texts, the recording, help.
 
 use std::time::Duration;
 
@@ -61,7 +61,7 @@ pub fn messages_lines(model: &Model, theme: Theme, columns: usize, rows: usize) 
     let (count, room) = (all.len(), rows.saturating_sub(1));
     let back = model.pages.scroll.min(count.saturating_sub(room));
     let place = if back == 0 { String::new() } else { format!(", {back} below") };
-    let text = format!(" {} events, {count} lines{place}; Up and Down scroll", model.events.total());
+    let text = format!(" {count} lines{place}; Up and Down scroll");
     let shown = all.into_iter().skip(count.saturating_sub(room + back)).take(room);
     std::iter::once(theme.line(text, TextRole::Label)).chain(shown).collect()
 }
@@ -123,7 +123,7 @@ const REPLAY: [(&str, &str); 5] = [
     ("+ -", "faster or slower"),
 ];
 
-const MARKS: &str = "~ older than 1.5 s; o command, # actual; line flown, dots planned; * computed on the ground. \
+const MARKS: &str = "~ older than 1.5 s; thick line flown, dots predicted; ▄ measured, │ asked for; on the map o is the crew. \
     Commanded, acknowledged and observed are three facts; armed is what HEARTBEAT says. Without link, + is the PREDICTED \
     position, its circle contains it in 19 of 20 cases. A last … is a cut line; a wider screen has more.";
 

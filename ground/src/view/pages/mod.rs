@@ -80,7 +80,8 @@ fn draw_list(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area
     }
     let lines = lines(model, theme, now, area.inner(Margin::new(1, 1)));
     let room = (area.height + 1).saturating_sub(lines.len() as u16 + 2);
-    let has_events = room >= EVENTS_ROWS && page != Page::Messages;
+    // These two list the events themselves.
+    let has_events = room >= EVENTS_ROWS && !matches!(page, Page::Messages | Page::Pad);
     let [list, below] = rows(area, [Fill(1), Length(if has_events { room } else { 1 })]);
     let beside = if page == Page::Checks { checks::supply(model, theme) } else { Line::default() };
     let inside = framed(page.name(), beside, theme, frame, list);
@@ -102,7 +103,7 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, area: Rect) -> Vec<Line
         Page::Messages => lists::messages_lines(model, theme, columns, rows),
         Page::Log => lists::log_lines(model, theme, now),
         Page::Alarms => lists::alarms_lines(model, theme, now, columns, rows),
-        Page::Find => checks::find_lines(model, theme, now),
+        Page::Find => checks::find_lines(model, model.last_place(now).or(model.place), theme, now),
         Page::Checks => checks::checks_lines(model, theme, now, columns),
         Page::Help => lists::help_lines(model, theme, now, columns),
         _ => super::lists::events(model, theme, columns, rows),

@@ -25,7 +25,7 @@ const STEP_COLUMNS: [u16; 2] = [30, 38];
 /// Rows of the panels under the pictures.
 const BELOW_ROWS: u16 = 12;
 
-/// Draws GO or what fails, the next step, the steps; and the vehicle with the place where it will land, or the checks while
+/// Draws GO or what fails, the next step, the steps; and the vehicle with what is around the pad, or the checks while
 /// something is amiss.
 pub fn draw_pad(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let area =

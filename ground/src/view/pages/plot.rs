@@ -13,8 +13,8 @@ use crate::model::{
     quantity::{ALL, Quantity},
 };
 use crate::view::footer::flight_began;
-use crate::view::pictures::scales;
-use crate::view::{Ink, TextRole, Theme, draw_line, draw_lines, fixed, quantity_row, widgets};
+use crate::view::pictures::{scales, seconds_since, ticks};
+use crate::view::{Ink, TextRole, Theme, draw_line, draw_lines, fixed, quantity_row};
 
 /// Columns of the list of quantities.
 const LIST_COLUMNS: u16 = 36;
@@ -47,13 +47,13 @@ fn values(model: &Model, theme: Theme, now: Duration, rows: usize) -> Vec<Line<'
     ALL.iter().skip(start).take(rows).map(line).collect()
 }
 
-/// A panel with the chosen quantity: its present value in the title, and the ticks at their places.
+/// A panel with the chosen quantity: its name and unit, its least and its greatest value in the title.
 fn draw_plot(quantity: &Quantity, model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let first = flight_began(model);
     let from = first.unwrap_or_else(|| now.saturating_sub(CALM_SPAN)).saturating_sub(BEFORE_FLIGHT);
-    let zero_s = first.unwrap_or(now).as_secs_f64();
+    let zero = first.unwrap_or(now);
     let trace = model.history.trace.values(quantity, from, now);
-    let points: Vec<(f64, f64)> = trace.map(|(at, value)| (at.as_secs_f64() - zero_s, value)).collect();
+    let points: Vec<(f64, f64)> = trace.map(|(at, value)| (seconds_since(at, zero), value)).collect();
     let bounds = |pick: fn(&(f64, f64)) -> f64| {
         let least = points.iter().map(pick).fold(f64::INFINITY, f64::min);
         [least, points.iter().map(pick).fold(f64::NEG_INFINITY, f64::max)]
@@ -68,10 +68,6 @@ fn draw_plot(quantity: &Quantity, model: &Model, theme: Theme, now: Duration, fr
     // A little room around the line, and for a value that does not change that of its last digit.
     let margin = ((most - least) / 20.0).max(libm::exp10(-(quantity.decimals as f64)));
     let up = [least - margin, most + margin];
-    let ticks = |[low, high]: [f64; 2], parts: u16| {
-        let step = widgets::tick_step(high - low, usize::from(parts));
-        widgets::ticks(low, high, step).map(|at| (at, at)).collect::<Vec<_>>()
-    };
     let marks = (&*ticks(across, inside.width / TICK_COLUMNS), &*ticks(up, inside.height / TICK_ROWS));
     let unit = if first.is_some() { "T+ s" } else { "s" };
     let plane = scales((across, up), marks, unit, theme, frame, inside);

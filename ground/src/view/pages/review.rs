@@ -85,7 +85,7 @@ fn findings(model: &Model, theme: Theme, columns: usize) -> Vec<Line<'static>> {
     let findings = &model.vehicle.findings;
     let Some(count) = findings.count else { return Vec::new() };
     if count == 0 {
-        return vec![theme.line(" nothing found", TextRole::Label)];
+        return vec![theme.line(" nothing went wrong", TextRole::Label)];
     }
     let arrived = findings.in_time();
     let missing = usize::from(count).saturating_sub(arrived.len());

@@ -7,10 +7,10 @@ use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::widgets::canvas::Line;
 
-use super::{Ink, TextRole, Theme, scales, seconds_since};
+use super::{Ink, TextRole, Theme, scales, seconds_since, ticks};
 use crate::model::{Model, dead_reckoning::course, is_burning, quantity::Quantity};
+use crate::view::fixed;
 use crate::view::footer::{LENGTHS_S, flight_began, shown_until};
-use crate::view::{fixed, widgets};
 
 /// The least height and time that the picture shows.
 const TOP_MIN_M: f64 = 10.0;
@@ -23,12 +23,6 @@ fn flown(model: &Model, from: Duration, now: Duration) -> Vec<(f64, f64)> {
     let Some(height) = Quantity::named("height") else { return Vec::new() };
     let values = model.history.trace.values(height, from, now);
     values.map(|(at, height_m)| (seconds_since(at, from), height_m)).collect()
-}
-
-/// The lines between which a picture is told: a tick every so often.
-fn ticks(span: f64, parts: u16) -> Vec<(f64, f64)> {
-    let step = widgets::tick_step(span, usize::from(parts.max(2)));
-    widgets::ticks(0.0, span, step).map(|at| (at, at)).collect()
 }
 
 /// Draws height over time: flown, predicted to the touchdown, where lighting lands, where it will be lit, and the height below which
@@ -58,12 +52,12 @@ pub fn draw_height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     let top =
         [apogee_m, commit_m, band.map(|band| band.1)].into_iter().flatten().fold(reached, f64::max) * 1.08;
     let last_s = to_come.last().map_or(present_s, |(at, _)| *at).max(flown.last().map_or(0.0, |(at, _)| *at));
-    let lengths_s = LENGTHS_S.into_iter().find(|length_s| last_s < *length_s);
     // Of a flight that is over as long as it was.
-    let length_s = lengths_s.filter(|_| until == now).unwrap_or(last_s);
+    let length_s = LENGTHS_S.into_iter().find(|most_s| until == now && last_s < *most_s).unwrap_or(last_s);
     let bounds = ([0.0, length_s], [-0.02 * top, top]);
-    let across = ticks(length_s, area.width / TICK_COLUMNS);
-    let plane = scales(bounds, (&across, &ticks(top, area.height / TICK_ROWS)), "T+ s", theme, frame, area);
+    let across = ticks([0.0, length_s], area.width / TICK_COLUMNS);
+    let plane =
+        scales(bounds, (&across, &ticks([0.0, top], area.height / TICK_ROWS)), "T+ s", theme, frame, area);
     let height_m = vehicle.height_m().filter(|height| !height.is_stale(now) && vehicle.in_flight());
     let highest = flown.iter().copied().reduce(|best, next| if next.1 > best.1 { next } else { best });
     // From the highest point on, so that neither they nor their names move.

@@ -83,8 +83,7 @@ pub fn draw_map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
         vehicle.flown.points().iter().map(|[north, east, _]| (*east, *north)).collect();
     let down = comes_down(model, now);
     let lost = predict_position(vehicle, now);
-    let fence_m =
-        vehicle.limits().map(|limits| f64::from(limits.fence_m)).filter(|m| m.is_finite() && *m > 0.0);
+    let fence_m = vehicle.fence_m();
     let phase = vehicle.phase_now();
     let stands = matches!(phase, Some(TdPhase::TD_PHASE_TOUCHDOWN | TdPhase::TD_PHASE_SAFED));
     let stands = flown.last().copied().filter(|_| stands);
@@ -109,11 +108,8 @@ pub fn draw_map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
     if let Some(fence_m) = fence_m.filter(|fence_m| is_small(*fence_m) && holds(*fence_m)) {
         (middle, reach_m) = ((0.0, 0.0), 1.08 * fence_m);
     }
-    let (across, up) = (f64::from(area.width) * DOTS_ACROSS, f64::from(area.height) * DOTS_UP);
-    let per_dot = 2.0 * reach_m / across.min(up);
-    let (half_x, half_y) = (per_dot * across / 2.0, per_dot * up / 2.0);
-    let plane =
-        Plane { area, x: [middle.0 - half_x, middle.0 + half_x], y: [middle.1 - half_y, middle.1 + half_y] };
+    let plane = Plane::around(area, middle, reach_m);
+    let per_dot = plane.dot();
     // In whole steps, so that it does not tremble.
     let step_m = SPREAD_STEP * reach_m;
     // What has not settled yet has none.
@@ -173,7 +169,7 @@ pub fn draw_map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
         label(frame, at, &format!("crew {} m", fixed(libm::hypot(at.0, at.1), 0)));
     }
     if let Some((at, tilt_deg)) = rail {
-        label(frame, at, &format!("rail {}°", fixed(tilt_deg, 0)));
+        label(frame, at, &format!("rail {} deg", fixed(tilt_deg, 0)));
     }
 }
 

@@ -16,7 +16,7 @@ use ratatui::style::{Color, Style};
 use ratatui::symbols::Marker;
 use ratatui::widgets::canvas::{Canvas, Context, Line, Points};
 
-use super::{Ink, TextRole, Theme, shortest};
+use super::{Ink, TextRole, Theme, shortest, widgets};
 
 /// Braille dots per cell.
 const DOTS_ACROSS: f64 = 2.0;
@@ -45,13 +45,20 @@ impl Plane {
         })
     }
 
+    /// Both axes have the same scale; it reaches at least so far from a place to every side.
+    pub fn around(area: Rect, (x, y): (f64, f64), reach: f64) -> Self {
+        let (across, up) = (f64::from(area.width) * DOTS_ACROSS, f64::from(area.height) * DOTS_UP);
+        let [half_x, half_y] = [across, up].map(|dots| reach * dots / across.min(up));
+        Self { area, x: [x - half_x, x + half_x], y: [y - half_y, y + half_y] }
+    }
+
     /// The height of a dot.
-    fn dot(&self) -> f64 {
+    pub fn dot(&self) -> f64 {
         (self.y[1] - self.y[0]) / (f64::from(self.area.height) * DOTS_UP)
     }
 
     /// Writes a sign or words that begin at a place; moved to the left where they would not fit.
-    pub fn write(&self, frame: &mut Frame, (x, y): (f64, f64), words: &str, style: Style) {
+    fn write(&self, frame: &mut Frame, (x, y): (f64, f64), words: &str, style: Style) {
         let length = words.chars().count() as u16;
         let Some((column, row)) = self.cell(x, y).filter(|_| length <= self.area.width) else { return };
         let column = column.min(self.area.right() - length);
@@ -135,14 +142,17 @@ fn circle((x, y): (f64, f64), radius: f64) -> Vec<(f64, f64)> {
 /// Columns of the numbers beside a scale.
 const SCALE_COLUMNS: u16 = 5;
 
-/// A number beside a scale, and its place.
-pub type Tick = (f64, f64);
+/// Round numbers from one value to another, in at most this many parts, but two.
+pub fn ticks([low, high]: [f64; 2], parts_max: u16) -> Vec<f64> {
+    let step = widgets::tick_step(high - low, usize::from(parts_max.max(2)));
+    widgets::ticks(low, high, step).collect()
+}
 
 /// Draws the scales of a picture of one number over another: ticks with their numbers, and thin lines. Returns the plane inside.
-/// `ticks` are the numbers at the left and under it, each with its place.
+/// `across` are the numbers under it, `up` those at its left.
 pub fn scales(
     (x, y): ([f64; 2], [f64; 2]),
-    (across, up): (&[Tick], &[Tick]),
+    (across, up): (&[f64], &[f64]),
     unit: &str,
     theme: Theme,
     frame: &mut Frame,
@@ -156,18 +166,18 @@ pub fn scales(
     };
     let plane = Plane { area: inside, x, y };
     let label = theme.style(TextRole::Label);
-    for (value, at) in up {
+    for at in up {
         let Some((_, row)) = plane.cell(x[0], *at) else { continue };
-        let text = format!("{:>4}", shortest(*value));
+        let text = format!("{:>4}", shortest(*at));
         frame.buffer_mut().set_string(area.x, row, text, label);
         // The ground is a line, the others a tick: a slow line has no bytes for more.
-        let line = if *value == 0.0 { "─".repeat(inside.width.into()) } else { "┄".to_owned() };
+        let line = if *at == 0.0 { "─".repeat(inside.width.into()) } else { "┄".to_owned() };
         frame.buffer_mut().set_string(inside.x, row, line, theme.border());
     }
     let room = inside.width.saturating_sub(unit.chars().count() as u16 + 1);
-    for (value, at) in across {
+    for at in across {
         let Some((column, _)) = plane.cell(*at, y[0]) else { continue };
-        let text = shortest(*value);
+        let text = shortest(*at);
         if column + text.len() as u16 <= inside.x + room {
             frame.buffer_mut().set_string(column, inside.bottom(), text, label);
         }
@@ -177,6 +187,6 @@ pub fn scales(
 }
 
 /// A moment in seconds since another, negative before it.
-fn seconds_since(at: Duration, zero: Duration) -> f64 {
+pub fn seconds_since(at: Duration, zero: Duration) -> f64 {
     at.as_secs_f64() - zero.as_secs_f64()
 }

@@ -1,6 +1,7 @@
 //! The QR code of a place (ISO/IEC 18004): a phone's camera reads it from the terminal, and the phone shows the way.
 
-use qrcode::{Color as Module, EcLevel, QrCode};
+use qrcode::render::{Renderer, unicode::Dense1x2};
+use qrcode::{EcLevel, QrCode};
 use ratatui::style::{Color, Style};
 use ratatui::text::Line;
 
@@ -16,28 +17,14 @@ pub const COLUMNS: u16 = 29;
 /// whatever the theme is, because a camera expects that.
 pub fn code(place: Degrees, rows: u16) -> Vec<Line<'static>> {
     let margin = match ROWS.iter().position(|needs| *needs <= rows) {
-        Some(narrower) => 2 - narrower,
+        Some(narrower) => 2 - narrower as u32,
         None => return Vec::new(),
     };
     let address = format!("geo:{:.6},{:.6}", place.latitude, place.longitude);
     let Ok(code) = QrCode::with_error_correction_level(address, EcLevel::L) else { return Vec::new() };
-    let (modules, width) = (code.to_colors(), code.width());
-    let is_dark = |column: usize, row: usize| {
-        let place = column.checked_sub(margin).zip(row.checked_sub(margin));
-        place.is_some_and(|(x, y)| x < width && modules.get(y * width + x) == Some(&Module::Dark))
-    };
-    let side = width + 2 * margin;
-    let row = |row: usize| {
-        let cell = |column| match (is_dark(column, row), is_dark(column, row + 1)) {
-            (true, true) => '█',
-            (true, false) => '▀',
-            (false, true) => '▄',
-            (false, false) => ' ',
-        };
-        let style = Style::new().fg(Color::Black).bg(Color::White);
-        Line::styled((0..side).map(cell).collect::<String>(), style)
-    };
-    (0..side).step_by(2).map(row).collect()
+    let drawn = Renderer::<Dense1x2>::new(&code.to_colors(), code.width(), margin).build();
+    let style = Style::new().fg(Color::Black).bg(Color::White);
+    drawn.lines().map(|row| Line::styled(row.to_owned(), style)).collect()
 }
 
 #[cfg(test)]

@@ -59,26 +59,14 @@ pub(crate) fn colours(cell: &Cell) -> ([u8; 3], [u8; 3]) {
     if cell.modifier.contains(Modifier::REVERSED) { (back, fore) } else { (fore, back) }
 }
 
-/// The quarters that a block covers: of its left and of its right half. `None` for other characters.
-fn quarters(symbol: &str) -> Option<[u8; 2]> {
-    Some(match symbol {
-        "█" => [BOTH, BOTH],
-        "▀" => [UPPER, UPPER],
-        "▄" => [LOWER, LOWER],
-        "▌" => [BOTH, 0],
-        "▐" => [0, BOTH],
-        "▘" => [UPPER, 0],
-        "▝" => [0, UPPER],
-        "▖" => [LOWER, 0],
-        "▗" => [0, LOWER],
-        "▚" => [UPPER, LOWER],
-        "▞" => [LOWER, UPPER],
-        "▙" => [BOTH, LOWER],
-        "▛" => [BOTH, UPPER],
-        "▜" => [UPPER, BOTH],
-        "▟" => [LOWER, BOTH],
-        _ => return None,
-    })
+/// The halves that a block covers. `None` for other characters.
+fn halves(symbol: &str) -> Option<u8> {
+    match symbol {
+        "█" => Some(BOTH),
+        "▀" => Some(UPPER),
+        "▄" => Some(LOWER),
+        _ => None,
+    }
 }
 
 /// What pictures share: a class for each colour. A row is drawn around its base line.
@@ -118,14 +106,13 @@ impl Pen {
             cells.chunk_by(|one, next| colours(one).0 == colours(next).0 && one.modifier == next.modifier)
         {
             let class = self.class(colours(&run[0]).0);
-            let halves: Vec<u8> =
-                run.iter().flat_map(|cell| quarters(cell.symbol()).unwrap_or_default()).collect();
-            let path = path(&halves, at);
+            let covered: Vec<u8> = run.iter().map(|cell| halves(cell.symbol()).unwrap_or_default()).collect();
+            let path = path(&covered, at);
             if !path.is_empty() {
                 let _ = write!(blocks, "<path d=\"{path}\" class=\"{class}\"/>");
             }
             let letter =
-                |cell: &Cell| if quarters(cell.symbol()).is_some() { " " } else { cell.symbol() }.to_owned();
+                |cell: &Cell| if halves(cell.symbol()).is_some() { " " } else { cell.symbol() }.to_owned();
             let text: String = run.iter().map(letter).collect();
             let begin = text.len() - text.trim_start().len();
             let trimmed = text.trim();
@@ -168,11 +155,10 @@ impl Pen {
 
 /// Outlines of the halves of cells that are covered alike, from this column on.
 fn path(halves: &[u8], column: u16) -> String {
-    let half = f32::from(CELL.0) / 2.0;
     let mut path = String::new();
-    let mut at = 0;
+    let mut at = column;
     for run in halves.chunk_by(|one, next| one == next) {
-        let (x, width) = (f32::from(column * CELL.0) + f32::from(at) * half, run.len() as f32 * half);
+        let (x, width) = (at * CELL.0, run.len() as u16 * CELL.0);
         let (top, height) = match run[0] {
             UPPER => (i32::from(BASELINE), CELL.1 / 2),
             LOWER => (i32::from(BASELINE) - i32::from(CELL.1 / 2), CELL.1 / 2),

@@ -2,10 +2,11 @@
 
 use flight::rules::verdict::Landing;
 use onboard_sim::figure::Panel;
+use protocol::log::v1::LimitResult;
 
 use crate::findings::{Finding, over};
 use crate::info::{Info, rounded};
-use crate::log::{Verdict, VerdictLimit};
+use crate::log::{Verdict, worst_first};
 use crate::refly::{FaultChanges, ReflyOptions, refly_flight};
 use crate::report::chart::Chart;
 use crate::report::html::{escaped, paragraph, table};
@@ -56,7 +57,7 @@ fn verdict(info: &Info) -> String {
     let (all, broken) = (sorted.len(), sorted.iter().filter(|(limit, _)| !limit.passed).count());
     if let Some((worst, share)) = sorted.first().filter(|(_, share)| share.is_finite()) {
         let far = if *share > 1.0 { over(*share) } else { format!("{:.0} % of its limit", 100.0 * share) };
-        let VerdictLimit { name, value, unit, .. } = worst;
+        let LimitResult { name, value, unit, .. } = worst;
         let value = value.abs();
         html += &paragraph(&format!(
             "Worst of the legs' limits: {name} {value:.2} {unit}, {far}; {broken} of {all} broken."
@@ -96,12 +97,6 @@ fn without_its_faults(flight: &Flight) -> String {
     paragraph(&format!("Simulated: flown again without {faults}: {ending}."))
 }
 
-fn worst_first<'a>(limits: impl Iterator<Item = &'a VerdictLimit>) -> Vec<(&'a VerdictLimit, f64)> {
-    let mut sorted: Vec<(&VerdictLimit, f64)> = limits.map(|limit| (limit, limit.share())).collect();
-    sorted.sort_by(|a, b| b.1.total_cmp(&a.1));
-    sorted
-}
-
 fn limits(info: &Info) -> String {
     let Some(verdict) = &info.verdict else { return String::new() };
     let [_, _, envelope, table_2] = Landing::WORDS;
@@ -111,8 +106,8 @@ fn limits(info: &Info) -> String {
         + &format!("<details><summary>{table_2}</summary>\n{more}</details>\n")
 }
 
-fn limit_table(title: &str, limits: &[VerdictLimit]) -> String {
-    let row = |(limit, share): (&VerdictLimit, f64)| {
+fn limit_table(title: &str, limits: &[LimitResult]) -> String {
+    let row = |(limit, share): (&LimitResult, f64)| {
         let (class, word) = if limit.passed { ("good", "inside") } else { ("bad", "OUTSIDE") };
         [
             escaped(&limit.name),
@@ -132,7 +127,7 @@ fn limit_table(title: &str, limits: &[VerdictLimit]) -> String {
 }
 
 /// A value's share of its limit, up to half more than it.
-fn bar(limit: &VerdictLimit, share: f64) -> String {
+fn bar(limit: &LimitResult, share: f64) -> String {
     const WIDTH: f64 = 120.0;
     const LONGEST: f64 = 1.5;
     if !share.is_finite() {
