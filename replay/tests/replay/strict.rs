@@ -51,6 +51,18 @@ fn passes(report: &VerifyReport) -> bool {
     report.outcome == Verification::Identical && report.is_all_compared()
 }
 
+/// T+ of the frame in which it comes back has the same bits whenever the flight was released.
+#[test]
+fn a_computer_that_restarts_in_flight_is_flown_again_bit_for_bit() {
+    for (fault, release) in
+        [("reboot:1.5@descent", 2_600), ("reboot:1.5@descent", 2_611), ("reboot:0.7@coast+1", 2_605)]
+    {
+        let flown = Flown::from(StartPoint::Pad, &armed_and_started(release), &[fault]);
+        let report = only(verify_strictly(&flown.log()).unwrap());
+        assert!(passes(&report), "{fault}: {report:?}");
+    }
+}
+
 /// Changes the frames that are wanted.
 fn with_frames(mut change: impl FnMut(u64, &mut ComputerFrame)) -> Held {
     let mut held = pad();

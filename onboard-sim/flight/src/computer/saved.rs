@@ -20,7 +20,7 @@ use super::pad::{PadWatch, SelfTest};
 use super::pad_check::PadCheck;
 use super::pilot::{Pilot, SavedPilot};
 use super::table::PhaseTable;
-use super::{Commands, Computer, CrewMemory, KeptInput, LogState, Release, Severity, flight_time_s};
+use super::{Commands, Computer, CrewMemory, FRAME_S, KeptInput, LogState, Release, Severity, flight_time_s};
 use crate::estimation::estimator::StartUncertainty;
 use crate::estimation::sensor_watch::SensorWatch;
 use crate::guidance::powered::ControlLevel;
@@ -141,7 +141,10 @@ impl Computer {
                 self.release = Some(flown.release);
                 self.commands = flown.commands;
                 self.level = flown.level;
-                *self.pilot = self.pilot.resumed(&flown.pilot, time_s - flown.release.time_s);
+                // Counted in frames: T+ has the same bits after a pad and without one.
+                let frame = libm::round(time_s / FRAME_S) as u64;
+                let since_s = flight_time_s(frame.saturating_sub(flown.release.frame));
+                *self.pilot = self.pilot.resumed(&flown.pilot, since_s);
             }
             None => self.wake_on_the_pad(saved, time_s),
         }
