@@ -2,17 +2,19 @@
 //! landing broke.
 
 use flight::computer::findings::{Findings, Sign};
+use foxglove::messages::log::Level;
 use protocol::log::computer_v1::ComputerFrame;
 use serde::Serialize;
 
 use crate::controller::{FrameError, LoggedComputer};
-use crate::log::{Recording, Verdict, worst_first};
+use crate::log::{Clock, ClockTime, Recording, Verdict, worst_first};
 
 /// One finding.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Finding {
-    /// When it began, T+, s.
+    /// When it began, s; T+ unless the vehicle did not leave its pad.
     pub since_s: f64,
+    pub clock: Clock,
     /// How long it lasted altogether, s.
     pub lasted_s: f64,
     /// A short sentence.
@@ -22,11 +24,40 @@ pub struct Finding {
     pub(crate) section: &'static str,
 }
 
+impl Finding {
+    /// When it began.
+    pub fn since(&self) -> ClockTime {
+        ClockTime { clock: self.clock, time_s: self.since_s }
+    }
+}
+
 /// The findings of a recorded flight, first in time; `None` if its computer cannot be run again, or decides otherwise than it
 /// did: what it would have commanded says nothing of surfaces that followed other commands.
 pub(crate) fn of(recording: &Recording, verdict: Option<&Verdict>) -> Option<Vec<Finding>> {
+    if recording.frames.is_empty() {
+        return recording.from_power_up.then(|| on_the_pad(recording));
+    }
     let (_, findings) = run_again(recording, LoggedComputer::run_again)?;
     Some(facts(recording, verdict, &findings?))
+}
+
+/// What the vehicle itself reported of a wait that ended on its pad, each once.
+fn on_the_pad(recording: &Recording) -> Vec<Finding> {
+    let mut facts: Vec<Finding> = Vec::new();
+    for (log_s, event) in &recording.events {
+        let serious = event.name == "vehicle" && event.level >= Level::Warning as i32;
+        if serious && facts.iter().all(|known| known.words != event.message) {
+            let words = event.message.clone();
+            facts.push(Finding {
+                since_s: *log_s,
+                clock: Clock::Log,
+                lasted_s: 0.0,
+                words,
+                section: "events",
+            });
+        }
+    }
+    facts
 }
 
 /// The computer of a recorded flight after all its frames, each of which `run` has run again; `None` if that cannot be. Beside
@@ -56,6 +87,7 @@ pub(crate) fn facts(recording: &Recording, verdict: Option<&Verdict>, findings: 
         .iter()
         .map(|finding| Finding {
             since_s: finding.since_s,
+            clock: Clock::Flight,
             lasted_s: finding.held_s,
             words: finding.words(),
             section: section(finding.sign),
@@ -63,7 +95,7 @@ pub(crate) fn facts(recording: &Recording, verdict: Option<&Verdict>, findings: 
         .collect();
     if let Some(words) = verdict.and_then(|verdict| broken(verdict, findings)) {
         let since_s = recording.contact_s().unwrap_or(f64::NAN);
-        facts.push(Finding { since_s, lasted_s: 0.0, words, section: "findings" });
+        facts.push(Finding { since_s, clock: Clock::Flight, lasted_s: 0.0, words, section: "findings" });
     }
     facts
 }

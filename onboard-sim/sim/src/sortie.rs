@@ -417,7 +417,7 @@ impl Sortie {
     /// Something breaks now.
     pub fn break_down(&mut self, breakage: &Breakage) {
         match *breakage {
-            Breakage::Vehicle(fault) => self.surroundings.world.inject(&fault),
+            Breakage::Vehicle(fault) => self.surroundings.break_down(fault),
             Breakage::Sensor(sensor, defect) => self.surroundings.faults.break_down(sensor, defect),
             Breakage::LinkLoss => self.radio.silent = true,
             Breakage::LinkDelay(delay_s) => self.radio.delay_s = delay_s,

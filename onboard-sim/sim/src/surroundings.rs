@@ -4,7 +4,7 @@
 use crate::world::sensors::{
     NEARLY_EXACT, SensorFaults, SensorParamError, SensorTruth, Sensors, believed_start,
 };
-use crate::world::{Actuators, Battery, World};
+use crate::world::{Actuators, Battery, Fault, World};
 use flight::computer::{Commands, FRAME_MS, FRAME_S, pad_check};
 use flight::estimation::estimator::{Measurements, StartUncertainty};
 use flight::rules::outputs::PyroOutput;
@@ -23,6 +23,8 @@ pub(crate) struct Surroundings {
     pub(crate) world: World,
     sensors: Sensors,
     pub(crate) faults: SensorFaults,
+    /// What of the vehicle is broken.
+    broken: Vec<Fault>,
     actuators: Actuators,
     pub(crate) battery: Battery,
     /// The sensor samples of the last frame.
@@ -49,7 +51,11 @@ impl Surroundings {
         let actuators = at_rest(mission);
         let faults = SensorFaults::default();
         let battery = Battery::new(1.0, surfaces_rad(&world));
-        Ok((Self { world, sensors, faults, actuators, battery, measured: None, finite: true }, believed))
+        let broken = Vec::new();
+        Ok((
+            Self { world, sensors, faults, broken, actuators, battery, measured: None, finite: true },
+            believed,
+        ))
     }
 
     /// Goes to the start of the flight from wherever the vehicle waited. Both were already set up at power-up, which
@@ -57,11 +63,18 @@ impl Surroundings {
     pub(crate) fn begin(&mut self, mission: &Mission, dispersion: &Dispersion, drawn: &Draw) {
         if let Ok(world) = world(mission, drawn) {
             self.world = world;
+            self.broken.iter().for_each(|fault| self.world.inject(fault));
         }
         if let Ok(sensors) = sensors(dispersion, drawn) {
             self.sensors = sensors;
         }
         self.actuators = at_rest(mission);
+    }
+
+    /// Something of the vehicle breaks. What broke on the pad is broken in flight.
+    pub(crate) fn break_down(&mut self, fault: Fault) {
+        self.world.inject(&fault);
+        self.broken.push(fault);
     }
 
     /// From now on the receiver's times count from this time of its clock, s: the flight computer's do.

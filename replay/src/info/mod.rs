@@ -415,9 +415,9 @@ impl Info {
             return rows;
         }
         let mut found: Vec<String> = match &self.findings {
-            None => vec!["not looked for: no frame in flight, or this build decides otherwise".to_owned()],
+            None => vec!["not looked for: this build decides otherwise, or cannot run it again".to_owned()],
             Some(findings) => {
-                findings.iter().map(|found| format!("T+{:.2} s {}", found.since_s, found.words)).collect()
+                findings.iter().map(|found| format!("{:.2} {}", found.since(), found.words)).collect()
             }
         };
         if found.is_empty() {

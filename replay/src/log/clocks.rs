@@ -102,11 +102,12 @@ impl ClockTime {
 
 impl fmt::Display for ClockTime {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.clock {
-            Clock::Flight => write!(out, "T+{:.3} s", self.time_s),
-            Clock::Boot => write!(out, "boot {:.3} s", self.time_s),
-            Clock::Log => write!(out, "log {:.3} s", self.time_s),
-        }
+        let clock = match self.clock {
+            Clock::Flight => "T+",
+            Clock::Boot => "boot ",
+            Clock::Log => "log ",
+        };
+        write!(out, "{clock}{:.*} s", out.precision().unwrap_or(3), self.time_s)
     }
 }
 

@@ -68,7 +68,7 @@ const TABLE: [Row; 21] = [
             &[
                 "verdict     REFUSED: controller warm",
                 "its mission {mission}\n",
-                "not looked for: no frame in flight",
+                "not ready: controller warm",
             ],
         ),
     ),

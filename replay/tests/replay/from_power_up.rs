@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use flight::computer::crew::{Asked, People, Request};
+use flight::computer::news::Severity;
 use flight::computer::{Commander, LogState};
 use flight::rules::arming::Uplink;
 use flight::rules::operator::{Name, Operator, Role};
@@ -11,7 +12,7 @@ use flight::rules::phase::Phase;
 use flight::rules::two_person::Station;
 use flight::vehicle::mission::StartPoint;
 use proptest::prelude::*;
-use protocol::log::record::Record;
+use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::writer::{LogHeader, LogWriter};
 use replay::log::{Gap, Recording};
 use replay::refly::{ReflyOptions, refly};
@@ -150,6 +151,11 @@ impl Flown {
                     keep(Record::LandingVerdict(Box::new(vehicle.verdict_record().unwrap())));
                 }
                 VehicleEvent::PhaseChanged { to, .. } => self.phases.push(*to),
+                VehicleEvent::Text { severity: Severity::Warning, text } => keep(Record::Event(Event {
+                    level: EventLevel::Warning,
+                    name: "vehicle".to_owned(),
+                    message: text.clone(),
+                })),
                 _ => {}
             }
         }

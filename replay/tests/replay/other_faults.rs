@@ -92,6 +92,20 @@ fn a_description_says_what_went_wrong_first_in_time() {
     }
 }
 
+/// A vehicle that is not cleared to fly has said why.
+#[test]
+fn a_wait_that_ends_on_the_pad_has_findings() {
+    let crew = crate::from_power_up::armed_and_started(60_000);
+    let waited = crate::from_power_up::Flown::from(
+        flight::vehicle::mission::StartPoint::Pad,
+        &crew[..1],
+        &["gnss-out@pad+1"],
+    );
+    let found = info(&waited.log()).unwrap().findings.unwrap();
+    let lost = found.iter().find(|finding| finding.words.contains("no GNSS fix")).expect("GNSS is lost");
+    assert!(lost.since().to_string().starts_with("log "), "{found:?}");
+}
+
 /// A log whose decisions this build does not make has no findings, because they would be about other commands.
 #[test]
 fn findings_are_not_looked_for_where_the_decisions_are_not_made_again() {

@@ -100,6 +100,8 @@ pub struct Computer {
     motor_watch: MotorWatch,
     crew: CrewMemory,
     fins_answering: [bool; 4],
+    /// What the fins' feedback said of the closed fins before the self-test moved them, less the angle of closed fins, rad.
+    fins_zero_rad: [f64; 4],
     pad_check: PadCheck,
     /// The servos of a vehicle that tell nothing, from the first frame on.
     silent: Option<[ServoModel; SURFACES]>,
@@ -115,9 +117,10 @@ impl Computer {
         self.table.begin(input.time_s);
         self.report_changes(input);
         self.input = input.kept;
-        let commanded_rad = self.commands.fins_rad;
-        self.fins_answering =
-            core::array::from_fn(|fin| (commanded_rad[fin] - input.fins_rad[fin]).abs() <= ANSWERING_RAD);
+        let Self { commands: Commands { fins_rad: commanded_rad, .. }, fins_zero_rad: zero_rad, .. } = self;
+        self.fins_answering = core::array::from_fn(|fin| {
+            (commanded_rad[fin] + zero_rad[fin] - input.fins_rad[fin]).abs() <= ANSWERING_RAD
+        });
         if self.rehearsed.is_none() {
             self.rehearsed = input.rehearsed.cloned();
         }

@@ -159,6 +159,11 @@ const MOVED_RAD: f64 = 0.05;
 /// An actuator farther than this from its command counts as not answering, rad; one that has moved by this much answers. It is
 /// more than the play of a linkage.
 pub(super) const ANSWERING_RAD: f64 = 0.02;
+/// The feedback of a closed fin may be off by this much, rad: fins are set by eye, their potentiometers glued. One tooth of a servo's
+/// spline is 0.25 rad (25 teeth).
+const ZERO_MAX_RAD: f64 = 0.06;
+/// Servos have reached their rest so long after power-up, s.
+const REST_S: f64 = 0.5;
 /// The self-test has failed if it has not passed this long after power-up, s.
 const LIMIT_S: f64 = 3.0;
 
@@ -188,7 +193,7 @@ impl SelfTest {
     /// Called until the test has passed, with the time since power-up. `answering`: every actuator has reached its commanded angle.
     pub(super) fn step(&mut self, answering: bool, since_s: f64) -> TestStep {
         match self {
-            Self::NotBegun => {
+            Self::NotBegun if since_s >= REST_S => {
                 *self = Self::Moved;
                 TestStep::Command(MOVED_RAD)
             }
@@ -201,7 +206,7 @@ impl SelfTest {
                 *self = Self::Failed;
                 TestStep::Failed
             }
-            Self::Moved | Self::BroughtBack | Self::Failed => TestStep::Wait,
+            Self::NotBegun | Self::Moved | Self::BroughtBack | Self::Failed => TestStep::Wait,
         }
     }
 }
@@ -345,6 +350,12 @@ impl Computer {
         match self.self_test.step(answering, since_s) {
             TestStep::Command(angle_rad) => {
                 let closed_rad = self.closed_rad();
+                if self.self_test == SelfTest::Moved {
+                    // An actuator answers if it moves as it is told: its feedback may have a zero of its own.
+                    let off_rad = input.fins_rad.map(|fin_rad| fin_rad - closed_rad);
+                    self.fins_zero_rad =
+                        off_rad.map(|off_rad| if off_rad.abs() <= ZERO_MAX_RAD { off_rad } else { 0.0 });
+                }
                 self.commands.gimbal_rad = [angle_rad; 2];
                 self.commands.fins_rad = [closed_rad + angle_rad; 4];
             }

@@ -211,6 +211,7 @@ impl Computer {
             motor_watch: MotorWatch::default(),
             crew: CrewMemory::default(),
             fins_answering: [false; 4],
+            fins_zero_rad: [0.0; 4],
             pad_check: PadCheck::default(),
             silent: None,
             release: None,

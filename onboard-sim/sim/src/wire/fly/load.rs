@@ -86,7 +86,8 @@ impl OwnStart {
             // A reset has disarmed it. Only a person arms it again.
             self.refused.get_or_insert_with(|| "disarmed on the pad after it was started".to_owned());
         }
-        if !self.wanted || self.refused.is_some() || vehicle.phase() != Phase::PadIdle {
+        let waits = matches!(vehicle.phase(), Phase::Safe | Phase::PadIdle);
+        if !self.wanted || self.refused.is_some() || !waits {
             return Vec::new();
         }
         match arming::first_refusal(&vehicle.arming_checks()) {

@@ -1,11 +1,12 @@
 //! The check that the crew asks for on the pad: what it finds, when it is refused, and what ends it.
 
+use crate::sortie::Sortie;
 use crate::world::Fault;
 use flight::computer::pad_check::{CheckState, Item, Verdict};
 use flight::vehicle::mission::StartPoint;
 use proptest::prelude::*;
 
-use super::space::flight_of;
+use super::space::{flight_of, in_phase};
 use super::*;
 use crate::wire::fly::load_flight;
 
@@ -188,6 +189,31 @@ fn a_failed_self_test_is_a_reason_to_look_closer() {
     assert_eq!(rocket.phase(), Phase::Safe);
     checked(&mut rocket);
     assert_eq!(failing(&rocket), [Item::Range(4), Item::Error(4), Item::Lag(4)]);
+}
+
+/// 1.3 degrees off in flight 12 of `real`: the fins move as they are told.
+#[test]
+fn a_feedback_with_a_zero_of_its_own_passes_the_self_test_and_a_slipped_spline_does_not() {
+    let mut flight = flight_of("real", &[]);
+    for (feedback_deg, phase) in [(1.5, Phase::PadIdle), (15.0, Phase::Safe)] {
+        flight.recipe.dispersion.sensor_params.switches.fin_feedback_deg = feedback_deg;
+        let mut rocket = Told::of(Vehicle::on_the_pad(&flight).unwrap());
+        rocket.run_until(|rocket| rocket.time_s() > 4.0);
+        let found_rad = rocket.computer().commands().fins_rad;
+        assert_eq!(rocket.phase(), phase, "{feedback_deg} deg: {found_rad:?}");
+    }
+}
+
+/// The world begins anew with the release, and what is broken stays broken; without a pad it is broken from the beginning on.
+#[test]
+fn a_fin_that_sticks_on_the_pad_sticks_in_flight() {
+    let flight = flight_of("none", &["fin-stuck:1@pad"]);
+    let waited = in_phase(&flight, Phase::Deploy).vehicle.sortie;
+    for mut sortie in [waited, Sortie::new(&flight.recipe, 0).unwrap()] {
+        (0..100).for_each(|_| drop(sortie.step()));
+        let open = sortie.world().fins_rad().map(|angle_rad| angle_rad > 0.1);
+        assert_eq!((open, sortie.faults_happened()), ([true, false, true, true], 1));
+    }
 }
 
 #[test]
