@@ -14,6 +14,9 @@ use crate::refly::{ReflyOptions, refly_flight};
 /// The facts that a simulated flight is drawn from.
 const DRAWN_FROM: [&str; 3] = ["seed", "flight", "dispersion"];
 
+/// What of the metadata no flight follows from.
+const BESIDE: &str = "what the flight is drawn from; start_unix_ns, the build and touchdown.xml are not compared";
+
 /// Compares the verdict and the run facts of a log of one flight.
 pub(super) fn compare(path: &Path, simulated: bool, verdict: &mut Part, facts: &mut Part) {
     let flown = Recording::open(path).map_err(AgainError::from).and_then(|recording| {
@@ -39,8 +42,10 @@ pub(super) fn compare(path: &Path, simulated: bool, verdict: &mut Part, facts: &
         }
         Ok(Some((first_different, same_verdict))) => {
             facts.compare(first_different.is_none());
-            facts.why = first_different
-                .map(|frame| format!("drawn again, the flight is another one from frame {frame} on"));
+            facts.why = Some(match first_different {
+                Some(frame) => format!("drawn again, the flight is another one from frame {frame} on"),
+                None => BESIDE.to_owned(),
+            });
             verdict.compare(same_verdict);
             verdict.why = (!same_verdict).then(|| "flown again, the flight ends otherwise".to_owned());
         }

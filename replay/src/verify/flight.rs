@@ -5,7 +5,9 @@ use std::path::Path;
 
 use avionics::log::frame::thought_to_log;
 use protocol::log::computer_v1::ComputerStart;
-use protocol::log::record::{TOPIC_ESTIMATE, TOPIC_EVENTS, TOPIC_PILOT_TIMING, TOPIC_TRUTH_SAMPLE};
+use protocol::log::record::{
+    TOPIC_ESTIMATE, TOPIC_EVENTS, TOPIC_PILOT_TIMING, TOPIC_TRANSFORM, TOPIC_TRUTH_SAMPLE,
+};
 use serde::Serialize;
 
 use super::difference::{Tally, encode_into};
@@ -61,6 +63,7 @@ struct Parts {
     starts: Part,
     verdicts: u64,
     truth: u64,
+    transforms: u64,
     events: u64,
     timing: u64,
 }
@@ -90,6 +93,7 @@ impl FlightVerifier {
             _ => match log.channel(stamped.channel_id).map(|channel| channel.topic.as_str()) {
                 Some(TOPIC_ESTIMATE) => self.thought(&stamped.data),
                 Some(TOPIC_TRUTH_SAMPLE) => self.parts.truth += 1,
+                Some(TOPIC_TRANSFORM) => self.parts.transforms += 1,
                 Some(TOPIC_EVENTS) => self.parts.events += 1,
                 Some(TOPIC_PILOT_TIMING) => self.parts.timing += 1,
                 _ => {}
@@ -145,7 +149,7 @@ impl FlightVerifier {
         self.frames += 1;
         self.flies |= frame.since_release.is_some();
         let number = frame.record.input.frame;
-        let impossible = self.inputs.judge(&frame.record.input, frame.since_release);
+        let impossible = self.inputs.judge(&frame.record, frame.since_release);
         // What a missing field was filled with says nothing.
         let impossible = impossible.filter(|_| misread_frame(data).is_none());
         self.parts.inputs.recorded += 1;
@@ -281,7 +285,12 @@ impl FlightVerifier {
             None => Part::of("metadata", 1).because(alone()),
         };
         vec![
-            Part { name: "inputs", follows: true, ..parts.inputs.clone() },
+            Part {
+                name: "inputs",
+                follows: true,
+                why: parts.inputs.why.clone().or_else(|| Some(JUDGED.to_owned())),
+                ..parts.inputs.clone()
+            },
             part("frames", tally.compared, tally.different),
             part("outputs", tally.compared, tally.outputs_different),
             if self.remembers_less { digests.because(remembers_less) } else { digests },
@@ -290,11 +299,15 @@ impl FlightVerifier {
             Part::of("verdict", parts.verdicts).because(alone()),
             metadata,
             Part::beside("truth", parts.truth),
+            Part::beside("transforms", parts.transforms),
             Part::beside("events", parts.events),
             Part::beside("timing", parts.timing),
         ]
     }
 }
+
+/// What an input that nothing contradicts was held to.
+const JUDGED: &str = "judged by range and step alone: what decides nothing can be another value inside both";
 
 fn text_of<R: Read>(
     log: &FlightLog<R>,

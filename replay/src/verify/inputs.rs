@@ -3,16 +3,21 @@
 //! What decides nothing could be changed in a log without a divergence. A value far outside of what any sensor can say, or one
 //! that does not follow from the frame before it, gives that away.
 
+use avionics::log::frame::phase_of;
 use flight::computer::{FRAME_S, flight_time_s};
-use protocol::log::computer_v1::ComputerInput;
+use flight::rules::phase::Phase;
+use protocol::log::computer_v1::{ComputerFrame, ComputerInput};
 use protocol::log::flight_v1::{Measurements, Vector3};
 
 /// No servo turns further, rad.
 const ANGLE_MAX_RAD: f64 = 2.0;
 /// No battery of a model rocket has more, V.
 const BATTERY_MAX_V: f64 = 60.0;
-/// A battery under load does not drop or recover by more in one frame, V.
-const BATTERY_STEP_V: f64 = 10.0;
+/// Servos change a battery's voltage by no more in one frame, V: 5 A over 0.2 ohm.
+const BATTERY_STEP_V: f64 = 1.0;
+/// Igniters draw what they want, V, for this long after an output was switched, s.
+const FIRED_STEP_V: f64 = 10.0;
+const FIRED_S: f64 = 1.0;
 /// No gyro has a wider range, rad/s.
 const RATE_MAX_RAD_S: f64 = 200.0;
 /// No accelerometer of a model rocket has a wider range, m/s2.
@@ -25,7 +30,9 @@ const RANGE_MAX_M: f64 = 1_000.0;
 /// A fix is older than this only if the receiver is dead, s.
 const FIX_AGE_MAX_S: f64 = 60.0;
 /// Larger than any disk, bytes; a flight without a log says `u64::MAX`.
-const SPACE_MAX_BYTES: u64 = 1 << 60;
+const SPACE_MAX_BYTES: u64 = 1 << 50;
+/// The log's disk is asked once a second, and nothing fills or empties one faster, bytes.
+const SPACE_STEP_BYTES: u64 = 1 << 35;
 /// Tolerance for rounding, and for a clock that measures ages, s.
 const ROUNDING_S: f64 = 1e-3;
 
@@ -35,6 +42,9 @@ pub(super) struct Inputs {
     last: Option<LastInput>,
     /// The frame of the release, once it is known.
     release_frame: Option<u64>,
+    /// The outputs of the last frame, and the frame that last switched one.
+    outputs: [bool; 4],
+    switched: u64,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -43,14 +53,18 @@ struct LastInput {
     in_flight: bool,
     pin_out: bool,
     booster_attached: bool,
+    /// A foot touches the ground, although the landing motor was not lit yet.
+    struck: bool,
     battery_v: Option<f64>,
+    space_bytes: u64,
     uplink_age_s: Option<f64>,
     commander_age_s: Option<f64>,
 }
 
 impl Inputs {
-    /// Why the input cannot be; `None` if it can. `since_release`: the frame's number in flight.
-    pub(super) fn judge(&mut self, input: &ComputerInput, since_release: Option<u64>) -> Option<String> {
+    /// Why the input of a frame cannot be; `None` if it can. `since_release`: the frame's number in flight.
+    pub(super) fn judge(&mut self, frame: &ComputerFrame, since_release: Option<u64>) -> Option<String> {
+        let ComputerFrame { input, output, .. } = frame;
         if let Some(number) = since_release {
             self.release_frame = input.frame.checked_sub(number);
         }
@@ -59,13 +73,21 @@ impl Inputs {
             in_flight: since_release.is_some(),
             pin_out: input.pin_out,
             booster_attached: input.booster_attached,
+            struck: input.contact && phase_of(output).is_some_and(|phase| phase < Phase::Ignition),
             battery_v: input.battery_v,
+            space_bytes: input.log.space_bytes,
             uplink_age_s: input.uplink.as_ref().and_then(|uplink| uplink.age_s),
             commander_age_s: input.commander.as_ref().map(|commander| commander.age_s),
         };
         let before = self.last.replace(now);
+        let fired = flight_time_s(now.frame.saturating_sub(self.switched)) <= FIRED_S;
+        let step_v = if fired { FIRED_STEP_V } else { BATTERY_STEP_V };
+        let outputs = [output.ignite, output.parachute, output.ignite_booster, output.separate_booster];
+        if outputs != self.outputs {
+            (self.outputs, self.switched) = (outputs, now.frame);
+        }
         out_of_range(input, self.release_frame)
-            .or_else(|| before.and_then(|before| out_of_order(&before, &now)))
+            .or_else(|| before.and_then(|before| out_of_order(&before, &now, step_v)))
     }
 }
 
@@ -114,7 +136,7 @@ fn vector(Vector3 { x, y, z }: Vector3) -> [f64; 3] {
     [x, y, z]
 }
 
-fn out_of_order(before: &LastInput, now: &LastInput) -> Option<String> {
+fn out_of_order(before: &LastInput, now: &LastInput, step_v: f64) -> Option<String> {
     let passed_s = now.frame.saturating_sub(before.frame) as f64 * FRAME_S;
     // An age grows with the time, or begins anew with what is heard.
     let aged = |what: &str, then: Option<f64>, now: Option<f64>| {
@@ -129,8 +151,17 @@ fn out_of_order(before: &LastInput, now: &LastInput) -> Option<String> {
     if flew && now.booster_attached && !before.booster_attached {
         return Some("the booster is attached again, in flight".to_owned());
     }
+    if flew && before.struck && !now.struck {
+        return Some("the contact has ended, before the landing motor was lit".to_owned());
+    }
+    let [then, space] = [before.space_bytes, now.space_bytes];
+    if then.abs_diff(space) > SPACE_STEP_BYTES
+        && ![then, space].iter().any(|space| [0, u64::MAX].contains(space))
+    {
+        return Some(format!("space for the log goes from {then} to {space} bytes in {passed_s:.3} s"));
+    }
     if let (Some(then), Some(now)) = (before.battery_v, now.battery_v)
-        && (now - then).abs() > BATTERY_STEP_V
+        && (now - then).abs() > step_v
     {
         return Some(format!("the battery goes from {then:?} to {now:?} V in {passed_s:.3} s"));
     }
