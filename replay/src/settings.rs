@@ -145,10 +145,10 @@ const TRUTH: &str = "truth.";
 /// A name is unknown, or the result is not a valid mission.
 pub fn mission_with(mission_toml: &str, settings: &[Setting]) -> Result<Mission, SettingError> {
     let text = mission_toml_with(mission_toml, settings)?;
-    flight::vehicles::mission::from_toml(&text, "profile.toml").map_err(|error| {
+    flight::vehicles::mission::from_toml(&text, "the mission").map_err(|error| {
         let reason = error.to_string();
         if settings.is_empty() {
-            return SettingError::Toml { origin: "profile.toml".to_owned(), reason };
+            return SettingError::Toml { origin: "the mission".to_owned(), reason };
         }
         let recorded = mission_toml.parse().unwrap_or_default();
         refusal(&reason, settings, &known_keys(&recorded))
@@ -169,7 +169,7 @@ pub(crate) fn mission_toml_with_reasons(
     mission_toml: &str,
     settings: &[(Setting, String)],
 ) -> Result<String, SettingError> {
-    let wrong = |reason| SettingError::Toml { origin: "profile.toml".to_owned(), reason };
+    let wrong = |reason| SettingError::Toml { origin: "the mission".to_owned(), reason };
     let not_toml = |error: toml_edit::TomlError| wrong(error.to_string());
     let mut document: toml_edit::DocumentMut = mission_toml.parse().map_err(not_toml)?;
     for (Setting { path, value, .. }, comment) in settings {

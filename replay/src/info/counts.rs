@@ -68,11 +68,23 @@ impl ChannelCounter {
                     metadata: channel.metadata.clone(),
                     messages: counts.messages,
                     unreadable: counts.unreadable,
-                    lost: numbered.saturating_sub(counts.messages),
+                    // Those that there should be, so far.
+                    lost: numbered,
                 }
             })
             .collect();
         facts.sort_by(|a, b| (&a.topic, &a.metadata).cmp(&(&b.topic, &b.metadata)));
+        // A program that joined logs has given each part channels of its own.
+        facts.dedup_by(|more, first| {
+            let same = (&first.topic, &first.metadata) == (&more.topic, &more.metadata);
+            if same {
+                first.messages += more.messages;
+                first.unreadable += more.unreadable;
+                first.lost = first.lost.max(more.lost);
+            }
+            same
+        });
+        facts.iter_mut().for_each(|channel| channel.lost = channel.lost.saturating_sub(channel.messages));
         facts
     }
 }

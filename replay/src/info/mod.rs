@@ -1,6 +1,7 @@
 //! Describes a log: its content, how complete it is, and what can be done with it.
 
 mod counts;
+pub mod season;
 
 use std::collections::BTreeMap;
 use std::io::{IsTerminal as _, Read};
@@ -8,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 pub use self::counts::{Channel, Frames, PhaseSource, PhaseSpan, PhaseTimeline, SolveTimes};
 use self::counts::{ChannelCounter, EndingTracker, FrameCounter, PhaseTracker};
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use protocol::log::reader::Damage;
 use protocol::log::record::SCHEMA_VERSION;
 use protocol::log::v1::LimitResult;
@@ -17,7 +18,7 @@ use serde::Serialize;
 use time::OffsetDateTime;
 use time::format_description::well_known::Rfc3339;
 
-use crate::cli::{Answer, give_each, warn_of_cut, warn_of_damage};
+use crate::cli::{Answer, answer, give, give_each, warn_of_cut, warn_of_damage};
 use crate::cut::CUT_FROM;
 use crate::findings::{self, Finding};
 use crate::log::{
@@ -73,6 +74,7 @@ struct Seen {
     telemetry_phases: PhaseTracker,
     ending: EndingTracker,
     frames: FrameCounter,
+    highest_m: Option<f64>,
     unreadable: Option<String>,
 }
 
@@ -88,7 +90,9 @@ impl Seen {
                 if let Some(phase) = telemetry.phase {
                     self.telemetry_phases.note(telemetry.time_s, phase);
                 }
+                self.rises_to(telemetry.altitude_m);
             }
+            Entry::Estimate(estimate) => self.rises_to(Some(estimate.state.position_m.z)),
             Entry::Unreadable { reason } => {
                 self.unreadable.get_or_insert_with(|| reason.clone());
             }
@@ -102,6 +106,11 @@ impl Seen {
             }
             _ => {}
         }
+    }
+
+    fn rises_to(&mut self, height_m: Option<f64>) {
+        // What is no number is no height.
+        self.highest_m = height_m.into_iter().chain(self.highest_m).reduce(f64::max);
     }
 
     fn into_info<R: Read>(self, log: &FlightLog<R>, summary: impl FnOnce() -> Option<Summary>) -> Info {
@@ -143,6 +152,7 @@ impl Seen {
                 .collect(),
             ending: self.ending.words(verdict.as_ref()),
             verdict,
+            highest_m: self.highest_m.filter(|height_m| height_m.is_finite()),
             findings: None,
             clocks: log.clocks(),
             unreadable: self.unreadable,
@@ -180,6 +190,8 @@ pub struct Info {
     pub phases: Vec<PhaseTimeline>,
     /// The landing verdict.
     pub verdict: Option<Verdict>,
+    /// Greatest height that was estimated or heard, m.
+    pub highest_m: Option<f64>,
     /// How the flight ended, in one sentence, if the log says so.
     pub ending: Option<String>,
     /// What went wrong, first in time; `None` of a log whose flight this build does not run again as it was.
@@ -589,16 +601,34 @@ const STDIN: &str = "-";
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// The logs, MCAP files; - is standard input.
+    /// The logs, MCAP files; - is standard input. Of a folder every log is a line of a table.
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// Answer in JSON: a description, or a list of descriptions for several logs.
     #[arg(long)]
     json: bool,
+    /// Print the table of a folder as CSV.
+    #[arg(long, conflicts_with = "json")]
+    csv: bool,
 }
 
 impl Args {
     pub(crate) fn run(self) -> Result<Exit> {
+        if let [folder] = self.files.as_slice()
+            && folder.is_dir()
+        {
+            let flown = season::season(folder)?;
+            if !self.csv {
+                return give(&season::Season(flown), self.json);
+            }
+            answer(|output| {
+                let mut table = csv::Writer::from_writer(output);
+                flown.iter().try_for_each(|line| table.serialize(line).map_err(std::io::Error::other))?;
+                table.flush()
+            })?;
+            return Ok(Exit::Yes);
+        }
+        ensure!(!self.csv, "--csv is for a folder of logs, as in `replay info DIR --csv`");
         // On a terminal the description says it already.
         let said = !self.json && std::io::stdout().is_terminal();
         give_each(&self.files, self.json, |file| {

@@ -13,6 +13,7 @@
 //! Settings change both flight computer and world. Settings "of the plant" change the world only, timed ones the flight
 //! computer only. The crew's abort comes at its recorded frame.
 
+mod others;
 mod rerun;
 
 use std::collections::BTreeMap;
@@ -26,7 +27,7 @@ use flight::rules::phase::Phase;
 use prost::Message as _;
 use protocol::log::computer_v1::{ComputerFrame, ComputerInput, ComputerOutput};
 use protocol::log::record::{Event, EventLevel, Record};
-use protocol::log::v1;
+use protocol::log::v1::{self, LimitResult};
 use protocol::log::writer::{LogHeader, LogWriter};
 use protocol::program::Exit;
 use serde::Serialize;
@@ -34,6 +35,7 @@ use sim::draw::draw;
 use sim::sortie::SetUpError;
 use sim::wire::record;
 
+pub use self::others::{OtherFlights, other_flights};
 use self::rerun::Rerun;
 use crate::cli::{Answer, give, warn_of_what_is_missing};
 use crate::controller::{AgainError, LoggedComputer, SETTINGS_IN_FLIGHT, phase_name};
@@ -70,6 +72,16 @@ pub struct ReflyOptions {
     pub seed: Option<u64>,
     /// Other faults than the recorded ones.
     pub faults: FaultChanges,
+}
+
+impl ReflyOptions {
+    fn changes_nothing(&self) -> bool {
+        let Self { settings, plant_settings, seed, faults, .. } = self;
+        settings.is_empty()
+            && plant_settings.is_empty()
+            && seed.is_none()
+            && *faults == FaultChanges::default()
+    }
 }
 
 /// How the faults of a flight differ from the recorded ones.
@@ -131,6 +143,10 @@ pub struct ReflyReport {
     pub commands_identical: usize,
     /// The largest difference of a gimbal command from the recorded command of the same frame, rad.
     pub gimbal_difference_max_rad: f64,
+    /// Something was to be changed, and every output from the start on is the recorded one.
+    pub never_acted: bool,
+    /// What the changes do to other flights, if that was asked.
+    pub others: Option<OtherFlights>,
 }
 
 /// A re-flown flight.
@@ -216,8 +232,11 @@ pub fn refly_flight(
         commands_recorded: 0,
         commands_identical: 0,
         gimbal_difference_max_rad: 0.0,
+        never_acted: !options.changes_nothing() && rerun.frames().count() == frames.len(),
+        others: None,
     };
     for (now, then) in rerun.beside(&frames[place..]) {
+        report.never_acted &= now.output == then.output;
         let pairs = || then.output.gimbal_rad.iter().zip(&now.output.gimbal_rad);
         report.commands_recorded += 1;
         report.commands_identical += usize::from(pairs().all(|(a, b)| a.to_bits() == b.to_bits()));
@@ -377,11 +396,17 @@ fn find(recording: &Recording, frames: &[ComputerFrame], start: Option<Moment>) 
     found.ok_or_else(|| AgainError::Refused { of: recording.name.clone(), reason })
 }
 
-/// The smallest distance to a limit as a fraction of it; see [`ReflyReport::margin`].
+/// The smallest distance to a limit as a fraction of it; see [`ReflyReport::margin`]. A vehicle that fell over is as far from standing
+/// as load, speed and tilt at its contact say.
 pub fn margin(verdict: &Verdict) -> f64 {
-    let left = verdict.deciding().map(|limit| 1.0 - share(limit));
+    let has_width = |limit: &&LimitResult| limit.maximum > limit.minimum;
+    let fell = verdict.deciding().any(|limit| !has_width(&limit) && !limit.passed);
+    let limits: Vec<&LimitResult> =
+        if fell { verdict.of_the_legs().filter(has_width).collect() } else { verdict.deciding().collect() };
+    let left = limits.into_iter().map(|limit| 1.0 - share(limit));
     // A NaN counts as infinitely far outside.
-    left.map(|left| if left.is_nan() { f64::NEG_INFINITY } else { left }).fold(f64::INFINITY, f64::min)
+    let most = if fell { 0.0 } else { f64::INFINITY };
+    left.map(|left| if left.is_nan() { f64::NEG_INFINITY } else { left }).fold(most, f64::min)
 }
 
 /// Writes a re-flown flight as a log that every command accepts.
@@ -481,6 +506,17 @@ impl Answer for ReflyReport {
         };
         let margin = self.margin.map_or_else(|| "no contact".to_owned(), |margin| format!("{margin:.3}"));
         lines.push(format!("{answer}; margin to the nearest limit {margin}"));
+        if self.never_acted {
+            lines.push("what was to be changed NEVER ACTED: every output is the recorded one".to_owned());
+        }
+        let asks = self.others.is_none() && !self.never_acted && !self.settings.is_empty();
+        lines.extend(self.others.as_ref().map(OtherFlights::words));
+        if asks && self.verdict_changed == Some(true) {
+            lines.push(
+                "one flight may be luck: --flights 200 asks as many others, with and without the change"
+                    .to_owned(),
+            );
+        }
         lines.extend(self.worst_plans.iter().map(|plan| format!("worst plan: {}", plan.words())));
         lines.push(format!(
             "{}; of {} recorded too, {} with the same gimbal command bit for bit; largest difference {:.3e} rad",
@@ -525,6 +561,9 @@ pub(crate) struct Args {
     /// log:19.7 (since the first record). A frame has its number in the log. Without this, it is the landing's first frame.
     #[arg(long, value_name = "WHERE")]
     at: Option<Moment>,
+    /// Fly this many other flights of the recorded mission and dispersions, too, as recorded and with the changes.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    flights: Option<u64>,
     /// Write the flight as a new log.
     #[arg(long, alias = "log", value_name = "FILE")]
     out: Option<PathBuf>,
@@ -544,7 +583,9 @@ impl Args {
             seed: self.seed,
             faults: FaultChanges { with: self.faults, without: self.without_fault },
         };
-        let (report, flight) = refly_flight(&recording, &options)?;
+        let (mut report, flight) = refly_flight(&recording, &options)?;
+        report.others =
+            self.flights.map(|flights| other_flights(&recording, &options, flights)).transpose()?;
         if let Some(path) = &self.out {
             write_log(path, &recording, &flight)?;
         }

@@ -15,7 +15,8 @@ use crate::refly::{ReflyOptions, refly_flight};
 const DRAWN_FROM: [&str; 3] = ["seed", "flight", "dispersion"];
 
 /// What of the metadata no flight follows from.
-const BESIDE: &str = "what the flight is drawn from; start_unix_ns, the build and touchdown.xml are not compared";
+const BESIDE: &str =
+    "what the flight is drawn from; start_unix_ns, the build and touchdown.xml are not compared";
 
 /// Compares the verdict and the run facts of a log of one flight.
 pub(super) fn compare(path: &Path, simulated: bool, verdict: &mut Part, facts: &mut Part) {

@@ -3,12 +3,39 @@
 use flight::guidance::powered::ControlLevel;
 use flight::rules::phase::Phase;
 use protocol::log::computer_v1::ComputerFrame;
+use replay::info::info;
 
 use serde_json::Value;
 
 use crate::command_line::{Files, data, refusal, replay, run};
 use crate::flown::{FLIGHT, Recipe, WHOLE, write_log};
 use crate::simulated::{DISPERSED, MK2, WITH_FRAMES};
+
+/// Every log of a folder has its line, also one that cannot be read.
+#[test]
+fn a_folder_is_a_season() {
+    let season = tempfile::tempdir().unwrap();
+    for (name, flight) in [("a.mcap", &MK2), ("b.mcap", &DISPERSED)] {
+        std::fs::copy(&flight.log, season.path().join(name)).unwrap();
+    }
+    std::fs::write(season.path().join("c.mcap"), "no log").unwrap();
+    std::fs::write(season.path().join("notes.txt"), "no log either").unwrap();
+    let (code, stdout, _) = run(&mut replay("info", season.path()));
+    let lines: Vec<&str> = stdout.lines().collect();
+    assert_eq!((code, lines.len()), (0, 4), "{stdout}");
+    assert!(lines[0].starts_with("date ") && lines[0].contains("worst limit"), "{stdout}");
+    assert!(lines[1].contains("CANNOT BE READ") && lines[1].ends_with("c.mcap"), "{stdout}");
+    assert!(lines[2].contains(" mk2 ") && lines[2].contains("STANDS UNDAMAGED  "), "{stdout}");
+    let (_, table, _) = run(replay("info", season.path()).arg("--csv"));
+    let mut rows = csv::Reader::from_reader(table.as_bytes());
+    let found = info(&MK2.log).unwrap();
+    let row = rows.records().map(Result::unwrap).find(|row| row[8].ends_with("a.mcap")).unwrap();
+    let distance =
+        found.verdict.unwrap().table_2.iter().find(|limit| limit.name == "distance").unwrap().value;
+    assert_eq!(row[4].parse::<f64>().unwrap().to_bits(), distance.to_bits());
+    assert_eq!(&row[5], found.ending.unwrap());
+    assert!(refusal(replay("info", &MK2.log).arg("--csv")).contains("--csv is for a folder"));
+}
 
 #[test]
 fn several_logs_are_verified_at_once_and_the_worst_decides() {
