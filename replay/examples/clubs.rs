@@ -2,8 +2,8 @@
 //!
 //! `cargo run --release -p replay --example clubs -- MISSION FLIGHTS SEED`
 //!
-//! Each simulated club has a motor lot as the prior has them and five burns behind it, knows its motors as well as fits do, and
-//! simulates its next day in `real`. Its own world is `real`, or `wild`. FLIGHTS flights of each world, whose motors scatter
+//! Each simulated club has a motor lot as the prior has them and five or ten flights behind it, knows its motors as well as fits do,
+//! and simulates its next day in `real` or `wild`. Its own world is that one, or `wild` although it simulates `real`. FLIGHTS flights of each world, whose motors scatter
 //! more than any lot's, tell how a motor lands there: as the 40 flights with the nearest motors did.
 
 use std::io::Write as _;
@@ -11,7 +11,7 @@ use std::io::Write as _;
 use anyhow::Context as _;
 use flight::vehicle::lot::Posterior;
 use onboard_sim::run::in_parallel;
-use replay::fit::day::{Outcomes, is_go};
+use replay::fit::day::{Expected, Outcomes};
 use replay::fit::lot::{Trial, burnt, draw_lot, draw_next, predict};
 use sim::draw::{Chance, Draw, draw};
 use sim::recipe::Recipe;
@@ -29,12 +29,11 @@ const PRIOR: Motor = [0.027, 0.04, 0.05];
 const MISSED: Motor = [0.0055, 0.0075, 0.0025];
 const NEAREST: usize = 40;
 const CLUBS: u64 = 500;
-const BURNS: usize = 5;
 /// Simulated flights of a club's day, and flights that its true rate is taken over.
 const DAY: usize = 1000;
 /// The risk that `replay fit` takes unless it is told another.
 const RISK: f64 = 0.1;
-const LIMITS: [f64; 5] = [0.6, 0.7, 0.8, 0.9, 0.95];
+const LIMITS: [f64; 6] = [0.5, 0.6, 0.7, 0.8, 0.9, 0.95];
 
 fn nominal() -> Motor {
     [1.0, 1.0, Truth::default().ignition_delay_s]
@@ -75,17 +74,22 @@ impl World {
 }
 
 /// A club's true rate of the next day, and for each limit whether it has a GO.
-fn club(number: u64, simulated: &World, own: &World) -> anyhow::Result<(f64, [bool; LIMITS.len()])> {
+fn club(
+    number: u64,
+    flown: usize,
+    simulated: &World,
+    own: &World,
+) -> anyhow::Result<(f64, [bool; LIMITS.len()])> {
     let mut chance = Chance::of(9_000_000 + number, 0);
     let priors = [0, 1, 2].map(|i: usize| Posterior::prior(nominal()[i], PRIOR[i]));
     let lot = priors.map(|prior| draw_lot(&prior, &mut chance));
     let burn = |chance: &mut Chance| lot.map(|(mean, sigma)| mean + sigma * chance.normal());
     let missed = MISSED.map(|sigma| sigma * chance.normal());
-    let burns: [Motor; BURNS] = std::array::from_fn(|_| burn(&mut chance));
+    let burns: Vec<Motor> = (0..flown).map(|_| burn(&mut chance)).collect();
     let landed = burns.iter().filter(|motor| chance.unit() < own.chance_to_land(motor)).count();
     let lots = [0, 1, 2].map(|i: usize| {
         let values: Vec<f64> = burns.iter().map(|burn| burn[i] + missed[i]).collect();
-        priors[i].with(BURNS as u32, &burnt(&values, MISSED[i]))
+        priors[i].with(flown as u32, &burnt(&values, MISSED[i]))
     });
     // The day's mission expects what was learnt.
     let expected = |motor: &[f64]| {
@@ -98,11 +102,10 @@ fn club(number: u64, simulated: &World, own: &World) -> anyhow::Result<(f64, [bo
     };
     let trials: Vec<Trial> = (0..DAY).map(|_| trial()).collect();
     let rate = (0..DAY).map(|_| own.chance_to_land(&expected(&burn(&mut chance)))).sum::<f64>() / DAY as f64;
-    let mut go = [false; LIMITS.len()];
-    for (go, limit) in go.iter_mut().zip(LIMITS) {
-        let found = predict(&lots, &trials, limit, number).context("no flight was simulated")?;
-        *go = is_go(&found, Outcomes { landed, of: BURNS }, limit, RISK);
-    }
+    let found = predict(&lots, &trials, 0.5, number).context("no flight was simulated")?;
+    let outcomes = Outcomes { landed, of: flown, unknown: 0 };
+    let go = LIMITS
+        .map(|limit| Expected::of(&found, outcomes, limit).is_some_and(|expected| expected.risk <= RISK));
     Ok((rate, go))
 }
 
@@ -113,22 +116,21 @@ fn main() -> anyhow::Result<()> {
     let real = World::flown(&mission, "real", flights, seed)?;
     let wild = World::flown(&mission, "wild", flights, seed)?;
     let mut stdout = std::io::stdout().lock();
-    for (set, own) in [("real", &real), ("wild", &wild)] {
-        let numbers: Vec<u64> = (0..CLUBS).collect();
-        let clubs = in_parallel(&numbers, |number| club(*number, &real, own), &|_| {});
-        let clubs = clubs.into_iter().collect::<anyhow::Result<Vec<_>>>()?;
-        let mean = clubs.iter().map(|(rate, _)| rate).sum::<f64>() / CLUBS as f64;
-        writeln!(stdout, "{CLUBS} clubs in {set}: landing rate {:.1} % on average", 100.0 * mean)?;
-        for (place, limit) in LIMITS.into_iter().enumerate() {
-            let rates: Vec<f64> = clubs.iter().filter(|(_, go)| go[place]).map(|(rate, _)| *rate).collect();
-            let right = rates.iter().filter(|rate| **rate >= limit).count();
-            let could = clubs.iter().filter(|(rate, _)| *rate >= limit).count();
-            writeln!(
-                stdout,
-                "  limit {:.0} %: {} have GO, {right} of them land at least that; {could} of all clubs do",
-                100.0 * limit,
-                rates.len()
-            )?;
+    writeln!(stdout, "simulated,lives_in,flown,mean_rate,limit,go,right,could")?;
+    for (prior, set, simulated, own) in
+        [("real", "real", &real, &real), ("wild", "wild", &wild, &wild), ("real", "wild", &real, &wild)]
+    {
+        for flown in [5, 10] {
+            let numbers: Vec<u64> = (0..CLUBS).collect();
+            let clubs = in_parallel(&numbers, |number| club(*number, flown, simulated, own), &|_| {});
+            let clubs = clubs.into_iter().collect::<anyhow::Result<Vec<_>>>()?;
+            let mean = clubs.iter().map(|(rate, _)| rate).sum::<f64>() / CLUBS as f64;
+            for (place, limit) in LIMITS.into_iter().enumerate() {
+                let go = clubs.iter().filter(|(_, go)| go[place]).count();
+                let right = clubs.iter().filter(|(rate, go)| go[place] && *rate >= limit).count();
+                let could = clubs.iter().filter(|(rate, _)| *rate >= limit).count();
+                writeln!(stdout, "{prior},{set},{flown},{mean:.3},{limit},{go},{right},{could}")?;
+            }
         }
     }
     Ok(())

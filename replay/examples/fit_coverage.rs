@@ -11,10 +11,10 @@ use anyhow::Context as _;
 use onboard_sim::run::in_parallel;
 use onboard_sim::statistics::{Share, quantile, sorted};
 use replay::fit::calibration::{Entry, Table};
+use replay::fit::truth::truth;
 use replay::fit::{Fit, Parameter, Trace, Z_95, fit, uncalibrated};
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
-use sim::world::sensors::Sensors;
 
 /// The table is made of these vehicles in these sets.
 const VEHICLES: [&str; 2] = ["mk2", "mk3"];
@@ -36,62 +36,6 @@ fn flown(recipe: &Recipe, number: u64) -> anyhow::Result<(Trace, Sortie)> {
     }
 }
 
-/// The truth by the names of a fit's parameters.
-fn truth(recipe: &Recipe, flight: &Sortie, body_share: f64) -> anyhow::Result<BTreeMap<String, f64>> {
-    let drawn = flight.drawn();
-    let truth = &drawn.truth;
-    let sensors = &recipe.dispersion.sensor_params;
-    let errors = *Sensors::new(sensors, drawn.flight_seed, 1.0)?.errors();
-    let airframe = &recipe.mission.airframe;
-    let arm_m = airframe.thrust_arm_m(airframe.mass.loaded_cg_station_m);
-    let [pitch_rad, yaw_rad] = truth.thrust_misalignment_rad;
-    let [x_m, y_m, z_m] = truth.cg_offset_m;
-    let [oy_m, oz_m] = truth.thrust_offset_m;
-    // The torque of an angle is that of thrust and arm, over the inertia.
-    let turns = (arm_m + x_m) / arm_m / truth.inertia_scale;
-    let (sin, cos) = libm::sincos(truth.wind_towards_rad);
-    let [body, fins] =
-        [truth.body_drag_scale, truth.fin_drag_scale].map(|own| truth.drag_scale * own / truth.mass_scale);
-    let servo = &airframe.gimbal.servo;
-    let rows = [
-        ("thrust_scale", truth.impulse_scale / truth.mass_scale),
-        ("burn_time_scale", truth.burn_time_scale),
-        // By impulse: a thrust that rises slowly makes the whole burn late by half of its rise.
-        ("ignition_delay", truth.ignition_delay_s + 0.5 * truth.thrust_rise_s + truth.chuff_s[1]),
-        ("drag_scale", body_share * body + (1.0 - body_share) * fins),
-        ("body_drag_scale", body),
-        ("fin_drag_scale", fins),
-        ("exhaust_body_loss", truth.plume_body_loss),
-        ("exhaust_fin_loss", truth.plume_fin_loss),
-        ("gimbal_delay", servo.delay_s),
-        ("gimbal_rate", servo.rate_deg_s),
-        ("gimbal_gain", truth.gimbal_gain * turns),
-        (
-            "gimbal_pitch_offset",
-            (pitch_rad * turns + (z_m - oz_m) / arm_m / truth.inertia_scale).to_degrees(),
-        ),
-        ("gimbal_yaw_offset", (yaw_rad * turns - (y_m - oy_m) / arm_m / truth.inertia_scale).to_degrees()),
-        ("gimbal_play", servo.slop_deg + truth.gimbal_slop_rad.to_degrees()),
-        ("wind_x", truth.wind_m_s * cos),
-        ("wind_y", truth.wind_m_s * sin),
-        ("gyro_noise", sensors.imu.gyro_noise_deg_s_sqrt_hz),
-        ("accelerometer_noise", sensors.imu.accelerometer_noise_mg_sqrt_hz),
-        ("barometer_noise", sensors.barometer.noise_m),
-        ("gnss_velocity_noise", sensors.gnss.velocity_m_s),
-        ("gnss_horizontal_noise", sensors.gnss.horizontal_white_m),
-        ("gnss_vertical_noise", sensors.gnss.vertical_white_m),
-        ("lidar_noise", sensors.lidar.noise_m),
-    ];
-    let mut all: BTreeMap<String, f64> = rows.map(|(name, value)| (name.to_owned(), value)).into();
-    all.extend((1..).zip(truth.thrust_shape).map(|(k, value)| (format!("thrust_shape_{k}"), value)));
-    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
-        all.insert(format!("gyro_bias_{name}"), errors.gyro_bias_rad_s[axis].to_degrees());
-        let milli_g = errors.accelerometer_bias_m_s2[axis] / 9.806_65e-3;
-        all.insert(format!("accelerometer_bias_{name}"), milli_g);
-    }
-    Ok(all)
-}
-
 /// What was found of one parameter: error and standard deviation, and whether the interval holds the truth.
 #[derive(Debug, Clone, Copy)]
 struct Found {
@@ -108,7 +52,7 @@ fn tallied(recipe: &Recipe, flights: u64, fitted: fn(&Trace) -> Fit) -> anyhow::
     let one = |number: &u64| -> anyhow::Result<(Fit, BTreeMap<String, f64>)> {
         let (trace, flight) = flown(recipe, *number)?;
         let fit = fitted(&trace);
-        let truth = truth(recipe, &flight, fit.body_share.unwrap_or(0.5))?;
+        let truth = truth(&recipe.dispersion, &flight, &fit)?;
         Ok((fit, truth))
     };
     let mut tallies = Tallies::new();

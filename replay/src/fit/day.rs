@@ -22,7 +22,8 @@ use sim::dispersion::{DEFAULT, Dispersion, may_be_kinder};
 use sim::draw::{Chance, Draw, draw};
 use sim::sortie::{SetUpError, Sortie};
 use sim::world::truth::Truth;
-use statrs::distribution::{Beta, Binomial, ContinuousCDF as _, DiscreteCDF as _};
+use statrs::distribution::{Beta, ContinuousCDF as _};
+use statrs::function::beta::beta;
 
 use super::lot::{Prediction, Trial, burnt, draw_next, predict};
 use super::{Basis, Fit, Parameter, Pooled, Z_95, pooled};
@@ -71,8 +72,8 @@ pub struct Learnt {
     pub prediction: Option<Prediction>,
     /// How the flights so far ended.
     pub flown: Outcomes,
-    /// The rate with these outcomes; `None` without any, and if the day was not flown.
-    pub pulled: Option<Pulled>,
+    /// The rate after these outcomes, which decides; `None` if the day was not flown.
+    pub expected: Option<Expected>,
     pub limit: f64,
     pub risk: f64,
     pub go: Option<bool>,
@@ -133,7 +134,7 @@ fn learn(fits: &[Fit], ask: &Arguments, mission_toml: &str, set_toml: &str) -> R
     });
     let prediction = prediction.transpose()?;
     let flown = Outcomes::of(fits);
-    let pulled = prediction.and_then(|found| Pulled::of(&found, flown));
+    let expected = prediction.as_ref().and_then(|found| Expected::of(found, flown, ask.limit));
     let reports = PROPERTIES.iter().zip(&lots).zip(&values).zip(&priors);
     let reports = reports.map(|((((name, unit), lot), (burns, _)), prior)| LotReport {
         name,
@@ -158,19 +159,12 @@ fn learn(fits: &[Fit], ask: &Arguments, mission_toml: &str, set_toml: &str) -> R
         flights: trials.map_or(0, |trials| trials.len()),
         prediction,
         flown,
-        pulled,
+        expected,
         limit: ask.limit,
         risk: ask.risk,
-        go: prediction.map(|found| is_go(&found, flown, ask.limit, ask.risk)),
+        go: expected.map(|expected| expected.risk <= ask.risk),
         day,
     })
-}
-
-/// Whether the club flies: the risk that the rate is below its limit is one that it takes, and the flights so far do not speak
-/// against the limit.
-pub fn is_go(found: &Prediction, flown: Outcomes, limit: f64, risk: f64) -> bool {
-    let pulled = Pulled::of(found, flown);
-    found.risk <= risk && pulled.is_none_or(|pulled| pulled.rate >= limit) && flown.allow(limit)
 }
 
 /// How the flights so far ended.
@@ -178,54 +172,63 @@ pub fn is_go(found: &Prediction, flown: Outcomes, limit: f64, risk: f64) -> bool
 pub struct Outcomes {
     pub landed: usize,
     pub of: usize,
+    /// Flights whose log does not say how they ended.
+    pub unknown: usize,
 }
-
-/// Outcomes that are rarer than this, if the rate is what the club wants, speak against it.
-const AGAINST: f64 = 0.05;
 
 impl Outcomes {
+    /// A burn on a stand is no flight.
     fn of(fits: &[Fit]) -> Self {
-        let known: Vec<bool> = fits.iter().filter_map(|fit| fit.landed).collect();
-        Self { landed: known.iter().filter(|landed| **landed).count(), of: known.len() }
-    }
-
-    /// Whether so few landings may be, if each flight lands with this rate.
-    fn allow(self, rate: f64) -> bool {
-        let so_few = Binomial::new(rate, self.of as u64).map(|flights| flights.cdf(self.landed as u64));
-        self.landed == self.of || so_few.is_ok_and(|share| share >= AGAINST)
+        let flights = || fits.iter().filter(|fit| !fit.mission.is_empty());
+        let landed = flights().filter(|fit| fit.landed == Some(true)).count();
+        let of = flights().filter(|fit| fit.landed.is_some()).count();
+        Self { landed, of, unknown: flights().count() - of }
     }
 }
 
-/// The landing rate of a simulation that the outcomes of flights have moved.
+/// The landing rate by the simulation and by the outcomes of flights: one distribution for rate, interval and risk.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Pulled {
-    /// So many flights the simulation was worth.
-    pub worth: f64,
+pub struct Expected {
+    /// Probability that the simulation is of the club's world.
+    pub trust: f64,
     pub rate: f64,
     /// Ends of the 95 % interval.
     pub low: f64,
     pub high: f64,
+    /// Probability that the rate is below the limit.
+    pub risk: f64,
 }
 
-/// A simulation is worth no more flights than this, however many it has flown: it knows only what its models know.
-const WORTH_MAX: f64 = 20.0;
-/// And no fewer.
-const WORTH_MIN: f64 = 1.0;
+/// Before its first flight one club of ten lives in a world that its simulation does not have: any rate may be there. More of
+/// them, and no club could fly before it has flown ten times; fewer, and five flights are no evidence against a simulation.
+const OTHER_WORLD: f64 = 0.1;
 
-impl Pulled {
-    /// A beta distribution of the simulation's mean and width, with the outcomes; `None` without outcomes.
-    fn of(simulated: &Prediction, Outcomes { landed, of }: Outcomes) -> Option<Self> {
-        if of == 0 {
-            return None;
-        }
-        let mean = simulated.rate.clamp(0.001, 0.999);
-        let sigma = ((simulated.high - simulated.low) / (2.0 * Z_95)).max(1e-6);
-        let worth = (mean * (1.0 - mean) / (sigma * sigma) - 1.0).clamp(WORTH_MIN, WORTH_MAX);
-        let landed = mean * worth + landed as f64;
-        let all = worth + of as f64;
-        let rate = Beta::new(landed, all - landed).ok()?;
-        let [low, high] = [0.025, 0.975].map(|share| rate.inverse_cdf(share));
-        Some(Self { worth, rate: landed / all, low, high })
+impl Expected {
+    /// A mixture: the rates that the simulation thinks possible, and a rate of which nothing is known, each with the likelihood of
+    /// the outcomes (Gelman et al., Bayesian Data Analysis, 3rd ed., 2.4 and 7.4).
+    pub fn of(simulated: &Prediction, Outcomes { landed, of, .. }: Outcomes, limit: f64) -> Option<Self> {
+        let [landed, lost] = [landed, of - landed].map(|count| count as f64);
+        let likelihood = |rate: f64| libm::pow(rate, landed) * libm::pow(1.0 - rate, lost);
+        let any = Beta::new(1.0 + landed, 1.0 + lost).ok()?;
+        let any_weight = OTHER_WORLD * beta(1.0 + landed, 1.0 + lost);
+        let share = (1.0 - OTHER_WORLD) / simulated.rates.len() as f64;
+        let rates = || simulated.rates.iter().map(|rate| (*rate, share * likelihood(*rate)));
+        let held: f64 = rates().map(|(_, weight)| weight).sum();
+        let all = held + any_weight;
+        let below = |limit: f64| {
+            let held: f64 = rates().filter(|(rate, _)| *rate < limit).map(|(_, weight)| weight).sum();
+            (held + any_weight * any.cdf(limit)) / all
+        };
+        let at = |share: f64| {
+            let halved = |[low, high]: [f64; 2], _| {
+                let middle = 0.5 * (low + high);
+                if below(middle) < share { [middle, high] } else { [low, middle] }
+            };
+            (0..30).fold([0.0, 1.0], halved)[0]
+        };
+        let held_rate: f64 = rates().map(|(rate, weight)| rate * weight).sum();
+        let rate = (held_rate + any_weight * (1.0 + landed) / (2.0 + of as f64)) / all;
+        Some(Self { trust: held / all, rate, low: at(0.025), high: at(0.975), risk: below(limit) })
     }
 }
 
@@ -424,14 +427,18 @@ impl Answer for Learnt {
         said.push(format!(
             "rate      {rate:.1} %, 95 % interval {low:.1} to {high:.1} %, from {flights} in {set}"
         ));
-        if let Some(Pulled { worth, rate, low, high }) = self.pulled {
-            let Outcomes { landed, of } = self.flown;
-            let [rate, low, high] = percent([rate, low, high]);
-            said.push(format!(
-                "flown     {landed} of {of} landed: with the simulation worth {worth:.0} flights {rate:.1} %, 95 % interval {low:.1} to {high:.1} %"
-            ));
-        }
-        let [risk, limit, taken] = percent([found.risk, self.limit, self.risk]);
+        let Some(expected) = self.expected else { return said };
+        let Outcomes { landed, of, unknown } = self.flown;
+        let [trust, rate, low, high] =
+            [expected.trust, expected.rate, expected.low, expected.high].map(|share| 100.0 * share);
+        let unknown = match unknown {
+            0 => String::new(),
+            unknown => format!(" ({} without a verdict not counted)", counted(unknown as u64, "flight")),
+        };
+        said.push(format!(
+            "flown     {landed} of {of} landed{unknown}: the simulation holds with {trust:.0} %; rate {rate:.1} %, 95 % interval {low:.1} to {high:.1} %"
+        ));
+        let [risk, limit, taken] = percent([expected.risk, self.limit, self.risk]);
         said.push(format!(
             "risk      {risk:.1} % that the rate is below {limit:.0} %; {taken:.0} % is taken"
         ));
@@ -439,7 +446,9 @@ impl Answer for Learnt {
             (true, false) => "GO".to_owned(),
             (true, true) => format!("GO in {set} only, which may be kinder than {DEFAULT}"),
             (false, _) if found.risk <= self.risk => {
-                format!("NO-GO: the flights so far speak against a rate of {limit:.0} %")
+                format!(
+                    "NO-GO: the simulation alone would fly, and {of} flights are too few or speak against it"
+                )
             }
             (false, _) => "NO-GO".to_owned(),
         });
@@ -553,18 +562,43 @@ mod tests {
         );
     }
 
-    /// Of a beta distribution with 17.7 and 2.3, eleven flights that did not land leave 17.7 of 31.
+    /// A simulation that says 0.8 and 1 with the same weight, and three of four landed: 0.8^3 0.2 = 0.1024 of the first, nothing of the
+    /// second. Of any rate it is B(4, 2) = 3! 1! / 5! = 0.05.
     #[test]
-    fn val_hand_what_was_flown_moves_the_rate_and_forbids_a_go() {
-        let simulated = Prediction { rate: 0.885, low: 0.86, high: 0.91, risk: 0.0 };
-        let pulled = Pulled::of(&simulated, Outcomes { landed: 0, of: 11 }).unwrap();
-        assert!((pulled.rate - 17.7 / 31.0).abs() < 1e-9 && pulled.high < 0.8, "{pulled:?}");
-        assert!(!Outcomes { landed: 0, of: 11 }.allow(0.8));
-        let good = Pulled::of(&simulated, Outcomes { landed: 11, of: 11 }).unwrap();
-        assert!(good.rate > simulated.rate && Outcomes { landed: 11, of: 11 }.allow(1.0));
-        // Seven and fewer of ten come in 12 % of all tens at 0.8 and in 1.2 % at 0.95.
-        let seven = Outcomes { landed: 7, of: 10 };
-        assert!(seven.allow(0.8) && !seven.allow(0.95));
-        assert_eq!(Pulled::of(&simulated, Outcomes { landed: 0, of: 0 }), None);
+    fn val_hand_what_was_flown_decides() {
+        let simulated = Prediction { rate: 0.9, low: 0.8, high: 1.0, risk: 0.0, rates: vec![0.8, 1.0] };
+        let flown = |landed, of| Outcomes { landed, of, unknown: 0 };
+        let found = Expected::of(&simulated, flown(3, 4), 0.7).unwrap();
+        let (held, any) = (0.9 * 0.5 * 0.1024, 0.1 * 0.05);
+        assert!((found.trust - held / (held + any)).abs() < 1e-9, "{found:?}");
+        assert!((found.rate - (held * 0.8 + any * 4.0 / 6.0) / (held + any)).abs() < 1e-9, "{found:?}");
+        // A beta distribution of 4 and 2 is below x with 5 x^4 - 4 x^5.
+        let below = any / (held + any) * (5.0 * 0.7_f64.powi(4) - 4.0 * 0.7_f64.powi(5));
+        assert!((found.risk - below).abs() < 1e-9, "{found:?}");
+        assert!(found.low < 0.8 && (found.high - 0.8).abs() < 0.2, "{found:?}");
+    }
+
+    /// One of five landed, and the simulation says 88 %: whoever asks for 50 or 60 % does not fly.
+    #[test]
+    fn flights_speak_against_a_simulation() {
+        let rates: Vec<f64> = (0..1000).map(|i| 0.86 + 5e-5 * f64::from(i)).collect();
+        let simulated = Prediction { rate: 0.885, low: 0.861, high: 0.909, risk: 0.0, rates };
+        let risk = |landed, of, limit| {
+            Expected::of(&simulated, Outcomes { landed, of, unknown: 0 }, limit).unwrap().risk
+        };
+        for (landed, of, limit) in [(1, 5, 0.6), (1, 5, 0.5), (2, 5, 0.6), (0, 2, 0.5)] {
+            assert!(
+                risk(landed, of, limit) > 0.1,
+                "{landed} of {of} at {limit}: {}",
+                risk(landed, of, limit)
+            );
+        }
+        for (landed, of, limit) in [(5, 5, 0.8), (4, 5, 0.6), (9, 10, 0.8), (0, 0, 0.8)] {
+            assert!(
+                risk(landed, of, limit) < 0.1,
+                "{landed} of {of} at {limit}: {}",
+                risk(landed, of, limit)
+            );
+        }
     }
 }

@@ -44,7 +44,7 @@ pub struct Trial {
 }
 
 /// The predicted landing rate.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Prediction {
     /// Expected rate.
     pub rate: f64,
@@ -53,6 +53,9 @@ pub struct Prediction {
     pub high: f64,
     /// Probability that the rate is below the limit.
     pub risk: f64,
+    /// Rates that are equally likely, ascending.
+    #[serde(skip)]
+    pub rates: Vec<f64>,
 }
 
 /// Draws a flight's motor from the lots.
@@ -95,6 +98,7 @@ pub fn predict(lots: &[Posterior], trials: &[Trial], limit: f64, seed: u64) -> O
         low: at(0.025),
         high: at(0.975),
         risk: below as f64 / DRAWS as f64,
+        rates,
     })
 }
 

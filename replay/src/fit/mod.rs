@@ -24,6 +24,7 @@ pub mod lot;
 mod sensors;
 mod servo;
 mod trace;
+pub mod truth;
 mod turning;
 mod wind;
 
@@ -148,6 +149,9 @@ pub struct Fit {
     pub damage: Option<String>,
     /// Whether the flight landed; `None` of a test stand, and of a log that does not say.
     pub landed: Option<bool>,
+    /// The truth of a simulated flight by the names of its parameters, if that was asked.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub truth: BTreeMap<String, f64>,
     /// Names what was recorded: one flight is one flight, under however many names.
     pub content: Option<String>,
 }
@@ -197,6 +201,12 @@ impl Fit {
             return by;
         }
         format!("the widest of {}, {by}: not calibrated on this vehicle", vehicles.join(" and "))
+    }
+
+    fn head(&self) -> String {
+        let Self { source, mission, motor, .. } = self;
+        let mission = if mission.is_empty() { "a test stand" } else { mission };
+        format!("{source}: {mission} with {motor}")
     }
 
     fn lacks(&mut self, name: &str, reason: &str) {
@@ -465,7 +475,9 @@ pub struct FitReport {
 
 impl Answer for FitReport {
     fn sentences(&self) -> Vec<String> {
-        let mut said = self.fits.sentences();
+        // Many fits are one answer; JSON has each.
+        let mut said = if self.together.is_empty() { self.fits.sentences() } else { Vec::new() };
+        said.extend(self.fits.iter().filter(|_| !self.together.is_empty()).map(Fit::head));
         if !self.together.is_empty() {
             let logs = counted(self.fits.len() as u64, "log");
             said.push(String::new());
@@ -491,11 +503,15 @@ impl Answer for FitReport {
 
 impl Answer for Fit {
     fn sentences(&self) -> Vec<String> {
-        let Self { source, mission, motor, .. } = self;
-        let mission = if mission.is_empty() { "a test stand" } else { mission };
-        let mut said =
-            vec![format!("{source}: {mission} with {motor}"), format!("95 % intervals, {}", self.widened())];
-        said.extend(self.found.iter().map(|parameter| format!("  {}", line(parameter))));
+        let mut said = vec![self.head(), format!("95 % intervals, {}", self.widened())];
+        said.extend(self.found.iter().map(|parameter| {
+            let Some(truth) = self.truth.get(&parameter.name) else {
+                return format!("  {}", line(parameter));
+            };
+            let held = (parameter.low..=parameter.high).contains(truth);
+            let held = if held { "held" } else { "MISSED" };
+            format!("  {:<68}  truth {} {held}", line(parameter), digits(*truth, parameter.sigma))
+        }));
         for (title, lacks) in [
             ("not calibrated: the interval is that of the noise alone", &self.not_calibrated),
             ("not found", &self.not_found),
@@ -535,6 +551,9 @@ pub(crate) struct Args {
     /// mission that was flown.
     #[arg(long, alias = "write", value_name = "FILE.toml")]
     out: Option<PathBuf>,
+    /// Put the truth of a simulated flight beside what was found, and whether the interval holds it.
+    #[arg(long)]
+    against_truth: bool,
     #[command(flatten)]
     day: day::Arguments,
     /// Answer in JSON.
@@ -602,7 +621,13 @@ impl Args {
             return Ok(vec![fit_stand(&name, &rows, &curve_of(motor)?).context(name)?]);
         }
         let trace = Trace::open(file)?;
-        let found = fit(&trace);
+        let mut found = fit(&trace);
+        if self.against_truth {
+            let recording = crate::log::Recording::open(file)?;
+            found.truth = crate::refly::with_its_world(&recording, |dispersion, flight| {
+                truth::truth(dispersion, flight, &found)
+            })??;
+        }
         if let Some(path) = &self.out {
             write_into(path, file, &trace, &found)?;
         }

@@ -151,7 +151,7 @@ impl Trace {
         let nothing = || RecordingError::NoTrace { name: name.clone(), found };
         recording.estimates.first().ok_or_else(nothing)?;
         let text = recording.profile_toml()?;
-        let mission = flight::vehicles::mission::from_toml(text, "profile.toml").map_err(|error| {
+        let mission = flight::vehicles::mission::from_toml(text, "the mission").map_err(|error| {
             RecordingError::ProfileUnusable { name: name.clone(), reason: error.to_string() }
         })?;
         let mut trace = Self {

@@ -31,8 +31,9 @@ use protocol::log::v1::{self, LimitResult};
 use protocol::log::writer::{LogHeader, LogWriter};
 use protocol::program::Exit;
 use serde::Serialize;
+use sim::dispersion::Dispersion;
 use sim::draw::draw;
-use sim::sortie::SetUpError;
+use sim::sortie::{SetUpError, Sortie};
 use sim::wire::record;
 
 pub use self::others::{OtherFlights, other_flights};
@@ -158,6 +159,18 @@ pub struct ReflownFlight {
     pub run: BTreeMap<String, String>,
     /// The landing verdict; `None` if it did not come down.
     pub verdict: Option<v1::LandingVerdict>,
+}
+
+/// The dispersions and the drawn world of a simulated flight, as it began.
+///
+/// # Errors
+/// The log does not say what its flight was drawn from.
+pub(crate) fn with_its_world<T>(
+    recording: &Recording,
+    look: impl FnOnce(&Dispersion, &Sortie) -> T,
+) -> Result<T, AgainError> {
+    let Rerun { recipe, flight, .. } = Rerun::of(recording, &FaultChanges::default())?;
+    Ok(look(&recipe.dispersion, &flight))
 }
 
 /// Flies a recorded flight again.

@@ -233,3 +233,18 @@ proptest! {
         prop_assert!(fit(&trace).found.iter().all(|found| found.value.is_finite()));
     }
 }
+
+/// The truth of a simulated flight stands beside what was found of it: of the draw that a flight of the same recipe has.
+#[test]
+fn a_fit_is_held_against_the_truth() {
+    let recipe = Recipe { seed: 3, ..Recipe::built_in("mk2", "field").unwrap() };
+    let drawn = draw(&recipe.mission, &recipe.dispersion, 3, 3).truth;
+    let flown = crate::from_apogee::fly_recipe(&recipe);
+    let log = flown.log.to_str().unwrap();
+    let (code, stdout, _) = asked(&[log, "--against-truth"]);
+    let thrust = stdout.lines().find(|line| line.trim_start().starts_with("thrust_scale")).unwrap();
+    assert!(code == 0 && thrust.contains("truth ") && thrust.ends_with("held"), "{stdout}");
+    let (found, _) = fits(&[log, "--against-truth"]);
+    let truth = found[0].truth["thrust_scale"];
+    assert!((truth - drawn.impulse_scale / drawn.mass_scale).abs() < 1e-12, "{truth}");
+}
