@@ -42,8 +42,6 @@ const VITAL_SHARE: f64 = 0.3;
 const PERIODIC_SHARE: f64 = 0.85;
 /// What is stretched to fit such a line still comes this often, Hz, if it came as often before.
 const STRETCHED_HZ: f64 = 0.04;
-/// How often the vehicle's place on the Earth is told over any line, Hz: at 20 m/s it is known to 40 m when the line falls silent.
-const PLACE_HZ: f64 = 0.5;
 /// Longest interval that can be requested, s.
 const MAX_INTERVAL_S: f64 = 60.0;
 
@@ -146,8 +144,9 @@ pub const STANDARD: &[Standard] = &[
     standard::<SYS_STATUS_DATA>("RATE_SYS_STATUS", 1.0),
     standard::<EXTENDED_SYS_STATE_DATA>("RATE_EXT_STATE", 1.0),
     standard::<ESTIMATOR_STATUS_DATA>("RATE_ESTIMATOR", 0.5),
-    // The vehicle's place and the pad's on the Earth: where people look for it, over any link.
-    standard::<GLOBAL_POSITION_INT_DATA>("RATE_GLOBAL", PLACE_HZ).on_network(4.0),
+    // The vehicle's place and the pad's on the Earth: where people look for it, over any link. At 20 m/s its place is known to 40 m
+    // when the link falls silent.
+    standard::<GLOBAL_POSITION_INT_DATA>("RATE_GLOBAL", 0.5).on_network(4.0),
     standard::<HOME_POSITION_DATA>("RATE_HOME", 0.1).on_network(1.0),
     standard::<TD_TOUCHDOWN_LIMITS_DATA>("RATE_LIMITS", 0.2),
     // For other clients. A radio has no room for all of them: the messages above already have this data.
@@ -285,9 +284,8 @@ impl Streams {
             }
             for (rate_hz, stream) in rates.iter_mut().zip(&self.each) {
                 let is_place = stream.message_id == GLOBAL_POSITION_INT_DATA::ID;
-                let least_hz = if is_place { PLACE_HZ } else { STRETCHED_HZ };
-                if !is_vital(stream.message_id) && *rate_hz > least_hz {
-                    *rate_hz = (*rate_hz / 1.05).max(least_hz);
+                if !is_vital(stream.message_id) && !is_place && *rate_hz > STRETCHED_HZ {
+                    *rate_hz = (*rate_hz / 1.05).max(STRETCHED_HZ);
                 }
             }
         }
