@@ -1,11 +1,12 @@
 //! Texts that are built in or files; and files that are written whole: each is complete or absent. What exists is kept: a new file or
 //! folder gets the next free name.
 
-use std::fs::File;
+use std::fs::{File, TryLockError};
 use std::io::{self, Seek, SeekFrom, Write};
+use std::os::fd::AsFd as _;
 use std::path::{Path, PathBuf};
 
-use protocol::log::recorder::{free_name, other_name};
+use protocol::log::recorder::{is_device, other_name, under_free_name};
 use tempfile::{NamedTempFile, TempPath};
 
 /// Neither a built-in text nor a file.
@@ -48,14 +49,30 @@ impl WriteError {
     }
 }
 
-/// The name of a new file or folder: the next free one. Says so if it is not the one that was asked for.
-pub fn new_name(asked: &Path) -> PathBuf {
-    let free = free_name(asked);
-    if let Some(words) = other_name(asked, &free) {
-        // If nobody reads it, the file is written anyway.
+/// Says that something gets another name than the one that was asked for. If nobody reads it, it is written anyway.
+pub fn say_other(asked: &Path, free: &Path) {
+    if let Some(words) = other_name(asked, free) {
         let _ = writeln!(io::stderr(), "{words}");
     }
-    free
+}
+
+/// Makes a folder under the next free name, and says it if it is another one. An empty folder is taken as it is. No other process
+/// takes it before the returned file is dropped; then something should be in it.
+///
+/// # Errors
+/// It cannot be made, or no name is free.
+pub fn new_folder(asked: &Path) -> Result<(PathBuf, File), WriteError> {
+    let make = |name: &Path| {
+        std::fs::create_dir(name).or_else(|taken| if name.is_dir() { Ok(()) } else { Err(taken) })?;
+        let folder = File::open(name)?;
+        let held = matches!(folder.try_lock(), Err(TryLockError::WouldBlock));
+        let is_ours = !held && std::fs::read_dir(name)?.next().is_none();
+        is_ours.then_some(folder).ok_or(io::ErrorKind::AlreadyExists.into())
+    };
+    let parents = std::fs::create_dir_all(asked.parent().unwrap_or(asked));
+    let made = parents.and_then(|()| under_free_name(asked, make)).map_err(WriteError::at(asked))?;
+    say_other(asked, &made.0);
+    Ok(made)
 }
 
 /// Writes the files of a folder, which is made if it is not there: all or none, under hidden temporary names first. They replace those
@@ -63,12 +80,13 @@ pub fn new_name(asked: &Path) -> PathBuf {
 ///
 /// # Errors
 /// A file cannot be written.
-pub fn write_folder(folder: &Path, files: Vec<(&str, Vec<u8>)>) -> Result<(), WriteError> {
+pub fn write_folder(folder: &Path, files: &[(&str, impl AsRef<[u8]>)]) -> Result<(), WriteError> {
     std::fs::create_dir_all(folder).map_err(WriteError::at(folder))?;
-    let mut complete = Vec::with_capacity(files.len());
+    let mut complete = Vec::new();
     for (name, bytes) in files {
         let mut file = NewFile::replace(&folder.join(name))?;
-        file.write_all(&bytes).and_then(|()| file.file.sync_all()).map_err(WriteError::at(&file.path))?;
+        let written = file.write_all(bytes.as_ref()).and_then(|()| file.file.sync_all());
+        written.map_err(WriteError::at(&file.path))?;
         complete.push(file);
     }
     complete.into_iter().try_for_each(|file| file.commit().map(drop))
@@ -77,8 +95,8 @@ pub fn write_folder(folder: &Path, files: Vec<(&str, Vec<u8>)>) -> Result<(), Wr
 /// A file being written, under a temporary name in the same directory until it is complete. If dropped, it is removed.
 #[derive(Debug)]
 pub struct NewFile {
-    /// Its final name.
-    pub path: PathBuf,
+    /// The name that was asked for.
+    path: PathBuf,
     replaces: bool,
     file: File,
     /// Its name until it is complete; a pipe or a device has no content that could be lost.
@@ -86,12 +104,12 @@ pub struct NewFile {
 }
 
 impl NewFile {
-    /// Creates a file, under the next free name if there is one of this name.
+    /// Creates a file. If there is one of this name when it is complete, it gets the next free name, and says it.
     ///
     /// # Errors
     /// It cannot be created in its directory.
     pub fn create(asked: &Path) -> Result<Self, WriteError> {
-        Self::begin(new_name(asked), false)
+        Self::begin(asked, false)
     }
 
     /// Begins the new content of a file.
@@ -99,18 +117,20 @@ impl NewFile {
     /// # Errors
     /// It cannot be created in its directory.
     pub fn replace(path: &Path) -> Result<Self, WriteError> {
-        Self::begin(path.to_owned(), true)
+        Self::begin(path, true)
     }
 
-    fn begin(path: PathBuf, replaces: bool) -> Result<Self, WriteError> {
-        let is_device = std::fs::metadata(&path).is_ok_and(|found| !found.is_file() && !found.is_dir());
-        let begun = if is_device {
-            File::options().write(true).open(&path).map(|file| (file, None))
+    fn begin(path: &Path, replaces: bool) -> Result<Self, WriteError> {
+        let begun = if path == Path::new("/dev/stdout") {
+            // If it is a file, what is printed afterwards follows in it.
+            io::stdout().as_fd().try_clone_to_owned().map(|stdout| (stdout.into(), None))
+        } else if is_device(path) {
+            File::options().write(true).open(path).map(|file| (file, None))
         } else {
-            unfinished(&path).map(NamedTempFile::into_parts).map(|(file, name)| (file, Some(name)))
+            unfinished(path).map(NamedTempFile::into_parts).map(|(file, name)| (file, Some(name)))
         };
-        let (file, unfinished) = begun.map_err(WriteError::at(&path))?;
-        Ok(Self { path, replaces, file, unfinished })
+        let (file, unfinished) = begun.map_err(WriteError::at(path))?;
+        Ok(Self { path: path.to_owned(), replaces, file, unfinished })
     }
 
     /// Writes the content and finishes the file.
@@ -125,16 +145,20 @@ impl NewFile {
     /// Finishes the file and gives it its name, which is returned.
     ///
     /// # Errors
-    /// It could not be written to the disk, or a file has taken the name of a new one in the meantime.
+    /// It could not be written to the disk, or no name is free.
     pub fn commit(self) -> Result<PathBuf, WriteError> {
-        let Self { path, replaces, file, unfinished } = self;
-        if let Some(unfinished) = unfinished {
-            file.sync_all().map_err(WriteError::at(&path))?;
-            let named =
-                if replaces { unfinished.persist(&path) } else { unfinished.persist_noclobber(&path) };
-            named.map_err(|error| WriteError::at(&path)(error.error))?;
-        }
-        Ok(path)
+        let Self { path, replaces, file, mut unfinished } = self;
+        let name = |name: &Path| {
+            let Some(temporary) = unfinished.take() else { return Ok(()) };
+            file.sync_all()?;
+            let named = if replaces { temporary.persist(name) } else { temporary.persist_noclobber(name) };
+            let Err(refused) = named else { return Ok(()) };
+            unfinished = Some(refused.path);
+            Err(refused.error)
+        };
+        let (named, ()) = under_free_name(&path, name).map_err(WriteError::at(&path))?;
+        say_other(&path, &named);
+        Ok(named)
     }
 }
 
@@ -196,7 +220,29 @@ mod tests {
         let path = directory.path().join("file");
         let file = NewFile::create(&path).unwrap();
         std::fs::write(&path, "theirs").unwrap();
-        assert_eq!(file.commit().unwrap_err().source.kind(), io::ErrorKind::AlreadyExists);
+        assert_eq!(file.commit().unwrap(), directory.path().join("file-2"));
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "theirs");
+    }
+
+    /// A folder is nobody else's from the moment on when it is made, and what is in it is kept.
+    #[test]
+    fn a_new_folder_is_one_process_s() {
+        let directory = tempfile::tempdir().unwrap();
+        let at = |name: &str| directory.path().join(name);
+        let (made, held) = new_folder(&at("new/card")).unwrap();
+        assert_eq!(made, at("new/card"));
+        assert_eq!(new_folder(&made).unwrap().0, at("new/card-2"), "it is empty, but not ours");
+        drop(held);
+        assert_eq!(new_folder(&made).unwrap().0, made, "an empty folder is taken as it is");
+        write_folder(&made, &[("card.txt", "precious")]).unwrap();
+        assert_eq!(new_folder(&made).unwrap().0, at("new/card-2"));
+        for number in 2..=100 {
+            write_folder(&at(&format!("new/card-{number}")), &[("card.txt", "precious")]).unwrap();
+        }
+        for full in [made.as_path(), Path::new("."), Path::new("/dev/null")] {
+            let refused = new_folder(full).unwrap_err();
+            assert!(refused.source.to_string().contains("no name like it is free"), "{refused:?}");
+        }
+        assert_eq!(std::fs::read_dir(at("new")).unwrap().count(), 100);
     }
 }

@@ -184,7 +184,8 @@ impl Store {
     /// The directory was created for another campaign, is in use, or cannot be read or written.
     pub fn open(path: &Path, recipe: &Recipe, manifest: Manifest) -> Result<Self, StoreError> {
         fs::create_dir_all(path).map_err(unreadable(path))?;
-        let lock = File::create(path.join("lock")).map_err(unreadable(path))?;
+        let lock =
+            File::options().create(true).append(true).open(path.join("lock")).map_err(unreadable(path))?;
         lock.try_lock().map_err(|_held| StoreError::InUse(path.to_owned()))?;
         if path.join(MANIFEST).exists() {
             manifest.refuse_other(path, &Manifest::read(path)?)?;
@@ -192,13 +193,13 @@ impl Store {
             refuse_foreign(path)?;
             let text =
                 serde_json::to_vec_pretty(&manifest).map_err(|error| StoreError::content(path, &error))?;
-            write_folder(path, vec![(MANIFEST, text)])?;
+            write_folder(path, &[(MANIFEST, text)])?;
         }
         let rows = read_rows(path, &manifest)?;
         let texts = [(MISSION, &recipe.mission_toml), (DISPERSION, &recipe.dispersion_toml)];
         let mut files = texts.map(|(name, text)| (name, text.clone().into_bytes())).to_vec();
         files.push((FLIGHTS, to_csv(rows.values(), true)?));
-        write_folder(path, files)?;
+        write_folder(path, &files)?;
         let file = path.join(FLIGHTS);
         let file = File::options().append(true).open(&file).map_err(unreadable(&file))?;
         Ok(Self { path: path.to_owned(), manifest, rows: Mutex::new((rows, file)), _lock: lock })
@@ -248,7 +249,7 @@ impl Store {
             let picture = picture.map_err(|error| StoreError::content(&self.path.join(name), &error))?;
             files.push((name, picture.into_bytes()));
         }
-        write_folder(&self.path, files)?;
+        write_folder(&self.path, &files)?;
         Ok(summary)
     }
 }

@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 use std::io::Cursor;
+use std::path::Path;
 
 use proptest::prelude::*;
 use prost::Message as _;
@@ -147,11 +148,16 @@ fn other_files_are_reported_as_not_mcap() {
 fn a_recorder_never_overwrites_and_ends_its_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("flight.mcap");
-    let recorder = Recorder::create(&path, &header()).unwrap();
+    let recorder = Recorder::create(&path, None, &header()).unwrap();
     for k in 0..20_000 {
         recorder.record(operator(k), k);
     }
-    assert!(matches!(Recorder::create(&path, &header()), Err(RecorderError::Create { .. })));
+    let other = Recorder::create(&path, None, &header()).unwrap();
+    assert_eq!(other.finish().unwrap(), folder.path().join("flight-2.mcap"));
+    for device in ["/dev/null", "/dev/stdout"] {
+        let refused = Recorder::create(Path::new(device), None, &header());
+        assert!(matches!(refused, Err(RecorderError::Create { path, .. }) if path == Path::new(device)));
+    }
     assert_eq!(recorder.finish().unwrap(), path);
     recorder.finish().unwrap();
     assert_eq!(recorder.dropped(), 0);

@@ -10,7 +10,7 @@ use std::time::Duration;
 use anyhow::Context as _;
 use protocol::ftp::download::{Download, DownloadEvent, Progress};
 use protocol::ftp::{Packet, crc};
-use protocol::log::recorder::{free_name, other_name};
+use protocol::log::recorder::{other_name, under_free_name};
 use tokio::time::{MissedTickBehavior, interval};
 
 use super::KeyRing;
@@ -181,19 +181,13 @@ impl Kept {
             anyhow::bail!("what arrived is not what the vehicle has: the checksums differ; fetch it again");
         }
         file.sync_all()?;
-        let free = free_name(&whole);
         // A link fails if the name is taken; a rename would overwrite. Some file systems have no such links.
-        if std::fs::hard_link(&beginning, &free).is_ok() {
-            std::fs::remove_file(&beginning)?;
-        } else {
-            anyhow::ensure!(
-                free.symlink_metadata().is_err(),
-                "{} is here by now; the download is in {}",
-                free.display(),
-                beginning.display()
-            );
-            std::fs::rename(&beginning, &free)?;
-        }
+        let named = under_free_name(&whole, |name| match std::fs::hard_link(&beginning, name) {
+            Err(_) if name.symlink_metadata().is_err() => std::fs::rename(&beginning, name),
+            linked => linked.and_then(|()| std::fs::remove_file(&beginning)),
+        });
+        let (free, ()) = named
+            .with_context(|| format!("{}: the download is in {}", whole.display(), beginning.display()))?;
         if let Some(words) = other_name(&whole, &free) {
             print(format!("{words}\n").as_bytes())?;
         }

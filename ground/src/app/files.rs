@@ -38,9 +38,7 @@ pub fn open_log(
             anyhow::ensure!(!alone, "--tlog writes beside a log; do not give --log none");
             Ok(None)
         }
-        Some(LogChoice::File(path)) => {
-            Ok(Some(Recorder::create_under_free_name(path, tlog_name(tlog), header)?))
-        }
+        Some(LogChoice::File(path)) => Ok(Some(Recorder::create(path, tlog_name(tlog), header)?)),
         None => open_named_by_time(Path::new(""), tlog, header).map(Some),
     }
 }
@@ -68,7 +66,7 @@ fn open_named_by_time(
         .context("the system clock is invalid")?;
     let stamp = start.format(format_description!("[year][month][day]-[hour][minute][second]"))?;
     let path = directory.join(format!("touchdown-{stamp}.mcap"));
-    Ok(Recorder::create_under_free_name(&path, tlog_name(tlog), header)?)
+    Ok(Recorder::create(&path, tlog_name(tlog), header)?)
 }
 
 /// How often the space is looked at; the rate is a mean over this time.
@@ -498,7 +496,7 @@ mod log_tests {
     fn a_panic_ends_the_log_properly() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("panic.mcap");
-        let recorder = Recorder::create(&path, &LogHeader::default()).unwrap();
+        let recorder = Recorder::create(&path, None, &LogHeader::default()).unwrap();
         let event =
             Event { level: EventLevel::Info, name: "ground".to_owned(), message: "before".to_owned() };
         let panicked = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {

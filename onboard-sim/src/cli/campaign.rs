@@ -88,7 +88,7 @@ pub(crate) fn run(arguments: &CampaignArguments) -> anyhow::Result<Exit> {
     let summary = store.publish(&recipe.mission.leg_limits)?;
     write!(stdout, "{}", to_text(&summary))?;
     if cost.flights > 0 {
-        write_folder(out, vec![("cost.json", serde_json::to_vec_pretty(&cost)?)])?;
+        write_folder(out, &[("cost.json", serde_json::to_vec_pretty(&cost)?)])?;
         writeln!(stdout, "\n{cost}")?;
     }
     writeln!(stdout, "results {}", out.display())?;

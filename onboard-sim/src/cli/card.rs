@@ -5,14 +5,12 @@ use std::path::PathBuf;
 
 use clap::Args;
 use onboard_sim::card::Card;
-use onboard_sim::files::{new_name, write_folder};
+use onboard_sim::files::{new_folder, write_folder};
 use onboard_sim::hazard::Flights;
 use protocol::program::Exit;
 
 use super::{Asked, in_wind, on_threads, show_flights};
 
-/// The files of a card.
-const FILES: [&str; 3] = ["card.html", "card.txt", "mission.toml"];
 /// Most flights of a card.
 const CARD_FLIGHTS_MAX: u64 = 10_000;
 
@@ -50,12 +48,11 @@ pub(crate) fn run(arguments: &CardArguments) -> anyhow::Result<Exit> {
     let card = on_threads(arguments.asked.jobs, || {
         Ok(Card::new(&recipe, winds, flights, arguments.wind_from, &show_flights())?)
     })?;
-    let [html, text, mission_file] = FILES;
     let page = card.text();
-    let files = [(html, card.html()), (text, page.clone()), (mission_file, card.recipe.mission_toml)];
-    let out = new_name(&arguments.out);
-    write_folder(&out, files.map(|(name, text)| (name, text.into_bytes())).to_vec())?;
-    writeln!(std::io::stdout().lock(), "{page}card {}", out.join(html).display())?;
+    let (out, _held) = new_folder(&arguments.out)?;
+    let [html, mission] = [card.html(), card.recipe.mission_toml];
+    write_folder(&out, &[("card.html", &html), ("card.txt", &page), ("mission.toml", &mission)])?;
+    writeln!(std::io::stdout().lock(), "{page}card {}", out.join("card.html").display())?;
     Ok(Exit::Yes)
 }
 

@@ -8,17 +8,16 @@ pub(crate) mod hazard;
 pub(crate) mod new;
 mod single;
 
-use std::io::Write as _;
 use std::path::Path;
 
 use anyhow::Context as _;
 use clap::Args;
 use flight::vehicle::mission::StartPoint;
 use flight::vehicles::mission;
-use onboard_sim::files::text_of;
+use onboard_sim::files::{say_other, text_of};
 use onboard_sim::progress::Progress;
 use onboard_sim::run::threads;
-use protocol::log::recorder::{Recorder, other_name};
+use protocol::log::recorder::Recorder;
 use protocol::log::writer::LogHeader;
 use sim::dispersion::{self, Dispersion};
 use sim::recipe::Recipe;
@@ -57,10 +56,8 @@ fn on_threads<T: Send>(
 
 /// Begins a log, under the next free name.
 fn logging(path: &Path, header: &LogHeader) -> anyhow::Result<Recorder> {
-    let recorder = Recorder::create_under_free_name(path, None, header)?;
-    if let Some(words) = other_name(path, recorder.path()) {
-        writeln!(std::io::stderr(), "{words}")?;
-    }
+    let recorder = Recorder::create(path, None, header)?;
+    say_other(path, recorder.path());
     Ok(recorder)
 }
 

@@ -26,13 +26,10 @@ pub(super) fn fly(
     log: Option<&Path>,
 ) -> anyhow::Result<Exit> {
     let mut tally = Tally::new(recipe, number)?;
-    let log = match log {
-        None => {
-            while tally.step() {}
-            None
-        }
-        Some(path) => Some(fly_logged(recipe, number, &mut tally, path)?),
-    };
+    let log = log.map(|path| fly_logged(recipe, number, &mut tally, path)).transpose()?;
+    if log.is_none() {
+        while tally.step() {}
+    }
     let row = tally.row();
     let mut stdout = std::io::stdout().lock();
     print_row(&row, &mut stdout)?;
@@ -65,17 +62,15 @@ fn fly_logged(recipe: &Recipe, number: u64, tally: &mut Tally, path: &Path) -> a
     recorder.record(Record::ComputerStart(Box::new(record::start(tally.flight()))), 0);
     let mut last = LastFrame::default();
     let mut phase = tally.flight().computer().mode().phase;
-    loop {
-        let goes_on = tally.step_watched(&mut last);
+    let mut goes_on = true;
+    while goes_on {
+        goes_on = tally.step_watched(&mut last);
         let flight = tally.flight();
         let time_ns = record::time_ns(flight);
         for record in record::frame_and_phase(flight, &mut last, phase) {
             recorder.record(record, time_ns);
         }
         phase = flight.computer().mode().phase;
-        if !goes_on {
-            break;
-        }
     }
     let flight = tally.flight();
     if let Some(verdict) = record::verdict(flight) {

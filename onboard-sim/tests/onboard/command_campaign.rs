@@ -31,6 +31,16 @@ fn a_campaign_without_a_flight_is_refused() {
     assert!(!directory.path().join("c").exists());
 }
 
+#[test]
+fn a_file_that_has_the_name_of_the_lock_keeps_its_content() {
+    let directory = tempfile::tempdir().unwrap();
+    let lock = directory.path().join("lock");
+    fs::write(&lock, "notes").unwrap();
+    let flown = campaign(directory.path(), &["--flights", "1", "--out", "."]);
+    assert_eq!(flown.status.code(), Some(0), "{}", stderr(&flown));
+    assert_eq!(fs::read_to_string(lock).unwrap(), "notes");
+}
+
 /// With sensors, a fault that affects the estimator, and a restart in the middle.
 #[test]
 fn a_logged_flight_flies_again_bit_for_bit() {

@@ -8,7 +8,7 @@
 //! The system reports a disk error once for an open file: the sync after it succeeds although data is lost. So every failure is
 //! kept where it happens, and [`Recorder::is_whole`] and [`Recorder::finish`] read what was kept.
 
-use std::fs::{File, Metadata};
+use std::fs::File;
 use std::io::{self, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -20,6 +20,7 @@ use std::time::{Duration, Instant};
 use super::record::Record;
 use super::tlog::TlogWriter;
 use super::writer::{LogHeader, LogWriteError, LogWriter};
+use crate::text::printable;
 
 const QUEUE_RECORDS: usize = 8192;
 const FLUSH_INTERVAL: Duration = Duration::from_millis(200);
@@ -100,7 +101,7 @@ impl Drop for FailedByPanic {
     }
 }
 
-/// How many names are tried for a log.
+/// How many names are tried for a file or a folder.
 const NAMES_MAX: u32 = 100;
 
 /// How the telemetry log beside a log is named.
@@ -111,27 +112,41 @@ pub enum TlogName<'a> {
     Own(&'a Path),
 }
 
-/// The first of `flight.mcap`, `flight-2.mcap`, `flight-3.mcap` and so on under which nothing is that could be lost; the last one if
-/// all are taken.
-pub fn free_name(asked: &Path) -> PathBuf {
-    // A pipe, a device and an empty folder keep nothing.
-    let has_entries = || std::fs::read_dir(asked).is_ok_and(|mut entries| entries.next().is_some());
-    let keeps = |found: Metadata| found.is_file() || (found.is_dir() && has_entries());
-    if std::fs::metadata(asked).is_ok_and(|found| !keeps(found)) {
-        return asked.to_owned();
+/// Makes something under the first of `flight.mcap`, `flight-2.mcap`, `flight-3.mcap` and so on that is free, and returns it with its
+/// name.
+///
+/// # Errors
+/// It cannot be made, or no name is free. `make` fails with [`io::ErrorKind::AlreadyExists`] where something is that could be lost.
+pub fn under_free_name<T>(
+    asked: &Path,
+    mut make: impl FnMut(&Path) -> io::Result<T>,
+) -> io::Result<(PathBuf, T)> {
+    for name in (1..=NAMES_MAX).map(|number| numbered(asked, number)) {
+        match make(&name) {
+            Err(taken) if taken.kind() == io::ErrorKind::AlreadyExists => {}
+            made => return made.map(|made| (name, made)),
+        }
     }
-    let mut names = (1..NAMES_MAX).map(|number| numbered(asked, number));
-    names.find(|name| name.symlink_metadata().is_err()).unwrap_or_else(|| numbered(asked, NAMES_MAX))
+    Err(io::Error::new(io::ErrorKind::AlreadyExists, "it exists, and no name like it is free: give another"))
 }
 
 /// What to say if the name is not the one that was asked for.
 pub fn other_name(asked: &Path, free: &Path) -> Option<String> {
-    (asked != free).then(|| format!("{} exists and is kept; {} is written", asked.display(), free.display()))
+    let words = || format!("{} exists and is kept; {} is written", asked.display(), free.display());
+    (asked != free).then(|| printable(words().as_bytes()))
+}
+
+/// Whether a path is a pipe or a device: it has no content that could be lost, and no other name. So is what lies in `/dev` itself:
+/// `/dev/stdout` may be a file.
+pub fn is_device(path: &Path) -> bool {
+    path.parent() == Some(Path::new("/dev"))
+        || std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
 }
 
 /// `flight.mcap` for 1, `flight-2.mcap` for 2.
 fn numbered(path: &Path, number: u32) -> PathBuf {
-    let Some(stem) = path.file_stem().filter(|_| number > 1) else { return path.to_owned() };
+    let stem = path.file_stem().filter(|_| number > 1 && !is_device(path));
+    let Some(stem) = stem else { return path.to_owned() };
     let mut name = stem.to_owned();
     name.push(format!("-{number}"));
     if let Some(extension) = path.extension() {
@@ -142,69 +157,41 @@ fn numbered(path: &Path, number: u32) -> PathBuf {
 }
 
 impl Recorder {
-    /// Creates the file and starts the writing thread. An existing file is never overwritten.
+    /// Creates the file and starts the writing thread, under the first free name of `flight.mcap`, `flight-2.mcap`, `flight-3.mcap`
+    /// and so on: nothing is overwritten, and the same command works again after a crash. The telemetry log, of the ground's raw
+    /// frames, is named after the name that was found, or has a name of its own that gets the same number.
     ///
     /// # Errors
-    /// The file exists or cannot be created, or its header cannot be written.
-    pub fn create(path: &Path, header: &LogHeader) -> Result<Self, RecorderError> {
-        Self::create_with_tlog(path, None, header)
-    }
-
-    /// As [`Recorder::create`], under the first free name of `flight.mcap`, `flight-2.mcap`, `flight-3.mcap` and so on: the same
-    /// command works again after a crash. The telemetry log is named after the name that was found, or has a name of its own
-    /// that gets the same number.
-    ///
-    /// # Errors
-    /// No name is free, or a file cannot be created.
-    pub fn create_under_free_name(
-        path: &Path,
+    /// No name is free, a file cannot be created, or the header cannot be written.
+    pub fn create(
+        asked: &Path,
         tlog: Option<TlogName<'_>>,
         header: &LogHeader,
     ) -> Result<Self, RecorderError> {
-        let mut number = 1;
-        loop {
-            let log = numbered(path, number);
-            let tlog = tlog.map(|name| match name {
+        let (mut number, mut tried) = (0, PathBuf::new());
+        let mut create = |path: &Path| {
+            path.clone_into(&mut tried);
+            File::options().write(true).read(true).create_new(true).open(path)
+        };
+        let created = under_free_name(asked, |log| {
+            number += 1;
+            let file = create(log)?;
+            let Some(name) = tlog else { return Ok((file, None)) };
+            let tlog = match name {
                 TlogName::OfTheLog => log.with_extension("tlog"),
                 TlogName::Own(own) => numbered(own, number),
-            });
-            match Self::create_with_tlog(&log, tlog.as_deref(), header) {
-                Err(RecorderError::Create { source, .. })
-                    if source.kind() == std::io::ErrorKind::AlreadyExists && number < NAMES_MAX =>
-                {
-                    number += 1;
-                }
-                other => return other,
-            }
-        }
-    }
-
-    /// As [`Recorder::create`]; also writes the ground's raw frames into a `.tlog` file.
-    ///
-    /// # Errors
-    /// A file exists or cannot be created, or the header cannot be written.
-    pub fn create_with_tlog(
-        path: &Path,
-        tlog: Option<&Path>,
-        header: &LogHeader,
-    ) -> Result<Self, RecorderError> {
-        let create_error = |source| RecorderError::Create { path: path.to_owned(), source };
-        let file =
-            File::options().write(true).read(true).create_new(true).open(path).map_err(create_error)?;
-        let tlog_path = tlog.map(Path::to_owned);
-        let tlog = match tlog.map(|path| (path, File::options().write(true).create_new(true).open(path))) {
-            None => None,
-            Some((_, Ok(made))) => Some(TlogWriter::new(BufWriter::new(made), header.start_unix_ns)),
-            Some((refused, Err(source))) => {
-                // The log file was created a moment ago and is empty; if it stayed, the next attempt would fail.
-                let _ = std::fs::remove_file(path);
-                return Err(RecorderError::Create { path: refused.to_owned(), source });
-            }
-        };
+            };
+            // The log file was created a moment ago and is empty; if it stayed, the next attempt would fail.
+            let made = create(&tlog).inspect_err(|_refused| _ = std::fs::remove_file(log))?;
+            Ok((file, Some((tlog, TlogWriter::new(BufWriter::new(made), header.start_unix_ns)))))
+        });
+        let (path, (file, tlog)) = created.map_err(|source| RecorderError::Create { path: tried, source })?;
+        let create_error = |source| RecorderError::Create { path: path.clone(), source };
         let disk = file.try_clone().map_err(create_error)?;
         let writer = LogWriter::new(BufWriter::new(file), header)
-            .map_err(|source| RecorderError::Write { path: path.to_owned(), source })?;
-        Self::start((path.to_owned(), tlog_path), (writer, tlog), disk).map_err(create_error)
+            .map_err(|source| RecorderError::Write { path: path.clone(), source })?;
+        let (tlog_path, tlog) = tlog.unzip();
+        Self::start((path.clone(), tlog_path), (writer, tlog), disk).map_err(create_error)
     }
 
     /// Starts the two threads.

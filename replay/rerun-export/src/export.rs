@@ -1,7 +1,7 @@
 //! Writes the recording of a log: what Rerun imports from it, and what it is drawn with.
 
 use std::io::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use flight::rules::verdict::TABLE_2;
 use flight::vehicle::mission::Mission;
@@ -67,11 +67,12 @@ pub struct Exported {
     pub mission_problem: Option<String>,
 }
 
-/// Writes the recording of a log, and of another one beside it. The file appears when it is complete.
+/// Writes the recording of a log, and of another one beside it. The file appears when it is complete; returns its name, and what was
+/// exported of each.
 ///
 /// # Errors
 /// A log cannot be used, or the recording cannot be written.
-pub fn export(log: &Path, beside: Option<&Path>, to: &Path) -> Result<Vec<Exported>, ExportError> {
+pub fn export(log: &Path, beside: Option<&Path>, to: &Path) -> Result<(PathBuf, Vec<Exported>), ExportError> {
     let cannot_write = WriteError::at(to);
     let mut file = NewFile::create(to)?;
     let own = Survey::of(log)?;
@@ -94,8 +95,7 @@ pub fn export(log: &Path, beside: Option<&Path>, to: &Path) -> Result<Vec<Export
     }
     layout(&topics).send(&recording, rerun::blueprint::BlueprintActivation::default())?;
     file.write_all(&messages.drain_as_bytes()?).map_err(cannot_write)?;
-    file.commit()?;
-    Ok(exported)
+    Ok((file.commit()?, exported))
 }
 
 /// What is read of a log before its import.

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Parser;
-use replay::output::new_name;
 use replay_rerun::{ExportError, Exported, export};
 
 /// Turns a flight log into a recording for the Rerun viewer.
@@ -14,8 +13,8 @@ use replay_rerun::{ExportError, Exported, export};
 /// shape of the rocket, the pad, the path that was flown, and the layout to show them. Open it with `rerun FLIGHT.rrd`,
 /// Rerun 0.36 or newer.
 ///
-/// Exit codes: 0 written, also from the readable part of a damaged log; 2 not written: wrong usage, no flight log,
-/// or the recording cannot be written.
+/// Exit codes: 0 written, also from the readable part of a damaged log; 1 not written: no flight log, or the recording cannot be
+/// written; 2 the command line was not understood.
 #[derive(Debug, Parser)]
 #[command(name = "replay-rerun", version, about, long_about, after_help = EXAMPLES)]
 struct Cli {
@@ -33,22 +32,19 @@ const EXAMPLES: &str = "Examples:
   replay-rerun flight.mcap
   replay-rerun flight.mcap --with other.mcap";
 
-/// Nothing was written.
-const EXIT_NOT_WRITTEN: u8 = 2;
-
 fn main() -> ExitCode {
     match run(&Cli::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             say(&format!("{:#}", anyhow::Error::from(error)));
-            ExitCode::from(EXIT_NOT_WRITTEN)
+            ExitCode::FAILURE
         }
     }
 }
 
 fn run(cli: &Cli) -> Result<(), ExportError> {
-    let output = new_name(&cli.output.clone().unwrap_or_else(|| cli.log.with_extension("rrd")));
-    let exported = export(&cli.log, cli.with.as_deref(), &output)?;
+    let asked = cli.output.clone().unwrap_or_else(|| cli.log.with_extension("rrd"));
+    let (output, exported) = export(&cli.log, cli.with.as_deref(), &asked)?;
     let logs = [Some(&cli.log), cli.with.as_ref()].into_iter().flatten();
     logs.zip(&exported).for_each(|(log, exported)| warn(log, exported));
     let (poses, events) = exported.first().map_or((0, 0), |own| (own.poses, own.events));

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::ExportError;
 use crate::log::FlightLog;
-use crate::output::{NewFile, WriteError, new_name};
+use crate::output::{NewFile, WriteError, new_folder};
 use crate::table::{Cell, Column, Kind, Meaning, TableReader, TableShape};
 
 /// A file that was written.
@@ -19,8 +19,8 @@ pub struct ExportedFile {
     pub columns: usize,
 }
 
-/// Writes every table of a log into a new directory. Memory does not grow with the log. The
-/// files get their names when all of them are complete.
+/// Writes every table of a log into a new folder. Memory does not grow with the log. The files get their names when all of them are
+/// complete.
 ///
 /// # Errors
 /// The log cannot be read, or a file cannot be written.
@@ -28,13 +28,20 @@ pub fn export_tables<R: Read>(
     log: &mut FlightLog<R>,
     directory: &Path,
 ) -> Result<Vec<ExportedFile>, ExportError> {
-    let directory = &new_name(directory);
+    // It is made with the first table, so that a file that is not a flight log leaves nothing behind.
+    let mut folder = None;
     let mut open: BTreeMap<usize, (ExportedFile, csv::Writer<NewFile>)> = BTreeMap::new();
     let mut reader = TableReader::new();
     reader.read::<R, ExportError>(log, |shape, row| {
         let (file, csv) = match open.entry(row.table) {
             std::collections::btree_map::Entry::Occupied(entry) => entry.into_mut(),
-            std::collections::btree_map::Entry::Vacant(entry) => entry.insert(create(directory, shape)?),
+            std::collections::btree_map::Entry::Vacant(entry) => {
+                let (folder, _held) = match &folder {
+                    Some(made) => made,
+                    None => folder.insert(new_folder(directory)?),
+                };
+                entry.insert(create(folder, shape)?)
+            }
         };
         file.rows += 1;
         let written = csv.write_record(row.cells.iter().map(text_of));
@@ -46,9 +53,9 @@ pub fn export_tables<R: Read>(
         Ok((file, written))
     });
     let mut whole: Vec<(ExportedFile, NewFile)> = finished.collect::<Result<_, ExportError>>()?;
-    if !whole.is_empty() {
-        let path = directory.join(DICTIONARY);
-        let file = NewFile::create(&path)?;
+    if let Some((folder, _held)) = &folder {
+        let path = folder.join(DICTIONARY);
+        let file = NewFile::replace(&path)?;
         let (written, rows) = dictionary(file, reader.shapes()).map_err(WriteError::at(&path))?;
         whole.push((ExportedFile { path, rows, columns: DICTIONARY_COLUMNS.len() }, written));
     }
@@ -60,11 +67,9 @@ pub fn export_tables<R: Read>(
     Ok(files)
 }
 
-fn create(directory: &Path, shape: &TableShape) -> Result<(ExportedFile, csv::Writer<NewFile>), ExportError> {
-    // The directory is created with the first table, so that a file that is not a flight log leaves nothing behind.
-    std::fs::create_dir_all(directory).map_err(WriteError::at(directory))?;
-    let path = directory.join(format!("{}.csv", shape.name));
-    let mut csv = csv::Writer::from_writer(NewFile::create(&path)?);
+fn create(folder: &Path, shape: &TableShape) -> Result<(ExportedFile, csv::Writer<NewFile>), ExportError> {
+    let path = folder.join(format!("{}.csv", shape.name));
+    let mut csv = csv::Writer::from_writer(NewFile::replace(&path)?);
     let head = csv.write_record(shape.columns.iter().map(|column| &column.name));
     head.map_err(io::Error::from).map_err(WriteError::at(&path))?;
     Ok((ExportedFile { path, rows: 0, columns: shape.columns.len() }, csv))

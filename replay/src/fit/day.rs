@@ -30,7 +30,7 @@ use super::{Basis, Fit, Parameter, Pooled, Z_95, pooled};
 use crate::cli::{Answer, say, text_of};
 use crate::print::counted;
 use crate::settings::{Setting, mission_toml_with, mission_with};
-use onboard_sim::files::{new_name, write_folder};
+use onboard_sim::files::{new_folder, write_folder};
 use onboard_sim::run::threads;
 
 /// A lot's property before the next burn.
@@ -488,9 +488,6 @@ pub(super) struct Arguments {
     jobs: Option<NonZeroUsize>,
 }
 
-/// The files of the day.
-const FILES: [&str; 2] = ["mission.toml", "dispersion.toml"];
-
 impl Arguments {
     pub(super) fn is_asked(&self) -> bool {
         self.day.is_some() || self.flights.is_some()
@@ -518,11 +515,10 @@ impl Arguments {
         let learnt =
             threads(self.jobs.map(NonZeroUsize::get))?.install(|| learn(fits, self, &mission_toml, &set))?;
         if let Some(directory) = &self.day {
-            let directory = new_name(directory);
-            let name = directory.display();
-            let texts = [&learnt.day.mission_toml, &learnt.day.dispersion_toml];
-            let files = FILES.into_iter().zip(texts.map(|text| text.clone().into_bytes()));
-            write_folder(&directory, files.collect())?;
+            let (directory, _held) = new_folder(directory)?;
+            let (name, day) = (directory.display(), &learnt.day);
+            let files = [("mission.toml", &day.mission_toml), ("dispersion.toml", &day.dispersion_toml)];
+            write_folder(&directory, &files)?;
             say(&format!(
                 "onboard-sim campaign --mission {name}/mission.toml --dispersion {name}/dispersion.toml --out flights"
             ));

@@ -127,8 +127,7 @@ pub fn import_tlog(input: &Path, output: &Path) -> Result<ImportedTlog, ImportEr
     is_tlog(input).map_err(read)?;
     let file = open_regular(input).map_err(read)?;
     let new = NewFile::create(output)?;
-    let output = new.path.clone();
-    let failed = WriteError::at(&output);
+    let failed = WriteError::at(output);
     let (log, imported) = convert(file, input, BufWriter::new(new)).map_err(|stopped| match stopped {
         Stopped::Read(source) => read(source),
         Stopped::NoFrames => ImportError::NoFrames { path: input.to_owned() },

@@ -85,7 +85,7 @@ impl<'a> Rescue<'a> {
         keeps: &'a mut dyn FnMut(&str, u64) -> bool,
     ) -> Result<Self, E> {
         let file = NewFile::create(output)?;
-        let path = file.path.clone();
+        let path = output.to_owned();
         let options = mcap::WriteOptions::new()
             .compression(Some(mcap::Compression::Lz4))
             .chunk_size(Some(CHUNK_BYTES))
@@ -212,11 +212,11 @@ impl<'a> Rescue<'a> {
     /// Completes the log with what it is.
     pub(crate) fn finish(self, about: &Metadata) -> Result<PathBuf, WriteError> {
         let path = self.path.clone();
-        self.close(about).map_err(|error| WriteError::at(&path)(std::io::Error::other(error)))?;
-        Ok(path)
+        let file = self.close(about).map_err(|error| WriteError::at(&path)(std::io::Error::other(error)))?;
+        file.commit()
     }
 
-    fn close(mut self, about: &Metadata) -> mcap::McapResult<()> {
+    fn close(mut self, about: &Metadata) -> mcap::McapResult<NewFile> {
         let mut waiting = take(&mut self.waiting);
         let starts = waiting.iter_mut().filter(|message| message.place == Place::Start);
         if let Some(first) = starts.min_by_key(|message| message.header.log_time) {
@@ -228,9 +228,7 @@ impl<'a> Rescue<'a> {
         }
         self.writer.write_metadata(about)?;
         self.writer.finish()?;
-        let file = self.writer.into_inner().into_inner().map_err(std::io::IntoInnerError::into_error)?;
-        file.commit().map_err(|error| error.source)?;
-        Ok(())
+        Ok(self.writer.into_inner().into_inner().map_err(std::io::IntoInnerError::into_error)?)
     }
 
     fn failed(&self, error: mcap::McapError) -> WriteError {

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use anyhow::{bail, ensure};
 use avionics::board::stream::{Answer, Begin, Frame, put};
-use onboard_sim::files::{new_name, write_folder};
+use onboard_sim::files::write_folder;
 use protocol::log::computer_v1::{ComputerFrame, ComputerStart};
 use replay::controller::SETTINGS_IN_FLIGHT;
 use replay::log::{Entry, FlightLog};
@@ -41,7 +41,7 @@ fn main() -> anyhow::Result<()> {
     }
     ensure!(log.damage().is_none(), "{} is damaged", log.name());
     ensure!(written > 0, "{} has no frames of a flight computer from its start on", log.name());
-    Ok(write_folder(&new_name(&folder), vec![("frames", frames), ("recorded", recorded)])?)
+    Ok(write_folder(&folder, &[("frames", frames), ("recorded", recorded)])?)
 }
 
 /// What the computer of a log is built from, besides its record of the start.

@@ -5,8 +5,8 @@ mod study;
 use std::io::Write as _;
 use std::path::PathBuf;
 
-use anyhow::Context as _;
 use clap::Parser;
+use onboard_sim::files::{new_folder, write_folder};
 
 use crate::study::fall::{CG_STATION_M, HEAVY_TAIL_STATION_M, Stability};
 use crate::study::figures::{figures, stability_figures};
@@ -19,7 +19,7 @@ struct Arguments {
     /// fins, with the static margin that explains it.
     #[arg(long)]
     stability: bool,
-    /// Write the figures of what is printed as SVG into this folder, which must not be there: Figures 5 to 9, or the map.
+    /// Write the figures of what is printed as SVG into this folder, a new one: Figures 5 to 9, or the map.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
@@ -37,11 +37,8 @@ fn main() -> anyhow::Result<()> {
         figures(&experiments.rows)?
     };
     let Some(folder) = folder else { return Ok(()) };
-    std::fs::create_dir(&folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
-    for (name, svg) in figures {
-        let path = folder.join(name);
-        std::fs::write(&path, svg).with_context(|| format!("cannot write {}", path.display()))?;
-        writeln!(std::io::stderr(), "{}", path.display())?;
-    }
+    let (folder, _held) = new_folder(&folder)?;
+    write_folder(&folder, &figures)?;
+    writeln!(std::io::stderr(), "{}", folder.display())?;
     Ok(())
 }

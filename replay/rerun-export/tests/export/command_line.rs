@@ -25,6 +25,6 @@ fn the_recording_stands_beside_the_log_and_what_goes_wrong_is_said() {
     let (code, said) = run(&[&log, Path::new("-o"), &rrd]);
     assert!(code == Some(0) && said.contains("flight.mcap is damaged: ends after"), "{said}");
     assert!(std::fs::read(&rrd).unwrap().starts_with(b"RRF2"));
-    assert_eq!(run(&[&folder.path().join("missing.mcap")]).0, Some(2));
+    assert_eq!(run(&[&folder.path().join("missing.mcap")]).0, Some(1));
     assert_eq!(run(&[]).0, Some(2), "wrong usage");
 }

@@ -15,7 +15,7 @@ fn the_readable_part_of_a_cut_log_is_exported() {
     for cut in cuts.chain([in_the_third_chunk(&bytes)]) {
         std::fs::write(&log, &bytes[..cut]).unwrap();
         let exported = match export(&log, None, cleared(&rrd)) {
-            Ok(exported) => exported,
+            Ok((_, exported)) => exported,
             Err(refused) => {
                 assert!(refused.to_string().contains("before its first message"), "{cut}: {refused}");
                 assert_eq!(partly, 0, "{cut}: less of the log could be read");
@@ -37,9 +37,9 @@ fn what_exists_is_kept_and_a_recording_gets_the_next_free_name() {
     write_log(&log);
     write_log(&other);
     std::fs::write(&rrd, "precious").unwrap();
-    for to in [&rrd, &log, &other] {
+    for (to, free) in [(&rrd, "flight-2.rrd"), (&log, "flight-2.mcap"), (&other, "other-2.mcap")] {
         let before = std::fs::read(to).unwrap();
-        export(&log, Some(&other), to).unwrap();
+        assert_eq!(export(&log, Some(&other), to).unwrap().0, to.with_file_name(free));
         assert_eq!(std::fs::read(to).unwrap(), before);
     }
     export(&log, None, cleared(&rrd)).unwrap();

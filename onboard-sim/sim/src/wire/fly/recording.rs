@@ -204,7 +204,8 @@ mod tests {
     #[test]
     fn a_log_up_to_its_mark_is_whole_and_does_not_change() {
         let folder = tempfile::tempdir().unwrap();
-        let recorder = Recorder::create(&folder.path().join("flight.mcap"), &LogHeader::default()).unwrap();
+        let recorder =
+            Recorder::create(&folder.path().join("flight.mcap"), None, &LogHeader::default()).unwrap();
         for number in 0..500 {
             recorder.record(event(number), u64::from(number));
         }
@@ -234,7 +235,8 @@ mod tests {
     #[test]
     fn a_log_that_is_cut_at_any_byte_is_read_up_to_its_last_whole_chunk() {
         let folder = tempfile::tempdir().unwrap();
-        let recorder = Recorder::create(&folder.path().join("flight.mcap"), &LogHeader::default()).unwrap();
+        let recorder =
+            Recorder::create(&folder.path().join("flight.mcap"), None, &LogHeader::default()).unwrap();
         let mut ends = Vec::new();
         for number in 0..40 {
             recorder.record(event(number), u64::from(number));
