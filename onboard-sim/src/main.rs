@@ -24,9 +24,6 @@ use protocol::signing::Key;
 struct Arguments {
     #[command(subcommand)]
     command: Command,
-    /// Nothing is replaced any more, so it has no effect.
-    #[arg(long = "force", global = true, hide = true)]
-    _force: bool,
     #[command(flatten)]
     _shown: Shown,
 }
@@ -37,7 +34,7 @@ enum Command {
     ///
     /// Without --mavlink the vehicle arms and starts itself; with it, it waits for a ground station.
     ///
-    /// Exit code 0 if it landed inside every limit (from apogee: on its legs), 3 if it ended outside a limit.
+    /// Exit code 0 if it stands undamaged, 3 if not, 4 if it was refused or aborted, 5 if it was stopped.
     #[command(
         after_help = "Examples:\n  onboard-sim fly --mission mk3 --log flight.mcap\n  onboard-sim fly --mavlink udpout:127.0.0.1:14550 --seed 7"
     )]
@@ -85,7 +82,7 @@ enum Command {
     )]
     New(cli::new::NewArguments),
     /// List the built-in missions, or print one as a file to start from.
-    #[command(alias = "profiles", after_help = "Example: onboard-sim missions --show mk3")]
+    #[command(after_help = "Example: onboard-sim missions --show mk3")]
     Missions {
         /// Print this mission's TOML.
         #[arg(long, value_name = "NAME")]

@@ -56,8 +56,8 @@ use protocol::program::{EXIT_CODES, Exit, Manual, Shown};
 /// The answer is no, and the exit code 3: of verify, if something differs or cannot be, or with --strict not all that can be
 /// compared was; with --baseline, if some flight got worse, lands no longer, diverged or is lost; with --book, if a book is broken,
 /// or its end is not proven; of compare, if more differs or is missing than is tolerated, or the verdicts differ; of fit, if it is
-/// NO-GO. It is 5 if verify cannot re-execute some frame (no frames, no profile, frames missing) and all others are identical, and
-/// if some of several logs could not be read.
+/// NO-GO. It is 5 if verify cannot run some frame again (no frames, no profile, frames missing) and all others are identical, if no
+/// log has a book, and if some of several logs could not be read and the answer of the others is not no.
 ///
 /// A damaged log is used up to the damage, with a warning and exit code 0, except by verify --strict and by compare.
 #[derive(Debug, Parser)]
@@ -71,9 +71,6 @@ use protocol::program::{EXIT_CODES, Exit, Manual, Shown};
 pub struct Cli {
     #[command(subcommand)]
     command: Command,
-    /// Nothing is replaced any more, so it has no effect.
-    #[arg(long = "force", global = true, hide = true)]
-    _force: bool,
     #[command(flatten)]
     _shown: Shown,
 }

@@ -21,7 +21,7 @@ struct Cli {
     /// The log, an MCAP file.
     log: PathBuf,
     /// The recording [default: the log's name with .rrd].
-    #[arg(short, long = "out", alias = "output", value_name = "FILE")]
+    #[arg(short, long = "out", value_name = "FILE")]
     output: Option<PathBuf>,
     /// Another log, whose flight is drawn into the same space and plots.
     #[arg(long, value_name = "LOG")]

@@ -36,7 +36,7 @@ fn copied(log: &Path) -> (tempfile::TempDir, PathBuf) {
     (directory, path)
 }
 
-/// A file that is there is kept, also the log that is read, under any of its names; a script that still says --force is understood.
+/// A file that is there is kept, also the log that is read, under any of its names.
 #[test]
 fn what_exists_is_kept_and_the_next_free_name_is_said() {
     for (arguments, name) in writers() {
@@ -54,7 +54,7 @@ fn what_exists_is_kept_and_the_next_free_name_is_said() {
         ];
         for (asked, free) in &written {
             let mut command = replay(arguments[0], &log);
-            let (code, stdout, stderr) = run(command.args(&arguments[1..]).arg(at(asked)).arg("--force"));
+            let (code, stdout, stderr) = run(command.args(&arguments[1..]).arg(at(asked)));
             assert_eq!(code, 0, "{arguments:?}: {stdout}{stderr}");
             let said =
                 format!("{} exists and is kept; {} is written", at(asked).display(), at(free).display());
@@ -79,6 +79,16 @@ fn tables_get_a_folder_of_their_own_and_an_import_a_free_name() {
     assert_eq!(code, 0, "{stderr}");
     assert_eq!(listed(&at("tables")), ["notes.txt"]);
     assert!(at("tables-2").join("vehicle_truth3d.csv").is_file());
+    // A folder that has no other name.
+    let before = std::fs::read(at("tables-2").join("dictionary.csv")).unwrap();
+    let mut here = replay("export", &log);
+    let refused = refusal(here.args(["--to", "csv", "--out", "."]).current_dir(at("tables-2")));
+    assert!(refused.contains(".: cannot be written"), "{refused}");
+    assert_eq!(std::fs::read(at("tables-2").join("dictionary.csv")).unwrap(), before);
+    std::fs::create_dir(at("empty")).unwrap();
+    let mut here = replay("export", &log);
+    let (code, _, stderr) = run(here.args(["--to", "csv", "--out", "."]).current_dir(at("empty")));
+    assert!(code == 0 && at("empty").join("dictionary.csv").is_file(), "{stderr}");
     let tlog = at("flight.tlog");
     std::fs::copy(crate::simulated::tlog(&WITH_FRAMES, "overwriting.tlog"), &tlog).unwrap();
     let before = std::fs::read(&log).unwrap();
@@ -99,6 +109,12 @@ fn a_report_twice_is_two_pages() {
     // A device has no content that could be lost.
     let (code, stdout, stderr) = run(replay("report", &log).args(["--out", "/dev/stdout"]));
     assert!(code == 0 && stdout.len() > 10_000, "{stderr}");
+    // Also if it is a file, in which the page's name follows.
+    let file = std::fs::File::create(directory.path().join("all.html")).unwrap();
+    let mut report = replay("report", &log);
+    assert!(report.args(["--out", "/dev/stdout"]).stdout(file).status().unwrap().success());
+    let all = std::fs::read_to_string(directory.path().join("all.html")).unwrap();
+    assert_eq!(all, stdout);
 }
 
 /// A command that fails keeps the old file and leaves no incomplete one.

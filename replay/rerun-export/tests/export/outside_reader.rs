@@ -18,7 +18,7 @@ fn said(command: &mut Command) -> String {
 fn recordings_pass_rerun_rrd_verify() {
     let recording = MK2.beside("mk2.rrd");
     let mut export = Command::new(env!("CARGO_BIN_EXE_replay-rerun"));
-    let exported = said(export.arg(&MK2.log).arg("--output").arg(&recording));
+    let exported = said(export.arg(&MK2.log).arg("--out").arg(&recording));
     assert!(exported.contains(" poses,") && !exported.contains("warning"), "{exported}");
     let verified = said(RERUN.program("rerun").args(["rrd", "verify"]).arg(&recording));
     assert!(verified.contains("verified without error"), "{verified}");
