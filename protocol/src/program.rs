@@ -4,6 +4,7 @@ use std::io::{self, Write as _};
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use clap::error::ErrorKind;
 use clap::{ArgMatches, Args, ColorChoice, Command, Subcommand};
 use clap_complete::Shell;
 
@@ -90,13 +91,24 @@ pub fn read(program: Command) -> Result<ArgMatches, clap::Error> {
     let when = first.strip_prefix("--color=").map(str::to_owned).or_else(|| words.next());
     let color = when.and_then(|when| when.parse().ok()).unwrap_or_default();
     let name = program.get_name().to_owned();
-    let program = ["completions bash", "man"].into_iter().fold(program, |program, words| {
-        let command = words.split(' ').next().unwrap_or_default().to_owned();
-        program.mut_subcommand(command, |command| command.after_help(format!("Example: {name} {words}")))
-    });
+    let program = program
+        .mut_subcommand("completions", |its| its.after_help(format!("Example: {name} completions bash")))
+        .mut_subcommand("man", |its| its.after_help(format!("Example: {name} man")));
     let given = program.color(color).try_get_matches()?;
     QUIET.store(given.get_flag("quiet"), Ordering::Relaxed);
     Ok(given)
+}
+
+/// Writes to standard output. A reader that closes the pipe early is not an error.
+///
+/// # Errors
+/// It cannot be written.
+pub fn print(bytes: &[u8]) -> io::Result<()> {
+    let mut output = io::stdout().lock();
+    match output.write_all(bytes).and_then(|()| output.flush()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error),
+        _ => Ok(()),
+    }
 }
 
 /// The commands that print the command line in another form.
@@ -109,7 +121,7 @@ pub enum Manual {
     },
     /// Print the manual page (roff) of the program, or of a command.
     Man {
-        /// The command, as in `man config check`.
+        /// The command, and its own if it has some.
         command: Vec<String>,
     },
 }
@@ -118,7 +130,7 @@ impl Manual {
     /// Prints it for a program.
     ///
     /// # Errors
-    /// There is no such command, or nobody reads it.
+    /// It cannot be written.
     pub fn print(&self, mut program: Command) -> io::Result<Exit> {
         let (mut text, name) = (Vec::new(), program.get_name().to_owned());
         match self {
@@ -127,13 +139,17 @@ impl Manual {
                 program.build();
                 let mut page = &program;
                 for word in command {
-                    let none = || io::Error::other(format!("{name} has no command `{}`", command.join(" ")));
-                    page = page.find_subcommand(word).ok_or_else(none)?;
+                    let Some(found) = page.find_subcommand(word) else {
+                        let known: Vec<&str> = page.get_subcommands().map(Command::get_name).collect();
+                        let words = format!("there is no command `{word}`, but: {}\n", known.join(", "));
+                        return Ok(Exit::unread(&clap::Error::raw(ErrorKind::InvalidSubcommand, words)));
+                    };
+                    page = found;
                 }
                 clap_mangen::Man::new(page.clone()).render(&mut text)?;
             }
         }
-        io::stdout().lock().write_all(&text).map(|()| Exit::Yes)
+        print(&text).map(|()| Exit::Yes)
     }
 }
 

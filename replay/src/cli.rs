@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result};
 pub(crate) use onboard_sim::files::text_of;
-use protocol::program::{Exit, is_quiet};
+use protocol::program::{Exit, is_quiet, print};
 use protocol::text::printable;
 use serde::Serialize;
 
@@ -86,11 +86,7 @@ pub(crate) fn give_each<A: Answer>(
 pub(crate) fn answer(write: impl FnOnce(&mut Vec<u8>) -> io::Result<()>) -> Result<()> {
     let mut text = Vec::new();
     write(&mut text)?;
-    let mut output = io::stdout().lock();
-    match output.write_all(harmless(&text).as_bytes()).and_then(|()| output.flush()) {
-        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error).context("standard output"),
-        _ => Ok(()),
-    }
+    print(harmless(&text).as_bytes()).context("standard output")
 }
 
 /// Text without what steers a terminal: text of a log or a file name is only shown.

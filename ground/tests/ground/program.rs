@@ -171,7 +171,7 @@ fn completions_and_the_manual_name_the_commands() {
         out(&of_a_command).contains("ground\\-config\\-check")
             || out(&of_a_command).contains(".TH ground-config-check")
     );
-    assert_eq!(ground(directory.path(), &["man", "land"]).status.code(), Some(1));
+    assert_eq!(ground(directory.path(), &["man", "land"]).status.code(), Some(2));
 }
 
 /// The log and the telemetry log of a demonstration contain the same flight.

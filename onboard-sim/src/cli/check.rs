@@ -10,7 +10,7 @@ use onboard_sim::check::{Candidate, Verdict, built_in, check};
 use protocol::program::Exit;
 use serde::Deserialize;
 
-use super::{on_threads, read, recipe, show_flights};
+use super::{on_threads, read, recipe, say, show_flights};
 
 #[derive(Args)]
 pub(crate) struct CheckArguments {
@@ -64,12 +64,9 @@ fn read_motors(path: &Path, motors: &mut Vec<Candidate>) -> anyhow::Result<()> {
         return files.iter().try_for_each(|file| read_motors(file, motors));
     }
     let text = read(path)?;
-    let mut take = |name: &str, motor: anyhow::Result<Candidate>| {
-        match motor {
-            Ok(motor) => motors.push(motor),
-            Err(reason) => writeln!(std::io::stderr(), "{name} cannot be used: {origin}: {reason:#}")?,
-        }
-        anyhow::Ok(())
+    let mut take = |name: &str, motor: anyhow::Result<Candidate>| match motor {
+        Ok(motor) => motors.push(motor),
+        Err(reason) => say(&format!("{name} cannot be used: {origin}: {reason:#}")),
     };
     if is(path, "json") {
         let list: Vec<serde_json::Value> = serde_json::from_str(&text).with_context(|| {
@@ -78,16 +75,18 @@ fn read_motors(path: &Path, motors: &mut Vec<Candidate>) -> anyhow::Result<()> {
             )
         })?;
         anyhow::ensure!(!list.is_empty(), "{origin}: the list holds no motor");
-        return list.into_iter().try_for_each(|entry| {
+        for entry in list {
             let name = entry["designation"].as_str().unwrap_or("an entry").to_owned();
-            take(&name, of_entry(entry))
-        });
+            take(&name, of_entry(entry));
+        }
+        return Ok(());
     }
     let text = text.trim_start_matches('\u{feff}').trim_end();
     let curve = thrust_curve::from_file_text(&origin.to_string(), text);
     // A mission takes a text without a line break for a name.
     let motor = curve.map(|curve| Candidate { motor: format!("{text}\n"), curve, in_production: true });
-    take(&path.file_stem().unwrap_or_default().to_string_lossy(), motor.map_err(Into::into))
+    take(&path.file_stem().unwrap_or_default().to_string_lossy(), motor.map_err(Into::into));
+    Ok(())
 }
 
 /// What is read of an entry of the list: grams and millimetres, and samples in seconds and newtons.

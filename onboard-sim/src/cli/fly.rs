@@ -49,8 +49,8 @@ pub(crate) struct FlyArguments {
     /// them. Needs --key, which all share.
     #[arg(long, value_name = "FILE", requires = "key")]
     crew: Option<PathBuf>,
-    /// Budget of a network link, bytes per second, 2000 to 1000000: 2000 if a radio carries it on. Above 2000, attitude,
-    /// position, battery and mode go out in the messages of other ground stations, too.
+    /// Budget of a network link, bytes per second, 2000 to 1000000: 2000 if a radio carries it on. Above 2000, attitude, speed,
+    /// battery, mode and GNSS go out in the messages of other ground stations, too, and the place more often than every 2 s.
     #[arg(long, value_name = "BYTES_S", default_value_t = NETWORK_BUDGET_BYTES_S,
         value_parser = clap::value_parser!(u32).range(i64::from(RADIO_BUDGET_BYTES_S)..=1_000_000))]
     network_budget: u32,
@@ -261,7 +261,7 @@ fn read_pin(pin: &watch::Sender<bool>) {
                 ["pin", "in"] => _ = pin.send(false),
                 ["pin", "out"] => _ = pin.send(true),
                 [] => {}
-                _ => _ = writeln!(std::io::stdout(), "type `pin in` or `pin out`, and Enter"),
+                _ => _ = writeln!(std::io::stderr(), "type `pin in` or `pin out`, and Enter"),
             }
         }
         // No line is so long.

@@ -8,6 +8,7 @@ pub(crate) mod hazard;
 pub(crate) mod new;
 mod single;
 
+use std::io::Write as _;
 use std::path::Path;
 
 use anyhow::Context as _;
@@ -19,6 +20,7 @@ use onboard_sim::progress::Progress;
 use onboard_sim::run::threads;
 use protocol::log::recorder::Recorder;
 use protocol::log::writer::LogHeader;
+use protocol::program::is_quiet;
 use sim::dispersion::{self, Dispersion};
 use sim::recipe::Recipe;
 use toml_edit::{Array, DocumentMut};
@@ -59,6 +61,13 @@ fn logging(path: &Path, header: &LogHeader) -> anyhow::Result<Recorder> {
     let recorder = Recorder::create(path, None, header)?;
     say_other(path, recorder.path());
     Ok(recorder)
+}
+
+/// Says on standard error what is no error, unless --quiet is given. If nobody reads it, nothing is lost.
+fn say(text: &str) {
+    if !is_quiet() {
+        let _ = writeln!(std::io::stderr(), "{text}");
+    }
 }
 
 /// A file's text; what is not UTF-8 is read as Latin-1, in which some programs export.

@@ -16,7 +16,7 @@ use onboard_sim::files::{NewFile, text_of};
 use protocol::program::Exit;
 use toml::Value;
 
-use super::read;
+use super::{read, say};
 
 const MASS: &str = "airframe.mass.loaded_kg";
 const LENGTH: &str = "airframe.body.length_m";
@@ -54,7 +54,7 @@ type Ask<'a> = &'a mut dyn FnMut(&str) -> anyhow::Result<String>;
 
 pub(crate) fn run(arguments: &NewArguments) -> anyhow::Result<Exit> {
     let path = arguments.out.clone().unwrap_or_else(|| format!("{}.toml", arguments.name).into());
-    let (mut stdin, mut stderr) = (std::io::stdin().lock(), std::io::stderr());
+    let mut stdin = std::io::stdin().lock();
     let terminal = stdin.is_terminal();
     let mut ask = |question: &str| {
         ensure!(terminal, "there is no terminal on which to ask for it");
@@ -65,11 +65,11 @@ pub(crate) fn run(arguments: &NewArguments) -> anyhow::Result<Exit> {
     };
     let asks = arguments.like.is_none();
     if asks && !terminal {
-        writeln!(stderr, "no terminal on which to ask: what is not told is {}'s", mission::DEFAULT)?;
+        say(&format!("no terminal on which to ask: what is not told is {}'s", mission::DEFAULT));
     }
     let text = made(arguments, asks && terminal, &mut ask, &path.display().to_string())?;
     let path = NewFile::create(&path)?.fill(|file| file.write_all(text.as_bytes()))?;
-    writeln!(stderr, "{0} is written; `onboard-sim check {0}` says whether it will land", path.display())?;
+    say(&format!("{0} is written; `onboard-sim check {0}` says whether it will land", path.display()));
     Ok(Exit::Yes)
 }
 

@@ -44,6 +44,8 @@ fn a_check_answers_with_its_worst_word_and_names_motors_that_cannot_be_used() {
     assert!(page.starts_with("mk3: 3.700 kg on HP-H45W") && !page.contains("flights"), "{page}");
     let words = stderr(&good);
     assert!(words.contains("grams.eng: line 11: propellant mass is '40.7 kg"), "{words}");
+    let quiet = run(directory.path(), &[&["-q", "check", "mk3"], &none[..]].concat());
+    assert_eq!((stdout(&quiet), stderr(&quiet)), (stdout(&good), String::new()));
     let mk3 = include_str!("../../flight/vehicles/missions/mk3.toml");
     fs::write(directory.path().join("heavy.toml"), mk3.replace("loaded_kg = 3.7", "loaded_kg = 5.0"))
         .unwrap();
@@ -113,6 +115,44 @@ fn a_card_is_written_whole_shows_what_is_left_and_names_no_rate_of_two_flights()
     let again = run(directory.path(), &arguments);
     assert_eq!(again.status.code(), Some(0), "{}", stderr(&again));
     assert_eq!(names(&directory.path().join("card-2")), names(&card));
+    let full = Command::new(env!("CARGO_BIN_EXE_onboard-sim"))
+        .current_dir(&card)
+        .args([&arguments[..], &["--out", "."]].concat())
+        .output()
+        .unwrap();
+    assert_eq!(full.status.code(), Some(1), "{}", stdout(&full));
+    assert!(stderr(&full).contains(".: cannot be written: it exists, and no name like it is free"));
+    assert_eq!((names(&card).len(), fs::read_to_string(card.join("card.txt")).unwrap()), (3, text));
+}
+
+/// `--quiet` leaves what the program was asked for, and where it is.
+#[test]
+fn a_new_mission_is_quiet_if_asked() {
+    let directory = tempfile::tempdir().unwrap();
+    for (quiet, lines) in [(&[][..], 1), (&["-q"], 0), (&["-q"], 1)] {
+        let made = run(directory.path(), &[&["new", "ours", "--like", "mk3"], quiet].concat());
+        assert_eq!((made.status.code(), stderr(&made).lines().count()), (Some(0), lines), "{made:?}");
+        if quiet.is_empty() {
+            fs::remove_file(directory.path().join("ours.toml")).unwrap();
+        }
+    }
+    assert_eq!(names(directory.path()), ["ours-2.toml", "ours.toml"]);
+}
+
+#[test]
+fn a_command_that_there_is_not_is_wrong_usage_and_the_commands_are_listed() {
+    let wrong = run(Path::new("."), &["man", "land"]);
+    assert_eq!((wrong.status.code(), stdout(&wrong)), (Some(2), String::new()));
+    assert!(stderr(&wrong).contains("no command `land`, but: fly, campaign, check"), "{}", stderr(&wrong));
+    let inner = run(Path::new("."), &["man", "campaign", "fly"]);
+    assert!(stderr(&inner).contains("no command `fly`, but: merge"), "{}", stderr(&inner));
+    assert_eq!(run(Path::new("."), &["man", "campaign", "merge"]).status.code(), Some(0));
+    // Nobody reads it.
+    let (reader, writer) = std::io::pipe().unwrap();
+    drop(reader);
+    let mut unread = Command::new(env!("CARGO_BIN_EXE_onboard-sim"));
+    let unread = unread.args(["completions", "bash"]).stdout(writer).output().unwrap();
+    assert_eq!((unread.status.code(), stderr(&unread)), (Some(0), String::new()));
 }
 
 /// What a person acts on says its set, and a set that may be kinder than `real` says that.

@@ -2,8 +2,9 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
 
 use std::fs;
+use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Stdio};
 
 /// What `fly` says with this log besides its error. A key that does not exist ends it before the flight.
 fn fly(directory: &Path, log: &str) -> String {
@@ -34,6 +35,23 @@ fn fly_keeps_a_log_that_exists_and_says_the_free_name() {
     let said = fly(directory.path(), "flight.mcap");
     assert_eq!(said, "flight.mcap exists and is kept; flight-2.mcap is written\n");
     assert_eq!(fs::read_to_string(directory.path().join("flight.mcap")).unwrap(), "a flight");
+}
+
+/// What helps the person who types at it is no part of the object.
+#[test]
+fn a_line_that_is_not_understood_is_answered_beside_the_object() {
+    let mut fly = Command::new(env!("CARGO_BIN_EXE_onboard-sim"));
+    fly.args(["fly", "--json", "--mavlink", "udpin:127.0.0.1:0"]);
+    fly.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut flying = fly.spawn().unwrap();
+    writeln!(flying.stdin.as_mut().unwrap(), "pull the pin").unwrap();
+    let mut lines = BufReader::new(flying.stderr.take().unwrap()).lines();
+    assert!(lines.any(|line| line.unwrap().starts_with("type `pin in`")));
+    let pid = rustix::process::Pid::from_child(&flying);
+    rustix::process::kill_process(pid, rustix::process::Signal::TERM).unwrap();
+    let ended = flying.wait_with_output().unwrap();
+    let told: serde_json::Value = serde_json::from_slice(&ended.stdout).unwrap();
+    assert_eq!(told["exit_code"], 5, "{told}");
 }
 
 /// A program reads one object: how the flight ended, and where its log is.
