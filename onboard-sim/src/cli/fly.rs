@@ -196,13 +196,10 @@ async fn fly(arguments: FlyArguments) -> anyhow::Result<Exit> {
 /// Waits for Ctrl-C or a request to terminate.
 async fn interrupted() {
     use tokio::signal::unix::{SignalKind, signal};
-    let Ok(mut terminate) = signal(SignalKind::terminate()) else {
-        let _ = tokio::signal::ctrl_c().await;
-        return;
-    };
+    let mut terminate = signal(SignalKind::terminate());
     tokio::select! {
         _ = tokio::signal::ctrl_c() => {}
-        _ = terminate.recv() => {}
+        Some(()) = async { terminate.as_mut().ok()?.recv().await } => {}
     }
 }
 
@@ -215,12 +212,9 @@ fn boot_number(text: &str) -> Result<NonZeroU32, String> {
 fn kept_uid(file: &Path, drawn: NonZeroU16) -> anyhow::Result<NonZeroU16> {
     let name = file.display();
     match std::fs::read_to_string(file) {
-        Ok(text) => text.trim().parse().map_err(|_wrong| {
-            anyhow::anyhow!(
-                "{name}: `{}` is no unique id; it must be a whole number from 1 to {}",
-                text.trim(),
-                u16::MAX
-            )
+        Ok(text) => text.trim().parse().ok().with_context(|| {
+            let most = u16::MAX;
+            format!("{name}: `{}` is no unique id; it must be a whole number from 1 to {most}", text.trim())
         }),
         Err(why) if why.kind() == std::io::ErrorKind::NotFound => {
             std::fs::write(file, format!("{drawn}\n"))

@@ -3,6 +3,7 @@
 
 use std::fs;
 use std::io::{BufRead as _, BufReader, Write as _};
+use std::net::UdpSocket;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
@@ -41,12 +42,16 @@ fn fly_keeps_a_log_that_exists_and_says_the_free_name() {
 #[test]
 fn a_line_that_is_not_understood_is_answered_beside_the_object() {
     let mut fly = Command::new(env!("CARGO_BIN_EXE_onboard-sim"));
-    fly.args(["fly", "--json", "--mavlink", "udpin:127.0.0.1:0"]);
+    let station = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let link = format!("udpout:{}", station.local_addr().unwrap());
+    fly.args(["fly", "--json", "--mavlink", &link]);
     fly.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut flying = fly.spawn().unwrap();
     writeln!(flying.stdin.as_mut().unwrap(), "pull the pin").unwrap();
     let mut lines = BufReader::new(flying.stderr.take().unwrap()).lines();
     assert!(lines.any(|line| line.unwrap().starts_with("type `pin in`")));
+    // It is under way, and hears a signal.
+    (0..20).for_each(|_| _ = station.recv(&mut [0; 300]).unwrap());
     let pid = rustix::process::Pid::from_child(&flying);
     rustix::process::kill_process(pid, rustix::process::Signal::TERM).unwrap();
     let ended = flying.wait_with_output().unwrap();

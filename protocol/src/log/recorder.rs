@@ -149,11 +149,7 @@ fn numbered(path: &Path, number: u32) -> PathBuf {
     let Some(stem) = stem else { return path.to_owned() };
     let mut name = stem.to_owned();
     name.push(format!("-{number}"));
-    if let Some(extension) = path.extension() {
-        name.push(".");
-        name.push(extension);
-    }
-    path.with_file_name(name)
+    path.with_file_name(name).with_added_extension(path.extension().unwrap_or_default())
 }
 
 impl Recorder {
@@ -163,17 +159,13 @@ impl Recorder {
     ///
     /// # Errors
     /// No name is free, a file cannot be created, or the header cannot be written.
-    pub fn create(
-        asked: &Path,
-        tlog: Option<TlogName<'_>>,
-        header: &LogHeader,
-    ) -> Result<Self, RecorderError> {
+    pub fn create(at: &Path, tlog: Option<TlogName<'_>>, header: &LogHeader) -> Result<Self, RecorderError> {
         let (mut number, mut tried) = (0, PathBuf::new());
         let mut create = |path: &Path| {
             path.clone_into(&mut tried);
             File::options().write(true).read(true).create_new(true).open(path)
         };
-        let created = under_free_name(asked, |log| {
+        let created = under_free_name(at, |log| {
             number += 1;
             let file = create(log)?;
             let Some(name) = tlog else { return Ok((file, None)) };
