@@ -109,7 +109,7 @@ fn section(sign: Sign) -> &'static str {
         | Sign::HeightsDisagree
         | Sign::Estimate => "sensors",
         Sign::Battery => "battery",
-        Sign::Surface(0 | 1) | Sign::Tumbles => "burn",
+        Sign::Surface(0 | 1) | Sign::SlowGimbal | Sign::Tumbles => "burn",
         Sign::LateLight | Sign::Impulse | Sign::BurntOutEarly => "thrust",
         Sign::Surface(_) => "descent",
         Sign::NoPlan => "solver",

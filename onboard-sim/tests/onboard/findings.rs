@@ -11,7 +11,7 @@ use sim::recipe::Recipe;
 use sim::sortie::Sortie;
 
 /// What breaks, and the signs of which one must come first.
-const BREAKS: [(&str, &[Sign]); 17] = [
+const BREAKS: [(&str, &[Sign]); 18] = [
     ("gnss-out@5", &[Sign::Gnss]),
     ("barometer-out@coast", &[Sign::Barometer]),
     ("barometer-step:-20@descent+1", &[Sign::HeightsDisagree]),
@@ -20,7 +20,8 @@ const BREAKS: [(&str, &[Sign]); 17] = [
     ("fin-stuck:2@apogee", &[Sign::Surface(4)]),
     ("gimbal-stuck@powered+0.3", &[Sign::Surface(0), Sign::Surface(1)]),
     ("gimbal-jams:4@powered", &[Sign::Surface(0)]),
-    ("gimbal-slow:0.2@ignition", &[Sign::Surface(0), Sign::Surface(1)]),
+    ("gimbal-slow:0.2@ignition", &[Sign::Surface(0), Sign::Surface(1), Sign::SlowGimbal]),
+    ("gimbal-slow:0.5@ignition", &[Sign::SlowGimbal]),
     ("ascent-no-light@0", &[Sign::Latched]),
     ("ascent-weak:0.7@0", &[Sign::AscentMotor]),
     ("separation-fails@0", &[Sign::Separation]),

@@ -169,7 +169,7 @@ pub(super) fn fit_stand(source: &str, rows: &[(f64, f64)], curve: &ThrustCurve) 
     ];
     fit.take(&solution, reason, &rows);
     fit.take(&solution, reason, &shape_rows(SHAPE));
-    fit.lacks("drag_scale, gimbal, wind, sensors", "a test stand does not fly");
+    fit.lacks("drag_per_mass_scale, gimbal, wind, sensors", "a test stand does not fly");
     Ok(fit)
 }
 

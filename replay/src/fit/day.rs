@@ -65,6 +65,9 @@ pub struct Learnt {
     pub lot_toml: String,
     /// Drag and gimbal of the airframe, over the flights.
     pub airframe: Vec<Pooled>,
+    /// The gimbal's rate that the next day is flown with, deg/s, and the fit that it is from: the slowest, if it is slower than the
+    /// mission's. What has slowed down does not recover.
+    pub slow_gimbal: Option<(f64, String)>,
     /// Mean wind at the site, lowest and highest of an even distribution, m/s.
     pub wind_m_s: [f64; 2],
     pub flights: usize,
@@ -123,11 +126,14 @@ fn learn(fits: &[Fit], ask: &Arguments, mission_toml: &str, set_toml: &str) -> R
     let lots = priors.iter().zip(&values);
     let lots: Vec<Posterior> = lots.map(|(prior, (count, burnt))| prior.with(*count as u32, burnt)).collect();
     let airframe: Vec<Pooled> = airframe(fits);
+    let slow_gimbal = slow_gimbal(fits, mission.airframe.gimbal.servo.rate_deg_s);
     let wind_m_s = wind(fits, &set);
     let sources: Vec<String> = fits.iter().map(|fit| fit.source.clone()).collect();
     let motor = mission.motor_curve.name();
     let lot = with_burns(lot, motor, burns.len(), [&values[0].1, &values[1].1])?;
-    let day = Day::of([&before, set_toml], &ask.prior, &lot, &lots, &airframe, wind_m_s, &sources)?;
+    let rate_deg_s = slow_gimbal.as_ref().map(|(rate_deg_s, _)| *rate_deg_s);
+    let day =
+        Day::of([&before, set_toml], &ask.prior, &lot, &lots, (&airframe, rate_deg_s), wind_m_s, &sources)?;
     let trials = ask.flights.map(|flights| fly(ask.seed, flights, &lots, &day)).transpose()?;
     let prediction = trials.as_ref().map(|trials| {
         predict(&lots, trials, ask.limit, ask.seed).context("no flight was simulated: --flights is 0")
@@ -155,6 +161,7 @@ fn learn(fits: &[Fit], ask: &Arguments, mission_toml: &str, set_toml: &str) -> R
         lots: reports.collect(),
         lot_toml: lot_toml(&lot),
         airframe,
+        slow_gimbal,
         wind_m_s,
         flights: trials.map_or(0, |trials| trials.len()),
         prediction,
@@ -248,7 +255,7 @@ fn one_vehicle(fits: &[Fit], known: [&str; 2]) -> Result<()> {
 
 /// Drag and gimbal; of one flight as it was found.
 fn airframe(fits: &[Fit]) -> Vec<Pooled> {
-    let wanted = ["drag_scale", "gimbal_delay", "gimbal_gain", "gimbal_play"];
+    let wanted = ["drag_per_mass_scale", "gimbal_delay", "gimbal_gain", "gimbal_play"];
     let together = pooled(fits);
     let one = |name: &str| {
         let mean = fits.iter().find_map(|fit| fit.get(name))?.clone();
@@ -259,6 +266,17 @@ fn airframe(fits: &[Fit]) -> Vec<Pooled> {
     });
     found.collect()
 }
+
+/// The slowest gimbal that a fit has found for certain, deg/s, and which one, if it is below the mission's.
+fn slow_gimbal(fits: &[Fit], of_mission_deg_s: f64) -> Option<(f64, String)> {
+    let found = fits.iter().filter_map(|fit| Some((fit.get("gimbal_rate")?, &fit.source)));
+    let slow = found.filter(|(rate, _)| rate.high < of_mission_deg_s * SLOWER);
+    let (rate, source) = slow.min_by(|a, b| a.0.value.total_cmp(&b.0.value))?;
+    Some((rate.value, source.clone()))
+}
+
+/// A servo at another voltage or load is as much slower.
+const SLOWER: f64 = 0.9;
 
 /// The mean wind of the next day: the prior's range is a mean and a deviation, the flights' winds are values of them, and the
 /// next value's deviation is a range again.
@@ -318,13 +336,16 @@ impl Day {
         set: &str,
         lot: &toml::Table,
         lots: &[Posterior],
-        airframe: &[Pooled],
+        (airframe, gimbal_deg_s): (&[Pooled], Option<f64>),
         wind_m_s: [f64; 2],
         sources: &[String],
     ) -> Result<Self> {
         let [_, _, delay] = lots else { bail!("a lot has thrust, burn time and delay") };
         let mission = mission_with(before_toml, &[])?;
-        let drag = airframe.iter().find(|pooled| pooled.mean.name == "drag_scale").map(|pooled| &pooled.mean);
+        let drag = airframe
+            .iter()
+            .find(|pooled| pooled.mean.name == "drag_per_mass_scale")
+            .map(|pooled| &pooled.mean);
         let drag_scale = drag.map_or(1.0, |mean| mean.value);
         let (body, fins) = (&mission.airframe.body, &mission.airframe.fins);
         let float = |value: f64| toml::Value::Float(value);
@@ -337,7 +358,12 @@ impl Day {
             ("airframe.legs.drag_area_m2", float(mission.airframe.legs.drag_area_m2 * drag_scale)),
             ("ignition.delay_s", float(delay.mean)),
         ];
-        let settings = settings.map(|(path, value)| Setting { path: path.to_owned(), value, at_s: None });
+        let gimbal = gimbal_deg_s.map(|deg_s| ("airframe.gimbal.servo.rate_deg_s", float(deg_s)));
+        let settings: Vec<Setting> = settings
+            .into_iter()
+            .chain(gimbal)
+            .map(|(path, value)| Setting { path: path.to_owned(), value, at_s: None })
+            .collect();
         let mission_toml = head("The mission", set, sources) + &mission_toml_with(before_toml, &settings)?;
         let mission = mission_with(&mission_toml, &[])?;
         let mut table: toml::Table = set_toml.parse().with_context(|| set.to_owned())?;
@@ -417,6 +443,11 @@ impl Answer for Learnt {
             let line = format!("airframe  {name:<16} {value:.4}, {low:.4} to {high:.4} {unit}");
             said.push(line.trim_end().to_owned());
         }
+        said.extend(self.slow_gimbal.iter().map(|(rate_deg_s, source)| {
+            format!(
+                "SLOW      the gimbal turned at {rate_deg_s:.0} deg/s in {source}: the day is flown with that"
+            )
+        }));
         said.extend(self.lot_toml.lines().map(str::to_owned));
         let [low, high] = self.wind_m_s;
         said.push(format!("site      wind {low:.1} to {high:.1} m/s"));
@@ -556,6 +587,16 @@ mod tests {
             (high - 4.0 - reach).abs() < 1e-9 && (low - (4.0 - reach).max(0.0)).abs() < 1e-9,
             "{low} {high}"
         );
+    }
+
+    #[test]
+    fn a_gimbal_that_was_slow_once_is_slow_on_the_next_day() {
+        let with = |source: &str, deg_s| {
+            fit(source, "mk3", "H45W", vec![Parameter::normal("gimbal_rate", "deg/s", deg_s, 2.0)])
+        };
+        let fits = [with("a", 299.0), with("b", 150.0), with("c", 298.0)];
+        assert_eq!(slow_gimbal(&fits, 300.0), Some((150.0, "b".to_owned())));
+        assert_eq!(slow_gimbal(&fits[..1], 300.0), None);
     }
 
     /// A simulation that says 0.8 and 1 with the same weight, and three of four landed: 0.8^3 0.2 = 0.1024 of the first, nothing of the

@@ -138,7 +138,7 @@ pub struct Fit {
     pub basis: Basis,
     pub found: Vec<Parameter>,
     pub not_found: Vec<NotFound>,
-    /// Fraction of the air force in this fall that is the body's by the mission's data: `drag_scale` is that of the sum.
+    /// Fraction of the air force in this fall that is the body's by the mission's data: `drag_per_mass_scale` is that of the sum.
     pub body_share: Option<f64>,
     /// What intervals were widened by; `None`: they are those of the noise alone.
     pub calibration: Option<Calibration>,
@@ -173,7 +173,7 @@ impl Fit {
             let factor = match parameter.name.as_str() {
                 "thrust_scale" => own.impulse_n_s / other.impulse_n_s * per_mass,
                 "burn_time_scale" => own.burn_time_s / other.burn_time_s,
-                "drag_scale" | "body_drag_scale" | "fin_drag_scale" => {
+                "drag_per_mass_scale" | "body_drag_scale" | "fin_drag_scale" => {
                     own.drag_area_m2 / other.drag_area_m2 * per_mass
                 }
                 _ => continue,
@@ -262,7 +262,8 @@ pub fn uncalibrated(trace: &Trace) -> Fit {
             }
         }
         Err(reason) => {
-            for name in ["drag_scale", "thrust_scale", "burn_time_scale", "ignition_delay", "gimbal", "wind"]
+            for name in
+                ["drag_per_mass_scale", "thrust_scale", "burn_time_scale", "ignition_delay", "gimbal", "wind"]
             {
                 fit.lacks(name, &reason);
             }
@@ -295,8 +296,8 @@ fn along_and_turning(trace: &Trace) -> Result<(Along, Result<Solution, String>),
 
 fn drag(fit: &mut Fit, along: &Along) {
     let (total, sigma) = along.drag();
-    fit.found.push(Parameter::normal("drag_scale", "", total, sigma));
-    let reason = "the openings of the fins changed too little to tell their drag from the body's: drag_scale is the sum";
+    fit.found.push(Parameter::normal("drag_per_mass_scale", "", total, sigma));
+    let reason = "the openings of the fins changed too little to tell their drag from the body's: drag_per_mass_scale is the sum";
     fit.take(
         &along.solution,
         reason,
@@ -367,7 +368,7 @@ pub fn patched(mission_toml: &str, flown: &Mission, fit: &Fit, flight: &str) -> 
     let airframe = &flown.airframe;
     let per_mass = mission.airframe.mass.loaded_kg / airframe.mass.loaded_kg;
     let apart = ["body_drag_scale", "fin_drag_scale"].iter().all(|name| fit.get(name).is_some());
-    let [body, fins] = if apart { ["body_drag_scale", "fin_drag_scale"] } else { ["drag_scale"; 2] };
+    let [body, fins] = if apart { ["body_drag_scale", "fin_drag_scale"] } else { ["drag_per_mass_scale"; 2] };
     let rows = [
         ("airframe.body.axial_drag_coefficient", body, airframe.body.axial_drag_coefficient * per_mass),
         ("airframe.fins.drag_coefficient", fins, airframe.fins.drag_coefficient * per_mass),
@@ -712,7 +713,7 @@ mod tests {
     /// interval is 4.3027 (97.5 % of Student's t with 2 degrees) times the root of 1/3.
     #[test]
     fn val_hand_three_flights() {
-        let found = pooled(&fits("drag_scale", UNIT, [(1.0, 0.1), (2.0, 0.1), (3.0, 0.1)]));
+        let found = pooled(&fits("drag_per_mass_scale", UNIT, [(1.0, 0.1), (2.0, 0.1), (3.0, 0.1)]));
         let [Pooled { mean, scatter, flights: 3 }] = &found[..] else { panic!("{found:?}") };
         assert!((mean.value - 2.0).abs() < 1e-12 && (scatter - libm::sqrt(0.99)).abs() < 1e-12, "{found:?}");
         assert!((mean.high - 2.0 - 4.302_65 / libm::sqrt(3.0)).abs() < 1e-4, "{mean:?}");
@@ -723,7 +724,7 @@ mod tests {
     #[test]
     fn val_hand_what_all_flights_have_in_common_does_not_average_out() {
         for common in [0.0, 0.3] {
-            let mut fits = fits("drag_scale", UNIT, [(1.0, libm::hypot(0.1, common)); 2]);
+            let mut fits = fits("drag_per_mass_scale", UNIT, [(1.0, libm::hypot(0.1, common)); 2]);
             for parameter in fits.iter_mut().flat_map(|fit| &mut fit.found) {
                 parameter.systematic = Some(common);
             }

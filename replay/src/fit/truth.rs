@@ -38,7 +38,7 @@ pub fn truth(
         ("burn_time_scale", truth.burn_time_scale),
         // By impulse: a thrust that rises slowly makes the whole burn late by half of its rise.
         ("ignition_delay", truth.ignition_delay_s + 0.5 * truth.thrust_rise_s + truth.chuff_s[1]),
-        ("drag_scale", body_share * body + (1.0 - body_share) * fins),
+        ("drag_per_mass_scale", body_share * body + (1.0 - body_share) * fins),
         ("body_drag_scale", body),
         ("fin_drag_scale", fins),
         ("exhaust_body_loss", truth.plume_body_loss),

@@ -28,7 +28,7 @@ fn fits(path: &Path, thrusts: &[f64]) {
         serde_json::json!({
             "basis": basis, "source": format!("flight {place}"), "mission": "mk2", "motor": "H45W", "not_found": [], "damage": null,
             "found": [parameter("thrust_scale", *thrust), parameter("burn_time_scale", 1.0),
-                      parameter("ignition_delay", 0.16), parameter("drag_scale", 1.02)],
+                      parameter("ignition_delay", 0.16), parameter("drag_per_mass_scale", 1.02)],
         })
     };
     let all: Vec<_> = thrusts.iter().enumerate().map(fit).collect();

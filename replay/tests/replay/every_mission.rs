@@ -146,7 +146,7 @@ const TABLE: [Row; 21] = [
     row(
         "fit {log}",
         (0, &["{mission} with ", "thrust_scale", "gimbal_delay"]),
-        (0, &["{mission} with ", "drag_scale"]),
+        (0, &["{mission} with ", "drag_per_mass_scale"]),
         (1, &["has no frames of a flight computer"]),
     ),
     row("cut {log} {dir}/cut.mcap --from POWERED", (0, &["kept ", "cut.mcap"]), NO_BURN, NO_BURN),

@@ -44,7 +44,7 @@ fn val_simulation_a_field_flight_is_known_within_the_bars() {
     for (name, truth, bar) in [
         ("thrust_scale", truth.impulse_scale / truth.mass_scale, 0.01),
         ("burn_time_scale", truth.burn_time_scale, 0.01),
-        ("drag_scale", truth.drag_scale / truth.mass_scale, 0.03),
+        ("drag_per_mass_scale", truth.drag_scale / truth.mass_scale, 0.03),
         ("ignition_delay", truth.ignition_delay_s, 0.005),
         ("gimbal_delay", 0.020, 0.005),
         ("gimbal_gain", 1.0, 0.02),
@@ -74,9 +74,9 @@ fn what_is_broken_is_told_with_its_reason_and_the_rest_is_found() {
     );
     let gimbal = ["gimbal_delay", "gimbal_gain", "gimbal_play"];
     for (fault, lacks, reason, found) in [
-        ("no-light@0", &["thrust_scale"][..], dark, "drag_scale"),
+        ("no-light@0", &["thrust_scale"][..], dark, "drag_per_mass_scale"),
         ("gimbal-jams:3.7@0", &gimbal, not_its_model, "thrust_scale"),
-        ("early-burnout:2@0", &["thrust_scale"], not_its_curve, "drag_scale"),
+        ("early-burnout:2@0", &["thrust_scale"], not_its_curve, "drag_per_mass_scale"),
     ] {
         let fit = fit(&Trace::open(&crate::from_apogee::fly(&[fault]).log).unwrap());
         for name in lacks {
@@ -109,7 +109,7 @@ fn intervals_say_on_how_many_flights_they_were_calibrated() {
     let mission = flight::vehicle::mission::Mission { name: "ours".to_owned(), ..TRACE.mission.clone() };
     let ours = fit(&Trace { mission, ..TRACE.clone() });
     assert!(!ours.calibration.as_ref().unwrap().own);
-    for name in ["thrust_scale", "drag_scale", "wind_x"] {
+    for name in ["thrust_scale", "drag_per_mass_scale", "wind_x"] {
         let [own, other] = [&own, &ours].map(|fit| fit.get(name).unwrap().sigma);
         assert!(other >= own, "{name}: {other} {own}");
     }

@@ -35,6 +35,8 @@ pub enum Sign {
     Estimate,
     /// Gimbal pitch and yaw, then the fins: it is not where its commands take it.
     Surface(u8),
+    /// The gimbal turns more slowly than its servo's data say.
+    SlowGimbal,
     Battery,
     /// The ascent motor gave less than its curve.
     AscentMotor,
@@ -59,7 +61,7 @@ pub enum Sign {
 }
 
 /// Every sign, and how long it must last to be a finding, s. A moment of it is noise, a dropped sample or a gust.
-const RULES: [(Sign, f64); 24] = [
+const RULES: [(Sign, f64); 25] = [
     (Sign::Restart, 0.0),
     (Sign::Gnss, 0.0),
     (Sign::Barometer, 0.0),
@@ -73,6 +75,7 @@ const RULES: [(Sign, f64); 24] = [
     (Sign::Surface(3), 0.3),
     (Sign::Surface(4), 0.3),
     (Sign::Surface(5), 0.3),
+    (Sign::SlowGimbal, 0.0),
     (Sign::Battery, 0.1),
     (Sign::AscentMotor, 0.0),
     (Sign::Separation, 0.5),
@@ -118,6 +121,7 @@ impl Finding {
                 let name = SURFACE_NAMES.get(usize::from(surface)).unwrap_or(&"surface");
                 format!("{name} {value:.1} deg from where its commands take it, at {beside:.1} deg")
             }
+            Sign::SlowGimbal => format!("gimbal turns at {value:.0} deg/s at most, not {beside:.0}"),
             Sign::Battery => format!("battery down to {value:.2} V"),
             Sign::AscentMotor => format!("ascent motor gave {value:.2} of its impulse"),
             Sign::Separation => "booster did not separate".to_string(),
@@ -242,6 +246,11 @@ const ASTRAY_COS_TILT: f64 = 0.5;
 /// A gimbal and a fin this far from where their servo's data take them do not follow, rad. Feedback, play and an unknown
 /// half frame of delay make 1 deg of it for a gimbal; the fins' feedback is coarser.
 const AWAY_RAD: [f64; 2] = [0.035, 0.14];
+/// In a frame that asks a gimbal for this share of its servo's rate it has to turn fast.
+const FAST: f64 = 0.6;
+/// A gimbal that in so many of them never turned by this share of what its servo's data say is slow.
+const FAST_FRAMES: u32 = 40;
+const SLOW: f64 = 0.85;
 /// Common regulators of 5 V give up here, V.
 const BATTERY_LOW_V: f64 = 6.6;
 /// Less than this share of the ascent motor's certified impulse was felt.
@@ -271,6 +280,10 @@ struct Watcher {
     /// Satellites were seen after the boost.
     gnss_since_boost: bool,
     surfaces: [ServoModel; SURFACES],
+    /// Where the gimbal was in the frame before, rad.
+    gimbal_rad: [f64; 2],
+    /// In the burn: the frames in which each axis had to turn fast, and how far it had to and did turn in one at most, rad.
+    turns: [(u32, f64, f64); 2],
     /// Specific force along the nose over the boost, m/s.
     boost_m_s: f64,
     ejected_s: Option<f64>,
@@ -292,6 +305,8 @@ impl Watcher {
             missing: 0,
             gnss_since_boost: false,
             surfaces: ServoModel::of_each(airframe, surfaces_rad(flown.gimbal_rad, flown.fins_rad)),
+            gimbal_rad: flown.gimbal_rad,
+            turns: [(0, 0.0, 0.0); 2],
             boost_m_s: 0.0,
             ejected_s: None,
             parted_s: None,
@@ -309,6 +324,7 @@ impl Watcher {
             // Nobody knows what was commanded or measured meanwhile.
             let at_rad = surfaces_rad(flown.gimbal_rad, flown.fins_rad);
             self.surfaces = ServoModel::of_each(&computer.pilot().mission().airframe, at_rad);
+            self.gimbal_rad = flown.gimbal_rad;
         }
         if flown.measured.gnss.is_some() {
             self.gnss_since_boost = phase != Phase::Boost;
@@ -318,10 +334,20 @@ impl Watcher {
         }
         let commands = computer.commands();
         let told_rad = surfaces_rad(commands.gimbal_rad, commands.fins_rad);
+        let before_rad = self.surfaces.each_ref().map(|servo| servo.at_rad);
         for (servo, command_rad) in self.surfaces.iter_mut().zip(told_rad) {
             servo.advance();
             servo.take(command_rad);
         }
+        let fast_rad = FAST * computer.pilot().mission().airframe.gimbal.servo.rate_rad_s() * FRAME_S;
+        for axis in (0..GIMBALS).filter(|_| phase == Phase::Powered && !self.down) {
+            let has_to_rad = (self.surfaces[axis].at_rad - before_rad[axis]).abs();
+            let did_rad = (flown.gimbal_rad[axis] - self.gimbal_rad[axis]).abs();
+            let (frames, had_to_rad, turned_rad) = &mut self.turns[axis];
+            *frames += u32::from(has_to_rad > fast_rad);
+            (*had_to_rad, *turned_rad) = (had_to_rad.max(has_to_rad), turned_rad.max(did_rad));
+        }
+        self.gimbal_rad = flown.gimbal_rad;
         for (output, since_s) in
             [(PyroOutput::Parachute, &mut self.ejected_s), (PyroOutput::Separation, &mut self.parted_s)]
         {
@@ -411,6 +437,16 @@ fn seen_in_flight(
             let away_rad = (at_rad - watcher.surfaces[surface].at_rad).abs();
             (away_rad > AWAY_RAD[usize::from(surface >= GIMBALS)])
                 .then(|| now(away_rad.to_degrees(), at_rad.to_degrees()))
+        }
+        Sign::SlowGimbal => {
+            let is_slow = |&(frames, had_to_rad, turned_rad): &(u32, f64, f64)| {
+                frames >= FAST_FRAMES && turned_rad < SLOW * had_to_rad
+            };
+            let slow_rad =
+                watcher.turns.iter().filter(|turns| is_slow(turns)).map(|(_, _, turned_rad)| *turned_rad);
+            let rate_rad_s = slow_rad.reduce(f64::min)? / FRAME_S;
+            let servo = &mission.airframe.gimbal.servo;
+            Some(now(rate_rad_s.to_degrees(), servo.rate_deg_s))
         }
         Sign::Battery => {
             let volts = flown.battery_v.filter(|volts| *volts < BATTERY_LOW_V)?;
