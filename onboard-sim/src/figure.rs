@@ -1,6 +1,5 @@
 //! Figures as SVG, drawn with `plotters`: the best kept plotting crate that writes SVG without fonts, images or a browser
-//! (three small crates, 6 s of a build); ticks, axes and escaping are its own. The pictures of a flight's report are the
-//! same panels, with other colours.
+//! (three small crates, 6 s of a build); ticks, axes and escaping are its own.
 
 use plotters::backend::SVGBackend;
 use plotters::chart::{ChartBuilder, ChartContext};
@@ -8,9 +7,9 @@ use plotters::coord::Shift;
 use plotters::coord::cartesian::Cartesian2d;
 use plotters::coord::types::RangedCoordf64;
 use plotters::drawing::{DrawingArea, IntoDrawingArea as _};
-use plotters::element::{Circle, Cross, EmptyElement, PathElement, Rectangle, Text};
+use plotters::element::{Cross, EmptyElement, PathElement, Text};
 use plotters::series::{DashedLineSeries, LineSeries};
-use plotters::style::{BLACK, Color as _, IntoFont as _, RGBColor, ShapeStyle, TRANSPARENT, WHITE};
+use plotters::style::{BLACK, Color as _, RGBColor, ShapeStyle, TRANSPARENT, WHITE};
 
 /// A figure cannot be drawn: its axes are not finite, or too small for their labels.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -32,10 +31,6 @@ const COLOURS: [RGBColor; 6] = [
 /// The place of black among them.
 pub const BLACK_CURVE: usize = 4;
 const FAINT: RGBColor = RGBColor(130, 130, 130);
-/// Grounds of spans under thrust, and of spans that fall.
-const SHADES: [RGBColor; 2] = [RGBColor(253, 235, 208), RGBColor(232, 236, 245)];
-/// Of a limit.
-const RED: RGBColor = RGBColor(179, 38, 30);
 
 /// Font and size, px, of titles and of everything else.
 const TITLE_FONT: (&str, i32) = ("sans-serif", 18);
@@ -190,16 +185,6 @@ impl Line {
     }
 }
 
-/// A span of `x` with its name, behind the curves.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Span {
-    pub from: f64,
-    pub to: f64,
-    pub name: String,
-    /// Its ground: 0 warm, 1 cool; `None` has none.
-    pub shade: Option<usize>,
-}
-
 /// One pair of axes.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Panel {
@@ -212,22 +197,8 @@ pub struct Panel {
     pub kinds: Vec<(String, Vec<(f64, f64)>)>,
     /// Crosses, each with the colour of a curve.
     pub crosses: Vec<(f64, f64, usize)>,
-    /// Values of `y`.
-    pub limits: Vec<f64>,
-    /// Values of `x`, with their names.
-    pub marks: Vec<(f64, String)>,
-    /// Values of `x` where something went wrong, with their numbers.
-    pub signs: Vec<(f64, String)>,
-    pub spans: Vec<Span>,
-    /// Points with their names.
-    pub places: Vec<(f64, f64, String)>,
     /// Both axes have one scale.
     pub equal_scales: bool,
-}
-
-/// The plotted area of a lone panel of a size, px: left, top, right, bottom.
-pub fn plotted_px((width_px, height_px): (u32, u32)) -> [u32; 4] {
-    [12 + 62, TITLE_PX + 12, width_px.saturating_sub(12), TITLE_PX + height_px.saturating_sub(12 + 42)]
 }
 
 /// Panels of a size, px, in rows of `columns`, below a title. `cross_name` says what the crosses are.
@@ -267,14 +238,14 @@ pub fn sized_lines_svg(
 }
 
 /// The ends of a panel's axes; `None` without a finite point.
-pub fn ends(panel: &Panel, (width_px, height_px): (u32, u32)) -> Option<[(f64, f64); 2]> {
+fn ends(panel: &Panel, (width_px, height_px): (u32, u32)) -> Option<[(f64, f64); 2]> {
     let points = || {
         let of_lines = panel.lines.iter().flat_map(|line| line.points.iter().copied());
         let of_kinds = panel.kinds.iter().flat_map(|(_, places)| places.iter().copied());
         of_lines.chain(of_kinds).chain(panel.crosses.iter().map(|(x, y, _)| (*x, *y)))
     };
     let x = extent(points().map(|point| point.0))?;
-    let mut ends = [x, extent(points().map(|point| point.1).chain(panel.limits.iter().copied()))?];
+    let mut ends = [x, extent(points().map(|point| point.1))?];
     if panel.equal_scales {
         equalise(&mut ends, [width_px.saturating_sub(ROOM_PX.0), height_px.saturating_sub(ROOM_PX.1)]);
     }
@@ -284,32 +255,6 @@ pub fn ends(panel: &Panel, (width_px, height_px): (u32, u32)) -> Option<[(f64, f
 fn draw_panel(area: &Area<'_>, panel: &Panel) -> Drawn {
     let [x, y] = ends(panel, area.dim_in_pixel()).ok_or("no finite point")?;
     let mut chart = axes(area, [x, y], [&panel.x_label, &panel.y_label])?;
-    let width_px = f64::from(area.dim_in_pixel().0.saturating_sub(ROOM_PX.0));
-    for span in &panel.spans {
-        let (from, to) = (span.from.clamp(x.0, x.1), span.to.clamp(x.0, x.1));
-        if let Some(shade) = span.shade {
-            let ground = SHADES[shade % SHADES.len()].mix(0.6).filled();
-            chart.draw_series([Rectangle::new([(from, y.0), (to, y.1)], ground)])?;
-        }
-        let letters = (to - from) / (x.1 - x.0) * width_px / f64::from(LETTER_PX + 1);
-        if letters > span.name.chars().count() as f64 {
-            let name = Text::new(span.name.clone(), (4, -16), FONT);
-            chart.draw_series([EmptyElement::at((from, y.0)) + name])?;
-        }
-    }
-    let across = panel.limits.iter().map(|limit| PathElement::new([(x.0, *limit), (x.1, *limit)], RED));
-    chart.draw_series(across)?;
-    for (named, colour, label, drop_px) in [(&panel.marks, FAINT, BLACK, 2), (&panel.signs, RED, RED, 16)] {
-        for (at, name) in named.iter().filter(|(at, _)| (x.0..=x.1).contains(at)) {
-            chart.draw_series([PathElement::new([(*at, y.0), (*at, y.1)], colour)])?;
-            let name = Text::new(name.clone(), (3, drop_px), FONT.into_font().color(&label));
-            chart.draw_series([EmptyElement::at((*at, y.1)) + name])?;
-        }
-    }
-    chart.draw_series(panel.places.iter().map(|(x, y, name)| {
-        let named = EmptyElement::at((*x, *y)) + Circle::new((0, 0), 3, BLACK.filled());
-        named + Text::new(name.clone(), (6, -14), FONT)
-    }))?;
     for (kind, (_, places)) in panel.kinds.iter().enumerate() {
         let finite = places.iter().filter(|(x, y)| x.is_finite() && y.is_finite());
         chart.draw_series(finite.map(|place| EmptyElement::at(*place) + mark(kind)))?;
@@ -414,19 +359,6 @@ mod tests {
         let mut ends = [(0.0, 10.0), (0.0, 110.0)];
         equalise(&mut ends, [200, 100]);
         assert_eq!(ends, [(-105.0, 115.0), (0.0, 110.0)]);
-    }
-
-    #[test]
-    fn limits_marks_and_places_are_drawn_with_their_names() {
-        let panel = Panel {
-            limits: vec![7.5],
-            marks: vec![(0.5, "ignition".to_owned()), (9.0, "outside".to_owned())],
-            places: vec![(0.2, 0.3, "apogee".to_owned())],
-            ..panel(vec![(0.0, 0.0), (1.0, 2.0)])
-        };
-        let svg = sized_lines_svg("T", &[panel], 1, None, SIZE_PX).unwrap();
-        assert!(svg.contains("ignition") && svg.contains("apogee") && !svg.contains("outside"), "{svg}");
-        assert_eq!(svg.matches("#B3261E").count(), 1);
     }
 
     #[test]

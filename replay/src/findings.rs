@@ -19,9 +19,9 @@ pub struct Finding {
     pub lasted_s: f64,
     /// A short sentence.
     pub words: String,
-    /// Where a report shows more of it.
+    /// The picture of a report that shows it, by its place on the page, or another place.
     #[serde(skip)]
-    pub(crate) section: &'static str,
+    pub(crate) picture: &'static str,
 }
 
 impl Finding {
@@ -90,30 +90,33 @@ pub(crate) fn facts(recording: &Recording, verdict: Option<&Verdict>, findings: 
             clock: Clock::Flight,
             lasted_s: finding.held_s,
             words: finding.words(),
-            section: section(finding.sign),
+            picture: picture(finding.sign),
         })
         .collect();
     if let Some(words) = verdict.and_then(|verdict| broken(verdict, findings)) {
         let since_s = recording.contact_s().unwrap_or(f64::NAN);
-        facts.push(Finding { since_s, clock: Clock::Flight, lasted_s: 0.0, words, section: "findings" });
+        facts.push(Finding { since_s, clock: Clock::Flight, lasted_s: 0.0, words, picture: "limits" });
     }
     facts
 }
 
-fn section(sign: Sign) -> &'static str {
+/// The pictures of the fins.
+pub(crate) const FINS: [&str; 4] = ["fin-1", "fin-2", "fin-3", "fin-4"];
+
+fn picture(sign: Sign) -> &'static str {
     match sign {
-        Sign::Gnss
-        | Sign::Barometer
-        | Sign::Lidar
-        | Sign::Accelerometer
-        | Sign::HeightsDisagree
-        | Sign::Estimate => "sensors",
+        Sign::Gnss | Sign::Barometer | Sign::Lidar | Sign::Accelerometer | Sign::HeightsDisagree => {
+            "test-ratio"
+        }
+        Sign::Estimate => "standard-deviations",
         Sign::Battery => "battery",
-        Sign::Surface(0 | 1) | Sign::SlowGimbal | Sign::Tumbles => "burn",
+        Sign::Surface(0) | Sign::SlowGimbal => "gimbal-pitch",
+        Sign::Surface(1) => "gimbal-yaw",
+        Sign::Surface(fin) => FINS[usize::from(fin - 2) % FINS.len()],
+        Sign::Tumbles => "tilt",
         Sign::LateLight | Sign::Impulse | Sign::BurntOutEarly => "thrust",
-        Sign::Surface(_) => "descent",
-        Sign::NoPlan => "solver",
-        Sign::AscentMotor | Sign::Separation | Sign::Parachute => "whole",
+        Sign::NoPlan => "newton-iterations",
+        Sign::AscentMotor | Sign::Separation | Sign::Parachute => "height-over-the-whole-flight",
         Sign::Restart | Sign::Gate | Sign::Latched => "events",
     }
 }

@@ -114,7 +114,7 @@ enum Command {
         after_help = "Examples:\n  replay compare old.mcap new.mcap\n  replay compare mk3 day/mission.toml"
     )]
     Compare(compare::Args),
-    /// Writes a flight as one HTML page with its pictures inside: no script, no network.
+    /// Writes a flight as one HTML page with its pictures inside: no network, whole without its script.
     #[command(after_help = "Example: replay report flight.mcap")]
     Report(report::Args),
     /// Writes a log's content as CSV or a Rerun recording; makes a log of a .tlog.

@@ -196,7 +196,6 @@ impl Study<'_> {
                 ],
                 crosses: vec![(0.0, 0.0, BLACK_CURVE)],
                 equal_scales: true,
-                ..Panel::default()
             }
         };
         let panels: Vec<Panel> = self.arguments.winds.iter().zip(self.impacts).map(panel).collect();

@@ -2,12 +2,13 @@
 
 use std::fmt;
 use std::fmt::Write as _;
+use std::path::Path;
 
 pub(super) use onboard_sim::card::escaped;
 
-use super::section::Section;
+use super::section::{Section, motion};
 use super::track::Flight;
-use crate::info::Info;
+use crate::info::{Info, utc};
 
 /// Appends to a text in memory, which cannot fail.
 pub(super) fn put(text: &mut String, more: fmt::Arguments<'_>) {
@@ -40,34 +41,25 @@ pub(super) fn paragraph(text: &str) -> String {
 }
 
 /// Pictures side by side, as many as fit.
-pub(super) fn charts(pictures: &[String]) -> String {
-    let drawn = pictures.concat();
-    if drawn.is_empty() { drawn } else { format!("<div class=\"charts\">\n{drawn}</div>\n") }
+pub(super) fn charts(drawn: &str) -> String {
+    if drawn.is_empty() { String::new() } else { format!("<div class=\"charts\">\n{drawn}</div>\n") }
 }
 
 const STYLE: &str = include_str!("style.css");
 
-/// A pointer's time and values in every picture over time, and one part of the time in all of them. Without it the page is whole.
-const SCRIPT: &str = include_str!("zoom.js");
+/// One time in every picture, the vehicle at that time, and a part of the time. Without it the page is whole.
+const SCRIPT: &str = include_str!("script.js");
 
 /// The whole page.
 pub(super) fn page(flight: &Flight, info: &Info, sections: &[Section]) -> String {
     let title = format!("Flight report: {}", flight.recording.name);
-    let mut body = format!("<h1>{}</h1>\n", escaped(&title));
-    let span = info.span.map(|span| format!("{:.1} s of log", span.duration_s)).unwrap_or_default();
-    let said = info.run.iter().filter(|(_, value)| !value.is_empty());
-    let run: Vec<String> = said.map(|(key, value)| format!("{key} {value}")).collect();
-    put(
-        &mut body,
-        format_args!(
-            "<p class=\"muted\">{}</p>\n",
-            escaped(&[span, run.join(", "), format!("written by {}", info.library)].join("; "))
-        ),
-    );
+    let mut body = format!("<header><p>{}</p>\n", escaped(&about(flight, info).join(" \u{b7} ")));
     let named = sections.iter().filter(|section| !section.title.is_empty());
-    let links: Vec<String> =
-        named.map(|section| format!("<a href=\"#{}\">{}</a>", section.id, escaped(section.title))).collect();
-    put(&mut body, format_args!("<nav>{}</nav>\n", links.join(" \u{b7} ")));
+    let links = named.map(|section| {
+        let word = section.title.split(' ').next().unwrap_or_default();
+        format!("<a href=\"#{}\">{word}</a> ", section.id)
+    });
+    put(&mut body, format_args!("<nav>{}</nav></header>\n", links.collect::<String>()));
     for section in sections {
         if !section.title.is_empty() {
             put(&mut body, format_args!("<h2 id=\"{}\">{}</h2>\n", section.id, escaped(section.title)));
@@ -77,9 +69,40 @@ pub(super) fn page(flight: &Flight, info: &Info, sections: &[Section]) -> String
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n<title>{}</title>\n\
-         <style>{STYLE}</style>\n</head>\n<body>\n<main>\n{body}</main>\n<script>//<![CDATA[\n{SCRIPT}//]]></script>\n</body>\n</html>\n",
-        escaped(&title)
+         <style>{STYLE}</style>\n</head>\n<body>\n<main>\n{body}</main>\n\
+         <script id=\"flight\" type=\"application/json\">{}</script>\n<script>//<![CDATA[\n{SCRIPT}//]]></script>\n</body>\n</html>\n",
+        escaped(&title),
+        motion::json(flight)
     )
+}
+
+/// Logs of simulated flights may count from the Unix epoch; no real flight was before 2001, ns.
+const NO_DATE_NS: u64 = 1_000_000_000_000_000_000;
+
+/// What flew, when, where, and what wrote it.
+fn about(flight: &Flight, info: &Info) -> Vec<String> {
+    let name = info.profile.as_ref().and_then(|profile| profile.name.clone());
+    let begun = info.span.filter(|span| span.first_ns > NO_DATE_NS).map(|span| {
+        let utc = utc(span.first_ns);
+        let (date, time) = utc.split_once('T').unwrap_or((&utc, ""));
+        format!("{date} {} UTC", time.get(..5).unwrap_or_default())
+    });
+    let place = flight.pilot.as_ref().map(|pilot| {
+        let (start, site) = (pilot.mission().start.at.name(), pilot.mission().site);
+        let side =
+            |deg: f64, sides: [&str; 2]| format!("{:.4}\u{b0} {}", deg.abs(), sides[usize::from(deg < 0.0)]);
+        format!(
+            "from {start}, {} {}",
+            side(site.latitude_deg, ["N", "S"]),
+            side(site.longitude_deg, ["E", "W"])
+        )
+    });
+    let run = info.run.iter().filter(|(key, value)| *key != "profile" && !value.is_empty());
+    let run: Vec<String> = run.map(|(key, value)| format!("{key} {value}")).collect();
+    let known = [name, Some(begun.unwrap_or_else(|| "no date recorded".to_owned())), place];
+    let file = Path::new(&info.file).file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let written = [run.join(", "), file, info.library.clone()];
+    known.into_iter().flatten().chain(written).filter(|words| !words.is_empty()).collect()
 }
 
 #[cfg(test)]

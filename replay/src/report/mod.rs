@@ -1,7 +1,8 @@
-//! Writes a flight as one HTML page with its pictures inside, without scripts and without network access.
+//! Writes a flight as one HTML page with its pictures inside, without network access, whole without its script.
 //!
-//! The verdict comes first, each value against its limit; then what led to it: path, states, input, thrust, plans, actuators,
-//! estimator, moments, events, link, and how complete the log is. If the log lacks something, the section says so.
+//! The first screen tells the flight: verdict, findings, limits, moments, height and place. Then come burn, fall, sensors and
+//! estimator, solver, battery, link, mission, events, and how complete the log is. What the log lacks is named at the end. The
+//! script has one time for all pictures, and the vehicle at that time.
 
 mod chart;
 mod html;
@@ -49,6 +50,8 @@ pub fn report(path: &Path, with: Option<&Path>) -> Result<Report, RecordingError
 fn told(path: &Path) -> Result<(Flight, Info), RecordingError> {
     let recording = Recording::open(path)?;
     let mut info = described(path)?;
+    // The date says it.
+    info.run.remove("start_unix_ns");
     Ok((Flight::of(recording, &mut info), info))
 }
 

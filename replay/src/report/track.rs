@@ -9,7 +9,7 @@ use flight::estimation::estimator::Estimate;
 use flight::guidance::powered::Plan;
 use flight::rules::phase::Phase;
 use flight::vehicle::rigid::RigidState;
-use onboard_sim::figure::Span;
+use nalgebra::UnitQuaternion;
 use protocol::log::computer_v1::ComputerFrame;
 use protocol::log::flight_v1::{self as v1, TruthSample};
 use protocol::log::v1::Telemetry;
@@ -31,6 +31,15 @@ pub(super) type State = [f64; 7];
 /// Values over time, s on the report's axis.
 pub(super) type Series = Vec<(f64, f64)>;
 
+/// A stretch of the time axis with its name, and the class of its ground in the page's style.
+#[derive(Debug, Clone)]
+pub(super) struct Span {
+    pub(super) from: f64,
+    pub(super) to: f64,
+    pub(super) name: String,
+    pub(super) shade: &'static str,
+}
+
 /// The state of the flight at one time.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sample {
@@ -38,6 +47,8 @@ pub(super) struct Sample {
     pub(super) time_s: f64,
     pub(super) phase: Option<Phase>,
     pub(super) state: State,
+    /// From body to world; telemetry has none.
+    pub(super) attitude: Option<UnitQuaternion<f64>>,
 }
 
 /// What the flight computer, run again, makes of a planning frame.
@@ -82,8 +93,10 @@ pub(super) struct Flight {
     pub(super) touchdown_s: Option<f64>,
     /// T+0 on the clock of the track, s; `None` if the log does not connect the two.
     zero_s: Option<f64>,
-    /// Where the findings begin, T+, s, with their numbers.
-    pub(super) signs: Vec<(f64, String)>,
+    /// Where the findings begin, T+, s.
+    pub(super) signs: Vec<f64>,
+    /// What pictures show them.
+    pub(super) shown: Vec<&'static str>,
     pub(super) spans: Vec<Span>,
 }
 
@@ -114,14 +127,14 @@ impl Flight {
         let clocks = &recording.clocks;
         let heard_zero_s = || Some(clocks.flight_zero_s? - clocks.telemetry_zero_s?);
         let zero_s = if source == Some(HEARD) { heard_zero_s() } else { Some(0.0) };
-        let signs = info.findings.iter().flatten().map(|finding| finding.since_s);
-        let signs = signs.filter(|since_s| since_s.is_finite()).zip(1..);
+        let found = || info.findings.iter().flatten();
         Self {
             ignition_s: ignited.or_else(|| track.iter().find(burning).map(|sample| sample.time_s)),
             touchdown_s: recording.contact_s(),
             worst_plans: worst(broken),
             zero_s,
-            signs: signs.map(|(since_s, number)| (since_s, number.to_string())).collect(),
+            signs: found().map(|finding| finding.since_s).collect(),
+            shown: found().map(|finding| finding.picture).collect(),
             spans: spans(info, zero_s.unwrap_or(0.0)),
             recording,
             pilot,
@@ -200,11 +213,18 @@ impl Flight {
         world.get(world.partition_point(|sample| sample.time_s < time_s - SAME_MOMENT_S))
     }
 
-    /// The state at a time; `None` without a sample then.
-    pub(super) fn state_at(&self, time_s: f64) -> Option<State> {
-        let place = self.track.partition_point(|sample| sample.time_s < time_s - SAME_MOMENT_S);
-        let sample = self.track.get(place).filter(|sample| sample.time_s < time_s + SAME_MOMENT_S);
-        sample.map(|sample| sample.state)
+    /// The state in which it came down.
+    pub(super) fn contact(&self) -> Option<State> {
+        let contact_s = self.touchdown_s?;
+        self.track.iter().rfind(|sample| sample.time_s <= contact_s).map(|sample| sample.state)
+    }
+
+    /// A value of the states of the first plan.
+    pub(super) fn planned_first(&self, value: impl Fn(&State) -> f64) -> Series {
+        let made = self.made();
+        let Some((_, plan)) = made.first() else { return Series::new() };
+        let at_s = |node: usize| self.axis_s(plan.begins_s() + plan.step_s() * node as f64);
+        plan.states().iter().enumerate().map(|(node, state)| (at_s(node), value(&planned(state)))).collect()
     }
 
     /// The plans, with the frames that made them.
@@ -240,9 +260,9 @@ fn spans(info: &Info, zero_s: f64) -> Vec<Span> {
         to: spans.get(place + 1).map_or(span.until_s, |next| next.from_s) - zero_s,
         name: span.phase.clone(),
         shade: match Phase::ALL.into_iter().find(|phase| phase.name() == span.phase) {
-            Some(Phase::Boost | Phase::Ignition | Phase::Powered) => Some(0),
-            Some(Phase::Deploy | Phase::AeroDescent | Phase::Chute) => Some(1),
-            _ => None,
+            Some(Phase::Boost | Phase::Ignition | Phase::Powered) => "hot",
+            Some(Phase::Deploy | Phase::AeroDescent | Phase::Chute) => "cool",
+            _ => "",
         },
     };
     spans.iter().enumerate().map(span).collect()
@@ -257,14 +277,18 @@ fn track(recording: &Recording, thoughts: &[Thought]) -> (Option<&'static str>, 
     let truth = recording.world.iter().map(|sample| {
         let behind = frames.partition_point(|frame| frame.input.time_s <= sample.time_s + SAME_MOMENT_S);
         let frame = behind.checked_sub(1).and_then(|place| frames.get(place));
+        let state = state_from_log(&sample.state);
         Sample {
             time_s: sample.time_s,
             phase: frame.and_then(|frame| phase_of(&frame.output)),
-            state: state_of(&state_from_log(&sample.state), sample.height_m),
+            state: state_of(&state, sample.height_m),
+            attitude: Some(state.world_from_body),
         }
     });
     let estimated = thoughts.iter().filter_map(|thought| {
-        Some(Sample { time_s: thought.time_s, phase: thought.phase, state: thought.state? })
+        let &Thought { time_s, phase, .. } = thought;
+        let attitude = thought.estimate.map(|estimate| estimate.state.world_from_body);
+        Some(Sample { time_s, phase, state: thought.state?, attitude })
     });
     let heard = recording.telemetry.iter().map(|told| {
         let level_m_s = told.north_m_s.zip(told.east_m_s).map(|(north, east)| libm::hypot(north, east));
@@ -278,7 +302,8 @@ fn track(recording: &Recording, thoughts: &[Thought]) -> (Option<&'static str>, 
             told.turn_rate_rad_s,
         ];
         let phase = told.phase.and_then(|phase| Phase::from_index(u8::try_from(phase).ok()?));
-        Sample { time_s: told.time_s, phase, state: state.map(|value| value.unwrap_or(f64::NAN)) }
+        let state = state.map(|value| value.unwrap_or(f64::NAN));
+        Sample { time_s: told.time_s, phase, state, attitude: None }
     });
     let sources: [(&str, Vec<Sample>); 3] = [
         ("From the simulated truth.", truth.collect()),
@@ -306,15 +331,6 @@ pub(super) fn planned(node: &ocp::landing::State) -> State {
     let tilt_rad = libm::atan2(libm::hypot(sin_p, cos_p * sin_r), cos_p * cos_r);
     let level_m_s = libm::hypot(*north_m_s, *west_m_s);
     [*north, -west, *height_m, level_m_s, *up_m_s, tilt_rad, libm::hypot(*p_rate, cos_p * r_rate)]
-}
-
-/// The planned state at a time, between nodes; `None` outside.
-pub(super) fn planned_at(plan: &Plan, time_s: f64) -> Option<State> {
-    let steps = (time_s - plan.begins_s()) / plan.step_s();
-    let before = (steps >= 0.0).then_some(steps as usize)?;
-    let (share, states) = (steps.fract(), plan.states());
-    let (before, after) = (planned(states.get(before)?), planned(states.get(before + 1)?));
-    Some(core::array::from_fn(|i| before[i] + share * (after[i] - before[i])))
 }
 
 #[cfg(test)]

@@ -2,84 +2,96 @@
 
 use flight::guidance::powered::{ControlLevel, Plan};
 use flight::vehicle::mission::Mission;
+use nalgebra::Vector3;
 
-use super::pictures::gimbal_deg;
-use super::{COMPONENTS, DEGREES, rms_and_max};
-use crate::report::chart::{Chart, line};
-use crate::report::html::{charts, paragraph, table};
-use crate::report::track::{Flight, Part, Sample, Series, State, Thought, planned, planned_at};
-
-/// Prediction times at which predictions are compared with the flight, s.
-pub(super) const AHEAD_S: [f64; 2] = [0.1, 0.5];
+use super::HEIGHT;
+use super::pictures::PLANNED;
+use crate::report::chart::{Axes, Chart, line};
+use crate::report::html::{charts, paragraph};
+use crate::report::track::{Flight, Part, Sample, Series, State, Thought, planned};
 
 /// A plan that ends this far below the ground ends on it, m.
 const GROUND_M: f64 = 0.05;
 
 const PLANS_DRAWN: usize = 8;
 
-/// A view of a path: title, axes, and what it shows of a state.
-pub(super) type View = (&'static str, [&'static str; 2], fn(&State) -> (f64, f64));
+/// Where the nose points is drawn this often, s, as a line of this length, m.
+const NOSE_EACH_S: f64 = 0.4;
+const NOSE_M: f64 = 4.0;
 
-const VIEWS: [View; 2] = [
-    (
-        "The landing: height over the distance from the pad",
-        ["distance from the pad, m", "height of the feet, m"],
-        |state| (libm::hypot(state[0], state[1]), state[2]),
-    ),
-    ("The landing from above", ["east, m", "north, m"], |state| (state[1], state[0])),
+/// The views of a path: which components are to the right and up, and the name of the first.
+const VIEWS: [(&str, [usize; 2], &str); 3] = [
+    ("Landing from the south, m", [1, HEIGHT], "east, m"),
+    ("Landing from the east, m", [0, HEIGHT], "north, m"),
+    ("Landing from above, m", [1, 0], "east, m"),
 ];
 
-/// The flights' paths to their landings, each with its name and class, in both views; of a single flight with its plans.
+/// The flights' paths to their landings, each with its name and class, from three sides; of a single flight with its plans and
+/// its attitude.
 pub(super) fn paths(flights: &[(&'static str, &'static str, &Flight)]) -> String {
-    let picture = |(title, labels, see): View| {
-        let shown = |flight: &Flight| -> Series {
-            let part = |sample: &&Sample| {
-                [Part::Burn, Part::Air].iter().all(|part| flight.has(*part, sample.time_s))
-            };
-            flight.track.iter().filter(part).map(|sample| see(&sample.state)).collect()
+    let picture = |(title, [right, up], x_name): (&str, [usize; 2], &'static str)| {
+        let see = |state: &State| (state[right], state[up]);
+        let part = |flight: &Flight, sample: &&Sample| {
+            [Part::Burn, Part::Air].iter().all(|part| flight.has(*part, sample.time_s))
         };
-        let plans = flights.iter().filter(|_| flights.len() == 1).map(|(.., flight)| {
+        let mut lines = Vec::new();
+        for (.., flight) in flights.iter().filter(|_| flights.len() == 1) {
             let made = flight.made();
-            let drawn = made.iter().step_by(made.len().div_ceil(PLANS_DRAWN).max(1));
+            let drawn = made.iter().skip(1).step_by(made.len().div_ceil(PLANS_DRAWN).max(1));
             let path = |(_, plan): &(&Thought, &Plan)| -> Series {
                 // A plan that does not land ends below the ground.
-                let above = plan.states().iter().map(planned).take_while(|state| state[2] >= -GROUND_M);
+                let above = plan.states().iter().map(planned).take_while(|state| state[HEIGHT] >= -GROUND_M);
                 above.map(|state| see(&state)).chain([(f64::NAN, f64::NAN)]).collect()
             };
-            line("planned", "thin", drawn.flat_map(path).collect())
-        });
-        let flown = flights.iter().map(|(name, class, flight)| line(name, class, shown(flight)));
-        let mut chart = Chart::new(title, labels, plans.chain(flown).collect());
-        (chart.panel.equal_scales, chart.full) = (true, true);
-        chart.svg()
+            lines.push(line("later plans", "thin", drawn.flat_map(path).collect()));
+            lines.push(line(PLANNED, "b", made.first().map(path).unwrap_or_default()));
+            let mut next_s = flight.ignition_s.unwrap_or(f64::INFINITY);
+            let mut noses = Series::new();
+            for sample in flight.track.iter().filter(|sample| part(flight, sample)) {
+                if let Some(attitude) = sample.attitude.filter(|_| sample.time_s >= next_s) {
+                    next_s += NOSE_EACH_S;
+                    // East is against y.
+                    let nose = attitude.to_rotation_matrix() * Vector3::x();
+                    let along = [nose.x, -nose.y, nose.z];
+                    let (x, y) = see(&sample.state);
+                    let end = (x + NOSE_M * along[right], y + NOSE_M * along[up]);
+                    noses.extend([(x, y), end, (f64::NAN, f64::NAN)]);
+                }
+            }
+            lines.push(line("nose", "nose", noses));
+        }
+        lines.extend(flights.iter().map(|(name, class, flight)| {
+            let flown = flight.track.iter().filter(|sample| part(flight, sample));
+            line(name, class, flown.map(|sample| see(&sample.state)).collect())
+        }));
+        let (axes, title) = (Axes::Ground([right, up]), title.to_owned());
+        Chart { title, axes, x_name, size_px: Some((348.0, 300.0)), lines, ..Chart::default() }.svg()
     };
-    charts(&VIEWS.map(picture))
+    charts(&VIEWS.map(picture).concat())
 }
 
-pub(super) fn path(flight: &Flight) -> String {
+/// Where the track comes from, what the motor did, and the path.
+pub(super) fn words(flight: &Flight) -> String {
     let Some(source) = flight.source else {
         return paragraph("The log has no positions of the vehicle.");
     };
-    // Without a landing, the pictures of the whole flight show all there is of its path.
-    let lands = flight.pilot.is_none() || !flight.made().is_empty();
-    paragraph(source) + &if lands { paths(&[("flown", "a", flight)]) } else { String::new() }
+    paragraph(&format!("{source} {}", thrust(flight))) + &paths(&[("flown", "a", flight)])
 }
 
 /// A motor that is further off than this was another one than the mission expected: one of twenty of its own lot is.
 const ANOTHER_SIGMAS: f64 = 2.0;
 
-pub(super) fn thrust(flight: &Flight) -> String {
+fn thrust(flight: &Flight) -> String {
     let (Some(pilot), Some(_)) = (&flight.pilot, flight.ignition_s) else {
-        return paragraph("The log has no ignition, or no profile that says how strong the motor should be.");
+        return "The log has no ignition, or no profile that says how strong the motor should be.".to_owned();
     };
-    let mut rows = Vec::new();
-    let mut words = None;
+    let mut words = Vec::new();
     if pilot.motor().ignition_s().is_some() {
-        let scales = pilot.scales();
-        for (what, scale) in ["impulse", "burn time"].into_iter().zip(scales) {
-            rows.push([format!("inferred {what} at the end, of expected"), format!("{scale:.4}")]);
-        }
-        words = another_curve(scales, pilot.mission(), pilot.other_curve());
+        let [impulse, burn_time] = pilot.scales();
+        words.push(format!(
+            "Inferred at the end: impulse {impulse:.3} and burn time {burn_time:.3} of expected."
+        ));
+        words.extend(another_curve([impulse, burn_time], pilot.mission(), pilot.other_curve()));
     }
     let world = &flight.recording.world;
     let pairs =
@@ -87,11 +99,9 @@ pub(super) fn thrust(flight: &Flight) -> String {
     let impulse_n_s: f64 = pairs.map(|(twice_n, dt_s)| 0.5 * twice_n * dt_s).sum();
     if impulse_n_s > 0.0 && world.last().is_some_and(|last| last.thrust_n <= 0.0) {
         let scale = impulse_n_s / pilot.mission().motor_curve.total_impulse_n_s();
-        rows.push(["actual impulse, of expected".to_owned(), format!("{scale:.4}")]);
+        words.push(format!("Actual impulse: {scale:.3} of expected."));
     }
-    words.map_or_else(String::new, |words| paragraph(&words))
-        + &table(&["", "#"], rows)
-        + &paragraph("The dashed level is the vehicle's weight.")
+    words.join(" ")
 }
 
 /// That the motor flew another curve than expected, if it did, and what had confirmed that curve.
@@ -129,73 +139,6 @@ pub(super) fn plans(flight: &Flight) -> Option<String> {
     let worst = flight.worst_plans.iter().map(|plan| paragraph(&format!("Worst: {}.", plan.words())));
     let kept = paragraph("By the judge's formulas every plan keeps its conditions.");
     Some(paragraph(&words) + &if flight.worst_plans.is_empty() { kept } else { worst.collect() })
-}
-
-/// What the flight made of each plan: the time that it predicts, so far ahead, s, and the actual less the planned state then.
-pub(super) fn tracking_errors(flight: &Flight, ahead_s: f64) -> Vec<(f64, State)> {
-    let error = |(thought, plan): (&Thought, &Plan)| {
-        let then_s = thought.time_s + ahead_s;
-        // After contact the ground determines the motion.
-        let came = flight.state_at(then_s).filter(|_| flight.has(Part::Air, then_s))?;
-        let planned = planned_at(plan, then_s)?;
-        Some((then_s, core::array::from_fn(|i| came[i] - planned[i])))
-    };
-    flight.made().into_iter().filter_map(error).collect()
-}
-
-pub(super) fn tracking(flight: &Flight) -> Option<String> {
-    let row = |ahead_s: f64| -> Vec<String> {
-        let errors = tracking_errors(flight, ahead_s);
-        let cells = COMPONENTS.iter().enumerate().filter_map(|(component, (_, _, factor))| {
-            let (rms, max) = rms_and_max(errors.iter().map(|(_, error)| factor * error[component]))?;
-            Some(format!("{rms:.4} / {max:.4}"))
-        });
-        [format!("{ahead_s} s"), errors.len().to_string()].into_iter().chain(cells).collect()
-    };
-    flight.made().first()?;
-    let heads = COMPONENTS.map(|(name, unit, _)| format!("#{name}, {unit}"));
-    let heads: Vec<&str> =
-        ["predicted ahead", "#plans"].into_iter().chain(heads.iter().map(String::as_str)).collect();
-    let words = paragraph("Actual state less the planned one, root mean square / largest.");
-    Some(words + &table(&heads, AHEAD_S.map(row)))
-}
-
-/// A value within this fraction of a stop or of the maximum slew rate counts as saturated.
-const AT_LIMIT: f64 = 0.995;
-
-pub(super) fn saturation(flight: &Flight) -> Option<String> {
-    let airframe = &flight.pilot.as_ref()?.mission().airframe;
-    let world = &flight.recording.world;
-    // The track is the world's.
-    let mut flying = world.iter().zip(&flight.track).filter(|(sample, Sample { phase, .. })| {
-        !sample.in_contact && phase.is_some_and(|phase| !phase.on_pad())
-    });
-    let ((from, _), (to, _)) = flying.next().zip(flying.next_back())?;
-    let total_s = to.time_s - from.time_s;
-    let mut rows = Vec::new();
-    let mut put = |what: String, angles: &Series, holds: &dyn Fn(f64, f64, f64) -> bool| {
-        let pairs = angles.windows(2).filter(|pair| from.time_s <= pair[0].0 && pair[1].0 <= to.time_s);
-        let pairs = pairs.map(|pair| (pair[0].1, pair[1].1, pair[1].0 - pair[0].0));
-        // From positive zero, because an empty sum is a negative one.
-        let found_s =
-            pairs.filter(|(a, b, dt_s)| holds(*a, *b, *dt_s)).fold(0.0, |sum, (_, _, dt_s)| sum + dt_s);
-        rows.push([what, format!("{found_s:.2} s"), format!("{:.1} %", 100.0 * found_s / total_s)]);
-    };
-    let slews = |rate: f64| move |a: f64, b: f64, dt_s: f64| (b - a).abs() >= AT_LIMIT * rate * dt_s;
-    for (axis, name) in ["pitch", "yaw"].into_iter().enumerate() {
-        let ([actual, _], gimbal) = (gimbal_deg(flight, axis), &airframe.gimbal);
-        let at_stop = |_: f64, b: f64, _: f64| b.abs() >= AT_LIMIT * gimbal.limit_deg;
-        put(format!("gimbal {name} at its stop of {:.1} deg", gimbal.limit_deg), &actual, &at_stop);
-        put(format!("gimbal {name} at its fastest slew"), &actual, &slews(gimbal.servo.rate_deg_s));
-    }
-    for fin in 0..from.fins_actual_rad.len() {
-        let angles = flight.truth(|sample| Some(DEGREES * sample.fins_actual_rad.get(fin)?));
-        let rate_deg_s = airframe.fins.servo.rate_deg_s;
-        let what = format!("fin {} at its fastest slew of {rate_deg_s:.0} deg/s", fin + 1);
-        put(what, &angles, &slews(rate_deg_s));
-    }
-    let words = paragraph(&format!("Of {total_s:.2} s in the air."));
-    Some(words + &table(&["actuator", "#time", "#share"], rows))
 }
 
 #[cfg(test)]

@@ -1,17 +1,15 @@
-//! The estimate: what its sensors said, and how far it was from the truth; vibration.
+//! What was used of the sensors; vibration.
 
 use avionics::log::frame::phase_of;
-use avionics::log::logged::state_from_log;
 use flight::rules::phase::Phase;
-use nalgebra::Vector3;
 use protocol::log::computer_v1::ComputerFrame;
 
-use super::rms_and_max;
-use crate::report::chart::{Chart, line};
-use crate::report::html::{paragraph, table};
-use crate::report::track::{Flight, Part, Thought};
+use crate::report::chart::{Axes, Chart, line};
+use crate::report::html::table;
+use crate::report::track::Flight;
 
-pub(super) fn aids(flight: &Flight) -> Option<String> {
+/// What was used of each sensor.
+pub(super) fn used(flight: &Flight) -> Option<String> {
     let aids = flight.pilot.as_ref()?.estimator().aids();
     let rows = [
         ("barometer", aids.barometer),
@@ -21,44 +19,6 @@ pub(super) fn aids(flight: &Flight) -> Option<String> {
     ];
     let rows = rows.map(|(name, aid)| [name.to_owned(), aid.used.to_string(), aid.refused.to_string()]);
     Some(table(&["measurement", "#used", "#refused"], rows))
-}
-
-/// The rows of the errors.
-const ERRORS: [&str; 9] = [
-    "position north, m",
-    "position east, m",
-    "position up, m",
-    "position, distance, m",
-    "velocity north, m/s",
-    "velocity east, m/s",
-    "velocity up, m/s",
-    "velocity, size, m/s",
-    "direction of the nose, deg",
-];
-
-pub(super) fn errors(flight: &Flight) -> Option<String> {
-    let errors: Vec<[f64; 9]> = flight.thoughts.iter().filter_map(|thought| error(flight, thought)).collect();
-    errors.first()?;
-    let row = |(place, name): (usize, &&str)| {
-        let (rms, max) = rms_and_max(errors.iter().map(|error| error[place]))?;
-        Some([(*name).to_owned(), format!("{rms:.4}"), format!("{max:.4}")])
-    };
-    let rows = ERRORS.iter().enumerate().filter_map(row);
-    let words = paragraph(&format!("At {} planning frames from the release to contact.", errors.len()));
-    Some(table(&["estimate less truth", "#root mean square", "#largest"], rows) + &words)
-}
-
-/// Estimate less truth, as in [`ERRORS`]; `None` without a record of the world then.
-fn error(flight: &Flight, thought: &Thought) -> Option<[f64; 9]> {
-    let estimate = thought.estimate.filter(|_| flight.has(Part::Air, thought.time_s))?.state;
-    let truth = state_from_log(&flight.world_at(thought.time_s)?.state);
-    // East is against y.
-    let ground = |vector: Vector3<f64>| [vector.x, -vector.y, vector.z, libm::sqrt(vector.norm_squared())];
-    let [north, east, up, distance] = ground(estimate.position_m - truth.position_m);
-    let [north_m_s, east_m_s, up_m_s, size] = ground(estimate.velocity_m_s - truth.velocity_m_s);
-    let cosine = estimate.nose_in_world().dot(&truth.nose_in_world());
-    let nose_deg = libm::acos(cosine.clamp(-1.0, 1.0)).to_degrees();
-    Some([north, east, up, distance, north_m_s, east_m_s, up_m_s, size, nose_deg])
 }
 
 /// Samples of one spectrum, 1.28 s at 200 Hz.
@@ -73,7 +33,13 @@ pub(super) fn vibration(flight: &Flight) -> Chart {
         line(name, class, spectrum(&frames.map(felt).collect::<Vec<f64>>()))
     };
     let lines = vec![felt("descent", "a", Phase::in_descent), felt("burn", "b", Phase::in_landing_burn)];
-    Chart::new("Specific force along the nose, m/s^2 per sqrt(Hz)", ["Hz", ""], lines)
+    Chart {
+        title: "Specific force along the nose, m/s\u{b2} per \u{221a}Hz".to_owned(),
+        axes: Axes::Own,
+        x_name: "Hz",
+        lines,
+        ..Chart::default()
+    }
 }
 
 /// Amplitude spectral density by Welch's method: half overlapping segments under a Hann window, without their means. Hz, and

@@ -1,43 +1,33 @@
-//! The first screen: how the flight ended, what went wrong, the whole flight, its place and its limits.
+//! The first screen: how the flight ended, what went wrong, the whole flight, its limits and its place.
 
 use flight::rules::verdict::Landing;
-use onboard_sim::figure::Panel;
 use protocol::log::v1::LimitResult;
 
 use crate::findings::{Finding, over};
 use crate::info::{Info, rounded};
 use crate::log::{Verdict, worst_first};
 use crate::refly::{FaultChanges, ReflyOptions, refly_flight};
-use crate::report::chart::Chart;
-use crate::report::html::{escaped, paragraph, table};
+use crate::report::html::{escaped, paragraph, put, table};
 use crate::report::track::Flight;
 
-use super::pictures::{IGNITION, Picture, TOUCHDOWN};
-use super::whole::{FROM_ABOVE, view};
+use super::{Drawn, place};
 
-pub(super) fn html(flight: &Flight, info: &Info, pictures: &[Picture<'_>]) -> String {
-    let mut html = verdict(info);
-    html += "<div class=\"first\">\n<div>\n";
-    html += &findings(flight, info);
-    html += &limits(info);
-    html += "</div>\n<div class=\"charts\">\n";
-    for picture in pictures.iter().filter(|picture| picture.section == "first") {
-        let panel = &picture.chart.panel;
-        let mut panel = Panel { spans: flight.spans.clone(), ..panel.clone() };
-        // The backgrounds say what the phases' marks would; a crew's notes stay.
-        panel.marks.retain(|(_, name)| ![IGNITION, TOUCHDOWN].contains(&&**name));
-        html += &Chart { panel, ..picture.chart.clone() }.svg();
-    }
-    html += &view(flight, FROM_ABOVE, true);
-    html += "</div>\n</div>\n";
-    html + &paragraph(
-        "Backgrounds are phases; red numbers are the findings, where they begin. Drag in a picture to see a part of the \
-         time in all of them, double click for the whole.",
+pub(super) fn html(flight: &Flight, info: &Info, drawn: &[Drawn]) -> String {
+    let height: String =
+        drawn.iter().filter(|(section, ..)| *section == "first").map(|(.., svg)| svg.as_str()).collect();
+    format!(
+        "{}<div class=\"first\"><div>\n<section class=\"found\">{}</section><section class=\"limits\">{}</section></div><div>\n\
+         <section class=\"whole\">{height}</section><section class=\"maps\">{}</section><section class=\"moments\">{}</section></div></div>\n",
+        verdict(flight, info),
+        findings(flight, info, drawn),
+        limits(info),
+        place::maps(flight),
+        place::moments_table(flight),
     )
 }
 
-/// The ending, the worst limit, and the first sign.
-fn verdict(info: &Info) -> String {
+/// The ending, the worst limit, the first sign, and the touchdown.
+fn verdict(flight: &Flight, info: &Info) -> String {
     let ending = info.ending.as_deref().unwrap_or("No verdict in this log");
     let class = match &info.verdict {
         Some(Verdict { landing: Landing { stands: false, .. }, .. }) => " bad",
@@ -45,42 +35,65 @@ fn verdict(info: &Info) -> String {
         // It stands, and its legs were not designed for it.
         Some(_) | None => "",
     };
-    let mut html = format!("<p class=\"verdict{class}\">{}</p>\n", escaped(ending));
+    let mut words = Vec::new();
+    if let Some(verdict) = &info.verdict {
+        let sorted = worst_first(verdict.of_the_legs());
+        let (all, broken) = (sorted.len(), sorted.iter().filter(|(limit, _)| !limit.passed).count());
+        // A limit that allows nothing has no share, and is in the ending.
+        if let Some((worst, share)) = sorted.iter().find(|(_, share)| share.is_finite()) {
+            let far =
+                if *share > 1.0 { over(*share) } else { format!("{:.0} % of its limit", 100.0 * share) };
+            let value = measured(worst);
+            words.push(format!(
+                "Worst of the legs' limits: {} {value}, {far}; {broken} of {all} broken.",
+                worst.name
+            ));
+        }
+    }
     if let Some(first) = info.findings.iter().flatten().next() {
-        html += &paragraph(&format!("First sign: {}, at T+{:.2} s.", first.words, first.since_s));
+        words.push(format!("First sign: {}, at T+{:.2} s.", first.words, first.since_s));
     }
-    let Some(verdict) = &info.verdict else {
-        let none = "The vehicle did not touch down while it was recorded, or its verdict was not recorded.";
-        return html + &paragraph(none);
-    };
-    let sorted = worst_first(verdict.of_the_legs());
-    let (all, broken) = (sorted.len(), sorted.iter().filter(|(limit, _)| !limit.passed).count());
-    if let Some((worst, share)) = sorted.first().filter(|(_, share)| share.is_finite()) {
-        let far = if *share > 1.0 { over(*share) } else { format!("{:.0} % of its limit", 100.0 * share) };
-        let LimitResult { name, value, unit, .. } = worst;
-        let value = value.abs();
-        html += &paragraph(&format!(
-            "Worst of the legs' limits: {name} {value:.2} {unit}, {far}; {broken} of {all} broken."
-        ));
+    match &info.verdict {
+        Some(verdict) => {
+            let place = flight.contact().map(|[north, east, ..]| libm::hypot(north, east));
+            let place = place.map_or_else(String::new, |place_m| format!(", {place_m:.1} m from the pad"));
+            words.push(format!("Touchdown at {}{place}.", info.clocks.words(verdict.contact())));
+        }
+        None => words.push(
+            "The vehicle did not touch down while it was recorded, or its verdict was not recorded."
+                .to_owned(),
+        ),
     }
-    html + &paragraph(&format!("Touchdown at {}.", info.clocks.words(verdict.contact())))
+    format!("<h1 class=\"verdict{class}\">{}</h1>\n", escaped(ending)) + &paragraph(&words.join(" "))
 }
 
-fn findings(flight: &Flight, info: &Info) -> String {
+/// The findings, numbered as in the pictures, and below them the picture that shows the first.
+fn findings(flight: &Flight, info: &Info, drawn: &[Drawn]) -> String {
     let mut html = "<h3 id=\"findings\">Findings, first in time</h3>\n".to_owned();
     let Some(findings) = &info.findings else {
         let none = "Nothing was looked for: the log has no frames, or this build does not make their decisions again.";
         return html + &paragraph(none);
     };
+    let of = |picture: &str| drawn.iter().find(|(_, id, svg)| id == picture && !svg.is_empty());
+    let item = |finding: &Finding| {
+        let Finding { since_s, picture, words, .. } = finding;
+        let mut words = escaped(words);
+        if of(picture).is_some() || ["events", "limits"].contains(picture) {
+            words = format!("<a href=\"#{picture}\">{words}</a>");
+        }
+        format!("<li><b>T+{since_s:.2} s</b> {words}</li>\n")
+    };
     if findings.is_empty() {
         html += &paragraph(info.no_findings());
+    } else {
+        let items: String = findings.iter().map(item).collect();
+        put(&mut html, format_args!("<ol class=\"findings\">\n{items}</ol>\n"));
     }
-    let item = |finding: &Finding| {
-        let Finding { since_s, section, words, .. } = finding;
-        format!("<li><b>T+{since_s:.2} s</b> <a href=\"#{section}\">{}</a></li>\n", escaped(words))
-    };
-    let items: String = findings.iter().map(item).collect();
-    html + "<ol class=\"findings\">\n" + &items + "</ol>\n" + &without_its_faults(flight)
+    html += &without_its_faults(flight);
+    // The picture of the first; the whole flight stands beside it. Of nothing wrong how it came down.
+    let shown = findings.iter().map(|finding| finding.picture).chain(["vertical-speed"]);
+    let first = shown.filter_map(of).find(|(section, ..)| *section != "first");
+    html + &first.map_or_else(String::new, |(.., svg)| svg.replacen("<figure id=", "<figure data-of=", 1))
 }
 
 /// A simulated flight flown again with nothing broken in it.
@@ -99,47 +112,82 @@ fn without_its_faults(flight: &Flight) -> String {
 
 fn limits(info: &Info) -> String {
     let Some(verdict) = &info.verdict else { return String::new() };
-    let [_, _, envelope, table_2] = Landing::WORDS;
-    let more = limit_table(table_2, &verdict.table_2);
-    limit_table("borne", &verdict.borne)
-        + &limit_table(envelope, &verdict.envelope)
-        + &format!("<details><summary>{table_2}</summary>\n{more}</details>\n")
+    let legs = limit_table("limits of the legs", verdict.of_the_legs());
+    let table_2 = limit_table("the paper's Table 2", verdict.table_2.iter());
+    format!(
+        "<div id=\"limits\">{legs}{table_2}</div><p class=\"note\">Bars: evenly up to the limit, then \u{d7} 10 and \u{d7} 100. Grounds of the \
+         pictures: warm under thrust, cool in the fall. Red numbers: the findings.</p>"
+    )
 }
 
-fn limit_table(title: &str, limits: &[LimitResult]) -> String {
+fn limit_table<'a>(title: &str, limits: impl Iterator<Item = &'a LimitResult>) -> String {
     let row = |(limit, share): (&LimitResult, f64)| {
-        let (class, word) = if limit.passed { ("good", "inside") } else { ("bad", "OUTSIDE") };
+        let LimitResult { name, minimum, maximum, passed, .. } = limit;
+        let [minimum, maximum] = [minimum, maximum].map(|end| rounded(*end) + 0.0);
+        let limit_words = match (minimum < 0.0, (minimum + maximum).abs() < 1e-9) {
+            (true, true) => format!("\u{b1}{maximum}"),
+            (true, false) => format!("{minimum} to {maximum}"),
+            (false, _) => maximum.to_string(),
+        };
+        let class = if *passed { "good" } else { "bad" };
+        let far = match share {
+            share if !share.is_finite() => "OUTSIDE".to_owned(),
+            share if share < 9.95 => format!("\u{d7} {share:.2}"),
+            share => format!("\u{d7} {share:.0}"),
+        };
         [
-            escaped(&limit.name),
-            format!("{:.2} {}", limit.value + 0.0, escaped(&limit.unit)),
-            format!("{} to {}", rounded(limit.minimum) + 0.0, rounded(limit.maximum) + 0.0),
-            bar(limit, share),
-            format!("<span class=\"{class}\">{word}</span>"),
+            escaped(name),
+            escaped(&measured(limit)),
+            limit_words,
+            bar(share, *passed),
+            format!("<b class=\"{class}\">{far}</b>"),
         ]
     };
-    if limits.is_empty() {
+    let rows: Vec<_> = worst_first(limits).into_iter().map(row).collect();
+    if rows.is_empty() {
         return String::new();
     }
-    let heads = [title, "#value", "#limit", "share; the mark is the limit", ""];
-    let html = table(&heads, worst_first(limits.iter()).into_iter().map(row));
-    // On a narrow screen its pictures are left out.
-    html.replacen("class=\"wide\"", "class=\"wide limits\"", 1)
+    table(&[title, "#value", "#limit", "", "#share"], rows)
 }
 
-/// A value's share of its limit, up to half more than it.
-fn bar(limit: &LimitResult, share: f64) -> String {
-    const WIDTH: f64 = 120.0;
-    const LONGEST: f64 = 1.5;
-    if !share.is_finite() {
-        return String::new();
+/// A value with its unit; what only happens or does not has none.
+fn measured(limit: &LimitResult) -> String {
+    let LimitResult { value, minimum, maximum, unit, .. } = limit;
+    if maximum <= minimum {
+        return if *value == 0.0 { "no" } else { "yes" }.to_owned();
     }
-    let class = if limit.passed { "bar" } else { "barbad" };
-    let px = |share: f64| WIDTH * share.min(LONGEST) / LONGEST;
+    format!("{:.2} {unit}", value.abs()).trim_end().to_owned()
+}
+
+/// A value's share of its limit: even up to the limit, and from there a third of the rest for each factor of ten.
+fn bar(share: f64, passed: bool) -> String {
+    const LIMIT: f64 = 70.0;
+    const TEN: f64 = 25.0;
+    let px =
+        if share <= 1.0 { LIMIT * share } else { (LIMIT + TEN * libm::log10(share)).min(LIMIT + 2.0 * TEN) };
+    let class = if passed { "bar" } else { "barbad" };
     format!(
-        "<svg viewBox=\"0 0 {WIDTH} 14\" style=\"width:{WIDTH}px\" aria-hidden=\"true\"><rect class=\"room\" x=\"0\" y=\"3\" \
-         width=\"{WIDTH}\" height=\"8\"/><rect class=\"{class}\" x=\"0\" y=\"3\" width=\"{:.1}\" height=\"8\"/>\
-         <rect class=\"mark\" x=\"{:.1}\" y=\"0\" width=\"2\" height=\"14\"/></svg>",
-        px(share),
-        px(1.0) - 1.0
+        "<svg class=\"share\" viewBox=\"0 0 120 14\" aria-hidden=\"true\"><path class=\"room\" d=\"M0 7h120\"/><path class=\"{class}\" \
+         d=\"M0 7h{px:.1}\"/><path class=\"mark\" d=\"M{LIMIT} 1v12M95 5v4M119.5 5v4\"/></svg>"
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Far beyond the limit is longer than beyond it, which is longer than at it; a share without end fills the bar.
+    #[test]
+    fn bars_of_different_shares_differ() {
+        let long = |share: f64| {
+            let drawn = bar(share, share <= 1.0);
+            let (_, path) = drawn.split_once("d=\"M0 7h120\"/><path class=\"").unwrap();
+            let (class, long) = path.split_once("\" d=\"M0 7h").unwrap();
+            (class.to_owned(), long.split_once('"').unwrap().0.parse::<f64>().unwrap())
+        };
+        let shares = [0.0, 0.45, 1.0, 1.9, 36.0, 100.0].map(long);
+        assert!(shares.windows(2).all(|pair| pair[1].1 > pair[0].1 + 4.0), "{shares:?}");
+        assert_eq!((shares[2].0.as_str(), shares[3].0.as_str()), ("bar", "barbad"));
+        assert!((long(f64::INFINITY).1 - shares[5].1).abs() < 1e-9);
+    }
 }

@@ -3,8 +3,10 @@
 mod burn;
 mod estimate;
 mod first;
+pub(super) mod motion;
 pub(super) mod overlay;
 mod pictures;
+mod place;
 mod whole;
 
 use super::html::{charts, paragraph};
@@ -18,58 +20,53 @@ pub(super) struct Section {
     pub(super) html: String,
 }
 
-/// Every section: its words and tables, then its pictures.
+/// A drawn picture: its section, its place on the page, and its HTML.
+type Drawn = (&'static str, String, String);
+
+/// Every section of which the log has something: its words and tables, then its pictures.
 pub(super) fn all(flight: &Flight, info: &Info) -> Vec<Section> {
-    let pictures = pictures::all(flight);
+    let pictures = pictures::all(flight).into_iter();
+    let drawn: Vec<Drawn> =
+        pictures.map(|picture| (picture.section, picture.chart.id(), picture.chart.svg())).collect();
     let text = Option::unwrap_or_default;
     let sections = [
-        ("first", "", first::html(flight, info, &pictures)),
-        ("burn", "Path, states and input", burn::path(flight)),
-        ("thrust", "Thrust expected against inferred", burn::thrust(flight)),
-        ("touchdown", "Predicted against actual touchdown", String::new()),
-        ("solver", "Plans", text(burn::plans(flight))),
-        ("tracking", "Tracking error", text(burn::tracking(flight))),
-        ("saturation", "Gimbal and fin saturation", text(burn::saturation(flight))),
-        ("descent", "Wind, fins, roll and sensors", String::new()),
-        ("sensors", "Sensors and estimator", text(estimate::aids(flight))),
-        ("estimator", "Estimator error", text(estimate::errors(flight))),
+        ("first", "", first::html(flight, info, &drawn)),
+        ("burn", "Burn", burn::words(flight)),
+        ("fall", "Fall", String::new()),
+        ("sensors", "Sensors and estimator", text(estimate::used(flight))),
+        ("solver", "Solver", text(burn::plans(flight))),
         ("battery", "Battery and vibration", String::new()),
-        ("whole", "The whole flight", whole::moments_and_views(flight)),
-        ("events", "Events", text(whole::events(flight))),
-        ("mission", "Mission against the built-in one", text(whole::mission(flight, info))),
         ("link", "Link", String::new()),
+        ("mission", "Mission against the built-in one", text(whole::mission(flight, info))),
+        ("events", "Events", text(whole::events(flight))),
         ("log", "Log", whole::described(info)),
     ];
-    let section = |(id, title, words): (&'static str, &'static str, String)| {
-        let here = pictures.iter().filter(|picture| picture.section == id && id != "first");
-        let drawn: Vec<String> = here.map(|picture| picture.chart.svg()).collect();
-        let html = words + &charts(&drawn);
-        let html = if html.is_empty() { paragraph("The log has no records for this.") } else { html };
-        Section { id, title, html }
-    };
-    sections.into_iter().map(section).collect()
-}
-
-/// Root mean square and largest magnitude of some numbers; `None` without any.
-fn rms_and_max(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
-    let (mut count, mut squares, mut largest) = (0_u32, 0.0, 0.0_f64);
-    for value in values.filter(|value| value.is_finite()) {
-        count += 1;
-        squares += value * value;
-        largest = largest.max(value.abs());
+    let mut missing = Vec::new();
+    let mut all: Vec<Section> = Vec::new();
+    for (id, title, words) in sections {
+        let here = drawn.iter().filter(|(section, ..)| *section == id && id != "first");
+        let html = words + &charts(&here.map(|(.., svg)| svg.as_str()).collect::<String>());
+        if html.is_empty() {
+            missing.push(title);
+        } else {
+            all.push(Section { id, title, html });
+        }
     }
-    (count > 0).then(|| (libm::sqrt(squares / f64::from(count)), largest))
+    if let Some(last) = all.last_mut().filter(|_| !missing.is_empty()) {
+        last.html += &paragraph(&format!("The log has nothing of: {}.", missing.join(", ")));
+    }
+    all
 }
 
 /// The components of a state: name, unit, and the factor to that unit.
 const COMPONENTS: [(&str, &str, f64); 7] = [
-    ("north", "m", 1.0),
-    ("east", "m", 1.0),
-    ("height", "m", 1.0),
-    ("level speed", "m/s", 1.0),
-    ("vertical speed", "m/s", 1.0),
-    ("tilt", "deg", DEGREES),
-    ("rotation rate", "deg/s", DEGREES),
+    ("North", "m", 1.0),
+    ("East", "m", 1.0),
+    ("Height", "m", 1.0),
+    ("Level speed", "m/s", 1.0),
+    ("Vertical speed", "m/s", 1.0),
+    ("Tilt", "deg", DEGREES),
+    ("Rotation rate", "deg/s", DEGREES),
 ];
 /// Of [`COMPONENTS`] the height.
 const HEIGHT: usize = 2;

@@ -21,17 +21,17 @@ pub(in crate::report) fn html(flights: [LogFacts<'_>; 2]) -> String {
     let [a, b] = flights.map(|(flight, _)| flight);
     let axis = a.axis_name();
     let named = NAMES.into_iter().zip([a, b]).map(|((name, class), flight)| (name, class, flight));
-    // What flew is the first line of a picture of the burn.
+    // What flew is the last line of a picture of the burn.
     let pairs = pictures::all(a).into_iter().zip(pictures::all(b));
     let both = pairs.filter(|(picture, _)| picture.section == "burn").map(|(a, b)| {
         let flown = NAMES.iter().zip([&a, &b]).filter_map(|((name, class), picture)| {
-            Some(line(name, class, picture.chart.panel.lines.first()?.points.clone()))
+            Some(line(name, class, picture.chart.lines.last()?.points.clone()))
         });
-        let title = format!("Both: {}", a.chart.title);
-        Chart { own_x: false, ..Chart::new(&title, [axis, ""], flown.collect()) }.svg()
+        let (title, lines) = (format!("Both: {}", a.chart.title), flown.collect());
+        Chart { title, x_name: axis, lines, ..Chart::default() }.svg()
     });
     table(&["", "log", "ending"], rows)
         + &paragraph(&format!("Each flight has its own {axis}."))
         + &paths(&named.collect::<Vec<_>>())
-        + &charts(&both.collect::<Vec<_>>())
+        + &charts(&both.collect::<String>())
 }

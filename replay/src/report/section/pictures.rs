@@ -1,23 +1,26 @@
 //! Every picture over time, by section.
 
+use avionics::log::logged::state_from_log;
 use flight::computer::pilot::Pilot;
 use flight::estimation::estimator::Estimate;
-use onboard_sim::figure::Panel;
+use flight::guidance::powered::Plan;
+use flight::vehicle::rigid::RigidState;
 use protocol::log::flight_v1::{AidStatus, Measurements, TruthSample, Vector3};
 
-use super::burn::{AHEAD_S, tracking_errors};
 use super::estimate::vibration;
+use super::place::moments;
 use super::{COMPONENTS, DEGREES, HEIGHT};
+use crate::findings::FINS;
 use crate::log::{Clock, ClockTime};
 use crate::report::chart::{Chart, line};
 use crate::report::track::Part::{Air, Burn, Whole};
-use crate::report::track::{Flight, Part, Series, Thought, planned};
+use crate::report::track::{Flight, Part, Sample, Series, Thought, planned};
 
 /// As much of a crew's note as stands beside its mark; the events have all of it.
 const NOTE_LETTERS: usize = 40;
 
-pub(super) const IGNITION: &str = "ignition";
-pub(super) const TOUCHDOWN: &str = "touchdown";
+/// The first plan of the landing burn.
+pub(super) const PLANNED: &str = "plan at ignition";
 
 /// A picture of a section.
 pub(super) struct Picture<'a> {
@@ -28,10 +31,10 @@ pub(super) struct Picture<'a> {
 }
 
 impl<'a> Picture<'a> {
-    /// A picture over a part of the flight, with what happened and what went wrong in it.
+    /// A picture over a part of the flight, with its phases, what happened and what went wrong in it.
     fn new(flight: &'a Flight, section: &'static str, part: Part, title: &str) -> Self {
         let mark = |at_s: Option<f64>, name: &str| Some((flight.axis_s(at_s?), name.to_owned()));
-        let marks = [mark(flight.ignition_s, IGNITION), mark(flight.touchdown_s, TOUCHDOWN)];
+        let marks = [mark(flight.ignition_s, "ignition"), mark(flight.touchdown_s, "touchdown")];
         let (events, clocks) = (&flight.recording.events, &flight.recording.clocks);
         let notes =
             events.iter().filter(|(_, event)| event.name == "ground" && event.message.starts_with("note"));
@@ -42,20 +45,21 @@ impl<'a> Picture<'a> {
             let (_, text) = event.message.split_once(": ").unwrap_or_default();
             (at_s, text.chars().take(NOTE_LETTERS).collect())
         });
-        let panel = Panel {
-            x_label: flight.axis_name().to_owned(),
+        let chart = Chart {
+            title: title.to_owned(),
+            x_name: flight.axis_name(),
             marks: marks.into_iter().flatten().chain(notes).collect(),
             signs: flight.signs.clone(),
-            ..Panel::default()
+            spans: flight.spans.clone(),
+            ..Chart::default()
         };
-        let full = matches!(section, "thrust" | "tracking");
-        Self { flight, section, part, chart: Chart { title: title.to_owned(), panel, full, own_x: false } }
+        Self { flight, section, part, chart }
     }
 
     /// With one more line: its name, its class and its values.
-    fn line(mut self, name: &str, class: &str, mut points: Series) -> Self {
+    fn line(mut self, name: &str, class: &'static str, mut points: Series) -> Self {
         points.retain(|(at_s, _)| self.flight.has(self.part, self.flight.time_s(*at_s)));
-        self.chart.panel.lines.push(line(name, class, points));
+        self.chart.lines.push(line(name, class, points));
         self
     }
 
@@ -65,7 +69,7 @@ impl<'a> Picture<'a> {
     }
 
     fn limits(mut self, limits: impl IntoIterator<Item = f64>) -> Self {
-        self.chart.panel.limits.extend(limits);
+        self.chart.limits.extend(limits);
         self
     }
 }
@@ -77,89 +81,89 @@ pub(super) fn all(flight: &Flight) -> Vec<Picture<'_>> {
     pictures
 }
 
-/// Those of the burn and of where it leads.
+/// Those of the whole flight and of the burn.
 fn of_landing(flight: &Flight) -> Vec<Picture<'_>> {
     let mission = flight.pilot.as_ref().map(Pilot::mission);
     let over = |section, part, title: &str| Picture::new(flight, section, part, title);
-    let predicted = |title: &str, actual: Option<f64>, value: &dyn Fn(&Thought) -> Option<f64>| {
-        let values = flight.thought(value);
-        let ends = [values.first(), values.last()];
-        let actual = ends.into_iter().flatten().filter_map(|(at_s, _)| Some((*at_s, actual?))).collect();
-        over("touchdown", Burn, title).line("predicted", "a", values).line("actual", "b", actual)
+    let mut whole = over("first", Whole, "Height over the whole flight, m")
+        .line("barometer", "thin", flight.framed(|frame| frame.input.measured.pressure_altitude_m))
+        .line("flown", "a", flight.flown(|state| state[HEIGHT]))
+        .line(PLANNED, "b", flight.planned_first(|state| state[HEIGHT]));
+    let shown =
+        moments(flight).into_iter().filter(|(name, _)| ["separation", "apogee", "ignition"].contains(name));
+    let place = |(name, sample): (&str, &Sample)| {
+        let height_m = sample.state[HEIGHT];
+        (flight.axis_s(sample.time_s), height_m, "place", format!("{name} {height_m:.0} m"))
     };
-    let lands = |thought: &Thought| {
-        Some(flight.axis_s(thought.time_s + thought.plan.as_ref()?.left_s(thought.time_s)))
-    };
-    let touchdown_s = flight.touchdown_s.map(|at_s| flight.axis_s(at_s));
-    let mut pictures = vec![
-        over("first", Whole, "Height over the whole flight, m")
-            .line("barometer", "thin", flight.framed(|frame| frame.input.measured.pressure_altitude_m))
-            .line("feet", "a", flight.flown(|state| state[HEIGHT])),
-        predicted(&format!("Touchdown, {}", flight.axis_name()), touchdown_s, &lands),
-    ];
-
-    let contact = flight.touchdown_s.and_then(|contact_s| {
-        flight.track.iter().rfind(|sample| sample.time_s <= contact_s).map(|sample| sample.state)
-    });
+    (whole.chart.places, whole.chart.named, whole.chart.size_px) =
+        (shown.map(place).collect(), true, Some((640.0, 230.0)));
+    let mut pictures = vec![whole];
     for (component, (name, unit, factor)) in COMPONENTS.into_iter().enumerate() {
-        let estimate = flight.thought(|thought| Some(factor * thought.state?[component]));
-        let beside = if flight.recording.world.is_empty() { Series::new() } else { estimate };
         pictures.push(
             over("burn", Burn, &format!("{name}, {unit}"))
-                .line("flown", "a", flight.flown(|state| factor * state[component]))
-                .line("estimate", "b", beside),
+                .line(PLANNED, "b", flight.planned_first(|state| factor * state[component]))
+                .line("flown", "a", flight.flown(|state| factor * state[component])),
         );
-        if component != HEIGHT {
-            pictures.push(predicted(
-                &format!("{name} at touchdown, {unit}"),
-                contact.map(|state| factor * state[component]),
-                &|thought| Some(factor * planned(thought.plan.as_ref()?.states().last()?)[component]),
-            ));
-        }
     }
-    for (axis, name) in ["pitch", "yaw"].into_iter().enumerate() {
+    for (axis, name) in ["Gimbal pitch, deg", "Gimbal yaw, deg"].into_iter().enumerate() {
         let limit = mission.map(|mission| mission.airframe.gimbal.limit_deg);
-        let [actual, commanded] = gimbal_deg(flight, axis);
-        pictures.push(
-            over("burn", Burn, &format!("Gimbal {name}, deg"))
-                .limits(limit.into_iter().flat_map(|limit| [-limit, limit]))
-                .line("actual", "a", actual)
-                .line("commanded", "b", commanded),
-        );
+        let limits = limit.into_iter().flat_map(|limit| [-limit, limit]);
+        pictures.push(surface(over("burn", Burn, name), axis).limits(limits));
     }
     if let Some((mission, ignition_s)) = mission.zip(flight.ignition_s) {
-        let expected = flight.truth(|sample| {
-            let since_s = sample.time_s - ignition_s;
+        let expected = flight.framed(|frame| {
+            let since_s = frame.input.time_s - ignition_s;
             (since_s >= 0.0).then(|| mission.motor_curve.thrust_at_n(since_s - mission.ignition.delay_s))
         });
         pictures.push(
-            over("thrust", Burn, "Thrust, N")
+            over("burn", Burn, "Thrust, N; dashed the weight")
                 .limits([mission.airframe.mass.loaded_kg * mission.gravity_m_s2])
                 .line("actual", "c", flight.truth(|sample| Some(sample.thrust_n)))
                 .line("expected", "b", expected)
                 .line("inferred", "a", flight.thought(|thought| thought.thrust_n)),
         );
     }
+    if let Some((contact, contact_s)) = flight.contact().zip(flight.touchdown_s) {
+        // After contact the ground determines the motion.
+        let ends = |value: &dyn Fn(f64, &Plan) -> Option<f64>| {
+            flight.thought(|thought| {
+                let plan = thought.plan.as_ref().filter(|_| thought.time_s < contact_s)?;
+                value(thought.time_s, plan)
+            })
+        };
+        let off = |component: usize| {
+            ends(&|_, plan| Some(planned(plan.states().last()?)[component] - contact[component]))
+        };
+        pictures.push(
+            over("burn", Burn, "Where each plan ends, less where it did, m").line("north", "a", off(0)).line(
+                "east",
+                "b",
+                off(1),
+            ),
+        );
+        let late = ends(&|time_s, plan| Some(time_s + plan.left_s(time_s) - contact_s));
+        pictures.push(over("burn", Burn, "When each plan ends, less when it did, s").only(late));
+    }
     pictures
 }
 
-/// Those of solver, descent, sensors, battery and link.
+/// A servo's axis, as it was and as it was told to be.
+fn surface(picture: Picture<'_>, surface: usize) -> Picture<'_> {
+    let [actual, commanded] = surface_deg(picture.flight, surface);
+    picture.line("commanded", "b", commanded).line("actual", "a", actual)
+}
+
+/// Those of fall, sensors, solver, battery and link.
 fn of_the_rest(flight: &Flight) -> Vec<Picture<'_>> {
     let over = |section, part, title: &str| Picture::new(flight, section, part, title);
     let iterations = |thought: &Thought| thought.plan.as_ref().map(|_| thought.iterations as f64);
     let timings = &flight.recording.timings;
     let took = timings.iter().map(|timing| (flight.axis_s(timing.time_s), 1e3 * timing.solve_time_s));
-    let apart_m = |ahead_s: f64| -> Series {
-        let errors = tracking_errors(flight, ahead_s).into_iter();
-        let apart_m = |[north, east, up, ..]: [f64; 7]| libm::hypot(libm::hypot(north, east), up);
-        errors.map(|(time_s, error)| (flight.axis_s(time_s), apart_m(error))).collect()
-    };
     // On the way up nothing estimates the wind.
     let wind = |thought: &Thought| {
         let falls = thought.phase.is_some_and(|phase| !phase.before_apogee());
         thought.estimate.filter(|_| falls).map(|estimate| estimate.wind_m_s)
     };
-    let fin = |place: usize| flight.truth(move |sample| Some(DEGREES * sample.fins_actual_rad.get(place)?));
     let off = |value: &dyn Fn(&Measurements, &TruthSample) -> Option<f64>| {
         flight.framed(|frame| value(&frame.input.measured, flight.world_at(frame.input.time_s)?))
     };
@@ -167,76 +171,108 @@ fn of_the_rest(flight: &Flight) -> Vec<Picture<'_>> {
     let fix = |along: fn(&Vector3) -> f64| {
         off(&|it, truth| Some(along(&it.gnss.as_ref()?.position_m) - along(&truth.state.position_m)))
     };
+    let wrong = |of: fn(&RigidState, &RigidState) -> f64| {
+        let truth = |thought: &Thought| Some(state_from_log(&flight.world_at(thought.time_s)?.state));
+        flight.thought(|thought| Some(of(&thought.estimate?.state, &truth(thought)?)))
+    };
     let ratio = |aid: Option<AidStatus>| Some(aid?.test_ratio.min(3.0));
     let estimated =
         |value: fn(&Estimate) -> f64| flight.thought(|thought| thought.estimate.as_ref().map(value));
-    vec![
-        over("solver", Burn, "Newton iterations of each plan").only(flight.thought(iterations)),
-        over("solver", Whole, "From the frame that posed each plan to the one that took it over, ms")
-            .limits(timings.first().map(|timing| 1e3 * timing.deadline_s))
-            .only(took.collect()),
-        over("tracking", Burn, "Distance between the planned and the actual position, m")
-            .line("0.5 s ahead", "b", apart_m(AHEAD_S[1]))
-            .line("0.1 s ahead", "a", apart_m(AHEAD_S[0])),
-        over("descent", Air, "Wind towards north, m/s")
+    let fin = |fin: usize| {
+        let [actual, _] = surface_deg(flight, 2 + fin);
+        actual
+    };
+    let mut pictures = vec![
+        over("fall", Air, "Wind towards north, m/s")
             .line("true", "c", flight.truth(|sample| Some(sample.wind_m_s.x)))
             .line("estimated", "a", flight.thought(|thought| Some(wind(thought)?.x))),
-        over("descent", Air, "Wind towards east, m/s")
+        over("fall", Air, "Wind towards east, m/s")
             .line("true", "c", flight.truth(|sample| Some(-sample.wind_m_s.y)))
             .line("estimated", "a", flight.thought(|thought| Some(-wind(thought)?.y))),
-        over("descent", Air, "Fins, actual, deg")
+        over("fall", Air, "Fins, deg")
             .line("fin 1", "a", fin(0))
             .line("fin 2", "b", fin(1))
             .line("fin 3", "c", fin(2))
             .line("fin 4", "d", fin(3)),
-        over("descent", Air, "Roll rate, deg/s")
-            .only(flight.truth(|sample| Some(DEGREES * sample.state.rate_rad_s.x))),
-        over("descent", Air, "Parachute, share open")
+        over("fall", Air, "Roll rate, deg/s")
+            .only(estimated(|estimate| DEGREES * estimate.state.rate_rad_s.x)),
+        over("fall", Air, "Parachute, share open")
             .only(flight.truth(|sample| Some(sample.parachute_open_share))),
-        over("descent", Air, "Sensed height less true height, m")
+        over("sensors", Whole, "Test ratio, above 1 refused")
+            .limits([1.0])
+            .line("barometer", "thin", flight.estimated(|it| ratio(it.barometer)))
+            .line("GNSS velocity", "a", flight.estimated(|it| ratio(it.gnss_velocity)))
+            .line("GNSS position", "c", flight.estimated(|it| ratio(it.gnss_position)))
+            .line("lidar", "b", flight.estimated(|it| ratio(it.lidar))),
+        over("sensors", Whole, "Standard deviations, m and m/s")
+            .line("height", "a", estimated(|estimate| estimate.sigmas.position_m.z))
+            .line("place", "c", estimated(|estimate| estimate.sigmas.position_m.xy().norm()))
+            .line("velocity", "b", estimated(|estimate| estimate.sigmas.velocity_m_s.norm())),
+        over("sensors", Whole, "Gyro bias, estimated, deg/s")
+            .line("roll", "a", estimated(|estimate| DEGREES * estimate.gyro_bias_rad_s.x))
+            .line("pitch", "b", estimated(|estimate| DEGREES * estimate.gyro_bias_rad_s.y))
+            .line("yaw", "c", estimated(|estimate| DEGREES * estimate.gyro_bias_rad_s.z)),
+        over("sensors", Air, "Sensed height less true, m")
             .line(
                 "barometer",
                 "a",
                 off(&|it, truth| Some(it.pressure_altitude_m? - truth.state.position_m.z)),
             )
             .line("lidar range", "c", off(&|it, truth| Some(it.lidar_range_m? - truth.height_m))),
-        over("descent", Air, "Satellite position less true position, m")
+        over("sensors", Air, "GNSS place less true, m")
             .line("north", "a", fix(|at| at.x))
             .line("east", "b", fix(|at| -at.y))
             .line("up", "c", fix(|at| at.z)),
-        over("sensors", Whole, "Test ratio of each measurement; above 1 it was refused")
-            .limits([1.0])
-            .line("barometer", "thin", flight.estimated(|it| ratio(it.barometer)))
-            .line("GNSS velocity", "a", flight.estimated(|it| ratio(it.gnss_velocity)))
-            .line("GNSS position", "c", flight.estimated(|it| ratio(it.gnss_position)))
-            .line("lidar", "b", flight.estimated(|it| ratio(it.lidar))),
-        over("sensors", Whole, "Standard deviations of the estimate")
-            .line("height, m", "a", estimated(|estimate| estimate.sigmas.position_m.z))
-            .line("place, m", "c", estimated(|estimate| estimate.sigmas.position_m.xy().norm()))
-            .line("velocity, m/s", "b", estimated(|estimate| estimate.sigmas.velocity_m_s.norm())),
-        over("sensors", Whole, "Gyro bias as estimated, deg/s")
-            .line("roll", "a", estimated(|estimate| DEGREES * estimate.gyro_bias_rad_s.x))
-            .line("pitch", "b", estimated(|estimate| DEGREES * estimate.gyro_bias_rad_s.y))
-            .line("yaw", "c", estimated(|estimate| DEGREES * estimate.gyro_bias_rad_s.z)),
+        over("sensors", Air, "Estimated place less true, m")
+            .line("north", "a", wrong(|estimate, truth| estimate.position_m.x - truth.position_m.x))
+            .line("east", "b", wrong(|estimate, truth| truth.position_m.y - estimate.position_m.y))
+            .line("up", "c", wrong(|estimate, truth| estimate.position_m.z - truth.position_m.z)),
+        over("sensors", Air, "Estimated velocity less true, m/s")
+            .line("north", "a", wrong(|estimate, truth| estimate.velocity_m_s.x - truth.velocity_m_s.x))
+            .line("east", "b", wrong(|estimate, truth| truth.velocity_m_s.y - estimate.velocity_m_s.y))
+            .line("up", "c", wrong(|estimate, truth| estimate.velocity_m_s.z - truth.velocity_m_s.z)),
+        over("sensors", Air, "Estimated nose from the true one, deg").only(wrong(|estimate, truth| {
+            let cosine = estimate.nose_in_world().dot(&truth.nose_in_world());
+            DEGREES * libm::acos(cosine.clamp(-1.0, 1.0))
+        })),
+        over("solver", Burn, "Newton iterations, of each plan").only(flight.thought(iterations)),
+        over("solver", Burn, "From posing a plan to taking it over, ms")
+            .limits(timings.first().map(|timing| 1e3 * timing.deadline_s))
+            .only(took.collect()),
         over("battery", Whole, "Battery, V").only(flight.framed(|frame| frame.input.battery_v)),
         Picture { chart: vibration(flight), ..over("battery", Whole, "") },
         over("link", Whole, "Age of the last heartbeat, s").only(flight.heard(|told| told.link_age_s)),
         over("link", Whole, "Frames lost, %").only(flight.heard(|told| Some(100.0 * told.link_loss?))),
         over("link", Whole, "Received, bytes/s").only(flight.heard(|told| told.link_rx_bytes_s)),
-    ]
+    ];
+    // A fin that did not follow has a picture of its own.
+    let stuck = (0..4).filter(|fin| flight.shown.contains(&FINS[*fin]));
+    pictures.extend(stuck.map(|fin| surface(over("fall", Air, &format!("Fin {}, deg", fin + 1)), 2 + fin)));
+    pictures
 }
 
-/// Actual and commanded angle of a gimbal's axis, deg.
-pub(super) fn gimbal_deg(flight: &Flight, axis: usize) -> [Series; 2] {
-    let deg = |angles_rad: &[f64]| angles_rad.get(axis).map(|rad| DEGREES * rad);
-    if flight.recording.world.is_empty() {
+/// Actual and commanded angle of gimbal pitch and yaw, and of the fins, deg. Without a simulated truth actual is what the servos
+/// report.
+pub(super) fn surface_deg(flight: &Flight, surface: usize) -> [Series; 2] {
+    let deg = |gimbal_rad: &[f64], fins_rad: &[f64]| {
+        let of_fins = || fins_rad.get(surface.checked_sub(2)?);
+        Some(DEGREES * gimbal_rad.get(surface).or_else(of_fins)?)
+    };
+    let recording = &flight.recording;
+    if !recording.world.is_empty() {
         return [
-            flight.heard(|told| deg(&told.gimbal_measured_rad)),
-            flight.heard(|told| deg(&told.gimbal_commanded_rad)),
+            flight.truth(|sample| deg(&sample.gimbal_actual_rad, &sample.fins_actual_rad)),
+            flight.truth(|sample| deg(&sample.gimbal_commanded_rad, &sample.fins_commanded_rad)),
+        ];
+    }
+    if !recording.frames.is_empty() {
+        return [
+            flight.framed(|frame| deg(&frame.input.gimbal_rad, &frame.input.fins_rad)),
+            flight.framed(|frame| deg(&frame.output.gimbal_rad, &frame.output.fins_rad)),
         ];
     }
     [
-        flight.truth(|sample| deg(&sample.gimbal_actual_rad)),
-        flight.truth(|sample| deg(&sample.gimbal_commanded_rad)),
+        flight.heard(|told| deg(&told.gimbal_measured_rad, &told.fin_measured_rad)),
+        flight.heard(|told| deg(&told.gimbal_commanded_rad, &told.fin_commanded_rad)),
     ]
 }

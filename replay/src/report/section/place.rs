@@ -1,0 +1,113 @@
+//! Where the vehicle was: its main moments, and the place from above.
+
+use flight::rules::phase::Phase;
+
+use crate::report::chart::{Axes, Chart, Line, line};
+use crate::report::html::table;
+use crate::report::track::{Flight, Part, Sample, State, planned};
+
+/// A stage of the flight: its name, its class, and whether a phase belongs to it.
+type Stage = (&'static str, &'static str, fn(Phase) -> bool);
+
+const STAGES: [Stage; 4] = [
+    ("ascent", "thin", |phase| phase.before_apogee()),
+    ("fall", "a", |phase| phase.in_descent()),
+    ("burn", "b", |phase| phase.in_landing_burn() || phase == Phase::Touchdown),
+    ("parachute", "d", |phase| phase == Phase::Chute),
+];
+
+/// The place from above: inside its fence, and closer.
+pub(super) fn maps(flight: &Flight) -> String {
+    let fence_m = flight.pilot.as_ref().map(|pilot| pilot.mission().gate.fence_radius_m);
+    let fence = fence_m.filter(|fence_m| fence_m.is_finite()).map(|fence_m| {
+        let corner = |corner: u32| {
+            let (sin, cos) = libm::sincos(f64::from(corner).to_radians());
+            (fence_m * sin, fence_m * cos)
+        };
+        line(&format!("fence {fence_m:.0} m"), "fence", (0..=360).step_by(5).map(corner).collect())
+    });
+    let wind = flight.thoughts.iter().find(|thought| Some(thought.time_s) >= flight.ignition_s);
+    let wind = wind.filter(|_| flight.ignition_s.is_some()).and_then(|thought| thought.estimate);
+    // East is against y.
+    let wind = wind.map(|estimate| (-estimate.wind_m_s.y, estimate.wind_m_s.x));
+    let arrow = wind.map(|(east, north)| (east, north, format!("wind {:.1} m/s", libm::hypot(east, north))));
+    let picture = |title: &str, more: Option<Line>| Chart {
+        title: title.to_owned(),
+        axes: Axes::Ground([1, 0]),
+        x_name: "east, m",
+        size_px: Some((196.0, 196.0)),
+        places: places(flight, more.is_none()),
+        lines: stages(flight).into_iter().chain(more).collect(),
+        arrow: arrow.clone(),
+        ..Chart::default()
+    };
+    let whole = fence.map(|fence| picture("Place from above, m", Some(fence)).svg());
+    whole.unwrap_or_default() + &picture("The same closer, m", None).svg()
+}
+
+/// The pad, where the first plan ends, and where it came down; with their names, if there is room.
+fn places(flight: &Flight, named: bool) -> Vec<(f64, f64, &'static str, String)> {
+    let end = flight.made().first().and_then(|(_, plan)| Some(planned(plan.states().last()?)));
+    let known = [(Some([0.0; 7]), "pad"), (end, "planned"), (flight.contact(), "touchdown")];
+    let place = |(state, kind): (Option<State>, &'static str)| {
+        let [north, east, ..] = state?;
+        Some((east, north, kind, if named { kind.to_owned() } else { String::new() }))
+    };
+    known.into_iter().filter_map(place).collect()
+}
+
+/// The flown path from above up to contact; another stage ends a line.
+fn stages(flight: &Flight) -> Vec<Line> {
+    let flown = || flight.track.iter().filter(|sample| flight.has(Part::Air, sample.time_s));
+    let lines = STAGES.iter().map(|(name, class, belongs)| {
+        let point = |sample: &Sample| {
+            let [north, east, ..] = sample.state;
+            if sample.phase.is_some_and(belongs) { (east, north) } else { (f64::NAN, f64::NAN) }
+        };
+        line(name, class, flown().map(point).collect())
+    });
+    lines.filter(|line| line.points.iter().any(|point| point.0.is_finite())).collect()
+}
+
+pub(super) fn moments_table(flight: &Flight) -> String {
+    let moments = moments(flight);
+    if moments.is_empty() {
+        return String::new();
+    }
+    let row = |(name, sample): (&str, &Sample)| {
+        let [north, east, height_m, level_m_s, up_m_s, ..] = sample.state;
+        let cells = [height_m, north, east, level_m_s, up_m_s].map(|value| format!("{:.1}", value + 0.0));
+        [name.to_owned(), format!("{:.2}", flight.axis_s(sample.time_s))].into_iter().chain(cells).collect()
+    };
+    let time = format!("#{}", flight.axis_name());
+    let heads = ["moment", &time, "#height, m", "#north, m", "#east, m", "#level, m/s", "#up, m/s"];
+    table(&heads, moments.into_iter().map(row).collect::<Vec<Vec<String>>>())
+}
+
+/// What happened when, as far as it did.
+pub(super) fn moments(flight: &Flight) -> Vec<(&'static str, &Sample)> {
+    let frames = &flight.recording.frames;
+    let flown = || flight.track.iter().filter(|sample| flight.has(Part::Air, sample.time_s));
+    let enters = |wanted: Phase| flown().find(|sample| sample.phase == Some(wanted));
+    let highest =
+        flown().filter(|sample| sample.state[2].is_finite()).max_by(|a, b| a.state[2].total_cmp(&b.state[2]));
+    let rises = flown().any(|sample| sample.phase.is_some_and(Phase::before_apogee));
+    let at = |time_s: f64| flown().find(|sample| sample.time_s >= time_s);
+    let mut pairs = frames.windows(2).map(|pair| (&pair[0].input, &pair[1].input));
+    let separated = pairs.find(|(before, now)| before.booster_attached && !now.booster_attached);
+    let moments = [
+        ("lift-off", enters(Phase::Boost)),
+        ("burn-out", enters(Phase::Coast)),
+        ("separation", separated.and_then(|(_, now)| at(now.time_s))),
+        ("apogee", highest.filter(|_| rises)),
+        ("parachute", enters(Phase::Chute)),
+        ("ignition", flight.ignition_s.and_then(at)),
+        ("contact", flown().next_back().filter(|_| flight.touchdown_s.is_some())),
+    ];
+    // Telemetry may begin without a place.
+    let known = |sample: &&Sample| sample.state[..5].iter().all(|value| value.is_finite());
+    let known = moments.into_iter().filter_map(|(name, sample)| Some((name, sample.filter(known)?)));
+    let mut moments: Vec<_> = known.collect();
+    moments.sort_by(|a, b| a.1.time_s.total_cmp(&b.1.time_s));
+    moments
+}
