@@ -53,7 +53,7 @@ fn on_the_pad(recording: &Recording) -> Vec<Finding> {
                 clock: Clock::Log,
                 lasted_s: 0.0,
                 words,
-                section: "events",
+                picture: "events",
             });
         }
     }
@@ -109,7 +109,7 @@ fn picture(sign: Sign) -> &'static str {
             "test-ratio"
         }
         Sign::Estimate => "standard-deviations",
-        Sign::Battery => "battery",
+        Sign::Battery => "battery-voltage",
         Sign::Surface(0) | Sign::SlowGimbal => "gimbal-pitch",
         Sign::Surface(1) => "gimbal-yaw",
         Sign::Surface(fin) => FINS[usize::from(fin - 2) % FINS.len()],

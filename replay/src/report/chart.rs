@@ -219,7 +219,8 @@ impl Chart {
             }
             free_px.len() as f64
         };
-        let spans = self.spans.iter().filter(|_| self.named).map(|span| (span.from, span.name.as_str()));
+        let seen = self.spans.iter().filter(|span| self.named && span.to > frame.x.0);
+        let spans = seen.map(|span| (span.from.max(frame.x.0), span.name.as_str()));
         let rows = named(spans.collect(), "phase", &|row| -ABOVE - 4.0 - ROW * row);
         let marks = self.marks.iter().map(|(x, name)| (*x, name.as_str()));
         named(marks.collect(), "mark", &|row| height - 4.0 - ROW * row);

@@ -103,13 +103,12 @@
     }) : [];
   });
   figures.filter((f) => f.over).forEach((f) => {
+    const target = made(f.plot.parentNode, "rect", { class: "target", width: f.wide / 10, height: f.high / 10 });
     const time = (event) => {
-      const box = f.plot.getBoundingClientRect(), [from, until] = f.seen || f.x;
+      const box = target.getBoundingClientRect(), [from, until] = f.seen || f.x;
       return from + Math.min(1, Math.max(0, (event.clientX - box.left) / box.width)) * (until - from);
     };
     let from = null, chosen = null;
-    const over = f.plot.parentNode;
-    const target = made(f.plot, "rect", { x: -f.wide * 50, width: f.wide * 100, height: f.high, fill: "transparent" });
     target.addEventListener("pointerdown", (event) => {
       stop(); target.setPointerCapture(event.pointerId);
       if (event.shiftKey) { from = time(event); chosen = made(f.plot, "rect", { class: "chosen", height: f.high, width: 0 }); }
@@ -141,7 +140,7 @@
     figure.className = "vehicle";
     figure.innerHTML = `<figcaption><b>Vehicle at this time</b> <span></span></figcaption><svg viewBox="0 0 ${SIZE} ${SIZE}"></svg>`;
     maps.append(figure);
-    const svg = figure.querySelector("svg"), words = figure.querySelector("span"), scale = 125 / shape.length, r = shape.diameter / 2;
+    const svg = figure.querySelector("svg"), words = figure.querySelector("span"), r = shape.diameter / 2;
     const hull = (points) => {
       const sorted = [...points].sort((a, b) => a[0] - b[0] || a[1] - b[1]);
       const half = (list) => list.reduce((kept, p) => {
@@ -165,19 +164,20 @@
         -(2 * (qx * qy + qw * qz) * a + (1 - 2 * (qx * qx + qz * qz)) * b + 2 * (qy * qz - qw * qx) * c), // east is against y
         2 * (qx * qz - qw * qy) * a + 2 * (qy * qz + qw * qx) * b + (1 - 2 * (qx * qx + qy * qy)) * c];
       const [sin, cos] = [Math.sin(side), Math.cos(side)], DOWN = 0.2; // the eye looks down a little
+      const tail = booster > 0.5 && shape.booster ? -shape.booster : 0, center = (shape.length + tail) / 2;
+      const on = thrust > 0.5, scale = 150 / (1.2 * shape.length - tail);
       const seen = ([north, east, up]) => {
         const right = east * cos + north * sin, away = north * cos - east * sin;
         return [SIZE / 2 + scale * right, SIZE / 2 - scale * (up * Math.cos(DOWN) + away * Math.sin(DOWN)), away];
       };
-      // Stations along the axis count from the nozzle; the middle of the vehicle stands still.
-      const body = ([station, b, c]) => seen(world([station - shape.length / 2, b, c]));
+      // Stations along the axis count from the nozzle; the middle of the stack stands still.
+      const body = ([station, b, c]) => seen(world([station - center, b, c]));
       const items = [], add = (name, points, closed = true) => items.push([points.reduce((sum, p) => sum + p[2], 0) / points.length, name, points, closed]);
       const solid = (name, ...rings) => add(name, hull(rings.flat().map(body)));
       const bell = (along, radius) => { // a ring about the axis of the motor, which turns about its pivot
         const [p, q] = [pitch, yaw].map((deg) => deg * Math.PI / 180);
         return ring(0, radius).map(([, b, c]) => [shape.pivot - along, b - along * Math.sin(q), c + along * Math.sin(p)]);
       };
-      const tail = booster > 0.5 && shape.booster ? -shape.booster : 0, on = thrust > 0.5;
       if (tail) { solid("metal", ring(tail, r), ring(0, r)); if (on) solid("fire", ring(tail, 0.6 * r), ring(tail - 0.6 * shape.length, 0)); }
       else {
         solid("metal", bell(0, 0.5 * r), bell(shape.pivot + r, 0.7 * r));
@@ -201,7 +201,7 @@
         made(svg, "path", { class: "band", d: `M${top[0] - span} ${top[1] - 45}a${span} ${span * 0.6} 0 0 1 ${2 * span} 0z` });
       }
       // The ground, if it is near: where the feet of the upright vehicle would stand on it.
-      const under = shape.middle - shape.foot[0] + height, middle = world([shape.middle - shape.length / 2, 0, 0]);
+      const under = shape.middle - shape.foot[0] + height, middle = world([shape.middle - center, 0, 0]);
       const floor = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11].map((k) => seen([shape.length * Math.cos(k * Math.PI / 6), shape.length * Math.sin(k * Math.PI / 6), middle[2] - under]));
       const path = (name, points, closed) => made(svg, "path", { class: name, d: "M" + points.map((p) => `${p[0].toFixed(1)} ${p[1].toFixed(1)}`).join("L") + (closed ? "Z" : "") });
       if (floor[0][1] < SIZE + 30) path("floor", floor, true);

@@ -1,5 +1,6 @@
 //! Tests the report of a flight: well-formed, self-contained and complete.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use flight::vehicle::mission::StartPoint;
@@ -27,6 +28,8 @@ fn page_of(log: &Path, with: Option<&Path>) -> String {
             assert!(document.descendants().any(|tag| tag.attribute("id") == Some(place)), "{link}");
         }
     }
+    let ids: Vec<&str> = document.descendants().filter_map(|tag| tag.attribute("id")).collect();
+    assert_eq!(ids.iter().collect::<BTreeSet<_>>().len(), ids.len(), "{ids:?}");
     let page = html.replace("http://www.w3.org/2000/svg", "");
     for outside in ["http:", "https:", "url(\"", "@import", "fetch", "import(", "NaN", "inf "] {
         assert!(!page.contains(outside), "{outside}");
@@ -62,11 +65,11 @@ fn the_report_says_the_verdict_first_and_then_why() {
             <th>limits of the legs</th>|<th>the paper's Table 2</th>|Height over the whole flight, m|\
             Place from above, m|fence 120 m|The same closer, m|>planned</text>|<td>ignition</td>|\
             <td>contact</td>|Inferred at the end: impulse |\
-            Landing from the south, m|>later plans</span>|>plan at ignition</span>|>nose</span>|>flown</span>|\
-            Landing from the east, m|Landing from above, m|Level speed, m/s|Rotation rate, deg/s|Gimbal pitch, deg|\
+            Path from the south, m|>later plans</span>|>plan at ignition</span>|>nose</span>|>flown</span>|\
+            Path from the east, m|Path from above, m|Level speed, m/s|Rotation rate, deg/s|Gimbal pitch, deg|\
             Gimbal yaw, deg|Thrust, N|Where each plan ends, less where it did, m|Wind towards north, m/s|\
             Fins, deg|Roll rate, deg/s|<td>GNSS position</td>|Test ratio, above 1 refused|Gyro bias, estimated, deg/s|Estimated place less true, m|Estimated nose from the true one, deg|\
-            iterations.</p>|Newton iterations, of each plan|Battery, V|\
+            iterations.</p>|Newton iterations, of each plan|Battery voltage, V|\
             Specific force along the nose|Mission against the built-in one</h2>|Events</h2>|\
             every checksum holds|The log has nothing of: Link.";
         says_in_order(&page, &order.split('|').collect::<Vec<_>>());
@@ -176,7 +179,7 @@ fn a_report_with_another_log_draws_both_flights() {
     page_of(&MK2.log, Some(&LANDED.log));
     let page = page_of(&MK2.log, Some(&DISPERSED.log));
     let both = section(&page, ">Two flights");
-    let words = ["STANDS UNDAMAGED", "Landing from above, m", "Both: Height, m", "Both: Gimbal yaw, deg"];
+    let words = ["STANDS UNDAMAGED", "Both: Path from above, m", "Both: Height, m", "Both: Gimbal yaw, deg"];
     says_in_order(both, &words);
     for figure in both.split("<figure").skip(1) {
         assert!(["a", "b"].iter().all(|class| figure.contains(&format!("class=\"l {class}\""))), "{figure}");

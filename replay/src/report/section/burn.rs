@@ -21,9 +21,9 @@ const NOSE_M: f64 = 4.0;
 
 /// The views of a path: which components are to the right and up, and the name of the first.
 const VIEWS: [(&str, [usize; 2], &str); 3] = [
-    ("Landing from the south, m", [1, HEIGHT], "east, m"),
-    ("Landing from the east, m", [0, HEIGHT], "north, m"),
-    ("Landing from above, m", [1, 0], "east, m"),
+    ("Path from the south, m", [1, HEIGHT], "east, m"),
+    ("Path from the east, m", [0, HEIGHT], "north, m"),
+    ("Path from above, m", [1, 0], "east, m"),
 ];
 
 /// The flights' paths to their landings, each with its name and class, from three sides; of a single flight with its plans and
@@ -64,7 +64,8 @@ pub(super) fn paths(flights: &[(&'static str, &'static str, &Flight)]) -> String
             let flown = flight.track.iter().filter(|sample| part(flight, sample));
             line(name, class, flown.map(|sample| see(&sample.state)).collect())
         }));
-        let (axes, title) = (Axes::Ground([right, up]), title.to_owned());
+        let title = if flights.len() > 1 { format!("Both: {title}") } else { title.to_owned() };
+        let axes = Axes::Ground([right, up]);
         Chart { title, axes, x_name, size_px: Some((348.0, 300.0)), lines, ..Chart::default() }.svg()
     };
     charts(&VIEWS.map(picture).concat())

@@ -4,7 +4,7 @@ use flight::rules::verdict::Landing;
 use protocol::log::v1::LimitResult;
 
 use crate::findings::{Finding, over};
-use crate::info::{Info, rounded};
+use crate::info::Info;
 use crate::log::{Verdict, worst_first};
 use crate::refly::{FaultChanges, ReflyOptions, refly_flight};
 use crate::report::html::{escaped, paragraph, put, table};
@@ -123,7 +123,8 @@ fn limits(info: &Info) -> String {
 fn limit_table<'a>(title: &str, limits: impl Iterator<Item = &'a LimitResult>) -> String {
     let row = |(limit, share): (&LimitResult, f64)| {
         let LimitResult { name, minimum, maximum, passed, .. } = limit;
-        let [minimum, maximum] = [minimum, maximum].map(|end| rounded(*end) + 0.0);
+        // A station heard them as `f32`.
+        let [minimum, maximum] = [minimum, maximum].map(|end| (end * 1e4).round() / 1e4 + 0.0);
         let limit_words = match (minimum < 0.0, (minimum + maximum).abs() < 1e-9) {
             (true, true) => format!("\u{b1}{maximum}"),
             (true, false) => format!("{minimum} to {maximum}"),

@@ -31,7 +31,7 @@ pub(super) fn all(flight: &Flight, info: &Info) -> Vec<Section> {
     let text = Option::unwrap_or_default;
     let sections = [
         ("first", "", first::html(flight, info, &drawn)),
-        ("burn", "Burn", burn::words(flight)),
+        ("burn", if flight.ignition_s.is_some() { "Burn" } else { "Flight" }, burn::words(flight)),
         ("fall", "Fall", String::new()),
         ("sensors", "Sensors and estimator", text(estimate::used(flight))),
         ("solver", "Solver", text(burn::plans(flight))),

@@ -239,7 +239,7 @@ fn of_the_rest(flight: &Flight) -> Vec<Picture<'_>> {
         over("solver", Burn, "From posing a plan to taking it over, ms")
             .limits(timings.first().map(|timing| 1e3 * timing.deadline_s))
             .only(took.collect()),
-        over("battery", Whole, "Battery, V").only(flight.framed(|frame| frame.input.battery_v)),
+        over("battery", Whole, "Battery voltage, V").only(flight.framed(|frame| frame.input.battery_v)),
         Picture { chart: vibration(flight), ..over("battery", Whole, "") },
         over("link", Whole, "Age of the last heartbeat, s").only(flight.heard(|told| told.link_age_s)),
         over("link", Whole, "Frames lost, %").only(flight.heard(|told| Some(100.0 * told.link_loss?))),

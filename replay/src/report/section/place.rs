@@ -16,6 +16,9 @@ const STAGES: [Stage; 4] = [
     ("parachute", "d", |phase| phase == Phase::Chute),
 ];
 
+/// The title of the map.
+const WHOLE: &str = "Place from above, m";
+
 /// The place from above: inside its fence, and closer.
 pub(super) fn maps(flight: &Flight) -> String {
     let fence_m = flight.pilot.as_ref().map(|pilot| pilot.mission().gate.fence_radius_m);
@@ -41,8 +44,8 @@ pub(super) fn maps(flight: &Flight) -> String {
         arrow: arrow.clone(),
         ..Chart::default()
     };
-    let whole = fence.map(|fence| picture("Place from above, m", Some(fence)).svg());
-    whole.unwrap_or_default() + &picture("The same closer, m", None).svg()
+    let Some(fence) = fence else { return picture(WHOLE, None).svg() };
+    picture(WHOLE, Some(fence)).svg() + &picture("The same closer, m", None).svg()
 }
 
 /// The pad, where the first plan ends, and where it came down; with their names, if there is room.
@@ -76,7 +79,8 @@ pub(super) fn moments_table(flight: &Flight) -> String {
     }
     let row = |(name, sample): (&str, &Sample)| {
         let [north, east, height_m, level_m_s, up_m_s, ..] = sample.state;
-        let cells = [height_m, north, east, level_m_s, up_m_s].map(|value| format!("{:.1}", value + 0.0));
+        let cells = [height_m, north, east, level_m_s, up_m_s]
+            .map(|value| format!("{:.1}", (10.0 * value).round() / 10.0 + 0.0));
         [name.to_owned(), format!("{:.2}", flight.axis_s(sample.time_s))].into_iter().chain(cells).collect()
     };
     let time = format!("#{}", flight.axis_name());
