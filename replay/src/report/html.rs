@@ -82,20 +82,11 @@ const NO_DATE_NS: u64 = 1_000_000_000_000_000_000;
 /// What flew, when, where, and what wrote it.
 fn about(flight: &Flight, info: &Info) -> Vec<String> {
     let name = info.profile.as_ref().and_then(|profile| profile.name.clone());
-    let begun = info.span.filter(|span| span.first_ns > NO_DATE_NS).map(|span| {
-        let utc = utc(span.first_ns);
-        let (date, time) = utc.split_once('T').unwrap_or((&utc, ""));
-        format!("{date} {} UTC", time.get(..5).unwrap_or_default())
-    });
+    let begun = info.span.filter(|span| span.first_ns > NO_DATE_NS).map(|span| utc(span.first_ns));
+    let begun = begun.map(|utc| format!("{} UTC", utc.get(..16).unwrap_or(&utc).replace('T', " ")));
     let place = flight.pilot.as_ref().map(|pilot| {
         let (start, site) = (pilot.mission().start.at.name(), pilot.mission().site);
-        let side =
-            |deg: f64, sides: [&str; 2]| format!("{:.4}\u{b0} {}", deg.abs(), sides[usize::from(deg < 0.0)]);
-        format!(
-            "from {start}, {} {}",
-            side(site.latitude_deg, ["N", "S"]),
-            side(site.longitude_deg, ["E", "W"])
-        )
+        format!("from {start} at {:.4}, {:.4}", site.latitude_deg, site.longitude_deg)
     });
     let run = info.run.iter().filter(|(key, value)| *key != "profile" && !value.is_empty());
     let run: Vec<String> = run.map(|(key, value)| format!("{key} {value}")).collect();

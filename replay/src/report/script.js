@@ -16,12 +16,11 @@
   const numbers = (text) => (text.match(/-?[\d.]+/g) || []).map(Number);
 
   // The pictures, and the lines in them.
-  const figures = [...document.querySelectorAll("figure[data-axes]")].map((figure) => {
+  const figures = [...document.querySelectorAll("figure[data-axes]:not([data-axes=''])")].map((figure) => {
     const plot = figure.querySelector(".plot"), box = numbers(plot.getAttribute("viewBox")), over = figure.dataset.axes === "time";
     const lines = [...plot.querySelectorAll(".l")].map((path) => path.getAttribute("d").split("M").slice(1).map((piece) => {
-      const d = numbers(piece.replace(/-/g, " -")), points = [[d[0], d[1]]];
-      for (let k = 2; k + 1 < d.length; k += 2) { const before = points[points.length - 1]; points.push([before[0] + d[k], before[1] + d[k + 1]]); }
-      return points;
+      const d = numbers(piece);
+      return d.filter((_, k) => k % 2).map((y, k) => [d[2 * k], y]);
     }));
     return { figure, plot, lines, over, wide: box[2], high: box[3], x: numbers(figure.dataset.x), y: numbers(figure.dataset.y), seen: null,
       shows: over ? null : numbers(figure.dataset.axes), values: figure.querySelectorAll("figcaption i"),
@@ -140,7 +139,11 @@
     figure.className = "vehicle";
     figure.innerHTML = `<figcaption><b>Vehicle at this time</b> <span></span></figcaption><svg viewBox="0 0 ${SIZE} ${SIZE}"></svg>`;
     maps.append(figure);
-    const svg = figure.querySelector("svg"), words = figure.querySelector("span"), r = shape.diameter / 2;
+    const svg = figure.querySelector("svg"), words = figure.querySelector("span");
+    const [[trunk, fin, gimbal, legs], middle_m, booster_m, most_n] = shape, long = trunk.length_m, r = trunk.diameter_m / 2;
+    // Open fin i stands so far from the y axis, in the quarter that its number says.
+    const stands = (fin.from_y_deg - fin.hinge_off_deg) * Math.PI / 180;
+    const outward = [[-1, 1], [-1, -1], [1, -1], [1, 1]].map(([b, c]) => [b * Math.cos(stands), c * Math.sin(stands)]);
     const hull = (points) => {
       const sorted = [...points].sort((a, b) => a[0] - b[0] || a[1] - b[1]);
       const half = (list) => list.reduce((kept, p) => {
@@ -164,8 +167,8 @@
         -(2 * (qx * qy + qw * qz) * a + (1 - 2 * (qx * qx + qz * qz)) * b + 2 * (qy * qz - qw * qx) * c), // east is against y
         2 * (qx * qz - qw * qy) * a + 2 * (qy * qz + qw * qx) * b + (1 - 2 * (qx * qx + qy * qy)) * c];
       const [sin, cos] = [Math.sin(side), Math.cos(side)], DOWN = 0.2; // the eye looks down a little
-      const tail = booster > 0.5 && shape.booster ? -shape.booster : 0, center = (shape.length + tail) / 2;
-      const on = thrust > 0.5, scale = 150 / (1.2 * shape.length - tail);
+      const tail = booster > 0.5 && booster_m ? -booster_m : 0, center = (long + tail) / 2;
+      const on = thrust > 0.5, scale = 150 / (1.2 * long - tail);
       const seen = ([north, east, up]) => {
         const right = east * cos + north * sin, away = north * cos - east * sin;
         return [SIZE / 2 + scale * right, SIZE / 2 - scale * (up * Math.cos(DOWN) + away * Math.sin(DOWN)), away];
@@ -176,33 +179,33 @@
       const solid = (name, ...rings) => add(name, hull(rings.flat().map(body)));
       const bell = (along, radius) => { // a ring about the axis of the motor, which turns about its pivot
         const [p, q] = [pitch, yaw].map((deg) => deg * Math.PI / 180);
-        return ring(0, radius).map(([, b, c]) => [shape.pivot - along, b - along * Math.sin(q), c + along * Math.sin(p)]);
+        return ring(0, radius).map(([, b, c]) => [gimbal.pivot_station_m - along, b - along * Math.sin(q), c + along * Math.sin(p)]);
       };
-      if (tail) { solid("metal", ring(tail, r), ring(0, r)); if (on) solid("fire", ring(tail, 0.6 * r), ring(tail - 0.6 * shape.length, 0)); }
+      if (tail) { solid("metal", ring(tail, r), ring(0, r)); if (on) solid("fire", ring(tail, 0.6 * r), ring(tail - 0.6 * long, 0)); }
       else {
-        solid("metal", bell(0, 0.5 * r), bell(shape.pivot + r, 0.7 * r));
-        if (on) solid("fire", bell(shape.pivot + r, 0.6 * r), bell(shape.pivot + r + 0.7 * shape.length * thrust / shape.thrust, 0));
+        solid("metal", bell(0, 0.5 * r), bell(gimbal.pivot_station_m + r, 0.7 * r));
+        if (on) solid("fire", bell(gimbal.pivot_station_m + r, 0.6 * r), bell(gimbal.pivot_station_m + r + 0.7 * long * thrust / most_n, 0));
         for (const [b, c] of [[1, 0], [0, 1], [-1, 0], [0, -1]]) {
-          const [foot, out] = shape.foot, hip = 0.3 * shape.length;
+          const [foot, out] = [legs.foot_station_m, legs.foot_radius_m], hip = 0.3 * long;
           add("leg", [[hip, b * r, c * r], [foot, b * out, c * out], [0.02, b * r, c * r]].map(body), false);
         }
       }
-      solid("skin", ring(0, r), ring(0.78 * shape.length, r));
-      solid("band", ring(0.55 * shape.length, r), ring(0.6 * shape.length, r));
-      solid("band", ring(0.78 * shape.length, r), ring(0.9 * shape.length, 0.7 * r), ring(shape.length, 0));
-      shape.fins.forEach(([b, c], k) => {
-        const [hinge, length] = shape.fin, open = fins[k] * Math.PI / 180, half = 0.5 * r;
+      solid("skin", ring(0, r), ring(0.78 * long, r));
+      solid("band", ring(0.55 * long, r), ring(0.6 * long, r));
+      solid("band", ring(0.78 * long, r), ring(0.9 * long, 0.7 * r), ring(long, 0));
+      outward.forEach(([b, c], k) => {
+        const [hinge, length] = [fin.station_m, fin.length_m], open = fins[k] * Math.PI / 180, half = 0.5 * r;
         const out = r + length * Math.sin(open), back = hinge - length * Math.cos(open);
         add("metal", [[hinge, r, half], [back, out, half], [back, out, -half], [hinge, r, -half]].map(([s, o, side]) => body([s, o * b - side * c, o * c + side * b])));
       });
       if (chute > 0.05) {
-        const top = body([shape.length, 0, 0]), span = 55 * Math.sqrt(chute);
+        const top = body([long, 0, 0]), span = 55 * Math.sqrt(chute);
         for (const share of [-1, 0, 1]) made(svg, "path", { class: "leg", d: `M${top[0]} ${top[1]}L${top[0] + share * span} ${top[1] - 45}` });
         made(svg, "path", { class: "band", d: `M${top[0] - span} ${top[1] - 45}a${span} ${span * 0.6} 0 0 1 ${2 * span} 0z` });
       }
       // The ground, if it is near: where the feet of the upright vehicle would stand on it.
-      const under = shape.middle - shape.foot[0] + height, middle = world([shape.middle - center, 0, 0]);
-      const floor = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11].map((k) => seen([shape.length * Math.cos(k * Math.PI / 6), shape.length * Math.sin(k * Math.PI / 6), middle[2] - under]));
+      const under = middle_m - legs.foot_station_m + height, middle = world([middle_m - center, 0, 0]);
+      const floor = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11].map((k) => seen([long * Math.cos(k * Math.PI / 6), long * Math.sin(k * Math.PI / 6), middle[2] - under]));
       const path = (name, points, closed) => made(svg, "path", { class: name, d: "M" + points.map((p) => `${p[0].toFixed(1)} ${p[1].toFixed(1)}`).join("L") + (closed ? "Z" : "") });
       if (floor[0][1] < SIZE + 30) path("floor", floor, true);
       // The far ones first; the body's bands lie on its skin.

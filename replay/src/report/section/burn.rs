@@ -6,66 +6,65 @@ use nalgebra::Vector3;
 
 use super::HEIGHT;
 use super::pictures::PLANNED;
-use crate::report::chart::{Axes, Chart, line};
+use crate::report::chart::{Chart, line};
 use crate::report::html::{charts, paragraph};
 use crate::report::track::{Flight, Part, Sample, Series, State, Thought, planned};
 
 /// A plan that ends this far below the ground ends on it, m.
 const GROUND_M: f64 = 0.05;
 
+/// Ends a line.
+const GAP: (f64, f64) = (f64::NAN, f64::NAN);
+
 const PLANS_DRAWN: usize = 8;
 
-/// Where the nose points is drawn this often, s, as a line of this length, m.
-const NOSE_EACH_S: f64 = 0.4;
+/// Where the nose points is drawn so many times, as a line of this length, m.
+const NOSES_DRAWN: usize = 16;
 const NOSE_M: f64 = 4.0;
 
-/// The views of a path: which components are to the right and up, and the name of the first.
-const VIEWS: [(&str, [usize; 2], &str); 3] = [
-    ("Path from the south, m", [1, HEIGHT], "east, m"),
-    ("Path from the east, m", [0, HEIGHT], "north, m"),
-    ("Path from above, m", [1, 0], "east, m"),
+/// The views of a path: its axes, as words and as numbers, and the name of the first.
+const VIEWS: [(&str, &str, [usize; 2], &str); 3] = [
+    ("Path from the south, m", "1 2", [1, 2], "east, m"),
+    ("Path from the east, m", "0 2", [0, 2], "north, m"),
+    ("Path from above, m", "1 0", [1, 0], "east, m"),
 ];
 
 /// The flights' paths to their landings, each with its name and class, from three sides; of a single flight with its plans and
 /// its attitude.
 pub(super) fn paths(flights: &[(&'static str, &'static str, &Flight)]) -> String {
-    let picture = |(title, [right, up], x_name): (&str, [usize; 2], &'static str)| {
+    let picture = |(title, axes, [right, up], x_name): (&str, &'static str, [usize; 2], &'static str)| {
         let see = |state: &State| (state[right], state[up]);
-        let part = |flight: &Flight, sample: &&Sample| {
-            [Part::Burn, Part::Air].iter().all(|part| flight.has(*part, sample.time_s))
+        let flown = |flight: &'_ Flight| -> Vec<Sample> {
+            let parts = [Part::Burn, Part::Air];
+            let shown = |sample: &&Sample| parts.iter().all(|part| flight.has(*part, sample.time_s));
+            flight.track.iter().filter(shown).copied().collect()
         };
         let mut lines = Vec::new();
-        for (.., flight) in flights.iter().filter(|_| flights.len() == 1) {
-            let made = flight.made();
-            let drawn = made.iter().skip(1).step_by(made.len().div_ceil(PLANS_DRAWN).max(1));
+        if let [(.., flight)] = flights {
+            let (made, flown) = (flight.made(), flown(flight));
             let path = |(_, plan): &(&Thought, &Plan)| -> Series {
                 // A plan that does not land ends below the ground.
                 let above = plan.states().iter().map(planned).take_while(|state| state[HEIGHT] >= -GROUND_M);
-                above.map(|state| see(&state)).chain([(f64::NAN, f64::NAN)]).collect()
+                above.map(|state| see(&state)).chain([GAP]).collect()
             };
-            lines.push(line("later plans", "thin", drawn.flat_map(path).collect()));
+            let nose = |sample: &Sample| {
+                let nose = sample.attitude? * Vector3::x();
+                // East is against y.
+                let along = [nose.x, -nose.y, nose.z].map(|share| NOSE_M * share);
+                let (x, y) = see(&sample.state);
+                Some([(x, y), (x + along[right], y + along[up]), GAP])
+            };
+            let every = |all: usize, drawn: usize| all.div_ceil(drawn).max(1);
+            let later = made.iter().skip(1).step_by(every(made.len(), PLANS_DRAWN)).flat_map(path);
+            let noses = flown.iter().step_by(every(flown.len(), NOSES_DRAWN)).filter_map(nose).flatten();
+            lines.push(line("later plans", "thin", later.collect()));
             lines.push(line(PLANNED, "b", made.first().map(path).unwrap_or_default()));
-            let mut next_s = flight.ignition_s.unwrap_or(f64::INFINITY);
-            let mut noses = Series::new();
-            for sample in flight.track.iter().filter(|sample| part(flight, sample)) {
-                if let Some(attitude) = sample.attitude.filter(|_| sample.time_s >= next_s) {
-                    next_s += NOSE_EACH_S;
-                    // East is against y.
-                    let nose = attitude.to_rotation_matrix() * Vector3::x();
-                    let along = [nose.x, -nose.y, nose.z];
-                    let (x, y) = see(&sample.state);
-                    let end = (x + NOSE_M * along[right], y + NOSE_M * along[up]);
-                    noses.extend([(x, y), end, (f64::NAN, f64::NAN)]);
-                }
-            }
-            lines.push(line("nose", "nose", noses));
+            lines.push(line("nose", "nose", noses.collect()));
         }
         lines.extend(flights.iter().map(|(name, class, flight)| {
-            let flown = flight.track.iter().filter(|sample| part(flight, sample));
-            line(name, class, flown.map(|sample| see(&sample.state)).collect())
+            line(name, class, flown(flight).iter().map(|sample| see(&sample.state)).collect())
         }));
         let title = if flights.len() > 1 { format!("Both: {title}") } else { title.to_owned() };
-        let axes = Axes::Ground([right, up]);
         Chart { title, axes, x_name, size_px: Some((348.0, 300.0)), lines, ..Chart::default() }.svg()
     };
     charts(&VIEWS.map(picture).concat())
@@ -86,23 +85,14 @@ fn thrust(flight: &Flight) -> String {
     let (Some(pilot), Some(_)) = (&flight.pilot, flight.ignition_s) else {
         return "The log has no ignition, or no profile that says how strong the motor should be.".to_owned();
     };
-    let mut words = Vec::new();
-    if pilot.motor().ignition_s().is_some() {
-        let [impulse, burn_time] = pilot.scales();
-        words.push(format!(
-            "Inferred at the end: impulse {impulse:.3} and burn time {burn_time:.3} of expected."
-        ));
-        words.extend(another_curve([impulse, burn_time], pilot.mission(), pilot.other_curve()));
+    if pilot.motor().ignition_s().is_none() {
+        return String::new();
     }
-    let world = &flight.recording.world;
-    let pairs =
-        world.windows(2).map(|pair| (pair[0].thrust_n + pair[1].thrust_n, pair[1].time_s - pair[0].time_s));
-    let impulse_n_s: f64 = pairs.map(|(twice_n, dt_s)| 0.5 * twice_n * dt_s).sum();
-    if impulse_n_s > 0.0 && world.last().is_some_and(|last| last.thrust_n <= 0.0) {
-        let scale = impulse_n_s / pilot.mission().motor_curve.total_impulse_n_s();
-        words.push(format!("Actual impulse: {scale:.3} of expected."));
-    }
-    words.join(" ")
+    let [impulse, burn_time] = pilot.scales();
+    let another = another_curve([impulse, burn_time], pilot.mission(), pilot.other_curve());
+    let inferred =
+        format!("Inferred at the end: impulse {impulse:.3} and burn time {burn_time:.3} of expected. ");
+    inferred + &another.unwrap_or_default()
 }
 
 /// That the motor flew another curve than expected, if it did, and what had confirmed that curve.

@@ -35,36 +35,32 @@ fn verdict(flight: &Flight, info: &Info) -> String {
         // It stands, and its legs were not designed for it.
         Some(_) | None => "",
     };
-    let mut words = Vec::new();
-    if let Some(verdict) = &info.verdict {
-        let sorted = worst_first(verdict.of_the_legs());
-        let (all, broken) = (sorted.len(), sorted.iter().filter(|(limit, _)| !limit.passed).count());
-        // A limit that allows nothing has no share, and is in the ending.
-        if let Some((worst, share)) = sorted.iter().find(|(_, share)| share.is_finite()) {
-            let far =
-                if *share > 1.0 { over(*share) } else { format!("{:.0} % of its limit", 100.0 * share) };
-            let value = measured(worst);
-            words.push(format!(
-                "Worst of the legs' limits: {} {value}, {far}; {broken} of {all} broken.",
-                worst.name
-            ));
-        }
+    let legs = info.verdict.iter().flat_map(Verdict::of_the_legs);
+    let (sorted, mut words) = (worst_first(legs), String::new());
+    let (all, broken) = (sorted.len(), sorted.iter().filter(|(limit, _)| !limit.passed).count());
+    // A limit that allows nothing has no share, and is in the ending.
+    if let Some((worst, share)) = sorted.iter().find(|(_, share)| share.is_finite()) {
+        let far = if *share > 1.0 { over(*share) } else { format!("{:.0} % of its limit", 100.0 * share) };
+        let (name, value) = (&worst.name, measured(worst));
+        words.extend([format!(
+            "Worst of the legs' limits: {name} {value}, {far}; {broken} of {all} broken. "
+        )]);
     }
     if let Some(first) = info.findings.iter().flatten().next() {
-        words.push(format!("First sign: {}, at T+{:.2} s.", first.words, first.since_s));
+        words.extend([format!("First sign: {}, at T+{:.2} s. ", first.words, first.since_s)]);
     }
-    match &info.verdict {
-        Some(verdict) => {
+    words += &info.verdict.as_ref().map_or_else(
+        || {
+            "The vehicle did not touch down while it was recorded, or its verdict was not recorded."
+                .to_owned()
+        },
+        |verdict| {
             let place = flight.contact().map(|[north, east, ..]| libm::hypot(north, east));
             let place = place.map_or_else(String::new, |place_m| format!(", {place_m:.1} m from the pad"));
-            words.push(format!("Touchdown at {}{place}.", info.clocks.words(verdict.contact())));
-        }
-        None => words.push(
-            "The vehicle did not touch down while it was recorded, or its verdict was not recorded."
-                .to_owned(),
-        ),
-    }
-    format!("<h1 class=\"verdict{class}\">{}</h1>\n", escaped(ending)) + &paragraph(&words.join(" "))
+            format!("Touchdown at {}{place}.", info.clocks.words(verdict.contact()))
+        },
+    );
+    format!("<h1 class=\"verdict{class}\">{}</h1>\n", escaped(ending)) + &paragraph(&words)
 }
 
 /// The findings, numbered as in the pictures, and below them the picture that shows the first.

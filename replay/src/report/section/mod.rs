@@ -1,12 +1,12 @@
 //! The sections of a report, in the order they are read.
 
 mod burn;
-mod estimate;
 mod first;
 pub(super) mod motion;
 pub(super) mod overlay;
 mod pictures;
 mod place;
+mod vibration;
 mod whole;
 
 use super::html::{charts, paragraph};
@@ -33,7 +33,7 @@ pub(super) fn all(flight: &Flight, info: &Info) -> Vec<Section> {
         ("first", "", first::html(flight, info, &drawn)),
         ("burn", if flight.ignition_s.is_some() { "Burn" } else { "Flight" }, burn::words(flight)),
         ("fall", "Fall", String::new()),
-        ("sensors", "Sensors and estimator", text(estimate::used(flight))),
+        ("sensors", "Sensors and estimator", String::new()),
         ("solver", "Solver", text(burn::plans(flight))),
         ("battery", "Battery and vibration", String::new()),
         ("link", "Link", String::new()),

@@ -41,25 +41,13 @@ pub(in crate::report) fn json(flight: &Flight) -> String {
     let spans = flight.spans.iter().map(|span| json!([span.name, span.from, span.to]));
     let burn_s = flight.ignition_s.zip(flight.touchdown_s);
     let at_s = burn_s.map(|(from_s, to_s)| flight.axis_s(from_s + 0.4 * (to_s - from_s)));
-    json!({ "shape": shape(flight), "phases": spans.collect::<Value>(), "at": at_s, "rows": rows })
-        .to_string()
-}
-
-/// Lengths and stations along the axis, m, and where the open fins stand (body y and z); nothing without a mission.
-fn shape(flight: &Flight) -> Option<Value> {
-    let mission = flight.pilot.as_ref()?.mission();
-    let airframe = &mission.airframe;
-    let propellant_kg = mission.motor_curve.propellant_mass_kg();
-    let stand = [0, 1, 2, 3].map(|fin| airframe.fin_model().outward(fin));
-    Some(json!({
-        "length": airframe.body.length_m,
-        "diameter": airframe.body.diameter_m,
-        "middle": MassModel::new(&airframe.mass, propellant_kg).at(propellant_kg).cg_station_m,
-        "pivot": airframe.gimbal.pivot_station_m,
-        "foot": [airframe.legs.foot_station_m, airframe.legs.foot_radius_m],
-        "fin": [airframe.fins.station_m, airframe.fins.length_m],
-        "fins": stand,
-        "booster": mission.launched().map(|launch| launch.booster.length_m),
-        "thrust": mission.motor_curve.peak_thrust_n(),
-    }))
+    let shape = flight.pilot.as_ref().map(|pilot| {
+        let (airframe, curve) = (&pilot.mission().airframe, &pilot.mission().motor_curve);
+        let propellant_kg = curve.propellant_mass_kg();
+        let dry = MassModel::new(&airframe.mass, propellant_kg).at(propellant_kg);
+        let booster_m = pilot.mission().launched().map(|launch| launch.booster.length_m);
+        let parts = json!([airframe.body, airframe.fins, airframe.gimbal, airframe.legs]);
+        json!([parts, dry.cg_station_m, booster_m, curve.peak_thrust_n()])
+    });
+    json!({ "shape": shape, "phases": spans.collect::<Value>(), "at": at_s, "rows": rows }).to_string()
 }

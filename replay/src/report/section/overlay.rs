@@ -3,7 +3,7 @@
 use super::burn::paths;
 use super::pictures;
 use crate::info::Info;
-use crate::report::chart::{Chart, line};
+use crate::report::chart::{Chart, TIME, line};
 use crate::report::html::{charts, escaped, paragraph, table};
 use crate::report::track::Flight;
 
@@ -28,7 +28,7 @@ pub(in crate::report) fn html(flights: [LogFacts<'_>; 2]) -> String {
             Some(line(name, class, picture.chart.lines.last()?.points.clone()))
         });
         let (title, lines) = (format!("Both: {}", a.chart.title), flown.collect());
-        Chart { title, x_name: axis, lines, ..Chart::default() }.svg()
+        Chart { title, axes: TIME, x_name: axis, lines, ..Chart::default() }.svg()
     });
     table(&["", "log", "ending"], rows)
         + &paragraph(&format!("Each flight has its own {axis}."))

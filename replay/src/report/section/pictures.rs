@@ -3,16 +3,15 @@
 use avionics::log::logged::state_from_log;
 use flight::computer::pilot::Pilot;
 use flight::estimation::estimator::Estimate;
-use flight::guidance::powered::Plan;
 use flight::vehicle::rigid::RigidState;
-use protocol::log::flight_v1::{AidStatus, Measurements, TruthSample, Vector3};
+use protocol::log::flight_v1::AidStatus;
 
-use super::estimate::vibration;
 use super::place::moments;
+use super::vibration::vibration;
 use super::{COMPONENTS, DEGREES, HEIGHT};
 use crate::findings::FINS;
 use crate::log::{Clock, ClockTime};
-use crate::report::chart::{Chart, line};
+use crate::report::chart::{Chart, TIME, line};
 use crate::report::track::Part::{Air, Burn, Whole};
 use crate::report::track::{Flight, Part, Sample, Series, Thought, planned};
 
@@ -47,6 +46,7 @@ impl<'a> Picture<'a> {
         });
         let chart = Chart {
             title: title.to_owned(),
+            axes: TIME,
             x_name: flight.axis_name(),
             marks: marks.into_iter().flatten().chain(notes).collect(),
             signs: flight.signs.clone(),
@@ -89,8 +89,7 @@ fn of_landing(flight: &Flight) -> Vec<Picture<'_>> {
         .line("barometer", "thin", flight.framed(|frame| frame.input.measured.pressure_altitude_m))
         .line("flown", "a", flight.flown(|state| state[HEIGHT]))
         .line(PLANNED, "b", flight.planned_first(|state| state[HEIGHT]));
-    let shown =
-        moments(flight).into_iter().filter(|(name, _)| ["separation", "apogee", "ignition"].contains(name));
+    let shown = moments(flight).into_iter().filter(|(name, _)| ["apogee", "ignition"].contains(name));
     let place = |(name, sample): (&str, &Sample)| {
         let height_m = sample.state[HEIGHT];
         (flight.axis_s(sample.time_s), height_m, "place", format!("{name} {height_m:.0} m"))
@@ -125,24 +124,14 @@ fn of_landing(flight: &Flight) -> Vec<Picture<'_>> {
     }
     if let Some((contact, contact_s)) = flight.contact().zip(flight.touchdown_s) {
         // After contact the ground determines the motion.
-        let ends = |value: &dyn Fn(f64, &Plan) -> Option<f64>| {
+        let off = |component: usize| {
             flight.thought(|thought| {
                 let plan = thought.plan.as_ref().filter(|_| thought.time_s < contact_s)?;
-                value(thought.time_s, plan)
+                Some(planned(plan.states().last()?)[component] - contact[component])
             })
         };
-        let off = |component: usize| {
-            ends(&|_, plan| Some(planned(plan.states().last()?)[component] - contact[component]))
-        };
-        pictures.push(
-            over("burn", Burn, "Where each plan ends, less where it did, m").line("north", "a", off(0)).line(
-                "east",
-                "b",
-                off(1),
-            ),
-        );
-        let late = ends(&|time_s, plan| Some(time_s + plan.left_s(time_s) - contact_s));
-        pictures.push(over("burn", Burn, "When each plan ends, less when it did, s").only(late));
+        let ends = over("burn", Burn, "Where each plan ends, less where it did, m");
+        pictures.push(ends.line("north", "a", off(0)).line("east", "b", off(1)));
     }
     pictures
 }
@@ -164,13 +153,7 @@ fn of_the_rest(flight: &Flight) -> Vec<Picture<'_>> {
         let falls = thought.phase.is_some_and(|phase| !phase.before_apogee());
         thought.estimate.filter(|_| falls).map(|estimate| estimate.wind_m_s)
     };
-    let off = |value: &dyn Fn(&Measurements, &TruthSample) -> Option<f64>| {
-        flight.framed(|frame| value(&frame.input.measured, flight.world_at(frame.input.time_s)?))
-    };
     // East is against y.
-    let fix = |along: fn(&Vector3) -> f64| {
-        off(&|it, truth| Some(along(&it.gnss.as_ref()?.position_m) - along(&truth.state.position_m)))
-    };
     let wrong = |of: fn(&RigidState, &RigidState) -> f64| {
         let truth = |thought: &Thought| Some(state_from_log(&flight.world_at(thought.time_s)?.state));
         flight.thought(|thought| Some(of(&thought.estimate?.state, &truth(thought)?)))
@@ -212,25 +195,10 @@ fn of_the_rest(flight: &Flight) -> Vec<Picture<'_>> {
             .line("roll", "a", estimated(|estimate| DEGREES * estimate.gyro_bias_rad_s.x))
             .line("pitch", "b", estimated(|estimate| DEGREES * estimate.gyro_bias_rad_s.y))
             .line("yaw", "c", estimated(|estimate| DEGREES * estimate.gyro_bias_rad_s.z)),
-        over("sensors", Air, "Sensed height less true, m")
-            .line(
-                "barometer",
-                "a",
-                off(&|it, truth| Some(it.pressure_altitude_m? - truth.state.position_m.z)),
-            )
-            .line("lidar range", "c", off(&|it, truth| Some(it.lidar_range_m? - truth.height_m))),
-        over("sensors", Air, "GNSS place less true, m")
-            .line("north", "a", fix(|at| at.x))
-            .line("east", "b", fix(|at| -at.y))
-            .line("up", "c", fix(|at| at.z)),
         over("sensors", Air, "Estimated place less true, m")
             .line("north", "a", wrong(|estimate, truth| estimate.position_m.x - truth.position_m.x))
             .line("east", "b", wrong(|estimate, truth| truth.position_m.y - estimate.position_m.y))
             .line("up", "c", wrong(|estimate, truth| estimate.position_m.z - truth.position_m.z)),
-        over("sensors", Air, "Estimated velocity less true, m/s")
-            .line("north", "a", wrong(|estimate, truth| estimate.velocity_m_s.x - truth.velocity_m_s.x))
-            .line("east", "b", wrong(|estimate, truth| truth.velocity_m_s.y - estimate.velocity_m_s.y))
-            .line("up", "c", wrong(|estimate, truth| estimate.velocity_m_s.z - truth.velocity_m_s.z)),
         over("sensors", Air, "Estimated nose from the true one, deg").only(wrong(|estimate, truth| {
             let cosine = estimate.nose_in_world().dot(&truth.nose_in_world());
             DEGREES * libm::acos(cosine.clamp(-1.0, 1.0))
@@ -260,19 +228,19 @@ pub(super) fn surface_deg(flight: &Flight, surface: usize) -> [Series; 2] {
     };
     let recording = &flight.recording;
     if !recording.world.is_empty() {
-        return [
+        [
             flight.truth(|sample| deg(&sample.gimbal_actual_rad, &sample.fins_actual_rad)),
             flight.truth(|sample| deg(&sample.gimbal_commanded_rad, &sample.fins_commanded_rad)),
-        ];
-    }
-    if !recording.frames.is_empty() {
-        return [
+        ]
+    } else if !recording.frames.is_empty() {
+        [
             flight.framed(|frame| deg(&frame.input.gimbal_rad, &frame.input.fins_rad)),
             flight.framed(|frame| deg(&frame.output.gimbal_rad, &frame.output.fins_rad)),
-        ];
+        ]
+    } else {
+        [
+            flight.heard(|told| deg(&told.gimbal_measured_rad, &told.fin_measured_rad)),
+            flight.heard(|told| deg(&told.gimbal_commanded_rad, &told.fin_commanded_rad)),
+        ]
     }
-    [
-        flight.heard(|told| deg(&told.gimbal_measured_rad, &told.fin_measured_rad)),
-        flight.heard(|told| deg(&told.gimbal_commanded_rad, &told.fin_commanded_rad)),
-    ]
 }

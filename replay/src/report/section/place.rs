@@ -2,7 +2,7 @@
 
 use flight::rules::phase::Phase;
 
-use crate::report::chart::{Axes, Chart, Line, line};
+use crate::report::chart::{Chart, Line, line};
 use crate::report::html::table;
 use crate::report::track::{Flight, Part, Sample, State, planned};
 
@@ -36,10 +36,10 @@ pub(super) fn maps(flight: &Flight) -> String {
     let arrow = wind.map(|(east, north)| (east, north, format!("wind {:.1} m/s", libm::hypot(east, north))));
     let picture = |title: &str, more: Option<Line>| Chart {
         title: title.to_owned(),
-        axes: Axes::Ground([1, 0]),
+        axes: "1 0",
         x_name: "east, m",
         size_px: Some((196.0, 196.0)),
-        places: places(flight, more.is_none()),
+        places: places(flight),
         lines: stages(flight).into_iter().chain(more).collect(),
         arrow: arrow.clone(),
         ..Chart::default()
@@ -48,13 +48,13 @@ pub(super) fn maps(flight: &Flight) -> String {
     picture(WHOLE, Some(fence)).svg() + &picture("The same closer, m", None).svg()
 }
 
-/// The pad, where the first plan ends, and where it came down; with their names, if there is room.
-fn places(flight: &Flight, named: bool) -> Vec<(f64, f64, &'static str, String)> {
+/// The pad, where the first plan ends, and where it came down.
+fn places(flight: &Flight) -> Vec<(f64, f64, &'static str, String)> {
     let end = flight.made().first().and_then(|(_, plan)| Some(planned(plan.states().last()?)));
     let known = [(Some([0.0; 7]), "pad"), (end, "planned"), (flight.contact(), "touchdown")];
     let place = |(state, kind): (Option<State>, &'static str)| {
         let [north, east, ..] = state?;
-        Some((east, north, kind, if named { kind.to_owned() } else { String::new() }))
+        Some((east, north, kind, kind.to_owned()))
     };
     known.into_iter().filter_map(place).collect()
 }

@@ -1,25 +1,11 @@
-//! What was used of the sensors; vibration.
+//! Vibration.
 
 use avionics::log::frame::phase_of;
 use flight::rules::phase::Phase;
 use protocol::log::computer_v1::ComputerFrame;
 
-use crate::report::chart::{Axes, Chart, line};
-use crate::report::html::table;
+use crate::report::chart::{Chart, line};
 use crate::report::track::Flight;
-
-/// What was used of each sensor.
-pub(super) fn used(flight: &Flight) -> Option<String> {
-    let aids = flight.pilot.as_ref()?.estimator().aids();
-    let rows = [
-        ("barometer", aids.barometer),
-        ("GNSS velocity", aids.gnss_velocity),
-        ("GNSS position", aids.gnss_position),
-        ("lidar", aids.lidar),
-    ];
-    let rows = rows.map(|(name, aid)| [name.to_owned(), aid.used.to_string(), aid.refused.to_string()]);
-    Some(table(&["measurement", "#used", "#refused"], rows))
-}
 
 /// Samples of one spectrum, 1.28 s at 200 Hz.
 const SEGMENT: usize = 256;
@@ -35,7 +21,6 @@ pub(super) fn vibration(flight: &Flight) -> Chart {
     let lines = vec![felt("descent", "a", Phase::in_descent), felt("burn", "b", Phase::in_landing_burn)];
     Chart {
         title: "Specific force along the nose, m/s\u{b2} per \u{221a}Hz".to_owned(),
-        axes: Axes::Own,
         x_name: "Hz",
         lines,
         ..Chart::default()
