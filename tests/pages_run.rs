@@ -74,7 +74,6 @@ const SAID: [(&str, &str); 20] = [
     ("replay verify flight.mcap ", "frames identical"),
     ("replay verify flight.mcap --explain", "identical bit for bit"),
     ("replay recover cut.mcap", "whole.mcap"),
-    ("replay cut flight.mcap", "`replay verify` runs the flight computer again"),
     ("replay compare mk2 mk3", "mk3 differs from mk2 in"),
     ("replay refly flight.mcap --without-fault gnss-out", "flown again"),
     ("replay compare flight.mcap without.mcap --tolerances tolerances.toml", "without.mcap"),

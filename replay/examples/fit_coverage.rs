@@ -52,7 +52,7 @@ fn tallied(recipe: &Recipe, flights: u64, fitted: fn(&Trace) -> Fit) -> anyhow::
     let one = |number: &u64| -> anyhow::Result<(Fit, BTreeMap<String, f64>)> {
         let (trace, flight) = flown(recipe, *number)?;
         let fit = fitted(&trace);
-        let truth = truth(&recipe.dispersion, &flight, &fit)?;
+        let truth = truth(&flight, &fit);
         Ok((fit, truth))
     };
     let mut tallies = Tallies::new();

@@ -8,7 +8,6 @@
 //! * [`log`]: opens a log and streams its records in bounded memory, or holds a whole flight.
 //! * [`info`]: describes what is in a log, how complete it is and what can be done with it.
 //! * [`findings`]: what went wrong in a flight, first in time.
-//! * [`worst_plans`]: the plans of a landing burn that the judge finds worst.
 //! * [`controller`]: builds the flight computer that a log's frames came from.
 //! * [`verify`]: runs every frame again on its recorded input and compares the results bit for bit; explains one,
 //!   holds a directory of logs against a baseline, and proves the books of ground stations.
@@ -19,15 +18,13 @@
 //!   tell of the next day.
 //! * [`table`]: reads a log as tables; [`compare`](mod@compare): compares flights signal by signal.
 //! * [`report`](mod@report): writes a flight as one HTML page.
-//! * [`export`]: converts logs to and from other formats; [`recover`](mod@recover): repairs a damaged log, sorts another;
-//!   [`cut`](mod@cut): makes a shorter one.
+//! * [`export`]: converts logs to and from other formats; [`recover`](mod@recover): repairs a damaged log, sorts another.
 //! * [`output`](onboard_sim::files): writes files completely or not at all, each new one under a name that is free.
 //! * [`print`](mod@print): what answers have in common: columns, two verdicts beside each other, JSON.
 
 pub mod cli;
 pub mod compare;
 pub mod controller;
-pub mod cut;
 mod digest;
 pub use onboard_sim::files as output;
 pub mod evaluate;
@@ -43,7 +40,6 @@ pub mod report;
 pub mod settings;
 pub mod table;
 pub mod verify;
-pub mod worst_plans;
 
 use anyhow::Result;
 use clap::{CommandFactory as _, Parser, Subcommand};
@@ -126,11 +122,6 @@ enum Command {
     /// of time.
     #[command(after_help = "Example: replay recover cut.mcap whole.mcap")]
     Recover(recover::Args),
-    /// Cuts a log by time and topic, and says what of it can still be verified.
-    #[command(
-        after_help = "Example: replay cut flight.mcap burn.mcap --from POWERED --until TOUCHDOWN '/computer/*' /events"
-    )]
-    Cut(cut::Args),
     /// Finds drag, thrust, delays, gimbal, wind and sensor errors of flights, with 95 % intervals, and says what it cannot find.
     ///
     /// Only sensor samples, commands, feedback and the flight computer's estimates are used. Scales are over the data of the
@@ -164,7 +155,6 @@ impl Cli {
             Command::Report(args) => args.run(),
             Command::Export(args) => args.run(),
             Command::Recover(args) => args.run(),
-            Command::Cut(args) => args.run(),
             Command::Fit(args) => args.run(),
             Command::Manual(manual) => Ok(manual.print(Self::command())?),
         }

@@ -21,7 +21,6 @@ pub mod calibration;
 pub mod day;
 mod least_squares;
 pub mod lot;
-mod sensors;
 mod servo;
 mod trace;
 pub mod truth;
@@ -269,13 +268,11 @@ pub fn uncalibrated(trace: &Trace) -> Fit {
             }
         }
     }
-    fit.found.extend(sensors::noises(trace));
-    match steady {
-        Ok(()) => fit.found.extend(sensors::biases(trace)),
-        Err(reason) => fit.lacks("gyro_bias, accelerometer_bias", &reason),
-    }
     fit.lacks("mass", "the accelerometer cannot tell a lighter vehicle from more thrust and drag: weigh it");
-    fit.lacks("gnss_wander, barometer_offset_walk", "the flight is shorter than they take to wander");
+    fit.lacks(
+        "sensors",
+        "an hour on the pad tells their noise and wander better than a flight (Allan variance)",
+    );
     fit
 }
 
@@ -376,13 +373,6 @@ pub fn patched(mission_toml: &str, flown: &Mission, fit: &Fit, flight: &str) -> 
         ("airframe.gimbal.servo.delay_s", "gimbal_delay", 1.0),
         ("airframe.gimbal.servo.rate_deg_s", "gimbal_rate", 1.0),
         ("airframe.gimbal.servo.slop_deg", "gimbal_play", 1.0),
-        ("estimator.gyro_noise_deg_s_sqrt_hz", "gyro_noise", 1.0),
-        ("estimator.accelerometer_noise_mg_sqrt_hz", "accelerometer_noise", 1.0),
-        ("estimator.barometer_m", "barometer_noise", 1.0),
-        ("estimator.gnss_velocity_m_s", "gnss_velocity_noise", 1.0),
-        ("estimator.gnss_horizontal_m", "gnss_horizontal_noise", 1.0),
-        ("estimator.gnss_vertical_m", "gnss_vertical_noise", 1.0),
-        ("estimator.lidar_m", "lidar_noise", 1.0),
     ];
     let settings =
         rows.into_iter().filter(|(.., factor)| *factor > 0.0).filter_map(|(path, name, factor)| {
@@ -625,9 +615,7 @@ impl Args {
         let mut found = fit(&trace);
         if self.against_truth {
             let recording = crate::log::Recording::open(file)?;
-            found.truth = crate::refly::with_its_world(&recording, |dispersion, flight| {
-                truth::truth(dispersion, flight, &found)
-            })??;
+            found.truth = truth::truth(&crate::refly::as_it_began(&recording)?, &found);
         }
         if let Some(path) = &self.out {
             write_into(path, file, &trace, &found)?;

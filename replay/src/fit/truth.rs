@@ -2,26 +2,15 @@
 
 use std::collections::BTreeMap;
 
-use sim::dispersion::Dispersion;
 use sim::sortie::Sortie;
-use sim::world::sensors::{SensorParamError, Sensors};
 
 use super::Fit;
 
 /// The truth by the names of a fit's parameters.
-///
-/// # Errors
-/// The dispersions have impossible sensors.
-pub fn truth(
-    dispersion: &Dispersion,
-    flight: &Sortie,
-    fit: &Fit,
-) -> Result<BTreeMap<String, f64>, SensorParamError> {
+pub fn truth(flight: &Sortie, fit: &Fit) -> BTreeMap<String, f64> {
     let body_share = fit.body_share.unwrap_or(0.5);
     let drawn = flight.drawn();
     let truth = &drawn.truth;
-    let sensors = &dispersion.sensor_params;
-    let errors = *Sensors::new(sensors, drawn.flight_seed, 1.0)?.errors();
     let airframe = &flight.mission().airframe;
     let arm_m = airframe.thrust_arm_m(airframe.mass.loaded_cg_station_m);
     let [pitch_rad, yaw_rad] = truth.thrust_misalignment_rad;
@@ -54,20 +43,8 @@ pub fn truth(
         ("gimbal_play", servo.slop_deg + truth.gimbal_slop_rad.to_degrees()),
         ("wind_x", truth.wind_m_s * cos),
         ("wind_y", truth.wind_m_s * sin),
-        ("gyro_noise", sensors.imu.gyro_noise_deg_s_sqrt_hz),
-        ("accelerometer_noise", sensors.imu.accelerometer_noise_mg_sqrt_hz),
-        ("barometer_noise", sensors.barometer.noise_m),
-        ("gnss_velocity_noise", sensors.gnss.velocity_m_s),
-        ("gnss_horizontal_noise", sensors.gnss.horizontal_white_m),
-        ("gnss_vertical_noise", sensors.gnss.vertical_white_m),
-        ("lidar_noise", sensors.lidar.noise_m),
     ];
     let mut all: BTreeMap<String, f64> = rows.map(|(name, value)| (name.to_owned(), value)).into();
     all.extend((1..).zip(truth.thrust_shape).map(|(k, value)| (format!("thrust_shape_{k}"), value)));
-    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
-        all.insert(format!("gyro_bias_{name}"), errors.gyro_bias_rad_s[axis].to_degrees());
-        let milli_g = errors.accelerometer_bias_m_s2[axis] / 9.806_65e-3;
-        all.insert(format!("accelerometer_bias_{name}"), milli_g);
-    }
-    Ok(all)
+    all
 }

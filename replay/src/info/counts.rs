@@ -84,7 +84,9 @@ impl ChannelCounter {
             }
             same
         });
-        facts.iter_mut().for_each(|channel| channel.lost = channel.lost.saturating_sub(channel.messages));
+        for channel in &mut facts {
+            channel.lost = channel.lost.saturating_sub(channel.messages);
+        }
         facts
     }
 }

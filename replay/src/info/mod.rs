@@ -19,7 +19,6 @@ use time::OffsetDateTime;
 use time::format_description::well_known::Rfc3339;
 
 use crate::cli::{Answer, answer, give, give_each, warn_of_cut, warn_of_damage};
-use crate::cut::CUT_FROM;
 use crate::findings::{self, Finding};
 use crate::log::{
     Attachment, BuildComparison, Clocks, Cut, Entry, FlightLog, Head, LogError, Recording, StampedEntry,
@@ -459,8 +458,7 @@ impl Info {
             faults.extend(found.missing_s.map(|missing_s| format!("{missing_s:.3} s after that are lost")));
         }
         if found.messages_lost > 0 {
-            let how = if self.run.contains_key(CUT_FROM) { "cut out or lost" } else { "lost" };
-            faults.push(format!("{} {how}", counted(found.messages_lost, "message")));
+            faults.push(format!("{} lost", counted(found.messages_lost, "message")));
         }
         faults.extend(found.cut.as_ref().map(|cut| format!("the flight {cut}")));
         format!("NO: {}", faults.join("; "))

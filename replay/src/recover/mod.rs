@@ -19,7 +19,7 @@ pub(crate) use scan::Records;
 use scan::{ChunkName, Contents, LostStretch};
 pub use scan::{Summary, summary_of};
 use serde::Serialize;
-pub(crate) use write::{Kept, Rescue};
+pub(crate) use write::Rescue;
 
 use crate::cli::{Answer, give};
 use crate::log::{IN_ORDER_NS, LogError, is_tlog};

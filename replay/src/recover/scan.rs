@@ -363,13 +363,6 @@ impl Contents {
         !self.told.chunks.is_empty() && !self.told.chunks.iter().any(|(_, _, told)| could_be(told))
     }
 
-    /// What is wrong with the file, if something is.
-    pub(crate) fn fault(&self) -> Option<String> {
-        let lost = self.lost.first().map(|lost| format!("byte {}: {}", lost.from_byte, lost.reason));
-        lost.or_else(|| self.summary_fault.map(str::to_owned))
-            .or_else(|| (!self.ended).then(|| "it has no end mark".to_owned()))
-    }
-
     /// Whether a record is kept, if it can be read: indexes are made anew. Notes the times of its messages.
     fn check(&mut self, opcode: u8, body: &[u8]) -> Result<bool, RecordError> {
         match opcode {

@@ -31,7 +31,6 @@ use protocol::log::v1::{self, LimitResult};
 use protocol::log::writer::{LogHeader, LogWriter};
 use protocol::program::Exit;
 use serde::Serialize;
-use sim::dispersion::Dispersion;
 use sim::draw::draw;
 use sim::sortie::{SetUpError, Sortie};
 use sim::wire::record;
@@ -44,7 +43,6 @@ use crate::log::{Clock, ClockTime, Moment, Recording, Verdict, share};
 use crate::output::{NewFile, WriteError};
 use crate::print::{counted, verdict_table};
 use crate::settings::{Setting, SettingArguments, mission_with, truth_with};
-use crate::worst_plans::BrokenPlan;
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct StartState {
@@ -134,8 +132,6 @@ pub struct ReflyReport {
     /// The smallest distance to a limit that decides whether it stands undamaged, as a fraction of the limit: 1 far from it, 0 on
     /// it, negative outside. `None` without a contact.
     pub margin: Option<f64>,
-    /// The plans of the landing burn that break their conditions most.
-    pub worst_plans: Vec<BrokenPlan>,
     /// Frames that the controller ran.
     pub frames: usize,
     /// Of these, how many have a recorded frame of the same number.
@@ -161,16 +157,12 @@ pub struct ReflownFlight {
     pub verdict: Option<v1::LandingVerdict>,
 }
 
-/// The dispersions and the drawn world of a simulated flight, as it began.
+/// A simulated flight as it began, with its drawn world.
 ///
 /// # Errors
 /// The log does not say what its flight was drawn from.
-pub(crate) fn with_its_world<T>(
-    recording: &Recording,
-    look: impl FnOnce(&Dispersion, &Sortie) -> T,
-) -> Result<T, AgainError> {
-    let Rerun { recipe, flight, .. } = Rerun::of(recording, &FaultChanges::default())?;
-    Ok(look(&recipe.dispersion, &flight))
+pub(crate) fn as_it_began(recording: &Recording) -> Result<Sortie, AgainError> {
+    Ok(Rerun::of(recording, &FaultChanges::default())?.flight)
 }
 
 /// Flies a recorded flight again.
@@ -240,12 +232,11 @@ pub fn refly_flight(
         recorded,
         margin: reflown.as_ref().map(margin),
         reflown,
-        worst_plans: rerun.worst_plans(),
         frames: rerun.frames().filter(|frame| frame.input.frame >= first_frame).count(),
         commands_recorded: 0,
         commands_identical: 0,
         gimbal_difference_max_rad: 0.0,
-        never_acted: !options.changes_nothing() && rerun.frames().count() == frames.len(),
+        never_acted: !options.changes_nothing() && rerun.frames().count() <= frames.len(),
         others: None,
     };
     for (now, then) in rerun.beside(&frames[place..]) {
@@ -530,7 +521,6 @@ impl Answer for ReflyReport {
                     .to_owned(),
             );
         }
-        lines.extend(self.worst_plans.iter().map(|plan| format!("worst plan: {}", plan.words())));
         lines.push(format!(
             "{}; of {} recorded too, {} with the same gimbal command bit for bit; largest difference {:.3e} rad",
             counted(self.frames as u64, "frame"),

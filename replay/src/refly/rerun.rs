@@ -2,12 +2,12 @@
 
 use avionics::log::frame::accepts_abort;
 use avionics::log::logged::{state_from_log, vector_from_log};
-use flight::computer::{Computer, FRAME_S, Input, Output};
+use flight::computer::FRAME_S;
 use flight::vehicle::mission::Mission;
 use protocol::log::computer_v1::{ComputerFrame, ComputerStart};
 use protocol::log::record::Record;
 use sim::fault::{Breakage, FaultError, TimedFault};
-use sim::outside::{Outside, Watch};
+use sim::outside::Outside;
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
 use sim::wire::record::{self as sortie_log, LastFrame};
@@ -16,7 +16,6 @@ use super::FaultChanges;
 use crate::controller::{AgainError, LoggedComputer};
 use crate::log::Recording;
 use crate::settings::Schedule;
-use crate::worst_plans::{BrokenPlan, worst};
 
 /// Stands for every recorded fault.
 const EVERY_FAULT: &str = "all";
@@ -30,27 +29,9 @@ pub(super) struct Rerun {
     pub(super) schedule: Option<Schedule<Mission>>,
     /// The frames in which the crew aborted.
     aborts: Vec<u64>,
-    seen: Seen,
+    last: LastFrame,
     /// With vehicle times, s.
     pub(super) records: Vec<(f64, Record)>,
-}
-
-/// What is looked at while it flies.
-#[derive(Default)]
-struct Seen {
-    last: LastFrame,
-    /// Added to a frame's number for its number in the log.
-    release_frame: u64,
-    broken: Vec<BrokenPlan>,
-}
-
-impl Watch for Seen {
-    fn decided(&mut self, input: &Input<'_>, output: &Output, computer: &Computer) {
-        self.last.decided(input, output, computer);
-        let solved = computer.pilot().landing_solved().filter(|_| output.planned);
-        let frame = self.release_frame + input.frame;
-        self.broken.extend(solved.and_then(|solved| BrokenPlan::of(frame, input.time_s, &solved)));
-    }
 }
 
 impl Rerun {
@@ -102,8 +83,7 @@ impl Rerun {
         let ComputerStart { believed, gyro_bias_rad_s, .. } = sortie_log::start(&flight);
         let start = ComputerStart { believed, gyro_bias_rad_s, ..*start };
         let records = vec![(0.0, Record::ComputerStart(Box::new(start)))];
-        let seen = Seen { release_frame: recording.release_frame, ..Seen::default() };
-        Ok(Self { recipe, number, flight, schedule: None, aborts, seen, records })
+        Ok(Self { recipe, number, flight, schedule: None, aborts, last: LastFrame::default(), records })
     }
 
     /// Flies up to a frame, or to the end.
@@ -123,15 +103,10 @@ impl Rerun {
         if self.aborts.binary_search(&number).is_ok() {
             self.flight.abort();
         }
-        self.flight.step_with(&Outside::NOBODY, &mut self.seen);
-        let records = sortie_log::frame_and_phase(&self.flight, &mut self.seen.last, phase);
+        self.flight.step_with(&Outside::NOBODY, &mut self.last);
+        let records = sortie_log::frame_and_phase(&self.flight, &mut self.last, phase);
         self.records.extend(records.into_iter().map(|record| (time_s, record)));
         self.flight.goes_on()
-    }
-
-    /// The plans that break their conditions, the worst.
-    pub(super) fn worst_plans(&mut self) -> Vec<BrokenPlan> {
-        worst(std::mem::take(&mut self.seen.broken))
     }
 
     /// Its frames beside the recorded ones of the same numbers; a log may have lost some.

@@ -18,8 +18,6 @@ use crate::controller::new_plan;
 use crate::findings;
 use crate::info::{Info, PhaseSpan};
 use crate::log::Recording;
-use crate::verify::explain::plans;
-use crate::worst_plans::{BrokenPlan, worst};
 
 /// Records of the world this close to a frame belong to the same moment, s.
 const SAME_MOMENT_S: f64 = 1e-4;
@@ -83,7 +81,6 @@ pub(super) struct Flight {
     pub(super) pilot: Option<Pilot>,
     /// At the planning frames.
     pub(super) thoughts: Vec<Thought>,
-    pub(super) worst_plans: Vec<BrokenPlan>,
     /// Where the track comes from, in a sentence; `None` if there is none.
     pub(super) source: Option<&'static str>,
     pub(super) track: Vec<Sample>,
@@ -104,13 +101,10 @@ impl Flight {
     /// A recorded flight and the description of its log, which gets its findings here, if its computer decides again as it did.
     /// Without mission, start or frames the sections report what is missing.
     pub(super) fn of(recording: Recording, info: &mut Info) -> Self {
-        let (mut thoughts, mut broken) = (Vec::new(), Vec::new());
+        let mut thoughts = Vec::new();
         let again = findings::run_again(&recording, |computer, recorded| {
-            let (number, time_s) = (recording.release_frame + recorded.input.frame, recorded.input.time_s);
             let frame = computer.run_again(recorded)?;
             let pilot = computer.pilot();
-            let solved = pilot.landing_solved().filter(|_| plans(&frame));
-            broken.extend(solved.and_then(|solved| BrokenPlan::of(number, time_s, &solved)));
             if recorded.input.frame.is_multiple_of(FRAMES_PER_PLAN) || frame.output.planned {
                 thoughts.push(Thought::of(pilot, &frame));
             }
@@ -131,7 +125,6 @@ impl Flight {
         Self {
             ignition_s: ignited.or_else(|| track.iter().find(burning).map(|sample| sample.time_s)),
             touchdown_s: recording.contact_s(),
-            worst_plans: worst(broken),
             zero_s,
             signs: found().map(|finding| finding.since_s).collect(),
             shown: found().map(|finding| finding.picture).collect(),

@@ -50,8 +50,6 @@ fn val_simulation_a_field_flight_is_known_within_the_bars() {
         ("gimbal_gain", 1.0, 0.02),
         ("wind_x", truth.wind_m_s * cos, 1.0),
         ("wind_y", truth.wind_m_s * sin, 1.0),
-        ("accelerometer_noise", 0.65, 0.05),
-        ("gyro_noise", 0.05, 0.005),
     ] {
         close(fit, name, truth, bar);
     }

@@ -11,7 +11,6 @@ mod book;
 mod clocks;
 mod command_line;
 mod commands;
-mod cut;
 mod damage;
 mod damage_told;
 mod day;

@@ -4,11 +4,8 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use flight::vehicle::mission::StartPoint;
-use replay::cli::Answer as _;
 use replay::log::Recording;
-use replay::refly::{ReflyOptions, refly};
 use replay::report::report;
-use replay::verify::explain::explain;
 use sim::recipe::{Recipe as Flown, toml_starting_at};
 
 use crate::flown::{FLIGHT, Recipe, WHOLE, write_log};
@@ -207,23 +204,4 @@ fn the_report_of_a_broken_flight_names_its_cause_first() {
     // In every picture of the burn the finding stands where it began.
     assert!(page.matches("<circle class=\"sign\"").count() > 10);
     assert!(page.matches(">1</text>").count() > 10);
-}
-
-/// Report and a flight flown again name the same plans, and what is said of one when it is explained is the same.
-#[test]
-fn the_worst_plans_are_named_alike() {
-    let recording = Recording::open(&DISPERSED.log).unwrap();
-    let flown = refly(&recording, &ReflyOptions::default()).unwrap();
-    let worst = &flown.worst_plans;
-    assert!((1..=3).contains(&worst.len()) && worst.is_sorted_by(|a, b| a.price >= b.price), "{worst:?}");
-    let (text, page) = (flown.sentences().join("\n"), page_of(&DISPERSED.log, None));
-    for plan in worst {
-        let words =
-            format!("orst plan: frame {} (T+{:.2} s): {} at node", plan.frame, plan.time_s, plan.condition);
-        assert!(text.contains(&words) && page.contains(&words.replace(" plan", "")), "{words}: {text}");
-    }
-    let judged = explain(&recording, worst[0].frame).unwrap().judged.unwrap().flown;
-    let condition = format!("{} at node {}", worst[0].condition, worst[0].node);
-    assert_eq!(judged.broken_condition, Some(condition));
-    assert!((judged.merit - judged.cost - worst[0].price).abs() < 1e-9, "{judged:?}");
 }
