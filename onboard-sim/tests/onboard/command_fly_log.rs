@@ -36,6 +36,10 @@ fn fly_keeps_a_log_that_exists_and_says_the_free_name() {
     let said = fly(directory.path(), "flight.mcap");
     assert_eq!(said, "flight.mcap exists and is kept; flight-2.mcap is written\n");
     assert_eq!(fs::read_to_string(directory.path().join("flight.mcap")).unwrap(), "a flight");
+    // A name steers no terminal.
+    fs::write(directory.path().join("\u{1b}[2J.mcap"), "a flight").unwrap();
+    let said = fly(directory.path(), "\u{1b}[2J.mcap");
+    assert_eq!(said, "\u{fffd}[2J.mcap exists and is kept; \u{fffd}[2J-2.mcap is written\n");
 }
 
 /// What helps the person who types at it is no part of the object.

@@ -41,7 +41,6 @@ const NEVER: [&str; 6] = [" plane ", " plane.", " plane,", "Across it", "undefin
 const NO_FLIGHT: Answer = (1, &["has no frames of a flight computer after its release"]);
 const NO_BOOK: Answer = (5, &["no book in these logs: only a ground station writes one"]);
 const NO_RERUN: Answer = (1, &["the export to Rerun is not built"]);
-const NO_BURN: Answer = (1, &["has no POWERED"]);
 const IDENTICAL: Answer = (0, &["{frames} of {frames} frames identical\n", "!INCOMPLETE", "!DIVERGED"]);
 const UNFLOWN: Answer =
     (0, &["{frames} of {frames} frames identical of an INCOMPLETE flight: ends on the pad", "!DIVERGED"]);

@@ -94,6 +94,27 @@ fn an_abort_from_the_screen_opens_the_parachute_of_a_board() {
     expect_identical_replay(folder.path(), "vehicle.mcap");
 }
 
+/// What a recorded flight is written as goes into the folder that is given, beside what is there: `emulate` has the flight's words in
+/// it. A board answers as was recorded.
+#[test]
+fn a_recorded_flight_is_written_beside_what_is_there_and_flown_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let mut fly = program(Program::OnboardSim);
+    fly.args(["fly", "--mission", "mk2", "--start", "apogee", "--speed", "max", "--log", "flight.mcap"]);
+    Running::to_end(fly.current_dir(folder.path()));
+    let board = Path::new(env!("CARGO_BIN_EXE_board"));
+    // `cargo test -p board` builds it.
+    let mut frames = Command::new(board.with_file_name("examples").join("frames"));
+    let written = Running::to_end(frames.arg(at("flight.mcap")).arg(folder.path()));
+    assert_eq!(written.code, Some(0), "{}", written.output);
+    let mut again = Command::new(board);
+    again.arg("fly").stdin(File::open(at("frames")).unwrap()).stdout(File::create(at("answers")).unwrap());
+    assert!(again.status().unwrap().success());
+    assert!(std::fs::read(at("answers")).unwrap() == std::fs::read(at("recorded")).unwrap());
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 4);
+}
+
 /// What carries the frames loses bytes and changes them: nothing of the flight changes.
 #[test]
 fn a_bad_wire_to_a_board_changes_nothing() {

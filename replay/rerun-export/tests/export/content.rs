@@ -13,7 +13,7 @@ use crate::read_back::Recording;
 fn a_flight_is_exported_whole() {
     let (_folder, log, rrd) = folder();
     write_log(&log);
-    let exported = export(&log, None, &rrd).unwrap();
+    let (_, exported) = export(&log, None, &rrd).unwrap();
     let [own] = exported.as_slice() else { panic!("{exported:?}") };
     assert_eq!((own.poses, own.events), (FRAMES as usize, 1));
     assert_eq!((&own.damage, &own.mission_problem), (&None, &None));
@@ -91,7 +91,7 @@ fn two_flights_lie_in_one_recording_on_one_clock() {
     let other = folder.path().join("other.mcap");
     write_log(&log);
     write_log_from(&other, START_UNIX_NS + 1_000_000_000);
-    let exported = export(&log, Some(&other), &rrd).unwrap();
+    let (_, exported) = export(&log, Some(&other), &rrd).unwrap();
     assert!(exported.iter().map(|exported| exported.poses).eq([4, 4]), "{exported:?}");
     let both = Recording::read(&rrd);
     assert_eq!((both.ids.len(), both.layouts), (1, 1));
