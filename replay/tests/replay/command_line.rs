@@ -145,8 +145,11 @@ fn a_question_without_an_answer_exits_1_with_the_reason() {
             assert!(refusal(&mut command).contains("flight.mcap: "), "{question:?}");
         }
     }
-    for none in [files.directory.path().join("none.mcap"), files.directory.path().to_owned()] {
-        assert!(refusal(&mut replay("info", &none)).contains("cannot be read"));
+    let empty = tempfile::tempdir().unwrap();
+    for (none, why) in
+        [(files.directory.path().join("none.mcap"), "cannot be read"), (empty.path().to_owned(), "no log (*.mcap)")]
+    {
+        assert!(refusal(&mut replay("info", &none)).contains(why));
     }
     let (code, report) = data(&mut replay("verify", &files.file(&write_log(&[], &Recipe::default()).bytes)));
     assert_eq!((code, &report["outcome"]), (5, &"not-replayable".into()));

@@ -127,7 +127,7 @@ const TABLE: [Row; 19] = [
     row("compare {mission} {mission}", SAME_MISSION, SAME_MISSION, SAME_MISSION),
     row(
         "report {log} --out -",
-        (0, &["STANDS UNDAMAGED", "{mission}", "The landing from above", "!NaN"]),
+        (0, &["STANDS UNDAMAGED", "{mission}", "Place from above", "!NaN"]),
         (0, &["ABORTED", "{mission}", "abort of the crew", "!NaN"]),
         (0, &["REFUSED: controller warm", "{mission}", "!NaN"]),
     ),
