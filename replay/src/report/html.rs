@@ -1,7 +1,5 @@
 //! Pieces of HTML.
 
-use std::fmt;
-use std::fmt::Write as _;
 use std::path::Path;
 
 pub(super) use onboard_sim::card::escaped;
@@ -10,29 +8,25 @@ use super::section::{Section, motion};
 use super::track::Flight;
 use crate::info::{Info, utc};
 
-/// Appends to a text in memory, which cannot fail.
-pub(super) fn put(text: &mut String, more: fmt::Arguments<'_>) {
-    let _ = text.write_fmt(more);
-}
-
-/// A table: headings, then rows; a heading that begins with `#` marks a column of numbers.
+/// A table, or nothing without rows: headings, then rows; a heading that begins with `#` marks a column of numbers.
 pub(super) fn table<R: AsRef<[String]>>(heads: &[&str], rows: impl IntoIterator<Item = R>) -> String {
-    let numeric: Vec<bool> = heads.iter().map(|head| head.starts_with('#')).collect();
-    let class = |place: usize| if numeric.get(place) == Some(&true) { " class=\"n\"" } else { "" };
-    let mut html = "<div class=\"wide\"><table><thead><tr>".to_owned();
-    for (place, head) in heads.iter().enumerate() {
-        put(&mut html, format_args!("<th{}>{}</th>", class(place), escaped(head.trim_start_matches('#'))));
+    let cell = |tag: &str, place: usize, words: &str| {
+        let is_number = heads.get(place).is_some_and(|head| head.starts_with('#'));
+        format!("<{tag}{}>{words}</{tag}>", if is_number { " class=\"n\"" } else { "" })
+    };
+    let row = |row: R| {
+        let cells = row.as_ref().iter().enumerate().map(|(place, words)| cell("td", place, words));
+        format!("<tr>{}</tr>\n", cells.collect::<String>())
+    };
+    let head = |(place, head): (usize, &&str)| cell("th", place, &escaped(head.trim_start_matches('#')));
+    let (head, rows): (String, String) =
+        (heads.iter().enumerate().map(head).collect(), rows.into_iter().map(row).collect());
+    if rows.is_empty() {
+        return rows;
     }
-    html.push_str("</tr></thead><tbody>\n");
-    for row in rows {
-        html.push_str("<tr>");
-        for (place, cell) in row.as_ref().iter().enumerate() {
-            put(&mut html, format_args!("<td{}>{cell}</td>", class(place)));
-        }
-        html.push_str("</tr>\n");
-    }
-    html.push_str("</tbody></table></div>\n");
-    html
+    format!(
+        "<div class=\"wide\"><table><thead><tr>{head}</tr></thead><tbody>\n{rows}</tbody></table></div>\n"
+    )
 }
 
 /// A paragraph of text.
@@ -55,14 +49,12 @@ pub(super) fn page(flight: &Flight, info: &Info, sections: &[Section]) -> String
     let title = format!("Flight report: {}", flight.recording.name);
     let mut body = format!("<header><p>{}</p>\n", escaped(&about(flight, info).join(" \u{b7} ")));
     let named = sections.iter().filter(|section| !section.title.is_empty());
-    let links = named.map(|section| {
-        let word = section.title.split(' ').next().unwrap_or_default();
-        format!("<a href=\"#{}\">{word}</a> ", section.id)
-    });
-    put(&mut body, format_args!("<nav>{}</nav></header>\n", links.collect::<String>()));
+    let word = |title: &'static str| title.split(' ').next().unwrap_or_default();
+    let links = named.map(|section| format!("<a href=\"#{}\">{}</a> ", section.id, word(section.title)));
+    body.extend([format!("<nav>{}</nav></header>\n", links.collect::<String>())]);
     for section in sections {
         if !section.title.is_empty() {
-            put(&mut body, format_args!("<h2 id=\"{}\">{}</h2>\n", section.id, escaped(section.title)));
+            body.extend([format!("<h2 id=\"{}\">{}</h2>\n", section.id, escaped(section.title))]);
         }
         body.push_str(&section.html);
     }

@@ -31,6 +31,8 @@ mod lost_samples;
 mod missions;
 mod obstacles;
 mod one_verdict;
+#[cfg(unix)]
+mod opened;
 mod other_faults;
 mod overwriting;
 mod pages;

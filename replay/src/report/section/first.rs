@@ -7,7 +7,7 @@ use crate::findings::{Finding, over};
 use crate::info::Info;
 use crate::log::{Verdict, worst_first};
 use crate::refly::{FaultChanges, ReflyOptions, refly_flight};
-use crate::report::html::{escaped, paragraph, put, table};
+use crate::report::html::{escaped, paragraph, table};
 use crate::report::track::Flight;
 
 use super::{Drawn, place};
@@ -83,7 +83,7 @@ fn findings(flight: &Flight, info: &Info, drawn: &[Drawn]) -> String {
         html += &paragraph(info.no_findings());
     } else {
         let items: String = findings.iter().map(item).collect();
-        put(&mut html, format_args!("<ol class=\"findings\">\n{items}</ol>\n"));
+        html.extend([format!("<ol class=\"findings\">\n{items}</ol>\n")]);
     }
     html += &without_its_faults(flight);
     // The picture of the first; the whole flight stands beside it. Of nothing wrong how it came down.
@@ -140,11 +140,7 @@ fn limit_table<'a>(title: &str, limits: impl Iterator<Item = &'a LimitResult>) -
             format!("<b class=\"{class}\">{far}</b>"),
         ]
     };
-    let rows: Vec<_> = worst_first(limits).into_iter().map(row).collect();
-    if rows.is_empty() {
-        return String::new();
-    }
-    table(&[title, "#value", "#limit", "", "#share"], rows)
+    table(&[title, "#value", "#limit", "", "#share"], worst_first(limits).into_iter().map(row))
 }
 
 /// A value with its unit; what only happens or does not has none.

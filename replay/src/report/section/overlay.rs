@@ -7,13 +7,10 @@ use crate::report::chart::{Chart, TIME, line};
 use crate::report::html::{charts, escaped, paragraph, table};
 use crate::report::track::Flight;
 
-/// A flight and what its log says.
-pub(in crate::report) type LogFacts<'a> = (&'a Flight, &'a Info);
-
 /// The names of the two flights in the pictures, with their classes.
 const NAMES: [(&str, &str); 2] = [("A", "a"), ("B", "b")];
 
-pub(in crate::report) fn html(flights: [LogFacts<'_>; 2]) -> String {
+pub(in crate::report) fn html(flights: [(&Flight, &Info); 2]) -> String {
     let rows = NAMES.into_iter().zip(flights).map(|((name, _), (flight, info))| {
         let ending = info.ending.as_deref().unwrap_or("no verdict");
         [name, flight.recording.name.as_str(), ending].map(escaped)

@@ -199,10 +199,6 @@ fn of_the_rest(flight: &Flight) -> Vec<Picture<'_>> {
             .line("north", "a", wrong(|estimate, truth| estimate.position_m.x - truth.position_m.x))
             .line("east", "b", wrong(|estimate, truth| truth.position_m.y - estimate.position_m.y))
             .line("up", "c", wrong(|estimate, truth| estimate.position_m.z - truth.position_m.z)),
-        over("sensors", Air, "Estimated nose from the true one, deg").only(wrong(|estimate, truth| {
-            let cosine = estimate.nose_in_world().dot(&truth.nose_in_world());
-            DEGREES * libm::acos(cosine.clamp(-1.0, 1.0))
-        })),
         over("solver", Burn, "Newton iterations, of each plan").only(flight.thought(iterations)),
         over("solver", Burn, "From posing a plan to taking it over, ms")
             .limits(timings.first().map(|timing| 1e3 * timing.deadline_s))

@@ -29,8 +29,9 @@ pub(super) fn maps(flight: &Flight) -> String {
         };
         line(&format!("fence {fence_m:.0} m"), "fence", (0..=360).step_by(5).map(corner).collect())
     });
-    let wind = flight.thoughts.iter().find(|thought| Some(thought.time_s) >= flight.ignition_s);
-    let wind = wind.filter(|_| flight.ignition_s.is_some()).and_then(|thought| thought.estimate);
+    let lit = |time_s: f64| flight.ignition_s.is_some_and(|ignition_s| time_s >= ignition_s);
+    let wind =
+        flight.thoughts.iter().find(|thought| lit(thought.time_s)).and_then(|thought| thought.estimate);
     // East is against y.
     let wind = wind.map(|estimate| (-estimate.wind_m_s.y, estimate.wind_m_s.x));
     let arrow = wind.map(|(east, north)| (east, north, format!("wind {:.1} m/s", libm::hypot(east, north))));
@@ -73,10 +74,6 @@ fn stages(flight: &Flight) -> Vec<Line> {
 }
 
 pub(super) fn moments_table(flight: &Flight) -> String {
-    let moments = moments(flight);
-    if moments.is_empty() {
-        return String::new();
-    }
     let row = |(name, sample): (&str, &Sample)| {
         let [north, east, height_m, level_m_s, up_m_s, ..] = sample.state;
         let cells = [height_m, north, east, level_m_s, up_m_s]
@@ -85,7 +82,7 @@ pub(super) fn moments_table(flight: &Flight) -> String {
     };
     let time = format!("#{}", flight.axis_name());
     let heads = ["moment", &time, "#height, m", "#north, m", "#east, m", "#level, m/s", "#up, m/s"];
-    table(&heads, moments.into_iter().map(row).collect::<Vec<Vec<String>>>())
+    table(&heads, moments(flight).into_iter().map(row).collect::<Vec<Vec<String>>>())
 }
 
 /// What happened when, as far as it did.
