@@ -67,7 +67,7 @@ const ELSEWHERE: [(&str, &str, &str); 28] = [
 ];
 
 /// What the pages say that a line answers: how the line begins, and words of its answer.
-const SAID: [(&str, &str); 20] = [
+const SAID: [(&str, &str); 19] = [
     ("onboard-sim fly --start pad --fault separation-fails@0", "DOWN UNDER THE PARACHUTE"),
     ("onboard-sim campaign --only 17", "attainable_low_m"),
     ("replay info flight.mcap", "verdict"),

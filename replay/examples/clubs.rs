@@ -102,7 +102,7 @@ fn club(
     };
     let trials: Vec<Trial> = (0..DAY).map(|_| trial()).collect();
     let rate = (0..DAY).map(|_| own.chance_to_land(&expected(&burn(&mut chance)))).sum::<f64>() / DAY as f64;
-    let found = predict(&lots, &trials, 0.5, number).context("no flight was simulated")?;
+    let found = predict(&lots, &trials, number).context("no flight was simulated")?;
     let outcomes = Outcomes { landed, of: flown, unknown: 0 };
     let go = LIMITS
         .map(|limit| Expected::of(&found, outcomes, limit).is_some_and(|expected| expected.risk <= RISK));

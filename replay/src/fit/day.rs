@@ -135,9 +135,9 @@ fn learn(fits: &[Fit], ask: &Arguments, mission_toml: &str, set_toml: &str) -> R
     let day =
         Day::of([&before, set_toml], &ask.prior, &lot, &lots, (&airframe, rate_deg_s), wind_m_s, &sources)?;
     let trials = ask.flights.map(|flights| fly(ask.seed, flights, &lots, &day)).transpose()?;
-    let prediction = trials.as_ref().map(|trials| {
-        predict(&lots, trials, ask.limit, ask.seed).context("no flight was simulated: --flights is 0")
-    });
+    let prediction = trials
+        .as_ref()
+        .map(|trials| predict(&lots, trials, ask.seed).context("no flight was simulated: --flights is 0"));
     let prediction = prediction.transpose()?;
     let flown = Outcomes::of(fits);
     let expected = prediction.as_ref().and_then(|found| Expected::of(found, flown, ask.limit));
@@ -476,11 +476,6 @@ impl Answer for Learnt {
         said.push(match (self.go == Some(true), may_be_kinder(set)) {
             (true, false) => "GO".to_owned(),
             (true, true) => format!("GO in {set} only, which may be kinder than {DEFAULT}"),
-            (false, _) if found.risk <= self.risk => {
-                format!(
-                    "NO-GO: the simulation alone would fly, and {of} flights are too few or speak against it"
-                )
-            }
             (false, _) => "NO-GO".to_owned(),
         });
         said
@@ -603,7 +598,7 @@ mod tests {
     /// second. Of any rate it is B(4, 2) = 3! 1! / 5! = 0.05.
     #[test]
     fn val_hand_what_was_flown_decides() {
-        let simulated = Prediction { rate: 0.9, low: 0.8, high: 1.0, risk: 0.0, rates: vec![0.8, 1.0] };
+        let simulated = Prediction { rate: 0.9, low: 0.8, high: 1.0, rates: vec![0.8, 1.0] };
         let flown = |landed, of| Outcomes { landed, of, unknown: 0 };
         let found = Expected::of(&simulated, flown(3, 4), 0.7).unwrap();
         let (held, any) = (0.9 * 0.5 * 0.1024, 0.1 * 0.05);
@@ -619,7 +614,7 @@ mod tests {
     #[test]
     fn flights_speak_against_a_simulation() {
         let rates: Vec<f64> = (0..1000).map(|i| 0.86 + 5e-5 * f64::from(i)).collect();
-        let simulated = Prediction { rate: 0.885, low: 0.861, high: 0.909, risk: 0.0, rates };
+        let simulated = Prediction { rate: 0.885, low: 0.861, high: 0.909, rates };
         let risk = |landed, of, limit| {
             Expected::of(&simulated, Outcomes { landed, of, unknown: 0 }, limit).unwrap().risk
         };

@@ -51,8 +51,6 @@ pub struct Prediction {
     /// Ends of the 95 % interval.
     pub low: f64,
     pub high: f64,
-    /// Probability that the rate is below the limit.
-    pub risk: f64,
     /// Rates that are equally likely, ascending.
     #[serde(skip)]
     pub rates: Vec<f64>,
@@ -68,7 +66,7 @@ pub fn draw_next(lots: &[Posterior], chance: &mut Chance) -> Vec<f64> {
 }
 
 /// The rate over all lots that the posterior thinks possible; `None` without flights.
-pub fn predict(lots: &[Posterior], trials: &[Trial], limit: f64, seed: u64) -> Option<Prediction> {
+pub fn predict(lots: &[Posterior], trials: &[Trial], seed: u64) -> Option<Prediction> {
     if trials.is_empty() {
         return None;
     }
@@ -92,12 +90,10 @@ pub fn predict(lots: &[Posterior], trials: &[Trial], limit: f64, seed: u64) -> O
         .collect::<Option<Vec<f64>>>()?;
     rates.sort_by(f64::total_cmp);
     let at = |share: f64| rates[libm::round(share * (DRAWS - 1) as f64) as usize];
-    let below = rates.iter().filter(|rate| **rate < limit).count();
     Some(Prediction {
         rate: rates.iter().sum::<f64>() / DRAWS as f64,
         low: at(0.025),
         high: at(0.975),
-        risk: below as f64 / DRAWS as f64,
         rates,
     })
 }
@@ -320,7 +316,7 @@ mod tests {
                 Trial { drawn, landed }
             };
             let trials: Vec<Trial> = (0..1000).map(|_| trial()).collect();
-            let found = predict(&lots, &trials, 0.9, club).unwrap();
+            let found = predict(&lots, &trials, club).unwrap();
             let rate = (0..FLOWN).map(|_| chance_of(&burn(&mut chance))).sum::<f64>() / f64::from(FLOWN);
             (found.low..=found.high).contains(&rate)
         };
@@ -347,16 +343,19 @@ mod tests {
     #[test]
     fn flights_that_all_land_are_little_risk_if_they_are_many_and_no_flights_are_no_answer() {
         let lots = [Posterior::prior(1.0, 0.02)];
-        assert_eq!(predict(&lots, &[], 0.9, 1), None);
+        assert_eq!(predict(&lots, &[], 1), None);
         let found = |flights| {
             let mut chance = Chance::of(3, 0);
             let trials: Vec<Trial> =
                 (0..flights).map(|_| Trial { drawn: draw_next(&lots, &mut chance), landed: true }).collect();
-            predict(&lots, &trials, 0.9, 1).unwrap()
+            predict(&lots, &trials, 1).unwrap()
         };
         let (few, many) = (found(20), found(1000));
-        assert!(few.low < 0.9 && few.high > 0.99 && few.risk > 0.02, "{few:?}");
-        assert!(many.rate > 0.99 && many.low < 1.0 && many.risk < 0.02, "{many:?}");
+        let risk = |found: &Prediction| {
+            found.rates.iter().filter(|rate| **rate < 0.9).count() as f64 / found.rates.len() as f64
+        };
+        assert!(few.low < 0.9 && few.high > 0.99 && risk(&few) > 0.02, "{few:?}");
+        assert!(many.rate > 0.99 && many.low < 1.0 && risk(&many) < 0.02, "{many:?}");
     }
 
     /// One property, and a chance of which the log-odds are 2 + 1.5 u - 0.7 u^2: 20,000 flights find the coefficients to

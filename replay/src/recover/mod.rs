@@ -151,8 +151,7 @@ pub fn recover(input: &Path, output: &Path) -> Result<Recovery, RecoverError> {
         summary_fault: contents.summary_fault,
         ..Recovery::default()
     };
-    let mut keeps_all = |_: &str, _: u64| true;
-    let rescue = Rescue::of::<RecoverError>(output, (&mut records, &contents), &mut keeps_all)?;
+    let rescue = Rescue::of(output, &mut records, &contents)?;
     let kept = rescue.kept();
     let Some((first_ns, last_ns)) = kept.span_ns else {
         let reason = contents.lost.first().map(|lost| lost.reason.clone());

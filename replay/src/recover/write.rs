@@ -9,9 +9,8 @@ use mcap::records::{MessageHeader, Metadata, Record, op};
 use protocol::log::reader::{RecordError, parse_record, records_of_chunk};
 use protocol::log::record::{TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START};
 
-use super::is_sorted_anew;
 use super::scan::{Contents, Records, WriterReport};
-use crate::log::LogError;
+use super::{RecoverError, is_sorted_anew};
 use crate::output::{NewFile, WriteError};
 
 /// Chunk size as in the recorder's own logs.
@@ -21,8 +20,6 @@ type Writer = mcap::Writer<BufWriter<NewFile>>;
 
 pub(crate) struct Rescue<'a> {
     path: PathBuf,
-    /// Whether a message of this topic and time is kept.
-    keeps: &'a mut dyn FnMut(&str, u64) -> bool,
     /// What the file's own summary tells of its channels, for messages whose channel record is lost.
     told: &'a WriterReport,
     writer: Writer,
@@ -69,8 +66,6 @@ struct Waiting {
 pub(crate) struct Kept {
     pub(crate) span_ns: Option<(u64, u64)>,
     pub(crate) messages: u64,
-    /// Messages that were not wanted.
-    pub(crate) left_out: u64,
     pub(crate) chunks: u64,
     pub(crate) records_about: u64,
     /// Messages whose channel nothing describes.
@@ -79,11 +74,11 @@ pub(crate) struct Kept {
 
 impl<'a> Rescue<'a> {
     /// Copies what can be read of a log and is kept; sorted, if it was not in order of time.
-    pub(crate) fn of<E: From<LogError> + From<WriteError>>(
+    pub(crate) fn of(
         output: &Path,
-        (records, contents): (&mut Records, &'a Contents),
-        keeps: &'a mut dyn FnMut(&str, u64) -> bool,
-    ) -> Result<Self, E> {
+        records: &mut Records,
+        contents: &'a Contents,
+    ) -> Result<Self, RecoverError> {
         let file = NewFile::create(output)?;
         let path = output.to_owned();
         let options = mcap::WriteOptions::new()
@@ -91,7 +86,6 @@ impl<'a> Rescue<'a> {
             .chunk_size(Some(CHUNK_BYTES))
             .library(&contents.told.library);
         let mut rescue = Self {
-            keeps,
             told: &contents.told,
             writer: options
                 .create(BufWriter::new(file))
@@ -178,10 +172,6 @@ impl<'a> Rescue<'a> {
             return Ok(());
         }
         let (channel_id, topic) = &self.channels[&header.channel_id];
-        if !(self.keeps)(topic, header.log_time) {
-            self.kept.left_out += 1;
-            return Ok(());
-        }
         let header = MessageHeader { channel_id: *channel_id, ..header };
         if self.sorts {
             self.waiting.push(Waiting { header, data: data.to_vec(), place: Place::of(topic) });

@@ -146,9 +146,10 @@ fn a_question_without_an_answer_exits_1_with_the_reason() {
         }
     }
     let empty = tempfile::tempdir().unwrap();
-    for (none, why) in
-        [(files.directory.path().join("none.mcap"), "cannot be read"), (empty.path().to_owned(), "no log (*.mcap)")]
-    {
+    for (none, why) in [
+        (files.directory.path().join("none.mcap"), "cannot be read"),
+        (empty.path().to_owned(), "no log (*.mcap)"),
+    ] {
         assert!(refusal(&mut replay("info", &none)).contains(why));
     }
     let (code, report) = data(&mut replay("verify", &files.file(&write_log(&[], &Recipe::default()).bytes)));

@@ -6,7 +6,6 @@ pub(super) mod motion;
 pub(super) mod overlay;
 mod pictures;
 mod place;
-mod vibration;
 mod whole;
 
 use super::html::{charts, paragraph};
@@ -35,7 +34,7 @@ pub(super) fn all(flight: &Flight, info: &Info) -> Vec<Section> {
         ("fall", "Fall", String::new()),
         ("sensors", "Sensors and estimator", String::new()),
         ("solver", "Solver", text(burn::plans(flight))),
-        ("battery", "Battery and vibration", String::new()),
+        ("battery", "Battery", String::new()),
         ("link", "Link", String::new()),
         ("mission", "Mission against the built-in one", text(whole::mission(flight, info))),
         ("events", "Events", text(whole::events(flight))),

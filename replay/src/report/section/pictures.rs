@@ -7,7 +7,6 @@ use flight::vehicle::rigid::RigidState;
 use protocol::log::flight_v1::AidStatus;
 
 use super::place::moments;
-use super::vibration::vibration;
 use super::{COMPONENTS, DEGREES, HEIGHT};
 use crate::findings::FINS;
 use crate::log::{Clock, ClockTime};
@@ -204,7 +203,6 @@ fn of_the_rest(flight: &Flight) -> Vec<Picture<'_>> {
             .limits(timings.first().map(|timing| 1e3 * timing.deadline_s))
             .only(took.collect()),
         over("battery", Whole, "Battery voltage, V").only(flight.framed(|frame| frame.input.battery_v)),
-        Picture { chart: vibration(flight), ..over("battery", Whole, "") },
         over("link", Whole, "Age of the last heartbeat, s").only(flight.heard(|told| told.link_age_s)),
         over("link", Whole, "Frames lost, %").only(flight.heard(|told| Some(100.0 * told.link_loss?))),
         over("link", Whole, "Received, bytes/s").only(flight.heard(|told| told.link_rx_bytes_s)),

@@ -209,7 +209,7 @@ fn a_feedback_with_a_zero_of_its_own_passes_the_self_test_and_a_slipped_spline_d
 fn a_fin_that_sticks_on_the_pad_sticks_in_flight() {
     let flight = flight_of("none", &["fin-stuck:1@pad"]);
     let waited = in_phase(&flight, Phase::Deploy).vehicle.sortie;
-    for mut sortie in [waited, Sortie::new(&flight.recipe, 0).unwrap()] {
+    for mut sortie in [Box::new(waited), Box::new(Sortie::new(&flight.recipe, 0).unwrap())] {
         (0..100).for_each(|_| drop(sortie.step()));
         let open = sortie.world().fins_rad().map(|angle_rad| angle_rad > 0.1);
         assert_eq!((open, sortie.faults_happened()), ([true, false, true, true], 1));
