@@ -14,7 +14,7 @@ use crate::attainable::{Window, best_height_m};
 use crate::figure::{BLACK_CURVE, FigureError, Line, Panel, sized_lines_svg};
 use crate::row::{COLUMNS, Row};
 use crate::statistics::{Landings, Share, quantile, sorted};
-use crate::store::Manifest;
+use crate::store::{Manifest, Shard};
 
 /// Columns whose percentiles are in the summary.
 const TOLD: [&str; 14] = [
@@ -279,6 +279,9 @@ known, and fins and tilt are a throttle. Wind, place and attitude are left out";
 fn what(manifest: &Manifest) -> String {
     let mut what =
         format!("{}, dispersion {}, seed {}", manifest.mission, manifest.dispersion, manifest.seed);
+    if manifest.shard != Shard::WHOLE {
+        what = format!("{what}, shard {}", manifest.shard);
+    }
     if !manifest.faults.is_empty() {
         what = format!("{what}, faults {}", manifest.faults.join(" "));
     }

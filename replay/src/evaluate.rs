@@ -5,7 +5,6 @@
 //! for the [closed loop](mod@crate::refly). For example, a flight computer that lights its motor earlier than in flight
 //! measures no thrust until the recorded ignition.
 
-use std::io::Write as _;
 use std::path::PathBuf;
 
 use anyhow::Result;
@@ -16,7 +15,6 @@ use crate::cli::{Answer, give, warn_of_what_is_missing};
 pub use crate::controller::Decided;
 use crate::controller::{AgainError, LoggedComputer, phase_name};
 use crate::log::Recording;
-use crate::output::NewFile;
 use crate::print::columns;
 use crate::settings::{Setting, SettingArguments};
 use crate::verify::explain::degrees;
@@ -64,12 +62,8 @@ pub struct EvaluateReport {
     pub unchanged_different: usize,
     /// Number of frames whose gimbal command differs in any bit.
     pub commands_different: usize,
-    /// Root mean square of the differences of the gimbal commands in the landing, rad.
-    pub gimbal_difference_rms_rad: f64,
     /// The largest difference of a gimbal command, rad.
     pub gimbal_difference_max_rad: f64,
-    /// The frame with the largest difference.
-    pub gimbal_difference_max_frame: Option<u64>,
     /// The largest difference of a fin command, rad.
     pub fins_difference_max_rad: f64,
     /// Number of frames on which another control level decides.
@@ -78,8 +72,7 @@ pub struct EvaluateReport {
     pub phases: Vec<PhaseEntered>,
     /// Number of frames compared.
     pub frames_compared: usize,
-    /// Thousands: they go into a file.
-    #[serde(skip)]
+    /// Thousands.
     pub frames: Vec<EvaluatedFrame>,
 }
 
@@ -159,10 +152,6 @@ fn summarise(
     unchanged_different: usize,
 ) -> EvaluateReport {
     let apart = |frame: &EvaluatedFrame| apart_rad(&frame.recorded.gimbal_rad, &frame.evaluated.gimbal_rad);
-    let lands = |phase: &str| matches!(phase, "LAND_ARMED" | "IGNITION" | "POWERED" | "TOUCHDOWN");
-    let landing: Vec<f64> = frames.iter().filter(|frame| lands(frame.phase)).map(apart).collect();
-    let squares: f64 = landing.iter().map(|apart_rad| apart_rad * apart_rad).sum();
-    let largest = frames.iter().max_by(|a, b| apart(a).total_cmp(&apart(b)));
     let count = |differs: &dyn Fn(&Decided, &Decided) -> bool| {
         frames.iter().filter(|frame| differs(&frame.recorded, &frame.evaluated)).count()
     };
@@ -174,9 +163,7 @@ fn summarise(
         settings: settings.iter().map(ToString::to_string).collect(),
         unchanged_different,
         commands_different: count(&|recorded, evaluated| bits(recorded) != bits(evaluated)),
-        gimbal_difference_rms_rad: libm::sqrt(squares / landing.len().max(1) as f64),
-        gimbal_difference_max_rad: largest.map_or(0.0, apart),
-        gimbal_difference_max_frame: largest.filter(|frame| apart(frame) > 0.0).map(|frame| frame.frame),
+        gimbal_difference_max_rad: frames.iter().map(apart).fold(0.0, f64::max),
         fins_difference_max_rad: frames.iter().map(fins_rad).fold(0.0, f64::max),
         levels_different: count(&|recorded, evaluated| recorded.level != evaluated.level),
         phases: phases(&frames),
@@ -219,14 +206,10 @@ impl Answer for EvaluateReport {
                 "with nothing changed this build decides {unchanged_different} of {compared} frames differently from the record"
             ));
         }
-        let [rms_deg, largest_deg, fins_deg] =
-            [self.gimbal_difference_rms_rad, self.gimbal_difference_max_rad, self.fins_difference_max_rad]
-                .map(f64::to_degrees);
-        let at = self.gimbal_difference_max_frame.map(|frame| format!(" at frame {frame}"));
+        let [gimbal_deg, fins_deg] =
+            [self.gimbal_difference_max_rad, self.fins_difference_max_rad].map(f64::to_degrees);
         lines.push(format!(
-            "{commands_different} of {compared} gimbal commands differ: root mean square {rms_deg:.3} deg in the landing, largest \
-             {largest_deg:.3} deg{}",
-            at.unwrap_or_default()
+            "{commands_different} of {compared} gimbal commands differ, by {gimbal_deg:.3} deg at most"
         ));
         lines.push(format!(
             "fin commands differ by {fins_deg:.3} deg at most; {} frames are decided by another level",
@@ -251,7 +234,7 @@ impl Answer for EvaluateReport {
         // Thousands of frames hardly differ.
         let stride = differing.len().div_ceil(FRAMES_SHOWN).max(1);
         if stride > 1 {
-            lines.push(format!("one of {stride} differing frames; --csv FILE writes all:"));
+            lines.push(format!("one of {stride} differing frames; --json has every frame:"));
         }
         let head = ["frame", "time s", "phase", "gimbal deg", "cost", "iterations", "plan lands", ""];
         let rows = differing.into_iter().step_by(stride).map(EvaluatedFrame::row);
@@ -283,37 +266,6 @@ impl EvaluatedFrame {
     }
 }
 
-/// Every frame of an evaluation as CSV.
-fn csv_of(report: &EvaluateReport) -> Result<String> {
-    let mut csv = csv::Writer::from_writer(Vec::new());
-    for (place, EvaluatedFrame { frame, time_s, recorded, evaluated, .. }) in report.frames.iter().enumerate()
-    {
-        if place == 0 {
-            let frame = ["frame", "time_s"].map(str::to_owned).to_vec();
-            csv.write_record([frame, recorded.columns("recorded"), evaluated.columns("evaluated")].concat())?;
-        }
-        let frame = vec![frame.to_string(), format!("{time_s:?}")];
-        csv.write_record([frame, recorded.cells(), evaluated.cells()].concat())?;
-    }
-    Ok(String::from_utf8(csv.into_inner()?)?)
-}
-
-impl Decided {
-    fn columns(&self, side: &str) -> Vec<String> {
-        let words = ["phase", "level", "cost", "iterations"].map(|name| format!("{side}_{name}"));
-        let gimbal = (0..self.gimbal_rad.len()).map(|axis| format!("{side}_gimbal_rad_{axis}"));
-        let fins = (0..self.fins_rad.len()).map(|fin| format!("{side}_fins_rad_{fin}"));
-        words.into_iter().chain(gimbal).chain(fins).collect()
-    }
-
-    fn cells(&self) -> Vec<String> {
-        let Self { gimbal_rad, fins_rad, phase, level, cost, iterations, .. } = self;
-        let words = [(*phase).to_owned(), (*level).to_owned(), format!("{cost:?}"), iterations.to_string()];
-        let angles = gimbal_rad.iter().chain(fins_rad).map(|angle| format!("{angle:?}"));
-        words.into_iter().chain(angles).collect()
-    }
-}
-
 fn yes_no(answer: Option<bool>) -> &'static str {
     match answer {
         None => "-",
@@ -328,12 +280,9 @@ pub(crate) struct Args {
     file: PathBuf,
     #[command(flatten)]
     settings: SettingArguments,
-    /// Answer in JSON.
+    /// Answer in JSON, with every frame.
     #[arg(long)]
     json: bool,
-    /// Write a table with every frame into a new file.
-    #[arg(long, value_name = "FILE")]
-    csv: Option<PathBuf>,
 }
 
 impl Args {
@@ -341,10 +290,6 @@ impl Args {
         let recording = Recording::open(&self.file)?;
         warn_of_what_is_missing(&recording);
         let report = evaluate(&recording, &self.settings.all()?)?;
-        if let Some(path) = &self.csv {
-            let csv = csv_of(&report)?;
-            NewFile::create(path)?.fill(|file| file.write_all(csv.as_bytes()))?;
-        }
         give(&report, self.json)
     }
 }

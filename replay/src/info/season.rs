@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, Result};
+use anyhow::Result;
 use protocol::log::v1::LimitResult;
 use serde::Serialize;
 
@@ -10,6 +10,7 @@ use super::{Info, info, utc};
 use crate::cli::Answer;
 use crate::log::worst_first;
 use crate::print::columns;
+use crate::verify::logs_of;
 
 /// One log in a line. What it does not say is left empty.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
@@ -67,17 +68,8 @@ impl Flown {
 /// # Errors
 /// The folder cannot be read, or has no log.
 pub fn season(folder: &Path) -> Result<Vec<Flown>> {
-    let of_folder = || folder.display().to_string();
-    let mut paths: Vec<PathBuf> = std::fs::read_dir(folder)
-        .with_context(of_folder)?
-        .map(|entry| Ok(entry?.path()))
-        .collect::<std::io::Result<_>>()
-        .with_context(of_folder)?;
-    paths.retain(|path| path.extension().is_some_and(|extension| extension == "mcap"));
-    anyhow::ensure!(!paths.is_empty(), "{}: no log (*.mcap) is in this folder", of_folder());
-    paths.sort();
-    let line = |path: &PathBuf| {
-        info(path).map_or_else(
+    let line = |path: PathBuf| {
+        info(&path).map_or_else(
             |error| {
                 let file = path.display().to_string();
                 let reason = error.to_string().replace(&format!("{file}: "), "");
@@ -86,7 +78,7 @@ pub fn season(folder: &Path) -> Result<Vec<Flown>> {
             |info| Flown::of(&info),
         )
     };
-    let mut flown: Vec<Flown> = paths.iter().map(line).collect();
+    let mut flown: Vec<Flown> = logs_of(folder)?.into_iter().map(line).collect();
     // The same minute: by name.
     flown.sort_by(|a, b| a.date.cmp(&b.date));
     Ok(flown)

@@ -152,7 +152,7 @@ pub fn recover(input: &Path, output: &Path) -> Result<Recovery, RecoverError> {
         ..Recovery::default()
     };
     let rescue = Rescue::of(output, &mut records, &contents)?;
-    let kept = rescue.kept();
+    let kept = rescue.kept;
     let Some((first_ns, last_ns)) = kept.span_ns else {
         let reason = contents.lost.first().map(|lost| lost.reason.clone());
         return Err(RecoverError::Nothing { name: recovery.input, reason });

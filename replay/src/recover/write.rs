@@ -28,7 +28,7 @@ pub(crate) struct Rescue<'a> {
     channels: BTreeMap<u16, (u16, String)>,
     /// The chunk at hand is of another log.
     is_foreign: bool,
-    kept: Kept,
+    pub(crate) kept: Kept,
     /// Messages wait until the end, and are then written in order of time.
     sorts: bool,
     waiting: Vec<Waiting>,
@@ -110,11 +110,6 @@ impl<'a> Rescue<'a> {
             }
         }
         Ok(rescue)
-    }
-
-    /// What was kept so far.
-    pub(crate) fn kept(&self) -> Kept {
-        self.kept
     }
 
     /// Keeps a record, or every record of a chunk.

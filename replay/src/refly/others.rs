@@ -1,13 +1,10 @@
 //! What a change does to other flights than the recorded one.
 
-use std::cmp::Ordering;
-
 use onboard_sim::progress::Progress;
 use onboard_sim::run::in_parallel;
 use serde::Serialize;
 use sim::recipe::Recipe;
 use sim::sortie::{SetUpError, Sortie};
-use statrs::distribution::{Binomial, DiscreteCDF as _};
 
 use super::rerun::Rerun;
 use super::{FaultChanges, ReflyOptions};
@@ -70,20 +67,11 @@ pub fn other_flights(
 }
 
 impl OtherFlights {
-    /// The answer for people: a change that loses more than it saves is told, and one that decides nothing.
+    /// The answer for people: a change may lose more than it saves.
     pub(super) fn words(&self) -> String {
         let Self { flights, dispersion, stood, stand, saved, lost } = self;
-        // A sign test: as many of the flights that end otherwise as one side has, or more, by chance alone.
-        let moved = (saved + lost) as u64;
-        let chance = Binomial::new(0.5, moved)
-            .map_or(1.0, |tossed| (2.0 * tossed.cdf((*saved).min(*lost) as u64)).min(1.0));
-        let decides = match saved.cmp(lost) {
-            _ if chance > 0.05 => "that is no difference that so many flights show",
-            Ordering::Less => "it LOSES more than it saves",
-            _ => "it saves more than it loses",
-        };
         format!(
-            "{flights} other flights of {dispersion}: {stood} stand undamaged as recorded, {stand} with the change, which saves {saved} and loses {lost}: {decides}"
+            "{flights} other flights of {dispersion}: {stood} stand undamaged as recorded, {stand} with the change, which saves {saved} and loses {lost}"
         )
     }
 }

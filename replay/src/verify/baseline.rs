@@ -189,7 +189,7 @@ fn content_of(path: &Path) -> Option<String> {
 
 /// The logs of a directory, in subdirectories, too. Each regular file counts once, however many links lead to it; what has
 /// the name of a log and is no file (a pipe, a link to nothing) is never opened, and is told.
-pub(super) fn logs_of(directory: &Path) -> Result<Vec<PathBuf>> {
+pub(crate) fn logs_of(directory: &Path) -> Result<Vec<PathBuf>> {
     let (mut seen, mut logs, mut left) =
         (BTreeSet::new(), Vec::new(), VecDeque::from([directory.to_owned()]));
     while let Some(path) = left.pop_back() {

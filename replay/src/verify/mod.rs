@@ -21,6 +21,7 @@
 
 mod again;
 mod baseline;
+pub(crate) use baseline::logs_of;
 pub mod book;
 mod difference;
 pub mod explain;
@@ -495,7 +496,7 @@ impl Args {
     fn verify(&self) -> Result<Exit> {
         let mut files = Vec::new();
         for file in &self.files {
-            if file.is_dir() { files.extend(baseline::logs_of(file)?) } else { files.push(file.clone()) }
+            if file.is_dir() { files.extend(logs_of(file)?) } else { files.push(file.clone()) }
         }
         give_each(&files, self.json, |file| {
             #[expect(clippy::disallowed_methods, reason = "tells the user how fast it was; decides nothing")]

@@ -44,9 +44,9 @@ fn telemetry_alone_is_refused_because_it_has_no_frames() {
 fn a_cut_log_is_compared_up_to_its_end() {
     let mut recording = Recording::open(&LANDED.log).unwrap();
     let whole = refly(&recording, &ReflyOptions::default()).unwrap();
-    assert_eq!((whole.commands_recorded, whole.commands_identical), (whole.frames, whole.frames));
+    assert_eq!(whole.commands_identical, whole.frames);
     recording.frames.truncate(recording.frames.len() - 700);
     let cut = refly(&recording, &ReflyOptions::default()).unwrap();
-    assert_eq!((cut.commands_recorded, cut.commands_identical), (whole.frames - 700, whole.frames - 700));
+    assert_eq!(cut.commands_identical, whole.frames - 700);
     assert_eq!(cut.frames, whole.frames);
 }
