@@ -231,6 +231,7 @@
   }
   if (rows.length > 1) {
     document.querySelector("main").append(bar);
-    to(data.at === null ? (first + last) / 2 : data.at);
+    const sign = document.querySelector("circle.sign");
+    to(data.at ?? (sign ? Number(sign.dataset.t) : (first + last) / 2));
   }
 })();
