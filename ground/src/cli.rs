@@ -142,7 +142,7 @@ pub struct Flags {
 
     /// The mission, built-in name or file. The demonstration flies it; default: mk3. A vehicle over --connect has to fly it: arming is
     /// refused if it flies another one.
-    #[arg(long, value_name = "NAME|FILE", help_heading = "Station")]
+    #[arg(long, value_name = "NAME|FILE", alias = "profile", help_heading = "Station")]
     pub mission: Option<String>,
 
     /// Checklist (TOML): arming is refused until every step is signed. `checklist-example.toml` is one.
@@ -264,7 +264,7 @@ pub struct DownloadArgs {
     #[arg(value_name = "NAME")]
     pub name: Option<String>,
     /// Folder to write into.
-    #[arg(long, value_name = "FOLDER", default_value = ".")]
+    #[arg(long, alias = "to", value_name = "FOLDER", default_value = ".")]
     pub out: PathBuf,
     #[command(flatten)]
     pub link: LinkArgs,

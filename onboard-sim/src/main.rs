@@ -82,7 +82,7 @@ enum Command {
     )]
     New(cli::new::NewArguments),
     /// List the built-in missions, or print one as a file to start from.
-    #[command(after_help = "Example: onboard-sim missions --show mk3")]
+    #[command(alias = "profiles", after_help = "Example: onboard-sim missions --show mk3")]
     Missions {
         /// Print this mission's TOML.
         #[arg(long, value_name = "NAME")]

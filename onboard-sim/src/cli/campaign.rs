@@ -45,7 +45,7 @@ pub(crate) struct CampaignArguments {
     scenario: Option<PathBuf>,
     /// Directory of the results. If it holds part of the same campaign, the campaign is continued. With --only: the flight's log
     /// (MCAP); a file that exists is kept, and the log gets the next free name.
-    #[arg(long, value_name = "PATH", required_unless_present = "only")]
+    #[arg(long, alias = "log", value_name = "PATH", required_unless_present = "only")]
     out: Option<PathBuf>,
     /// Fly only this flight, and print its row.
     #[arg(long, value_name = "NUMBER", conflicts_with_all = ["shard", "jobs"])]

@@ -29,7 +29,7 @@ use toml_edit::{Array, DocumentMut};
 #[derive(Args)]
 pub(crate) struct Asked {
     /// Built-in mission or TOML file.
-    #[arg(long, default_value = mission::DEFAULT, value_name = "NAME|FILE")]
+    #[arg(long, alias = "profile", default_value = mission::DEFAULT, value_name = "NAME|FILE")]
     mission: String,
     /// Built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh, wild) or TOML file.
     #[arg(long, default_value = dispersion::DEFAULT, value_name = "NAME|FILE")]

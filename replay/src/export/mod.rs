@@ -37,7 +37,7 @@ pub(crate) struct Args {
     to: Option<Format>,
     /// Output: a directory for csv (one file for each table), otherwise a file; of a .tlog its name with .mcap
     /// if left out.
-    #[arg(long, short, value_name = "PATH")]
+    #[arg(long, short, alias = "output", value_name = "PATH")]
     out: Option<PathBuf>,
     /// Answer in JSON.
     #[arg(long)]

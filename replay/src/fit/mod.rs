@@ -540,7 +540,7 @@ pub(crate) struct Args {
     motor: Option<String>,
     /// Put what was found in the only log into this mission's file; its comments stay. If there is no such file, it gets the
     /// mission that was flown.
-    #[arg(long, value_name = "FILE.toml")]
+    #[arg(long, alias = "write", value_name = "FILE.toml")]
     out: Option<PathBuf>,
     /// Put the truth of a simulated flight beside what was found, and whether the interval holds it.
     #[arg(long)]

@@ -543,7 +543,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
     flights: Option<u64>,
     /// Write the flight as a new log.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, alias = "log", value_name = "FILE")]
     out: Option<PathBuf>,
     /// Answer in JSON.
     #[arg(long)]

@@ -60,7 +60,7 @@ pub(crate) struct Args {
     /// The log, an MCAP file.
     file: PathBuf,
     /// The page to write, or - for standard output; the log's name with .html if left out.
-    #[arg(long, short, value_name = "FILE")]
+    #[arg(long, short, alias = "output", value_name = "FILE")]
     out: Option<PathBuf>,
     /// Another log, whose flight is drawn into the same pictures.
     #[arg(long, value_name = "LOG")]
