@@ -67,7 +67,7 @@ fn the_report_says_the_verdict_first_and_then_why() {
             Gimbal yaw, deg|Thrust, N|Where each plan ends, less where it did, m|Wind towards north, m/s|\
             Fins, deg|Roll rate, deg/s|Test ratio, above 1 refused|Gyro bias, estimated, deg/s|Estimated place less true, m|\
             iterations.</p>|Newton iterations, of each plan|Battery voltage, V|\
-            Specific force along the nose|Mission against the built-in one</h2>|Events</h2>|\
+            Mission against the built-in one</h2>|Events</h2>|\
             every checksum holds|The log has nothing of: Link.";
         says_in_order(&page, &order.split('|').collect::<Vec<_>>());
         assert!(page.len() <= 400_000, "{} bytes", page.len());
