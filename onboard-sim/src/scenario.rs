@@ -26,8 +26,13 @@ const DEGRADED_M_S: f64 = 35.0;
 
 impl Expected {
     /// The name in a table.
-    pub fn name(self) -> String {
-        format!("{self:?}").to_lowercase()
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Land => "land",
+            Self::Degrade => "degrade",
+            Self::Inhibit => "inhibit",
+            Self::Parachute => "parachute",
+        }
     }
 
     /// Whether a flight ended as expected. A landing always counts as expected.

@@ -316,11 +316,12 @@ impl Injector {
     pub fn due(&mut self, time_s: f64, phase: Phase) -> Vec<Breakage> {
         self.entered_s[usize::from(phase.index())].get_or_insert(time_s);
         let entered_s = self.entered_s;
-        let waited =
-            Phase::ALL.iter().any(|phase| phase.on_pad() && entered_s[usize::from(phase.index())].is_some());
+        let waited = || {
+            Phase::ALL.iter().any(|phase| phase.on_pad() && entered_s[usize::from(phase.index())].is_some())
+        };
         let due = |fault: &TimedFault| match fault.when {
             // Without a wait on the pad the vehicle is broken from the beginning on.
-            When::PhaseBetween(since, _) | When::Phase(since, _) if since.on_pad() && !waited => {
+            When::PhaseBetween(since, _) | When::Phase(since, _) if since.on_pad() && !waited() => {
                 matches!(fault.breakage, Breakage::Vehicle(_) | Breakage::Sensor(..))
             }
             // The start is the release.

@@ -51,11 +51,8 @@ impl Surroundings {
         let actuators = at_rest(mission);
         let faults = SensorFaults::default();
         let battery = Battery::new(1.0, surfaces_rad(&world));
-        let broken = Vec::new();
-        Ok((
-            Self { world, sensors, faults, broken, actuators, battery, measured: None, finite: true },
-            believed,
-        ))
+        let (broken, measured, finite) = (Vec::new(), None, true);
+        Ok((Self { world, sensors, faults, broken, actuators, battery, measured, finite }, believed))
     }
 
     /// Goes to the start of the flight from wherever the vehicle waited. Both were already set up at power-up, which

@@ -47,6 +47,7 @@ use self::least_squares::Solution;
 pub use self::trace::{Frame, Trace};
 use crate::cli::{Answer, give, say, say_anyway, text_of, warn_of_damage};
 use crate::info::utc;
+use crate::log::Recording;
 use crate::output::NewFile;
 use crate::print::counted;
 use crate::settings::{Setting, SettingError, mission_toml_with_reasons, mission_with};
@@ -467,10 +468,12 @@ pub struct FitReport {
 impl Answer for FitReport {
     fn sentences(&self) -> Vec<String> {
         // Many fits are one answer; JSON has each.
-        let mut said = if self.together.is_empty() { self.fits.sentences() } else { Vec::new() };
-        said.extend(self.fits.iter().filter(|_| !self.together.is_empty()).map(Fit::head));
-        if !self.together.is_empty() {
+        let mut said = Vec::new();
+        if self.together.is_empty() {
+            said = self.fits.sentences();
+        } else {
             let logs = counted(self.fits.len() as u64, "log");
+            said.extend(self.fits.iter().map(Fit::head));
             said.push(String::new());
             said.push(format!(
                 "together, {logs}: mean with its 95 % interval, and scatter from one to the next"
@@ -611,10 +614,10 @@ impl Args {
             let rows = flight::vehicles::thrust_curve::read_stand(&read()?).with_context(|| name.clone())?;
             return Ok(vec![fit_stand(&name, &rows, &curve_of(motor)?).context(name)?]);
         }
-        let trace = Trace::open(file)?;
+        let recording = Recording::open(file)?;
+        let trace = Trace::of(&recording)?;
         let mut found = fit(&trace);
         if self.against_truth {
-            let recording = crate::log::Recording::open(file)?;
             found.truth = truth::truth(&crate::refly::as_it_began(&recording)?, &found);
         }
         if let Some(path) = &self.out {

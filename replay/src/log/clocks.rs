@@ -79,16 +79,6 @@ impl FromStr for Moment {
     }
 }
 
-impl fmt::Display for Moment {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Frame(number) => write!(out, "frame {number}"),
-            Self::Time(time) => write!(out, "{time}"),
-            Self::Phase(phase) => write!(out, "{}", phase.name()),
-        }
-    }
-}
-
 impl ClockTime {
     /// `None` if the text is no time.
     pub fn read(given: &str) -> Option<Self> {

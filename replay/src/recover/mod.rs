@@ -15,11 +15,10 @@ use anyhow::Result;
 use mcap::records::Metadata;
 use protocol::log::record::{METADATA_RECOVERY, RECOVERY_FAULT_ENTRY};
 use protocol::program::Exit;
-pub(crate) use scan::Records;
-use scan::{ChunkName, Contents, LostStretch};
+use scan::{ChunkName, Contents, LostStretch, Records};
 pub use scan::{Summary, summary_of};
 use serde::Serialize;
-pub(crate) use write::Rescue;
+use write::Rescue;
 
 use crate::cli::{Answer, give};
 use crate::log::{IN_ORDER_NS, LogError, is_tlog};
@@ -181,7 +180,7 @@ fn was_changed(contents: &Contents) -> bool {
 }
 
 /// Whether the messages are out of order. A chunk is moved by less than what a log of ours may go back, too.
-pub(crate) fn is_sorted_anew(contents: &Contents) -> bool {
+fn is_sorted_anew(contents: &Contents) -> bool {
     contents.back_ns > if was_changed(contents) { 0 } else { IN_ORDER_NS }
 }
 
