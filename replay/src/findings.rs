@@ -34,11 +34,8 @@ impl Finding {
 /// The findings of a recorded flight, first in time; `None` if its computer cannot be run again, or decides otherwise than it
 /// did: what it would have commanded says nothing of surfaces that followed other commands.
 pub(crate) fn of(recording: &Recording, verdict: Option<&Verdict>) -> Option<Vec<Finding>> {
-    if recording.frames.is_empty() {
-        return recording.from_power_up.then(|| on_the_pad(recording));
-    }
-    let (_, findings) = run_again(recording, LoggedComputer::run_again)?;
-    Some(facts(recording, verdict, &findings?))
+    let again = run_again(recording, LoggedComputer::run_again);
+    facts(recording, verdict, again.and_then(|(_, findings)| findings))
 }
 
 /// What the vehicle itself reported of a wait that ended on its pad, each once.
@@ -80,8 +77,16 @@ pub(crate) fn run_again(
     Some((computer, findings))
 }
 
-/// The findings of a computer that was run again with the recorded decisions, and the limits that were broken.
-pub(crate) fn facts(recording: &Recording, verdict: Option<&Verdict>, findings: &Findings) -> Vec<Finding> {
+/// The findings of a computer that was run again with the recorded decisions, and the limits that were broken; of a flight that
+/// never left its pad, what the vehicle said.
+pub(crate) fn facts(
+    recording: &Recording,
+    verdict: Option<&Verdict>,
+    findings: Option<Findings>,
+) -> Option<Vec<Finding>> {
+    let Some(findings) = findings else {
+        return (recording.frames.is_empty() && recording.from_power_up).then(|| on_the_pad(recording));
+    };
     let mut facts: Vec<Finding> = findings
         .found()
         .iter()
@@ -93,11 +98,11 @@ pub(crate) fn facts(recording: &Recording, verdict: Option<&Verdict>, findings: 
             picture: picture(finding.sign),
         })
         .collect();
-    if let Some(words) = verdict.and_then(|verdict| broken(verdict, findings)) {
+    if let Some(words) = verdict.and_then(|verdict| broken(verdict, &findings)) {
         let since_s = recording.contact_s().unwrap_or(f64::NAN);
         facts.push(Finding { since_s, clock: Clock::Flight, lasted_s: 0.0, words, picture: "limits" });
     }
-    facts
+    Some(facts)
 }
 
 /// The pictures of the fins.

@@ -502,8 +502,7 @@ impl Answer for Fit {
             let Some(truth) = self.truth.get(&parameter.name) else {
                 return format!("  {}", line(parameter));
             };
-            let held = (parameter.low..=parameter.high).contains(truth);
-            let held = if held { "held" } else { "MISSED" };
+            let held = if (parameter.low..=parameter.high).contains(truth) { "held" } else { "MISSED" };
             format!("  {:<68}  truth {} {held}", line(parameter), digits(*truth, parameter.sigma))
         }));
         for (title, lacks) in [

@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
-use protocol::log::v1::LimitResult;
 use serde::Serialize;
 
 use super::{Info, info, utc};
@@ -42,11 +41,10 @@ impl Flown {
             limits.into_iter().find(|limit| limit.name == name).map(|limit| limit.value)
         };
         let worst = verdict.and_then(|verdict| worst_first(verdict.of_the_legs()).into_iter().next());
-        let worst = worst.map(
-            |(LimitResult { name, .. }, share)| {
-                if share.is_finite() { format!("{name} x {share:.2}") } else { name.clone() }
-            },
-        );
+        let worst = worst.map(|(limit, share)| {
+            let share = if share.is_finite() { format!(" x {share:.2}") } else { String::new() };
+            format!("{}{share}", limit.name)
+        });
         let vehicle = info.profile.as_ref().and_then(|profile| profile.name.clone());
         Self {
             // To the minute.

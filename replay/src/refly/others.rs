@@ -34,10 +34,8 @@ pub fn other_flights(
     options: &ReflyOptions,
     flights: u64,
 ) -> Result<OtherFlights, AgainError> {
-    let one_flights = options.seed.is_some()
-        || !options.plant_settings.is_empty()
-        || options.settings.iter().any(|setting| setting.at_s.is_some());
-    if one_flights {
+    let timed = options.settings.iter().any(|setting| setting.at_s.is_some());
+    if timed || options.seed.is_some() || !options.plant_settings.is_empty() {
         let reason =
             "takes --set without a time, --fault and --without-fault; the rest belongs to one flight";
         return Err(AgainError::Refused { of: "--flights".to_owned(), reason: reason.to_owned() });

@@ -114,7 +114,7 @@ impl Flight {
         thoughts.retain(|_| again.is_some());
         let pilot = again.as_ref().map(|(computer, _)| computer.pilot().clone());
         let found = again.and_then(|(_, findings)| findings);
-        info.findings = found.map(|found| findings::facts(&recording, info.verdict.as_ref(), &found));
+        info.findings = findings::facts(&recording, info.verdict.as_ref(), found);
         let (source, track) = track(&recording, &thoughts);
         let burning = |sample: &&Sample| sample.phase.is_some_and(Phase::in_landing_burn);
         let ignited = pilot.as_ref().and_then(Pilot::ignited_at_s);

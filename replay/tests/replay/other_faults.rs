@@ -3,6 +3,7 @@
 use replay::info::info;
 use replay::log::{Moment, Recording};
 use replay::refly::{FaultChanges, ReflyOptions, refly_flight, write_log};
+use replay::report::report;
 use replay::verify::{Verification, verify};
 
 use crate::command_line::{data, refusal, replay, run};
@@ -101,9 +102,15 @@ fn a_wait_that_ends_on_the_pad_has_findings() {
         &crew[..1],
         &["gnss-out@pad+1"],
     );
-    let found = info(&waited.log()).unwrap().findings.unwrap();
+    let log = waited.log();
+    let found = info(&log).unwrap().findings.unwrap();
     let lost = found.iter().find(|finding| finding.words.contains("no GNSS fix")).expect("GNSS is lost");
     assert!(lost.since().to_string().starts_with("log "), "{found:?}");
+    // The report has the same on the same clock.
+    let page = report(&log, None).unwrap().html;
+    assert!(
+        page.contains(&format!("<b>{:.2}</b>", lost.since())) && !page.contains("Nothing was looked for")
+    );
 }
 
 /// A log whose decisions this build does not make has no findings, because they would be about other commands.

@@ -47,7 +47,7 @@ fn verdict(flight: &Flight, info: &Info) -> String {
         )]);
     }
     if let Some(first) = info.findings.iter().flatten().next() {
-        words.extend([format!("First sign: {}, at T+{:.2} s. ", first.words, first.since_s)]);
+        words.extend([format!("First sign: {}, at {:.2}. ", first.words, first.since())]);
     }
     words += &info.verdict.as_ref().map_or_else(
         || {
@@ -72,12 +72,12 @@ fn findings(flight: &Flight, info: &Info, drawn: &[Drawn]) -> String {
     };
     let of = |picture: &str| drawn.iter().find(|(_, id, svg)| id == picture && !svg.is_empty());
     let item = |finding: &Finding| {
-        let Finding { since_s, picture, words, .. } = finding;
+        let Finding { picture, words, .. } = finding;
         let mut words = escaped(words);
         if of(picture).is_some() || ["events", "limits"].contains(picture) {
             words = format!("<a href=\"#{picture}\">{words}</a>");
         }
-        format!("<li><b>T+{since_s:.2} s</b> {words}</li>\n")
+        format!("<li><b>{:.2}</b> {words}</li>\n", finding.since())
     };
     if findings.is_empty() {
         html += &paragraph(info.no_findings());
