@@ -126,7 +126,7 @@ enum Command {
     /// of time.
     #[command(after_help = "Example: replay recover cut.mcap whole.mcap")]
     Recover(recover::Args),
-    /// Finds drag, thrust, delays, gimbal, wind and sensor errors of flights, with 95 % intervals, and says what it cannot find.
+    /// Finds drag, thrust, delays, gimbal and wind of flights, with 95 % intervals, and says what it cannot find.
     ///
     /// Only sensor samples, commands, feedback and the flight computer's estimates are used. Scales are over the data of the
     /// mission in the log, per mass: weigh the vehicle. Several logs are also put together. A burn on a test stand (CSV) is

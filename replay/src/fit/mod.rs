@@ -1,5 +1,5 @@
-//! What a flight tells of its vehicle, its motor, its sensors and its day: values with 95 % intervals, and what could not
-//! be told, with the reason.
+//! What a flight tells of its vehicle, its motor and its day: values with 95 % intervals, and what could not be told, with
+//! the reason.
 //!
 //! Only what a real flight's log holds is used: sensor samples, commands, feedback, and the flight computer's estimates.
 //!
@@ -9,8 +9,7 @@
 //! * [`along`]: drag and thrust along the nose. [`burn`] is the model of the thrust, and of a burn on a test stand.
 //! * [`turning`]: the gimbal, from the rotation while the motor burns. [`servo`] is its model.
 //! * [`wind`]: the mean wind, from the force across the nose.
-//! * [`sensors`]: noises and biases.
-//! * [`calibration`]: by how much the intervals are wider than the noise says.
+//! * [`calibration`]: by how much the intervals are wider than the noise says. [`truth`](mod@truth) is what they have to hold.
 //! * [`pooled`]: several flights together. [`patched`]: the mission with what was found.
 //! * [`lot`] and [`day`]: what all flights so far tell of the next one.
 //! * [`least_squares`]: most likely values, where the noise is a slow disturbance.

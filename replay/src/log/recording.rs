@@ -63,7 +63,7 @@ pub enum RecordingError {
     },
     #[error(
         "{name}: has no frames of a flight computer with its sensors and estimates ({found}). A fit needs the vehicle's own log: at \
-         the rates of telemetry neither thrust nor delays nor noises can be found"
+         the rates of telemetry neither thrust nor delays can be found"
     )]
     NoTrace { name: String, found: &'static str },
     #[error("{name}")]
