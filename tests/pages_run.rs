@@ -23,7 +23,7 @@ const PAGES: [&str; 9] = [
 ];
 
 /// Lines that do not run here: their page, how they begin, and why.
-const ELSEWHERE: [(&str, &str, &str); 28] = [
+const ELSEWHERE: [(&str, &str, &str); 29] = [
     ("README.md", "cargo run ", "compiles; tests/demo.rs flies the same demonstration"),
     ("README.md", "cargo test", "is this test among all others"),
     ("ENGINEER.md", "sbatch ", "needs a Slurm cluster; tests/clients/tests/cluster.rs runs it"),
@@ -41,10 +41,11 @@ const ELSEWHERE: [(&str, &str, &str); 28] = [
     ),
     (
         "ENGINEER.md",
-        "cargo run --release -p replay-rerun",
+        "cargo build --release -p replay-rerun",
         "compiles for ten minutes; .ci/run exports a log to Rerun",
     ),
     ("ENGINEER.md", "replay-rerun ", "needs the line above"),
+    ("ENGINEER.md", "replay open ", "opens a window; replay/tests tells which viewer it starts"),
     ("MK3.md", "onboard-sim campaign ", "flies for minutes; ENGINEER.md has shorter campaigns"),
     ("CONTRIBUTING.md", "cargo run ", "compiles; tests/demo.rs flies it"),
     ("CONTRIBUTING.md", "cargo test", "is or holds this test"),
