@@ -79,47 +79,146 @@ pub struct PlanarModel {
 impl PlanarModel {
     /// Time derivative of the state (x, z, theta, u, w, q), SI and radians.
     pub fn derivative(&self, state: &[f64; 6], gimbal_rad: f64, thrust_n: f64) -> [f64; 6] {
-        let [_, _, theta, u, w, q] = *state;
-        let (sin_theta, cos_theta) = libm::sincos(theta);
-        let (sin_delta, cos_delta) = libm::sincos(gimbal_rad);
-        let Self { mass_kg, pitch_inertia_kg_m2, thrust_arm_m, drag_per_m, gravity_m_s2, kind } = *self;
-        let thrust_m_s2 = thrust_n / mass_kg;
-        let speed = libm::sqrt(u * u + w * w);
-        let (x_dot, z_dot, drag_m_s2) = match kind {
-            ModelKind::Consistent => {
-                (u * cos_theta + w * sin_theta, u * sin_theta - w * cos_theta, -drag_per_m * speed * u)
-            }
-            // The rotation of Eq. 22, and the drag of Eq. 18, which always acts towards the nose.
-            ModelKind::AsPrinted => {
-                (u * cos_theta - w * sin_theta, u * sin_theta + w * cos_theta, drag_per_m * speed * speed)
-            }
-        };
-        [
-            x_dot,
-            z_dot,
-            q,
-            thrust_m_s2 * cos_delta + drag_m_s2 - gravity_m_s2 * sin_theta - q * w,
-            -thrust_m_s2 * sin_delta + gravity_m_s2 * cos_theta + q * u,
-            -thrust_n * sin_delta * thrust_arm_m / pitch_inertia_kg_m2,
-        ]
+        Motion::of(self, state, gimbal_rad, thrust_n).rates()
     }
 
     /// One classical fourth-order Runge-Kutta step of `step_s` with input and thrust held.
     pub fn rk4_step(&self, state: &PlanarState, gimbal_rad: f64, thrust_n: f64, step_s: f64) -> PlanarState {
-        let x = state.to_array();
-        let k1 = self.derivative(&x, gimbal_rad, thrust_n);
-        let k2 = self.derivative(&along(&x, &k1, 0.5 * step_s), gimbal_rad, thrust_n);
-        let k3 = self.derivative(&along(&x, &k2, 0.5 * step_s), gimbal_rad, thrust_n);
-        let k4 = self.derivative(&along(&x, &k3, step_s), gimbal_rad, thrust_n);
-        PlanarState::from_array(core::array::from_fn(|i| {
-            x[i] + step_s / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])
-        }))
+        let state = state.to_array();
+        PlanarState::from_array(end(&state, &self.stages(&state, gimbal_rad, thrust_n, step_s), step_s))
+    }
+
+    /// The stages of that step.
+    pub(super) fn stages(
+        &self,
+        state: &[f64; 6],
+        gimbal_rad: f64,
+        thrust_n: f64,
+        step_s: f64,
+    ) -> [Motion; 4] {
+        let mut slope = [0.0; 6];
+        AHEAD.map(|ahead| {
+            let stage = Motion::of(self, &along(state, &slope, ahead * step_s), gimbal_rad, thrust_n);
+            slope = stage.rates();
+            stage
+        })
     }
 
     /// Kinetic plus potential energy of translation, per kilogram, J/kg.
     pub fn specific_energy_j_kg(&self, state: &PlanarState) -> f64 {
         0.5 * (state.u_m_s * state.u_m_s + state.w_m_s * state.w_m_s) + self.gravity_m_s2 * state.z_m
     }
+}
+
+/// The motion at a state, for its rates and their derivatives by pitch, `u`, `w`, pitch rate and gimbal angle.
+pub(super) struct Motion {
+    state: [f64; 6],
+    /// Sine and cosine of the pitch.
+    turned: (f64, f64),
+    gravity_m_s2: f64,
+    /// 1, or -1 where the printed rotation (Eq. 22) turns `w` the other way.
+    lateral: f64,
+    /// Accelerations by the thrust: along the axis, across it (its derivative by the gimbal angle), and of the pitch, with its
+    /// derivative by that angle.
+    push: f64,
+    side: f64,
+    turn: f64,
+    turn_by_gimbal: f64,
+    /// The drag's acceleration along the axis, its derivatives by `u` and `w`, and those of second order: by `u` twice, by both,
+    /// by `w` twice.
+    drag: f64,
+    drag_by: [f64; 2],
+    drag_bent: [f64; 3],
+}
+
+impl Motion {
+    pub(super) fn of(model: &PlanarModel, state: &[f64; 6], gimbal_rad: f64, thrust_n: f64) -> Self {
+        /// Below it the direction of the drag, which is nothing then, is left out.
+        const REST_SPEED_M_S: f64 = 1e-9;
+        let [_, _, theta, u, w, _] = *state;
+        let (sin, cos) = libm::sincos(gimbal_rad);
+        let thrust_m_s2 = thrust_n / model.mass_kg;
+        let turn_rad_s2 = thrust_n * model.thrust_arm_m / model.pitch_inertia_kg_m2;
+        let (drag_per_m, speed) = (model.drag_per_m, libm::sqrt(u * u + w * w));
+        let (lateral, drag, drag_by, drag_bent) = match model.kind {
+            ModelKind::Consistent => {
+                let [along, across] = if speed > REST_SPEED_M_S { [u / speed, w / speed] } else { [0.0; 2] };
+                let by = [speed + u * along, u * across];
+                let of_along = 1.0 - along * along;
+                let bent = [along * (2.0 + of_along), across * of_along, along * (1.0 - across * across)];
+                (1.0, speed * u, by, bent)
+            }
+            // The drag of Eq. 18, which always acts towards the nose.
+            ModelKind::AsPrinted => (-1.0, -speed * speed, [-2.0 * u, -2.0 * w], [-2.0, 0.0, -2.0]),
+        };
+        Self {
+            state: *state,
+            turned: libm::sincos(theta),
+            gravity_m_s2: model.gravity_m_s2,
+            lateral,
+            push: thrust_m_s2 * cos,
+            side: -thrust_m_s2 * sin,
+            turn: -turn_rad_s2 * sin,
+            turn_by_gimbal: -turn_rad_s2 * cos,
+            drag: -drag_per_m * drag,
+            drag_by: drag_by.map(|by| -drag_per_m * by),
+            drag_bent: drag_bent.map(|bent| -drag_per_m * bent),
+        }
+    }
+
+    /// Time derivative of the state.
+    pub(super) fn rates(&self) -> [f64; 6] {
+        let ([_, _, _, u, w, q], (sin, cos), g) = (self.state, self.turned, self.gravity_m_s2);
+        let w_level = self.lateral * w;
+        [
+            u * cos + w_level * sin,
+            u * sin - w_level * cos,
+            q,
+            self.push + self.drag - g * sin - q * w,
+            self.side + g * cos + q * u,
+            self.turn,
+        ]
+    }
+
+    /// Derivatives of the rates.
+    pub(super) fn by_directions(&self) -> [[f64; 5]; 6] {
+        let ([_, _, _, u, w, q], (sin, cos), g) = (self.state, self.turned, self.gravity_m_s2);
+        let ([x_dot, z_dot, ..], [drag_u, drag_w]) = (self.rates(), self.drag_by);
+        [
+            [-z_dot, cos, self.lateral * sin, 0.0, 0.0],
+            [x_dot, sin, -self.lateral * cos, 0.0, 0.0],
+            [0.0, 0.0, 0.0, 1.0, 0.0],
+            [-g * cos, drag_u, drag_w - q, -w, self.side],
+            [-g * sin, q, 0.0, u, -self.push],
+            [0.0, 0.0, 0.0, 0.0, self.turn_by_gimbal],
+        ]
+    }
+
+    /// Second derivatives of the sum of the rates, each times its worth.
+    pub(super) fn bent(&self, [kx, kz, _, ku, kw, kq]: &[f64; 6]) -> [[f64; 5]; 5] {
+        let ((sin, cos), g, [x_dot, z_dot, ..]) = (self.turned, self.gravity_m_s2, self.rates());
+        let pitch = g * (ku * sin - kw * cos) - kx * x_dot - kz * z_dot;
+        let [pitch_u, pitch_w] = [kz * cos - kx * sin, self.lateral * (kx * cos + kz * sin)];
+        let [uu, uw, ww] = self.drag_bent.map(|bent| ku * bent);
+        let gimbal = -kw * self.side - ku * self.push - kq * self.turn;
+        [
+            [pitch, pitch_u, pitch_w, 0.0, 0.0],
+            [pitch_u, uu, uw, *kw, 0.0],
+            [pitch_w, uw, ww, -ku, 0.0],
+            [0.0, *kw, -ku, 0.0, 0.0],
+            [0.0, 0.0, 0.0, 0.0, gimbal],
+        ]
+    }
+}
+
+/// Of each stage of a Runge-Kutta step: its weight, and the part of the step after which it is.
+pub(super) const WEIGHTS: [f64; 4] = [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0];
+pub(super) const AHEAD: [f64; 4] = [0.0, 0.5, 0.5, 1.0];
+
+/// The state after a Runge-Kutta step of these stages.
+pub(super) fn end(state: &[f64; 6], stages: &[Motion; 4], step_s: f64) -> [f64; 6] {
+    let weighed = stages.iter().zip(WEIGHTS);
+    weighed.fold(*state, |end, (stage, weight)| along(&end, &stage.rates(), weight * step_s))
 }
 
 /// `x + step * slope`.

@@ -6,7 +6,7 @@
 //! * [`problem`]: the problem and its conditions, as data and as the solver reads it, and a lower bound of the touchdown
 //!   speed, which shows starts that cannot be landed.
 //! * [`dynamics`]: the planar equations of motion and their integrator.
-//! * `intervals`: the dynamics of all intervals with exact first and second derivatives, in vector registers.
+//! * `intervals`: the dynamics of all intervals with exact first and second derivatives.
 //!
 //! The solver is the crate [`ocp`], whose page has the formulation, the steps and the references. Gauss-Newton Hessians
 //! do not work here: the multiplier of the end height is large, so the curvature of the dynamics counts, and full
@@ -15,6 +15,8 @@
 pub mod dynamics;
 mod intervals;
 pub mod problem;
+#[cfg(test)]
+mod tests;
 
 pub use self::problem::{FinalBox, Problem, SolverLimits, best_touchdown_speed_m_s};
 pub use ocp::{Outcome, Start, Status};

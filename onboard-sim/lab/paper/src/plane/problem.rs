@@ -3,11 +3,11 @@
 use core::array::from_fn;
 use core::f64::consts::{FRAC_PI_2, PI};
 
-use ocp::{Condition, InputRange, Model, Settings};
+use ocp::{Condition, DenseIntervals, InputRange, Model, Settings};
 
 use crate::plane::LANDING_MISS;
 use crate::plane::dynamics::{PlanarModel, PlanarState};
-use crate::plane::intervals::Blocks;
+use crate::plane::intervals;
 
 /// The box in which a planned trajectory ends, in addition to height and distance.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -106,7 +106,7 @@ const BENDS_RAD: [f64; 4] = [0.3, -0.3, 3.3 * 0.3, -3.3 * 0.3];
 const NARROW_BENDS: usize = 2;
 
 impl Model<6, 1> for Problem {
-    type Intervals = Blocks;
+    type Intervals = DenseIntervals<6, 1>;
     type StateCurvature = [f64; 6];
     type InputCurvature = [f64; 1];
 
@@ -181,13 +181,9 @@ impl Model<6, 1> for Problem {
         inputs_rad: &[[f64; 1]],
         costates: &[[f64; 6]],
         derivatives: bool,
-        blocks: &mut Blocks,
+        intervals: &mut DenseIntervals<6, 1>,
     ) {
-        if derivatives {
-            blocks.evaluate::<true>(self, states, inputs_rad, costates);
-        } else {
-            blocks.evaluate::<false>(self, states, inputs_rad, costates);
-        }
+        intervals::evaluate(self, states, inputs_rad, costates, derivatives, intervals);
     }
 
     fn next(&self, _: usize, state: &[f64; 6], [gimbal_rad]: &[f64; 1]) -> [f64; 6] {
@@ -197,16 +193,9 @@ impl Model<6, 1> for Problem {
 
     /// Running cost (Eq. 28 of the landing paper).
     fn cost(&self, states: &[[f64; 6]], inputs_rad: &[[f64; 1]]) -> f64 {
-        let mut squares = [0.0; 6];
-        for state in &states[1..] {
-            let deviation = Self::deviation(state);
-            for (sum, value) in squares.iter_mut().zip(&deviation) {
-                *sum += value * value;
-            }
-        }
-        let state_part: f64 = squares.iter().zip(&self.state_weights).map(|(sum, weight)| sum * weight).sum();
-        let input_part: f64 = inputs_rad.iter().map(|[input]| input * input).sum();
-        0.5 * self.step_s * (state_part + self.input_weight * input_part)
+        let rates =
+            states[1..].iter().zip(inputs_rad).map(|(state, [input_rad])| self.cost_rate(state, *input_rad));
+        self.step_s * rates.sum::<f64>()
     }
 
     #[inline]
@@ -228,20 +217,6 @@ impl Model<6, 1> for Problem {
     #[inline]
     fn input_curvature(&self, _: usize, _: &[f64; 1]) -> [f64; 1] {
         [self.input_weight * self.step_s]
-    }
-
-    fn slope_along(&self, states: &[[f64; 6]], changes: &[[f64; 6]]) -> f64 {
-        let mut along = [0.0; 6];
-        for (state, change) in states.iter().zip(changes) {
-            let deviation = Self::deviation(state);
-            for i in 0..6 {
-                along[i] += deviation[i] * change[i];
-            }
-        }
-        along
-            .iter()
-            .zip(&self.state_weights)
-            .fold(0.0, |slope, (sum, weight)| slope + self.step_s * weight * sum)
     }
 }
 
