@@ -4,9 +4,8 @@
 
 use alloc::vec::Vec;
 use core::array::from_fn;
-use pulp::Simd;
 
-use crate::intervals::{Curvature, Feedback, Hessian, Interval, Intervals, Stage, Value};
+use crate::intervals::{Curvature, Feedback, Hessian, Interval, Intervals, Stage, add_times};
 
 /// One interval. [`Model::evaluate`](crate::Model::evaluate) fills in `end`, `pulled_x` and `pulled_u`, and the other
 /// fields if derivatives are asked for.
@@ -70,7 +69,6 @@ impl<const NX: usize, const NU: usize> Dense<NX, NU> {
 pub struct DenseIntervals<const NX: usize, const NU: usize>(pub Vec<Dense<NX, NU>>);
 
 impl<const NX: usize, const NU: usize> Intervals<NX, NU> for DenseIntervals<NX, NU> {
-    type Value = [[f64; NX]; NX];
     type Interval<'a> = &'a Dense<NX, NU>;
 
     fn resize(&mut self, intervals: usize) {
@@ -94,8 +92,6 @@ impl<const NX: usize, const NU: usize> Intervals<NX, NU> for DenseIntervals<NX, 
 }
 
 impl<const NX: usize, const NU: usize> Interval<NX, NU> for &Dense<NX, NU> {
-    type Value = [[f64; NX]; NX];
-
     #[inline(always)]
     fn pull(&self, g: &[f64; NX]) -> ([f64; NX], [f64; NU]) {
         (combine(g, &self.a), combine(g, &self.b))
@@ -107,15 +103,14 @@ impl<const NX: usize, const NU: usize> Interval<NX, NU> for &Dense<NX, NU> {
     }
 
     #[inline(always)]
-    fn eliminate<S: Simd, C: Curvature<NX>, R: Curvature<NU>>(
+    fn eliminate<C: Curvature<NX>, R: Curvature<NU>>(
         &self,
-        _: S,
         stage: &Stage<C, R, NX, NU>,
         after: &[[f64; NX]; NX],
         before: &mut [[f64; NX]; NX],
         slope: &mut [f64; NX],
     ) -> Option<Feedback<NX, NU>> {
-        after.add_times(&stage.defect, slope);
+        add_times(after, &stage.defect, slope);
         let pulled = self.pull(slope);
         stage.without_inputs(self.square(after, stage.share), &pulled, before, slope)
     }
@@ -166,12 +161,6 @@ pub struct Factor<const N: usize> {
 
 impl<const N: usize> Factor<N> {
     pub(crate) const ZERO: Self = Self { lower: [[0.0; N]; N], inverse: [0.0; N] };
-
-    /// The inverse of `D`.
-    #[inline(always)]
-    pub fn inverse(&self) -> &[f64; N] {
-        &self.inverse
-    }
 
     /// Factorises a matrix, if every entry of `D` exceeds its `least`.
     #[inline(always)]

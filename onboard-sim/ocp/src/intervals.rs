@@ -5,7 +5,6 @@
 
 use core::array::from_fn;
 use core::fmt::Debug;
-use pulp::Simd;
 
 use crate::dense::{Factor, add_multiple};
 
@@ -18,11 +17,8 @@ pub trait Intervals<const NX: usize, const NU: usize>: Clone + Debug + Default {
     /// are those of the identity.
     const INTEGRALS: usize = 0;
 
-    /// The quadratic part of the value function.
-    type Value: Value<NX>;
-
     /// One interval's derivatives.
-    type Interval<'a>: Interval<NX, NU, Value = Self::Value>
+    type Interval<'a>: Interval<NX, NU>
     where
         Self: 'a;
 
@@ -42,25 +38,22 @@ pub trait Intervals<const NX: usize, const NU: usize>: Clone + Debug + Default {
 
 /// The derivatives of one interval, as operations. They are inlined into the sweeps, so mark them `#[inline(always)]`.
 pub trait Interval<const NX: usize, const NU: usize> {
-    type Value: Value<NX>;
-
     /// `(A' g, B' g)`.
     fn pull(&self, g: &[f64; NX]) -> ([f64; NX], [f64; NU]);
 
     /// `A dx + B du`.
     fn push(&self, dx: &[f64; NX], du: &[f64; NU]) -> [f64; NX];
 
-    /// One stage of the backward sweep, in the vectors of `simd`: from the value function of the node after the interval,
+    /// One stage of the backward sweep: from the value function of the node after the interval,
     /// `dx' after dx / 2 + slope' dx`, to that of the node before it, with the feedback of the inputs. `None` if the matrix of
     /// the inputs is not positive definite; `before` and `slope` must then not be used.
     ///
     /// [`Dense`](crate::Dense) has the formulas.
-    fn eliminate<S: Simd, C: Curvature<NX>, R: Curvature<NU>>(
+    fn eliminate<C: Curvature<NX>, R: Curvature<NU>>(
         &self,
-        simd: S,
         stage: &Stage<C, R, NX, NU>,
-        after: &Self::Value,
-        before: &mut Self::Value,
+        after: &[[f64; NX]; NX],
+        before: &mut [[f64; NX]; NX],
         slope: &mut [f64; NX],
     ) -> Option<Feedback<NX, NU>>;
 
@@ -167,35 +160,11 @@ pub(crate) fn slope_before<const NX: usize, const NU: usize>(
     slope
 }
 
-// The quadratic part of the value function of the backward sweep.
-
-/// A symmetric matrix over the states, in the order in which a model's [`eliminate`](crate::Interval::eliminate) reads it
-/// fastest. `[[f64; N]; N]` is it row by row.
-pub trait Value<const NX: usize>: Copy + Debug {
-    const ZERO: Self;
-
-    /// Adds a second derivative of the cost.
-    fn add<C: Curvature<NX>>(&mut self, curvature: &C);
-
-    /// Adds the product with a vector to `sum`.
-    fn add_times(&self, vector: &[f64; NX], sum: &mut [f64; NX]);
-}
-
-impl<const NX: usize> Value<NX> for [[f64; NX]; NX] {
-    const ZERO: Self = [[0.0; NX]; NX];
-
-    #[inline(always)]
-    fn add<C: Curvature<NX>>(&mut self, curvature: &C) {
-        curvature.add_to(self);
-    }
-
-    #[inline(always)]
-    fn add_times(&self, vector: &[f64; NX], sum: &mut [f64; NX]) {
-        for (row, value) in self.iter().zip(vector) {
-            for (entry, column) in sum.iter_mut().zip(row) {
-                *entry += column * value;
-            }
-        }
+/// Adds the product of a symmetric matrix with a vector to `sum`.
+#[inline(always)]
+pub(crate) fn add_times<const NX: usize>(matrix: &[[f64; NX]; NX], vector: &[f64; NX], sum: &mut [f64; NX]) {
+    for (row, value) in matrix.iter().zip(vector) {
+        add_multiple(sum, *value, row);
     }
 }
 

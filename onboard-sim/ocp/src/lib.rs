@@ -30,9 +30,9 @@
 //! 2. `iterate`: stops if the optimality conditions hold; lowers the barrier `mu` if its problem is solved.
 //! 3. `newton`: eliminates slacks and limit multipliers, which leaves diagonal terms at the nodes.
 //! 4. `riccati`: computes the Newton step by a backward and a forward sweep with the exact Hessian. In the backward sweep an
-//!    interval eliminates itself ([`Interval::eliminate`]), so that a model can keep the value function in the order of its
-//!    vectors ([`Value`]). The inertia is right exactly if one matrix per stage, with a row for each input, is positive definite. If it is not, the sweep
-//!    runs again with half the dynamics' curvature, and then without it.
+//!    interval eliminates itself ([`Interval::eliminate`]). The inertia is right exactly if one matrix per stage, with a row for
+//!    each input, is positive definite. If it is not, the sweep runs again with half the dynamics' curvature, and then without
+//!    it.
 //! 5. `newton`: finds the longest fractions of the step that keep slacks and multipliers positive, primal and dual
 //!    separately.
 //! 6. `newton`: halves the step until defects or objective make progress.
@@ -75,7 +75,7 @@ mod solver;
 mod start;
 
 pub use dense::{Dense, DenseIntervals, Factor, add_multiple};
-pub use intervals::{Curvature, Feedback, Hessian, Interval, Intervals, Stage, Value};
+pub use intervals::{Curvature, Feedback, Hessian, Interval, Intervals, Stage};
 pub use model::{Condition, InputRange, Model, Settings};
 pub use solver::Workspace;
 pub use start::{Outcome, Start, Status};

@@ -66,18 +66,6 @@ pub trait Model<const NX: usize, const NU: usize> {
     /// Second derivative of the cost by the input of interval `k`. Where it is not positive semidefinite, the solver
     /// may fail.
     fn input_curvature(&self, k: usize, input: &[f64; NU]) -> Self::InputCurvature;
-
-    /// Slope of the cost along a change of all states. A model whose weights are the same at all nodes can add up
-    /// faster.
-    fn slope_along(&self, states: &[[f64; NX]], changes: &[[f64; NX]]) -> f64 {
-        let mut sum = 0.0;
-        for (node, (state, change)) in states.iter().zip(changes).enumerate() {
-            for (slope, change) in self.state_slope(node, state).iter().zip(change) {
-                sum += slope * change;
-            }
-        }
-        sum
-    }
 }
 
 /// The limits of an input, finite.

@@ -123,7 +123,12 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Newton<M, NX, NU> {
     pub(crate) fn slope(&self, model: &M, iterate: &Iterate<M, NX, NU>, barrier: f64) -> f64 {
         let ranges = model.input_ranges();
         let penalty = model.settings().penalty;
-        let mut slope = model.slope_along(&iterate.states, &self.sweep.states);
+        let mut slope = 0.0;
+        for (node, (state, step)) in iterate.states.iter().zip(&self.sweep.states).enumerate() {
+            for (own, step) in model.state_slope(node, state).iter().zip(step) {
+                slope += own * step;
+            }
+        }
         for (k, (input, step)) in iterate.inputs.iter().zip(&self.sweep.inputs).enumerate() {
             let own = model.input_slope(k, input);
             for i in 0..NU {

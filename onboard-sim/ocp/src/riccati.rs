@@ -17,7 +17,7 @@ use alloc::vec::Vec;
 use core::array::from_fn;
 use pulp::{Arch, Simd, WithSimd};
 
-use crate::intervals::{Curvature, Feedback, Interval, Intervals, Stage, Value, slope_before};
+use crate::intervals::{Curvature, Feedback, Interval, Intervals, Stage, add_times, slope_before};
 use crate::iterate::Iterate;
 use crate::model::Model;
 
@@ -32,7 +32,7 @@ pub(crate) struct Sweep<M: Model<NX, NU>, const NX: usize, const NU: usize> {
     pub(crate) input_terms: Vec<(M::InputCurvature, [f64; NU])>,
     feedbacks: Vec<Feedback<NX, NU>>,
     /// `P` of each node.
-    values: Vec<<M::Intervals as Intervals<NX, NU>>::Value>,
+    values: Vec<[[f64; NX]; NX]>,
     /// Change of each state.
     pub(crate) states: Vec<[f64; NX]>,
     /// Change of each interval's inputs.
@@ -76,9 +76,9 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize, const SWEEP: u8> WithSi
     type Output = bool;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> bool {
+    fn with_simd<S: Simd>(self, _: S) -> bool {
         match SWEEP {
-            BACKWARD => return self.sweep.eliminate(simd, self.iterate),
+            BACKWARD => return self.sweep.eliminate(self.iterate),
             BACKWARD_AGAIN => self.sweep.eliminate_again(self.iterate),
             _ => self.sweep.substitute(self.iterate),
         }
@@ -93,7 +93,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Sweep<M, NX, NU> {
         self.slopes.resize(intervals + 1, [0.0; NX]);
         self.input_terms.resize(intervals, (M::InputCurvature::ZERO, [0.0; NU]));
         self.feedbacks.resize(intervals, Feedback::ZERO);
-        self.values.resize(intervals + 1, Value::ZERO);
+        self.values.resize(intervals + 1, [[0.0; NX]; NX]);
         self.states.resize(intervals + 1, [0.0; NX]);
         self.inputs.resize(intervals, [0.0; NU]);
         self.costates.resize(intervals + 1, [0.0; NX]);
@@ -132,11 +132,10 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Sweep<M, NX, NU> {
 impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Sweep<M, NX, NU> {
     /// [`backward`](Self::backward) in the vectors of the function it is inlined into.
     #[inline(always)]
-    pub(crate) fn eliminate<S: Simd>(&mut self, simd: S, iterate: &Iterate<M, NX, NU>) -> bool {
+    pub(crate) fn eliminate(&mut self, iterate: &Iterate<M, NX, NU>) -> bool {
         let count = self.inputs.len();
-        let mut value = <M::Intervals as Intervals<NX, NU>>::Value::ZERO;
-        value.add(&self.curvatures[count]);
-        self.values[count] = value;
+        self.values[count] = [[0.0; NX]; NX];
+        self.curvatures[count].add_to(&mut self.values[count]);
         let mut slope = self.slopes[count];
 
         for k in (0..count).rev() {
@@ -149,8 +148,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Sweep<M, NX, NU> {
             };
             let (before, after) = self.values.split_at_mut(k + 1);
             let interval = iterate.intervals.interval(k);
-            let Some(feedback) = interval.eliminate(simd, &stage, &after[0], &mut before[k], &mut slope)
-            else {
+            let Some(feedback) = interval.eliminate(&stage, &after[0], &mut before[k], &mut slope) else {
                 return false;
             };
             self.feedbacks[k] = feedback;
@@ -167,7 +165,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Sweep<M, NX, NU> {
             let interval = iterate.intervals.interval(k);
             let residual = iterate.defect(k);
             let mut g = slope;
-            self.values[k + 1].add_times(&residual, &mut g);
+            add_times(&self.values[k + 1], &residual, &mut g);
             let (pulled_x, pulled_u) = interval.pull(&g);
             // The correction for the dynamics' change since then, because their first derivatives are the old ones,
             // too.

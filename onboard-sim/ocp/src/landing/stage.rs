@@ -12,9 +12,9 @@
 //! which is half the arithmetic of whole matrices, in half of their memory.
 #![expect(clippy::inline_always, reason = "inlined into the sweeps, to be compiled for their vectors")]
 
-use crate::{Curvature, Feedback, Hessian, Interval, Intervals, Stage, Value, add_multiple};
+use crate::intervals::add_times;
+use crate::{Curvature, Feedback, Hessian, Interval, Intervals, Stage, add_multiple};
 use alloc::vec::Vec;
-use pulp::Simd;
 
 use super::{INPUTS, STATES, State};
 
@@ -85,7 +85,6 @@ pub struct LandingIntervals(pub(super) Vec<LandingInterval>);
 impl Intervals<STATES, INPUTS> for LandingIntervals {
     const INTEGRALS: usize = PLACES;
 
-    type Value = [[f64; STATES]; STATES];
     type Interval<'a> = &'a LandingInterval;
 
     fn resize(&mut self, intervals: usize) {
@@ -130,8 +129,6 @@ fn directions(x: &State, u: &[f64; INPUTS]) -> [f64; DIRECTIONS] {
 }
 
 impl Interval<STATES, INPUTS> for &LandingInterval {
-    type Value = [[f64; STATES]; STATES];
-
     #[inline(always)]
     fn pull(&self, g: &State) -> (State, [f64; INPUTS]) {
         let mut by = [0.0; DIRECTIONS];
@@ -159,15 +156,14 @@ impl Interval<STATES, INPUTS> for &LandingInterval {
     }
 
     #[inline(always)]
-    fn eliminate<S: Simd, C: Curvature<STATES>, R: Curvature<INPUTS>>(
+    fn eliminate<C: Curvature<STATES>, R: Curvature<INPUTS>>(
         &self,
-        _: S,
         stage: &Stage<C, R, STATES, INPUTS>,
         after: &[[f64; STATES]; STATES],
         before: &mut [[f64; STATES]; STATES],
         slope: &mut State,
     ) -> Option<Feedback<STATES, INPUTS>> {
-        after.add_times(&stage.defect, slope);
+        add_times(after, &stage.defect, slope);
         let pulled = self.pull(slope);
         let h = self.step_s;
 

@@ -2,7 +2,6 @@ use std::array::from_fn;
 use std::f64::consts::TAU;
 
 use crate::{DenseIntervals, Feedback, Hessian, Interval as _, Intervals as _, Stage, Status};
-use pulp::Scalar;
 
 use super::stage::LandingInterval;
 use super::{
@@ -261,8 +260,8 @@ fn an_interval_is_eliminated_like_its_whole_matrices() {
     };
     let slope = from_fn(|i| number(30 + i));
     let (mut one, mut other) = ((value, slope), (value, slope));
-    let found = (&interval).eliminate(Scalar, &stage, &value, &mut one.0, &mut one.1).unwrap();
-    let expected = (&whole.0[0]).eliminate(Scalar, &stage, &value, &mut other.0, &mut other.1).unwrap();
+    let found = (&interval).eliminate(&stage, &value, &mut one.0, &mut one.1).unwrap();
+    let expected = (&whole.0[0]).eliminate(&stage, &value, &mut other.0, &mut other.1).unwrap();
     let all = |(value, slope): ([State; STATES], State), feedback: Feedback<STATES, INPUTS>| {
         let Feedback { gain, offset, .. } = feedback;
         [value.as_flattened(), &slope[..], gain.as_flattened(), &offset[..]].concat()

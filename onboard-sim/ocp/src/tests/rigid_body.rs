@@ -188,7 +188,7 @@ fn the_width_of_the_vectors_does_not_change_any_bit() {
     workspace.sweep(&model);
     let (sweep, current) = (&mut workspace.newton.sweep, &workspace.current);
     let wide = (sweep.states.clone(), sweep.inputs.clone(), sweep.costates.clone());
-    assert!(sweep.eliminate(pulp::Scalar, current));
+    assert!(sweep.eliminate(current));
     sweep.substitute(current);
     assert_eq!(wide, (sweep.states.clone(), sweep.inputs.clone(), sweep.costates.clone()));
     sweep.backward_again(current);

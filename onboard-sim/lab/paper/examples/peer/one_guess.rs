@@ -62,10 +62,6 @@ macro_rules! as_in_the_problem {
         fn input_curvature(&self, k: usize, input_rad: &[f64; 1]) -> Self::InputCurvature {
             self.problem.input_curvature(k, input_rad)
         }
-
-        fn slope_along(&self, states: &[[f64; 6]], changes: &[[f64; 6]]) -> f64 {
-            self.problem.slope_along(states, changes)
-        }
     };
 }
 pub(crate) use as_in_the_problem;

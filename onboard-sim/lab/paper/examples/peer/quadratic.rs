@@ -65,7 +65,6 @@ pub(crate) fn answer(problem: &Problem, plan: &Solution) -> Result<String> {
 impl Intervals<6, 1> for Linear {
     const INTEGRALS: usize = Blocks::INTEGRALS;
 
-    type Value = <Blocks as Intervals<6, 1>>::Value;
     type Interval<'a> = <Blocks as Intervals<6, 1>>::Interval<'a>;
 
     fn resize(&mut self, intervals: usize) {
