@@ -116,19 +116,14 @@ pub(crate) fn warn_of_what_is_missing(recording: &Recording) {
             "warning: {name}: after frame {after} comes frame {before}; nothing after the gap was run again"
         ));
     }
-    warn_of_damage(&recording.name, recording.damage.as_deref());
-    warn_of_cut(&recording.name, recording.cut.as_ref());
+    warn_of_loss(&recording.name, recording.damage.as_deref(), recording.cut.as_ref());
 }
 
-/// Warns that only the part of a log before its damage is used.
-pub(crate) fn warn_of_damage(file: &str, damage: Option<&str>) {
+/// Warns of a log that is damaged, and of a flight that was not recorded to its end.
+pub(crate) fn warn_of_loss(file: &str, damage: Option<&str>, cut: Option<&Cut>) {
     if let Some(damage) = damage {
         say(&format!("warning: {file} is damaged: {damage}; what can be read was used"));
     }
-}
-
-/// Warns that a flight was not recorded to its end.
-pub(crate) fn warn_of_cut(file: &str, cut: Option<&Cut>) {
     if let Some(cut) = cut {
         say(&format!("warning: {file}: the flight {cut}"));
     }

@@ -28,7 +28,7 @@ pub use series::{Align, Flown, Series};
 pub use tolerance::SignalDifference;
 pub use tolerance::{Tolerance, ToleranceError, Tolerances};
 
-use crate::cli::{give, warn_of_cut, warn_of_damage};
+use crate::cli::{give, warn_of_loss};
 use crate::log::Verdict;
 
 /// One flight against another.
@@ -212,8 +212,7 @@ impl Args {
 
 fn open(path: &Path) -> Result<Flown> {
     let flown = Flown::open(path)?;
-    warn_of_damage(&flown.name, flown.damage.as_deref());
-    warn_of_cut(&flown.name, flown.cut.as_ref());
+    warn_of_loss(&flown.name, flown.damage.as_deref(), flown.cut.as_ref());
     Ok(flown)
 }
 

@@ -13,7 +13,7 @@ use anyhow::{Context as _, Result, bail, ensure};
 use clap::ValueEnum;
 pub use tables::{ExportedFile, export_tables};
 
-use crate::cli::{Answer, give, warn_of_damage};
+use crate::cli::{Answer, give, warn_of_loss};
 use crate::log::{FlightLog, ImportedTlog, LogError, import_tlog, is_tlog};
 use crate::output::WriteError;
 use protocol::program::Exit;
@@ -72,7 +72,7 @@ impl Args {
         let mut log = FlightLog::open(&self.file)?;
         let files = export_tables(&mut log, output)?;
         let outcome = give(&files, self.json)?;
-        warn_of_damage(log.name(), log.damage().map(ToString::to_string).as_deref());
+        warn_of_loss(log.name(), log.damage().map(ToString::to_string).as_deref(), None);
         Ok(outcome)
     }
 

@@ -44,7 +44,7 @@ use self::calibration::{Calibration, Table};
 use self::day::Learnt;
 use self::least_squares::Solution;
 pub use self::trace::{Frame, Trace};
-use crate::cli::{Answer, give, say, say_anyway, text_of, warn_of_damage};
+use crate::cli::{Answer, give, say, say_anyway, text_of, warn_of_loss};
 use crate::info::utc;
 use crate::log::Recording;
 use crate::output::NewFile;
@@ -588,7 +588,7 @@ impl Args {
         }
         once_each(&mut fits);
         for fit in &fits {
-            warn_of_damage(&fit.source, fit.damage.as_deref());
+            warn_of_loss(&fit.source, fit.damage.as_deref(), None);
         }
         let day = self.day.is_asked().then(|| self.day.learn(&fits, flown)).transpose()?;
         let report = FitReport { together: pooled(&fits), fits, day };

@@ -18,7 +18,7 @@ use serde::Serialize;
 use time::OffsetDateTime;
 use time::format_description::well_known::Rfc3339;
 
-use crate::cli::{Answer, answer, give, give_each, warn_of_cut, warn_of_damage};
+use crate::cli::{Answer, answer, give, give_each, warn_of_loss};
 use crate::findings::{self, Finding};
 use crate::log::{
     Attachment, BuildComparison, Clocks, Cut, Entry, FlightLog, Head, LogError, Recording, StampedEntry,
@@ -328,8 +328,7 @@ pub struct Completeness {
 impl Completeness {
     /// Warns about the damage and the missing end of a log that was described.
     pub(crate) fn warn(&self, name: &str) {
-        warn_of_damage(name, self.damage.as_deref());
-        warn_of_cut(name, self.cut.as_ref());
+        warn_of_loss(name, self.damage.as_deref(), self.cut.as_ref());
     }
 
     fn of<R: Read>(

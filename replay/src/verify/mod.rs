@@ -43,7 +43,7 @@ use protocol::log::record::{SCHEMA_VERSION, TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER
 use protocol::program::Exit;
 use serde::Serialize;
 
-use crate::cli::{Answer, give_each, say, warn_of_cut, warn_of_damage};
+use crate::cli::{Answer, give_each, say, warn_of_loss};
 use crate::controller::FrameError;
 use crate::log::{
     BuildComparison, Cut, Entry, FlightLog, Gap, Head, LogError, LoggedFlight, Recording, Verdict,
@@ -504,8 +504,7 @@ impl Args {
             let found = if self.strict { verify_strictly(file)? } else { verify(file)? };
             let took = started.elapsed();
             for report in &found {
-                warn_of_damage(&report.file, report.damage.as_deref());
-                warn_of_cut(&report.file, report.cut.as_ref());
+                warn_of_loss(&report.file, report.damage.as_deref(), report.cut.as_ref());
                 warn_of_build(report);
             }
             say_speed(&found, took);
