@@ -106,11 +106,12 @@ impl Pace {
 
     /// A message was taken into the model; its kind decides how soon it must be drawn.
     pub fn mark_message(&mut self, msg: &Msg, model: &Model) {
-        let counting = model.vehicle.countdown_s().is_some_and(|time| time.value > 0.0);
         match msg {
             // These change nothing that must be drawn within the next second.
             Msg::Tick | Msg::Sent { .. } | Msg::Links { .. } | Msg::HeardOver(_) | Msg::HeardFrom(_) => {}
-            Msg::Frame(_) | Msg::Received { .. } if model.vehicle.in_flight() || counting => {
+            Msg::Frame(_) | Msg::Received { .. }
+                if model.vehicle.in_flight() || model.vehicle.counts_down() =>
+            {
                 self.wait = self.wait.min(FLIGHT_FRAME);
             }
             Msg::Frame(_) | Msg::Received { .. } => self.wait = self.wait.min(CALM_FRAME),

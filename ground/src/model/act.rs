@@ -159,10 +159,7 @@ impl Act {
             Self::Arm => acts && why_not_arm(model, now).is_none(),
             Self::Start => acts && why_not_start(model, now).is_none(),
             Self::Disarm => acts && model.every_vehicle(now).any(|v| v.is_armed() && !v.in_flight()),
-            Self::HoldCountdown => {
-                let counts = |vehicle: &Vehicle| vehicle.countdown_s().is_some_and(|left| left.value > 0.0);
-                commands && model.every_vehicle(now).any(counts)
-            }
+            Self::HoldCountdown => commands && model.every_vehicle(now).any(Vehicle::counts_down),
             Self::Tap => acts && model.tapping(now).is_some_and(|(by, _)| by == model.own_number()),
             Self::TakeCommand => acts && why_not_take(model, now).is_none(),
             Self::Note => commands,

@@ -208,9 +208,8 @@ impl Model {
     /// Who has to tap, and how long is left.
     pub fn tapping(&self, now: Duration) -> Option<(u8, Duration)> {
         let crew = self.vehicle.last::<TD_CREW_DATA>().filter(|crew| crew.age(now) <= TOLD_FOR)?;
-        let counting = self.vehicle.countdown_s().is_some_and(|left| left.value > 0.0);
         let left = Duration::from_millis(crew.value.tap_left_ms.into()).saturating_sub(crew.age(now));
-        (crew.value.tapped_by > 0 && counting).then_some((crew.value.tapped_by, left))
+        (crew.value.tapped_by > 0 && self.vehicle.counts_down()).then_some((crew.value.tapped_by, left))
     }
 
     /// The operator who commands, by the number of their key; `None` if nobody has armed it.

@@ -101,10 +101,7 @@ impl Model {
     /// Whether the station may end its log and begin another: the vehicle is disarmed on the pad, or nothing is heard, and no
     /// vehicle that was heard flies or is about to.
     pub fn may_change_log(&self, now: Duration) -> bool {
-        let rests = |vehicle: &Vehicle| {
-            let counts = vehicle.countdown_s().is_some_and(|left| left.value > 0.0);
-            !vehicle.is_armed() && !vehicle.in_flight() && !counts
-        };
+        let rests = |of: &Vehicle| !of.is_armed() && !of.in_flight() && !of.counts_down();
         let is_silent = match self.link.state(now) {
             LinkState::NeverHeard => true,
             LinkState::Lost(silence) => silence >= SILENT_FOR,

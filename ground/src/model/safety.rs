@@ -294,12 +294,11 @@ impl Model {
 
     /// Whether countdowns run, and a hold comes too late for each.
     pub fn is_past_hold(&self, now: Duration) -> bool {
-        let counting = |vehicle: &&Vehicle| vehicle.countdown_s().is_some_and(|left| left.value > 0.0);
         let past = |vehicle: &Vehicle| {
             let left_s = vehicle.countdown_s().map(|left| left.value - left.age(now).as_secs_f64());
             left_s.zip(self.last_hold_of(vehicle)).is_some_and(|(left_s, last_s)| left_s <= last_s)
         };
-        let mut counted = self.every_vehicle(now).filter(counting).peekable();
+        let mut counted = self.every_vehicle(now).filter(|vehicle| vehicle.counts_down()).peekable();
         counted.peek().is_some() && counted.all(past)
     }
 

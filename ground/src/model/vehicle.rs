@@ -255,6 +255,11 @@ impl Vehicle {
         self.phase_now().is_some_and(is_flight)
     }
 
+    /// Whether a countdown runs to a release that has not come.
+    pub fn counts_down(&self) -> bool {
+        self.countdown_s().is_some_and(|left| left.value > 0.0)
+    }
+
     /// Time to release, s (negative after it), if a countdown is known.
     pub fn countdown_s(&self) -> Option<Sample<f64>> {
         let status = self.status.as_ref()?;

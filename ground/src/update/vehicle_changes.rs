@@ -33,10 +33,7 @@ impl Announced {
             phase: vehicle.phase_now(),
             armed: vehicle.armed().map(|armed| armed.value),
             counting: on_pad && vehicle.countdown_s().is_some(),
-            status: vehicle.status.as_ref().map(|status| {
-                let counts = vehicle.countdown_s().is_some_and(|left| left.value > 0.0);
-                (status.value.phase, counts)
-            }),
+            status: vehicle.status.as_ref().map(|status| (status.value.phase, vehicle.counts_down())),
             aborted: vehicle.interlocks().is_some_and(is_aborted)
                 || vehicle.heartbeat.is_some_and(|heartbeat| heartbeat.value.terminated),
             hold: vehicle.status.as_ref().map(|status| status.value.hold),

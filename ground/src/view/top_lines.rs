@@ -267,9 +267,8 @@ pub fn phase(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
 
 /// What the vehicle does, in words.
 pub fn doing(model: &Model, phase: TdPhase) -> &'static str {
-    let counts = model.vehicle.countdown_s().is_some_and(|left| left.value > 0.0);
     match phase {
-        _ if is_on_pad(phase) && counts => "Countdown",
+        _ if is_on_pad(phase) && model.vehicle.counts_down() => "Countdown",
         TdPhase::TD_PHASE_BOOST if !model.vehicle.has_lifted => "Told to light",
         _ => words::doing(phase),
     }
@@ -361,9 +360,8 @@ pub fn abort(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line
 
 /// In the countdown: until when a hold works.
 fn hold_until(model: &Model, now: Duration) -> Option<String> {
-    let counts = model.vehicle.countdown_s().is_some_and(|left| left.value > 0.0);
     let may_fly = may_have_left(&model.vehicle, now).is_some();
-    let last_s = model.last_hold_s().filter(|_| counts && !may_fly)?;
+    let last_s = model.last_hold_s().filter(|_| model.vehicle.counts_down() && !may_fly)?;
     if model.is_past_hold(now) {
         return Some("; TOO LATE to hold".to_owned());
     }

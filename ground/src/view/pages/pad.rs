@@ -72,7 +72,7 @@ fn is_amiss(model: &Model, now: Duration) -> bool {
 /// The band: GO or NO-GO, and the next step large.
 fn draw_go(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) -> Rect {
     let keys = &model.settings.keys;
-    let counts = model.vehicle.countdown_s().is_some_and(|left| left.value > 0.0);
+    let counts = model.vehicle.counts_down();
     let (words, role) = summary(model, now);
     let next = [(Act::Arm, "ARM"), (Act::Start, "START")].into_iter().find(|(act, _)| act.works(model, now));
     let next = next.filter(|_| role == TextRole::Good && !counts).map(|(act, typed)| (keys.name(act), typed));
