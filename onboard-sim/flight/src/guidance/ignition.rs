@@ -23,6 +23,10 @@ pub struct IgnitionSettings {
     pub burn_time_scales: [f64; 2],
     /// Chosen place in the common band: 0 at its low end, 1 at its high end.
     pub place: f64,
+    /// How much later than expected an igniter may light, s. None lights much earlier, so the height is chosen for the middle
+    /// of the two.
+    #[serde(default)]
+    pub late_s: f64,
     /// Expected time from command to thrust, s.
     pub delay_s: f64,
     /// How long before the expected ignition the landing controller takes over, s.
@@ -113,9 +117,12 @@ impl IgnitionSettings {
                 high_m: nearest.high_m.min(band.high_m),
             })
         });
+        let late_m = -0.5 * self.late_s * onset_vertical_m_s;
+        let in_time_m = |band: Band| band.low_m + self.place * (band.high_m - band.low_m);
+        // Above all bands no motor lands, however late.
         let chosen_m = self
             .fixed_height_m
-            .or_else(|| nearest.map(|nearest| nearest.low_m + self.place * (nearest.high_m - nearest.low_m)));
+            .or_else(|| nearest.map(|band| (in_time_m(band) + late_m).min(in_time_m(band).max(band.high_m))));
         let command_in_s =
             chosen_m.map(|chosen_m| (onset_height_m - chosen_m) / (-onset_vertical_m_s).max(1.0));
         IgnitionPrediction {

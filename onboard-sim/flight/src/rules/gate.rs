@@ -28,7 +28,7 @@ pub struct GateInput {
     pub landing_feasible: bool,
     /// The certified motor lands from here or from farther down.
     pub lands_ahead: bool,
-    /// Horizontal distance of the predicted touchdown from the pad, m.
+    /// Horizontal distance of the predicted touchdown under the motor from the pad, m.
     pub predicted_touchdown_x_m: f64,
     /// All fins have reached their deployed angle.
     pub fins_confirmed: bool,
@@ -64,8 +64,8 @@ pub const GATE_CHECKS: usize = 13;
 
 /// The checks of the gate, in the order in which they are told.
 ///
-/// The fence needs no margin: steering does not bring the vehicle back. From the commit height to ignition it has half a
-/// second, and the wind carries the predicted touchdown 0.3 to 1.8 m further out (1000 `harsh` flights).
+/// The fence needs no margin beside the prediction's: steering does not bring the vehicle back. From the commit height to ignition it
+/// has a second.
 pub fn checks(limits: &GateLimits, input: &GateInput) -> [GateCheck; GATE_CHECKS] {
     let value = |name, found: f64, limit: f64, unit, beyond: f64| GateCheck {
         name,

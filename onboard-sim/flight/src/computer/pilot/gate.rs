@@ -421,26 +421,32 @@ mod tests {
     fn what_lasts_brings_the_parachute_above_the_commit_height() {
         assert_parachute(|_, _, input| input.fins_rad = [0.0; 4], AT_COMMIT_HEIGHT_M);
         assert_parachute(|_, _, input| input.igniter_continuity = false, AT_COMMIT_HEIGHT_M);
-        // The fence is at 120 m.
-        assert_parachute(|_, estimate, _| estimate.state.position_m.x = 121.0, AT_COMMIT_HEIGHT_M);
+        // The fence is at 120 m, and the motor brings the vehicle back by 15 m.
+        assert_parachute(|_, estimate, _| estimate.state.position_m.x = 140.0, AT_COMMIT_HEIGHT_M);
         let drifting_out: Wrong = |height_m, estimate, _| {
             estimate.state.velocity_m_s.x = 5.0;
-            estimate.state.position_m.x = 121.0 - 5.0 * height_m / 38.0;
+            estimate.state.position_m.x = 140.0 - 5.0 * height_m / 38.0;
         };
         assert_parachute(drifting_out, AT_COMMIT_HEIGHT_M);
     }
 
     #[test]
-    fn inside_the_fence_it_lands() {
-        let ended = fall(|_, estimate, _| estimate.state.position_m.x = 119.0, NO_ABORT_M);
-        assert!(matches!(ended, Ended::Ignition(_)), "{ended:?}");
+    fn inside_the_fence_it_lands_also_where_only_the_motor_brings_it_there() {
+        let places: [Wrong; 2] = [
+            |_, estimate, _| estimate.state.position_m.x = 119.0,
+            |_, estimate, _| estimate.state.position_m.x = 130.0,
+        ];
+        for place in places {
+            let ended = fall(place, NO_ABORT_M);
+            assert!(matches!(ended, Ended::Ignition(_)), "{ended:?}");
+        }
     }
 
     #[test]
     fn a_gate_shut_after_the_commit_height_brings_the_parachute_while_it_fills() {
         let filling_m = 58.0..75.0;
         let out_of_the_fence: Wrong = |height_m, estimate, _| {
-            estimate.state.position_m.y = if height_m < 80.0 { 121.0 } else { 119.0 };
+            estimate.state.position_m.y = if height_m < 80.0 { 140.0 } else { 119.0 };
         };
         assert_parachute(out_of_the_fence, filling_m.clone());
         let open_circuit: Wrong = |height_m, _, input| input.igniter_continuity = height_m > 73.0;

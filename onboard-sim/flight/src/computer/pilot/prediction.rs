@@ -7,13 +7,19 @@ use super::Pilot;
 use super::vehicle_model::VehicleModel;
 use crate::estimation::estimator::Estimate;
 use crate::guidance::ignition::IgnitionPrediction;
+use crate::guidance::powered::Homing;
 use crate::guidance::vertical::fall_ends_m_s;
 use crate::rules::phase::Phase;
 use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
+use crate::vehicle::rigid::RigidState;
 
 /// The commit height is the height that the parachute needs, times this: half as much again, because ejection and filling
 /// scatter.
 const COMMIT_MARGIN: f64 = 1.5;
+
+/// Share of the burn's reach towards the pad that it is sure of: with it, of 33 `harsh` flights (seed 7001) a second before their
+/// ignition, 30 touched down nearer than predicted or within 2 m, and the others by up to 14 m farther.
+const SURE_REACH: f64 = 0.5;
 
 /// A fall is taken to be at least this fast, m/s, so that the time to the ground is finite at apogee.
 const FALL_MIN_M_S: f64 = 5.0;
@@ -30,7 +36,8 @@ pub struct Prediction {
     pub predicted_speed_m_s: f64,
     /// The certified motor lands from here or from farther down.
     pub lands_ahead: bool,
-    /// Distance from the pad at which the vehicle would touch down without further steering, m.
+    /// Distance from the pad at which the vehicle would touch down under the motor, or without a height for its ignition by
+    /// falling on, m.
     pub touchdown_distance_m: f64,
 }
 
@@ -122,7 +129,23 @@ impl VehicleModel {
         let ignition = settings.prediction(&column, curve, height_m, vertical_m_s, fins_m2);
         let lands_ahead =
             ignition.band.is_some() || settings.lands_ahead(&column, curve, height_m, vertical_m_s, fins_m2);
-        Prediction { ignition, lands_ahead, ..fall }
+        let touchdown_distance_m = self
+            .landing_m(estimate, &ignition)
+            .map_or(fall.touchdown_distance_m, |landing_m| landing_m.norm());
+        Prediction { ignition, lands_ahead, touchdown_distance_m, ..fall }
+    }
+
+    /// Where the motor lets the vehicle down, m, in the world's horizontal axes: it falls to its ignition, brakes evenly, and diverts
+    /// towards the pad.
+    fn landing_m(&self, estimate: &Estimate, ignition: &IgnitionPrediction) -> Option<Vector2<f64>> {
+        let settings = &self.mission.powered.homing;
+        let homing = Homing { reach_m_s2: SURE_REACH * settings.reach_m_s2, ..*settings };
+        let falls_s = ignition.command_in_s?.max(0.0) + self.mission.ignition.delay_s;
+        let burns_s =
+            self.burn().falls_through_weight_s(self.mass.at(0.0).mass_kg, self.mission.gravity_m_s2)?;
+        let RigidState { position_m, velocity_m_s, .. } = estimate.state;
+        let onset_m = position_m + velocity_m_s * falls_s;
+        Some(onset_m.xy().zip_map(&velocity_m_s.xy(), |onset_m, m_s| homing.target_m(onset_m, m_s, burns_s)))
     }
 
     /// Drag area of the fins in flight, m^2.

@@ -233,7 +233,7 @@ pub struct Homing {
 
 impl Homing {
     /// The landing point in one direction, m from the pad, at a velocity of `along_m_s` with `left_s` to go.
-    fn target_m(&self, x_m: f64, along_m_s: f64, left_s: f64) -> f64 {
+    pub(crate) fn target_m(&self, x_m: f64, along_m_s: f64, left_s: f64) -> f64 {
         let free_m = here_m(x_m, along_m_s, left_s);
         let reach_m = self.reach_m_s2 * left_s * left_s;
         free_m + (free_m.clamp(-self.near_m, self.near_m) - free_m).clamp(-reach_m, reach_m)

@@ -42,6 +42,9 @@ pub struct GnssParams {
     /// Probability that a fix is an outlier, and how far an outlier's position is off, each axis, m.
     pub outlier_share: f64,
     pub outlier_m: f64,
+    /// How much of the sky a lean takes from an antenna that looks along the nose: at 1 beyond 20 degrees of tilt the noise is
+    /// threefold, and beyond 30 half of the fixes are lost.
+    pub shadow_share: f64,
 }
 
 impl Default for GnssParams {
@@ -63,6 +66,7 @@ impl Default for GnssParams {
             dropout_share: 0.0,
             outlier_share: 0.0,
             outlier_m: 0.0,
+            shadow_share: 0.0,
         }
     }
 }
@@ -80,12 +84,20 @@ impl Sensors {
         let white_m = Vector3::new(gnss.horizontal_white_m, gnss.horizontal_white_m, gnss.vertical_white_m);
         let (older_s, slow_m_s) = self.flaws.of_satellites(&self.params);
         let then = moved_back(truth, older_s);
+        let beyond = |limit_deg: f64, share: f64| {
+            if then.tilt_rad() > limit_deg.to_radians() { share * gnss.shadow_share } else { 0.0 }
+        };
+        let (noise, shadowed_share) = (1.0 + beyond(20.0, 2.0), beyond(30.0, 0.5));
         let mut fix = GnssFix {
-            position_m: then.position_m + wandered_m + self.gnss_noise.next3().component_mul(&white_m),
-            velocity_m_s: then.velocity_m_s + slow_m_s + self.gnss_noise.next3() * gnss.velocity_m_s,
+            position_m: then.position_m
+                + wandered_m
+                + self.gnss_noise.next3().component_mul(&white_m) * noise,
+            velocity_m_s: then.velocity_m_s
+                + slow_m_s
+                + self.gnss_noise.next3() * (gnss.velocity_m_s * noise),
             valid_at_s: self.start_s + f64::from(self.elapsed_ms) * MS_S + self.flaws.gnss_tag_s,
         };
-        let (fate, off_m) = self.flaws.of_fix(&self.params);
+        let (fate, off_m) = self.flaws.of_fix(&self.params, shadowed_share);
         if fate == Fate::Outlier {
             fix.position_m += off_m;
         }
@@ -113,9 +125,10 @@ impl Flaws {
         (older_s, Vector3::from_fn(|axis, _| self.velocity_wander[axis].value))
     }
 
-    /// What becomes of a fix, and how far an outlier is off, m.
-    fn of_fix(&mut self, params: &SensorParams) -> (Fate, Vector3<f64>) {
-        let fate = fate(self.gnss.unit(), params.gnss.dropout_share, params.gnss.outlier_share);
+    /// What becomes of a fix, of which a lean takes so many, and how far an outlier is off, m.
+    fn of_fix(&mut self, params: &SensorParams, shadowed_share: f64) -> (Fate, Vector3<f64>) {
+        let lost_share = params.gnss.dropout_share + shadowed_share;
+        let fate = fate(self.gnss.unit(), lost_share, params.gnss.outlier_share);
         (fate, self.gnss.next3() * params.gnss.outlier_m)
     }
 }
