@@ -32,6 +32,8 @@ pub struct GateInput {
     pub predicted_touchdown_x_m: f64,
     /// All fins have reached their deployed angle.
     pub fins_confirmed: bool,
+    /// The gyro feels the motor swing about both axes, or too little to tell.
+    pub gimbal_moves: bool,
     pub parachute_stowed: bool,
     /// The igniter has continuity.
     pub igniter_continuity: bool,
@@ -60,7 +62,7 @@ pub struct GateCheck {
 const FAR_BEYOND: f64 = 2.0;
 
 /// How many checks the gate has.
-pub const GATE_CHECKS: usize = 13;
+pub const GATE_CHECKS: usize = 14;
 
 /// The checks of the gate, in the order in which they are told.
 ///
@@ -89,6 +91,7 @@ pub fn checks(limits: &GateLimits, input: &GateInput) -> [GateCheck; GATE_CHECKS
         condition("estimator in doubt", input.estimator_healthy, true),
         condition("igniter continuity lost", input.igniter_continuity, true),
         condition("a fin does not follow", input.fins_confirmed, true),
+        condition("the gimbal does not move", input.gimbal_moves, true),
         value("touchdown beyond the fence", input.predicted_touchdown_x_m, limits.fence_radius_m, "m", 1.0),
         condition("no landing ahead", input.lands_ahead, true),
         value("tilt", input.tilt_rad.to_degrees(), limits.tilt_max_deg, "deg", FAR_BEYOND),
@@ -138,6 +141,7 @@ mod tests {
             lands_ahead: true,
             predicted_touchdown_x_m: 0.3,
             fins_confirmed: true,
+            gimbal_moves: true,
             parachute_stowed: true,
             igniter_continuity: true,
             estimator_healthy: true,
@@ -163,7 +167,7 @@ mod tests {
 
     #[test]
     fn each_check_closes_the_gate_alone() {
-        let spoilings: [Spoiling; 14] = [
+        let spoilings: [Spoiling; 15] = [
             ("not descending", |input| {
                 input.vertical_speed_m_s = 0.0;
             }),
@@ -190,6 +194,9 @@ mod tests {
             }),
             ("a fin does not follow", |input| {
                 input.fins_confirmed = false;
+            }),
+            ("the gimbal does not move", |input| {
+                input.gimbal_moves = false;
             }),
             ("parachute not stowed", |input| {
                 input.parachute_stowed = false;

@@ -165,6 +165,7 @@ impl Pilot {
             landing_feasible: self.prediction.ignition.band.is_some_and(|band| band.contains(onset_m)),
             predicted_touchdown_x_m: self.prediction.touchdown_distance_m,
             fins_confirmed: self.fins_there(&input.fins_rad) && !self.fin_watch.any_stuck(),
+            gimbal_moves: !self.swing_watch.found_stuck(),
             parachute_stowed: mode.phase != Phase::Chute,
             igniter_continuity: input.igniter_continuity,
             estimator_healthy: estimate.health.is_good(),
@@ -227,8 +228,8 @@ impl Pilot {
             return None;
         }
         let lasts = self.gate_shut_since_s.is_some_and(|since_s| {
-            // A stuck fin has already been watched for long enough.
-            self.fin_watch.any_stuck() || input.time_s - since_s >= LASTS_S
+            // A stuck surface has already been watched for long enough.
+            self.fin_watch.any_stuck() || self.swing_watch.found_stuck() || input.time_s - since_s >= LASTS_S
         });
         // The parachute comes anyway: of two heights the lower one says when.
         let estimated_m = self.feet_height_m(estimate);
@@ -301,19 +302,22 @@ mod tests {
     use super::*;
     use nalgebra::{Vector2, Vector3};
 
+    use crate::computer::pilot::Pointed;
     use crate::computer::pilot::sample::{self, input, released};
+    use crate::computer::pilot::swing::Swing;
+    use crate::computer::pilot::swing::reaction::Reaction;
     use crate::computer::table::PhaseTable;
     use crate::estimation::estimator::StartUncertainty;
     use crate::vehicle::rigid::RigidState;
 
     /// One frame, in which the crew may abort.
-    fn frame_with(pilot: &mut Pilot, table: &mut PhaseTable, input: &KeptInput, abort: bool) -> [f64; 4] {
+    fn frame_with(pilot: &mut Pilot, table: &mut PhaseTable, input: &KeptInput, abort: bool) -> Pointed {
         pilot.estimate_state(table.mode().phase, input);
         fly_on(pilot, table, input, abort)
     }
 
     /// The same after the estimate.
-    fn fly_on(pilot: &mut Pilot, table: &mut PhaseTable, input: &KeptInput, abort: bool) -> [f64; 4] {
+    fn fly_on(pilot: &mut Pilot, table: &mut PhaseTable, input: &KeptInput, abort: bool) -> Pointed {
         pilot.take_over(input.time_s);
         pilot.predict(table, input);
         if abort {
@@ -322,7 +326,7 @@ mod tests {
         }
         pilot.decide(table, input, &SensorWatch::default());
         pilot.plan(table.mode(), input, false);
-        pilot.point(table.mode(), input).fins_rad
+        pilot.point(table.mode(), input)
     }
 
     /// Whether an abort in the very next frame releases the parachute.
@@ -369,17 +373,21 @@ mod tests {
         let mission = crate::vehicles::mission::builtin("mk2").expect("built in").expect("sound");
         let start = RigidState::upright(250.0);
         let mut pilot = Pilot::starting(&mission, 0.0, &start, &StartUncertainty::at_apogee());
-        let (mut table, mut fins_rad) = (released(), [0.0; 4]);
+        let (mut table, mut fins_rad, mut gimbal_rad) = (released(), [0.0; 4], [0.0; 2]);
+        let swing = Swing::of(&mission, &pilot.model.mass_now(None)).expect("it shows");
+        let mut reaction = Reaction::of(&mission, swing);
         let ended = (1..1300).find_map(|frame| {
             let time_s = frame as f64 * 0.005;
             let mut estimate = falling(time_s);
             let height_m = estimate.state.position_m.z;
             let mut input = KeptInput { fins_rad, ..sample::input(frame, 0.0) };
+            let [pitch_rad_s, yaw_rad_s] = reaction.felt_rad_s(gimbal_rad);
+            input.measured.imu.gyro_rad_s = Vector3::new(0.0, pitch_rad_s, yaw_rad_s);
             wrong(height_m, &mut estimate, &mut input);
             let aborts = height_m < abort_below_m && !table.mode().interlocks.abort_latched;
             pilot.estimate = Some(estimate);
             pilot.update_models(table.mode().phase, &input, &estimate);
-            fins_rad = fly_on(&mut pilot, &mut table, &input, aborts);
+            Pointed { fins_rad, gimbal_rad, .. } = fly_on(&mut pilot, &mut table, &input, aborts);
             let phase = table.mode().phase;
             let lost = table.take_news().iter().any(|news| format!("{news:?}").contains("will be lost"));
             match phase {
@@ -421,6 +429,8 @@ mod tests {
     fn what_lasts_brings_the_parachute_above_the_commit_height() {
         assert_parachute(|_, _, input| input.fins_rad = [0.0; 4], AT_COMMIT_HEIGHT_M);
         assert_parachute(|_, _, input| input.igniter_continuity = false, AT_COMMIT_HEIGHT_M);
+        // The gyro feels no swing.
+        assert_parachute(|_, _, input| input.measured.imu.gyro_rad_s.z = 0.0, AT_COMMIT_HEIGHT_M);
         // The fence is at 120 m, and the motor brings the vehicle back by 15 m.
         assert_parachute(|_, estimate, _| estimate.state.position_m.x = 140.0, AT_COMMIT_HEIGHT_M);
         let drifting_out: Wrong = |height_m, estimate, _| {

@@ -11,6 +11,7 @@ mod prediction;
 mod rehearsal;
 mod steering;
 mod step;
+mod swing;
 mod vehicle_model;
 mod vertical_speed;
 
@@ -23,6 +24,7 @@ use serde::{Deserialize, Serialize};
 use self::ascent::{AscentWatch, FinWatch};
 use self::planner::Planner;
 pub use self::prediction::{ApogeeAhead, Prediction, touchdown_from_below_m, touchdown_m};
+use self::swing::SwingWatch;
 use self::vehicle_model::VehicleModel;
 use self::vertical_speed::VerticalSpeeds;
 use crate::control::aim::AimLoop;
@@ -77,6 +79,7 @@ pub struct Pilot {
     fin_share: f64,
     fins_rad: [f64; 4],
     fin_watch: FinWatch,
+    swing_watch: SwingWatch,
     gimbal_rad: [f64; 2],
     gate_refusal: Option<&'static str>,
     /// Since when a lasting reason has kept the gate shut, s, and each of its checks.
@@ -131,6 +134,7 @@ impl Pilot {
             fin_share: 1.0,
             fins_rad: [airframe.fins.closed_rad(); 4],
             fin_watch: FinWatch::default(),
+            swing_watch: SwingWatch::default(),
             gimbal_rad: [0.0; 2],
             gate_refusal: None,
             gate_shut_since_s: None,
@@ -247,7 +251,7 @@ impl Pilot {
 // What a pilot saves for a restart in the air, and how it goes on.
 
 /// What a pilot keeps through a reset: the knowledge of motor and drag, the last commands, the last estimate, and what it has
-/// seen of its ascent and of its fins. Covariances of the estimator, prediction, plan and gimbal loop are not kept.
+/// seen of its ascent, its fins and its gimbal. Covariances of the estimator, prediction, plan and gimbal loop are not kept.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SavedPilot {
     motor: MotorEstimate,
@@ -260,6 +264,7 @@ pub struct SavedPilot {
     fin_share: f64,
     fins_rad: [f64; 4],
     fin_watch: FinWatch,
+    swing_watch: SwingWatch,
     gimbal_rad: [f64; 2],
 }
 
@@ -276,6 +281,7 @@ impl Pilot {
             fin_share: self.fin_share,
             fins_rad: self.fins_rad,
             fin_watch: self.fin_watch,
+            swing_watch: self.swing_watch,
             gimbal_rad: self.gimbal_rad,
         }
     }
@@ -315,6 +321,7 @@ impl Pilot {
             fin_share: saved.fin_share,
             fins_rad: saved.fins_rad,
             fin_watch: saved.fin_watch,
+            swing_watch: saved.swing_watch.interrupted(),
             gimbal_rad: saved.gimbal_rad,
             ..self.clone()
         };

@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use super::swing::Swing;
 use super::vehicle_model::Burning;
 use super::{Pilot, Pointed};
 use crate::computer::KeptInput;
@@ -40,6 +41,7 @@ impl Pilot {
             // The thrust still carries a vehicle that stands: the legs then carry little, and the wind tips it over. So the gimbal
             // holds it upright until the thrust ends.
             let balances = self.model.mission.upright_after_contact && mode.phase == Phase::Touchdown;
+            let mut added_rad_s = [0.0; 2];
             self.gimbal_rad = match burning {
                 Some(burning) => {
                     self.fin_share = self.powered.fin_share(input.time_s).unwrap_or(self.fin_share);
@@ -47,15 +49,34 @@ impl Pilot {
                 }
                 None => match thrusting.as_ref().filter(|_| balances) {
                     Some(burning) => self.turned_towards(&Aim::upright(), estimate, burning),
-                    None => [0.0; 2],
+                    None => {
+                        let gimbal_rad;
+                        (gimbal_rad, added_rad_s) = self.swing(mode, input);
+                        gimbal_rad
+                    }
                 },
             };
             let mass = self.model.mass_now(self.model.burning_s(input.time_s));
+            // What a swing adds is gone before a fin has moved.
+            let mut calm = *estimate;
+            calm.state.rate_rad_s -= Vector3::new(0.0, added_rad_s[0], added_rad_s[1]);
             self.fins_rad =
-                self.fins(mode, estimate, &mass, self.model.density_kg_m3(estimate), burning.is_some());
+                self.fins(mode, &calm, &mass, self.model.density_kg_m3(estimate), burning.is_some());
         }
         let level = if flying { self.powered.report().level } else { ControlLevel::Idle };
         Pointed { gimbal_rad: self.gimbal_rad, fins_rad: self.fins_rad, level }
+    }
+
+    /// Swings the gimbal of a vehicle that does not burn while the motor may still be lit: its command, rad, and what that has
+    /// added to the cross rates, rad/s.
+    fn swing(&mut self, mode: &Mode, input: &KeptInput) -> ([f64; 2], [f64; 2]) {
+        let may_light = matches!(mode.phase, Phase::AeroDescent | Phase::LandArmed)
+            && !mode.interlocks.landing_motor_inhibited;
+        let swing = Swing::of(&self.model.mission, &self.model.mass_now(None)).filter(|_| may_light);
+        let gyro_rad_s = input.measured.imu.gyro_rad_s;
+        swing.map_or_else(Default::default, |swing| {
+            self.swing_watch.update(&swing, [gyro_rad_s.y, gyro_rad_s.z])
+        })
     }
 
     fn gimbal(
