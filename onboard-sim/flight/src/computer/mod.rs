@@ -135,7 +135,7 @@ impl Computer {
         let planned =
             flown.filter(|_| input.plan_ready).is_some_and(|flown| self.pilot.take_over(flown.time_s));
         if let Some(flown) = &flown {
-            self.pilot.estimate_state(self.table.mode().phase, flown);
+            self.pilot.estimate_state(self.table.mode().phase, flown, &self.sensors);
             self.pilot.predict(&mut self.table, flown);
         }
         let answers = input.requests.iter().map(|request| self.answer(request)).collect();

@@ -10,7 +10,7 @@ use super::estimator::Measurements;
 use super::estimator::alignment::FELT_AT_REST_M_S2;
 
 /// So many equal inertial samples in a row do not happen to noise.
-const FROZEN_IMU: u32 = 10;
+const FROZEN_IMU: u32 = 4;
 /// The same of a barometer, half a second, and of satellite fixes, two seconds: both round more coarsely.
 const FROZEN_BAROMETER: u32 = 25;
 const FROZEN_FIXES: u32 = 10;
@@ -171,6 +171,11 @@ impl SensorWatch {
     /// For how long the accelerometer has repeated one sample, s; `None` if it does not.
     pub fn accelerometer_frozen_s(&self) -> Option<f64> {
         self.accelerometer.repeats_for_s(FROZEN_IMU, self.time_s)
+    }
+
+    /// The accelerometer repeats itself, or says nothing that can be.
+    pub fn accelerometer_is_lost(&self) -> bool {
+        self.accelerometer_frozen_s().is_some() || self.accelerometer.silent_s(self.time_s) > 0.0
     }
 
     /// For how long nothing was felt, s: accelerometer or gyro repeat one sample, or say nothing that can be.

@@ -77,6 +77,7 @@ pub(crate) struct AscentWatch {
     denied: bool,
     braking_s: f64,
     separating_since_s: Option<f64>,
+    parted: bool,
     falling_frames: u32,
     highest_m: f64,
     sunk_s: f64,
@@ -97,6 +98,7 @@ impl Default for AscentWatch {
             denied: false,
             braking_s: 0.0,
             separating_since_s: None,
+            parted: false,
             falling_frames: 0,
             highest_m: f64::NEG_INFINITY,
             sunk_s: 0.0,
@@ -116,6 +118,13 @@ impl AscentWatch {
     /// Apogee is near, or was: the booster goes.
     pub(crate) fn separates(&self) -> bool {
         self.separating_since_s.is_some()
+    }
+
+    /// Whether the booster parts in this frame, of which its wire tells.
+    pub(super) fn parts(&mut self, booster_attached: bool) -> bool {
+        let parts = self.separates() && !booster_attached && !self.parted;
+        self.parted |= parts;
+        parts
     }
 
     /// The event of this frame, if there is one.

@@ -9,7 +9,7 @@ use super::Pilot;
 use crate::computer::KeptInput;
 use crate::computer::news::Severity;
 use crate::computer::table::PhaseTable;
-use crate::estimation::estimator::Estimate;
+use crate::estimation::estimator::{Doubt, Estimate, Health};
 use crate::estimation::sensor_watch::SensorWatch;
 use crate::rules::gate::{self, GATE_CHECKS, GateCheck, GateInput};
 use crate::rules::phase::{Effect, Effects, Event, Mode, Motor, NO_THRUST_TIMEOUT_S, Phase, Refusal};
@@ -25,6 +25,8 @@ const LASTS_S: f64 = 0.5;
 const BEFORE_S: f64 = 0.1;
 /// A pressure altitude that is lower than the estimate by more, m, is not only its ram error and a slow offset.
 const HEIGHTS_APART_M: f64 = 8.0;
+/// The fence holds for a place that is farther out by so many of its standard deviations.
+const PLACE_SIGMAS: f64 = 2.0;
 
 /// What a frame shows, beside the pilot.
 #[derive(Clone, Copy)]
@@ -153,6 +155,9 @@ impl Pilot {
     ) -> [GateCheck; GATE_CHECKS] {
         let state = &estimate.state;
         let onset_m = self.onset_m(estimate);
+        // With no room for the parachute, a landing by what is not known well ends better than a fall.
+        let low = self.feet_height_m(estimate) < self.prediction.filling_height_m();
+        let unknown = matches!(estimate.health, Health::Doubtful(Doubt::Restarted | Doubt::Imu));
         let found = GateInput {
             tilt_rad: state.tilt_rad(),
             vertical_speed_m_s: state.velocity_m_s.z,
@@ -161,14 +166,15 @@ impl Pilot {
             predicted_speed_m_s: self.prediction.predicted_speed_m_s,
             // With one source left there is no disagreement; the estimator's health says whether that source is
             // reliable.
-            height_disagreement_m: estimate.heights.disagreement_m().unwrap_or(0.0),
+            height_disagreement_m: estimate.heights.contradiction_m().unwrap_or(0.0),
             landing_feasible: self.prediction.ignition.band.is_some_and(|band| band.contains(onset_m)),
-            predicted_touchdown_x_m: self.prediction.touchdown_distance_m,
+            predicted_touchdown_x_m: self.prediction.touchdown_distance_m
+                + PLACE_SIGMAS * estimate.sigmas.position_m.xy().max(),
             fins_confirmed: self.fins_there(&input.fins_rad) && !self.fin_watch.any_stuck(),
             gimbal_moves: !self.swing_watch.found_stuck(),
             parachute_stowed: mode.phase != Phase::Chute,
             igniter_continuity: input.igniter_continuity,
-            estimator_healthy: estimate.health.is_good(),
+            estimator_healthy: estimate.health.is_good() || (low && !unknown),
             lands_ahead: self.prediction.lands_ahead,
             sensors_agree: !self.is_astray(sensors),
         };
@@ -312,7 +318,7 @@ mod tests {
 
     /// One frame, in which the crew may abort.
     fn frame_with(pilot: &mut Pilot, table: &mut PhaseTable, input: &KeptInput, abort: bool) -> Pointed {
-        pilot.estimate_state(table.mode().phase, input);
+        pilot.estimate_state(table.mode().phase, input, &SensorWatch::default());
         fly_on(pilot, table, input, abort)
     }
 

@@ -391,12 +391,13 @@ mod tests {
     use crate::computer::pilot::sample::{falling, input, released};
     use crate::estimation::estimator::StartUncertainty;
     use crate::estimation::motor_estimate::MotorSample;
+    use crate::estimation::sensor_watch::SensorWatch;
     use crate::vehicle::rigid::RigidState;
 
     #[test]
     fn the_attitude_is_extrapolated_over_the_lost_time() {
         let mut pilot = falling();
-        pilot.estimate_state(released().mode().phase, &input(1, 0.0));
+        pilot.estimate_state(released().mode().phase, &input(1, 0.0), &SensorWatch::default());
         pilot.predict(&mut released(), &input(1, 0.0));
         let mut estimate = pilot.estimate.expect("the pilot has an estimate");
         estimate.state.rate_rad_s = Vector3::new(2.0, 0.5, -0.3);

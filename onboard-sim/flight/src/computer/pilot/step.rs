@@ -1,5 +1,7 @@
 //! One frame of the flight: estimates, follows the ascent, and poses what is planned and predicted.
 
+use nalgebra::Vector3;
+
 use super::ascent::{AscentReadings, words_of_ascent};
 use super::planner::Posed;
 use super::vehicle_model::Burning;
@@ -9,12 +11,17 @@ use crate::computer::KeptInput;
 use crate::computer::table::PhaseTable;
 use crate::estimation::estimator::{Estimate, Measurements, VehicleNow};
 use crate::estimation::motor_estimate::{MotorSample, MotorStage};
+use crate::estimation::sensor_watch::SensorWatch;
 use crate::rules::phase::{Event, Mode, Phase};
 use crate::vehicle::atmosphere::Air;
 use crate::vehicle::mission::StartPoint;
 
 /// Frames between outlooks while the ignition is seconds away.
 const FRAMES_PER_FAR_LOOK: u64 = 4 * FRAMES_PER_PLAN;
+
+/// What a frame adds to the doubt about the velocity when the force is not felt but expected, m/s: it is off by some 0.3 m/s^2
+/// for half a second.
+const EXPECTED_FORCE_M_S: f64 = 0.02;
 
 /// What the estimator may use before apogee. The booster's drag and masses are not those of the vehicle, so the air
 /// shows no wind. The barometer's ram error belongs to a flow from the nose, not from the tail, and its static ports lie
@@ -31,10 +38,14 @@ fn on_the_way_up(
 
 impl Pilot {
     /// Estimates the vehicle's state, and its motor and drag.
-    pub(crate) fn estimate_state(&mut self, phase: Phase, input: &KeptInput) {
-        let estimate = self.estimated(phase, input);
+    pub(crate) fn estimate_state(&mut self, phase: Phase, input: &KeptInput, sensors: &SensorWatch) {
+        let burns = phase.in_landing_burn() && self.model.motor.stage() == MotorStage::Burning;
+        let thrust_felt = !(burns && sensors.accelerometer_is_lost());
+        let estimate = self.estimated(phase, input, thrust_felt);
         self.estimate = Some(estimate);
-        self.update_models(phase, input, &estimate);
+        if thrust_felt {
+            self.update_models(phase, input, &estimate);
+        }
     }
 
     /// Follows the ascent, predicts ignition and abort, and watches the fins. Every event goes through the `table`.
@@ -84,9 +95,13 @@ impl Pilot {
         })
     }
 
-    fn estimated(&mut self, phase: Phase, input: &KeptInput) -> Estimate {
+    fn estimated(&mut self, phase: Phase, input: &KeptInput, thrust_felt: bool) -> Estimate {
         let mut measurements = input.measured;
         self.silence_what_is_wrong(&mut measurements, input.time_s);
+        if let Some(estimate) = self.estimate.filter(|_| !thrust_felt) {
+            measurements.imu.specific_force_m_s2 = self.expected_force_m_s2(phase, input, &estimate);
+            self.estimator.doubt_velocity(&Vector3::repeat(EXPECTED_FORCE_M_S));
+        }
         let burning_s = self.model.burning_s(input.time_s);
         let mass = self.model.mass_now(burning_s);
         let height_m = self.estimate.map_or(0.0, |estimate| estimate.state.position_m.z);
@@ -126,29 +141,43 @@ impl Pilot {
         if input.contact || phase == Phase::Chute || phase.before_apogee() {
             return;
         }
+        let (air_force_n, mass_kg) = self.air_force_n(phase, input, estimate);
+        let sample = MotorSample {
+            time_s: input.time_s,
+            axial_specific_force_m_s2: estimate.specific_force_m_s2.x,
+            mass_kg,
+            axial_air_force_n: air_force_n.x,
+            gimbal_rad: self.gimbal_rad,
+            may_burn: phase.in_landing_burn(),
+        };
+        self.model.learn(&sample);
+    }
+
+    /// The certified force of the air, body axes, N, and the mass, kg.
+    fn air_force_n(&self, phase: Phase, input: &KeptInput, estimate: &Estimate) -> (Vector3<f64>, f64) {
         let mass = self.model.mass_now(self.model.burning_s(input.time_s));
-        let burning = phase.in_landing_burn();
         let vehicle = VehicleNow::of(
             self.model.airframe(),
             &mass,
             self.model.density_kg_m3(estimate),
             input.fins_rad,
-            burning,
+            phase.in_landing_burn(),
             self.model.mission.lidar_ahead_of_feet_m,
         );
         let burns = self.model.motor.stage() == MotorStage::Burning;
         let vehicle = if burns { vehicle.in_exhaust(&self.model.mission.exhaust) } else { vehicle };
         let through_air_m_s =
             estimate.state.world_from_body.inverse_transform_vector(&estimate.velocity_through_air_m_s());
-        let sample = MotorSample {
-            time_s: input.time_s,
-            axial_specific_force_m_s2: estimate.specific_force_m_s2.x,
-            mass_kg: mass.mass_kg,
-            axial_air_force_n: vehicle.air_force_n(&through_air_m_s, &estimate.state.rate_rad_s).x,
-            gimbal_rad: self.gimbal_rad,
-            may_burn: burning,
-        };
-        self.model.learn(&sample);
+        (vehicle.air_force_n(&through_air_m_s, &estimate.state.rate_rad_s), mass.mass_kg)
+    }
+
+    /// What an accelerometer would say of the motor and the air as they are known, body, m/s^2.
+    fn expected_force_m_s2(&self, phase: Phase, input: &KeptInput, estimate: &Estimate) -> Vector3<f64> {
+        let (thrust_n, _) = self.thrust_and_weight_n(input.time_s);
+        let [(sin_pitch, cos_pitch), (sin_yaw, cos_yaw)] = input.gimbal_rad.map(libm::sincos);
+        let thrust_n = Vector3::new(cos_pitch * cos_yaw, sin_yaw, -sin_pitch * cos_yaw) * thrust_n;
+        let (air_force_n, mass_kg) = self.air_force_n(phase, input, estimate);
+        (thrust_n + air_force_n * self.model.motor.air_scale()) / mass_kg + estimate.accelerometer_bias_m_s2
     }
 
     fn watch_the_speeds(&mut self, input: &KeptInput, estimate: &Estimate) {
@@ -182,6 +211,10 @@ impl Pilot {
             separate_before_apogee_s: launch.separate_before_apogee_s,
             burn_time_s: launch.booster.motor_curve.burn_time_s(),
         };
+        if self.ascent.parts(input.booster_attached) {
+            let gained_m_s = launch.booster.separation_impulse_n_s / self.model.mass.at(0.0).mass_kg;
+            self.estimator.take_shock(gained_m_s);
+        }
         let Some(event) = self.ascent.update(&seen) else { return };
         if let Event::Apogee { .. } = event {
             self.apogee_m = estimate.state.position_m.z;

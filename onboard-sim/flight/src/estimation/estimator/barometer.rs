@@ -3,14 +3,18 @@
 //! The error of a static port is in proportion to the dynamic pressure (W. Gracey, Measurement of Aircraft Speed and Altitude, NASA
 //! Reference Publication 1046, 1980).
 
-use super::Estimator;
 use super::correction::{DOUBT_POSITION_M, without_last_if};
 use super::covariance::{
     BAROMETER_LATE, BAROMETER_OFFSET, BAROMETER_RAM, BAROMETER_SUCTION, POSITION, VELOCITY, WIND,
 };
+use super::{Estimator, HeightSources};
 
 /// After this many rejections in a row, half a second, the filter assumes that the barometer has a new offset.
 const BAROMETER_REJECTIONS: u32 = 25;
+
+/// After so many, three tenths of a second, what was felt and the fixes that came meanwhile outvote it: before heights that
+/// disagree end the landing.
+const OUTVOTED_REJECTIONS: u32 = 15;
 
 impl Estimator {
     /// The barometer measures height plus its own offset, plus the ram error `-k V^2 / 2 g`, plus the suction `c v^2 / 2 g` of
@@ -47,7 +51,18 @@ impl Estimator {
         let noise = self.config.barometer_m * self.config.barometer_m;
         let correction = self.correct(sensitivity, altitude_m - predicted_m, noise, |_| true);
         self.aids.barometer.take(&correction);
-        if altitude_m.is_finite() {
+        if correction.accepted {
+            (self.barometer_outvoted, self.outvoted_from) = (false, self.aids.gnss_position.used);
+        }
+        let fixes = &self.aids.gnss_position;
+        if self.aids.barometer.refused_in_a_row >= OUTVOTED_REJECTIONS
+            && fixes.refused_in_a_row == 0
+            && fixes.used > self.outvoted_from
+        {
+            self.barometer_outvoted = true;
+            self.heights.forget_barometer();
+        }
+        if altitude_m.is_finite() && !self.barometer_outvoted {
             let state = &self.nominal;
             let late_m = state.barometer_late_s * state.velocity_m_s.z;
             self.heights.take_barometer(
@@ -57,7 +72,14 @@ impl Estimator {
         }
         if self.aids.barometer.refused_in_a_row >= BAROMETER_REJECTIONS {
             self.aids.barometer.refused_in_a_row = 0;
-            self.covariance.widen(BAROMETER_OFFSET, DOUBT_POSITION_M * DOUBT_POSITION_M);
+            let HeightSources { inertial_m, barometric_m, .. } = self.heights.sources();
+            let off_m = (self.nominal.position_m.z - inertial_m).abs();
+            if barometric_m.is_some_and(|height_m| (height_m - inertial_m).abs() < 0.5 * off_m) {
+                // It and the inertial height outvote the estimate, which fixes have drawn away.
+                self.covariance.widen(POSITION + 2, off_m * off_m);
+            } else {
+                self.covariance.widen(BAROMETER_OFFSET, DOUBT_POSITION_M * DOUBT_POSITION_M);
+            }
         }
     }
 }

@@ -85,8 +85,10 @@ pub struct EstimatorConfig {
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct HealthLimits {
-    /// Velocity, any axis, m/s.
+    /// Vertical velocity, m/s.
     pub velocity_m_s: f64,
+    /// Horizontal velocity, either axis, m/s: legs that crush stand on at 2 m/s.
+    pub lateral_m_s: f64,
     pub height_m: f64,
     /// Horizontal position, either axis, m.
     pub horizontal_m: f64,
@@ -134,7 +136,7 @@ impl Default for EstimatorConfig {
 
 impl Default for HealthLimits {
     fn default() -> Self {
-        Self { velocity_m_s: 0.5, height_m: 2.5, horizontal_m: 6.0, tilt_deg: 3.0 }
+        Self { velocity_m_s: 0.5, lateral_m_s: 1.2, height_m: 2.5, horizontal_m: 10.0, tilt_deg: 3.0 }
     }
 }
 

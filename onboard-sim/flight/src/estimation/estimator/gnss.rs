@@ -9,11 +9,14 @@ use super::covariance::{
     ACCELEROMETER_BIAS, ATTITUDE, GNSS_OFFSET, GNSS_TIME_TAG, GYRO_BIAS, POSITION, VELOCITY,
 };
 use super::strapdown::Since;
-use super::{Estimator, EstimatorConfig, GnssFix};
+use super::{Estimator, EstimatorConfig, GnssFix, health};
 
 /// Standard deviations that the filter adds when satellite velocities do not fit on average: of the velocity. All four make
 /// room for what a fault of the inertial unit has done.
 const DOUBT_VELOCITY_M_S: f64 = 0.5;
+/// A velocity that surprises while it is off by less, m/s, has crept away: a gyro that is off by 2 deg/s has moved it by 0.3 when
+/// that is noticed, one by 20 deg/s by more than 0.45.
+const CREEPS_M_S: f64 = 0.4;
 /// Of the attitude.
 const DOUBT_ATTITUDE_RAD: f64 = 0.04;
 /// Of the gyro's bias.
@@ -28,6 +31,8 @@ const BELIEVED_FIXES: f64 = 10.0;
 const REMEMBERED_FIXES: f64 = 40.0;
 /// One fix counts as at most this many standard deviations: an outlier says nothing of the age.
 const AGE_SIGMAS: f64 = 3.0;
+/// Numbers of positions, of ten fixes in two seconds, that must fit after a surprise before the fixes outvote the barometer.
+const FITS_AGAIN: u32 = 30;
 
 /// How much the ages of the fixes vary, from how far their positions are off along the motion: innovation-based adaptive
 /// estimation (Mehra, "Approaches to adaptive filtering", IEEE Trans. Automatic Control 17, 1972), of this one number.
@@ -92,7 +97,7 @@ impl Estimator {
             self.aids.gnss_velocity.take_next(axis, &correction);
             if correction.normalised_squared.is_finite() && self.surprise.take(correction.normalised_squared)
             {
-                self.doubt_motion();
+                self.doubt_motion(correction.innovation.abs() < CREEPS_M_S);
             }
         }
         for axis in 0..3 {
@@ -122,6 +127,8 @@ impl Estimator {
         }
         if self.aids.gnss_position.refused_in_a_row >= POSITION_REJECTIONS {
             self.aids.gnss_position.refused_in_a_row = 0;
+            // Until the barometer agrees with what becomes of this.
+            self.outvoted_from = u32::MAX;
             for axis in 0..3 {
                 self.covariance.widen(POSITION + axis, DOUBT_POSITION_M * DOUBT_POSITION_M);
                 self.covariance.widen(GNSS_OFFSET + axis, DOUBT_POSITION_M * DOUBT_POSITION_M);
@@ -135,9 +142,11 @@ impl Estimator {
     }
 
     /// Increases the uncertainty of motion and inertial biases: satellite velocities do not fit on average, so an error
-    /// of the inertial unit must have changed.
-    fn doubt_motion(&mut self) {
-        self.surprised_at_s = self.time_s();
+    /// of the inertial unit must have changed. `creeping`: by little so far.
+    fn doubt_motion(&mut self, creeping: bool) {
+        self.doubted_until_s = self.time_s()
+            + if creeping { health::DOUBT_AFTER_SURPRISE_S } else { health::DOUBT_AFTER_RESTART_S };
+        self.outvoted_from = self.aids.gnss_position.used.saturating_add(FITS_AGAIN);
         for axis in 0..3 {
             let widen = [
                 (VELOCITY, DOUBT_VELOCITY_M_S),

@@ -9,6 +9,9 @@ use super::{Aids, EstimatorConfig, Sigmas};
 const BRIDGED_FRAMES: u32 = 4;
 /// Shortest time that the estimate stays unhealthy after a restart, s.
 pub(super) const DOUBT_AFTER_RESTART_S: f64 = 1.0;
+/// The same after a surprise by velocities that are off by little, s: two fixes, from where on the standard deviations tell. No longer,
+/// as half a second of doubt ends a landing.
+pub(super) const DOUBT_AFTER_SURPRISE_S: f64 = 0.45;
 
 /// The estimator's own verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -69,15 +72,15 @@ pub(super) fn judge(
     aids: &Aids,
     sigmas: &Sigmas,
     restart_age_s: f64,
-    surprise_age_s: f64,
+    surprised: bool,
 ) -> Health {
     let limits = &config.health;
     // In the order of the doubts.
     let applies = [
         restart_age_s < DOUBT_AFTER_RESTART_S,
         aids.imu.refused_in_a_row > BRIDGED_FRAMES,
-        surprise_age_s < DOUBT_AFTER_RESTART_S,
-        sigmas.velocity_m_s.max() > limits.velocity_m_s,
+        surprised,
+        sigmas.velocity_m_s.z > limits.velocity_m_s || sigmas.velocity_m_s.xy().max() > limits.lateral_m_s,
         sigmas.position_m.z > limits.height_m,
         sigmas.position_m.xy().max() > limits.horizontal_m,
         sigmas.attitude_rad.xy().max() > limits.tilt_deg.to_radians(),
@@ -131,6 +134,9 @@ const VELOCITY_ERROR_LASTS_S: f64 = 1.0;
 /// Growth of the height's variance with each measurement that does not fit; below 1 the variance would shrink.
 const DOUBT_FACTOR: f64 = 1.1;
 
+/// A difference of fewer standard deviations is no contradiction.
+const CONTRADICTS_SIGMAS: f64 = 3.0;
+
 /// Heights of the centre of gravity above the pad, from two sources.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct HeightSources {
@@ -147,6 +153,12 @@ impl HeightSources {
     pub fn disagreement_m(&self) -> Option<f64> {
         self.barometric_m.map(|height_m| (height_m - self.inertial_m).abs())
     }
+
+    /// The same, if the inertial height is known well enough to contradict, m; without fixes it is not for long.
+    pub fn contradiction_m(&self) -> Option<f64> {
+        self.disagreement_m()
+            .filter(|off_m| off_m.is_nan() || *off_m > CONTRADICTS_SIGMAS * self.inertial_sigma_m)
+    }
 }
 
 /// Height and the satellite height's offset, with their covariance.
@@ -160,6 +172,7 @@ pub(super) struct HeightChannel {
     cross_m2: f64,
     barometric_m: f64,
     barometer_age_s: f64,
+    fix_age_s: f64,
 }
 
 impl HeightChannel {
@@ -172,6 +185,7 @@ impl HeightChannel {
             cross_m2: 0.0,
             barometric_m: height_m,
             barometer_age_s: f64::INFINITY,
+            fix_age_s: 0.0,
         }
     }
 
@@ -183,7 +197,9 @@ impl HeightChannel {
         interval_s: f64,
     ) {
         self.height_m += moved_m;
-        self.height_m2 += velocity_m2_s2 * VELOCITY_ERROR_LASTS_S * interval_s;
+        // The variance of an error that has lasted for a time grows with twice that time.
+        self.fix_age_s += interval_s;
+        self.height_m2 += velocity_m2_s2 * (2.0 * self.fix_age_s).max(VELOCITY_ERROR_LASTS_S) * interval_s;
         let walk = config.gnss_vertical_walk_m_sqrt_s;
         self.offset_m2 += walk * walk * interval_s;
         self.barometric_m += moved_m;
@@ -195,6 +211,10 @@ impl HeightChannel {
         self.barometer_age_s = 0.0;
     }
 
+    pub(super) fn forget_barometer(&mut self) {
+        self.barometer_age_s = f64::INFINITY;
+    }
+
     /// Takes a satellite height, the distance that the vehicle has climbed since the fix was valid, and the variance
     /// that its unknown age adds, m^2.
     pub(super) fn take_gnss(
@@ -204,6 +224,7 @@ impl HeightChannel {
         climbed_since_m: f64,
         aged_m2: f64,
     ) {
+        self.fix_age_s = 0.0;
         let innovation_m = height_m - (self.height_m - climbed_since_m + self.offset_m);
         let noise = config.gnss_vertical_m * config.gnss_vertical_m + aged_m2;
         self.update(config, innovation_m, [1.0, 1.0], noise);

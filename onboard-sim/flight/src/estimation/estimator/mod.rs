@@ -138,6 +138,10 @@ pub struct Estimator {
     heights: HeightChannel,
     sideways: Sideways,
     aids: Aids,
+    /// What was felt and the fixes agree on another height than the barometer's.
+    barometer_outvoted: bool,
+    /// They can as soon as more numbers of satellite positions were used than these.
+    outvoted_from: u32,
     surprise: Surprise,
     fix_age: FixAge,
     last_imu: ImuSample,
@@ -148,7 +152,8 @@ pub struct Estimator {
     last_good: Nominal,
     restarts: u32,
     restarted_at_s: f64,
-    surprised_at_s: f64,
+    /// After a surprise, s.
+    doubted_until_s: f64,
 }
 
 // Configuration, noise and the initial uncertainty come from the mission.
@@ -169,6 +174,8 @@ impl Estimator {
             heights: HeightChannel::new(state.position_m.z, start.height_m, start.gnss_vertical_offset_m),
             sideways: Sideways::default(),
             aids: Aids::default(),
+            barometer_outvoted: false,
+            outvoted_from: 0,
             surprise: Surprise::default(),
             fix_age: FixAge::new(config),
             is_shaken: false,
@@ -178,7 +185,7 @@ impl Estimator {
             last_good: nominal,
             restarts: 0,
             restarted_at_s: f64::NEG_INFINITY,
-            surprised_at_s: f64::NEG_INFINITY,
+            doubted_until_s: f64::NEG_INFINITY,
         }
     }
 
@@ -221,6 +228,21 @@ impl Estimator {
         self.estimate()
     }
 
+    /// Adds to the standard deviation of the velocity, world, m/s.
+    pub(crate) fn doubt_velocity(&mut self, sigma_m_s: &Vector3<f64>) {
+        self.catch_up();
+        for axis in 0..3 {
+            self.covariance.widen(VELOCITY + axis, sigma_m_s[axis] * sigma_m_s[axis]);
+        }
+    }
+
+    /// Takes a shock along the nose that no inertial unit measures: it changes the velocity by about so much, m/s, and a fix from
+    /// before it does not show the velocity after it.
+    pub(crate) fn take_shock(&mut self, gained_m_s: f64) {
+        self.doubt_velocity(&(self.nominal.world_from_body * Vector3::x() * gained_m_s));
+        self.history = History::new(self.time_s());
+    }
+
     /// The estimate now.
     pub fn estimate(&self) -> Estimate {
         let time_s = self.time_s();
@@ -252,7 +274,7 @@ impl Estimator {
                 &self.aids,
                 &sigmas,
                 time_s - self.restarted_at_s,
-                time_s - self.surprised_at_s,
+                time_s < self.doubted_until_s,
             ),
             sigmas,
             heights: self.heights.sources(),

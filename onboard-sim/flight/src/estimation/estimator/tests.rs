@@ -261,6 +261,64 @@ fn ranges_that_agree_for_a_tenth_of_a_second_are_believed_at_once() {
     }
 }
 
+/// Hovers for 10 s at 5 m, out of the lidar's sight, and from the fifth second on the barometer and the fixes are higher by these, m.
+fn hover_with_heights_off(barometer_m: f64, fixes_m: f64) -> Estimate {
+    let mut estimator = at(5.0);
+    for frame in 1..=2000 {
+        let measured = hovering(frame);
+        let late = if frame > 1000 { 1.0 } else { 0.0 };
+        let off =
+            |fix: GnssFix| GnssFix { position_m: fix.position_m + Vector3::z() * fixes_m * late, ..fix };
+        let measurements = Measurements {
+            pressure_altitude_m: measured.pressure_altitude_m.map(|height_m| height_m + barometer_m * late),
+            gnss: measured.gnss.map(off),
+            lidar_range_m: None,
+            ..measured
+        };
+        estimator.step(&measurements, &VEHICLE);
+    }
+    estimator.estimate()
+}
+
+#[test]
+fn two_heights_outvote_the_third() {
+    for off_m in [60.0, -60.0] {
+        let barometer_off = hover_with_heights_off(off_m, 0.0);
+        assert!((barometer_off.state.position_m.z - 5.0).abs() < 0.5, "{barometer_off:?}");
+        assert_eq!(barometer_off.heights.barometric_m, None);
+        let fixes_off = hover_with_heights_off(0.0, off_m);
+        assert!((fixes_off.state.position_m.z - 5.0).abs() < 0.5, "{fixes_off:?}");
+        assert!(fixes_off.heights.barometric_m.is_some(), "{fixes_off:?}");
+        // Which of two that are off together is right, nothing shows.
+        let both_off = hover_with_heights_off(-off_m, off_m);
+        assert!(both_off.heights.contradiction_m() != Some(0.0), "{both_off:?}");
+    }
+}
+
+/// A charge changes the velocity by what no inertial unit feels. The fixes show it, and nothing else is doubted.
+#[test]
+fn an_expected_shock_does_not_spoil_the_attitude() {
+    let doubts = [true, false].map(|expected| {
+        let mut estimator = at(5.0);
+        let mut estimate = estimator.estimate();
+        for frame in 1..=1400 {
+            if frame == 1000 && expected {
+                estimator.take_shock(0.5);
+            }
+            let mut measurements =
+                Measurements { lidar_range_m: None, pressure_altitude_m: None, ..hovering(frame) };
+            if let Some(fix) = measurements.gnss.as_mut().filter(|fix| fix.valid_at_s > 5.0) {
+                fix.velocity_m_s.z = 0.5;
+                fix.position_m.z = 5.0 + 0.5 * (fix.valid_at_s - 5.0);
+            }
+            estimate = estimator.step(&measurements, &VEHICLE);
+        }
+        assert!((estimate.state.velocity_m_s.z - 0.5).abs() < 0.1, "{estimate:?}");
+        estimate.sigmas.attitude_rad.x.to_degrees()
+    });
+    assert!(doubts[0] < 1.0 && doubts[1] > 2.0, "{doubts:?}");
+}
+
 /// The doubt of the gyro's bias grows once, when the motor lights.
 #[test]
 fn the_landing_motor_may_shift_the_gyros_bias() {
