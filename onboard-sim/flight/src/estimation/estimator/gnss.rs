@@ -23,6 +23,10 @@ const DOUBT_ATTITUDE_RAD: f64 = 0.04;
 const DOUBT_GYRO_BIAS_RAD_S: f64 = 0.05;
 /// Of the accelerometer's bias.
 const DOUBT_ACCELEROMETER_BIAS_M_S2: f64 = 0.5;
+/// An antenna along the nose loses satellites of the open sky: beyond this lean, rad, a fix is off by up to so many times what it is
+/// upright. It is believed as much less also by a vehicle that loses none.
+const LEANS_RAD: f64 = 0.35;
+const LEANING_NOISE: f64 = 3.0;
 /// Below this speed along an axis its satellite position does not show how old the fix is, m/s: 10 ms are 0.15 m.
 const SHOWS_AGE_M_S: f64 = 15.0;
 /// The filter's belief before the flight counts as much as this many fixes.
@@ -68,6 +72,8 @@ impl Estimator {
     /// A fix measures the past position and velocity, and the slow offset of the position.
     pub(super) fn take_gnss(&mut self, fix: &GnssFix) {
         self.catch_up();
+        let upright = (self.nominal.world_from_body * nalgebra::Vector3::x()).z;
+        let leaning = if upright < libm::cos(LEANS_RAD) { LEANING_NOISE } else { 1.0 };
         for axis in 0..3 {
             let Some(since) = self.since_fix(fix) else {
                 self.aids.gnss_velocity.refuse();
@@ -91,8 +97,8 @@ impl Estimator {
             let sensitivity = without_last_if(self.config.gnss_time_tag_s <= 0.0, &sensitivity);
             let predicted = self.nominal.velocity_m_s[axis] - since.gained_m_s[axis];
             let late = since.acceleration_m_s2[axis];
-            let noise = self.config.gnss_velocity_m_s * self.config.gnss_velocity_m_s
-                + late * late * self.fix_age.variance_s2;
+            let sigma_m_s = leaning * self.config.gnss_velocity_m_s;
+            let noise = sigma_m_s * sigma_m_s + late * late * self.fix_age.variance_s2;
             let correction = self.correct(sensitivity, fix.velocity_m_s[axis] - predicted, noise, |_| true);
             self.aids.gnss_velocity.take_next(axis, &correction);
             if correction.normalised_squared.is_finite() && self.surprise.take(correction.normalised_squared)
@@ -115,7 +121,8 @@ impl Estimator {
             let sensitivity = without_last_if(self.config.gnss_time_tag_s <= 0.0, &sensitivity);
             let predicted =
                 self.nominal.position_m[axis] - since.moved_m[axis] + self.nominal.gnss_offset_m[axis];
-            let sigma = if axis == 2 { self.config.gnss_vertical_m } else { self.config.gnss_horizontal_m };
+            let sigma =
+                leaning * if axis == 2 { self.config.gnss_vertical_m } else { self.config.gnss_horizontal_m };
             let aged_m2 = then_m_s * then_m_s * self.fix_age.variance_s2;
             let innovation_m = fix.position_m[axis] - predicted;
             let correction = self.correct(sensitivity, innovation_m, sigma * sigma + aged_m2, |_| true);
