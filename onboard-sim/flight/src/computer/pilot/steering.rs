@@ -41,21 +41,15 @@ impl Pilot {
             // The thrust still carries a vehicle that stands: the legs then carry little, and the wind tips it over. So the gimbal
             // holds it upright until the thrust ends.
             let balances = self.model.mission.upright_after_contact && mode.phase == Phase::Touchdown;
-            let mut added_rad_s = [0.0; 2];
-            self.gimbal_rad = match burning {
-                Some(burning) => {
+            let (gimbal_rad, added_rad_s) = match (burning, thrusting.as_ref().filter(|_| balances)) {
+                (Some(burning), _) => {
                     self.fin_share = self.powered.fin_share(input.time_s).unwrap_or(self.fin_share);
-                    self.gimbal(input.time_s, estimate, burning, &input.fins_rad)
+                    (self.gimbal(input.time_s, estimate, burning, &input.fins_rad), [0.0; 2])
                 }
-                None => match thrusting.as_ref().filter(|_| balances) {
-                    Some(burning) => self.turned_towards(&Aim::upright(), estimate, burning),
-                    None => {
-                        let gimbal_rad;
-                        (gimbal_rad, added_rad_s) = self.swing(mode, input);
-                        gimbal_rad
-                    }
-                },
+                (None, Some(burning)) => (self.turned_towards(&Aim::upright(), estimate, burning), [0.0; 2]),
+                (None, None) => self.swing(mode, input),
             };
+            self.gimbal_rad = gimbal_rad;
             let mass = self.model.mass_now(self.model.burning_s(input.time_s));
             // What a swing adds is gone before a fin has moved.
             let mut calm = *estimate;
