@@ -39,7 +39,8 @@ fn on_the_way_up(
 impl Pilot {
     /// Estimates the vehicle's state, and its motor and drag.
     pub(crate) fn estimate_state(&mut self, phase: Phase, input: &KeptInput, sensors: &SensorWatch) {
-        let burns = phase.in_landing_burn() && self.model.motor.stage() == MotorStage::Burning;
+        // Also on the ground, where the gimbal goes on to balance.
+        let burns = self.model.motor.stage() == MotorStage::Burning;
         let thrust_felt = !(burns && sensors.accelerometer_is_lost());
         let estimate = self.estimated(phase, input, thrust_felt);
         self.estimate = Some(estimate);
