@@ -20,7 +20,7 @@ const SIGNS: [f64; 8] = [1.0, -1.0, -1.0, 1.0, -1.0, 1.0, 1.0, -1.0];
 const SIGMAS: f64 = 10.0;
 const REPEATS_MAX: f64 = 4.0;
 /// A swing that shows less than this share of what is expected speaks against the gimbal. One that is stuck shows nothing, with a
-/// scatter of 0.05; one at 0.3 of its rate with 1.5 degrees of play, which lands, shows 0.17, and a sound one 0.5 at least (13,000
+/// scatter of 0.05; one at 0.3 of its rate with 1.5 degrees of play, which lands, shows 0.17, and a sound one 0.5 at least (4,800
 /// swings of mk3 in `real`, `wild` and `harsh`). Longer legs would show more of a slow one, and more of the fins.
 const MOVES: f64 = 0.09;
 /// What is missing to that adds up, swing by swing, and more takes it away again (E. S. Page, "Continuous inspection schemes",
