@@ -155,9 +155,12 @@ impl Pilot {
     ) -> [GateCheck; GATE_CHECKS] {
         let state = &estimate.state;
         let onset_m = self.onset_m(estimate);
-        // With no room for the parachute, a landing by what is not known well ends better than a fall.
+        // With no room for the parachute, a landing by what is not known well ends better than a fall, while the vehicle knows which
+        // way is up.
         let low = self.feet_height_m(estimate) < self.prediction.filling_height_m();
-        let unknown = matches!(estimate.health, Health::Doubtful(Doubt::Restarted | Doubt::Imu));
+        let unknown = matches!(estimate.health, Health::Doubtful(Doubt::Restarted | Doubt::Imu))
+            || estimate.sigmas.attitude_rad.xy().max()
+                > self.model.mission.estimator.health.tilt_deg.to_radians();
         let found = GateInput {
             tilt_rad: state.tilt_rad(),
             vertical_speed_m_s: state.velocity_m_s.z,
