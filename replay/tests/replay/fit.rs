@@ -73,7 +73,7 @@ fn what_is_broken_is_told_with_its_reason_and_the_rest_is_found() {
     let gimbal = ["gimbal_delay", "gimbal_gain", "gimbal_play"];
     for (fault, lacks, reason, found) in [
         ("no-light@0", &["thrust_scale"][..], dark, "drag_per_mass_scale"),
-        ("gimbal-jams:3.7@0", &gimbal, not_its_model, "thrust_scale"),
+        ("gimbal-jams:3.7@ignition", &gimbal, not_its_model, "thrust_scale"),
         ("early-burnout:2@0", &["thrust_scale"], not_its_curve, "drag_per_mass_scale"),
     ] {
         let fit = fit(&Trace::open(&crate::from_apogee::fly(&[fault]).log).unwrap());

@@ -88,8 +88,8 @@ fn different_verdicts_fail_unless_they_are_tolerated() {
     let (a, b) = (flown(&MK2), Flown::open(&path).unwrap());
     let found = compare(&a, &b, &Tolerances::default()).unwrap();
     assert!(found.failures.contains(&"the verdicts differ: stands undamaged and not landed".to_owned()));
-    // The weak motor's flight is shorter.
-    assert!(found.signals.iter().all(|signal| signal.samples_of[0] >= signal.samples_of[1]));
+    // The weak motor's flight has another length.
+    assert!(found.signals.iter().any(|signal| signal.samples_of[0] != signal.samples_of[1]));
     let tolerated = Tolerances::from_toml("verdict = false", "t.toml").unwrap();
     let found = compare(&a, &b, &tolerated).unwrap();
     assert!(found.failures.is_empty(), "{:?}", found.failures);

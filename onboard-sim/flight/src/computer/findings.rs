@@ -247,8 +247,8 @@ const ASTRAY_COS_TILT: f64 = 0.5;
 /// half frame of delay make 1 deg of it for a gimbal; the fins' feedback is coarser.
 const AWAY_RAD: [f64; 2] = [0.035, 0.14];
 /// A gimbal that never turned by this share of its servo's rate, in so many frames that asked for more, is slow. One that is as its
-/// data say turns by 0.67 of it at least (388 flights of mk2 and mk3 in `real`).
-const SLOW: f64 = 0.65;
+/// data say turns by 0.6 of it at least (388 flights of mk2 and mk3 in `real`).
+const SLOW: f64 = 0.55;
 const SLOW_FRAMES: u32 = 40;
 /// Common regulators of 5 V give up here, V.
 const BATTERY_LOW_V: f64 = 6.6;
@@ -278,6 +278,8 @@ struct Watcher {
     missing: u64,
     /// Satellites were seen after the boost.
     gnss_since_boost: bool,
+    /// The barometer's last altitude, m.
+    pressure_m: Option<f64>,
     surfaces: [ServoModel; SURFACES],
     /// Where the gimbal was in the frame before, rad.
     gimbal_rad: [f64; 2],
@@ -303,6 +305,7 @@ impl Watcher {
             frame: flown.frame.saturating_sub(1),
             missing: 0,
             gnss_since_boost: false,
+            pressure_m: None,
             surfaces: ServoModel::of_each(airframe, surfaces_rad(flown.gimbal_rad, flown.fins_rad)),
             gimbal_rad: flown.gimbal_rad,
             turns: [(0, 0.0); 2],
@@ -325,6 +328,7 @@ impl Watcher {
             self.surfaces = ServoModel::of_each(&computer.pilot().mission().airframe, at_rad);
             self.gimbal_rad = flown.gimbal_rad;
         }
+        self.pressure_m = flown.measured.pressure_altitude_m.or(self.pressure_m);
         if flown.measured.gnss.is_some() {
             self.gnss_since_boost = phase != Phase::Boost;
         }
@@ -421,7 +425,10 @@ fn seen_in_flight(
         }
         Sign::HeightsDisagree => {
             let falls = mode.phase.in_descent() || mode.phase.in_landing_burn();
-            let apart_m = estimate.heights.disagreement_m().filter(|_| falls)?;
+            // One that was outvoted is no source of heights any more.
+            let apart_m = (estimate.heights.disagreement_m())
+                .or_else(|| Some((watcher.pressure_m? - height_m).abs()))
+                .filter(|_| falls)?;
             (apart_m > HEIGHTS_APART_M).then(|| now(apart_m, 0.0))
         }
         Sign::Estimate => match estimate.health {

@@ -75,6 +75,9 @@ impl Estimator {
         self.catch_up();
         let upright = (self.nominal.world_from_body * nalgebra::Vector3::x()).z;
         let leaning = if upright < libm::cos(LEANS_RAD) { LEANING_NOISE } else { 1.0 };
+        let off_m_s = self
+            .since_fix(fix)
+            .map_or(0.0, |since| (fix.velocity_m_s - self.nominal.velocity_m_s + since.gained_m_s).norm());
         for axis in 0..3 {
             let Some(since) = self.since_fix(fix) else {
                 self.aids.gnss_velocity.refuse();
@@ -104,7 +107,7 @@ impl Estimator {
             self.aids.gnss_velocity.take_next(axis, &correction);
             if correction.normalised_squared.is_finite() && self.surprise.take(correction.normalised_squared)
             {
-                self.doubt_motion(correction.innovation.abs() < CREEPS_M_S);
+                self.doubt_motion(off_m_s < CREEPS_M_S);
             }
         }
         for axis in 0..3 {

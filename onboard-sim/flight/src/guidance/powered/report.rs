@@ -102,6 +102,7 @@ pub struct PoweredSettings {
     /// Latest end of a plan after the thrust has fallen through the weight, s.
     pub latest_after_s: f64,
     /// How long before touchdown a plan is inside the box, except for its axial velocity, s.
+    #[serde(default)]
     pub settled_s: f64,
     /// A plan that ends sooner than this is flown to its end, s.
     pub flown_out_s: f64,
