@@ -214,7 +214,7 @@ mod tests {
             let rates_rad_s = reaction.felt_rad_s(told_rad);
             (told_rad, _) = watch.update(&swing.unwrap(), rates_rad_s);
             assert!(told_rad.iter().all(|rad| rad.abs() <= mission.airframe.gimbal.limit_rad()));
-            assert!(told_rad.iter().any(|rad| *rad == 0.0), "{told_rad:?}");
+            assert!(told_rad.contains(&0.0), "{told_rad:?}");
             moved = [0, 1].map(|axis: usize| moved[axis] || told_rad[axis] != 0.0);
         }
         assert_eq!(moved, [true; 2]);
@@ -248,6 +248,6 @@ mod tests {
         let mut resumed = resumed;
         silent(&mut resumed, 2 * 52);
         assert!(resumed.found_stuck() && resumed.interrupted().found_stuck());
-        assert_eq!(resumed.update(&swing, [0.0; 2]).0, [0.0; 2], "it rests");
+        assert_eq!(resumed.update(&swing, [0.0; 2]).0.map(f64::to_bits), [0; 2], "it rests");
     }
 }
