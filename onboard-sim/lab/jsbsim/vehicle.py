@@ -30,6 +30,13 @@ def motor(path):
     return propellant_kg, curve
 
 
+def swinging_kg_m2(path):
+    """Inertia across its axis of a full motor of a RASP file, a solid cylinder that swings about its middle, kg m^2."""
+    lines = [line for line in Path(path).read_text().splitlines() if line.strip() and not line.startswith(";")]
+    diameter_m, length_m = (1e-3 * float(word) for word in lines[0].split()[1:3])
+    return float(lines[0].split()[5]) * (length_m**2 / 12 + diameter_m**2 / 16)
+
+
 def thrust_over_burnt(propellant_kg, curve, parts=20):
     """Impulse, N s, and (propellant burnt kg, thrust N). Thrust is proportional to the mass flow."""
     points, impulse = [(0.0, 0.0)], 0.0
@@ -178,14 +185,13 @@ def aerodynamics(airframe, scale):
 
 
 def servo(name, data, stops_deg):
-    """JSBSim's actuator: a rate limit, stops, and play as hysteresis; its delay is a component of its own."""
+    """JSBSim's actuator: a delay in frames of a millisecond, a rate limit, stops, and play as hysteresis."""
     low, high = (math.radians(stop) for stop in stops_deg)
     play = math.radians(data.get("slop_deg", 0.0))
     hysteresis = f"<hysteresis_width>{play!r}</hysteresis_width>" if play else ""
     return (
-        f'<pure_gain name="fcs/{name}-late"><input>fcs/{name}-cmd</input><gain>1</gain>'
-        f'<delay type="time">{data["delay_s"]!r}</delay></pure_gain>'
-        f'<actuator name="fcs/{name}-rad"><input>fcs/{name}-late</input>'
+        f'<actuator name="fcs/{name}-rad"><input>fcs/{name}-cmd</input>'
+        f'<delay type="frames">{round(1000 * data["delay_s"])}</delay>'
         f'<rate_limit>{math.radians(data["rate_deg_s"])!r}</rate_limit>{hysteresis}'
         f"<clipto><min>{low!r}</min><max>{high!r}</max></clipto></actuator>"
     )

@@ -28,6 +28,10 @@ class Plant:
         truth = draw["truth"]
         self.airframe = vehicle.write(folder, order["airframe"], order["motor"], truth)
         self.truth, self.site = truth, order["site"]
+        # JSBSim swings no mass: the body turns back by the motor's share of its inertia.
+        pitch_kg_m2 = self.airframe["mass"]["loaded_pitch_inertia_kg_m2"]
+        self.turns_back = vehicle.swinging_kg_m2(order["motor"]) / pitch_kg_m2
+        self.gimbal_rad, self.swing_rad_s = np.zeros(2), np.zeros(2)
         fdm = jsbsim.FGFDMExec(folder)
         fdm.set_debug_level(0)
         fdm.set_aircraft_path("aircraft")
@@ -82,6 +86,8 @@ class Plant:
         fdm["atmosphere/wind-north-fps"] = mean * math.cos(towards) / M
         fdm["atmosphere/wind-east-fps"] = -mean * math.sin(towards) / M
         fdm.run()
+        gimbal_rad = np.array([fdm[f"fcs/gimbal-{axis}-rad"] for axis in ("pitch", "yaw")])
+        self.swing_rad_s, self.gimbal_rad = (gimbal_rad - self.gimbal_rad) / STEP_S, gimbal_rad
         self.time_s += STEP_S
 
     def height(self):
@@ -94,7 +100,8 @@ class Plant:
         theta, phi = fdm["attitude/theta-rad"], fdm["attitude/phi-rad"]
         legs = self.airframe["legs"]
         return {
-            "rate": np.array([fdm[f"velocities/{axis}i-rad_sec"] for axis in "pqr"]),
+            "rate": np.array([fdm[f"velocities/{axis}i-rad_sec"] for axis in "pqr"])
+            - self.turns_back * np.array([0.0, *self.swing_rad_s]),
             "force": np.array([fdm[f"accelerations/a-pilot-{axis}-ft_sec2"] * M for axis in "xyz"]),
             "place": np.array([
                 math.radians(fdm["position/lat-geod-deg"] - self.site["latitude_deg"]) * north,
