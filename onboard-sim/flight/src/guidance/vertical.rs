@@ -16,6 +16,8 @@
 
 use core::array::from_fn;
 
+use pulp::{Arch, Simd, WithSimd};
+
 use crate::vehicle::atmosphere::Air;
 use crate::vehicle::burn::Burn;
 use crate::vehicle::mission::Mission;
@@ -155,8 +157,8 @@ impl Column {
         }
         let carried_until_s = burn.falls_through_weight_s(self.mass_at_ignition_kg, self.gravity_m_s2);
         carried_until_s.filter(|end_s| *end_s > burning_s).is_some_and(|end_s| {
-            let [softest] =
-                Falls::new(self, burn, burning_s, [end_s]).along::<false>(Way::Even, vertical_m_s, [1.0]);
+            let falls = Falls::new(self, burn, burning_s, [end_s]);
+            let [[softest]] = falls.along::<false, 1>([Way::Even], vertical_m_s, [[1.0]]);
             softest.vertical_m_s > self.touchdown_m_s
         })
     }
@@ -247,7 +249,7 @@ impl EvenLanding {
         let braked = |speed_m_s: f64, tilt_rad: f64| {
             let soft = Braking { tilt_rad, fin_drag_area_m2: half_m2 };
             let falls = Falls::new(&Column { soft, ..column }, &burn, 0.0, [carried_s]);
-            let [ended] = falls.along::<false>(Way::Even, -speed_m_s, [1.0]);
+            let [[ended]] = falls.along::<false, 1>([Way::Even], -speed_m_s, [[1.0]]);
             ended
         };
         let halved = |mut low: f64, mut high: f64, below: &dyn Fn(f64) -> bool| {
@@ -334,9 +336,14 @@ enum Way {
     Even,
 }
 
+/// All ways, and the place of the one that brakes hard first.
+const WAYS: [Way; 3] = [Way::SoftFirst, Way::HardFirst, Way::Even];
+const HARD_FIRST: usize = 1;
+
 impl Way {
     /// The fraction of soft braking in interval `k`, before it is limited to 0 to 1: the first number times the parameter,
     /// plus the second times `k`, plus the third.
+    #[inline(always)]
     fn softly(self) -> (f64, f64, f64) {
         const ALL: f64 = INTERVALS as f64;
         match self {
@@ -372,167 +379,235 @@ impl Landings {
 }
 
 /// The rest of the burn until `N` given ends, each in equal intervals. A step of a fall waits for the one before it, so the
-/// falls to all ends are computed side by side, in vectors.
+/// falls to all ends are computed side by side, in vectors, and those of all ways in turn.
 struct Falls<const N: usize> {
     step_s: [f64; N],
-    gravity_m_s2: f64,
     touchdown_m_s: f64,
-    soft: Share,
-    hard: Share,
-    upright: Share,
     ahead: [Ahead<N>; INTERVALS],
 }
 
-/// An interval of each fall: thrust over mass, m/s^2, one over the mass, 1/kg, and the fraction in which the vehicle may lean.
+/// An interval of each fall.
 struct Ahead<const N: usize> {
-    thrust_m_s2: [f64; N],
-    per_kg: [f64; N],
-    leaning: [f64; N],
+    /// Acceleration without drag of the hardest and the softest braking, m/s^2, and drag over the mass and the square of the
+    /// speed, 1/m: while the vehicle leans, and in that share of the interval in which it is upright.
+    pushed_m_s2: [[f64; N]; 2],
+    drag_per_m: [[f64; N]; 2],
+}
+
+/// Falls of one way, each to its end.
+#[derive(Clone, Copy)]
+struct Falling<const N: usize> {
+    fallen_m: [f64; N],
+    speeds_m_s: [f64; N],
+    highest_m_s: [f64; N],
 }
 
 impl<const N: usize> Falls<N> {
     /// Falls from `from_s` to `ends_s` of the burn.
     fn new(column: &Column, burn: &Burn<'_>, from_s: f64, ends_s: [f64; N]) -> Self {
         let step_s = ends_s.map(|to_s| (to_s - from_s) / INTERVALS as f64);
+        let upright = Share::new(column, &Braking { tilt_rad: 0.0, ..column.soft });
+        let shares = [&column.hard, &column.soft].map(|braking| Share::new(column, braking));
+        let mut given_n_s = [burn.impulse_n_s(from_s); N];
         let ahead = from_fn(|k| {
-            let at_s = step_s.map(|step_s| from_s + k as f64 * step_s);
-            let middle_s: [f64; N] = from_fn(|i| at_s[i] + 0.5 * step_s[i]);
+            let [at_s, middle_s, until_s] =
+                [0.0, 0.5, 1.0].map(|share| step_s.map(|step_s| from_s + (k as f64 + share) * step_s));
             let per_kg = middle_s.map(|at_s| 1.0 / (column.mass_at_ignition_kg - burn.burnt_kg(at_s)));
+            let before_n_s = core::mem::replace(&mut given_n_s, until_s.map(|at_s| burn.impulse_n_s(at_s)));
+            let thrust_m_s2: [f64; N] = from_fn(|i| {
+                let mean_n = (given_n_s[i] - before_n_s[i]) / step_s[i];
+                mean_n * burn.deviates(at_s[i], step_s[i]) * per_kg[i]
+            });
+            // The vehicle is upright once it settles.
+            let leaning =
+                step_s.map(|step_s| ((INTERVALS - k) as f64 - column.settle_s / step_s).clamp(0.0, 1.0));
+            let mixed = |one: f64, i: usize, other: f64| leaning[i] * one + (1.0 - leaning[i]) * other;
             Ahead {
-                thrust_m_s2: from_fn(|i| burn.mean_thrust_n(at_s[i], step_s[i]) * per_kg[i]),
-                per_kg,
-                // The vehicle is upright once it settles.
-                leaning: step_s
-                    .map(|step_s| ((INTERVALS - k) as f64 - column.settle_s / step_s).clamp(0.0, 1.0)),
+                pushed_m_s2: shares.map(|share| {
+                    from_fn(|i| thrust_m_s2[i] * mixed(share.thrust, i, upright.thrust) - column.gravity_m_s2)
+                }),
+                drag_per_m: shares
+                    .map(|share| from_fn(|i| per_kg[i] * mixed(share.drag_per_v2, i, upright.drag_per_v2))),
             }
         });
-        Self {
-            step_s,
-            gravity_m_s2: column.gravity_m_s2,
-            touchdown_m_s: column.touchdown_m_s,
-            soft: Share::new(column, &column.soft),
-            hard: Share::new(column, &column.hard),
-            upright: Share::new(column, &Braking { tilt_rad: 0.0, ..column.soft }),
-            ahead,
-        }
+        Self { step_s, touchdown_m_s: column.touchdown_m_s, ahead }
     }
 
     /// The heights from which landings to each end begin, one for each way of braking that reaches the touchdown speed
     /// without rising before.
-    fn heights_m(&self, vertical_m_s: f64) -> [[Option<f64>; N]; 3] {
-        // All ways have the same two extremes.
-        let extremes =
-            [0.0, 1.0].map(|parameter| self.along::<false>(Way::Even, vertical_m_s, [parameter; N]));
-        [Way::SoftFirst, Way::HardFirst, Way::Even].map(|way| self.heights_of_m(way, vertical_m_s, &extremes))
+    fn heights_m(&self, vertical_m_s: f64) -> [[Option<f64>; N]; WAYS.len()] {
+        Arch::new().dispatch(Heights { falls: self, vertical_m_s })
     }
 
-    /// Finds for each end the parameter that gives the touchdown speed, by false position. The value of an end that stays
-    /// twice is halved (the Illinois rule; Dowell and Jarratt, BIT 11, 1971).
-    fn heights_of_m(&self, way: Way, vertical_m_s: f64, extremes: &[[Ended; N]; 2]) -> [Option<f64>; N] {
+    /// Finds for each end and way the parameter that gives the touchdown speed, by false position. The value of an end that
+    /// stays twice is halved (the Illinois rule; Dowell and Jarratt, BIT 11, 1971).
+    #[inline(always)]
+    fn sought_m(&self, vertical_m_s: f64) -> [[Option<f64>; N]; WAYS.len()] {
         let missed_m_s = |ended: &Ended| ended.vertical_m_s - self.touchdown_m_s;
-        let (mut heights_m, mut risen) = ([None; N], [false; N]);
-        let mut one: [_; N] = from_fn(|i| (0.0, missed_m_s(&extremes[0][i])));
+        // All ways have the same two extremes.
+        let extremes = self.along::<false, 2>([Way::Even; 2], vertical_m_s, [[0.0; N], [1.0; N]]);
+        let mut heights_m = [[None; N]; WAYS.len()];
+        let mut risen = [[false; N]; WAYS.len()];
+        let mut one: [[_; N]; WAYS.len()] = [from_fn(|i| (0.0, missed_m_s(&extremes[0][i]))); _];
         // `other` is the newest point.
-        let mut other: [_; N] = from_fn(|i| (1.0, missed_m_s(&extremes[1][i])));
-        let mut sought: [bool; N] = from_fn(|i| one[i].1 * other[i].1 <= 0.0);
+        let mut other: [[_; N]; WAYS.len()] = [from_fn(|i| (1.0, missed_m_s(&extremes[1][i]))); _];
+        let mut sought: [[_; N]; WAYS.len()] = [from_fn(|i| one[0][i].1 * other[0][i].1 <= 0.0); _];
         for _ in 0..MOST_FALLS {
-            if !sought.contains(&true) {
+            if !sought.as_flattened().contains(&true) {
                 break;
             }
-            let parameters: [f64; N] = from_fn(|i| {
-                let span_m_s = other[i].1 - one[i].1;
-                if span_m_s.abs() > 0.0 {
-                    one[i].0 - one[i].1 * (other[i].0 - one[i].0) / span_m_s
-                } else {
-                    other[i].0
-                }
+            let parameters: [[f64; N]; WAYS.len()] = from_fn(|way| {
+                from_fn(|i| {
+                    let ((at, miss_m_s), (newest, newest_m_s)) = (one[way][i], other[way][i]);
+                    let span_m_s = newest_m_s - miss_m_s;
+                    if span_m_s.abs() > 0.0 { at - miss_m_s * (newest - at) / span_m_s } else { newest }
+                })
             });
-            let ended = self.along::<false>(way, vertical_m_s, parameters);
-            for i in 0..N {
-                if !sought[i] {
-                    continue;
+            let ended = self.along::<false, { WAYS.len() }>(WAYS, vertical_m_s, parameters);
+            for way in 0..WAYS.len() {
+                for i in 0..N {
+                    if !sought[way][i] {
+                        continue;
+                    }
+                    let (ended, one, other) = (&ended[way][i], &mut one[way][i], &mut other[way][i]);
+                    let miss_m_s = missed_m_s(ended);
+                    if miss_m_s.abs() < MET_M_S {
+                        sought[way][i] = false;
+                        risen[way][i] = ended.highest_m_s > RISING_M_S;
+                        heights_m[way][i] = (!risen[way][i]).then_some(ended.fallen_m);
+                    } else if miss_m_s * other.1 < 0.0 {
+                        *one = *other;
+                    } else {
+                        one.1 *= 0.5;
+                    }
+                    *other = (parameters[way][i], miss_m_s);
                 }
-                let miss_m_s = missed_m_s(&ended[i]);
-                if miss_m_s.abs() < MET_M_S {
-                    sought[i] = false;
-                    risen[i] = ended[i].highest_m_s > RISING_M_S;
-                    heights_m[i] = (!risen[i]).then_some(ended[i].fallen_m);
-                } else if miss_m_s * other[i].1 < 0.0 {
-                    one[i] = other[i];
-                } else {
-                    one[i].1 *= 0.5;
-                }
-                other[i] = (parameters[i], miss_m_s);
             }
         }
-        if matches!(way, Way::HardFirst) && risen.contains(&true) {
+        let risen = &risen[HARD_FIRST];
+        if risen.contains(&true) {
             // It would rise. It may instead be held by its tilt once it sinks as at touchdown: braked hard before that for as long
             // as the softest braking can still hold it.
+            let after = |softly: f64, rises: bool, by: f64| (softly + if rises { by } else { -by }).max(0.0);
             let mut softly = [0.0; N];
-            let mut softer_by = 1.0;
-            for _ in 0..HOLDS_TRIED {
-                let held = self.along::<true>(way, vertical_m_s, softly);
-                softer_by *= 0.5;
-                for (i, ended) in held.iter().enumerate().filter(|(i, _)| risen[*i]) {
-                    let lands = missed_m_s(ended).abs() < HELD_M_S;
-                    let rises = ended.highest_m_s > RISING_M_S;
-                    if lands && !rises {
-                        heights_m[i] = Some(ended.fallen_m);
-                    }
-                    softly[i] = (softly[i] + if rises { softer_by } else { -softer_by }).max(0.0);
+            let mut softer_by = 0.5;
+            for _ in 0..HOLDS_TRIED / 2 {
+                // With each, what may follow it.
+                let tried = [
+                    softly,
+                    softly.map(|softly| after(softly, true, softer_by)),
+                    softly.map(|softly| after(softly, false, softer_by)),
+                ];
+                let held = self.along::<true, 3>([Way::HardFirst; 3], vertical_m_s, tried);
+                for i in (0..N).filter(|i| risen[*i]) {
+                    let mut rises = |held: &Ended| {
+                        let rises = held.highest_m_s > RISING_M_S;
+                        if missed_m_s(held).abs() < HELD_M_S && !rises {
+                            heights_m[HARD_FIRST][i] = Some(held.fallen_m);
+                        }
+                        rises
+                    };
+                    let next = if rises(&held[0][i]) { 1 } else { 2 };
+                    softly[i] = after(tried[next][i], rises(&held[next][i]), 0.5 * softer_by);
                 }
+                softer_by *= 0.25;
             }
         }
         heights_m
     }
 
-    /// The falls from a vertical velocity, each with its parameter of a way; if it `HOLDS`, no faster upwards than at touchdown
-    /// as far as the softest braking allows.
-    fn along<const HOLDS: bool>(&self, way: Way, vertical_m_s: f64, parameters: [f64; N]) -> [Ended; N] {
-        // Every line is one operation on all falls, which the compiler makes one on vectors.
-        let mixed = |share: &[f64; N], one: [f64; N], other: f64| -> [f64; N] {
-            from_fn(|i| share[i] * one[i] + (1.0 - share[i]) * other)
+    /// The falls from a vertical velocity, each with its parameter of each way; if it `HOLDS`, no faster upwards than at
+    /// touchdown as far as the softest braking allows.
+    #[inline(always)]
+    fn along<const HOLDS: bool, const W: usize>(
+        &self,
+        ways: [Way; W],
+        vertical_m_s: f64,
+        parameters: [[f64; N]; W],
+    ) -> [[Ended; N]; W] {
+        let ways: [_; W] = from_fn(|way| {
+            let (per_parameter, per_interval, at_first) = ways[way].softly();
+            (parameters[way].map(|parameter| parameter * per_parameter + at_first), per_interval)
+        });
+        let begins = Falling {
+            fallen_m: [0.0; N],
+            speeds_m_s: [vertical_m_s; N],
+            highest_m_s: [f64::NEG_INFINITY; N],
         };
-        let (per_parameter, per_interval, at_first) = way.softly();
-        let mut fallen_m = [0.0; N];
-        let mut speeds_m_s = [vertical_m_s; N];
-        let mut highest_m_s = [f64::NEG_INFINITY; N];
-        for (k, Ahead { thrust_m_s2, per_kg, leaning }) in self.ahead.iter().enumerate() {
-            let before = per_interval * k as f64 + at_first;
-            let softly = parameters.map(|parameter| (parameter * per_parameter + before).clamp(0.0, 1.0));
-            let thrust = mixed(&softly, [self.soft.thrust; N], self.hard.thrust);
-            let drag_per_v2 = mixed(&softly, [self.soft.drag_per_v2; N], self.hard.drag_per_v2);
-            let thrust = mixed(leaning, thrust, self.upright.thrust);
-            let drag_per_v2 = mixed(leaning, drag_per_v2, self.upright.drag_per_v2);
-            let pushed_m_s2: [f64; N] = from_fn(|i| thrust_m_s2[i] * thrust[i] - self.gravity_m_s2);
-            let drag_per_m: [f64; N] = from_fn(|i| drag_per_v2[i] * per_kg[i]);
-            let acceleration = |speeds_m_s: &[f64; N]| -> [f64; N] {
-                from_fn(|i| pushed_m_s2[i] - drag_per_m[i] * speeds_m_s[i] * speeds_m_s[i].abs())
-            };
-            // Midpoint rule.
-            let begins_m_s2 = acceleration(&speeds_m_s);
-            let mut midway_m_s = from_fn(|i| speeds_m_s[i] + 0.5 * self.step_s[i] * begins_m_s2[i]);
-            let midway_m_s2 = acceleration(&midway_m_s);
-            let mut next_m_s: [f64; N] = from_fn(|i| speeds_m_s[i] + self.step_s[i] * midway_m_s2[i]);
-            if HOLDS {
-                let softest = mixed(leaning, [self.soft.thrust; N], self.upright.thrust);
-                next_m_s = from_fn(|i| {
-                    let after = |thrust: f64| {
-                        speeds_m_s[i] + self.step_s[i] * (thrust_m_s2[i] * thrust - self.gravity_m_s2)
-                    };
-                    let [least_m_s, most_m_s] = [after(softest[i]), after(self.hard.thrust)];
-                    let held =
-                        speeds_m_s[i] >= self.touchdown_m_s - MET_M_S || next_m_s[i] > self.touchdown_m_s;
-                    if held { self.touchdown_m_s.min(most_m_s).max(least_m_s) } else { next_m_s[i] }
-                });
-                midway_m_s = from_fn(|i| 0.5 * (speeds_m_s[i] + next_m_s[i]));
+        let mut falling = [begins; W];
+        for (k, ahead) in self.ahead.iter().enumerate() {
+            for (falling, (at_first, per_interval)) in falling.iter_mut().zip(&ways) {
+                let later = per_interval * k as f64;
+                let softly = at_first.map(|at_first| lower(higher(at_first + later, 0.0), 1.0));
+                self.step::<HOLDS>(ahead, &softly, falling);
             }
-            fallen_m = from_fn(|i| fallen_m[i] - self.step_s[i] * midway_m_s[i]);
-            speeds_m_s = next_m_s;
-            let higher = |one: f64, other: f64| if one > other { one } else { other };
-            highest_m_s = from_fn(|i| higher(highest_m_s[i], speeds_m_s[i]));
         }
-        from_fn(|i| Ended { fallen_m: fallen_m[i], vertical_m_s: speeds_m_s[i], highest_m_s: highest_m_s[i] })
+        falling.map(|Falling { fallen_m, speeds_m_s, highest_m_s }| {
+            from_fn(|i| Ended {
+                fallen_m: fallen_m[i],
+                vertical_m_s: speeds_m_s[i],
+                highest_m_s: highest_m_s[i],
+            })
+        })
+    }
+
+    /// One interval of the falls of one way, with these shares of soft braking: the midpoint rule. Every line is one operation on
+    /// all falls, which the compiler makes one on vectors.
+    #[inline(always)]
+    fn step<const HOLDS: bool>(&self, ahead: &Ahead<N>, softly: &[f64; N], falling: &mut Falling<N>) {
+        let Ahead { pushed_m_s2: [hard_m_s2, soft_m_s2], drag_per_m: [hard_per_m, soft_per_m] } = ahead;
+        let (step_s, speeds_m_s) = (&self.step_s, falling.speeds_m_s);
+        let mixed = |hard: &[f64; N], soft: &[f64; N]| -> [f64; N] {
+            from_fn(|i| hard[i] + softly[i] * (soft[i] - hard[i]))
+        };
+        let (pushed_m_s2, drag_per_m) = (mixed(hard_m_s2, soft_m_s2), mixed(hard_per_m, soft_per_m));
+        let acceleration = |speeds_m_s: &[f64; N]| -> [f64; N] {
+            from_fn(|i| pushed_m_s2[i] - drag_per_m[i] * speeds_m_s[i] * speeds_m_s[i].abs())
+        };
+        let begins_m_s2 = acceleration(&speeds_m_s);
+        let mut midway_m_s = from_fn(|i| speeds_m_s[i] + 0.5 * step_s[i] * begins_m_s2[i]);
+        let midway_m_s2 = acceleration(&midway_m_s);
+        let mut next_m_s: [f64; N] = from_fn(|i| speeds_m_s[i] + step_s[i] * midway_m_s2[i]);
+        if HOLDS {
+            next_m_s = from_fn(|i| {
+                let least_m_s = speeds_m_s[i] + step_s[i] * soft_m_s2[i];
+                let most_m_s = speeds_m_s[i] + step_s[i] * hard_m_s2[i];
+                let held_m_s = higher(lower(self.touchdown_m_s, most_m_s), least_m_s);
+                let held =
+                    (speeds_m_s[i] >= self.touchdown_m_s - MET_M_S) | (next_m_s[i] > self.touchdown_m_s);
+                if held { held_m_s } else { next_m_s[i] }
+            });
+            midway_m_s = from_fn(|i| 0.5 * (speeds_m_s[i] + next_m_s[i]));
+        }
+        falling.fallen_m = from_fn(|i| falling.fallen_m[i] - step_s[i] * midway_m_s[i]);
+        falling.highest_m_s = from_fn(|i| higher(falling.highest_m_s[i], next_m_s[i]));
+        falling.speeds_m_s = next_m_s;
+    }
+}
+
+/// The larger and the smaller of two numbers, each in one instruction.
+#[inline(always)]
+fn higher(one: f64, other: f64) -> f64 {
+    if one > other { one } else { other }
+}
+
+#[inline(always)]
+fn lower(one: f64, other: f64) -> f64 {
+    if one < other { one } else { other }
+}
+
+/// The search of the heights in the widest vectors that the machine has; the bits are the same.
+struct Heights<'a, const N: usize> {
+    falls: &'a Falls<N>,
+    vertical_m_s: f64,
+}
+
+impl<const N: usize> WithSimd for Heights<'_, N> {
+    type Output = [[Option<f64>; N]; WAYS.len()];
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Self::Output {
+        self.falls.sought_m(self.vertical_m_s)
     }
 }
 

@@ -60,8 +60,18 @@ impl<'a> Burn<'a> {
     /// Mean thrust over `[from_s, from_s + duration_s]` since it began, N.
     pub fn mean_thrust_n(&self, from_s: f64, duration_s: f64) -> f64 {
         let curve_n = self.curve.mean_thrust_n(from_s / self.time_scale, duration_s / self.time_scale);
-        // The deviation changes little over the spans of a plan, so its mean may multiply the thrust's.
-        self.impulse_scale / self.time_scale * curve_n * (1.0 + self.deviation.mean(from_s, duration_s))
+        self.impulse_scale / self.time_scale * curve_n * self.deviates(from_s, duration_s)
+    }
+
+    /// Impulse up to a time since it began, N s, without the deviation from the certified shape.
+    pub(crate) fn impulse_n_s(&self, burning_s: f64) -> f64 {
+        self.impulse_scale * self.curve.impulse_to_n_s(burning_s / self.time_scale)
+    }
+
+    /// Factor of the deviation on the mean thrust of a span that begins at `from_s` since it began, s. It changes little over
+    /// the spans of a plan, so its mean may multiply the thrust's.
+    pub(crate) fn deviates(&self, from_s: f64, duration_s: f64) -> f64 {
+        1.0 + self.deviation.mean(from_s, duration_s)
     }
 
     /// Derivative of the impulse from `from_s` to `until_s` since the thrust began by the deviation at `from_s`, N s.

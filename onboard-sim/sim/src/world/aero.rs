@@ -6,6 +6,8 @@
 //! the axis and the crossflow of a cylinder across it (strip by strip, S. F. Hoerner, Fluid-Dynamic Drag, chapter 3). The legs
 //! drag along the wind where each of them is, ahead of the centre of gravity in the flow: they turn the tail away from it.
 
+use core::array::from_fn;
+
 use flight::vehicle::airframe::{Airframe, Parachute as ParachuteData};
 use flight::vehicle::fins::{FinModel, ROLL};
 use nalgebra::Vector3;
@@ -15,6 +17,9 @@ use crate::world::truth::Truth;
 
 /// Strips of the body's crossflow.
 const STRIPS: usize = 8;
+
+/// Legs and fins.
+const POINTS: usize = 8;
 
 /// The vehicle's shape.
 #[derive(Debug, Clone)]
@@ -109,12 +114,10 @@ impl Shape {
                 * body.diameter_m
                 * strip_m
                 * truth.crossflow_scale,
-            strip_stations_m: core::array::from_fn(|i| strip_m * (i as f64 + 0.5)),
+            strip_stations_m: from_fn(|i| strip_m * (i as f64 + 0.5)),
             fins,
             fin_station_m: airframe.fins.station_m,
-            fin_directions: core::array::from_fn(|i| {
-                Vector3::from([0.0, fins.outward(i)[0], fins.outward(i)[1]])
-            }),
+            fin_directions: from_fn(|i| Vector3::from([0.0, fins.outward(i)[0], fins.outward(i)[1]])),
             nose_station_m: body.length_m,
             leg_drag_m2: airframe.legs.drag_area_m2 + truth.leg_drag_m2,
             legs_m: [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)].map(|(y, z)| {
@@ -142,12 +145,8 @@ impl Shape {
         let half_density = 0.5 * self.scale * flow.density_kg_m3;
         let axis_m = |station_m: f64| Vector3::new(station_m, 0.0, 0.0) - configuration.cg_m;
         let mut load = Load::none();
-        let Plume { body, fins } = configuration.plume;
-        self.add_body(&mut load, flow, half_density, body, &axis_m);
-        if configuration.legs_out && self.leg_drag_m2 > 0.0 {
-            self.add_legs(&mut load, flow, half_density, &configuration.cg_m);
-        }
-        self.add_fins(&mut load, flow, half_density * self.fin_scale * fins, configuration);
+        self.add_body(&mut load, flow, half_density, configuration.plume.body, &axis_m);
+        self.add_points(&mut load, flow, half_density, configuration);
         if configuration.parachute_area_m2 > 0.0 {
             let place_m = axis_m(self.nose_station_m);
             let local = flow.velocity_m_s + flow.rate_rad_s.cross(&place_m);
@@ -189,27 +188,38 @@ impl Shape {
         load.moment_n_m += Vector3::new(roll_n_m, turning_n_m[0], turning_n_m[1]);
     }
 
-    /// Tubes and struts in every direction: their drag is along the wind where each leg is.
-    fn add_legs(&self, load: &mut Load, flow: &Flow, half_density: f64, cg_m: &Vector3<f64>) {
-        for leg_m in &self.legs_m {
-            let place_m = leg_m - cg_m;
-            let local = flow.velocity_m_s + flow.rate_rad_s.cross(&place_m);
-            load.add_at(&place_m, &(local * (-half_density * 0.25 * self.leg_drag_m2 * length(&local))));
-        }
-    }
-
-    fn add_fins(&self, load: &mut Load, flow: &Flow, half_density: f64, configuration: &Configuration) {
-        let drag = half_density * self.fins.reference_area_m2 * self.fins.drag_coefficient;
-        let lift = half_density * self.fins.reference_area_m2 * self.fins.lift_coefficient;
-        for ((outward, sine), turn) in self.fin_directions.iter().zip(configuration.fin_sines).zip(ROLL) {
-            let mut place_m = outward * self.fins.radius_m(sine) - configuration.cg_m;
-            place_m.x += self.fin_station_m;
-            let local = flow.velocity_m_s + flow.rate_rad_s.cross(&place_m);
-            let airspeed = length(&local);
-            // Drag along the local wind; lift across both the wind and the fin's own direction from the axis.
-            let force_n =
-                local * (-drag * sine * airspeed) - local.cross(outward) * (lift * sine * airspeed * turn);
-            load.add_at(&place_m, &force_n);
+    /// Legs and fins, each in the wind where it is. The drag is along it: legs are tubes and struts in every direction. The lift
+    /// of a fin is across both the wind and the fin's own direction from the axis.
+    fn add_points(&self, load: &mut Load, flow: &Flow, half_density: f64, configuration: &Configuration) {
+        let Configuration { fin_sines, legs_out, plume, cg_m, .. } = configuration;
+        let leg = if *legs_out { -half_density * 0.25 * self.leg_drag_m2 } else { 0.0 };
+        let fin = half_density * self.fin_scale * plume.fins * self.fins.reference_area_m2;
+        let [drag, lift] = [self.fins.drag_coefficient, self.fins.lift_coefficient].map(|per| -fin * per);
+        // Legs, then fins; the same arithmetic for all, which the compiler makes one on vectors.
+        let outward: [Vector3<f64>; POINTS] = from_fn(|i| self.fin_directions[i % 4]);
+        let place_m: [Vector3<f64>; POINTS] = from_fn(|i| match i {
+            0..4 => self.legs_m[i] - cg_m,
+            _ => {
+                let mut place_m = outward[i] * self.fins.radius_m(fin_sines[i - 4]) - cg_m;
+                place_m.x += self.fin_station_m;
+                place_m
+            }
+        });
+        let [along, across]: [[f64; POINTS]; 2] = [
+            from_fn(|i| if i < 4 { leg } else { drag * fin_sines[i - 4] }),
+            from_fn(|i| if i < 4 { 0.0 } else { lift * fin_sines[i - 4] * ROLL[i - 4] }),
+        ];
+        let (v, w) = (&flow.velocity_m_s, &flow.rate_rad_s);
+        let x_m_s: [f64; POINTS] = from_fn(|i| v.x + (w.y * place_m[i].z - w.z * place_m[i].y));
+        let y_m_s: [f64; POINTS] = from_fn(|i| v.y + (w.z * place_m[i].x - w.x * place_m[i].z));
+        let z_m_s: [f64; POINTS] = from_fn(|i| v.z + (w.x * place_m[i].y - w.y * place_m[i].x));
+        let speed_m_s: [f64; POINTS] =
+            from_fn(|i| (x_m_s[i] * x_m_s[i] + y_m_s[i] * y_m_s[i] + z_m_s[i] * z_m_s[i]).sqrt());
+        for i in 0..POINTS {
+            let wind_m_s = Vector3::new(x_m_s[i], y_m_s[i], z_m_s[i]);
+            let force_n = wind_m_s * (along[i] * speed_m_s[i])
+                + wind_m_s.cross(&outward[i]) * (across[i] * speed_m_s[i]);
+            load.add_at(&place_m[i], &force_n);
         }
     }
 }

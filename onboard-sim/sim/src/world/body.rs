@@ -19,10 +19,10 @@ pub(crate) struct Inertia {
     pub(crate) principal_rad: [f64; 2],
 }
 
-/// The force and moment on the body at a state and a fraction of the step (0, 1/2 or 1).
+/// The force and moment on the body at a state.
 pub(crate) trait Loads {
     /// Force without gravity, and moment about the centre of gravity, in body axes.
-    fn load(&self, state: &RigidState, world_from_body: &Rotation3<f64>, share: f64) -> Load;
+    fn load(&self, state: &RigidState, world_from_body: &Rotation3<f64>) -> Load;
 }
 
 /// Time derivative of the state.
@@ -44,9 +44,9 @@ pub(crate) fn rk4_step(
     gravity_m_s2: f64,
     step_s: f64,
 ) -> (RigidState, Vector3<f64>) {
-    let rates = |state: &RigidState, share: f64| {
+    let rates = |state: &RigidState| {
         let world_from_body = state.world_from_body.to_rotation_matrix();
-        let load = loads.load(state, &world_from_body, share);
+        let load = loads.load(state, &world_from_body);
         let specific_force = load.force_n / inertia.mass_kg;
         let mut acceleration = world_from_body * specific_force;
         acceleration.z -= gravity_m_s2;
@@ -58,10 +58,10 @@ pub(crate) fn rk4_step(
             specific_force,
         }
     };
-    let first = rates(state, 0.0);
-    let second = rates(&moved(state, &first, 0.5 * step_s), 0.5);
-    let third = rates(&moved(state, &second, 0.5 * step_s), 0.5);
-    let fourth = rates(&moved(state, &third, step_s), 1.0);
+    let first = rates(state);
+    let second = rates(&moved(state, &first, 0.5 * step_s));
+    let third = rates(&moved(state, &second, 0.5 * step_s));
+    let fourth = rates(&moved(state, &third, step_s));
     let weigh =
         |of: fn(&Rates) -> Vector3<f64>| (of(&first) + (of(&second) + of(&third)) * 2.0 + of(&fourth)) / 6.0;
     let mean = Rates {
@@ -112,7 +112,7 @@ mod tests {
     struct Nothing;
 
     impl Loads for Nothing {
-        fn load(&self, _: &RigidState, _: &Rotation3<f64>, _: f64) -> Load {
+        fn load(&self, _: &RigidState, _: &Rotation3<f64>) -> Load {
             Load::none()
         }
     }

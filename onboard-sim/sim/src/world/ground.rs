@@ -336,7 +336,7 @@ mod tests {
     struct OnGround<'a>(&'a Ground, Vector3<f64>);
 
     impl Loads for OnGround<'_> {
-        fn load(&self, state: &RigidState, world_from_body: &Rotation3<f64>, _: f64) -> Load {
+        fn load(&self, state: &RigidState, world_from_body: &Rotation3<f64>) -> Load {
             let mut load = Load::none();
             self.0.add_load(&mut load, state, world_from_body, &self.1);
             load

@@ -46,6 +46,9 @@ impl TrueBurn {
         if burning_s <= 0.0 {
             return 0.0;
         }
+        if burning_s >= self.lasts_s() {
+            return self.curve.propellant_mass_kg();
+        }
         let curve_s = burning_s / self.burn_time_scale;
         let more_kg = self.shape_at(curve_s).1 * self.curve.propellant_mass_kg();
         self.curve.propellant_burnt_kg(curve_s) + more_kg

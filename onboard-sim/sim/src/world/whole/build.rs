@@ -98,6 +98,7 @@ impl World {
             ground: Ground::new(airframe, truth.ground_rise),
             steps: 0,
             state: *initial,
+            burnt_kg: 0.0,
             mass: mass_model.at(0.0),
             mass_model,
             specific_force_m_s2: Vector3::zeros(),

@@ -90,6 +90,8 @@ pub struct World {
     ground: Ground,
     steps: u64,
     state: RigidState,
+    /// Landing propellant burnt up to the middle of the last step, kg, and what the vehicle weighs with the rest.
+    burnt_kg: f64,
     mass: MassProperties,
     specific_force_m_s2: Vector3<f64>,
     angular_acceleration_rad_s2: Vector3<f64>,
@@ -135,8 +137,8 @@ struct Acting<'a> {
     stack: Option<(&'a Stack, f64)>,
     wind_m_s: Vector3<f64>,
     air: AirHere,
-    /// Thrust at the start, middle and end, N.
-    thrust_n: [f64; 3],
+    /// Thrust in the middle, N.
+    thrust_n: f64,
     thrust_direction: Vector3<f64>,
     thrust_place_m: Vector3<f64>,
     /// Damping of the cross rates per newton of thrust, m s/rad.
@@ -145,7 +147,7 @@ struct Acting<'a> {
 }
 
 impl Loads for Acting<'_> {
-    fn load(&self, state: &RigidState, world_from_body: &Rotation3<f64>, share: f64) -> Load {
+    fn load(&self, state: &RigidState, world_from_body: &Rotation3<f64>) -> Load {
         let flow = Flow {
             density_kg_m3: self.air.density_kg_m3(state.position_m.z),
             velocity_m_s: world_from_body.inverse_transform_vector(&(state.velocity_m_s - self.wind_m_s)),
@@ -155,7 +157,7 @@ impl Loads for Acting<'_> {
         if let Some((stack, area_m2)) = self.stack {
             stack.add_air(&mut load, &flow, &self.configuration.cg_m, area_m2);
         }
-        let thrust_n = self.thrust_n[(2.0 * share) as usize];
+        let thrust_n = self.thrust_n;
         if thrust_n > 0.0 {
             load.add_at(&self.thrust_place_m, &(self.thrust_direction * thrust_n));
             let damping_n_m_s = thrust_n * self.jet_damping_m_s;
@@ -190,7 +192,8 @@ impl World {
             self.wind.step(self.state.position_m.z, airspeed_m_s * STEP_S * WIND_STEPS as f64);
         }
         self.air.follow(self.state.position_m.z);
-        self.mass = self.mass_model.at(self.motor.burnt_kg(time_s + 0.5 * STEP_S) * self.truth.mass_scale);
+        self.burnt_kg = self.motor.burnt_kg(time_s + 0.5 * STEP_S);
+        self.mass = self.mass_model.at(self.burnt_kg * self.truth.mass_scale);
         if let Some(stack) = self.stack.take() {
             self.ride(*stack, time_s);
             return;
@@ -287,17 +290,20 @@ impl World {
         Vector3::new(self.mass.cg_station_m, 0.0, 0.0) + aside + Vector3::from(self.truth.cg_offset_m)
     }
 
-    /// Mass of the landing motor now, kg.
+    /// Mass of the landing motor, kg.
     fn motor_kg(&self) -> f64 {
-        self.certified.total_mass_kg() - self.motor.burnt_kg(self.time_s())
+        self.certified.total_mass_kg() - self.burnt_kg
     }
 
     /// The body turns back when the motor begins to swing and when it stops: their common angular momentum is kept.
     fn turn_back(&mut self) {
+        let [before_rad_s, now_rad_s] = self.gimbal_rates_rad_s;
+        if before_rad_s == now_rad_s {
+            return;
+        }
         let swinging_kg_m2 =
             self.airframe.swinging_kg_m2(&self.certified, self.motor_kg(), self.mass.cg_station_m);
         let share = swinging_kg_m2 / (self.mass.pitch_inertia_kg_m2 * self.truth.inertia_scale);
-        let [before_rad_s, now_rad_s] = self.gimbal_rates_rad_s;
         self.state.rate_rad_s.y -= share * (now_rad_s[0] - before_rad_s[0]);
         self.state.rate_rad_s.z -= share * (now_rad_s[1] - before_rad_s[1]);
     }
@@ -313,14 +319,14 @@ impl World {
         let [pitch_rad, yaw_rad] = [0, 1]
             .map(|axis: usize| self.gimbal_links[axis].rad() + self.truth.thrust_misalignment_rad[axis]);
         let ((sin_pitch, cos_pitch), (sin_yaw, cos_yaw)) = (libm::sincos(pitch_rad), libm::sincos(yaw_rad));
-        let thrust_n = [0.0, 0.5, 1.0].map(|share| self.motor.thrust_n(from_s + share * step_s));
+        let thrust_n = self.motor.thrust_n(from_s + 0.5 * step_s);
         let acting = Acting {
             shape: &self.shape,
             configuration: Configuration {
                 fin_sines: [0, 1, 2, 3].map(|fin: usize| libm::sin(self.fin_links[fin].rad())),
                 legs_out: true,
                 parachute_area_m2: self.parachute.drag_area_m2(),
-                plume: self.plume(thrust_n[1], self.air.density_kg_m3),
+                plume: self.plume(thrust_n, self.air.density_kg_m3),
                 cg_m,
             },
             stack: None,

@@ -52,7 +52,7 @@ impl World {
         let before = at_offset(&self.state, &-from_stack_m);
         let acting = self.acting_on(&stack, &mass, time_s);
         let (after, felt_m_s2) = if stack.on_rail() {
-            let load = acting.load(&before, &before.world_from_body.to_rotation_matrix(), 0.5);
+            let load = acting.load(&before, &before.world_from_body.to_rotation_matrix());
             guided(&mut stack, &before, &load, mass.inertia.mass_kg)
         } else {
             body::rk4_step(&before, &mass.inertia, &acting, STANDARD_GRAVITY_M_S2, STEP_S)
@@ -90,7 +90,7 @@ impl World {
             stack: Some((stack, body.reference_area_m2)),
             wind_m_s: self.wind.now_m_s(),
             air: self.air,
-            thrust_n: [0.0, 0.5, 1.0].map(|share| stack.thrust_n(time_s + share * STEP_S)),
+            thrust_n: stack.thrust_n(time_s + 0.5 * STEP_S),
             thrust_direction: Vector3::x(),
             thrust_place_m: stack.nozzle_m() - cg_m,
             jet_damping_m_s: stack.jet_damping_m_s(cg_m.x),
