@@ -11,6 +11,7 @@ use core::array::from_fn;
 use flight::vehicle::airframe::{Airframe, Parachute as ParachuteData};
 use flight::vehicle::fins::{FinModel, ROLL};
 use nalgebra::Vector3;
+use pulp::{Arch, Simd, WithSimd};
 
 use crate::world::STEP_S;
 use crate::world::truth::Truth;
@@ -97,9 +98,25 @@ impl Load {
         Self { force_n: Vector3::zeros(), moment_n_m: Vector3::zeros() }
     }
 
+    #[inline(always)]
     pub(crate) fn add_at(&mut self, place_m: &Vector3<f64>, force_n: &Vector3<f64>) {
         self.force_n += force_n;
         self.moment_n_m += place_m.cross(force_n);
+    }
+}
+
+struct Blown<'a> {
+    shape: &'a Shape,
+    flow: &'a Flow,
+    configuration: &'a Configuration,
+}
+
+impl WithSimd for Blown<'_> {
+    type Output = Load;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Load {
+        self.shape.blown(self.flow, self.configuration)
     }
 }
 
@@ -140,8 +157,13 @@ impl Shape {
         ]
     }
 
-    /// The total force and moment of the air.
+    /// The total force and moment of the air, in the widest vectors that the machine has; the bits are the same.
     pub(crate) fn load(&self, flow: &Flow, configuration: &Configuration) -> Load {
+        Arch::new().dispatch(Blown { shape: self, flow, configuration })
+    }
+
+    #[inline(always)]
+    fn blown(&self, flow: &Flow, configuration: &Configuration) -> Load {
         let half_density = 0.5 * self.scale * flow.density_kg_m3;
         let axis_m = |station_m: f64| Vector3::new(station_m, 0.0, 0.0) - configuration.cg_m;
         let mut load = Load::none();
@@ -158,6 +180,7 @@ impl Shape {
 
     /// The drag along the axis, and across it strip by strip. The strips are on the axis: with `a` from the centre of gravity
     /// to the axis and `x` up to the strip, the wind there is `v + rate x (x, a)`.
+    #[inline(always)]
     fn add_body(
         &self,
         load: &mut Load,
@@ -190,37 +213,46 @@ impl Shape {
 
     /// Legs and fins, each in the wind where it is. The drag is along it: legs are tubes and struts in every direction. The lift
     /// of a fin is across both the wind and the fin's own direction from the axis.
+    #[inline(always)]
     fn add_points(&self, load: &mut Load, flow: &Flow, half_density: f64, configuration: &Configuration) {
         let Configuration { fin_sines, legs_out, plume, cg_m, .. } = configuration;
         let leg = if *legs_out { -half_density * 0.25 * self.leg_drag_m2 } else { 0.0 };
         let fin = half_density * self.fin_scale * plume.fins * self.fins.reference_area_m2;
         let [drag, lift] = [self.fins.drag_coefficient, self.fins.lift_coefficient].map(|per| -fin * per);
-        // Legs, then fins; the same arithmetic for all, which the compiler makes one on vectors.
+        // Legs, then fins; every line is one operation on all, which the compiler makes one on vectors.
+        type Each = [f64; POINTS];
         let outward: [Vector3<f64>; POINTS] = from_fn(|i| self.fin_directions[i % 4]);
-        let place_m: [Vector3<f64>; POINTS] = from_fn(|i| match i {
-            0..4 => self.legs_m[i] - cg_m,
-            _ => {
-                let mut place_m = outward[i] * self.fins.radius_m(fin_sines[i - 4]) - cg_m;
-                place_m.x += self.fin_station_m;
-                place_m
-            }
-        });
-        let [along, across]: [[f64; POINTS]; 2] = [
-            from_fn(|i| if i < 4 { leg } else { drag * fin_sines[i - 4] }),
-            from_fn(|i| if i < 4 { 0.0 } else { lift * fin_sines[i - 4] * ROLL[i - 4] }),
-        ];
+        let (y_out, z_out): (Each, Each) = (from_fn(|i| outward[i].y), from_fn(|i| outward[i].z));
+        let out_m: Each = from_fn(|i| if i < 4 { 0.0 } else { self.fins.radius_m(fin_sines[i - 4]) });
+        let leg_m: [Vector3<f64>; POINTS] =
+            from_fn(|i| if i < 4 { self.legs_m[i] } else { Vector3::new(self.fin_station_m, 0.0, 0.0) });
+        let x_m: Each = from_fn(|i| leg_m[i].x - cg_m.x);
+        let y_m: Each = from_fn(|i| leg_m[i].y + y_out[i] * out_m[i] - cg_m.y);
+        let z_m: Each = from_fn(|i| leg_m[i].z + z_out[i] * out_m[i] - cg_m.z);
+        let along: Each = from_fn(|i| if i < 4 { leg } else { drag * fin_sines[i - 4] });
+        let across: Each = from_fn(|i| if i < 4 { 0.0 } else { lift * fin_sines[i - 4] * ROLL[i - 4] });
         let (v, w) = (&flow.velocity_m_s, &flow.rate_rad_s);
-        let x_m_s: [f64; POINTS] = from_fn(|i| v.x + (w.y * place_m[i].z - w.z * place_m[i].y));
-        let y_m_s: [f64; POINTS] = from_fn(|i| v.y + (w.z * place_m[i].x - w.x * place_m[i].z));
-        let z_m_s: [f64; POINTS] = from_fn(|i| v.z + (w.x * place_m[i].y - w.y * place_m[i].x));
-        let speed_m_s: [f64; POINTS] =
+        let x_m_s: Each = from_fn(|i| v.x + (w.y * z_m[i] - w.z * y_m[i]));
+        let y_m_s: Each = from_fn(|i| v.y + (w.z * x_m[i] - w.x * z_m[i]));
+        let z_m_s: Each = from_fn(|i| v.z + (w.x * y_m[i] - w.y * x_m[i]));
+        let speed_m_s: Each =
             from_fn(|i| (x_m_s[i] * x_m_s[i] + y_m_s[i] * y_m_s[i] + z_m_s[i] * z_m_s[i]).sqrt());
-        for i in 0..POINTS {
-            let wind_m_s = Vector3::new(x_m_s[i], y_m_s[i], z_m_s[i]);
-            let force_n = wind_m_s * (along[i] * speed_m_s[i])
-                + wind_m_s.cross(&outward[i]) * (across[i] * speed_m_s[i]);
-            load.add_at(&place_m[i], &force_n);
-        }
+        let along: Each = from_fn(|i| along[i] * speed_m_s[i]);
+        let across: Each = from_fn(|i| across[i] * speed_m_s[i]);
+        let x_n: Each =
+            from_fn(|i| x_m_s[i] * along[i] + (y_m_s[i] * z_out[i] - z_m_s[i] * y_out[i]) * across[i]);
+        let y_n: Each = from_fn(|i| y_m_s[i] * along[i] - x_m_s[i] * z_out[i] * across[i]);
+        let z_n: Each = from_fn(|i| z_m_s[i] * along[i] + x_m_s[i] * y_out[i] * across[i]);
+        let sum = |each: Each| {
+            let pairs: [f64; 4] = from_fn(|i| each[i] + each[i + 4]);
+            (pairs[0] + pairs[2]) + (pairs[1] + pairs[3])
+        };
+        load.force_n += Vector3::new(sum(x_n), sum(y_n), sum(z_n));
+        load.moment_n_m += Vector3::new(
+            sum(from_fn(|i| y_m[i] * z_n[i] - z_m[i] * y_n[i])),
+            sum(from_fn(|i| z_m[i] * x_n[i] - x_m[i] * z_n[i])),
+            sum(from_fn(|i| x_m[i] * y_n[i] - y_m[i] * x_n[i])),
+        );
     }
 }
 
