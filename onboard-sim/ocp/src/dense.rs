@@ -112,7 +112,9 @@ impl<const NX: usize, const NU: usize> Interval<NX, NU> for &Dense<NX, NU> {
     ) -> Option<Feedback<NX, NU>> {
         add_times(after, &stage.defect, slope);
         let pulled = self.pull(slope);
-        stage.without_inputs(self.square(after, stage.share), &pulled, before, slope)
+        let Hessian { xx, ux, uu } = self.square(after, stage.share);
+        *before = xx;
+        stage.without_inputs(before, ux, uu, &pulled, slope)
     }
 
     #[inline(always)]

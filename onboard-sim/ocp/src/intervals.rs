@@ -100,14 +100,16 @@ impl<C: Curvature<NX>, R: Curvature<NU>, const NX: usize, const NU: usize> Stage
         Factor::of(by_inputs, &from_fn(|i| LEAST_CURVATURE * (1.0 + own.diagonal(i))))
     }
 
-    /// Eliminates the inputs: from the second derivative by state and inputs that comes through the node after the interval, and
-    /// the slopes that do, to the value function of the node before it. `None` as in [`Interval::eliminate`].
+    /// Eliminates the inputs: from the second derivatives by states (`xx`), inputs and states, and inputs that come through the
+    /// node after the interval, and the slopes that do, to the value function of the node before it. `None` as in
+    /// [`Interval::eliminate`].
     #[inline(always)]
     pub fn without_inputs(
         &self,
-        Hessian { mut xx, ux, uu }: Hessian<NX, NU>,
+        xx: &mut [[f64; NX]; NX],
+        ux: [[f64; NX]; NU],
+        uu: [[f64; NU]; NU],
         (pulled_x, pulled_u): &([f64; NX], [f64; NU]),
-        before: &mut [[f64; NX]; NX],
         slope: &mut [f64; NX],
     ) -> Option<Feedback<NX, NU>> {
         let ((own_curvature, own_slope), (_, input_slope)) = (self.state_terms, self.input_terms);
@@ -121,8 +123,7 @@ impl<C: Curvature<NX>, R: Curvature<NU>, const NX: usize, const NU: usize> Stage
                 add_multiple(row, -scaled[i], reduced);
             }
         }
-        own_curvature.add_to(&mut xx);
-        *before = xx;
+        own_curvature.add_to(xx);
         *slope = slope_before(own_slope, pulled_x, &reduced, &push);
         Some(Feedback { gain: factor.restore(scaled), offset, reduced, factor })
     }

@@ -13,7 +13,7 @@
 #![expect(clippy::inline_always, reason = "inlined into the sweeps, to be compiled for their vectors")]
 
 use crate::intervals::add_times;
-use crate::{Curvature, Feedback, Hessian, Interval, Intervals, Stage, add_multiple};
+use crate::{Curvature, Feedback, Interval, Intervals, Stage, add_multiple};
 use alloc::vec::Vec;
 
 use super::{INPUTS, STATES, State};
@@ -24,6 +24,9 @@ const PLACES: usize = 3;
 /// What the accelerations depend on: velocity, leans and rates, in the states' order, and the inputs.
 pub(super) const DIRECTIONS: usize = MOVING + INPUTS;
 const MOVING: usize = STATES - PLACES;
+
+/// A row by states and inputs, whole vectors long.
+const WIDE: usize = (STATES + INPUTS).next_multiple_of(4);
 
 /// Accelerations of the place, and of the leans.
 pub(super) const ACCELERATIONS: usize = 5;
@@ -168,7 +171,7 @@ impl Interval<STATES, INPUTS> for &LandingInterval {
         let h = self.step_s;
 
         // Y, with the places' columns of G' P E before it.
-        let mut y = [[0.0; STATES + INPUTS]; ACCELERATIONS];
+        let mut y = [[0.0; WIDE]; ACCELERATIONS];
         for (row, [first, second]) in y.iter_mut().zip(DRIVEN) {
             let mut drawn = [0.0; STATES];
             for j in 0..STATES {
@@ -185,20 +188,21 @@ impl Interval<STATES, INPUTS> for &LandingInterval {
         }
 
         // D' Y, E' P E, and their sum.
-        let mut product = [[0.0; STATES + INPUTS]; DIRECTIONS];
+        let mut product = [[0.0; WIDE]; DIRECTIONS];
         for (c, product) in product.iter_mut().enumerate() {
-            let mut sum = [0.0; STATES + INPUTS];
+            let mut sum = [0.0; WIDE];
             for (by, y) in self.by.iter().zip(&y) {
                 add_multiple(&mut sum, by[c], y);
             }
             *product = sum;
         }
-        let mut xx = *after;
+        *before = *after;
+        let xx = before;
         for [first, second] in DRIVEN {
             let row = xx[first];
             add_multiple(&mut xx[second], h, &row);
         }
-        for row in &mut xx {
+        for row in &mut *xx {
             *row = self.shifted(*row);
         }
         let (mut ux, mut uu) = ([[0.0; STATES]; INPUTS], [[0.0; INPUTS]; INPUTS]);
@@ -206,8 +210,12 @@ impl Interval<STATES, INPUTS> for &LandingInterval {
             product[c][PLACES + d] + product[d][PLACES + c] + stage.share * self.bend[c][d]
         };
         for c in 0..MOVING {
-            for d in 0..MOVING {
-                xx[PLACES + c][PLACES + d] += sum(c, d);
+            for d in 0..=c {
+                let sum = sum(c, d);
+                xx[PLACES + c][PLACES + d] += sum;
+                if d < c {
+                    xx[PLACES + d][PLACES + c] += sum;
+                }
             }
             for i in 0..PLACES {
                 xx[PLACES + c][i] += product[c][i];
@@ -221,7 +229,7 @@ impl Interval<STATES, INPUTS> for &LandingInterval {
                 *entry = sum(MOVING + i, d);
             }
         }
-        stage.without_inputs(Hessian { xx, ux, uu }, &pulled, before, slope)
+        stage.without_inputs(xx, ux, uu, &pulled, slope)
     }
 
     #[inline(always)]
