@@ -166,9 +166,9 @@ impl Formulas<'_> {
         let scales = around(2.0, motor.burn_time_sigma);
         self.of_controller("ignition.burn_time_scales", &mut ignition.burn_time_scales, scales);
         let intervals = libm::ceil((carried_s + powered.latest_after_s) / powered.interval_s).min(60.0);
-        // Above that a plan takes more than the 40 million instructions for which a Cortex-M7 has 100 ms
-        // (onboard-sim/lab/cortex-m7/README.md).
-        let passes = (76.0 * intervals).clamp(2_200.0, 2_890.0) as usize;
+        // A plan then takes 20 million instructions of a Cortex-M7 (onboard-sim/lab/cortex-m7/README.md): the last iteration, which is
+        // finished, five passes over every interval. Twice as many land no more: the plan comes later (`cargo bench --bench work`).
+        let passes = (1_230.0 - 5.0 * intervals) as usize;
         self.of_controller("powered.max_passes", &mut powered.max_passes, Some(passes));
 
         // What legs are designed for, if their file does not say it: those with blocks bear more.
