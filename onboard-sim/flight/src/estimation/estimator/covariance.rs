@@ -9,7 +9,8 @@
 //! (27).
 
 use nalgebra::{Matrix3, Vector3};
-use serde::Serialize;
+use serde::ser::SerializeTuple as _;
+use serde::{Serialize, Serializer};
 
 /// Length of the error state.
 pub(super) const N: usize = 28;
@@ -37,7 +38,19 @@ const SMALLEST_VARIANCE: f64 = 1e-14;
 /// The matrix is exactly symmetric: after each change the upper half is copied to the lower half.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(super) struct Covariance {
+    #[serde(serialize_with = "upper_half")]
     rows: [Row; N],
+}
+
+/// All there is to know of a symmetric matrix, in half of the numbers.
+fn upper_half<S: Serializer>(rows: &[Row; N], serializer: S) -> Result<S::Ok, S::Error> {
+    let mut half = serializer.serialize_tuple(N * (N + 1) / 2)?;
+    for (i, row) in rows.iter().enumerate() {
+        for value in &row[i..] {
+            half.serialize_element(value)?;
+        }
+    }
+    half.end()
 }
 
 /// Propagation of the error over one interval.
