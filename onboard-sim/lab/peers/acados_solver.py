@@ -1,6 +1,6 @@
-"""acados on the landing problem, in every one of its ways.
+"""acados on a landing in the plane, in every one of its ways; `space_acados` has the landing in space.
 
-Dynamics are discrete: the same RK4 step as everybody's. One solver for each length of the horizon, all from one
+Dynamics are discrete: the same step as everybody's. One solver for each length of the horizon, all from one
 generated program for each way: exact Hessians (CONVEXIFY) or Gauss-Newton, HPIPM after partial or full condensing. Cold with
 a merit line search; warm with full steps, all multipliers and the slacks handed over, the path rolled out from the kicked
 state. A few microseconds of its Python interface are in its times.
@@ -11,11 +11,11 @@ import itertools
 import os
 import time
 
+import casadi as ca
 import numpy as np
 
 import acados_problem
 import landing
-import rollout
 from result import Result, cost, guess
 
 
@@ -39,7 +39,9 @@ class Acados:
         """`model`: whose plan is adopted; itself if it is `None`."""
         from acados_template import AcadosOcpSolver
 
-        self.kind, self.model, self.solvers = kind, model, {}
+        self.kind, self.posed, self.model, self.solvers = kind, kind.posed, model, {}
+        given = [ca.SX.sym(f"given_{index}", self.posed.STEP.size1_in(index)) for index in range(self.posed.STEP.n_in())]
+        self.by_state = ca.Function("by_state", given, [ca.jacobian(self.posed.STEP(*given), given[0])])
         self.name, self.problem = kind.name, kind.problem
         self.makes = ("step",) if kind.rti else ("cold", "warm")
         # Most Gauss-Newton solves of a disturbed loop run to their cap: its single iterations stand for it.
@@ -60,65 +62,82 @@ class Acados:
 
         if intervals not in self.solvers:
             made = AcadosOcpSolver(None, json_file=self.json, build=False, generate=False, verbose=False)
-            if intervals != landing.HORIZON:
-                made.set_new_time_steps(np.full(intervals, landing.STEP_S))
+            if intervals != self.posed.HORIZON:
+                made.set_new_time_steps(np.full(intervals, self.posed.STEP_S))
                 if not self.kind.full:
-                    made.update_qp_solver_cond_N(min(acados_problem.BLOCKS, intervals))
+                    made.update_qp_solver_cond_N(min(acados_problem.BLOCKS[self.posed], intervals))
+            lower, upper, ((way, _), (end, _)) = acados_problem.bounded(self.kind, intervals)
+            for node in range(1, intervals + 1):
+                index = self.posed.INPUTS + (end if node == intervals else way)
+                if len(index):
+                    made.constraints_set(node, "lbx", lower[node - 1, index])
+                    made.constraints_set(node, "ubx", upper[node - 1, index])
             self.solvers[intervals] = made
         return self.solvers[intervals]
 
-    def fill(self, solver, start, plan, with_multipliers):
+    def rolled_out(self, start, inputs, *thrust):
+        """States at the nodes."""
+        after = self.posed.STEP.mapaccum(len(inputs))(start, inputs.reshape(len(inputs), -1).T, *(row.reshape(1, -1) for row in thrust))
+        return np.vstack([start, np.array(after).T])
+
+    def fill(self, solver, start, plan, with_multipliers, *thrust):
         """Puts a start and a first path into a solver."""
-        intervals = len(plan.inputs)
+        intervals, inputs = len(plan.inputs), self.posed.INPUTS
+        first = inputs + self.posed.STATES
         for bound in ("lbx", "ubx"):
             solver.set(0, bound, start)
         for k in range(intervals + 1):
             solver.set(k, "x", plan.states[k])
             multiplier = np.zeros(len(solver.get(k, "lam")))
             if with_multipliers:
-                # The first node has multipliers of the start, too; a later one of the plan becomes the first.
-                here, there = len(multiplier) // 2, len(plan.limits[k]) // 2
-                shared = min(here, there)
-                multiplier[:shared] = plan.limits[k][:shared]
-                multiplier[here : here + shared] = plan.limits[k][there : there + shared]
-                if k == 0 and here == 7:
-                    # The dynamics' multiplier of the step before it, which is not in the plan.
-                    _, by_state, _ = rollout.tangent(plan.states[0], plan.inputs[0])
-                    of_start = np.array(by_state).T @ plan.dynamics[0]
-                    multiplier[1:7], multiplier[8:] = np.maximum(of_start, 0.0), np.maximum(-of_start, 0.0)
+                if len(plan.limits[k]) == len(multiplier):
+                    multiplier[:] = plan.limits[k]
+                else:
+                    # A later node of the plan becomes the first. The start has multipliers instead of the state's bounds: the
+                    # dynamics' of the step before it, which is not in the plan.
+                    there = inputs + len(acados_problem.bounded(self.kind, intervals)[2][0][0])
+                    multiplier[:inputs] = plan.limits[0][:inputs]
+                    multiplier[first : first + inputs] = plan.limits[0][there : there + inputs]
+                    of_start = np.array(self.by_state(plan.states[0], plan.inputs[0], *(row[0] for row in thrust))).T @ plan.dynamics[0]
+                    multiplier[inputs:first] = np.maximum(of_start, 0.0)
+                    multiplier[first + inputs :] = np.maximum(-of_start, 0.0)
             solver.set(k, "lam", multiplier)
             if k < intervals:
-                solver.set(k, "u", np.array([plan.inputs[k]]))
-                solver.set(k, "pi", plan.dynamics[k] if with_multipliers else np.zeros(6))
-        if self.problem == landing.SOFT:
+                solver.set(k, "u", np.ravel(plan.inputs[k]))
+                solver.set(k, "pi", plan.dynamics[k] if with_multipliers else np.zeros(self.posed.STATES))
+                for row in thrust:
+                    solver.set(k, "p", row[k])
             for slack in ("sl", "su"):
-                solver.set(intervals, slack, np.zeros(1))
+                solver.set(k, slack, np.zeros(len(solver.get(k, slack))))
 
-    def solve(self, start, plan, with_multipliers):
-        """Solves twice from a path; the second run is timed."""
+    def solve(self, start, plan, with_multipliers, *thrust):
+        """Solves twice from a path; the second run is timed. `thrust`: of each interval, in space."""
         intervals = len(plan.inputs)
         solver = self.solver(intervals)
         if not self.kind.rti:
-            # With the line search more of the warm solves fail.
-            solver.options_set("globalization", "fixed_step" if with_multipliers else "merit_backtracking")
+            # With the line search more of the warm solves fail, and those in space are slower.
+            search = self.posed is landing and not with_multipliers
+            solver.options_set("globalization", "merit_backtracking" if search else "fixed_step")
             # Without its slacks even an optimum looks unsolved to it.
             solver.options_set("initialize_t_slacks", 1 if with_multipliers else 0)
         for _ in range(2):
             solver.reset()
-            self.fill(solver, start, plan, with_multipliers)
+            self.fill(solver, start, plan, with_multipliers, *thrust)
             before = time.thread_time_ns()
             status = solver.solve()
             ns = time.thread_time_ns() - before
         nodes, steps = range(intervals + 1), range(intervals)
         self.last = Plan(
             np.array([solver.get(k, "x") for k in nodes]),
-            np.array([solver.get(k, "u")[0] for k in steps]),
+            np.array([solver.get(k, "u") for k in steps]),
             [solver.get(k, "pi") for k in steps],
             [solver.get(k, "lam") for k in nodes],
         )
         iterations = int(np.ravel(solver.get_stats("sqp_iter"))[0])
-        finite = bool(np.all(np.isfinite(self.last.inputs)))
-        return Result(status == 0 and finite, ns, iterations, cost(self.last.states, self.last.inputs), self.last.inputs)
+        inputs = self.last.inputs
+        converged = status == 0 and bool(np.all(np.isfinite(inputs)))
+        shown = inputs if self.posed.INPUTS > 1 else inputs.ravel()
+        return Result(converged, ns, iterations, cost(self.last.states, inputs, self.posed), shown)
 
     def cold(self, start, bend_rad):
         return self.solve(start, Plan(*guess(start, bend_rad), None, None), False)
@@ -141,7 +160,7 @@ class Acados:
         the plan as it is; with a hard end height every fifth QP then has no solution."""
         rest = self.plan.rest(samples)
         if not (self.kind.rti and self.problem == landing.SOFT):
-            rest.states = rollout.states(start, rest.inputs)
+            rest.states = self.rolled_out(start, rest.inputs)
         return self.solve(start, rest, not retry)
 
     def step(self, samples, start):
@@ -158,7 +177,7 @@ def entrants(folder, wheel_folder):
     for problem in (landing.HARD, landing.SOFT):
         model = None
         for rti, exact, full in itertools.product((False, True), (True, False), (False, True)):
-            entrant = Acados(acados_problem.Kind(problem, rti, exact, full), folder, model)
+            entrant = Acados(acados_problem.Kind(landing, problem, rti, exact, full), folder, model)
             model = model or entrant
             made.append(entrant)
     return version, made

@@ -1,5 +1,6 @@
-"""Compiles every problem's functions to C libraries, once; `build.py FOLDER SOLVER...`."""
+"""Compiles every problem's functions to C libraries, once; `build.py FOLDER SOLVER...`. Of PEERS_ONLY alone, if it is given."""
 
+import itertools
 import multiprocessing
 import os
 import sys
@@ -14,33 +15,23 @@ KICKS = range(1, 49, 6)
 
 
 def jobs(solvers, folder):
-    """(solver, which problem, intervals, library, effort): every horizon that a warm solve may have left. Those of the cold
+    """(plane or space, solver, which problem, intervals, library, effort): every horizon that a warm solve may have left. Those of the cold
     and the kicked solves are compiled with more effort, and first."""
-    for problem in (landing.HARD, landing.SOFT):
-        for samples in (0, *KICKS):
-            yield from (_plane(solver, problem, landing.HORIZON - samples, folder) for solver in solvers)
-    for intervals in range(landing.HORIZON - 1, 0, -1):
-        if landing.HORIZON - intervals not in KICKS:
-            for problem in (landing.HARD, landing.SOFT):
-                yield from (_plane(solver, problem, intervals, folder) for solver in solvers)
-    for intervals in space_measure.HORIZONS:
-        for solver in solvers:
-            yield solver, None, intervals, space_landing.library_path(solver, intervals, folder), compiled.FULLY
-
-
-def _plane(solver, problem, intervals, folder):
-    samples = landing.HORIZON - intervals
-    effort = compiled.FULLY if samples == 0 or samples in KICKS else compiled.QUICKLY
-    return solver, problem, intervals, landing.library_path(solver, intervals, problem, folder), effort
+    only = os.environ.get("PEERS_ONLY")
+    for posed, least, kicks in ((landing, 1, KICKS), (space_landing, space_landing.SETTLED_NODES + 1, space_measure.KICK_SAMPLES)):
+        if only and posed is not {"plane": landing, "space": space_landing}[only]:
+            continue
+        fully = [posed.HORIZON, *(posed.HORIZON - samples for samples in kicks)]
+        quickly = [intervals for intervals in range(posed.HORIZON - 1, least - 1, -1) if intervals not in fully]
+        for effort, horizons in ((compiled.FULLY, fully), (compiled.QUICKLY, quickly)):
+            for intervals, problem, solver in itertools.product(horizons, (landing.HARD, landing.SOFT), solvers):
+                yield posed.__name__, solver, problem, intervals, posed.library_path(solver, intervals, problem, folder), effort
 
 
 def build(job):
-    solver, problem, intervals, library, effort = job
-    if problem is None:
-        posed, options = space_landing.nlp(intervals), space_landing.structure(solver, intervals)
-    else:
-        posed, options = landing.nlp(intervals, problem), landing.structure(solver, intervals, problem)
-    compiled.functions(solver, posed, options, library, effort)
+    module, solver, problem, intervals, library, effort = job
+    posed = sys.modules[module]
+    compiled.functions(solver, posed.nlp(intervals, problem), posed.structure(solver, intervals, problem), library, effort)
 
 
 def main():
@@ -49,7 +40,7 @@ def main():
     # ripopt takes the functions that are made for IPOPT.
     wanted = {"ipopt" if peer == "ripopt" else peer for peer in sys.argv[2:]}
     todo = list(jobs([solver for solver in ("fatrop", "ipopt") if solver in wanted], folder))
-    with multiprocessing.Pool(os.cpu_count()) as pool:
+    with multiprocessing.Pool(len(os.sched_getaffinity(0))) as pool:
         for done, _ in enumerate(pool.imap_unordered(build, todo), 1):
             if done % 20 == 0 or done == len(todo):
                 print(f"compiling the problems' functions: {done} of {len(todo)}", flush=True)

@@ -18,8 +18,8 @@ import worker
 from ours import Ours
 
 
-# Who gets the landing in space, too.
-IN_SPACE = ("fatrop", "ipopt")
+# "plane" or "space", for one of the two; both without.
+ONLY = os.environ.get("PEERS_ONLY")
 
 # Who gets one step's quadratic problem alone.
 QUADRATIC = ("piqp", "hpipm")
@@ -64,24 +64,38 @@ def main():
     sys.stdout.reconfigure(line_buffering=True)
     words = asked()
     functions = words.functions
-    workers = {
+    plane = {
         "fatrop": ("interior", "fatrop", functions),
         "ipopt": ("interior", "ipopt", functions),
         "ripopt": ("ripopt_solver", words.ripopt, words.bridge, functions),
         "acados": ("acados_solver", words.acados, words.wheel),
+    } | {peer: ("quadratic", peer, words.wheel) for peer in QUADRATIC}
+    space = {
+        "fatrop": ("space_interior", "fatrop", functions),
+        "ipopt": ("space_interior", "ipopt", functions),
+        "acados": ("space_acados", words.acados, words.wheel),
     }
     own = [Ours(words.ours, problem) for problem in (landing.HARD, landing.SOFT)]
-    entrants = list(own)
     print(f"{machine()}; {said(os.environ.get('CC', 'cc'), '--version')}; {said('rustc', '--version')}")
     print(f"ours at {said('git', '-C', os.path.dirname(__file__), 'describe', '--always', '--dirty', '--exclude=*')}")
-    workers |= {peer: ("quadratic", peer, words.wheel) for peer in QUADRATIC}
-    public = []
-    for peer in words.peers:
-        version, made = worker.start(*workers[peer])
-        print(version, flush=True)
-        (public if peer in QUADRATIC else entrants).extend(made)
-    if public:
-        quadratic.run(own[0], public)
+    if ONLY != "space":
+        in_plane(own, {peer: started(plane[peer]) for peer in words.peers})
+    if ONLY != "plane":
+        space_measure.run([*own, *(entrant for peer in words.peers if peer in space for entrant in started(space[peer]))])
+
+
+def started(how):
+    """The entrants of a worker; prints what they are."""
+    version, made = worker.start(*how)
+    print(version, flush=True)
+    return made
+
+
+def in_plane(own, public):
+    steps = [entrant for peer, made in public.items() if peer in QUADRATIC for entrant in made]
+    if steps:
+        quadratic.run(own[0], steps)
+    entrants = [*own, *(entrant for peer, made in public.items() if peer not in QUADRATIC for entrant in made)]
     records = [measure.Record(entrant) for entrant in entrants]
     measure.cold(records)
     planned_rad = measure.warm(records)
@@ -95,8 +109,6 @@ def main():
         tables.loops(field)
     tables.checks(fields)
     scattered.run(records)
-    in_space = [worker.start("space_interior", peer, words.functions)[1][0] for peer in words.peers if peer in IN_SPACE]
-    space_measure.run(own[0], in_space)
     limit(own[1])
 
 

@@ -83,7 +83,9 @@ class Nlp:
             self.buffer.set_arg(index, memoryview(self.inputs[name]))
         for index, name in enumerate(self.function.name_out()):
             self.buffer.set_res(index, memoryview(self.outputs[name]))
-        self.inputs["lbx"][:], self.inputs["ubx"][:] = bounds
+        self.inputs["lbx"][:], self.inputs["ubx"][:] = bounds[:2]
+        if len(bounds) > 2:
+            self.inputs["lbg"][:], self.inputs["ubg"][:] = bounds[2:]
 
     def solve(self, parameter, first, lam_x=0.0, lam_g=0.0):
         """Solves twice from a path and multipliers, and times the second: (converged, ns, iterations, plan)."""
@@ -145,10 +147,13 @@ class Interior:
         return self._warm(samples, start, ONE_STEP)
 
 
-def entrants(solver, folder):
-    """Called by `worker`."""
+def version(solver):
     package = os.path.dirname(ca.__file__)
     numbered = sorted(glob.glob(os.path.join(package, f"lib{solver}.so.*")), key=len)
     number = numbered[-1].split(".so.")[1] if numbered else "of unknown version"
-    made = [Interior(solver, problem, folder) for problem in (landing.HARD, landing.SOFT)]
-    return f"{solver} {number} in casadi {ca.__version__}", made
+    return f"{solver} {number} in casadi {ca.__version__}"
+
+
+def entrants(solver, folder):
+    """Called by `worker`."""
+    return version(solver), [Interior(solver, problem, folder) for problem in (landing.HARD, landing.SOFT)]

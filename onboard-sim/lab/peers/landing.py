@@ -15,8 +15,10 @@ import numpy as np
 MASS_KG, INERTIA_KG_M2, ARM_M, GRAVITY_M_S2, THRUST_N = 3.0, 0.12, 0.52, 9.81, 33.3
 DRAG_PER_M = 1.225 * 0.0043 * 1.0 / (2.0 * MASS_KG)
 STEP_S, HORIZON = 0.1, 50
+STATES, INPUTS = 6, 1
 STATE_WEIGHTS = np.array([0.5, 60.0, 150.0, 50.0, 70.0, 90.0])
 INPUT_WEIGHT = 1.0
+INPUT_WEIGHTS, REST = np.array([INPUT_WEIGHT]), np.zeros(1)
 TARGET = np.array([0.0, 0.0, math.pi / 2.0, 0.0, 0.0, 0.0])
 GIMBAL_LIMIT_RAD = math.radians(20.0)
 X_FINAL_M = 20.0

@@ -73,6 +73,9 @@ class Ours:
 
     def space_adopt(self, ratio, start, _inputs, _nodes):
         self.space_cold(ratio, start)
+        self.space_hold()
+
+    def space_hold(self):
         self._ask("space", "hold")
 
     def space_warm(self, samples, start):

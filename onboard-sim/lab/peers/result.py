@@ -32,8 +32,7 @@ def guess(start, bend_rad):
     return states, np.zeros(landing.HORIZON)
 
 
-def cost(states, inputs):
+def cost(states, inputs, posed=landing):
     """Running cost of a path."""
-    misses = states[1:] - landing.TARGET
-    rates = misses**2 @ landing.STATE_WEIGHTS + landing.INPUT_WEIGHT * np.asarray(inputs) ** 2
-    return float(0.5 * landing.STEP_S * rates.sum())
+    misses, off = states[1:] - posed.TARGET, np.reshape(inputs, (-1, posed.INPUTS)) - posed.REST
+    return float(0.5 * posed.STEP_S * (misses**2 @ posed.STATE_WEIGHTS + off**2 @ posed.INPUT_WEIGHTS).sum())

@@ -9,7 +9,7 @@ import multiprocessing
 import os
 import traceback
 
-CALLED = ("cold", "adopt", "hold", "warm", "step", "space_cold", "space_adopt", "space_warm", "quadratic")
+CALLED = ("cold", "adopt", "hold", "warm", "step", "space_cold", "space_adopt", "space_hold", "space_warm", "quadratic")
 
 
 def _serve(pipe, module, arguments):

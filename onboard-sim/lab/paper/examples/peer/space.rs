@@ -75,7 +75,8 @@ impl Space {
         let Self { workspace, problem, plan } = self;
         let mut rest = problem.clone();
         rest.initial = start;
-        rest.pushes.drain(..samples);
+        // The plan may be a later one than that of the whole horizon.
+        rest.pushes.drain(..rest.pushes.len() - (planned - samples));
         let mut conditions = Vec::new();
         last_multipliers(&plan.conditions, settled, planned, planned - samples, &mut conditions);
         let from = Start {
