@@ -15,7 +15,7 @@ import scattered
 import space_measure
 import tables
 import worker
-from ours import Ours
+from ours import SPACE_HARD_PENALTY, Ours
 
 
 # "plane" or "space", for one of the two; both without.
@@ -73,6 +73,7 @@ def main():
     space = {
         "fatrop": ("space_interior", "fatrop", functions),
         "ipopt": ("space_interior", "ipopt", functions),
+        "ripopt": ("space_ripopt", words.ripopt, words.bridge, functions),
         "acados": ("space_acados", words.acados, words.wheel),
     }
     own = [Ours(words.ours, problem) for problem in (landing.HARD, landing.SOFT)]
@@ -81,6 +82,7 @@ def main():
     if ONLY != "space":
         in_plane(own, {peer: started(plane[peer]) for peer in words.peers})
     if ONLY != "plane":
+        own = [Ours(words.ours, problem, SPACE_HARD_PENALTY) for problem in (landing.HARD, landing.SOFT)]
         space_measure.run([*own, *(entrant for peer in words.peers if peer in space for entrant in started(space[peer]))])
 
 

@@ -7,8 +7,10 @@ import numpy as np
 import landing
 from result import BENDS_RAD, Result
 
-# With this penalty a condition whose multiplier is smaller holds exactly, so it is a hard one; per metre.
+# With this penalty a condition whose multiplier is smaller holds exactly, so it is a hard one; per metre. In space the
+# multipliers are larger.
 HARD_PENALTY_PER_M = landing.PENALTY_PER_M
+SPACE_HARD_PENALTY = 10_000.0
 
 # Iterations of a solve that is not to be stopped, as in the profile.
 MOST_ITERATIONS = 60
@@ -22,10 +24,10 @@ class Ours:
 
     name, makes, loops = "ours", ("cold", "warm", "step"), True
 
-    def __init__(self, program, problem):
+    def __init__(self, program, problem, hard_penalty=HARD_PENALTY_PER_M):
         self.problem, self.status = problem, None
         self.process = subprocess.Popen([program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1)
-        self._ask("penalty", landing.PENALTY_PER_M if problem == landing.SOFT else HARD_PENALTY_PER_M)
+        self._ask("penalty", landing.PENALTY_PER_M if problem == landing.SOFT else hard_penalty)
 
     def _ask(self, *words):
         line = " ".join(repr(float(w)) if isinstance(w, float) else str(w) for w in words)

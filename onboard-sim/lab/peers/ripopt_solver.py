@@ -65,7 +65,7 @@ class Functions:
     def __init__(self, library):
         self.library = ctypes.CDLL(library)
         self.kept, self.sparsity = [], {}
-        self.parameter = np.zeros(6)
+        self.parameter = np.zeros(ca.external("nlp_f", library).size1_in("p"))
         self.problem = Problem(parameter=self.parameter.ctypes.data)
         for name in CALLBACKS:
             setattr(self.problem, name, self._function(name, ca.external(f"nlp_{name}", library)))
@@ -96,18 +96,17 @@ class Functions:
 
 
 class Solver:
-    """One problem in one ripopt."""
+    """One problem in one ripopt. `bounds`: of variables and of equations."""
 
-    def __init__(self, ripopt, bridge, functions, intervals, problem, how):
-        self.ripopt, self.functions, self.intervals = ripopt, functions, intervals
-        lower, upper = (np.clip(bound, -INFINITE, INFINITE) for bound in landing.bounds(intervals, problem))
-        self.variables, self.equations = len(lower), 6 * intervals + (1 if problem == landing.SOFT else 0)
-        zeros = np.zeros(self.equations)
+    def __init__(self, ripopt, bridge, functions, bounds, how):
+        self.ripopt, self.functions, self.how = ripopt, functions, how
+        lower, upper, least, most = (np.clip(bound, -INFINITE, INFINITE) for bound in bounds)
+        self.variables, self.equations = len(lower), len(least)
         nonzeros = [len(functions.sparsity[name][0]) for name in ("jac_g", "hess_l")]
         callbacks = [ctypes.cast(getattr(bridge, f"bridge_{name}"), ctypes.c_void_p) for name in CALLBACKS]
         self.handle = ctypes.c_void_p(
             ripopt.ripopt_create(
-                self.variables, doubles(lower), doubles(upper), self.equations, doubles(zeros), doubles(zeros), *nonzeros, 0, *callbacks
+                self.variables, doubles(lower), doubles(upper), self.equations, doubles(least), doubles(most), *nonzeros, 0, *callbacks
             )
         )
         options = dict(OPTIONS)
@@ -129,22 +128,23 @@ class Solver:
         if not taken:
             raise SystemExit(f"ripopt does not take {key} = {value}")
 
-    def solve(self, start, first, multipliers=None):
-        """Solves twice from a path and multipliers, and times the second; the result, and the plan."""
-        self.functions.parameter[:] = start
+    def solve(self, parameter, first, _lam_x=None, lam_g=None):
+        """Solves twice from a path, and warm from the equations' multipliers, and times the second: (converged, ns, iterations,
+        plan). Given bounds' multipliers, 0.8.2 reads past their end when its preprocessing or restoration changes the number
+        of variables, and ends the process."""
+        self.functions.parameter[:] = parameter
         for _ in range(2):
-            found = first.copy()
-            fresh = (np.zeros(self.equations), np.zeros(self.variables), np.zeros(self.variables))
-            of_equations, of_lower, of_upper = (m.copy() for m in multipliers or fresh)
+            found, of_equations = first.copy(), np.zeros(self.equations)
+            if self.how != COLD:
+                of_equations[:] = lam_g
+            of_lower, of_upper = np.zeros(self.variables), np.zeros(self.variables)
             # All its threads, if it had any.
             before = time.process_time_ns()
             status = self.ripopt.ripopt_solve(
                 self.handle, doubles(found), None, None, doubles(of_equations), doubles(of_lower), doubles(of_upper), ctypes.byref(self.functions.problem)
             )
             ns = time.process_time_ns() - before
-        inputs, running = claimed(found, self.intervals)
-        iterations = self.ripopt.ripopt_get_iter_count(self.handle)
-        return Result(status == 0, ns, iterations, running, inputs), (found, of_equations, of_lower, of_upper)
+        return status == 0, ns, self.ripopt.ripopt_get_iter_count(self.handle), (found, of_lower, of_equations)
 
 
 class Ripopt:
@@ -159,18 +159,22 @@ class Ripopt:
     def solver(self, intervals, how):
         if (intervals, how) not in self.solvers:
             functions = Functions(landing.library_path("ipopt", intervals, self.problem, self.folder))
-            self.solvers[intervals, how] = Solver(self.ripopt, self.bridge, functions, intervals, self.problem, how)
+            zeros = np.zeros(6 * intervals + (1 if self.problem == landing.SOFT else 0))
+            bounds = (*landing.bounds(intervals, self.problem), zeros, zeros)
+            self.solvers[intervals, how] = Solver(self.ripopt, self.bridge, functions, bounds, how)
         return self.solvers[intervals, how]
 
+    def solve(self, intervals, how, *given):
+        converged, ns, iterations, self.last = self.solver(intervals, how).solve(*given)
+        inputs, running = claimed(self.last[0], intervals)
+        return Result(converged, ns, iterations, running, inputs)
+
     def cold(self, start, bend_rad):
-        first = variables(*guess(start, bend_rad), self.problem)
-        result, self.last = self.solver(landing.HORIZON, COLD).solve(start, first)
-        return result
+        return self.solve(landing.HORIZON, COLD, start, variables(*guess(start, bend_rad), self.problem))
 
     def adopt(self, start, states, inputs):
         """Converges from a given optimum; holds it."""
-        first = variables(states, inputs, self.problem)
-        result, self.last = self.solver(landing.HORIZON, COLD).solve(start, first)
+        result = self.solve(landing.HORIZON, COLD, start, variables(states, inputs, self.problem))
         self.hold()
         return result
 
@@ -178,15 +182,9 @@ class Ripopt:
         self.plan = self.last
 
     def _warm(self, samples, start, how):
-        path, of_equations, _, _ = self.plan
+        path, _, lam_g = self.plan
         intervals = (len(path) - landing.slacks(self.problem)) // 7 - samples
-        gone = 7 * samples
-        # Given bounds' multipliers, 0.8.2 reads past their end when its preprocessing or restoration changes the number of
-        # variables, and ends the process.
-        none = np.zeros(len(path) - gone)
-        multipliers = (of_equations[6 * samples :], none, none)
-        result, self.last = self.solver(intervals, how).solve(start, path[gone:], None if how == COLD else multipliers)
-        return result
+        return self.solve(intervals, how, start, path[7 * samples :], None, lam_g[6 * samples :])
 
     def warm(self, samples, start, retry=False):
         """Solves what is left some samples after the plan began, from the plan shifted; with `retry`, with the
@@ -198,11 +196,17 @@ class Ripopt:
         return self._warm(samples, start, ONE_STEP)
 
 
-def entrants(library, bridge, folder):
-    """Called by `worker`."""
+def loaded(library, bridge):
+    """ripopt, the bridge, and the words for its version."""
     ripopt, bridge = ctypes.CDLL(library), ctypes.CDLL(bridge)
     ripopt.ripopt_create.restype = ctypes.c_void_p
     number = (ctypes.c_int(), ctypes.c_int(), ctypes.c_int())
     ripopt.ripopt_get_version(*map(ctypes.byref, number))
     version = ".".join(str(part.value) for part in number)
-    return f"ripopt {version}", [Ripopt(ripopt, bridge, problem, folder) for problem in (landing.HARD, landing.SOFT)]
+    return ripopt, bridge, f"ripopt {version}"
+
+
+def entrants(library, bridge, folder):
+    """Called by `worker`."""
+    ripopt, bridge, version = loaded(library, bridge)
+    return version, [Ripopt(ripopt, bridge, problem, folder) for problem in (landing.HARD, landing.SOFT)]

@@ -16,11 +16,14 @@ class SpaceInterior(InSpace):
         self.name, self.solver, self.problem, self.folder = solver, solver, problem, folder
         self.nlps = {}
 
+    def made(self, intervals, how, limits):
+        library = space_landing.library_path(self.solver, intervals, self.problem, self.folder)
+        chosen = options(self.solver, how) | space_landing.structure(self.solver, intervals, self.problem)
+        return Nlp(self.solver, library, chosen, limits)
+
     def _solved(self, intervals, how, start, *given):
         if (intervals, how) not in self.nlps:
-            library = space_landing.library_path(self.solver, intervals, self.problem, self.folder)
-            chosen = options(self.solver, how) | space_landing.structure(self.solver, intervals, self.problem)
-            self.nlps[intervals, how] = Nlp(self.solver, library, chosen, space_landing.limits(intervals, self.problem))
+            self.nlps[intervals, how] = self.made(intervals, how, space_landing.limits(intervals, self.problem))
         converged, ns, _, found = self.nlps[intervals, how].solve([*start, *self.thrust[-intervals:]], *given)
         inputs, states = (found[0][at] for at in space_landing.places(intervals, self.problem)[:2])
         self.last = intervals, *found

@@ -113,14 +113,15 @@ def nlp(intervals, problem):
     off = inputs - ca.repmat(ca.DM(REST), 1, intervals)
     weighted = ca.dot(after, ca.mtimes(ca.diag(ca.DM(STATE_WEIGHTS)), after))
     cost = 0.5 * STEP_S * (weighted + ca.dot(off, ca.mtimes(ca.diag(ca.DM(INPUT_WEIGHTS)), off)))
-    equations = []
-    for node, rows in enumerate(conditions(intervals, problem)):
-        # fatrop has the dynamics of a stage before its conditions.
-        equations += [gaps[:, node]] if node < intervals else []
-        missed = list(zip(sides(node, intervals, problem), at_misses[node].tolist()))
-        for index, _, _ in rows:
-            equations.append(after[index, node - 1] + sum(sign * path[at] for (of, sign), at in missed if of == index))
-        cost += PENALTY_PER_M * sum(path[at] for _, at in missed)
+    # fatrop has the dynamics of a stage before its conditions.
+    priced = [node for node, at in enumerate(at_misses) if len(at)]
+    equations = [ca.vec(gaps[:, : min([*priced, intervals])])]
+    for node in priced:
+        missed, rows = path[at_misses[node].tolist()], conditions(intervals, problem)[node]
+        signs = [[sign * (of == index) for of, sign in sides(node, intervals, problem)] for index, _, _ in rows]
+        held = after[[index for index, _, _ in rows], node - 1] + ca.mtimes(ca.sparsify(ca.DM(signs)), missed)
+        equations += [gaps[:, node], held] if node < intervals else [held]
+        cost += PENALTY_PER_M * ca.sum1(missed)
     return {"x": path, "p": ca.vertcat(start, thrust), "f": cost, "g": ca.vertcat(*equations)}
 
 
