@@ -16,6 +16,7 @@ import numpy as np
 
 import acados_problem
 import landing
+import rollout
 from result import Result, cost, guess
 
 
@@ -74,11 +75,6 @@ class Acados:
                     made.constraints_set(node, "ubx", upper[node - 1, index])
             self.solvers[intervals] = made
         return self.solvers[intervals]
-
-    def rolled_out(self, start, inputs, *thrust):
-        """States at the nodes."""
-        after = self.posed.STEP.mapaccum(len(inputs))(start, inputs.reshape(len(inputs), -1).T, *(row.reshape(1, -1) for row in thrust))
-        return np.vstack([start, np.array(after).T])
 
     def fill(self, solver, start, plan, with_multipliers, *thrust):
         """Puts a start and a first path into a solver."""
@@ -160,7 +156,7 @@ class Acados:
         the plan as it is; with a hard end height every fifth QP then has no solution."""
         rest = self.plan.rest(samples)
         if not (self.kind.rti and self.problem == landing.SOFT):
-            rest.states = self.rolled_out(start, rest.inputs)
+            rest.states = rollout.states(start, rest.inputs)
         return self.solve(start, rest, not retry)
 
     def step(self, samples, start):

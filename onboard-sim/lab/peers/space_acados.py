@@ -12,7 +12,7 @@ from space_entrant import InSpace
 
 
 class SpaceAcados(InSpace, Acados):
-    """On one of the two problems. Warm, with all multipliers, its path is rolled out from where the vehicle is."""
+    """On one of the two problems. Warm, it gets the plan as it is, with all multipliers: rolled out, it is slower."""
 
     makes, loops = InSpace.makes, InSpace.loops
 
@@ -30,7 +30,6 @@ class SpaceAcados(InSpace, Acados):
 
     def rest(self, samples, start, retry):
         rest = self.plan.rest(samples)
-        rest.states = self.rolled_out(start, rest.inputs, self.thrust[-len(rest.inputs) :])
         return self._solved(start, rest, not retry)
 
 
