@@ -9,6 +9,10 @@ from result import cost
 from space_entrant import InSpace
 
 
+# The fastest found, as in the plane; with the barrier of the plane fatrop fails now and then.
+WARM_IN_SPACE = {"fatrop": {"fatrop.mu_init": 1e-7, "fatrop.bound_push": 1e-12, "fatrop.bound_frac": 1e-12}}
+
+
 class SpaceInterior(InSpace):
     """One of them on one of the two problems."""
 
@@ -18,7 +22,8 @@ class SpaceInterior(InSpace):
 
     def made(self, intervals, how, limits):
         library = space_landing.library_path(self.solver, intervals, self.problem, self.folder)
-        chosen = options(self.solver, how) | space_landing.structure(self.solver, intervals, self.problem)
+        warm = {} if how == COLD else WARM_IN_SPACE.get(self.solver, {})
+        chosen = options(self.solver, how) | warm | space_landing.structure(self.solver, intervals, self.problem)
         return Nlp(self.solver, library, chosen, limits)
 
     def _solved(self, intervals, how, start, *given):
