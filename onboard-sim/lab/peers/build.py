@@ -1,4 +1,4 @@
-"""Compiles every problem's functions to C libraries, once; `build.py FOLDER SOLVER...`. Of PEERS_ONLY alone, if it is given."""
+"""Compiles the landing's functions to C libraries, once; `build.py FOLDER SOLVER...`."""
 
 import itertools
 import multiprocessing
@@ -6,32 +6,25 @@ import os
 import sys
 
 import compiled
-import landing
+import measure
 import space_landing
-import space_measure
-
-# After these the kicks come.
-KICKS = range(1, 49, 6)
+from space_landing import HARD, HORIZON, SOFT
 
 
 def jobs(solvers, folder):
-    """(plane or space, solver, which problem, intervals, library, effort): every horizon that a warm solve may have left. Those of the cold
-    and the kicked solves are compiled with more effort, and first."""
-    only = os.environ.get("PEERS_ONLY")
-    for posed, least, kicks in ((landing, 1, KICKS), (space_landing, space_landing.SETTLED_NODES + 1, space_measure.KICK_SAMPLES)):
-        if only and posed is not {"plane": landing, "space": space_landing}[only]:
-            continue
-        fully = [posed.HORIZON, *(posed.HORIZON - samples for samples in kicks)]
-        quickly = [intervals for intervals in range(posed.HORIZON - 1, least - 1, -1) if intervals not in fully]
-        for effort, horizons in ((compiled.FULLY, fully), (compiled.QUICKLY, quickly)):
-            for intervals, problem, solver in itertools.product(horizons, (landing.HARD, landing.SOFT), solvers):
-                yield posed.__name__, solver, problem, intervals, posed.library_path(solver, intervals, problem, folder), effort
+    """(solver, problem, intervals, library, effort): every horizon that a warm solve may have left. Those of the cold and the
+    kicked solves are compiled with more effort, and first."""
+    fully = [HORIZON, *(HORIZON - samples for samples in measure.KICK_SAMPLES)]
+    quickly = [intervals for intervals in range(HORIZON - 1, HORIZON - 1 - measure.LOOP_SAMPLES, -1) if intervals not in fully]
+    for effort, horizons in ((compiled.FULLY, fully), (compiled.QUICKLY, quickly)):
+        for intervals, problem, solver in itertools.product(horizons, (HARD, SOFT), solvers):
+            yield solver, problem, intervals, space_landing.library_path(solver, intervals, problem, folder), effort
 
 
 def build(job):
-    module, solver, problem, intervals, library, effort = job
-    posed = sys.modules[module]
-    compiled.functions(solver, posed.nlp(intervals, problem), posed.structure(solver, intervals, problem), library, effort)
+    solver, problem, intervals, library, effort = job
+    posed, options = space_landing.nlp(intervals, problem), space_landing.structure(solver, intervals, problem)
+    compiled.functions(solver, posed, options, library, effort)
 
 
 def main():

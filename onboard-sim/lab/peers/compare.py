@@ -10,16 +10,10 @@ import floor
 import landing
 import measure
 import quadratic
-import rollout
-import scattered
-import space_measure
-import tables
 import worker
-from ours import SPACE_HARD_PENALTY, Ours
+from ours import Ours
+from space_landing import HARD, SOFT
 
-
-# "plane" or "space", for one of the two; both without.
-ONLY = os.environ.get("PEERS_ONLY")
 
 # Who gets one step's quadratic problem alone.
 QUADRATIC = ("piqp", "hpipm")
@@ -43,9 +37,9 @@ def machine():
 
 def limit(ours):
     """One iteration beside the floating-point limit of its sweep."""
-    start = measure.STARTS[0]
-    inputs = ours.cold_both(start).inputs
-    floor.report(rollout.states(start, inputs), inputs, ours.peak(), ours.layers(start))
+    start = quadratic.STARTS[0]
+    inputs = ours.plane_cold(start)
+    floor.report(landing.states(start, inputs), inputs, ours.peak(), ours.layers(start))
 
 
 def asked():
@@ -64,54 +58,23 @@ def main():
     sys.stdout.reconfigure(line_buffering=True)
     words = asked()
     functions = words.functions
-    plane = {
+    workers = {
         "fatrop": ("interior", "fatrop", functions),
         "ipopt": ("interior", "ipopt", functions),
         "ripopt": ("ripopt_solver", words.ripopt, words.bridge, functions),
         "acados": ("acados_solver", words.acados, words.wheel),
     } | {peer: ("quadratic", peer, words.wheel) for peer in QUADRATIC}
-    space = {
-        "fatrop": ("space_interior", "fatrop", functions),
-        "ipopt": ("space_interior", "ipopt", functions),
-        "ripopt": ("space_ripopt", words.ripopt, words.bridge, functions),
-        "acados": ("space_acados", words.acados, words.wheel),
-    }
-    own = [Ours(words.ours, problem) for problem in (landing.HARD, landing.SOFT)]
     print(f"{machine()}; {said(os.environ.get('CC', 'cc'), '--version')}; {said('rustc', '--version')}")
     print(f"ours at {said('git', '-C', os.path.dirname(__file__), 'describe', '--always', '--dirty', '--exclude=*')}")
-    if ONLY != "space":
-        in_plane(own, {peer: started(plane[peer]) for peer in words.peers})
-    if ONLY != "plane":
-        own = [Ours(words.ours, problem, SPACE_HARD_PENALTY) for problem in (landing.HARD, landing.SOFT)]
-        space_measure.run([*own, *(entrant for peer in words.peers if peer in space for entrant in started(space[peer]))])
-
-
-def started(how):
-    """The entrants of a worker; prints what they are."""
-    version, made = worker.start(*how)
-    print(version, flush=True)
-    return made
-
-
-def in_plane(own, public):
-    steps = [entrant for peer, made in public.items() if peer in QUADRATIC for entrant in made]
+    plane, steps, entrants = Ours(words.ours), [], [Ours(words.ours, problem) for problem in (HARD, SOFT)]
+    for peer in words.peers:
+        version, made = worker.start(*workers[peer])
+        print(version, flush=True)
+        (steps if peer in QUADRATIC else entrants).extend(made)
+    measure.run(entrants)
     if steps:
-        quadratic.run(own[0], steps)
-    entrants = [*own, *(entrant for peer, made in public.items() if peer not in QUADRATIC for entrant in made)]
-    records = [measure.Record(entrant) for entrant in entrants]
-    measure.cold(records)
-    planned_rad = measure.warm(records)
-    fields = [tables.Field(records, problem) for problem in (landing.HARD, landing.SOFT)]
-    for field in fields:
-        tables.solves(field)
-    for field in fields:
-        tables.steps(field, planned_rad)
-    measure.disturbed(records)
-    for field in fields:
-        tables.loops(field)
-    tables.checks(fields)
-    scattered.run(records)
-    limit(own[1])
+        quadratic.run(plane, steps)
+        limit(plane)
 
 
 if __name__ == "__main__":

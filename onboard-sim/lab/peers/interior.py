@@ -1,4 +1,4 @@
-"""The interior-point methods that take the problem's compiled functions through CasADi: fatrop and IPOPT.
+"""fatrop and IPOPT, which take the problem's compiled functions through CasADi.
 
 CasADi's plug-ins with exact Hessians, called through CasADi's buffers, without Python's conversions; its own overhead is
 in their times. Variables are ordered by stage, and fatrop is told the structure outright. Warm, IPOPT is handed the
@@ -12,19 +12,24 @@ import time
 import casadi as ca
 import numpy as np
 
-import landing
-from result import MOST_ITERATIONS, Result, cost, guess
+import space_landing
+from landing import TOLERANCE
+from space_entrant import InSpace
+from space_landing import HARD, SOFT
+
+# Several times what any solve of these problems that ends takes.
+MOST_ITERATIONS = 100
 
 COLD_OPTIONS = {
     "fatrop": {
         "fatrop.print_level": 0,
-        "fatrop.tol": landing.TOLERANCE,
+        "fatrop.tol": TOLERANCE,
         "fatrop.max_iter": MOST_ITERATIONS,
     },
     "ipopt": {
         "ipopt.print_level": 0,
         "ipopt.sb": "yes",
-        "ipopt.tol": landing.TOLERANCE,
+        "ipopt.tol": TOLERANCE,
         "ipopt.max_iter": MOST_ITERATIONS,
         "ipopt.linear_solver": "mumps",
     },
@@ -32,7 +37,7 @@ COLD_OPTIONS = {
 
 # The fastest found of initial barriers 1e-1 to 1e-8 and distances of the start from the bounds.
 WARM_OPTIONS = {
-    "fatrop": {"fatrop.mu_init": 1e-8},
+    "fatrop": {"fatrop.mu_init": 1e-7, "fatrop.bound_push": 1e-12, "fatrop.bound_frac": 1e-12},
     "ipopt": {
         "ipopt.warm_start_init_point": "yes",
         "ipopt.mu_init": 1e-8,
@@ -44,21 +49,7 @@ WARM_OPTIONS = {
     },
 }
 
-COLD, WARM, ONE_STEP = "cold", "warm", "one step"
-
-
-def variables(states, inputs, problem):
-    """A path as the NLP's variables; the slacks hold its miss."""
-    z_m = states[-1, 1]
-    miss = [max(z_m, 0.0), max(-z_m, 0.0)][: landing.slacks(problem)]
-    return np.append(np.column_stack([inputs, states[1:]]).ravel(), miss)
-
-
-def claimed(found, intervals):
-    """Inputs and running cost of the NLP's variables."""
-    stages = found[: 7 * intervals].reshape(-1, 7)
-    inputs = stages[:, 0].copy()
-    return inputs, cost(np.vstack([np.zeros(6), stages[:, 1:]]), inputs)
+COLD, WARM = "cold", "warm"
 
 
 def options(solver, how):
@@ -66,8 +57,6 @@ def options(solver, how):
     chosen = {"print_time": False, "show_eval_warnings": False, **COLD_OPTIONS[solver]}
     if how != COLD:
         chosen |= WARM_OPTIONS[solver]
-    if how == ONE_STEP:
-        chosen[f"{solver}.max_iter"] = 1
     return chosen
 
 
@@ -83,9 +72,8 @@ class Nlp:
             self.buffer.set_arg(index, memoryview(self.inputs[name]))
         for index, name in enumerate(self.function.name_out()):
             self.buffer.set_res(index, memoryview(self.outputs[name]))
-        self.inputs["lbx"][:], self.inputs["ubx"][:] = bounds[:2]
-        if len(bounds) > 2:
-            self.inputs["lbg"][:], self.inputs["ubg"][:] = bounds[2:]
+        for name, bound in zip(("lbx", "ubx", "lbg", "ubg"), bounds):
+            self.inputs[name][:] = bound
 
     def solve(self, parameter, first, lam_x=0.0, lam_g=0.0):
         """Solves twice from a path and multipliers, and times the second: (converged, ns, iterations, plan)."""
@@ -100,51 +88,33 @@ class Nlp:
         return bool(stats["success"]), ns, stats["iter_count"], plan
 
 
-class Interior:
-    """fatrop or IPOPT on one of the two problems, cold and warm, over every length of horizon."""
-
-    makes, loops = ("cold", "warm", "step"), True
+class Interior(InSpace):
+    """One of them on one of the two problems."""
 
     def __init__(self, solver, problem, folder):
         self.name, self.solver, self.problem, self.folder = solver, solver, problem, folder
-        self.nlps, self.plan, self.last = {}, None, None
+        self.nlps = {}
 
-    def solve(self, intervals, how, *given):
-        """Solves a horizon from what is given; keeps the plan."""
+    def made(self, intervals, how, limits):
+        library = space_landing.library_path(self.solver, intervals, self.problem, self.folder)
+        chosen = options(self.solver, how) | space_landing.structure(self.solver, intervals, self.problem)
+        return Nlp(self.solver, library, chosen, limits)
+
+    def _solved(self, intervals, how, start, *given):
         if (intervals, how) not in self.nlps:
-            library = landing.library_path(self.solver, intervals, self.problem, self.folder)
-            chosen = options(self.solver, how) | landing.structure(self.solver, intervals, self.problem)
-            self.nlps[intervals, how] = Nlp(self.solver, library, chosen, landing.bounds(intervals, self.problem))
-        converged, ns, iterations, self.last = self.nlps[intervals, how].solve(*given)
-        inputs, running = claimed(self.last[0], intervals)
-        return Result(converged, ns, iterations, running, inputs)
+            self.nlps[intervals, how] = self.made(intervals, how, space_landing.limits(intervals, self.problem))
+        converged, ns, _, found = self.nlps[intervals, how].solve([*start, *self.thrust[-intervals:]], *given)
+        inputs, states = (found[0][at] for at in space_landing.places(intervals, self.problem)[:2])
+        self.last = intervals, *found
+        return converged, ns, space_landing.cost(np.vstack([start, states]), inputs), inputs
 
-    def cold(self, start, bend_rad):
-        return self.solve(landing.HORIZON, COLD, start, variables(*guess(start, bend_rad), self.problem))
+    def first(self, start, path):
+        return self._solved(len(path), COLD, start, space_landing.variables(path, self.problem))
 
-    def adopt(self, start, states, inputs):
-        """Converges from a given optimum, so that every solver's plan is the same landing; holds it."""
-        result = self.solve(landing.HORIZON, COLD, start, variables(states, inputs, self.problem))
-        self.hold()
-        return result
-
-    def hold(self):
-        self.plan = self.last
-
-    def _warm(self, samples, start, how):
-        path, lam_x, lam_g = self.plan
-        intervals = (len(path) - landing.slacks(self.problem)) // 7 - samples
-        rest = path[7 * samples :], lam_x[7 * samples :], lam_g[6 * samples :]
-        return self.solve(intervals, how, start, *rest)
-
-    def warm(self, samples, start, retry=False):
-        """Solves what is left some samples after the plan began, from the plan shifted; with `retry`, with the
-        barrier of a cold solve."""
-        return self._warm(samples, start, COLD if retry else WARM)
-
-    def step(self, samples, start):
-        """One iteration of a warm solve."""
-        return self._warm(samples, start, ONE_STEP)
+    def rest(self, samples, start, retry):
+        planned, path, lam_x, lam_g = self.plan
+        gone, equations = space_landing.WIDTH * samples, space_landing.STATES * samples
+        return self._solved(planned - samples, COLD if retry else WARM, start, path[gone:], lam_x[gone:], lam_g[equations:])
 
 
 def version(solver):
@@ -156,4 +126,4 @@ def version(solver):
 
 def entrants(solver, folder):
     """Called by `worker`."""
-    return version(solver), [Interior(solver, problem, folder) for problem in (landing.HARD, landing.SOFT)]
+    return version(solver), [Interior(solver, problem, folder) for problem in (HARD, SOFT)]

@@ -7,20 +7,20 @@ variables).
 """
 
 import ctypes
-import os
 import time
 
 import casadi as ca
 import numpy as np
 
-import landing
-from interior import COLD, ONE_STEP, WARM, claimed, variables
-from result import MOST_ITERATIONS, Result, guess
+import space_landing
+from landing import TOLERANCE
+from interior import COLD, MOST_ITERATIONS, Interior
+from space_landing import HARD, SOFT
 
 # What it takes for infinite.
 INFINITE = 1e30
 
-OPTIONS = {"tol": landing.TOLERANCE, "max_iter": MOST_ITERATIONS, "print_level": 0}
+OPTIONS = {"tol": TOLERANCE, "max_iter": MOST_ITERATIONS, "print_level": 0}
 WARM_OPTIONS = {
     "warm_start_init_point": "yes",
     "mu_init": 1e-8,
@@ -112,8 +112,6 @@ class Solver:
         options = dict(OPTIONS)
         if how != COLD:
             options |= WARM_OPTIONS
-        if how == ONE_STEP:
-            options["max_iter"] = 1
         for key, value in options.items():
             self._set(key, value)
 
@@ -147,66 +145,23 @@ class Solver:
         return status == 0, ns, self.ripopt.ripopt_get_iter_count(self.handle), (found, of_lower, of_equations)
 
 
-class Ripopt:
-    """ripopt on one of the two problems, cold and warm, over every length of horizon."""
-
-    name, makes, loops = "ripopt", ("cold", "warm", "step"), True
+class Ripopt(Interior):
+    """On one of the two problems."""
 
     def __init__(self, ripopt, bridge, problem, folder):
-        self.ripopt, self.bridge, self.problem, self.folder = ripopt, bridge, problem, folder
-        self.solvers, self.plan, self.last = {}, None, None
+        super().__init__("ripopt", problem, folder)
+        self.ripopt, self.bridge = ripopt, bridge
 
-    def solver(self, intervals, how):
-        if (intervals, how) not in self.solvers:
-            functions = Functions(landing.library_path("ipopt", intervals, self.problem, self.folder))
-            zeros = np.zeros(6 * intervals + (1 if self.problem == landing.SOFT else 0))
-            bounds = (*landing.bounds(intervals, self.problem), zeros, zeros)
-            self.solvers[intervals, how] = Solver(self.ripopt, self.bridge, functions, bounds, how)
-        return self.solvers[intervals, how]
-
-    def solve(self, intervals, how, *given):
-        converged, ns, iterations, self.last = self.solver(intervals, how).solve(*given)
-        inputs, running = claimed(self.last[0], intervals)
-        return Result(converged, ns, iterations, running, inputs)
-
-    def cold(self, start, bend_rad):
-        return self.solve(landing.HORIZON, COLD, start, variables(*guess(start, bend_rad), self.problem))
-
-    def adopt(self, start, states, inputs):
-        """Converges from a given optimum; holds it."""
-        result = self.solve(landing.HORIZON, COLD, start, variables(states, inputs, self.problem))
-        self.hold()
-        return result
-
-    def hold(self):
-        self.plan = self.last
-
-    def _warm(self, samples, start, how):
-        path, _, lam_g = self.plan
-        intervals = (len(path) - landing.slacks(self.problem)) // 7 - samples
-        return self.solve(intervals, how, start, path[7 * samples :], None, lam_g[6 * samples :])
-
-    def warm(self, samples, start, retry=False):
-        """Solves what is left some samples after the plan began, from the plan shifted; with `retry`, with the
-        barrier of a cold solve."""
-        return self._warm(samples, start, COLD if retry else WARM)
-
-    def step(self, samples, start):
-        """One iteration of a warm solve."""
-        return self._warm(samples, start, ONE_STEP)
+    def made(self, intervals, how, limits):
+        functions = Functions(space_landing.library_path("ipopt", intervals, self.problem, self.folder))
+        return Solver(self.ripopt, self.bridge, functions, limits, how)
 
 
-def loaded(library, bridge):
-    """ripopt, the bridge, and the words for its version."""
+def entrants(library, bridge, folder):
+    """Called by `worker`."""
     ripopt, bridge = ctypes.CDLL(library), ctypes.CDLL(bridge)
     ripopt.ripopt_create.restype = ctypes.c_void_p
     number = (ctypes.c_int(), ctypes.c_int(), ctypes.c_int())
     ripopt.ripopt_get_version(*map(ctypes.byref, number))
     version = ".".join(str(part.value) for part in number)
-    return ripopt, bridge, f"ripopt {version}"
-
-
-def entrants(library, bridge, folder):
-    """Called by `worker`."""
-    ripopt, bridge, version = loaded(library, bridge)
-    return version, [Ripopt(ripopt, bridge, problem, folder) for problem in (landing.HARD, landing.SOFT)]
+    return f"ripopt {version}", [Ripopt(ripopt, bridge, problem, folder) for problem in (HARD, SOFT)]

@@ -2,7 +2,7 @@
 
 The equations are those of `onboard-sim/ocp`, the numbers those of `onboard-sim/lab/paper/examples/peer/space.rs`. Variables
 are ordered by stage, (u_k, x_{k+1}); parameters are the start and the thrust over mass of each interval. All conditions
-are bounds of states, and hard.
+are bounds of states. Those of the last three nodes are hard, or have a price.
 """
 
 import functools
@@ -11,7 +11,9 @@ import os
 import casadi as ca
 import numpy as np
 
-from landing import HARD, PENALTY_PER_M, SOFT
+HARD, SOFT = "hard", "soft"
+# Of a metre, a metre a second, a radian or a radian a second by which the end is missed, cost units.
+PENALTY_PER_UNIT = 1000.0
 
 HORIZON, STEP_S = 38, 0.1
 STATES, INPUTS = 10, 3
@@ -121,7 +123,7 @@ def nlp(intervals, problem):
         signs = [[sign * (of == index) for of, sign in sides(node, intervals, problem)] for index, _, _ in rows]
         held = after[[index for index, _, _ in rows], node - 1] + ca.mtimes(ca.sparsify(ca.DM(signs)), missed)
         equations += [gaps[:, node], held] if node < intervals else [held]
-        cost += PENALTY_PER_M * ca.sum1(missed)
+        cost += PENALTY_PER_UNIT * ca.sum1(missed)
     return {"x": path, "p": ca.vertcat(start, thrust), "f": cost, "g": ca.vertcat(*equations)}
 
 
@@ -179,17 +181,21 @@ def guess(start, turns):
     return np.hstack([np.tile(REST, (HORIZON, 1)), states[1:]])
 
 
+def cost(nodes, inputs):
+    """Of a path, without prices."""
+    off = inputs - REST
+    return float(0.5 * STEP_S * (((nodes[1:] - TARGET) ** 2 @ STATE_WEIGHTS).sum() + (off**2 @ INPUT_WEIGHTS).sum()))
+
+
 def flown(start, inputs, thrust, problem=HARD):
     """(cost without prices, worst broken condition in its own unit, sum of the misses that have a price, states) of inputs."""
     nodes = [np.asarray(start, dtype=float)]
     for k, push in enumerate(thrust):
         nodes.append(np.array(STEP(nodes[-1], inputs[k], push)).ravel())
     nodes = np.array(nodes)
-    off = inputs - REST
-    cost = 0.5 * STEP_S * ((nodes[1:] ** 2 @ STATE_WEIGHTS).sum() + (off**2 @ INPUT_WEIGHTS).sum())
     path = np.hstack([inputs, nodes[1:]]).ravel()
     every, kept = (np.maximum(low - path, path - high) for low, high in (bounds(len(inputs), of) for of in (HARD, problem)))
-    return float(cost), float(kept.max()), float(np.maximum(every[np.isneginf(kept)], 0.0).sum()), nodes
+    return cost(nodes, inputs), float(kept.max()), float(np.maximum(every[np.isneginf(kept)], 0.0).sum()), nodes
 
 
 def structure(solver, intervals, problem):

@@ -9,7 +9,7 @@ import multiprocessing
 import os
 import traceback
 
-CALLED = ("cold", "adopt", "hold", "warm", "step", "space_cold", "space_adopt", "space_hold", "space_warm", "quadratic")
+CALLED = ("cold", "adopt", "hold", "warm", "quadratic")
 
 
 def _serve(pipe, module, arguments):
@@ -20,7 +20,7 @@ def _serve(pipe, module, arguments):
     except Exception:
         pipe.send((None, traceback.format_exc()))
         return
-    pipe.send((version, [(e.name, e.problem, e.makes, e.loops) for e in entrants]))
+    pipe.send((version, [(e.name, e.problem) for e in entrants]))
     while True:
         try:
             index, method, words, more = pipe.recv()
@@ -33,12 +33,10 @@ def _serve(pipe, module, arguments):
 
 
 class Entrant:
-    """A solver on one of the two problems. `makes`: which of cold solves, warm solves and single iterations it has;
-    `loops`: whether it flies the closed loop."""
+    """A solver on one of the two problems."""
 
-    def __init__(self, pipe, index, name, problem, makes, loops):
-        self.pipe, self.index = pipe, index
-        self.name, self.problem, self.makes, self.loops = name, problem, makes, loops
+    def __init__(self, pipe, index, name, problem):
+        self.pipe, self.index, self.name, self.problem = pipe, index, name, problem
 
     def __getattr__(self, method):
         if method not in CALLED:
