@@ -13,6 +13,7 @@
 //! Tilt at high speed does not reduce the deceleration: the body lies across the air, and its own drag compensates the
 //! lost thrust. The model contains that drag, `1/2 rho V^2 S_n sin^3`, so the fins act as the throttle early in the
 //! burn and the tilt late in it.
+#![expect(clippy::inline_always, reason = "what is to be compiled for wide vectors must be inlined there")]
 
 use core::array::from_fn;
 
@@ -388,8 +389,8 @@ struct Falls<const N: usize> {
 
 /// An interval of each fall.
 struct Ahead<const N: usize> {
-    /// Acceleration without drag of the hardest and the softest braking, m/s^2, and drag over the mass and the square of the
-    /// speed, 1/m: while the vehicle leans, and in that share of the interval in which it is upright.
+    /// Acceleration without drag of the hardest and the softest braking, m/s^2, and their drag over the mass and the square of the
+    /// speed, 1/m; upright in the share of the interval that is for settling.
     pushed_m_s2: [[f64; N]; 2],
     drag_per_m: [[f64; N]; 2],
 }
@@ -573,9 +574,8 @@ impl<const N: usize> Falls<N> {
                 let least_m_s = speeds_m_s[i] + step_s[i] * soft_m_s2[i];
                 let most_m_s = speeds_m_s[i] + step_s[i] * hard_m_s2[i];
                 let held_m_s = higher(lower(self.touchdown_m_s, most_m_s), least_m_s);
-                let held =
-                    (speeds_m_s[i] >= self.touchdown_m_s - MET_M_S) | (next_m_s[i] > self.touchdown_m_s);
-                if held { held_m_s } else { next_m_s[i] }
+                let next_m_s = if next_m_s[i] > self.touchdown_m_s { held_m_s } else { next_m_s[i] };
+                if speeds_m_s[i] >= self.touchdown_m_s - MET_M_S { held_m_s } else { next_m_s }
             });
             midway_m_s = from_fn(|i| 0.5 * (speeds_m_s[i] + next_m_s[i]));
         }

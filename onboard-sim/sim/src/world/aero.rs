@@ -5,6 +5,7 @@
 //! (coefficients, areas, radius), with the force turned into the local wind. The body follows the paper's Eq. 8 along
 //! the axis and the crossflow of a cylinder across it (strip by strip, S. F. Hoerner, Fluid-Dynamic Drag, chapter 3). The legs
 //! drag along the wind where each of them is, ahead of the centre of gravity in the flow: they turn the tail away from it.
+#![expect(clippy::inline_always, reason = "what is to be compiled for wide vectors must be inlined there")]
 
 use core::array::from_fn;
 
@@ -19,8 +20,9 @@ use crate::world::truth::Truth;
 /// Strips of the body's crossflow.
 const STRIPS: usize = 8;
 
-/// Legs and fins.
+/// Legs, then fins, and a number of each.
 const POINTS: usize = 8;
+type Each = [f64; POINTS];
 
 /// The vehicle's shape.
 #[derive(Debug, Clone)]
@@ -220,7 +222,6 @@ impl Shape {
         let fin = half_density * self.fin_scale * plume.fins * self.fins.reference_area_m2;
         let [drag, lift] = [self.fins.drag_coefficient, self.fins.lift_coefficient].map(|per| -fin * per);
         // Legs, then fins; every line is one operation on all, which the compiler makes one on vectors.
-        type Each = [f64; POINTS];
         let outward: [Vector3<f64>; POINTS] = from_fn(|i| self.fin_directions[i % 4]);
         let (y_out, z_out): (Each, Each) = (from_fn(|i| outward[i].y), from_fn(|i| outward[i].z));
         let out_m: Each = from_fn(|i| if i < 4 { 0.0 } else { self.fins.radius_m(fin_sines[i - 4]) });
