@@ -101,14 +101,18 @@ fn reports_say_open_or_closed_loop_and_unknown_names_exit_1() {
     assert_eq!(by_flag.1["frames"].as_array().map(Vec::len), Some(frames));
 }
 
+/// Whether a plan was taken over in this frame of the burn whose solve had converged.
+fn has_converged(frame: &ComputerFrame) -> bool {
+    frame.output.phase == u32::from(Phase::Powered.index())
+        && frame.input.plan_ready
+        && frame.output.level == u32::from(ControlLevel::Converged.index())
+}
+
 #[test]
 fn a_frame_is_shown_and_a_missing_frame_exits_2() {
     let recording = MK2.recording();
     let frames = &recording.frames;
-    let planned = |frame: &&ComputerFrame| {
-        frame.output.phase == u32::from(Phase::Powered.index()) && frame.input.plan_ready
-    };
-    let planning = frames.iter().filter(planned).nth(5).unwrap().input.frame;
+    let planning = frames.iter().filter(|frame| has_converged(frame)).nth(5).unwrap().input.frame;
     let planning = (recording.release_frame + planning).to_string();
     let (code, stdout, _) = run(replay("verify", &MK2.log).args(["--explain", &planning]));
     assert_eq!(code, 0);
@@ -134,12 +138,7 @@ fn a_frame_is_shown_and_a_missing_frame_exits_2() {
 fn val_judge_finds_no_better_plan_than_the_one_that_flew() {
     let recording = MK2.recording();
     let (_, frames) = recording.replayable_frames().unwrap();
-    let planned = |frame: &&ComputerFrame| {
-        frame.output.phase == u32::from(Phase::Powered.index())
-            && frame.input.plan_ready
-            && frame.output.level == u32::from(ControlLevel::Converged.index())
-    };
-    let planning = frames.iter().filter(planned).map(|frame| frame.input.frame);
+    let planning = frames.iter().filter(|frame| has_converged(frame)).map(|frame| frame.input.frame);
     let mut same = 0;
     for frame in planning.skip(2).step_by(10).take(5) {
         let judged = replay::verify::explain::explain(&recording, recording.release_frame + frame)
