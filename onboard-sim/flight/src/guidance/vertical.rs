@@ -586,12 +586,10 @@ impl<const N: usize> Falls<N> {
 }
 
 /// The larger and the smaller of two numbers, each in one instruction.
-#[inline(always)]
 fn higher(one: f64, other: f64) -> f64 {
     if one > other { one } else { other }
 }
 
-#[inline(always)]
 fn lower(one: f64, other: f64) -> f64 {
     if one < other { one } else { other }
 }

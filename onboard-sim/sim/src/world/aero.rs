@@ -100,7 +100,6 @@ impl Load {
         Self { force_n: Vector3::zeros(), moment_n_m: Vector3::zeros() }
     }
 
-    #[inline(always)]
     pub(crate) fn add_at(&mut self, place_m: &Vector3<f64>, force_n: &Vector3<f64>) {
         self.force_n += force_n;
         self.moment_n_m += place_m.cross(force_n);
