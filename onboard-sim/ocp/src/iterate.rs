@@ -231,12 +231,12 @@ pub(crate) fn push_nodes<M: Model<NX, NU>, const NX: usize, const NU: usize>(
 
 /// The larger of two numbers, in one instruction.
 #[inline]
-pub(crate) fn larger(a: f64, b: f64) -> f64 {
+pub fn larger(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
 /// The smaller of two numbers, in one instruction.
 #[inline]
-fn smaller(a: f64, b: f64) -> f64 {
+pub fn smaller(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }
 }

@@ -76,6 +76,7 @@ mod start;
 
 pub use dense::{Dense, DenseIntervals, Factor, add_multiple};
 pub use intervals::{Curvature, Feedback, Hessian, Interval, Intervals, Stage};
+pub use iterate::{larger, smaller};
 pub use model::{Condition, InputRange, Model, Settings};
 pub use solver::Workspace;
 pub use start::{Outcome, Start, Status};

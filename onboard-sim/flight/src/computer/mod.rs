@@ -217,10 +217,9 @@ impl Computer {
         }
         self.gate_told = refusal;
         self.commands = Commands { gimbal_rad, fins_rad, ..self.commands };
-        // Between a plan that has converged and one that nearly has there is nothing to tell: either is new, and is flown.
-        let is_new = |level| matches!(level, ControlLevel::Converged | ControlLevel::BestFeasible);
-        let changes = level != self.level && !(is_new(level) && is_new(self.level));
-        if phase.in_landing_burn() && changes {
+        // A new plan, converged or nearly, is what is expected: it is told after one that was missed.
+        let misses = |level| matches!(level, ControlLevel::ShiftedPlan | ControlLevel::Stabiliser);
+        if phase.in_landing_burn() && level != self.level && (misses(level) || misses(self.level)) {
             self.table.say(Severity::Notice, format!("controller level {}", level.name()));
         }
         self.level = level;

@@ -17,6 +17,7 @@
 
 use core::array::from_fn;
 
+use ocp::{larger, smaller};
 use pulp::{Arch, Simd, WithSimd};
 
 use crate::vehicle::atmosphere::Air;
@@ -159,8 +160,8 @@ impl Column {
         let carried_until_s = burn.falls_through_weight_s(self.mass_at_ignition_kg, self.gravity_m_s2);
         carried_until_s.filter(|end_s| *end_s > burning_s).is_some_and(|end_s| {
             let falls = Falls::new(self, burn, burning_s, [end_s]);
-            let [[softest]] = falls.along::<false, 1>([Way::Even], vertical_m_s, [[1.0]]);
-            softest.vertical_m_s > self.touchdown_m_s
+            let [softest] = falls.along::<false, 1>([Way::Even], vertical_m_s, [[1.0]]);
+            softest.speeds_m_s[0] > self.touchdown_m_s
         })
     }
 
@@ -250,7 +251,7 @@ impl EvenLanding {
         let braked = |speed_m_s: f64, tilt_rad: f64| {
             let soft = Braking { tilt_rad, fin_drag_area_m2: half_m2 };
             let falls = Falls::new(&Column { soft, ..column }, &burn, 0.0, [carried_s]);
-            let [[ended]] = falls.along::<false, 1>([Way::Even], -speed_m_s, [[1.0]]);
+            let [ended] = falls.along::<false, 1>([Way::Even], -speed_m_s, [[1.0]]);
             ended
         };
         let halved = |mut low: f64, mut high: f64, below: &dyn Fn(f64) -> bool| {
@@ -261,7 +262,7 @@ impl EvenLanding {
             low
         };
         let tilt_rad = |speed_m_s: f64| {
-            let brakes = |tilt_rad: f64| braked(speed_m_s, tilt_rad).vertical_m_s > column.touchdown_m_s;
+            let brakes = |tilt_rad: f64| braked(speed_m_s, tilt_rad).speeds_m_s[0] > column.touchdown_m_s;
             brakes(0.0).then(|| halved(0.0, LIMIT_RAD, &brakes))
         };
         let terminal_m_s = column.terminal_speed_m_s(airframe.open_fin_drag_area_m2());
@@ -271,7 +272,7 @@ impl EvenLanding {
         // The higher the ignition, the slower the fall into it, and the lower it might be.
         let height_m = halved(0.0, start_m, &|height_m| {
             let speed_m_s = speed_m_s(height_m);
-            braked(speed_m_s, tilt_rad(speed_m_s).unwrap_or_default()).fallen_m > height_m
+            braked(speed_m_s, tilt_rad(speed_m_s).unwrap_or_default()).fallen_m[0] > height_m
         });
         let speed_m_s = speed_m_s(height_m);
         Self { carried_s, speed_m_s, height_m, tilt_rad: tilt_rad(speed_m_s) }
@@ -355,14 +356,6 @@ impl Way {
     }
 }
 
-/// How a fall ends.
-#[derive(Clone, Copy)]
-struct Ended {
-    fallen_m: f64,
-    vertical_m_s: f64,
-    highest_m_s: f64,
-}
-
 /// The landings on one motor from now on, at any velocity.
 pub struct Landings(Falls<END_TIMES>);
 
@@ -395,7 +388,7 @@ struct Ahead<const N: usize> {
     drag_per_m: [[f64; N]; 2],
 }
 
-/// Falls of one way, each to its end.
+/// Falls of one way, each to its end: how far, the vertical velocity, up positive, and the highest so far.
 #[derive(Clone, Copy)]
 struct Falling<const N: usize> {
     fallen_m: [f64; N],
@@ -444,14 +437,14 @@ impl<const N: usize> Falls<N> {
     /// stays twice is halved (the Illinois rule; Dowell and Jarratt, BIT 11, 1971).
     #[inline(always)]
     fn sought_m(&self, vertical_m_s: f64) -> [[Option<f64>; N]; WAYS.len()] {
-        let missed_m_s = |ended: &Ended| ended.vertical_m_s - self.touchdown_m_s;
+        let missed_m_s = |fall: &Falling<N>, i: usize| fall.speeds_m_s[i] - self.touchdown_m_s;
         // All ways have the same two extremes.
         let extremes = self.along::<false, 2>([Way::Even; 2], vertical_m_s, [[0.0; N], [1.0; N]]);
         let mut heights_m = [[None; N]; WAYS.len()];
         let mut risen = [[false; N]; WAYS.len()];
-        let mut one: [[_; N]; WAYS.len()] = [from_fn(|i| (0.0, missed_m_s(&extremes[0][i]))); _];
+        let mut one: [[_; N]; WAYS.len()] = [from_fn(|i| (0.0, missed_m_s(&extremes[0], i))); _];
         // `other` is the newest point.
-        let mut other: [[_; N]; WAYS.len()] = [from_fn(|i| (1.0, missed_m_s(&extremes[1][i]))); _];
+        let mut other: [[_; N]; WAYS.len()] = [from_fn(|i| (1.0, missed_m_s(&extremes[1], i))); _];
         let mut sought: [[_; N]; WAYS.len()] = [from_fn(|i| one[0][i].1 * other[0][i].1 <= 0.0); _];
         for _ in 0..MOST_FALLS {
             if !sought.as_flattened().contains(&true) {
@@ -470,12 +463,12 @@ impl<const N: usize> Falls<N> {
                     if !sought[way][i] {
                         continue;
                     }
-                    let (ended, one, other) = (&ended[way][i], &mut one[way][i], &mut other[way][i]);
-                    let miss_m_s = missed_m_s(ended);
+                    let (ended, one, other) = (&ended[way], &mut one[way][i], &mut other[way][i]);
+                    let miss_m_s = missed_m_s(ended, i);
                     if miss_m_s.abs() < MET_M_S {
                         sought[way][i] = false;
-                        risen[way][i] = ended.highest_m_s > RISING_M_S;
-                        heights_m[way][i] = (!risen[way][i]).then_some(ended.fallen_m);
+                        risen[way][i] = ended.highest_m_s[i] > RISING_M_S;
+                        heights_m[way][i] = (!risen[way][i]).then_some(ended.fallen_m[i]);
                     } else if miss_m_s * other.1 < 0.0 {
                         *one = *other;
                     } else {
@@ -501,15 +494,15 @@ impl<const N: usize> Falls<N> {
                 ];
                 let held = self.along::<true, 3>([Way::HardFirst; 3], vertical_m_s, tried);
                 for i in (0..N).filter(|i| risen[*i]) {
-                    let mut rises = |held: &Ended| {
-                        let rises = held.highest_m_s > RISING_M_S;
-                        if missed_m_s(held).abs() < HELD_M_S && !rises {
-                            heights_m[HARD_FIRST][i] = Some(held.fallen_m);
+                    let mut rises = |held: &Falling<N>| {
+                        let rises = held.highest_m_s[i] > RISING_M_S;
+                        if missed_m_s(held, i).abs() < HELD_M_S && !rises {
+                            heights_m[HARD_FIRST][i] = Some(held.fallen_m[i]);
                         }
                         rises
                     };
-                    let next = if rises(&held[0][i]) { 1 } else { 2 };
-                    softly[i] = after(tried[next][i], rises(&held[next][i]), 0.5 * softer_by);
+                    let next = if rises(&held[0]) { 1 } else { 2 };
+                    softly[i] = after(tried[next][i], rises(&held[next]), 0.5 * softer_by);
                 }
                 softer_by *= 0.25;
             }
@@ -525,7 +518,7 @@ impl<const N: usize> Falls<N> {
         ways: [Way; W],
         vertical_m_s: f64,
         parameters: [[f64; N]; W],
-    ) -> [[Ended; N]; W] {
+    ) -> [Falling<N>; W] {
         let ways: [_; W] = from_fn(|way| {
             let (per_parameter, per_interval, at_first) = ways[way].softly();
             (parameters[way].map(|parameter| parameter * per_parameter + at_first), per_interval)
@@ -539,17 +532,11 @@ impl<const N: usize> Falls<N> {
         for (k, ahead) in self.ahead.iter().enumerate() {
             for (falling, (at_first, per_interval)) in falling.iter_mut().zip(&ways) {
                 let later = per_interval * k as f64;
-                let softly = at_first.map(|at_first| lower(higher(at_first + later, 0.0), 1.0));
+                let softly = at_first.map(|at_first| smaller(larger(at_first + later, 0.0), 1.0));
                 self.step::<HOLDS>(ahead, &softly, falling);
             }
         }
-        falling.map(|Falling { fallen_m, speeds_m_s, highest_m_s }| {
-            from_fn(|i| Ended {
-                fallen_m: fallen_m[i],
-                vertical_m_s: speeds_m_s[i],
-                highest_m_s: highest_m_s[i],
-            })
-        })
+        falling
     }
 
     /// One interval of the falls of one way, with these shares of soft braking: the midpoint rule. Every line is one operation on
@@ -573,25 +560,16 @@ impl<const N: usize> Falls<N> {
             next_m_s = from_fn(|i| {
                 let least_m_s = speeds_m_s[i] + step_s[i] * soft_m_s2[i];
                 let most_m_s = speeds_m_s[i] + step_s[i] * hard_m_s2[i];
-                let held_m_s = higher(lower(self.touchdown_m_s, most_m_s), least_m_s);
+                let held_m_s = larger(smaller(self.touchdown_m_s, most_m_s), least_m_s);
                 let next_m_s = if next_m_s[i] > self.touchdown_m_s { held_m_s } else { next_m_s[i] };
                 if speeds_m_s[i] >= self.touchdown_m_s - MET_M_S { held_m_s } else { next_m_s }
             });
             midway_m_s = from_fn(|i| 0.5 * (speeds_m_s[i] + next_m_s[i]));
         }
         falling.fallen_m = from_fn(|i| falling.fallen_m[i] - step_s[i] * midway_m_s[i]);
-        falling.highest_m_s = from_fn(|i| higher(falling.highest_m_s[i], next_m_s[i]));
+        falling.highest_m_s = from_fn(|i| larger(falling.highest_m_s[i], next_m_s[i]));
         falling.speeds_m_s = next_m_s;
     }
-}
-
-/// The larger and the smaller of two numbers, each in one instruction.
-fn higher(one: f64, other: f64) -> f64 {
-    if one > other { one } else { other }
-}
-
-fn lower(one: f64, other: f64) -> f64 {
-    if one < other { one } else { other }
 }
 
 /// The search of the heights in the widest vectors that the machine has; the bits are the same.

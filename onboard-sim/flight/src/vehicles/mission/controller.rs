@@ -166,8 +166,9 @@ impl Formulas<'_> {
         let scales = around(2.0, motor.burn_time_sigma);
         self.of_controller("ignition.burn_time_scales", &mut ignition.burn_time_scales, scales);
         let intervals = libm::ceil((carried_s + powered.latest_after_s) / powered.interval_s).min(60.0);
-        // A plan then takes 20 million instructions of a Cortex-M7 (onboard-sim/lab/cortex-m7/README.md): the last iteration, which is
-        // finished, five passes over every interval. Twice as many land no more: the plan comes later (`cargo bench --bench work`).
+        // A plan then takes at most 22 million instructions of a Cortex-M7 (onboard-sim/lab/cortex-m7/README.md): the last iteration,
+        // which is finished, is about five passes over every interval. With twice the passes no more flights land, because the plan comes
+        // later (`cargo bench --bench work`).
         let passes = (1_230.0 - 5.0 * intervals) as usize;
         self.of_controller("powered.max_passes", &mut powered.max_passes, Some(passes));
 

@@ -298,9 +298,6 @@ impl World {
     /// The body turns back when the motor begins to swing and when it stops: their common angular momentum is kept.
     fn turn_back(&mut self) {
         let [before_rad_s, now_rad_s] = self.gimbal_rates_rad_s;
-        if before_rad_s.map(f64::to_bits) == now_rad_s.map(f64::to_bits) {
-            return;
-        }
         let swinging_kg_m2 =
             self.airframe.swinging_kg_m2(&self.certified, self.motor_kg(), self.mass.cg_station_m);
         let share = swinging_kg_m2 / (self.mass.pitch_inertia_kg_m2 * self.truth.inertia_scale);
