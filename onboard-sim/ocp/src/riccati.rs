@@ -237,18 +237,6 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Sweep<M, NX, NU> {
             dx = from_fn(|i| moved[i] + residual[i]);
         }
     }
-
-    /// The optimality residuals of the inputs of interval `k` after the step: only rounding, unless the sweeps are
-    /// wrong.
-    #[cfg(test)]
-    pub(crate) fn input_residual(&self, iterate: &Iterate<M, NX, NU>, k: usize) -> [f64; NU] {
-        let interval = iterate.intervals.interval(k);
-        let (_, turned) = interval.curve(self.share, &self.states[k], &self.inputs[k]);
-        let (_, pulled) = interval.pull(&self.costates[k + 1]);
-        let (curvature, slope) = &self.input_terms[k];
-        let bent = curvature.times(&self.inputs[k]);
-        from_fn(|i| bent[i] + slope[i] + turned[i] + pulled[i])
-    }
 }
 
 /// The sum of the products, added up in pairs.
@@ -266,3 +254,6 @@ fn dot<const N: usize>(one: &[f64; N], other: &[f64; N]) -> f64 {
     }
     sum
 }
+
+#[cfg(test)]
+mod tests;

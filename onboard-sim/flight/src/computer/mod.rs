@@ -246,11 +246,6 @@ impl Computer {
         }
     }
 
-    #[cfg(test)]
-    pub(crate) fn into_table(self) -> PhaseTable {
-        self.table
-    }
-
     /// What it remembers of its crew: an ask that waits, the taps, who held.
     pub fn crew(&self) -> &CrewMemory {
         &self.crew
