@@ -51,7 +51,8 @@ fn generate_records(out_dir: &Path, package: &str) -> Result<()> {
     for judged in ["LandingVerdict", "Landing", "LimitResult"] {
         config.type_attribute(judged, "#[cfg_attr(feature = \"program\", derive(serde::Serialize))]");
     }
-    config.compile_fds(descriptors).with_context(|| file.clone())
+    // Each message says its name, which the log names its schema by.
+    config.enable_type_names().compile_fds(descriptors).with_context(|| file.clone())
 }
 
 /// What a vehicle says and hears of the standard's messages; beside them it knows all of ours. The code of all 254 messages would

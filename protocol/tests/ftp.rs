@@ -284,7 +284,7 @@ fn a_session_that_the_vehicle_has_closed_is_opened_again() {
 
 #[test]
 fn a_log_keeps_no_content_of_a_file_and_every_frame() {
-    let request = Packet { size: 239, ..Packet::request(1, 2, protocol::ftp::Opcode::ReadFile, 239, "") };
+    let request = Packet { size: 239, ..Packet::request(1, 2, protocol::ftp::Opcode::READ_FILE, 239, "") };
     let frame = Encoder::new(VEHICLE).encode(&request.ack(&[0xAB; 239]).message(GROUND));
     let mut framer = Framer::new();
     framer.push(&frame.for_log().unwrap());

@@ -118,24 +118,24 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Iterate<M, NX, NU> {
 
 // How a solve ended, and what it found.
 
-/// How a solve ended.
+/// How a solve ended, with its number on the wire (TD_SOLVER_STATUS).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub enum Status {
     /// Nothing was solved.
     #[default]
-    NotRun,
+    NotRun = 0,
     /// The optimality conditions hold to the tolerance.
-    Converged,
+    Converged = 1,
     /// The iteration cap ended the solve; the best iterate is returned.
-    IterationLimit,
+    IterationLimit = 2,
     /// What was allowed ([`Workspace::allow`]) ended the solve; the best iterate is returned.
-    WorkLimit,
+    WorkLimit = 6,
     /// No step improved the best iterate any more before the tolerance was reached.
-    Stalled,
+    Stalled = 3,
     /// The quadratic subproblem could not be solved; the best iterate is returned.
-    SubproblemFailed,
+    SubproblemFailed = 4,
     /// A number of the problem, the start or the path is not finite.
-    NotFinite,
+    NotFinite = 5,
 }
 
 impl Status {

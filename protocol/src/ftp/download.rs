@@ -171,7 +171,7 @@ impl Download {
         if self.ended().is_some() {
             return None;
         }
-        if packet.asked == Opcode::ReadFile {
+        if packet.asked == Opcode::READ_FILE {
             return self.take_piece(packet, now);
         }
         let expected = self.asked.as_ref().is_some_and(|asked| asked.packet.is_answered_by(packet));
@@ -237,10 +237,10 @@ impl Download {
         if self.asked.is_none() {
             let path = self.path.as_deref().unwrap_or_default();
             let (opcode, session, offset, path) = match self.phase {
-                Phase::Listing => (Opcode::ListDirectory, 0, self.listed.len() as u32, LOG_DIRECTORY),
-                Phase::Opening => (Opcode::OpenFileRo, 0, 0, path),
-                Phase::Summing => (Opcode::CalcFileCrc32, self.session, 0, path),
-                _ => (Opcode::TerminateSession, self.session, 0, ""),
+                Phase::Listing => (Opcode::LIST_DIRECTORY, 0, self.listed.len() as u32, LOG_DIRECTORY),
+                Phase::Opening => (Opcode::OPEN_FILE_RO, 0, 0, path),
+                Phase::Summing => (Opcode::CALC_FILE_CRC32, self.session, 0, path),
+                _ => (Opcode::TERMINATE_SESSION, self.session, 0, ""),
             };
             let packet = Packet::request(self.sequence, session, opcode, offset, path);
             self.sequence = self.sequence.wrapping_add(1);
@@ -274,7 +274,7 @@ impl Download {
             let size = (self.len - offset).min(DATA_LEN as u32);
             let is_asked = self.waiting.iter().any(|request| request.offset == offset);
             if !is_asked && !self.ahead.contains_key(&offset) {
-                let request = Packet::request(self.sequence, self.session, Opcode::ReadFile, offset, "");
+                let request = Packet::request(self.sequence, self.session, Opcode::READ_FILE, offset, "");
                 let request = Packet { size: size as u8, ..request };
                 self.sequence = self.sequence.wrapping_add(1);
                 self.waiting.push_back(request.clone());

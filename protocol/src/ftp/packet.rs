@@ -16,67 +16,30 @@ pub const PAYLOAD_LEN: usize = 254;
 const ADDRESS_LEN: usize = 3;
 const HEADER_LEN: usize = 12;
 
-/// What a packet asks for, or how it answers.
+/// What a packet asks for, or how it answers: a MAV_FTP_OPCODE. Any other number writes, or it is unknown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Opcode {
-    None,
-    TerminateSession,
-    ResetSessions,
-    ListDirectory,
-    OpenFileRo,
-    ReadFile,
-    CalcFileCrc32,
-    BurstReadFile,
-    Ack,
-    Nak,
-    /// Any other: it writes, or it is unknown.
-    Other(u8),
-}
+pub struct Opcode(pub u8);
 
 impl Opcode {
-    /// The opcodes that change a file or a directory: create, write, remove, make and remove a directory, open for
-    /// writing, truncate, rename.
-    const WRITING: [u8; 8] = [6, 7, 8, 9, 10, 11, 12, 13];
+    pub const NONE: Self = Self(0);
+    pub const TERMINATE_SESSION: Self = Self(1);
+    pub const RESET_SESSIONS: Self = Self(2);
+    pub const LIST_DIRECTORY: Self = Self(3);
+    pub const OPEN_FILE_RO: Self = Self(4);
+    pub const READ_FILE: Self = Self(5);
+    pub const CALC_FILE_CRC32: Self = Self(14);
+    pub const BURST_READ_FILE: Self = Self(15);
+    pub const ACK: Self = Self(128);
+    pub const NAK: Self = Self(129);
 
-    pub fn from_number(number: u8) -> Self {
-        match number {
-            0 => Self::None,
-            1 => Self::TerminateSession,
-            2 => Self::ResetSessions,
-            3 => Self::ListDirectory,
-            4 => Self::OpenFileRo,
-            5 => Self::ReadFile,
-            14 => Self::CalcFileCrc32,
-            15 => Self::BurstReadFile,
-            128 => Self::Ack,
-            129 => Self::Nak,
-            other => Self::Other(other),
-        }
-    }
-
-    pub fn number(self) -> u8 {
-        match self {
-            Self::None => 0,
-            Self::TerminateSession => 1,
-            Self::ResetSessions => 2,
-            Self::ListDirectory => 3,
-            Self::OpenFileRo => 4,
-            Self::ReadFile => 5,
-            Self::CalcFileCrc32 => 14,
-            Self::BurstReadFile => 15,
-            Self::Ack => 128,
-            Self::Nak => 129,
-            Self::Other(number) => number,
-        }
-    }
-
-    /// Whether it changes a file or a directory.
+    /// Whether it changes a file or a directory: create, write, remove, make and remove a directory, open for writing, truncate,
+    /// rename.
     pub fn writes(self) -> bool {
-        Self::WRITING.contains(&self.number())
+        (6..=13).contains(&self.0)
     }
 
     fn is_answer(self) -> bool {
-        self.number() >= 128
+        self.0 >= 128
     }
 }
 
@@ -162,7 +125,7 @@ impl Packet {
             session,
             opcode,
             size: data.len() as u8,
-            asked: Opcode::None,
+            asked: Opcode::NONE,
             burst_complete: false,
             offset,
             data,
@@ -176,7 +139,7 @@ impl Packet {
         Self {
             sequence: self.sequence.wrapping_add(1),
             session: self.session,
-            opcode: Opcode::Ack,
+            opcode: Opcode::ACK,
             size: data.len() as u8,
             asked: self.opcode,
             burst_complete: false,
@@ -188,12 +151,12 @@ impl Packet {
     /// The refusal of this request.
     #[must_use]
     pub fn nak(&self, why: Refusal) -> Self {
-        Self { opcode: Opcode::Nak, ..self.ack(&why.bytes()) }
+        Self { opcode: Opcode::NAK, ..self.ack(&why.bytes()) }
     }
 
     /// Why a request was refused; `None` if this is no refusal.
     pub fn refusal(&self) -> Option<Refusal> {
-        (self.opcode == Opcode::Nak).then(|| Refusal::from_bytes(&self.data))
+        (self.opcode == Opcode::NAK).then(|| Refusal::from_bytes(&self.data))
     }
 
     /// Whether that packet is the answer to this request.
@@ -214,17 +177,17 @@ impl Packet {
 
     fn from_bytes(bytes: &[u8]) -> Option<Self> {
         let (header, rest) = bytes.split_at_checked(HEADER_LEN)?;
-        let opcode = Opcode::from_number(header[3]);
+        let opcode = Opcode(header[3]);
         let size = header[4];
         // What a request reads is in the answer, not in the request.
-        let has_data = !matches!(opcode, Opcode::ReadFile | Opcode::BurstReadFile);
+        let has_data = !matches!(opcode, Opcode::READ_FILE | Opcode::BURST_READ_FILE);
         let len = if has_data { usize::from(size).min(rest.len()) } else { 0 };
         Some(Self {
             sequence: u16::from_le_bytes([header[0], header[1]]),
             session: header[2],
             opcode,
             size,
-            asked: Opcode::from_number(header[5]),
+            asked: Opcode(header[5]),
             burst_complete: header[6] != 0,
             offset: u32::from_le_bytes([header[8], header[9], header[10], header[11]]),
             data: rest[..len].to_vec(),
@@ -236,9 +199,9 @@ impl Packet {
         let mut payload = [0; PAYLOAD_LEN - ADDRESS_LEN];
         payload[..2].copy_from_slice(&self.sequence.to_le_bytes());
         payload[2] = self.session;
-        payload[3] = self.opcode.number();
+        payload[3] = self.opcode.0;
         payload[4] = self.size;
-        payload[5] = self.asked.number();
+        payload[5] = self.asked.0;
         payload[6] = u8::from(self.burst_complete);
         payload[8..HEADER_LEN].copy_from_slice(&self.offset.to_le_bytes());
         let data = &self.data[..self.data.len().min(DATA_LEN)];
@@ -270,10 +233,10 @@ fn packet_in(frame: &Frame) -> Option<(Address, Packet)> {
 /// Whether a frame carries a piece of a file, and where in its payload that piece begins. A log does not keep it:
 /// a log that is downloaded would contain itself.
 pub(crate) fn piece_begins_at(message_id: u32, payload: &[u8]) -> Option<usize> {
-    let opcode = |place: usize| payload.get(ADDRESS_LEN + place).copied().map(Opcode::from_number);
+    let opcode = |place: usize| payload.get(ADDRESS_LEN + place).copied().map(Opcode);
     let is_piece = message_id == FILE_TRANSFER_PROTOCOL_ID
-        && opcode(3) == Some(Opcode::Ack)
-        && matches!(opcode(5), Some(Opcode::ReadFile | Opcode::BurstReadFile));
+        && opcode(3) == Some(Opcode::ACK)
+        && matches!(opcode(5), Some(Opcode::READ_FILE | Opcode::BURST_READ_FILE));
     is_piece.then_some(ADDRESS_LEN + HEADER_LEN)
 }
 
@@ -304,20 +267,11 @@ mod tests {
 
     #[test]
     fn answers_are_not_answered() {
-        for opcode in [Opcode::Ack, Opcode::Nak] {
+        for opcode in [Opcode::ACK, Opcode::NAK] {
             let packet = Packet::request(1, 0, opcode, 0, "");
             let frame = Encoder::new(GROUND).encode(&packet.message(VEHICLE));
             assert_eq!(FileRequest::from_frame(&frame), None);
             assert!(Packet::answer_in(&frame).is_some());
-        }
-    }
-
-    #[test]
-    fn every_opcode_that_writes_is_known_as_such() {
-        for number in 0..=255 {
-            let opcode = Opcode::from_number(number);
-            assert_eq!(opcode.number(), number);
-            assert_eq!(opcode.writes(), (6..=13).contains(&number), "{number}");
         }
     }
 
@@ -328,7 +282,7 @@ mod tests {
             data in proptest::collection::vec(any::<u8>(), 0..=DATA_LEN),
             burst_complete in any::<bool>(),
         ) {
-            let asked = Packet::request(sequence, session, Opcode::BurstReadFile, offset, "");
+            let asked = Packet::request(sequence, session, Opcode::BURST_READ_FILE, offset, "");
             let packet = Packet { burst_complete, ..asked.ack(&data) };
             let frame = Encoder::new(VEHICLE).encode(&packet.message(GROUND));
             prop_assert_eq!(Packet::answer_in(&frame), Some((GROUND, packet)));

@@ -3,8 +3,6 @@
 use std::collections::BTreeMap;
 use std::io::{Seek, Write};
 
-use foxglove::Encode as _;
-use foxglove::messages::{FrameTransform, Log};
 use mcap::records::MessageHeader;
 
 use super::build::build_info;
@@ -17,21 +15,6 @@ use super::record::{
 };
 use super::{DESCRIPTORS_COMPUTER_V1, DESCRIPTORS_FLIGHT_V1, DESCRIPTORS_V1};
 use crate::dialect::DIALECT_XML;
-
-/// The messages of `touchdown/log/v1.proto`.
-const LOG: Package = Package { name: "touchdown.log.v1", descriptors: DESCRIPTORS_V1 };
-/// The messages of `touchdown/flight/v1.proto`.
-const FLIGHT: Package = Package { name: "touchdown.flight.v1", descriptors: DESCRIPTORS_FLIGHT_V1 };
-
-/// The messages of `touchdown/computer/v1.proto`.
-const COMPUTER: Package = Package { name: "touchdown.computer.v1", descriptors: DESCRIPTORS_COMPUTER_V1 };
-
-/// A protobuf package and the descriptors of its messages.
-#[derive(Clone, Copy)]
-struct Package {
-    name: &'static str,
-    descriptors: &'static [u8],
-}
 
 /// A killed process loses its open chunk, so chunks are small.
 const CHUNK_BYTES: u64 = 64 * 1024;
@@ -127,51 +110,27 @@ impl<W: Write + Seek> LogWriter<W> {
     pub fn write(&mut self, record: &Record, time_ns: u64) -> Result<(), LogWriteError> {
         let log_time = self.start_unix_ns.saturating_add(time_ns);
         match record {
-            Record::LandingVerdict(verdict) => {
-                self.write_message(TOPIC_VERDICT, (LOG, "LandingVerdict"), verdict.as_ref(), log_time)
+            Record::LandingVerdict(verdict) => self.write_message(TOPIC_VERDICT, verdict.as_ref(), log_time),
+            Record::Telemetry(telemetry) => self.write_message(TOPIC_TELEMETRY, telemetry.as_ref(), log_time),
+            Record::OperatorAction(action) => self.write_message(TOPIC_OPERATOR, action, log_time),
+            Record::BookEntry(entry) => self.write_message(TOPIC_BOOK, entry, log_time),
+            Record::BookHead(head) => self.write_message(TOPIC_BOOK_HEAD, head, log_time),
+            Record::ComputerStart(start) => {
+                self.write_message(TOPIC_COMPUTER_START, start.as_ref(), log_time)
             }
-            Record::Telemetry(telemetry) => {
-                self.write_message(TOPIC_TELEMETRY, (LOG, "Telemetry"), telemetry.as_ref(), log_time)
+            Record::ComputerFrame(frame) => {
+                self.write_message(TOPIC_COMPUTER_FRAME, frame.as_ref(), log_time)
             }
-            Record::OperatorAction(action) => {
-                self.write_message(TOPIC_OPERATOR, (LOG, "OperatorAction"), action, log_time)
-            }
-            Record::BookEntry(entry) => self.write_message(TOPIC_BOOK, (LOG, "BookEntry"), entry, log_time),
-            Record::BookHead(head) => self.write_message(TOPIC_BOOK_HEAD, (LOG, "BookHead"), head, log_time),
-            Record::ComputerStart(start) => self.write_message(
-                TOPIC_COMPUTER_START,
-                (COMPUTER, "ComputerStart"),
-                start.as_ref(),
-                log_time,
-            ),
-            Record::ComputerFrame(frame) => self.write_message(
-                TOPIC_COMPUTER_FRAME,
-                (COMPUTER, "ComputerFrame"),
-                frame.as_ref(),
-                log_time,
-            ),
-            Record::PilotTiming(timing) => {
-                self.write_message(TOPIC_PILOT_TIMING, (FLIGHT, "PilotTiming"), timing, log_time)
-            }
-            Record::Estimate(estimate) => {
-                self.write_message(TOPIC_ESTIMATE, (FLIGHT, "Estimate"), estimate.as_ref(), log_time)
-            }
+            Record::PilotTiming(timing) => self.write_message(TOPIC_PILOT_TIMING, timing, log_time),
+            Record::Estimate(estimate) => self.write_message(TOPIC_ESTIMATE, estimate.as_ref(), log_time),
             Record::TruthSample(truth) => {
-                self.write_message(TOPIC_TRUTH_SAMPLE, (FLIGHT, "TruthSample"), truth.as_ref(), log_time)?;
-                self.write_foxglove(
-                    TOPIC_TRANSFORM,
-                    &transform(truth, log_time),
-                    FrameTransform::get_schema().as_ref(),
-                    log_time,
-                )
+                self.write_message(TOPIC_TRUTH_SAMPLE, truth.as_ref(), log_time)?;
+                self.write_foxglove(TOPIC_TRANSFORM, &transform(truth, log_time), log_time)
             }
             Record::RawFrame(frame) => self.write_raw(frame, log_time),
-            Record::Event(event) => self.write_foxglove(
-                TOPIC_EVENTS,
-                &log_message(event, log_time),
-                Log::get_schema().as_ref(),
-                log_time,
-            ),
+            Record::Event(event) => {
+                self.write_foxglove(TOPIC_EVENTS, &log_message(event, log_time), log_time)
+            }
         }
     }
 
@@ -201,15 +160,18 @@ impl<W: Write + Seek> LogWriter<W> {
         Ok(self.writer.into_inner())
     }
 
-    fn write_message<M: prost::Message>(
+    fn write_message<M: prost::Message + prost::Name>(
         &mut self,
         topic: &'static str,
-        (package, message_name): (Package, &str),
         message: &M,
         log_time: u64,
     ) -> Result<(), LogWriteError> {
-        let name = format!("{}.{message_name}", package.name);
-        self.write_protobuf(topic, Some((&name, package.descriptors)), log_time, |buffer| {
+        let descriptors = match M::PACKAGE {
+            "touchdown.log.v1" => DESCRIPTORS_V1,
+            "touchdown.flight.v1" => DESCRIPTORS_FLIGHT_V1,
+            _ => DESCRIPTORS_COMPUTER_V1,
+        };
+        self.write_protobuf(topic, Some((&M::full_name(), descriptors)), log_time, |buffer| {
             buffer.reserve(message.encoded_len());
             message.encode_raw(buffer);
             Ok(())
@@ -220,10 +182,10 @@ impl<W: Write + Seek> LogWriter<W> {
         &mut self,
         topic: &'static str,
         message: &M,
-        schema: Option<&foxglove::Schema>,
         log_time: u64,
     ) -> Result<(), LogWriteError> {
-        let schema = schema.map(|schema| (schema.name.as_str(), schema.data.as_ref()));
+        let schema = M::get_schema();
+        let schema = schema.as_ref().map(|schema| (schema.name.as_str(), schema.data.as_ref()));
         self.write_protobuf(topic, schema, log_time, |buffer| {
             let encoded = message.encode(buffer);
             encoded.map_err(|error| LogWriteError::Encode { topic, reason: error.to_string() })

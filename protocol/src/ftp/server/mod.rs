@@ -153,15 +153,15 @@ impl Server {
     ) -> Taken {
         let FileRequest { source: client, packet, .. } = request;
         self.sessions.retain(|session| now.saturating_sub(session.used_at) < IDLE);
-        let of_file = matches!(packet.opcode, Opcode::ReadFile | Opcode::BurstReadFile)
+        let of_file = matches!(packet.opcode, Opcode::READ_FILE | Opcode::BURST_READ_FILE)
             || (!packet.path().is_empty() && place_of(packet.path(), files).is_some())
-            || (packet.opcode == Opcode::ListDirectory
+            || (packet.opcode == Opcode::LIST_DIRECTORY
                 && matches!(parts(packet.path())[..], [directory] if names_log(directory)));
         if !open && of_file {
             self.answer(link, *client, packet.nak(Refusal::Busy));
             return Taken::NotNow;
         }
-        if matches!(packet.opcode, Opcode::ReadFile | Opcode::BurstReadFile) {
+        if matches!(packet.opcode, Opcode::READ_FILE | Opcode::BURST_READ_FILE) {
             let len = self.session_of(*client, packet.session).map(|session| {
                 (session.link, session.used_at) = (link, now);
                 session.len
@@ -170,7 +170,7 @@ impl Server {
                 None => self.answer(link, *client, packet.nak(Refusal::InvalidSession)),
                 Some(len) if packet.offset >= len => {
                     if let Some(session) = self.session_of(*client, packet.session)
-                        && packet.opcode == Opcode::BurstReadFile
+                        && packet.opcode == Opcode::BURST_READ_FILE
                     {
                         session.burst = None;
                     }
@@ -193,8 +193,8 @@ impl Server {
             return Taken::Answered;
         }
         let answer = match packet.opcode {
-            Opcode::None => packet.ack(&[]),
-            Opcode::TerminateSession => {
+            Opcode::NONE => packet.ack(&[]),
+            Opcode::TERMINATE_SESSION => {
                 let before = self.sessions.len();
                 self.sessions.retain(|session| !session.is(*client, packet.session));
                 if self.sessions.len() < before {
@@ -203,16 +203,16 @@ impl Server {
                     packet.nak(Refusal::InvalidSession)
                 }
             }
-            Opcode::ResetSessions => {
+            Opcode::RESET_SESSIONS => {
                 self.sessions.retain(|session| session.client != *client);
                 packet.ack(&[])
             }
-            Opcode::ListDirectory => list(packet, files),
-            Opcode::OpenFileRo => match place_of(packet.path(), files) {
+            Opcode::LIST_DIRECTORY => list(packet, files),
+            Opcode::OPEN_FILE_RO => match place_of(packet.path(), files) {
                 Some(place) => self.open(packet, *client, link, (place, files.entries()[place].len), now),
                 None => packet.nak(Refusal::FileNotFound),
             },
-            Opcode::CalcFileCrc32 => match place_of(packet.path(), files) {
+            Opcode::CALC_FILE_CRC32 => match place_of(packet.path(), files) {
                 Some(place) => match self.summed {
                     Some((summed, crc)) if summed == place => packet.ack(&crc.to_le_bytes()),
                     _ => {
@@ -319,11 +319,11 @@ impl Server {
     /// Whether an answer that is remembered does not hold any more: its session is closed, or there are files now.
     fn is_void(&self, client: Address, answer: &Packet) -> bool {
         match answer.asked {
-            Opcode::OpenFileRo => {
-                answer.opcode == Opcode::Nak
+            Opcode::OPEN_FILE_RO => {
+                answer.opcode == Opcode::NAK
                     || !self.sessions.iter().any(|session| session.is(client, answer.session))
             }
-            Opcode::ListDirectory => true,
+            Opcode::LIST_DIRECTORY => true,
             _ => false,
         }
     }
@@ -470,7 +470,7 @@ impl Session {
 
     /// Takes a request to read inside the file.
     fn ask(&mut self, request: &Packet) {
-        if request.opcode == Opcode::BurstReadFile {
+        if request.opcode == Opcode::BURST_READ_FILE {
             // A request that comes again does not begin again what is under way, and one for pieces farther ahead in
             // it prolongs it. So a client need not wait for the end of a burst, nor for its last packet if that is lost.
             if let Some(burst) = &mut self.burst

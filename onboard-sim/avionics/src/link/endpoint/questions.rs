@@ -100,48 +100,42 @@ pub(super) struct ListQuestion {
 impl ListQuestion {
     /// The question in a frame; `None` for any other message.
     pub(super) fn from_frame(frame: &Frame) -> Option<Self> {
-        let bytes = frame.padded_payload();
+        let (bytes, asker) = (frame.padded_payload(), frame.source());
         let integer = |at: usize| u16::from_le_bytes([bytes[at], bytes[at + 1]]);
-        let address = |at: usize| Address { system_id: bytes[at], component_id: bytes[at + 1] };
         let id = |at: usize| bytes[at..at + 16].first_chunk().copied().unwrap_or_default();
-        let of = |target_at: usize, type_at: usize| List {
-            target: address(target_at),
-            asker: frame.source(),
-            mission_type: MavMissionType::from_u8(bytes[type_at])
-                .filter(|kind| *kind != MavMissionType::MAV_MISSION_TYPE_ALL),
-        };
-        let answer = |target_at: usize, answer| Self { target: address(target_at), answer };
-        Some(match frame.message_id() {
-            MISSION_REQUEST_LIST => of(0, 2).empty(),
+        let mission_ack = |kind_at: usize, result| acknowledged(asker, bytes[kind_at], result);
+        let (target_at, answer) = match frame.message_id() {
+            MISSION_REQUEST_LIST => (0, empty_list(asker, bytes[2])),
             // An upload of zero items clears the list, which is always clear.
-            MISSION_COUNT if integer(0) == 0 => of(2, 4).done(),
-            MISSION_COUNT => of(2, 4).unsupported(),
-            MISSION_CLEAR_ALL => of(0, 2).done(),
+            MISSION_COUNT if integer(0) == 0 => (2, mission_ack(4, MavMissionResult::MAV_MISSION_ACCEPTED)),
+            MISSION_COUNT => (2, mission_ack(4, MavMissionResult::MAV_MISSION_UNSUPPORTED)),
+            MISSION_CLEAR_ALL => (0, mission_ack(2, MavMissionResult::MAV_MISSION_ACCEPTED)),
             MISSION_REQUEST | MISSION_REQUEST_INT => {
-                of(2, 4).acknowledge(MavMissionResult::MAV_MISSION_INVALID_SEQUENCE)
+                (2, mission_ack(4, MavMissionResult::MAV_MISSION_INVALID_SEQUENCE))
             }
-            MISSION_WRITE_PARTIAL_LIST => of(4, 6).unsupported(),
-            MISSION_ITEM | MISSION_ITEM_INT => of(32, 37).unsupported(),
-            LOG_REQUEST_LIST => answer(4, MavMessage::LOG_ENTRY(LOG_ENTRY_DATA::default())),
+            MISSION_WRITE_PARTIAL_LIST => (4, mission_ack(6, MavMissionResult::MAV_MISSION_UNSUPPORTED)),
+            MISSION_ITEM | MISSION_ITEM_INT => {
+                (32, mission_ack(37, MavMissionResult::MAV_MISSION_UNSUPPORTED))
+            }
+            LOG_REQUEST_LIST => (4, MavMessage::LOG_ENTRY(LOG_ENTRY_DATA::default())),
             LOG_REQUEST_DATA => {
                 let ofs = u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
-                let nothing = LOG_DATA_DATA { ofs, id: integer(8), count: 0, data: [0; 90] };
-                answer(10, MavMessage::LOG_DATA(nothing))
+                (10, MavMessage::LOG_DATA(LOG_DATA_DATA { ofs, id: integer(8), count: 0, data: [0; 90] }))
             }
-            PARAM_EXT_REQUEST_READ => {
-                answer(2, no_parameter(id(4), integer(0).cast_signed(), frame.source()))
-            }
-            PARAM_EXT_REQUEST_LIST => answer(0, no_parameter([0; 16], -1, frame.source())),
+            PARAM_EXT_REQUEST_READ => (2, no_parameter(id(4), integer(0).cast_signed(), asker)),
+            PARAM_EXT_REQUEST_LIST => (0, no_parameter([0; 16], -1, asker)),
             PARAM_EXT_SET => {
                 let failed = PARAM_EXT_ACK_DATA {
                     param_id: CharArray::new(id(2)),
                     param_result: ParamAck::PARAM_ACK_FAILED,
                     ..PARAM_EXT_ACK_DATA::default()
                 };
-                answer(0, MavMessage::PARAM_EXT_ACK(failed))
+                (0, MavMessage::PARAM_EXT_ACK(failed))
             }
             _ => return None,
-        })
+        };
+        let target = Address { system_id: bytes[target_at], component_id: bytes[target_at + 1] };
+        Some(Self { target, answer })
     }
 }
 
@@ -171,45 +165,31 @@ const MISSION_ITEM_INT: u32 = 73;
 const LOG_REQUEST_LIST: u32 = 117;
 const LOG_REQUEST_DATA: u32 = 119;
 
-struct List {
-    target: Address,
-    asker: Address,
-    /// `None` for an unknown number.
-    mission_type: Option<MavMissionType>,
-}
-
-impl List {
-    fn empty(self) -> ListQuestion {
-        let Some(mission_type) = self.mission_type else { return self.unsupported() };
-        let answer = MISSION_COUNT_DATA {
+/// The list of this kind of mission has no item.
+fn empty_list(asker: Address, kind: u8) -> MavMessage {
+    match MavMissionType::from_u8(kind) {
+        None | Some(MavMissionType::MAV_MISSION_TYPE_ALL) => {
+            acknowledged(asker, kind, MavMissionResult::MAV_MISSION_UNSUPPORTED)
+        }
+        Some(mission_type) => MavMessage::MISSION_COUNT(MISSION_COUNT_DATA {
             count: 0,
-            target_system: self.asker.system_id,
-            target_component: self.asker.component_id,
+            target_system: asker.system_id,
+            target_component: asker.component_id,
             mission_type,
             ..MISSION_COUNT_DATA::default()
-        };
-        ListQuestion { target: self.target, answer: MavMessage::MISSION_COUNT(answer) }
+        }),
     }
+}
 
-    fn done(self) -> ListQuestion {
-        self.acknowledge(MavMissionResult::MAV_MISSION_ACCEPTED)
-    }
-
-    fn unsupported(self) -> ListQuestion {
-        self.acknowledge(MavMissionResult::MAV_MISSION_UNSUPPORTED)
-    }
-
-    fn acknowledge(self, result: MavMissionResult) -> ListQuestion {
-        let answer = MISSION_ACK_DATA {
-            target_system: self.asker.system_id,
-            target_component: self.asker.component_id,
-            mavtype: result,
-            // An unknown kind is answered with "all".
-            mission_type: self.mission_type.unwrap_or(MavMissionType::MAV_MISSION_TYPE_ALL),
-            ..MISSION_ACK_DATA::default()
-        };
-        ListQuestion { target: self.target, answer: MavMessage::MISSION_ACK(answer) }
-    }
+fn acknowledged(asker: Address, kind: u8, result: MavMissionResult) -> MavMessage {
+    MavMessage::MISSION_ACK(MISSION_ACK_DATA {
+        target_system: asker.system_id,
+        target_component: asker.component_id,
+        mavtype: result,
+        // An unknown kind is answered with "all".
+        mission_type: MavMissionType::from_u8(kind).unwrap_or(MavMissionType::MAV_MISSION_TYPE_ALL),
+        ..MISSION_ACK_DATA::default()
+    })
 }
 
 // Gives out the vehicle's log (MAVLink FTP), while nobody can be harmed by a thinner telemetry: on the ground, disarmed.
@@ -266,7 +246,7 @@ impl VehicleEndpoint {
         vehicle: &VehicleState<'_>,
     ) {
         let forbidden = why_forbidden(by, vehicle);
-        if forbidden.is_none() && request.packet.opcode == Opcode::OpenFileRo {
+        if forbidden.is_none() && request.packet.opcode == Opcode::OPEN_FILE_RO {
             self.separate(link);
         }
         let FileService { server, files } = &mut self.files;

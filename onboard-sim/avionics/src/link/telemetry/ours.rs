@@ -15,7 +15,7 @@ use protocol::dialect::{
     MavMessage, TD_CONTROLLER_DATA, TD_CREW_DATA, TD_FINDING_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA,
     TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_MISSION_DATA, TD_OPERATOR_DATA, TD_PAD_CHECK_DATA,
     TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, TdAbortEffect, TdCheck,
-    TdInterlock, TdLanding, TdLimit, TdPadCheckItem, TdSolverStatus, TdVehicleFlag,
+    TdInterlock, TdLanding, TdLimit, TdPadCheckItem, TdVehicleFlag,
 };
 
 use super::{boot_ms, centidegrees, centimetres, characters};
@@ -116,21 +116,8 @@ pub(super) fn controller(state: &VehicleState<'_>, boot_number: u32) -> Option<M
         deadline_margin_us: microseconds(PLAN_WITHIN_S - solve_time_s) as i32,
         iterations: u16::try_from(report.iterations).unwrap_or(u16::MAX),
         level: numbered(level.index()),
-        solver_status: td_status(report.status),
+        solver_status: numbered(report.status as u8),
     }))
-}
-
-fn td_status(status: ocp::Status) -> TdSolverStatus {
-    use ocp::Status as S;
-    match status {
-        S::NotRun => TdSolverStatus::TD_SOLVER_STATUS_NOT_RUN,
-        S::Converged => TdSolverStatus::TD_SOLVER_STATUS_CONVERGED,
-        S::IterationLimit => TdSolverStatus::TD_SOLVER_STATUS_ITERATION_LIMIT,
-        S::Stalled => TdSolverStatus::TD_SOLVER_STATUS_STALLED,
-        S::SubproblemFailed => TdSolverStatus::TD_SOLVER_STATUS_SUBPROBLEM_FAILED,
-        S::NotFinite => TdSolverStatus::TD_SOLVER_STATUS_BAD_INPUT,
-        S::WorkLimit => TdSolverStatus::TD_SOLVER_STATUS_WORK_LIMIT,
-    }
 }
 
 pub(super) fn touchdown_prediction(state: &VehicleState<'_>, boot_number: u32) -> Option<MavMessage> {

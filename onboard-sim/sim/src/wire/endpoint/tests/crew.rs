@@ -557,8 +557,8 @@ fn the_log_is_for_operators() {
         let answer = launch.sent.iter().find_map(Packet::answer_in).map(|(_, answer)| answer);
         (answer, texts(&launch.sent).join("; "))
     };
-    let open = Packet::request(1, 0, Opcode::OpenFileRo, 0, "/log/flight.mcap");
-    let read = Packet { size: 239, ..Packet::request(2, 0, Opcode::ReadFile, 0, "") };
+    let open = Packet::request(1, 0, Opcode::OPEN_FILE_RO, 0, "/log/flight.mcap");
+    let read = Packet { size: 239, ..Packet::request(2, 0, Opcode::READ_FILE, 0, "") };
     assert_eq!(fetches(&mut launch, FLIGHT, &open).0.unwrap().number(), Some(1000));
     let (refused, words) = fetches(&mut launch, OBSERVER, &open);
     assert_eq!(refused.unwrap().refusal(), Some(Refusal::Busy));

@@ -327,7 +327,7 @@ fn a_log_fills_the_link_within_its_budget_and_the_vehicle_is_still_heard() {
 fn a_log_is_refused_while_armed_and_in_flight_with_a_reason() {
     let mut wire = Wire::new();
     wire.endpoint.offer(Box::new(log(1000)));
-    assert_eq!(wire.asked_file(Opcode::OpenFileRo, "/log/flight.mcap").0, None);
+    assert_eq!(wire.asked_file(Opcode::OPEN_FILE_RO, "/log/flight.mcap").0, None);
     let mut download = Download::new(None, 0);
     wire.endpoint.offer(Box::new(log(100_000)));
     wire.fetch(&mut download, 10.0);
@@ -338,9 +338,9 @@ fn a_log_is_refused_while_armed_and_in_flight_with_a_reason() {
     let words = texts(&sent.into_iter().map(|(_, frame)| frame).collect::<Vec<_>>()).join("; ");
     assert!(words.contains("log refused: found PAD_ARMED, armed, required disarmed"), "{words}");
     for (opcode, path) in [
-        (Opcode::OpenFileRo, "/log/flight.mcap"),
-        (Opcode::CalcFileCrc32, "/log/flight.mcap"),
-        (Opcode::ListDirectory, "/log"),
+        (Opcode::OPEN_FILE_RO, "/log/flight.mcap"),
+        (Opcode::CALC_FILE_CRC32, "/log/flight.mcap"),
+        (Opcode::LIST_DIRECTORY, "/log"),
     ] {
         assert_eq!(wire.asked_file(opcode, path).0, Some(Refusal::Busy));
     }
@@ -353,11 +353,11 @@ fn a_log_is_refused_while_armed_and_in_flight_with_a_reason() {
 fn a_client_that_looks_for_parameters_in_files_is_answered_at_once_also_in_flight() {
     let mut wire = Wire::new();
     for _ in 0..2 {
-        assert_eq!(wire.asked_file(Opcode::OpenFileRo, "@PARAM/param.pck").0, Some(Refusal::FileNotFound));
-        assert_eq!(wire.asked_file(Opcode::Other(6), "/log/x").0, Some(Refusal::FileProtected));
+        assert_eq!(wire.asked_file(Opcode::OPEN_FILE_RO, "@PARAM/param.pck").0, Some(Refusal::FileNotFound));
+        assert_eq!(wire.asked_file(Opcode(6), "/log/x").0, Some(Refusal::FileProtected));
         wire.ask(400, 1.0, 0.0);
     }
-    assert_eq!(wire.asked_file(Opcode::ListDirectory, "/").1, "");
+    assert_eq!(wire.asked_file(Opcode::LIST_DIRECTORY, "/").1, "");
 }
 
 #[test]
@@ -368,9 +368,9 @@ fn a_link_that_reads_does_not_thin_the_telemetry_of_another() {
     };
     wire.endpoint.offer(Box::new(log(50_000)));
     wire.run(1.0);
-    wire.ask_file(&Packet::request(1, 0, Opcode::OpenFileRo, 0, "/log/flight.mcap"));
+    wire.ask_file(&Packet::request(1, 0, Opcode::OPEN_FILE_RO, 0, "/log/flight.mcap"));
     wire.run(0.5);
-    wire.ask_file(&Packet { size: 239, ..Packet::request(2, 0, Opcode::BurstReadFile, 0, "") });
+    wire.ask_file(&Packet { size: 239, ..Packet::request(2, 0, Opcode::BURST_READ_FILE, 0, "") });
     let mut carried = [[0; 2]; 2];
     for _ in 0..1000 {
         let (_, leaving) = frame(&mut wire.vehicle, &mut wire.endpoint, &[]);
