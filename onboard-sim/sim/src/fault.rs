@@ -59,61 +59,57 @@ pub struct FaultError {
     problem: String,
 }
 
-/// Reads a value, or gives the default if there is none.
-type Build = fn(Option<f64>) -> Option<Breakage>;
+/// What a fault takes.
+enum Takes {
+    Nothing(Breakage),
+    /// A value, with its meaning; `None` of one that is not accepted.
+    Value(&'static str, fn(f64) -> Option<Breakage>),
+}
 
-/// For each fault: its name, the meaning of its value (empty if it takes none), and its constructor.
-const NAMES: &[(&str, &str, Build)] = &[
-    ("link-loss", "", |value| value.is_none().then_some(Breakage::LinkLoss)),
-    ("link-delay", "s, 0 to 60", |value| {
-        value.filter(|delay_s| (0.0..=60.0).contains(delay_s)).map(Breakage::LinkDelay)
-    }),
-    ("fin-stuck", "0 to 3", |value| {
-        let fin =
-            value.filter(|fin| (0.0..=3.0).contains(fin) && libm::trunc(*fin).to_bits() == fin.to_bits())?;
-        Some(Breakage::Vehicle(Fault::FinStuck { fin: fin as usize }))
-    }),
-    ("reversed", "1 or 2, the gimbal's axes, 3 to 6, the fins", |value| {
-        let surface = value.and_then(surface)?;
-        Some(Breakage::Vehicle(Fault::Reversed { surface }))
-    }),
-    ("swapped", "two of these digits, as 36", |value| {
-        let surfaces = [surface(libm::trunc(value? / 10.0))?, surface(value? % 10.0)?];
-        Some(Breakage::Vehicle(Fault::Swapped { surfaces }))
-    }),
-    ("gimbal-stuck", "", |value| value.is_none().then_some(Breakage::Vehicle(Fault::GimbalStuck))),
-    ("gimbal-jams", "deg, -90 to 90", |value| {
-        let deg = value.filter(|deg| (-90.0..=90.0).contains(deg))?;
-        Some(Breakage::Vehicle(Fault::GimbalJams { deg }))
-    }),
-    ("gimbal-slow", "rate over nominal, 0 to 1", |value| {
-        let scale = value.filter(|scale| (0.0..=1.0).contains(scale))?;
-        Some(Breakage::Vehicle(Fault::GimbalSlow { scale }))
-    }),
-    ("no-light", "", |value| value.is_none().then_some(Breakage::Vehicle(Fault::NoLight))),
-    ("late-light", "s", |value| {
-        let delay_s = value.filter(|delay_s| *delay_s >= 0.0)?;
-        Some(Breakage::Vehicle(Fault::LateLight { delay_s }))
-    }),
-    ("weak-motor", "thrust over nominal, 0.01 to 1", |value| {
-        let scale = value.filter(|scale| (0.01..=1.0).contains(scale))?;
-        Some(Breakage::Vehicle(Fault::WeakMotor { scale }))
-    }),
-    ("early-burnout", "s after the first thrust", |value| {
-        let after_s = value.filter(|after_s| *after_s >= 0.0)?;
-        Some(Breakage::Vehicle(Fault::EarlyBurnout { after_s }))
-    }),
-    ("ascent-no-light", "", |value| value.is_none().then_some(Breakage::Vehicle(Fault::AscentNoLight))),
-    ("ascent-self-lights", "", |value| value.is_none().then_some(Breakage::Vehicle(Fault::AscentSelfLights))),
-    ("ascent-weak", "thrust over nominal, 0.01 to 1", |value| {
-        let scale = value.filter(|scale| (0.01..=1.0).contains(scale))?;
-        Some(Breakage::Vehicle(Fault::AscentWeak { scale }))
-    }),
-    ("separation-fails", "", |value| value.is_none().then_some(Breakage::Vehicle(Fault::SeparationFails))),
-    ("parachute-fails", "", |value| value.is_none().then_some(Breakage::Vehicle(Fault::ParachuteFails))),
-    ("reboot", "s", |value| value.filter(|down_s| (0.0..=10.0).contains(down_s)).map(Breakage::Reboot)),
-    ("abort", "", |value| value.is_none().then_some(Breakage::Abort)),
-];
+/// Each fault by its name.
+#[rustfmt::skip]
+const NAMES: &[(&str, Takes)] = {
+    use Breakage::Vehicle;
+    use Takes::{Nothing, Value};
+    &[
+        ("link-loss", Nothing(Breakage::LinkLoss)),
+        ("link-delay", Value("s, 0 to 60", |s| within(s, 0.0, 60.0).map(Breakage::LinkDelay))),
+        ("fin-stuck", Value("0 to 3", |fin| Some(Vehicle(Fault::FinStuck { fin: surface(within(fin, 0.0, 3.0)? + 1.0)? })))),
+        ("reversed", Value("1 or 2, the gimbal's axes, 3 to 6, the fins", |number| {
+            Some(Vehicle(Fault::Reversed { surface: surface(number)? }))
+        })),
+        ("swapped", Value("two of these digits, as 36", |numbers| {
+            let surfaces = [surface(libm::trunc(numbers / 10.0))?, surface(numbers % 10.0)?];
+            Some(Vehicle(Fault::Swapped { surfaces }))
+        })),
+        ("gimbal-stuck", Nothing(Vehicle(Fault::GimbalStuck))),
+        ("gimbal-jams", Value("deg, -90 to 90", |deg| Some(Vehicle(Fault::GimbalJams { deg: within(deg, -90.0, 90.0)? })))),
+        ("gimbal-slow", Value("rate over nominal, 0 to 1", |scale| {
+            Some(Vehicle(Fault::GimbalSlow { scale: within(scale, 0.0, 1.0)? }))
+        })),
+        ("no-light", Nothing(Vehicle(Fault::NoLight))),
+        ("late-light", Value("s", |s| Some(Vehicle(Fault::LateLight { delay_s: within(s, 0.0, f64::INFINITY)? })))),
+        ("weak-motor", Value("thrust over nominal, 0.01 to 1", |scale| {
+            Some(Vehicle(Fault::WeakMotor { scale: within(scale, 0.01, 1.0)? }))
+        })),
+        ("early-burnout", Value("s after the first thrust", |s| {
+            Some(Vehicle(Fault::EarlyBurnout { after_s: within(s, 0.0, f64::INFINITY)? }))
+        })),
+        ("ascent-no-light", Nothing(Vehicle(Fault::AscentNoLight))),
+        ("ascent-self-lights", Nothing(Vehicle(Fault::AscentSelfLights))),
+        ("ascent-weak", Value("thrust over nominal, 0.01 to 1", |scale| {
+            Some(Vehicle(Fault::AscentWeak { scale: within(scale, 0.01, 1.0)? }))
+        })),
+        ("separation-fails", Nothing(Vehicle(Fault::SeparationFails))),
+        ("parachute-fails", Nothing(Vehicle(Fault::ParachuteFails))),
+        ("reboot", Value("s", |s| within(s, 0.0, 10.0).map(Breakage::Reboot))),
+        ("abort", Nothing(Breakage::Abort)),
+    ]
+};
+
+fn within(value: f64, least: f64, most: f64) -> Option<f64> {
+    Some(value).filter(|value| (least..=most).contains(value))
+}
 
 /// A surface by its number from 1.
 fn surface(number: f64) -> Option<usize> {
@@ -181,8 +177,9 @@ pub fn how_to_write() -> String {
 }
 
 fn known() -> String {
-    let with_value = |(name, value, _): &(&str, &str, Build)| {
-        if value.is_empty() { (*name).to_owned() } else { format!("{name}:VALUE ({value})") }
+    let with_value = |(name, takes): &(&str, Takes)| match takes {
+        Takes::Nothing(_) => (*name).to_owned(),
+        Takes::Value(meaning, _) => format!("{name}:VALUE ({meaning})"),
     };
     let names = NAMES.iter().map(with_value).collect::<Vec<_>>().join(", ");
     let sensors = SENSORS.map(|(_, name, unit)| format!("{name} ({unit})")).join(", ");
@@ -244,9 +241,12 @@ impl FromStr for TimedFault {
             Some(text) => Some(number(text).ok_or_else(|| refuse(format!("`{text}` is no number")))?),
             None => None,
         };
-        let known = NAMES.iter().find(|(known, ..)| *known == name);
+        let known = NAMES.iter().find(|(known, _)| *known == name);
         let (unit, breakage) = known
-            .map(|(_, unit, build)| (*unit, build(value)))
+            .map(|(_, takes)| match takes {
+                Takes::Nothing(breakage) => ("", value.is_none().then_some(*breakage)),
+                Takes::Value(meaning, of) => (*meaning, value.and_then(of)),
+            })
             .or_else(|| sensor_fault(name, value))
             .ok_or_else(|| refuse(format!("no fault is named `{name}`")))?;
         let breakage = breakage.ok_or_else(|| {

@@ -159,19 +159,12 @@ struct SignWatch {
 }
 
 /// The findings of a flight.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Findings {
     watcher: Option<Watcher>,
     watches: [SignWatch; RULES.len()],
     found: Vec<Finding>,
     thrust_over_weight: Option<f64>,
-}
-
-impl Default for Findings {
-    fn default() -> Self {
-        let watches = [SignWatch::default(); RULES.len()];
-        Self { watcher: None, watches, found: Vec::new(), thrust_over_weight: None }
-    }
 }
 
 impl Findings {

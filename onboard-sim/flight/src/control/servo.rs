@@ -51,7 +51,8 @@ impl ServoModel {
         self.next = (self.next + 1) % LINE_FRAMES;
     }
 
-    /// Moves for a frame under the commands so far.
+    /// Moves for a frame under the commands so far: towards the command of a delay ago, by at most the rate. A data sheet states the
+    /// rate alone, as the time for 60 degrees; the delay is measured.
     pub(crate) fn advance(&mut self) {
         let delayed = (self.next + LINE_FRAMES - 1 - self.delay_frames) % LINE_FRAMES;
         self.at_rad += (self.line_rad[delayed] - self.at_rad).clamp(-self.step_rad, self.step_rad);

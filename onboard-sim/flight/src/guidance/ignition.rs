@@ -56,7 +56,7 @@ pub struct IgnitionPrediction {
 }
 
 impl IgnitionPrediction {
-    /// How long the ignition has been due, s; `None` before. It is due when thrust commanded at the next frame would begin
+    /// How long the ignition has been due, s, at an even speed; `None` before. It is due when thrust commanded at the next frame would begin
     /// below the chosen height; `onset_m` is where it would begin.
     pub fn overdue_s(&self, onset_m: f64) -> Option<f64> {
         let below_m = self.chosen_m? - onset_m;
@@ -92,7 +92,8 @@ impl IgnitionSettings {
         })
     }
 
-    /// The prediction from a height and a vertical velocity (up positive), with the fins open at `fin_drag_area_m2`.
+    /// The prediction from a height and a vertical velocity (up positive), with the fins open at `fin_drag_area_m2`. Each end of a
+    /// band moves one way with impulse and with burn time, so the motors at the ends of their ranges bound what suits all between.
     pub fn prediction(
         &self,
         column: &Column,

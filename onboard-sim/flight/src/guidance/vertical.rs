@@ -194,7 +194,6 @@ impl Column {
         soft_tilt_deg: f64,
     ) -> Self {
         let airframe = &mission.airframe;
-        let body = &airframe.body;
         let scaled = |area_m2: f64| air_scale * area_m2;
         let open_fins_m2 = airframe.open_fin_drag_area_m2();
         let final_box = &mission.powered.final_box;
@@ -204,7 +203,7 @@ impl Column {
             air_density_kg_m3,
             body_drag_area_m2: scaled(airframe.unfinned_drag_area_m2(0.0)),
             burning_body_drag_area_m2: scaled(airframe.unfinned_drag_area_m2(mission.exhaust.body_loss)),
-            crossflow_area_m2: body.crossflow_drag_coefficient * body.length_m * body.diameter_m,
+            crossflow_area_m2: airframe.body.crossflow_area_m2(),
             soft: Braking { tilt_rad: soft_tilt_deg.to_radians(), fin_drag_area_m2: 0.0 },
             hard: Braking {
                 tilt_rad: 0.0,

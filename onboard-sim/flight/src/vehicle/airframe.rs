@@ -94,7 +94,8 @@ impl Airframe {
     }
 
     /// Drag area of the fins, m^2, times their distance ahead of a centre of gravity, m, less that of the legs times their distance
-    /// behind it: this turns the nose back into the wind in a tail-first fall, m^3.
+    /// behind it: this turns the nose back into the wind in a tail-first fall, m^3. A drag `q A` along the wind has a moment of
+    /// `q A x sin(lean)` about a point `x` away on the axis.
     pub fn restoring_m3(&self, fin_drag_area_m2: f64, cg_station_m: f64) -> f64 {
         fin_drag_area_m2 * (self.fins.station_m - cg_station_m)
             - self.legs.drag_area_m2 * (cg_station_m - self.legs.drag_station_m)
@@ -111,7 +112,8 @@ impl Airframe {
     }
 
     /// Angular momentum that a swinging motor of this mass, kg, has for each rad/s of the gimbal, kg m^2: `m (k^2 + l a)`, with its
-    /// radius of gyration `k` and the distances `l` from its middle up to the pivot and `a` up to the centre of gravity of all. The
+    /// radius of gyration `k` and the distances `l` from its middle up to the pivot and `a` up to the centre of gravity of all: its own,
+    /// and that of its mass moving at `l` about a point `a` away (Koenig's theorem; H. Goldstein, Classical Mechanics, section 1.2). The
     /// body turns back by as much.
     pub fn swinging_kg_m2(&self, motor: &ThrustCurve, motor_kg: f64, cg_station_m: f64) -> f64 {
         let middle_m = self.mass.propellant_station_m;
@@ -261,6 +263,13 @@ pub struct Body {
     pub axial_drag_coefficient: f64,
     /// Crossflow drag coefficient on length times diameter.
     pub crossflow_drag_coefficient: f64,
+}
+
+impl Body {
+    /// Its drag area when the air comes from the side, m^2.
+    pub fn crossflow_area_m2(&self) -> f64 {
+        self.crossflow_drag_coefficient * self.length_m * self.diameter_m
+    }
 }
 
 /// The four fins and their servos. Opening angle from the body: 0 closed, 90 degrees deployed.

@@ -3,7 +3,7 @@
 use crate::vehicle::thrust_curve::ThrustCurve;
 
 /// A certified thrust curve with the scales of this motor: `T(t) = s/b T0(t/b)`, so that `s` scales the impulse and `b`
-/// the time.
+/// the time: with `t = b u` the integral of `T dt` is `s` times that of `T0 du`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Burn<'a> {
     /// The certified curve.
@@ -32,7 +32,7 @@ impl Deviation {
     /// The certified shape.
     pub const NONE: Self = Self { share: 0.0, at_s: 0.0, lasts_s: 1.0 };
 
-    /// Mean over a span that begins at `from_s` since the thrust began, s.
+    /// Mean over a span that begins at `from_s` since the thrust began, s: of `exp(-t)` over a time `d` it is `(1 - exp(-d)) / d`.
     fn mean(&self, from_s: f64, duration_s: f64) -> f64 {
         if self.share == 0.0 {
             return 0.0;

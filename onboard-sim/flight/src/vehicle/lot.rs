@@ -176,7 +176,8 @@ impl Expectation {
 }
 
 impl Lot {
-    /// What this lot lets expect, where nothing was known but `prior`; the vehicle has this mass.
+    /// What this lot lets expect, where nothing was known but `prior`; the vehicle has this mass. Mean and scatter are those of
+    /// [`Posterior`]; the variances of causes that know nothing of each other add up.
     pub fn expectation(&self, prior: &MotorPrior, loaded_kg: f64) -> Expectation {
         let impulse_sigma = libm::sqrt(
             (prior.impulse_sigma * prior.impulse_sigma - UNWEIGHED_SHARE * UNWEIGHED_SHARE).max(0.0),

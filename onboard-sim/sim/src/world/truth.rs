@@ -46,7 +46,7 @@ pub struct Truth {
     /// Turn of the mean wind's direction with height, from world x towards world y, rad/m.
     pub wind_veer_rad_m: f64,
     /// Shape of the thrust curve: the file's thrust is multiplied by `1 + sum over k of a_k cos(k pi s)`, k from 1,
-    /// where `s` is the fraction of the impulse already given. The impulse stays the same.
+    /// where `s` is the fraction of the impulse already given. The impulse stays the same: over a whole burn each term's integral is zero.
     pub thrust_shape: [f64; SHAPE_TERMS],
     /// Fractions of drag that the exhaust takes away while the motor burns: of the body along its axis, and of the fins.
     pub plume_body_loss: f64,

@@ -47,15 +47,16 @@ pub enum CheckState {
 const RETURN_FRAMES: u64 = 200;
 
 /// What is being done.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 enum Stage {
+    #[default]
     Resting,
     Sweeping(Sweep),
     Still(Still),
 }
 
 /// The last check, and the running one.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct PadCheck {
     run: u16,
     state: CheckState,
@@ -72,21 +73,6 @@ pub struct PadCheck {
 
 /// Where a surface is told to go: its number, and its angle, rad. All others rest.
 pub(super) type SurfaceCommand = (usize, f64);
-
-impl Default for PadCheck {
-    fn default() -> Self {
-        Self {
-            run: 0,
-            state: CheckState::NotRun,
-            stage: Stage::Resting,
-            by: None,
-            swept_frames: 0,
-            returns_until: 0,
-            findings: Vec::new(),
-            seen_by: Vec::new(),
-        }
-    }
-}
 
 impl PadCheck {
     /// Begins a check; with `moves` the surfaces are swept first.

@@ -150,7 +150,7 @@ impl VehicleModel {
 
     /// Drag area of the fins in flight, m^2.
     fn fins_m2(&self, fins_rad: &[f64; 4]) -> f64 {
-        self.motor.air_scale() * self.fin_drag_area_m2(fins_rad)
+        self.motor.air_scale() * self.airframe().fin_drag_area_m2(fins_rad)
     }
 }
 

@@ -80,7 +80,7 @@ impl Pilot {
         situation: &Burning,
         fins_rad: &[f64; 4],
     ) -> [f64; 2] {
-        let fins_m2 = self.model.fin_drag_area_m2(fins_rad);
+        let fins_m2 = self.model.airframe().fin_drag_area_m2(fins_rad);
         let aim: Aim = self.powered.aim(
             time_s,
             &estimate.state,
@@ -130,14 +130,14 @@ impl Pilot {
             };
         }
         let largest_m2 = self.model.airframe().open_fin_drag_area_m2();
-        let fins_m2 = self.model.fin_drag_area_m2(&self.fins_rad);
+        let fins_m2 = self.model.airframe().fin_drag_area_m2(&self.fins_rad);
         let situation = DescentSituation {
             mass_kg: mass.mass_kg,
             inertia_kg_m2: [mass.roll_inertia_kg_m2, mass.pitch_inertia_kg_m2],
             air_density_kg_m3: density_kg_m3,
             wind_m_s: estimate.wind_m_s.push(0.0),
-            drag_area_m2: self.model.body_drag_area_m2() + fins_m2,
-            crossflow_area_m2: self.model.crossflow_area_m2(),
+            drag_area_m2: self.model.airframe().unfinned_drag_area_m2(0.0) + fins_m2,
+            crossflow_area_m2: self.model.airframe().body.crossflow_area_m2(),
             restoring_m3: self.model.airframe().restoring_m3(fins_m2, mass.cg_station_m),
             body_behind_cg_m: mass.cg_station_m - 0.5 * self.model.airframe().body.length_m,
             time_to_go_s: self.prediction.ignition.command_in_s,

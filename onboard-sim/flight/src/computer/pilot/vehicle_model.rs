@@ -71,19 +71,6 @@ impl VehicleModel {
         &self.mission.airframe
     }
 
-    pub(super) fn crossflow_area_m2(&self) -> f64 {
-        let body = &self.airframe().body;
-        body.crossflow_drag_coefficient * body.length_m * body.diameter_m
-    }
-
-    pub(super) fn body_drag_area_m2(&self) -> f64 {
-        self.airframe().unfinned_drag_area_m2(0.0)
-    }
-
-    pub(super) fn fin_drag_area_m2(&self, fins_rad: &[f64; 4]) -> f64 {
-        self.airframe().fin_drag_area_m2(fins_rad)
-    }
-
     /// Time since the landing motor's thrust began, s.
     pub(super) fn burning_s(&self, time_s: f64) -> Option<f64> {
         self.motor.ignition_s().map(|ignition_s| (time_s - ignition_s).max(0.0))
@@ -163,7 +150,7 @@ impl VehicleModel {
             wind_m_s: estimate.wind_m_s.push(0.0),
             body_drag_area_m2: self.motor.air_scale()
                 * self.airframe().unfinned_drag_area_m2(exhaust.body_loss),
-            crossflow_area_m2: self.crossflow_area_m2(),
+            crossflow_area_m2: self.airframe().body.crossflow_area_m2(),
             fin_drag_area_m2: self.motor.air_scale() * (fin_drag_area_m2 * (1.0 - exhaust.fin_loss)),
             gimbal_limit_rad: self.airframe().gimbal.limit_rad(),
             lands_in_place: situation.lands_in_place,

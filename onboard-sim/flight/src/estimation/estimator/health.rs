@@ -90,7 +90,8 @@ pub(super) fn judge(
 }
 
 /// Whether satellite velocities still fit on average. Each of them may pass its gate although together they differ too
-/// much from their predictions.
+/// much from their predictions: the test of the normalised innovation squared over time (Y. Bar-Shalom, X. R. Li and T. Kirubarajan,
+/// Estimation with Applications to Tracking and Navigation, 2001, section 5.4), with a memory that fades.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(super) struct Surprise {
     mean: f64,

@@ -19,7 +19,8 @@ const LIDAR_COS_TILT: f64 = 0.65;
 
 impl Estimator {
     /// The lidar looks along body `-x` from its place behind the centre of gravity. Its range plus that distance is the
-    /// height divided by the cosine of the tilt.
+    /// height divided by the cosine of the tilt: `s = h / n`, `n` the nose's vertical part. A small turn `d` about the world's axes
+    /// adds `d_x n_y - d_y n_x` to `n`, so it adds `-s / n (d_x n_y - d_y n_x)` to `s`.
     pub(super) fn take_lidar(&mut self, range_m: f64, behind_cg_m: f64) {
         let nose = self.nominal.world_from_body * nalgebra::Vector3::x();
         if nose.z < LIDAR_COS_TILT {

@@ -201,7 +201,7 @@ impl VehicleNow {
                 * sines.iter().sum::<f64>(),
             fin_lift_area_m2,
             fin_ahead_of_cg_m: airframe.fins.station_m - mass.cg_station_m,
-            crossflow_area_m2: body.crossflow_drag_coefficient * body.length_m * body.diameter_m,
+            crossflow_area_m2: body.crossflow_area_m2(),
             motor_burning,
             lidar_behind_cg_m: airframe.above_feet_m(mass.cg_station_m) - lidar_ahead_of_feet_m,
         }

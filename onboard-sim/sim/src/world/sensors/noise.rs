@@ -61,7 +61,7 @@ impl Wander {
         Self { value: sigma * normal.next(), sigma, correlation_s }
     }
 
-    /// Advances over an interval of any length, exactly.
+    /// Advances over an interval of any length, exactly: what is kept of the variance, `k^2`, and what is new, `1 - k^2`, are one.
     pub(super) fn advance(&mut self, interval_s: f64, normal: &mut Normal) {
         let kept = libm::exp(-interval_s / self.correlation_s);
         self.value = self.value * kept + self.sigma * libm::sqrt(1.0 - kept * kept) * normal.next();

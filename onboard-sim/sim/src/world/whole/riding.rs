@@ -205,7 +205,7 @@ impl Stack {
     }
 
     /// Damping of the cross rates per newton of thrust, m s/rad: the gas leaves with the angular momentum that it has at
-    /// the nozzle, and it had that of its place in the motor.
+    /// the nozzle, and it had that of its place in the motor (W. T. Thomson, Introduction to Space Dynamics, section 7.7).
     pub(crate) fn jet_damping_m_s(&self, cg_station_m: f64) -> f64 {
         let [nozzle_m, propellant_m] =
             [self.nozzle_m().x, self.booster.propellant_station_m].map(|station_m| station_m - cg_station_m);
