@@ -70,7 +70,7 @@ const ELSEWHERE: [(&str, &str, &str); 29] = [
 /// What the pages say that a line answers: how the line begins, and words of its answer.
 const SAID: [(&str, &str); 19] = [
     ("onboard-sim fly --start pad --fault separation-fails@0", "DOWN UNDER THE PARACHUTE"),
-    ("onboard-sim campaign --only 17", "attainable_low_m"),
+    ("onboard-sim campaign --only 17", "touchdown_vertical_m_s"),
     ("replay info flight.mcap", "verdict"),
     ("replay verify flight.mcap ", "frames identical"),
     ("replay verify flight.mcap --explain", "identical bit for bit"),

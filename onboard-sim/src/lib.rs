@@ -6,7 +6,6 @@
 //! * [`progress`]: how far something long is.
 //! * [`files`]: texts that are built in or files, and files that are written whole.
 //! * [`statistics`], [`summary`]: percentiles, texts and pictures from the rows; [`figure`] draws.
-//! * [`attainable`]: whether a flight could have been landed with perfect information.
 //! * [`hazard`]: where a flight comes down in each way that it can end.
 //! * [`check`]: whether a vehicle that is not built yet will land, and what to change.
 //! * [`frame`]: another motor in an airframe.
@@ -16,7 +15,6 @@
 //! A flight depends only on its recipe and its number. So a campaign can be divided into shards, stopped, continued and
 //! run on any number of threads with the same results.
 
-pub mod attainable;
 pub mod card;
 pub mod check;
 pub mod figure;

@@ -7,8 +7,6 @@ use flight::rules::verdict::Landing;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::attainable::Window;
-
 /// A column: its name and how to read it off a row.
 pub struct Column {
     /// The name, with its unit.
@@ -66,11 +64,6 @@ row! {
     apogee_tilt_deg: f64,
     /// Drawn: size of the rotation rate at apogee, degrees per second.
     apogee_rate_deg_s: f64,
-    /// Lowest height of the feet at the ignition command from which perfect information lands this draw, m (see
-    /// [`crate::attainable`]); empty if there is none.
-    attainable_low_m: Option<f64>,
-    /// Highest such height, m.
-    attainable_high_m: Option<f64>,
     /// The landing motor was commanded to light.
     ignited: bool,
     /// The motor was commanded to light while a check of the ignition gate failed. This must never happen.
@@ -166,12 +159,6 @@ impl Row {
     pub fn landing(&self) -> Landing {
         let Self { stands, upright, envelope, table_2, .. } = *self;
         Landing { stands, upright, envelope, table_2 }
-    }
-
-    /// The command heights from which perfect information lands this draw.
-    pub fn attainable(&self) -> Option<Window> {
-        let (low_m, high_m) = (self.attainable_low_m?, self.attainable_high_m?);
-        Some(Window { low_m, high_m })
     }
 
     /// The drawn columns in order, each with its nominal value if it has one.

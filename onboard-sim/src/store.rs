@@ -9,14 +9,13 @@ use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use flight::vehicle::mission::LegLimits;
 use serde::{Deserialize, Serialize};
 use sha2::Digest as _;
 use sim::recipe::Recipe;
 
 use crate::files::{WriteError, write_folder};
 use crate::row::{COLUMNS, Row};
-use crate::summary::{PICTURES, Summary, pictures, to_markdown};
+use crate::summary::{Summary, to_markdown};
 
 const MANIFEST: &str = "manifest.json";
 const MISSION: &str = "mission.toml";
@@ -232,11 +231,11 @@ impl Store {
         Ok(())
     }
 
-    /// Writes the rows in the order of their numbers, the summary and the pictures.
+    /// Writes the rows in the order of their numbers, and the summary.
     ///
     /// # Errors
     /// A file cannot be written.
-    pub fn publish(self, legs: &LegLimits) -> Result<Summary, StoreError> {
+    pub fn publish(self) -> Result<Summary, StoreError> {
         let (rows, _) = self.rows.into_inner().unwrap_or_else(PoisonError::into_inner);
         let table = to_csv(rows.values(), true)?;
         let rows: Vec<Row> = rows.into_values().collect();
@@ -244,22 +243,16 @@ impl Store {
         let json = serde_json::to_vec_pretty(&summary);
         let json = json.map_err(|error| StoreError::content(&self.path.join("summary.json"), &error))?;
         let markdown = to_markdown(&summary).into_bytes();
-        let mut files = vec![(FLIGHTS, table), ("summary.json", json), ("summary.md", markdown)];
-        for ((name, _), picture) in PICTURES.iter().zip(pictures(&rows, legs)) {
-            let picture = picture.map_err(|error| StoreError::content(&self.path.join(name), &error))?;
-            files.push((name, picture.into_bytes()));
-        }
-        write_folder(&self.path, &files)?;
+        write_folder(&self.path, &[(FLIGHTS, table), ("summary.json", json), ("summary.md", markdown)])?;
         Ok(summary)
     }
 }
 
 /// Refuses a directory with files of these names but without a manifest, because no campaign wrote them.
 fn refuse_foreign(directory: &Path) -> Result<(), StoreError> {
-    let pictures = PICTURES.iter().map(|(name, _)| *name);
     let names = [MISSION, DISPERSION, FLIGHTS, "summary.json", "summary.md", "cost.json"];
-    let mut paths = names.into_iter().chain(pictures).map(|name| directory.join(name));
-    let found = paths.find(|path| path.symlink_metadata().is_ok());
+    let found =
+        names.map(|name| directory.join(name)).into_iter().find(|path| path.symlink_metadata().is_ok());
     found.map_or(Ok(()), |path| Err(StoreError::Foreign(path)))
 }
 
@@ -327,7 +320,7 @@ pub fn merge(parts: &[PathBuf], out: &Path) -> Result<Summary, StoreError> {
     let recipe = recipe.map_err(|error| StoreError::content(first, &error))?;
     let store = Store::open(out, &recipe, whole)?;
     rows.into_values().try_for_each(|row| store.add(row))?;
-    store.publish(&recipe.mission.leg_limits)
+    store.publish()
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! The summary of a campaign, as data, plain text and Markdown, and its pictures.
+//! The summary of a campaign, as data, plain text and Markdown.
 //!
 //! It does not depend on a clock, a thread or a machine, so it is the same however the campaign was run.
 
@@ -7,11 +7,8 @@ use core::fmt::{self, Write};
 use std::collections::BTreeMap;
 
 use flight::rules::verdict::Landing;
-use flight::vehicle::mission::LegLimits;
 use serde::Serialize;
 
-use crate::attainable::{Window, best_height_m};
-use crate::figure::{BLACK_CURVE, FigureError, Line, Panel, sized_lines_svg};
 use crate::row::{COLUMNS, Row};
 use crate::statistics::{Landings, Share, quantile, sorted};
 use crate::store::{Manifest, Shard};
@@ -42,8 +39,6 @@ pub struct Summary {
     /// How the flights landed.
     #[serde(flatten)]
     pub landings: Landings,
-    /// What perfect information lands; `None` if it lands no flight.
-    pub attainable: Option<Attainable>,
     /// Why the others did not, the most frequent reason first.
     pub failures: Vec<Failures>,
     /// Ignitions while a check of the gate failed. This must be zero.
@@ -53,40 +48,6 @@ pub struct Summary {
     pub distributions: Vec<Distribution>,
     /// Drawn quantities, beginning with the one that costs most landings.
     pub sensitivity: Vec<Sensitivity>,
-}
-
-/// What perfect information lands, with one command height for all flights (see [`crate::attainable`]).
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Attainable {
-    /// Height of the feet at the command from which it lands most flights, m.
-    pub command_height_m: f64,
-    /// Flights that it lands.
-    pub attainable: Share,
-    /// Of these, the flights that stand undamaged.
-    pub landed: Share,
-    /// Flights that landed although they are not attainable from that height. Their controller chose another height for
-    /// each flight.
-    pub landed_from_another_height: u64,
-    /// Flights that landed although they are not attainable from any height. The bound leaves out wind and place, so
-    /// there can be a few.
-    pub landed_beyond: u64,
-}
-
-impl Attainable {
-    fn of(rows: &[Row]) -> Option<Self> {
-        let windows: Vec<Window> = rows.iter().filter_map(Row::attainable).collect();
-        let (command_height_m, _) = best_height_m(&windows)?;
-        let is = |row: &Row| row.attainable().is_some_and(|window| window.contains(command_height_m));
-        let count = |is: &dyn Fn(&Row) -> bool| rows.iter().filter(|row| is(row)).count() as u64;
-        let attainable = count(&is);
-        Some(Self {
-            command_height_m,
-            attainable: Share::new(attainable, rows.len() as u64),
-            landed: Share::new(count(&|row| row.stands && is(row)), attainable),
-            landed_from_another_height: count(&|row| row.stands && !is(row) && row.attainable().is_some()),
-            landed_beyond: count(&|row| row.stands && row.attainable().is_none()),
-        })
-    }
 }
 
 /// A reason and the number of flights with it.
@@ -172,7 +133,6 @@ impl Summary {
         Self {
             manifest: manifest.clone(),
             landings: Landings::of(rows.iter().map(Row::landing)),
-            attainable: Attainable::of(rows),
             failures: failures(rows),
             ignitions_outside_gate: count(|row| row.ignition_outside_gate),
             plans: Plans {
@@ -264,17 +224,11 @@ pub fn to_text(summary: &Summary) -> String {
     out
 }
 
-/// The summary as Markdown: its text, and links to the pictures in the same directory.
+/// The summary as Markdown.
 pub fn to_markdown(summary: &Summary) -> String {
-    let pictures = PICTURES.map(|(name, title)| format!("![{title}]({name})\n")).concat();
     let Manifest { mission, build, .. } = &summary.manifest;
-    format!("# {mission}\n\nProgram `{build}`.\n\n```\n{}```\n\n## Pictures\n\n{pictures}", to_text(summary))
+    format!("# {mission}\n\nProgram `{build}`.\n\n```\n{}```\n", to_text(summary))
 }
-
-/// What attainable means.
-const ATTAINABLE: &str = "attainable: perfect information lands it with the legs. The command height
-is the same for all flights; once the thrust begins, motor, mass and drag are
-known, and fins and tilt are a throttle. Wind, place and attitude are left out";
 
 fn what(manifest: &Manifest) -> String {
     let mut what =
@@ -333,19 +287,6 @@ fn write_text(summary: &Summary, out: &mut String) -> fmt::Result {
     for (word, share) in Landing::WORDS.iter().zip(summary.landings.shares()) {
         writeln!(out, "{word:<38}  {share}")?;
     }
-    if let Some(attainable) = &summary.attainable {
-        let Attainable { command_height_m, attainable, landed, landed_from_another_height, landed_beyond } =
-            attainable;
-        writeln!(out, "attainable, ignition command at {command_height_m:.1} m  {attainable}")?;
-        write!(out, "landed of attainable  {landed}")?;
-        if landed_from_another_height + landed_beyond > 0 {
-            write!(
-                out,
-                "; besides, {landed_from_another_height} landed from another height, and {landed_beyond} beyond what is attainable"
-            )?;
-        }
-        writeln!(out, "\n({ATTAINABLE})")?;
-    }
     writeln!(out, "ignitions outside the gate: {}", summary.ignitions_outside_gate)?;
     if !summary.failures.is_empty() {
         writeln!(out, "\nwhy not:")?;
@@ -362,77 +303,4 @@ fn write_text(summary: &Summary, out: &mut String) -> fmt::Result {
     )?;
     write_distributions(summary, out)?;
     write_sensitivities(summary, out)
-}
-
-/// Bars of a histogram.
-const BARS: usize = 40;
-/// Values beyond this fraction at each end go into the last bar, so that one crash does not hide the rest.
-const TAIL_SHARE: f64 = 0.005;
-
-/// File names and titles of the pictures.
-pub const PICTURES: [(&str, &str); 4] = [
-    ("touchdown.svg", "Where they touched down"),
-    ("vertical-speed.svg", "Vertical speed at contact"),
-    ("ignition-height.svg", "Height at the first thrust"),
-    ("tilt.svg", "Tilt at contact"),
-];
-
-/// Size of a histogram and of a map, px.
-const HISTOGRAM_PX: (u32, u32) = (720, 500);
-const MAP_PX: (u32, u32) = (706, 686);
-
-/// Every picture, in the order of [`PICTURES`].
-pub fn pictures(rows: &[Row], legs: &LegLimits) -> [Result<String, FigureError>; 4] {
-    let [scatter, speed, height, tilt] = PICTURES.map(|(_, title)| title);
-    let places = |name: &str, is: fn(&Row) -> bool| {
-        let rows = rows.iter().filter(|row| is(row));
-        (name.to_owned(), rows.filter_map(|row| Some((row.touchdown_x_m?, row.touchdown_y_m?))).collect())
-    };
-    let touchdowns = Panel {
-        x_label: "world x, m from the pad".to_owned(),
-        y_label: "world y, m from the pad".to_owned(),
-        kinds: vec![
-            places("damaged", |row| !row.stands),
-            places("stands, outside the envelope", |row| row.stands && !row.envelope),
-            places("stands, inside", |row| row.stands && row.envelope),
-        ],
-        crosses: vec![(0.0, 0.0, BLACK_CURVE)],
-        equal_scales: true,
-        ..Panel::default()
-    };
-    let values = |column| sorted(numbers(rows, column).map(f64::abs));
-    [
-        sized_lines_svg(scatter, &[touchdowns], 1, None, MAP_PX),
-        histogram(&values("touchdown_vertical_m_s"), speed, "vertical speed, m/s", Some(legs.vertical_m_s)),
-        histogram(&values("onset_height_m"), height, "height of the feet, m", None),
-        histogram(&values("touchdown_tilt_deg"), tilt, "tilt, degrees", Some(legs.tilt_deg)),
-    ]
-}
-
-/// The outline of the bars, and the limit of the legs.
-fn histogram(values: &[f64], title: &str, label: &str, limit: Option<f64>) -> Result<String, FigureError> {
-    let tail = libm::floor(TAIL_SHARE * values.len() as f64) as usize;
-    let (from, to) = values.get(tail).zip(values.iter().rev().nth(tail)).unwrap_or((&0.0, &0.0));
-    let width = if to > from { (to - from) / BARS as f64 } else { 1.0 };
-    let mut counts = [0.0; BARS];
-    for value in values {
-        let place = (value.clamp(*from, *to) - from) / width;
-        counts[(place as usize).min(BARS - 1)] += 1.0;
-    }
-    let bar = |(place, count): (usize, &f64)| {
-        let (left, right) = (from + width * place as f64, from + width * (place + 1) as f64);
-        [(left, 0.0), (left, *count), (right, *count), (right, 0.0)]
-    };
-    let line = |name: &str, colour, points| Line { name: name.to_owned(), colour, dashed: false, points };
-    let most = counts.iter().copied().fold(1.0, f64::max);
-    let limit = limit.map(|limit| line("design envelope of the legs", 1, vec![(limit, 0.0), (limit, most)]));
-    let bars = line("", 0, counts.iter().enumerate().flat_map(bar).collect());
-    let panel = Panel {
-        x_label: label.to_owned(),
-        y_label: "flights".to_owned(),
-        lines: [bars].into_iter().chain(limit).collect(),
-        ..Panel::default()
-    };
-    let none = if values.is_empty() { ": no flight has one" } else { "" };
-    sized_lines_svg(&format!("{title}{none}"), &[panel], 1, None, HISTOGRAM_PX)
 }

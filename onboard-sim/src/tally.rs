@@ -10,7 +10,6 @@ use sim::recipe::Recipe;
 use sim::sortie::{SetUpError, Sortie};
 use sim::world::{FirstContact, RestOutcome};
 
-use crate::attainable;
 use crate::row::Row;
 
 /// Fraction of the gimbal's travel from which a command counts as at its stop.
@@ -125,7 +124,6 @@ impl Tally {
         let (truth, apogee) = (&drawn.truth, self.flight.fell_from());
         let at = |read: fn(&FirstContact) -> f64| touchdown.map(read);
         let strain = outcome.rest.and_then(|rest| rest.strain);
-        let attainable = attainable::window(self.flight.mission(), drawn, apogee);
         Row {
             impulse_scale: truth.impulse_scale,
             burn_time_scale: truth.burn_time_scale,
@@ -143,8 +141,6 @@ impl Tally {
             apogee_speed_m_s: libm::hypot(apogee.velocity_m_s.x, apogee.velocity_m_s.y),
             apogee_tilt_deg: apogee.tilt_rad().to_degrees(),
             apogee_rate_deg_s: libm::sqrt(apogee.rate_rad_s.norm_squared()).to_degrees(),
-            attainable_low_m: attainable.map(|window| window.low_m),
-            attainable_high_m: attainable.map(|window| window.high_m),
             parachute: world.parachute_ejected(),
             burn_time_at_contact_s: touchdown
                 .zip(world.thrust_begins_s())

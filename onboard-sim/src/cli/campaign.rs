@@ -85,7 +85,7 @@ pub(crate) fn run(arguments: &CampaignArguments) -> anyhow::Result<Exit> {
         let flown = run::run(&recipe, &store, &|flown| show(&progress, flown))?;
         Ok(Cost::of(&flown, progress.elapsed_s()))
     })?;
-    let summary = store.publish(&recipe.mission.leg_limits)?;
+    let summary = store.publish()?;
     write!(stdout, "{}", to_text(&summary))?;
     if cost.flights > 0 {
         write_folder(out, &[("cost.json", serde_json::to_vec_pretty(&cost)?)])?;

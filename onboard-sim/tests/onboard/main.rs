@@ -1,7 +1,6 @@
 //! The command line, and the library of campaigns behind it.
 
 mod aborted;
-mod attainable;
 mod bar;
 mod campaign;
 mod card;

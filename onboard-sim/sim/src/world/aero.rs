@@ -147,17 +147,6 @@ impl Shape {
         }
     }
 
-    /// Drag areas of a vehicle whose equally open fins have this sine: along the body, of fins and legs, and across the body,
-    /// m^2.
-    pub(crate) fn drag_areas_m2(&self, fin_sine: f64) -> [f64; 3] {
-        let fins_m2 = 4.0 * self.fins.reference_area_m2 * self.fins.drag_coefficient * fin_sine;
-        [
-            self.scale * self.axial_area_m2,
-            self.scale * (self.fin_scale * fins_m2 + self.leg_drag_m2),
-            self.scale * STRIPS as f64 * self.strip_area_m2,
-        ]
-    }
-
     /// The total force and moment of the air, in the widest vectors that the machine has; the bits are the same.
     pub(crate) fn load(&self, flow: &Flow, configuration: &Configuration) -> Load {
         Arch::new().dispatch(Blown { shape: self, flow, configuration })

@@ -10,7 +10,6 @@
 //! * [`hanging`]: the vehicle below a drone; on its booster it is a part of [`whole`].
 //! * [`wind`]: the mean wind over height, and gusts.
 //! * [`sensors`]: the measurements that the flight computer gets.
-//! * [`vertical`]: the true vehicle's forces in a vertical fall through still air, for bounds on what is possible.
 //! * [`balance`]: the centre of pressure of a tail-first fall, which decides whether it is stable.
 //! * [`truth`]: how the true vehicle and the weather of one flight differ from the nominal data, and what can break.
 
@@ -24,7 +23,6 @@ mod motor;
 pub mod sensors;
 mod servo;
 pub mod truth;
-pub mod vertical;
 pub mod whole;
 pub mod wind;
 

@@ -1,16 +1,13 @@
-//! The true vehicle in a vertical fall through still air: the same thrust, masses and drag as in [`crate::world::whole`], without
+//! The true vehicle in a vertical fall through still air: the same thrust, masses and drag as in [`sim::world::World`], without
 //! attitude dynamics. Tilt and fin opening are given, so the forces are those of a vehicle that turns at once.
 
 use flight::vehicle::airframe::{Airframe, MassModel};
 use flight::vehicle::thrust_curve::ThrustCurve;
-
-use crate::world::aero::{Plume, Shape};
-use crate::world::motor::TrueBurn;
-use crate::world::truth::Truth;
+use sim::world::{TrueBurn, Truth};
 
 /// The vehicle's forces and masses.
 #[derive(Debug, Clone)]
-pub struct Vertical {
+pub(crate) struct Vertical {
     burn: TrueBurn,
     mass_model: MassModel,
     truth: Truth,
@@ -24,20 +21,21 @@ pub struct Vertical {
 
 /// Drag forces at one speed, N, all positive.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Drag {
+#[expect(clippy::struct_field_names, reason = "each name ends in its unit")]
+pub(crate) struct Drag {
     /// Along the body of an upright vehicle.
-    pub body_n: f64,
+    pub(crate) body_n: f64,
     /// Of the fins, closed and fully open.
-    pub fins_n: [f64; 2],
+    pub(crate) fins_n: [f64; 2],
     /// Across the body of a vehicle that lies flat.
-    pub across_n: f64,
+    pub(crate) across_n: f64,
 }
 
 impl Drag {
     /// Vertical force with the nose at an angle from the vertical, given by its sine and cosine, and with the fins open to
     /// a share between closed (0) and fully open (1), N. The air meets the body along its axis with the cosine of the
     /// speed and across it with the sine; the fins' drag follows the wind.
-    pub fn at_n(&self, [sin, cos]: [f64; 2], fin_share: f64) -> f64 {
+    pub(crate) fn at_n(&self, [sin, cos]: [f64; 2], fin_share: f64) -> f64 {
         let [closed_n, open_n] = self.fins_n;
         self.body_n * cos * cos + self.across_n * sin * sin * sin + closed_n + fin_share * (open_n - closed_n)
     }
@@ -46,47 +44,55 @@ impl Drag {
 impl Vertical {
     /// The vehicle of an airframe and a motor file as the truth changes them. Fins hang exactly at their commanded angle,
     /// without misalignment or play.
-    pub fn new(airframe: &Airframe, motor: &ThrustCurve, truth: &Truth) -> Self {
-        let shape = Shape::new(airframe, truth);
-        let areas_m2 = |opening_rad: f64| shape.drag_areas_m2(libm::sin(opening_rad));
-        let [body_m2, closed_m2, across_m2] = areas_m2(airframe.fins.closed_rad());
-        let [_, open_m2, _] = areas_m2(airframe.fins.open_rad());
+    pub(crate) fn new(airframe: &Airframe, motor: &ThrustCurve, truth: &Truth) -> Self {
+        let (body, fins) = (&airframe.body, airframe.fin_model());
+        let legs_m2 = airframe.legs.drag_area_m2 + truth.leg_drag_m2;
+        let fins_m2 = [airframe.fins.closed_rad(), airframe.fins.open_rad()].map(|opening_rad| {
+            let whole_m2 = 4.0 * fins.reference_area_m2 * fins.drag_coefficient * libm::sin(opening_rad);
+            truth.drag_scale * (truth.fin_drag_scale * whole_m2 + legs_m2)
+        });
+        let across_m2 = body.crossflow_drag_coefficient * body.diameter_m * body.length_m;
         let mass_model = MassModel::new(&airframe.mass, motor.propellant_mass_kg()).scaled(truth.mass_scale);
         let cg_station_m = mass_model.at(0.0).cg_station_m + truth.cg_offset_m[0];
         Self {
             burn: TrueBurn::new(motor, truth),
             mass_model,
             truth: *truth,
-            body_m2,
-            fins_m2: [closed_m2, open_m2],
-            across_m2,
+            body_m2: truth.drag_scale
+                * (body.reference_area_m2 * body.axial_drag_coefficient * truth.body_drag_scale),
+            fins_m2,
+            across_m2: truth.drag_scale * (across_m2 * truth.crossflow_scale),
             base_m2: airframe.body.reference_area_m2,
             cg_above_feet_m: airframe.above_feet_m(cg_station_m),
         }
     }
 
     /// The motor.
-    pub fn burn(&self) -> &TrueBurn {
+    pub(crate) fn burn(&self) -> &TrueBurn {
         &self.burn
     }
 
     /// Mass at a time since the thrust began, kg.
-    pub fn mass_kg(&self, burning_s: f64) -> f64 {
+    pub(crate) fn mass_kg(&self, burning_s: f64) -> f64 {
         self.mass_model.at(self.burn.burnt_kg(burning_s) * self.truth.mass_scale).mass_kg
     }
 
     /// Distance from the feet up to the centre of gravity before ignition, m.
-    pub fn cg_above_feet_m(&self) -> f64 {
+    pub(crate) fn cg_above_feet_m(&self) -> f64 {
         self.cg_above_feet_m
     }
 
     /// The drag at a speed in air of a density under a thrust.
-    pub fn drag(&self, density_kg_m3: f64, speed_m_s: f64, thrust_n: f64) -> Drag {
+    pub(crate) fn drag(&self, density_kg_m3: f64, speed_m_s: f64, thrust_n: f64) -> Drag {
         let pressure_pa = 0.5 * density_kg_m3 * speed_m_s * speed_m_s;
-        let plume = Plume::new(&self.truth, thrust_n, pressure_pa * self.base_m2);
+        // The exhaust takes its share when its thrust exceeds the pressure on the base, and in proportion below that.
+        let on_base_n = pressure_pa * self.base_m2;
+        let strength = if thrust_n > on_base_n { 1.0 } else { (thrust_n / on_base_n).max(0.0) };
+        let [body, fins] =
+            [self.truth.plume_body_loss, self.truth.plume_fin_loss].map(|loss| 1.0 - loss * strength);
         Drag {
-            body_n: pressure_pa * self.body_m2 * plume.body,
-            fins_n: self.fins_m2.map(|fins_m2| pressure_pa * fins_m2 * plume.fins),
+            body_n: pressure_pa * self.body_m2 * body,
+            fins_n: self.fins_m2.map(|fins_m2| pressure_pa * fins_m2 * fins),
             across_n: pressure_pa * self.across_m2,
         }
     }
@@ -100,7 +106,7 @@ mod tests {
     use flight::vehicle::rigid::RigidState;
 
     use super::*;
-    use crate::world::{Actuators, World};
+    use sim::world::{Actuators, World};
 
     /// The whole world with a vehicle that is upright in still air: its vertical acceleration is this room's.
     #[test]

@@ -1,12 +1,12 @@
 //! The window of a flight against a search that knows nothing of bang-bang paths.
-#![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
 
 use flight::vehicle::atmosphere::{Air, STANDARD_GRAVITY_M_S2};
 use flight::vehicle::mission::Mission;
-use onboard_sim::attainable::{Window, window};
 use sim::draw::{Draw, draw};
 use sim::recipe::Recipe;
-use sim::world::vertical::Vertical;
+
+use crate::vertical::Vertical;
+use crate::window::{Window, window};
 
 /// Controls are constant for this long, s, and the motion in it is integrated in `PARTS` parts.
 const HOLD_S: f64 = 0.1;

@@ -1,42 +1,22 @@
-//! Whether a flight could have been landed with perfect information: the measure for the landing rate of a controller.
-//!
-//! The vehicle falls with open fins from the drawn apogee and gets its ignition command at one height that is the same for
-//! all flights of the campaign. From the first thrust on the true motor, mass and drag are known, and at every instant
-//! fins are chosen between closed and fully open and the tilt between upright and the planner's limit
-//! (`powered.tilt_max_deg`). It lands if its feet reach the ground within the vertical speed limit of the legs and after
-//! the thrust has fallen through the weight for the last time, because before that the vehicle would lift off again.
-//!
-//! It is a bound, so it errs on the generous side. Motion is vertical: wind, gusts, place, attitude dynamics and the
-//! slope of the ground are left out. Tilt and fins change at once, so the vehicle may lean until touchdown: upright last
-//! moments would cost only what the servos and the inertia cost. Injected faults do not happen.
-//!
-//! [`window`] is the interval of command heights from which a flight lands, [`best_height_m`] the height inside most of
-//! them. A landing from a height exists if the height lies between two bang-bang landings.
-//!
-//! At every instant the acceleration lies between a soft and a hard one: the extremes over tilt and fins at that speed.
-//! (At high speed a lean brakes harder than an upright vehicle: the body across the air gives more drag than the thrust
-//! loses.) So the velocity over time lies between bang-bang paths. The least fall brakes hard from the first thrust on; a
-//! vehicle that stops before the thrust has fallen through the weight hovers there, just above the ground, or climbs if
-//! even the softest braking is more than its weight. The greatest fall brakes softly first and hard later, and touches
-//! down at the limit of the legs, some time after the thrust has fallen through the weight: a later touchdown falls
-//! farther at the end, but has to be slower before. In between any fall is possible.
+//! The heights of the ignition command from which a flight lands, found with bang-bang paths.
 
 use flight::vehicle::atmosphere::{Air, STANDARD_GRAVITY_M_S2};
 use flight::vehicle::mission::Mission;
 use flight::vehicle::rigid::RigidState;
 use sim::draw::Draw;
-use sim::world::vertical::Vertical;
+
+use crate::vertical::Vertical;
 
 /// Heights of the feet at the ignition command, m, from which a landing exists.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Window {
-    pub low_m: f64,
-    pub high_m: f64,
+pub(crate) struct Window {
+    pub(crate) low_m: f64,
+    pub(crate) high_m: f64,
 }
 
 impl Window {
     /// Whether the flight lands from this command height.
-    pub fn contains(&self, height_m: f64) -> bool {
+    pub(crate) fn contains(&self, height_m: f64) -> bool {
         (self.low_m..=self.high_m).contains(&height_m)
     }
 }
@@ -46,7 +26,7 @@ impl Window {
 const TRIED: usize = 24;
 
 /// The window of a flight whose fall begins in this state; `None` if it lands from no height.
-pub fn window(mission: &Mission, drawn: &Draw, fall: &RigidState) -> Option<Window> {
+pub(crate) fn window(mission: &Mission, drawn: &Draw, fall: &RigidState) -> Option<Window> {
     let curve = drawn.truth.curve(mission).ok()?;
     let vertical = Vertical::new(&mission.airframe, curve.as_ref(), &drawn.truth);
     let apogee_m = fall.position_m.z - vertical.cg_above_feet_m();
@@ -112,7 +92,7 @@ impl Search {
 
 /// The command height inside most windows, m, and the number of windows around it; `None` without windows. Among equally
 /// good heights it is the middle of the lowest stretch.
-pub fn best_height_m(windows: &[Window]) -> Option<(f64, u64)> {
+pub(crate) fn best_height_m(windows: &[Window]) -> Option<(f64, u64)> {
     // Where windows begin (first at equal heights) and end, in order.
     let mut edges: Vec<(f64, bool)> =
         windows.iter().flat_map(|window| [(window.low_m, false), (window.high_m, true)]).collect();
