@@ -5,7 +5,7 @@ use std::str::FromStr;
 use std::time::Duration;
 
 use clap::builder::NonEmptyStringValueParser;
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, Parser, Subcommand};
 use protocol::dialect::TdPhase;
 use protocol::identity::{Address, GROUND, VEHICLE};
 use protocol::program::{EXIT_CODES, Manual, Shown};
@@ -15,7 +15,6 @@ use sim::wire::fly::StartPoint;
 
 use crate::demo::Speed;
 use crate::model::words;
-use crate::view::theme::Palette;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -52,10 +51,6 @@ pub struct Cli {
     #[arg(long, help_heading = "Without a screen")]
     pub headless: bool,
 
-    /// Print how the flight ended and where the log is, as one JSON object, and nothing else; without a screen.
-    #[arg(long, conflicts_with = "replay", help_heading = "Without a screen")]
-    pub json: bool,
-
     /// Without a screen: give up if the flight has not ended after this time.
     ///
     /// Default: 120 s if the flight is started automatically, otherwise never.
@@ -79,7 +74,7 @@ pub struct ConfigArgs {
 /// Who acts.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Args)]
 pub struct OperatorArgs {
-    /// Who sits at this screen, for the log. Default: the user and the terminal, or the address of the SSH client.
+    /// Who sits at this screen, for the log. Default: the user.
     #[arg(long, value_name = "NAME", value_parser = NonEmptyStringValueParser::new(), help_heading = "Link and vehicle")]
     pub operator: Option<String>,
 }
@@ -217,12 +212,7 @@ pub enum Command {
     )]
     Download(DownloadArgs),
     /// List your stations: socket, process, link, vehicle, phase, log and screens.
-    #[command(after_help = "Examples:\n  ground status\n  ground status --json")]
-    Status {
-        /// As JSON.
-        #[arg(long)]
-        json: bool,
-    },
+    Status,
     /// End a station. This is refused while its vehicle is armed or in flight.
     #[command(after_help = "Examples:\n  ground stop\n  ground stop --force")]
     Stop {
@@ -391,7 +381,7 @@ fn wrong_seconds(given: impl std::fmt::Display) -> String {
 }
 
 /// What the terminal can show.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, ValueEnum)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Characters {
     /// Decide by the environment
@@ -401,33 +391,6 @@ pub enum Characters {
     Unicode,
     /// Only ASCII characters
     Ascii,
-}
-
-/// Which colours to use.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, ValueEnum)]
-#[serde(rename_all = "lowercase")]
-pub enum ThemeChoice {
-    /// Decide by the environment
-    #[default]
-    Auto,
-    /// White on black
-    Dark,
-    /// Black on white, for sunlight
-    Light,
-    /// No colours
-    None,
-}
-
-impl ThemeChoice {
-    /// `None` if the environment decides.
-    pub fn palette(self) -> Option<Palette> {
-        Some(match self {
-            Self::Auto => return None,
-            Self::Dark => Palette::Dark,
-            Self::Light => Palette::Light,
-            Self::None => Palette::None,
-        })
-    }
 }
 
 #[cfg(test)]
@@ -457,7 +420,6 @@ mod tests {
             "--speed",
             "--auto",
             "--headless",
-            "--json",
             "--timeout-s",
         ] {
             assert!(help.contains(word), "{word}");
@@ -494,7 +456,6 @@ mod tests {
             command.get_arguments().filter_map(|argument| argument.get_long().map(str::to_owned)).collect()
         };
         assert_eq!(flags("stop"), ["force", "socket"]);
-        assert_eq!(flags("status"), ["json"]);
         let link = ["out", "connect", "sysid", "vehicle-sysid", "key", "crew", "operator", "config"];
         assert_eq!(flags("download"), link);
         assert!(Cli::try_parse_from(["ground", "--timeout-s", "3", "attach"]).is_err());

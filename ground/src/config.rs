@@ -7,8 +7,9 @@ use clap::{ArgAction, ArgMatches, CommandFactory as _, FromArgMatches as _};
 use serde::{Deserialize, Deserializer, de};
 use toml::{Table, Value};
 
-use crate::cli::{Characters, Flags, LinkArgs, Seconds, StationArgs, ThemeChoice};
+use crate::cli::{Characters, Flags, LinkArgs, Seconds, StationArgs};
 use crate::model::{Amount, Bindings, Degrees, Talk};
+use crate::view::theme::Palette;
 
 /// A file with every key, its meaning and its default; `ground config example` prints it.
 pub const EXAMPLE: &str = include_str!("../config-example.toml");
@@ -26,7 +27,9 @@ pub struct Config {
     #[serde(deserialize_with = "command")]
     pub alarm_command: Option<String>,
     pub characters: Characters,
-    pub theme: ThemeChoice,
+    /// `None` lets the environment decide.
+    #[serde(deserialize_with = "palette")]
+    pub theme: Option<Palette>,
     pub keys: Bindings,
     #[serde(deserialize_with = "command")]
     pub voice: Option<String>,
@@ -36,6 +39,13 @@ pub struct Config {
 
 fn place<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Degrees>, D::Error> {
     String::deserialize(from)?.parse().map(Some).map_err(de::Error::custom)
+}
+
+fn palette<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Palette>, D::Error> {
+    let name = String::deserialize(from)?;
+    let palette = Palette::ALL.into_iter().find(|palette| format!("{palette:?}").eq_ignore_ascii_case(&name));
+    let wrong = || de::Error::custom(format!("`{name}`; give auto, dark, light or none"));
+    if name == "auto" { Ok(None) } else { palette.map(Some).ok_or_else(wrong) }
 }
 
 fn command<'de, D: Deserializer<'de>>(from: D) -> Result<Option<String>, D::Error> {
@@ -105,15 +115,6 @@ impl Config {
         }
         let config = table.try_into().map_err(|error: toml::de::Error| error.to_string())?;
         Ok(Self { flags, ..config })
-    }
-
-    /// Puts the file under the flags of a link that the command line gives. Links come from the command line alone.
-    ///
-    /// # Errors
-    /// The flags are of another command.
-    pub fn fill_link(&self, link: &mut LinkArgs, given: &ArgMatches) -> Result<(), clap::Error> {
-        *link = LinkArgs { connect: Vec::new(), ..self.flags.link.clone() };
-        link.update_from_arg_matches(given)
     }
 
     /// Puts the file under the flags of a station that the command line gives. A bare `ground` takes no link from the file: it

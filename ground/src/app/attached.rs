@@ -4,18 +4,18 @@ use std::path::Path;
 use std::time::Duration;
 
 use anyhow::Context as _;
+use futures_util::StreamExt as _;
 use protocol::log::record::{EventLevel, Record};
-use tokio::io::{AsyncRead, AsyncWriteExt as _};
-use tokio::net::unix::OwnedWriteHalf;
-use tokio::sync::mpsc;
+use tokio::io::AsyncWriteExt as _;
+use tokio::net::unix::{OwnedReadHalf, OwnedWriteHalf};
 use tokio::time::{MissedTickBehavior, interval, timeout};
+use tokio_util::codec::{FramedRead, LengthDelimitedCodec};
 
 use super::clock::{Clock, Signals};
 use super::files::{read_unfinished, write_unfinished};
 use super::output::{Lines, Output, print};
-use super::server::read_one;
 use super::stations;
-use crate::attach::codec::{CodecError, decode_to_screen, encode_to_station};
+use crate::attach::codec::{CodecError, decode_to_screen, encode_to_station, messages};
 use crate::attach::{Hello, ToScreen, ToStation, socket};
 use crate::config::Config;
 use crate::exit;
@@ -32,8 +32,6 @@ const TICK: Duration = Duration::from_millis(100);
 const ANSWERS_WITHIN: Duration = Duration::from_secs(5);
 /// How often a lost station is looked for again.
 const AGAIN_AFTER: Duration = Duration::from_secs(1);
-/// How many messages from the station may wait.
-const WAITING_MAX: usize = 4_096;
 
 /// What a person reads whose terminal shows no screen.
 const LINES_ONLY: &[u8] =
@@ -59,7 +57,9 @@ pub async fn session(
     config: &Config,
     interactive: bool,
 ) -> anyhow::Result<Exit> {
-    let mut link = open_first(named, viewer).await?;
+    let path = stations::the_station(named).await?;
+    let serves = || format!("no ground station serves {}; start one with `ground daemon`", path.display());
+    let mut link = StationConnection::open(&path, viewer).await.with_context(serves)?;
     let clock = Clock::start();
     let mut signals = Signals::listen()?;
     let mut model = Model::new(settings(&Hello::default(), viewer));
@@ -92,7 +92,7 @@ pub async fn session(
                 rest.map_or_else(Vec::new, |msg| update(&mut model, msg, times.theirs(clock.now())))
             }
             () = clock.sleep_until(chord_at) => update(&mut model, Msg::ScreenTick, times.theirs(clock.now())),
-            told = link.told.recv(), if look_again_at.is_none() => {
+            told = link.hear(), if look_again_at.is_none() => {
                 match &told {
                     Some(Ok((ToScreen::Msg(msg), _))) => output.mark_message(msg, &model),
                     _ => output.mark_changed(),
@@ -164,7 +164,7 @@ async fn take_history(
     let asked = kept.and_then(|kept| kept.abort).map(|at| format!("; ABORT asked at {at} NOT CONFIRMED"));
     let silent = format!("the station does not answer: it hangs or is stopped{}", asked.unwrap_or_default());
     loop {
-        let told = timeout(ANSWERS_WITHIN, link.told.recv()).await.with_context(|| silent.clone())?;
+        let told = timeout(ANSWERS_WITHIN, link.hear()).await.with_context(|| silent.clone())?;
         let Some(told) = told else { return Ok(()) };
         let (told, at) = told.context("the station")?;
         times.heard(at, clock.now());
@@ -174,14 +174,6 @@ async fn take_history(
             return Ok(());
         }
     }
-}
-
-/// Connects to the station of this machine.
-async fn open_first(named: Option<&Path>, viewer: &Viewer) -> anyhow::Result<StationConnection> {
-    let path = stations::the_station(named).await?;
-    StationConnection::open(&path, viewer).await.with_context(|| {
-        format!("no ground station serves {}; start one with `ground daemon`", path.display())
-    })
 }
 
 /// Does the actions that are a screen's own. Returns whether to quit.
@@ -317,39 +309,27 @@ impl Times {
     }
 }
 
-/// What a station tells, and when it told it.
-type Told = Result<(ToScreen, Duration), CodecError>;
-
 struct StationConnection {
-    told: mpsc::Receiver<Told>,
+    told: FramedRead<OwnedReadHalf, LengthDelimitedCodec>,
     write: OwnedWriteHalf,
 }
 
 impl StationConnection {
     async fn open(path: &Path, viewer: &Viewer) -> std::io::Result<Self> {
         let (read, write) = socket::connect(path).await?.into_split();
-        let mut link = Self { told: listen(read), write };
+        let mut link = Self { told: messages(read), write };
         link.ask(&ToStation::Hello { watch: viewer.watch, operator: viewer.operator.clone() }).await;
         Ok(link)
+    }
+
+    /// What the station tells next, and when it told it; `None` at its end.
+    async fn hear(&mut self) -> Option<Result<(ToScreen, Duration), CodecError>> {
+        let bytes = self.told.next().await?.ok()?;
+        Some(decode_to_screen(&bytes))
     }
 
     /// Sends a message. Returns whether the station still takes it.
     async fn ask(&mut self, asked: &ToStation) -> bool {
         self.write.write_all(&encode_to_station(asked)).await.is_ok()
     }
-}
-
-/// Decodes what a station tells, until it ends or makes no sense.
-fn listen(mut read: impl AsyncRead + Unpin + Send + 'static) -> mpsc::Receiver<Told> {
-    let (tell, told) = mpsc::channel(WAITING_MAX);
-    tokio::spawn(async move {
-        while let Some(bytes) = read_one(&mut read).await {
-            let told = decode_to_screen(&bytes);
-            let makes_sense = told.is_ok();
-            if tell.send(told).await.is_err() || !makes_sense {
-                return;
-            }
-        }
-    });
-    told
 }

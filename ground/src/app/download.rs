@@ -3,7 +3,7 @@
 
 use std::fs::File;
 use std::io;
-use std::io::{IsTerminal as _, Read as _, Seek as _, Write as _};
+use std::io::{Read as _, Seek as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -23,8 +23,6 @@ use crate::exit::Exit;
 use crate::update::Msg;
 
 const TICK: Duration = Duration::from_millis(20);
-/// How often the progress is shown in place on a terminal.
-const SHOW_EVERY: Duration = Duration::from_millis(500);
 
 /// Fetches the log over this program's own link.
 ///
@@ -45,12 +43,11 @@ pub(in crate::app) async fn run_download(args: &DownloadArgs) -> anyhow::Result<
     let mut signals = Signals::listen()?;
     let mut ticks = interval(TICK);
     ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
-    let mut shown = Shown { in_place: io::stderr().is_terminal(), at: Duration::ZERO, tenths: 0 };
+    let mut percent_shown = 0;
     loop {
         let msgs = tokio::select! {
             biased;
             signal = signals.next() => {
-                shown.end();
                 anyhow::bail!("stopped by {signal}; the same command goes on with what is here");
             }
             received = wire.receive() => wire.take(received),
@@ -81,45 +78,24 @@ pub(in crate::app) async fn run_download(args: &DownloadArgs) -> anyhow::Result<
         for packet in download.poll(now) {
             wire.send(&packet.message(vehicle), 0);
         }
-        shown.show(&download, now);
+        if let Some(progress) = download.progress() {
+            let percent = 1 + 100 * u64::from(progress.bytes) / u64::from(progress.len.max(1));
+            if percent > std::mem::replace(&mut percent_shown, percent) {
+                // If nobody reads it, the download goes on.
+                let _ = writeln!(
+                    io::stderr(),
+                    "log {}: {}",
+                    download.name().unwrap_or_default(),
+                    in_words(&progress)
+                );
+            }
+        }
         if let Some(ended) = download.ended() {
-            shown.end();
             ended?;
             let path = kept.context("the vehicle's log has no content")?.finish()?;
             wire.save_timestamps();
             print(format!("log {}\n", path.display()).as_bytes())?;
             return Ok(Exit::Yes);
-        }
-    }
-}
-
-/// The progress on standard error: on a terminal in place, otherwise a line at every tenth. If nobody reads it, the download goes
-/// on.
-struct Shown {
-    in_place: bool,
-    at: Duration,
-    tenths: u64,
-}
-
-impl Shown {
-    fn show(&mut self, download: &Download, now: Duration) {
-        let progress = download.progress();
-        let words = progress.as_ref().map_or_else(|| "asking the vehicle".to_owned(), in_words);
-        let tenths = progress.map_or(0, |p| 1 + 10 * u64::from(p.bytes) / u64::from(p.len.max(1)));
-        if self.in_place && now >= self.at + SHOW_EVERY {
-            self.at = now;
-            // Erase in line (ECMA-48, 8.3.41).
-            let _ = write!(io::stderr(), "\r{words}\x1b[K");
-        } else if !self.in_place && tenths > self.tenths {
-            self.tenths = tenths;
-            let name = download.name().unwrap_or_default();
-            let _ = writeln!(io::stderr(), "log {name}: {words}");
-        }
-    }
-
-    fn end(&self) {
-        if self.in_place && !self.at.is_zero() {
-            let _ = writeln!(io::stderr());
         }
     }
 }

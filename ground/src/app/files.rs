@@ -18,8 +18,8 @@ use time::macros::format_description;
 
 use crate::cli::LogChoice;
 use crate::model::{
-    Checklist, ChecklistEntry, LastPlace, LogSpace, Remembered, Unfinished, entry_text, geojson, kml,
-    parse_checklist, read_geojson, remembered,
+    Checklist, ChecklistEntry, LastPlace, LogSpace, Remembered, Unfinished, entry_text, kml, parse_checklist,
+    remembered,
 };
 
 /// Opens the chosen log and the telemetry log beside it; `Ok(None)` if no log is wanted. A log that exists is kept: the new one
@@ -32,41 +32,34 @@ pub fn open_log(
     tlog: Option<&LogChoice>,
     header: &LogHeader,
 ) -> anyhow::Result<Option<Recorder>> {
-    match choice {
+    let path = match choice {
         Some(LogChoice::None) => {
             let alone = matches!(tlog, Some(LogChoice::File(_)));
             anyhow::ensure!(!alone, "--tlog writes beside a log; do not give --log none");
-            Ok(None)
+            return Ok(None);
         }
-        Some(LogChoice::File(path)) => Ok(Some(Recorder::create(path, tlog_name(tlog), header)?)),
-        None => open_named_by_time(Path::new(""), tlog, header).map(Some),
-    }
+        Some(LogChoice::File(path)) => path.clone(),
+        None => named_by_time(header)?,
+    };
+    let tlog = match tlog {
+        None => Some(TlogName::OfTheLog),
+        Some(LogChoice::None) => None,
+        Some(LogChoice::File(path)) => Some(TlogName::Own(path)),
+    };
+    Ok(Some(Recorder::create(&path, tlog, header)?))
+}
+
+fn named_by_time(header: &LogHeader) -> anyhow::Result<PathBuf> {
+    let start = OffsetDateTime::from_unix_timestamp_nanos(i128::from(header.start_unix_ns))
+        .context("the system clock is invalid")?;
+    let stamp = start.format(format_description!("[year][month][day]-[hour][minute][second]"))?;
+    Ok(PathBuf::from(format!("touchdown-{stamp}.mcap")))
 }
 
 /// What to say if the log has another name than it was given.
 pub(super) fn other_name(choice: Option<&LogChoice>, log: Option<&Path>) -> Option<String> {
     let (Some(LogChoice::File(asked)), Some(log)) = (choice, log) else { return None };
     recorder::other_name(asked, log)
-}
-
-fn tlog_name(tlog: Option<&LogChoice>) -> Option<TlogName<'_>> {
-    match tlog {
-        None => Some(TlogName::OfTheLog),
-        Some(LogChoice::None) => None,
-        Some(LogChoice::File(path)) => Some(TlogName::Own(path)),
-    }
-}
-
-fn open_named_by_time(
-    directory: &Path,
-    tlog: Option<&LogChoice>,
-    header: &LogHeader,
-) -> anyhow::Result<Recorder> {
-    let start = OffsetDateTime::from_unix_timestamp_nanos(i128::from(header.start_unix_ns))
-        .context("the system clock is invalid")?;
-    let stamp = start.format(format_description!("[year][month][day]-[hour][minute][second]"))?;
-    let path = directory.join(format!("touchdown-{stamp}.mcap"));
-    Ok(Recorder::create(&path, tlog_name(tlog), header)?)
 }
 
 /// How often the space is looked at; the rate is a mean over this time.
@@ -361,7 +354,7 @@ impl SignatureFile {
     }
 }
 
-// The files with the last place of a vehicle, beside the log: one GeoJSON and one KML for each boot of a vehicle.
+// The files with the last place of a vehicle, beside the log, for each boot of a vehicle: one for a restart, and a KML.
 
 /// What the names of the files begin with; the vehicle's boot number follows.
 const PLACE_NAME: &str = "touchdown-place-";
@@ -376,7 +369,7 @@ const PLACE_BYTES_MAX: u64 = 64 * 1024;
 /// The folder cannot be written.
 pub(super) fn write_place(folder: &Path, place: &LastPlace) -> anyhow::Result<()> {
     let name = format!("{PLACE_NAME}{:08X}", place.boot);
-    write_one(folder, &format!("{name}.geojson"), &geojson(place))?;
+    write_one(folder, &format!("{name}.json"), &serde_json::to_string_pretty(place)?)?;
     match kml(place) {
         Some(kml) => write_one(folder, &format!("{name}.kml"), &kml),
         None => Ok(()),
@@ -398,16 +391,12 @@ pub(super) fn newest_place(folder: Option<&Path>, now_unix_s: u64) -> Option<Las
         folder => folder,
     };
     let files = fs::read_dir(folder).ok()?.filter_map(Result::ok);
-    let ours = files.filter(|file| {
-        let name = file.file_name();
-        let name = name.to_string_lossy();
-        name.starts_with(PLACE_NAME)
-            && Path::new(&*name).extension().is_some_and(|ending| ending == "geojson")
-    });
+    let ours = files.filter(|file| file.file_name().to_string_lossy().starts_with(PLACE_NAME));
+    // What is no place, as a KML is none, is passed over.
     let places = ours.filter_map(|file| {
-        let mut text = String::new();
-        File::open(file.path()).ok()?.take(PLACE_BYTES_MAX).read_to_string(&mut text).ok()?;
-        read_geojson(&text)
+        let place: LastPlace =
+            serde_json::from_reader(File::open(file.path()).ok()?.take(PLACE_BYTES_MAX)).ok()?;
+        Some(LastPlace { pad: place.pad.filter(|pad| pad.is_valid()), ..place })
     });
     places
         .filter(|place| now_unix_s.saturating_sub(place.heard_unix_s) <= KEPT_FOR_S)
@@ -454,7 +443,8 @@ mod log_tests {
         let header = LogHeader { start_unix_ns: 1_800_000_000_000_000_000, ..LogHeader::default() };
         let names: Vec<String> = (0..3)
             .map(|_| {
-                let recorder = open_named_by_time(directory.path(), None, &header).unwrap();
+                let choice = LogChoice::File(directory.path().join(named_by_time(&header).unwrap()));
+                let recorder = open_log(Some(&choice), None, &header).unwrap().unwrap();
                 assert!(recorder.tlog_path().unwrap().with_extension("mcap") == recorder.path());
                 recorder.finish().unwrap().file_name().unwrap().to_string_lossy().into_owned()
             })
@@ -595,7 +585,7 @@ mod places_tests {
         }
         // The place of a vehicle is written again and again.
         write_place(folder.path(), &place(2, now - 10)).unwrap();
-        fs::write(folder.path().join(format!("{PLACE_NAME}broken.geojson")), "{").unwrap();
+        fs::write(folder.path().join(format!("{PLACE_NAME}broken.json")), "{").unwrap();
         assert_eq!(newest_place(Some(folder.path()), now), Some(place(2, now - 10)));
         let kml = fs::read_to_string(folder.path().join(format!("{PLACE_NAME}00000002.kml"))).unwrap();
         assert!(kml.contains("<name>last heard</name>"));

@@ -42,11 +42,12 @@ use crate::exit;
 use crate::exit::Exit;
 use crate::model::{KeyOwner, Model, Role, Seat, Settings};
 use crate::update::update;
+use crate::view::theme::Palette;
 use attached::Viewer;
 use clock::{Clock, LogTime};
 use files::{LogGuard, SpaceWatch, newest_place, open_checklist, open_log, other_name, read_unfinished};
 use next_log::NextLog;
-use output::{Lines, Output, print};
+use output::{Output, print};
 use server::{Server, hello};
 use station::{Answers, Station};
 use wire::Wire;
@@ -61,8 +62,6 @@ struct Duty {
     /// It has a screen of its own.
     interactive: bool,
     time_limit: Option<Duration>,
-    /// It prints one object at its end, and nothing else.
-    json: bool,
 }
 
 /// Runs the ground station until its end.
@@ -73,11 +72,11 @@ pub fn run(given: &ArgMatches) -> anyhow::Result<Exit> {
     let cli = Cli::from_arg_matches(given)?;
     let given = given.subcommand().map_or(given, |(_, given)| given);
     let dumb = std::env::var_os("TERM").is_none_or(|term| term.is_empty() || term == "dumb");
-    let interactive = std::io::stdout().is_terminal() && !cli.headless && !cli.json && !dumb;
+    let interactive = std::io::stdout().is_terminal() && !cli.headless && !dumb;
     let load = |args: &ConfigArgs| -> anyhow::Result<Config> {
         let config = Config::load(args.config.as_deref())?;
-        let without = (cli.shown.color == ColorChoice::Never).then_some(crate::cli::ThemeChoice::None);
-        Ok(Config { theme: without.unwrap_or(config.theme), ..config })
+        let without = (cli.shown.color == ColorChoice::Never).then_some(Palette::None);
+        Ok(Config { theme: without.or(config.theme), ..config })
     };
     let said = |bytes: &[u8]| print(bytes).map(|()| Exit::Yes);
     let runtime =
@@ -91,7 +90,7 @@ pub fn run(given: &ArgMatches) -> anyhow::Result<Exit> {
             said(file.map_or_else(none, |path| format!("{}: valid\n", path.display())).as_bytes())
         }
         Some(Command::Manual(manual)) => manual.print(Cli::command()).context("printing the manual"),
-        Some(Command::Status { json }) => runtime.block_on(stations::list(json)),
+        Some(Command::Status) => runtime.block_on(stations::list()),
         Some(Command::Stop { force, socket }) => {
             let config = Config::load(None)?;
             let (socket, who) =
@@ -114,13 +113,15 @@ pub fn run(given: &ArgMatches) -> anyhow::Result<Exit> {
             runtime.block_on(attached::session(socket.as_deref(), &viewer, &config, interactive))
         }
         Some(Command::Download(mut args)) => {
-            load(&args.config)?.fill_link(&mut args.link, given)?;
+            // Links come from the command line alone.
+            args.link = LinkArgs { connect: Vec::new(), ..load(&args.config)?.flags.link };
+            args.link.update_from_arg_matches(given)?;
             runtime.block_on(download::run_download(&args))
         }
         Some(Command::Daemon { mut station }) => {
             let config = load(&station.config)?;
             config.fill(&mut station, given, true)?;
-            let duty = Duty { is_daemon: true, interactive: false, time_limit: None, json: false };
+            let duty = Duty { is_daemon: true, interactive: false, time_limit: None };
             runtime.block_on(Box::pin(session(&station, &config, duty)))
         }
         None => {
@@ -134,7 +135,7 @@ pub fn run(given: &ArgMatches) -> anyhow::Result<Exit> {
             }
             config.fill(&mut station, given, false)?;
             let time_limit = cli.timeout_s.map(|Seconds(limit)| limit);
-            let duty = Duty { is_daemon: false, interactive, time_limit, json: cli.json };
+            let duty = Duty { is_daemon: false, interactive, time_limit };
             runtime.block_on(Box::pin(session(&station, &config, duty)))
         }
     }
@@ -179,12 +180,7 @@ async fn session(args: &StationArgs, config: &Config, duty: Duty) -> anyhow::Res
     let log_path = log_guard.finish();
     ran?;
     let exit = exit::decide(&model.outcome, duty.interactive);
-    if duty.json {
-        let log = log_path.as_ref().ok().and_then(Option::as_ref);
-        print(output::ended(&model, exit, log, clock.now()).as_bytes())?;
-    } else {
-        output::closing(&model, duty.interactive, log_path.as_ref(), clock.now());
-    }
+    output::closing(&model, duty.interactive, log_path.as_ref(), clock.now());
     log_path.context("the log")?;
     Ok(exit)
 }
@@ -197,7 +193,7 @@ async fn start(
     (clock, demo_options): (Clock, Option<DemoOptions>),
     mut next_log: NextLog,
 ) -> anyhow::Result<(Station, Model, Wire)> {
-    let Duty { is_daemon, interactive, time_limit, json } = duty;
+    let Duty { is_daemon, interactive, time_limit } = duty;
     let recorder = next_log.present();
     let link = &args.flags.link;
     // The demonstration uses any free port, so that it can run beside a real ground station.
@@ -269,9 +265,9 @@ async fn start(
         }
         file
     });
-    go_on_with_what_is_kept(&mut model, recorder.as_ref(), is_daemon, clock.now()).await;
+    go_on_with_what_is_kept(&mut model, recorder.as_ref(), clock.now());
     let server = serve(args, &mut model, duty, &clock).await?;
-    let output = if json { Output::lines(Lines::closed()) } else { Output::open(interactive, config)? };
+    let output = Output::open(interactive, config)?;
     model.repeats_reported = output.reports_repeats();
     let mut station = Station {
         clock,
@@ -309,9 +305,8 @@ fn announce(model: &mut Model, auto: bool, renamed: Option<String>, now: Duratio
     }
 }
 
-/// Takes what an earlier run has kept beside its log, and says which stations run beside a demonstration, which has another
-/// vehicle.
-async fn go_on_with_what_is_kept(model: &mut Model, log: Option<&Recorder>, is_daemon: bool, now: Duration) {
+/// Takes what an earlier run has kept beside its log.
+fn go_on_with_what_is_kept(model: &mut Model, log: Option<&Recorder>, now: Duration) {
     let (folder, unix_s) = (log.and_then(|log| log.path().parent()), model.settings.start_unix_s);
     model.place = newest_place(folder, unix_s);
     if let Some(kept) = read_unfinished(folder, unix_s).filter(|_| !model.settings.demonstration) {
@@ -319,12 +314,6 @@ async fn go_on_with_what_is_kept(model: &mut Model, log: Option<&Recorder>, is_d
     }
     if model.place.is_some() {
         model.info(now, "the last place of a vehicle is kept from before: page Find");
-    }
-    if model.settings.demonstration
-        && !is_daemon
-        && let Some(line) = stations::running_beside().await
-    {
-        model.info(now, line);
     }
 }
 
@@ -353,32 +342,12 @@ async fn serve(
 
 // Finds the name of the person at this screen.
 
-/// The given name, otherwise the user and the terminal or host, as in `anna on pts/3` or `anna from 192.168.1.7`.
+/// The given name, otherwise the user.
 pub(super) fn operator(named: Option<&str>) -> String {
-    let variable = |name: &str| std::env::var(name).ok().filter(|value| !value.is_empty());
-    let words = named.map_or_else(
-        || {
-            let user = variable("USER").or_else(|| variable("LOGNAME"));
-            let client = variable("SSH_CLIENT").or_else(|| variable("SSH_CONNECTION"));
-            let terminal = std::fs::read_link("/proc/self/fd/0").ok();
-            let terminal = terminal.and_then(|path| path.to_str().map(str::to_owned));
-            described(user.as_deref(), client.as_deref(), terminal.as_deref())
-        },
-        str::to_owned,
-    );
+    let variable = |name| std::env::var(name).ok().filter(|value| !value.is_empty());
+    let words = named.map(str::to_owned).or_else(|| variable("USER")).or_else(|| variable("LOGNAME"));
+    let words = words.unwrap_or_else(|| "somebody".to_owned());
     protocol::text::printable(words.as_bytes()).chars().take(OPERATOR_MAX).collect()
-}
-
-/// `client` is the value of SSH_CLIENT (address, port, port); `terminal` is a path.
-fn described(user: Option<&str>, client: Option<&str>, terminal: Option<&str>) -> String {
-    let user = user.unwrap_or("somebody");
-    let address = client.and_then(|client| client.split_whitespace().next());
-    let terminal = terminal.and_then(|path| path.strip_prefix("/dev/")).filter(|name| *name != "null");
-    match (address, terminal) {
-        (Some(address), _) => format!("{user} from {address}"),
-        (None, Some(terminal)) => format!("{user} on {terminal}"),
-        (None, None) => user.to_owned(),
-    }
 }
 
 // The keys of a station: the one that all share, and that of the operator who sits here.
@@ -432,13 +401,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_operator_is_a_user_and_where_from() {
-        assert_eq!(described(Some("anna"), None, Some("/dev/pts/3")), "anna on pts/3");
-        assert_eq!(
-            described(Some("anna"), Some("10.0.0.7 5022 22"), Some("/dev/pts/3")),
-            "anna from 10.0.0.7"
-        );
-        assert_eq!(described(None, None, Some("pipe:[7]")), "somebody");
+    fn a_name_from_outside_is_printable() {
         assert_eq!(operator(Some("Anna \u{1b}[2J")).chars().filter(|c| c.is_control()).count(), 0);
     }
 }

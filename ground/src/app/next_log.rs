@@ -118,7 +118,7 @@ impl Station {
         self.close_book(&format!("the log goes on in {}", file_name(next.path())), model, wire);
         let end_of_book = model.book.short().map_or_else(String::new, |end| format!(" with book {end}"));
         let before = self.next_log.guarded().replace(Log::of(next.clone()));
-        wire.record_into(next.clone());
+        wire.recorder = Some(next.clone());
         (self.recorder, self.log_space) = (Some(next.clone()), SpaceWatch::default());
         self.next_log.ending = before.and_then(end);
         self.open_book(model, &format!(", after {before_name}{end_of_book}"));
@@ -185,7 +185,7 @@ mod tests {
             let clock = Clock::start();
             let header = LogHeader { start_unix_ns: clock.start_unix_ns(), ..LogHeader::default() };
             let guard = LogGuard::new(open_log(args.flags.log.as_ref(), None, &header).unwrap());
-            let duty = Duty { is_daemon: true, interactive: false, time_limit: None, json: false };
+            let duty = Duty { is_daemon: true, interactive: false, time_limit: None };
             let next_log = NextLog::new(&args, header, guard.log());
             let config = Config::default();
             let started = Box::pin(start(&args, &config, duty, (clock, None), next_log)).await;
@@ -200,7 +200,7 @@ mod tests {
             assert_eq!(model.settings.log_path.as_deref(), Some(&*log), "a short log goes on");
             station.change_log(&mut model, &mut wire);
             say(&mut wire);
-            assert_eq!(super::super::stations::of(&model, &[]).log, Some(path("flight-2.mcap")));
+            assert_eq!(super::super::stations::of(&model, &[]).log, path("flight-2.mcap"));
             station.change_log(&mut model, &mut wire);
             say(&mut wire);
             station.close_book("the station ends", &mut model, &mut wire);

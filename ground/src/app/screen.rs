@@ -232,7 +232,7 @@ impl Drop for Screen {
 /// The theme from the settings, otherwise from the environment.
 fn theme(config: &Config) -> Theme {
     let found = Theme::of_environment(|name| std::env::var(name).ok());
-    let palette = config.theme.palette().unwrap_or(found.palette);
+    let palette = config.theme.unwrap_or(found.palette);
     let ascii = match config.characters {
         Characters::Auto => found.ascii,
         Characters::Unicode => false,

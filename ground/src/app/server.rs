@@ -7,14 +7,15 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use anyhow::Context as _;
-use tokio::io::{AsyncRead, AsyncReadExt as _, AsyncWriteExt as _};
-
+use futures_util::StreamExt as _;
+use tokio::io::AsyncWriteExt as _;
 use tokio::net::UnixStream;
 use tokio::net::unix::{OwnedReadHalf, OwnedWriteHalf};
 use tokio::sync::{broadcast, mpsc, oneshot};
+use tokio_util::codec::{FramedRead, LengthDelimitedCodec};
 
 use super::output::absolute;
-use crate::attach::codec::{decode_to_station, encode_to_screen, length};
+use crate::attach::codec::{decode_to_station, encode_to_screen, messages};
 use crate::attach::{Hello, ToScreen, ToStation, socket};
 use crate::model::{Model, Seat, Settings};
 use crate::update::Msg;
@@ -32,6 +33,8 @@ const REQUESTS_MAX: usize = 64;
 const SPEAKS_WITHIN: Duration = Duration::from_secs(5);
 
 type Bytes = Arc<[u8]>;
+/// What a screen says.
+type Asked = FramedRead<OwnedReadHalf, LengthDelimitedCodec>;
 
 /// What a station receives over its socket.
 #[derive(Debug)]
@@ -191,8 +194,9 @@ impl Shared {
 
 /// Serves a new connection: a screen, or a single question.
 async fn receive(stream: UnixStream, shared: Arc<Shared>, ask: mpsc::Sender<ServerEvent>) {
-    let (mut read, mut write) = stream.into_split();
-    let Ok(Some(first)) = tokio::time::timeout(SPEAKS_WITHIN, read_one(&mut read)).await else { return };
+    let (read, mut write) = stream.into_split();
+    let mut read = messages(read);
+    let Ok(Some(Ok(first))) = tokio::time::timeout(SPEAKS_WITHIN, read.next()).await else { return };
     match decode_to_station(&first) {
         Ok(ToStation::Hello { watch, operator }) => {
             let screen = shared.next_screen.fetch_add(1, Ordering::Relaxed);
@@ -222,7 +226,7 @@ async fn receive(stream: UnixStream, shared: Arc<Shared>, ask: mpsc::Sender<Serv
 }
 
 async fn serve(
-    read: OwnedReadHalf,
+    read: Asked,
     mut write: OwnedWriteHalf,
     shared: &Shared,
     (seat, watch): (Seat, bool),
@@ -259,8 +263,8 @@ async fn hear_out(write: OwnedWriteHalf, mut listening: tokio::task::JoinHandle<
 }
 
 /// Reads a screen's requests until it closes or sends something invalid.
-async fn listen_to(mut read: OwnedReadHalf, seat: Seat, watch: bool, ask: mpsc::Sender<ServerEvent>) {
-    while let Some(bytes) = read_one(&mut read).await {
+async fn listen_to(mut read: Asked, seat: Seat, watch: bool, ask: mpsc::Sender<ServerEvent>) {
+    while let Some(Ok(bytes)) = read.next().await {
         match decode_to_station(&bytes) {
             // Requests of a screen that only watches are ignored.
             Ok(_) if watch => {}
@@ -272,15 +276,6 @@ async fn listen_to(mut read: OwnedReadHalf, seat: Seat, watch: bool, ask: mpsc::
             Err(_) => return,
         }
     }
-}
-
-/// The bytes of one message without its length; `None` at the end.
-pub async fn read_one(read: &mut (impl AsyncRead + Unpin)) -> Option<Vec<u8>> {
-    let mut prefix = [0; 4];
-    read.read_exact(&mut prefix).await.ok()?;
-    let mut bytes = vec![0; length(prefix).ok()?];
-    read.read_exact(&mut bytes).await.ok()?;
-    Some(bytes)
 }
 
 #[cfg(test)]
@@ -295,7 +290,7 @@ mod server_tests {
     fn numbers(mut bytes: &[u8]) -> Vec<u32> {
         let mut numbers = Vec::new();
         while let Some((prefix, rest)) = bytes.split_first_chunk() {
-            let length = length(*prefix).unwrap();
+            let length = u32::from_le_bytes(*prefix) as usize;
             numbers.push(u32::from_le_bytes(*rest.first_chunk().unwrap()));
             bytes = &rest[length..];
         }

@@ -1,19 +1,19 @@
 //! Finds, lists and stops this user's stations.
 
-use std::fmt::Write as _;
 use std::io;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::Context as _;
+use futures_util::StreamExt as _;
+use protocol::identity::Address;
 use protocol::transport::LinkAddress;
 use tokio::io::AsyncWriteExt as _;
 
 use super::output::{absolute, print};
-use super::server::read_one;
 use super::station::Attached;
-use crate::attach::codec::{decode_to_screen, encode_to_station};
+use crate::attach::codec::{decode_to_screen, encode_to_station, messages};
 use crate::attach::{StationStatus, ToScreen, ToStation, socket};
 use crate::exit::Exit;
 use crate::model::{Model, Seat, why_not_stop, words};
@@ -36,41 +36,43 @@ pub(super) fn of(model: &Model, screens: &[Attached]) -> StationStatus {
     let watching =
         screens.iter().filter(|screen| screen.watch).map(|screen| format!("{} (watches)", screen.seat));
     let silent = model.crew.silent().iter().map(|seat| format!("{seat} (does not answer)"));
-    let screens = model.crew.seats().iter().map(Seat::to_string).chain(silent).chain(watching);
-    let ids = format!("{}/{}", settings.vehicle.system_id, settings.vehicle.component_id);
+    let screens: Vec<String> =
+        model.crew.seats().iter().map(Seat::to_string).chain(silent).chain(watching).collect();
+    let boot = vehicle.boot.number().map_or_else(String::new, |boot| format!(" boot {}", words::boot(boot)));
+    let Address { system_id, component_id } = settings.vehicle;
+    let heard = vehicle.heartbeat.map(|_| format!("{system_id}/{component_id} {kind}{boot}"));
+    let phase = vehicle.phase_now().map_or_else(|| "phase unknown".to_owned(), words::phase);
     StationStatus {
         pid: std::process::id(),
         link: settings.link_name.clone(),
-        demonstration: settings.demonstration,
-        kind: kind.to_owned(),
-        vehicle: vehicle.heartbeat.as_ref().map(|_| ids),
-        boot_number: vehicle.status.as_ref().map_or(0, |status| status.value.boot_number),
-        phase: vehicle.phase().map_or_else(|| "phase unknown".to_owned(), |phase| words::phase(phase.value)),
-        armed: vehicle.is_armed(),
-        at_risk: model.is_at_risk(),
-        log: settings.log_path.as_deref().map(absolute),
-        screens: screens.collect(),
+        vehicle: heard.unwrap_or_else(|| "not heard".to_owned()),
+        state: format!("{phase} {}", if vehicle.is_armed() { "ARMED" } else { "disarmed" }),
+        log: log_of(model),
+        screens: if screens.is_empty() { "none".to_owned() } else { screens.join("; ") },
     }
+}
+
+fn log_of(model: &Model) -> String {
+    model.settings.log_path.as_deref().map_or_else(|| "none".to_owned(), absolute)
 }
 
 /// Answers a request to stop this station.
 pub(super) fn stopping(model: &Model, force: bool, now: Duration) -> ToScreen {
-    let log = model.settings.log_path.as_deref().map_or_else(|| "none".to_owned(), absolute);
     let free = force || model.settings.demonstration;
     match why_not_stop(model, now).filter(|_| !free) {
         Some(why) => {
             ToScreen::Stopping { stops: false, words: format!("{why}; --force ends the station anyway") }
         }
-        None => ToScreen::Stopping { stops: true, words: format!("log: {log}") },
+        None => ToScreen::Stopping { stops: true, words: format!("log: {}", log_of(model)) },
     }
 }
 
 /// Sends one question to the station on this socket.
 async fn ask(path: &Path, asked: &ToStation) -> io::Result<ToScreen> {
     let asking = async {
-        let (mut read, mut write) = socket::connect(path).await?.into_split();
+        let (read, mut write) = socket::connect(path).await?.into_split();
         write.write_all(&encode_to_station(asked)).await?;
-        let bytes = read_one(&mut read).await.ok_or_else(|| io::Error::from(ErrorKind::UnexpectedEof))?;
+        let bytes = messages(read).next().await.ok_or(ErrorKind::UnexpectedEof)??;
         let (told, _) =
             decode_to_screen(&bytes).map_err(|error| io::Error::new(ErrorKind::InvalidData, error))?;
         Ok(told)
@@ -131,64 +133,16 @@ pub(super) async fn station_over(links: &str) -> Option<PathBuf> {
     same.next().filter(|_| same.next().is_none()).map(|(path, _)| path)
 }
 
-/// As in `PAD_IDLE disarmed`.
-fn phase_of(StationStatus { phase, armed, .. }: &StationStatus) -> String {
-    format!("{phase} {}", if *armed { "ARMED" } else { "disarmed" })
-}
-
 fn listed(found: &[Found]) -> String {
-    let mut text = String::new();
-    for (path, status) in found {
-        // Writing into a String cannot fail.
-        let _ = match status {
-            Ok(status) => {
-                let StationStatus { pid, link, kind, vehicle, log, screens, .. } = status;
-                let boot = Some(status.boot_number).filter(|boot| *boot > 0);
-                let boot = boot.map_or_else(String::new, |boot| format!(" boot {boot:08X}"));
-                let named = vehicle.as_ref().map(|ids| format!("{ids} {kind}{boot}"));
-                let vehicle = named.as_deref().unwrap_or("not heard");
-                let (phase, log) = (phase_of(status), log.as_deref().unwrap_or("none"));
-                let screens = if screens.is_empty() { "none".to_owned() } else { screens.join("; ") };
-                writeln!(
-                    text,
-                    "pid {pid}  {link}  vehicle {vehicle}  {phase}\n  socket {}\n  log {log}\n  screens {screens}",
-                    path.display()
-                )
-            }
-            Err(why) => writeln!(text, "socket {}  gives no status: {why}", path.display()),
-        };
-    }
-    text
-}
-
-/// A station as a program reads it: its socket, and its status or why it gives none.
-fn listed_as_json(found: &[Found]) -> anyhow::Result<String> {
-    let one = |(socket, status): &Found| {
-        let mut one = match status {
-            Ok(status) => serde_json::to_value(status)?,
-            Err(error) => serde_json::json!({ "error": error }),
-        };
-        one["socket"] = serde_json::to_value(socket)?;
-        Ok(one)
-    };
-    let all = found.iter().map(one).collect::<serde_json::Result<Vec<_>>>()?;
-    Ok(serde_json::to_string_pretty(&all)? + "\n")
-}
-
-/// For a demonstration: a line saying that a station runs and how to reach it.
-pub(super) async fn running_beside() -> Option<String> {
-    // An error is ignored, because a demonstration needs no station.
-    let found = stations().await.ok()?;
-    match &found[..] {
-        [] => None,
-        [(_, Ok(StationStatus { pid, link, .. }))] => {
-            Some(format!("a station runs: pid {pid}, {link}; `ground attach` shows it"))
+    let one = |(path, status): &Found| match (path.display(), status) {
+        (path, Ok(StationStatus { pid, link, vehicle, state, log, screens })) => {
+            format!(
+                "pid {pid}  {link}  vehicle {vehicle}  {state}\n  socket {path}\n  log {log}\n  screens {screens}\n"
+            )
         }
-        _ => Some(format!(
-            "{} stations run: `ground status` lists them, `ground attach` shows one",
-            found.len()
-        )),
-    }
+        (path, Err(why)) => format!("socket {path}  gives no status: {why}\n"),
+    };
+    found.iter().map(one).collect()
 }
 
 /// What was opened, or why it could not be; if the address is in use, by which station.
@@ -211,9 +165,8 @@ pub(super) async fn explained<T>(opened: anyhow::Result<T>, endpoints: &[LinkAdd
         links.any(|link| places.contains(&kind_and_port(link))).then_some(status)
     });
     Err(match holder {
-        Some(status @ StationStatus { pid, link, .. }) => anyhow::anyhow!(
-            "your ground station pid {pid} ({}) uses {link}: `ground attach` shows it, `ground stop` ends it",
-            phase_of(status)
+        Some(StationStatus { pid, link, state, .. }) => anyhow::anyhow!(
+            "your ground station pid {pid} ({state}) uses {link}: `ground attach` shows it, `ground stop` ends it"
         ),
         None => error.context("another program uses the address; none of your ground stations does"),
     })
@@ -230,14 +183,10 @@ fn kind_and_port(link: &str) -> String {
 ///
 /// # Errors
 /// The stations cannot be looked for.
-pub async fn list(as_json: bool) -> anyhow::Result<Exit> {
+pub async fn list() -> anyhow::Result<Exit> {
     let found = stations().await.context("looking for ground stations")?;
-    let text = match &found[..] {
-        _ if as_json => listed_as_json(&found)?,
-        [] => "no ground station of yours runs\n".to_owned(),
-        _ => listed(&found),
-    };
-    print(text.as_bytes())?;
+    let none = "no ground station of yours runs\n";
+    print(if found.is_empty() { none.to_owned() } else { listed(&found) }.as_bytes())?;
     Ok(Exit::Yes)
 }
 

@@ -44,7 +44,7 @@ pub struct Wire {
     save_failure_reported: bool,
     encoder: Encoder,
     clock: Clock,
-    recorder: Option<Recorder>,
+    pub(super) recorder: Option<Recorder>,
     log_time: LogTime,
     /// Who is sent what is heard; nothing is ever read from them.
     listeners: Vec<UdpSocket>,
@@ -136,11 +136,6 @@ impl Wire {
             self.listeners.push(socket.with_context(|| format!("forward to {host}"))?);
         }
         Ok(())
-    }
-
-    /// Records into this log from now on.
-    pub(super) fn record_into(&mut self, log: Recorder) {
-        self.recorder = Some(log);
     }
 
     /// The addresses of the links.

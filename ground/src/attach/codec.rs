@@ -9,6 +9,8 @@
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
+use tokio::io::AsyncRead;
+use tokio_util::codec::{FramedRead, LengthDelimitedCodec};
 
 use super::{NOTE_MAX, OPERATOR_MAX, ToScreen, ToStation, VERSION};
 use crate::model::Request;
@@ -69,14 +71,9 @@ pub fn decode_to_station(bytes: &[u8]) -> Result<ToStation, CodecError> {
     Ok(asked)
 }
 
-/// The length of a message, from its four bytes.
-///
-/// # Errors
-/// No valid message has this length.
-pub fn length(prefix: [u8; PREFIX_LEN]) -> Result<usize, CodecError> {
-    let length = usize::try_from(u32::from_le_bytes(prefix)).unwrap_or(usize::MAX);
-    let is_valid = (PREFIX_LEN..=LENGTH_MAX).contains(&length);
-    if is_valid { Ok(length) } else { Err(CodecError::Bytes("a wrong length")) }
+/// The messages of a connection, each without its length. The connection ends with one that is too long.
+pub fn messages<R: AsyncRead>(read: R) -> FramedRead<R, LengthDelimitedCodec> {
+    LengthDelimitedCodec::builder().little_endian().max_frame_length(LENGTH_MAX).new_read(read)
 }
 
 fn message(payload: &impl Serialize) -> Option<Vec<u8>> {
@@ -128,7 +125,7 @@ mod tests {
     fn back(told: &ToScreen, now: Duration) -> (ToScreen, Duration) {
         let bytes = encode_to_screen(told, now).unwrap();
         let (prefix, rest) = bytes.split_first_chunk().unwrap();
-        assert_eq!(length(*prefix).unwrap(), rest.len());
+        assert_eq!(u32::from_le_bytes(*prefix) as usize, rest.len());
         decode_to_screen(rest).unwrap()
     }
 
@@ -181,7 +178,7 @@ mod tests {
             Msg::Asked { request: Request::Acknowledge(AlarmKind::Refused(CommandKind::Abort)), by: seat },
             Msg::Tick,
         ];
-        let status = StationStatus { pid: 7, phase: "PAD_ARMED".to_owned(), ..StationStatus::default() };
+        let status = StationStatus { pid: 7, state: "PAD_ARMED".to_owned(), ..StationStatus::default() };
         let others = [
             ToScreen::Hello(Box::new(Hello { screen: 3, station })),
             ToScreen::Live,

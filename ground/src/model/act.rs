@@ -118,7 +118,7 @@ pub const DEFINITIONS: [Definition; 36] = [
     shows(Act::Show(Page::Pad), "pad", '1', "page: arming checks and ladder"),
     shows(Act::Show(Page::Descent), "flight", '2', "page: ascent and descent"),
     shows(Act::Show(Page::Landing), "landing", '3', "page: the burn"),
-    shows(Act::Show(Page::Review), "review", '4', "page: verdict, limits, greatest values"),
+    shows(Act::Show(Page::Review), "review", '4', "page: verdict, limits, what went wrong"),
     shows(Act::Show(Page::Link), "link", '5', "page: link rates and the age of every message"),
     shows(Act::Show(Page::Messages), "texts", '6', "page: events and messages"),
     shows(Act::Show(Page::Log), "log", '7', "page: the recording"),
@@ -144,10 +144,18 @@ pub const DEFINITIONS: [Definition; 36] = [
     acts(Act::Quit, "quit", 'q', "quit; while it is not over: then type QUIT and Enter"),
 ];
 
-/// Whether a flight has been flown that this screen's log holds, and nothing is at risk.
-fn flown_here(model: &Model) -> bool {
-    let is_live = model.settings.role != Role::Replaying;
-    is_live && model.outcome.started && model.settings.log_path.is_some() && !model.is_at_risk()
+/// Why no flight can be shown again or reported here now.
+pub fn why_nothing_flown(model: &Model) -> Option<&'static str> {
+    if model.settings.role == Role::Replaying {
+        return Some("this is a replay");
+    }
+    if model.is_at_risk() {
+        return Some("the vehicle is armed or in flight");
+    }
+    if model.settings.log_path.is_none() {
+        return Some("there is no log (--log none)");
+    }
+    (!model.outcome.started).then_some("no flight has been flown yet")
 }
 
 impl Act {
@@ -169,8 +177,8 @@ impl Act {
             Self::Acknowledge => !model.alarms.list().is_empty() && model.settings.role != Role::Replaying,
             Self::Follow => model.pages.held.is_some(),
             Self::Checklist => model.checklist.is_some(),
-            Self::ReplayFlight => flown_here(model),
-            Self::Report => commands && flown_here(model),
+            Self::ReplayFlight => why_nothing_flown(model).is_none(),
+            Self::Report => commands && why_nothing_flown(model).is_none(),
             Self::MovePin => {
                 let is_ours = model.settings.demonstration && model.settings.role == Role::Station;
                 is_ours && !model.vehicle.in_flight() && model.vehicle.interlocks().is_some()

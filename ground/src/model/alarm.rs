@@ -263,7 +263,7 @@ impl Default for Talk {
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Called {
     pub(crate) phase: Option<TdPhase>,
-    pub(crate) has_lifted: bool,
+    pub(crate) lifts: bool,
     pub(crate) height_m: Option<f64>,
     pub(crate) height_at: Option<Duration>,
     /// Whether GO was the last that was called out on the pad.

@@ -6,6 +6,7 @@ use protocol::command::{CommandSender, Resend, Ticket};
 use protocol::dialect::{MavCmd, MavResult, TdAct, TdInterlock, TdPhase};
 use protocol::identity::Address;
 use serde::{Deserialize, Serialize};
+use strum::VariantArray;
 
 use super::{
     Ask, GONE_AFTER, LinkState, Model, PadCheck, Prompt, RED_AFTER, Seat, Settings, Vehicle, is_on_pad, words,
@@ -16,7 +17,7 @@ use super::{
 pub const OBSERVE_WITHIN: Duration = Duration::from_millis(2_500);
 
 /// A command that the crew can give.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, VariantArray)]
 pub enum CommandKind {
     Arm,
     Disarm,
@@ -51,21 +52,7 @@ struct CommandRow {
 }
 
 impl CommandKind {
-    pub const ALL: [Self; 13] = [
-        Self::Arm,
-        Self::Disarm,
-        Self::Start,
-        Self::Abort,
-        Self::ConfirmArm,
-        Self::ConfirmStart,
-        Self::Hold,
-        Self::Tap,
-        Self::TakeCommand,
-        Self::Check,
-        Self::CheckStill,
-        Self::EndCheck,
-        Self::Seen,
-    ];
+    pub const ALL: &'static [Self] = Self::VARIANTS;
 
     /// What a command is, but for when it may be given.
     ///
@@ -241,10 +228,6 @@ impl Commands {
         Self { sender: CommandSender::new(session), ..Self::default() }
     }
 
-    pub fn latest(&self) -> Option<&TrackedCommand> {
-        self.tracks.last()
-    }
-
     /// The latest command of a kind.
     pub fn of(&self, kind: CommandKind) -> Option<&TrackedCommand> {
         self.tracks.iter().find(|track| track.kind == kind)
@@ -334,6 +317,18 @@ pub fn why_not_arm(model: &Model, now: Duration) -> Option<String> {
         .or_else(|| model.why_checklist(now))
         .or_else(|| why_not_in(model, is_on_pad))
         // Last: the crew can overrule these two, each by its word.
+        .or_else(|| why_untested(model))
+        .or_else(|| model.why_no_log(now))
+}
+
+/// Why the vehicle is not ready to be armed, its own checks among it. What a screen says as NO-GO, and the voice.
+pub fn why_no_go(model: &Model, now: Duration) -> Option<String> {
+    let uplink = || "uplink not proven, every other check passes".to_owned();
+    why_not_reached(model, now)
+        .or_else(|| model.vehicle.why_no_go())
+        .or_else(|| (!model.link.uplink.is_proven(now)).then(uplink))
+        .or_else(|| why_other_mission(model))
+        .or_else(|| model.why_checklist(now))
         .or_else(|| why_untested(model))
         .or_else(|| model.why_no_log(now))
 }

@@ -48,13 +48,16 @@ impl Crew {
         &self.silent
     }
 
-    /// The first word of each operator's name, or the screen.
+    /// The first word of each operator's name, or the screen, each once.
     pub fn names(&self) -> Vec<String> {
         let name = |seat: &Seat| match seat.operator.split_whitespace().next() {
             Some(name) => name.to_owned(),
             None => seat.to_string(),
         };
-        self.seats.iter().map(name).collect()
+        let mut names: Vec<String> = self.seats.iter().map(name).collect();
+        names.sort();
+        names.dedup();
+        names
     }
 
     /// Whether no commanding screen has been there for too long.
@@ -83,7 +86,7 @@ impl Crew {
 pub struct Seat {
     /// The screen's number; 0 for none.
     pub screen: u32,
-    /// The operator, as in `anna on pts/3`; empty if unknown.
+    /// The operator; empty if unknown.
     pub operator: String,
 }
 
@@ -97,7 +100,7 @@ impl Seat {
         Self::new(0, "automatic mode")
     }
 
-    /// For the end of a text, as in ` (screen 2, anna on pts/3)`; empty if nothing is known.
+    /// For the end of a text, as in ` (screen 2, anna)`; empty if nothing is known.
     pub fn in_brackets(&self) -> String {
         let words = self.to_string();
         if words.is_empty() { words } else { format!(" ({words})") }

@@ -1,45 +1,24 @@
-//! The past of the flight: its timeline, its least and greatest values, and every quantity over time.
+//! The past of the flight: its timeline, and every quantity over time.
 
 use std::time::Duration;
 
 use protocol::dialect::TdPhase;
 
 use super::{
-    Model, Sample, every_second, is_flight,
+    Model, every_second, is_flight,
     quantity::{ALL, COUNT, Quantity},
 };
 
 /// The longest timeline, so that a vehicle that keeps changing its phase cannot fill the memory.
 const TIMELINE_MAX: usize = 64;
 
-/// The least and the greatest value of each quantity since the vehicle left the pad, in the order of [`ALL`].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Extremes {
-    values: [[f64; 2]; COUNT],
-    /// The longest time without a heartbeat, s.
-    pub silence_s: Option<f64>,
-}
-
-impl Default for Extremes {
-    fn default() -> Self {
-        Self { values: [[f64::INFINITY, f64::NEG_INFINITY]; COUNT], silence_s: None }
-    }
-}
-
-impl Extremes {
-    /// Those of the quantity of this name; `None` if it was never known.
-    pub fn of(&self, name: &str) -> Option<[f64; 2]> {
-        let values = self.values[Quantity::named(name)?.place()];
-        Some(values).filter(|[least, greatest]| least <= greatest)
-    }
-}
-
 /// What the review page shows.
 #[derive(Debug, Clone, Default)]
 pub struct History {
     /// Each phase and when it was first received, since the start of the run.
     pub timeline: Vec<(TdPhase, Duration)>,
-    pub extremes: Extremes,
+    /// The longest time without a heartbeat in flight.
+    pub silence: Duration,
     pub trace: Trace,
 }
 
@@ -49,22 +28,6 @@ impl History {
             self.timeline.push((phase, now));
         }
     }
-}
-
-/// Takes the present values of a flight, unless they are stale.
-pub(crate) fn note_extremes(model: &mut Model, now: Duration) {
-    if !model.vehicle.in_flight() {
-        return;
-    }
-    for (place, quantity) in ALL.iter().enumerate() {
-        if let Some(Sample { value, .. }) = quantity.read(model, now).filter(|sample| !sample.is_stale(now)) {
-            let [least, greatest] = model.history.extremes.values[place];
-            model.history.extremes.values[place] = [least.min(value), greatest.max(value)];
-        }
-    }
-    let silence_s = model.link.heard_at.map(|at| now.saturating_sub(at).as_secs_f64());
-    let longest_s = model.history.extremes.silence_s;
-    model.history.extremes.silence_s = longest_s.into_iter().chain(silence_s).reduce(f64::max);
 }
 
 // Every quantity over time, in a bounded number of rows: the recent past in full, the distant past in steps.
@@ -110,9 +73,12 @@ impl Trace {
     }
 }
 
-/// Adds a row with the present values, if one is due.
+/// Adds a row with the present values, if one is due, and notes the silence in flight.
 pub(crate) fn note_trace(model: &mut Model, now: Duration) {
     let in_flight = model.vehicle.phase_now().is_some_and(is_flight);
+    if let Some(heard_at) = model.link.heard_at.filter(|_| in_flight) {
+        model.history.silence = model.history.silence.max(now.saturating_sub(heard_at));
+    }
     if now < model.history.trace.due_at(in_flight) || model.vehicle.heartbeat.is_none() {
         return;
     }

@@ -149,31 +149,10 @@ impl Foreign {
     pub fn mode(&self) -> String {
         format!("mode {}", self.custom_mode)
     }
-
-    /// What `MAV_CMD_DO_FLIGHTTERMINATION` would do there.
-    pub fn termination(&self) -> &'static str {
-        match self.mavtype {
-            _ if turns_rotors(self.mavtype) => "CUTS ITS MOTORS: in the air it falls",
-            MavType::MAV_TYPE_FIXED_WING => "stops its motor and sets its surfaces to crash",
-            MavType::MAV_TYPE_GROUND_ROVER | MavType::MAV_TYPE_SURFACE_BOAT => "stops it where it is",
-            _ => "ends its flight as it is set to: it may fall",
-        }
-    }
 }
 
-fn turns_rotors(mavtype: MavType) -> bool {
-    matches!(
-        mavtype,
-        MavType::MAV_TYPE_QUADROTOR
-            | MavType::MAV_TYPE_HEXAROTOR
-            | MavType::MAV_TYPE_OCTOROTOR
-            | MavType::MAV_TYPE_TRICOPTER
-            | MavType::MAV_TYPE_DODECAROTOR
-            | MavType::MAV_TYPE_DECAROTOR
-            | MavType::MAV_TYPE_HELICOPTER
-            | MavType::MAV_TYPE_COAXIAL
-    )
-}
+/// What `MAV_CMD_DO_FLIGHTTERMINATION` does to a vehicle of another make.
+pub const TERMINATION: &str = "CUTS ITS MOTORS, or ends its flight as it is set to: in the air it falls";
 
 #[cfg(test)]
 mod boot_tests {

@@ -13,9 +13,6 @@ use serde::{Deserialize, Serialize};
 
 use super::{Model, Role, time_boot_ms};
 
-/// How many TIMESYNC questions may wait for an answer: of 10 s, one a second and those of a range test.
-const ASKED_MAX: usize = 64;
-
 /// How long a radio's last report about itself is shown.
 pub const RADIO_FRESH: Duration = Duration::from_secs(5);
 
@@ -89,7 +86,7 @@ pub struct Link {
     /// Whether the vehicle hears this station.
     pub uplink: Uplink,
     /// The stamps of the last TIMESYNC questions, ns.
-    asked: VecDeque<i64>,
+    pub(crate) asked: VecDeque<i64>,
     /// The round-trip time, measured with TIMESYNC.
     pub round_trip: Option<Duration>,
     /// Since when the vehicle has been heard without a loss of the link.
@@ -101,17 +98,6 @@ pub struct Link {
 }
 
 impl Link {
-    /// Notes the stamp of a TIMESYNC question.
-    pub(crate) fn note_asked(&mut self, stamp: i64) {
-        self.asked.truncate(ASKED_MAX - 1);
-        self.asked.push_front(stamp);
-    }
-
-    /// Whether this station has asked with this stamp.
-    pub(crate) fn has_asked(&self, stamp: i64) -> bool {
-        self.asked.contains(&stamp)
-    }
-
     /// The name of the link that brought the last frame, if there are several.
     pub fn heard_over(&self) -> Option<&str> {
         let report = self.heard_over.and_then(|number| self.reports.get(number));

@@ -268,11 +268,6 @@ impl Model {
         armed || self.commands.is_aborting() || self.vehicle.in_flight()
     }
 
-    /// Whether the last reset was one of a vehicle that was armed or flew.
-    pub fn was_reset_at_work(&self) -> bool {
-        self.rebooted.is_some_and(|(did, _)| !did.is_empty())
-    }
-
     /// When something is due before the next tick: the abort chord, or a command to resend.
     pub fn wakes_at(&self) -> Option<Duration> {
         let times = [self.abort_chord.acts_at(), self.commands.due_at()];

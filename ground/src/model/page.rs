@@ -1,13 +1,14 @@
 //! The pages of the screen: the flight phase chooses one, unless the crew holds another by its key.
 
 use protocol::dialect::TdPhase;
+use strum::{IntoStaticStr, VariantArray};
 
 use super::{
     AlarmKind,
     quantity::{self, Quantity},
 };
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, IntoStaticStr, VariantArray)]
 pub enum Page {
     /// Arming checks and the arming ladder.
     Pad,
@@ -17,11 +18,12 @@ pub enum Page {
     Descent,
     /// The burn: side view, controller, actuators.
     Landing,
-    /// The verdict, limits and greatest values of the flight.
+    /// The verdict, the limits and what went wrong.
     Review,
     /// The link's figures and the age of every message.
     Link,
     /// The event list.
+    #[strum(serialize = "Texts")]
     Messages,
     /// The state of the recording.
     Log,
@@ -30,6 +32,7 @@ pub enum Page {
     /// Where to look for the vehicle.
     Find,
     /// The checks on the pad.
+    #[strum(serialize = "Check")]
     Checks,
     /// Every number, and one of them over time.
     Plot,
@@ -38,20 +41,10 @@ pub enum Page {
 
 impl Page {
     /// Every page that a key shows: those with a digit in that order, then those with a letter or a mark.
-    pub const ALL: [Self; 12] = [
-        Self::Pad,
-        Self::Descent,
-        Self::Landing,
-        Self::Review,
-        Self::Link,
-        Self::Messages,
-        Self::Log,
-        Self::Alarms,
-        Self::Find,
-        Self::Checks,
-        Self::Plot,
-        Self::Help,
-    ];
+    pub fn all() -> impl Iterator<Item = Self> {
+        Self::VARIANTS.iter().copied().filter(|page| page.keyed() == *page)
+    }
+
     /// The page whose key shows this one: ascent and descent share one.
     #[must_use]
     pub fn keyed(self) -> Self {
@@ -60,21 +53,7 @@ impl Page {
 
     /// The name shown at the bottom of the screen.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Pad => "Pad",
-            Self::Ascent => "Ascent",
-            Self::Descent => "Descent",
-            Self::Landing => "Landing",
-            Self::Review => "Review",
-            Self::Link => "Link",
-            Self::Messages => "Texts",
-            Self::Log => "Log",
-            Self::Alarms => "Alarms",
-            Self::Find => "Find",
-            Self::Checks => "Check",
-            Self::Plot => "Plot",
-            Self::Help => "Help",
-        }
+        self.into()
     }
 
     /// The page for a phase.

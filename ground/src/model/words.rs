@@ -3,9 +3,9 @@
 use std::borrow::Cow;
 use std::fmt::Debug;
 
-use protocol::dialect::{TD_FLIGHT_STATUS_DATA, TdAbortEffect, TdInterlock, TdPhase};
+use protocol::dialect::{TD_FLIGHT_STATUS_DATA, TdAbortEffect, TdPhase};
 
-use super::{is_on_pad, telemetry::phase_from_number};
+use super::{is_aborted, is_on_pad, telemetry::phase_from_number};
 
 /// The phase's name, as in `PAD_IDLE`.
 pub fn phase(phase: TdPhase) -> String {
@@ -97,8 +97,9 @@ pub(crate) fn without_prefix(value: &impl Debug, prefix: &str) -> String {
 
 /// What an abort would do now, the consequence first.
 pub fn abort_effect(status: &TD_FLIGHT_STATUS_DATA) -> String {
+    let up = matches!(status.phase, TdPhase::TD_PHASE_BOOST | TdPhase::TD_PHASE_COAST);
     let words = match status.abort_effect {
-        TdAbortEffect::TD_ABORT_EFFECT_NONE if is_aborted_going_up(status) => {
+        TdAbortEffect::TD_ABORT_EFFECT_NONE if up && is_aborted(status.interlocks) => {
             "ABORTED already: parachute at apogee"
         }
         TdAbortEffect::TD_ABORT_EFFECT_NONE => "nothing is left to abort",
@@ -111,11 +112,6 @@ pub fn abort_effect(status: &TD_FLIGHT_STATUS_DATA) -> String {
         TdAbortEffect::TD_ABORT_EFFECT_IMPACT => return impact(status.abort_impact_m_s),
     };
     words.to_owned()
-}
-
-fn is_aborted_going_up(status: &TD_FLIGHT_STATUS_DATA) -> bool {
-    let up = matches!(status.phase, TdPhase::TD_PHASE_BOOST | TdPhase::TD_PHASE_COAST);
-    up && status.interlocks.contains(TdInterlock::TD_INTERLOCK_ABORT_LATCHED)
 }
 
 /// An impact, with its speed if known.

@@ -120,8 +120,16 @@ impl Player {
             Key::Char('-') => self.faster(-1),
             Key::Left => self.seek(self.position.saturating_sub(SEEK)),
             Key::Right => self.seek(self.position + SEEK),
-            Key::Char('[') => self.seek(self.phase_start()),
-            Key::Char(']') => self.seek(self.next_phase_start()),
+            // The start of the present phase, or of the previous one if it has just begun.
+            Key::Char('[') => {
+                let limit = self.position.saturating_sub(Duration::from_secs(1));
+                let begins = self.recording.phases.iter().rfind(|(_, at)| *at <= limit);
+                self.seek(begins.map_or(Duration::ZERO, |(_, at)| *at));
+            }
+            Key::Char(']') => {
+                let begins = self.recording.phases.iter().find(|(_, at)| *at > self.position);
+                self.seek(begins.map_or(Duration::MAX, |(_, at)| *at));
+            }
             Key::Char('j') => {
                 self.model.pages.entry = Some(TextEntry::Jump { typed: String::new(), refused: false });
             }
@@ -172,18 +180,6 @@ impl Player {
     fn faster(&mut self, doublings: i32) {
         let (least, most) = (*SPEED_EXPONENTS.start(), *SPEED_EXPONENTS.end());
         self.speed_exponent = (self.speed_exponent + doublings).clamp(least, most);
-    }
-
-    /// The start of the present phase, or of the previous one if it has just begun.
-    fn phase_start(&self) -> Duration {
-        let limit = self.position.saturating_sub(Duration::from_secs(1));
-        let mut begins = self.recording.phases.iter().map(|(_, at)| *at);
-        begins.rfind(|at| *at <= limit).unwrap_or(Duration::ZERO)
-    }
-
-    fn next_phase_start(&self) -> Duration {
-        let mut begins = self.recording.phases.iter().map(|(_, at)| *at);
-        begins.find(|at| *at > self.position).unwrap_or_else(|| self.recording.length())
     }
 
     fn rewind(&mut self) {

@@ -310,7 +310,7 @@ fn command_in(frame: &Frame) -> Option<CommandKind> {
             kind => *kind != CommandKind::Tap,
         }
     };
-    CommandKind::ALL.into_iter().find(is_sent).filter(|_| sent.confirmation == 0)
+    CommandKind::ALL.iter().copied().find(is_sent).filter(|_| sent.confirmation == 0)
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ use super::Action;
 use crate::model::{
     Acknowledgement, AlarmKind, Amount, Approach, CommandKind, Condition, Danger, Ending, KeepAway,
     LinkState, LogStanding, Model, PadCheck, RED_AFTER, Speaker, dead_reckoning::may_have_left, hold_words,
-    is_on_pad, latch_words, refused_frames, why_not_reached, why_untested, words,
+    is_on_pad, latch_words, refused_frames, why_no_go, words,
 };
 
 /// An abort without an answer raises an alarm after this time.
@@ -269,19 +269,31 @@ const WRONG: u8 = 3;
 /// Compares the present state with what was called out.
 pub(super) fn call_out(model: &mut Model, now: Duration) {
     call_phase(model);
-    call_liftoff(model);
+    let lifts = model.vehicle.has_lifted && model.vehicle.phase_now() == Some(TdPhase::TD_PHASE_BOOST);
+    if is_new(&mut model.called.lifts, lifts) && lifts {
+        call(model, Amount::Few, "liftoff", WATCH);
+    }
     call_height(model, now);
     call_readiness(model, now);
-    call_link(model, now);
-    call_ending(model, now);
-    call_approach(model, now);
-}
-
-/// Rings a bell that is still to ring; bells apart from each other can be counted.
-pub(super) fn ring_bells(model: &mut Model) {
-    if model.called.bells_left > 0 {
-        model.called.bells_left -= 1;
-        model.outbox.push(Action::Bell);
+    let lost = matches!(model.link.state(model.link.known_until(now)), LinkState::Lost(_));
+    if is_new(&mut model.called.lost, lost) {
+        // The alarm of the lost link rings by itself.
+        let (amount, text) =
+            if lost { (Amount::Few, "link lost") } else { (Amount::Normal, "link restored") };
+        call(model, amount, text, 0);
+    }
+    let ending = Ending::of(&model.vehicle, now);
+    if is_new(&mut model.called.ending, ending)
+        && let Some(ending) = ending
+    {
+        let bells = if ending == Ending::Stands { EVENT } else { WRONG };
+        call(model, Amount::Few, ending.word().to_lowercase(), bells);
+    }
+    let approach = Approach::of(&model.vehicle, now).map(|approach| approach.headline());
+    if is_new(&mut model.called.approach, approach)
+        && let Some(words) = approach
+    {
+        call(model, Amount::Few, words.to_lowercase(), EVENT);
     }
 }
 
@@ -306,25 +318,6 @@ fn is_new<T: PartialEq>(called: &mut T, present: T) -> bool {
     }
 }
 
-fn call_ending(model: &mut Model, now: Duration) {
-    let ending = Ending::of(&model.vehicle, now);
-    if is_new(&mut model.called.ending, ending)
-        && let Some(ending) = ending
-    {
-        let bells = if ending == Ending::Stands { EVENT } else { WRONG };
-        call(model, Amount::Few, ending.word().to_lowercase(), bells);
-    }
-}
-
-fn call_approach(model: &mut Model, now: Duration) {
-    let headline = Approach::of(&model.vehicle, now).map(|approach| approach.headline());
-    if is_new(&mut model.called.approach, headline)
-        && let Some(headline) = headline
-    {
-        call(model, Amount::Few, headline.to_lowercase(), EVENT);
-    }
-}
-
 fn call_phase(model: &mut Model) {
     let Some(phase) = model.vehicle.phase_now() else { return };
     let Some(before) = model.called.phase.replace(phase).filter(|before| *before != phase) else { return };
@@ -341,13 +334,6 @@ fn call_phase(model: &mut Model) {
     }
     if is_on_pad(phase) {
         model.called.height_m = None;
-    }
-}
-
-fn call_liftoff(model: &mut Model) {
-    let lifts = model.vehicle.has_lifted && model.vehicle.phase_now() == Some(TdPhase::TD_PHASE_BOOST);
-    if !std::mem::replace(&mut model.called.has_lifted, model.vehicle.has_lifted) && lifts {
-        call(model, Amount::Few, "liftoff", WATCH);
     }
 }
 
@@ -383,30 +369,13 @@ fn call_readiness(model: &mut Model, now: Duration) {
     if !status.is_some_and(|status| is_on_pad(status.value.phase)) {
         return;
     }
-    let failing = model.vehicle.why_no_go();
-    let no_log = model.why_no_log(now);
-    let link = why_not_reached(model, now).is_none() && model.link.uplink.is_proven(now);
-    let untested = why_untested(model).is_some();
-    let go = failing.is_none() && no_log.is_none() && !untested && link;
-    let Some(before) = model.called.go.replace(go).filter(|before| *before != go) else { return };
-    if before {
-        let why = match no_log {
-            Some(_) => "station log".to_owned(),
-            None if untested => "motor untested".to_owned(),
-            None => "link".to_owned(),
-        };
-        call(model, Amount::Few, format!("no go: {}", failing.unwrap_or(why)), WRONG);
-    } else {
-        call(model, Amount::Normal, "go", 0);
+    let why = why_no_go(model, now);
+    let go = why.is_none();
+    if model.called.go.replace(go).is_none_or(|before| before == go) {
+        return;
     }
-}
-
-fn call_link(model: &mut Model, now: Duration) {
-    let lost = matches!(model.link.state(model.link.known_until(now)), LinkState::Lost(_));
-    if is_new(&mut model.called.lost, lost) {
-        // The alarm of the lost link rings by itself.
-        let (amount, text) =
-            if lost { (Amount::Few, "link lost") } else { (Amount::Normal, "link restored") };
-        call(model, amount, text, 0);
+    match why {
+        Some(why) => call(model, Amount::Few, format!("no go: {why}"), WRONG),
+        None => call(model, Amount::Normal, "go", 0),
     }
 }

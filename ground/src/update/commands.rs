@@ -12,7 +12,7 @@ use super::Action;
 use crate::model::{
     Acknowledgement, AutoStep, CommandKind, LogFault, LogStanding, Model, Seat, Speaker, TrackedCommand,
     why_not_arm, why_not_check, why_not_confirm, why_not_seat, why_not_seen, why_not_start, why_not_take,
-    why_nothing_moves, why_untested, words,
+    why_nothing_moves, why_untested,
 };
 
 /// Of the many attempts of an abort, only the first and every n-th become an event.
@@ -104,7 +104,7 @@ pub(super) fn submit(model: &mut Model, kind: CommandKind, by: Seat, now: Durati
         commands.sender.withdraw_all(now);
         for track in &mut commands.tracks {
             track.not_observed_reported = true;
-            if is_open(track.acknowledged) {
+            if matches!(track.acknowledged, Acknowledgement::Waiting | Acknowledgement::InProgress) {
                 track.acknowledged = Acknowledgement::GivenUp;
             }
         }
@@ -149,10 +149,6 @@ fn send(model: &mut Model, kind: CommandKind, now: Duration) -> Ticket {
     let boot = if kind.moves() { model.vehicle.boot.parameter() } else { 0.0 };
     let params = [param1, 0.0, number, param4, param5, param6, boot];
     model.commands.sender.submit(model.settings.vehicle, command, params, kind.resend(), now)
-}
-
-fn is_open(acknowledged: Acknowledgement) -> bool {
-    matches!(acknowledged, Acknowledgement::Waiting | Acknowledgement::InProgress)
 }
 
 /// Sends the commands that are due and handles what happened to them.
@@ -354,7 +350,11 @@ pub(super) fn step_auto(model: &mut Model, now: Duration) {
         return;
     }
     if model.auto_step != AutoStep::Done && is_live(model) {
-        return refuse_auto(model, now);
+        let why = "the vehicle is live: it does not report that it is simulated";
+        model.say(now, Speaker::Ground, EventLevel::Error, format!("automatic mode refused: {why}"));
+        model.auto_step = AutoStep::Done;
+        model.outcome.refusal = Some((format!("the automatic mode: {why}"), now));
+        return;
     }
     let armed = model.vehicle.is_armed();
     let phase = model.vehicle.phase_now();
@@ -399,13 +399,6 @@ fn is_live(model: &Model) -> bool {
     model.vehicle.boot.has_said_what_it_is() && !model.vehicle.is_simulated()
 }
 
-fn refuse_auto(model: &mut Model, now: Duration) {
-    let why = "the vehicle is live: it does not report that it is simulated";
-    model.say(now, Speaker::Ground, EventLevel::Error, format!("automatic mode refused: {why}"));
-    model.auto_step = AutoStep::Done;
-    model.outcome.refusal = Some((format!("the automatic mode: {why}"), now));
-}
-
 fn arm_if_ready(model: &mut Model, not_before: Duration, now: Duration) {
     let why_not = why_not_ready(model, not_before, now);
     let waited = model.link.first_heartbeat_at.map_or(Duration::ZERO, |at| now.saturating_sub(at));
@@ -427,28 +420,19 @@ fn arm_if_ready(model: &mut Model, not_before: Duration, now: Duration) {
 }
 
 fn why_not_ready(model: &Model, not_before: Duration, now: Duration) -> Option<String> {
-    if let Some(why) = why_nothing_moves(model, now).filter(|_| model.vehicle.status.is_some()) {
-        return Some(why);
-    }
     let Some(status) = model.vehicle.status.as_ref() else {
         return Some("the vehicle has not reported its checks".to_owned());
     };
-    if !model.vehicle.is_simulated() {
-        return Some("the vehicle has not reported that it is simulated".to_owned());
-    }
-    if status.is_stale(now) {
-        Some("the vehicle no longer reports its checks".to_owned())
-    } else if let Some(failing) = model.vehicle.why_no_go() {
-        Some(format!("failing checks: {failing}"))
-    } else if !model.link.uplink.is_proven(now) {
-        Some(format!("the uplink is not proven: {}", model.link.uplink.why_unheard()))
-    } else if status.value.phase != TdPhase::TD_PHASE_PAD_IDLE {
-        Some(format!("phase {}", words::phase(status.value.phase)))
-    } else if status.received_at < not_before {
-        Some("temporarily refused, although no check fails".to_owned())
-    } else {
-        None
-    }
+    let simulated = model.vehicle.is_simulated();
+    (!simulated)
+        .then(|| "the vehicle has not reported that it is simulated".to_owned())
+        .or_else(|| status.is_stale(now).then(|| "the vehicle no longer reports its checks".to_owned()))
+        .or_else(|| model.vehicle.why_no_go().map(|failing| format!("failing checks: {failing}")))
+        .or_else(|| why_not_arm(model, now))
+        .or_else(|| {
+            let again = "temporarily refused, although no check fails";
+            (status.received_at < not_before).then(|| again.to_owned())
+        })
 }
 
 fn start_auto(model: &mut Model, now: Duration) {

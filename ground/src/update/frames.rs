@@ -191,7 +191,10 @@ fn answer_to_ping(message: &MavMessage, source: Address) -> Option<MavMessage> {
 }
 
 pub(super) fn add_vehicle_text(model: &mut Model, text: &Text, now: Duration) {
-    vehicle_changes::hear_of_reset(model, &text.text, now);
+    if text.text.starts_with(vehicle_changes::RESTARTED) {
+        let did = vehicle_changes::Announced::of(&model.vehicle).words_of_reset();
+        vehicle_changes::note_reset(model, did, now);
+    }
     model.vehicle.hear_of_check(&text.text);
     let level = EventLevel::of_severity(text.severity);
     model.say(now, Speaker::Vehicle, level, text.text.clone());
@@ -239,7 +242,7 @@ fn on_timesync(model: &mut Model, data: &TIMESYNC_DATA, source: Address, now: Du
             target_system: source.system_id,
             target_component: source.component_id,
         })));
-    } else if model.settings.role == Role::Station && !model.link.has_asked(data.ts1) {
+    } else if model.settings.role == Role::Station && !model.link.asked.contains(&data.ts1) {
         // The answer to another station under our id: it would make this one's news look old.
     } else if let Some(nanoseconds) = ours.checked_sub(data.ts1).and_then(|round| u64::try_from(round).ok()) {
         let round_trip = Duration::from_nanos(nanoseconds);

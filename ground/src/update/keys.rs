@@ -16,9 +16,8 @@ use crate::model::{
     AGAIN_AFTER, AGAIN_KEY, Act, AlarmKind, CommandKind, Dialog, FINGERS_APART, KeyOrigin, Model, Page,
     PaletteAction, Prompt, RestOfWord, Role, Standing, TextEntry, hold_words, overruled_by, palette_entries,
     quantity, standing, why_not_arm, why_not_check, why_not_confirm, why_not_here, why_not_quit,
-    why_not_seen, why_not_start, why_not_take, why_nothing_moves,
+    why_not_seen, why_not_start, why_not_take, why_nothing_flown, why_nothing_moves,
 };
-use crate::update;
 
 /// How many lines PgUp and PgDn scroll.
 const SCROLL_PAGE: i32 = 10;
@@ -289,7 +288,10 @@ fn on_free_key(model: &mut Model, key: Key, touch: KeyOrigin, now: Duration) {
         Key::Up | Key::Down if shown == Page::Pad && model.pages.checklist && model.checklist.is_some() => {
             choose_step(model, key == Key::Up, now);
         }
-        Key::Up | Key::Down if shown == Page::Plot => choose_quantity(model, key == Key::Up),
+        Key::Up | Key::Down if shown == Page::Plot => {
+            let next = beside(model.pages.plotted.place(), key == Key::Up, quantity::COUNT - 1);
+            model.pages.plotted = &quantity::ALL[next];
+        }
         Key::Up => scroll(model, 1),
         Key::Down => scroll(model, -1),
         Key::PageUp => scroll(model, SCROLL_PAGE),
@@ -370,8 +372,17 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
                 model.pages.hold(Some(Page::Pad));
             }
         }
-        Act::ReplayFlight => update::replay_flight(model, now),
-        Act::Report => update::ask_for_report(model, now),
+        Act::ReplayFlight => match why_nothing_flown(model) {
+            None => model.outbox.push(Action::ReplayFlight),
+            Some(why) => model.info(now, format!("no replay: {why}")),
+        },
+        Act::Report => {
+            let watches = (model.settings.role == Role::Watching).then_some("this screen only watches");
+            match why_nothing_flown(model).or(watches) {
+                Some(why) => model.info(now, format!("no report: {why}")),
+                None => request(model, Request::Report, now),
+            }
+        }
         Act::MovePin if act.works(model, now) => {
             let is_out = model
                 .vehicle
@@ -450,12 +461,6 @@ fn choose_step(model: &mut Model, up: bool, now: Duration) {
     let Some(at) = model.chosen_step(now) else { return };
     let last = model.checklist.as_ref().map_or(0, |list| list.steps.len().saturating_sub(1));
     model.pages.step = Some(beside(at, up, last));
-}
-
-/// Chooses the next or the previous quantity to plot.
-fn choose_quantity(model: &mut Model, up: bool) {
-    let next = beside(model.pages.plotted.place(), up, quantity::COUNT - 1);
-    model.pages.plotted = &quantity::ALL[next];
 }
 
 /// Scrolls up by this many lines; down if negative. Events are listed from the newest line, link values from

@@ -22,7 +22,7 @@ use crate::key::Key;
 pub use crate::model::{Action, Request};
 use crate::model::{
     BookState, Checklist, CommandKind, LastPlace, LinkReport, LogHealth, LogStanding, Model, Role, Seat,
-    Speaker, Unfinished,
+    Speaker, Unfinished, why_nothing_flown,
 };
 
 /// The name of a signal, or of another reason to end.
@@ -204,7 +204,12 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
         Msg::HeardFrom(source) => model.link.source = source,
         Msg::Links { links, signing } => on_reports(model, links, signing, now),
         Msg::Log(health) => on_log_health(model, health, now),
-        Msg::LogBegins { log, tlog } => on_log_begins(model, log, tlog, now),
+        // The log before is complete. What was flown is in it, and not in the one that is replayed and reported from now on.
+        Msg::LogBegins { log, tlog } => {
+            model.info(now, format!("the log goes on in {log}"));
+            (model.settings.log_path, model.settings.tlog_path) = (Some(log), tlog);
+            model.outcome.started = false;
+        }
         Msg::SimulatorEnded(failure) => {
             if let Some(why) = failure {
                 model.say(now, Speaker::Ground, EventLevel::Error, format!("the simulator failed: {why}"));
@@ -309,43 +314,4 @@ fn on_log_health(model: &mut Model, health: LogHealth, now: Duration) {
         _ => None,
     };
     model.without_log = model.without_log.filter(|typed_for| fault == Some(*typed_for));
-}
-
-/// The log before is complete. What was flown is in it, and not in the one that is replayed and reported from now on.
-fn on_log_begins(model: &mut Model, log: String, tlog: Option<String>, now: Duration) {
-    model.info(now, format!("the log goes on in {log}"));
-    (model.settings.log_path, model.settings.tlog_path) = (Some(log), tlog);
-    model.outcome.started = false;
-}
-
-// After the flight: the flight again on this screen, and its report.
-
-/// Why neither is possible now.
-fn why_nothing_flown(model: &Model) -> Option<&'static str> {
-    if model.settings.role == Role::Replaying {
-        return Some("this is a replay");
-    }
-    if model.is_at_risk() {
-        return Some("the vehicle is armed or in flight");
-    }
-    if model.settings.log_path.is_none() {
-        return Some("there is no log (--log none)");
-    }
-    (!model.outcome.started).then_some("no flight has been flown yet")
-}
-
-pub(super) fn replay_flight(model: &mut Model, now: Duration) {
-    match why_nothing_flown(model) {
-        None => model.outbox.push(Action::ReplayFlight),
-        Some(why) => model.info(now, format!("no replay: {why}")),
-    }
-}
-
-/// Has the report written, by the station.
-fn ask_for_report(model: &mut Model, now: Duration) {
-    let watches = (model.settings.role == Role::Watching).then_some("this screen only watches");
-    match why_nothing_flown(model).or(watches) {
-        Some(why) => model.info(now, format!("no report: {why}")),
-        None => keys::request(model, Request::Report, now),
-    }
 }

@@ -8,10 +8,9 @@ use protocol::dialect::{
 use protocol::log::record::{EventLevel, Record};
 use protocol::log::v1::Telemetry;
 
-use super::{Action, alarms, commands, frames, keys, pad, vehicle_changes};
+use super::{Action, commands, frames, keys, pad, vehicle_changes};
 use crate::model::{
-    LinkState, Model, Role, Speaker, dead_reckoning::may_have_left, is_on_pad, note_extremes, note_trace,
-    unheard_hints,
+    LinkState, Model, Role, Speaker, dead_reckoning::may_have_left, is_on_pad, note_trace, unheard_hints,
 };
 
 const HEARTBEAT_EVERY: Duration = Duration::from_secs(1);
@@ -21,6 +20,8 @@ const FAST_HEARTBEAT_EVERY: Duration = Duration::from_millis(100);
 const TIMESYNC_EVERY: Duration = Duration::from_secs(5);
 /// For a vehicle whose answers are the only proof that it hears this station.
 const PROVING_TIMESYNC_EVERY: Duration = Duration::from_secs(1);
+/// How many questions may wait for an answer: of 10 s, one a second and those of a range test.
+const ASKED_MAX: usize = 64;
 const SEEMS_OLD: Duration = Duration::from_secs(1);
 const TELEMETRY_RECORD_EVERY: Duration = Duration::from_millis(100);
 /// A station that has heard nothing of an armed vehicle for this long says so. The vehicle is to know it 1 s after the loss:
@@ -55,9 +56,12 @@ pub(super) fn on_tick(model: &mut Model, now: Duration) {
         model.link.unheard_reported = true;
         model.warn(now, hints.join(" "));
     }
-    note_extremes(model, now);
     note_trace(model, now);
-    alarms::ring_bells(model);
+    // Bells apart from each other can be counted.
+    if model.called.bells_left > 0 {
+        model.called.bells_left -= 1;
+        model.outbox.push(Action::Bell);
+    }
     commands::step_auto(model, now);
     commands::poll(model, now);
     commands::observe(model, now);
@@ -80,7 +84,8 @@ pub(super) fn on_tick(model: &mut Model, now: Duration) {
 
 /// Asks the vehicle for its time; the answer repeats this stamp, ns.
 pub(super) fn ask_time(model: &mut Model, stamp: i64) {
-    model.link.note_asked(stamp);
+    model.link.asked.truncate(ASKED_MAX - 1);
+    model.link.asked.push_front(stamp);
     model.outbox.push(Action::send(MavMessage::TIMESYNC(TIMESYNC_DATA {
         tc1: 0,
         ts1: stamp,

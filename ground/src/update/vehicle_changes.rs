@@ -8,9 +8,9 @@ use protocol::log::record::EventLevel;
 
 use super::{Action, commands, pad};
 use crate::model::{
-    Approach, CommandKind, Danger, Ending, Extremes, FlightSoFar, FlownMission, FlownPath, History, KeepAway,
-    Model, RestOfWord, Role, Sample, Seat, Speaker, Unfinished, Uplink, Vehicle, Verdict, hold_words,
-    is_aborted, is_flight, is_on_pad, latch_words, words,
+    Approach, CommandKind, Danger, Ending, FlightSoFar, FlownMission, FlownPath, History, KeepAway, Model,
+    RestOfWord, Role, Sample, Seat, Speaker, Unfinished, Uplink, Vehicle, Verdict, hold_words, is_aborted,
+    is_flight, is_on_pad, latch_words, words,
 };
 
 /// The part of the vehicle's state whose changes are reported.
@@ -40,16 +40,9 @@ impl Announced {
             verdict: vehicle.verdict().map(|verdict| verdict.value),
         }
     }
-}
 
-/// How the vehicle says that its flight computer has restarted.
-pub const RESTARTED: &str = "the flight computer has restarted";
-/// News of one reset come within this time.
-const ONE_RESET: Duration = Duration::from_secs(5);
-
-impl Announced {
     /// What a vehicle did when it was reset.
-    fn words_of_reset(&self) -> &'static str {
+    pub(super) fn words_of_reset(&self) -> &'static str {
         match self.status {
             Some((TdPhase::TD_PHASE_PAD_ARMED, true)) => " in the countdown",
             Some((TdPhase::TD_PHASE_PAD_ARMED, false)) => " while it was armed",
@@ -58,6 +51,11 @@ impl Announced {
         }
     }
 }
+
+/// How the vehicle says that its flight computer has restarted.
+pub const RESTARTED: &str = "the flight computer has restarted";
+/// News of one reset come within this time.
+const ONE_RESET: Duration = Duration::from_secs(5);
 /// A waiting time is kept anew if it differs by more than this from what is kept, s.
 const KEPT_WITHIN_S: u16 = 2;
 
@@ -117,7 +115,7 @@ pub(super) fn choose(model: &mut Model, boot: u32, by: &Seat, now: Duration) {
 }
 
 /// The flight computer has restarted within one power-up, as it says, or as a return to its self-test shows. Both tell of one reset.
-fn note_reset(model: &mut Model, did: &'static str, now: Duration) {
+pub(super) fn note_reset(model: &mut Model, did: &'static str, now: Duration) {
     if model.rebooted.as_ref().is_some_and(|(_, at)| now.saturating_sub(*at) < ONE_RESET) {
         return;
     }
@@ -125,13 +123,6 @@ fn note_reset(model: &mut Model, did: &'static str, now: Duration) {
     model.say(now, Speaker::Ground, EventLevel::Error, text);
     model.rebooted = Some((did, now));
     model.outbox.push(Action::SyncLog);
-}
-
-/// The vehicle says that its flight computer has restarted.
-pub(super) fn hear_of_reset(model: &mut Model, text: &str, now: Duration) {
-    if text.starts_with(RESTARTED) {
-        note_reset(model, Announced::of(&model.vehicle).words_of_reset(), now);
-    }
 }
 
 /// Another boot has the screen: after a reset, and what the vehicle did then, or of another vehicle.
@@ -231,7 +222,7 @@ pub(super) fn watch_approach(model: &mut Model, now: Duration) {
 fn on_phase(model: &mut Model, before: Option<TdPhase>, phase: TdPhase, now: Duration) {
     let from = before.map_or_else(String::new, |before| format!("{} -> ", words::phase(before)));
     if is_flight(phase) && !before.is_some_and(is_flight) && !model.outcome.started {
-        model.history.extremes = Extremes::default();
+        model.history.silence = Duration::ZERO;
     }
     model.history.note_phase(phase, now);
     model.info(now, format!("phase {from}{}", words::phase(phase)));

@@ -115,9 +115,6 @@ const fn rows_of((_, halves): Size) -> u16 {
     (5 * halves).div_ceil(2)
 }
 
-/// Columns and rows of the smallest letter.
-pub const LETTER: (u16, u16) = (DIGIT_PIXELS, rows_of(NARROW));
-
 /// Draws the main item at the left with the line under it, the others to its right, and returns the area below.
 pub fn draw_band(
     (main, below, others): (&Item, Line<'static>, &[Item]),

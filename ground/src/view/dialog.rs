@@ -10,7 +10,7 @@ use ratatui::widgets::{Block, Clear};
 
 use super::{TextRole, Theme, draw_lines};
 use crate::model::{
-    AGAIN_KEY, Act, CONFIRM_WORD, Foreign, Model, PadCheck, Prompt, Role, SURFACES, TextEntry,
+    AGAIN_KEY, Act, CONFIRM_WORD, Foreign, Model, PadCheck, Prompt, Role, SURFACES, TERMINATION, TextEntry,
     palette_entries, role_name, why_not_here, why_not_quit, why_untested,
 };
 
@@ -37,7 +37,9 @@ pub fn dialog_lines(
         return Some(("DID YOU TYPE THIS?", lines));
     }
     let any_other_key = || plain("Any other key cancels. Nothing is sent before Enter.".to_owned());
-    let next = || next_person(model).map(plain).into_iter().chain([any_other_key()]);
+    let own = model.role_of(model.own_number()).filter(|_| model.people() == Some(2));
+    let asks = |own| plain(format!("This only asks: {} must confirm within 10 s.", other_roles(own)));
+    let next = || own.map(asks).into_iter().chain([any_other_key()]);
     // What stands above and below the line of the word.
     let (title, above, below) = match dialog.prompt {
         Prompt::Arm => ("ARM, step 2 of 2", Vec::new(), next().chain(checks(model, theme)).collect()),
@@ -53,10 +55,9 @@ pub fn dialog_lines(
             ("TAKE COMMAND of an armed vehicle", vec![who], vec![any_other_key()])
         }
         Prompt::AbortForeign => {
-            let foreign = model.vehicle.as_foreign();
-            let name = foreign.map_or_else(|| "The vehicle".to_owned(), Foreign::name);
-            let does = foreign.map_or("does not say what it does", Foreign::termination);
-            let does = strong(format!("{name}: flight termination {does}."));
+            let foreign = model.vehicle.as_foreign().map(Foreign::name);
+            let name = foreign.unwrap_or_else(|| "The vehicle".to_owned());
+            let does = strong(format!("{name}: flight termination {TERMINATION}."));
             ("ABORT of a vehicle that is NOT A TOUCHDOWN VEHICLE", vec![does], vec![any_other_key()])
         }
         Prompt::WithoutLog => {
@@ -122,12 +123,6 @@ pub fn dialog_lines(
         strong(format!("Type {word} and Enter {left}:  [{:<width$}]", dialog.typed, width = word.len()))
     });
     Some((title, above.into_iter().chain(typing).chain(below).collect()))
-}
-
-/// What somebody else has to do after this dialog.
-fn next_person(model: &Model) -> Option<String> {
-    let own = model.role_of(model.own_number()).filter(|_| model.people() == Some(2))?;
-    Some(format!("This only asks: {} must confirm within 10 s.", other_roles(own)))
 }
 
 /// The other roles that may command.

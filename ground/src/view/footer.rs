@@ -12,7 +12,9 @@ use ratatui::text::{Line, Span};
 use super::lists::said;
 use super::status_lines::{alarm_text, replay_line};
 use super::{Ink, TextRole, Theme, draw_line, side_by_side, top_lines};
-use crate::model::{Act, Model, Page, dead_reckoning::course, is_burning, is_flight, is_on_pad, words};
+use crate::model::{
+    Act, Event, Model, Page, dead_reckoning::course, is_burning, is_flight, is_on_pad, words,
+};
 use crate::view::pictures::seconds_since;
 
 /// From this width on the flight has a second row, for the names of its events with their times.
@@ -34,15 +36,13 @@ pub fn message_rows(model: &Model, theme: Theme, now: Duration, columns: u16) ->
         over.splice(0..0, timeline(model, theme, now, columns, over.len() + 2 == rows));
     }
     if over.is_empty() {
-        over.push(newest_event(model, theme).unwrap_or_default());
+        let line = |(event, text): (&Event, _)| {
+            let role = if event.level == EventLevel::Info { TextRole::Label } else { TextRole::Plain };
+            theme.line(format!(" {:.1} {}{text}", event.at.as_secs_f64(), event.mark().trim_start()), role)
+        };
+        over.push(said(model).next().map(line).unwrap_or_default());
     }
     over
-}
-
-fn newest_event(model: &Model, theme: Theme) -> Option<Line<'static>> {
-    let (event, text) = said(model).next()?;
-    let role = if event.level == EventLevel::Info { TextRole::Label } else { TextRole::Plain };
-    Some(theme.line(format!(" {:.1} {}{text}", event.at.as_secs_f64(), event.mark().trim_start()), role))
 }
 
 // The flight along its time: what has been, what is expected, warnings and errors, and the shown moment.
@@ -264,6 +264,6 @@ fn pages(model: &Model, theme: Theme, room: u16) -> Line<'static> {
         }
         fits
     };
-    let pages = Page::ALL.into_iter().filter(fits).map(of);
+    let pages = Page::all().filter(fits).map(of);
     Line::from(pages.chain([more.clone(), theme.span(word, role)]).collect::<Vec<_>>())
 }

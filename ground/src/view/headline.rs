@@ -162,7 +162,8 @@ fn pad_word(model: &Model, now: Duration) -> (String, TextRole) {
         return word("ARMED", TextRole::Caution);
     }
     // A vehicle that was reset while it was armed may do it again.
-    if model.alarms.is_unseen(AlarmKind::Rebooted) && model.was_reset_at_work() {
+    let at_work = model.rebooted.is_some_and(|(did, _)| !did.is_empty());
+    if at_work && model.alarms.is_unseen(AlarmKind::Rebooted) {
         return word("RESET", TextRole::Alarm);
     }
     match readiness(model, now) {

@@ -15,8 +15,8 @@ use super::theme::Level;
 use super::{STALE_MARK, TextRole, Theme, age_mark, draw_line, lists, shortest, side_by_side, status_lines};
 use crate::model::{
     Acknowledgement, AlarmKind, Approach, CommandKind, Ending, Event, Foreign, LinkState, Model, Page, Role,
-    Standing, TrackedCommand, abort_too_late, dead_reckoning::may_have_left, hold_words,
-    is_liftoff_by_itself, is_on_pad, standing, why_not_reached, why_other_mission, why_untested, words,
+    Standing, TERMINATION, TrackedCommand, abort_too_late, dead_reckoning::may_have_left, hold_words,
+    is_liftoff_by_itself, is_on_pad, standing, why_no_go, words,
 };
 
 /// Columns of the state: armed, phase, clock, each in its place.
@@ -178,19 +178,6 @@ fn vehicle(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
     theme.plain(format!("{system}{name}boot {boot}"))
 }
 
-/// Each name once, with how many screens have it.
-fn counted(names: Vec<String>) -> Vec<String> {
-    let mut found: Vec<(String, usize)> = Vec::new();
-    for name in names {
-        match found.iter_mut().find(|(known, _)| *known == name) {
-            Some((_, count)) => *count += 1,
-            None => found.push((name, 1)),
-        }
-    }
-    let words = |(name, count)| if count == 1 { name } else { format!("{name} x{count}") };
-    found.into_iter().map(words).collect()
-}
-
 /// Who commands: another station that armed the vehicle, otherwise who can command here.
 fn crew(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
     if model.link.station_gone_for(now).is_some() {
@@ -220,7 +207,7 @@ fn crew(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
         _ if model.link.uplink.armed_by_us && model.link.state(now).carries() => "armed here".to_owned(),
         _ if model.link.uplink.armed_by_us => "~armed here".to_owned(),
         _ if model.crew.seats().iter().any(|seat| *seat != model.settings.seat) => {
-            format!("by {}", counted(model.crew.names()).join(","))
+            format!("by {}", model.crew.names().join(","))
         }
         Role::Watching => "watches only".to_owned(),
         _ => "commands here".to_owned(),
@@ -377,8 +364,8 @@ fn abort_effect(model: &Model, now: Duration) -> String {
     if model.link.station_silence(now).is_some() {
         return "NOT SENT while the station hangs; kept".to_owned();
     }
-    if let Some(foreign) = model.vehicle.as_foreign() {
-        return foreign.termination().to_owned();
+    if model.vehicle.as_foreign().is_some() {
+        return TERMINATION.to_owned();
     }
     let Some(status) = model.vehicle.status.as_ref() else { return "unknown".to_owned() };
     if may_have_left(&model.vehicle, now).is_some() {
@@ -483,15 +470,7 @@ pub fn readiness(model: &Model, now: Duration) -> Option<(String, TextRole)> {
     if status.is_stale(now) {
         return Some((format!("{STALE_MARK}checks: no longer received"), TextRole::Stale));
     }
-    let uplink = || "uplink not proven, every other check passes".to_owned();
-    let why = why_not_reached(model, now)
-        .or_else(|| model.vehicle.why_no_go())
-        .or_else(|| (!model.link.uplink.is_proven(now)).then(uplink))
-        .or_else(|| why_other_mission(model))
-        .or_else(|| model.why_checklist(now))
-        .or_else(|| why_untested(model))
-        .or_else(|| model.why_no_log(now));
-    Some(match why {
+    Some(match why_no_go(model, now) {
         Some(why) => (format!("NO-GO: {why}"), TextRole::Caution),
         None => ("GO: every arming check passes".to_owned(), TextRole::Good),
     })

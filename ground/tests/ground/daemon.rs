@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-use ground::attach::codec::{decode_to_screen, encode_to_station, length};
+use ground::attach::codec::{decode_to_screen, encode_to_station};
 use ground::attach::{ToScreen, ToStation};
 use ground::model::{CommandKind, Model, Role, Seat, Settings, TrackedCommand};
 use ground::update::{Msg, Request, update};
@@ -96,7 +96,7 @@ impl Screen {
             }
             let mut prefix = [0; 4];
             self.stream.read_exact(&mut prefix).unwrap_or_else(|error| panic!("{what}: {error}"));
-            let mut bytes = vec![0; length(prefix).expect("a length")];
+            let mut bytes = vec![0; u32::from_le_bytes(prefix) as usize];
             self.stream.read_exact(&mut bytes).unwrap_or_else(|error| panic!("{what}: {error}"));
             let (told, at) = decode_to_screen(&bytes).expect("what a station tells");
             match told {

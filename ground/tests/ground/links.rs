@@ -6,12 +6,12 @@ use ground::key::Key;
 use ground::model::LinkReport;
 use ground::update::Msg;
 use protocol::dialect::{HEARTBEAT_DATA, MavMessage, RADIO_STATUS_DATA, SYS_STATUS_DATA};
-use protocol::frame::{Encoder, FramerCounters};
+use protocol::frame::Encoder;
 use protocol::identity::{Address, VEHICLE};
 use protocol::link_stats::{LinkFigures, SourceFigures};
 use protocol::signing::SigningCounters;
 
-use crate::rig::{MONO, Rig};
+use crate::rig::Rig;
 
 /// A telemetry radio reports about itself with its own ids.
 const RADIO: Address = Address { system_id: 51, component_id: 68 };
@@ -150,27 +150,4 @@ fn the_link_screen_scrolls() {
     assert!(rig.screen(40, 12).contains("TD_PREDICTED_PATH"), "{}", rig.screen(40, 12));
     rig.key(Key::Home);
     assert!(rig.screen(40, 12).contains("rejected checksum"), "{}", rig.screen(40, 12));
-}
-
-/// The rates of the link are bars over time: a rate that grows has higher bars at the right.
-#[test]
-fn the_rates_are_bars_over_time() {
-    let mut rig = Rig::crewed();
-    rig.key(Key::Char('5'));
-    for second in 0..8 {
-        rig.msg(Msg::Received { bytes: 400 * second, framing: FramerCounters::default() });
-        rig.run(1.0);
-    }
-    for (columns, rows) in [(80, 24), (120, 36), (200, 50)] {
-        let terminal = rig.draw(columns, rows, MONO);
-        let cells = &terminal.backend().buffer().content;
-        let is_bar = |cell: &ratatui::buffer::Cell| "▁▂▃▄▅▆▇█".contains(cell.symbol());
-        // At 80 columns the first panel of four, otherwise the topmost.
-        let (from, to, most) = if columns == 80 { (1, 20, 8) } else { (80, usize::from(columns) - 1, 11) };
-        let heights: Vec<usize> = (from..to)
-            .map(|column| (3..most).filter(|row| is_bar(&cells[row * usize::from(columns) + column])).count())
-            .collect();
-        let risen: Vec<usize> = heights.into_iter().filter(|height| *height > 0).collect();
-        assert!(risen.len() >= 5 && risen.is_sorted(), "{columns}: {risen:?}\n{}", rig.screen(columns, rows));
-    }
 }

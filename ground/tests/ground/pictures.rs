@@ -165,7 +165,7 @@ pub(crate) fn states() -> Vec<(&'static str, Rig)> {
 fn every_page(mut see: impl FnMut(&str, &Rig, (u16, u16))) {
     for (state, mut rig) in states() {
         see(&format!("{state}-followed"), &rig, SIZES[0]);
-        for page in Page::ALL {
+        for page in Page::all() {
             rig.model.pages.hold(Some(page));
             for size in SIZES {
                 see(&format!("{state}-{}-{}x{}", page.name().to_lowercase(), size.0, size.1), &rig, size);

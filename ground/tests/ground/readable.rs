@@ -104,7 +104,7 @@ fn every_command_in_every_state_can_be_read_at_every_danger_in_every_theme() {
     for (danger, mut rig) in dangers() {
         // The others stand in the last rows, whose ground is that of the page.
         let others = ["calm", "boost", "down"].contains(&danger);
-        for kind in CommandKind::ALL.into_iter().filter(|kind| others || *kind == CommandKind::Abort) {
+        for kind in CommandKind::ALL.iter().copied().filter(|kind| others || *kind == CommandKind::Abort) {
             in_every_state(&mut rig, kind, |state, rig| {
                 for palette in Palette::ALL {
                     let theme = Theme { palette, ascii: false };

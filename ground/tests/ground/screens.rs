@@ -156,7 +156,7 @@ fn the_abort_is_on_every_small_screen_that_has_room_for_it() {
 #[test]
 fn every_page_in_ascii() {
     for (name, mut rig) in states() {
-        for page in Page::ALL {
+        for page in Page::all() {
             rig.model.pages.hold(Some(page));
             for (columns, rows) in [(40, 12), (79, 60), (80, 24), (300, 90)] {
                 let terminal = rig.draw(columns, rows, Theme { palette: Palette::Dark, ascii: true });

@@ -6,21 +6,18 @@ use std::time::Duration;
 use protocol::dialect::{TD_PAD_CHECK_DATA, TdPadCheckItem, TdPadCheckState, TdPadCheckVerdict};
 use ratatui::Frame;
 use ratatui::layout::Constraint::{Fill, Length};
-use ratatui::layout::{Layout, Rect};
+use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
-use ratatui::widgets::canvas;
 use ratatui::widgets::{Paragraph, Wrap};
 
-use super::{Room, columns, flight, framed, rows};
+use super::{columns, flight, framed};
 use crate::model::words;
 use crate::model::{
     Act, Degrees, LOSS_MOST, LastPlace, MARGIN_LEAST_DB, Model, PadCheck, SURFACES, Sample, Spot, Standing,
-    Way, dead_reckoning::may_have_left, shown, standing,
+    dead_reckoning::may_have_left, shown, standing,
 };
-use crate::view::band::{LETTER, draw_word, word};
-use crate::view::pictures::Plane;
 use crate::view::pictures::qr;
-use crate::view::{Ink, TextRole, Theme, draw_line, draw_lines, fixed, seconds};
+use crate::view::{TextRole, Theme, draw_lines, fixed, seconds};
 
 /// Columns of one value beside others.
 const VALUE_COLUMNS: usize = 39;
@@ -199,31 +196,15 @@ fn radio(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
 
 // The page that helps to find the vehicle: where it was last heard, where it is predicted, and the way there.
 
-/// Columns of the arrow at 80 columns, and of the words.
-const ARROW_COLUMNS: u16 = 14;
 const WORD_COLUMNS: u16 = 33;
-/// Rows of the words above the arrow.
-const WORD_ROWS: u16 = 15;
 
-/// Draws an arrow that points to where it is, what is known of the place, the way over the ground, and the code for a phone.
+/// Draws what is known of the place, the way over the ground, and the code for a phone.
 pub fn draw_find(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let (walk, middle, right) = if Room::of(frame.area()) == Room::Small {
-        columns(area, [Length(ARROW_COLUMNS), Length(WORD_COLUMNS), Fill(1)]).into()
-    } else {
-        let [left, right] = columns(area, [Length(WORD_COLUMNS), Fill(1)]);
-        let [words, walk] = rows(left, [Length(WORD_ROWS), Fill(1)]);
-        (walk, words, right)
-    };
-    let inside = framed("place", Line::default(), theme, frame, middle);
+    let [words, right] = columns(area, [Length(WORD_COLUMNS), Fill(1)]);
+    let inside = framed("place", Line::default(), theme, frame, words);
     let place = model.last_place(now).or(model.place);
     let words = Paragraph::new(find_lines(model, place, theme, now)).wrap(Wrap { trim: false });
     frame.render_widget(words, inside);
-    let way = place.map(|place| place.way(&place.best(), model.settings.here));
-    let inside = framed("walk", theme.line(" N up ", TextRole::Label), theme, frame, walk);
-    match way.filter(|_| may_have_left(&model.vehicle, now).is_none()) {
-        Some(way) => draw_way(way, theme, frame, inside),
-        None => draw_line(frame, inside, theme.line(" --", TextRole::Label)),
-    }
     let flies = model.vehicle.in_flight() && place.is_some_and(|place| place.predicted.is_none());
     let at = place.and_then(|place| place.degrees(&place.best())).filter(|_| !flies && !theme.ascii);
     let code = at.map_or_else(Vec::new, |at| qr::code(at, right.height));
@@ -234,31 +215,6 @@ pub fn draw_find(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
         flight::map(flight::FROM_ABOVE, model, theme, now, frame, over_ground);
     }
     draw_lines(frame, beside, &code);
-}
-
-/// An arrow with the distance under it in large letters, where there is room for both.
-fn draw_way(way: Way, theme: Theme, frame: &mut Frame, area: Rect) {
-    let text = format!("{} m", fixed(way.distance_m, 0));
-    let letters = text.len() as u16;
-    let is_large = area.height >= 4 * LETTER.1 && letters * LETTER.0 < area.width;
-    let rows = [Fill(1), Length(if is_large { LETTER.1 } else { 0 })];
-    let [above, below] = area.layout(&Layout::vertical(rows));
-    draw_word(&word("", &text, TextRole::Title), theme, frame, below);
-    // An arrow has the same shape wherever it points.
-    let plane = Plane::around(above, (0.0, 0.0), 1.0);
-    let reach = 1.0 - 2.0 * plane.dot();
-    let (sin, cos) = libm::sincos(way.bearing_deg.to_radians());
-    let at =
-        |along: f64, aside: f64| (reach * (along * sin + aside * cos), reach * (along * cos - aside * sin));
-    plane.draw(theme, frame, |context| {
-        for step in -20..=20 {
-            let aside = f64::from(step) / 33.0;
-            for (from, to) in [(at(0.0, aside), at(1.0, 0.0)), (at(-1.0, aside / 5.0), at(0.0, aside / 5.0))]
-            {
-                context.draw(&canvas::Line::new(from.0, from.1, to.0, to.1, theme.ink(Ink::Measured)));
-            }
-        }
-    });
 }
 
 /// The places and the ways to them.

@@ -5,16 +5,11 @@ use std::time::Duration;
 use protocol::dialect::message_name;
 use protocol::identity::Address;
 use protocol::link_stats::{LinkFigures, MessageFigures, SourceFigures};
-use ratatui::Frame;
-use ratatui::layout::Constraint::Fill;
-use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
-use ratatui::widgets::Sparkline;
 
-use super::{columns, framed, rows};
-use crate::model::{LinkReport, Model, RADIO_FRESH, STALE_AFTER, quantity::Quantity, refusal};
+use crate::model::{LinkReport, Model, RADIO_FRESH, STALE_AFTER, refusal};
 use crate::view::status_lines::{loss_role, percent};
-use crate::view::{Ink, STALE_MARK, TextRole, Theme, fixed, seconds};
+use crate::view::{STALE_MARK, TextRole, Theme, fixed, seconds};
 
 const NAME_WIDTH: usize = 26;
 /// The width of a message name with its age and rate: two beside each other on the smallest whole screen.
@@ -22,47 +17,6 @@ const MESSAGE_CELL_WIDTH: usize = 39;
 /// The messages that the vehicle sends regularly.
 const REGULAR: &str = "HEARTBEAT SYS_STATUS EXTENDED_SYS_STATE TD_FLIGHT_STATUS ATTITUDE_QUATERNION \
     LOCAL_POSITION_NED VFR_HUD TD_FINS TD_GIMBAL TD_DESCENT TD_CONTROLLER TD_TOUCHDOWN_PREDICTION TD_PREDICTED_PATH";
-
-/// What the panels of bars show.
-const OVER_TIME: [&str; 4] = ["link rate", "link sent", "link loss", "round trip"];
-/// A full bar of loss is at least this much, %.
-const LOSS_FULL_PERCENT: f64 = 10.0;
-/// A value counts for so long: the history keeps one about every second.
-const KEPT_WITHIN: Duration = Duration::from_millis(1_500);
-/// From this width on bars stand apart.
-const APART_COLUMNS: u16 = 60;
-
-/// Draws the figures of the link over time, beside each other or one below the other.
-pub fn draw_over_time(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let is_wide = area.width > 4 * area.height;
-    let panels = if is_wide { columns(area, [Fill(1); 4]) } else { rows(area, [Fill(1); 4]) };
-    for (quantity, at) in OVER_TIME.iter().filter_map(|name| Quantity::named(name)).zip(panels) {
-        draw_bars(quantity, model, theme, now, frame, at);
-    }
-}
-
-/// A panel with a quantity of the link: its present value, and a bar for each second.
-fn draw_bars(quantity: &Quantity, model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let value = quantity.read(model, now);
-    let value = value.map_or_else(|| "--".to_owned(), |value| fixed(value.value, quantity.decimals));
-    let title = format!("{} {value} {}", quantity.name.trim_start_matches("link "), quantity.unit);
-    let inside = framed(&title, Line::default(), theme, frame, area);
-    let apart = if inside.width < APART_COLUMNS { 1 } else { 2 };
-    let from = now.saturating_sub(Duration::from_secs((inside.width / apart).into()) + KEPT_WITHIN);
-    let values: Vec<(Duration, f64)> = model.history.trace.values(quantity, from, now).collect();
-    let bar = |column: u16| {
-        let ago = Duration::from_secs((column / apart).into());
-        let at = now.checked_sub(ago).filter(|_| column.is_multiple_of(apart))?;
-        let (kept_at, value) = values.iter().rfind(|(kept_at, _)| *kept_at <= at)?;
-        // In thousandths, because the widget draws whole numbers.
-        (at.saturating_sub(*kept_at) < KEPT_WITHIN).then_some((1_000.0 * value) as u64)
-    };
-    let bars: Vec<Option<u64>> = (0..inside.width).rev().map(bar).collect();
-    let least = if quantity.unit == "%" { LOSS_FULL_PERCENT } else { 0.0 };
-    let most = bars.iter().flatten().copied().fold((1_000.0 * least) as u64, u64::max);
-    let style = theme.ground().fg(theme.ink(Ink::Measured));
-    frame.render_widget(Sparkline::default().data(bars).max(most).style(style), inside);
-}
 
 /// What was rejected and by whom; the rates of all links together, of each link and of each component; age and rate of every message.
 pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize, rows: usize) -> Vec<Line<'static>> {
@@ -87,7 +41,7 @@ fn cells([name, rx, tx, frames, loss, copies, age]: [&str; 7]) -> String {
 
 /// Counts of rejected frames by reason, what the vehicle refuses, and what a radio reports about itself.
 fn rejected(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    let framing = &model.link.framing;
+    let (link, framing) = (&model.link, &model.link.framing);
     let unreadable = format!(
         "checksum {}  id {}  cut {}  flags {}  fields {}  garbage {} B",
         framing.crc_errors,
@@ -126,6 +80,7 @@ fn rejected(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
         ("unsent", (drops > 0).then(|| format!("{drops} writes found no room"))),
         ("refused", refused),
         ("radio", radio),
+        ("answers", link.round_trip.map(|trip| format!("round trip {:.0} ms", 1e3 * trip.as_secs_f64()))),
     ];
     let known = rows.into_iter().filter_map(|(label, value)| Some((label, value?)));
     known

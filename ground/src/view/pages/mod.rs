@@ -41,8 +41,8 @@ pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area:
 
 /// Columns of the tables of link and checks beside their pictures.
 const TABLE_COLUMNS: u16 = 80;
-/// Rows of the bars of the link at 80 columns, and of fins and gimbal, with their borders.
-const BARS_ROWS: [u16; 2] = [5, 8];
+/// Rows of the bars of fins and gimbal, with their borders.
+const BARS_ROWS: u16 = 8;
 /// Rows of the newest events under a list, with their borders, at least.
 const EVENTS_ROWS: u16 = 5;
 
@@ -52,31 +52,21 @@ fn draw_list(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area
     let has_pictures = Room::of(frame.area()) != Room::Small;
     let share =
         if matches!(page, Page::Link | Page::Checks) { Length(TABLE_COLUMNS) } else { Percentage(60) };
-    let [mut area, right] = columns(area, if has_pictures { [share, Fill(1)] } else { [Fill(1), Length(1)] });
-    match page {
-        Page::Link if has_pictures => link::draw_over_time(model, theme, now, frame, right),
-        Page::Link => {
-            let [bars, below] = rows(area, [Length(BARS_ROWS[0]), Fill(1)]);
-            link::draw_over_time(model, theme, now, frame, bars);
-            area = below;
+    let [area, right] = columns(area, if has_pictures { [share, Fill(1)] } else { [Fill(1), Length(1)] });
+    if has_pictures {
+        // A check moves fins and gimbal, and on the pad there is no flight to show.
+        let is_check = page == Page::Checks;
+        let [above, below] = rows(right, [Fill(1), if is_check { Length(BARS_ROWS) } else { Fill(1) }]);
+        if is_check || flight_began(model).is_none() {
+            flight::vehicle(model, [Side::South, Side::East], theme, now, frame, above);
+        } else {
+            flight::height(model, theme, now, frame, above);
         }
-        _ if has_pictures => {
-            // A check moves fins and gimbal, and on the pad there is no flight to show.
-            let is_check = page == Page::Checks;
-            let surfaces = if is_check { Length(BARS_ROWS[1]) } else { Fill(1) };
-            let [above, below] = rows(right, [Fill(1), surfaces]);
-            if is_check || flight_began(model).is_none() {
-                flight::vehicle(model, [Side::South, Side::East], theme, now, frame, above);
-            } else {
-                flight::height(model, theme, now, frame, above);
-            }
-            if is_check {
-                bars::draw_surfaces(model, theme, now, frame, below);
-            } else {
-                flight::map(flight::FROM_ABOVE, model, theme, now, frame, below);
-            }
+        if is_check {
+            bars::draw_surfaces(model, theme, now, frame, below);
+        } else {
+            flight::map(flight::FROM_ABOVE, model, theme, now, frame, below);
         }
-        _ => {}
     }
     let lines = lines(model, theme, now, area.inner(Margin::new(1, 1)));
     let room = (area.height + 1).saturating_sub(lines.len() as u16 + 2);
@@ -96,9 +86,6 @@ fn draw_list(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area
 pub fn lines(model: &Model, theme: Theme, now: Duration, area: Rect) -> Vec<Line<'static>> {
     let (columns, rows) = (usize::from(area.width), usize::from(area.height));
     match model.page() {
-        Page::Pad if let Some(vehicle) = model.vehicle.as_foreign() => {
-            pad::foreign_lines(model, vehicle, theme, (columns, rows))
-        }
         Page::Link => link::lines(model, theme, now, columns, rows),
         Page::Messages => lists::messages_lines(model, theme, columns, rows),
         Page::Log => lists::log_lines(model, theme, now),

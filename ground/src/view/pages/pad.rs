@@ -11,8 +11,8 @@ use ratatui::text::Line;
 use super::flight::map;
 use super::{Room, columns, events, framed, rows, table};
 use crate::model::{
-    Act, Deflection, Foreign, LogStanding, Model, Vehicle, hold_words, is_on_pad, unheard_hints,
-    why_not_here, why_untested, words,
+    Act, Deflection, LogStanding, Model, Vehicle, hold_words, is_on_pad, unheard_hints, why_not_here,
+    why_untested, words,
 };
 use crate::view::band::{Item, draw_band, word};
 use crate::view::pictures::attitude::{Side, draw_attitude};
@@ -119,7 +119,7 @@ fn draw_checklist(model: &Model, theme: Theme, now: Duration, frame: &mut Frame,
     draw_lines(frame, inside, &lists::checklist_rows(model, theme, now, size));
 }
 
-/// Each failing check with the value found and why it fails; how many pass; the measured values of those.
+/// Each failing check in the words of the vehicle, or with the value found; how many pass; the measured values of those.
 pub fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     // Off the pad the vehicle does not check for arming and reports no failing check.
     let off_pad = model.vehicle.phase().is_some_and(|phase| !is_on_pad(phase.value));
@@ -130,16 +130,9 @@ pub fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> 
         return lines.map(|words| Line::from(format!(" {words}"))).collect();
     };
     let mark = if status.is_stale(now) { STALE_MARK } else { " " };
-    let row = |word: &'static str, (name, bit): (&str, TdCheck), reason: &'static str| {
-        let name = words::check(name);
-        let found = found(&model.vehicle, bit);
-        let reason = if found.starts_with("--") && !reason.is_empty() { "not known" } else { reason };
-        Line::from(vec![
-            theme.span(word, if reason.is_empty() { TextRole::Plain } else { TextRole::Alarm }),
-            theme.plain(format!("{mark}{name:<19.19}")),
-            theme.plain(format!("{found:>10} ")),
-            theme.span(reason, TextRole::Caution),
-        ])
+    let row = |word: &'static str, (name, bit): (&str, TdCheck), role: TextRole| {
+        let (name, found) = (words::check(name), found(&model.vehicle, bit));
+        Line::from(vec![theme.span(word, role), theme.plain(format!("{mark}{name:<19.19}{found:>10}"))])
     };
     let fails = |bit: TdCheck| status.value.checks_failed.contains(bit);
     let all = model.vehicle.checks_made();
@@ -159,13 +152,13 @@ pub fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> 
             theme.span(" NO ", TextRole::Alarm),
             theme.span(format!("{mark}{words}"), TextRole::Caution),
         ]),
-        _ => row(" NO ", check, failure(check.1)),
+        _ => row(" NO ", check, TextRole::Alarm),
     }));
     let of = all.iter().count();
     let count = format!(" GO {mark}{} of {of} checks", of - failed.iter().count());
     lines.push(theme.line(count, TextRole::Good));
     let measured = |(_, bit): &(&str, TdCheck)| !fails(*bit) && found(&model.vehicle, *bit).contains(' ');
-    lines.extend(all.iter_names().filter(measured).map(|check| row("    ", check, "")));
+    lines.extend(all.iter_names().filter(measured).map(|check| row("    ", check, TextRole::Plain)));
     if !station_log_fails {
         lines.push(station_log);
     }
@@ -264,43 +257,6 @@ fn found(vehicle: &Vehicle, check: TdCheck) -> String {
     }
 }
 
-/// Why a check fails.
-fn failure(check: TdCheck) -> &'static str {
-    match check {
-        TdCheck::TD_CHECK_ABORT_LATCH => "keep away",
-        TdCheck::TD_CHECK_PIN => "pull the pin",
-        TdCheck::TD_CHECK_SELF_TEST => "not passed",
-        TdCheck::TD_CHECK_ACCELEROMETER
-        | TdCheck::TD_CHECK_GYRO
-        | TdCheck::TD_CHECK_BAROMETER
-        | TdCheck::TD_CHECK_LIDAR => "no data",
-        TdCheck::TD_CHECK_GNSS => "no fix",
-        TdCheck::TD_CHECK_TILT => "not upright",
-        TdCheck::TD_CHECK_ROTATION => "turning",
-        TdCheck::TD_CHECK_SPEED => "moving",
-        TdCheck::TD_CHECK_ESTIMATOR => "not settled",
-        TdCheck::TD_CHECK_FINS => "no answer",
-        TdCheck::TD_CHECK_IGNITER => "open circuit",
-        TdCheck::TD_CHECK_LOG => "not running",
-        TdCheck::TD_CHECK_LOG_SPACE => "disk full",
-        TdCheck::TD_CHECK_CONTROLLER_WARM => "no rehearsal",
-        TdCheck::TD_CHECK_PREDICTED_TOUCHDOWN => "outside",
-        TdCheck::TD_CHECK_UPLINK => "not heard",
-        TdCheck::TD_CHECK_HEIGHT | TdCheck::TD_CHECK_BATTERY => "too low",
-        _ => "",
-    }
-}
-
-/// The rung of the checks, and of the checklist if there is one.
-fn checks_rung(model: &Model, now: Duration) -> String {
-    match model.steps_done(now) {
-        None => "every check passes".to_owned(),
-        Some((done, all)) => {
-            format!("checks; checklist {done}/{all} ({})", model.settings.keys.name(Act::Checklist))
-        }
-    }
-}
-
 /// The steps from link to countdown, and which are done.
 fn ladder(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let vehicle = &model.vehicle;
@@ -317,11 +273,15 @@ fn ladder(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
         let key = keys.name(act);
         if two { format!("{key}, {word}, Enter; CONFIRM") } else { format!("{key}, type {word}, Enter") }
     };
+    let checks = model.steps_done(now).map_or_else(
+        || "every check passes".to_owned(),
+        |(done, all)| format!("checks; checklist {done}/{all} ({})", keys.name(Act::Checklist)),
+    );
     let rungs = [
         (model.link.state(now).carries(), "the vehicle is heard".to_owned()),
         (model.link.uplink.is_proven(now), "it hears us".to_owned()),
         (pin_out, "pin out (first inhibit)".to_owned()),
-        (checked && model.why_checklist(now).is_none(), checks_rung(model, now)),
+        (checked && model.why_checklist(now).is_none(), checks),
         (armed, then(Act::Arm, "ARM")),
         (armed && phase == Some(TdPhase::TD_PHASE_PAD_ARMED), "armed, says HEARTBEAT".to_owned()),
         (counting, then(Act::Start, "START")),
@@ -354,26 +314,5 @@ fn ladder(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let wrapped =
         lists::wrap(why, usize::from(STEP_COLUMNS[0]) - 3).into_iter().filter(|words| !words.is_empty());
     lines.extend(wrapped.map(|words| theme.line(format!(" {words}"), TextRole::Label)));
-    lines
-}
-
-// What is shown instead of the Pad page while the vehicle is none of ours.
-
-/// What it is, and below it the newest events: why something was refused is one of them.
-pub fn foreign_lines(
-    model: &Model,
-    foreign: &Foreign,
-    theme: Theme,
-    (columns, rows): (usize, usize),
-) -> Vec<Line<'static>> {
-    let plain = |text: String| theme.line(text, TextRole::Plain);
-    let mut lines = vec![
-        theme.line(format!(" NOT A TOUCHDOWN VEHICLE: {}", foreign.name()), TextRole::Alarm),
-        plain(format!(" {}, {}", foreign.mode(), if foreign.armed { "ARMED" } else { "disarmed" })),
-        plain(" Nothing is armed or started there from here.".to_owned()),
-        theme.line(format!(" An abort {}.", foreign.termination()), TextRole::Caution),
-    ];
-    let room = rows.saturating_sub(lines.len());
-    lines.extend(lists::events(model, theme, columns, room));
     lines
 }

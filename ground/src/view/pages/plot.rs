@@ -25,30 +25,12 @@ const TICK_ROWS: u16 = 3;
 const CALM_SPAN: Duration = Duration::from_mins(2);
 const BEFORE_FLIGHT: Duration = Duration::from_secs(5);
 
-/// Draws the list of quantities and the plot of the chosen one.
+/// Draws the list of quantities, and the chosen one over time: its name and unit, its least and its greatest value in the title.
 pub fn draw_plot_page(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let [list, right] = columns(area, [Length(LIST_COLUMNS), Fill(1)]);
+    let [list, area] = columns(area, [Length(LIST_COLUMNS), Fill(1)]);
     let inside = framed("Up Down choose", Line::default(), theme, frame, list);
     draw_lines(frame, inside, &values(model, theme, now, usize::from(inside.height)));
-    draw_plot(model.pages.plotted, model, theme, now, frame, right);
-}
-
-/// The quantities around the chosen one, which is marked, each with its present value.
-fn values(model: &Model, theme: Theme, now: Duration, rows: usize) -> Vec<Line<'static>> {
-    let chosen = model.pages.plotted;
-    let start = (chosen.place() + 1).saturating_sub(rows / 2 + 1).min(ALL.len().saturating_sub(rows));
-    let line = |quantity: &'static Quantity| {
-        let mut line = quantity_row(quantity, model, theme, now);
-        if quantity == chosen {
-            line.spans[0] = theme.key(format!(">{}", &line.spans[0].content[1..]));
-        }
-        line
-    };
-    ALL.iter().skip(start).take(rows).map(line).collect()
-}
-
-/// A panel with the chosen quantity: its name and unit, its least and its greatest value in the title.
-fn draw_plot(quantity: &Quantity, model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
+    let quantity = model.pages.plotted;
     let first = flight_began(model);
     let from = first.unwrap_or_else(|| now.saturating_sub(CALM_SPAN)).saturating_sub(BEFORE_FLIGHT);
     let zero = first.unwrap_or(now);
@@ -72,4 +54,17 @@ fn draw_plot(quantity: &Quantity, model: &Model, theme: Theme, now: Duration, fr
     let unit = if first.is_some() { "T+ s" } else { "s" };
     let plane = scales((across, up), marks, unit, theme, frame, inside);
     plane.draw(theme, frame, |context| plane.measured(context, &points, theme.ink(Ink::Measured)));
+}
+/// The quantities around the chosen one, which is marked, each with its present value.
+fn values(model: &Model, theme: Theme, now: Duration, rows: usize) -> Vec<Line<'static>> {
+    let chosen = model.pages.plotted;
+    let start = (chosen.place() + 1).saturating_sub(rows / 2 + 1).min(ALL.len().saturating_sub(rows));
+    let line = |quantity: &'static Quantity| {
+        let mut line = quantity_row(quantity, model, theme, now);
+        if quantity == chosen {
+            line.spans[0] = theme.key(format!(">{}", &line.spans[0].content[1..]));
+        }
+        line
+    };
+    ALL.iter().skip(start).take(rows).map(line).collect()
 }

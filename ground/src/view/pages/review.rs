@@ -1,4 +1,4 @@
-//! The page after a flight: verdict, limits, what went wrong, greatest values, height and place.
+//! The page after a flight: verdict, limits, what went wrong, height and place.
 
 use std::time::Duration;
 
@@ -9,9 +9,9 @@ use ratatui::text::Line;
 
 use super::flight::{FROM_ABOVE, LIMIT_ROWS, height, map};
 use super::{Room, columns, events, rows, table};
-use crate::model::{Act, Model, RED_AFTER, quantity::Quantity};
+use crate::model::{Act, Model, RED_AFTER};
 use crate::view::band::draw_band;
-use crate::view::{TextRole, Theme, bars, fixed, headline, lists, panels, text_row};
+use crate::view::{TextRole, Theme, bars, fixed, headline, lists, panels};
 
 /// Columns of the time before a finding.
 const FINDING_TIME_COLUMNS: usize = 10;
@@ -61,14 +61,8 @@ pub fn draw_review(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     map(FROM_ABOVE, model, theme, now, frame, right);
     let [left, middle, right] = columns(below, [Percentage(42), Percentage(30), Fill(1)]);
     bars::draw_limits(model, theme, now, frame, left);
-    let mut lines = findings(model, theme, usize::from(middle.width.saturating_sub(2)));
-    let title = if model.vehicle.findings.count.is_some_and(|count| count > 0) {
-        FINDINGS_TITLE
-    } else {
-        lines.extend(extremes(model, theme));
-        "least, greatest heard"
-    };
-    table(title, &lines, theme, frame, middle);
+    let lines = findings(model, theme, usize::from(middle.width.saturating_sub(2)));
+    table(FINDINGS_TITLE, &lines, theme, frame, middle);
     events(model, theme, frame, right);
 }
 
@@ -80,10 +74,12 @@ fn ended(model: &Model, now: Duration) -> (String, TextRole) {
     }
 }
 
-/// What the vehicle says went wrong, each with its T+; nothing if it has not said anything of it.
+/// What the vehicle says went wrong, each with its T+.
 fn findings(model: &Model, theme: Theme, columns: usize) -> Vec<Line<'static>> {
     let findings = &model.vehicle.findings;
-    let Some(count) = findings.count else { return Vec::new() };
+    let Some(count) = findings.count else {
+        return vec![theme.line(" not told yet", TextRole::Label)];
+    };
     if count == 0 {
         return vec![theme.line(" nothing went wrong", TextRole::Label)];
     }
@@ -106,23 +102,9 @@ fn findings(model: &Model, theme: Theme, columns: usize) -> Vec<Line<'static>> {
 
 /// For how long nothing was heard of a flight, if it was long enough to count.
 fn unheard(model: &Model, now: Duration) -> Option<String> {
-    let silence_s =
-        model.history.extremes.silence_s.filter(|silence_s| *silence_s > RED_AFTER.as_secs_f64())?;
+    let silence = Some(model.history.silence).filter(|silence| *silence > RED_AFTER)?;
     if model.vehicle.in_flight() && !model.link.state(now).carries() {
         return Some("link LOST before touchdown".to_owned());
     }
-    Some(format!("silent for {} s of the flight", fixed(silence_s, 1)))
-}
-
-/// What the last table shows of a flight; the height is in its picture.
-const EXTREMES: [&str; 4] = ["vertical speed", "tilt", "turn rate", "solver margin"];
-
-/// Least and greatest values: what happened in a silence is not known.
-fn extremes(model: &Model, theme: Theme) -> impl Iterator<Item = Line<'static>> {
-    EXTREMES.into_iter().filter_map(Quantity::named).map(move |quantity| {
-        let ends = model.history.extremes.of(quantity.name).unwrap_or([f64::NAN; 2]);
-        let [least, greatest] = ends.map(|end| fixed(end, quantity.decimals));
-        let text = format!("{least} {greatest:>7}");
-        text_row(theme, quantity.name, (" ", TextRole::Plain), &text, quantity.unit)
-    })
+    Some(format!("silent for {} s of the flight", fixed(silence.as_secs_f64(), 1)))
 }
