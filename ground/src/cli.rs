@@ -54,8 +54,8 @@ pub struct Cli {
     /// Without a screen: give up if the flight has not ended after this time.
     ///
     /// Default: 120 s if the flight is started automatically, otherwise never.
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Without a screen")]
-    pub timeout_s: Option<Seconds>,
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true, help_heading = "Without a screen")]
+    pub timeout_s: Option<Duration>,
 
     #[command(flatten)]
     pub shown: Shown,
@@ -354,30 +354,15 @@ impl FromStr for ReplayFrom {
     }
 }
 
-/// A time.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(try_from = "f64")]
-pub struct Seconds(pub Duration);
-
-impl FromStr for Seconds {
-    type Err = String;
-
-    fn from_str(given: &str) -> Result<Self, String> {
-        given.parse::<f64>().map_err(|_wrong| wrong_seconds(given)).and_then(Self::try_from)
+/// A time from its seconds.
+///
+/// # Errors
+/// It is no number, or too short or too long.
+pub fn seconds(given: &str) -> Result<Duration, String> {
+    match given.parse::<f64>() {
+        Ok(seconds) if (0.1..=86_400.0).contains(&seconds) => Ok(Duration::from_secs_f64(seconds)),
+        _ => Err(format!("`{given}` is not a number of seconds from 0.1 to 86400")),
     }
-}
-
-impl TryFrom<f64> for Seconds {
-    type Error = String;
-
-    fn try_from(seconds: f64) -> Result<Self, String> {
-        let accepted = (0.1..=86_400.0).contains(&seconds);
-        if accepted { Ok(Self(Duration::from_secs_f64(seconds))) } else { Err(wrong_seconds(seconds)) }
-    }
-}
-
-fn wrong_seconds(given: impl std::fmt::Display) -> String {
-    format!("`{given}` is not a number of seconds from 0.1 to 86400")
 }
 
 /// What the terminal can show.

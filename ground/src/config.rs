@@ -2,12 +2,14 @@
 //! flag's name and values, and the flag overrides it. What a person or a place keeps stands in [`Config`] and has none.
 
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
+use anyhow::Context as _;
 use clap::{ArgAction, ArgMatches, CommandFactory as _, FromArgMatches as _};
 use serde::{Deserialize, Deserializer, de};
 use toml::{Table, Value};
 
-use crate::cli::{Characters, Flags, LinkArgs, Seconds, StationArgs};
+use crate::cli::{Characters, Flags, LinkArgs, StationArgs, seconds};
 use crate::model::{Amount, Bindings, Degrees, Talk};
 use crate::view::theme::Palette;
 
@@ -34,11 +36,16 @@ pub struct Config {
     #[serde(deserialize_with = "command")]
     pub voice: Option<String>,
     pub talk: Amount,
-    pub talk_every_s: Option<Seconds>,
+    #[serde(deserialize_with = "every")]
+    pub talk_every_s: Option<Duration>,
 }
 
 fn place<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Degrees>, D::Error> {
     String::deserialize(from)?.parse().map(Some).map_err(de::Error::custom)
+}
+
+fn every<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Duration>, D::Error> {
+    seconds(&f64::deserialize(from)?.to_string()).map(Some).map_err(de::Error::custom)
 }
 
 fn palette<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Palette>, D::Error> {
@@ -63,30 +70,20 @@ fn reason(error: &clap::Error) -> String {
     words.split("\n\nFor more information").next().unwrap_or(words).trim().to_owned()
 }
 
-/// Why a settings file cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub enum ConfigError {
-    #[error("cannot read the settings {}", path.display())]
-    Read { path: PathBuf, source: std::io::Error },
-    /// It is not valid; the reason names line or key, and what would be accepted.
-    #[error("{}: {reason}", path.display())]
-    Wrong { path: PathBuf, reason: String },
-}
-
 impl Config {
     /// Loads the named file, otherwise the usual one if it exists.
     ///
     /// # Errors
     /// The file cannot be read or is invalid, or a named file is missing.
-    pub fn load(named: Option<&Path>) -> Result<Self, ConfigError> {
+    pub fn load(named: Option<&Path>) -> anyhow::Result<Self> {
         let path = match (named, usual_path()) {
             (Some(path), _) => path.to_owned(),
             (None, Some(path)) if path.exists() => path,
             (None, _) => return Ok(Self::default()),
         };
-        let text = std::fs::read_to_string(&path)
-            .map_err(|source| ConfigError::Read { path: path.clone(), source })?;
-        Self::parse(&text).map_err(|reason| ConfigError::Wrong { path, reason })
+        let text = std::fs::read_to_string(&path);
+        let text = text.with_context(|| format!("cannot read the settings {}", path.display()))?;
+        Self::parse(&text).map_err(|reason| anyhow::anyhow!("{}: {reason}", path.display()))
     }
 
     /// Parses the text of a file and checks every value.
@@ -122,12 +119,7 @@ impl Config {
     ///
     /// # Errors
     /// The flags are of another command.
-    pub fn fill(
-        &self,
-        station: &mut StationArgs,
-        given: &ArgMatches,
-        is_daemon: bool,
-    ) -> clap::error::Result<()> {
+    pub fn fill(&self, station: &mut StationArgs, given: &ArgMatches, is_daemon: bool) -> anyhow::Result<()> {
         let takes_links =
             is_daemon && !station.describes_demonstration() && !self.flags.link.connect.is_empty();
         let flags = self.flags.clone();
@@ -137,13 +129,12 @@ impl Config {
             let link = LinkArgs { connect: Vec::new(), key: None, crew: None, ..flags.link };
             Flags { link, mission: None, checklist: None, forward: Vec::new(), ..flags }
         };
-        station.flags.update_from_arg_matches(given)
+        Ok(station.flags.update_from_arg_matches(given)?)
     }
 
     /// What is called out.
     pub fn talk(&self) -> Talk {
-        let usual = Talk::default();
-        let height_every = self.talk_every_s.map_or(usual.height_every, |Seconds(every)| every);
+        let height_every = self.talk_every_s.unwrap_or(Talk::default().height_every);
         Talk { amount: self.talk, height_every, has_voice: self.voice.is_some() }
     }
 }

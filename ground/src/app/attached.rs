@@ -228,7 +228,7 @@ async fn find_again(named: Option<&Path>, links: &str, viewer: &Viewer) -> Optio
 fn keep_unsent(is_kept: &mut bool, model: &mut Model, unix_s: u64, now: Duration) {
     let abort = model.link.why_abort_not_sent(now).map(|_| asked_words(unix_s, &model.settings.seat));
     let changes = abort.is_some() != std::mem::replace(is_kept, abort.is_some());
-    if !changes || (abort.is_none() && !model.link.is_station_gone()) {
+    if !changes || (abort.is_none() && !model.link.station_gone) {
         return;
     }
     let folder = model.settings.log_path.as_deref().and_then(|log| Path::new(log).parent());

@@ -35,7 +35,7 @@ use protocol::transport::LinkAddress;
 use sim::wire::fly::load_flight;
 
 use crate::attach::OPERATOR_MAX;
-use crate::cli::{Cli, Command, ConfigArgs, ConfigCommand, LinkArgs, LogChoice, Seconds, StationArgs};
+use crate::cli::{Cli, Command, ConfigArgs, ConfigCommand, LinkArgs, LogChoice, StationArgs};
 use crate::config::{Config, EXAMPLE, usual_path};
 use crate::demo::{Demo, DemoOptions, LogClock};
 use crate::exit;
@@ -134,8 +134,7 @@ pub fn run(given: &ArgMatches) -> anyhow::Result<Exit> {
                 return runtime.block_on(replay);
             }
             config.fill(&mut station, given, false)?;
-            let time_limit = cli.timeout_s.map(|Seconds(limit)| limit);
-            let duty = Duty { is_daemon: false, interactive, time_limit };
+            let duty = Duty { is_daemon: false, interactive, time_limit: cli.timeout_s };
             runtime.block_on(Box::pin(session(&station, &config, duty)))
         }
     }

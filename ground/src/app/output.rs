@@ -82,7 +82,10 @@ impl Output {
         let screen = self.screen.as_mut()?;
         match action {
             Action::Redraw => screen.clear(),
-            Action::NextTheme => screen.next_theme(),
+            Action::NextTheme => {
+                screen.theme.palette = screen.theme.palette.next();
+                screen.pace.mark_changed();
+            }
             Action::Bell => screen.bell(),
             Action::Say(text) => return screen.say(text),
             _ => {}

@@ -63,7 +63,7 @@ pub struct Screen {
     terminal: ManuallyDrop<Terminal<DiffBackend<FrameBuffer>>>,
     writer: TerminalWriter,
     events: EventStream,
-    theme: Theme,
+    pub theme: Theme,
     bell: bool,
     voice: Option<Voice>,
     pub pace: Pace,
@@ -139,12 +139,6 @@ impl Screen {
         let ended = self.voice.as_ref()?.say(text).err();
         self.voice = self.voice.take().filter(|_| ended.is_none());
         ended
-    }
-
-    /// Changes to the next theme.
-    pub fn next_theme(&mut self) {
-        self.theme.palette = self.theme.palette.next();
-        self.pace.mark_changed();
     }
 
     /// Whether the terminal distinguishes a held key's repeats from presses.

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use futures_util::future::OptionFuture;
 use protocol::book::{CLOSED, Line};
 use protocol::dialect::MavMessage;
 use protocol::log::record::{Event, EventLevel, Record};
@@ -118,10 +119,12 @@ impl Station {
                 // The link comes last, because it can be busy all the time.
                 biased;
                 signal = signals.next() => vec![Msg::Terminate(signal)],
-                news = server_hears(server) => self.hear(news, model),
+                Some(news) = OptionFuture::from(server.as_mut().map(Server::next)) => self.hear(news, model),
                 msg = self.output.input() => self.output.typed(msg).into_iter().collect(),
                 () = self.clock.sleep_until(wakes_at) => vec![Msg::Tick],
-                failure = demo_ended(demo) => vec![Msg::SimulatorEnded(failure)],
+                Some(failure) = OptionFuture::from(demo.as_mut().map(Demo::ended)) => {
+                    vec![Msg::SimulatorEnded(failure)]
+                }
                 _ = ticks.tick() => {
                     let now = self.clock.now();
                     self.output.pass(model, now, now);
@@ -493,18 +496,4 @@ impl Station {
 /// The boot that the screens show; 0 if the vehicle has reported none.
 fn boot_of(model: &Model) -> u32 {
     model.vehicle.boot.number().unwrap_or(0)
-}
-
-async fn server_hears(server: &mut Option<Server>) -> ServerEvent {
-    match server {
-        Some(server) => server.next().await,
-        None => std::future::pending().await,
-    }
-}
-
-async fn demo_ended(demo: &mut Option<Demo>) -> Option<String> {
-    match demo {
-        Some(demo) => demo.ended().await,
-        None => std::future::pending().await,
-    }
 }

@@ -240,23 +240,6 @@ impl Default for Bindings {
     }
 }
 
-/// Why keys cannot be chosen so.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum BindingError {
-    #[error("`{given}` is no action; give one of {}", names())]
-    UnknownAction { given: String },
-    #[error("{action}: `{given}` cannot be chosen; give one printable ASCII character or Space")]
-    UnknownKey { action: &'static str, given: String },
-    #[error("{action}: `{given}` is no capital letter, and {action} needs one")]
-    NotCapital { action: &'static str, given: String },
-    #[error("{first} and {second} have the same key `{key}`; give each its own")]
-    Twice { first: &'static str, second: &'static str, key: String },
-}
-
-fn names() -> String {
-    DEFINITIONS.map(|definition| definition.name).join(", ")
-}
-
 impl Bindings {
     /// The action of a key. A letter also counts with Shift, unless its capital letter has an action of its own.
     pub fn act(&self, key: Key) -> Option<Act> {
@@ -293,34 +276,39 @@ impl Bindings {
     }
 }
 
-fn key_for(definition: &Definition, given: &str) -> Result<Key, BindingError> {
+fn key_for(definition: &Definition, given: &str) -> Result<Key, String> {
     let action = definition.name;
     let mut letters = given.chars();
     let letter = match (given, letters.next(), letters.next()) {
         ("Space", ..) => ' ',
         (_, Some(letter), None) if letter.is_ascii_graphic() => letter,
-        _ => return Err(BindingError::UnknownKey { action, given: given.to_owned() }),
+        _ => {
+            let give = "give one printable ASCII character or Space";
+            return Err(format!("{action}: `{given}` cannot be chosen; {give}"));
+        }
     };
     if definition.act.opens_confirmation() && !letter.is_ascii_uppercase() {
-        return Err(BindingError::NotCapital { action, given: given.to_owned() });
+        return Err(format!("{action}: `{given}` is no capital letter, and {action} needs one"));
     }
     Ok(Key::Char(letter))
 }
 
 impl TryFrom<BTreeMap<String, String>> for Bindings {
-    type Error = BindingError;
+    type Error = String;
 
-    fn try_from(chosen: BTreeMap<String, String>) -> Result<Self, BindingError> {
+    fn try_from(chosen: BTreeMap<String, String>) -> Result<Self, String> {
         let mut bindings = Self::default();
         for (name, given) in chosen {
             let place = DEFINITIONS.iter().position(|definition| definition.name == name);
-            let place = place.ok_or(BindingError::UnknownAction { given: name })?;
+            let names = || DEFINITIONS.map(|definition| definition.name).join(", ");
+            let place = place.ok_or_else(|| format!("`{name}` is no action; give one of {}", names()))?;
             bindings.0[place] = key_for(&DEFINITIONS[place], &given)?;
         }
         for (place, key) in bindings.0.iter().enumerate() {
             if let Some(other) = bindings.0[..place].iter().position(|bound| bound == key) {
                 let (first, second) = (DEFINITIONS[other].name, DEFINITIONS[place].name);
-                return Err(BindingError::Twice { first, second, key: key.name() });
+                let key = key.name();
+                return Err(format!("{first} and {second} have the same key `{key}`; give each its own"));
             }
         }
         Ok(bindings)
@@ -398,7 +386,7 @@ mod tests {
     use crate::model::Page;
     use proptest::prelude::*;
 
-    fn chosen(pairs: &[(&str, &str)]) -> Result<Bindings, BindingError> {
+    fn chosen(pairs: &[(&str, &str)]) -> Result<Bindings, String> {
         let pairs = pairs.iter().map(|(name, key)| ((*name).to_owned(), (*key).to_owned()));
         Bindings::try_from(pairs.collect::<BTreeMap<_, _>>())
     }
@@ -426,7 +414,7 @@ mod tests {
 
     #[test]
     fn a_wrong_choice_is_refused_with_what_would_do() {
-        let refused = |given: &str| chosen(&[given.split_once('=').unwrap()]).unwrap_err().to_string();
+        let refused = |given: &str| chosen(&[given.split_once('=').unwrap()]).unwrap_err();
         assert!(refused("abort=x").contains("`abort` is no action; give one of arm, start"));
         assert!(refused("theme=Enter").contains("one printable ASCII character"));
         assert!(refused("theme=").contains("theme: ``"));

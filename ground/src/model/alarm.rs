@@ -106,21 +106,12 @@ impl Alarm {
 #[derive(Debug, Default)]
 pub struct Alarms {
     list: Vec<Alarm>,
-    in_history: bool,
+    /// Whether what arrives is still the past: nothing rings until a screen has received its history.
+    pub(crate) in_history: bool,
     rung_at: Option<Duration>,
 }
 
 impl Alarms {
-    /// Whether what arrives is still the past.
-    pub(crate) fn are_in_history(&self) -> bool {
-        self.in_history
-    }
-
-    /// For a screen that first receives the history: nothing rings until the history has been received.
-    pub(crate) fn in_history() -> Self {
-        Self { in_history: true, ..Self::default() }
-    }
-
     /// The history has been received. Alarms that ended in it are past; alarms that still hold ring.
     pub(crate) fn history_ends(&mut self) {
         if std::mem::take(&mut self.in_history) {

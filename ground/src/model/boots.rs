@@ -417,11 +417,6 @@ impl Boots {
     pub fn age(&self, id: BootId, now: Duration) -> Option<Duration> {
         self.of(id).map(|boot| now.saturating_sub(boot.heard_at))
     }
-
-    /// Whether a boot is still remembered.
-    pub fn knows(&self, id: BootId) -> bool {
-        self.of(id).is_some()
-    }
 }
 
 // The vehicles of these boots: the shown one is the model's, and the others are kept beside it.

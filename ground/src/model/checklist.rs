@@ -275,17 +275,6 @@ const AHEAD_MAX_S: u64 = 600;
 /// Bytes of a checklist's hash.
 const HASH_BYTES: usize = 8;
 
-/// Why a checklist cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub enum ChecklistError {
-    #[error(transparent)]
-    Parse(#[from] toml::de::Error),
-    #[error("give a checklist from 1 to {STEPS_MAX} steps, not {0}")]
-    StepCount(usize),
-    #[error("step {number}: {why}")]
-    Step { number: usize, why: String },
-}
-
 /// The file as it is written.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -310,16 +299,15 @@ struct WrittenStep {
 ///
 /// # Errors
 /// It is not TOML of this shape, or a step is wrong; the message says which and what would do.
-pub fn parse_checklist(text: &str) -> Result<Checklist, ChecklistError> {
+pub fn parse_checklist(text: &str) -> anyhow::Result<Checklist> {
     let written: Written = toml::from_str(text)?;
     let count = written.step.len();
-    if !(1..=STEPS_MAX).contains(&count) {
-        return Err(ChecklistError::StepCount(count));
-    }
+    let fits = (1..=STEPS_MAX).contains(&count);
+    anyhow::ensure!(fits, "give a checklist from 1 to {STEPS_MAX} steps, not {count}");
     let step = |(place, step): (usize, WrittenStep)| {
-        step.checked().map_err(|why| ChecklistError::Step { number: place + 1, why })
+        step.checked().map_err(|why| anyhow::anyhow!("step {}: {why}", place + 1))
     };
-    let steps = written.step.into_iter().enumerate().map(step).collect::<Result<_, _>>()?;
+    let steps = written.step.into_iter().enumerate().map(step).collect::<anyhow::Result<_>>()?;
     Ok(Checklist { name: printable(&written.name), mission: written.mission, hash: hash_of(text), steps })
 }
 

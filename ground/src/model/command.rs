@@ -223,11 +223,6 @@ pub struct Commands {
 }
 
 impl Commands {
-    /// The session decides where the numbers of the commands begin.
-    pub fn of_session(session: u32) -> Self {
-        Self { sender: CommandSender::new(session), ..Self::default() }
-    }
-
     /// The latest command of a kind.
     pub fn of(&self, kind: CommandKind) -> Option<&TrackedCommand> {
         self.tracks.iter().find(|track| track.kind == kind)
@@ -236,11 +231,6 @@ impl Commands {
     /// Whether an abort is still being sent.
     pub fn is_aborting(&self) -> bool {
         self.sender.is_pending(CommandKind::Abort.mav_command().0)
-    }
-
-    /// When the next command is to be sent or resent.
-    pub(crate) fn due_at(&self) -> Option<Duration> {
-        self.sender.due_at()
     }
 }
 
@@ -269,17 +259,12 @@ pub fn why_nothing_moves(model: &Model, now: Duration) -> Option<String> {
         .then(|| format!("{same} {system_id}/{component_id}: give one another --sysid"))
 }
 
-/// Why no command reaches the vehicle that is meant.
+/// Why no command reaches the vehicle that is meant: it is silent, what it says arrives late, or nothing may be commanded.
 pub fn why_not_reached(model: &Model, now: Duration) -> Option<String> {
-    why_old(model, now).or_else(|| why_nothing_moves(model, now))
-}
-
-/// Why what is known of the vehicle says nothing about the present: it is silent, or what it says arrives late.
-fn why_old(model: &Model, now: Duration) -> Option<String> {
     if !model.link.state(now).carries() {
         return Some("the vehicle is not heard".to_owned());
     }
-    let LinkState::Lost(age) = model.link.down(now) else { return None };
+    let LinkState::Lost(age) = model.link.down(now) else { return why_nothing_moves(model, now) };
     let (age_s, most_s) = (age.as_secs_f64(), RED_AFTER.as_secs());
     Some(format!("what the vehicle said last is {age_s:.1} s old, at most {most_s} s would do"))
 }

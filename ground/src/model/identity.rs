@@ -15,8 +15,6 @@ use super::{Model, words};
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Boot {
     number: Option<NonZeroU32>,
-    /// The vehicle's unique id; 0: not reported.
-    uid: u16,
     /// Whether every HEARTBEAT so far had the HIL flag set; `None` before the first.
     hil: Option<bool>,
     /// The same for the simulated flag of `TD_FLIGHT_STATUS`.
@@ -27,11 +25,6 @@ impl Boot {
     /// The boot number; `None` if the vehicle has not reported one.
     pub fn number(&self) -> Option<u32> {
         self.number.map(NonZeroU32::get)
-    }
-
-    /// The vehicle's unique id; `None` if it has not reported one.
-    pub fn uid(&self) -> Option<u16> {
-        (self.uid > 0).then_some(self.uid)
     }
 
     /// The boot number as a parameter of a command. 0 names no boot: the vehicle has reported none, or one that a parameter
@@ -69,7 +62,7 @@ impl Boot {
         if self.number != told {
             (self.hil, self.flagged) = (None, None);
         }
-        (self.number, self.uid) = (told, status.vehicle_uid);
+        self.number = told;
         let set = status.vehicle_flags.contains(TdVehicleFlag::TD_VEHICLE_FLAG_SIMULATED);
         self.flagged = Some(set && self.flagged != Some(false));
     }

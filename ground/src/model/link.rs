@@ -75,7 +75,7 @@ pub struct Link {
     pub abort_asked_at: Option<Duration>,
     /// On an attached screen: the last tick of its station. `None` in the station itself.
     pub(crate) station_at: Option<Duration>,
-    /// On an attached screen: its station has ended.
+    /// On an attached screen: its station has ended. The screen shows the past, and commands nothing.
     pub(crate) station_gone: bool,
     /// The first heartbeat of the vehicle.
     pub first_heartbeat_at: Option<Duration>,
@@ -122,11 +122,6 @@ impl Link {
         }
         let hangs = self.abort_asked_at.is_some() && self.station_silence(now).is_some();
         hangs.then_some("the station hangs; it sends it when it goes on")
-    }
-
-    /// Whether the station of this attached screen has ended: the screen shows the past, and commands nothing.
-    pub fn is_station_gone(&self) -> bool {
-        self.station_gone
     }
 
     /// How long ago it was last heard, if it has ended.
@@ -223,7 +218,7 @@ pub struct Refused {
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Uplink {
     /// Whether the vehicle reports about this station.
-    is_reported: bool,
+    pub(crate) is_reported: bool,
     /// When it last accepted a frame of this station, as it reports.
     accepted_at: Option<Duration>,
     /// When the last TIMESYNC was sent that it has answered: the proof for a vehicle of another make.
@@ -271,11 +266,6 @@ impl Uplink {
     /// A TIMESYNC that was sent at this time was answered.
     pub(crate) fn answered(&mut self, asked_at: Duration) {
         self.answered_at = self.answered_at.max(Some(asked_at));
-    }
-
-    /// Whether the vehicle reports its uplink at all.
-    pub(crate) fn is_reported(&self) -> bool {
-        self.is_reported
     }
 
     /// The state of the uplink: whether the vehicle hears this station.

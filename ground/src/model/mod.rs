@@ -30,6 +30,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
+use protocol::command::CommandSender;
 use protocol::dialect::{MavMessage, TdPhase, TdRole};
 use protocol::identity::{Address, GROUND, VEHICLE};
 use protocol::log::record::{self, EventLevel, Record};
@@ -251,10 +252,11 @@ impl Model {
     ///
     /// A screen of a station in another process first receives the history, until [`Self::history_ends`].
     pub fn new(settings: Settings) -> Self {
-        let told_the_past = matches!(settings.role, Role::Attached | Role::Watching);
-        let alarms = if told_the_past { Alarms::in_history() } else { Alarms::default() };
-        let commands = Commands::of_session(settings.session);
-        Self { settings, commands, alarms, ..Self::default() }
+        let mut model = Self::default();
+        model.alarms.in_history = matches!(settings.role, Role::Attached | Role::Watching);
+        // The session decides where the numbers of the commands begin.
+        model.commands.sender = CommandSender::new(settings.session);
+        Self { settings, ..model }
     }
 
     /// The history has been received. Alarms that still hold ring from now on; ended ones do not.
@@ -270,7 +272,7 @@ impl Model {
 
     /// When something is due before the next tick: the abort chord, or a command to resend.
     pub fn wakes_at(&self) -> Option<Duration> {
-        let times = [self.abort_chord.acts_at(), self.commands.due_at()];
+        let times = [self.abort_chord.acts_at(), self.commands.sender.due_at()];
         times.into_iter().flatten().min()
     }
 

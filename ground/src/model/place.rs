@@ -125,17 +125,6 @@ impl Model {
 /// Corners of the polygon that stands for the circle of uncertainty.
 const CORNERS: u32 = 36;
 
-/// A closed ring around a spot, counter-clockwise.
-fn error_ring(pad: Degrees, spot: &Spot) -> impl Iterator<Item = Degrees> {
-    let spot = *spot;
-    (0..=CORNERS).map(move |corner| {
-        // The last corner is the first one, to the last bit.
-        let turn_rad = std::f64::consts::TAU * f64::from(corner % CORNERS) / f64::from(CORNERS);
-        let (north_m, east_m) = (spot.error_m * libm::sin(turn_rad), spot.error_m * libm::cos(turn_rad));
-        pad.moved(spot.north_m + north_m, spot.east_m + east_m)
-    })
-}
-
 /// The KML of a place; `None` if nobody knows where the pad is on the Earth.
 pub fn kml(place: &LastPlace) -> Option<String> {
     let pad = place.pad?;
@@ -152,7 +141,15 @@ pub fn kml(place: &LastPlace) -> Option<String> {
         let words = format!("within {:.0} m in 19 of 20 cases; boot {:08X}", spot.error_m, place.boot);
         marks += &mark(name, &words, pad.moved(spot.north_m, spot.east_m));
     }
-    let ring: Vec<String> = error_ring(pad, &place.best()).map(coordinates).collect();
+    // Closed, and counter-clockwise.
+    let best = place.best();
+    let corner = |corner: u32| {
+        // The last corner is the first one, to the last bit.
+        let turn_rad = std::f64::consts::TAU * f64::from(corner % CORNERS) / f64::from(CORNERS);
+        let (sin, cos) = libm::sincos(turn_rad);
+        coordinates(pad.moved(best.north_m + best.error_m * sin, best.east_m + best.error_m * cos))
+    };
+    let ring: Vec<String> = (0..=CORNERS).map(corner).collect();
     let ring = ring.join(" ");
     Some(format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<kml xmlns=\"http://www.opengis.net/kml/2.2\"><Document>\n\

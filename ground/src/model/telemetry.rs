@@ -14,7 +14,7 @@ pub use protocol::told::{phase_from_number, phase_of};
 
 use super::{
     Attitude, Battery, Deflection, FlownMission, Foreign, Gimbal, Heartbeat, Motion, PadCheck, Prediction,
-    Sample, Touchdown, Vehicle, Verdict, is_burning, is_on_pad, may_be_ours,
+    Sample, Touchdown, Vehicle, Verdict, is_on_pad, may_be_ours,
 };
 
 /// Takes a message of the vehicle into its model.
@@ -45,9 +45,6 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) {
             vehicle.trend.note(data.time_boot_ms, &motion, phase);
             if vehicle.in_flight() {
                 vehicle.flown.extend(&motion);
-            }
-            if phase.is_some_and(is_burning) {
-                vehicle.burn.extend(&motion);
             }
         }
         MavMessage::GLOBAL_POSITION_INT(data) => {

@@ -139,8 +139,6 @@ pub struct Vehicle {
     pub trend: Trend,
     /// The path it flew.
     pub flown: FlownPath,
-    /// The path since the landing motor was commanded to light.
-    pub burn: FlownPath,
     pub left_pad_at: Option<Duration>,
     /// It was seen to move since then: a motor that was commanded to light may not have lit.
     pub has_lifted: bool,
@@ -281,20 +279,13 @@ impl Vehicle {
     /// Height above the pad, m: from the position while it is fresh, otherwise from `TD_DESCENT`. Every part of the
     /// screen shows this value.
     pub fn height_m(&self) -> Option<Sample<f64>> {
-        self.newer(|motion| motion.altitude_m, |descent| descent.height_m)
+        better(self.of_motion(|motion| motion.altitude_m), self.of_descent(|d| d.height_m), STALE_AFTER)
     }
 
     /// Vertical speed, up, m/s; from the same source.
     pub fn vertical_m_s(&self) -> Option<Sample<f64>> {
-        self.newer(|motion| motion.climb_m_s, |descent| descent.vertical_speed_m_s)
-    }
-
-    fn newer(
-        &self,
-        of_motion: fn(&Motion) -> f64,
-        of_descent: fn(&TD_DESCENT_DATA) -> f32,
-    ) -> Option<Sample<f64>> {
-        better(self.of_motion(of_motion), self.of_descent(of_descent), STALE_AFTER)
+        let told = self.of_descent(|descent| descent.vertical_speed_m_s);
+        better(self.of_motion(|motion| motion.climb_m_s), told, STALE_AFTER)
     }
 
     /// A number of `TD_DESCENT`, while it is known.

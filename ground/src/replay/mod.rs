@@ -67,11 +67,6 @@ impl Player {
         self.position
     }
 
-    /// Whether the end is reached.
-    pub fn ended(&self) -> bool {
-        self.position >= self.recording.length()
-    }
-
     pub fn recording(&self) -> &Recording {
         &self.recording
     }

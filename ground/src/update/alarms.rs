@@ -52,7 +52,7 @@ const OF_STATION: [AlarmRow; 12] = [
         let gone = "STATION GONE: this screen shows the past and commands nothing";
         let silent = "STATION SILENT: it does not answer this screen, which shows the past";
         let silence = model.link.station_silence(now).map(|_| silent.to_owned());
-        if model.link.is_station_gone() { Some(gone.to_owned()) } else { silence }
+        if model.link.station_gone { Some(gone.to_owned()) } else { silence }
     }),
     of_boot(AlarmKind::Unanswered(CommandKind::Abort), ABORT, |model, now| {
         model.link.why_abort_not_sent(now).map(|why| format!("ABORT NOT SENT: {why}"))
@@ -300,7 +300,7 @@ pub(super) fn call_out(model: &mut Model, now: Duration) {
 fn call(model: &mut Model, amount: Amount, text: impl Into<String>, bells: u8) {
     let talk = model.settings.talk;
     // A screen that attaches late gets the past, and does not repeat it.
-    if amount > talk.amount || model.alarms.are_in_history() {
+    if amount > talk.amount || model.alarms.in_history {
         return;
     }
     if talk.has_voice {

@@ -349,7 +349,8 @@ pub(super) fn step_auto(model: &mut Model, now: Duration) {
     if !model.settings.auto || !model.link.down(now).carries() {
         return;
     }
-    if model.auto_step != AutoStep::Done && is_live(model) {
+    let is_live = model.vehicle.boot.has_said_what_it_is() && !model.vehicle.is_simulated();
+    if model.auto_step != AutoStep::Done && is_live {
         let why = "the vehicle is live: it does not report that it is simulated";
         model.say(now, Speaker::Ground, EventLevel::Error, format!("automatic mode refused: {why}"));
         model.auto_step = AutoStep::Done;
@@ -392,11 +393,6 @@ fn start_anew_if_silent(model: &mut Model, now: Duration) {
     if held && withdrawn && model.vehicle.is_armed() && model.link.uplink.is_proven(now) {
         start_auto(model, now);
     }
-}
-
-/// Whether the vehicle has reported what it is, and is not simulated.
-fn is_live(model: &Model) -> bool {
-    model.vehicle.boot.has_said_what_it_is() && !model.vehicle.is_simulated()
 }
 
 fn arm_if_ready(model: &mut Model, not_before: Duration, now: Duration) {

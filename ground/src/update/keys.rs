@@ -376,13 +376,7 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
             None => model.outbox.push(Action::ReplayFlight),
             Some(why) => model.info(now, format!("no replay: {why}")),
         },
-        Act::Report => {
-            let watches = (model.settings.role == Role::Watching).then_some("this screen only watches");
-            match why_nothing_flown(model).or(watches) {
-                Some(why) => model.info(now, format!("no report: {why}")),
-                None => request(model, Request::Report, now),
-            }
-        }
+        Act::Report => ask_for_report(model, now),
         Act::MovePin if act.works(model, now) => {
             let is_out = model
                 .vehicle
@@ -413,6 +407,15 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
         Act::NextTheme => model.outbox.push(Action::NextTheme),
         Act::Redraw => model.outbox.push(Action::Redraw),
         Act::Quit => quit(model, now),
+    }
+}
+
+/// Has the report written, by the station.
+fn ask_for_report(model: &mut Model, now: Duration) {
+    let watches = (model.settings.role == Role::Watching).then_some("this screen only watches");
+    match why_nothing_flown(model).or(watches) {
+        Some(why) => model.info(now, format!("no report: {why}")),
+        None => request(model, Request::Report, now),
     }
 }
 
@@ -585,16 +588,10 @@ fn on_entry_key(model: &mut Model, key: Key, now: Duration) {
 fn perform_entry(model: &mut Model, action: PaletteAction, now: Duration) {
     match action {
         // Enter has chosen it, and a held Enter would confirm it.
-        PaletteAction::Act(act) => {
-            let keys = match act {
-                Act::Disarm => ", then Enter: only these keys disarm",
-                Act::HoldCountdown => ", then Enter: only these keys hold",
-                Act::SignStep | Act::VoidStep => ", then Enter: only these keys sign or void",
-                Act::Tap => ": only this key taps",
-                _ => return perform(model, act, now),
-            };
-            model.info(now, format!("press {}{keys}", model.settings.keys.name(act)));
-        }
+        PaletteAction::Act(
+            act @ (Act::Disarm | Act::HoldCountdown | Act::SignStep | Act::VoidStep | Act::Tap),
+        ) => model.info(now, format!("press {}: only this key does it", model.settings.keys.name(act))),
+        PaletteAction::Act(act) => perform(model, act, now),
         PaletteAction::Choose(boot) => match model.settings.role.why_not_command() {
             None => request(model, Request::Choose(boot), now),
             Some(why) => model.info(now, why),

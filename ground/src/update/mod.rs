@@ -269,7 +269,7 @@ fn on_station_tick(model: &mut Model, now: Duration) {
     if !matches!(model.settings.role, Role::Attached | Role::Watching) {
         return;
     }
-    if model.link.station_silence(now).is_some() && !model.alarms.are_in_history() {
+    if model.link.station_silence(now).is_some() && !model.alarms.in_history {
         model.info(now, "the station answers again");
     }
     model.link.station_at = Some(now);

@@ -41,7 +41,7 @@ pub(super) fn on_tick(model: &mut Model, now: Duration) {
     let known = model.link.first_heartbeat_at.is_some();
     // What seems to be old is measured again soon: the vehicle's clock may have lost time.
     let seems_old = !matches!(model.link.down(now), LinkState::Alive(age) if age < SEEMS_OLD);
-    let often = seems_old || !model.link.uplink.is_reported();
+    let often = seems_old || !model.link.uplink.is_reported;
     let timesync_every = if often { PROVING_TIMESYNC_EVERY } else { TIMESYNC_EVERY };
     if known && is_due(&mut model.due.timesync, timesync_every, now) {
         ask_time(model, i64::try_from(now.as_nanos()).unwrap_or(i64::MAX));

@@ -72,7 +72,7 @@ pub(super) fn settle(model: &mut Model, now: Duration) {
     let did = is_reset.then(|| Announced::of(&before).words_of_reset());
     model.others.insert(former, before);
     let Model { boots, others, .. } = model;
-    others.retain(|id, _| boots.knows(*id));
+    others.retain(|id, _| boots.age(*id, now).is_some());
     on_shown(model, did, now);
     on_change(model, Announced::default(), now);
 }
@@ -232,7 +232,6 @@ fn on_phase(model: &mut Model, before: Option<TdPhase>, phase: TdPhase, now: Dur
     if after_it || (is_flight(phase) && !before.is_some_and(is_flight)) {
         if !model.outcome.started {
             model.vehicle.flown = FlownPath::default();
-            model.vehicle.burn = FlownPath::default();
         }
         model.outcome.started = true;
         pad::reopen_checklist(model, now);

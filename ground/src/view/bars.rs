@@ -23,13 +23,8 @@ const BAR_COLUMNS: u16 = 30;
 /// The widest panel that has no room for them.
 const NARROW: u16 = 44;
 
-/// What a thick line and dots mean, at the right end of a title.
-pub fn flown_legend(theme: Theme) -> Line<'static> {
-    legend([" ━", " flown "], ["┄", " predicted "], theme)
-}
-
-/// Two marks with their words.
-fn legend(measured: [&'static str; 2], predicted: [&'static str; 2], theme: Theme) -> Line<'static> {
+/// Two marks with their words, at the right end of a title.
+pub fn legend(measured: [&'static str; 2], predicted: [&'static str; 2], theme: Theme) -> Line<'static> {
     let of = |[mark, words]: [&'static str; 2], ink| {
         [Span::styled(mark, theme.ground().fg(theme.ink(ink))), theme.label(words)]
     };

@@ -16,12 +16,11 @@ use crate::model::{
 
 const BOX_COLUMNS: u16 = 68;
 
+/// A title and the lines under it.
+type Titled = (&'static str, Vec<Line<'static>>);
+
 /// Title and lines of the open dialog; `None` if none is open.
-pub fn dialog_lines(
-    model: &Model,
-    theme: Theme,
-    now: Duration,
-) -> Option<(&'static str, Vec<Line<'static>>)> {
+pub fn dialog_lines(model: &Model, theme: Theme, now: Duration) -> Option<Titled> {
     let Some(dialog) = &model.dialog else { return notice(model, theme, now) };
     let left = format!("within {:.0} s", dialog.until.saturating_sub(now).as_secs_f64());
     let plain = |text: String| theme.line(text, TextRole::Plain);
@@ -141,7 +140,7 @@ fn commander(model: &Model) -> String {
 }
 
 /// What is asked or waited for, while no dialog is open: it is on every page.
-fn notice(model: &Model, theme: Theme, now: Duration) -> Option<(&'static str, Vec<Line<'static>>)> {
+fn notice(model: &Model, theme: Theme, now: Duration) -> Option<Titled> {
     let plain = |text: String| theme.line(text, TextRole::Plain);
     let strong = |text: String| theme.line(text, TextRole::Caution);
     let keys = &model.settings.keys;

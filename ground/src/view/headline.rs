@@ -3,20 +3,17 @@
 
 use std::time::Duration;
 
-use protocol::dialect::TdPhase;
-use ratatui::Frame;
-use ratatui::layout::Rect;
-
-use super::band::{Item, draw_word, number, word};
+use super::band::{Item, number, word};
 use super::panels::ending_role;
 use super::pictures::map::comes_down;
-use super::top_lines::{level, readiness};
-use super::{STALE_MARK, TextRole, Theme};
+use super::top_lines::readiness;
+use super::{STALE_MARK, TextRole};
 use crate::model::{
     AlarmKind, Approach, Ending, Model, Sample, Spot,
     dead_reckoning::{is_unheard, may_have_left, predict_position},
     hold_words, is_burning, is_liftoff_by_itself, is_on_pad, why_not_here,
 };
+use protocol::dialect::TdPhase;
 
 // The largest words of every page, when people may be in danger or have waited for the word: DO NOT APPROACH, ONE
 // PERSON: PIN IN, MAY BE APPROACHED, LIFT-OFF, MAY BE IN THE AIR, LOST. While they stand, no page shows a headline of its own.
@@ -100,22 +97,6 @@ impl Banner {
     pub fn sentence(&self) -> String {
         format!("{}{}", self.words, self.rest)
     }
-}
-
-/// Draws the words in letters as large as the room allows, on the colour of the danger. Returns the area below.
-pub fn draw_banner(
-    model: &Model,
-    banner: &Banner,
-    theme: Theme,
-    now: Duration,
-    frame: &mut Frame,
-    area: Rect,
-) -> Rect {
-    let item = word("", banner.words, banner.role);
-    let rows = draw_word(&item, theme, frame, area);
-    let level = theme.level(level(model, now));
-    frame.buffer_mut().set_style(Rect { height: rows, ..area }, level);
-    Rect { y: area.y + rows, height: area.height - rows, ..area }
 }
 
 // The large number or word of each phase.

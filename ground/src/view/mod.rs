@@ -107,11 +107,16 @@ fn draw_wide(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area
     }
     top_lines::draw_identity(model, theme, now, frame, identity);
     top_lines::draw_state(model, theme, now, frame, state);
+    let mut body = body;
     if let Some(banner) = &banner {
-        frame.buffer_mut().set_style(words, theme.level(top_lines::level(model, now)));
+        // In letters as large as the room allows, on the colour of the danger.
+        let level = theme.level(top_lines::level(model, now));
+        frame.buffer_mut().set_style(words, level);
         draw_line(frame, words, Line::from(banner.reason()));
+        let rows = band::draw_word(&band::word("", banner.words, banner.role), theme, frame, body);
+        frame.buffer_mut().set_style(Rect { height: rows, ..body }, level);
+        body = Rect { y: body.y + rows, height: body.height - rows, ..body };
     }
-    let body = banner.map_or(body, |words| headline::draw_banner(model, &words, theme, now, frame, body));
     let pictures = pages::draw(model, theme, now, frame, body);
     draw_lines(frame, message, &messages);
     footer::draw_keys(model, theme, now, frame, keys);

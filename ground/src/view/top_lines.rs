@@ -226,7 +226,7 @@ pub const ABORT_LABEL: &str = " abort now: ";
 /// The key that aborts from this screen, or why none does.
 pub fn abort_key(model: &Model) -> String {
     match model.settings.role {
-        Role::Attached if model.link.is_station_gone() => "NO STATION".to_owned(),
+        Role::Attached if model.link.station_gone => "NO STATION".to_owned(),
         Role::Station | Role::Attached => format!("ABORT {ABORT_KEY}"),
         Role::Watching => "WATCHING only".to_owned(),
         Role::Replaying => "REPLAY".to_owned(),
@@ -358,7 +358,7 @@ fn hold_until(model: &Model, now: Duration) -> Option<String> {
 
 /// What an abort would do now, marked if the report is stale.
 fn abort_effect(model: &Model, now: Duration) -> String {
-    if model.link.is_station_gone() {
+    if model.link.station_gone {
         return "NOT SENT: no station; kept for the next one".to_owned();
     }
     if model.link.station_silence(now).is_some() {

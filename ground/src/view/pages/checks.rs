@@ -203,7 +203,7 @@ pub fn draw_find(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
     let [words, right] = columns(area, [Length(WORD_COLUMNS), Fill(1)]);
     let inside = framed("place", Line::default(), theme, frame, words);
     let place = model.last_place(now).or(model.place);
-    let words = Paragraph::new(find_lines(model, place, theme, now)).wrap(Wrap { trim: false });
+    let words = Paragraph::new(find_lines(model, theme, now)).wrap(Wrap { trim: false });
     frame.render_widget(words, inside);
     let flies = model.vehicle.in_flight() && place.is_some_and(|place| place.predicted.is_none());
     let at = place.and_then(|place| place.degrees(&place.best())).filter(|_| !flies && !theme.ascii);
@@ -218,17 +218,12 @@ pub fn draw_find(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
 }
 
 /// The places and the ways to them.
-pub fn find_lines(
-    model: &Model,
-    place: Option<LastPlace>,
-    theme: Theme,
-    now: Duration,
-) -> Vec<Line<'static>> {
+pub fn find_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     if may_have_left(&model.vehicle, now).is_some() {
         return may_have_left_lines(model, theme);
     }
     let label = |words: &'static str| theme.line(words, TextRole::Label);
-    let Some(place) = place else {
+    let Some(place) = model.last_place(now).or(model.place) else {
         return vec![if model.vehicle.left_pad_at.is_some() {
             theme.line(" The vehicle has left the pad, and has not told its place.", TextRole::Caution)
         } else {

@@ -6,7 +6,7 @@ use std::time::Duration;
 use protocol::dialect::{TD_CONTROLLER_DATA, TD_DESCENT_DATA, TdAbortEffect, TdBooster, TdChute, TdPhase};
 use ratatui::Frame;
 use ratatui::layout::Constraint::{Fill, Length, Percentage};
-use ratatui::layout::Rect;
+use ratatui::layout::{Layout, Rect, Spacing};
 use ratatui::text::Line;
 
 use super::{Room, columns, events, framed, rows, table};
@@ -67,13 +67,13 @@ pub fn draw_flying(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
         };
         height(model, theme, now, frame, left);
         map(FROM_ABOVE, model, theme, now, frame, place);
-        vehicle(model, [Side::South], theme, now, frame, side);
+        vehicle(model, &[Side::South], theme, now, frame, side);
         return area;
     }
     let [above, below] = rows(area, [Fill(1), Length(BELOW_ROWS)]);
     let [left, sides, right] = columns(above, [Percentage(40), Percentage(32), Fill(1)]);
     height(model, theme, now, frame, left);
-    vehicle(model, [Side::South, Side::East], theme, now, frame, sides);
+    vehicle(model, &[Side::South, Side::East], theme, now, frame, sides);
     map(FROM_ABOVE, model, theme, now, frame, right);
     let [left, middle, right] = columns(below, [Percentage(40), Percentage(30), Fill(1)]);
     if burns {
@@ -96,7 +96,8 @@ pub fn draw_flying(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
 
 /// A panel with the height over time.
 pub fn height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let legend = if area.width < LEGEND_COLUMNS { Line::default() } else { bars::flown_legend(theme) };
+    let legend = bars::legend([" ━", " flown "], ["┄", " predicted "], theme);
+    let legend = if area.width < LEGEND_COLUMNS { Line::default() } else { legend };
     let inside = framed("height m", legend, theme, frame, area);
     draw_height(model, theme, now, frame, inside);
 }
@@ -108,19 +109,13 @@ pub fn map(title: &str, model: &Model, theme: Theme, now: Duration, frame: &mut 
 }
 
 /// The vehicle from each of these sides; after the loss of the link its predicted position instead.
-pub fn vehicle<const N: usize>(
-    model: &Model,
-    sides: [Side; N],
-    theme: Theme,
-    now: Duration,
-    frame: &mut Frame,
-    area: Rect,
-) {
+pub fn vehicle(model: &Model, sides: &[Side], theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     if is_unheard(&model.vehicle, now) {
         return table("PREDICTED", &panels::lost_rows(model, theme, now), theme, frame, area);
     }
-    for (side, at) in sides.into_iter().zip(columns(area, [Fill(1); N])) {
-        draw_attitude(model, side, theme, now, frame, at);
+    let beside = Layout::horizontal(sides.iter().map(|_| Fill(1))).spacing(Spacing::Overlap(1));
+    for (side, at) in sides.iter().zip(&*beside.split(area)) {
+        draw_attitude(model, *side, theme, now, frame, *at);
     }
 }
 

@@ -58,7 +58,7 @@ fn draw_list(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area
         let is_check = page == Page::Checks;
         let [above, below] = rows(right, [Fill(1), if is_check { Length(BARS_ROWS) } else { Fill(1) }]);
         if is_check || flight_began(model).is_none() {
-            flight::vehicle(model, [Side::South, Side::East], theme, now, frame, above);
+            flight::vehicle(model, &[Side::South, Side::East], theme, now, frame, above);
         } else {
             flight::height(model, theme, now, frame, above);
         }
@@ -90,7 +90,7 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, area: Rect) -> Vec<Line
         Page::Messages => lists::messages_lines(model, theme, columns, rows),
         Page::Log => lists::log_lines(model, theme, now),
         Page::Alarms => lists::alarms_lines(model, theme, now, columns, rows),
-        Page::Find => checks::find_lines(model, model.last_place(now).or(model.place), theme, now),
+        Page::Find => checks::find_lines(model, theme, now),
         Page::Checks => checks::checks_lines(model, theme, now, columns),
         Page::Help => lists::help_lines(model, theme, now, columns),
         _ => super::lists::events(model, theme, columns, rows),

@@ -32,12 +32,21 @@ pub fn draw_pad(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
         if headline::banner(model, now).is_some() { area } else { draw_go(model, theme, now, frame, area) };
     let ladder = ladder(model, theme, now);
     if Room::of(frame.area()) == Room::Small {
+        let ready = top_lines::readiness(model, now).is_some_and(|(_, role)| role == TextRole::Good);
+        let on_the_way = model.vehicle.is_armed() || ready;
+        let is_amiss = !on_the_way || !model.alarms.list().is_empty() || model.beside(now).is_some();
         let [left, right] = columns(area, [Length(STEP_COLUMNS[0]), Fill(1)]);
         table("steps", &ladder, theme, frame, left);
         if model.checklist.is_some() && model.pages.checklist {
             draw_checklist(model, theme, now, frame, right);
-        } else if is_amiss(model, now) {
-            draw_checks(model, theme, now, frame, right);
+        } else if is_amiss {
+            let lines = checks(model, theme, now);
+            let wanted = (lines.len() as u16 + 2).min(right.height);
+            let [upper, below] = rows(right, [Length(wanted), Fill(1)]);
+            table("checks", &lines, theme, frame, upper);
+            if below.height > 2 {
+                events(model, theme, frame, below);
+            }
         } else {
             let [middle, right] = columns(right, [Length(18), Fill(1)]);
             draw_attitude(model, Side::South, theme, now, frame, middle);
@@ -60,13 +69,6 @@ pub fn draw_pad(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
         draw_checklist(model, theme, now, frame, middle);
     }
     events(model, theme, frame, right);
-}
-
-/// Whether the checks are more important than the pictures.
-fn is_amiss(model: &Model, now: Duration) -> bool {
-    let ready = top_lines::readiness(model, now).is_some_and(|(_, role)| role == TextRole::Good);
-    let on_the_way = model.vehicle.is_armed() || ready;
-    !on_the_way || !model.alarms.list().is_empty() || model.beside(now).is_some()
 }
 
 /// The band: GO or NO-GO, and the next step large.
@@ -101,16 +103,6 @@ fn draw_go(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: 
     };
     let below = theme.line(format!(" {words}"), role);
     draw_band((&headline::pad(model, now), below, &others), theme, frame, area)
-}
-
-/// The checks, and the newest events below.
-fn draw_checks(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let lines = checks(model, theme, now);
-    let [upper, below] = rows(area, [Length((lines.len() as u16 + 2).min(area.height)), Fill(1)]);
-    table("checks", &lines, theme, frame, upper);
-    if below.height > 2 {
-        events(model, theme, frame, below);
-    }
 }
 
 fn draw_checklist(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {

@@ -20,7 +20,8 @@ const FINDINGS_TITLE: &str = "what went wrong";
 
 /// Draws the verdict in large letters with its sentence, the limits as bars, the whole flight and the place.
 pub fn draw_review(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let (words, role) = ended(model, now);
+    let ended = panels::ending_role(model, now).map(|(ending, role)| (ending.sentence(&model.vehicle), role));
+    let (words, role) = ended.unwrap_or(("no verdict received yet".to_owned(), TextRole::Caution));
     let silent = unheard(model, now).map_or_else(String::new, |words| format!("; {words}"));
     let keys = &model.settings.keys;
     let again = Act::ReplayFlight.works(model, now).then(|| {
@@ -64,14 +65,6 @@ pub fn draw_review(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     let lines = findings(model, theme, usize::from(middle.width.saturating_sub(2)));
     table(FINDINGS_TITLE, &lines, theme, frame, middle);
     events(model, theme, frame, right);
-}
-
-/// How the flight ended, in words.
-fn ended(model: &Model, now: Duration) -> (String, TextRole) {
-    match panels::ending_role(model, now) {
-        Some((ending, role)) => (ending.sentence(&model.vehicle), role),
-        None => ("no verdict received yet".to_owned(), TextRole::Caution),
-    }
 }
 
 /// What the vehicle says went wrong, each with its T+.
