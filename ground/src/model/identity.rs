@@ -145,7 +145,7 @@ impl Foreign {
 }
 
 /// What `MAV_CMD_DO_FLIGHTTERMINATION` does to a vehicle of another make.
-pub const TERMINATION: &str = "CUTS ITS MOTORS, or ends its flight as it is set to: in the air it falls";
+pub const TERMINATION: &str = "CUTS ITS MOTORS, or does as set there: it falls";
 
 #[cfg(test)]
 mod boot_tests {

@@ -8,7 +8,7 @@ use ratatui::layout::Rect;
 use ratatui::text::Line;
 use ratatui::widgets::{Block, Clear};
 
-use super::{TextRole, Theme, draw_lines};
+use super::{TextRole, Theme, draw_lines, lists};
 use crate::model::{
     AGAIN_KEY, Act, CONFIRM_WORD, Foreign, Model, PadCheck, Prompt, Role, SURFACES, TERMINATION, TextEntry,
     palette_entries, role_name, why_not_here, why_not_quit, why_untested,
@@ -54,10 +54,10 @@ pub fn dialog_lines(model: &Model, theme: Theme, now: Duration) -> Option<Titled
             ("TAKE COMMAND of an armed vehicle", vec![who], vec![any_other_key()])
         }
         Prompt::AbortForeign => {
-            let foreign = model.vehicle.as_foreign().map(Foreign::name);
-            let name = foreign.unwrap_or_else(|| "The vehicle".to_owned());
-            let does = strong(format!("{name}: flight termination {TERMINATION}."));
-            ("ABORT of a vehicle that is NOT A TOUCHDOWN VEHICLE", vec![does], vec![any_other_key()])
+            let name = model.vehicle.as_foreign().map_or_else(|| "The vehicle".to_owned(), Foreign::name);
+            let does = format!("{name}: flight termination {TERMINATION}.");
+            let does = lists::wrap(&does, usize::from(BOX_COLUMNS) - 4).into_iter().map(strong).collect();
+            ("ABORT of a vehicle that is NOT A TOUCHDOWN VEHICLE", does, vec![any_other_key()])
         }
         Prompt::WithoutLog => {
             let why = model.why_no_log(now).unwrap_or_else(|| "It is fit again.".to_owned());

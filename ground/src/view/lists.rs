@@ -8,7 +8,7 @@ use ratatui::text::{Line, Span};
 use textwrap::{Options, WordSeparator, WordSplitter};
 
 use super::{TextRole, Theme, fixed, footer::flight_began};
-use crate::model::{Act, Event, Mark, Model, Step, StepState, role_name, words};
+use crate::model::{Event, Mark, Model, Step, StepState, role_name, words};
 use crate::view::pictures::seconds_since;
 
 /// Columns before the text of an event: time, speaker and mark.
@@ -80,14 +80,6 @@ const FRONT_COLUMNS: usize = 9;
 
 /// How long the reason why a step was not signed stands below the steps.
 const REFUSAL_SHOWN: Duration = Duration::from_secs(15);
-
-/// How far the checklist is, as a title.
-pub fn checklist_title(model: &Model, now: Duration) -> String {
-    let (done, all) = model.steps_done(now).unwrap_or_default();
-    let keys = &model.settings.keys;
-    let [sign, void] = [Act::SignStep, Act::VoidStep].map(|act| keys.name(act));
-    format!("Checklist {done} of {all}: {sign} signs, {void} voids")
-}
 
 /// The steps around the chosen one, on at most this many rows; below them who signs the chosen one, or who did.
 pub fn checklist_rows(

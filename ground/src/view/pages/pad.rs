@@ -106,7 +106,10 @@ fn draw_go(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: 
 }
 
 fn draw_checklist(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let inside = framed(&lists::checklist_title(model, now), Line::default(), theme, frame, area);
+    let (done, all) = model.steps_done(now).unwrap_or_default();
+    let [sign, void] = [Act::SignStep, Act::VoidStep].map(|act| model.settings.keys.name(act));
+    let title = format!("Checklist {done} of {all}: {sign} signs, {void} voids");
+    let inside = framed(&title, Line::default(), theme, frame, area);
     let size = (usize::from(inside.width), usize::from(inside.height));
     draw_lines(frame, inside, &lists::checklist_rows(model, theme, now, size));
 }
