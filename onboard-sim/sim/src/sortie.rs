@@ -13,7 +13,7 @@ use flight::computer::{Commands, Computer, FRAME_S, Input, KeptInput, Output, Re
 use flight::estimation::estimator::Measurements;
 use flight::guidance::powered::{ControlLevel, PoweredReport};
 use flight::rules::arming::PredictedLanding;
-use flight::rules::phase::Phase;
+use flight::rules::phase::{Mode, Phase};
 use flight::vehicle::mission::{Mission, StartPoint};
 use flight::vehicle::rigid::RigidState;
 use nalgebra::Vector3;
@@ -73,6 +73,26 @@ pub struct Sortie {
     frame: u64,
     abort: bool,
     largest_errors: EstimatorErrors,
+    /// The last decision of the computer that this flight [follows](Self::follow).
+    followed: Option<Decision>,
+}
+
+/// What a flight computer has decided that its world asks for.
+#[derive(Debug, Clone, Copy)]
+struct Decision {
+    mode: Mode,
+    released: bool,
+    ignited: bool,
+}
+
+impl Decision {
+    fn of(computer: &Computer) -> Self {
+        Self {
+            mode: *computer.mode(),
+            released: computer.released_at_s().is_some(),
+            ignited: computer.pilot().ignited_at_s().is_some(),
+        }
+    }
 }
 
 impl Sortie {
@@ -155,6 +175,7 @@ impl Sortie {
             frame: 0,
             abort: false,
             largest_errors: EstimatorErrors::default(),
+            followed: None,
             mission: mission.clone(),
             dispersion: *dispersion,
             drawn,
@@ -181,27 +202,11 @@ impl Sortie {
 
     /// Flies one frame.
     pub fn step_with(&mut self, outside: &Outside<'_>, watch: &mut dyn Watch) -> Option<Output> {
-        for breakage in self.injector.due(self.surroundings.world.time_s(), self.computer.mode().phase) {
-            self.break_down(&breakage);
-        }
         let waits = self.computer.released_at_s().is_none() && self.computer.mode().phase != Phase::Safe;
         if let Some(rehearsal) = self.rehearsal.as_mut().filter(|_| waits) {
             rehearsal.step();
         }
-        self.let_go_when_cleared();
-        let measured = self.surroundings.sample_sensors();
-        self.frame += 1;
-        self.dead = self.frames_down > 0;
-        if self.dead {
-            self.frames_down -= 1;
-            if self.frames_down == 0 {
-                self.computer.restart(flight_time_s(self.frame));
-                self.plan_ready_at = None;
-            }
-            return None;
-        }
-        // Without a sample there is no frame; what was commanded goes on.
-        let measured = measured?;
+        let felt = self.feel()?;
         let abort = [Request::of_the_programme(Asked::Abort)];
         let aborting;
         let requests = if core::mem::take(&mut self.abort) {
@@ -210,23 +215,13 @@ impl Sortie {
         } else {
             outside.requests
         };
-        let Feedback { gimbal_rad, fins_rad, contact, igniter_continuity, booster_attached } =
-            self.surroundings.feedback(self.computer.released_at_s().is_some());
         let kept = KeptInput {
-            frame: self.frame,
-            time_s: flight_time_s(self.frame),
-            measured,
-            gimbal_rad,
-            fins_rad,
-            contact,
-            igniter_continuity,
-            booster_attached,
             pin_out: outside.pin_out,
-            battery_v: Some(self.surroundings.battery.volts()),
             log: outside.log,
             uplink: outside.uplink,
             commander: outside.commander,
             people: outside.people,
+            ..felt
         };
         let input = Input {
             kept,
@@ -248,9 +243,64 @@ impl Sortie {
         Some(output)
     }
 
+    /// Flies the frame of this number since the release, that another computer has just flown: its commands move the world. What it felt before it decided; `None` if
+    /// the computer of this flight would have been dead, or would have lived in a frame that the other has missed.
+    pub fn follow(&mut self, frame: u64, computer: &Computer) -> Option<KeptInput> {
+        while self.frame + 1 < frame {
+            if self.feel().is_some() {
+                return None;
+            }
+        }
+        let felt = self.feel()?;
+        self.followed = Some(Decision::of(computer));
+        self.command(computer.commands());
+        Some(felt)
+    }
+
+    /// The computer's decisions, or those that this flight follows.
+    fn decision(&self) -> Decision {
+        self.followed.unwrap_or_else(|| Decision::of(&self.computer))
+    }
+
+    /// The world moves for one frame. What the computer feels in it, apart from its crew; `None` if it is dead, or if there is no sample:
+    /// then there is no frame, and what was commanded goes on.
+    fn feel(&mut self) -> Option<KeptInput> {
+        let Decision { mode, released, .. } = self.decision();
+        for breakage in self.injector.due(self.surroundings.world.time_s(), mode.phase) {
+            self.break_down(&breakage);
+        }
+        self.let_go_when_cleared(&mode);
+        let measured = self.surroundings.sample_sensors();
+        self.frame += 1;
+        self.dead = self.frames_down > 0;
+        if self.dead {
+            self.frames_down -= 1;
+            if self.frames_down == 0 {
+                self.computer.restart(flight_time_s(self.frame));
+                self.plan_ready_at = None;
+            }
+            return None;
+        }
+        let measured = measured?;
+        let Feedback { gimbal_rad, fins_rad, contact, igniter_continuity, booster_attached } =
+            self.surroundings.feedback(released);
+        Some(KeptInput {
+            frame: self.frame,
+            time_s: flight_time_s(self.frame),
+            measured,
+            gimbal_rad,
+            fins_rad,
+            contact,
+            igniter_continuity,
+            booster_attached,
+            battery_v: Some(self.surroundings.battery.volts()),
+            ..KeptInput::NONE
+        })
+    }
+
     fn command(&mut self, commands: &Commands) {
         self.surroundings.command(commands);
-        let falls = !self.computer.mode().phase.before_apogee();
+        let falls = !self.decision().mode.phase.before_apogee();
         if falls && self.fall.is_none() {
             self.fall = Some(*self.world().state());
         }
@@ -260,11 +310,10 @@ impl Sortie {
     }
 
     /// A drone's pilot lets go some time after the countdown has ended.
-    fn let_go_when_cleared(&mut self) {
+    fn let_go_when_cleared(&mut self, mode: &Mode) {
         let after_s = self.mission.drop.map_or(0.0, |drop| drop.release_after_s);
-        let ended_s = self.computer.mode().countdown_end_s;
         if self.world().hangs()
-            && ended_s.is_some_and(|ended_s| flight_time_s(self.frame) > ended_s + after_s)
+            && mode.countdown_end_s.is_some_and(|ended_s| flight_time_s(self.frame) > ended_s + after_s)
         {
             self.surroundings.world.release();
         }
@@ -277,8 +326,8 @@ impl Sortie {
 
     /// Whether the flight continues: the vehicle is not at rest and the time limit has not passed.
     pub fn goes_on(&self) -> bool {
-        let on_pad = self.computer.released_at_s().is_some() && self.computer.mode().phase.on_pad();
-        let stays = on_pad && !self.world().ascent_motor_lights();
+        let Decision { mode, released, .. } = self.decision();
+        let stays = released && mode.phase.on_pad() && !self.world().ascent_motor_lights();
         self.surroundings.go_on() && !stays
     }
 
@@ -316,6 +365,11 @@ impl Sortie {
     /// The pilot in the flight computer.
     pub fn pilot(&self) -> &Pilot {
         self.computer.pilot()
+    }
+
+    /// Phase, latches and countdown.
+    pub fn mode(&self) -> Mode {
+        self.decision().mode
     }
 
     /// The flight computer is dead: it neither hears nor speaks.
@@ -391,8 +445,8 @@ impl Sortie {
 
     /// The outcome so far.
     pub fn outcome(&self) -> Outcome {
-        let ignited = self.pilot().ignited_at_s().is_some();
-        self.surroundings.outcome(&self.mission, self.computer.mode().phase, ignited)
+        let Decision { mode, ignited, .. } = self.decision();
+        self.surroundings.outcome(&self.mission, mode.phase, ignited)
     }
 }
 

@@ -14,7 +14,7 @@
 //! computer only. The crew's abort comes at its recorded frame.
 
 mod others;
-mod rerun;
+pub(crate) mod rerun;
 
 use std::collections::BTreeMap;
 use std::io::{self, BufWriter, Write as _};
@@ -249,21 +249,28 @@ fn reached(recording: &Recording, rerun: &Rerun, before: &[ComputerFrame]) -> Re
 /// pad. What only a crew or a log's disk makes different does not count.
 fn is_same_flight(now: &ComputerFrame, then: &ComputerFrame, same_memory: bool) -> bool {
     let felt = |frame: &ComputerFrame| {
-        let ComputerInput { measured, fins_rad, contact, igniter_continuity, booster_attached, .. } =
-            frame.input.clone();
-        let input = ComputerInput {
-            measured,
-            fins_rad,
-            contact,
-            igniter_continuity,
-            booster_attached,
-            ..ComputerInput::default()
-        };
+        let input = felt(&frame.input);
         let output = ComputerOutput { answers: Vec::new(), released: false, ..frame.output.clone() };
         let state_digest = if same_memory { frame.state_digest } else { 0 };
         ComputerFrame { input, output, state_digest }.encode_to_vec()
     };
     felt(now) == felt(then)
+}
+
+/// What of an input the world makes the computer feel, and not its crew, its pad or its log's disk.
+pub(crate) fn felt(input: &ComputerInput) -> ComputerInput {
+    let ComputerInput {
+        measured, gimbal_rad, fins_rad, contact, igniter_continuity, booster_attached, ..
+    } = input;
+    ComputerInput {
+        measured: measured.clone(),
+        gimbal_rad: gimbal_rad.clone(),
+        fins_rad: fins_rad.clone(),
+        contact: *contact,
+        igniter_continuity: *igniter_continuity,
+        booster_attached: *booster_attached,
+        ..ComputerInput::default()
+    }
 }
 
 /// The settings as timed ones. None applies before the start (half a frame before the end of its first frame), because until
@@ -489,10 +496,11 @@ impl Answer for ReflyReport {
             None => "the log has no verdict to compare with",
         };
         let margin = self.margin.map_or_else(|| "no contact".to_owned(), |margin| format!("{margin:.3}"));
-        lines.push(format!("{answer}; margin to the nearest limit {margin}"));
-        if self.never_acted {
-            lines.push("what was to be changed NEVER ACTED: every output is the recorded one".to_owned());
-        }
+        lines.push(if self.never_acted {
+            "what was to be changed NEVER ACTED: every output is the recorded one".to_owned()
+        } else {
+            format!("{answer}; margin to the nearest limit {margin}")
+        });
         let asks = self.others.is_none() && !self.never_acted && !self.settings.is_empty();
         lines.extend(self.others.as_ref().map(OtherFlights::words));
         if asks && self.verdict_changed == Some(true) {

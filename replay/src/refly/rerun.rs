@@ -14,7 +14,7 @@ use sim::wire::record::{self as sortie_log, LastFrame};
 
 use super::FaultChanges;
 use crate::controller::{AgainError, LoggedComputer};
-use crate::log::Recording;
+use crate::log::{Head, Recording};
 use crate::settings::Schedule;
 
 /// Stands for every recorded fault.
@@ -42,40 +42,11 @@ impl Rerun {
     /// add is unknown.
     pub(super) fn of(recording: &Recording, changes: &FaultChanges) -> Result<Self, AgainError> {
         let (start, frames) = recording.recorded_frames()?;
-        let lacking = |reason: String| AgainError::Refused {
-            of: recording.name.clone(),
-            reason: format!("cannot be flown again from its start: {reason}"),
-        };
-        let run = &recording.head.run;
-        if let Some(original) = run.get("reflown_from") {
-            return Err(lacking(format!("it was flown again from {original}; fly that one again")));
-        }
-        let number_of = |fact: &str| {
-            let number = run.get(fact).and_then(|text| text.parse::<u64>().ok());
-            number.ok_or_else(|| lacking(format!("its run facts have no number `{fact}`")))
-        };
-        let (seed, number) = (number_of("seed")?, number_of("flight")?);
-        let dispersion = sortie_log::dispersion_of(run, recording.head.scenario_toml.as_deref())
-            .map_err(|error| lacking(error.to_string()))?;
-        let faults = run.get("faults").map_or("", String::as_str).split_whitespace();
-        let recorded: Vec<TimedFault> = faults
-            .map(str::parse)
-            .collect::<Result<_, _>>()
-            .map_err(|error: FaultError| lacking(error.to_string()))?;
-        let recipe = Recipe {
-            mission: LoggedComputer::schedule(recording.profile_toml()?, start, &[])?.base().clone(),
-            mission_toml: recording.profile_toml()?.to_owned(),
-            dispersion,
-            dispersion_name: run.get("dispersion").cloned().unwrap_or_default(),
-            dispersion_toml: recording.head.scenario_toml.clone().unwrap_or_default(),
-            seed,
-            faults: changed(recording, &recorded, changes)?,
-        };
-        let flight = Sortie::new(&recipe, number)?;
-        let flight = match &start.gyro_bias_rad_s {
-            Some(bias) => flight.standing(&state_from_log(&start.believed), vector_from_log(bias)),
-            None => flight,
-        };
+        let (mut recipe, number) =
+            drawn_from(&recording.name, &recording.head, recording.profile_toml()?, start)?;
+        let recorded = std::mem::take(&mut recipe.faults);
+        recipe.faults = changed(recording, &recorded, changes)?;
+        let flight = begun(&recipe, number, start)?;
         // An abort that no fault caused came from the crew.
         let by_fault = recorded.iter().any(|fault| matches!(fault.breakage, Breakage::Abort));
         let crews = frames.iter().filter(|frame| accepts_abort(frame) && !by_fault);
@@ -126,6 +97,57 @@ impl Rerun {
             _ => None,
         })
     }
+}
+
+/// What a log says that its flight was drawn from, and the flight's number in it.
+///
+/// # Errors
+/// The log lacks a part of its recipe, or this build does not know it.
+pub(crate) fn drawn_from(
+    name: &str,
+    head: &Head,
+    toml: &str,
+    start: &ComputerStart,
+) -> Result<(Recipe, u64), AgainError> {
+    let lacking = |reason: String| AgainError::Refused {
+        of: name.to_owned(),
+        reason: format!("cannot be flown again from its start: {reason}"),
+    };
+    let run = &head.run;
+    if let Some(original) = run.get("reflown_from") {
+        return Err(lacking(format!("it was flown again from {original}; fly that one again")));
+    }
+    let number_of = |fact: &str| {
+        let number = run.get(fact).and_then(|text| text.parse::<u64>().ok());
+        number.ok_or_else(|| lacking(format!("its run facts have no number `{fact}`")))
+    };
+    let (seed, number) = (number_of("seed")?, number_of("flight")?);
+    let dispersion = sortie_log::dispersion_of(run, head.scenario_toml.as_deref())
+        .map_err(|error| lacking(error.to_string()))?;
+    let faults = run.get("faults").map_or("", String::as_str).split_whitespace();
+    let faults: Result<Vec<TimedFault>, FaultError> = faults.map(str::parse).collect();
+    let recipe = Recipe {
+        mission: LoggedComputer::schedule(toml, start, &[])?.base().clone(),
+        mission_toml: toml.to_owned(),
+        dispersion,
+        dispersion_name: run.get("dispersion").cloned().unwrap_or_default(),
+        dispersion_toml: head.scenario_toml.clone().unwrap_or_default(),
+        seed,
+        faults: faults.map_err(|error| lacking(error.to_string()))?,
+    };
+    Ok((recipe, number))
+}
+
+/// A flight at its release, with the recorded estimate.
+///
+/// # Errors
+/// It cannot be set up.
+pub(crate) fn begun(recipe: &Recipe, number: u64, start: &ComputerStart) -> Result<Sortie, AgainError> {
+    let flight = Sortie::new(recipe, number)?;
+    Ok(match &start.gyro_bias_rad_s {
+        Some(bias) => flight.standing(&state_from_log(&start.believed), vector_from_log(bias)),
+        None => flight,
+    })
 }
 
 /// The recorded faults with the changes.

@@ -1,58 +1,88 @@
-//! Flies a simulated flight again, closed loop, from the facts in its log: what does not follow from the flight computer's
-//! inputs (its measurements, the verdict) follows from the seed.
+//! The world of a simulated flight, drawn again from the facts in its log: the commands of the computer that is verified move
+//! it. What does not follow from the computer's inputs (its measurements, the verdict) follows from the seed.
 
-use std::path::Path;
-
+use avionics::log::logged::Logged as _;
+use flight::computer::Computer;
 use prost::Message as _;
+use protocol::log::computer_v1::ComputerStart;
 use protocol::log::v1::LandingVerdict;
+use sim::fault::{Breakage, TimedFault, When};
+use sim::sortie::Sortie;
+use sim::wire::record;
 
-use super::parts::Part;
 use crate::controller::AgainError;
-use crate::log::{Moment, Recording};
-use crate::refly::{ReflyOptions, refly_flight};
+use crate::log::{Head, LoggedFrame};
+use crate::refly::felt;
+use crate::refly::rerun::{begun, drawn_from};
 
 /// The facts that a simulated flight is drawn from.
 const DRAWN_FROM: [&str; 3] = ["seed", "flight", "dispersion"];
 
 /// What of the metadata no flight follows from.
-const BESIDE: &str =
-    "what the flight is drawn from; start_unix_ns, the build and touchdown.xml are not compared";
+const BESIDE: &str = "what the flight is drawn from; the dispersion's name, start_unix_ns, the build and touchdown.xml are not compared";
 
-/// Compares the verdict and the run facts of a log of one flight.
-pub(super) fn compare(path: &Path, simulated: bool, verdict: &mut Part, facts: &mut Part) {
-    let flown = Recording::open(path).map_err(AgainError::from).and_then(|recording| {
-        let is_drawn = DRAWN_FROM.iter().any(|fact| recording.head.run.contains_key(*fact));
-        if !simulated && !is_drawn {
+/// A world that is moved beside a verification.
+pub(super) struct WorldAgain {
+    flight: Box<Sortie>,
+    /// The frame of the release.
+    released: u64,
+    /// It has come to its end.
+    over: bool,
+    /// The first frame that it made feel something else.
+    first_different: Option<u64>,
+}
+
+impl WorldAgain {
+    /// The world at the release; `None` if the log is not of a drawn flight.
+    ///
+    /// # Errors
+    /// The log lacks a part of its recipe, or this build does not know it.
+    pub(super) fn drawn(
+        name: &str,
+        head: &Head,
+        toml: &str,
+        start: &ComputerStart,
+    ) -> Result<Option<Self>, AgainError> {
+        if !DRAWN_FROM.iter().any(|fact| head.run.contains_key(*fact)) {
             return Ok(None);
         }
-        // Up to its last frame it is compared frame by frame, and then its end.
-        let start =
-            recording.frames.last().map(|last| Moment::Frame(recording.release_frame + last.input.frame));
-        let options = ReflyOptions { start, ..ReflyOptions::default() };
-        let (report, reflown) = refly_flight(&recording, &options)?;
+        let (recipe, number) = drawn_from(name, head, toml, start)?;
+        let on_the_pad = |fault: &&TimedFault| {
+            matches!(fault.when, When::Phase(phase, _) | When::PhaseBetween(phase, _) if phase.on_pad())
+                && matches!(fault.breakage, Breakage::Sensor(..))
+        };
+        if let Some(fault) = recipe.faults.iter().find(on_the_pad) {
+            let reason = format!("{fault}: what a sensor that broke on the pad remembers is not recorded");
+            return Err(AgainError::Refused { of: name.to_owned(), reason });
+        }
+        let flight = Box::new(begun(&recipe, number, start)?);
+        Ok(Some(Self { flight, released: start.frame, over: false, first_different: None }))
+    }
+
+    /// Moves on by a frame that the computer has just flown.
+    pub(super) fn follow(&mut self, frame: &LoggedFrame, computer: &Computer) {
+        if self.over {
+            return;
+        }
+        let number = frame.record.input.frame.saturating_sub(self.released);
+        let recorded = felt(&frame.record.input).encode_to_vec();
+        let again = self.flight.follow(number, computer);
+        let again = again.map(|kept| felt(&kept.to_log()).encode_to_vec());
+        if again != Some(recorded) {
+            self.first_different.get_or_insert(frame.record.input.frame);
+        }
+        self.over = !self.flight.goes_on();
+    }
+
+    /// Whether the flight, whose log has ended, has the recorded verdict and follows from the run facts, and what is to be said of each.
+    pub(super) fn judge(&self, recorded: Option<&LandingVerdict>) -> [(bool, Option<String>); 2] {
         let bytes = |verdict: Option<&LandingVerdict>| verdict.map(LandingVerdict::encode_to_vec);
-        let same = bytes(recording.verdict.as_ref()) == bytes(reflown.verdict.as_ref());
-        Ok(Some((report.reached.first_different, same)))
-    });
-    match flown {
-        Ok(None) => {
-            for part in [verdict, facts] {
-                part.follows = false;
-                part.why = Some("no simulated flight: nothing to draw it from again".to_owned());
-            }
-        }
-        Ok(Some((first_different, same_verdict))) => {
-            facts.compare(first_different.is_none());
-            facts.why = Some(match first_different {
-                Some(frame) => format!("drawn again, the flight is another one from frame {frame} on"),
-                None => BESIDE.to_owned(),
-            });
-            verdict.compare(same_verdict);
-            verdict.why = (!same_verdict).then(|| "flown again, the flight ends otherwise".to_owned());
-        }
-        Err(error) => {
-            let why = format!("cannot be flown again: {error}");
-            (verdict.why, facts.why) = (Some(why.clone()), Some(why));
-        }
+        let same = bytes(recorded) == bytes(record::verdict(&self.flight).as_ref());
+        let facts = match self.first_different {
+            Some(frame) => format!("drawn again, the flight is another one from frame {frame} on"),
+            None => BESIDE.to_owned(),
+        };
+        let verdict = (!same).then(|| "flown again, the flight ends otherwise".to_owned());
+        [(same, verdict), (self.first_different.is_none(), Some(facts))]
     }
 }

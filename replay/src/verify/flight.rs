@@ -10,6 +10,7 @@ use protocol::log::record::{
 };
 use serde::Serialize;
 
+use super::again::WorldAgain;
 use super::difference::{Tally, encode_into};
 use super::inputs::Inputs;
 use super::parts::Part;
@@ -45,6 +46,9 @@ pub(super) struct FlightVerifier {
     on_the_pad: Option<Obstacle>,
     /// Why some record could not be read.
     unreadable: Option<String>,
+    strict: bool,
+    /// Of a strict verification from the release on: the world, if the log is of a drawn flight, or why it cannot be drawn again.
+    world: Option<Result<WorldAgain, String>>,
 }
 
 /// What must follow the last frame, as bytes; empty if nothing must.
@@ -69,11 +73,11 @@ struct Parts {
 }
 
 impl FlightVerifier {
-    /// A flight before its first record. `behind_another`: another flight comes before it in the log. `unreadable`: why
-    /// a record that may have been its beginning could not be read.
-    pub(super) fn new(behind_another: bool, unreadable: Option<String>) -> Self {
+    /// A flight before its first record. `strict`: its world is drawn again. `behind_another`: another flight comes before it in
+    /// the log. `unreadable`: why a record that may have been its beginning could not be read.
+    pub(super) fn new(strict: bool, behind_another: bool, unreadable: Option<String>) -> Self {
         let order = if behind_another { FrameOrder::behind_another() } else { FrameOrder::default() };
-        Self { order, unreadable, ..Self::default() }
+        Self { order, unreadable, strict, ..Self::default() }
     }
 
     /// Takes a record of the flight.
@@ -111,6 +115,23 @@ impl FlightVerifier {
         log: &FlightLog<R>,
         whole_head: &impl Fn() -> Result<Head, LogError>,
     ) -> Result<(), LogError> {
+        let later;
+        let head = match &log.head().profile_toml {
+            Some(_) => log.head(),
+            None => {
+                later = whole_head()?;
+                &later
+            }
+        };
+        let toml = match &head.profile_toml {
+            None => Err(Obstacle::NoProfile),
+            Some(Err(error)) => Err(Obstacle::ProfileUnreadable(error.to_string())),
+            Some(Ok(text)) => Ok(text),
+        };
+        if let (true, true, Ok(toml)) = (self.strict && self.world.is_none(), start.released, &toml) {
+            let drawn = WorldAgain::drawn(log.name(), head, toml, start);
+            self.world = drawn.map_err(|error| error.to_string()).transpose();
+        }
         let starts = &mut self.parts.starts;
         starts.recorded += u64::from(self.awaited.release.is_empty());
         let runs = self.computer.is_some() && self.obstacle.is_none();
@@ -121,14 +142,14 @@ impl FlightVerifier {
             self.awaited.release.clear();
             return Ok(());
         }
-        let toml = match text_of(log, whole_head)? {
+        let toml = match toml {
             Ok(toml) => toml,
             Err(obstacle) => {
                 self.obstacle = Some(obstacle);
                 return Ok(());
             }
         };
-        match LoggedComputer::recorded(&toml, start, &log.head().run, &[]) {
+        match LoggedComputer::recorded(toml, start, &head.run, &[]) {
             Ok(computer) => {
                 // What it begins from decides what it does.
                 starts.compared += 1;
@@ -187,6 +208,9 @@ impl FlightVerifier {
                     {
                         self.parts.thoughts.recorded += 1;
                         encode_into(&thought, &mut self.awaited.thought);
+                    }
+                    if let Some(Ok(world)) = &mut self.world {
+                        world.follow(frame, computer.computer());
                     }
                     None
                 }
@@ -260,9 +284,12 @@ impl FlightVerifier {
             damage: damage.map(ToString::to_string),
             unread: None,
             build: head.compare_build(),
-            strict: false,
+            strict: self.strict,
         };
         report.conclude();
+        if self.strict {
+            report.compare_strictly(self.world, log.verdict().map(|found| found.verdict).as_ref());
+        }
         report
     }
 
@@ -308,21 +335,6 @@ impl FlightVerifier {
 
 /// What an input that nothing contradicts was held to.
 const JUDGED: &str = "judged by range and step alone: what decides nothing can be another value inside both";
-
-fn text_of<R: Read>(
-    log: &FlightLog<R>,
-    whole_head: &impl Fn() -> Result<Head, LogError>,
-) -> Result<Result<String, Obstacle>, LogError> {
-    let found = match &log.head().profile_toml {
-        Some(found) => Some(found.clone()),
-        None => whole_head()?.profile_toml,
-    };
-    Ok(match found {
-        None => Err(Obstacle::NoProfile),
-        Some(Err(error)) => Err(Obstacle::ProfileUnreadable(error.to_string())),
-        Some(Ok(text)) => Ok(text),
-    })
-}
 
 /// The unread part of a damaged log.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

@@ -2,7 +2,7 @@
 //!
 //! [`verify`] builds the flight computer from the mission in the log and runs it on every recorded input. It compares every
 //! field of the output, the digest of the memory, what the pilot thought, and the computer at its release with the record.
-//! The inputs themselves are judged: some cannot be. [`verify_strictly`] also flies a simulated flight again, closed loop,
+//! The inputs themselves are judged: some cannot be. [`verify_strictly`] also draws the world of a simulated flight again,
 //! and compares its measurements and its verdict. The answer lists what was compared and what was not; truth, events and
 //! measured times are not.
 //!
@@ -33,6 +33,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use self::again::WorldAgain;
 use self::flight::FlightVerifier;
 pub use self::flight::{Consequence, Unread};
 use anyhow::{Result, bail};
@@ -40,6 +41,7 @@ pub use difference::{Divergence, FieldDifference, FieldValue, differences, ulp_d
 pub use parts::Part;
 use protocol::log::reader::Damage;
 use protocol::log::record::{SCHEMA_VERSION, TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START, TOPIC_VERDICT};
+use protocol::log::v1::LandingVerdict;
 use protocol::program::Exit;
 use serde::Serialize;
 
@@ -58,8 +60,20 @@ const VERIFIED: [&str; 3] = [TOPIC_COMPUTER_START, TOPIC_COMPUTER_FRAME, TOPIC_V
 /// # Errors
 /// The file is not a flight log or cannot be read. A log that cannot be replayed is a report, not an error.
 pub fn verify(path: &Path) -> Result<Vec<VerifyReport>, LogError> {
+    verify_as(path, false)
+}
+
+/// Verifies a log file, and draws the world of a simulated flight again.
+///
+/// # Errors
+/// As [`verify`].
+pub fn verify_strictly(path: &Path) -> Result<Vec<VerifyReport>, LogError> {
+    verify_as(path, true)
+}
+
+fn verify_as(path: &Path, strict: bool) -> Result<Vec<VerifyReport>, LogError> {
     let mut log = FlightLog::open(path)?.decoding(&VERIFIED);
-    let mut reports = verify_log(&mut log, || {
+    let mut reports = verify_log(&mut log, strict, || {
         // Another tool may have moved the attachments to the end of the file, after the messages.
         let mut whole = FlightLog::open(path)?;
         while whole.next_entry()?.is_some() {}
@@ -81,43 +95,14 @@ pub fn verify(path: &Path) -> Result<Vec<VerifyReport>, LogError> {
     Ok(reports)
 }
 
-/// Verifies a log file, and flies a simulated flight again. That takes the time of another flight.
-///
-/// # Errors
-/// As [`verify`].
-pub fn verify_strictly(path: &Path) -> Result<Vec<VerifyReport>, LogError> {
-    let mut reports = verify(path)?;
-    for report in &mut reports {
-        report.strict = true;
-    }
-    let [report] = reports.as_mut_slice() else {
-        let why = "a file with several flights is not flown again";
-        for report in &mut reports {
-            report.explain_what_is_left(why);
-        }
-        return Ok(reports);
-    };
-    if report.outcome != Verification::Identical {
-        report.explain_what_is_left("what differs or is not whole is not flown again");
-        return Ok(reports);
-    }
-    let count = |name: &str| report.part(name).map_or(0, |part| part.recorded);
-    let simulated = count("truth") > 0;
-    let [mut verdict, mut facts] = ONLY_STRICTLY.map(|name| Part::of(name, count(name)));
-    again::compare(path, simulated, &mut verdict, &mut facts);
-    for part in [verdict, facts] {
-        report.replace(part);
-    }
-    Ok(reports)
-}
-
-/// Verifies a log that is being read. `whole_head` is called for the log's whole head if its first frame comes before
+/// Verifies a log that is being read, strictly or not. `whole_head` is called for the log's whole head if its first frame comes before
 /// its profile.
 ///
 /// # Errors
 /// As [`verify`].
 pub fn verify_log<R: Read>(
     log: &mut FlightLog<R>,
+    strict: bool,
     whole_head: impl Fn() -> Result<Head, LogError>,
 ) -> Result<Vec<VerifyReport>, LogError> {
     let mut computers: Vec<FlightVerifier> = Vec::new();
@@ -125,7 +110,7 @@ pub fn verify_log<R: Read>(
     let mut unreadable = None;
     while let Some(stamped) = log.next_entry()? {
         if log.flights().found().len() > computers.len() {
-            computers.push(FlightVerifier::new(!computers.is_empty(), unreadable.take()));
+            computers.push(FlightVerifier::new(strict, !computers.is_empty(), unreadable.take()));
         }
         let Some(computer) = computers.last_mut() else {
             if let Entry::Unreadable { reason } = stamped.entry {
@@ -136,7 +121,7 @@ pub fn verify_log<R: Read>(
         computer.take(stamped, log, &whole_head)?;
     }
     if computers.is_empty() {
-        computers.push(FlightVerifier::new(false, unreadable));
+        computers.push(FlightVerifier::new(strict, false, unreadable));
     }
     let of = computers.len();
     let report = |(place, computer): (usize, FlightVerifier)| {
@@ -274,20 +259,40 @@ impl VerifyReport {
         self.parts.iter().find(|part| part.name == name)
     }
 
-    /// Puts a part in the place of the one with its name.
-    fn replace(&mut self, part: Part) {
-        if let Some(place) = self.parts.iter_mut().find(|known| known.name == part.name) {
-            *place = part;
+    /// Compares what only a strict verification does. `world`: that of the flight, drawn again; `recorded`: its verdict.
+    fn compare_strictly(
+        &mut self,
+        world: Option<Result<WorldAgain, String>>,
+        recorded: Option<&LandingVerdict>,
+    ) {
+        let is_flown = self.part("truth").is_some_and(|truth| truth.recorded > 0);
+        let judged = match world {
+            _ if self.flight.is_some() => Err("a file with several flights is not flown again".to_owned()),
+            _ if self.outcome != Verification::Identical => {
+                Err("what differs or is not whole is not flown again".to_owned())
+            }
+            Some(Ok(world)) => Ok(world.judge(recorded)),
+            Some(Err(error)) => Err(format!("cannot be flown again: {error}")),
+            None if is_flown => {
+                Err("cannot be flown again: its run facts do not say what it was drawn from".to_owned())
+            }
+            None => Err(NOT_DRAWN.to_owned()),
+        };
+        for (place, name) in ONLY_STRICTLY.iter().enumerate() {
+            let part = self.parts.iter_mut().find(|part| part.name == *name && part.different == 0);
+            let Some(part) = part else { continue };
+            match &judged {
+                Ok(judged) => {
+                    part.compare(judged[place].0);
+                    part.why.clone_from(&judged[place].1);
+                }
+                Err(why) => {
+                    part.follows = why != NOT_DRAWN;
+                    part.why = Some(why.clone());
+                }
+            }
         }
         self.conclude();
-    }
-
-    /// Says why a strict verification has not compared what only it compares.
-    fn explain_what_is_left(&mut self, why: &str) {
-        let left = |part: &&mut Part| ONLY_STRICTLY.contains(&part.name) && part.different == 0;
-        for part in self.parts.iter_mut().filter(left) {
-            part.why = Some(why.to_owned());
-        }
     }
 
     /// Whether every part that follows from the inputs was compared.
@@ -312,6 +317,9 @@ impl VerifyReport {
         };
     }
 }
+
+/// Why nothing of a flight that was not simulated is drawn again.
+const NOT_DRAWN: &str = "no simulated flight: nothing to draw it from again";
 
 /// Parts that only a strict verification compares.
 const ONLY_STRICTLY: [&str; 2] = ["verdict", "metadata"];

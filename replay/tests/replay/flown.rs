@@ -158,7 +158,7 @@ pub(crate) fn only(mut reports: Vec<VerifyReport>) -> VerifyReport {
 /// Verifies a log in memory, of one flight.
 pub(crate) fn verify_bytes(bytes: &[u8]) -> Result<VerifyReport, LogError> {
     let open = || FlightLog::read("test.mcap".to_owned(), bytes);
-    let reports = verify_log(&mut open()?, || {
+    let reports = verify_log(&mut open()?, false, || {
         let mut whole = open()?;
         while whole.next_entry()?.is_some() {}
         Ok(whole.head().clone())

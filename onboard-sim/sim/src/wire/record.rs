@@ -163,7 +163,7 @@ pub fn verdict(flight: &Sortie) -> Option<v1::LandingVerdict> {
         borne.push(one(failure.name(), 1.0, 0.0, false));
     }
     let Landing { stands, upright, envelope, table_2 } = outcome.landing;
-    let aborted = flight.computer().mode().interlocks.abort_latched;
+    let aborted = flight.mode().interlocks.abort_latched;
     Some(v1::LandingVerdict {
         time_s: touchdown.time_s,
         table_2: limits_to_log(&by_table_2(touchdown)),
