@@ -29,14 +29,18 @@ pub(crate) fn nearest<'a>(given: &str, names: impl Iterator<Item = &'a String>) 
     most.cloned().unwrap_or_default()
 }
 
+/// A cell that is wider does not push the others away. (A width of more than 16 bits cannot be formatted.)
+const WIDEST: usize = 200;
+
 /// Rows as lines of columns, each as wide as its widest cell: a column begins at the left (`<`) or ends at the right (`>`).
 pub(crate) fn columns<const N: usize>(
     sides: [char; N],
     rows: impl IntoIterator<Item = [String; N]>,
 ) -> Vec<String> {
     let rows: Vec<[String; N]> = rows.into_iter().collect();
-    let widths: [usize; N] =
-        std::array::from_fn(|place| rows.iter().map(|row| row[place].chars().count()).max().unwrap_or(0));
+    let widths: [usize; N] = std::array::from_fn(|place| {
+        rows.iter().map(|row| row[place].chars().count()).max().unwrap_or(0).min(WIDEST)
+    });
     let line = |row: &[String; N]| {
         let cells = row.iter().zip(widths).zip(sides).map(|((cell, width), side)| match side {
             '<' => format!("{cell:<width$}"),

@@ -63,6 +63,27 @@ fn a_computer_that_restarts_in_flight_is_flown_again_bit_for_bit() {
     }
 }
 
+/// A sensor that is silent or broken says NaN, and a lidar that is disturbed a range below zero.
+#[test]
+fn a_sensor_that_dies_is_no_impossible_input() {
+    for fault in
+        ["gyro-out@descent", "accelerometer-nan@powered", "gnss-nan@descent", "lidar-noise:20@descent"]
+    {
+        let flown = Flown::from(StartPoint::Apogee, &armed_and_started(1_200), &[fault]);
+        let report = only(verify_strictly(&flown.log()).unwrap());
+        assert!(passes(&report), "{fault}: {report:?}");
+    }
+}
+
+#[test]
+fn what_a_sensor_remembers_of_the_pad_is_not_recorded_and_that_is_said() {
+    let flown = Flown::from(StartPoint::Pad, &armed_and_started(2_600), &["lidar-stuck@pad"]);
+    let report = only(verify_strictly(&flown.log()).unwrap());
+    assert_eq!((report.outcome, report.is_all_compared()), (Verification::Identical, false), "{report:?}");
+    let why = report.part("metadata").and_then(|part| part.why.clone()).unwrap_or_default();
+    assert!(why.starts_with("cannot be flown again: ") && why.contains("lidar-stuck@pad"), "{why}");
+}
+
 /// Changes the frames that are wanted.
 fn with_frames(mut change: impl FnMut(u64, &mut ComputerFrame)) -> Held {
     let mut held = pad();

@@ -76,6 +76,8 @@ pub(super) struct OwnStart {
     pub(super) refused: Option<String>,
     /// It has asked for arming and start.
     pub(super) asked: bool,
+    /// What has held the countdown.
+    pub(super) held: Option<String>,
 }
 
 impl OwnStart {
@@ -84,7 +86,11 @@ impl OwnStart {
         let mode = vehicle.mode();
         if self.asked && mode.phase.on_pad() && !mode.interlocks.armed && !vehicle.aborted() {
             // A reset has disarmed it. Only a person arms it again.
-            self.refused.get_or_insert_with(|| "disarmed on the pad after it was started".to_owned());
+            let why = self.held.as_ref().map(|held| format!(": {held}")).unwrap_or_default();
+            self.refused.get_or_insert_with(|| format!("disarmed on the pad after it was started{why}"));
+        }
+        if self.held.is_none() && mode.hold.is_some() {
+            self.held = arming::first_refusal(&vehicle.arming_checks());
         }
         let waits = matches!(vehicle.phase(), Phase::Safe | Phase::PadIdle);
         if !self.wanted || self.refused.is_some() || !waits {

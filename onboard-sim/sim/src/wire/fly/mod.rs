@@ -313,7 +313,7 @@ pub async fn fly_observed(
     let crewed = served && !options.auto_start;
     let (mut heard, mut sent) = (Delayed::default(), Delayed::default());
     let mut solve_times = SolveTimes::default();
-    let mut own_start = OwnStart { wanted: options.auto_start, refused: None, asked: false };
+    let mut own_start = OwnStart { wanted: options.auto_start, refused: None, asked: false, held: None };
     let mut pace = Pace::new(options.speed, FRAME_S);
     let mut log_state_due_s = 0.0;
     let (mut dropped, mut offer) = (0, Offer::default());
