@@ -20,10 +20,12 @@ use flights::InFlight;
 pub use flights::{Cut, Flights, FrameOrder, Gap, LoggedFlight};
 pub use head::{Attachment, BuildComparison, BuildDifference, Head};
 use protocol::log::reader::{Damage, LogChannel, LogItem, LogReader};
-use protocol::log::record::{TOPIC_COMPUTER_FRAME, TOPIC_RAW_RX, TOPIC_TELEMETRY, TOPIC_VERDICT};
+use protocol::log::record::{
+    TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START, TOPIC_ESTIMATE, TOPIC_RAW_RX, TOPIC_TELEMETRY, TOPIC_VERDICT,
+};
 use protocol::text::printable;
 pub use record::{Entry, LoggedFrame, StampedEntry};
-pub(crate) use record::{frame_descriptor, misread_frame};
+pub(crate) use record::{RECORD_MAX_BYTES, frame_descriptor, misread_frame};
 pub use recording::{Recording, RecordingError};
 pub use tlog::{ImportError, ImportedTlog, import_tlog};
 pub(crate) use tlog::{is_tlog, open_log};
@@ -39,6 +41,47 @@ const BUFFER_BYTES: usize = 1 << 20;
 /// A record may come this long after later ones, ns: writers of several threads do so. Beyond it, a log is not in order.
 pub(crate) const IN_ORDER_NS: u64 = 1_000_000_000;
 
+/// Of one time: what the computer starts from at power-up, a frame, what that led to, and the start at the release.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Place {
+    PowerUp,
+    Frame,
+    Other,
+    Release,
+}
+
+impl Place {
+    /// The place of a record; its first start is the power-up.
+    pub(crate) fn of(topic: &str) -> Self {
+        match topic {
+            TOPIC_COMPUTER_START => Self::Release,
+            TOPIC_COMPUTER_FRAME => Self::Frame,
+            _ => Self::Other,
+        }
+    }
+}
+
+/// The order of a flight computer's own records, which one thread writes: none is late.
+#[derive(Debug, Default)]
+pub(crate) struct ComputerOrder {
+    last: Option<(u64, Place)>,
+}
+
+impl ComputerOrder {
+    /// Whether a record comes behind one that belongs behind it.
+    pub(crate) fn is_broken_by(&mut self, topic: &str, log_time_ns: u64) -> bool {
+        if ![TOPIC_COMPUTER_START, TOPIC_COMPUTER_FRAME, TOPIC_ESTIMATE].contains(&topic) {
+            return false;
+        }
+        let last = self.last.get_or_insert((log_time_ns, Place::PowerUp));
+        let place = if *last == (log_time_ns, Place::PowerUp) { Place::PowerUp } else { Place::of(topic) };
+        let this = (log_time_ns, place);
+        let is_broken = this < *last;
+        *last = this.max(*last);
+        is_broken
+    }
+}
+
 /// A log being read.
 pub struct FlightLog<R: Read> {
     name: String,
@@ -53,6 +96,7 @@ pub struct FlightLog<R: Read> {
     verdicts: Verdicts,
     /// Its times need not be in order.
     may_go_back: bool,
+    order: ComputerOrder,
     in_flight: InFlight,
     /// The first verdict that contradicts itself.
     contradiction: Option<Damage>,
@@ -117,6 +161,7 @@ impl<R: Read> FlightLog<R> {
             clocks: Clocks::default(),
             verdicts: Verdicts::default(),
             may_go_back: false,
+            order: ComputerOrder::default(),
             in_flight: InFlight::default(),
             contradiction: None,
             wanted: None,
@@ -200,13 +245,16 @@ impl<R: Read> FlightLog<R> {
                 None => return self.end().map(|()| None),
                 Some(LogItem::Message { channel_id, log_time_ns, sequence, data }) => {
                     let back_ns = self.last_log_time_ns.unwrap_or(0).saturating_sub(log_time_ns);
-                    if back_ns > IN_ORDER_NS && !self.may_go_back {
+                    let channel = self.reader.channel(channel_id);
+                    let topic = channel.map_or("", |channel| channel.topic.as_str());
+                    let is_broken = self.order.is_broken_by(topic, log_time_ns);
+                    if (is_broken || back_ns > IN_ORDER_NS) && !self.may_go_back {
                         return Err(LogError::NotInOrder {
                             name: self.name.clone(),
+                            topic: printable(topic.as_bytes()),
                             back_s: back_ns as f64 / 1e9,
                         });
                     }
-                    let channel = self.reader.channel(channel_id);
                     let wanted = |channel: &&LogChannel| {
                         self.wanted.is_none_or(|topics| topics.contains(&channel.topic.as_str()))
                     };
@@ -294,9 +342,10 @@ pub enum LogError {
     },
     /// MCAP allows any order; a flight is told from its beginning to its end.
     #[error(
-        "{name}: is not in order of time: a record comes {back_s:.1} s after later ones; `replay recover` sorts it"
+        "{name}: is not in order of time: a record on {topic} comes {back_s:.3} s late, behind one that it belongs before; \
+        `replay recover` sorts it"
     )]
-    NotInOrder { name: String, back_s: f64 },
+    NotInOrder { name: String, topic: String, back_s: f64 },
     /// An MCAP file of another program.
     #[error(
         "{name}: is an MCAP file written by {:?}, but not a flight log: it has {}, and none of {}, {}, {} or similar topics",

@@ -181,7 +181,7 @@ fn was_changed(contents: &Contents) -> bool {
 
 /// Whether the messages are out of order. A chunk is moved by less than what a log of ours may go back, too.
 fn is_sorted_anew(contents: &Contents) -> bool {
-    contents.back_ns > if was_changed(contents) { 0 } else { IN_ORDER_NS }
+    contents.is_mixed || contents.back_ns > if was_changed(contents) { 0 } else { IN_ORDER_NS }
 }
 
 /// What is lost, with times after the first message kept: the stretches that cannot be read, with the times of the chunks of the

@@ -9,10 +9,12 @@ use std::io::{BufReader, Read as _, Seek as _, SeekFrom};
 use std::path::Path;
 
 use mcap::records::{Channel, Record, SchemaHeader, Statistics, op};
-use protocol::log::reader::{RECORD_LIMIT_BYTES, RecordError, parse_record, records_of_chunk};
+use protocol::log::reader::{
+    METADATA_LIMIT_BYTES, RECORD_LIMIT_BYTES, RecordError, parse_record, records_of_chunk,
+};
 use protocol::log::record::TOPIC_COMPUTER_FRAME;
 
-use crate::log::{LogError, open_regular, take_magic};
+use crate::log::{ComputerOrder, LogError, open_regular, take_magic};
 
 /// Size of the type and length before every record.
 const HEAD_BYTES: usize = 9;
@@ -67,6 +69,10 @@ pub(crate) struct Contents {
     /// A message comes this long after later ones, ns.
     pub(crate) back_ns: u64,
     latest_ns: u64,
+    /// The flight computer's own records are not in their order.
+    pub(crate) is_mixed: bool,
+    order: ComputerOrder,
+    topics: BTreeMap<u16, String>,
     pub(crate) told: WriterReport,
     /// What is wrong with the summary. The chunks before it do not depend on it.
     pub(crate) summary_fault: Option<&'static str>,
@@ -221,12 +227,10 @@ impl Records {
     ) -> Result<Option<&'static str>, LogError> {
         let mut checksum = crc32fast::Hasher::new();
         let mut at = from_byte;
-        while self.begins_record(at)? {
-            let Some((opcode, length)) =
-                self.head(at)?.filter(|(_, length)| *length <= RECORD_LIMIT_BYTES as u64)
-            else {
-                break;
-            };
+        // Records of types that a reader does not know may stand anywhere.
+        while let Some((opcode, length)) = self.head(at)?.filter(|(opcode, length)| {
+            *opcode != 0 && *length <= (RECORD_LIMIT_BYTES as u64).min(self.size - at - HEAD_BYTES as u64)
+        }) {
             let body = self.read(at + HEAD_BYTES as u64, length)?;
             checksum.update(&[opcode]);
             checksum.update(&length.to_le_bytes());
@@ -367,13 +371,16 @@ impl Contents {
     fn check(&mut self, opcode: u8, body: &[u8]) -> Result<bool, RecordError> {
         match opcode {
             op::CHUNK => records_of_chunk(body, |record| {
-                self.note_time(&record);
+                self.note_order(&record);
                 Ok(())
             })
             .map(|()| true),
+            op::METADATA if body.len() > METADATA_LIMIT_BYTES => {
+                Err(RecordError::TooLarge(body.len() as u64))
+            }
             op::HEADER | op::SCHEMA | op::CHANNEL | op::MESSAGE | op::METADATA | op::ATTACHMENT => {
                 let record = parse_record(opcode, body)?;
-                self.note_time(&record);
+                self.note_order(&record);
                 if let Record::Header(header) = record {
                     self.told.library = header.library;
                     return Ok(false);
@@ -384,8 +391,13 @@ impl Contents {
         }
     }
 
-    fn note_time(&mut self, record: &Record) {
+    fn note_order(&mut self, record: &Record) {
+        if let Record::Channel(channel) = record {
+            self.topics.insert(channel.id, channel.topic.clone());
+        }
         if let Record::Message { header, .. } = record {
+            let topic = self.topics.get(&header.channel_id).map_or("", String::as_str);
+            self.is_mixed |= self.order.is_broken_by(topic, header.log_time);
             self.back_ns = self.back_ns.max(self.latest_ns.saturating_sub(header.log_time));
             self.latest_ns = self.latest_ns.max(header.log_time);
         }

@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 
 use mcap::records::{MessageHeader, Metadata, Record, op};
 use protocol::log::reader::{RecordError, parse_record, records_of_chunk};
-use protocol::log::record::{TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START};
 
 use super::scan::{Contents, Records, WriterReport};
 use super::{RecoverError, is_sorted_anew};
+use crate::log::Place;
 use crate::output::{NewFile, WriteError};
 
 /// Chunk size as in the recorder's own logs.
@@ -32,26 +32,6 @@ pub(crate) struct Rescue<'a> {
     /// Messages wait until the end, and are then written in order of time.
     sorts: bool,
     waiting: Vec<Waiting>,
-}
-
-/// Of one time, what the computer starts from at power-up comes before its first frame. What a frame led to comes behind it, and
-/// the start at a release last.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Place {
-    PowerUp,
-    Frame,
-    Other,
-    Start,
-}
-
-impl Place {
-    fn of(topic: &str) -> Self {
-        match topic {
-            TOPIC_COMPUTER_START => Self::Start,
-            TOPIC_COMPUTER_FRAME => Self::Frame,
-            _ => Self::Other,
-        }
-    }
 }
 
 struct Waiting {
@@ -203,7 +183,7 @@ impl<'a> Rescue<'a> {
 
     fn close(mut self, about: &Metadata) -> mcap::McapResult<NewFile> {
         let mut waiting = take(&mut self.waiting);
-        let starts = waiting.iter_mut().filter(|message| message.place == Place::Start);
+        let starts = waiting.iter_mut().filter(|message| message.place == Place::Release);
         if let Some(first) = starts.min_by_key(|message| message.header.log_time) {
             first.place = Place::PowerUp;
         }

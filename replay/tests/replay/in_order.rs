@@ -12,14 +12,16 @@ use crate::from_apogee::LANDED;
 use crate::simulated::{MK2, WITH_FRAMES};
 use crate::tampered::Held;
 
-/// The orders that other programs write: one topic after the other, from either end, and a later part first.
-fn in_other_orders(held: &Held) -> [Held; 3] {
-    let (mut by_topic, mut from_z, mut second_half_first) = (held.clone(), held.clone(), held.clone());
+/// The orders that other programs write: one topic after the other, from either end; a later part first; and equal times from the
+/// last topic to the first.
+fn in_other_orders(held: &Held) -> [Held; 4] {
+    let [mut by_topic, mut from_z, mut second_half_first, mut equal_times] = [(); 4].map(|()| held.clone());
     by_topic.messages.sort_by(|a, b| a.topic.cmp(&b.topic));
     from_z.messages.sort_by(|a, b| b.topic.cmp(&a.topic));
     let half = held.messages.len() / 2;
     second_half_first.messages.rotate_left(half);
-    [by_topic, from_z, second_half_first]
+    equal_times.messages.sort_by(|a, b| (a.log_time_ns, &b.topic).cmp(&(b.log_time_ns, &a.topic)));
+    [by_topic, from_z, second_half_first, equal_times]
 }
 
 fn assert_refused_as_unordered(log: &Path, directory: &Path) {
@@ -63,6 +65,21 @@ fn a_log_in_another_order_is_called_that_and_is_whole_again_once_sorted() {
             std::fs::remove_file(&sorted).unwrap();
         }
     }
+}
+
+/// The flight computer's own records are written by one thread: a frame that is late by little is out of order as well.
+#[test]
+fn a_frame_that_is_a_little_late_is_out_of_order() {
+    let directory = tempfile::tempdir().unwrap();
+    let [log, sorted] = ["log.mcap", "sorted.mcap"].map(|name| directory.path().join(name));
+    let mut held = Held::read(&LANDED.log);
+    let late = held.messages.iter().rposition(|message| message.is_frame()).unwrap() - 20;
+    let late = (late..).find(|place| held.messages[*place].is_frame()).unwrap();
+    held.messages[late..late + 12].rotate_left(1);
+    held.write(&log);
+    assert_refused_as_unordered(&log, directory.path());
+    assert!(recover(&log, &sorted).unwrap().sorted);
+    assert_eq!(only(verify(&sorted).unwrap()).outcome, Verification::Identical);
 }
 
 /// Writers of several threads swap records, which changes nothing.
