@@ -17,8 +17,8 @@ const MAGIC_1: u8 = 0xfe;
 const SIGNED: u8 = 0x01;
 /// Length of the longest frame: 10 + 255 + 2 + 13.
 const FRAME_MAX_BYTES: usize = 280;
-/// Times outside the years 2000 to 2100 are treated as garbage.
-const PLAUSIBLE_US: std::ops::Range<u64> = 946_684_800_000_000..4_102_444_800_000_000;
+/// Times after the year 2100 are treated as garbage. A clock that nobody has set begins in 1970.
+const PLAUSIBLE_US: std::ops::Range<u64> = 0..4_102_444_800_000_000;
 
 /// Two frames without a byte between them stand in the first bytes of any `.tlog`, also of one whose beginning is damaged.
 const RECOGNISED_WITHIN_BYTES: u64 = 1 << 16;
@@ -42,6 +42,9 @@ pub fn is_tlog(input: impl Read) -> io::Result<bool> {
             return Ok(true);
         }
         garbage_before = garbage;
+    }
+    if reader.mavlink1() > 1 && reader.garbage_bytes() < FRAME_MAX_BYTES as u64 {
+        return Ok(true);
     }
     // One frame alone may be all that was received.
     Ok(is_all && garbage_before == Some(0) && reader.garbage_bytes() == 0)

@@ -24,6 +24,8 @@ use crate::output::{NewFile, WriteError};
 
 /// A frame of a `.tlog` follows a time of this length.
 const TIME_BYTES: usize = 8;
+/// The message ids of our dialect.
+const OUR_MESSAGES: std::ops::RangeInclusive<u32> = 54_000..=54_999;
 /// System id of a ground station, by convention.
 const GROUND_SYSTEM: u8 = 255;
 
@@ -167,8 +169,15 @@ fn convert<W: Write + Seek>(input: File, path: &Path, output: W) -> Result<(W, I
     let mut imported = ImportedTlog::default();
     let mut station = Station::default();
     let mut next = Some(first);
+    let (mut since_us, mut clock_us) = (0_u64, start_us);
     while let Some(TlogFrame { time_us, bytes }) = next {
-        let since_us = time_us.saturating_sub(start_us);
+        // A station's clock is set while it records: what is no step of a record's time is none.
+        let step_us = time_us.abs_diff(clock_us);
+        let is_set = step_us > if time_us < clock_us { CLOCK_BACK_US } else { CLOCK_AHEAD_US };
+        if is_set || time_us > clock_us {
+            since_us += if is_set { 0 } else { step_us };
+            clock_us = time_us;
+        }
         let time_ns = since_us.saturating_mul(1000);
         let understood = frame_of(&bytes);
         imported.frames += 1;
@@ -197,14 +206,20 @@ fn convert<W: Write + Seek>(input: File, path: &Path, output: W) -> Result<(W, I
     Ok((log.finish()?, imported))
 }
 
+/// A clock that goes back by more or ahead by more, us, was set: a second, which frames of several threads are not late by, and a day,
+/// which nobody records without hearing a frame.
+const CLOCK_BACK_US: u64 = 1_000_000;
+const CLOCK_AHEAD_US: u64 = 86_400_000_000;
+
 /// Shortest interval between telemetry records, s: a station's.
 const PERIOD_S: f64 = 0.1;
 
 /// What a station would have recorded beside the frames.
 #[derive(Default)]
 struct Station {
-    /// The vehicle that was heard first; a station shows one.
+    /// The vehicle that speaks our dialect, or else the one that was heard first; a station shows one.
     vehicle: Option<Address>,
+    is_ours: bool,
     told: Told,
     changed: bool,
     written_at_s: Option<f64>,
@@ -217,6 +232,9 @@ impl Station {
         let Ok(message) = frame.decode() else {
             return Vec::new();
         };
+        if !self.is_ours && OUR_MESSAGES.contains(&frame.message_id()) {
+            *self = Self { vehicle: Some(frame.source()), is_ours: true, ..Self::default() };
+        }
         if let MavMessage::HEARTBEAT(beat) = &message
             && beat.autopilot != MavAutopilot::MAV_AUTOPILOT_INVALID
         {

@@ -1,10 +1,11 @@
 //! Tests the log of a ground station, which has what was heard and nothing that the vehicle recorded.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 use protocol::log::record::{Direction, Event, EventLevel, RawFrame, Record};
+use protocol::log::tlog::TlogReader;
 use protocol::log::writer::{LogHeader, LogWriter};
 use replay::export::export_tables;
 use replay::info::info;
@@ -66,6 +67,46 @@ fn heard_while(flight: &Simulated, name: &str, hears: impl Fn(u64) -> bool) -> P
 const NOTED_NS: u64 = 22_000_000_000;
 
 static GROUND: LazyLock<PathBuf> = LazyLock::new(|| heard(&WITH_FRAMES));
+/// A laptop at the field gets its time from the network when it has one, and a clock that nobody has set begins in 1970.
+#[test]
+fn a_clock_that_is_set_while_it_records_loses_no_frame() {
+    let read = |path: &Path| {
+        let mut frames = TlogReader::new(std::fs::File::open(path).unwrap());
+        std::iter::from_fn(|| frames.next_frame().unwrap()).collect::<Vec<_>>()
+    };
+    let directory = tempfile::tempdir().unwrap();
+    let plain = tlog(&WITH_FRAMES, "as-sent.tlog");
+    let imported = |name: &str, path: &Path| import_tlog(path, &directory.path().join(name)).unwrap();
+    let as_sent = imported("as-sent.mcap", &plain);
+    let frames = read(&plain);
+    let begins_us = frames[0].time_us;
+    type Clock = fn(u64, u64) -> u64;
+    let clocks: [Clock; 2] =
+        [|time_us, _| time_us - 3_600_000_000, |time_us, begins_us| time_us - begins_us + 1];
+    for (place, set) in clocks.into_iter().enumerate() {
+        for first_half in [true, false] {
+            let half = frames.len() / 2;
+            let bytes = frames.iter().enumerate().flat_map(|(number, frame)| {
+                let is_set = (number < half) == first_half;
+                let time_us = if is_set { set(frame.time_us, begins_us) } else { frame.time_us };
+                [&time_us.to_be_bytes(), &frame.bytes[..]].concat()
+            });
+            let path = directory.path().join("set.tlog");
+            std::fs::write(&path, bytes.collect::<Vec<u8>>()).unwrap();
+            let set = imported(&format!("set-{place}-{first_half}.mcap"), &path);
+            assert_eq!((set.frames, set.garbage_bytes), (as_sent.frames, 0));
+            // Its telemetry goes on: no silence, and no jump of an hour.
+            assert!(set.telemetry.abs_diff(as_sent.telemetry) <= 2, "{set:?} {as_sent:?}");
+            let lasts_s = |output: &Path| {
+                let recording = Recording::open(output).unwrap();
+                recording.telemetry.last().unwrap().time_s
+            };
+            let apart_s = lasts_s(&set.output) - lasts_s(&as_sent.output);
+            assert!(apart_s.abs() < 1.0, "{apart_s}");
+        }
+    }
+}
+
 /// The verdict that was heard is the vehicle's own, to the precision of a message.
 #[test]
 fn a_ground_log_has_the_verdict_that_was_heard() {
