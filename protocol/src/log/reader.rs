@@ -15,7 +15,7 @@ use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOp
 pub const RECORD_LIMIT_BYTES: usize = 64 * 1024 * 1024;
 
 /// Metadata larger than this are passed over: their entries take far more memory than their bytes.
-const METADATA_LIMIT_BYTES: usize = 1024 * 1024;
+pub const METADATA_LIMIT_BYTES: usize = 1024 * 1024;
 
 /// A record begins with its type and its length.
 const HEAD_BYTES: usize = 9;
@@ -92,7 +92,9 @@ pub enum RecordError {
     #[error(transparent)]
     Mcap(#[from] mcap::McapError),
     /// A chunk would unpack to more than is held in memory.
-    #[error("a chunk of {0} bytes, more than the {RECORD_LIMIT_BYTES} that are read")]
+    #[error(
+        "a chunk or metadata of {0} bytes, more than the {RECORD_LIMIT_BYTES} or {METADATA_LIMIT_BYTES} that are read"
+    )]
     TooLarge(u64),
     #[error("a record of type 0, which does not exist")]
     TypeZero,
@@ -206,6 +208,14 @@ impl<R: Read> LogReader<R> {
                     let damage = self.corrupt("a record of type 0, which does not exist");
                     self.finish(Some(damage));
                     break;
+                }
+                // One between the chunks was passed over already.
+                Some(Ok(LinearReadEvent::Record { data, opcode: op::METADATA }))
+                    if data.len() > METADATA_LIMIT_BYTES =>
+                {
+                    let bytes = data.len() as u64;
+                    self.note(Damage::TooLarge { near_byte: self.bytes_read, bytes });
+                    continue;
                 }
                 Some(Ok(LinearReadEvent::Record { data, opcode })) => parse_record(opcode, data),
             };
@@ -490,6 +500,9 @@ pub fn records_of_chunk(
                 reader.notify_read(read);
             }
             LinearReadEvent::Record { opcode: 0, .. } => return Err(RecordError::TypeZero),
+            LinearReadEvent::Record { data, opcode: op::METADATA } if data.len() > METADATA_LIMIT_BYTES => {
+                return Err(RecordError::TooLarge(data.len() as u64));
+            }
             LinearReadEvent::Record { data, opcode } => keep(parse_record(opcode, data)?)?,
         }
     }

@@ -130,7 +130,7 @@ impl Entry {
 }
 
 /// Records are far smaller. Decoded, one may take many times its bytes.
-const RECORD_MAX_BYTES: usize = 1 << 20;
+pub(crate) const RECORD_MAX_BYTES: usize = 1 << 20;
 
 fn decoded<M: Message + Default>(
     channel: &LogChannel,

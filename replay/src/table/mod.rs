@@ -23,7 +23,7 @@ use protocol::log::record::{TOPIC_EVENTS, TOPIC_RAW_RX, TOPIC_VERDICT};
 use protocol::log::v1;
 
 use self::dialect::{cells_of_frame, shape_of_frame, words_of};
-use crate::log::{Entry, FlightLog, LogError, StampedEntry, frame_of};
+use crate::log::{Entry, FlightLog, LogError, RECORD_MAX_BYTES, StampedEntry, frame_of};
 
 /// A list up to this length has one column for each element; a longer one, has none.
 const LIST_MAX: usize = 8;
@@ -352,7 +352,7 @@ impl TableReader {
 
     /// A record of one of our packages, with the schema in the log.
     fn record<R: Read>(&mut self, log: &FlightLog<R>, stamped: &StampedEntry, time: Cell) -> Option<Row> {
-        let channel = log.channel(stamped.channel_id)?;
+        let channel = log.channel(stamped.channel_id).filter(|_| stamped.data.len() <= RECORD_MAX_BYTES)?;
         let shapes = &mut self.shapes;
         let known = match self.channels.entry(stamped.channel_id) {
             Occupied(entry) => entry.into_mut(),

@@ -183,9 +183,12 @@ fn many_facts_and_many_limits_do_not_fill_the_memory() {
         limits,
     ] {
         std::fs::write(&path, bytes).unwrap();
-        for question in ["info", "verify"] {
-            let (code, said) = within(200, &[question], &path);
-            assert!([0, 1, 5].contains(&code), "{question}: {said}");
+        let csv = directory.path().join("csv");
+        for question in
+            [&["info"][..], &["verify"], &["export", "--to", "csv", "--out", csv.to_str().unwrap()]]
+        {
+            let (code, said) = within(200, question, &path);
+            assert!([0, 1, 5].contains(&code), "{question:?}: {said}");
         }
     }
 }
