@@ -18,17 +18,22 @@ pub(super) const PARTS: usize = 5;
 
 impl ServoModel {
     /// The load's angles, rad: of every frame those of its parts and the angle at its end. `commands_rad[k]` is given
-    /// at the end of frame `k`; before the first the servo rests at zero.
-    pub(super) fn angles_rad(&self, commands_rad: &[f64], frame_s: f64) -> Vec<([f64; PARTS], f64)> {
+    /// at the end of frame `k`; before the first the servo rests at `rests_rad`.
+    pub(super) fn angles_rad(
+        &self,
+        rests_rad: f64,
+        commands_rad: &[f64],
+        frame_s: f64,
+    ) -> Vec<([f64; PARTS], f64)> {
         let delay = (self.delay_s.max(0.0)) / frame_s;
         let whole = libm::floor(delay);
         let late = delay - whole;
         let whole = whole as usize;
         let half_play_rad = 0.5 * self.play_rad.max(0.0);
         let part_s = frame_s / PARTS as f64;
-        let (mut horn_rad, mut load_rad) = (0.0_f64, 0.0_f64);
+        let (mut horn_rad, mut load_rad) = (rests_rad, rests_rad);
         let given = |frame: usize, back: usize| {
-            frame.checked_sub(back).and_then(|place| commands_rad.get(place)).copied().unwrap_or(0.0)
+            frame.checked_sub(back).and_then(|place| commands_rad.get(place)).copied().unwrap_or(rests_rad)
         };
         (0..commands_rad.len())
             .map(|frame| {
@@ -56,7 +61,7 @@ mod tests {
     use super::*;
 
     fn ends(servo: &ServoModel, commands_rad: &[f64]) -> Vec<f64> {
-        servo.angles_rad(commands_rad, 0.005).into_iter().map(|(_, end_rad)| end_rad).collect()
+        servo.angles_rad(0.0, commands_rad, 0.005).into_iter().map(|(_, end_rad)| end_rad).collect()
     }
 
     /// A step of 0.05 rad at the end of frame 0, 12 ms of delay, 5 rad/s: it moves from 12 ms after frame 0 to 22 ms, and

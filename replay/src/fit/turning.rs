@@ -34,6 +34,9 @@ const FEEDBACK_RAD: f64 = 0.001_745;
 const FEWEST_FRAMES: usize = 100;
 /// The frames before the thrust in which the servo may already move.
 const LEAD_FRAMES: usize = 60;
+/// The frames before those whose commands move the model to where the servo is: the gimbal swings in the fall. Longer than any delay
+/// of a servo.
+const SETTLING_FRAMES: usize = 40;
 /// Factors on the deviations of delay, gain and offsets. The rest is estimated from the residuals. The fit has already taken a
 /// part of the rest out of them, so the deviations are too small (R. N. Kackar and D. A. Harville, Journal of the American
 /// Statistical Association 79, 1984). By how much was measured: without these factors the 95 % intervals hold the truth in 92,
@@ -75,16 +78,16 @@ pub(super) fn fit_turning(trace: &Trace, along: &Along) -> Result<Solution, Stri
     if frames.len() < lit + FEWEST_FRAMES {
         return Err("less than half a second of burn was recorded".to_owned());
     }
-    if !frames[first - 1..].windows(2).all(|pair| follows(&pair[0], &pair[1])) {
+    let settles = first.saturating_sub(SETTLING_FRAMES).max(1);
+    if !frames[settles - 1..].windows(2).all(|pair| follows(&pair[0], &pair[1])) {
         return Err(
             "frames of the burn are lost, and with them the commands that the gimbal followed".to_owned()
         );
     }
     let samples = samples(trace, along, first, begins_s);
-    let frames = &frames[first..];
     let commands_rad: [Vec<f64>; 2] =
-        [0, 1].map(|axis: usize| frames.iter().map(|frame| frame.gimbal_rad[axis]).collect());
-    let reported_rad: Vec<[f64; 2]> = frames.iter().map(|frame| frame.gimbal_reported_rad).collect();
+        [0, 1].map(|axis: usize| frames[settles..].iter().map(|frame| frame.gimbal_rad[axis]).collect());
+    let reported_rad: Vec<[f64; 2]> = frames[first..].iter().map(|frame| frame.gimbal_reported_rad).collect();
     let gimbal = &trace.mission.airframe.gimbal;
     let servo = &gimbal.servo;
     let priors = [
@@ -98,7 +101,13 @@ pub(super) fn fit_turning(trace: &Trace, along: &Along) -> Result<Solution, Stri
         Prior { mean: servo.slop_rad(), sigma: 0.5_f64.to_radians() },
         Prior { mean: 0.5 * LINK_RAD, sigma: LINK_RAD },
     ];
-    let model = Model { samples: &samples, commands_rad: &commands_rad, limit_rad: gimbal.limit_rad() };
+    let model = Model {
+        samples: &samples,
+        commands_rad: &commands_rad,
+        settling: first - settles,
+        rests_rad: frames[settles - 1].gimbal_reported_rad,
+        limit_rad: gimbal.limit_rad(),
+    };
     let felt = |axis: usize| samples.iter().map(|sample| sample.felt_rad_s[axis]).collect::<Vec<_>>();
     let white = [0, 1].map(|axis| white_variance(&felt(axis)).unwrap_or(1e-6));
     let white = 0.5 * (white[0] + white[1]);
@@ -189,7 +198,11 @@ impl Rest {
 
 struct Model<'a> {
     samples: &'a [Sample],
+    /// Of the settling frames, too.
     commands_rad: &'a [Vec<f64>; 2],
+    settling: usize,
+    /// Where the servos are before them, rad.
+    rests_rad: [f64; 2],
     limit_rad: f64,
 }
 
@@ -201,7 +214,7 @@ impl Model<'_> {
             play_rad: values[PLAY],
             limit_rad: self.limit_rad,
         };
-        servo.angles_rad(&self.commands_rad[axis], FRAME_S)
+        servo.angles_rad(self.rests_rad[axis], &self.commands_rad[axis], FRAME_S)
     }
 
     /// The gyro's samples about y and z less the model's.
@@ -211,14 +224,22 @@ impl Model<'_> {
             let offset_rad = values[[PITCH, YAW][axis]];
             let part_s = FRAME_S / PARTS as f64;
             let half_rad = 0.5 * values[LINK].max(0.0);
-            let (mut rate_rad_s, mut nozzle_rad) = (0.0, 0.0_f64);
-            let missed = self.samples.iter().enumerate().map(|(place, sample)| {
+            let dragged_rad = |nozzle_rad: f64, angle_rad: f64| {
+                let driven_rad = values[GAIN] * angle_rad;
+                nozzle_rad.clamp(driven_rad - half_rad, driven_rad + half_rad)
+            };
+            let (settling, flown) = both[axis].split_at(self.settling);
+            let rests_rad = values[GAIN] * self.rests_rad[axis];
+            let mut nozzle_rad =
+                settling.iter().flat_map(|(parts, _)| parts).copied().fold(rests_rad, dragged_rad);
+            let mut rate_rad_s = 0.0;
+            let missed = self.samples.iter().zip(flown).enumerate().map(|(place, (sample, (parts, _)))| {
                 // The thrust turns about the pitch axis inside what the yaw axis leaves.
-                let left = if axis == 0 { libm::cos(both[1][place].1) } else { 1.0 };
+                let left = if axis == 0 { libm::cos(both[1][self.settling + place].1) } else { 1.0 };
                 let mut mean_rad_s = 0.0;
-                for angle_rad in both[axis][place].0 {
-                    let (driven_rad, before_rad) = (values[GAIN] * angle_rad, nozzle_rad);
-                    nozzle_rad = nozzle_rad.clamp(driven_rad - half_rad, driven_rad + half_rad);
+                for angle_rad in parts {
+                    let before_rad = nozzle_rad;
+                    nozzle_rad = dragged_rad(nozzle_rad, *angle_rad);
                     let turn = if sample.burning {
                         -sample.by_gimbal_rad_s2 * left * libm::sin(nozzle_rad + offset_rad)
                     } else {
@@ -239,7 +260,7 @@ impl Model<'_> {
     /// The servos' own feedback less the model's, whitened.
     fn feedback(&self, values: &[f64], reported_rad: &[[f64; 2]]) -> Vec<f64> {
         let of_axis = |axis: usize| {
-            let ends = self.angles_rad(values, axis).into_iter();
+            let ends = self.angles_rad(values, axis).into_iter().skip(self.settling);
             let missed = reported_rad.iter().zip(ends);
             missed.map(move |(reported_rad, (_, end_rad))| (reported_rad[axis] - end_rad) / FEEDBACK_RAD)
         };
@@ -328,6 +349,9 @@ pub(super) fn air_moment_n_m(
         across.x = 0.0;
         moment += place_m.cross(&(across * (-half * strip_m2 * across.norm())));
     }
+    let legs_m = Vector3::new(airframe.legs.drag_station_m - cg_station_m, 0.0, 0.0);
+    let local = through_air_m_s + rate_rad_s.cross(&legs_m);
+    moment += legs_m.cross(&(local * (-half * airframe.legs.drag_area_m2 * local.norm())));
     for fin in 0..4 {
         let sine = libm::sin(fins_rad[fin]);
         let outward = Vector3::from([0.0, fins.outward(fin)[0], fins.outward(fin)[1]]);
