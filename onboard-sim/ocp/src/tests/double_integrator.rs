@@ -44,16 +44,6 @@ fn val_closed_form_of_the_least_effort() {
     assert!(outcome.miss < 1e-8);
 }
 
-/// The largest force without limits is 0.37; the least with which the distance can be covered is 0.25.
-#[test]
-fn limited_forces_meet_the_optimality_conditions() {
-    let model = problem(0.27);
-    let (workspace, outcome) = solved(&model);
-    let found = Optimality::of(&model, &workspace);
-    found.assert_within(1e-6);
-    assert!(found.at_limit >= 20 && outcome.miss < 1e-8, "{found:?} {outcome:?}");
-}
-
 /// Backwards at most at 0.3: 1.1 in four seconds is possible, 2 is not.
 #[test]
 fn a_floor_on_the_speed_holds_before_the_end() {

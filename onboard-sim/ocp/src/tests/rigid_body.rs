@@ -80,35 +80,6 @@ fn a_turning_flight_meets_the_optimality_conditions() {
     }
 }
 
-/// The rest of a flight, from its plan and from a little beside it.
-#[test]
-fn a_shifted_plan_is_optimal_and_a_disturbed_one_soon_is() {
-    const SHIFT: usize = 6;
-    let mut model = problem(0.2);
-    let (mut workspace, cold) = solved(&model);
-    let mut plan = Kept::of(&workspace);
-    model.intervals -= SHIFT;
-    for condition in &mut model.conditions {
-        condition.node -= SHIFT;
-    }
-    plan.states.drain(..SHIFT);
-    plan.inputs.drain(..SHIFT);
-    plan.costates.drain(..SHIFT);
-    plan.limit_multipliers.drain(..SHIFT);
-    model.initial = plan.states[0];
-    let outcome = workspace.solve(&model, Some(&plan.start()));
-    assert_eq!((outcome.status, outcome.iterations), (Status::Converged, 0));
-    for (component, kick) in [(V, 0.02), (V + 1, -0.03), (W + 1, 0.05), (Q + 3, 0.01)] {
-        model.initial = plan.states[0];
-        model.initial[component] += kick;
-        let outcome = workspace.solve(&model, Some(&plan.start()));
-        println!("{component}: {} iterations, cold {}", outcome.iterations, cold.iterations);
-        assert_eq!(outcome.status, Status::Converged, "{outcome:?}");
-        assert!(2 * outcome.iterations < cold.iterations, "{outcome:?} {cold:?}");
-        Optimality::of(&model, &workspace).assert_within(1e-6);
-    }
-}
-
 #[test]
 fn inputs_alone_are_a_start() {
     let model = problem(0.2);
