@@ -155,13 +155,6 @@ fn a_sound_vehicle_passes_and_every_item_has_its_value() {
 }
 
 #[test]
-fn without_motion_no_surface_is_told_to_move() {
-    let check = checked(NOTHING_WRONG, 1.0, &SOUND, false);
-    assert_eq!(check.state(), CheckState::Passed);
-    assert_eq!(check.findings().len(), 9 + 6);
-}
-
-#[test]
 fn each_wrong_surface_is_named_with_what_is_wrong() {
     for surface in 0..SURFACES {
         let of = |wrong: Wrong| failing(&checked(Wrong { surface, ..wrong }, 1.0, &SOUND, true));

@@ -38,19 +38,6 @@ fn during_a_flight_the_motor_is_live_then_burning_then_hot_then_burnt() {
 }
 
 #[test]
-fn with_the_pin_in_the_motor_is_safe() {
-    let idle = after(&ARM[..1]);
-    assert_eq!((idle.motor_status(1.0), idle.approach_wait_s(1.0)), (MotorStatus::PinIn, Some(0.0)));
-}
-
-#[test]
-fn after_a_pad_abort_the_wait_runs() {
-    let aborted = after(&with_arm(&[ABORT]));
-    assert_eq!(aborted.motor_status(13.0), MotorStatus::Live);
-    assert_eq!(aborted.approach_wait_s(13.0), Some(50.0));
-}
-
-#[test]
 fn after_no_light_the_motor_is_live_and_after_a_late_light_it_burns() {
     let dark = transition(&in_order(Phase::Ignition), Event::NoThrustTimeout, 1.0).mode;
     assert_eq!(dark.motor_status(1.0), MotorStatus::Live);
@@ -92,16 +79,6 @@ fn a_pin_does_not_cool_a_motor() {
         Phase::Safed,
         "a burnt motor stays burnt"
     );
-}
-
-#[test]
-fn in_the_air_pin_events_are_refused() {
-    for phase in Phase::ALL.into_iter().filter(|phase| !phase.on_pad()) {
-        let on_ground = matches!(phase, Phase::Touchdown | Phase::Safed);
-        for event in [Event::PinPulled, Event::PinInserted] {
-            assert_eq!(transition(&in_order(phase), event, 1.0).refusal.is_none(), on_ground, "{phase:?}");
-        }
-    }
 }
 
 /// Every state of motor and pin, at several times.
@@ -247,14 +224,6 @@ fn after_a_minute_a_held_vehicle_disarms() {
     assert_eq!(disarmed.effects, Effects::of(&[Effect::Disarm]));
     assert!(!disarmed.mode.interlocks.armed && !disarmed.mode.interlocks.abort_latched);
     assert_eq!(transition(&after(&ARM), Event::HoldElapsed, 900.0).refusal, Some(Refusal::HoldNotOver));
-}
-
-#[test]
-fn every_event_that_leaves_pad_armed_ends_the_hold() {
-    for event in [Event::DisarmRequested { lifted_off: false }, Event::PinInserted, ABORT, Event::LiftOff] {
-        let answer = transition(&held(), event, 9.0);
-        assert_eq!((answer.refusal, answer.mode.hold), (None, None), "{event:?}");
-    }
 }
 
 /// Every mode of an armed vehicle on the pad that the table can reach, at 100 s.

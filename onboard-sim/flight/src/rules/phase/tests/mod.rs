@@ -187,45 +187,6 @@ fn with_arm(rest: &[Event]) -> Vec<Event> {
 const ABORT: Event = Event::AbortRequested { lifted_off: true, above_commit_height: false, gate_open: false };
 
 #[test]
-fn a_vehicle_released_at_apogee_flies_to_safed() {
-    let mode = after(&with_arm(&[
-        Event::StartRequested { countdown_s: 1.0, checks_passed: true },
-        Event::ReleasedAt(StartPoint::Apogee),
-        Event::FinsConfirmed,
-        Event::LandArm,
-        Event::IgnitionGate { open: true },
-        Event::ThrustConfirmed,
-        Event::Burnout,
-        Event::Contact { thrust_below_weight: true },
-    ]));
-    let burnt_out_at_s = 9.0;
-    assert_eq!(mode.motor, Motor::BurntOut { at_s: burnt_out_at_s });
-    let hot = transition(&mode, Event::SafingDone, burnt_out_at_s + MOTOR_HOT_S - 0.1);
-    assert_eq!(hot.refusal, Some(Refusal::MotorHot));
-    let mode = transition(&mode, Event::SafingDone, burnt_out_at_s + MOTOR_HOT_S).mode;
-    assert_eq!(mode.phase, Phase::Safed);
-    assert!(!mode.interlocks.armed && mode.interlocks.landing_motor_inhibited);
-}
-
-#[test]
-fn a_pad_start_flies_the_whole_sequence() {
-    let mode = after(&with_arm(&[
-        Event::StartRequested { countdown_s: 1.0, checks_passed: true },
-        Event::CountdownElapsed,
-        Event::LiftOff,
-        Event::Burnout,
-        Event::Apogee { booster_attached: false },
-        Event::FinsConfirmed,
-        Event::LandArm,
-        Event::IgnitionGate { open: false },
-        Event::IgnitionGate { open: true },
-        Event::ThrustConfirmed,
-        Event::Contact { thrust_below_weight: true },
-    ]));
-    assert_eq!(mode.phase, Phase::Touchdown);
-}
-
-#[test]
 fn the_countdown_must_run_out_before_a_release() {
     let mode = after(&with_arm(&[Event::StartRequested { countdown_s: 5.0, checks_passed: true }]));
     let release = Event::ReleasedAt(StartPoint::Apogee);
@@ -283,36 +244,6 @@ fn refused_arming_says_why() {
 }
 
 #[test]
-fn an_abort_while_rising_ends_under_the_parachute_at_apogee() {
-    for phase in [Phase::Boost, Phase::Coast] {
-        let aborted = transition(&in_order(phase), ABORT, 1.0).mode;
-        assert!(aborted.interlocks.landing_motor_inhibited && aborted.interlocks.abort_latched);
-        let answer = transition(&aborted, Event::Apogee { booster_attached: false }, 2.0);
-        assert_eq!(answer.mode.phase, Phase::Chute);
-        assert!(answer.effects.contains(Effect::DeployChute));
-    }
-}
-
-#[test]
-fn an_abort_or_a_disarm_before_the_lift_off_leaves_the_vehicle_on_its_pad_as_after_a_misfire() {
-    let abort = Event::AbortRequested { lifted_off: false, above_commit_height: false, gate_open: false };
-    for event in [abort, Event::DisarmRequested { lifted_off: false }] {
-        let aborted = transition(&in_order(Phase::Boost), event, 1.0).mode;
-        let locks = aborted.interlocks;
-        assert_eq!(aborted.phase, Phase::PadIdle);
-        assert!(!locks.armed && locks.abort_latched && locks.landing_motor_inhibited);
-        assert_eq!(aborted.pad_wait_remaining_s(1.0), Some(PAD_ABORT_WAIT_S));
-        // A motor that lights all the same.
-        let risen = transition(&aborted, Event::LiftOff, 2.0).mode;
-        assert!(risen.phase == Phase::Boost && risen.interlocks.landing_motor_inhibited);
-        let apogee = transition(&risen, Event::Apogee { booster_attached: false }, 8.0);
-        assert_eq!(apogee.mode.phase, Phase::Chute);
-    }
-    let risen = transition(&in_order(Phase::Boost), Event::DisarmRequested { lifted_off: true }, 1.0);
-    assert!(matches!(risen.refusal, Some(Refusal::WrongPhase { .. })));
-}
-
-#[test]
 fn after_an_abort_under_thrust_the_vehicle_lands_in_place_and_the_phase_stays() {
     let aborted = transition(&in_order(Phase::Powered), ABORT, 1.0);
     assert_eq!(aborted.mode.phase, Phase::Powered);
@@ -336,12 +267,6 @@ fn no_light_is_latched_once_and_a_late_light_still_counts() {
     let again = transition(&dark, Event::NoThrustTimeout, 1.1);
     assert!(again.effects.is_empty() && again.mode == dark);
     assert_eq!(transition(&dark, Event::ThrustConfirmed, 1.2).mode.phase, Phase::Powered);
-}
-
-#[test]
-fn contact_under_thrust_is_not_a_touchdown() {
-    let answer = transition(&in_order(Phase::Powered), Event::Contact { thrust_below_weight: false }, 1.0);
-    assert_eq!(answer.refusal, Some(Refusal::ThrustAboveWeight));
 }
 
 #[test]
