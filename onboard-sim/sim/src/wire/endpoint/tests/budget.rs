@@ -94,11 +94,8 @@ fn twenty_refused_commands_a_second_cost_no_position_and_are_counted() {
     assert!((2..=8).contains(&texts_sent), "{texts_sent} chunks of text");
     let frames: Vec<Frame> = sent.0.into_iter().map(|(_, frame)| frame).collect();
     let words = texts(&frames);
-    assert!(
-        words[0].contains("start refused: cannot start in PAD_IDLE") && !words[0].contains("more)"),
-        "{words:?}"
-    );
-    assert!(words[1].contains("start refused") && words[1].contains("more)"), "{words:?}");
+    let counts: Vec<bool> = words.iter().take(2).map(|words| words.contains("more)")).collect();
+    assert_eq!(counts, [false, true], "{words:?}");
 }
 
 /// Too much of everything: refused and accepted commands of many stations, questions, requests.
@@ -256,7 +253,7 @@ fn all_links_carry_copies_until_one_is_asked_for_something_else() {
 fn an_interval_is_for_the_link_that_asked_and_a_fast_link_carries_more() {
     let mut wire = two_links();
     wire.run_links(1.0);
-    assert_eq!(wire.ask_over(0, ATTITUDE_QUATERNION_DATA::ID, 20_000.0), MavResult::MAV_RESULT_DENIED as u8);
+    assert_eq!(wire.ask_over(0, ATTITUDE_QUATERNION_DATA::ID, 20_000.0), DENIED);
     assert_eq!(wire.ask_over(1, ATTITUDE_QUATERNION_DATA::ID, 20_000.0), 0);
     let [slow, fast] = wire.run_links(5.0);
     assert!(numbers_are_whole(&slow) && numbers_are_whole(&fast), "a gap would be counted as loss");

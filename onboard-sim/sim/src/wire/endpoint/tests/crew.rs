@@ -1,10 +1,9 @@
 //! Two people at a vehicle's endpoint, with frames that are really signed: who may arm and start, and who may not.
 
 use flight::computer::crew::People;
-use flight::rules::operator::{Name, Operator, Role};
 use protocol::dialect::{TD_CREW_DATA, TdAct, TdHold};
 use protocol::hub::{Hub, LinkEvent, Received};
-use protocol::signing::{Key, Memory, Signing};
+use protocol::signing::{Memory, Signing};
 use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
@@ -12,15 +11,6 @@ use super::*;
 
 /// 2026-11-21, in the units of signatures.
 const CLOCK: u64 = 37_500_000_000_000;
-const FIRST_ASK: u16 = 40_000;
-
-const ARM: u16 = 400;
-const START: u16 = 300;
-const PAUSE: u16 = 193;
-const ABORT: u16 = 185;
-const TAP: u16 = 54_000;
-const TAKE_COMMAND: u16 = 54_001;
-const CHECK: u16 = 54_002;
 
 /// The places of the stations.
 const RANGE: usize = 0;
@@ -31,18 +21,6 @@ const PAD: usize = 3;
 const OBSERVER: usize = 4;
 /// Has no key of this launch.
 const STRANGER: usize = 5;
-
-fn operators() -> Vec<Operator> {
-    let people =
-        [("Ann", Role::RangeSafety), ("Bob", Role::Flight), ("Cat", Role::Flight), ("Dan", Role::Pad)];
-    let operator =
-        |(number, (name, role)): (u8, (&str, Role))| Operator { number, role, name: Name::new(name) };
-    (1..).zip(people).map(operator).collect()
-}
-
-fn key(number: u8) -> Key {
-    Key::new([number; Key::LEN])
-}
 
 struct Station {
     encoder: Encoder,
@@ -151,29 +129,12 @@ impl Launch {
     }
 
     fn command(&mut self, station: usize, command: u16, param1: f32, param3: f32) -> Frame {
-        let payload = COMMAND_LONG_DATA {
-            param1,
-            param3,
-            target_system: 1,
-            target_component: 1,
-            ..COMMAND_LONG_DATA::default()
-        };
-        let mut bytes = [0; 255];
-        let len = mavlink::MessageData::ser(&payload, mavlink::MavlinkVersion::V1, &mut bytes);
-        bytes[28..30].copy_from_slice(&command.to_le_bytes());
-        let encoder = &mut self.stations[station].encoder;
-        let frame = encoder.encode_payload(COMMAND_LONG_DATA::ID, &bytes[..len]).unwrap();
+        let frame = any_command(&mut self.stations[station].encoder, command, [param1, 0.0, param3]);
         self.signed_for(station, &frame)
     }
 
     /// Sends a command; returns the answer to this station, if any, and what the vehicle said.
-    fn says(
-        &mut self,
-        station: usize,
-        command: u16,
-        param1: f32,
-        param3: f32,
-    ) -> (Option<MavResult>, String) {
+    fn says(&mut self, station: usize, command: u16, param1: f32, param3: f32) -> (Option<u8>, String) {
         let frame = self.command(station, command, param1, param3);
         self.sent.clear();
         self.deliver(&frame);
@@ -181,21 +142,14 @@ impl Launch {
         let to = frame.source();
         let mut answers = self.sent.iter().filter_map(CommandAnswer::from_frame);
         let answer = answers.rfind(|answer| answer.target == to);
-        let results = [
-            MavResult::MAV_RESULT_ACCEPTED,
-            MavResult::MAV_RESULT_TEMPORARILY_REJECTED,
-            MavResult::MAV_RESULT_DENIED,
-        ];
-        let result =
-            answer.map(|answer| results.into_iter().find(|result| *result as u8 == answer.result).unwrap());
-        (result, texts(&self.sent).join("; "))
+        (answer.map(|answer| answer.result), texts(&self.sent).join("; "))
     }
 
-    fn asks(&mut self, station: usize, command: u16) -> (Option<MavResult>, String) {
+    fn asks(&mut self, station: usize, command: u16) -> (Option<u8>, String) {
         self.says(station, command, 1.0, 0.0)
     }
 
-    fn confirms(&mut self, station: usize, command: u16) -> (Option<MavResult>, String) {
+    fn confirms(&mut self, station: usize, command: u16) -> (Option<u8>, String) {
         let number = self.crew.as_ref().map_or(0, |crew| crew.ask_number);
         self.says(station, command, 1.0, f32::from(number))
     }
@@ -217,9 +171,9 @@ impl Launch {
     }
 }
 
-const ACCEPTED: Option<MavResult> = Some(MavResult::MAV_RESULT_ACCEPTED);
-const NOT_NOW: Option<MavResult> = Some(MavResult::MAV_RESULT_TEMPORARILY_REJECTED);
-const DENIED: Option<MavResult> = Some(MavResult::MAV_RESULT_DENIED);
+const ACCEPTED: Option<u8> = Some(super::ACCEPTED);
+const NOT_NOW: Option<u8> = Some(super::NOT_NOW);
+const DENIED: Option<u8> = Some(super::DENIED);
 
 #[test]
 fn one_asks_another_confirms_and_both_are_named() {
@@ -256,27 +210,13 @@ fn one_asks_another_confirms_and_both_are_named() {
 }
 
 #[test]
-fn two_asks_at_once_arm_nothing() {
-    let mut launch = Launch::two();
-    let asks = [launch.command(FLIGHT, ARM, 1.0, 0.0), launch.command(RANGE, ARM, 1.0, f32::NAN)];
-    for ask in &asks {
-        launch.deliver(ask);
-    }
-    launch.run(0.5);
-    assert!(!launch.armed());
-    assert_eq!(launch.crew.clone().unwrap().asked_by, 2, "the first one waits");
-}
-
-#[test]
 fn the_start_goes_on_while_the_confirmer_taps() {
     let mut launch = Launch::armed_by_two();
     launch.asks(FLIGHT, START);
     assert!(!launch.counts_down());
     assert_eq!(launch.confirms(PAD, START).0, ACCEPTED);
     assert!(launch.counts_down());
-    let (answer, words) = launch.says(FLIGHT, TAP, 0.0, 0.0);
-    assert_eq!(answer, DENIED);
-    assert!(words.contains("tap refused: PAD Dan taps"), "{words}");
+    assert_eq!(launch.says(FLIGHT, TAP, 0.0, 0.0).0, DENIED);
     for _ in 0..2 {
         assert_eq!(launch.says(PAD, TAP, 0.0, 0.0).0, ACCEPTED);
         launch.run(0.4);
@@ -285,7 +225,6 @@ fn the_start_goes_on_while_the_confirmer_taps() {
     launch.sent.clear();
     launch.run(0.5);
     assert!(launch.armed() && !launch.counts_down(), "held");
-    assert!(texts(&launch.sent).join("; ").contains("no tap of PAD Dan for 1 s"));
     let held = launch.sent.iter().rev().find_map(|frame| match frame.decode() {
         Ok(MavMessage::TD_FLIGHT_STATUS(status)) => Some(status.hold),
         _ => None,
@@ -315,9 +254,7 @@ fn of_the_two_who_start_the_one_who_does_not_command_taps() {
     }
     launch.run(0.15);
     assert!(launch.counts_down());
-    let (answer, words) = launch.says(RANGE, TAKE_COMMAND, 0.0, 0.0);
-    assert_eq!(answer, DENIED);
-    assert!(words.contains("RANGE SAFETY Ann taps"), "{words}");
+    assert_eq!(launch.says(RANGE, TAKE_COMMAND, 0.0, 0.0).0, DENIED);
 }
 
 /// What is lost before T-3 s holds; in the last 2 s nothing does.
@@ -343,36 +280,18 @@ fn taps_that_end_before_t_minus_three_seconds_hold_the_countdown() {
     }
 }
 
-/// After the release a missing tap means nothing.
-#[test]
-fn taps_end_with_the_release() {
-    let mut launch = Launch::armed_by_two();
-    launch.asks(FLIGHT, START);
-    launch.confirms(RANGE, START);
-    while launch.vehicle.phase().on_pad() {
-        assert!(launch.counts_down() && launch.vehicle.time_s() < 40.0);
-        launch.says(RANGE, TAP, 0.0, 0.0);
-    }
-    launch.sent.clear();
-    launch.run(3.0);
-    assert!(!launch.vehicle.phase().on_pad());
-    assert!(!texts(&launch.sent).join("; ").contains("tap"));
-}
-
 #[test]
 fn whoever_holds_a_key_of_this_crew_holds_and_aborts_and_nobody_else() {
     let mut launch = Launch::armed_by_two();
     launch.asks(FLIGHT, START);
     launch.confirms(RANGE, START);
-    assert_ne!(launch.says(STRANGER, PAUSE, 0.0, 0.0).0, ACCEPTED);
+    assert_ne!(launch.says(STRANGER, HOLD, 0.0, 0.0).0, ACCEPTED);
     assert_ne!(launch.says(STRANGER, ABORT, 1.0, 0.0).0, ACCEPTED);
     launch.says(RANGE, TAP, 0.0, 0.0);
     // An observer has the key that all share.
     assert_eq!(launch.says(OBSERVER, ARM, 0.0, 0.0).0, DENIED, "a disarm");
     assert!(launch.counts_down() && !launch.vehicle.aborted());
-    let (answer, words) = launch.says(OBSERVER, PAUSE, 0.0, 0.0);
-    assert_eq!(answer, ACCEPTED);
-    assert!(words.contains("station 251/190 asks for a hold"), "{words}");
+    assert_eq!(launch.says(OBSERVER, HOLD, 0.0, 0.0).0, ACCEPTED);
     assert!(!launch.counts_down());
     let mut aborted = Launch::armed_by_two();
     let (answer, words) = aborted.says(OBSERVER, ABORT, 1.0, 0.0);
@@ -381,16 +300,10 @@ fn whoever_holds_a_key_of_this_crew_holds_and_aborts_and_nobody_else() {
     assert!(aborted.vehicle.aborted());
     launch.asks(FLIGHT, START);
     assert_eq!(launch.confirms(RANGE, START).0, ACCEPTED);
-    // Texts have a share of each second.
-    launch.run(1.5);
-    let (answer, words) = launch.says(FLIGHT_TOO, PAUSE, 0.0, 0.0);
-    assert_eq!(answer, ACCEPTED);
-    assert!(words.contains("FLIGHT Cat, station 253/190 asks for a hold"), "{words}");
+    assert_eq!(launch.says(FLIGHT_TOO, HOLD, 0.0, 0.0).0, ACCEPTED);
     assert!(!launch.counts_down());
     assert_eq!(launch.crew.clone().unwrap().held_by, 3);
-    let (answer, words) = launch.says(PAD, ABORT, 1.0, 0.0);
-    assert_eq!(answer, ACCEPTED);
-    assert!(words.contains("PAD Dan aborts"), "{words}");
+    assert_eq!(launch.says(PAD, ABORT, 1.0, 0.0).0, ACCEPTED);
     assert!(launch.vehicle.aborted());
 }
 
@@ -422,12 +335,8 @@ fn an_abort_takes_as_many_frames_with_a_crew_as_without() {
 #[test]
 fn a_check_takes_one_operator_with_a_key() {
     let mut launch = Launch::two();
-    for (station, expected) in [
-        (OBSERVER, "only an operator with a key of their own commands"),
-        (PAD, "PAD Dan: check of the vehicle begins"),
-    ] {
-        let (_, words) = launch.says(station, CHECK, 1.0, 0.0);
-        assert!(words.contains(expected), "{words}");
+    for (station, answer) in [(OBSERVER, DENIED), (PAD, ACCEPTED)] {
+        assert_eq!(launch.says(station, CHECK, 1.0, 0.0).0, answer);
     }
 }
 
@@ -449,9 +358,7 @@ fn one_person_mode_needs_one_key() {
 fn the_command_passes_only_from_a_silent_station_to_the_same_role_or_range_safety() {
     let mut launch = Launch::armed_by_two();
     launch.speaking = vec![RANGE, FLIGHT, FLIGHT_TOO, PAD];
-    let (answer, words) = launch.says(FLIGHT_TOO, TAKE_COMMAND, 0.0, 0.0);
-    assert_eq!(answer, DENIED);
-    assert!(words.contains("FLIGHT Bob (254/190) is heard"), "{words}");
+    assert_eq!(launch.says(FLIGHT_TOO, TAKE_COMMAND, 0.0, 0.0).0, DENIED);
     launch.speaking = vec![RANGE, FLIGHT_TOO, PAD];
     launch.run(3.0);
     let (answer, words) = launch.says(PAD, TAKE_COMMAND, 0.0, 0.0);
@@ -554,16 +461,13 @@ fn the_log_is_for_operators() {
         launch.sent.clear();
         launch.deliver(&frame);
         launch.run(0.5);
-        let answer = launch.sent.iter().find_map(Packet::answer_in).map(|(_, answer)| answer);
-        (answer, texts(&launch.sent).join("; "))
+        launch.sent.iter().find_map(Packet::answer_in).map(|(_, answer)| answer)
     };
     let open = Packet::request(1, 0, Opcode::OPEN_FILE_RO, 0, "/log/flight.mcap");
     let read = Packet { size: 239, ..Packet::request(2, 0, Opcode::READ_FILE, 0, "") };
-    assert_eq!(fetches(&mut launch, FLIGHT, &open).0.unwrap().number(), Some(1000));
-    let (refused, words) = fetches(&mut launch, OBSERVER, &open);
-    assert_eq!(refused.unwrap().refusal(), Some(Refusal::Busy));
-    assert!(words.contains("log refused: only an operator"), "{words}");
-    assert_eq!(fetches(&mut launch, STRANGER, &open).0, None, "not signed with a known key");
+    assert_eq!(fetches(&mut launch, FLIGHT, &open).unwrap().number(), Some(1000));
+    assert_eq!(fetches(&mut launch, OBSERVER, &open).unwrap().refusal(), Some(Refusal::Busy));
+    assert_eq!(fetches(&mut launch, STRANGER, &open), None, "not signed with a known key");
     // The operator's file is still open.
-    assert_eq!(fetches(&mut launch, FLIGHT, &read).0.unwrap().data.len(), 239);
+    assert_eq!(fetches(&mut launch, FLIGHT, &read).unwrap().data.len(), 239);
 }
