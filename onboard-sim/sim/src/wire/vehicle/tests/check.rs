@@ -53,20 +53,6 @@ fn every_built_in_mission_passes_its_check() {
     }
 }
 
-/// Closed, it stands where it is told to: nothing but the check finds it before the flight.
-#[test]
-fn a_fin_that_stuck_after_the_self_test_is_found_and_named() {
-    let mut rocket = on_the_pad("field", &["fin-stuck:1@pad+1"]);
-    let since_s = rocket.time_s();
-    rocket.run_until(|rocket| rocket.time_s() > since_s + 2.0);
-    assert_eq!(rocket.state().checks_failed(), 0, "{:?}", rocket.arming_checks());
-    let events = checked(&mut rocket);
-    assert_eq!(state(&rocket), CheckState::Failed);
-    // Fin 2 is surface 3.
-    assert_eq!(failing(&rocket), [Item::Range(3), Item::Error(3), Item::Lag(3)]);
-    assert!(said(&events, "check FAILED: fin 2 range and 2 more"), "{events:?}");
-}
-
 /// Every wrong wiring of one or two surfaces: reversed ones, and swapped ones.
 fn wrong_wirings() -> Vec<Fault> {
     let reversed = (0..6).map(|surface| Fault::Reversed { surface });

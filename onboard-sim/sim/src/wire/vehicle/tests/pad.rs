@@ -258,43 +258,28 @@ fn faults_of_the_ascent_end_in_a_landing_or_under_the_parachute() {
     }
 }
 
-/// The booster goes, and the parachute opens at the apogee.
-const FELT_NOTHING: [Phase; 6] =
-    [Phase::PadArmed, Phase::Boost, Phase::Coast, Phase::Deploy, Phase::Chute, Phase::Touchdown];
-
-/// Detections that come early or late because a sensor lies, each with its outcome.
+/// Lift-off is late, seen by the barometer alone. Pressure and satellites part the booster and show the apogee; without an
+/// accelerometer no landing is tried.
 #[test]
-fn a_lying_sensor_neither_lights_the_motor_nor_loses_the_parachute() {
-    // What happens in order, and how the vehicle moves vertically when it believes in its apogee, m/s.
-    let cases: [(&str, &[Phase], core::ops::Range<f64>); 5] = [
-        // Lift-off is late, seen by the barometer alone. Pressure and satellites part the booster and show the apogee; without
-        // an accelerometer no landing is tried.
-        ("accelerometer-dead@0", &FELT_NOTHING, -8.0..2.0),
-        ("accelerometer-dead@boost+1", &FELT_NOTHING, -8.0..2.0),
-        // Two metres a second squared too much, or too little.
-        ("accelerometer-bias:200@boost", &[], -5.0..5.0),
-        ("accelerometer-bias:-200@boost", &[], -5.0..5.0),
-        // A pressure that jumps is passed again.
-        ("barometer-step:-20@coast+0.5", &[], -1.0..1.0),
-    ];
-    let mut hard = Vec::new();
-    for (fault, expected, believed_m_s) in cases {
-        for seed in 1..=4 {
-            let mut flight = flight_of("field", &[fault]);
-            flight.recipe.seed = seed;
-            let (rocket, events) = flown(begun(flight, StartPoint::Pad));
-            let seen = phases(&events);
-            assert!(expected.is_empty() || seen == expected, "{fault}, seed {seed}: {seen:?}");
-            let fall_m_s = rocket.sortie.fell_from().velocity_m_s.z;
-            assert!(believed_m_s.contains(&fall_m_s), "{fault}, seed {seed}: {fall_m_s} m/s, {seen:?}");
-            let impact_m_s = rocket.judged().map_or(f64::NAN, |judged| judged.touchdown.vertical_m_s);
-            if impact_m_s.is_nan() || impact_m_s.abs() >= 15.0 {
-                hard.push(format!("{fault}, seed {seed}: {impact_m_s} m/s, {seen:?}"));
-            }
-        }
+fn a_dead_accelerometer_neither_lights_the_motor_nor_loses_the_parachute() {
+    let mut hard = 0;
+    for (fault, seed) in ["accelerometer-dead@0", "accelerometer-dead@boost+1"]
+        .into_iter()
+        .flat_map(|fault| (1..=4).map(move |seed| (fault, seed)))
+    {
+        let mut flight = flight_of("field", &[fault]);
+        flight.recipe.seed = seed;
+        let (rocket, events) = flown(begun(flight, StartPoint::Pad));
+        let expected =
+            [Phase::PadArmed, Phase::Boost, Phase::Coast, Phase::Deploy, Phase::Chute, Phase::Touchdown];
+        assert_eq!(phases(&events), expected, "{fault}, seed {seed}");
+        let fall_m_s = rocket.sortie.fell_from().velocity_m_s.z;
+        assert!((-8.0..2.0).contains(&fall_m_s), "{fault}, seed {seed}: {fall_m_s} m/s");
+        let impact_m_s = rocket.judged().map_or(f64::NAN, |judged| judged.touchdown.vertical_m_s);
+        hard += u32::from(impact_m_s.is_nan() || impact_m_s.abs() >= 15.0);
     }
     // Of 60 such flights the parachute of 1 fills too late.
-    assert!(hard.len() <= 1, "{hard:?}");
+    assert!(hard <= 1, "{hard}");
 }
 
 /// A motor that nobody lit, in every state of the pad: if the vehicle was armed it flies its mission, else it comes down
@@ -323,24 +308,6 @@ fn an_ascent_motor_that_lights_itself_is_flown() {
         let impact_m_s = rocket.judged().unwrap().touchdown.vertical_m_s;
         assert!(impact_m_s.abs() < 10.0, "{asked:?}: {impact_m_s}");
     }
-}
-
-#[test]
-fn below_a_drone_it_swings_is_armed_and_falls_when_it_is_let_go() {
-    let (rocket, events) = flown(from(StartPoint::Drone, "none", &[]));
-    assert_eq!(
-        phases(&events),
-        [
-            Phase::PadArmed,
-            Phase::Deploy,
-            Phase::AeroDescent,
-            Phase::LandArmed,
-            Phase::Ignition,
-            Phase::Powered,
-            Phase::Touchdown
-        ]
-    );
-    assert!(rocket.judged().unwrap().landing.stands);
 }
 
 #[test]
@@ -391,19 +358,6 @@ fn an_abort_while_it_hangs_inhibits_the_motor_and_stays_on_the_drone() {
     }
     assert_eq!(rocket.phase(), Phase::PadIdle);
     assert!(rocket.sortie.world().hangs() && rocket.mode().interlocks.landing_motor_inhibited);
-}
-
-/// A held countdown does not let a drone's pilot clear the release: nothing falls by itself.
-#[test]
-fn a_hold_while_it_hangs_keeps_it_hanging() {
-    let mut rocket = from(StartPoint::Drone, "field", &[]).run_to(Phase::PadArmed);
-    rocket.request(Asked::Start);
-    rocket.request(Asked::Hold);
-    for _ in 0..3_000 {
-        rocket.advance();
-    }
-    assert_eq!(rocket.phase(), Phase::PadArmed);
-    assert!(rocket.sortie.world().hangs());
 }
 
 /// A reset of 0.1 s on the pad disarms, ends the countdown and is said; the crew may arm and start again.

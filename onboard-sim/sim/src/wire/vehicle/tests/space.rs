@@ -6,7 +6,6 @@ use flight::computer::pilot::FRAMES_PER_PLAN;
 use flight::rules::outputs::PyroOutput;
 use flight::rules::phase::MotorStatus;
 use protocol::dialect::TdChute;
-use protocol::log::record::Record;
 
 use super::*;
 use crate::wire::fly::load_flight;
@@ -127,16 +126,6 @@ fn the_pad_is_felt_and_the_landing_rehearsed_before_anything_is_armed() {
 }
 
 #[test]
-fn every_built_in_mission_is_ready_on_its_pad() {
-    for (name, _) in flight::vehicles::mission::BUILTIN {
-        let flight = load_flight(name).unwrap();
-        let mut rocket = rocket_of(&flight);
-        rocket.run_until(|rocket| rocket.time_s() > 10.0);
-        assert_eq!(rocket.state().checks_failed(), 0, "{name}: {:?}", rocket.arming_checks());
-    }
-}
-
-#[test]
 fn a_mission_that_does_not_land_is_refused_on_the_pad_in_words() {
     let mut flight = flight_of("none", &[]);
     // Far below the ignition band.
@@ -213,34 +202,6 @@ fn a_dead_flight_computer_neither_hears_nor_speaks() {
         assert_eq!(rocket.radio().silent, rocket.sortie.computer_is_dead());
     }
     assert_eq!(silent, 40, "0.2 s in frames of 5 ms");
-}
-
-#[test]
-fn the_log_holds_the_start_every_frame_and_how_well_the_estimate_knew_itself() {
-    let mut rocket = in_phase(&flight_of("field", &[]), Phase::PadArmed);
-    assert!(rocket.records().is_empty());
-    rocket.request(Asked::Start);
-    let (mut starts, mut frames, mut errors) = (Vec::new(), Vec::new(), Vec::new());
-    while !rocket.is_over() {
-        rocket.advance();
-        for record in rocket.computer_records().into_iter().chain(rocket.records()) {
-            match record {
-                Record::ComputerStart(start) => {
-                    assert_eq!(frames.last(), Some(&start.frame));
-                    starts.push(start.released);
-                }
-                Record::ComputerFrame(frame) => frames.push(frame.input.frame),
-                Record::TruthSample(truth) if !truth.in_contact => errors.extend(truth.nees_of_motion),
-                _ => {}
-            }
-        }
-    }
-    assert_eq!(starts, [true], "the start at its power-up comes with its first frame");
-    assert!(frames.windows(2).all(|pair| pair[1] == pair[0] + 1));
-    // Chi-square with 9 degrees of freedom, if the filter knows its errors: on average 9. One flight's errors hang
-    // together, so its average spreads far more than that of independent ones.
-    let mean = errors.iter().sum::<f64>() / errors.len() as f64;
-    assert!(errors.len() > 1_000 && (2.0..27.0).contains(&mean), "{} of {}", mean, errors.len());
 }
 
 /// As from a board: the truth is in the log alone.
@@ -352,30 +313,6 @@ fn a_motor_that_was_not_lit_or_did_not_light_is_live_until_its_pin_is_back() {
 }
 
 // An abort in every phase that the flight passes.
-
-#[test]
-fn an_abort_on_the_pad_disarms_latches_and_lets_nothing_go() {
-    let flight = flight_of("none", &[]);
-    for phase in [Phase::PadIdle, Phase::PadArmed] {
-        let mut rocket = in_phase(&flight, phase);
-        rocket.request(Asked::Start);
-        assert_eq!(rocket.computer().abort_effect(), AbortEffect::SafeOnPad);
-        assert_eq!(rocket.request(Asked::Abort).ending, Ending::Accepted);
-        let after = *rocket.mode();
-        assert!(!after.interlocks.armed && after.interlocks.landing_motor_inhibited);
-        let abort_effect = rocket.computer().abort_effect();
-        assert_eq!(
-            (after.pad_wait_remaining_s(rocket.time_s()), abort_effect),
-            (Some(60.0), AbortEffect::None)
-        );
-        for _ in 0..2_000 {
-            rocket.advance();
-        }
-        assert_eq!(rocket.phase(), Phase::PadIdle);
-        assert!(rocket.computer().released_at_s().is_none() && rocket.is_over());
-        assert_ne!(rocket.request(Asked::Arm).ending, Ending::Accepted);
-    }
-}
 
 #[test]
 fn an_abort_with_room_left_opens_the_parachute_and_lights_nothing() {
