@@ -50,20 +50,6 @@ fn regress_flights_with_an_abort_in_the_burn_land_as_often_as_without() {
     assert!(otherwise.count() >= 3 * 35, "an abort ends the homing to the pad");
 }
 
-/// Right after the command to light, where an abort used to cost most landings.
-#[test]
-fn an_abort_right_after_the_ignition_lands() {
-    let recipe = recipe(Some("abort@ignition+0.3"));
-    for number in 0..3 {
-        let mut tally = Tally::new(&recipe, number).unwrap();
-        while tally.step() {}
-        let locks = tally.flight().computer().mode().interlocks;
-        assert!(locks.abort_latched && locks.lands_in_place);
-        let row = tally.row();
-        assert!(row.stands, "{number}: {} {:?} m/s", row.failure, row.touchdown_vertical_m_s);
-    }
-}
-
 /// Too low for the parachute, at the first moment that the gate is open: the motor is lit at the height that was chosen. A fall
 /// would end at about 37 m/s.
 #[test]
@@ -91,23 +77,4 @@ fn an_abort_before_the_ignition_with_the_gate_open_burns_at_its_height_and_lands
     let slow = |row: &Row| row.touchdown_vertical_m_s.is_some_and(|m_s| m_s.abs() < 12.0);
     assert!(rows.iter().all(|row| row.ignited && !row.parachute && slow(row)));
     assert!(landed(&rows) >= 7, "{} of 8", landed(&rows));
-}
-
-/// The impact speed that is reported to the crew is the speed at which the fall ends.
-#[test]
-fn an_abort_without_ignition_hits_the_ground_at_the_predicted_speed() {
-    let recipe = recipe(Some("no-light@0"));
-    let mut tally = Tally::new(&recipe, 0).unwrap();
-    while !tally.flight().computer().mode().interlocks.no_light_latched {
-        assert!(tally.step());
-    }
-    let predicted_m_s = tally.flight().pilot().impact_m_s().unwrap();
-    tally.step();
-    // The fins are open: the prediction assumes it, and the phase table asks for it.
-    let open_rad = tally.flight().mission().airframe.fins.open_rad();
-    let fins_rad = tally.flight().computer().commands().fins_rad;
-    assert_eq!(fins_rad.map(f64::to_bits), [open_rad.to_bits(); 4]);
-    while tally.step() {}
-    let found_m_s = -tally.row().touchdown_vertical_m_s.unwrap();
-    assert!((predicted_m_s - found_m_s).abs() < 2.0, "{predicted_m_s} m/s predicted, {found_m_s} found");
 }

