@@ -1,7 +1,6 @@
 //! Framing under every chunk size, garbage, cut frames and random bytes.
 #![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
-use proptest::prelude::*;
 use protocol::dialect::{
     ATTITUDE_QUATERNION_DATA, COMMAND_LONG_DATA, HEARTBEAT_DATA, MavCmd, MavMessage, TD_PREDICTED_PATH_DATA,
 };
@@ -174,45 +173,4 @@ fn an_unknown_message_id_is_counted_and_skipped() {
     assert_eq!(drain(&mut framer).len(), 1);
     assert_eq!(framer.counters().unknown_ids, 1);
     assert_eq!(Encoder::new(GROUND).encode_payload(0x000E_EEEE, &[1]), None);
-}
-
-proptest! {
-    #[test]
-    fn random_bytes_never_panic_and_are_all_counted(
-        chunks in prop::collection::vec(prop::collection::vec(any::<u8>(), 0..600), 0..8)
-    ) {
-        let mut framer = Framer::new();
-        let mut framed = 0;
-        for chunk in &chunks {
-            framer.push(chunk);
-            for frame in drain(&mut framer) {
-                framed += frame.as_bytes().len();
-                let _ = frame.decode();
-            }
-        }
-        framer.on_silence();
-        for frame in drain(&mut framer) {
-            framed += frame.as_bytes().len();
-        }
-        let total: usize = chunks.iter().map(Vec::len).sum();
-        prop_assert_eq!(framer.counters().garbage_bytes as usize + framed, total);
-    }
-
-    /// Random payloads with a correct CRC pass the framing and reach the typed decoders.
-    #[test]
-    fn random_payloads_never_panic_a_decoder(
-        message_id in prop_oneof![0u32..=511, 54_000u32..=54_010],
-        payload in prop::collection::vec(any::<u8>(), 1..=255),
-    ) {
-        let mut encoder = Encoder::new(GROUND);
-        if let Some(frame) = encoder.encode_payload(message_id, &payload) {
-            let mut framer = Framer::new();
-            framer.push(frame.as_bytes());
-            let found = framer.next_frame();
-            prop_assert_eq!(found.as_ref(), Some(&frame));
-            let _ = frame.decode();
-            let _ = protocol::command::CommandRequest::from_frame(&frame);
-            let _ = protocol::command::CommandAnswer::from_frame(&frame);
-        }
-    }
 }

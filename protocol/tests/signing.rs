@@ -106,14 +106,6 @@ fn a_restart_forgets_neither_what_was_heard_nor_what_was_sent() {
 }
 
 #[test]
-fn a_later_time_is_adopted_from_a_holder_of_the_key() {
-    let mut vehicle = side(7);
-    vehicle.check(&side(7).sign(&beat(), 0, NOW), 0).unwrap();
-    let old = side(7).sign(&beat(), 9, NOW - 61 * SECOND);
-    assert_eq!(vehicle.check(&old, 0), Err(Rejection::TooOld));
-}
-
-#[test]
 fn an_unreadable_memory_names_its_line() {
     for bad in ["ours x", "heard 1 2 3", "heard 256 1 0 5", "ours 281474976710656", "theirs 5", ""] {
         let text = format!("ours 5\n{bad}\nheard 1 1 0 5\n");
