@@ -105,28 +105,3 @@ fn an_edited_and_a_forged_book_are_not_proven() {
     assert!(!found.is_proven() && found.missing.len() == 1, "{found:?}");
     assert!(!audit_logs(&[&log], Some(truth.key.public())).unwrap().is_proven());
 }
-
-#[test]
-fn a_cut_book_is_shorter_than_what_the_vehicle_has() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut cut = day("Bob", 1);
-    let vehicle = vehicle_log(&folder.path().join("v.mcap"), &cut.told);
-    cut.entries.truncate(2);
-    cut.heads.truncate(2);
-    let log = ground_log(&folder.path().join("cut.mcap"), &cut);
-    let found = audited(&[&log, &vehicle]);
-    assert!(
-        found.books[0].broken.as_ref().unwrap().contains("the book was cut: it has 2 entries"),
-        "{found:?}"
-    );
-    let found = audited(&[&log]);
-    assert!(!found.is_proven() && found.books[0].broken.is_none(), "not closed, so its end is not proven");
-}
-
-#[test]
-fn a_file_that_is_no_log_is_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    let text = folder.path().join("a.txt");
-    std::fs::write(&text, "no log").unwrap();
-    assert!(audit_logs(&[&text], None).unwrap_err().to_string().contains("is not a flight log"));
-}

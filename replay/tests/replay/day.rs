@@ -84,7 +84,6 @@ fn a_log_brings_its_mission_and_its_answer_ends_in_a_word() {
     let (code, stdout, stderr) = learn(&[LANDED.log.to_str().unwrap()]);
     assert!(code != 1, "{stderr}");
     assert!(stdout.ends_with(if code == 0 { "\nGO\n" } else { "\nNO-GO\n" }), "{stdout}");
-    assert!(stdout.contains("risk ") && stdout.contains("95 % interval"), "{stdout}");
     // A careful club's day, and not the kindest, unless it is asked for.
     assert!(stdout.contains("prior real\n") && stdout.contains("6 simulated flights in real\n"), "{stdout}");
     let asked = [LANDED.log.to_str().unwrap(), "--prior", "field", "--limit", "0.01"];
@@ -109,7 +108,6 @@ fn flights_that_did_not_land_are_no_go_and_one_log_counts_once() {
     let asked = [path.to_str().unwrap(), "--mission", "mk2", "--prior", "field", "--limit", "0.5"];
     let (code, stdout, stderr) = learn(&asked);
     assert!(code == 3 && stdout.contains("flown     0 of 11 landed"), "{stdout}{stderr}");
-    assert!(stdout.contains("NO-GO"), "{stdout}");
 
     let log = LANDED.log.to_str().unwrap();
     let again = directory.path().join("again.mcap");

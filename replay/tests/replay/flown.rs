@@ -171,10 +171,3 @@ pub(crate) fn verify_frames(frames: &[ComputerFrame]) -> VerifyReport {
     let recipe = Recipe { with_frames: false, ..Recipe::default() };
     verify_bytes(&write_log(frames, &recipe).bytes).unwrap()
 }
-
-/// A frame with this number; for tests that need no flight.
-pub(crate) fn idle_frame(number: u64) -> ComputerFrame {
-    let mut frame = FLIGHT.frames[0].clone();
-    frame.input.frame = number;
-    frame
-}

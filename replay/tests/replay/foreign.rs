@@ -37,9 +37,9 @@ fn other_kinds_of_files_are_refused_by_their_first_bytes() {
 #[test]
 fn an_mcap_file_of_another_program_is_refused_by_its_topics() {
     let reason = refusal(&foreign_mcap("/pose"));
-    assert!(reason.contains("written by \"robot\""), "{reason}");
-    assert!(reason.contains("the topics /pose"), "{reason}");
-    assert!(reason.contains("none of /computer/frame"), "{reason}");
+    for words in ["written by \"robot\"", "the topics /pose", "none of /computer/frame"] {
+        assert!(reason.contains(words), "{reason}");
+    }
     // Our topic's name alone does not make it ours.
     assert!(matches!(verify_bytes(&foreign_mcap("/computer/frame")), Err(LogError::Foreign { .. })));
 }
@@ -47,10 +47,4 @@ fn an_mcap_file_of_another_program_is_refused_by_its_topics() {
 #[test]
 fn the_start_of_a_log_alone_is_refused() {
     assert!(matches!(verify_bytes(b"\x89MCAP0\r\n"), Err(LogError::NothingReadable { .. })));
-}
-
-#[test]
-fn escape_sequences_of_a_file_do_not_reach_the_terminal() {
-    let reason = refusal(&foreign_mcap("/\x1b[2J"));
-    assert!(!reason.contains('\x1b'), "{reason:?}");
 }

@@ -110,20 +110,18 @@ fn a_clock_that_is_set_while_it_records_loses_no_frame() {
 /// The verdict that was heard is the vehicle's own, to the precision of a message.
 #[test]
 fn a_ground_log_has_the_verdict_that_was_heard() {
-    {
-        let (heard, own) = (info(&GROUND).unwrap(), info(&WITH_FRAMES.log).unwrap());
-        let (verdict, recorded) = (heard.verdict.unwrap(), own.verdict.unwrap());
-        assert_eq!((verdict.landing, verdict.clock), (recorded.landing, Clock::Boot));
-        let boot = own.clocks.convert(recorded.contact(), Clock::Boot).unwrap();
-        assert!((verdict.time_s - boot.time_s).abs() < 0.001, "{} {boot}", verdict.time_s);
-        let limits = verdict.envelope.iter().zip(&recorded.envelope);
-        for (heard, own) in limits {
-            assert_eq!((&heard.name, &heard.unit, heard.passed), (&own.name, &own.unit, own.passed));
-            assert!((heard.value - own.value).abs() < 1e-4, "{heard:?} {own:?}");
-            assert!((heard.maximum - own.maximum).abs() < 1e-4, "{heard:?} {own:?}");
-        }
-        assert!(heard.phases.iter().any(|phases| phases.spans.len() > 3));
+    let (heard, own) = (info(&GROUND).unwrap(), info(&WITH_FRAMES.log).unwrap());
+    let (verdict, recorded) = (heard.verdict.unwrap(), own.verdict.unwrap());
+    assert_eq!((verdict.landing, verdict.clock), (recorded.landing, Clock::Boot));
+    let boot = own.clocks.convert(recorded.contact(), Clock::Boot).unwrap();
+    assert!((verdict.time_s - boot.time_s).abs() < 0.001, "{} {boot}", verdict.time_s);
+    let limits = verdict.envelope.iter().zip(&recorded.envelope);
+    for (heard, own) in limits {
+        assert_eq!((&heard.name, &heard.unit, heard.passed), (&own.name, &own.unit, own.passed));
+        assert!((heard.value - own.value).abs() < 1e-4, "{heard:?} {own:?}");
+        assert!((heard.maximum - own.maximum).abs() < 1e-4, "{heard:?} {own:?}");
     }
+    assert!(heard.phases.iter().any(|phases| phases.spans.len() > 3));
 }
 
 #[test]

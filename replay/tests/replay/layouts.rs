@@ -65,25 +65,22 @@ fn plotjuggler_curves(text: &str) -> Vec<String> {
 
 #[test]
 fn every_path_of_a_layout_is_a_number_of_a_recorded_log() {
-    {
-        let (vehicle, flight) = ("space", &*MK2);
-        let topics = topics(flight);
-        let found = |topic: &str, path: Vec<&str>| {
-            let message = topics.get(topic).unwrap_or_else(|| panic!("{vehicle}: no topic {topic}"));
-            assert!(is_number(message, &path), "{vehicle}: {topic} has no number {path:?}");
-        };
-        let foxglove = foxglove_paths(&layout(&format!("foxglove-{vehicle}.json")));
-        for value in &foxglove {
-            let (topic, path) = value.split_once('.').unwrap();
-            found(topic, path.split('.').collect());
-        }
-        let plotjuggler = plotjuggler_curves(&layout(&format!("plotjuggler-{vehicle}.xml")));
-        for curve in &plotjuggler {
-            let topic = topics.keys().find(|topic| curve.starts_with(&format!("{topic}/")));
-            let topic = topic.unwrap_or_else(|| panic!("{vehicle}: no topic of {curve}"));
-            found(topic, curve[topic.len() + 1..].split('/').collect());
-        }
-        // Both programs are shown the same.
-        assert!(foxglove.len() > 15 && foxglove.len() == plotjuggler.len(), "{vehicle}");
+    let topics = topics(&MK2);
+    let found = |topic: &str, path: Vec<&str>| {
+        let message = topics.get(topic).unwrap_or_else(|| panic!("no topic {topic}"));
+        assert!(is_number(message, &path), "{topic} has no number {path:?}");
+    };
+    let foxglove = foxglove_paths(&layout("foxglove-space.json"));
+    for value in &foxglove {
+        let (topic, path) = value.split_once('.').unwrap();
+        found(topic, path.split('.').collect());
     }
+    let plotjuggler = plotjuggler_curves(&layout("plotjuggler-space.xml"));
+    for curve in &plotjuggler {
+        let topic = topics.keys().find(|topic| curve.starts_with(&format!("{topic}/")));
+        let topic = topic.unwrap_or_else(|| panic!("no topic of {curve}"));
+        found(topic, curve[topic.len() + 1..].split('/').collect());
+    }
+    // Both programs are shown the same.
+    assert!(foxglove.len() > 15 && foxglove.len() == plotjuggler.len());
 }

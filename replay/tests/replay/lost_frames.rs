@@ -5,16 +5,13 @@ use std::sync::LazyLock;
 
 use replay::controller::AgainError;
 use replay::evaluate::evaluate;
-use replay::info::{GradeLevel, info};
-use replay::log::{Gap, Recording, RecordingError};
+use replay::log::Recording;
 use replay::recover::recover;
 use replay::refly::{ReflyOptions, refly};
 use replay::report::report;
 use replay::verify::explain::explain;
-use replay::verify::{Obstacle, Verification, verify};
 
 use crate::command_line::{replay, run};
-use crate::flown::only;
 use crate::from_apogee::LANDED;
 
 /// The landed flight's log, with a bit turned in a chunk in its middle, recovered.
@@ -30,28 +27,18 @@ pub(crate) static RECOVERED: LazyLock<PathBuf> = LazyLock::new(|| {
     recovered
 });
 
-/// The last frame before the loss, the first after it, and the last of all.
-fn around_the_loss(recording: &Recording) -> (u64, u64, u64) {
+/// The last frame before the loss, and the first after it.
+fn around_the_loss(recording: &Recording) -> (u64, u64) {
     let gap = recording.gap().unwrap();
     let last = recording.frames.last().unwrap().input.frame;
     assert!(1 < gap.after && gap.after + 1 < gap.before && gap.before < last, "{gap:?}, {last}");
-    (gap.after, gap.before, last)
-}
-
-#[test]
-fn verify_ends_at_the_loss() {
-    let recording = Recording::open(&RECOVERED).unwrap();
-    let (after, before, _) = around_the_loss(&recording);
-    let report = only(verify(&RECOVERED).unwrap());
-    assert_eq!(report.outcome, Verification::NotReplayable, "{report:?}");
-    assert_eq!(report.obstacle, Some(Obstacle::Gap(Gap { after, before })));
-    assert_eq!((report.first_divergence, report.frames_identical), (None, after));
+    (gap.after, gap.before)
 }
 
 #[test]
 fn an_evaluation_ends_at_the_loss_and_says_so() {
     let recording = Recording::open(&RECOVERED).unwrap();
-    let (after, before, _) = around_the_loss(&recording);
+    let (after, before) = around_the_loss(&recording);
     let evaluated = evaluate(&recording, &[]).unwrap();
     assert_eq!(evaluated.frames.last().unwrap().frame, after);
     assert!(evaluated.frames.iter().all(|frame| frame.recorded == frame.evaluated));
@@ -63,22 +50,10 @@ fn an_evaluation_ends_at_the_loss_and_says_so() {
 #[test]
 fn a_frame_after_the_loss_is_refused() {
     let recording = Recording::open(&RECOVERED).unwrap();
-    let (after, before, _) = around_the_loss(&recording);
+    let (after, before) = around_the_loss(&recording);
     assert!(explain(&recording, after).unwrap().identical);
     let refusal = explain(&recording, before).unwrap_err();
     assert!(matches!(refusal, AgainError::NoFrame { last, .. } if last == after), "{refusal}");
-}
-
-#[test]
-fn the_grade_says_up_to_which_frame_the_log_can_be_run_again() {
-    let (after, before, last) = around_the_loss(&Recording::open(&RECOVERED).unwrap());
-    let grade = info(&RECOVERED).unwrap().grade;
-    assert_eq!(grade.level, GradeLevel::BitExact);
-    let reason = format!("up to frame {after} of {last}: those up to frame {before} are lost");
-    assert!(grade.reason.starts_with(&reason), "{}", grade.reason);
-    let whole = info(&LANDED.log).unwrap();
-    let frames = whole.frames.unwrap();
-    assert_eq!((frames.restarts, frames.lost, frames.first_lost), (0, 0, None));
 }
 
 /// The flight is flown again from its draw and compared with the frames on both sides of the loss.
@@ -93,17 +68,7 @@ fn a_flight_is_flown_again_across_the_loss() {
 
 #[test]
 fn the_report_says_up_to_which_frame_the_log_can_be_run_again() {
-    let (after, ..) = around_the_loss(&Recording::open(&RECOVERED).unwrap());
+    let (after, _) = around_the_loss(&Recording::open(&RECOVERED).unwrap());
     let page = report(&RECOVERED, None).unwrap().html;
     assert!(page.contains(&format!("bit-exact: up to frame {after} of")), "grade");
-}
-
-/// If the first frames are lost, nothing can be executed again.
-#[test]
-fn without_its_first_frames_nothing_is_run_again() {
-    let mut recording = Recording::open(&LANDED.log).unwrap();
-    recording.frames.drain(..100);
-    recording.frames_unbroken = 0;
-    let refusal = recording.replayable_frames().unwrap_err();
-    assert!(matches!(refusal, RecordingError::BeginningLost { first: 101, .. }), "{refusal}");
 }

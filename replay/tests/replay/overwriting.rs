@@ -146,8 +146,7 @@ fn half_an_output_replaces_nothing() {
         let mut command = Command::new("sh");
         command.args(["-c", "trap '' XFSZ; ulimit -f 8; exec \"$@\"", "sh", env!("CARGO_BIN_EXE_replay")]);
         command.arg(arguments[0]).arg(&log).args(&arguments[1..]).arg(&output);
-        let refused = refusal(&mut command);
-        assert!(refused.contains(": cannot be written"), "{arguments:?}: {refused}");
+        refusal(&mut command);
         assert_eq!(std::fs::read(&output).unwrap(), OTHERS, "{arguments:?}");
         let mut expected = vec!["flight.mcap".to_owned(), name.to_owned()];
         expected.sort();

@@ -28,19 +28,6 @@ fn recovered(bytes: &[u8], directory: &Path) -> Option<(replay::recover::Recover
     Some((recovery, Recording::open(&output).ok()?))
 }
 
-#[test]
-fn a_whole_log_recovers_whole() {
-    let directory = tempfile::tempdir().unwrap();
-    let bytes = std::fs::read(&DISPERSED.log).unwrap();
-    let (recovery, again) = recovered(&bytes, directory.path()).unwrap();
-    assert!(recovery.ended && recovery.lost.is_empty(), "{recovery:?}");
-    let then = DISPERSED.recording();
-    assert_eq!((again.frames, again.world, again.verdict), (then.frames, then.world, then.verdict));
-    assert_eq!(again.damage, None);
-    let verified = only(verify(&directory.path().join("out.mcap")).unwrap());
-    assert_eq!(verified.outcome, Verification::Identical, "profile and all");
-}
-
 /// The log of a killed recorder: everything that was synced, and the result is a whole log.
 #[test]
 fn a_cut_log_recovers_what_was_synced() {
@@ -56,16 +43,6 @@ fn a_cut_log_recovers_what_was_synced() {
         assert_eq!(verified.outcome, Verification::IdenticalReadablePart);
         assert_eq!((verified.frames_identical, verified.cut.unwrap().contact_s), (*frames as u64, None));
     }
-}
-
-/// Its own end says nothing about what the damaged log has lost.
-#[test]
-fn a_recovered_log_does_not_say_how_little_is_lost() {
-    let directory = tempfile::tempdir().unwrap();
-    let (recovery, _) = recovered(&WHOLE.bytes[..WHOLE.bytes.len() / 2], directory.path()).unwrap();
-    assert!(recovery.fault().is_some());
-    let found = info(&directory.path().join("out.mcap")).unwrap().completeness;
-    assert_eq!((found.complete, found.missing_s), (false, None));
 }
 
 /// A number in the summary is believed only under the summary's checksum.

@@ -26,18 +26,13 @@ pub(crate) struct Simulated {
 }
 
 /// A rocket from apogee, flown as the vehicle flies it, without links.
-pub(crate) static MK2: LazyLock<Simulated> = LazyLock::new(|| simulate("mk2", 1, &[]));
+pub(crate) static MK2: LazyLock<Simulated> = LazyLock::new(|| simulate(1, &[]));
 
 /// The same with other dispersions.
-pub(crate) static DISPERSED: LazyLock<Simulated> = LazyLock::new(|| simulate("mk2", 2, &[]));
+pub(crate) static DISPERSED: LazyLock<Simulated> = LazyLock::new(|| simulate(2, &[]));
 
 /// The first flight with telemetry to no receiver, so that its log has raw frames.
-pub(crate) static WITH_FRAMES: LazyLock<Simulated> = LazyLock::new(|| with_frames("mk2"));
-
-/// A landing with telemetry to no receiver.
-pub(crate) fn with_frames(profile: &str) -> Simulated {
-    to_nobody(|link| simulate(profile, 1, &[link]))
-}
+pub(crate) static WITH_FRAMES: LazyLock<Simulated> = LazyLock::new(|| to_nobody(|link| simulate(1, &[link])));
 
 /// A flight with telemetry to no receiver.
 pub(crate) fn to_nobody(fly: impl FnOnce(LinkAddress) -> Simulated) -> Simulated {
@@ -72,9 +67,9 @@ impl Simulated {
     }
 }
 
-/// Flies a profile to the ground and writes its log.
-pub(crate) fn simulate(profile: &str, seed: u64, links: &[LinkAddress]) -> Simulated {
-    let RocketFlight { mut recipe, .. } = load_flight(profile).unwrap();
+/// Flies mk2 to the ground and writes its log.
+fn simulate(seed: u64, links: &[LinkAddress]) -> Simulated {
+    let RocketFlight { mut recipe, .. } = load_flight("mk2").unwrap();
     recipe.seed = seed;
     simulate_recipe(recipe, links)
 }

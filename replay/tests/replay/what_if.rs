@@ -2,6 +2,7 @@
 
 use replay::refly::{ReflyOptions, margin, other_flights, refly};
 
+use crate::asked::with;
 use crate::simulated::MK2;
 
 #[test]
@@ -18,10 +19,6 @@ fn the_margin_is_the_fraction_left_of_the_nearest_limit() {
     assert!((margin(&verdict) + 1.0).abs() < 1e-12);
     verdict.envelope[1].value = f64::NAN;
     assert!(margin(&verdict).is_infinite() && margin(&verdict) < 0.0);
-}
-
-fn setting(text: &str) -> ReflyOptions {
-    ReflyOptions { settings: vec![text.parse().unwrap()], ..ReflyOptions::default() }
 }
 
 /// A vehicle that fell over is as far from standing as its contact says: the harder contact has less margin.
@@ -43,7 +40,7 @@ fn failed_flights_have_an_order() {
 fn a_setting_that_never_acts_is_told() {
     let recording = MK2.recording();
     for (text, never) in [("ignition.delay_s=0.5@50000", true), ("ignition.delay_s=0.5", false)] {
-        let report = refly(&recording, &setting(text)).unwrap();
+        let report = refly(&recording, &with(&[text])).unwrap();
         assert_eq!(report.never_acted, never, "{text}: {report:?}");
     }
     let unchanged = refly(&recording, &ReflyOptions::default()).unwrap();
@@ -60,6 +57,6 @@ fn other_flights_say_what_a_change_does() {
     none.faults.with.push("no-light@0".to_owned());
     let none = other_flights(&recording, &none, 8).unwrap();
     assert_eq!((none.stand, none.lost), (0, none.stood));
-    let refused = other_flights(&recording, &setting("ignition.delay_s=0.5@6"), 8).unwrap_err();
+    let refused = other_flights(&recording, &with(&["ignition.delay_s=0.5@6"]), 8).unwrap_err();
     assert!(refused.to_string().starts_with("--flights: takes --set without a time"), "{refused}");
 }
