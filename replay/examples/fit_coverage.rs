@@ -1,6 +1,6 @@
 //! Flies simulated flights, fits each from what its log would hold, and counts how often the 95 % intervals hold the truth.
 //!
-//! `cargo run --release -p replay --example fit_coverage -- MISSION DISPERSION FLIGHTS SEED`
+//! `cargo run --release -p replay --example fit_coverage -- MISSION DISPERSION FLIGHTS SEED [pad]`
 //!
 //! With `--table FILE FLIGHTS SEED` it writes instead what the intervals lack, the table that `replay fit` widens them by.
 
@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use std::io::Write as _;
 
 use anyhow::Context as _;
+use flight::vehicle::mission::StartPoint;
 use onboard_sim::run::in_parallel;
 use onboard_sim::statistics::{Share, quantile, sorted};
 use replay::fit::calibration::{Entry, Table};
@@ -81,6 +82,7 @@ fn main() -> anyhow::Result<()> {
         return write_table(&at(1, "calibration.toml"), number(2, "200")?, number(3, "9001")?);
     }
     let recipe = Recipe::built_in(&at(0, "mk2"), &at(1, "field"))?;
+    let recipe = if at(4, "") == "pad" { recipe.starting_at(StartPoint::Pad)? } else { recipe };
     let recipe = Recipe { seed: number(3, "1")?, ..recipe };
     print_coverage(&tallied(&recipe, number(2, "100")?, fit)?)
 }
@@ -123,8 +125,19 @@ const FEWEST: usize = 20;
 fn write_table(file: &str, flights: u64, seed: u64) -> anyhow::Result<()> {
     let mut vehicles = BTreeMap::new();
     for vehicle in VEHICLES {
-        let of =
-            |set: &str| tallied(&Recipe { seed, ..Recipe::built_in(vehicle, set)? }, flights, uncalibrated);
+        let of = |set: &str| -> anyhow::Result<Tallies> {
+            let recipe = Recipe { seed, ..Recipe::built_in(vehicle, set)? };
+            let mut tallies = tallied(&recipe, flights, uncalibrated)?;
+            // A flight from its pad brings another estimate to its burn.
+            for (name, (found, lacks)) in
+                tallied(&recipe.starting_at(StartPoint::Pad)?, flights, uncalibrated)?
+            {
+                let both = tallies.entry(name).or_default();
+                both.0.extend(found);
+                both.1 += lacks;
+            }
+            Ok(tallies)
+        };
         let (real, mut wild) = (of(SETS[0])?, of(SETS[1])?);
         let mut by_name: BTreeMap<String, [Vec<Found>; 2]> = real
             .into_iter()
@@ -138,7 +151,8 @@ fn write_table(file: &str, flights: u64, seed: u64) -> anyhow::Result<()> {
             let both = [0, 1].map(|set: usize| [x[set].as_slice(), y[set].as_slice()].concat());
             by_name.extend(["wind_x", "wind_y"].map(|name| (name.to_owned(), both.clone())));
         }
-        let entries = by_name.into_iter().map(|(name, [real, wild])| (name, entry([&real, &wild], flights)));
+        let entries =
+            by_name.into_iter().map(|(name, [real, wild])| (name, entry([&real, &wild], 2 * flights)));
         vehicles.insert(vehicle.to_owned(), entries.collect());
     }
     let table = Table { sets: SETS.map(str::to_owned).to_vec(), flights, seed, vehicles };

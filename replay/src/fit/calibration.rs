@@ -20,7 +20,7 @@ const TABLE: &str = include_str!("calibration.toml");
 pub struct Table {
     /// The sets that were flown, which count alike.
     pub sets: Vec<String>,
-    /// Flights of each vehicle in each set.
+    /// Flights of each vehicle in each set, from apogee and as many from the pad.
     pub flights: u64,
     pub seed: u64,
     /// By vehicle and parameter.
