@@ -14,19 +14,8 @@ use clap::ValueEnum;
 pub use tables::{ExportedFile, export_tables};
 
 use crate::cli::{Answer, give, warn_of_loss};
-use crate::log::{FlightLog, ImportedTlog, LogError, import_tlog, is_tlog};
-use crate::output::WriteError;
+use crate::log::{FlightLog, ImportedTlog, import_tlog, is_tlog};
 use protocol::program::Exit;
-
-/// Why a log could not be exported.
-#[derive(Debug, thiserror::Error)]
-pub enum ExportError {
-    /// The file is not a flight log, or cannot be read.
-    #[error(transparent)]
-    Log(#[from] LogError),
-    #[error(transparent)]
-    Write(#[from] WriteError),
-}
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
@@ -57,6 +46,10 @@ enum Format {
 impl Args {
     pub(crate) fn run(self) -> Result<Exit> {
         let is_tlog = is_tlog(&self.file).with_context(|| self.file.display().to_string())?;
+        if !is_tlog {
+            // What is no log needs no format.
+            FlightLog::open(&self.file)?;
+        }
         let format = self.to.or(is_tlog.then_some(Format::Mcap));
         let format = format.context("--to is missing: csv or rrd")?;
         let output = self.out.clone().or_else(|| is_tlog.then(|| self.file.with_extension("mcap")));

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
+use anyhow::Result;
 use serde::Serialize;
 
-use super::ExportError;
 use crate::log::FlightLog;
 use crate::output::{NewFile, WriteError, new_folder};
 use crate::table::{Cell, Column, Kind, Meaning, TableReader, TableShape};
@@ -24,15 +24,12 @@ pub struct ExportedFile {
 ///
 /// # Errors
 /// The log cannot be read, or a file cannot be written.
-pub fn export_tables<R: Read>(
-    log: &mut FlightLog<R>,
-    directory: &Path,
-) -> Result<Vec<ExportedFile>, ExportError> {
+pub fn export_tables<R: Read>(log: &mut FlightLog<R>, directory: &Path) -> Result<Vec<ExportedFile>> {
     // It is made with the first table, so that a file that is not a flight log leaves nothing behind.
     let mut folder = None;
     let mut open: BTreeMap<usize, (ExportedFile, csv::Writer<NewFile>)> = BTreeMap::new();
     let mut reader = TableReader::new();
-    reader.read::<R, ExportError>(log, |shape, row| {
+    reader.read::<R, anyhow::Error>(log, |shape, row| {
         let (file, csv) = match open.entry(row.table) {
             std::collections::btree_map::Entry::Occupied(entry) => entry.into_mut(),
             std::collections::btree_map::Entry::Vacant(entry) => {
@@ -52,7 +49,7 @@ pub fn export_tables<R: Read>(
         let written = written.map_err(WriteError::at(&file.path))?;
         Ok((file, written))
     });
-    let mut whole: Vec<(ExportedFile, NewFile)> = finished.collect::<Result<_, ExportError>>()?;
+    let mut whole: Vec<(ExportedFile, NewFile)> = finished.collect::<Result<_>>()?;
     if let Some((folder, _held)) = &folder {
         let path = folder.join(DICTIONARY);
         let file = NewFile::replace(&path)?;
@@ -67,7 +64,7 @@ pub fn export_tables<R: Read>(
     Ok(files)
 }
 
-fn create(folder: &Path, shape: &TableShape) -> Result<(ExportedFile, csv::Writer<NewFile>), ExportError> {
+fn create(folder: &Path, shape: &TableShape) -> Result<(ExportedFile, csv::Writer<NewFile>)> {
     let path = folder.join(format!("{}.csv", shape.name));
     let mut csv = csv::Writer::from_writer(NewFile::replace(&path)?);
     let head = csv.write_record(shape.columns.iter().map(|column| &column.name));

@@ -70,6 +70,13 @@ pub struct Column {
     pub meaning: Meaning,
 }
 
+impl Column {
+    fn of(name: &str, kind: Kind, unit: &str, words: &str) -> Self {
+        let meaning = Meaning { unit: unit.to_owned(), words: words.to_owned(), values_of: None };
+        Self { name: name.to_owned(), kind, meaning }
+    }
+}
+
 /// What the numbers of a column mean, from the schema or the dialect.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Meaning {
@@ -133,20 +140,8 @@ pub(super) struct Place {
 
 impl TableShape {
     pub(super) fn new(name: &str, columns: &[(&str, Kind)]) -> Self {
-        let time = Column {
-            name: "log_time_ns".to_owned(),
-            kind: Kind::Integer,
-            meaning: Meaning {
-                unit: "ns".to_owned(),
-                words: "Unix time of the record.".to_owned(),
-                values_of: None,
-            },
-        };
-        let others = columns.iter().map(|(name, kind)| Column {
-            name: (*name).to_owned(),
-            kind: *kind,
-            meaning: Meaning::default(),
-        });
+        let time = Column::of("log_time_ns", Kind::Integer, "ns", "Unix time of the record.");
+        let others = columns.iter().map(|(name, kind)| Column::of(name, *kind, "", ""));
         Self { name: name.to_owned(), columns: std::iter::once(time).chain(others).collect() }
     }
 
@@ -361,16 +356,8 @@ impl TableReader {
                     let first = DynamicMessage::decode(descriptor.clone(), stamped.data.as_slice()).ok()?;
                     let (mut shape, places) = TableShape::of_record(&table_name(&channel.topic), &first);
                     if matches!(stamped.entry, Entry::ComputerFrame(_)) {
-                        shape.columns.push(Column {
-                            name: FLIGHT_TIME_S.to_owned(),
-                            kind: Kind::Float,
-                            meaning: Meaning {
-                                unit: "s".to_owned(),
-                                words: "Time since the release; empty on the pad and after the flight."
-                                    .to_owned(),
-                                values_of: None,
-                            },
-                        });
+                        let words = "Time since the release; empty on the pad and after the flight.";
+                        shape.columns.push(Column::of(FLIGHT_TIME_S, Kind::Float, "s", words));
                     }
                     // Two channels with one topic share a table.
                     let table = shapes.iter().position(|known| *known == shape).unwrap_or_else(|| {

@@ -19,6 +19,17 @@ fn flights_with_nothing_in_common_are_not_within_tolerance() {
     assert!(found[0]["verdicts"][0]["landing"]["stands"] == true, "the verdict is still told: {found}");
 }
 
+/// What a file is matters more than what is missing of the command.
+#[test]
+fn a_file_that_is_no_log_is_named_before_a_missing_format() {
+    let file = MK2.beside("nothing-in-it.mcap");
+    for (bytes, words) in [("", "is empty"), ("no log", "is not a flight log")] {
+        std::fs::write(&file, bytes).unwrap();
+        assert!(refusal(&mut replay("export", &file)).contains(words), "{words}");
+    }
+    assert!(refusal(&mut replay("export", &MK2.log)).contains("--to is missing"));
+}
+
 /// In a log that ends early, only the recorded part can be identical.
 #[test]
 fn a_cut_log_is_compared_up_to_its_end() {
