@@ -191,19 +191,19 @@ impl Chart {
         let mut spans = spans.map(|span| (span.from.max(frame.x.0), span.name.as_str()));
         let rows = in_rows(&mut spans, "phase", -ABOVE - 4.0);
         in_rows(&mut self.marks.iter().map(|(x, name)| (*x, name.as_str())), "mark", height - 4.0);
+        for (x, y, kind, name) in &self.places {
+            let ([x_px, y_px], at) = ([frame.x_px(*x), frame.y_px(*y)], (self.axes == TIME).then_some(*x));
+            drawn += &dot(kind, [x_px, y_px], at);
+            if at.is_some() {
+                drawn += &text("name", [x_px, y_px - 7.0], at, name);
+            }
+        }
         let mut last = [f64::NEG_INFINITY, 0.0];
         for (number, x) in (1..).zip(&self.signs).filter(|(_, x)| frame.has(**x)) {
             let x_px = frame.x_px(*x);
             last = [x_px, if x_px - last[0] < ABOVE { last[1] + ABOVE } else { -0.5 * ABOVE }];
             drawn += &dot("sign", last, Some(*x));
             drawn += &text("number middle", [x_px, last[1] + 4.0], Some(*x), &number.to_string());
-        }
-        for (x, y, kind, name) in &self.places {
-            let [x_px, y_px] = [frame.x_px(*x), frame.y_px(*y)];
-            drawn += &dot(kind, [x_px, y_px], None);
-            if self.axes == TIME {
-                drawn += &text("name", [x_px + 6.0, y_px - 7.0], None, name);
-            }
         }
         if let Some((right, up, words)) = &self.arrow {
             let turned = libm::atan2(*right, *up).to_degrees();

@@ -63,7 +63,7 @@
   let now = 0, playing = 0;
   const bar = document.createElement("div");
   bar.className = "time";
-  bar.innerHTML = `<button type="button">play</button><input type="range" step="0.01" min="${first}" max="${last}" aria-label="time"/><output></output><small>Drag in any picture. Shift and drag: closer; double click: all.</small>`;
+  bar.innerHTML = `<button type="button">play</button><input type="range" step="0.01" min="${first}" max="${last}" aria-label="time"/><output></output><small>Drag in any picture over time. Shift and drag: closer; double click: all.</small>`;
   const [button, range, output] = bar.children;
   const to = (time) => {
     now = Math.min(last, Math.max(first, time));
@@ -199,9 +199,9 @@
         add("metal", [[hinge, r, half], [back, out, half], [back, out, -half], [hinge, r, -half]].map(([s, o, side]) => body([s, o * b - side * c, o * c + side * b])));
       });
       if (chute > 0.05) {
-        const top = body([long, 0, 0]), span = 55 * Math.sqrt(chute);
-        for (const share of [-1, 0, 1]) made(svg, "path", { class: "leg", d: `M${top[0]} ${top[1]}L${top[0] + share * span} ${top[1] - 45}` });
-        made(svg, "path", { class: "band", d: `M${top[0] - span} ${top[1] - 45}a${span} ${span * 0.6} 0 0 1 ${2 * span} 0z` });
+        const top = body([long, 0, 0]), span = 40 * Math.sqrt(chute), rise = 30; // the nose is 57 or more below the edge
+        for (const share of [-1, 0, 1]) made(svg, "path", { class: "leg", d: `M${top[0]} ${top[1]}L${top[0] + share * span} ${top[1] - rise}` });
+        made(svg, "path", { class: "band", d: `M${top[0] - span} ${top[1] - rise}a${span} ${span * 0.6} 0 0 1 ${2 * span} 0z` });
       }
       // The ground, if it is near: where the feet of the upright vehicle would stand on it.
       const under = middle_m - legs.foot_station_m + height, middle = world([middle_m - center, 0, 0]);

@@ -162,6 +162,11 @@ impl Flight {
         }
     }
 
+    /// Whether the landing motor gave thrust.
+    pub(super) fn is_lit(&self) -> bool {
+        self.track.iter().any(|sample| sample.phase == Some(Phase::Powered))
+    }
+
     /// A value of each state.
     pub(super) fn flown(&self, value: impl Fn(&State) -> f64) -> Series {
         self.track.iter().map(|sample| (self.axis_s(sample.time_s), value(&sample.state))).collect()
@@ -253,7 +258,7 @@ fn spans(info: &Info, zero_s: f64) -> Vec<Span> {
         to: spans.get(place + 1).map_or(span.until_s, |next| next.from_s) - zero_s,
         name: span.phase.clone(),
         shade: match Phase::ALL.into_iter().find(|phase| phase.name() == span.phase) {
-            Some(Phase::Boost | Phase::Ignition | Phase::Powered) => "hot",
+            Some(Phase::Boost | Phase::Powered) => "hot",
             Some(Phase::Deploy | Phase::AeroDescent | Phase::Chute) => "cool",
             _ => "",
         },

@@ -72,6 +72,17 @@ fn the_report_says_the_verdict_first_and_then_why() {
         says_in_order(&page, &order.split('|').collect::<Vec<_>>());
         assert!(page.len() <= 400_000, "{} bytes", page.len());
         assert!(!page.contains("start_unix_ns"));
+        // A part of the time moves what stands beside a line.
+        let whole = page.split_once("<figure id=\"height-over-the-whole-flight\"").unwrap().1;
+        let whole = whole.split("</figure>").next().unwrap();
+        for beside in
+            whole.split('<').filter(|tag| tag.contains("class=\"place\"") || tag.contains("class=\"name\""))
+        {
+            assert!(beside.contains(" data-t=\""), "{beside}");
+        }
+        assert!(whole.contains("class=\"place\""), "{whole}");
+        // Paper and pages without scripts have the events, too.
+        assert!(!page.contains("<details") && section(&page, ">Events").contains("<td>"));
         // The script finds a scale in every picture, as many values as lines, and the vehicle at every time.
         for figure in page.split("<figure id=").skip(1) {
             let figure = figure.split("</figure>").next().unwrap();
@@ -136,6 +147,16 @@ fn a_poor_log_has_a_page_that_says_what_is_missing() {
     let log = WITH_FRAMES.beside("page.mcap");
     replay::log::import_tlog(&tlog(&WITH_FRAMES, "page.tlog"), &log).unwrap();
     says_in_order(&page_of(&log, None), &["STANDS UNDAMAGED", "From the telemetry of a ground station"]);
+}
+
+/// A motor that never lit has no thrust in words, legends and grounds.
+#[test]
+fn the_report_of_a_motor_that_never_lit_says_nothing_of_thrust() {
+    let page = page_of(&fly(&["no-light@0"]).log, None);
+    assert!(page.contains("landing motor did not light") && page.contains(">Flight</h2>"));
+    for words in [">burn</span>", ">Burn</h2>", "<b>Thrust, N", "class=\"hot\""] {
+        assert!(!page.contains(words), "{words}");
+    }
 }
 
 /// From the pad, by the mission's own words: the moments of the ascent, and each stage in the pictures of the place.

@@ -94,7 +94,7 @@ fn of_landing(flight: &Flight) -> Vec<Picture<'_>> {
         (flight.axis_s(sample.time_s), height_m, "place", format!("{name} {height_m:.0} m"))
     };
     (whole.chart.places, whole.chart.named, whole.chart.size_px) =
-        (shown.map(place).collect(), true, Some((640.0, 230.0)));
+        (shown.map(place).collect(), true, Some((640.0, 130.0)));
     let mut pictures = vec![whole];
     for (component, (name, unit, factor)) in COMPONENTS.into_iter().enumerate() {
         pictures.push(
@@ -108,7 +108,7 @@ fn of_landing(flight: &Flight) -> Vec<Picture<'_>> {
         let limits = limit.into_iter().flat_map(|limit| [-limit, limit]);
         pictures.push(surface(over("burn", Burn, name), axis).limits(limits));
     }
-    if let Some((mission, ignition_s)) = mission.zip(flight.ignition_s) {
+    if let Some((mission, ignition_s)) = mission.zip(flight.ignition_s.filter(|_| flight.is_lit())) {
         let expected = flight.framed(|frame| {
             let since_s = frame.input.time_s - ignition_s;
             (since_s >= 0.0).then(|| mission.motor_curve.thrust_at_n(since_s - mission.ignition.delay_s))

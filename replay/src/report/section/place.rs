@@ -10,9 +10,9 @@ use crate::report::track::{Flight, Part, Sample, State, planned};
 type Stage = (&'static str, &'static str, fn(Phase) -> bool);
 
 const STAGES: [Stage; 4] = [
-    ("ascent", "thin", |phase| phase.before_apogee()),
-    ("fall", "a", |phase| phase.in_descent()),
-    ("burn", "b", |phase| phase.in_landing_burn() || phase == Phase::Touchdown),
+    ("ascent", "thin", |phase| phase.before_apogee() && !phase.on_pad()),
+    ("fall", "a", |phase| phase.in_descent() || phase == Phase::Ignition),
+    ("burn", "b", |phase| phase == Phase::Powered),
     ("parachute", "d", |phase| phase == Phase::Chute),
 ];
 
@@ -39,7 +39,7 @@ pub(super) fn maps(flight: &Flight) -> String {
         title: title.to_owned(),
         axes: "1 0",
         x_name: "east, m",
-        size_px: Some((196.0, 196.0)),
+        size_px: Some((140.0, 140.0)),
         places: places(flight),
         lines: stages(flight).into_iter().chain(more).collect(),
         arrow: arrow.clone(),
@@ -111,4 +111,19 @@ pub(super) fn moments(flight: &Flight) -> Vec<(&'static str, &Sample)> {
     let mut moments: Vec<_> = known.collect();
     moments.sort_by(|a, b| a.1.time_s.total_cmp(&b.1.time_s));
     moments
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A station has no place of a vehicle on its pad: from there to the rail nothing flew.
+    #[test]
+    fn a_phase_in_flight_has_one_stage_and_one_on_the_pad_has_none() {
+        for phase in Phase::ALL {
+            let stages = STAGES.iter().filter(|(.., belongs)| belongs(phase)).count();
+            let on_ground = phase.on_pad() || matches!(phase, Phase::Touchdown | Phase::Safed);
+            assert_eq!(stages, usize::from(!on_ground), "{phase:?}");
+        }
+    }
 }

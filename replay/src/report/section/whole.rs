@@ -30,8 +30,7 @@ pub(super) fn events(flight: &Flight) -> Option<String> {
     });
     let more = events.len().saturating_sub(SHOWN);
     let rest = if more > 0 { paragraph(&format!("And {more} more.")) } else { String::new() };
-    let shown = table(&[heading, "from", "event"], rows) + &rest;
-    Some(format!("<details><summary>{} events</summary>\n{shown}</details>\n", events.len()))
+    Some(table(&[heading, "from", "event"], rows) + &rest)
 }
 
 /// What of the flown mission differs from the built-in one of its name, and whether its controller is the standard one.
