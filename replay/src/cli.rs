@@ -1,9 +1,12 @@
 //! What all commands have in common: how they ended, what they print, how they stop.
 
+use std::collections::{BTreeSet, VecDeque};
+use std::ffi::OsStr;
+use std::fs::DirEntry;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, ensure};
 pub(crate) use onboard_sim::files::text_of;
 use protocol::program::{Exit, is_quiet, print};
 use protocol::text::printable;
@@ -80,6 +83,42 @@ pub(crate) fn give_each<A: Answer>(
         _ => give(&all, json)?,
     };
     Ok(worse(given, outcome))
+}
+
+/// The logs of a directory with these endings, in subdirectories, too. Each regular file counts once, however many links lead to
+/// it; what has the name of a log and is no file (a pipe, a link to nothing) is never opened, and is told, as is a `.tlog` where
+/// only the vehicle's logs are wanted.
+pub(crate) fn files_of(directory: &Path, endings: &[&str]) -> Result<Vec<PathBuf>> {
+    let (mut seen, mut logs, mut left) =
+        (BTreeSet::new(), Vec::new(), VecDeque::from([directory.to_owned()]));
+    while let Some(path) = left.pop_back() {
+        let ending = path.extension().and_then(OsStr::to_str).unwrap_or_default();
+        let (is_log, is_wanted) = (["mcap", "tlog"].contains(&ending), endings.contains(&ending));
+        let failed = || format!("{}: cannot be read", path.display());
+        match path.metadata() {
+            Ok(found) if found.is_dir() && seen.insert(path.canonicalize().with_context(failed)?) => {
+                let entries: io::Result<Vec<_>> = std::fs::read_dir(&path).and_then(Iterator::collect);
+                let mut entries = entries.with_context(failed)?;
+                entries.sort_by_key(DirEntry::path);
+                for entry in entries {
+                    // What is itself here comes before what only leads here, so that it keeps its name.
+                    let is_link = entry.path().is_symlink();
+                    if is_link { left.push_front(entry.path()) } else { left.push_back(entry.path()) }
+                }
+            }
+            Ok(found) if found.is_dir() => {}
+            Ok(found) if is_wanted && found.is_file() && seen.insert(path.canonicalize()?) => logs.push(path),
+            Err(error) if path == directory => return Err(error).with_context(failed),
+            _ if is_wanted => say(&format!("left out: {}: no file, or here already", path.display())),
+            _ if is_log => {
+                say(&format!("left out: {}: what went over the air has no frames", path.display()))
+            }
+            _ => {}
+        }
+    }
+    ensure!(!logs.is_empty(), "{}: holds no log (*.{})", directory.display(), endings.join(", *."));
+    logs.sort();
+    Ok(logs)
 }
 
 /// Writes an answer to standard output. A reader that closes the pipe early is not an error.

@@ -51,14 +51,19 @@ pub(crate) fn columns<const N: usize>(
     rows.iter().map(line).collect()
 }
 
-/// Two verdicts beside each other, and every limit that one of them has.
-pub(crate) fn verdict_table(names: [&str; 2], both: [Option<&Verdict>; 2]) -> Vec<String> {
-    let words = both.map(|verdict| {
-        verdict.map_or_else(
-            || "no verdict".to_owned(),
-            |verdict| format!("{} at {}", verdict.landing.word(), verdict.contact()),
-        )
-    });
+/// The name of a verdict.
+pub(crate) fn word(verdict: Option<&Verdict>) -> &'static str {
+    verdict.map_or("no verdict", |verdict| verdict.landing.word())
+}
+
+/// Where a value is that broke its limit: what gives way at it went no further.
+pub(crate) fn beyond(limit: &LimitResult) -> &'static str {
+    if (limit.minimum..=limit.maximum).contains(&limit.value) { "AT ITS LIMIT" } else { "OUTSIDE" }
+}
+
+/// Every limit that one of two verdicts has, the most different first: how far apart they are over its range, and its name, both
+/// values and its ends.
+pub(crate) fn limits_of_both(both: [Option<&Verdict>; 2]) -> Vec<(f64, [String; 4])> {
     let mut limits: Vec<&LimitResult> = Vec::new();
     for limit in both.into_iter().rev().flatten().flat_map(Verdict::of_the_legs) {
         if !limits.iter().any(|known| known.name == limit.name) {
@@ -66,22 +71,40 @@ pub(crate) fn verdict_table(names: [&str; 2], both: [Option<&Verdict>; 2]) -> Ve
         }
     }
     let row = |limit: &LimitResult| {
-        let [first, second] = both.map(|verdict| {
-            let found =
-                verdict.and_then(|verdict| verdict.of_the_legs().find(|found| found.name == limit.name));
-            found.map_or_else(
-                || "-".to_owned(),
-                |LimitResult { value, unit, passed, .. }| {
-                    format!("{value:.4} {unit}{}", if *passed { "" } else { " OUTSIDE" })
-                        .trim_end()
-                        .to_owned()
-                },
-            )
+        let found = both.map(|verdict| verdict?.of_the_legs().find(|found| found.name == limit.name));
+        let [first, second] = found.map(|found| {
+            let Some(limit) = found else { return "-".to_owned() };
+            let beyond = if limit.passed { "" } else { beyond(limit) };
+            format!("{:.4} {} {beyond}", limit.value, limit.unit).trim_end().replace("  ", " ")
         });
-        [limit.name.clone(), first, second, format!("{:.4} to {:.4}", limit.minimum, limit.maximum)]
+        let [then, now] = found.map(|found| found.map_or(0.0, |found| found.value));
+        // The larger of it and of no number, which is 0 over 0.
+        let apart = ((then - now).abs() / (limit.maximum - limit.minimum)).max(0.0);
+        (apart, [limit.name.clone(), first, second, format!("{:.4} to {:.4}", limit.minimum, limit.maximum)])
     };
-    let ([first, second], [then, now]) = (names.map(str::to_owned), words);
+    let mut rows: Vec<_> = limits.into_iter().map(row).collect();
+    rows.sort_by(|a, b| b.0.total_cmp(&a.0));
+    rows
+}
+
+/// Two verdicts beside each other, and their limits.
+pub(crate) fn verdict_table(names: [&str; 2], both: [Option<&Verdict>; 2]) -> Vec<String> {
+    let at = |verdict: &Verdict| format!(" at {}", verdict.contact());
+    let [then, now] = both.map(|verdict| word(verdict).to_owned() + &verdict.map_or_else(String::new, at));
+    let [first, second] = names.map(str::to_owned);
     let head = [String::new(), first, second, "limit".to_owned()];
     let verdict = ["verdict".to_owned(), then, now, String::new()];
-    columns(['<', '>', '>', '<'], [head, verdict].into_iter().chain(limits.into_iter().map(row)))
+    let limits = limits_of_both(both).into_iter().map(|(_, row)| row);
+    columns(['<', '>', '>', '<'], [head, verdict].into_iter().chain(limits))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_has_no_more_to_give_is_at_its_limit_and_not_outside() {
+        let stroke = |value| LimitResult { value, maximum: 1.0, ..LimitResult::default() };
+        assert_eq!([1.0, 1.1].map(|value| beyond(&stroke(value))), ["AT ITS LIMIT", "OUTSIDE"]);
+    }
 }

@@ -26,10 +26,11 @@ use protocol::program::Exit;
 use serde::Serialize;
 pub use series::{Align, Flown, Series};
 pub use tolerance::SignalDifference;
-pub use tolerance::{Tolerance, ToleranceError, Tolerances};
+pub use tolerance::{Tolerance, Tolerances};
 
 use crate::cli::{give, warn_of_loss};
 use crate::log::Verdict;
+use crate::print::word;
 
 /// One flight against another.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -85,11 +86,7 @@ impl Comparison {
 ///
 /// # Errors
 /// A tolerance names a signal that neither flight has.
-pub fn compare(
-    baseline: &Flown,
-    other: &Flown,
-    tolerances: &Tolerances,
-) -> Result<Comparison, ToleranceError> {
+pub fn compare(baseline: &Flown, other: &Flown, tolerances: &Tolerances) -> Result<Comparison> {
     let (align, shift_s) = Align::of(baseline, other);
     let over_the_air = baseline.only_one_has_frames(other);
     let both_recorded_s = over_the_air
@@ -112,12 +109,9 @@ pub fn compare(
     tolerances.check_names(&ours.iter().chain(&theirs))?;
     let missing: Vec<String> = ours.iter().filter(|name| !b.contains_key(*name)).cloned().collect();
     let added: Vec<String> = theirs.iter().filter(|name| !a.contains_key(*name)).cloned().collect();
-    let mut signals = Vec::new();
-    for (name, ours) in a {
-        if let Some(theirs) = b.get(name) {
-            signals.push(SignalDifference::of(name, ours, theirs, shift_s, tolerances.of(name)));
-        }
-    }
+    let both = a.iter().filter_map(|(name, ours)| Some((name.as_str(), ours, b.get(name)?)));
+    let of = |(name, ours, theirs)| SignalDifference::of(name, ours, theirs, shift_s, tolerances.of(name));
+    let mut signals: Vec<_> = both.map(of).collect();
     let mut failures = tolerances.record_failures([baseline, other]);
     failures.extend(signals.iter().filter_map(SignalDifference::failure));
     signals.sort_by(|a, b| (a.passed, &a.signal).cmp(&(b.passed, &b.signal)));
@@ -127,9 +121,7 @@ pub fn compare(
         failures.push("the logs have no signal in common: nothing was compared".to_owned());
     }
     let verdicts = (baseline.verdict.clone(), other.verdict.clone());
-    let word =
-        |verdict: &Option<Verdict>| verdict.as_ref().map_or("no verdict", |verdict| verdict.landing.word());
-    let (then, now) = (word(&verdicts.0), word(&verdicts.1));
+    let (then, now) = (word(verdicts.0.as_ref()), word(verdicts.1.as_ref()));
     if tolerances.verdict_must_agree() && then != now {
         failures.push(format!("the verdicts differ: {then} and {now}"));
     }
@@ -219,5 +211,5 @@ fn open(path: &Path) -> Result<Flown> {
 fn read(path: &Path) -> Result<Tolerances> {
     let name = path.display().to_string();
     let text = std::fs::read_to_string(path).with_context(|| format!("{name}: cannot be read"))?;
-    Ok(Tolerances::from_toml(&text, &name)?)
+    Tolerances::from_toml(&text, &name)
 }

@@ -2,11 +2,13 @@
 
 use super::{Align, Comparison, SignalDifference, WordsOfOne};
 use crate::cli::Answer;
-use crate::print::{columns, counted, verdict_table};
+use crate::print::{columns, counted, limits_of_both, verdict_table, word};
 use protocol::program::Exit;
 
 /// Most signals listed that differ within their tolerance or have no tolerance.
 const SIGNALS_SHOWN: usize = 60;
+/// Most limits named in which the landings differ.
+const LIMITS_SHOWN: usize = 3;
 /// Most names and rows of words listed.
 const NAMES_SHOWN: usize = 20;
 
@@ -16,15 +18,12 @@ impl Answer for Comparison {
             Align::Ignition => "ignition",
             Align::Time => "vehicle time",
         };
-        let mut lines = vec![
-            self.sentence(),
-            format!("aligned on {aligned}: {:+.6} s added to the second's times", self.shift_s),
-        ];
+        let mut lines = self.landings();
+        lines.push(self.sentence());
+        lines.push(format!("aligned on {aligned}: {:+.6} s added to the second's times", self.shift_s));
         lines.extend(self.both_recorded_s.map(|[from_s, to_s]| {
             format!("compared while both recorded: {from_s:.3} to {to_s:.3} s since power-up")
         }));
-        lines
-            .extend(verdict_table(["first", "second"], [self.verdicts.0.as_ref(), self.verdicts.1.as_ref()]));
         lines.push(format!(
             "{} of both flights, {} of them identical; {} missing, {} added",
             counted(self.signals.len() as u64, "signal"),
@@ -69,6 +68,23 @@ impl Answer for Comparison {
 }
 
 impl Comparison {
+    /// What differs in the landings; nothing of two logs without one.
+    fn landings(&self) -> Vec<String> {
+        let both = [self.verdicts.0.as_ref(), self.verdicts.1.as_ref()];
+        let different = limits_of_both(both).into_iter().filter(|(apart, _)| *apart > 0.0);
+        let [then, now] = both.map(word);
+        let most = different
+            .take(LIMITS_SHOWN)
+            .map(|(_, [name, first, second, _])| format!("{name} {first} and {second}"));
+        let most = match most.collect::<Vec<_>>() {
+            _ if both == [None; 2] => return Vec::new(),
+            same if same.is_empty() => "no limit differs".to_owned(),
+            most => format!("most different: {}", most.join(", ")),
+        };
+        let sentence = format!("{}: {then}; {}: {now}; {most}", self.baseline, self.other);
+        [vec![sentence], verdict_table(["first", "second"], both)].concat()
+    }
+
     /// The answer in one sentence.
     fn sentence(&self) -> String {
         let Self { baseline, other, signals, failures, .. } = self;

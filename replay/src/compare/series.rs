@@ -6,7 +6,7 @@ use std::path::Path;
 use flight::rules::phase::Phase;
 use serde::Serialize;
 
-use crate::log::{Cut, FlightLog, LogError, RecordingError, Verdict};
+use crate::log::{Cut, FlightLog, RecordingError, Verdict};
 use crate::table::{Cell, FLIGHT_TIME_S, Kind, TableReader, TableShape};
 
 /// Limit on the numbers held for one log; a flight of some minutes has a few hundred thousand.
@@ -113,50 +113,46 @@ impl Flown {
         let (mut held, mut out_of_order) = (0_usize, 0_usize);
         let mut words: BTreeMap<String, BTreeMap<String, usize>> = BTreeMap::new();
         let mut reader = TableReader::new();
-        reader
-            .read::<_, Stopped>(&mut log, |shape, row| {
-                let log_ns = row.cells.first().and_then(Cell::number).unwrap_or(0.0);
-                let since_s = (log_ns - *first_ns.get_or_insert(log_ns)) / 1e9;
-                if shape.name == NO_SIGNAL_TABLE {
-                    return Ok(());
-                }
-                if WORDS.contains(&shape.name.as_str()) {
-                    *words
-                        .entry(shape.name.clone())
-                        .or_default()
-                        .entry(words_of(shape, &row.cells))
-                        .or_default() += 1;
-                    return Ok(());
-                }
-                let (signals, time_s) = if shape.name.starts_with(MESSAGES) {
-                    let Some(boot_s) = boot_time_of(shape, &row.cells) else { return Ok(()) };
-                    (&mut over_the_air, boot_s)
-                } else if let Some(place) = shape.place_of(FLIGHT_TIME_S) {
-                    // Outside the flight a frame has no time in it.
-                    let Some(time_s) = row.cells.get(place).and_then(Cell::number) else { return Ok(()) };
-                    (&mut signals, time_s)
+        reader.read::<_, RecordingError>(&mut log, |shape, row| {
+            let log_ns = row.cells.first().and_then(Cell::number).unwrap_or(0.0);
+            let since_s = (log_ns - *first_ns.get_or_insert(log_ns)) / 1e9;
+            if shape.name == NO_SIGNAL_TABLE {
+                return Ok(());
+            }
+            if WORDS.contains(&shape.name.as_str()) {
+                *words
+                    .entry(shape.name.clone())
+                    .or_default()
+                    .entry(words_of(shape, &row.cells))
+                    .or_default() += 1;
+                return Ok(());
+            }
+            let (signals, time_s) = if shape.name.starts_with(MESSAGES) {
+                let Some(boot_s) = boot_time_of(shape, &row.cells) else { return Ok(()) };
+                (&mut over_the_air, boot_s)
+            } else if let Some(place) = shape.place_of(FLIGHT_TIME_S) {
+                // Outside the flight a frame has no time in it.
+                let Some(time_s) = row.cells.get(place).and_then(Cell::number) else { return Ok(()) };
+                (&mut signals, time_s)
+            } else {
+                (&mut signals, time_of(shape, &row.cells).unwrap_or(since_s))
+            };
+            for (column, cell) in shape.columns.iter().zip(&row.cells) {
+                let Some(value) = cell.number().filter(|_| is_signal(&column.name)) else { continue };
+                let series = signals.entry(format!("{}.{}", shape.name, column.name)).or_default();
+                // A signal needs ascending times, so records out of order are left out and counted.
+                if series.times_s.last().is_none_or(|last_s| *last_s <= time_s) {
+                    series.whole = column.kind == Kind::Integer;
+                    series.times_s.push(time_s);
+                    series.values.push(value);
+                    held += 1;
                 } else {
-                    (&mut signals, time_of(shape, &row.cells).unwrap_or(since_s))
-                };
-                for (column, cell) in shape.columns.iter().zip(&row.cells) {
-                    let Some(value) = cell.number().filter(|_| is_signal(&column.name)) else { continue };
-                    let series = signals.entry(format!("{}.{}", shape.name, column.name)).or_default();
-                    // A signal needs ascending times, so records out of order are left out and counted.
-                    if series.times_s.last().is_none_or(|last_s| *last_s <= time_s) {
-                        series.whole = column.kind == Kind::Integer;
-                        series.times_s.push(time_s);
-                        series.values.push(value);
-                        held += 1;
-                    } else {
-                        out_of_order += 1;
-                    }
+                    out_of_order += 1;
                 }
-                if held > VALUES_MAX { Err(Stopped::TooLong) } else { Ok(()) }
-            })
-            .map_err(|stopped| match stopped {
-                Stopped::Log(error) => RecordingError::Log(error),
-                Stopped::TooLong => RecordingError::TooLong { name: name.clone(), kind: "numbers" },
-            })?;
+            }
+            let too_long = || RecordingError::TooLong { name: name.clone(), kind: "numbers" };
+            if held > VALUES_MAX { Err(too_long()) } else { Ok(()) }
+        })?;
         log.flights().refuse_several(&name)?;
         let lit = |signal: &str| {
             let lit = |phase: f64| Phase::from_index(phase as u8).is_some_and(Phase::in_landing_burn);
@@ -178,17 +174,6 @@ impl Flown {
             cut: log.flights().cut(),
             out_of_order,
         })
-    }
-}
-
-enum Stopped {
-    Log(LogError),
-    TooLong,
-}
-
-impl From<LogError> for Stopped {
-    fn from(error: LogError) -> Self {
-        Self::Log(error)
     }
 }
 

@@ -16,6 +16,7 @@
 
 use std::collections::BTreeMap;
 
+use anyhow::{Result, anyhow, bail, ensure};
 use serde::{Deserialize, Serialize};
 
 use super::{Flown, Series};
@@ -46,49 +47,17 @@ pub struct Tolerances {
     signals: BTreeMap<String, Tolerance>,
 }
 
-/// Why tolerances cannot be used.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum ToleranceError {
-    /// Not the expected TOML.
-    #[error("{origin}: {reason}")]
-    Parse {
-        /// The file.
-        origin: String,
-        /// The parser's message.
-        reason: String,
-    },
-    /// Neither flight has the signal.
-    #[error("tolerance of `{given}`: neither flight has such a signal; the nearest is `{nearest}`")]
-    Unknown {
-        given: String,
-        /// The signal with the most similar name.
-        nearest: String,
-    },
-    /// A limit that no signal can meet.
-    #[error("tolerance of `{given}`: {found} must be a number, 0 or more")]
-    Value {
-        /// The signal.
-        given: String,
-        found: f64,
-    },
-}
-
 impl Tolerances {
     /// Reads tolerances; `origin` is used in messages only.
     ///
     /// # Errors
     /// The text is not the expected TOML, or a limit is negative.
-    pub fn from_toml(text: &str, origin: &str) -> Result<Self, ToleranceError> {
-        let tolerances: Self = toml::from_str(text).map_err(|error| ToleranceError::Parse {
-            origin: origin.to_owned(),
-            reason: error.to_string(),
-        })?;
+    pub fn from_toml(text: &str, origin: &str) -> Result<Self> {
+        let tolerances: Self = toml::from_str(text).map_err(|error| anyhow!("{origin}: {error}"))?;
         for (given, tolerance) in &tolerances.signals {
             let limits = tolerance.rms.into_iter().chain(tolerance.max);
             for found in limits {
-                if found.is_nan() || found < 0.0 {
-                    return Err(ToleranceError::Value { given: given.clone(), found });
-                }
+                ensure!(found >= 0.0, "tolerance of `{given}`: {found} must be a number, 0 or more");
             }
         }
         Ok(tolerances)
@@ -133,14 +102,11 @@ impl Tolerances {
     }
 
     /// Every tolerance must match some signal; otherwise a misspelt name would go unnoticed.
-    pub(super) fn check_names<'a>(
-        &self,
-        signals: &(impl Iterator<Item = &'a String> + Clone),
-    ) -> Result<(), ToleranceError> {
+    pub(super) fn check_names<'a>(&self, signals: &(impl Iterator<Item = &'a String> + Clone)) -> Result<()> {
         let is_unknown = |given: &&String| !signals.clone().any(|signal| fits(given, signal));
-        self.signals.keys().find(is_unknown).map_or(Ok(()), |given| {
-            Err(ToleranceError::Unknown { given: given.clone(), nearest: nearest(given, signals.clone()) })
-        })
+        let Some(given) = self.signals.keys().find(is_unknown) else { return Ok(()) };
+        let nearest = nearest(given, signals.clone());
+        bail!("tolerance of `{given}`: neither flight has such a signal; the nearest is `{nearest}`")
     }
 }
 

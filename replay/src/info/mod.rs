@@ -24,7 +24,7 @@ use crate::log::{
     Attachment, BuildComparison, Clocks, Cut, Entry, FlightLog, Head, LogError, Recording, StampedEntry,
     Verdict,
 };
-use crate::print::counted;
+use crate::print::{beyond, counted};
 use crate::recover::{Summary, summary_of};
 
 /// Describes a log file.
@@ -417,7 +417,9 @@ impl Info {
                 rows.extend(limits.iter().filter(|limit| !limit.passed).map(|limit| {
                     let LimitResult { name, value, unit, .. } = limit;
                     let (minimum, maximum) = (rounded(limit.minimum), rounded(limit.maximum));
-                    ("", format!("{whose}{name} {value:.4} {unit} is OUTSIDE {minimum} to {maximum}"))
+                    let value = format!("{value:.4} {unit}");
+                    let (value, beyond) = (value.trim_end(), beyond(limit));
+                    ("", format!("{whose}{name} {value} is {beyond} {minimum} to {maximum}"))
                 }));
             }
         }
@@ -614,16 +616,16 @@ impl Args {
         if let [folder] = self.files.as_slice()
             && folder.is_dir()
         {
-            let flown = season::season(folder)?;
+            let season = season::Season(season::season(folder)?);
             if !self.csv {
-                return give(&season::Season(flown), self.json);
+                return give(&season, self.json);
             }
             answer(|output| {
                 let mut table = csv::Writer::from_writer(output);
-                flown.iter().try_for_each(|line| table.serialize(line).map_err(std::io::Error::other))?;
+                season.0.iter().try_for_each(|line| table.serialize(line).map_err(std::io::Error::other))?;
                 table.flush()
             })?;
-            return Ok(Exit::Yes);
+            return Ok(season.outcome());
         }
         ensure!(!self.csv, "--csv is for a folder of logs, as in `replay info DIR --csv`");
         // On a terminal the description says it already.

@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
+use protocol::program::Exit;
 use serde::Serialize;
 
 use super::{Info, info, utc};
-use crate::cli::Answer;
+use crate::cli::{Answer, files_of};
 use crate::log::worst_first;
 use crate::print::columns;
-use crate::verify::logs_of;
 
 /// One log in a line. What it does not say is left empty.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
@@ -45,6 +45,9 @@ impl Flown {
             let share = if share.is_finite() { format!(" x {share:.2}") } else { String::new() };
             format!("{}{share}", limit.name)
         });
+        let first = info.findings.iter().flatten().next().map(|found| found.words.clone());
+        let cut = info.completeness.cut.as_ref().map(|cut| format!("the flight {cut}"));
+        let lost = [info.completeness.damage.clone(), cut, first];
         let vehicle = info.profile.as_ref().and_then(|profile| profile.name.clone());
         Self {
             // To the minute.
@@ -55,7 +58,7 @@ impl Flown {
             distance_m: at_contact("distance"),
             ending: info.ending.clone().unwrap_or_else(|| "no verdict".to_owned()),
             worst_limit: worst.unwrap_or_default(),
-            finding: info.findings.iter().flatten().next().map_or(String::new(), |found| found.words.clone()),
+            finding: lost.into_iter().flatten().collect::<Vec<_>>().join("; "),
             file: info.file.clone(),
         }
     }
@@ -70,17 +73,20 @@ pub fn season(folder: &Path) -> Result<Vec<Flown>> {
         info(&path).map_or_else(
             |error| {
                 let file = path.display().to_string();
-                let reason = error.to_string().replace(&format!("{file}: "), "");
-                Flown { ending: "CANNOT BE READ".to_owned(), finding: reason, file, ..Flown::default() }
+                let reason = format!("{:#}", anyhow::Error::from(error)).replace(&format!("{file}: "), "");
+                Flown { ending: UNREAD.to_owned(), finding: reason, file, ..Flown::default() }
             },
             |info| Flown::of(&info),
         )
     };
-    let mut flown: Vec<Flown> = logs_of(folder)?.into_iter().map(line).collect();
+    let mut flown: Vec<Flown> = files_of(folder, &["mcap", "tlog"])?.into_iter().map(line).collect();
     // The same minute: by name.
     flown.sort_by(|a, b| a.date.cmp(&b.date));
     Ok(flown)
 }
+
+/// How a log that cannot be read ends.
+const UNREAD: &str = "CANNOT BE READ";
 
 /// A season as a table.
 #[derive(Serialize)]
@@ -112,5 +118,9 @@ impl Answer for Season {
         };
         let sides = ['<', '<', '>', '>', '>', '<', '<', '<', '<'];
         columns(sides, std::iter::once(head.map(str::to_owned)).chain(self.0.iter().map(row)))
+    }
+
+    fn outcome(&self) -> Exit {
+        if self.0.iter().any(|flown| flown.ending == UNREAD) { Exit::NotSeen } else { Exit::Yes }
     }
 }

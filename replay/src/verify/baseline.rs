@@ -3,9 +3,7 @@
 //! Each log is verified (the recorded decisions, made again) and flown again closed loop. The baseline is a file that an
 //! earlier run wrote.
 
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
-use std::fs::DirEntry;
-use std::io;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail, ensure};
@@ -14,7 +12,7 @@ use protocol::program::Exit;
 use serde::{Deserialize, Serialize};
 
 use super::{Obstacle, Verification, VerifyReport, verify};
-use crate::cli::{Answer, give, say};
+use crate::cli::{Answer, files_of, give, say};
 use crate::digest::digest;
 use crate::log::{Entry, FlightLog, LogError, Moment, Recording};
 use crate::output::NewFile;
@@ -187,35 +185,9 @@ fn content_of(path: &Path) -> Option<String> {
     (!records.is_empty()).then(|| format!("{:016x}", digest(run.chain(records.iter().map(Vec::as_slice)))))
 }
 
-/// The logs of a directory, in subdirectories, too. Each regular file counts once, however many links lead to it; what has
-/// the name of a log and is no file (a pipe, a link to nothing) is never opened, and is told.
+/// The logs of a directory that a vehicle wrote.
 pub(crate) fn logs_of(directory: &Path) -> Result<Vec<PathBuf>> {
-    let (mut seen, mut logs, mut left) =
-        (BTreeSet::new(), Vec::new(), VecDeque::from([directory.to_owned()]));
-    while let Some(path) = left.pop_back() {
-        let is_log = path.extension().is_some_and(|ending| ending == "mcap");
-        let failed = || format!("{}: cannot be read", path.display());
-        match path.metadata() {
-            Ok(found) if found.is_dir() && seen.insert(path.canonicalize().with_context(failed)?) => {
-                let entries: io::Result<Vec<_>> = std::fs::read_dir(&path).and_then(Iterator::collect);
-                let mut entries = entries.with_context(failed)?;
-                entries.sort_by_key(DirEntry::path);
-                for entry in entries {
-                    // What is itself here comes before what only leads here, so that it keeps its name.
-                    let is_link = entry.path().is_symlink();
-                    if is_link { left.push_front(entry.path()) } else { left.push_back(entry.path()) }
-                }
-            }
-            Ok(found) if found.is_dir() => {}
-            Ok(found) if is_log && found.is_file() && seen.insert(path.canonicalize()?) => logs.push(path),
-            Err(error) if path == directory => return Err(error).with_context(failed),
-            _ if is_log => say(&format!("left out: {}: no file, or here already", path.display())),
-            _ => {}
-        }
-    }
-    ensure!(!logs.is_empty(), "{}: holds no log (*.mcap)", directory.display());
-    logs.sort();
-    Ok(logs)
+    files_of(directory, &["mcap"])
 }
 
 /// How a directory of logs is held against a baseline.

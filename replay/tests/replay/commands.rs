@@ -9,7 +9,8 @@ use serde_json::Value;
 
 use crate::command_line::{Files, data, refusal, replay, run};
 use crate::flown::{FLIGHT, Recipe, WHOLE, write_log};
-use crate::simulated::{DISPERSED, MK2};
+use crate::from_apogee::{LANDED, fly};
+use crate::simulated::{DISPERSED, MK2, WITH_FRAMES, tlog};
 
 /// Every log of a folder has its line, also one that cannot be read.
 #[test]
@@ -22,9 +23,12 @@ fn a_folder_is_a_season() {
     std::fs::write(season.path().join("notes.txt"), "no log either").unwrap();
     let (code, stdout, _) = run(&mut replay("info", season.path()));
     let lines: Vec<&str> = stdout.lines().collect();
-    assert_eq!((code, lines.len()), (0, 4), "{stdout}");
+    assert_eq!((code, lines.len()), (5, 4), "{stdout}");
+    assert!(lines[0].starts_with("date ") && lines[0].contains("worst limit"), "{stdout}");
     assert!(lines[1].contains("CANNOT BE READ") && lines[1].ends_with("c.mcap"), "{stdout}");
-    let (_, table, _) = run(replay("info", season.path()).arg("--csv"));
+    assert!(lines[2].contains(" mk2 ") && lines[2].contains("STANDS UNDAMAGED  "), "{stdout}");
+    let (code, table, _) = run(replay("info", season.path()).arg("--csv"));
+    assert_eq!(code, 5);
     let mut rows = csv::Reader::from_reader(table.as_bytes());
     let found = info(&MK2.log).unwrap();
     let row = rows.records().map(Result::unwrap).find(|row| row[8].ends_with("a.mcap")).unwrap();
@@ -33,6 +37,42 @@ fn a_folder_is_a_season() {
     assert_eq!(row[4].parse::<f64>().unwrap().to_bits(), distance.to_bits());
     assert_eq!(&row[5], found.ending.unwrap());
     assert!(refusal(replay("info", &MK2.log).arg("--csv")).contains("--csv is for a folder"));
+}
+
+/// What a station heard and a log without its end have their lines; only a vehicle's logs are verified, and the rest is named.
+#[test]
+fn a_season_has_what_a_station_heard_and_says_what_is_damaged() {
+    let season = tempfile::tempdir().unwrap();
+    std::fs::copy(tlog(&WITH_FRAMES, "season.tlog"), season.path().join("heard.tlog")).unwrap();
+    let (code, stdout, _) = run(&mut replay("info", season.path()));
+    assert!(code == 0 && stdout.contains("STANDS UNDAMAGED") && stdout.contains("heard.tlog"), "{stdout}");
+    std::fs::write(season.path().join("cut.mcap"), &WHOLE.bytes[..WHOLE.bytes.len() / 2]).unwrap();
+    let (code, stdout, _) = run(&mut replay("info", season.path()));
+    let cut = stdout.lines().find(|line| line.ends_with("cut.mcap")).unwrap();
+    assert!(code == 0 && cut.contains("no verdict") && cut.contains("without an end mark"), "{stdout}");
+    let (_, _, stderr) = run(&mut replay("verify", season.path()));
+    assert!(stderr.contains("left out: ") && stderr.contains("heard.tlog"), "{stderr}");
+}
+
+/// What differs in the landing comes first, the limits that are furthest apart before the others.
+#[test]
+fn a_comparison_opens_with_the_landings() {
+    let crash = fly(&["no-light@0"]);
+    let (code, stdout, _) = run(replay("compare", &LANDED.log).arg(&crash.log));
+    let first = stdout.lines().next().unwrap();
+    assert!(
+        code == 3 && first.contains(": stands undamaged; ") && first.contains(": not landed; "),
+        "{stdout}"
+    );
+    let rows: Vec<&str> = stdout.lines().skip(3).collect();
+    let (_, most) = first.split_once("most different: ").unwrap();
+    for (place, limit) in most.split(", ").enumerate() {
+        let name = rows[place].split("  ").next().unwrap();
+        assert!(limit.starts_with(name), "{limit}: {stdout}");
+    }
+    assert!(most.contains(" OUTSIDE") && stdout.contains("\nleg load "), "{stdout}");
+    let (_, stdout, _) = run(replay("compare", &LANDED.log).arg(&LANDED.log));
+    assert!(stdout.lines().next().unwrap().ends_with("; no limit differs"), "{stdout}");
 }
 
 #[test]
