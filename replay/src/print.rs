@@ -77,9 +77,14 @@ pub(crate) fn limits_of_both(both: [Option<&Verdict>; 2]) -> Vec<(f64, [String; 
             let beyond = if limit.passed { "" } else { beyond(limit) };
             format!("{:.4} {} {beyond}", limit.value, limit.unit).trim_end().replace("  ", " ")
         });
-        let [then, now] = found.map(|found| found.map_or(0.0, |found| found.value));
-        // The larger of it and of no number, which is 0 over 0.
-        let apart = ((then - now).abs() / (limit.maximum - limit.minimum)).max(0.0);
+        let range = limit.maximum - limit.minimum;
+        let apart = match found {
+            // The larger of it and of no number, which is 0 over 0.
+            [Some(then), Some(now)] => ((then.value - now.value).abs() / range).max(0.0),
+            // Of what only happens or does not, only what happened is told; a value may be unknown.
+            _ if range > 0.0 => 0.0,
+            _ => f64::INFINITY,
+        };
         (apart, [limit.name.clone(), first, second, format!("{:.4} to {:.4}", limit.minimum, limit.maximum)])
     };
     let mut rows: Vec<_> = limits.into_iter().map(row).collect();

@@ -78,6 +78,7 @@ impl Comparison {
             .map(|(_, [name, first, second, _])| format!("{name} {first} and {second}"));
         let most = match most.collect::<Vec<_>>() {
             _ if both == [None; 2] => return Vec::new(),
+            _ if both.contains(&None) => "of one landing nothing is known".to_owned(),
             same if same.is_empty() => "no limit differs".to_owned(),
             most => format!("most different: {}", most.join(", ")),
         };

@@ -417,9 +417,8 @@ impl Info {
                 rows.extend(limits.iter().filter(|limit| !limit.passed).map(|limit| {
                     let LimitResult { name, value, unit, .. } = limit;
                     let (minimum, maximum) = (rounded(limit.minimum), rounded(limit.maximum));
-                    let value = format!("{value:.4} {unit}");
-                    let (value, beyond) = (value.trim_end(), beyond(limit));
-                    ("", format!("{whose}{name} {value} is {beyond} {minimum} to {maximum}"))
+                    let value = format!("{value:.4} {unit} is").replace("  ", " ");
+                    ("", format!("{whose}{name} {value} {} {minimum} to {maximum}", beyond(limit)))
                 }));
             }
         }
