@@ -26,7 +26,7 @@ pub mod truth;
 mod turning;
 mod wind;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
@@ -82,6 +82,10 @@ impl Parameter {
         let (name, unit) = (name.to_owned(), unit.to_owned());
         let (low, high) = (value - Z_95 * sigma, value + Z_95 * sigma);
         Self { name, unit, value, sigma, low, high, systematic: None }
+    }
+
+    fn holds(&self, truth: f64) -> bool {
+        (self.low..=self.high).contains(&truth)
     }
 
     /// Standard deviation without the systematic part.
@@ -404,9 +408,15 @@ pub struct Pooled {
     pub scatter: f64,
 }
 
-/// Every parameter that at least two fits have, in the order of the first fit that has it.
+/// The missions of fits; a test stand has none.
+fn missions(fits: &[Fit]) -> BTreeSet<&str> {
+    fits.iter().map(|fit| fit.mission.as_str()).filter(|mission| !mission.is_empty()).collect()
+}
+
+/// Every parameter that at least two fits have, in the order of the first fit that has it; none of different missions.
 pub fn pooled(fits: &[Fit]) -> Vec<Pooled> {
     let mut names: Vec<&str> = Vec::new();
+    let fits = if missions(fits).len() > 1 { &[] } else { fits };
     for parameter in fits.iter().flat_map(|fit| &fit.found) {
         if !names.contains(&parameter.name.as_str()) {
             names.push(&parameter.name);
@@ -468,8 +478,12 @@ impl Answer for FitReport {
     fn sentences(&self) -> Vec<String> {
         // Many fits are one answer; JSON has each.
         let mut said = Vec::new();
+        let missions: Vec<&str> = missions(&self.fits).into_iter().collect();
         if self.together.is_empty() {
             said = self.fits.sentences();
+            if missions.len() > 1 {
+                said.push(format!("not put together: these are flights of {}", missions.join(" and ")));
+            }
         } else {
             let logs = counted(self.fits.len() as u64, "log");
             said.extend(self.fits.iter().map(Fit::head));
@@ -479,7 +493,15 @@ impl Answer for FitReport {
             ));
         }
         said.extend(self.together.iter().map(|Pooled { mean, flights, scatter }| {
-            format!("  {}   scatter {} in {flights}", line(mean), digits(*scatter, mean.sigma))
+            let ours = self.fits.iter().filter_map(|fit| fit.get(&mean.name).zip(fit.truth.get(&mean.name)));
+            let ours: Vec<_> = ours.collect();
+            let held = ours.iter().filter(|(found, truth)| found.holds(**truth)).count();
+            let truth = ours.iter().map(|(_, truth)| **truth).sum::<f64>() / ours.len() as f64;
+            let truth = match ours.len() {
+                0 => String::new(),
+                of => format!("; truth {} in the mean, held by {held} of {of}", digits(truth, mean.sigma)),
+            };
+            format!("  {}   scatter {} in {flights}{truth}", line(mean), digits(*scatter, mean.sigma))
         }));
         if let Some(day) = &self.day {
             said.push(String::new());
@@ -501,7 +523,7 @@ impl Answer for Fit {
             let Some(truth) = self.truth.get(&parameter.name) else {
                 return format!("  {}", line(parameter));
             };
-            let held = if (parameter.low..=parameter.high).contains(truth) { "held" } else { "MISSED" };
+            let held = if parameter.holds(*truth) { "held" } else { "MISSED" };
             format!("  {:<68}  truth {} {held}", line(parameter), digits(*truth, parameter.sigma))
         }));
         for (title, lacks) in [

@@ -166,8 +166,22 @@ fn several_logs_are_put_together_and_a_bad_one_does_not_hide_the_others() {
     let together = answer["together"].as_array().unwrap();
     let delay = together.iter().find(|one| one["mean"]["name"] == "gimbal_delay").unwrap();
     assert_eq!((found.len(), &delay["flights"]), (2, &2.into()));
+    let (_, stdout, _) = asked(&[landed, mk2, "--against-truth"]);
+    let delay = stdout.lines().find(|line| line.starts_with("  gimbal_delay")).unwrap();
+    assert!(delay.contains(" truth 0.020000 in the mean, held by 2 of 2"), "{stdout}");
     let (code, stdout, stderr) = asked(&[landed, "none.mcap"]);
     assert!(code == 5 && stdout.contains("thrust_scale") && stderr.contains("none.mcap: cannot"), "{stderr}");
+}
+
+/// Two vehicles have no drag in common.
+#[test]
+fn flights_of_different_missions_are_not_put_together() {
+    let other = crate::simulated::simulate("mk3", 1, &[]);
+    let files = [LANDED.log.to_str().unwrap(), other.log.to_str().unwrap()];
+    let (found, answer) = fits(&files);
+    assert!(found.len() == 2 && answer["together"].as_array().unwrap().is_empty(), "{answer}");
+    let (_, stdout, _) = asked(&files);
+    assert!(stdout.ends_with("not put together: these are flights of mk2 and mk3\n"), "{stdout}");
 }
 
 #[test]
