@@ -51,6 +51,10 @@ pub struct Cli {
     #[arg(long, help_heading = "Without a screen")]
     pub headless: bool,
 
+    /// Print how the flight ended and where the log is, as one JSON object, and nothing else; without a screen.
+    #[arg(long, conflicts_with = "replay", help_heading = "Without a screen")]
+    pub json: bool,
+
     /// Without a screen: give up if the flight has not ended after this time.
     ///
     /// Default: 120 s if the flight is started automatically, otherwise never.
@@ -212,7 +216,12 @@ pub enum Command {
     )]
     Download(DownloadArgs),
     /// List your stations: socket, process, link, vehicle, phase, log and screens.
-    Status,
+    #[command(after_help = "Examples:\n  ground status\n  ground status --json")]
+    Status {
+        /// As JSON.
+        #[arg(long)]
+        json: bool,
+    },
     /// End a station. This is refused while its vehicle is armed or in flight.
     #[command(after_help = "Examples:\n  ground stop\n  ground stop --force")]
     Stop {
@@ -405,6 +414,7 @@ mod tests {
             "--speed",
             "--auto",
             "--headless",
+            "--json",
             "--timeout-s",
         ] {
             assert!(help.contains(word), "{word}");
@@ -441,6 +451,7 @@ mod tests {
             command.get_arguments().filter_map(|argument| argument.get_long().map(str::to_owned)).collect()
         };
         assert_eq!(flags("stop"), ["force", "socket"]);
+        assert_eq!(flags("status"), ["json"]);
         let link = ["out", "connect", "sysid", "vehicle-sysid", "key", "crew", "operator", "config"];
         assert_eq!(flags("download"), link);
         assert!(Cli::try_parse_from(["ground", "--timeout-s", "3", "attach"]).is_err());

@@ -65,8 +65,10 @@ fn stations_are_listed_and_stopped_and_an_armed_one_only_by_force() {
     ] {
         assert!(listed.output.contains(words), "no {words} in:\n{}", listed.output);
     }
-    let log = listed.output.lines().find_map(|line| line.strip_prefix("  log "));
-    assert!(log.is_some_and(|log| Path::new(log).is_absolute()), "{}", listed.output);
+    let told: serde_json::Value = serde_json::from_str(&station.run(&["status", "--json"]).output).unwrap();
+    assert_eq!((&told[0]["phase"], &told[0]["armed"]), (&"PAD_IDLE".into(), &false.into()), "{told}");
+    assert_eq!(told[0]["screens"].as_array().map(Vec::len), Some(1), "{told}");
+    assert!(Path::new(told[0]["log"].as_str().unwrap()).is_absolute(), "{told}");
     screen.type_until(b"AARM\r", " ARMED ");
     assert!(station.run(&["status"]).output.contains("PAD_ARMED ARMED"));
     let refused = station.run(&["stop"]);

@@ -47,7 +47,7 @@ use attached::Viewer;
 use clock::{Clock, LogTime};
 use files::{LogGuard, SpaceWatch, newest_place, open_checklist, open_log, other_name, read_unfinished};
 use next_log::NextLog;
-use output::{Output, print};
+use output::{Lines, Output, print};
 use server::{Server, hello};
 use station::{Answers, Station};
 use wire::Wire;
@@ -62,6 +62,8 @@ struct Duty {
     /// It has a screen of its own.
     interactive: bool,
     time_limit: Option<Duration>,
+    /// It prints one object at its end, and nothing else.
+    json: bool,
 }
 
 /// Runs the ground station until its end.
@@ -72,7 +74,7 @@ pub fn run(given: &ArgMatches) -> anyhow::Result<Exit> {
     let cli = Cli::from_arg_matches(given)?;
     let given = given.subcommand().map_or(given, |(_, given)| given);
     let dumb = std::env::var_os("TERM").is_none_or(|term| term.is_empty() || term == "dumb");
-    let interactive = std::io::stdout().is_terminal() && !cli.headless && !dumb;
+    let interactive = std::io::stdout().is_terminal() && !cli.headless && !cli.json && !dumb;
     let load = |args: &ConfigArgs| -> anyhow::Result<Config> {
         let config = Config::load(args.config.as_deref())?;
         let without = (cli.shown.color == ColorChoice::Never).then_some(Palette::None);
@@ -90,7 +92,7 @@ pub fn run(given: &ArgMatches) -> anyhow::Result<Exit> {
             said(file.map_or_else(none, |path| format!("{}: valid\n", path.display())).as_bytes())
         }
         Some(Command::Manual(manual)) => manual.print(Cli::command()).context("printing the manual"),
-        Some(Command::Status) => runtime.block_on(stations::list()),
+        Some(Command::Status { json }) => runtime.block_on(stations::list(json)),
         Some(Command::Stop { force, socket }) => {
             let config = Config::load(None)?;
             let (socket, who) =
@@ -121,7 +123,7 @@ pub fn run(given: &ArgMatches) -> anyhow::Result<Exit> {
         Some(Command::Daemon { mut station }) => {
             let config = load(&station.config)?;
             config.fill(&mut station, given, true)?;
-            let duty = Duty { is_daemon: true, interactive: false, time_limit: None };
+            let duty = Duty { is_daemon: true, interactive: false, time_limit: None, json: false };
             runtime.block_on(Box::pin(session(&station, &config, duty)))
         }
         None => {
@@ -134,7 +136,7 @@ pub fn run(given: &ArgMatches) -> anyhow::Result<Exit> {
                 return runtime.block_on(replay);
             }
             config.fill(&mut station, given, false)?;
-            let duty = Duty { is_daemon: false, interactive, time_limit: cli.timeout_s };
+            let duty = Duty { is_daemon: false, interactive, time_limit: cli.timeout_s, json: cli.json };
             runtime.block_on(Box::pin(session(&station, &config, duty)))
         }
     }
@@ -179,7 +181,12 @@ async fn session(args: &StationArgs, config: &Config, duty: Duty) -> anyhow::Res
     let log_path = log_guard.finish();
     ran?;
     let exit = exit::decide(&model.outcome, duty.interactive);
-    output::closing(&model, duty.interactive, log_path.as_ref(), clock.now());
+    if duty.json {
+        let log = log_path.as_ref().ok().and_then(Option::as_ref);
+        print(output::ended(&model, exit, log, clock.now()).as_bytes())?;
+    } else {
+        output::closing(&model, duty.interactive, log_path.as_ref(), clock.now());
+    }
     log_path.context("the log")?;
     Ok(exit)
 }
@@ -192,7 +199,7 @@ async fn start(
     (clock, demo_options): (Clock, Option<DemoOptions>),
     mut next_log: NextLog,
 ) -> anyhow::Result<(Station, Model, Wire)> {
-    let Duty { is_daemon, interactive, time_limit } = duty;
+    let Duty { is_daemon, interactive, time_limit, json } = duty;
     let recorder = next_log.present();
     let link = &args.flags.link;
     // The demonstration uses any free port, so that it can run beside a real ground station.
@@ -266,7 +273,7 @@ async fn start(
     });
     go_on_with_what_is_kept(&mut model, recorder.as_ref(), clock.now());
     let server = serve(args, &mut model, duty, &clock).await?;
-    let output = Output::open(interactive, config)?;
+    let output = if json { Output::lines(Lines::closed()) } else { Output::open(interactive, config)? };
     model.repeats_reported = output.reports_repeats();
     let mut station = Station {
         clock,

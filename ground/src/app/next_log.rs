@@ -185,7 +185,7 @@ mod tests {
             let clock = Clock::start();
             let header = LogHeader { start_unix_ns: clock.start_unix_ns(), ..LogHeader::default() };
             let guard = LogGuard::new(open_log(args.flags.log.as_ref(), None, &header).unwrap());
-            let duty = Duty { is_daemon: true, interactive: false, time_limit: None };
+            let duty = Duty { is_daemon: true, interactive: false, time_limit: None, json: false };
             let next_log = NextLog::new(&args, header, guard.log());
             let config = Config::default();
             let started = Box::pin(start(&args, &config, duty, (clock, None), next_log)).await;
@@ -200,7 +200,7 @@ mod tests {
             assert_eq!(model.settings.log_path.as_deref(), Some(&*log), "a short log goes on");
             station.change_log(&mut model, &mut wire);
             say(&mut wire);
-            assert_eq!(super::super::stations::of(&model, &[]).log, path("flight-2.mcap"));
+            assert_eq!(super::super::stations::of(&model, &[]).log, Some(path("flight-2.mcap")));
             station.change_log(&mut model, &mut wire);
             say(&mut wire);
             station.close_book("the station ends", &mut model, &mut wire);

@@ -8,13 +8,14 @@ use std::time::Duration;
 use anyhow::Context as _;
 use protocol::log::record::EventLevel;
 use protocol::log::recorder::RecorderError;
-use protocol::program::is_quiet;
+use protocol::program::{Exit, is_quiet};
+use serde_json::json;
 
 use super::programs::VoiceEnded;
 use super::replaying::Again;
 use super::screen::Screen;
 use crate::config::Config;
-use crate::model::{Ending, Event, Model, Speaker, Verdict};
+use crate::model::{Ending, Event, FlightSoFar, Model, Speaker, Verdict};
 use crate::update::{Action, Msg};
 use crate::view::headline;
 use crate::view::panels::limit_rows;
@@ -228,6 +229,17 @@ pub fn closing(
     }
     // The exit code is decided even if nobody reads this.
     let _ = print(text.as_bytes());
+}
+
+/// How the flight ended and where the log is, for programs.
+pub(super) fn ended(model: &Model, exit: Exit, log: Option<&PathBuf>, now: Duration) -> String {
+    let FlightSoFar { started, refusal, verdict, error, .. } = &model.outcome;
+    let ending = Ending::of(&model.vehicle, now).map(|ending| ending.sentence(&model.vehicle));
+    let ended = json!({
+        "exit_code": exit as u8, "started": started, "stands": verdict.map(|(stands, _)| stands), "ending": ending,
+        "refusal": refusal.as_ref().map(|(words, _)| words), "error": error, "log": log,
+    });
+    format!("{ended:#}\n")
 }
 
 fn verdict_table(model: &Model, verdict: &Verdict, now: Duration) -> String {

@@ -9,6 +9,7 @@ use anyhow::Context as _;
 use futures_util::StreamExt as _;
 use protocol::identity::Address;
 use protocol::transport::LinkAddress;
+use serde_json::json;
 use tokio::io::AsyncWriteExt as _;
 
 use super::output::{absolute, print};
@@ -36,24 +37,21 @@ pub(super) fn of(model: &Model, screens: &[Attached]) -> StationStatus {
     let watching =
         screens.iter().filter(|screen| screen.watch).map(|screen| format!("{} (watches)", screen.seat));
     let silent = model.crew.silent().iter().map(|seat| format!("{seat} (does not answer)"));
-    let screens: Vec<String> =
-        model.crew.seats().iter().map(Seat::to_string).chain(silent).chain(watching).collect();
-    let boot = vehicle.boot.number().map_or_else(String::new, |boot| format!(" boot {}", words::boot(boot)));
+    let screens = model.crew.seats().iter().map(Seat::to_string).chain(silent).chain(watching);
     let Address { system_id, component_id } = settings.vehicle;
-    let heard = vehicle.heartbeat.map(|_| format!("{system_id}/{component_id} {kind}{boot}"));
-    let phase = vehicle.phase_now().map_or_else(|| "phase unknown".to_owned(), words::phase);
     StationStatus {
         pid: std::process::id(),
         link: settings.link_name.clone(),
-        vehicle: heard.unwrap_or_else(|| "not heard".to_owned()),
-        state: format!("{phase} {}", if vehicle.is_armed() { "ARMED" } else { "disarmed" }),
-        log: log_of(model),
-        screens: if screens.is_empty() { "none".to_owned() } else { screens.join("; ") },
+        demonstration: settings.demonstration,
+        kind: kind.to_owned(),
+        vehicle: vehicle.heartbeat.map(|_| format!("{system_id}/{component_id}")),
+        boot_number: vehicle.boot.number().unwrap_or(0),
+        phase: vehicle.phase_now().map_or_else(|| "phase unknown".to_owned(), words::phase),
+        armed: vehicle.is_armed(),
+        at_risk: model.is_at_risk(),
+        log: settings.log_path.as_deref().map(absolute),
+        screens: screens.collect(),
     }
-}
-
-fn log_of(model: &Model) -> String {
-    model.settings.log_path.as_deref().map_or_else(|| "none".to_owned(), absolute)
 }
 
 /// Answers a request to stop this station.
@@ -63,7 +61,10 @@ pub(super) fn stopping(model: &Model, force: bool, now: Duration) -> ToScreen {
         Some(why) => {
             ToScreen::Stopping { stops: false, words: format!("{why}; --force ends the station anyway") }
         }
-        None => ToScreen::Stopping { stops: true, words: format!("log: {}", log_of(model)) },
+        None => {
+            let log = model.settings.log_path.as_deref().map_or_else(|| "none".to_owned(), absolute);
+            ToScreen::Stopping { stops: true, words: format!("log: {log}") }
+        }
     }
 }
 
@@ -133,9 +134,20 @@ pub(super) async fn station_over(links: &str) -> Option<PathBuf> {
     same.next().filter(|_| same.next().is_none()).map(|(path, _)| path)
 }
 
+/// As in `PAD_IDLE disarmed`.
+fn state(StationStatus { phase, armed, .. }: &StationStatus) -> String {
+    format!("{phase} {}", if *armed { "ARMED" } else { "disarmed" })
+}
+
 fn listed(found: &[Found]) -> String {
     let one = |(path, status): &Found| match (path.display(), status) {
-        (path, Ok(StationStatus { pid, link, vehicle, state, log, screens })) => {
+        (path, Ok(status @ StationStatus { pid, link, kind, boot_number, log, screens, .. })) => {
+            let boot = Some(*boot_number).filter(|boot| *boot > 0).map(words::boot);
+            let boot = boot.map_or_else(String::new, |boot| format!(" boot {boot}"));
+            let heard = status.vehicle.as_ref().map(|ids| format!("{ids} {kind}{boot}"));
+            let (vehicle, state) = (heard.as_deref().unwrap_or("not heard"), state(status));
+            let (log, screens) = (log.as_deref().unwrap_or("none"), screens.join("; "));
+            let screens = if screens.is_empty() { "none" } else { &screens };
             format!(
                 "pid {pid}  {link}  vehicle {vehicle}  {state}\n  socket {path}\n  log {log}\n  screens {screens}\n"
             )
@@ -165,8 +177,9 @@ pub(super) async fn explained<T>(opened: anyhow::Result<T>, endpoints: &[LinkAdd
         links.any(|link| places.contains(&kind_and_port(link))).then_some(status)
     });
     Err(match holder {
-        Some(StationStatus { pid, link, state, .. }) => anyhow::anyhow!(
-            "your ground station pid {pid} ({state}) uses {link}: `ground attach` shows it, `ground stop` ends it"
+        Some(status @ StationStatus { pid, link, .. }) => anyhow::anyhow!(
+            "your ground station pid {pid} ({}) uses {link}: `ground attach` shows it, `ground stop` ends it",
+            state(status)
         ),
         None => error.context("another program uses the address; none of your ground stations does"),
     })
@@ -183,11 +196,22 @@ fn kind_and_port(link: &str) -> String {
 ///
 /// # Errors
 /// The stations cannot be looked for.
-pub async fn list() -> anyhow::Result<Exit> {
+pub async fn list(as_json: bool) -> anyhow::Result<Exit> {
     let found = stations().await.context("looking for ground stations")?;
-    let none = "no ground station of yours runs\n";
-    print(if found.is_empty() { none.to_owned() } else { listed(&found) }.as_bytes())?;
-    Ok(Exit::Yes)
+    let text = match &found[..] {
+        _ if as_json => {
+            let one = |(socket, status): &Found| {
+                let told = status.as_ref().map(|status| json!(status));
+                let mut one = told.unwrap_or_else(|error| json!({ "error": error }));
+                one["socket"] = json!(socket.display().to_string());
+                one
+            };
+            format!("{:#}\n", found.iter().map(one).collect::<serde_json::Value>())
+        }
+        [] => "no ground station of yours runs\n".to_owned(),
+        _ => listed(&found),
+    };
+    print(text.as_bytes()).map(|()| Exit::Yes)
 }
 
 /// `ground stop`: asks the station to end and waits until it has.

@@ -178,7 +178,7 @@ mod tests {
             Msg::Asked { request: Request::Acknowledge(AlarmKind::Refused(CommandKind::Abort)), by: seat },
             Msg::Tick,
         ];
-        let status = StationStatus { pid: 7, state: "PAD_ARMED".to_owned(), ..StationStatus::default() };
+        let status = StationStatus { pid: 7, phase: "PAD_ARMED".to_owned(), ..StationStatus::default() };
         let others = [
             ToScreen::Hello(Box::new(Hello { screen: 3, station })),
             ToScreen::Live,

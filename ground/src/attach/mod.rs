@@ -54,13 +54,22 @@ pub enum ToScreen {
 pub struct StationStatus {
     pub pid: u32,
     pub link: String,
-    /// As in `1/1 LIVE boot 1A2B3C4D`: the vehicle's MAVLink ids, whether it is simulated, and its boot.
-    pub vehicle: String,
-    /// As in `PAD_IDLE disarmed`.
-    pub state: String,
-    pub log: String,
+    /// Whether the vehicle is simulated in the station's process.
+    pub demonstration: bool,
+    /// LIVE, SIM or DEMO.
+    pub kind: String,
+    /// The vehicle's MAVLink ids, as in `1/1`, if it was heard.
+    pub vehicle: Option<String>,
+    /// 0 if it is not known.
+    pub boot_number: u32,
+    /// In words.
+    pub phase: String,
+    pub armed: bool,
+    /// Whether the vehicle is armed, in flight or being aborted.
+    pub at_risk: bool,
+    pub log: Option<String>,
     /// The screens with their operators.
-    pub screens: String,
+    pub screens: Vec<String>,
 }
 
 /// What a screen, or a command without a screen, sends to a station.

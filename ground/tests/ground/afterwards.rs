@@ -5,7 +5,7 @@ use ground::model::{Degrees, LastPlace, Role, Settings};
 use ground::update::{Action, Msg, Request};
 use protocol::dialect::{GLOBAL_POSITION_INT_DATA, HOME_POSITION_DATA, MavMessage, TdPhase};
 
-use crate::rig::{Rig, settings};
+use crate::rig::{MONO, Rig, settings};
 
 const PAD: Degrees = Degrees { latitude: 35.347, longitude: -117.809 };
 
@@ -171,5 +171,46 @@ fn the_place_of_a_vehicle_that_has_not_told_its_pad_is_known() {
         let screen = rig.screen(columns, rows);
         let code = screen.lines().filter(|row| row.contains('▀') && row.contains('█')).count();
         assert!(code >= 11 && screen.contains("█▀▀▀▀▀█"), "{code}: {screen}");
+    }
+}
+
+/// The columns and rows of the dots in the panel of the arrow.
+fn dots(rig: &Rig, (columns, rows): (u16, u16)) -> Vec<(f64, f64)> {
+    let terminal = rig.draw(columns, rows, MONO);
+    let cells = terminal.backend().buffer().content.chunks(usize::from(columns)).enumerate();
+    let width = if columns == 80 { 14 } else { 33 };
+    let mut dots = Vec::new();
+    for (row, cells) in cells {
+        for (column, cell) in cells[..width].iter().enumerate() {
+            let pattern = cell.symbol().chars().next().and_then(|c| u32::from(c).checked_sub(0x2800));
+            let count = pattern.filter(|pattern| *pattern < 0x100).map_or(0, u32::count_ones);
+            dots.extend((0..count).map(|_| (column as f64, row as f64)));
+        }
+    }
+    dots
+}
+
+/// The arrow is heavier where its head is: there the vehicle is, at every size.
+#[test]
+fn the_arrow_points_to_the_vehicle() {
+    for (north_m, east_m) in [(50.0, 0.0), (-50.0, 0.0), (0.0, 50.0), (0.0, -50.0)] {
+        let mut place = *kept(&falling(Role::Station)).last().unwrap();
+        (place.heard.north_m, place.heard.east_m, place.predicted) = (north_m, east_m, None);
+        let mut rig = Rig::new(settings(false, true));
+        rig.msg(Msg::Place(Box::new(place)));
+        rig.run(1.0);
+        rig.key(Key::Char('f'));
+        for size in [(80, 24), (120, 36), (140, 45), (200, 50)] {
+            // How far each dot is towards the vehicle.
+            let dots = dots(&rig, size).into_iter().map(|(column, row)| column * east_m - row * north_m);
+            let dots: Vec<f64> = dots.collect();
+            let least = dots.iter().copied().fold(f64::INFINITY, f64::min);
+            let most = dots.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let middle = f64::midpoint(least, most);
+            let head = dots.iter().filter(|along| **along > middle).count();
+            let tail = dots.iter().filter(|along| **along < middle).count();
+            let screen = rig.screen(size.0, size.1);
+            assert!(tail > 0 && head > tail, "{size:?} {north_m} {east_m}: {head}, {tail}\n{screen}");
+        }
     }
 }

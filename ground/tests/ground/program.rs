@@ -194,3 +194,14 @@ fn the_telemetry_log_contains_the_same_flight() {
     assert_eq!(output.status.code(), Some(1));
     assert!(err(&output).contains("--tlog writes beside a log"));
 }
+
+/// A program reads one object: how the flight ended, and where its log is.
+#[test]
+fn the_end_of_a_run_is_one_object() {
+    let directory = tempfile::tempdir().unwrap();
+    let output =
+        ground(directory.path(), &["--json", "--start", "apogee", "--speed", "4", "--log", "f.mcap"]);
+    let told: serde_json::Value = serde_json::from_str(&out(&output)).unwrap();
+    assert_eq!((&told["exit_code"], &told["stands"]), (&0.into(), &true.into()), "{told}");
+    assert_eq!(told["log"], "f.mcap", "{told}");
+}

@@ -8,16 +8,16 @@ use ratatui::Frame;
 use ratatui::layout::Constraint::{Fill, Length};
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
-use ratatui::widgets::{Paragraph, Wrap};
+use ratatui::widgets::{Paragraph, Wrap, canvas};
 
-use super::{columns, flight, framed};
+use super::{Room, columns, flight, framed, rows};
 use crate::model::words;
 use crate::model::{
     Act, Degrees, LOSS_MOST, LastPlace, MARGIN_LEAST_DB, Model, PadCheck, SURFACES, Sample, Spot, Standing,
     dead_reckoning::may_have_left, shown, standing,
 };
-use crate::view::pictures::qr;
-use crate::view::{TextRole, Theme, draw_lines, fixed, seconds};
+use crate::view::pictures::{Plane, qr};
+use crate::view::{Ink, TextRole, Theme, draw_line, draw_lines, fixed, seconds};
 
 /// Columns of one value beside others.
 const VALUE_COLUMNS: usize = 39;
@@ -196,15 +196,32 @@ fn radio(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
 
 // The page that helps to find the vehicle: where it was last heard, where it is predicted, and the way there.
 
+/// Columns of the arrow at 80 columns, and of the words.
+const ARROW_COLUMNS: u16 = 14;
 const WORD_COLUMNS: u16 = 33;
+/// Rows of the words above the arrow.
+const WORD_ROWS: u16 = 15;
 
-/// Draws what is known of the place, the way over the ground, and the code for a phone.
+/// Draws an arrow that points to where it is, what is known of the place, the way over the ground, and the code for a phone.
 pub fn draw_find(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let [words, right] = columns(area, [Length(WORD_COLUMNS), Fill(1)]);
-    let inside = framed("place", Line::default(), theme, frame, words);
+    let (walk, middle, right) = if Room::of(frame.area()) == Room::Small {
+        columns(area, [Length(ARROW_COLUMNS), Length(WORD_COLUMNS), Fill(1)]).into()
+    } else {
+        let [left, right] = columns(area, [Length(WORD_COLUMNS), Fill(1)]);
+        let [words, walk] = rows(left, [Length(WORD_ROWS), Fill(1)]);
+        (walk, words, right)
+    };
+    let inside = framed("place", Line::default(), theme, frame, middle);
     let place = model.last_place(now).or(model.place);
     let words = Paragraph::new(find_lines(model, theme, now)).wrap(Wrap { trim: false });
     frame.render_widget(words, inside);
+    let inside = framed("walk", theme.line(" N up ", TextRole::Label), theme, frame, walk);
+    match place.filter(|_| may_have_left(&model.vehicle, now).is_none()) {
+        Some(place) => {
+            draw_arrow(place.way(&place.best(), model.settings.here).bearing_deg, theme, frame, inside)
+        }
+        None => draw_line(frame, inside, theme.line(" --", TextRole::Label)),
+    }
     let flies = model.vehicle.in_flight() && place.is_some_and(|place| place.predicted.is_none());
     let at = place.and_then(|place| place.degrees(&place.best())).filter(|_| !flies && !theme.ascii);
     let code = at.map_or_else(Vec::new, |at| qr::code(at, right.height));
@@ -215,6 +232,24 @@ pub fn draw_find(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
         flight::map(flight::FROM_ABOVE, model, theme, now, frame, over_ground);
     }
     draw_lines(frame, beside, &code);
+}
+
+/// An arrow has the same shape wherever it points.
+fn draw_arrow(bearing_deg: f64, theme: Theme, frame: &mut Frame, area: Rect) {
+    let plane = Plane::around(area, (0.0, 0.0), 1.0);
+    let reach = 1.0 - 2.0 * plane.dot();
+    let (sin, cos) = libm::sincos(bearing_deg.to_radians());
+    let at =
+        |along: f64, aside: f64| (reach * (along * sin + aside * cos), reach * (along * cos - aside * sin));
+    plane.draw(theme, frame, |context| {
+        for step in -20..=20 {
+            let aside = f64::from(step) / 33.0;
+            for (from, to) in [(at(0.0, aside), at(1.0, 0.0)), (at(-1.0, aside / 5.0), at(0.0, aside / 5.0))]
+            {
+                context.draw(&canvas::Line::new(from.0, from.1, to.0, to.1, theme.ink(Ink::Measured)));
+            }
+        }
+    });
 }
 
 /// The places and the ways to them.

@@ -114,7 +114,7 @@ fn draw_checklist(model: &Model, theme: Theme, now: Duration, frame: &mut Frame,
     draw_lines(frame, inside, &lists::checklist_rows(model, theme, now, size));
 }
 
-/// Each failing check in the words of the vehicle, or with the value found; how many pass; the measured values of those.
+/// Each failing check in the words of the vehicle, or with the value found and why it fails; how many pass; the measured values of those.
 pub fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     // Off the pad the vehicle does not check for arming and reports no failing check.
     let off_pad = model.vehicle.phase().is_some_and(|phase| !is_on_pad(phase.value));
@@ -125,9 +125,12 @@ pub fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> 
         return lines.map(|words| Line::from(format!(" {words}"))).collect();
     };
     let mark = if status.is_stale(now) { STALE_MARK } else { " " };
-    let row = |word: &'static str, (name, bit): (&str, TdCheck), role: TextRole| {
+    let row = |word: &'static str, (name, bit): (&str, TdCheck), reason: &'static str| {
         let (name, found) = (words::check(name), found(&model.vehicle, bit));
-        Line::from(vec![theme.span(word, role), theme.plain(format!("{mark}{name:<19.19}{found:>10}"))])
+        let reason = if found.starts_with("--") && !reason.is_empty() { "not known" } else { reason };
+        let role = if reason.is_empty() { TextRole::Plain } else { TextRole::Alarm };
+        let value = theme.plain(format!("{mark}{name:<19.19}{found:>10} "));
+        Line::from(vec![theme.span(word, role), value, theme.span(reason, TextRole::Caution)])
     };
     let fails = |bit: TdCheck| status.value.checks_failed.contains(bit);
     let all = model.vehicle.checks_made();
@@ -147,13 +150,13 @@ pub fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> 
             theme.span(" NO ", TextRole::Alarm),
             theme.span(format!("{mark}{words}"), TextRole::Caution),
         ]),
-        _ => row(" NO ", check, TextRole::Alarm),
+        _ => row(" NO ", check, failure(check.1)),
     }));
     let of = all.iter().count();
     let count = format!(" GO {mark}{} of {of} checks", of - failed.iter().count());
     lines.push(theme.line(count, TextRole::Good));
     let measured = |(_, bit): &(&str, TdCheck)| !fails(*bit) && found(&model.vehicle, *bit).contains(' ');
-    lines.extend(all.iter_names().filter(measured).map(|check| row("    ", check, TextRole::Plain)));
+    lines.extend(all.iter_names().filter(measured).map(|check| row("    ", check, "")));
     if !station_log_fails {
         lines.push(station_log);
     }
@@ -249,6 +252,33 @@ fn found(vehicle: &Vehicle, check: TdCheck) -> String {
         TdCheck::TD_CHECK_BATTERY => number(vehicle.battery().map(|battery| battery.value.volts), 2, "V"),
         TdCheck::TD_CHECK_LOG_SPACE => number(vehicle.log_space_mib().map(|space| space.value), 0, "MiB"),
         _ => String::new(),
+    }
+}
+
+/// Why a check fails.
+fn failure(check: TdCheck) -> &'static str {
+    match check {
+        TdCheck::TD_CHECK_ABORT_LATCH => "keep away",
+        TdCheck::TD_CHECK_PIN => "pull the pin",
+        TdCheck::TD_CHECK_SELF_TEST => "not passed",
+        TdCheck::TD_CHECK_ACCELEROMETER
+        | TdCheck::TD_CHECK_GYRO
+        | TdCheck::TD_CHECK_BAROMETER
+        | TdCheck::TD_CHECK_LIDAR => "no data",
+        TdCheck::TD_CHECK_GNSS => "no fix",
+        TdCheck::TD_CHECK_TILT => "not upright",
+        TdCheck::TD_CHECK_ROTATION => "turning",
+        TdCheck::TD_CHECK_SPEED => "moving",
+        TdCheck::TD_CHECK_ESTIMATOR => "not settled",
+        TdCheck::TD_CHECK_FINS => "no answer",
+        TdCheck::TD_CHECK_IGNITER => "open circuit",
+        TdCheck::TD_CHECK_LOG => "not running",
+        TdCheck::TD_CHECK_LOG_SPACE => "disk full",
+        TdCheck::TD_CHECK_CONTROLLER_WARM => "no rehearsal",
+        TdCheck::TD_CHECK_PREDICTED_TOUCHDOWN => "outside",
+        TdCheck::TD_CHECK_UPLINK => "not heard",
+        TdCheck::TD_CHECK_HEIGHT | TdCheck::TD_CHECK_BATTERY => "too low",
+        _ => "",
     }
 }
 
