@@ -7,6 +7,8 @@ use protocol::program::Exit;
 
 /// Most signals listed that differ within their tolerance or have no tolerance.
 const SIGNALS_SHOWN: usize = 60;
+/// Limits that are nearer, as a share of their range, are the same: a station hears them as `f32`.
+const SAME: f64 = 1e-4;
 /// Most limits named in which the landings differ.
 const LIMITS_SHOWN: usize = 3;
 /// Most names and rows of words listed.
@@ -71,7 +73,7 @@ impl Comparison {
     /// What differs in the landings; nothing of two logs without one.
     fn landings(&self) -> Vec<String> {
         let both = [self.verdicts.0.as_ref(), self.verdicts.1.as_ref()];
-        let different = limits_of_both(both).into_iter().filter(|(apart, _)| *apart > 0.0);
+        let different = limits_of_both(both).into_iter().filter(|(apart, _)| *apart > SAME);
         let [then, now] = both.map(word);
         let most = different
             .take(LIMITS_SHOWN)
