@@ -4,7 +4,7 @@
 use std::collections::VecDeque;
 use std::fs::File;
 use std::io;
-use std::io::{BufReader, Seek as _};
+use std::io::{BufReader, Read as _, Seek as _};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -17,7 +17,7 @@ use protocol::log::tlog::{TlogFrame, TlogReader, is_tlog};
 
 use crate::model::{CommandKind, telemetry::phase_of as phase_of_heartbeat};
 
-/// A larger step back in time means that the clock was set back, not that frames of two links are out of order.
+/// A larger step back in time means that the clock was set back, not that frames of two links are out of order. An MCAP log has none.
 const CLOCK_SET_BACK_NS: i128 = 1_000_000_000;
 /// A longer gap is skipped: the log was continued on another day, or a time stamp is wrong.
 const LEFT_OUT_NS: i128 = 3_600 * 1_000_000_000;
@@ -33,6 +33,9 @@ pub enum RecordingError {
     /// There is nothing to show.
     #[error("{}: contains no frames of a vehicle; is it a log of `ground` or `onboard-sim`?", path.display())]
     Empty { path: PathBuf },
+    /// Nothing says when its frames came.
+    #[error("{}: is a MAVLink stream without times; a .tlog has one before each frame", path.display())]
+    NoTimes { path: PathBuf },
 }
 
 /// A recorded flight.
@@ -70,7 +73,15 @@ impl Recording {
         // What the ground received; if that is missing, what the vehicle sent.
         let found = [(Side::Ground, ground), (Side::Vehicle, vehicle)];
         let Some((side, survey)) = found.into_iter().find(|(_, survey)| survey.has_vehicle) else {
-            return Err(RecordingError::Empty { path: path.to_owned() });
+            let (path, mut start, mut framer) = (path.to_owned(), Vec::new(), Framer::new());
+            (&file).rewind().map_err(read)?;
+            (&file).take(BUFFER_BYTES as u64).read_to_end(&mut start).map_err(read)?;
+            framer.push(&start);
+            let is_log = matches!(events.format, Format::Tlog(_)) || start.starts_with(b"\x89MCAP");
+            let is_stream = !is_log && framer.next_frame().is_some();
+            let error =
+                if is_stream { RecordingError::NoTimes { path } } else { RecordingError::Empty { path } };
+            return Err(error);
         };
         let Survey { events: count, length, phases, .. } = survey;
         let (damage, vehicle) = (events.damage(), events.vehicle);
@@ -205,6 +216,8 @@ struct LogEvents {
     ground: Option<Address>,
     /// One for each side.
     clocks: [RecordingClock; 2],
+    /// The latest time stamp of an MCAP log.
+    latest_ns: u64,
     /// What the last record holds.
     waiting: VecDeque<(Side, Duration, RecordedEvent)>,
 }
@@ -228,7 +241,7 @@ impl LogEvents {
             Format::Mcap(Box::new(LogReader::new(BufReader::with_capacity(BUFFER_BYTES, file))))
         };
         let clocks = <[RecordingClock; 2]>::default();
-        Ok(Self { format, vehicle, ground: None, clocks, waiting: VecDeque::new() })
+        Ok(Self { format, vehicle, ground: None, clocks, latest_ns: 0, waiting: VecDeque::new() })
     }
 
     /// Why reading ended early, if it did.
@@ -258,6 +271,11 @@ impl LogEvents {
                         Some("vehicle") => Side::Vehicle,
                         _ => continue,
                     };
+                    self.latest_ns = self.latest_ns.max(log_time_ns);
+                    if i128::from(self.latest_ns - log_time_ns) > CLOCK_SET_BACK_NS {
+                        let words = "it is not in order of time; `replay recover` sorts it";
+                        return Err(io::Error::other(words));
+                    }
                     (side, log_time_ns, data)
                 }
                 Format::Tlog(reader) => {

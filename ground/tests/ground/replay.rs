@@ -13,6 +13,9 @@ use ground::view::draw;
 use protocol::dialect::{HEARTBEAT_DATA, MavAutopilot, MavMessage, MavType, TdPhase};
 use protocol::frame::Encoder;
 use protocol::identity::{GROUND, VEHICLE};
+use protocol::log::record::{Direction, RawFrame, Record};
+use protocol::log::recorder::Recorder;
+use protocol::log::writer::LogHeader;
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
 use ratatui::buffer::Cell;
@@ -250,6 +253,28 @@ fn a_file_that_is_no_log_is_refused_by_name() {
     let refused = load(&path).unwrap_err();
     assert!(matches!(refused, RecordingError::Empty { .. }) && refused.to_string().contains("notes.mcap"));
     assert!(matches!(load(&directory.path().join("gone")), Err(RecordingError::Read { .. })));
+    let heartbeat = Encoder::new(VEHICLE).encode(&MavMessage::HEARTBEAT(beat(9)));
+    std::fs::write(&path, heartbeat.as_bytes().repeat(3)).unwrap();
+    assert!(matches!(load(&path), Err(RecordingError::NoTimes { .. })), "a stream");
+}
+
+#[test]
+fn a_log_that_is_not_in_order_of_time_is_refused() {
+    let directory = tempfile::tempdir().unwrap();
+    for late_ns in [1_000_000_000, 1_000_000_001] {
+        let path = directory.path().join(format!("{late_ns}.mcap"));
+        let log = Recorder::create(&path, None, &LogHeader::default()).unwrap();
+        let bytes = Encoder::new(VEHICLE).encode(&MavMessage::HEARTBEAT(beat(9))).as_bytes().to_vec();
+        let frame = RawFrame { direction: Direction::Rx, endpoint: "ground", link: "udp".to_owned(), bytes };
+        for time_ns in [late_ns, 0] {
+            log.record(Record::RawFrame(frame.clone()), time_ns);
+        }
+        log.finish().unwrap();
+        let refused = load(&path).err().map(|error| format!("{:#}", anyhow::Error::from(error)));
+        let says =
+            refused.map(|words| words.ends_with("it is not in order of time; `replay recover` sorts it"));
+        assert_eq!(says, (late_ns > 1_000_000_000).then_some(true));
+    }
 }
 
 /// The peak memory of a running process, kB (Linux).
