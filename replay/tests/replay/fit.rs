@@ -176,7 +176,7 @@ fn several_logs_are_put_together_and_a_bad_one_does_not_hide_the_others() {
 /// Two vehicles have no drag in common.
 #[test]
 fn flights_of_different_missions_are_not_put_together() {
-    let other = crate::simulated::simulate("mk3", 1, &[]);
+    let other = crate::simulated::simulate_recipe(Recipe::built_in("mk3", "field").unwrap(), &[]);
     let files = [LANDED.log.to_str().unwrap(), other.log.to_str().unwrap()];
     let (found, answer) = fits(&files);
     assert!(found.len() == 2 && answer["together"].as_array().unwrap().is_empty(), "{answer}");

@@ -3,7 +3,7 @@
 use replay::log::Recording;
 use replay::refly::{ReflyOptions, refly};
 
-use crate::command_line::{data, replay};
+use crate::command_line::{data, refusal, replay};
 use crate::flown::{Recipe, write_log};
 use crate::from_apogee::LANDED;
 use crate::simulated::MK2;
