@@ -56,16 +56,12 @@ pub(super) fn of(model: &Model, screens: &[Attached]) -> StationStatus {
 
 /// Answers a request to stop this station.
 pub(super) fn stopping(model: &Model, force: bool, now: Duration) -> ToScreen {
+    let log = model.settings.log_path.as_deref().map_or_else(|| "none".to_owned(), absolute);
     let free = force || model.settings.demonstration;
-    match why_not_stop(model, now).filter(|_| !free) {
-        Some(why) => {
-            ToScreen::Stopping { stops: false, words: format!("{why}; --force ends the station anyway") }
-        }
-        None => {
-            let log = model.settings.log_path.as_deref().map_or_else(|| "none".to_owned(), absolute);
-            ToScreen::Stopping { stops: true, words: format!("log: {log}") }
-        }
+    if let Some(why) = why_not_stop(model, now).filter(|_| !free) {
+        return ToScreen::Stopping { stops: false, words: format!("{why}; --force ends the station anyway") };
     }
+    ToScreen::Stopping { stops: true, words: format!("log: {log}") }
 }
 
 /// Sends one question to the station on this socket.

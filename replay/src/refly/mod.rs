@@ -263,7 +263,7 @@ pub(crate) fn felt(input: &ComputerInput) -> ComputerInput {
         measured, gimbal_rad, fins_rad, contact, igniter_continuity, booster_attached, ..
     } = input;
     ComputerInput {
-        measured: measured.clone(),
+        measured: *measured,
         gimbal_rad: gimbal_rad.clone(),
         fins_rad: fins_rad.clone(),
         contact: *contact,

@@ -116,12 +116,11 @@ impl FlightVerifier {
         whole_head: &impl Fn() -> Result<Head, LogError>,
     ) -> Result<(), LogError> {
         let later;
-        let head = match &log.head().profile_toml {
-            Some(_) => log.head(),
-            None => {
-                later = whole_head()?;
-                &later
-            }
+        let head = if log.head().profile_toml.is_some() {
+            log.head()
+        } else {
+            later = whole_head()?;
+            &later
         };
         let toml = match &head.profile_toml {
             None => Err(Obstacle::NoProfile),

@@ -14,7 +14,7 @@ use super::{Room, columns, flight, framed, rows};
 use crate::model::words;
 use crate::model::{
     Act, Degrees, LOSS_MOST, LastPlace, MARGIN_LEAST_DB, Model, PadCheck, SURFACES, Sample, Spot, Standing,
-    dead_reckoning::may_have_left, shown, standing,
+    Way, dead_reckoning::may_have_left, shown, standing,
 };
 use crate::view::pictures::{Plane, qr};
 use crate::view::{Ink, TextRole, Theme, draw_line, draw_lines, fixed, seconds};
@@ -217,9 +217,7 @@ pub fn draw_find(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
     frame.render_widget(words, inside);
     let inside = framed("walk", theme.line(" N up ", TextRole::Label), theme, frame, walk);
     match place.filter(|_| may_have_left(&model.vehicle, now).is_none()) {
-        Some(place) => {
-            draw_arrow(place.way(&place.best(), model.settings.here).bearing_deg, theme, frame, inside)
-        }
+        Some(place) => draw_arrow(place.way(&place.best(), model.settings.here), theme, frame, inside),
         None => draw_line(frame, inside, theme.line(" --", TextRole::Label)),
     }
     let flies = model.vehicle.in_flight() && place.is_some_and(|place| place.predicted.is_none());
@@ -235,10 +233,10 @@ pub fn draw_find(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
 }
 
 /// An arrow has the same shape wherever it points.
-fn draw_arrow(bearing_deg: f64, theme: Theme, frame: &mut Frame, area: Rect) {
+fn draw_arrow(way: Way, theme: Theme, frame: &mut Frame, area: Rect) {
     let plane = Plane::around(area, (0.0, 0.0), 1.0);
     let reach = 1.0 - 2.0 * plane.dot();
-    let (sin, cos) = libm::sincos(bearing_deg.to_radians());
+    let (sin, cos) = libm::sincos(way.bearing_deg.to_radians());
     let at =
         |along: f64, aside: f64| (reach * (along * sin + aside * cos), reach * (along * cos - aside * sin));
     plane.draw(theme, frame, |context| {
