@@ -43,7 +43,7 @@ pub(in crate::app) async fn run_download(args: &DownloadArgs) -> anyhow::Result<
     let mut signals = Signals::listen()?;
     let mut ticks = interval(TICK);
     ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
-    let mut percent_shown = 0;
+    let mut tenths_shown = 0;
     loop {
         let msgs = tokio::select! {
             biased;
@@ -79,8 +79,8 @@ pub(in crate::app) async fn run_download(args: &DownloadArgs) -> anyhow::Result<
             wire.send(&packet.message(vehicle), 0);
         }
         if let Some(progress) = download.progress() {
-            let percent = 1 + 100 * u64::from(progress.bytes) / u64::from(progress.len.max(1));
-            if percent > std::mem::replace(&mut percent_shown, percent) {
+            let tenths = 1 + 10 * u64::from(progress.bytes) / u64::from(progress.len.max(1));
+            if tenths > std::mem::replace(&mut tenths_shown, tenths) {
                 // If nobody reads it, the download goes on.
                 let _ = writeln!(
                     io::stderr(),

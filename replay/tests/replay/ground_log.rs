@@ -80,8 +80,7 @@ fn a_clock_that_is_set_while_it_records_loses_no_frame() {
     let as_sent = imported("as-sent.mcap", &plain);
     let frames = read(&plain);
     let begins_us = frames[0].time_us;
-    type Clock = fn(u64, u64) -> u64;
-    let clocks: [Clock; 2] =
+    let clocks: [fn(u64, u64) -> u64; 2] =
         [|time_us, _| time_us - 3_600_000_000, |time_us, begins_us| time_us - begins_us + 1];
     for (place, set) in clocks.into_iter().enumerate() {
         for first_half in [true, false] {

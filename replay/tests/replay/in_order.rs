@@ -10,7 +10,7 @@ use crate::command_line::{replay, run};
 use crate::flown::only;
 use crate::from_apogee::LANDED;
 use crate::simulated::{MK2, WITH_FRAMES};
-use crate::tampered::Held;
+use crate::tampered::{Held, Kept};
 
 /// The orders that other programs write: one topic after the other, from either end; a later part first; and equal times from the
 /// last topic to the first.
@@ -73,8 +73,8 @@ fn a_frame_that_is_a_little_late_is_out_of_order() {
     let directory = tempfile::tempdir().unwrap();
     let [log, sorted] = ["log.mcap", "sorted.mcap"].map(|name| directory.path().join(name));
     let mut held = Held::read(&LANDED.log);
-    let late = held.messages.iter().rposition(|message| message.is_frame()).unwrap() - 20;
-    let late = (late..).find(|place| held.messages[*place].is_frame()).unwrap();
+    let before = held.messages.len() - 40;
+    let late = before + held.messages[before..].iter().position(Kept::is_frame).unwrap();
     held.messages[late..late + 12].rotate_left(1);
     held.write(&log);
     assert_refused_as_unordered(&log, directory.path());
