@@ -51,7 +51,7 @@ pub(crate) enum Place {
 }
 
 impl Place {
-    /// The place of a record; its first start is the power-up.
+    /// The place of a record; a start is that of a release.
     pub(crate) fn of(topic: &str) -> Self {
         match topic {
             TOPIC_COMPUTER_START => Self::Release,
@@ -73,11 +73,13 @@ impl ComputerOrder {
         if ![TOPIC_COMPUTER_START, TOPIC_COMPUTER_FRAME, TOPIC_ESTIMATE].contains(&topic) {
             return false;
         }
-        let last = self.last.get_or_insert((log_time_ns, Place::PowerUp));
-        let place = if *last == (log_time_ns, Place::PowerUp) { Place::PowerUp } else { Place::of(topic) };
-        let this = (log_time_ns, place);
-        let is_broken = this < *last;
-        *last = this.max(*last);
+        // The start at a release is of the time of its frame; one that comes later powers up another flight.
+        let powers_up =
+            topic == TOPIC_COMPUTER_START && self.last.is_none_or(|(last_ns, _)| last_ns < log_time_ns);
+        let place = if powers_up { Place::PowerUp } else { Place::of(topic) };
+        let this = Some((log_time_ns, place));
+        let is_broken = this < self.last;
+        self.last = self.last.max(this);
         is_broken
     }
 }
