@@ -78,7 +78,8 @@ impl ComputerOrder {
             topic == TOPIC_COMPUTER_START && self.last.is_none_or(|(last_ns, _)| last_ns < log_time_ns);
         let place = if powers_up { Place::PowerUp } else { Place::of(topic) };
         let this = Some((log_time_ns, place));
-        let last = std::mem::replace(&mut self.last, self.last.max(this));
+        let last = self.last;
+        self.last = last.max(this);
         this < last
     }
 }

@@ -171,13 +171,11 @@ fn convert<W: Write + Seek>(input: File, path: &Path, output: W) -> Result<(W, I
     let mut next = Some(first);
     let (mut since_us, mut clock_us) = (0_u64, start_us);
     while let Some(TlogFrame { time_us, bytes }) = next {
-        // A station's clock is set while it records: what is no step of a record's time is none.
+        // A step that no silence explains is that of a clock which was set: no time passed in it.
         let step_us = time_us.abs_diff(clock_us);
         let is_set = step_us > if time_us < clock_us { CLOCK_BACK_US } else { CLOCK_AHEAD_US };
-        if is_set || time_us > clock_us {
-            since_us += if is_set { 0 } else { step_us };
-            clock_us = time_us;
-        }
+        since_us += if is_set { 0 } else { time_us.saturating_sub(clock_us) };
+        clock_us = if is_set { time_us } else { clock_us.max(time_us) };
         let time_ns = since_us.saturating_mul(1000);
         let understood = frame_of(&bytes);
         imported.frames += 1;
@@ -206,8 +204,8 @@ fn convert<W: Write + Seek>(input: File, path: &Path, output: W) -> Result<(W, I
     Ok((log.finish()?, imported))
 }
 
-/// A clock that goes back by more or ahead by more, us, was set: a second, which frames of several threads are not late by, and a day,
-/// which nobody records without hearing a frame.
+/// A clock that goes back or ahead by more than this, us, was set. Frames of several threads are late by less than a second, and nobody
+/// records a day without hearing a frame.
 const CLOCK_BACK_US: u64 = 1_000_000;
 const CLOCK_AHEAD_US: u64 = 86_400_000_000;
 
