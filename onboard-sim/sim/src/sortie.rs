@@ -253,7 +253,7 @@ impl Sortie {
         }
         let felt = self.feel()?;
         self.followed = Some(Decision::of(computer));
-        self.command(computer.commands());
+        self.surroundings.command(computer.commands());
         Some(felt)
     }
 
@@ -300,7 +300,7 @@ impl Sortie {
 
     fn command(&mut self, commands: &Commands) {
         self.surroundings.command(commands);
-        let falls = !self.decision().mode.phase.before_apogee();
+        let falls = !self.computer.mode().phase.before_apogee();
         if falls && self.fall.is_none() {
             self.fall = Some(*self.world().state());
         }

@@ -248,27 +248,23 @@ fn reached(recording: &Recording, rerun: &Rerun, before: &[ComputerFrame]) -> Re
 /// Whether two frames are of the same flight: what was felt, what was decided, and what is remembered, unless that covers a
 /// pad. What only a crew or a log's disk makes different does not count.
 fn is_same_flight(now: &ComputerFrame, then: &ComputerFrame, same_memory: bool) -> bool {
-    let felt = |frame: &ComputerFrame| {
-        let input = felt(&frame.input);
+    let compared = |frame: &ComputerFrame| {
         let output = ComputerOutput { answers: Vec::new(), released: false, ..frame.output.clone() };
         let state_digest = if same_memory { frame.state_digest } else { 0 };
-        ComputerFrame { input, output, state_digest }.encode_to_vec()
+        ComputerFrame { input: felt(&frame.input), output, state_digest }.encode_to_vec()
     };
-    felt(now) == felt(then)
+    compared(now) == compared(then)
 }
 
 /// What of an input the world makes the computer feel, and not its crew, its pad or its log's disk.
 pub(crate) fn felt(input: &ComputerInput) -> ComputerInput {
-    let ComputerInput {
-        measured, gimbal_rad, fins_rad, contact, igniter_continuity, booster_attached, ..
-    } = input;
     ComputerInput {
-        measured: *measured,
-        gimbal_rad: gimbal_rad.clone(),
-        fins_rad: fins_rad.clone(),
-        contact: *contact,
-        igniter_continuity: *igniter_continuity,
-        booster_attached: *booster_attached,
+        measured: input.measured,
+        gimbal_rad: input.gimbal_rad.clone(),
+        fins_rad: input.fins_rad.clone(),
+        contact: input.contact,
+        igniter_continuity: input.igniter_continuity,
+        booster_attached: input.booster_attached,
         ..ComputerInput::default()
     }
 }

@@ -15,9 +15,6 @@ use crate::log::{Head, LoggedFrame};
 use crate::refly::felt;
 use crate::refly::rerun::{begun, drawn_from};
 
-/// The facts that a simulated flight is drawn from.
-const DRAWN_FROM: [&str; 3] = ["seed", "flight", "dispersion"];
-
 /// What of the metadata no flight follows from.
 const BESIDE: &str = "what the flight is drawn from; the dispersion's name, start_unix_ns, the build and touchdown.xml are not compared";
 
@@ -43,7 +40,7 @@ impl WorldAgain {
         toml: &str,
         start: &ComputerStart,
     ) -> Result<Option<Self>, AgainError> {
-        if !DRAWN_FROM.iter().any(|fact| head.run.contains_key(*fact)) {
+        if !["seed", "flight", "dispersion"].iter().any(|fact| head.run.contains_key(*fact)) {
             return Ok(None);
         }
         let (recipe, number) = drawn_from(name, head, toml, start)?;
@@ -61,10 +58,8 @@ impl WorldAgain {
 
     /// Moves on by a frame that the computer has just flown.
     pub(super) fn follow(&mut self, frame: &LoggedFrame, computer: &Computer) {
-        if self.over {
-            return;
-        }
-        let number = frame.record.input.frame.saturating_sub(self.released);
+        let number = frame.record.input.frame.checked_sub(self.released);
+        let Some(number) = number.filter(|_| !self.over) else { return };
         let recorded = felt(&frame.record.input).encode_to_vec();
         let again = self.flight.follow(number, computer);
         let again = again.map(|kept| felt(&kept.to_log()).encode_to_vec());

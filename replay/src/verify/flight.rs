@@ -115,6 +115,20 @@ impl FlightVerifier {
         log: &FlightLog<R>,
         whole_head: &impl Fn() -> Result<Head, LogError>,
     ) -> Result<(), LogError> {
+        let starts = &mut self.parts.starts;
+        starts.recorded += u64::from(self.awaited.release.is_empty());
+        let runs = self.computer.is_some() && self.obstacle.is_none();
+        let goes_on = start.released && (runs || self.flies);
+        if goes_on {
+            if runs {
+                starts.compare(self.awaited.release == data);
+            }
+            self.awaited.release.clear();
+        }
+        let draws = self.strict && self.world.is_none() && start.released;
+        if goes_on && !draws {
+            return Ok(());
+        }
         let later;
         let head = if log.head().profile_toml.is_some() {
             log.head()
@@ -123,35 +137,25 @@ impl FlightVerifier {
             &later
         };
         let toml = match &head.profile_toml {
-            None => Err(Obstacle::NoProfile),
-            Some(Err(error)) => Err(Obstacle::ProfileUnreadable(error.to_string())),
-            Some(Ok(text)) => Ok(text),
-        };
-        if let (true, true, Ok(toml)) = (self.strict && self.world.is_none(), start.released, &toml) {
-            let drawn = WorldAgain::drawn(log.name(), head, toml, start);
-            self.world = drawn.map_err(|error| error.to_string()).transpose();
-        }
-        let starts = &mut self.parts.starts;
-        starts.recorded += u64::from(self.awaited.release.is_empty());
-        let runs = self.computer.is_some() && self.obstacle.is_none();
-        if start.released && (runs || self.flies) {
-            if runs {
-                starts.compare(self.awaited.release == data);
-            }
-            self.awaited.release.clear();
-            return Ok(());
-        }
-        let toml = match toml {
-            Ok(toml) => toml,
-            Err(obstacle) => {
-                self.obstacle = Some(obstacle);
+            Some(Ok(text)) => text,
+            _ if goes_on => return Ok(()),
+            lacking => {
+                let error = lacking.as_ref().and_then(|text| text.as_ref().err()).map(ToString::to_string);
+                self.obstacle = Some(error.map_or(Obstacle::NoProfile, Obstacle::ProfileUnreadable));
                 return Ok(());
             }
         };
+        if draws {
+            let drawn = WorldAgain::drawn(log.name(), head, toml, start);
+            self.world = drawn.map_err(|error| error.to_string()).transpose();
+        }
+        if goes_on {
+            return Ok(());
+        }
         match LoggedComputer::recorded(toml, start, &head.run, &[]) {
             Ok(computer) => {
                 // What it begins from decides what it does.
-                starts.compared += 1;
+                self.parts.starts.compared += 1;
                 self.remembers_less = start.released && (self.frames > 0 || start.frame > 0);
                 self.computer = Some(if self.remembers_less { computer.without_digests() } else { computer });
                 self.from_power_up = !start.released;
