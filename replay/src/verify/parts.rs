@@ -55,8 +55,8 @@ pub(super) fn table(parts: &[Part]) -> Vec<String> {
             None => String::new(),
         };
         let [recorded, compared, different] = [recorded, compared, different].map(ToString::to_string);
-        let judged = if *name == "inputs" { ", judged" } else { "" };
-        [format!("  {name}{judged}"), recorded, compared, different, words]
+        let name = if *name == "inputs" { "inputs, judged" } else { name };
+        [format!("  {name}"), recorded, compared, different, words]
     };
     columns(['<', '>', '>', '>', '<'], std::iter::once(head).chain(parts.iter().map(row)))
 }
