@@ -13,7 +13,7 @@ use onboard_sim::run::in_parallel;
 use onboard_sim::statistics::{Share, quantile, sorted};
 use replay::fit::calibration::{Entry, Table};
 use replay::fit::truth::truth;
-use replay::fit::{Fit, Parameter, Trace, Z_95, fit, uncalibrated};
+use replay::fit::{Fit, Trace, Z_95, fit, uncalibrated};
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
 
@@ -63,10 +63,10 @@ fn tallied(recipe: &Recipe, flights: u64, fitted: fn(&Trace) -> Fit) -> anyhow::
             let (found, lacks) = tallies.entry(name.clone()).or_default();
             match fit.get(&name) {
                 None => *lacks += 1,
-                Some(Parameter { value, sigma, low, high, .. }) => found.push(Found {
-                    error: value - true_value,
-                    sigma: *sigma,
-                    held: (*low..=*high).contains(&true_value),
+                Some(parameter) => found.push(Found {
+                    error: parameter.value - true_value,
+                    sigma: parameter.sigma,
+                    held: parameter.holds(true_value),
                 }),
             }
         }

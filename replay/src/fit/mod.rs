@@ -84,7 +84,8 @@ impl Parameter {
         Self { name, unit, value, sigma, low, high, systematic: None }
     }
 
-    fn holds(&self, truth: f64) -> bool {
+    /// Whether its interval holds a value.
+    pub fn holds(&self, truth: f64) -> bool {
         (self.low..=self.high).contains(&truth)
     }
 

@@ -387,4 +387,17 @@ mod tests {
         let lifts_n_m = 1.28 * 0.0043 * 0.6 * libm::sqrt(901.0) * libm::sqrt(3.0) * 0.087;
         assert!((moment.z - (0.23 * side_n - 0.05 * body_n + lifts_n_m)).abs() < 1e-6, "{moment}");
     }
+
+    /// The same side wind, with closed fins, on legs of 0.01 m^2 at 0.1 m, 0.3 m behind the centre of gravity: 0.6 0.01 V is 0.1801 N
+    /// against body y. The body's part is that of above.
+    #[test]
+    fn val_hand_legs_in_a_side_wind() {
+        let mut airframe = flight::vehicles::mission::builtin_airframe("mk2").unwrap();
+        (airframe.legs.drag_area_m2, airframe.legs.drag_station_m) = (0.01, 0.1);
+        let velocity = Vector3::new(-30.0, 1.0, 0.0);
+        let moment = air_moment_n_m(&airframe, 0.4, 1.2, &velocity, &Vector3::zeros(), &[0.0; 4]);
+        let legs_n = -0.6 * 0.01 * libm::sqrt(901.0);
+        let body_n = -0.6 * 0.062_16;
+        assert!((moment.z - (-0.3 * legs_n - 0.05 * body_n)).abs() < 1e-9, "{moment}");
+    }
 }
