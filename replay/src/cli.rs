@@ -110,7 +110,7 @@ pub(crate) fn files_of(directory: &Path, endings: &[&str]) -> Result<Vec<PathBuf
             Ok(found) if is_wanted && found.is_file() && seen.insert(path.canonicalize()?) => logs.push(path),
             Err(error) if path == directory => return Err(error).with_context(failed),
             _ if is_wanted => say(&format!("left out: {}: no file, or here already", path.display())),
-            _ if is_log => say(&format!("left out: {}: a .tlog has no frames", path.display())),
+            _ if is_log => say(&format!("left out: {}: not a vehicle's own log", path.display())),
             _ => {}
         }
     }

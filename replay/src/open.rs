@@ -51,9 +51,9 @@ pub(crate) struct Args {
 impl Args {
     pub(crate) fn run(self) -> Result<Exit> {
         FlightLog::open(&self.file)?;
-        let (name, is_tlog) = (self.file.display(), is_tlog(&self.file)?);
+        let name = self.file.display();
         ensure!(
-            !is_tlog,
+            !is_tlog(&self.file)?,
             "{name}: is a .tlog, which viewers do not read: `replay export {name}` makes a log of it"
         );
         let (programs, by_hand) = way(|name| found(name).is_some()).context(NOTHING)?;

@@ -173,8 +173,8 @@ impl Verdicts {
             table_2: verdict.landing.contains(TdLanding::TD_LANDING_TABLE_2),
         };
         let limits = limits_to_log(&envelope);
-        let broken = worst_first(limits.iter().filter(|limit| !limit.passed)).into_iter().next();
-        let broken = broken.map(|(limit, _)| limit.name.as_str());
+        let broken = worst_first(limits.iter().filter(|limit| !limit.passed));
+        let broken = broken.first().map(|(limit, _)| limit.name.as_str());
         let failure = if self.under_parachute { Some(UNDER_PARACHUTE) } else { broken };
         let ending = FlightEnding { aborted: self.aborted, landing: landing_of(landing), failure };
         Some(v1::LandingVerdict {
