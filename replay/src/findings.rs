@@ -38,20 +38,18 @@ pub(crate) fn of(recording: &Recording, verdict: Option<&Verdict>) -> Option<Vec
     facts(recording, verdict, again.and_then(|(_, findings)| findings))
 }
 
-/// What the vehicle itself reported of a wait that ended on its pad, each once.
+/// What the vehicle itself reported before its release, each once; all it reported if it was never released.
 fn on_the_pad(recording: &Recording) -> Vec<Finding> {
+    let (clock, zero_s, end_s) = match recording.clocks.flight_zero_s {
+        Some(zero_s) => (Clock::Flight, zero_s, zero_s),
+        None => (Clock::Log, 0.0, f64::INFINITY),
+    };
     let mut facts: Vec<Finding> = Vec::new();
-    for (log_s, event) in &recording.events {
+    for (log_s, event) in recording.events.iter().filter(|(log_s, _)| *log_s < end_s) {
         let serious = event.name == "vehicle" && event.level >= Level::Warning as i32;
         if serious && facts.iter().all(|known| known.words != event.message) {
             let words = event.message.clone();
-            facts.push(Finding {
-                since_s: *log_s,
-                clock: Clock::Log,
-                lasted_s: 0.0,
-                words,
-                picture: "events",
-            });
+            facts.push(Finding { since_s: log_s - zero_s, clock, lasted_s: 0.0, words, picture: "events" });
         }
     }
     facts
@@ -77,8 +75,8 @@ pub(crate) fn run_again(
     Some((computer, findings))
 }
 
-/// The findings of a computer that was run again with the recorded decisions, and the limits that were broken; of a flight that
-/// never left its pad, what the vehicle said.
+/// What the vehicle said on its pad, the findings of a computer that was run again with the recorded decisions, and the limits
+/// that were broken.
 pub(crate) fn facts(
     recording: &Recording,
     verdict: Option<&Verdict>,
@@ -87,18 +85,15 @@ pub(crate) fn facts(
     let Some(findings) = findings else {
         return (recording.frames.is_empty() && recording.from_power_up).then(|| on_the_pad(recording));
     };
-    let mut facts: Vec<Finding> = findings
-        .found()
-        .iter()
-        .map(|finding| Finding {
-            since_s: finding.since_s,
-            clock: Clock::Flight,
-            lasted_s: finding.held_s,
-            words: finding.words(),
-            picture: picture(finding.sign),
-        })
-        .collect();
-    if let Some(words) = verdict.and_then(|verdict| broken(verdict, &findings)) {
+    let mut facts = on_the_pad(recording);
+    facts.extend(findings.found().iter().map(|finding| Finding {
+        since_s: finding.since_s,
+        clock: Clock::Flight,
+        lasted_s: finding.held_s,
+        words: finding.words(),
+        picture: picture(finding.sign),
+    }));
+    if let Some(words) = verdict.and_then(|verdict| broken(verdict, &findings, facts.is_empty())) {
         let since_s = recording.contact_s().unwrap_or(f64::NAN);
         facts.push(Finding { since_s, clock: Clock::Flight, lasted_s: 0.0, words, picture: "limits" });
     }
@@ -127,7 +122,7 @@ fn picture(sign: Sign) -> &'static str {
 }
 
 /// The limits that a landing broke, the worst first, and what the motor still pushed; `None` if it kept all.
-fn broken(verdict: &Verdict, findings: &Findings) -> Option<String> {
+fn broken(verdict: &Verdict, findings: &Findings, nothing_else: bool) -> Option<String> {
     // A vehicle that comes down under its parachute is judged by nothing else.
     let judged = verdict.deciding().all(|limit| limit.maximum > limit.minimum);
     let broken = worst_first(verdict.deciding().filter(|limit| judged && !limit.passed));
@@ -137,7 +132,7 @@ fn broken(verdict: &Verdict, findings: &Findings) -> Option<String> {
     let mut words = vec![format!("{} {:.2} {}: {}", worst.name, worst.value.abs(), worst.unit, over(*share))];
     if !also.is_empty() {
         words.push(format!("also {}", also.join(", ")));
-    } else if findings.found().is_empty() {
+    } else if nothing_else {
         words.push("nothing else wrong".to_owned());
     }
     let ratio = findings.thrust_over_weight_at_contact();

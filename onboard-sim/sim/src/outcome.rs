@@ -7,7 +7,7 @@ use flight::rules::verdict::{
 };
 use flight::vehicle::mission::{LegLimits, Mission};
 
-/// Why a vehicle does not stand undamaged: the first thing that went wrong.
+/// Why a vehicle does not stand undamaged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Failure {
     /// The ignition gate never opened.
@@ -16,7 +16,7 @@ pub enum Failure {
     NoLight,
     /// The vehicle came down under the parachute.
     Parachute,
-    /// The contact broke this limit of legs that cannot give way.
+    /// Of the limits of legs that cannot give way, the contact broke this one by the largest share.
     Limit(&'static str),
     /// The vehicle was within the limits at contact but fell over.
     TippedOver,
@@ -107,7 +107,7 @@ pub fn judge(mission: &Mission, ending: &Ending) -> Outcome {
         _ if !ending.lit => Some(Failure::NoLight),
         (_, Some(Rest { outcome, strain: Some(strain), .. })) => damage(outcome, &strain),
         (Some(envelope), _) => {
-            let broken = envelope.failures().next().map(|limit| Failure::Limit(limit.name));
+            let broken = envelope.worst().map(|limit| Failure::Limit(limit.name));
             broken.or((!upright).then_some(Failure::TippedOver))
         }
     };

@@ -92,12 +92,13 @@ impl ClockTime {
 
 impl fmt::Display for ClockTime {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let clock = match self.clock {
-            Clock::Flight => "T+",
-            Clock::Boot => "boot ",
-            Clock::Log => "log ",
+        let (clock, time_s) = match self.clock {
+            Clock::Flight if self.time_s < 0.0 => ("T-", -self.time_s),
+            Clock::Flight => ("T+", self.time_s),
+            Clock::Boot => ("boot ", self.time_s),
+            Clock::Log => ("log ", self.time_s),
         };
-        write!(out, "{clock}{:.*} s", out.precision().unwrap_or(3), self.time_s)
+        write!(out, "{clock}{time_s:.*} s", out.precision().unwrap_or(3))
     }
 }
 

@@ -1,6 +1,8 @@
 //! The landing verdict of a log: recorded by the vehicle, or heard by a ground station.
 
-use flight::rules::verdict::{FlightEnding, Landing, LandingVerdict, Limits, Touchdown, UNDER_PARACHUTE};
+use flight::rules::verdict::{
+    FlightEnding, Landing, LandingVerdict, Limits, Touchdown, UNDER_PARACHUTE, share_of_limit,
+};
 use protocol::dialect::{
     MavMessage, TD_LANDING_VERDICT_DATA, TD_TOUCHDOWN_LIMITS_DATA, TdInterlock, TdLanding, TdPhase,
 };
@@ -35,15 +37,9 @@ pub struct Verdict {
     pub table_2: Vec<LimitResult>,
 }
 
-/// The value over the limit on its side of 0: above 1 it is outside. A limit of 0 has no shares: outside of it the value counts over
-/// the width of the range.
+/// The value over its limit ([`share_of_limit`]).
 pub fn share(limit: &LimitResult) -> f64 {
-    let LimitResult { value, minimum, maximum, .. } = *limit;
-    let end = if value < 0.0 { minimum } else { maximum };
-    if end == 0.0 && value != 0.0 {
-        return 1.0 + (value / (maximum - minimum)).abs();
-    }
-    if value == 0.0 { 0.0 } else { (value / end).abs() }
+    share_of_limit(limit.value, limit.minimum, limit.maximum)
 }
 
 /// Limits with their shares, the worst first.

@@ -152,11 +152,13 @@ impl Flown {
                     keep(Record::LandingVerdict(Box::new(vehicle.verdict_record().unwrap())));
                 }
                 VehicleEvent::PhaseChanged { to, .. } => self.phases.push(*to),
-                VehicleEvent::Text { severity: Severity::Warning, text } => keep(Record::Event(Event {
-                    level: EventLevel::Warning,
-                    name: "vehicle".to_owned(),
-                    message: text.clone(),
-                })),
+                VehicleEvent::Text { severity, text } if *severity >= Severity::Warning => {
+                    keep(Record::Event(Event {
+                        level: EventLevel::Warning,
+                        name: "vehicle".to_owned(),
+                        message: text.clone(),
+                    }));
+                }
                 _ => {}
             }
         }

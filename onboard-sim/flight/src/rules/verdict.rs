@@ -114,6 +114,16 @@ pub struct LimitResult {
     pub passed: bool,
 }
 
+/// A value over the limit on its side of 0: above 1 it is outside. A limit of 0 has no shares: outside of it the value counts over
+/// the width of the range.
+pub fn share_of_limit(value: f64, lowest: f64, highest: f64) -> f64 {
+    let end = if value < 0.0 { lowest } else { highest };
+    if end == 0.0 && value != 0.0 {
+        return 1.0 + (value / (highest - lowest)).abs();
+    }
+    if value == 0.0 { 0.0 } else { (value / end).abs() }
+}
+
 impl fmt::Display for LimitResult {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { name, value, lowest, highest, unit, .. } = self;
@@ -172,6 +182,12 @@ impl LandingVerdict {
     /// The limits that were not kept.
     pub fn failures(&self) -> impl Iterator<Item = &LimitResult> {
         self.results.iter().filter(|result| !result.passed)
+    }
+
+    /// The limit that was broken by the largest share of itself.
+    pub fn worst(&self) -> Option<&LimitResult> {
+        let share = |limit: &LimitResult| share_of_limit(limit.value, limit.lowest, limit.highest);
+        self.failures().max_by(|a, b| share(a).total_cmp(&share(b)))
     }
 
     /// One line: "inside every limit", or the broken limits with their values.

@@ -115,14 +115,15 @@ impl World {
         Ok(world)
     }
 
-    /// The same world with the vehicle on its booster, at rest on the rail.
+    /// The same world with the vehicle on its booster, at rest on the rail, whose foot stands on the ground.
     #[must_use]
     pub fn on_rail(mut self, launch: &Launch, truth: &AscentTruth) -> Self {
         let [about_x, about_y] = truth.rail_lean_rad;
         let lean = UnitQuaternion::from_scaled_axis(Vector3::new(about_x, about_y, 0.0));
         let (standing, foot_m) = (launch.standing(self.cg_m().x), launch.rail.foot_m());
+        let ground_m = Vector3::z() * self.truth.ground_m(foot_m.x, foot_m.y);
         self.state = RigidState {
-            position_m: foot_m + lean * (standing.position_m - foot_m),
+            position_m: foot_m + ground_m + lean * (standing.position_m - foot_m),
             world_from_body: lean * standing.world_from_body,
             ..standing
         };

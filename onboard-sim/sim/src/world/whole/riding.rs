@@ -64,7 +64,8 @@ impl World {
             + rate.cross(&rate.cross(&from_stack_m));
         self.state = at_offset(&after, &from_stack_m);
         let now_s = time_s + STEP_S;
-        if !stack.on_rail() && stack.lower_end_m(&self.state, &cg_m) < 0.0 {
+        let lower_end_m = stack.lower_end_m(&self.state, &cg_m);
+        if !stack.on_rail() && lower_end_m.z < self.truth.ground_m(lower_end_m.x, lower_end_m.y) {
             self.touchdown = Some(self.touchdown_at(now_s, &self.state.clone()));
             self.come_to_rest(now_s, RestOutcome::BodyStrike);
         } else if stack.parts(now_s) {
@@ -285,8 +286,8 @@ impl Stack {
         next_m_s
     }
 
-    /// Lowest point of the axis over level ground, m.
-    pub(crate) fn lower_end_m(&self, vehicle: &RigidState, vehicle_cg_m: &Vector3<f64>) -> f64 {
-        (vehicle.position_m + vehicle.world_from_body * (self.nozzle_m() - vehicle_cg_m)).z
+    /// Lowest point of the axis, world axes, m.
+    fn lower_end_m(&self, vehicle: &RigidState, vehicle_cg_m: &Vector3<f64>) -> Vector3<f64> {
+        vehicle.position_m + vehicle.world_from_body * (self.nozzle_m() - vehicle_cg_m)
     }
 }

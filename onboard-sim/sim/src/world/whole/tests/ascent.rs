@@ -52,6 +52,22 @@ fn val_rocketpy_apogee_of_the_stack() {
     }
 }
 
+/// A pad below its target on a slope does not stand inside the hill.
+#[test]
+fn a_rail_stands_on_the_ground_at_its_place() {
+    let mission = flight::vehicles::mission::builtin("mk2").unwrap().unwrap();
+    let mut launch: Launch = mission.launch.unwrap();
+    (launch.rail.x_m, launch.rail.y_m) = (-9.0, -28.0);
+    let standing = |ground_rise| {
+        let truth = Truth { ground_rise, ..Truth::default() };
+        world("mk2", &truth, &RigidState::upright(1.0)).on_rail(&launch, &AscentTruth::default())
+    };
+    let [level, hill] = [[0.0; 2], [-0.02, -0.02]].map(standing);
+    // The lean of the rail puts the centre of gravity a little downhill.
+    assert!((hill.height_m() - level.height_m()).abs() < 0.005, "{} {}", hill.height_m(), level.height_m());
+    assert!((hill.state().position_m.z - level.state().position_m.z - 0.74).abs() < 1e-12);
+}
+
 #[test]
 fn val_rocketpy_rail_exit_and_burn_out() {
     let mut world =
