@@ -7,7 +7,7 @@ use flight::rules::phase::Phase;
 use serde::Serialize;
 
 use crate::log::{Cut, FlightLog, RecordingError, Verdict};
-use crate::table::{Cell, FLIGHT_TIME_S, Kind, TableReader, TableShape};
+use crate::table::{Cell, Column, FLIGHT_TIME_S, Kind, TableReader, TableShape};
 
 /// Limit on the numbers held for one log; a flight of some minutes has a few hundred thousand.
 const VALUES_MAX: usize = 20_000_000;
@@ -108,8 +108,8 @@ impl Flown {
         let mut log = FlightLog::open(path)?;
         let name = log.name().to_owned();
         let mut first_ns = None;
-        let mut signals: BTreeMap<String, Series> = BTreeMap::new();
-        let mut over_the_air: BTreeMap<String, Series> = BTreeMap::new();
+        // By table and column; `None` of a column that is no signal.
+        let mut read: Vec<Vec<Option<Series>>> = Vec::new();
         let (mut held, mut out_of_order) = (0_usize, 0_usize);
         let mut words: BTreeMap<String, BTreeMap<String, usize>> = BTreeMap::new();
         let mut reader = TableReader::new();
@@ -127,22 +127,28 @@ impl Flown {
                     .or_default() += 1;
                 return Ok(());
             }
-            let (signals, time_s) = if shape.name.starts_with(MESSAGES) {
-                let Some(boot_s) = boot_time_of(shape, &row.cells) else { return Ok(()) };
-                (&mut over_the_air, boot_s)
+            let time_s = if shape.name.starts_with(MESSAGES) {
+                boot_time_of(shape, &row.cells)
             } else if let Some(place) = shape.place_of(FLIGHT_TIME_S) {
                 // Outside the flight a frame has no time in it.
-                let Some(time_s) = row.cells.get(place).and_then(Cell::number) else { return Ok(()) };
-                (&mut signals, time_s)
+                row.cells.get(place).and_then(Cell::number)
             } else {
-                (&mut signals, time_of(shape, &row.cells).unwrap_or(since_s))
+                time_of(shape, &row.cells).or(Some(since_s))
             };
-            for (column, cell) in shape.columns.iter().zip(&row.cells) {
-                let Some(value) = cell.number().filter(|_| is_signal(&column.name)) else { continue };
-                let series = signals.entry(format!("{}.{}", shape.name, column.name)).or_default();
+            let Some(time_s) = time_s else { return Ok(()) };
+            read.resize_with(read.len().max(row.table + 1), Vec::new);
+            let columns = &mut read[row.table];
+            if columns.is_empty() {
+                let series =
+                    |column: &Column| Series { whole: column.kind == Kind::Integer, ..Series::default() };
+                columns.extend(
+                    shape.columns.iter().map(|column| is_signal(&column.name).then(|| series(column))),
+                );
+            }
+            for (series, cell) in columns.iter_mut().zip(&row.cells) {
+                let (Some(series), Some(value)) = (series, cell.number()) else { continue };
                 // A signal needs ascending times, so records out of order are left out and counted.
                 if series.times_s.last().is_none_or(|last_s| *last_s <= time_s) {
-                    series.whole = column.kind == Kind::Integer;
                     series.times_s.push(time_s);
                     series.values.push(value);
                     held += 1;
@@ -154,14 +160,22 @@ impl Flown {
             if held > VALUES_MAX { Err(too_long()) } else { Ok(()) }
         })?;
         log.flights().refuse_several(&name)?;
+        let [mut signals, mut over_the_air] = [(); 2].map(|()| BTreeMap::<String, Series>::new());
+        // The limits and times of a verdict stand beside the signals.
+        for (shape, columns) in reader.shapes().iter().zip(read).filter(|(shape, _)| shape.name != "verdict")
+        {
+            let signals = if shape.name.starts_with(MESSAGES) { &mut over_the_air } else { &mut signals };
+            for (column, series) in shape.columns.iter().zip(columns) {
+                let series = series.filter(|series| !series.values.is_empty());
+                signals.extend(series.map(|series| (format!("{}.{}", shape.name, column.name), series)));
+            }
+        }
         let lit = |signal: &str| {
             let lit = |phase: f64| Phase::from_index(phase as u8).is_some_and(Phase::in_landing_burn);
             let series = signals.get(signal)?;
             series.times_s.iter().zip(&series.values).find(|(_, phase)| lit(**phase)).map(|(at_s, _)| *at_s)
         };
         let ignition_s = lit("computer_frame.output.phase").or_else(|| lit("telemetry.phase"));
-        // Its limits and its times stand beside the signals.
-        signals.retain(|name, _| !name.starts_with("verdict."));
         Ok(Self {
             name,
             signals,
