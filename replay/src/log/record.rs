@@ -121,8 +121,7 @@ impl Entry {
                     Self::Operator
                 })
             }
-            TOPIC_EVENTS if channel.schema_name == "foxglove.Log" => foxglove::messages::Log::decode(data)
-                .map_or(Self::Other, |event| Self::Event(Box::new(event))),
+            TOPIC_EVENTS => decoded_if(false, channel, "foxglove.Log", data, Self::Event),
             TOPIC_RAW_RX | TOPIC_RAW_TX if channel.message_encoding == ENCODING_MAVLINK => Self::RawFrame,
             _ => Self::Other,
         }

@@ -5,7 +5,7 @@ use std::process::Command;
 
 use proptest::prelude::*;
 use protocol::log::computer_v1::{ComputerFrame, Request};
-use protocol::log::record::Record;
+use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::writer::{LogHeader, LogWriter};
 use replay::compare::{Flown, Tolerances, compare};
 use replay::evaluate::evaluate;
@@ -156,7 +156,7 @@ fn a_hole_is_not_read_as_a_summary() {
 }
 
 #[test]
-fn many_facts_and_many_limits_do_not_fill_the_memory() {
+fn many_facts_many_limits_and_many_words_do_not_fill_the_memory() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("many.mcap");
     let (data, ending) = data_and_ending();
@@ -176,18 +176,29 @@ fn many_facts_and_many_limits_do_not_fill_the_memory() {
     writer.write(&Record::ComputerStart(Box::new(FLIGHT.start)), 0).unwrap();
     writer.write(&Record::LandingVerdict(Box::new(verdict)), 0).unwrap();
     let limits = writer.finish().unwrap().into_inner();
+    let mut writer = LogWriter::new(std::io::Cursor::new(Vec::new()), &header).unwrap();
+    writer.write(&Record::ComputerStart(Box::new(FLIGHT.start)), 0).unwrap();
+    let said =
+        Event { level: EventLevel::Warning, name: "vehicle".to_owned(), message: "x".repeat(60 << 20) };
+    writer.write(&Record::Event(said), 0).unwrap();
+    let words = writer.finish().unwrap().into_inner();
     for bytes in [
         [&data[..], &facts(0, 1_000_000), &ending].concat(),
         [&data[..], &in_pieces, &ending].concat(),
         limits,
+        words,
     ] {
         std::fs::write(&path, bytes).unwrap();
         let csv = directory.path().join("csv");
-        for question in
-            [&["info"][..], &["verify"], &["export", "--to", "csv", "--out", csv.to_str().unwrap()]]
-        {
+        for question in [
+            &["info"][..],
+            &["verify"],
+            &["export", "--to", "csv", "--out", csv.to_str().unwrap()],
+            &["report", "--out", "-"],
+            &["compare", path.to_str().unwrap()],
+        ] {
             let (code, said) = within(200, question, &path);
-            assert!([0, 1, 5].contains(&code), "{question:?}: {said}");
+            assert!([0, 1, 3, 5].contains(&code), "{question:?}: {said}");
         }
     }
 }
