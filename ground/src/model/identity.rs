@@ -112,7 +112,8 @@ pub struct Foreign {
     pub autopilot: MavAutopilot,
     pub mavtype: MavType,
     pub armed: bool,
-    custom_mode: u32,
+    /// The number of its mode.
+    pub custom_mode: u32,
     /// The last heartbeat.
     pub heard_at: Duration,
 }
@@ -136,11 +137,6 @@ impl Foreign {
             other => words::lower_case(&other, "MAV_AUTOPILOT_"),
         };
         format!("{autopilot} {}", words::lower_case(&self.mavtype, "MAV_TYPE_"))
-    }
-
-    /// The number of its mode.
-    pub fn mode(&self) -> String {
-        format!("mode {}", self.custom_mode)
     }
 }
 

@@ -383,7 +383,7 @@ mod tests {
         // The worst of all reports counts.
         let weak = tested(0, 0, &[good.clone(), radio(58, 40, 100, 40), good]);
         assert!(!weak.passed());
-        assert!(weak.words().contains("FAILED") && weak.words().contains("margin 9.5 dB (at least 10)"));
+        assert_eq!(weak.margin_db, Some(18.0 / STEPS_PER_DB), "9.5 dB, and 10 are needed");
     }
 
     #[test]
@@ -397,7 +397,8 @@ mod tests {
         assert!(!found.passed() && found.loss_up >= 1.0 && found.loss_down >= 1.0, "{found:?}");
         let mut test = RangeTest::begin(Seat::default(), silent, Duration::ZERO);
         test.stop("the vehicle is armed");
-        assert!(test.found.unwrap().words().contains("STOPPED, the vehicle is armed"));
+        let found = test.found.unwrap();
+        assert_eq!((found.stopped, found.passed()), (Some("the vehicle is armed"), false));
     }
 
     proptest! {

@@ -194,6 +194,7 @@ fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
     let kind = track.kind;
     let name = kind.name();
     let (by, seat) = (track.by.in_brackets(), track.by.clone());
+    let mut answered = None;
     let (operator_kind, level, text) = match event {
         CommandEvent::Sent { .. } => {
             track.attempts += 1;
@@ -217,6 +218,7 @@ fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
             track.acknowledged =
                 if asked { Acknowledgement::Asked } else { Acknowledgement::Answered(result) };
             track.acknowledged_at = Some(now);
+            answered = (!asks).then_some(result);
             let words = result_words(result);
             let late = if matches!(event, CommandEvent::AnsweredLate { .. }) { " (late)" } else { "" };
             if asked {
@@ -231,11 +233,6 @@ fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
             track.acknowledged = Acknowledgement::GivenUp;
             ("unanswered", EventLevel::Error, format!("{name} not acknowledged after {attempts} attempts"))
         }
-    };
-    let answered = match event {
-        CommandEvent::Answered { result, asks: false, .. }
-        | CommandEvent::AnsweredLate { result, asks: false, .. } => Some(result),
-        _ => None,
     };
     let told = if matches!(event, CommandEvent::Sent { .. }) { text.clone() } else { format!("{text}{by}") };
     model.record_operator(now, operator_kind, &seat, &told);

@@ -205,36 +205,17 @@ fn confirmed(model: &mut Model, prompt: Prompt, now: Duration) {
     {
         return model.warn(now, format!("nothing is confirmed: {why}"));
     }
-    if let Some(kind) = prompt.command() {
-        return ask(model, kind, now);
-    }
-    match prompt {
-        Prompt::WithoutLog => request(model, Request::WithoutLog, now),
-        Prompt::Untested => request(model, Request::Untested, now),
-        Prompt::Sign { step, void } => {
-            let step = u8::try_from(step).unwrap_or(u8::MAX);
-            request(model, Request::Sign { step, void }, now);
-            // The next step that is open is chosen.
-            model.pages.step = None;
-        }
+    let Some(wanted) = prompt.request() else {
         // A live station must keep running without its screen; a demonstration or an attached screen may end.
-        Prompt::Quit => {
-            let stays = model.settings.role == Role::Station && !model.settings.demonstration;
-            let leave =
-                if stays && why_not_quit(model, now).is_some() { Action::LeaveScreen } else { Action::Quit };
-            model.outbox.push(leave);
-        }
-        // Each is a command.
-        Prompt::Arm
-        | Prompt::Start
-        | Prompt::Confirm(_)
-        | Prompt::TakeCommand
-        | Prompt::Disarm
-        | Prompt::AbortForeign
-        | Prompt::Hold
-        | Prompt::Check { .. }
-        | Prompt::Seen => {}
+        let stays = model.settings.role == Role::Station && !model.settings.demonstration;
+        let leaves = stays && why_not_quit(model, now).is_some();
+        return model.outbox.push(if leaves { Action::LeaveScreen } else { Action::Quit });
+    };
+    if matches!(wanted, Request::Sign { .. }) {
+        // The next step that is open is chosen.
+        model.pages.step = None;
     }
+    request(model, wanted, now);
 }
 
 /// Closes the open dialog because something else came in between.
@@ -492,7 +473,7 @@ pub(super) fn request(model: &mut Model, request: Request, now: Duration) {
 
 /// Acknowledges the alarm in the alarm line, or the chosen one of the list.
 fn see_alarm(model: &mut Model, now: Duration) {
-    let Some(kind) = model.pointed_at().map(|alarm| alarm.kind) else { return };
+    let Some(kind) = model.pointed_at().map(|alarm| alarm.what.kind) else { return };
     // The station does not know of its own silence.
     if model.settings.role == Role::Attached && kind != AlarmKind::StationSilent {
         model.outbox.push(Action::Request(Request::Acknowledge(kind)));
@@ -513,9 +494,11 @@ pub(super) fn acknowledge(model: &mut Model, kind: AlarmKind, now: Duration) {
 /// Chooses the next or the previous alarm of the list.
 fn choose_alarm(model: &mut Model, up: bool) {
     let list = model.alarms.list();
-    let at = model.pointed_at().and_then(|chosen| list.iter().position(|alarm| alarm.kind == chosen.kind));
+    let at = model
+        .pointed_at()
+        .and_then(|chosen| list.iter().position(|alarm| alarm.what.kind == chosen.what.kind));
     if let Some(at) = at {
-        model.pages.chosen = Some(list[beside(at, up, list.len() - 1)].kind);
+        model.pages.chosen = Some(list[beside(at, up, list.len() - 1)].what.kind);
     }
 }
 

@@ -211,15 +211,7 @@ pub fn of_flight(model: &Model, now: Duration) -> (Item, Vec<Item>) {
 
 /// The verdict.
 pub fn verdict(model: &Model, now: Duration) -> Item {
-    let (ending, role) = ending_role(model, now).unzip();
-    let text = match ending {
-        Some(Ending::Stands) => "STANDS",
-        Some(Ending::Upright) => "UPRIGHT",
-        Some(Ending::UnderParachute) => "PARACHUTE",
-        Some(Ending::Hard) => "HARD",
-        Some(Ending::Lost) => "LOST",
-        None => "NO VERDICT",
-    };
-    let role = role.unwrap_or(TextRole::Caution);
+    let ended = ending_role(model, now).map(|(ending, role)| (ending.words()[1], role));
+    let (text, role) = ended.unwrap_or(("NO VERDICT", TextRole::Caution));
     word("", text, role)
 }

@@ -14,8 +14,8 @@ use ratatui::text::{Line, Span};
 use super::theme::Level;
 use super::{STALE_MARK, TextRole, Theme, age_mark, draw_line, lists, shortest, side_by_side, status_lines};
 use crate::model::{
-    Acknowledgement, AlarmKind, Approach, CommandKind, Ending, Event, Foreign, LinkState, Model, Page, Role,
-    Standing, TERMINATION, TrackedCommand, abort_too_late, dead_reckoning::may_have_left, hold_words,
+    Acknowledgement, AlarmKind, Approach, CommandKind, Ending, Event, LinkState, Model, Page, Role, Standing,
+    TERMINATION, TrackedCommand, abort_too_late, dead_reckoning::may_have_left, hold_words,
     is_liftoff_by_itself, is_on_pad, standing, why_no_go, words,
 };
 
@@ -108,7 +108,7 @@ fn in_the_middle(model: &Model, theme: Theme, now: Duration, columns: usize) -> 
         Some(format!(" {}{text}", event.mark().trim_start()))
     };
     // Of an abort that was seen, what comes after it counts.
-    let aborted = model.alarms.foremost().is_some_and(|alarm| alarm.kind == AlarmKind::Aborted);
+    let aborted = model.alarms.foremost().is_some_and(|alarm| alarm.what.kind == AlarmKind::Aborted);
     let after = if aborted { next() } else { None };
     let words = after.or(seen).or_else(next).or_else(ready).or_else(said)?;
     Some(Line::from(status_lines::cut(&words, columns)))
@@ -236,9 +236,8 @@ pub fn abort_key(model: &Model) -> String {
 /// The phase, with its age.
 pub fn phase(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
     match model.vehicle.phase() {
-        None if model.vehicle.as_foreign().is_some() => {
-            let mode = model.vehicle.as_foreign().map(Foreign::mode).unwrap_or_default();
-            theme.plain(format!(" {mode}"))
+        None if let Some(foreign) = model.vehicle.as_foreign() => {
+            theme.plain(format!(" mode {}", foreign.custom_mode))
         }
         None => theme.label(" no vehicle"),
         Some(_) if may_have_left(&model.vehicle, now).is_some() => {
@@ -257,7 +256,7 @@ pub fn doing(model: &Model, phase: TdPhase) -> &'static str {
     match phase {
         _ if is_on_pad(phase) && model.vehicle.counts_down() => "Countdown",
         TdPhase::TD_PHASE_BOOST if !model.vehicle.has_lifted => "Told to light",
-        _ => words::doing(phase),
+        _ => words::doing_and_event(phase).0,
     }
 }
 

@@ -14,11 +14,10 @@ use crate::model::{Deflection, Model, Page, Sample, dead_reckoning::is_unheard, 
 use crate::view::band::draw_band;
 use crate::view::pictures::attitude::{Side, draw_attitude};
 use crate::view::pictures::height::draw_height;
-use crate::view::pictures::map::comes_down;
-use crate::view::pictures::map::draw_map;
-use crate::view::status_lines;
+use crate::view::pictures::map::{comes_down, draw_map};
 use crate::view::{
-    TextRole, Theme, age_mark, bars, draw_lines, fixed, headline, panels, quantity_row, text_row,
+    TextRole, Theme, age_mark, bars, draw_lines, fixed, headline, panels, quantity_row, status_lines,
+    text_row,
 };
 
 /// Columns of the vehicle from one side at 80 columns.
