@@ -75,7 +75,7 @@ pub async fn session(
     if interactive {
         watch(&mut player, config).await?;
     } else {
-        player.seek(player.recording().length());
+        player.seek(player.recording().length);
         Lines::default().show(&player.model);
     }
     output::closing(&player.model, interactive, Ok(&None), player.position());

@@ -146,16 +146,12 @@ pub const DEFINITIONS: [Definition; 36] = [
 
 /// Why no flight can be shown again or reported here now.
 pub fn why_nothing_flown(model: &Model) -> Option<&'static str> {
-    if model.settings.role == Role::Replaying {
-        return Some("this is a replay");
+    match model.settings.role {
+        Role::Replaying => Some("this is a replay"),
+        _ if model.is_at_risk() => Some("the vehicle is armed or in flight"),
+        _ if model.settings.log_path.is_none() => Some("there is no log (--log none)"),
+        _ => (!model.outcome.started).then_some("no flight has been flown yet"),
     }
-    if model.is_at_risk() {
-        return Some("the vehicle is armed or in flight");
-    }
-    if model.settings.log_path.is_none() {
-        return Some("there is no log (--log none)");
-    }
-    (!model.outcome.started).then_some("no flight has been flown yet")
 }
 
 impl Act {

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
 use super::{
-    FlownMission, Model, is_flight,
+    FlownMission, Model,
     quantity::{self, Quantity},
     words,
 };
@@ -245,16 +245,10 @@ impl Model {
     /// # Errors
     /// The reason.
     pub fn may_sign(&self, by: &str) -> Result<Option<TdRole>, String> {
-        if self.vehicle.is_armed() {
-            return Err("the vehicle is armed: disarm first".to_owned());
-        }
-        if self.vehicle.phase_now().is_some_and(is_flight) {
-            return Err("the vehicle is in flight".to_owned());
-        }
-        if self.settings.crew_roles.is_empty() {
-            return Ok(None);
-        }
         match self.settings.crew_roles.iter().find(|(name, _)| name == by) {
+            _ if self.vehicle.is_armed() => Err("the vehicle is armed: disarm first".to_owned()),
+            _ if self.vehicle.in_flight() => Err("the vehicle is in flight".to_owned()),
+            _ if self.settings.crew_roles.is_empty() => Ok(None),
             None if by.is_empty() => Err("nobody is named (--operator)".to_owned()),
             None => Err(format!("{by} is not in the crew (--operator)")),
             Some((_, TdRole::TD_ROLE_OBSERVER)) => Err(format!("{by} is an observer")),

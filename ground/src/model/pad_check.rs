@@ -44,9 +44,6 @@ pub enum Standing {
 /// How the check of a vehicle stands.
 pub fn standing(model: &Model, now: Duration) -> Standing {
     let told = model.vehicle.pad_check.as_ref();
-    if told.is_some_and(PadCheck::is_running) {
-        return Standing::Runs;
-    }
     let asked = [CommandKind::Check, CommandKind::CheckStill].map(|kind| model.commands.of(kind));
     let ended = model.commands.of(CommandKind::EndCheck).filter(|end| end.accepted());
     let may_run = asked.into_iter().flatten().any(|asked| {
@@ -55,10 +52,9 @@ pub fn standing(model: &Model, now: Duration) -> Standing {
         let is_ended = ended.is_some_and(|end| end.commanded_at > asked.commanded_at);
         !is_refused && !is_told && !is_ended && now.saturating_sub(asked.commanded_at) < LONGEST
     });
-    if may_run {
-        return Standing::MayRun;
-    }
     match told.and_then(|told| told.ended_at) {
+        _ if told.is_some_and(PadCheck::is_running) => Standing::Runs,
+        _ if may_run => Standing::MayRun,
         Some(at) if now.saturating_sub(at) < JUST_ENDED => Standing::JustEnded,
         _ => Standing::Rests,
     }

@@ -73,13 +73,13 @@ impl Player {
     pub fn pass(&mut self, elapsed: Duration) {
         if !self.paused {
             let target = self.position + elapsed.mul_f64(libm::exp2(f64::from(self.speed_exponent)));
-            self.advance_to(target.min(self.recording.length()));
+            self.advance_to(target.min(self.recording.length));
         }
     }
 
     /// Goes to a time. To go back, the recording is played again from its start.
     pub fn seek(&mut self, to: Duration) {
-        let to = to.min(self.recording.length());
+        let to = to.min(self.recording.length);
         if to < self.position {
             let pages = std::mem::take(&mut self.model.pages);
             self.model = Model::new(self.settings.clone());
@@ -127,7 +127,7 @@ impl Player {
                 self.model.pages.entry = Some(TextEntry::Jump { typed: String::new(), refused: false });
             }
             Key::Char('g') => self.seek(Duration::ZERO),
-            Key::Char('G') => self.seek(self.recording.length()),
+            Key::Char('G') => self.seek(self.recording.length),
             // Pages and scrolling. Keys that command a vehicle have no effect in a replay.
             _ => actions = update(&mut self.model, Msg::Keys(vec![key]), self.position),
         }
@@ -240,7 +240,7 @@ impl Player {
     fn update_playing(&mut self) {
         self.model.playing = Some(Playback {
             position: self.position,
-            length: self.recording.length(),
+            length: self.recording.length,
             speed: libm::exp2(f64::from(self.speed_exponent)),
             paused: self.paused,
             phases: Arc::clone(&self.recording.phases),

@@ -47,7 +47,8 @@ pub struct Recording {
     side: Side,
     /// The number of events to play; a log that is still being written grows behind them.
     events: u64,
-    length: Duration,
+    /// The time of the last event.
+    pub length: Duration,
     /// When each phase began.
     pub phases: Arc<[(TdPhase, Duration)]>,
     /// Why reading ended early, if it did.
@@ -87,11 +88,6 @@ impl Recording {
         let Survey { events: count, length, phases, .. } = survey;
         let (damage, vehicle) = (events.damage(), events.vehicle);
         Ok(Self { damage, vehicle, file, side, events: count, length, phases: phases.into() })
-    }
-
-    /// The time of the last event.
-    pub fn length(&self) -> Duration {
-        self.length
     }
 
     /// When a phase first began.

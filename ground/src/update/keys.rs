@@ -323,13 +323,15 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
             let held = held.map(|words| words.replacen("HOLD", "HELD already", 1));
             model.info(now, held.unwrap_or_else(|| "no countdown runs".to_owned()));
         }
-        Act::Tap => ask(model, CommandKind::Tap, now),
+        Act::Tap => request(model, Request::Command(CommandKind::Tap), now),
         Act::TakeCommand => {
             open_unless(model, Prompt::TakeCommand, "take command", why_not_take(model, now), now);
         }
         Act::Seen => open_unless(model, Prompt::Seen, "say so", why_not_seen(model, now), now),
         Act::Check | Act::CheckStill => match standing(model, now) {
-            Standing::Runs | Standing::MayRun => ask(model, CommandKind::EndCheck, now),
+            Standing::Runs | Standing::MayRun => {
+                request(model, Request::Command(CommandKind::EndCheck), now);
+            }
             Standing::JustEnded => {
                 model.info(now, "the check has just ended; press again in 3 s for another one");
             }
@@ -456,11 +458,6 @@ fn scroll(model: &mut Model, up: i32) {
     model.pages.scroll = usize::try_from(scrolled).unwrap_or(0);
 }
 
-/// Every step of a command is complete.
-fn ask(model: &mut Model, kind: CommandKind, now: Duration) {
-    request(model, Request::Command(kind), now);
-}
-
 /// Does what the crew has asked for and tells the other screens, or asks the station to.
 pub(super) fn request(model: &mut Model, request: Request, now: Duration) {
     if model.settings.role.why_not_command().is_none() {
@@ -509,7 +506,7 @@ fn abort(model: &mut Model, now: Duration) {
         return;
     }
     model.dialog = None;
-    ask(model, CommandKind::Abort, now);
+    request(model, Request::Command(CommandKind::Abort), now);
 }
 
 fn quit(model: &mut Model, now: Duration) {

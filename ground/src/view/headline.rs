@@ -122,32 +122,19 @@ fn pad_word(model: &Model, now: Duration) -> (String, TextRole) {
     let Some(status) = vehicle.status.as_ref().filter(|status| !status.is_stale(now)) else {
         return word("NO DATA", TextRole::Caution);
     };
-    if !is_on_pad(status.value.phase) {
-        return word("FLIGHT", TextRole::Title);
-    }
-    if hold_words(vehicle, model.link.uplink.armed_by_us).is_some() {
-        return word("HOLD", TextRole::Alarm);
-    }
     let taps =
         model.tapping(now).is_some_and(|(by, _)| by == model.own_number()) && why_not_here(model).is_none();
-    if taps {
-        return word("TAP", TextRole::Alarm);
-    }
-    if let Some(left) = vehicle.countdown_s().filter(|left| left.value > 0.0) {
-        return (format!("T-{}", super::fixed(left.value, 1)), TextRole::Title);
-    }
-    if vehicle.unfit_while_armed().is_some() {
-        return word("NO-GO", TextRole::Alarm);
-    }
-    if vehicle.is_armed() {
-        return word("ARMED", TextRole::Caution);
-    }
+    let left = vehicle.countdown_s().filter(|left| left.value > 0.0);
     // A vehicle that was reset while it was armed may do it again.
     let at_work = model.rebooted.is_some_and(|(did, _)| !did.is_empty());
-    if at_work && model.alarms.is_unseen(AlarmKind::Rebooted) {
-        return word("RESET", TextRole::Alarm);
-    }
     match readiness(model, now) {
+        _ if !is_on_pad(status.value.phase) => word("FLIGHT", TextRole::Title),
+        _ if hold_words(vehicle, model.link.uplink.armed_by_us).is_some() => word("HOLD", TextRole::Alarm),
+        _ if taps => word("TAP", TextRole::Alarm),
+        _ if let Some(left) = left => (format!("T-{}", super::fixed(left.value, 1)), TextRole::Title),
+        _ if vehicle.unfit_while_armed().is_some() => word("NO-GO", TextRole::Alarm),
+        _ if vehicle.is_armed() => word("ARMED", TextRole::Caution),
+        _ if at_work && model.alarms.is_unseen(AlarmKind::Rebooted) => word("RESET", TextRole::Alarm),
         Some((_, TextRole::Good)) => word("GO", TextRole::Good),
         _ => word("NO-GO", TextRole::Caution),
     }

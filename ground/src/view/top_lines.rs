@@ -156,13 +156,12 @@ fn mode(model: &Model, theme: Theme) -> Span<'static> {
 /// Why the vehicle under this id may not be obeyed, or may not be the one that is meant.
 fn doubt(model: &Model, now: Duration) -> Option<String> {
     let id = model.settings.vehicle.system_id;
-    if model.beside(now).is_some() {
-        return Some(format!("TWO VEHICLES under id {id}"));
+    let misfits = || "ANOTHER VERSION: its messages do not fit".to_owned();
+    match model.vehicle.as_foreign() {
+        _ if model.beside(now).is_some() => Some(format!("TWO VEHICLES under id {id}")),
+        Some(foreign) => Some(format!("NOT A TOUCHDOWN VEHICLE: {}", foreign.name())),
+        None => model.speaks_another_version(now).then(misfits),
     }
-    if let Some(foreign) = model.vehicle.as_foreign() {
-        return Some(format!("NOT A TOUCHDOWN VEHICLE: {}", foreign.name()));
-    }
-    model.speaks_another_version(now).then(|| "ANOTHER VERSION: its messages do not fit".to_owned())
 }
 
 fn vehicle(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
@@ -357,22 +356,19 @@ fn hold_until(model: &Model, now: Duration) -> Option<String> {
 
 /// What an abort would do now, marked if the report is stale.
 fn abort_effect(model: &Model, now: Duration) -> String {
-    if model.link.station_gone {
-        return "NOT SENT: no station; kept for the next one".to_owned();
-    }
-    if model.link.station_silence(now).is_some() {
-        return "NOT SENT while the station hangs; kept".to_owned();
-    }
-    if model.vehicle.as_foreign().is_some() {
-        return TERMINATION.to_owned();
-    }
-    let Some(status) = model.vehicle.status.as_ref() else { return "unknown".to_owned() };
-    if may_have_left(&model.vehicle, now).is_some() {
-        return "MAY NOT ARRIVE; what it would do is not told".to_owned();
-    }
-    if let Some(why) = abort_too_late(model, now) {
-        return why.to_owned();
-    }
+    let status = match model.vehicle.status.as_ref() {
+        _ if model.link.station_gone => return "NOT SENT: no station; kept for the next one".to_owned(),
+        _ if model.link.station_silence(now).is_some() => {
+            return "NOT SENT while the station hangs; kept".to_owned();
+        }
+        _ if model.vehicle.as_foreign().is_some() => return TERMINATION.to_owned(),
+        None => return "unknown".to_owned(),
+        _ if may_have_left(&model.vehicle, now).is_some() => {
+            return "MAY NOT ARRIVE; what it would do is not told".to_owned();
+        }
+        _ if let Some(why) = abort_too_late(model, now) => return why.to_owned(),
+        Some(status) => status,
+    };
     let mark = if status.is_stale(now) { "~" } else { "" };
     // First, because a narrow screen cuts the end off.
     let [down, up] = [model.link.state(now), model.link.uplink.state(now)];
