@@ -250,10 +250,8 @@ impl AbortChord {
 
     /// When a second press counts.
     pub fn acts_at(self) -> Option<Duration> {
-        match self {
-            Self::Twice(at) => Some(at + REPEATS_WITHIN),
-            Self::Open | Self::Once(_) => None,
-        }
+        let Self::Twice(at) = self else { return None };
+        Some(at + REPEATS_WITHIN)
     }
 
     pub fn press(&mut self, now: Duration) {
@@ -302,10 +300,7 @@ impl AbortChord {
 
     /// Enter was pressed: whether it came too late, a moment after the question had run out. It is asked once.
     pub fn take_late_enter(&mut self, now: Duration) -> bool {
-        match std::mem::take(self) {
-            Self::Once(at) => now.saturating_sub(at) <= LATE_WITHIN,
-            Self::Open | Self::Twice(_) => false,
-        }
+        matches!(std::mem::take(self), Self::Once(at) if now.saturating_sub(at) <= LATE_WITHIN)
     }
 }
 

@@ -3,9 +3,7 @@
 use std::num::NonZeroU32;
 use std::time::Duration;
 
-use protocol::dialect::{
-    HEARTBEAT_DATA, MavAutopilot, MavMessage, MavModeFlag, MavType, TD_FLIGHT_STATUS_DATA, TdVehicleFlag,
-};
+use protocol::dialect::{HEARTBEAT_DATA, MavAutopilot, MavMessage, MavModeFlag, MavType, TdVehicleFlag};
 use protocol::identity::LARGEST_BOOT_NUMBER;
 pub use protocol::told::may_be_ours;
 
@@ -52,19 +50,16 @@ impl Boot {
                 let set = beat.base_mode.contains(MavModeFlag::MAV_MODE_FLAG_HIL_ENABLED);
                 self.hil = Some(set && self.hil != Some(false));
             }
-            MavMessage::TD_FLIGHT_STATUS(status) => self.hear_status(status),
+            MavMessage::TD_FLIGHT_STATUS(status) => {
+                let number = NonZeroU32::new(status.boot_number);
+                if self.number != number {
+                    *self = Self { number, ..Self::default() };
+                }
+                let set = status.vehicle_flags.contains(TdVehicleFlag::TD_VEHICLE_FLAG_SIMULATED);
+                self.flagged = Some(set && self.flagged != Some(false));
+            }
             _ => {}
         }
-    }
-
-    fn hear_status(&mut self, status: &TD_FLIGHT_STATUS_DATA) {
-        let told = NonZeroU32::new(status.boot_number);
-        if self.number != told {
-            (self.hil, self.flagged) = (None, None);
-        }
-        self.number = told;
-        let set = status.vehicle_flags.contains(TdVehicleFlag::TD_VEHICLE_FLAG_SIMULATED);
-        self.flagged = Some(set && self.flagged != Some(false));
     }
 }
 
@@ -146,7 +141,7 @@ pub const TERMINATION: &str = "CUTS ITS MOTORS, or does as set there: it falls";
 #[cfg(test)]
 mod boot_tests {
     use super::*;
-    use protocol::dialect::HEARTBEAT_DATA;
+    use protocol::dialect::{HEARTBEAT_DATA, TD_FLIGHT_STATUS_DATA};
 
     fn status(boot_number: u32, simulated: bool) -> MavMessage {
         let vehicle_flags =

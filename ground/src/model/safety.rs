@@ -396,16 +396,12 @@ impl Ending {
 
     fn judged(vehicle: &Vehicle, verdict: &Verdict) -> Self {
         let Touchdown { vertical_m_s, .. } = verdict.touchdown;
-        if verdict.landing.contains(TdLanding::TD_LANDING_STANDS) {
-            Self::Stands
-        } else if hangs_on_its_chute(vehicle) && vertical_m_s.abs() < WRECKED_FROM_M_S {
-            Self::UnderParachute
-        } else if verdict.landing.contains(TdLanding::TD_LANDING_UPRIGHT) {
-            Self::Upright
-        } else if verdict.touchdown.speed_m_s() < WRECKED_FROM_M_S {
-            Self::Hard
-        } else {
-            Self::Lost
+        match verdict.landing {
+            landing if landing.contains(TdLanding::TD_LANDING_STANDS) => Self::Stands,
+            _ if hangs_on_its_chute(vehicle) && vertical_m_s.abs() < WRECKED_FROM_M_S => Self::UnderParachute,
+            landing if landing.contains(TdLanding::TD_LANDING_UPRIGHT) => Self::Upright,
+            _ if verdict.touchdown.speed_m_s() < WRECKED_FROM_M_S => Self::Hard,
+            _ => Self::Lost,
         }
     }
 

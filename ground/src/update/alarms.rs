@@ -177,10 +177,7 @@ pub(super) fn watch(model: &mut Model, now: Duration) {
 fn is_unheard(model: &Model, now: Duration) -> bool {
     // A report from before a silence says nothing about the present: the vehicle has this long to report.
     let heard_for = model.link.alive_since.map_or(Duration::ZERO, |at| now.saturating_sub(at));
-    let silent = match model.link.uplink.state(now) {
-        LinkState::Lost(_) | LinkState::NeverHeard => heard_for > RED_AFTER,
-        LinkState::Alive(_) | LinkState::Doubtful(_) => false,
-    };
+    let silent = !model.link.uplink.state(now).carries() && heard_for > RED_AFTER;
     // While nothing is received, an alarm that holds stays.
     let told = match model.link.state(now) {
         LinkState::Alive(_) => true,

@@ -306,9 +306,7 @@ fn on_log_health(model: &mut Model, health: LogHealth, now: Duration) {
     }
     model.log = health;
     // A word that was typed for another fault, or before the log was fit again, does not count.
-    let fault = match model.station_log(now) {
-        LogStanding::Unfit(fault, _) => Some(fault),
-        _ => None,
-    };
-    model.without_log = model.without_log.filter(|typed_for| fault == Some(*typed_for));
+    if !matches!(model.station_log(now), LogStanding::Unfit(fault, _) if model.without_log == Some(fault)) {
+        model.without_log = None;
+    }
 }

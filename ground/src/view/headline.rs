@@ -53,19 +53,19 @@ pub fn banner(model: &Model, now: Duration) -> Option<Banner> {
         let lead = format!("{mark}{ending}{}", words.to_lowercase());
         return Some(Banner { words, lead, rest: approach.reason(), role });
     }
-    if let Some(why) = model.link.why_abort_not_sent(now) {
-        return Some(Banner::alarm(NOT_SENT, format!(": {why}")));
-    }
-    if ending.is_none() && may_have_left(vehicle, now).is_some() {
-        return Some(may_fly(model));
-    }
-    if is_liftoff_by_itself(vehicle) {
-        let rest = " that nobody commanded: TAKE COVER, look up".to_owned();
-        return Some(Banner::alarm(LIFT_OFF, rest));
-    }
-    ending.filter(|ending| *ending == Ending::Lost)?;
-    let rest = format!("{}: do not approach", Ending::Lost.detail(vehicle));
-    Some(Banner::alarm(Ending::Lost.word(), rest))
+    let commanded_by_nobody = || " that nobody commanded: TAKE COVER, look up".to_owned();
+    Some(match ending {
+        _ if let Some(why) = model.link.why_abort_not_sent(now) => {
+            Banner::alarm(NOT_SENT, format!(": {why}"))
+        }
+        None if may_have_left(vehicle, now).is_some() => may_fly(model),
+        _ if is_liftoff_by_itself(vehicle) => Banner::alarm(LIFT_OFF, commanded_by_nobody()),
+        Some(Ending::Lost) => {
+            let rest = format!("{}: do not approach", Ending::Lost.detail(vehicle));
+            Banner::alarm(Ending::Lost.word(), rest)
+        }
+        _ => return None,
+    })
 }
 
 /// Since when, and where it is meant to come down. The moment stands still; the clock in the line above runs.
