@@ -50,7 +50,7 @@ fn frame_300x90(bencher: Bencher, page: char) {
 
 fn frame(bencher: Bencher, page: char, columns: u16, rows: u16) {
     let mut model = flying();
-    drop(update(&mut model, Msg::Key(Key::Char(page)), NOW));
+    drop(update(&mut model, Msg::Keys(vec![Key::Char(page)]), NOW));
     let mut terminal = Terminal::new(TestBackend::new(columns, rows)).expect("memory");
     let theme = Theme { palette: Palette::Dark, ascii: false };
     bencher.bench_local(|| {

@@ -391,6 +391,7 @@ pub enum Characters {
 mod tests {
     use super::*;
     use clap::CommandFactory as _;
+    use clap::error::ErrorKind;
 
     #[test]
     fn the_definition_is_consistent() {
@@ -424,15 +425,22 @@ mod tests {
 
     #[test]
     fn wrong_values_are_refused_with_what_would_do() {
-        let refuse = |arguments: &[&str]| {
-            Cli::try_parse_from([&["ground"], arguments].concat()).unwrap_err().to_string()
-        };
-        assert!(refuse(&["--connect", "tcp:host:1"]).contains("udpin:ADDRESS:PORT"));
-        assert!(refuse(&["--forward", "tcpout:host:1"]).contains("udpout:HOST:PORT"));
-        assert!(refuse(&["--timeout-s", "-1"]).contains("from 0.1 to 86400"));
-        assert!(refuse(&["--sysid", "0"]).contains("1..=255"));
-        assert!(refuse(&["--speed", "0"]).contains("0.01"));
-        assert!(refuse(&["--connect", "udpin:0.0.0.0:14550", "--seed", "2"]).contains("cannot be used"));
+        let refuse =
+            |arguments: &[&str]| Cli::try_parse_from([&["ground"], arguments].concat()).unwrap_err().kind();
+        for wrong in [
+            ["--connect", "tcp:host:1"],
+            ["--forward", "tcpout:host:1"],
+            ["--timeout-s", "-1"],
+            ["--sysid", "0"],
+            ["--speed", "0"],
+        ] {
+            assert_eq!(refuse(&wrong), ErrorKind::ValueValidation, "{wrong:?}");
+        }
+        assert_eq!(listener("tcpout:host:1"), Err("give udpout:HOST:PORT".to_owned()));
+        let told = "`-1` is not a number of seconds from 0.1 to 86400";
+        assert_eq!(seconds("-1"), Err(told.to_owned()));
+        let both = ["--connect", "udpin:0.0.0.0:14550", "--seed", "2"];
+        assert_eq!(refuse(&both), ErrorKind::ArgumentConflict);
     }
 
     #[test]

@@ -6,21 +6,16 @@ use crate::model::FlightSoFar;
 
 /// The exit code for an outcome; `interactive` if a person closed the program.
 pub fn decide(outcome: &FlightSoFar, interactive: bool) -> Exit {
-    if outcome.error.is_some() {
-        Exit::Error
-    } else if outcome.aborted_at.is_some() {
-        Exit::RefusedOrAborted
-    } else if let Some((stands, _)) = outcome.verdict {
-        Exit::of(stands)
-    } else if outcome.started {
+    match outcome.verdict {
+        _ if outcome.error.is_some() => Exit::Error,
+        _ if outcome.aborted_at.is_some() => Exit::RefusedOrAborted,
+        Some((stands, _)) => Exit::of(stands),
         // At rest without a verdict: the vehicle came down under a parachute or without a landing burn.
-        if outcome.safed_at.is_some() { Exit::No } else { Exit::NotSeen }
-    } else if outcome.refusal.is_some() {
-        Exit::RefusedOrAborted
-    } else if interactive {
-        Exit::Yes
-    } else {
-        Exit::NotSeen
+        None if outcome.started && outcome.safed_at.is_some() => Exit::No,
+        None if outcome.started => Exit::NotSeen,
+        None if outcome.refusal.is_some() => Exit::RefusedOrAborted,
+        None if interactive => Exit::Yes,
+        None => Exit::NotSeen,
     }
 }
 

@@ -209,7 +209,7 @@ mod kept_tests {
         assert_eq!(whole, folder.path().join("vehicle1-..flight.mcap"));
         assert_eq!(std::fs::read(&whole).unwrap(), b"abcdefg");
         let refused = open(folder.path(), crc).unwrap_err();
-        assert!(refused.to_string().contains("is this log already"), "{refused}");
+        assert_eq!(refused.to_string(), format!("{} is this log already", whole.display()));
     }
 
     #[test]

@@ -542,12 +542,14 @@ mod checklist_tests {
         let (list, mut kept, told) = open_checklist(&path, now).unwrap();
         assert!(!list.is_touched() && told.is_empty());
         let another = || open_checklist(&path, now).map(|_| ()).unwrap_err().to_string();
-        assert!(another().contains("another station keeps"), "{}", another());
+        let keeps = format!("another station keeps {}", path.display());
+        let keeps = format!("{keeps}: attach a screen to it to sign (`ground attach`)");
+        assert_eq!(another(), keeps);
         let signed = folder.path().join("list.toml.signed");
         assert!(!signed.exists(), "nothing is signed");
         kept.add(&entry).unwrap();
         assert!(signed.exists());
-        assert!(another().contains("another station keeps"), "{}", another());
+        assert_eq!(another(), keeps);
         drop(kept);
         let (list, kept, _) = open_checklist(&path, now + 60).unwrap();
         assert_eq!(list.steps[2].mark, Mark::Signed(signature));

@@ -40,7 +40,7 @@ use crate::config::{Config, EXAMPLE, usual_path};
 use crate::demo::{Demo, DemoOptions, LogClock};
 use crate::exit;
 use crate::exit::Exit;
-use crate::model::{KeyOwner, Model, Role, Seat, Settings};
+use crate::model::{KeyOwner, Model, Role, Seat, Settings, words::printable};
 use crate::update::update;
 use crate::view::theme::Palette;
 use attached::Viewer;
@@ -353,7 +353,7 @@ pub(super) fn operator(named: Option<&str>) -> String {
     let variable = |name| std::env::var(name).ok().filter(|value| !value.is_empty());
     let words = named.map(str::to_owned).or_else(|| variable("USER")).or_else(|| variable("LOGNAME"));
     let words = words.unwrap_or_else(|| "somebody".to_owned());
-    protocol::text::printable(words.as_bytes()).chars().take(OPERATOR_MAX).collect()
+    printable(&words, OPERATOR_MAX)
 }
 
 // The keys of a station: the one that all share, and that of the operator who sits here.

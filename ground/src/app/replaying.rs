@@ -75,7 +75,7 @@ pub async fn session(
     if interactive {
         watch(&mut player, config).await?;
     } else {
-        player.seek(player.recording().length());
+        player.seek(player.recording().length);
         Lines::default().show(&player.model);
     }
     output::closing(&player.model, interactive, Ok(&None), player.position());
@@ -142,20 +142,14 @@ async fn watch(player: &mut Player, config: &Config) -> anyhow::Result<()> {
 /// Gives a replay what was typed. Returns what the screen has to do: what the ground did is part of the recording. Held or
 /// pasted keys count only if they scroll or move the time.
 fn typed(player: &mut Player, msg: &Msg) -> Vec<Action> {
-    let mut actions = match msg {
-        Msg::Key(key) => player.on_key(*key),
-        Msg::Keys(keys) => {
-            let mut actions = Vec::new();
-            for key in keys {
-                // What is typed as a text may come faster.
-                if key.scrolls() || player.model.pages.entry.is_some() {
-                    actions.extend(player.on_key(*key));
-                }
-            }
-            actions
+    let Msg::Keys(keys) = msg else { return Vec::new() };
+    let mut actions = Vec::new();
+    for key in keys {
+        // What is typed as a text may come faster.
+        if keys.len() == 1 || key.scrolls() || player.model.pages.entry.is_some() {
+            actions.extend(player.on_key(*key));
         }
-        _ => Vec::new(),
-    };
+    }
     actions.retain(|action| matches!(action, Action::Redraw | Action::NextTheme | Action::Quit));
     actions
 }
@@ -224,7 +218,6 @@ impl Again {
             return (Vec::new(), Some(msg));
         }
         let aborts = match &msg {
-            Msg::Key(key) => *key == Key::CtrlX,
             Msg::Keys(keys) => keys.contains(&Key::CtrlX),
             Msg::Pasted => false,
             _ => return (Vec::new(), Some(msg)),
@@ -254,7 +247,8 @@ mod tests {
     #[test]
     fn the_newest_log_is_found_by_its_date() {
         let folder = tempfile::tempdir().unwrap();
-        assert!(newest_log(folder.path()).unwrap_err().to_string().contains("give --replay a file"));
+        let none = newest_log(folder.path()).unwrap_err().to_string();
+        assert_eq!(none, "the current directory has no touchdown-*.mcap; give --replay a file");
         for name in
             ["touchdown-20261120-064030.mcap", "touchdown-20261121-010203.mcap", "other.mcap", "x.tlog"]
         {

@@ -28,7 +28,7 @@ use rustix::termios::QueueSelector;
 
 use super::answers;
 use super::pace::Pace;
-use super::programs::{Voice, VoiceEnded};
+use super::programs::{Voice, VoiceEnded, in_a_thread};
 use super::terminal::DiffBackend;
 use crate::cli::Characters;
 use crate::config::Config;
@@ -207,13 +207,11 @@ impl Screen {
             }
         };
         // Keys first, in their order; any other input is returned by the next call.
-        let first = match &keys[..] {
-            [] => return other.map_or(Poll::Pending, Poll::Ready),
-            [key] => Msg::Key(*key),
-            _ => Msg::Keys(keys),
-        };
+        if keys.is_empty() {
+            return other.map_or(Poll::Pending, Poll::Ready);
+        }
         self.waiting = other;
-        Poll::Ready(first)
+        Poll::Ready(Msg::Keys(keys))
     }
 }
 
@@ -362,9 +360,7 @@ impl TerminalWriter {
         let (page, gone) = (FrameBuffer::default(), Arc::new(AtomicBool::new(false)));
         let failed = Arc::clone(&gone);
         // The thread is never joined: it may hang with the terminal, and holds only a frame.
-        std::thread::Builder::new()
-            .name("terminal".to_owned())
-            .spawn(move || write_frames(&waiting, &failed))?;
+        in_a_thread("terminal", move || write_frames(&waiting, &failed))?;
         Ok((Self { page: page.clone(), frames, gone }, page))
     }
 

@@ -53,6 +53,7 @@ pub enum ServerEvent {
     Question(ToStation, oneshot::Sender<ToScreen>),
 }
 
+#[derive(Default)]
 struct History {
     hello: Hello,
     /// The latest checklist, which is sent also if the history no longer reaches back to it.
@@ -66,10 +67,6 @@ struct History {
 }
 
 impl History {
-    fn new(hello: Hello) -> Self {
-        Self { hello, checklist: None, blocks: VecDeque::new(), last: Vec::new(), bytes: 0 }
-    }
-
     fn keep(&mut self, message: &[u8]) {
         if self.last.len() + message.len() > BLOCK_BYTES && !self.last.is_empty() {
             self.blocks.push_back(Bytes::from(&self.last[..]));
@@ -119,7 +116,7 @@ impl Server {
         }
         let (news, _) = broadcast::channel(BEHIND_MAX);
         let (ask, requests) = mpsc::channel(REQUESTS_MAX);
-        let history = Mutex::new(History::new(hello));
+        let history = Mutex::new(History { hello, ..History::default() });
         let shared = Arc::new(Shared { history, news, next_screen: AtomicU32::new(first_screen) });
         let for_screens = Arc::clone(&shared);
         let accepting = tokio::spawn(async move {
@@ -299,7 +296,7 @@ mod server_tests {
 
     #[test]
     fn the_history_keeps_the_latest_messages_whole_and_is_bounded() {
-        let mut history = History::new(Hello::default());
+        let mut history = History::default();
         for number in 0..200_000 {
             history.keep(&message(number));
             assert!(history.bytes <= HISTORY_BYTES_MAX);

@@ -339,13 +339,10 @@ fn record(recorder: Option<&Recorder>, log_time: &LogTime, direction: Direction,
 
 /// Whether everybody on the link is to get a message.
 fn concerns_all(message: &MavMessage) -> bool {
-    match message {
-        MavMessage::HEARTBEAT(_) => true,
-        MavMessage::COMMAND_LONG(sent) => match sent.command {
-            MavCmd::MAV_CMD_DO_FLIGHTTERMINATION | MavCmd::MAV_CMD_DO_PAUSE_CONTINUE => true,
-            MavCmd::MAV_CMD_COMPONENT_ARM_DISARM => sent.param1 == 0.0,
-            _ => false,
-        },
+    let MavMessage::COMMAND_LONG(sent) = message else { return matches!(message, MavMessage::HEARTBEAT(_)) };
+    match sent.command {
+        MavCmd::MAV_CMD_DO_FLIGHTTERMINATION | MavCmd::MAV_CMD_DO_PAUSE_CONTINUE => true,
+        MavCmd::MAV_CMD_COMPONENT_ARM_DISARM => sent.param1 == 0.0,
         _ => false,
     }
 }

@@ -13,7 +13,7 @@ use tokio::io::AsyncRead;
 use tokio_util::codec::{FramedRead, LengthDelimitedCodec};
 
 use super::{NOTE_MAX, OPERATOR_MAX, ToScreen, ToStation, VERSION};
-use crate::model::Request;
+use crate::model::{Request, words::printable};
 use crate::update::Msg;
 
 /// The longest accepted message, bytes.
@@ -62,10 +62,10 @@ pub fn decode_to_station(bytes: &[u8]) -> Result<ToStation, CodecError> {
     let mut asked = payload(bytes)?;
     match &mut asked {
         ToStation::Hello { operator: text, .. } | ToStation::Stop { operator: text, .. } => {
-            *text = words(text, OPERATOR_MAX);
+            *text = printable(text, OPERATOR_MAX);
         }
-        ToStation::Key(name) => *name = words(name, KEY_MAX),
-        ToStation::Request(Request::Note(text)) => *text = words(text, NOTE_MAX),
+        ToStation::Key(name) => *name = printable(name, KEY_MAX),
+        ToStation::Request(Request::Note(text)) => *text = printable(text, NOTE_MAX),
         ToStation::Status | ToStation::Request(_) | ToStation::Here => {}
     }
     Ok(asked)
@@ -95,11 +95,6 @@ fn payload<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, CodecError> {
         Ok(_) => Err(CodecError::Bytes("too long")),
         Err(_) => Err(CodecError::Bytes("no message of this version")),
     }
-}
-
-/// A text from another process, made printable and shortened to this many characters.
-fn words(text: &str, characters: usize) -> String {
-    protocol::text::printable(text.as_bytes()).chars().take(characters).collect()
 }
 
 #[cfg(test)]
@@ -206,9 +201,11 @@ mod tests {
     #[test]
     fn own_keys_and_what_the_station_answers_by_what_it_does_are_not_sent() {
         let asked = |request| Msg::Asked { request, by: Seat::default() };
-        for msg in
-            [Msg::Key(Key::Enter), asked(Request::Report), asked(Request::Sign { step: 1, void: false })]
-        {
+        for msg in [
+            Msg::Keys(vec![Key::Enter]),
+            asked(Request::Report),
+            asked(Request::Sign { step: 1, void: false }),
+        ] {
             assert_eq!(encode_to_screen(&ToScreen::Msg(msg), Duration::ZERO), None);
         }
     }

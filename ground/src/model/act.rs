@@ -146,16 +146,12 @@ pub const DEFINITIONS: [Definition; 36] = [
 
 /// Why no flight can be shown again or reported here now.
 pub fn why_nothing_flown(model: &Model) -> Option<&'static str> {
-    if model.settings.role == Role::Replaying {
-        return Some("this is a replay");
+    match model.settings.role {
+        Role::Replaying => Some("this is a replay"),
+        _ if model.is_at_risk() => Some("the vehicle is armed or in flight"),
+        _ if model.settings.log_path.is_none() => Some("there is no log (--log none)"),
+        _ => (!model.outcome.started).then_some("no flight has been flown yet"),
     }
-    if model.is_at_risk() {
-        return Some("the vehicle is armed or in flight");
-    }
-    if model.settings.log_path.is_none() {
-        return Some("there is no log (--log none)");
-    }
-    (!model.outcome.started).then_some("no flight has been flown yet")
 }
 
 impl Act {
@@ -247,7 +243,7 @@ impl Bindings {
             Key::Char(letter) if letter.is_ascii_uppercase() => {
                 self.exactly(Key::Char(letter.to_ascii_lowercase()))
             }
-            Key::F1 => Some(Act::Show(crate::model::Page::Help)),
+            Key::F1 => Some(Act::Show(Page::Help)),
             Key::CtrlC => Some(Act::Quit),
             Key::Escape => Some(Act::Follow),
             _ => None,
@@ -349,33 +345,20 @@ pub fn palette_entries(model: &Model, typed: &str, now: Duration) -> Vec<Palette
 }
 
 fn every_entry(model: &Model, now: Duration) -> impl Iterator<Item = PaletteEntry> {
-    let abort = PaletteEntry {
-        words: ABORT_WORDS.to_owned(),
-        key: "Ctrl-X".to_owned(),
-        action: PaletteAction::TellAbort,
-    };
-    let acts = DEFINITIONS.iter().map(|definition| PaletteEntry {
-        words: definition.words.to_owned(),
-        key: model.settings.keys.name(definition.act),
-        action: PaletteAction::Act(definition.act),
+    let entry = |words: String, key: String, action| PaletteEntry { words, key, action };
+    let abort = entry(ABORT_WORDS.to_owned(), "Ctrl-X".to_owned(), PaletteAction::TellAbort);
+    let acts = DEFINITIONS.iter().map(move |Definition { act, words, .. }| {
+        entry((*words).to_owned(), model.settings.keys.name(*act), PaletteAction::Act(*act))
     });
-    let boots = model.vehicle.boot.number().into_iter().chain(model.other_boots(now));
-    let several = !model.other_boots(now).is_empty();
-    let choices: Vec<PaletteEntry> = boots
-        .filter(|_| several)
-        .map(|boot| PaletteEntry {
-            words: format!(
-                "choose boot {}: show and command this one of several vehicles",
-                words::boot(boot)
-            ),
-            key: String::new(),
-            action: PaletteAction::Choose(boot),
-        })
-        .collect();
-    let plots = quantity::ALL.iter().map(|quantity| PaletteEntry {
-        words: format!("plot {}", quantity.name),
-        key: String::new(),
-        action: PaletteAction::Plot(quantity),
+    let others = model.other_boots(now);
+    let own = model.vehicle.boot.number().filter(|_| !others.is_empty());
+    let choices = own.into_iter().chain(others).map(move |boot| {
+        let number = words::boot(boot);
+        let words = format!("choose boot {number}: show and command this one of several vehicles");
+        entry(words, String::new(), PaletteAction::Choose(boot))
+    });
+    let plots = quantity::ALL.iter().map(move |quantity| {
+        entry(format!("plot {}", quantity.name), String::new(), PaletteAction::Plot(quantity))
     });
     std::iter::once(abort).chain(choices).chain(acts).chain(plots)
 }
@@ -416,10 +399,11 @@ mod tests {
     fn a_wrong_choice_is_refused_with_what_would_do() {
         let refused = |given: &str| chosen(&[given.split_once('=').unwrap()]).unwrap_err();
         assert!(refused("abort=x").contains("`abort` is no action; give one of arm, start"));
-        assert!(refused("theme=Enter").contains("one printable ASCII character"));
-        assert!(refused("theme=").contains("theme: ``"));
-        assert!(refused("arm=a").contains("no capital letter"));
-        assert!(refused("theme=t").contains("plot and theme have the same key `t`"));
+        let one = "give one printable ASCII character or Space";
+        assert_eq!(refused("theme=Enter"), format!("theme: `Enter` cannot be chosen; {one}"));
+        assert_eq!(refused("theme="), format!("theme: `` cannot be chosen; {one}"));
+        assert_eq!(refused("arm=a"), "arm: `a` is no capital letter, and arm needs one");
+        assert_eq!(refused("theme=t"), "plot and theme have the same key `t`; give each its own");
     }
 
     #[test]

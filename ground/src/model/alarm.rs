@@ -6,7 +6,7 @@ use clap::ValueEnum;
 use protocol::dialect::TdPhase;
 use serde::{Deserialize, Serialize};
 
-use super::{CommandKind, Ending};
+use super::CommandKind;
 
 /// An alarm that nobody has acknowledged rings again after this long.
 pub const RING_EVERY: Duration = Duration::from_secs(4);
@@ -81,11 +81,8 @@ pub struct Condition {
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Alarm {
-    pub kind: AlarmKind,
-    pub urgency: u8,
-    pub ends_with_boot: bool,
-    /// The text for a person; safe to print on a terminal.
-    pub text: String,
+    /// What holds, or held.
+    pub what: Condition,
     /// When it was last raised, since the start of the run.
     pub raised_at: Duration,
     /// When its condition ended; `None` while it holds.
@@ -131,13 +128,13 @@ impl Alarms {
     pub fn foremost(&self) -> Option<&Alarm> {
         self.list.iter().max_by_key(|alarm| {
             let unseen = if alarm.acknowledged { 0 } else { 2 - u8::from(alarm.past) };
-            (unseen, alarm.is_active(), alarm.urgency, alarm.raised_at)
+            (unseen, alarm.is_active(), alarm.what.urgency, alarm.raised_at)
         })
     }
 
     /// Whether there is an alarm of this kind that nobody has acknowledged.
     pub fn is_unseen(&self, kind: AlarmKind) -> bool {
-        self.list.iter().any(|alarm| alarm.kind == kind && !alarm.acknowledged)
+        self.list.iter().any(|alarm| alarm.what.kind == kind && !alarm.acknowledged)
     }
 
     /// How many alarms nobody has acknowledged.
@@ -149,25 +146,17 @@ impl Alarms {
     /// new alarm with a new age, which must be acknowledged again.
     pub(crate) fn watch(&mut self, now: Duration, conditions: Vec<Condition>) -> Vec<Alarm> {
         for alarm in &mut self.list {
-            if !conditions.iter().any(|condition| condition.kind == alarm.kind) {
+            if !conditions.iter().any(|condition| condition.kind == alarm.what.kind) {
                 alarm.ended_at.get_or_insert(now);
             }
         }
         let mut raised = Vec::new();
-        for Condition { kind, urgency, ends_with_boot, text } in conditions {
-            match self.list.iter_mut().find(|alarm| alarm.kind == kind) {
-                Some(known) if known.is_active() => known.text = text,
+        for what in conditions {
+            match self.list.iter_mut().find(|alarm| alarm.what.kind == what.kind) {
+                Some(known) if known.is_active() => known.what.text = what.text,
                 known => {
-                    let alarm = Alarm {
-                        kind,
-                        urgency,
-                        ends_with_boot,
-                        text,
-                        raised_at: now,
-                        ended_at: None,
-                        acknowledged: false,
-                        past: false,
-                    };
+                    let alarm =
+                        Alarm { what, raised_at: now, ended_at: None, acknowledged: false, past: false };
                     raised.push(alarm.clone());
                     match known {
                         Some(known) => *known = alarm,
@@ -183,7 +172,7 @@ impl Alarms {
 
     /// The vehicle has rebooted: alarms about the previous boot have ended.
     pub(crate) fn vehicle_rebooted(&mut self, now: Duration) {
-        for alarm in self.list.iter_mut().filter(|alarm| alarm.ends_with_boot) {
+        for alarm in self.list.iter_mut().filter(|alarm| alarm.what.ends_with_boot) {
             alarm.ended_at.get_or_insert(now);
         }
         self.forget_seen();
@@ -191,9 +180,9 @@ impl Alarms {
 
     /// Marks an alarm as seen. Returns its text if it was not marked before.
     pub(crate) fn acknowledge(&mut self, kind: AlarmKind) -> Option<String> {
-        let new = self.list.iter_mut().find(|alarm| alarm.kind == kind && !alarm.acknowledged)?;
+        let new = self.list.iter_mut().find(|alarm| alarm.what.kind == kind && !alarm.acknowledged)?;
         new.acknowledged = true;
-        let text = new.text.clone();
+        let text = new.what.text.clone();
         self.forget_seen();
         if self.unacknowledged() == 0 {
             self.rung_at = None;
@@ -251,17 +240,13 @@ impl Default for Talk {
 }
 
 /// What has been called out.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Called {
     pub(crate) phase: Option<TdPhase>,
-    pub(crate) lifts: bool,
     pub(crate) height_m: Option<f64>,
     pub(crate) height_at: Option<Duration>,
-    /// Whether GO was the last that was called out on the pad.
-    pub(crate) go: Option<bool>,
-    pub(crate) lost: bool,
-    pub(crate) ending: Option<Ending>,
-    pub(crate) approach: Option<&'static str>,
+    /// What each row of the other callouts said last.
+    pub(crate) rows: [Option<String>; 5],
     pub(crate) bells_left: u8,
 }
 
@@ -285,7 +270,7 @@ mod tests {
         let unsent = condition(AlarmKind::Unanswered(CommandKind::Abort), 3);
         let gone = condition(AlarmKind::StationSilent, 2);
         let low = condition(AlarmKind::Battery, 0);
-        let foremost = |alarms: &Alarms| alarms.foremost().map(|alarm| alarm.kind);
+        let foremost = |alarms: &Alarms| alarms.foremost().map(|alarm| alarm.what.kind);
         let mut alarms = Alarms::default();
         let mut conditions = vec![unsent, gone];
         alarms.watch(S(1), conditions.clone());

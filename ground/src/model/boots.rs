@@ -54,7 +54,7 @@ pub struct StatusReport {
 }
 
 /// Names a boot for as long as the station runs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct BootId(u32);
 
 /// The last report of a boot from one source.
@@ -87,7 +87,7 @@ const fn link_of(source: u16) -> u16 {
     source >> 8
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 struct HeardBoot {
     id: BootId,
     uid: u16,
@@ -114,17 +114,7 @@ fn is_within(at: Duration, limit: Duration, now: Duration) -> bool {
 
 impl HeardBoot {
     fn new(id: BootId, report: &StatusReport, now: Duration) -> Self {
-        let mut boot = Self {
-            id,
-            uid: report.uid,
-            number: report.boot,
-            sources: Vec::new(),
-            clock_ms: report.clock_ms,
-            heard_at: now,
-            reports_at: VecDeque::new(),
-            contradicted_at: VecDeque::new(),
-            is_busy: false,
-        };
+        let mut boot = Self { id, uid: report.uid, number: report.boot, ..Self::default() };
         boot.hear(report, now);
         boot
     }
@@ -265,6 +255,12 @@ impl Boots {
         self.shown
     }
 
+    /// The boot that fits, if it is the only one.
+    fn only(&self, fits: impl Fn(&HeardBoot) -> bool) -> Option<BootId> {
+        let mut fitting = self.list.iter().filter(|boot| fits(boot)).map(|boot| boot.id);
+        fitting.next().filter(|_| fitting.next().is_none())
+    }
+
     /// Whether this boot may be the shown vehicle after a reset, rather than another vehicle.
     pub fn follows(&self, id: BootId, former: BootId) -> bool {
         self.of(id).zip(self.of(former)).is_some_and(|(boot, former)| boot.follows(former))
@@ -312,13 +308,10 @@ impl Boots {
         now: Duration,
     ) -> Option<BootId> {
         let shown = self.shown_boot()?;
-        let mut named = self.list.iter().filter(|boot| number.is_some_and(|number| boot.is_number(number)));
-        if let (Some(only), None) = (named.next(), named.next()) {
-            return Some(only.id);
-        }
-        let mut here = self.list.iter().filter(|boot| boot.is_heard(now) && boot.is_at(source));
-        if let (Some(only), None) = (here.next(), here.next()) {
-            return Some(only.id);
+        let named = |boot: &HeardBoot| number.is_some_and(|number| boot.is_number(number));
+        let here = |boot: &HeardBoot| boot.is_heard(now) && boot.is_at(source);
+        if let Some(only) = self.only(named).or_else(|| self.only(here)) {
+            return Some(only);
         }
         let off = |boot: &HeardBoot| match clock_ms {
             Some(clock_ms) => boot.away_ms(clock_ms, now).abs(),
@@ -381,16 +374,9 @@ impl Boots {
 
     /// The crew chooses this boot by name. Returns false if it is not heard, or not the only one of its number.
     pub fn choose(&mut self, number: u32, now: Duration) -> bool {
-        let named: Vec<BootId> = self
-            .list
-            .iter()
-            .filter(|boot| boot.number == number && boot.is_heard(now))
-            .map(|boot| boot.id)
-            .collect();
-        if let [only] = named[..] {
-            self.chosen = Some(only);
-        }
-        named.len() == 1
+        let only = self.only(|boot| boot.number == number && boot.is_heard(now));
+        self.chosen = only.or(self.chosen);
+        only.is_some()
     }
 
     /// Other vehicles that are heard beside the shown one.

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
 use super::{
-    FlownMission, Model, is_flight,
+    FlownMission, Model,
     quantity::{self, Quantity},
     words,
 };
@@ -245,16 +245,10 @@ impl Model {
     /// # Errors
     /// The reason.
     pub fn may_sign(&self, by: &str) -> Result<Option<TdRole>, String> {
-        if self.vehicle.is_armed() {
-            return Err("the vehicle is armed: disarm first".to_owned());
-        }
-        if self.vehicle.phase_now().is_some_and(is_flight) {
-            return Err("the vehicle is in flight".to_owned());
-        }
-        if self.settings.crew_roles.is_empty() {
-            return Ok(None);
-        }
         match self.settings.crew_roles.iter().find(|(name, _)| name == by) {
+            _ if self.vehicle.is_armed() => Err("the vehicle is armed: disarm first".to_owned()),
+            _ if self.vehicle.in_flight() => Err("the vehicle is in flight".to_owned()),
+            _ if self.settings.crew_roles.is_empty() => Ok(None),
             None if by.is_empty() => Err("nobody is named (--operator)".to_owned()),
             None => Err(format!("{by} is not in the crew (--operator)")),
             Some((_, TdRole::TD_ROLE_OBSERVER)) => Err(format!("{by} is an observer")),
@@ -308,7 +302,12 @@ pub fn parse_checklist(text: &str) -> anyhow::Result<Checklist> {
         step.checked().map_err(|why| anyhow::anyhow!("step {}: {why}", place + 1))
     };
     let steps = written.step.into_iter().enumerate().map(step).collect::<anyhow::Result<_>>()?;
-    Ok(Checklist { name: printable(&written.name), mission: written.mission, hash: hash_of(text), steps })
+    Ok(Checklist {
+        name: words::printable(&written.name, WORDS_MAX),
+        mission: written.mission,
+        hash: hash_of(text),
+        steps,
+    })
 }
 
 /// The beginning of the SHA-256, as hexadecimal digits.
@@ -318,10 +317,6 @@ fn hash_of(text: &str) -> String {
         let _ = write!(digits, "{byte:02x}");
         digits
     })
-}
-
-fn printable(text: &str) -> String {
-    protocol::text::printable(text.as_bytes()).chars().take(WORDS_MAX).collect()
 }
 
 impl WrittenStep {
@@ -354,7 +349,7 @@ impl WrittenStep {
             let signs = &self.signs;
             return Err(format!("signs: `{signs}`; give range-safety, flight, pad or anybody"));
         }
-        Ok(Step { words: printable(&self.words), role, value, mark: Mark::Open })
+        Ok(Step { words: words::printable(&self.words, WORDS_MAX), role, value, mark: Mark::Open })
     }
 }
 
@@ -383,7 +378,7 @@ pub fn remembered(list: &str, hash: &str, now_unix_s: u64) -> Remembered {
         if let ChecklistEntry::Marked { mark, .. } = &mut entry
             && let Mark::Signed(signature) | Mark::Voided(signature) = mark
         {
-            signature.by = printable(&signature.by);
+            signature.by = words::printable(&signature.by, WORDS_MAX);
         }
         if let ChecklistEntry::Marked { mark: Mark::Signed(Signature { unix_s, .. }), .. } = &entry
             && !(now_unix_s.saturating_sub(SIGNED_FOR_S)..=now_unix_s + AHEAD_MAX_S).contains(unix_s)
@@ -433,17 +428,23 @@ mod tests {
             let text = format!("name = \"a\"\n[[step]]\n{step}");
             parse_checklist(&text).unwrap_err().to_string()
         };
-        assert!(refused("words = \"\"\nsigns = \"pad\"").contains("step 1: words: give 1 to 60"));
-        assert!(refused("words = \"a\"\nsigns = \"cook\"").contains("range-safety"));
-        assert!(refused("words = \"a\"\nsigns = \"pad\"\nleast = 1.0").contains("need a value"));
+        for (step, why) in [
+            ("words = \"\"\nsigns = \"pad\"", "words: give 1 to 60 characters, not 0"),
+            ("words = \"a\"\nsigns = \"cook\"", "signs: `cook`; give range-safety, flight, pad or anybody"),
+            ("words = \"a\"\nsigns = \"pad\"\nleast = 1.0", "least and most need a value"),
+        ] {
+            assert_eq!(refused(step), format!("step 1: {why}"));
+        }
         let unknown = refused("words = \"a\"\nsigns = \"pad\"\nvalue = \"x\"\nmost = 1.0");
         assert!(unknown.contains("`x` is no value; give one of height"), "{unknown}");
         let value =
             |limits: &str| refused(&format!("words = \"a\"\nsigns = \"pad\"\nvalue = \"tilt\"\n{limits}"));
-        assert!(value("least = 2.0\nmost = 1.0").contains("least not above most"));
-        assert!(value("most = nan").contains("must be numbers"));
-        assert!(value("").contains("needs least, most or both"));
-        assert!(parse_checklist("name = \"a\"").unwrap_err().to_string().contains("not 0"));
+        let numbers = "step 1: least and most must be numbers, least not above most";
+        assert_eq!(value("least = 2.0\nmost = 1.0"), numbers);
+        assert_eq!(value("most = nan"), numbers);
+        assert_eq!(value(""), "step 1: a value needs least, most or both");
+        let none = parse_checklist("name = \"a\"").unwrap_err().to_string();
+        assert_eq!(none, "give a checklist from 1 to 40 steps, not 0");
         assert!(refused("words = \"a\"\nsigns = \"pad\"\ncolour = 1").contains("colour"));
     }
 

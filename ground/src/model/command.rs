@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 use strum::VariantArray;
 
 use super::{
-    Ask, GONE_AFTER, LinkState, Model, PadCheck, Prompt, RED_AFTER, Seat, Settings, Vehicle, is_on_pad, words,
+    Ask, FlownMission, GONE_AFTER, LinkState, Model, PadCheck, Prompt, RED_AFTER, Seat, Settings, Vehicle,
+    is_on_pad, words,
 };
 
 /// The effect of an accepted command should show in the vehicle's state within this time: a little over two
@@ -43,12 +44,14 @@ pub enum CommandKind {
 }
 
 /// A command as a row of their table.
-struct CommandRow {
+pub(crate) struct CommandRow {
     name: &'static str,
     mav: (MavCmd, f32),
     moves: bool,
-    resend: Resend,
-    seen: Option<&'static str>,
+    /// How often the command is resent.
+    pub(crate) resend: Resend,
+    /// What in the vehicle's own state shows the effect, for the event "observed"; `None` if its answer has to do.
+    pub(crate) seen: Option<&'static str>,
 }
 
 impl CommandKind {
@@ -58,7 +61,7 @@ impl CommandKind {
     ///
     /// A repetition has the number of the command, and the vehicle does it once: a late one arms nothing that was disarmed since.
     /// A tap is for one moment. A check is not repeated either: it would move what somebody has just laid hands on.
-    fn row(self) -> CommandRow {
+    pub(crate) fn row(self) -> CommandRow {
         use MavCmd::{
             MAV_CMD_COMPONENT_ARM_DISARM as ARM, MAV_CMD_DO_FLIGHTTERMINATION as TERMINATE,
             MAV_CMD_DO_PAUSE_CONTINUE as PAUSE, MAV_CMD_MISSION_START as START,
@@ -97,16 +100,6 @@ impl CommandKind {
     /// the vehicle that is shown.
     pub fn moves(self) -> bool {
         self.row().moves
-    }
-
-    /// How often the command is resent.
-    pub fn resend(self) -> Resend {
-        self.row().resend
-    }
-
-    /// What in the vehicle's own state shows the effect, for the event "observed"; `None` if its answer has to do.
-    pub fn seen(self) -> Option<&'static str> {
-        self.row().seen
     }
 
     /// Whether only the owner of the station's key gives it: everything but what anybody may do to stop something.
@@ -240,23 +233,22 @@ impl Commands {
 pub fn why_nothing_moves(model: &Model, now: Duration) -> Option<String> {
     let Settings { us, vehicle: of, .. } = &model.settings;
     let vehicle = &model.vehicle;
-    if model.beside(now).is_some() && !model.boots.is_chosen(now) {
-        return Some(format!("TWO VEHICLES under id {}: switch one off", of.system_id));
-    }
-    if let Some(foreign) =
-        vehicle.foreign.as_ref().filter(|foreign| now.saturating_sub(foreign.heard_at) < GONE_AFTER)
-    {
-        return Some(format!("not a Touchdown vehicle: {}", foreign.name()));
-    }
-    if vehicle.status.is_none() {
-        return Some("it is not known yet what the vehicle is: it has sent no flight status".to_owned());
-    }
     let Address { system_id, component_id } = us;
-    let same = "another station uses our id";
-    model
-        .link
-        .shares_our_id(now)
-        .then(|| format!("{same} {system_id}/{component_id}: give one another --sysid"))
+    Some(match vehicle.foreign.as_ref() {
+        _ if model.beside(now).is_some() && !model.boots.is_chosen(now) => {
+            format!("TWO VEHICLES under id {}: switch one off", of.system_id)
+        }
+        Some(foreign) if now.saturating_sub(foreign.heard_at) < GONE_AFTER => {
+            format!("not a Touchdown vehicle: {}", foreign.name())
+        }
+        _ if vehicle.status.is_none() => {
+            "it is not known yet what the vehicle is: it has sent no flight status".to_owned()
+        }
+        _ if model.link.shares_our_id(now) => {
+            format!("another station uses our id {system_id}/{component_id}: give one another --sysid")
+        }
+        _ => return None,
+    })
 }
 
 /// Why no command reaches the vehicle that is meant: it is silent, what it says arrives late, or nothing may be commanded.
@@ -403,17 +395,16 @@ fn why_no_key(model: &Model) -> Option<String> {
 /// Why the vehicle is not the one that this station is prepared for.
 pub fn why_other_mission(model: &Model) -> Option<String> {
     let ours = model.settings.mission?;
-    let Some(flown) = model.vehicle.mission() else {
-        return Some(format!("the vehicle has not said whether it flies {ours} (--mission)"));
-    };
-    if flown.hash != ours {
-        let theirs = flown.hash;
-        return Some(format!("the vehicle flies {} {theirs}, --mission is {ours}", flown.name));
-    }
-    let start = model.settings.start.as_deref()?;
-    (flown.start != Some(start)).then(|| {
-        let begins = flown.start.unwrap_or("where it does not say");
-        format!("the flight begins at: {begins}, --start is {start}")
+    Some(match model.vehicle.mission() {
+        None => format!("the vehicle has not said whether it flies {ours} (--mission)"),
+        Some(FlownMission { hash: theirs, name, .. }) if theirs != ours => {
+            format!("the vehicle flies {name} {theirs}, --mission is {ours}")
+        }
+        Some(FlownMission { start: told, .. }) => {
+            let start = model.settings.start.as_deref().filter(|start| told != Some(*start))?;
+            let begins = told.unwrap_or("where it does not say");
+            format!("the flight begins at: {begins}, --start is {start}")
+        }
     })
 }
 

@@ -71,10 +71,11 @@ pub fn predict_position(vehicle: &Vehicle, now: Duration) -> Option<PredictedPos
     let wrong_m_s2 = acceleration_error_m_s2(vehicle, phase, expected.basis);
     let swerved_m = swerve_m(expected.burning_s);
     let grown_m = SPEED_ERROR_M_S * growing_s + 0.5 * wrong_m_s2 * growing_s * growing_s + swerved_m;
+    let [x_m, y_m, altitude_m] = expected.place;
     Some(PredictedPosition {
-        x_m: expected.x_m,
-        y_m: expected.y_m,
-        altitude_m: expected.altitude_m.max(0.0),
+        x_m,
+        y_m,
+        altitude_m: altitude_m.max(0.0),
         error_m: POSITION_ERROR_M + grown_m + expected.or_else_m,
         age,
         basis: expected.basis,
@@ -105,7 +106,7 @@ pub fn course(vehicle: &Vehicle, now: Duration) -> Vec<(f64, NorthEastUp)> {
     for step in 0..(COURSE_LONGEST_S / COURSE_STEP_S) as u32 {
         let ahead_s = f64::from(step) * COURSE_STEP_S;
         let planned = along_plan(vehicle, phase, now + Duration::from_secs_f64(ahead_s));
-        let planned = planned.map(|at| ([at.x_m, at.y_m, at.altitude_m], at.landed_after_s));
+        let planned = planned.map(|at| (at.place, at.landed_after_s));
         let ([x_m, y_m, altitude_m], landed_after_s) = planned.unwrap_or_else(|| {
             let (place, landed_after_s, _) = last.follow(age_s + ahead_s);
             (place, landed_after_s)
@@ -185,10 +186,9 @@ fn along_plan(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> Option<Extrap
     let end_s = total_s - path.age(motion.received_at).as_secs_f64();
     let passed_s = motion.age(now).as_secs_f64().min(end_s.max(0.0));
     let braked = if end_s > 0.0 { 1.0 - 0.5 * passed_s / end_s } else { 0.0 };
+    let east_m = motion.value.y_m + motion.value.vy_m_s * passed_s * braked;
     Some(Extrapolated {
-        x_m: from.0 + share * (to.0 - from.0),
-        y_m: motion.value.y_m + motion.value.vy_m_s * passed_s * braked,
-        altitude_m: from.1 + share * (to.1 - from.1),
+        place: [from.0 + share * (to.0 - from.0), east_m, from.1 + share * (to.1 - from.1)],
         or_else_m: 0.0,
         burning_s: passed_s,
         landed_after_s: (path.age(now).as_secs_f64() >= total_s).then(|| end_s.max(0.0)),
@@ -231,11 +231,7 @@ pub enum Basis {
 /// The expected state after some time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Extrapolated {
-    /// North of the pad, m.
-    pub(super) x_m: f64,
-    /// East of the pad, m.
-    pub(super) y_m: f64,
-    pub(super) altitude_m: f64,
+    pub(super) place: NorthEastUp,
     /// The distance from this position if the burn does not happen, m.
     pub(super) or_else_m: f64,
     /// How long the landing motor burns until then, s.
@@ -307,8 +303,7 @@ impl LastMotion {
             Forces::Air { drag_per_m: Some(_), .. } => (0.0, Basis::Fall),
             Forces::Air { drag_per_m: None, .. } => (0.0, Basis::FreeFall),
         };
-        let [x_m, y_m, altitude_m] = place;
-        Extrapolated { x_m, y_m, altitude_m, or_else_m, burning_s, landed_after_s, basis }
+        Extrapolated { place, or_else_m, burning_s, landed_after_s, basis }
     }
 
     /// Place, when it landed, s, and for how long the motor burnt, s. Integrates with the midpoint rule: exact for free fall, second

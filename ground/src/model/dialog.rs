@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use protocol::dialect::TdAct;
 
-use super::{Ask, CommandKind};
+use super::{Ask, CommandKind, Request};
 use crate::key::Key;
 
 /// How long the crew has to type a word.
@@ -73,26 +73,29 @@ impl Prompt {
         !matches!(self, Self::Hold | Self::Disarm | Self::AbortForeign)
     }
 
-    /// Its name for the list of events, the word to type, and the command that it completes.
-    fn row(self) -> (&'static str, Option<&'static str>, Option<CommandKind>) {
+    /// Its name for the list of events, the word to type, and what it asks for once it is complete.
+    fn row(self) -> (&'static str, Option<&'static str>, Option<Request>) {
+        let command = |kind| Some(Request::Command(kind));
         match self {
-            Self::Arm => ("arming", Some("ARM"), Some(CommandKind::Arm)),
-            Self::Start => ("start", Some("START"), Some(CommandKind::Start)),
+            Self::Arm => ("arming", Some("ARM"), command(CommandKind::Arm)),
+            Self::Start => ("start", Some("START"), command(CommandKind::Start)),
             Self::Confirm(Ask { act: TdAct::TD_ACT_START, .. }) => {
-                ("confirmation", Some(CONFIRM_WORD), Some(CommandKind::ConfirmStart))
+                ("confirmation", Some(CONFIRM_WORD), command(CommandKind::ConfirmStart))
             }
-            Self::Confirm(_) => ("confirmation", Some(CONFIRM_WORD), Some(CommandKind::ConfirmArm)),
-            Self::WithoutLog => ("going on without a log", Some("NOLOG"), None),
-            Self::Untested => ("going on with an untested motor", Some("UNTESTED"), None),
-            Self::TakeCommand => ("take-over", Some("TAKE"), Some(CommandKind::TakeCommand)),
-            Self::AbortForeign => ("abort", Some("ABORT"), Some(CommandKind::Abort)),
-            Self::Disarm => ("disarm", None, Some(CommandKind::Disarm)),
-            Self::Hold => ("hold", None, Some(CommandKind::Hold)),
-            Self::Check { moves: true } => ("check", None, Some(CommandKind::Check)),
-            Self::Check { moves: false } => ("check", None, Some(CommandKind::CheckStill)),
-            Self::Seen => ("seen motion", Some("SEEN"), Some(CommandKind::Seen)),
-            Self::Sign { void: false, .. } => ("signature", None, None),
-            Self::Sign { void: true, .. } => ("voiding", None, None),
+            Self::Confirm(_) => ("confirmation", Some(CONFIRM_WORD), command(CommandKind::ConfirmArm)),
+            Self::WithoutLog => ("going on without a log", Some("NOLOG"), Some(Request::WithoutLog)),
+            Self::Untested => ("going on with an untested motor", Some("UNTESTED"), Some(Request::Untested)),
+            Self::TakeCommand => ("take-over", Some("TAKE"), command(CommandKind::TakeCommand)),
+            Self::AbortForeign => ("abort", Some("ABORT"), command(CommandKind::Abort)),
+            Self::Disarm => ("disarm", None, command(CommandKind::Disarm)),
+            Self::Hold => ("hold", None, command(CommandKind::Hold)),
+            Self::Check { moves: true } => ("check", None, command(CommandKind::Check)),
+            Self::Check { moves: false } => ("check", None, command(CommandKind::CheckStill)),
+            Self::Seen => ("seen motion", Some("SEEN"), command(CommandKind::Seen)),
+            Self::Sign { step, void } => {
+                let step = u8::try_from(step).unwrap_or(u8::MAX);
+                (if void { "voiding" } else { "signature" }, None, Some(Request::Sign { step, void }))
+            }
             Self::Quit => ("quit", Some("QUIT"), None),
         }
     }
@@ -106,8 +109,8 @@ impl Prompt {
         self.row().1
     }
 
-    /// The command that it completes, if it is one.
-    pub fn command(self) -> Option<CommandKind> {
+    /// What it asks for once it is complete; `None` for what concerns this screen alone.
+    pub fn request(self) -> Option<Request> {
         self.row().2
     }
 }
@@ -247,10 +250,8 @@ impl AbortChord {
 
     /// When a second press counts.
     pub fn acts_at(self) -> Option<Duration> {
-        match self {
-            Self::Twice(at) => Some(at + REPEATS_WITHIN),
-            Self::Open | Self::Once(_) => None,
-        }
+        let Self::Twice(at) = self else { return None };
+        Some(at + REPEATS_WITHIN)
     }
 
     pub fn press(&mut self, now: Duration) {
@@ -299,10 +300,7 @@ impl AbortChord {
 
     /// Enter was pressed: whether it came too late, a moment after the question had run out. It is asked once.
     pub fn take_late_enter(&mut self, now: Duration) -> bool {
-        match std::mem::take(self) {
-            Self::Once(at) => now.saturating_sub(at) <= LATE_WITHIN,
-            Self::Open | Self::Twice(_) => false,
-        }
+        matches!(std::mem::take(self), Self::Once(at) if now.saturating_sub(at) <= LATE_WITHIN)
     }
 }
 

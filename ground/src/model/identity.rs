@@ -3,9 +3,7 @@
 use std::num::NonZeroU32;
 use std::time::Duration;
 
-use protocol::dialect::{
-    HEARTBEAT_DATA, MavAutopilot, MavMessage, MavModeFlag, MavType, TD_FLIGHT_STATUS_DATA, TdVehicleFlag,
-};
+use protocol::dialect::{HEARTBEAT_DATA, MavAutopilot, MavMessage, MavModeFlag, MavType, TdVehicleFlag};
 use protocol::identity::LARGEST_BOOT_NUMBER;
 pub use protocol::told::may_be_ours;
 
@@ -52,19 +50,16 @@ impl Boot {
                 let set = beat.base_mode.contains(MavModeFlag::MAV_MODE_FLAG_HIL_ENABLED);
                 self.hil = Some(set && self.hil != Some(false));
             }
-            MavMessage::TD_FLIGHT_STATUS(status) => self.hear_status(status),
+            MavMessage::TD_FLIGHT_STATUS(status) => {
+                let number = NonZeroU32::new(status.boot_number);
+                if self.number != number {
+                    *self = Self { number, ..Self::default() };
+                }
+                let set = status.vehicle_flags.contains(TdVehicleFlag::TD_VEHICLE_FLAG_SIMULATED);
+                self.flagged = Some(set && self.flagged != Some(false));
+            }
             _ => {}
         }
-    }
-
-    fn hear_status(&mut self, status: &TD_FLIGHT_STATUS_DATA) {
-        let told = NonZeroU32::new(status.boot_number);
-        if self.number != told {
-            (self.hil, self.flagged) = (None, None);
-        }
-        self.number = told;
-        let set = status.vehicle_flags.contains(TdVehicleFlag::TD_VEHICLE_FLAG_SIMULATED);
-        self.flagged = Some(set && self.flagged != Some(false));
     }
 }
 
@@ -112,7 +107,8 @@ pub struct Foreign {
     pub autopilot: MavAutopilot,
     pub mavtype: MavType,
     pub armed: bool,
-    custom_mode: u32,
+    /// The number of its mode.
+    pub custom_mode: u32,
     /// The last heartbeat.
     pub heard_at: Duration,
 }
@@ -137,11 +133,6 @@ impl Foreign {
         };
         format!("{autopilot} {}", words::lower_case(&self.mavtype, "MAV_TYPE_"))
     }
-
-    /// The number of its mode.
-    pub fn mode(&self) -> String {
-        format!("mode {}", self.custom_mode)
-    }
 }
 
 /// What `MAV_CMD_DO_FLIGHTTERMINATION` does to a vehicle of another make.
@@ -150,7 +141,7 @@ pub const TERMINATION: &str = "CUTS ITS MOTORS, or does as set there: it falls";
 #[cfg(test)]
 mod boot_tests {
     use super::*;
-    use protocol::dialect::HEARTBEAT_DATA;
+    use protocol::dialect::{HEARTBEAT_DATA, TD_FLIGHT_STATUS_DATA};
 
     fn status(boot_number: u32, simulated: bool) -> MavMessage {
         let vehicle_flags =

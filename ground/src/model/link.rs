@@ -275,10 +275,7 @@ impl Uplink {
 
     /// Whether it is proven that the vehicle hears this station.
     pub fn is_proven(&self, now: Duration) -> bool {
-        match self.state(now) {
-            LinkState::Alive(age) | LinkState::Doubtful(age) => age <= PROVEN_WITHIN,
-            LinkState::NeverHeard | LinkState::Lost(_) => false,
-        }
+        matches!(self.state(now), LinkState::Alive(age) | LinkState::Doubtful(age) if age <= PROVEN_WITHIN)
     }
 
     /// Why the vehicle does not hear this station, as far as it reports.

@@ -8,6 +8,7 @@ use std::time::Duration;
 use protocol::book::{SignedHead, shown};
 use protocol::log::record::EventLevel;
 use serde::{Deserialize, Serialize};
+use strum::IntoStaticStr;
 
 use super::{LinkState, Model, Settings, Vehicle, is_on_pad};
 
@@ -137,7 +138,8 @@ const KEPT: usize = 500;
 const TEXT_LEN_MAX: usize = 400;
 
 /// Who reports an event.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, IntoStaticStr)]
+#[strum(serialize_all = "lowercase")]
 pub enum Speaker {
     /// The ground station.
     Ground,
@@ -148,10 +150,7 @@ pub enum Speaker {
 impl Speaker {
     /// The name in lists and in the log.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Ground => "ground",
-            Self::Vehicle => "vehicle",
-        }
+        self.into()
     }
 }
 

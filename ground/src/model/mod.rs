@@ -285,7 +285,7 @@ impl Model {
     pub fn pointed_at(&self) -> Option<&Alarm> {
         let listed = self.page() == Page::Alarms;
         let chosen = self.pages.chosen.filter(|_| listed);
-        let chosen = chosen.and_then(|kind| self.alarms.list().iter().find(|alarm| alarm.kind == kind));
+        let chosen = chosen.and_then(|kind| self.alarms.list().iter().find(|alarm| alarm.what.kind == kind));
         chosen.or_else(|| self.alarms.foremost())
     }
 
@@ -305,14 +305,7 @@ impl Model {
     }
 
     /// Adds an event to the list and to the log; the book has it already.
-    pub(crate) fn tell(
-        &mut self,
-        now: Duration,
-        speaker: Speaker,
-        level: EventLevel,
-        text: impl Into<String>,
-    ) {
-        let text = text.into();
+    pub(crate) fn tell(&mut self, now: Duration, speaker: Speaker, level: EventLevel, text: String) {
         self.outbox.push(Action::event(speaker, level, &text));
         self.events.push(now, speaker, level, text);
     }

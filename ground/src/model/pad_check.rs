@@ -44,9 +44,6 @@ pub enum Standing {
 /// How the check of a vehicle stands.
 pub fn standing(model: &Model, now: Duration) -> Standing {
     let told = model.vehicle.pad_check.as_ref();
-    if told.is_some_and(PadCheck::is_running) {
-        return Standing::Runs;
-    }
     let asked = [CommandKind::Check, CommandKind::CheckStill].map(|kind| model.commands.of(kind));
     let ended = model.commands.of(CommandKind::EndCheck).filter(|end| end.accepted());
     let may_run = asked.into_iter().flatten().any(|asked| {
@@ -55,10 +52,9 @@ pub fn standing(model: &Model, now: Duration) -> Standing {
         let is_ended = ended.is_some_and(|end| end.commanded_at > asked.commanded_at);
         !is_refused && !is_told && !is_ended && now.saturating_sub(asked.commanded_at) < LONGEST
     });
-    if may_run {
-        return Standing::MayRun;
-    }
     match told.and_then(|told| told.ended_at) {
+        _ if told.is_some_and(PadCheck::is_running) => Standing::Runs,
+        _ if may_run => Standing::MayRun,
         Some(at) if now.saturating_sub(at) < JUST_ENDED => Standing::JustEnded,
         _ => Standing::Rests,
     }
@@ -383,7 +379,7 @@ mod tests {
         // The worst of all reports counts.
         let weak = tested(0, 0, &[good.clone(), radio(58, 40, 100, 40), good]);
         assert!(!weak.passed());
-        assert!(weak.words().contains("FAILED") && weak.words().contains("margin 9.5 dB (at least 10)"));
+        assert_eq!(weak.margin_db, Some(18.0 / STEPS_PER_DB), "9.5 dB, and 10 are needed");
     }
 
     #[test]
@@ -397,7 +393,8 @@ mod tests {
         assert!(!found.passed() && found.loss_up >= 1.0 && found.loss_down >= 1.0, "{found:?}");
         let mut test = RangeTest::begin(Seat::default(), silent, Duration::ZERO);
         test.stop("the vehicle is armed");
-        assert!(test.found.unwrap().words().contains("STOPPED, the vehicle is armed"));
+        let found = test.found.unwrap();
+        assert_eq!((found.stopped, found.passed()), (Some("the vehicle is armed"), false));
     }
 
     proptest! {

@@ -3,10 +3,7 @@
 use protocol::dialect::TdPhase;
 use strum::{IntoStaticStr, VariantArray};
 
-use super::{
-    AlarmKind,
-    quantity::{self, Quantity},
-};
+use super::{AlarmKind, quantity::Quantity};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, IntoStaticStr, VariantArray)]
 pub enum Page {
@@ -72,7 +69,7 @@ impl Page {
 }
 
 /// Which page is shown, and how far its list is scrolled.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Pages {
     /// The page that the crew holds; `None` follows the flight.
     pub held: Option<Page>,
@@ -108,21 +105,6 @@ pub enum TextEntry {
         /// The place of the marked entry among those found.
         chosen: usize,
     },
-}
-
-impl Default for Pages {
-    fn default() -> Self {
-        Self {
-            held: None,
-            scroll: 0,
-            chosen: None,
-            plotted: &quantity::ALL[0],
-            checklist: false,
-            step: None,
-            entry: None,
-            word: String::new(),
-        }
-    }
 }
 
 impl Pages {

@@ -202,7 +202,8 @@ mod place_tests {
     fn a_place_is_two_numbers_in_degrees() {
         assert_eq!("35.347,-117.809".parse(), Ok(Degrees { latitude: 35.347, longitude: -117.809 }));
         for wrong in ["", "1", "91,0", "0,181", "a,b", "nan,0", "1,2,3"] {
-            assert!(wrong.parse::<Degrees>().unwrap_err().contains("35.347,-117.809"), "{wrong}");
+            let what = "is no place; give latitude,longitude in degrees, as in 35.347,-117.809";
+            assert_eq!(wrong.parse::<Degrees>(), Err(format!("`{wrong}` {what}")));
         }
     }
 

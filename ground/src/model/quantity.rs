@@ -7,13 +7,15 @@ use protocol::link_stats::LinkFigures;
 
 use super::{BodySpeed, Model, Motion, Sample, Vehicle};
 
+type Read = fn(&Model, Duration) -> Option<Sample<f64>>;
+
 /// A number of the telemetry or of the link, in the unit of the screen.
 pub struct Quantity {
     /// Unique, in lower case.
     pub name: &'static str,
     pub unit: &'static str,
     pub decimals: usize,
-    read: fn(&Model, Duration) -> Option<Sample<f64>>,
+    read: Read,
 }
 
 impl PartialEq for Quantity {
@@ -25,6 +27,12 @@ impl PartialEq for Quantity {
 impl std::fmt::Debug for Quantity {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         formatter.write_str(self.name)
+    }
+}
+
+impl Default for &Quantity {
+    fn default() -> Self {
+        &ALL[0]
     }
 }
 
@@ -48,12 +56,7 @@ impl Quantity {
 /// How many quantities there are.
 pub const COUNT: usize = 40;
 
-const fn quantity(
-    name: &'static str,
-    unit: &'static str,
-    decimals: usize,
-    read: fn(&Model, Duration) -> Option<Sample<f64>>,
-) -> Quantity {
+const fn quantity(name: &'static str, unit: &'static str, decimals: usize, read: Read) -> Quantity {
     Quantity { name, unit, decimals, read }
 }
 

@@ -328,14 +328,13 @@ pub fn hold_words(vehicle: &Vehicle, armed_here: bool) -> Option<String> {
         TdHold::TD_HOLD_CHECK_FAILED => {
             vehicle.held_for().map_or_else(|| "a check of the vehicle fails".to_owned(), |(_, words)| words)
         }
-        TdHold::TD_HOLD_COMMANDED => match held_by(vehicle) {
-            Some(who) => format!("{who} asked for it"),
-            None => "a station asked for it".to_owned(),
-        },
-        TdHold::TD_HOLD_TAP_OVERDUE => match held_by(vehicle) {
-            Some(who) => format!("no tap of {who} for 1 s"),
-            None => "no tap for 1 s".to_owned(),
-        },
+        TdHold::TD_HOLD_COMMANDED => {
+            format!("{} asked for it", held_by(vehicle).unwrap_or_else(|| "a station".to_owned()))
+        }
+        TdHold::TD_HOLD_TAP_OVERDUE => {
+            let whose = held_by(vehicle).map_or_else(String::new, |who| format!(" of {who}"));
+            format!("no tap{whose} for 1 s")
+        }
     };
     let held = status.phase == TdPhase::TD_PHASE_PAD_ARMED;
     held.then(|| format!("HOLD: {why}; start anew; disarms in {} s", status.hold_left_s))
@@ -366,15 +365,19 @@ pub enum Ending {
 }
 
 impl Ending {
-    /// The word that every screen uses.
-    pub fn word(self) -> &'static str {
+    /// The word that every screen uses, and the same in large letters.
+    pub fn words(self) -> [&'static str; 2] {
         match self {
-            Self::Stands => "STANDS UNDAMAGED",
-            Self::Upright => "UPRIGHT",
-            Self::UnderParachute => "DOWN UNDER THE PARACHUTE",
-            Self::Hard => "HARD LANDING",
-            Self::Lost => "LOST",
+            Self::Stands => ["STANDS UNDAMAGED", "STANDS"],
+            Self::Upright => ["UPRIGHT"; 2],
+            Self::UnderParachute => ["DOWN UNDER THE PARACHUTE", "PARACHUTE"],
+            Self::Hard => ["HARD LANDING", "HARD"],
+            Self::Lost => ["LOST"; 2],
         }
+    }
+
+    pub fn word(self) -> &'static str {
+        self.words()[0]
     }
 
     /// The end of this flight; `None` while it goes on, or while its end has not been reported.
@@ -393,16 +396,12 @@ impl Ending {
 
     fn judged(vehicle: &Vehicle, verdict: &Verdict) -> Self {
         let Touchdown { vertical_m_s, .. } = verdict.touchdown;
-        if verdict.landing.contains(TdLanding::TD_LANDING_STANDS) {
-            Self::Stands
-        } else if hangs_on_its_chute(vehicle) && vertical_m_s.abs() < WRECKED_FROM_M_S {
-            Self::UnderParachute
-        } else if verdict.landing.contains(TdLanding::TD_LANDING_UPRIGHT) {
-            Self::Upright
-        } else if verdict.touchdown.speed_m_s() < WRECKED_FROM_M_S {
-            Self::Hard
-        } else {
-            Self::Lost
+        match verdict.landing {
+            landing if landing.contains(TdLanding::TD_LANDING_STANDS) => Self::Stands,
+            _ if hangs_on_its_chute(vehicle) && vertical_m_s.abs() < WRECKED_FROM_M_S => Self::UnderParachute,
+            landing if landing.contains(TdLanding::TD_LANDING_UPRIGHT) => Self::Upright,
+            _ if verdict.touchdown.speed_m_s() < WRECKED_FROM_M_S => Self::Hard,
+            _ => Self::Lost,
         }
     }
 

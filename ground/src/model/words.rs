@@ -7,44 +7,33 @@ use protocol::dialect::{TD_FLIGHT_STATUS_DATA, TdAbortEffect, TdPhase};
 
 use super::{is_aborted, is_on_pad, telemetry::phase_from_number};
 
+/// A text from outside, made printable and shortened to this many characters.
+pub fn printable(text: &str, characters: usize) -> String {
+    protocol::text::printable(text.as_bytes()).chars().take(characters).collect()
+}
+
 /// The phase's name, as in `PAD_IDLE`.
 pub fn phase(phase: TdPhase) -> String {
     without_prefix(&phase, "TD_PHASE_")
 }
 
-/// The phase in the words of the crew, as in `Ready to light`.
-pub fn doing(phase: TdPhase) -> &'static str {
+/// A phase in the words of the crew, as in `Ready to light`, and the event that begins it, as the timeline names it; `None` if the
+/// crew need not see it there.
+pub fn doing_and_event(phase: TdPhase) -> (&'static str, Option<&'static str>) {
     match phase {
-        TdPhase::TD_PHASE_SAFE => "Safe",
-        TdPhase::TD_PHASE_PAD_IDLE | TdPhase::TD_PHASE_PAD_ARMED => "On the pad",
-        TdPhase::TD_PHASE_BOOST => "Rising",
-        TdPhase::TD_PHASE_COAST => "Coasting",
-        TdPhase::TD_PHASE_DEPLOY => "Fins opening",
-        TdPhase::TD_PHASE_AERO_DESCENT => "Falling",
-        TdPhase::TD_PHASE_LAND_ARMED => "Ready to light",
-        TdPhase::TD_PHASE_IGNITION => "Lighting",
-        TdPhase::TD_PHASE_POWERED => "Landing",
-        TdPhase::TD_PHASE_TOUCHDOWN => "On the ground",
-        TdPhase::TD_PHASE_SAFED => "Flight over",
-        TdPhase::TD_PHASE_CHUTE => "Parachute",
+        TdPhase::TD_PHASE_SAFE => ("Safe", None),
+        TdPhase::TD_PHASE_PAD_IDLE | TdPhase::TD_PHASE_PAD_ARMED => ("On the pad", None),
+        TdPhase::TD_PHASE_BOOST => ("Rising", Some("lift-off")),
+        TdPhase::TD_PHASE_COAST => ("Coasting", Some("burn-out")),
+        TdPhase::TD_PHASE_DEPLOY => ("Fins opening", Some("apogee")),
+        TdPhase::TD_PHASE_AERO_DESCENT => ("Falling", Some("falls")),
+        TdPhase::TD_PHASE_LAND_ARMED => ("Ready to light", Some("ready")),
+        TdPhase::TD_PHASE_IGNITION => ("Lighting", Some("ignition")),
+        TdPhase::TD_PHASE_POWERED => ("Landing", Some("burns")),
+        TdPhase::TD_PHASE_TOUCHDOWN => ("On the ground", Some("touchdown")),
+        TdPhase::TD_PHASE_SAFED => ("Flight over", Some("over")),
+        TdPhase::TD_PHASE_CHUTE => ("Parachute", Some("parachute")),
     }
-}
-
-/// The event that begins a phase, as the timeline names it; `None` if the crew need not see it there.
-pub fn event(phase: TdPhase) -> Option<&'static str> {
-    Some(match phase {
-        TdPhase::TD_PHASE_SAFE | TdPhase::TD_PHASE_PAD_IDLE | TdPhase::TD_PHASE_PAD_ARMED => return None,
-        TdPhase::TD_PHASE_SAFED => "over",
-        TdPhase::TD_PHASE_BOOST => "lift-off",
-        TdPhase::TD_PHASE_COAST => "burn-out",
-        TdPhase::TD_PHASE_DEPLOY => "apogee",
-        TdPhase::TD_PHASE_AERO_DESCENT => "falls",
-        TdPhase::TD_PHASE_LAND_ARMED => "ready",
-        TdPhase::TD_PHASE_IGNITION => "ignition",
-        TdPhase::TD_PHASE_POWERED => "burns",
-        TdPhase::TD_PHASE_TOUCHDOWN => "touchdown",
-        TdPhase::TD_PHASE_CHUTE => "parachute",
-    })
 }
 
 /// What an event says to the crew; `None` if it tells them nothing that other events or the state do not. The log keeps its own
@@ -53,7 +42,8 @@ pub fn of_event(text: &str) -> Option<Cow<'_, str>> {
     if let Some(phases) = text.strip_prefix("phase ") {
         // The vehicle itself says what lights, and on the pad the crew does it.
         let phase = phase_from_name(phases.rsplit(' ').next()?)?;
-        return (phase != TdPhase::TD_PHASE_BOOST && !is_on_pad(phase)).then(|| doing(phase).into());
+        return (phase != TdPhase::TD_PHASE_BOOST && !is_on_pad(phase))
+            .then(|| doing_and_event(phase).0.into());
     }
     match text.strip_prefix("controller level ") {
         Some("CONVERGED") => None,
@@ -109,15 +99,14 @@ pub fn abort_effect(status: &TD_FLIGHT_STATUS_DATA) -> String {
         TdAbortEffect::TD_ABORT_EFFECT_LAND_UPRIGHT => "TOO LATE: no cut-off exists, only stays upright",
         TdAbortEffect::TD_ABORT_EFFECT_LAND_IN_PLACE => "lands here, no cut-off exists",
         TdAbortEffect::TD_ABORT_EFFECT_BURN => "burns and lands here, too low for a chute",
-        TdAbortEffect::TD_ABORT_EFFECT_IMPACT => return impact(status.abort_impact_m_s),
+        TdAbortEffect::TD_ABORT_EFFECT_IMPACT if status.abort_impact_m_s == u8::MAX => {
+            "IMPACT, too low for a chute"
+        }
+        TdAbortEffect::TD_ABORT_EFFECT_IMPACT => {
+            return format!("IMPACT at about {} m/s, too low for a chute", status.abort_impact_m_s);
+        }
     };
     words.to_owned()
-}
-
-/// An impact, with its speed if known.
-fn impact(speed_m_s: u8) -> String {
-    let speed = if speed_m_s == u8::MAX { String::new() } else { format!(" at about {speed_m_s} m/s") };
-    format!("IMPACT{speed}, too low for a chute")
 }
 
 /// The name of an arming check. The vehicle's log is named as such, because the station has one of its own.

@@ -28,7 +28,6 @@ const SPEED_EXPONENTS: std::ops::RangeInclusive<i32> = -3..=6;
 /// A recording and the present position in it.
 pub struct Player {
     recording: Recording,
-    phases: Arc<[(TdPhase, Duration)]>,
     settings: Settings,
     /// The model at the present position.
     pub model: Model,
@@ -47,7 +46,6 @@ impl Player {
         let settings = Settings { vehicle: recording.vehicle.unwrap_or(settings.vehicle), ..settings };
         let mut player = Self {
             model: Model::new(settings.clone()),
-            phases: recording.phases.iter().copied().collect(),
             recording,
             settings,
             position: Duration::ZERO,
@@ -75,13 +73,13 @@ impl Player {
     pub fn pass(&mut self, elapsed: Duration) {
         if !self.paused {
             let target = self.position + elapsed.mul_f64(libm::exp2(f64::from(self.speed_exponent)));
-            self.advance_to(target.min(self.recording.length()));
+            self.advance_to(target.min(self.recording.length));
         }
     }
 
     /// Goes to a time. To go back, the recording is played again from its start.
     pub fn seek(&mut self, to: Duration) {
-        let to = to.min(self.recording.length());
+        let to = to.min(self.recording.length);
         if to < self.position {
             let pages = std::mem::take(&mut self.model.pages);
             self.model = Model::new(self.settings.clone());
@@ -108,7 +106,7 @@ impl Player {
             // A text that is being typed takes every key.
             _ if matches!(self.model.pages.entry, Some(TextEntry::Jump { .. })) => self.on_jump_key(key),
             _ if self.model.pages.entry.is_some() => {
-                actions = update(&mut self.model, Msg::Key(key), self.position);
+                actions = update(&mut self.model, Msg::Keys(vec![key]), self.position);
             }
             Key::Char(' ') => self.paused = !self.paused,
             Key::Char('+' | '=') => self.faster(1),
@@ -129,9 +127,9 @@ impl Player {
                 self.model.pages.entry = Some(TextEntry::Jump { typed: String::new(), refused: false });
             }
             Key::Char('g') => self.seek(Duration::ZERO),
-            Key::Char('G') => self.seek(self.recording.length()),
+            Key::Char('G') => self.seek(self.recording.length),
             // Pages and scrolling. Keys that command a vehicle have no effect in a replay.
-            _ => actions = update(&mut self.model, Msg::Key(key), self.position),
+            _ => actions = update(&mut self.model, Msg::Keys(vec![key]), self.position),
         }
         // A key to quit waits for a paste to show itself; a replay has nothing to protect.
         if self.model.quit_at.take().is_some() {
@@ -163,7 +161,8 @@ impl Player {
         let since_release = to.strip_prefix("T+").map(str::parse);
         match since_release.unwrap_or_else(|| to.parse()).ok()? {
             ReplayFrom::Time(at) => {
-                let released = self.phases.iter().find(|(phase, _)| !is_on_pad(*phase)).map(|(_, at)| *at);
+                let phases = &self.recording.phases;
+                let released = phases.iter().find(|(phase, _)| !is_on_pad(*phase)).map(|(_, at)| *at);
                 let zero = if to.starts_with("T+") { released? } else { Duration::ZERO };
                 self.seek(zero + at);
                 Some(())
@@ -241,10 +240,10 @@ impl Player {
     fn update_playing(&mut self) {
         self.model.playing = Some(Playback {
             position: self.position,
-            length: self.recording.length(),
+            length: self.recording.length,
             speed: libm::exp2(f64::from(self.speed_exponent)),
             paused: self.paused,
-            phases: Arc::clone(&self.phases),
+            phases: Arc::clone(&self.recording.phases),
         });
     }
 }

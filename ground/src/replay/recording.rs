@@ -6,6 +6,7 @@ use std::fs::File;
 use std::io;
 use std::io::{BufReader, Read as _, Seek as _};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Duration;
 
 use protocol::dialect::{MavMessage, TdPhase};
@@ -46,9 +47,10 @@ pub struct Recording {
     side: Side,
     /// The number of events to play; a log that is still being written grows behind them.
     events: u64,
-    length: Duration,
+    /// The time of the last event.
+    pub length: Duration,
     /// When each phase began.
-    pub phases: Vec<(TdPhase, Duration)>,
+    pub phases: Arc<[(TdPhase, Duration)]>,
     /// Why reading ended early, if it did.
     pub damage: Option<String>,
     /// The vehicle that is shown: the chosen one, otherwise the first that was heard.
@@ -85,12 +87,7 @@ impl Recording {
         };
         let Survey { events: count, length, phases, .. } = survey;
         let (damage, vehicle) = (events.damage(), events.vehicle);
-        Ok(Self { damage, vehicle, file, side, events: count, length, phases })
-    }
-
-    /// The time of the last event.
-    pub fn length(&self) -> Duration {
-        self.length
+        Ok(Self { damage, vehicle, file, side, events: count, length, phases: phases.into() })
     }
 
     /// When a phase first began.

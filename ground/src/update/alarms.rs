@@ -166,10 +166,10 @@ pub(super) fn watch(model: &mut Model, now: Duration) {
     }
     for alarm in raised {
         // Also an event for runs without a screen; other alarms have an event of their own.
-        if alarm.urgency == WHO || alarm.kind == AlarmKind::UplinkLost {
-            model.say(now, Speaker::Ground, EventLevel::Error, alarm.text.clone());
+        if alarm.what.urgency == WHO || alarm.what.kind == AlarmKind::UplinkLost {
+            model.say(now, Speaker::Ground, EventLevel::Error, alarm.what.text.clone());
         }
-        model.outbox.push(Action::Alarm(alarm.text));
+        model.outbox.push(Action::Alarm(alarm.what.text));
     }
 }
 
@@ -177,16 +177,13 @@ pub(super) fn watch(model: &mut Model, now: Duration) {
 fn is_unheard(model: &Model, now: Duration) -> bool {
     // A report from before a silence says nothing about the present: the vehicle has this long to report.
     let heard_for = model.link.alive_since.map_or(Duration::ZERO, |at| now.saturating_sub(at));
-    let silent = match model.link.uplink.state(now) {
-        LinkState::Lost(_) | LinkState::NeverHeard => heard_for > RED_AFTER,
-        LinkState::Alive(_) | LinkState::Doubtful(_) => false,
-    };
+    let silent = !model.link.uplink.state(now).carries() && heard_for > RED_AFTER;
     // While nothing is received, an alarm that holds stays.
     let told = match model.link.state(now) {
         LinkState::Alive(_) => true,
         LinkState::Doubtful(_) => {
             let mut alarms = model.alarms.list().iter();
-            alarms.any(|alarm| alarm.kind == AlarmKind::UplinkLost && alarm.is_active())
+            alarms.any(|alarm| alarm.what.kind == AlarmKind::UplinkLost && alarm.is_active())
         }
         LinkState::NeverHeard | LinkState::Lost(_) => false,
     };
@@ -266,34 +263,58 @@ const EVENT: u8 = 1;
 const WATCH: u8 = 2;
 const WRONG: u8 = 3;
 
+/// How much is called out with it, its words, and its bells. It is said anew when what stands before a colon changes.
+type Callout = (Amount, String, u8);
+type Present = fn(&Model, Duration) -> Option<Callout>;
+
+/// A state is called out when it changes, and stays while it is not known; anything else as soon as it is so.
+const STATE: bool = true;
+const NEWS: bool = false;
+
+/// The callouts but for phases and heights.
+const CALLOUTS: [(bool, Present); 5] = [
+    (NEWS, |model, _| {
+        let lifts = model.vehicle.has_lifted && model.vehicle.phase_now() == Some(TdPhase::TD_PHASE_BOOST);
+        lifts.then(|| (Amount::Few, "liftoff".to_owned(), WATCH))
+    }),
+    // On the pad, once the vehicle has reported its checks.
+    (STATE, |model, now| {
+        let status = model.vehicle.status.as_ref().filter(|status| !status.is_stale(now));
+        status.filter(|status| is_on_pad(status.value.phase))?;
+        let no_go = |why| (Amount::Few, format!("no go: {why}"), WRONG);
+        Some(why_no_go(model, now).map_or_else(|| (Amount::Normal, "go".to_owned(), 0), no_go))
+    }),
+    // The alarm of the lost link rings by itself.
+    (STATE, |model, now| match model.link.state(model.link.known_until(now)) {
+        LinkState::Lost(_) => Some((Amount::Few, "link lost".to_owned(), 0)),
+        _ => Some((Amount::Normal, "link restored".to_owned(), 0)),
+    }),
+    (NEWS, |model, now| {
+        let ending = Ending::of(&model.vehicle, now)?;
+        let bells = if ending == Ending::Stands { EVENT } else { WRONG };
+        Some((Amount::Few, ending.word().to_lowercase(), bells))
+    }),
+    (NEWS, |model, now| {
+        let approach = Approach::of(&model.vehicle, now)?;
+        Some((Amount::Few, approach.headline().to_lowercase(), EVENT))
+    }),
+];
+
 /// Compares the present state with what was called out.
 pub(super) fn call_out(model: &mut Model, now: Duration) {
     call_phase(model);
-    let lifts = model.vehicle.has_lifted && model.vehicle.phase_now() == Some(TdPhase::TD_PHASE_BOOST);
-    if is_new(&mut model.called.lifts, lifts) && lifts {
-        call(model, Amount::Few, "liftoff", WATCH);
-    }
     call_height(model, now);
-    call_readiness(model, now);
-    let lost = matches!(model.link.state(model.link.known_until(now)), LinkState::Lost(_));
-    if is_new(&mut model.called.lost, lost) {
-        // The alarm of the lost link rings by itself.
-        let (amount, text) =
-            if lost { (Amount::Few, "link lost") } else { (Amount::Normal, "link restored") };
-        call(model, amount, text, 0);
-    }
-    let ending = Ending::of(&model.vehicle, now);
-    if is_new(&mut model.called.ending, ending)
-        && let Some(ending) = ending
-    {
-        let bells = if ending == Ending::Stands { EVENT } else { WRONG };
-        call(model, Amount::Few, ending.word().to_lowercase(), bells);
-    }
-    let approach = Approach::of(&model.vehicle, now).map(|approach| approach.headline());
-    if is_new(&mut model.called.approach, approach)
-        && let Some(words) = approach
-    {
-        call(model, Amount::Few, words.to_lowercase(), EVENT);
+    for (place, (is_state, present)) in CALLOUTS.into_iter().enumerate() {
+        let present = present(model, now);
+        let about = present.as_ref().and_then(|(_, words, _)| words.split(':').next()).map(str::to_owned);
+        let said = &mut model.called.rows[place];
+        if *said == about || (is_state && about.is_none()) {
+            continue;
+        }
+        let before = std::mem::replace(said, about);
+        if let Some((amount, words, bells)) = present.filter(|_| !is_state || before.is_some()) {
+            call(model, amount, words, bells);
+        }
     }
 }
 
@@ -307,14 +328,6 @@ fn call(model: &mut Model, amount: Amount, text: impl Into<String>, bells: u8) {
         model.outbox.push(Action::Say(text.into()));
     } else if amount == Amount::Few {
         model.called.bells_left = model.called.bells_left.max(bells);
-    }
-}
-
-/// Whether this is not what was called out last.
-fn is_new<T: PartialEq>(called: &mut T, present: T) -> bool {
-    *called != present && {
-        *called = present;
-        true
     }
 }
 
@@ -360,22 +373,5 @@ fn call_height(model: &mut Model, now: Duration) {
     if passed_m > 0.0 && !waits && amount <= model.settings.talk.amount {
         model.called.height_at = Some(now);
         call(model, amount, format!("{passed_m:.0} metres"), 0);
-    }
-}
-
-/// GO and NO-GO on the pad, once the vehicle has reported its checks.
-fn call_readiness(model: &mut Model, now: Duration) {
-    let status = model.vehicle.status.as_ref().filter(|status| !status.is_stale(now));
-    if !status.is_some_and(|status| is_on_pad(status.value.phase)) {
-        return;
-    }
-    let why = why_no_go(model, now);
-    let go = why.is_none();
-    if model.called.go.replace(go).is_none_or(|before| before == go) {
-        return;
-    }
-    match why {
-        Some(why) => call(model, Amount::Few, format!("no go: {why}"), WRONG),
-        None => call(model, Amount::Normal, "go", 0),
     }
 }

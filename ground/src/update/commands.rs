@@ -148,7 +148,7 @@ fn send(model: &mut Model, kind: CommandKind, now: Duration) -> Ticket {
     let [param4, param5, param6] = mission;
     let boot = if kind.moves() { model.vehicle.boot.parameter() } else { 0.0 };
     let params = [param1, 0.0, number, param4, param5, param6, boot];
-    model.commands.sender.submit(model.settings.vehicle, command, params, kind.resend(), now)
+    model.commands.sender.submit(model.settings.vehicle, command, params, kind.row().resend, now)
 }
 
 /// Sends the commands that are due and handles what happened to them.
@@ -194,6 +194,7 @@ fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
     let kind = track.kind;
     let name = kind.name();
     let (by, seat) = (track.by.in_brackets(), track.by.clone());
+    let mut answered = None;
     let (operator_kind, level, text) = match event {
         CommandEvent::Sent { .. } => {
             track.attempts += 1;
@@ -217,6 +218,7 @@ fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
             track.acknowledged =
                 if asked { Acknowledgement::Asked } else { Acknowledgement::Answered(result) };
             track.acknowledged_at = Some(now);
+            answered = (!asks).then_some(result);
             let words = result_words(result);
             let late = if matches!(event, CommandEvent::AnsweredLate { .. }) { " (late)" } else { "" };
             if asked {
@@ -231,11 +233,6 @@ fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
             track.acknowledged = Acknowledgement::GivenUp;
             ("unanswered", EventLevel::Error, format!("{name} not acknowledged after {attempts} attempts"))
         }
-    };
-    let answered = match event {
-        CommandEvent::Answered { result, asks: false, .. }
-        | CommandEvent::AnsweredLate { result, asks: false, .. } => Some(result),
-        _ => None,
     };
     let told = if matches!(event, CommandEvent::Sent { .. }) { text.clone() } else { format!("{text}{by}") };
     model.record_operator(now, operator_kind, &seat, &told);
@@ -306,34 +303,28 @@ pub(super) fn restart_after_reboot(model: &mut Model, now: Duration) -> Vec<&'st
 
 /// Compares the vehicle's own state with the commands.
 pub(super) fn observe(model: &mut Model, now: Duration) {
-    let mut seen = Vec::new();
+    let mut told = Vec::new();
     for track in &mut model.commands.tracks {
-        let answered = track.kind.seen().is_none() && track.accepted();
+        let (name, seen) = (track.kind.name(), track.kind.row().seen);
+        let answered = seen.is_none() && track.accepted();
         let shown = answered || track.kind.is_observed(&model.vehicle, track.commanded_at);
-        if let Some(since) = track.observed_at {
-            if let Some(why) = track.kind.no_longer(&model.vehicle, since) {
-                (track.observed_at, track.is_withdrawn) = (None, true);
-                let text = format!("{} no longer so: {why}", track.kind.name());
-                seen.push((EventLevel::Warning, track.by.clone(), text));
-            }
+        let (level, text) = if let Some(since) = track.observed_at {
+            let Some(why) = track.kind.no_longer(&model.vehicle, since) else { continue };
+            (track.observed_at, track.is_withdrawn) = (None, true);
+            (EventLevel::Warning, format!("{name} no longer so: {why}"))
         } else if shown && !track.is_withdrawn {
             track.observed_at = Some(now);
-            seen.push((
-                EventLevel::Info,
-                track.by.clone(),
-                format!("{} observed: {}", track.kind.name(), track.kind.seen().unwrap_or("accepted")),
-            ));
+            (EventLevel::Info, format!("{name} observed: {}", seen.unwrap_or("accepted")))
         } else if track.disagrees(now) && !track.not_observed_reported {
             track.not_observed_reported = true;
-            let name = track.kind.name();
-            seen.push((
-                EventLevel::Error,
-                track.by.clone(),
-                format!("{name} acknowledged, not observed: the vehicle does not show it"),
-            ));
-        }
+            let what = "not observed: the vehicle does not show it";
+            (EventLevel::Error, format!("{name} acknowledged, {what}"))
+        } else {
+            continue;
+        };
+        told.push((level, track.by.clone(), text));
     }
-    for (level, by, text) in seen {
+    for (level, by, text) in told {
         model.tell_act(now, "observed", &by, level, text);
     }
     stop_if_latched(model, now);
@@ -453,14 +444,14 @@ const HALF_A_TICK: Duration = Duration::from_millis(50);
 
 /// Why this station is not fit to command a countdown.
 fn why_unfit(model: &Model, now: Duration) -> Option<&'static str> {
-    if !model.settings.auto && model.crew.is_gone(now) {
-        return Some("no commanding screen in the countdown");
+    match model.unfit_log(now) {
+        _ if !model.settings.auto && model.crew.is_gone(now) => Some("no commanding screen in the countdown"),
+        _ if model.beside(now).is_some() && !model.boots.is_chosen(now) => {
+            Some("TWO VEHICLES in the countdown")
+        }
+        None | Some((LogFault::Full, _)) => None,
+        Some(_) => Some("the station's log fails in the countdown"),
     }
-    if model.beside(now).is_some() && !model.boots.is_chosen(now) {
-        return Some("TWO VEHICLES in the countdown");
-    }
-    let fault = model.unfit_log(now).map(|(fault, _)| fault).filter(|fault| *fault != LogFault::Full);
-    fault.map(|_| "the station's log fails in the countdown")
 }
 
 pub(super) fn hold_if_unfit(model: &mut Model, now: Duration) {

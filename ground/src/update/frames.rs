@@ -135,13 +135,13 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
         _ => {}
     }
     let before = vehicle_changes::Announced::of(&model.vehicle);
-    let crew_before = vehicle_changes::CrewReport::of(model);
     telemetry::apply(&mut model.vehicle, &message, now);
     if let Some(shown) = model.boots.shown() {
         model.boots.note(shown, is_busy(&model.vehicle, now));
     }
-    vehicle_changes::on_change(model, before, now);
-    vehicle_changes::enter_crew_changes(model, &crew_before, now);
+    let after = vehicle_changes::Announced::of(&model.vehicle);
+    vehicle_changes::on_change(model, &before, &after, now);
+    vehicle_changes::enter_crew_changes(model, &before, &after, now);
     pad::enter_check(model, now);
     commands::observe(model, now);
 }

@@ -205,36 +205,17 @@ fn confirmed(model: &mut Model, prompt: Prompt, now: Duration) {
     {
         return model.warn(now, format!("nothing is confirmed: {why}"));
     }
-    if let Some(kind) = prompt.command() {
-        return ask(model, kind, now);
-    }
-    match prompt {
-        Prompt::WithoutLog => request(model, Request::WithoutLog, now),
-        Prompt::Untested => request(model, Request::Untested, now),
-        Prompt::Sign { step, void } => {
-            let step = u8::try_from(step).unwrap_or(u8::MAX);
-            request(model, Request::Sign { step, void }, now);
-            // The next step that is open is chosen.
-            model.pages.step = None;
-        }
+    let Some(wanted) = prompt.request() else {
         // A live station must keep running without its screen; a demonstration or an attached screen may end.
-        Prompt::Quit => {
-            let stays = model.settings.role == Role::Station && !model.settings.demonstration;
-            let leave =
-                if stays && why_not_quit(model, now).is_some() { Action::LeaveScreen } else { Action::Quit };
-            model.outbox.push(leave);
-        }
-        // Each is a command.
-        Prompt::Arm
-        | Prompt::Start
-        | Prompt::Confirm(_)
-        | Prompt::TakeCommand
-        | Prompt::Disarm
-        | Prompt::AbortForeign
-        | Prompt::Hold
-        | Prompt::Check { .. }
-        | Prompt::Seen => {}
+        let stays = model.settings.role == Role::Station && !model.settings.demonstration;
+        let leaves = stays && why_not_quit(model, now).is_some();
+        return model.outbox.push(if leaves { Action::LeaveScreen } else { Action::Quit });
+    };
+    if matches!(wanted, Request::Sign { .. }) {
+        // The next step that is open is chosen.
+        model.pages.step = None;
     }
+    request(model, wanted, now);
 }
 
 /// Closes the open dialog because something else came in between.
@@ -342,13 +323,15 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
             let held = held.map(|words| words.replacen("HOLD", "HELD already", 1));
             model.info(now, held.unwrap_or_else(|| "no countdown runs".to_owned()));
         }
-        Act::Tap => ask(model, CommandKind::Tap, now),
+        Act::Tap => request(model, Request::Command(CommandKind::Tap), now),
         Act::TakeCommand => {
             open_unless(model, Prompt::TakeCommand, "take command", why_not_take(model, now), now);
         }
         Act::Seen => open_unless(model, Prompt::Seen, "say so", why_not_seen(model, now), now),
         Act::Check | Act::CheckStill => match standing(model, now) {
-            Standing::Runs | Standing::MayRun => ask(model, CommandKind::EndCheck, now),
+            Standing::Runs | Standing::MayRun => {
+                request(model, Request::Command(CommandKind::EndCheck), now);
+            }
             Standing::JustEnded => {
                 model.info(now, "the check has just ended; press again in 3 s for another one");
             }
@@ -475,11 +458,6 @@ fn scroll(model: &mut Model, up: i32) {
     model.pages.scroll = usize::try_from(scrolled).unwrap_or(0);
 }
 
-/// Every step of a command is complete.
-fn ask(model: &mut Model, kind: CommandKind, now: Duration) {
-    request(model, Request::Command(kind), now);
-}
-
 /// Does what the crew has asked for and tells the other screens, or asks the station to.
 pub(super) fn request(model: &mut Model, request: Request, now: Duration) {
     if model.settings.role.why_not_command().is_none() {
@@ -492,7 +470,7 @@ pub(super) fn request(model: &mut Model, request: Request, now: Duration) {
 
 /// Acknowledges the alarm in the alarm line, or the chosen one of the list.
 fn see_alarm(model: &mut Model, now: Duration) {
-    let Some(kind) = model.pointed_at().map(|alarm| alarm.kind) else { return };
+    let Some(kind) = model.pointed_at().map(|alarm| alarm.what.kind) else { return };
     // The station does not know of its own silence.
     if model.settings.role == Role::Attached && kind != AlarmKind::StationSilent {
         model.outbox.push(Action::Request(Request::Acknowledge(kind)));
@@ -513,9 +491,11 @@ pub(super) fn acknowledge(model: &mut Model, kind: AlarmKind, now: Duration) {
 /// Chooses the next or the previous alarm of the list.
 fn choose_alarm(model: &mut Model, up: bool) {
     let list = model.alarms.list();
-    let at = model.pointed_at().and_then(|chosen| list.iter().position(|alarm| alarm.kind == chosen.kind));
+    let at = model
+        .pointed_at()
+        .and_then(|chosen| list.iter().position(|alarm| alarm.what.kind == chosen.what.kind));
     if let Some(at) = at {
-        model.pages.chosen = Some(list[beside(at, up, list.len() - 1)].kind);
+        model.pages.chosen = Some(list[beside(at, up, list.len() - 1)].what.kind);
     }
 }
 
@@ -526,7 +506,7 @@ fn abort(model: &mut Model, now: Duration) {
         return;
     }
     model.dialog = None;
-    ask(model, CommandKind::Abort, now);
+    request(model, Request::Command(CommandKind::Abort), now);
 }
 
 fn quit(model: &mut Model, now: Duration) {

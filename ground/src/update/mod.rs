@@ -106,9 +106,7 @@ pub enum Msg {
     /// What an earlier run of the station, or its screen, has left unfinished.
     Unfinished(Box<Unfinished>),
     // Skipped ones come last: the others are numbered without them.
-    #[serde(skip)]
-    Key(Key),
-    /// One read of the terminal brought several keys.
+    /// What one read of the terminal brought: one key if it was typed by hand, several from a paste, a held key or a slow line.
     #[serde(skip)]
     Keys(Vec<Key>),
     /// The terminal reports that text was pasted.
@@ -150,7 +148,6 @@ mod frame_bytes {
 /// Takes a message into the model and returns what the run loop is to do.
 pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
     match msg {
-        Msg::Key(key) => keys::on_keys(model, &[key], now),
         Msg::Keys(keys) => keys::on_keys(model, &keys, now),
         Msg::Pasted => keys::on_paste(model, now),
         Msg::Commanded(kind) => commands::submit(model, kind, Seat::default(), now),
@@ -309,9 +306,7 @@ fn on_log_health(model: &mut Model, health: LogHealth, now: Duration) {
     }
     model.log = health;
     // A word that was typed for another fault, or before the log was fit again, does not count.
-    let fault = match model.station_log(now) {
-        LogStanding::Unfit(fault, _) => Some(fault),
-        _ => None,
-    };
-    model.without_log = model.without_log.filter(|typed_for| fault == Some(*typed_for));
+    if !matches!(model.station_log(now), LogStanding::Unfit(fault, _) if model.without_log == Some(fault)) {
+        model.without_log = None;
+    }
 }

@@ -114,10 +114,8 @@ fn signature(
 pub(super) fn reopen_checklist(model: &mut Model, now: Duration) {
     let touched = model.checklist.as_ref().is_some_and(crate::model::Checklist::is_touched);
     if model.settings.role == Role::Station && touched {
-        change_checklist(
-            model,
-            ChecklistEntry::Flown { unix_s: model.settings.start_unix_s + now.as_secs() },
-        );
+        let unix_s = model.settings.start_unix_s + now.as_secs();
+        change_checklist(model, ChecklistEntry::Flown { unix_s });
         model.info(now, "the checklist is open again, for the next flight");
     }
 }

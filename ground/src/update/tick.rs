@@ -155,30 +155,21 @@ fn why_end(model: &Model, now: Duration) -> Option<String> {
     let outcome = &model.outcome;
     let past = |at: Duration| now.saturating_sub(at) >= WAIT_AFTER_FLIGHT;
     let on_ground = model.vehicle.phase().is_some_and(|phase| !crate::model::is_flight(phase.value));
-    if outcome.error.is_some() {
-        return Some("the run cannot continue".to_owned());
-    }
-    if outcome.verdict.is_some_and(|(_, at)| past(at)) || outcome.safed_at.is_some_and(past) {
-        return Some("the flight has ended".to_owned());
-    }
-    if outcome.aborted_at.is_some_and(past) && on_ground {
-        return Some("the flight was aborted".to_owned());
-    }
-    if model.settings.auto
-        && let Some((what, at)) = &outcome.refusal
-        && past(*at)
-    {
-        return Some(format!("refused: {what}"));
-    }
-    match model.link.state(now) {
-        LinkState::Lost(age) if age >= LOST_FOR_GOOD => return Some("the link is lost".to_owned()),
-        LinkState::NeverHeard if model.settings.auto && now >= LOST_FOR_GOOD => {
-            return Some("no vehicle was heard".to_owned());
+    let is_over = outcome.verdict.is_some_and(|(_, at)| past(at)) || outcome.safed_at.is_some_and(past);
+    let refused = outcome.refusal.as_ref().filter(|(_, at)| model.settings.auto && past(*at));
+    let why = match model.link.state(now) {
+        _ if outcome.error.is_some() => "the run cannot continue",
+        _ if is_over => "the flight has ended",
+        _ if outcome.aborted_at.is_some_and(past) && on_ground => "the flight was aborted",
+        _ if let Some((what, _)) = refused => return Some(format!("refused: {what}")),
+        LinkState::Lost(age) if age >= LOST_FOR_GOOD => "the link is lost",
+        LinkState::NeverHeard if model.settings.auto && now >= LOST_FOR_GOOD => "no vehicle was heard",
+        _ => {
+            let limit = model.settings.time_limit.filter(|limit| now >= *limit)?;
+            return Some(format!("time limit: the flight did not end within {:.0} s", limit.as_secs_f64()));
         }
-        _ => {}
-    }
-    let limit = model.settings.time_limit?;
-    (now >= limit).then(|| format!("time limit: the flight did not end within {:.0} s", limit.as_secs_f64()))
+    };
+    Some(why.to_owned())
 }
 
 fn telemetry_record(model: &Model, now: Duration) -> Telemetry {

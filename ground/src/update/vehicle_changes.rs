@@ -14,7 +14,7 @@ use crate::model::{
 };
 
 /// The part of the vehicle's state whose changes are reported.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Announced {
     phase: Option<TdPhase>,
     armed: Option<bool>,
@@ -24,6 +24,9 @@ pub(super) struct Announced {
     aborted: bool,
     hold: Option<TdHold>,
     verdict: Option<Verdict>,
+    /// What it says of its crew and its mission.
+    crew: TD_CREW_DATA,
+    mission: Option<FlownMission>,
 }
 
 impl Announced {
@@ -38,6 +41,8 @@ impl Announced {
                 || vehicle.heartbeat.is_some_and(|heartbeat| heartbeat.value.terminated),
             hold: vehicle.status.as_ref().map(|status| status.value.hold),
             verdict: vehicle.verdict().map(|verdict| verdict.value),
+            crew: vehicle.last().map(|crew| crew.value).unwrap_or_default(),
+            mission: vehicle.mission(),
         }
     }
 
@@ -74,7 +79,8 @@ pub(super) fn settle(model: &mut Model, now: Duration) {
     let Model { boots, others, .. } = model;
     others.retain(|id, _| boots.age(*id, now).is_some());
     on_shown(model, did, now);
-    on_change(model, Announced::default(), now);
+    let after = Announced::of(&model.vehicle);
+    on_change(model, &Announced::default(), &after, now);
 }
 
 /// Has what is unfinished kept when it has changed. A demonstration ends with its vehicle.
@@ -157,8 +163,7 @@ fn on_shown(model: &mut Model, reset: Option<&'static str>, now: Duration) {
     }
 }
 
-pub(super) fn on_change(model: &mut Model, before: Announced, now: Duration) {
-    let after = Announced::of(&model.vehicle);
+pub(super) fn on_change(model: &mut Model, before: &Announced, after: &Announced, now: Duration) {
     if after == before {
         return;
     }
@@ -280,29 +285,16 @@ pub(super) fn on_kept(model: &mut Model, kept: &TD_BOOK_KEPT_DATA) {
     }
 }
 
-/// What the vehicle says of its crew and its mission.
-pub(super) struct CrewReport {
-    crew: TD_CREW_DATA,
-    mission: Option<FlownMission>,
-}
-
-impl CrewReport {
-    pub(super) fn of(model: &Model) -> Self {
-        let crew = model.vehicle.last::<TD_CREW_DATA>().map(|crew| crew.value).unwrap_or_default();
-        Self { crew, mission: model.vehicle.mission() }
-    }
-}
-
-/// Enters what has changed.
-pub(super) fn enter_crew_changes(model: &mut Model, before: &CrewReport, now: Duration) {
-    let CrewReport { crew: after, mission } = CrewReport::of(model);
-    let (before, former) = (&before.crew, &before.mission);
+/// Enters what the vehicle says of its crew and its mission, if it has changed.
+pub(super) fn enter_crew_changes(model: &mut Model, before: &Announced, after: &Announced, now: Duration) {
+    let (mission, former) = (&after.mission, &before.mission);
+    let (after, before) = (&after.crew, &before.crew);
     let mut lines: Vec<(u8, String)> = Vec::new();
     if after.people != before.people {
         lines.push((0, format!("an arming and a start take {} of the crew", after.people)));
     }
     let ask = |crew: &TD_CREW_DATA| (crew.act, crew.ask_number, crew.asked_by);
-    if after.act != TdAct::TD_ACT_NONE && ask(&after) != ask(before) {
+    if after.act != TdAct::TD_ACT_NONE && ask(after) != ask(before) {
         let act = if after.act == TdAct::TD_ACT_START { "start" } else { "arm" };
         lines.push((after.asked_by, format!("asks to {act} (ask {})", after.ask_number)));
     }
@@ -316,7 +308,7 @@ pub(super) fn enter_crew_changes(model: &mut Model, before: &CrewReport, now: Du
             lines.push((after, words.to_owned()));
         }
     }
-    if let Some(mission) = mission.filter(|mission| former.as_ref() != Some(mission)) {
+    if let Some(mission) = mission.as_ref().filter(|_| mission != former) {
         lines.push((0, format!("it flies the mission {} {}", mission.in_words(), mission.hash)));
     }
     for (by, words) in lines {

@@ -130,7 +130,11 @@ fn timeline(model: &Model, theme: Theme, now: Duration, columns: usize, is_wide:
         // Apogee and fall are one event, and so are ignition and burn.
         let before = place.checked_sub(1).map(|before| phases[before].0);
         let again = matches!(before, Some(TdPhase::TD_PHASE_DEPLOY | TdPhase::TD_PHASE_IGNITION));
-        let name = if is_told { "commanded to light" } else { words::event(*phase).filter(|_| !again)? };
+        let name = if is_told {
+            "commanded to light"
+        } else {
+            words::doing_and_event(*phase).1.filter(|_| !again)?
+        };
         Some((name, *at, *at, BEEN, Ink::Measured))
     });
     // In steps, so that it does not tremble; never in the past.

@@ -53,19 +53,19 @@ pub fn banner(model: &Model, now: Duration) -> Option<Banner> {
         let lead = format!("{mark}{ending}{}", words.to_lowercase());
         return Some(Banner { words, lead, rest: approach.reason(), role });
     }
-    if let Some(why) = model.link.why_abort_not_sent(now) {
-        return Some(Banner::alarm(NOT_SENT, format!(": {why}")));
-    }
-    if ending.is_none() && may_have_left(vehicle, now).is_some() {
-        return Some(may_fly(model));
-    }
-    if is_liftoff_by_itself(vehicle) {
-        let rest = " that nobody commanded: TAKE COVER, look up".to_owned();
-        return Some(Banner::alarm(LIFT_OFF, rest));
-    }
-    ending.filter(|ending| *ending == Ending::Lost)?;
-    let rest = format!("{}: do not approach", Ending::Lost.detail(vehicle));
-    Some(Banner::alarm(Ending::Lost.word(), rest))
+    let commanded_by_nobody = || " that nobody commanded: TAKE COVER, look up".to_owned();
+    Some(match ending {
+        _ if let Some(why) = model.link.why_abort_not_sent(now) => {
+            Banner::alarm(NOT_SENT, format!(": {why}"))
+        }
+        None if may_have_left(vehicle, now).is_some() => may_fly(model),
+        _ if is_liftoff_by_itself(vehicle) => Banner::alarm(LIFT_OFF, commanded_by_nobody()),
+        Some(Ending::Lost) => {
+            let rest = format!("{}: do not approach", Ending::Lost.detail(vehicle));
+            Banner::alarm(Ending::Lost.word(), rest)
+        }
+        _ => return None,
+    })
 }
 
 /// Since when, and where it is meant to come down. The moment stands still; the clock in the line above runs.
@@ -122,32 +122,19 @@ fn pad_word(model: &Model, now: Duration) -> (String, TextRole) {
     let Some(status) = vehicle.status.as_ref().filter(|status| !status.is_stale(now)) else {
         return word("NO DATA", TextRole::Caution);
     };
-    if !is_on_pad(status.value.phase) {
-        return word("FLIGHT", TextRole::Title);
-    }
-    if hold_words(vehicle, model.link.uplink.armed_by_us).is_some() {
-        return word("HOLD", TextRole::Alarm);
-    }
     let taps =
         model.tapping(now).is_some_and(|(by, _)| by == model.own_number()) && why_not_here(model).is_none();
-    if taps {
-        return word("TAP", TextRole::Alarm);
-    }
-    if let Some(left) = vehicle.countdown_s().filter(|left| left.value > 0.0) {
-        return (format!("T-{}", super::fixed(left.value, 1)), TextRole::Title);
-    }
-    if vehicle.unfit_while_armed().is_some() {
-        return word("NO-GO", TextRole::Alarm);
-    }
-    if vehicle.is_armed() {
-        return word("ARMED", TextRole::Caution);
-    }
+    let left = vehicle.countdown_s().filter(|left| left.value > 0.0);
     // A vehicle that was reset while it was armed may do it again.
     let at_work = model.rebooted.is_some_and(|(did, _)| !did.is_empty());
-    if at_work && model.alarms.is_unseen(AlarmKind::Rebooted) {
-        return word("RESET", TextRole::Alarm);
-    }
     match readiness(model, now) {
+        _ if !is_on_pad(status.value.phase) => word("FLIGHT", TextRole::Title),
+        _ if hold_words(vehicle, model.link.uplink.armed_by_us).is_some() => word("HOLD", TextRole::Alarm),
+        _ if taps => word("TAP", TextRole::Alarm),
+        _ if let Some(left) = left => (format!("T-{}", super::fixed(left.value, 1)), TextRole::Title),
+        _ if vehicle.unfit_while_armed().is_some() => word("NO-GO", TextRole::Alarm),
+        _ if vehicle.is_armed() => word("ARMED", TextRole::Caution),
+        _ if at_work && model.alarms.is_unseen(AlarmKind::Rebooted) => word("RESET", TextRole::Alarm),
         Some((_, TextRole::Good)) => word("GO", TextRole::Good),
         _ => word("NO-GO", TextRole::Caution),
     }
@@ -211,15 +198,7 @@ pub fn of_flight(model: &Model, now: Duration) -> (Item, Vec<Item>) {
 
 /// The verdict.
 pub fn verdict(model: &Model, now: Duration) -> Item {
-    let (ending, role) = ending_role(model, now).unzip();
-    let text = match ending {
-        Some(Ending::Stands) => "STANDS",
-        Some(Ending::Upright) => "UPRIGHT",
-        Some(Ending::UnderParachute) => "PARACHUTE",
-        Some(Ending::Hard) => "HARD",
-        Some(Ending::Lost) => "LOST",
-        None => "NO VERDICT",
-    };
-    let role = role.unwrap_or(TextRole::Caution);
+    let ended = ending_role(model, now).map(|(ending, role)| (ending.words()[1], role));
+    let (text, role) = ended.unwrap_or(("NO VERDICT", TextRole::Caution));
     word("", text, role)
 }

@@ -185,7 +185,7 @@ pub fn alarm_text(model: &Model, theme: Theme, now: Duration, columns: usize) ->
     let taken = 1 + word.len() + 1 + 1 + age.len() + more.len() + key.len();
     // On the narrowest screens the text is more important than its age.
     let room = columns.saturating_sub(taken).max(TEXT_COLUMNS_MIN);
-    let text = cut(&alarm.text, room);
+    let text = cut(&alarm.what.text, room);
     let line = format!(" {word} {text} {age}{more}");
     let blank = columns.saturating_sub(key.len() + Span::raw(&*line).width());
     let mut spans = vec![theme.span(format!("{line}{:blank$}", ""), role)];

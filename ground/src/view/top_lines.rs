@@ -14,8 +14,8 @@ use ratatui::text::{Line, Span};
 use super::theme::Level;
 use super::{STALE_MARK, TextRole, Theme, age_mark, draw_line, lists, shortest, side_by_side, status_lines};
 use crate::model::{
-    Acknowledgement, AlarmKind, Approach, CommandKind, Ending, Event, Foreign, LinkState, Model, Page, Role,
-    Standing, TERMINATION, TrackedCommand, abort_too_late, dead_reckoning::may_have_left, hold_words,
+    Acknowledgement, AlarmKind, Approach, CommandKind, Ending, Event, LinkState, Model, Page, Role, Standing,
+    TERMINATION, TrackedCommand, abort_too_late, dead_reckoning::may_have_left, hold_words,
     is_liftoff_by_itself, is_on_pad, standing, why_no_go, words,
 };
 
@@ -108,7 +108,7 @@ fn in_the_middle(model: &Model, theme: Theme, now: Duration, columns: usize) -> 
         Some(format!(" {}{text}", event.mark().trim_start()))
     };
     // Of an abort that was seen, what comes after it counts.
-    let aborted = model.alarms.foremost().is_some_and(|alarm| alarm.kind == AlarmKind::Aborted);
+    let aborted = model.alarms.foremost().is_some_and(|alarm| alarm.what.kind == AlarmKind::Aborted);
     let after = if aborted { next() } else { None };
     let words = after.or(seen).or_else(next).or_else(ready).or_else(said)?;
     Some(Line::from(status_lines::cut(&words, columns)))
@@ -156,13 +156,12 @@ fn mode(model: &Model, theme: Theme) -> Span<'static> {
 /// Why the vehicle under this id may not be obeyed, or may not be the one that is meant.
 fn doubt(model: &Model, now: Duration) -> Option<String> {
     let id = model.settings.vehicle.system_id;
-    if model.beside(now).is_some() {
-        return Some(format!("TWO VEHICLES under id {id}"));
+    let misfits = || "ANOTHER VERSION: its messages do not fit".to_owned();
+    match model.vehicle.as_foreign() {
+        _ if model.beside(now).is_some() => Some(format!("TWO VEHICLES under id {id}")),
+        Some(foreign) => Some(format!("NOT A TOUCHDOWN VEHICLE: {}", foreign.name())),
+        None => model.speaks_another_version(now).then(misfits),
     }
-    if let Some(foreign) = model.vehicle.as_foreign() {
-        return Some(format!("NOT A TOUCHDOWN VEHICLE: {}", foreign.name()));
-    }
-    model.speaks_another_version(now).then(|| "ANOTHER VERSION: its messages do not fit".to_owned())
 }
 
 fn vehicle(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
@@ -236,9 +235,8 @@ pub fn abort_key(model: &Model) -> String {
 /// The phase, with its age.
 pub fn phase(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
     match model.vehicle.phase() {
-        None if model.vehicle.as_foreign().is_some() => {
-            let mode = model.vehicle.as_foreign().map(Foreign::mode).unwrap_or_default();
-            theme.plain(format!(" {mode}"))
+        None if let Some(foreign) = model.vehicle.as_foreign() => {
+            theme.plain(format!(" mode {}", foreign.custom_mode))
         }
         None => theme.label(" no vehicle"),
         Some(_) if may_have_left(&model.vehicle, now).is_some() => {
@@ -257,7 +255,7 @@ pub fn doing(model: &Model, phase: TdPhase) -> &'static str {
     match phase {
         _ if is_on_pad(phase) && model.vehicle.counts_down() => "Countdown",
         TdPhase::TD_PHASE_BOOST if !model.vehicle.has_lifted => "Told to light",
-        _ => words::doing(phase),
+        _ => words::doing_and_event(phase).0,
     }
 }
 
@@ -358,22 +356,19 @@ fn hold_until(model: &Model, now: Duration) -> Option<String> {
 
 /// What an abort would do now, marked if the report is stale.
 fn abort_effect(model: &Model, now: Duration) -> String {
-    if model.link.station_gone {
-        return "NOT SENT: no station; kept for the next one".to_owned();
-    }
-    if model.link.station_silence(now).is_some() {
-        return "NOT SENT while the station hangs; kept".to_owned();
-    }
-    if model.vehicle.as_foreign().is_some() {
-        return TERMINATION.to_owned();
-    }
-    let Some(status) = model.vehicle.status.as_ref() else { return "unknown".to_owned() };
-    if may_have_left(&model.vehicle, now).is_some() {
-        return "MAY NOT ARRIVE; what it would do is not told".to_owned();
-    }
-    if let Some(why) = abort_too_late(model, now) {
-        return why.to_owned();
-    }
+    let status = match model.vehicle.status.as_ref() {
+        _ if model.link.station_gone => return "NOT SENT: no station; kept for the next one".to_owned(),
+        _ if model.link.station_silence(now).is_some() => {
+            return "NOT SENT while the station hangs; kept".to_owned();
+        }
+        _ if model.vehicle.as_foreign().is_some() => return TERMINATION.to_owned(),
+        None => return "unknown".to_owned(),
+        _ if may_have_left(&model.vehicle, now).is_some() => {
+            return "MAY NOT ARRIVE; what it would do is not told".to_owned();
+        }
+        _ if let Some(why) = abort_too_late(model, now) => return why.to_owned(),
+        Some(status) => status,
+    };
     let mark = if status.is_stale(now) { "~" } else { "" };
     // First, because a narrow screen cuts the end off.
     let [down, up] = [model.link.state(now), model.link.uplink.state(now)];

@@ -59,7 +59,7 @@ fn failing_checks_prevent_arming_and_the_run_ends_with_the_reason() {
     let mut rig = Rig::new(settings(true, false));
     rig.checks_failed = 0b10;
     rig.run(10.5);
-    assert!(!rig.events().contains("gave up"), "ten seconds from the first heartbeat, at 1 s");
+    assert_eq!(rig.model.outcome.refusal, None, "ten seconds from the first heartbeat, at 1 s");
     rig.run(4.0);
     assert!(rig.commands().is_empty());
     rig.expect_event("gave up 10 s after first contact: failing checks: ");
@@ -126,7 +126,9 @@ fn repeated_temporary_refusals_end_with_the_time_limit() {
         }
     }
     assert!((5..=12).contains(&asked), "asked {asked} times");
-    assert!(quit && rig.events().contains("gave up 10 s after first contact: temporarily refused"));
+    let why = rig.model.outcome.refusal.as_ref().map(|(why, _)| why.as_str());
+    assert_eq!(why, Some("ARM not sent: temporarily refused, although no check fails"));
+    assert!(quit);
     assert_eq!(decide(&rig.model.outcome, false), Exit::RefusedOrAborted);
 }
 
@@ -167,7 +169,9 @@ fn the_automatic_mode_is_refused_with_a_live_vehicle() {
     let mut half = Rig::new(settings(true, false));
     half.hil = false;
     half.run(2.0);
-    assert!(half.take_commands().is_empty() && half.events().contains("automatic mode refused"));
+    let why = half.model.outcome.refusal.as_ref().map(|(why, _)| why.as_str());
+    assert_eq!(why, Some("the automatic mode: the vehicle is live: it does not report that it is simulated"));
+    assert!(half.take_commands().is_empty());
 }
 
 #[test]

@@ -18,7 +18,7 @@ fn armed() -> Rig {
 
 fn is_alarmed(rig: &Rig, words: &str) -> bool {
     let mut alarms = rig.model.alarms.list().iter();
-    alarms.any(|alarm| alarm.kind == AlarmKind::Unfit && alarm.is_active() && alarm.text == words)
+    alarms.any(|alarm| alarm.what.kind == AlarmKind::Unfit && alarm.is_active() && alarm.what.text == words)
 }
 
 /// The uplink comes and goes with every lost heartbeat, and has an alarm of its own.

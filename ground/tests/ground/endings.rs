@@ -30,7 +30,7 @@ fn ending(rig: &Rig) -> Option<Ending> {
 }
 
 fn alarm_texts(rig: &Rig) -> Vec<&str> {
-    rig.model.alarms.list().iter().map(|alarm| alarm.text.as_str()).collect()
+    rig.model.alarms.list().iter().map(|alarm| alarm.what.text.as_str()).collect()
 }
 
 /// The line above the large words.
@@ -205,7 +205,7 @@ fn a_text_is_the_reason_of_a_latch_without_one() {
         rig.text_of(MavSeverity::MAV_SEVERITY_CRITICAL, "LIVE MOTOR: do not approach for 60 s");
         rig.run(0.1);
         let alarms = rig.model.alarms.list();
-        alarms.iter().find(|alarm| alarm.text.starts_with("ABORT")).map(|alarm| alarm.text.clone())
+        alarms.iter().find(|alarm| alarm.what.text.starts_with("ABORT")).map(|alarm| alarm.what.text.clone())
     };
     assert_eq!(
         latched("an old trouble", Some("LIFT-OFF that nobody asked for")).as_deref(),

@@ -61,7 +61,7 @@ fn type_over(rig: &mut Rig, connection: &Connection, keys: &[Key], apart_ms: &[u
     for read in arrived.chunk_by(|one, next| one.0 == next.0) {
         pass_until(rig, begin + Duration::from_millis(read[0].0));
         let keys: Vec<Key> = read.iter().map(|(_, key)| *key).collect();
-        rig.msg(if let [key] = keys[..] { Msg::Key(key) } else { Msg::Keys(keys) });
+        rig.msg(Msg::Keys(keys));
     }
 }
 

@@ -1,8 +1,8 @@
 //! Who commands, which boot of which vehicle, and whether people may approach it.
 
 use ground::key::Key;
-use ground::model::{Alarm, AlarmKind, Role, Seat, Settings, why_not_stop};
-use ground::update::{Action, Msg};
+use ground::model::{Alarm, AlarmKind, Role, Settings, why_not_stop};
+use ground::update::Action;
 use protocol::dialect::{
     MavCmd, MavMessage, TD_FLIGHT_STATUS_DATA, TD_MISSION_DATA, TdAbortEffect, TdHold, TdInterlock, TdMotor,
     TdPhase, TdStart,
@@ -58,14 +58,6 @@ fn a_vehicle_that_contradicts_itself_is_live() {
     rig.reboot();
     rig.run(4.0);
     assert!(rig.model.vehicle.is_simulated() && first_line(&rig, 80, 24).starts_with(" SIM"));
-}
-
-#[test]
-fn several_operators_are_named() {
-    let mut rig = Rig::crewed();
-    let seats = vec![Seat::new(1, "ann on pts/1"), Seat::new(2, "bob on pts/2")];
-    rig.msg(Msg::Crew { seats, silent: Vec::new() });
-    assert!(first_line(&rig, 80, 24).contains("by ann,bob"), "{}", first_line(&rig, 80, 24));
 }
 
 /// The vehicle reboots four seconds after its boot, which its clock alone would not show.
@@ -153,19 +145,19 @@ fn a_live_motor_after_a_flight_keeps_people_away_until_it_is_safe() {
         );
         assert_eq!(logged.count(), 1);
         assert!(rig.events().contains(words), "{}", rig.events());
-        assert!(rig.model.alarms.list().iter().any(|alarm| alarm.text.ends_with("LIVE MOTOR")));
+        assert!(rig.model.alarms.list().iter().any(|alarm| alarm.what.text.ends_with("LIVE MOTOR")));
         rig.approach_wait_s = 0;
         rig.run(0.1);
         let live = "one person: pin in: the motor is LIVE, and the waiting time is over";
         stands_on_every_page(&mut rig, "ONE PERSON: PIN IN", live);
         assert!(rig.events().contains("ONE PERSON: PIN IN: the motor is LIVE"), "{}", rig.events());
         let alarms = rig.model.alarms.list();
-        assert!(alarms.iter().any(|alarm| alarm.text.starts_with("ONE PERSON: PIN IN")), "{alarms:?}");
+        assert!(alarms.iter().any(|alarm| alarm.what.text.starts_with("ONE PERSON: PIN IN")), "{alarms:?}");
         rig.motor = TdMotor::TD_MOTOR_PIN_IN;
         rig.run(0.1);
         stands_on_every_page(&mut rig, "MAY BE APPROACHED", "may be approached: the pin is in");
         assert!(rig.events().contains("MAY BE APPROACHED: the pin is in"));
-        let live = |alarm: &Alarm| alarm.kind == AlarmKind::LiveMotor && alarm.is_active();
+        let live = |alarm: &Alarm| alarm.what.kind == AlarmKind::LiveMotor && alarm.is_active();
         assert!(!rig.model.alarms.list().iter().any(live));
     }
 }

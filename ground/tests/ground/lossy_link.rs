@@ -93,7 +93,7 @@ fn run(seed: u64) -> Run {
         }
         msgs.extend(down.arrived(now).into_iter().map(Msg::Frame));
         if now == pressed_at {
-            msgs.extend([Msg::Key(Key::CtrlX), Msg::Key(Key::Enter)]);
+            msgs.extend([Key::CtrlX, Key::Enter].map(|key| Msg::Keys(vec![key])));
         }
         if milliseconds % 100 == 0 || model.wakes_at().is_some_and(|at| now >= at) {
             msgs.push(Msg::Tick);

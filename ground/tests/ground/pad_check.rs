@@ -2,7 +2,7 @@
 
 use crate::rig::{Rig, settings, typed};
 use ground::key::Key;
-use ground::model::{AlarmKind, Model, Page, Role};
+use ground::model::{AlarmKind, LOSS_MOST, Model, Page, Role};
 use ground::update::Action;
 use protocol::dialect::{
     COMMAND_LONG_DATA, MavCmd, MavMessage, RADIO_STATUS_DATA, STORAGE_INFORMATION_DATA, SYS_STATUS_DATA,
@@ -78,7 +78,7 @@ fn supply(rig: &mut Rig, millivolts: u16, percent: i8, space_mib: f32) {
 }
 
 fn alarms(model: &Model) -> Vec<AlarmKind> {
-    model.alarms.list().iter().filter(|alarm| alarm.is_active()).map(|alarm| alarm.kind).collect()
+    model.alarms.list().iter().filter(|alarm| alarm.is_active()).map(|alarm| alarm.what.kind).collect()
 }
 
 fn entered(rig: &Rig) -> String {
@@ -221,8 +221,8 @@ fn a_low_battery_and_a_full_storage_are_alarms_outside_a_check_too() {
     rig.checks_failed = (TdCheck::TD_CHECK_BATTERY | TdCheck::TD_CHECK_LOG_SPACE).bits();
     rig.run(0.5);
     assert_eq!(alarms(&rig.model), [AlarmKind::Battery, AlarmKind::VehicleLog]);
-    let screen = rig.screen(80, 24);
-    assert!(screen.contains("VEHICLE LOG has too little space: 40 MiB"), "{screen}");
+    let text = &rig.model.alarms.list()[1].what.text;
+    assert_eq!(text, "VEHICLE LOG has too little space: 40 MiB");
     rig.key(Key::Char(' '));
     rig.expect_screen("BATTERY LOW: 7.31 V, 20 % left");
     // In the air by what is left.
@@ -285,12 +285,13 @@ fn the_radio_is_tested_with_a_margin_and_a_verdict() {
     range_test(&mut rig, 0);
     let screen = rig.screen(80, 24);
     assert!(screen.contains("RADIO PASSED"), "{screen}");
-    assert!(screen.contains("ok margin 26.3 dB least 10"), "{screen}");
+    let found = rig.model.range_test.as_ref().and_then(|test| test.found).unwrap();
+    assert_eq!(found.margin_db, Some((100.0 - 50.0) / 1.9), "26.3 dB at the worse end");
     rig.expect_event("radio range test PASSED: loss down 0.0 %, up 0.0 %");
     let mut rig = Rig::crewed();
     range_test(&mut rig, 10);
-    let screen = rig.screen(80, 24);
-    assert!(screen.contains("RADIO FAILED") && screen.contains("NO up"), "{screen}");
+    let found = rig.model.range_test.as_ref().and_then(|test| test.found).unwrap();
+    assert!(!found.passed() && found.loss_up > LOSS_MOST && found.loss_down <= LOSS_MOST, "{found:?}");
 }
 
 #[test]

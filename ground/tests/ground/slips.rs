@@ -5,8 +5,7 @@ use ground::model::Page;
 use ground::view::{footer, top_lines};
 use protocol::dialect::{TdInterlock, TdLatch, TdPhase};
 
-use crate::keys::ladder;
-use crate::rig::{MONO, Rig, is_abort, settings, typed};
+use crate::rig::{MONO, Rig, is_abort, typed};
 use crate::screens::{armed, descending, on_the_pad};
 
 #[test]
@@ -123,19 +122,4 @@ fn the_alarm_of_a_gate_that_stayed_shut_says_which_check_kept_it_shut() {
     rig.finding(0, 1, 12.0, "ignition gate stayed shut: tilt from vertical, 31 of 20 deg");
     rig.run(0.2);
     assert!(line(&rig).contains("gate stayed shut: tilt from vertical, 31 of 20"), "{}", line(&rig));
-}
-
-#[test]
-fn a_demonstration_says_on_every_page_that_no_vehicle_is_real() {
-    let mut settings = settings(false, true);
-    settings.demonstration = true;
-    let mut rig = Rig::new(settings);
-    rig.run(1.0);
-    for digit in "123456789".chars() {
-        rig.key(Key::Char(digit));
-        let screen = rig.screen(80, 24);
-        assert!(screen.lines().next().is_some_and(|row| row.contains(" DEMO, NOT REAL ")), "{screen}");
-    }
-    rig.keys(&ladder());
-    assert!(rig.screen(20, 5).contains("DEMO"));
 }

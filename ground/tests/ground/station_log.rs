@@ -1,7 +1,7 @@
 //! The station's own log as a check of its own.
 
 use ground::key::Key;
-use ground::model::{LogFault, LogHealth, LogSpace, LogStanding, Prompt, Role, Seat, Settings};
+use ground::model::{LogFault, LogHealth, LogSpace, LogStanding, Prompt, Seat, Settings};
 use ground::update::{Action, Msg, Request};
 use protocol::dialect::{MavCmd, TdPhase};
 use protocol::log::record::Record;
@@ -173,19 +173,4 @@ fn a_station_that_was_told_to_keep_no_log_may_arm() {
     assert_eq!(rig.model.station_log(rig.now), LogStanding::None);
     rig.keys(&enter("AARM"));
     assert!(rig.take_commands().iter().any(is_arm));
-}
-
-/// An attached screen shows its station's log, and asks the station to go on without it.
-#[test]
-fn an_attached_screen_asks_its_station_to_go_on_without_a_log() {
-    let mut rig = Rig::new(Settings { role: Role::Attached, ..settings(false, true) });
-    rig.model.history_ends();
-    rig.run(1.0);
-    rig.msg(Msg::Log(FAILED));
-    rig.keys(&enter("ANOLOG"));
-    assert!(rig.actions.contains(&Action::Request(Request::WithoutLog)));
-    assert!(rig.model.why_no_log(rig.now).is_some(), "the station decides");
-    rig.msg(Msg::Asked { request: Request::WithoutLog, by: Seat::new(2, "bob on pts/2") });
-    assert_eq!(rig.model.why_no_log(rig.now), None);
-    rig.expect_event("(screen 2, bob on pts/2)");
 }

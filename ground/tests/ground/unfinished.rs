@@ -138,7 +138,7 @@ fn a_new_station_says_what_was_asked_for_and_not_confirmed() {
     rig.key(Key::Char(' '));
     rig.run(0.2);
     let is_open =
-        |rig: &Rig| rig.model.alarms.list().iter().any(|alarm| alarm.kind == AlarmKind::AbortBefore);
+        |rig: &Rig| rig.model.alarms.list().iter().any(|alarm| alarm.what.kind == AlarmKind::AbortBefore);
     assert!(!is_open(&rig));
     assert_eq!(kept(&rig), Some(Unfinished::default()));
     rig.msg(Msg::Unfinished(Box::new(Unfinished { abort: asked, away: None })));

@@ -1,7 +1,7 @@
 //! A real vehicle whose motor no burn of its lot has confirmed.
 
 use ground::key::Key;
-use ground::model::{Prompt, Role, Seat, why_untested};
+use ground::model::{LogHealth, Prompt, Role, Seat, why_untested};
 use ground::update::{Action, Msg, Request};
 use protocol::dialect::{MavMessage, TD_MISSION_DATA};
 use protocol::log::record::Record;
@@ -84,18 +84,27 @@ fn the_word_counts_for_one_power_up_only() {
     assert!(why_untested(&rig.model).is_some());
 }
 
-/// An attached screen asks its station, which records who asked.
+/// An attached screen asks its station to go on with an untested motor, or without a log. The station decides, and records who
+/// asked.
 #[test]
-fn an_attached_screen_asks_its_station_to_go_on_with_an_untested_motor() {
-    let mut rig = Rig::new(ground::model::Settings { role: Role::Attached, ..settings(false, true) });
-    rig.model.history_ends();
-    rig.simulated = false;
-    rig.run(1.0);
-    tell_mission(&mut rig, 0);
-    rig.keys(&enter("AUNTESTED"));
-    assert!(rig.actions.contains(&Action::Request(Request::Untested)));
-    assert!(why_untested(&rig.model).is_some(), "the station decides");
-    rig.msg(Msg::Asked { request: Request::Untested, by: Seat::new(2, "bob on pts/2") });
-    assert_eq!(why_untested(&rig.model), None);
-    rig.expect_event("(screen 2, bob on pts/2)");
+fn an_attached_screen_asks_its_station_to_go_on_nevertheless() {
+    let failed = LogHealth { failed: true, ..LogHealth::default() };
+    for (simulated, health, word, request) in [
+        (false, LogHealth::default(), "AUNTESTED", Request::Untested),
+        (true, failed, "ANOLOG", Request::WithoutLog),
+    ] {
+        let mut rig = Rig::new(ground::model::Settings { role: Role::Attached, ..settings(false, true) });
+        rig.model.history_ends();
+        rig.simulated = simulated;
+        rig.run(1.0);
+        tell_mission(&mut rig, 0);
+        rig.msg(Msg::Log(health));
+        let stops = |rig: &Rig| why_untested(&rig.model).or_else(|| rig.model.why_no_log(rig.now));
+        rig.keys(&enter(word));
+        assert!(rig.actions.contains(&Action::Request(request.clone())));
+        assert_ne!(stops(&rig), None, "the station decides");
+        rig.msg(Msg::Asked { request, by: Seat::new(2, "bob on pts/2") });
+        assert_eq!(stops(&rig), None);
+        rig.expect_event("(screen 2, bob on pts/2)");
+    }
 }

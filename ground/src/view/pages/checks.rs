@@ -11,10 +11,9 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{Paragraph, Wrap, canvas};
 
 use super::{Room, columns, flight, framed, rows};
-use crate::model::words;
 use crate::model::{
     Act, Degrees, LOSS_MOST, LastPlace, MARGIN_LEAST_DB, Model, PadCheck, SURFACES, Sample, Spot, Standing,
-    Way, dead_reckoning::may_have_left, shown, standing,
+    Way, dead_reckoning::may_have_left, shown, standing, words,
 };
 use crate::view::pictures::{Plane, qr};
 use crate::view::{Ink, TextRole, Theme, draw_line, draw_lines, fixed, seconds};

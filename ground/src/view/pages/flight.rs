@@ -14,11 +14,10 @@ use crate::model::{Deflection, Model, Page, Sample, dead_reckoning::is_unheard, 
 use crate::view::band::draw_band;
 use crate::view::pictures::attitude::{Side, draw_attitude};
 use crate::view::pictures::height::draw_height;
-use crate::view::pictures::map::comes_down;
-use crate::view::pictures::map::draw_map;
-use crate::view::status_lines;
+use crate::view::pictures::map::{comes_down, draw_map};
 use crate::view::{
-    TextRole, Theme, age_mark, bars, draw_lines, fixed, headline, panels, quantity_row, text_row,
+    TextRole, Theme, age_mark, bars, draw_lines, fixed, headline, panels, quantity_row, status_lines,
+    text_row,
 };
 
 /// Columns of the vehicle from one side at 80 columns.
@@ -217,16 +216,13 @@ fn band_word(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     let d = &descent.value;
     let height_m = model.vehicle.height_m().map_or(f64::NAN, |height| height.value);
     let (low_m, high_m) = (f64::from(d.band_low_m), f64::from(d.band_high_m));
-    let (words, role) = if !(height_m.is_finite() && low_m.is_finite() && high_m.is_finite()) {
-        ("band -- until it falls fast enough", TextRole::Label)
-    } else if low_m > high_m {
-        ("NO HEIGHT LANDS", TextRole::Alarm)
-    } else if height_m < low_m {
-        ("BELOW the band", TextRole::Alarm)
-    } else if height_m > high_m {
-        ("above the band", TextRole::Plain)
-    } else {
-        ("INSIDE the band", TextRole::Good)
+    let is_known = [height_m, low_m, high_m].iter().all(|value| value.is_finite());
+    let (words, role) = match height_m {
+        _ if !is_known => ("band -- until it falls fast enough", TextRole::Label),
+        _ if low_m > high_m => ("NO HEIGHT LANDS", TextRole::Alarm),
+        _ if height_m < low_m => ("BELOW the band", TextRole::Alarm),
+        _ if height_m > high_m => ("above the band", TextRole::Plain),
+        _ => ("INSIDE the band", TextRole::Good),
     };
     let committed = height_m < f64::from(d.commit_height_m) && !parachute_may_fly(model, d.chute);
     let commit = if committed { ", committed" } else { "" };

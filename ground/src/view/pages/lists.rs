@@ -23,8 +23,9 @@ pub fn alarms_lines(
     if list.is_empty() {
         return vec![theme.line(" no active or unacknowledged alarm", TextRole::Good)];
     }
-    let chosen =
-        model.pointed_at().and_then(|chosen| list.iter().position(|alarm| alarm.kind == chosen.kind));
+    let chosen = model
+        .pointed_at()
+        .and_then(|chosen| list.iter().position(|alarm| alarm.what.kind == chosen.what.kind));
     let head = Line::from(vec![
         theme.key(" Space"),
         theme.label(" acknowledges the marked one; "),
@@ -37,7 +38,7 @@ pub fn alarms_lines(
         let lasted = lasted.map_or_else(String::new, |held_s| format!(", held {held_s} s"));
         let mark = if Some(place) == chosen { ">" } else { " " };
         let room = columns.saturating_sub(1 + WORD_COLUMNS + age.len() + lasted.len() + 1);
-        let text = cut(&alarm.text, room);
+        let text = cut(&alarm.what.text, room);
         Line::from(vec![
             theme.key(mark),
             theme.span(format!("{word:<WORD_COLUMNS$}"), role),

@@ -125,8 +125,9 @@ pub fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> 
         return lines.map(|words| Line::from(format!(" {words}"))).collect();
     };
     let mark = if status.is_stale(now) { STALE_MARK } else { " " };
+    let found = |check: TdCheck| about(&model.vehicle, check).0;
     let row = |word: &'static str, (name, bit): (&str, TdCheck), reason: &'static str| {
-        let (name, found) = (words::check(name), found(&model.vehicle, bit));
+        let (name, found) = (words::check(name), found(bit));
         let reason = if found.starts_with("--") && !reason.is_empty() { "not known" } else { reason };
         let role = if reason.is_empty() { TextRole::Plain } else { TextRole::Alarm };
         let value = theme.plain(format!("{mark}{name:<19.19}{found:>10} "));
@@ -146,16 +147,16 @@ pub fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> 
     let failed = status.value.checks_failed;
     lines.extend(failed.iter_names().map(|check| match model.vehicle.told_of(check.1) {
         // A value that is measured now is better than the vehicle's words for an earlier one.
-        Some(words) if !found(&model.vehicle, check.1).contains(' ') => Line::from(vec![
+        Some(words) if !found(check.1).contains(' ') => Line::from(vec![
             theme.span(" NO ", TextRole::Alarm),
             theme.span(format!("{mark}{words}"), TextRole::Caution),
         ]),
-        _ => row(" NO ", check, failure(check.1)),
+        _ => row(" NO ", check, about(&model.vehicle, check.1).1),
     }));
     let of = all.iter().count();
     let count = format!(" GO {mark}{} of {of} checks", of - failed.iter().count());
     lines.push(theme.line(count, TextRole::Good));
-    let measured = |(_, bit): &(&str, TdCheck)| !fails(*bit) && found(&model.vehicle, *bit).contains(' ');
+    let measured = |(_, bit): &(&str, TdCheck)| !fails(*bit) && found(*bit).contains(' ');
     lines.extend(all.iter_names().filter(measured).map(|check| row("    ", check, "")));
     if !station_log_fails {
         lines.push(station_log);
@@ -220,8 +221,8 @@ fn station_log(model: &Model, theme: Theme, now: Duration) -> (bool, Line<'stati
     (word == " NO ", of_the_station(word, " station log ", found, theme))
 }
 
-/// The value that telemetry shows for a check; empty if there is none.
-fn found(vehicle: &Vehicle, check: TdCheck) -> String {
+/// The value that telemetry shows for a check, empty if there is none; and why the check fails, if it does.
+fn about(vehicle: &Vehicle, check: TdCheck) -> (String, &'static str) {
     let locks = vehicle.interlocks();
     let yes_no = |bit: TdInterlock, yes: &'static str, no: &'static str| {
         locks.map_or("", |locks| if locks.contains(bit) { yes } else { no }).to_owned()
@@ -230,55 +231,52 @@ fn found(vehicle: &Vehicle, check: TdCheck) -> String {
         value.map_or_else(String::new, |value| format!("{} {unit}", fixed(value, decimals)))
     };
     let attitude = vehicle.attitude.map(|attitude| attitude.value);
+    let unseen = |reason| (String::new(), reason);
     match check {
-        TdCheck::TD_CHECK_ABORT_LATCH => yes_no(TdInterlock::TD_INTERLOCK_ABORT_LATCHED, "latched", "free"),
-        TdCheck::TD_CHECK_PIN => yes_no(TdInterlock::TD_INTERLOCK_PIN_OUT, "out", "in"),
-        TdCheck::TD_CHECK_TILT => number(attitude.map(|a| a.tilt_rad.to_degrees()), 1, "deg"),
-        TdCheck::TD_CHECK_ROTATION => number(attitude.map(|a| a.turn_rate_rad_s().to_degrees()), 1, "deg/s"),
-        TdCheck::TD_CHECK_SPEED => number(vehicle.motion.map(|m| m.value.speed_m_s()), 2, "m/s"),
-        TdCheck::TD_CHECK_FINS => {
-            let error =
-                vehicle.fins().map(|fins| fins.value.iter().map(Deflection::error_deg).fold(0.0, f64::max));
-            number(error, 1, "deg")
+        TdCheck::TD_CHECK_ABORT_LATCH => {
+            (yes_no(TdInterlock::TD_INTERLOCK_ABORT_LATCHED, "latched", "free"), "keep away")
         }
-        TdCheck::TD_CHECK_CONTROLLER_WARM => {
-            vehicle.last::<TD_CONTROLLER_DATA>().map_or_else(String::new, |c| {
-                words::lower_case(&c.value.solver_status, "TD_SOLVER_STATUS_").chars().take(10).collect()
-            })
-        }
-        TdCheck::TD_CHECK_PREDICTED_TOUCHDOWN => vehicle.prediction.map_or_else(String::new, |prediction| {
-            prediction.value.touchdown.violations().unwrap_or_else(|| "inside".to_owned())
-        }),
-        TdCheck::TD_CHECK_BATTERY => number(vehicle.battery().map(|battery| battery.value.volts), 2, "V"),
-        TdCheck::TD_CHECK_LOG_SPACE => number(vehicle.log_space_mib().map(|space| space.value), 0, "MiB"),
-        _ => String::new(),
-    }
-}
-
-/// Why a check fails.
-fn failure(check: TdCheck) -> &'static str {
-    match check {
-        TdCheck::TD_CHECK_ABORT_LATCH => "keep away",
-        TdCheck::TD_CHECK_PIN => "pull the pin",
-        TdCheck::TD_CHECK_SELF_TEST => "not passed",
+        TdCheck::TD_CHECK_PIN => (yes_no(TdInterlock::TD_INTERLOCK_PIN_OUT, "out", "in"), "pull the pin"),
+        TdCheck::TD_CHECK_SELF_TEST => unseen("not passed"),
         TdCheck::TD_CHECK_ACCELEROMETER
         | TdCheck::TD_CHECK_GYRO
         | TdCheck::TD_CHECK_BAROMETER
-        | TdCheck::TD_CHECK_LIDAR => "no data",
-        TdCheck::TD_CHECK_GNSS => "no fix",
-        TdCheck::TD_CHECK_TILT => "not upright",
-        TdCheck::TD_CHECK_ROTATION => "turning",
-        TdCheck::TD_CHECK_SPEED => "moving",
-        TdCheck::TD_CHECK_ESTIMATOR => "not settled",
-        TdCheck::TD_CHECK_FINS => "no answer",
-        TdCheck::TD_CHECK_IGNITER => "open circuit",
-        TdCheck::TD_CHECK_LOG => "not running",
-        TdCheck::TD_CHECK_LOG_SPACE => "disk full",
-        TdCheck::TD_CHECK_CONTROLLER_WARM => "no rehearsal",
-        TdCheck::TD_CHECK_PREDICTED_TOUCHDOWN => "outside",
-        TdCheck::TD_CHECK_UPLINK => "not heard",
-        TdCheck::TD_CHECK_HEIGHT | TdCheck::TD_CHECK_BATTERY => "too low",
-        _ => "",
+        | TdCheck::TD_CHECK_LIDAR => unseen("no data"),
+        TdCheck::TD_CHECK_GNSS => unseen("no fix"),
+        TdCheck::TD_CHECK_TILT => {
+            (number(attitude.map(|a| a.tilt_rad.to_degrees()), 1, "deg"), "not upright")
+        }
+        TdCheck::TD_CHECK_ROTATION => {
+            (number(attitude.map(|a| a.turn_rate_rad_s().to_degrees()), 1, "deg/s"), "turning")
+        }
+        TdCheck::TD_CHECK_SPEED => (number(vehicle.motion.map(|m| m.value.speed_m_s()), 2, "m/s"), "moving"),
+        TdCheck::TD_CHECK_ESTIMATOR => unseen("not settled"),
+        TdCheck::TD_CHECK_FINS => {
+            let error =
+                vehicle.fins().map(|fins| fins.value.iter().map(Deflection::error_deg).fold(0.0, f64::max));
+            (number(error, 1, "deg"), "no answer")
+        }
+        TdCheck::TD_CHECK_IGNITER => unseen("open circuit"),
+        TdCheck::TD_CHECK_LOG => unseen("not running"),
+        TdCheck::TD_CHECK_LOG_SPACE => {
+            (number(vehicle.log_space_mib().map(|space| space.value), 0, "MiB"), "disk full")
+        }
+        TdCheck::TD_CHECK_CONTROLLER_WARM => {
+            let status =
+                vehicle.last::<TD_CONTROLLER_DATA>().map(|controller| controller.value.solver_status);
+            let words = status.map(|status| words::lower_case(&status, "TD_SOLVER_STATUS_"));
+            (words.unwrap_or_default().chars().take(10).collect(), "no rehearsal")
+        }
+        TdCheck::TD_CHECK_PREDICTED_TOUCHDOWN => {
+            let ends = vehicle.prediction.map(|prediction| prediction.value.touchdown.violations());
+            (ends.map_or_else(String::new, |outside| outside.unwrap_or("inside".into())), "outside")
+        }
+        TdCheck::TD_CHECK_UPLINK => unseen("not heard"),
+        TdCheck::TD_CHECK_HEIGHT => unseen("too low"),
+        TdCheck::TD_CHECK_BATTERY => {
+            (number(vehicle.battery().map(|battery| battery.value.volts), 2, "V"), "too low")
+        }
+        _ => unseen(""),
     }
 }
 

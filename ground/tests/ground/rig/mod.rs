@@ -111,7 +111,7 @@ impl Rig {
 
     /// A key at this moment.
     pub(crate) fn press(&mut self, key: Key) {
-        self.msg(Msg::Key(key));
+        self.msg(Msg::Keys(vec![key]));
     }
 
     pub(crate) fn keys(&mut self, keys: &[Key]) {
