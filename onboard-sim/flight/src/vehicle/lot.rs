@@ -21,7 +21,6 @@ pub struct Lot {
     pub burns: u32,
     /// A measured curve, flown instead of the certified one: a built-in motor's name, or the text of a motor file. The scales
     /// are then over this curve.
-    #[serde(default)]
     pub curve: Option<String>,
     /// Impulses of the burns over the curve's.
     #[serde(default)]
@@ -29,7 +28,6 @@ pub struct Lot {
     /// Burn times of the burns over the curve's.
     #[serde(default)]
     pub burn_time: Burnt,
-    #[serde(default)]
     pub temperature: Option<Temperature>,
     #[serde(default)]
     pub weighed: Weighed,
@@ -65,10 +63,8 @@ pub struct Temperature {
 #[serde(deny_unknown_fields)]
 pub struct Weighed {
     /// The motor before the flight, kg.
-    #[serde(default)]
     pub motor_kg: Option<f64>,
     /// The vehicle with the motor in, kg. It replaces `airframe.mass.loaded_kg`.
-    #[serde(default)]
     pub vehicle_kg: Option<f64>,
 }
 

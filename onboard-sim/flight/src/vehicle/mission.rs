@@ -189,7 +189,6 @@ pub struct Mission {
     pub other_curves: Vec<ThrustCurve>,
     /// What burns of the motor's lot tell. The reader of the mission puts it into the motor's curve and prior, the ignition
     /// and the mass.
-    #[serde(default)]
     pub lot: Option<Box<Lot>>,
     /// What comes of the lot; `None` without one.
     #[serde(skip)]
@@ -222,10 +221,8 @@ pub struct Mission {
     pub settle_s: f64,
     pub start: Start,
     /// The rail and the booster stage, for a start from the pad.
-    #[serde(default)]
     pub launch: Option<Launch>,
     /// The drone, for a start below it.
-    #[serde(default)]
     pub drop: Option<Drop>,
     #[serde(default)]
     pub estimator: EstimatorConfig,
