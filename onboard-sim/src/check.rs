@@ -25,22 +25,14 @@ use crate::run::{RunError, fly};
 use crate::statistics::Landings;
 use crate::summary::failures;
 
+flight::numbered_enum! {
 /// An answer, from the best to the worst.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Verdict {
-    Ok,
-    Tight,
-    No,
+    Ok = "ok",
+    Tight = "tight",
+    No = "no",
 }
-
-impl fmt::Display for Verdict {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        out.pad(match self {
-            Self::Ok => "ok",
-            Self::Tight => "tight",
-            Self::No => "no",
-        })
-    }
 }
 
 /// What a value must be at least: below the first number the answer is no, below the second tight.
@@ -152,11 +144,11 @@ impl fmt::Display for Page {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(out, "{}", self.title)?;
         for Row { what, found, beside, verdict, change } in &self.rows {
-            let line = format!("{verdict:<6}{what:<11}{found:<34}{beside}");
+            let line = format!("{:<6}{what:<11}{found:<34}{beside}", verdict.name());
             writeln!(out, "{}", line.trim_end())?;
             change.iter().try_for_each(|change| writeln!(out, "{:<17}-> {change}", ""))?;
         }
-        writeln!(out, "{}", self.verdict())
+        writeln!(out, "{}", self.verdict().name())
     }
 }
 

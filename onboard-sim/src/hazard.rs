@@ -37,92 +37,75 @@ const SLIDES_S: f64 = 5.0;
 /// Any number that no other draw uses.
 const OF_HAZARD: u64 = 0x4a2a_0000_0000_0005;
 
+flight::numbered_enum! {
 /// A way in which a flight can end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Way {
-    AsPlanned,
+    AsPlanned = "as planned",
     /// Aborted in the boost or in the coast: the parachute opens at apogee, the longest way under it.
-    AbortInAscent,
+    AbortInAscent = "aborted in boost, coast",
     /// Aborted at apogee, of a flight that begins there.
-    ParachuteFromApogee,
+    ParachuteFromApogee = "parachute from apogee",
     /// Aborted in the descent, with room for the parachute.
-    AbortInDescent,
+    AbortInDescent = "aborted in the descent",
     /// Aborted before the ignition, too low for the parachute: it burns or hits the ground.
-    AbortTooLow,
+    AbortTooLow = "aborted below commit",
     /// Aborted under the landing motor.
-    AbortUnderThrust,
-    NoLight,
-    NoSeparation,
+    AbortUnderThrust = "aborted under thrust",
+    NoLight = "landing motor not lit",
+    NoSeparation = "booster stays on",
     /// A disarmed vehicle lifts off.
-    Uncommanded,
+    Uncommanded = "uncommanded lift-off",
     /// The booster parts. No fin opens, no parachute, and no motor lights.
-    Ballistic,
+    Ballistic = "ballistic",
     /// Nothing happens any more after the lift-off, as with a dead flight computer.
-    BallisticWithBooster,
+    BallisticWithBooster = "ballistic, with booster",
     /// The booster without its own parachute: along its axis or tumbling across it, whichever carries it farther.
-    Booster,
+    Booster = "spent booster, ballistic",
+}
 }
 
 impl Way {
-    pub const ALL: [Self; 12] = [
-        Self::AsPlanned,
-        Self::AbortInAscent,
-        Self::ParachuteFromApogee,
-        Self::AbortInDescent,
-        Self::AbortTooLow,
-        Self::AbortUnderThrust,
-        Self::NoLight,
-        Self::NoSeparation,
-        Self::Uncommanded,
-        Self::Ballistic,
-        Self::BallisticWithBooster,
-        Self::Booster,
-    ];
-
-    /// The words of a table, the one start from which it happens, or none if it happens from all, and the faults that make a flight
-    /// end so, or none for what happens to the flight as planned.
-    const fn facts(self) -> (&'static str, Option<StartPoint>, &'static [&'static str]) {
-        const PAD: Option<StartPoint> = Some(StartPoint::Pad);
-        const BALLISTIC: &[&str] = &[
-            "no-light@0",
-            "parachute-fails@0",
-            "fin-stuck:0@0",
-            "fin-stuck:1@0",
-            "fin-stuck:2@0",
-            "fin-stuck:3@0",
-        ];
+    /// The one start from which it happens; `None`: it happens from all.
+    const fn start(self) -> Option<StartPoint> {
         match self {
-            Self::AsPlanned => ("as planned", None, &[]),
-            Self::AbortInAscent => ("aborted in boost, coast", PAD, &[]),
-            Self::ParachuteFromApogee => ("parachute from apogee", Some(StartPoint::Apogee), &[]),
-            Self::AbortInDescent => ("aborted in the descent", None, &[]),
-            Self::AbortTooLow => ("aborted below commit", None, &[]),
-            Self::AbortUnderThrust => ("aborted under thrust", None, &[]),
-            Self::NoLight => ("landing motor not lit", None, &["no-light@0"]),
-            Self::NoSeparation => ("booster stays on", PAD, &["separation-fails@0"]),
-            Self::Uncommanded => ("uncommanded lift-off", PAD, &[]),
-            Self::Ballistic => ("ballistic", None, BALLISTIC),
-            Self::BallisticWithBooster => {
-                ("ballistic, with booster", PAD, &["separation-fails@0", "parachute-fails@0"])
-            }
-            Self::Booster => ("spent booster, ballistic", PAD, &[]),
+            Self::AbortInAscent
+            | Self::NoSeparation
+            | Self::Uncommanded
+            | Self::BallisticWithBooster
+            | Self::Booster => Some(StartPoint::Pad),
+            Self::ParachuteFromApogee => Some(StartPoint::Apogee),
+            _ => None,
+        }
+    }
+
+    /// The faults that make a flight end so; none for what happens to the flight as planned.
+    const fn faults(self) -> &'static [&'static str] {
+        match self {
+            Self::NoLight => &["no-light@0"],
+            Self::NoSeparation => &["separation-fails@0"],
+            Self::Ballistic => &[
+                "no-light@0",
+                "parachute-fails@0",
+                "fin-stuck:0@0",
+                "fin-stuck:1@0",
+                "fin-stuck:2@0",
+                "fin-stuck:3@0",
+            ],
+            Self::BallisticWithBooster => &["separation-fails@0", "parachute-fails@0"],
+            _ => &[],
         }
     }
 
     /// The ways that a mission's flights can end.
     pub fn of(mission: &Mission) -> Vec<Self> {
-        let happens = |way: &Self| way.facts().1.is_none_or(|start| start == mission.start.at);
+        let happens = |way: &Self| way.start().is_none_or(|start| start == mission.start.at);
         Self::ALL.into_iter().filter(happens).collect()
-    }
-
-    /// The words of a table.
-    pub fn name(self) -> &'static str {
-        self.facts().0
     }
 
     /// It is a flight of its own, and no part of the one as planned.
     fn is_alone(self) -> bool {
-        self == Self::Uncommanded || !self.facts().2.is_empty()
+        self == Self::Uncommanded || !self.faults().is_empty()
     }
 
     /// The abort of a flight at this moment would end it so.
@@ -400,8 +383,8 @@ pub fn fly(recipe: &Recipe, ways: &[Way], number: u64) -> Result<Vec<Impact>, Se
         let mut flight = if way == Way::Uncommanded {
             uncommanded(recipe, number)?
         } else {
-            let (_, _, faults) = way.facts();
-            let faults: Vec<TimedFault> = faults.iter().filter_map(|fault| fault.parse().ok()).collect();
+            let faults: Vec<TimedFault> =
+                way.faults().iter().filter_map(|fault| fault.parse().ok()).collect();
             Sortie::new(&Recipe { faults, ..recipe.clone() }, number)?
         };
         let down = come_down(&mut flight, |_| true);

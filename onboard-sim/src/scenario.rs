@@ -6,35 +6,27 @@ use sim::fault::TimedFault;
 
 use crate::row::Row;
 
+flight::numbered_enum! {
 /// The expected outcome of a flight with a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Expected {
     /// The vehicle stands undamaged.
-    Land,
+    Land = "land",
     /// The flight may not land, but the vehicle uses what still works: the motor is lit inside the gate, and the
     /// vehicle reaches the ground more slowly than without the motor.
-    Degrade,
+    Degrade = "degrade",
     /// The landing motor is not lit, or gives no thrust. The fins are open, and the loss is recorded.
-    Inhibit,
+    Inhibit = "inhibit",
     /// The vehicle comes down under the parachute.
-    Parachute,
+    Parachute = "parachute",
+}
 }
 
 /// A degraded flight reaches the ground more slowly than this, m/s. Without braking the speed would be 40 m/s.
 const DEGRADED_M_S: f64 = 35.0;
 
 impl Expected {
-    /// The name in a table.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Land => "land",
-            Self::Degrade => "degrade",
-            Self::Inhibit => "inhibit",
-            Self::Parachute => "parachute",
-        }
-    }
-
     /// Whether a flight ended as expected. A landing always counts as expected.
     pub fn met(self, row: &Row) -> bool {
         if row.ignition_outside_gate || row.failure == "not a number" {

@@ -23,6 +23,7 @@ extern crate alloc;
 extern crate self as flight;
 
 /// An enumeration whose variants have a number, from 0, and a name that people see.
+#[macro_export]
 macro_rules! numbered_enum {
     ($(#[$attribute:meta])* pub enum $name:ident { $($(#[$meaning:meta])* $variant:ident = $word:literal,)+ }) => {
         $(#[$attribute])*
@@ -46,6 +47,23 @@ macro_rules! numbered_enum {
             /// The one of a number, if there is one.
             pub fn from_index(index: u8) -> Option<Self> {
                 Self::ALL.get(usize::from(index)).copied()
+            }
+        }
+    };
+}
+
+/// A struct that has a default value beside each field, as Rust's `default_field_values` will have it.
+#[macro_export]
+macro_rules! with_defaults {
+    ($(#[$attribute:meta])* $seen:vis struct $name:ident {
+        $($(#[$about:meta])* $field_seen:vis $field:ident: $kind:ty = $default:expr,)+
+    }) => {
+        $(#[$attribute])*
+        $seen struct $name { $($(#[$about])* $field_seen $field: $kind,)+ }
+
+        impl Default for $name {
+            fn default() -> Self {
+                Self { $($field: $default,)+ }
             }
         }
     };

@@ -24,18 +24,7 @@ pub(crate) struct Iterate<M: Model<NX, NU>, const NX: usize, const NU: usize> {
     pub(crate) intervals: M::Intervals,
 }
 
-impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Default for Iterate<M, NX, NU> {
-    fn default() -> Self {
-        Self {
-            states: Vec::new(),
-            inputs: Vec::new(),
-            costates: Vec::new(),
-            limits: Vec::new(),
-            elastics: Vec::new(),
-            intervals: M::Intervals::default(),
-        }
-    }
-}
+empty!(Iterate { states, inputs, costates, limits, elastics, intervals });
 
 impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Iterate<M, NX, NU> {
     /// Makes room for the point, not for its intervals; allocates only if no earlier problem was this long.

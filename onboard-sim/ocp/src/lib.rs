@@ -61,6 +61,17 @@
 
 extern crate alloc;
 
+/// Buffers without room, for any model: a derived default would ask the model for one, too.
+macro_rules! empty {
+    ($name:ident { $($field:ident),+ }) => {
+        impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Default for $name<M, NX, NU> {
+            fn default() -> Self {
+                Self { $($field: Default::default()),+ }
+            }
+        }
+    };
+}
+
 mod barrier;
 mod clamped;
 mod dense;

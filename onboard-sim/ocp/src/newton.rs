@@ -24,11 +24,7 @@ pub(crate) struct Fractions {
     pub(crate) dual: f64,
 }
 
-impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Default for Newton<M, NX, NU> {
-    fn default() -> Self {
-        Self { sweep: Sweep::default(), limits: Vec::new(), elastics: Vec::new() }
-    }
-}
+empty!(Newton { sweep, limits, elastics });
 
 impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Newton<M, NX, NU> {
     /// Makes room for a problem; allocates only if no earlier problem was this long.

@@ -75,21 +75,7 @@ pub struct Workspace<M: Model<NX, NU>, const NX: usize, const NU: usize> {
     pub(crate) allowance: Allowance,
 }
 
-impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Default for Workspace<M, NX, NU> {
-    fn default() -> Self {
-        Self {
-            conditions: Vec::new(),
-            current: Iterate::default(),
-            trial: Iterate::default(),
-            best: Iterate::default(),
-            newton: Newton::default(),
-            sides: Sides::default(),
-            filter: Filter::default(),
-            scratch: Vec::new(),
-            allowance: Allowance::default(),
-        }
-    }
-}
+empty!(Workspace { conditions, current, trial, best, newton, sides, filter, scratch, allowance });
 
 impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
     /// Solves a problem, warm if there is a start with as many inputs as the problem has intervals, otherwise cold. It

@@ -2,6 +2,7 @@
 
 use core::f64::consts::TAU;
 
+use crate::world::normal;
 use crate::world::truth::{SHAPE_MOST, SHAPE_TERMS, Truth};
 use crate::world::wind::Wind;
 use crate::world::{AscentTruth, Hanging};
@@ -236,7 +237,7 @@ impl Chance {
 
     /// Uniform in [0, 1).
     pub fn unit(&mut self) -> f64 {
-        (self.random.next_u64() >> 11) as f64 / (1u64 << 53) as f64
+        normal::unit(&mut self.random)
     }
 
     /// Uniform in [-1, 1).

@@ -24,7 +24,7 @@ use crate::fault::{Breakage, Injector};
 use crate::outcome::{Outcome, by_envelope};
 use crate::outside::{Outside, Unwatched, Watch};
 use crate::recipe::Recipe;
-use crate::surroundings::{Feedback, Surroundings, falling_as, world_at};
+use crate::surroundings::{Surroundings, falling_as, world_at};
 
 /// A flight that lasts longer is ended, s. A fall from apogee under the parachute takes a minute.
 pub(crate) const LONGEST_S: f64 = 150.0;
@@ -282,19 +282,11 @@ impl Sortie {
             return None;
         }
         let measured = measured?;
-        let Feedback { gimbal_rad, fins_rad, contact, igniter_continuity, booster_attached } =
-            self.surroundings.feedback(released);
         Some(KeptInput {
             frame: self.frame,
             time_s: flight_time_s(self.frame),
             measured,
-            gimbal_rad,
-            fins_rad,
-            contact,
-            igniter_continuity,
-            booster_attached,
-            battery_v: Some(self.surroundings.battery.volts()),
-            ..KeptInput::NONE
+            ..self.surroundings.feedback(released)
         })
     }
 

@@ -5,7 +5,7 @@ use crate::world::sensors::{
     NEARLY_EXACT, SensorFaults, SensorParamError, SensorTruth, Sensors, believed_start,
 };
 use crate::world::{Actuators, Battery, Fault, World};
-use flight::computer::{Commands, FRAME_MS, FRAME_S, pad_check};
+use flight::computer::{Commands, FRAME_MS, FRAME_S, KeptInput, pad_check};
 use flight::estimation::estimator::{Measurements, StartUncertainty};
 use flight::rules::outputs::PyroOutput;
 use flight::rules::phase::Phase;
@@ -94,19 +94,21 @@ impl Surroundings {
         self.measured
     }
 
-    /// What feedback and switches say after the frame; `released`: contact counts.
-    pub(crate) fn feedback(&mut self, released: bool) -> Feedback {
+    /// What feedback and switches say after the frame, and nothing else; `released`: contact counts.
+    pub(crate) fn feedback(&mut self, released: bool) -> KeptInput {
         let (gimbal_rad, fins_rad) = if self.world.airframe().servos_tell {
             (self.world.gimbal_feedback_rad(), self.sensors.fins_rad(&self.world.fins_feedback_rad()))
         } else {
             (self.actuators.gimbal_rad, self.actuators.fins_rad)
         };
-        Feedback {
+        KeptInput {
             gimbal_rad,
             fins_rad,
             contact: self.sensors.contact(released && self.world.touchdown().is_some()),
             igniter_continuity: self.sensors.igniter_continuity(),
             booster_attached: self.world.booster_attached(),
+            battery_v: Some(self.battery.volts()),
+            ..KeptInput::NONE
         }
     }
 
@@ -153,20 +155,6 @@ impl Surroundings {
 fn sensors(dispersion: &Dispersion, drawn: &Draw) -> Result<Sensors, SensorParamError> {
     let errors = if dispersion.sensors { 1.0 } else { NEARLY_EXACT };
     Sensors::new(&dispersion.sensor_params, drawn.flight_seed, errors)
-}
-
-/// What actuators and switches say at the end of a frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Feedback {
-    /// Where the gimbal is (pitch, yaw), rad.
-    pub(crate) gimbal_rad: [f64; 2],
-    /// Where the fins are, rad.
-    pub(crate) fins_rad: [f64; 4],
-    /// A foot touches the ground.
-    pub(crate) contact: bool,
-    pub(crate) igniter_continuity: bool,
-    /// The wire between booster and vehicle is whole.
-    pub(crate) booster_attached: bool,
 }
 
 /// Where gimbal and fins are, rad.

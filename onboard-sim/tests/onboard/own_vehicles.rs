@@ -163,12 +163,12 @@ fn table() {
         if let Ok(folder) = std::env::var("FOLDER") {
             std::fs::write(format!("{folder}/{vehicle}.toml"), &text).unwrap();
         }
-        print!("{vehicle:4} {} {}", page.verdict(), page.title);
+        print!("{vehicle:4} {} {}", page.verdict().name(), page.title);
         for set in ["field", "real"] {
             print!(" | {set} {}/{flights}", stand(&text, set, 7001, flights));
         }
         for row in page.rows.iter().filter(|row| row.verdict > Verdict::Ok) {
-            print!("; {} {} ({} / {})", row.what, row.verdict, row.found, row.beside);
+            print!("; {} {} ({} / {})", row.what, row.verdict.name(), row.found, row.beside);
         }
         println!();
     }

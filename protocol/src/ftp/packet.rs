@@ -67,35 +67,36 @@ const FAIL_ERRNO: u8 = 2;
 const EBUSY: u8 = 16;
 const ENOENT: u8 = 2;
 
+/// Those that are a number alone: a MAV_FTP_ERR.
+const NUMBERED: [(u8, Refusal); 8] = [
+    (1, Refusal::Fail),
+    (3, Refusal::InvalidDataSize),
+    (4, Refusal::InvalidSession),
+    (5, Refusal::NoSessionsAvailable),
+    (6, Refusal::EndOfFile),
+    (7, Refusal::UnknownCommand),
+    (9, Refusal::FileProtected),
+    (10, Refusal::FileNotFound),
+];
+
 impl Refusal {
     fn bytes(self) -> Vec<u8> {
         match self {
-            Self::Fail => vec![1],
             Self::Busy => vec![FAIL_ERRNO, EBUSY],
-            Self::InvalidDataSize => vec![3],
-            Self::InvalidSession => vec![4],
-            Self::NoSessionsAvailable => vec![5],
-            Self::EndOfFile => vec![6],
-            Self::UnknownCommand => vec![7],
-            Self::FileProtected => vec![9],
-            Self::FileNotFound => vec![10],
             Self::Other(error, errno) => vec![error, errno],
+            _ => NUMBERED.iter().filter(|(_, known)| *known == self).map(|(error, _)| *error).collect(),
         }
     }
 
     fn from_bytes(bytes: &[u8]) -> Self {
-        let errno = bytes.get(1).copied().unwrap_or(0);
-        match (bytes.first().copied().unwrap_or(1), errno) {
-            (1, _) => Self::Fail,
+        let (error, errno) = (bytes.first().copied().unwrap_or(1), bytes.get(1).copied().unwrap_or(0));
+        match (error, errno) {
             (FAIL_ERRNO, EBUSY) => Self::Busy,
-            (FAIL_ERRNO, ENOENT) | (10, _) => Self::FileNotFound,
-            (3, _) => Self::InvalidDataSize,
-            (4, _) => Self::InvalidSession,
-            (5, _) => Self::NoSessionsAvailable,
-            (6, _) => Self::EndOfFile,
-            (7, _) => Self::UnknownCommand,
-            (9, _) => Self::FileProtected,
-            (error, errno) => Self::Other(error, errno),
+            (FAIL_ERRNO, ENOENT) => Self::FileNotFound,
+            _ => {
+                let known = NUMBERED.iter().find(|(known, _)| *known == error);
+                known.map_or(Self::Other(error, errno), |(_, refusal)| *refusal)
+            }
         }
     }
 }
@@ -138,13 +139,12 @@ impl Packet {
         let data = data[..data.len().min(DATA_LEN)].to_vec();
         Self {
             sequence: self.sequence.wrapping_add(1),
-            session: self.session,
             opcode: Opcode::ACK,
             size: data.len() as u8,
             asked: self.opcode,
             burst_complete: false,
-            offset: self.offset,
             data,
+            ..*self
         }
     }
 

@@ -40,15 +40,17 @@ pub struct Identity {
     pub uid: u16,
 }
 
-/// Which mission or profile a vehicle flies.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct MissionName {
-    pub name: String,
-    pub hash: MissionHash,
-    /// Where the flight begins, which the hash leaves out.
-    pub start: Option<StartPoint>,
-    /// Burns that confirm the curve of its motor.
-    pub motor_burns: u8,
+flight::with_defaults! {
+    /// Which mission or profile a vehicle flies.
+    #[derive(Debug, Clone, PartialEq, Eq)]
+    pub struct MissionName {
+        pub name: String = String::new(),
+        pub hash: MissionHash = MissionHash::of(""),
+        /// Where the flight begins, which the hash leaves out.
+        pub start: Option<StartPoint> = None,
+        /// Burns that confirm the curve of its motor.
+        pub motor_burns: u8 = 0,
+    }
 }
 
 impl MissionName {
@@ -60,12 +62,6 @@ impl MissionName {
             start: Some(mission.start.at),
             motor_burns: u8::try_from(mission.motor_burns()).unwrap_or(u8::MAX),
         }
-    }
-}
-
-impl Default for MissionName {
-    fn default() -> Self {
-        Self { name: String::new(), hash: MissionHash::of(""), start: None, motor_burns: 0 }
     }
 }
 

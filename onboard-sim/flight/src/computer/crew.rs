@@ -153,8 +153,8 @@ pub(super) fn refused(table: &mut PhaseTable, asked: Asked, refusal: Refusal, ch
         return Answer::ACCEPTED;
     }
     let reason = match refusal {
-        Refusal::ChecksFailed => arming::first_refusal(checks).unwrap_or_else(|| refusal.reason()),
-        other => other.reason(),
+        Refusal::ChecksFailed => arming::first_refusal(checks).unwrap_or_else(|| refusal.to_string()),
+        other => other.to_string(),
     };
     let ending = match (asked, refusal) {
         (Asked::Abort, _) => Ending::Failed,

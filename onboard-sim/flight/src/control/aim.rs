@@ -105,6 +105,8 @@ pub struct AimLoop {
     /// Angular accelerations that were commanded but have not acted yet, about body y and z, oldest first, rad/s^2.
     under_way_rad_s2: [[f64; 2]; MAX_LATENCY_FRAMES],
     rate_before_rad_s: Option<[f64; 2]>,
+    /// The angular acceleration about body y and z that the model does not explain, rad/s^2: the sum of the effects of
+    /// a crooked nozzle, a centre of gravity off the axis and the air.
     disturbance_rad_s2: [f64; 2],
     /// The wanted nozzle angle, and the side of the play on which the horn is.
     nozzle_rad: [f64; 2],
@@ -133,22 +135,12 @@ impl AimLoop {
     #[must_use]
     pub fn reconfigured(&self, gains: AimGains) -> Self {
         let other = Self::new(gains, self.frame_s);
-        if other.latency_frames == self.latency_frames {
-            Self { gains, ..self.clone() }
-        } else {
-            Self {
-                latency_frames: other.latency_frames,
-                under_way_rad_s2: other.under_way_rad_s2,
-                gains,
-                ..self.clone()
-            }
+        let mut changed = Self { gains, ..self.clone() };
+        if other.latency_frames != self.latency_frames {
+            (changed.latency_frames, changed.under_way_rad_s2) =
+                (other.latency_frames, other.under_way_rad_s2);
         }
-    }
-
-    /// The angular acceleration about body y and z that the model does not explain, rad/s^2: the sum of the effects of
-    /// a crooked nozzle, a centre of gravity off the axis and the air.
-    pub fn disturbance_rad_s2(&self) -> [f64; 2] {
-        self.disturbance_rad_s2
+        changed
     }
 
     /// Gimbal angles (pitch, yaw), rad, for one frame.
@@ -299,7 +291,7 @@ mod tests {
             overshoot = overshoot.max(-turn_to_aim_rad(&attitude, &Vector3::z()).y * -1.0);
         }
         let error = turn_to_aim_rad(&attitude, &Vector3::z()).norm();
-        (error, overshoot, aim_loop.disturbance_rad_s2()[0])
+        (error, overshoot, aim_loop.disturbance_rad_s2[0])
     }
 
     #[test]

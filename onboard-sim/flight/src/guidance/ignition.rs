@@ -32,7 +32,6 @@ pub struct IgnitionSettings {
     /// How long before the expected ignition the landing controller takes over, s.
     pub arm_before_s: f64,
     /// Fixed height at which thrust begins, m, for flights that are timed beforehand.
-    #[serde(default)]
     pub fixed_height_m: Option<f64>,
 }
 

@@ -4,7 +4,6 @@
 //! the gimbal's pivot. The controller's model and the simulated truth use the same data.
 
 use alloc::string::String;
-use core::ops::RangeInclusive;
 use serde::{Deserialize, Serialize};
 
 use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
@@ -41,16 +40,6 @@ pub struct BadValue {
     pub key: &'static str,
     pub found: f64,
     pub required: &'static str,
-}
-
-/// The first value outside its range: key, value, range, and the range in words.
-pub(super) fn within<const N: usize>(
-    values: [(&'static str, f64, RangeInclusive<f64>, &'static str); N],
-) -> Result<(), BadValue> {
-    match values.into_iter().find(|(_, found, range, _)| !range.contains(found)) {
-        Some((key, found, _, required)) => Err(BadValue { key, found, required }),
-        None => Ok(()),
-    }
 }
 
 impl Airframe {

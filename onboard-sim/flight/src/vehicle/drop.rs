@@ -2,8 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::airframe::{BadValue, within};
-
 /// Below this height a hanging vehicle is never armed, m: a motor that is lit there has no room to brake a fall, and
 /// people may stand under it.
 pub const LOWEST_ARMED_M: f64 = 10.0;
@@ -45,23 +43,4 @@ fn rotation_max_deg_s() -> f64 {
 /// A drone that drifts at 2 m/s, and the swing's 0.7 m/s.
 fn speed_max_m_s() -> f64 {
     3.0
-}
-
-impl Drop {
-    /// Checks that every value is inside its range.
-    ///
-    /// # Errors
-    /// [`BadValue`] names the first key with a wrong value.
-    pub fn validate(&self) -> Result<(), BadValue> {
-        within([
-            ("drop.height_m", self.height_m, LOWEST_ARMED_M..=150.0, "10 to 150"),
-            ("drop.drift_m_s", self.drift_m_s, 0.0..=5.0, "0 to 5"),
-            ("drop.rope_m", self.rope_m, 0.05..=10.0, "0.05 to 10"),
-            ("drop.swing_deg", self.swing_deg, 0.0..=30.0, "0 to 30"),
-            ("drop.tilt_max_deg", self.tilt_max_deg, 0.0..=45.0, "0 to 45"),
-            ("drop.rotation_max_deg_s", self.rotation_max_deg_s, 0.0..=360.0, "0 to 360"),
-            ("drop.speed_max_m_s", self.speed_max_m_s, 0.0..=10.0, "0 to 10"),
-            ("drop.release_after_s", self.release_after_s, 0.0..=60.0, "0 to 60"),
-        ])
-    }
 }

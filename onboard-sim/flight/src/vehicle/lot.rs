@@ -9,7 +9,7 @@ use alloc::string::String;
 use serde::{Deserialize, Serialize};
 
 use crate::estimation::motor_estimate::MotorPrior;
-use crate::vehicle::airframe::{BadValue, within};
+use crate::vehicle::airframe::BadValue;
 
 /// The section `[lot]`.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
@@ -21,7 +21,6 @@ pub struct Lot {
     pub burns: u32,
     /// A measured curve, flown instead of the certified one: a built-in motor's name, or the text of a motor file. The scales
     /// are then over this curve.
-    #[serde(default)]
     pub curve: Option<String>,
     /// Impulses of the burns over the curve's.
     #[serde(default)]
@@ -29,28 +28,23 @@ pub struct Lot {
     /// Burn times of the burns over the curve's.
     #[serde(default)]
     pub burn_time: Burnt,
-    #[serde(default)]
     pub temperature: Option<Temperature>,
     #[serde(default)]
     pub weighed: Weighed,
 }
 
-/// What the burns of a lot had, over the curve's value.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
-pub struct Burnt {
-    pub mean: f64,
-    /// Sample standard deviation; 0 of a single burn.
-    #[serde(default)]
-    pub scatter: f64,
-    /// Standard deviation of what every burn may be wrong by in the same direction, such as the load cell's calibration.
-    #[serde(default)]
-    pub common: f64,
-}
-
-impl Default for Burnt {
-    fn default() -> Self {
-        Self { mean: 1.0, scatter: 0.0, common: 0.0 }
+with_defaults! {
+    /// What the burns of a lot had, over the curve's value.
+    #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct Burnt {
+        pub mean: f64 = 1.0,
+        /// Sample standard deviation; 0 of a single burn.
+        #[serde(default)]
+        pub scatter: f64 = 0.0,
+        /// Standard deviation of what every burn may be wrong by in the same direction, such as the load cell's calibration.
+        #[serde(default)]
+        pub common: f64 = 0.0,
     }
 }
 
@@ -69,10 +63,8 @@ pub struct Temperature {
 #[serde(deny_unknown_fields)]
 pub struct Weighed {
     /// The motor before the flight, kg.
-    #[serde(default)]
     pub motor_kg: Option<f64>,
     /// The vehicle with the motor in, kg. It replaces `airframe.mass.loaded_kg`.
-    #[serde(default)]
     pub vehicle_kg: Option<f64>,
 }
 
@@ -196,30 +188,6 @@ impl Lot {
             },
             mass_share: self.weighed.vehicle_kg.map_or(UNWEIGHED_SHARE, |_| WEIGHED_KG / loaded_kg),
         }
-    }
-
-    /// Checks every value.
-    ///
-    /// # Errors
-    /// [`BadValue`] names the first key with a wrong value.
-    pub fn validate(&self) -> Result<(), BadValue> {
-        // The filter of the motor knows scales from 0.7 to 1.3; a motor further off is another motor.
-        let scale = |key, found| (key, found, 0.7..=1.3, "0.7 to 1.3");
-        let share = |key, found| (key, found, 0.0..=0.2, "0 to 0.2");
-        // Kelvin or Fahrenheit are not meant; propellants are sold for -30 to 55 degrees.
-        let celsius = |key, found| (key, found, -40.0..=60.0, "degrees Celsius, -40 to 60");
-        let Temperature { burns_c, pad_c } =
-            self.temperature.unwrap_or(Temperature { burns_c: 0.0, pad_c: 0.0 });
-        within([
-            scale("lot.impulse.mean", self.impulse.mean),
-            scale("lot.burn_time.mean", self.burn_time.mean),
-            share("lot.impulse.scatter", self.impulse.scatter),
-            share("lot.burn_time.scatter", self.burn_time.scatter),
-            share("lot.impulse.common", self.impulse.common),
-            share("lot.burn_time.common", self.burn_time.common),
-            celsius("lot.temperature.burns_c", burns_c),
-            celsius("lot.temperature.pad_c", pad_c),
-        ])
     }
 
     /// Checks the weights against what motor and vehicle are by their data, kg: another one was weighed, or in grams.

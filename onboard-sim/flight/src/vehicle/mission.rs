@@ -126,33 +126,23 @@ pub struct FinalBox {
     pub pitch_rate_deg_s: f64,
 }
 
-/// Limits of the pad checks before arming.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct ArmingLimits {
-    /// Largest tilt from vertical, degrees.
-    pub tilt_max_deg: f64,
-    /// Largest rotation rate that counts as rest, degrees per second.
-    pub rotation_max_deg_s: f64,
-    /// Largest speed that counts as rest, m/s.
-    pub speed_max_m_s: f64,
-    /// Smallest free log space, bytes.
-    pub log_space_min_bytes: u64,
-    /// Lowest voltage of the battery, V. The default is for two lithium-polymer cells: 3.7 V a cell at light load is
-    /// about a seventh of the charge, a quarter of an hour of the simulated vehicle (1 Ah, 0.5 A), and 0.8 V above the 6.6 V
-    /// at which common 5 V regulators give up; six moving servos and an igniter take 0.65 V of that (9.2 A through 70 mohm).
-    pub battery_min_v: f64,
-}
-
-impl Default for ArmingLimits {
-    fn default() -> Self {
-        Self {
-            tilt_max_deg: 5.0,
-            rotation_max_deg_s: 2.0,
-            speed_max_m_s: 0.2,
-            log_space_min_bytes: 64 << 20,
-            battery_min_v: 7.4,
-        }
+with_defaults! {
+    /// Limits of the pad checks before arming.
+    #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
+    #[serde(deny_unknown_fields, default)]
+    pub struct ArmingLimits {
+        /// Largest tilt from vertical, degrees.
+        pub tilt_max_deg: f64 = 5.0,
+        /// Largest rotation rate that counts as rest, degrees per second.
+        pub rotation_max_deg_s: f64 = 2.0,
+        /// Largest speed that counts as rest, m/s.
+        pub speed_max_m_s: f64 = 0.2,
+        /// Smallest free log space, bytes.
+        pub log_space_min_bytes: u64 = 64 << 20,
+        /// Lowest voltage of the battery, V. The default is for two lithium-polymer cells: 3.7 V a cell at light load is
+        /// about a seventh of the charge, a quarter of an hour of the simulated vehicle (1 Ah, 0.5 A), and 0.8 V above the 6.6 V
+        /// at which common 5 V regulators give up; six moving servos and an igniter take 0.65 V of that (9.2 A through 70 mohm).
+        pub battery_min_v: f64 = 7.4,
     }
 }
 
@@ -199,7 +189,6 @@ pub struct Mission {
     pub other_curves: Vec<ThrustCurve>,
     /// What burns of the motor's lot tell. The reader of the mission puts it into the motor's curve and prior, the ignition
     /// and the mass.
-    #[serde(default)]
     pub lot: Option<Box<Lot>>,
     /// What comes of the lot; `None` without one.
     #[serde(skip)]
@@ -232,10 +221,8 @@ pub struct Mission {
     pub settle_s: f64,
     pub start: Start,
     /// The rail and the booster stage, for a start from the pad.
-    #[serde(default)]
     pub launch: Option<Launch>,
     /// The drone, for a start below it.
-    #[serde(default)]
     pub drop: Option<Drop>,
     #[serde(default)]
     pub estimator: EstimatorConfig,

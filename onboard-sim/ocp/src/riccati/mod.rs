@@ -43,21 +43,7 @@ pub(crate) struct Sweep<M: Model<NX, NU>, const NX: usize, const NU: usize> {
     share: f64,
 }
 
-impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Default for Sweep<M, NX, NU> {
-    fn default() -> Self {
-        Self {
-            curvatures: Vec::new(),
-            slopes: Vec::new(),
-            input_terms: Vec::new(),
-            feedbacks: Vec::new(),
-            values: Vec::new(),
-            states: Vec::new(),
-            inputs: Vec::new(),
-            costates: Vec::new(),
-            share: 0.0,
-        }
-    }
-}
+empty!(Sweep { curvatures, slopes, input_terms, feedbacks, values, states, inputs, costates, share });
 
 /// One of the sweeps, in the widest vectors that the machine has.
 struct Wide<'a, M: Model<NX, NU>, const NX: usize, const NU: usize, const SWEEP: u8> {

@@ -11,6 +11,7 @@
 //! * [`wind`]: the mean wind over height, and gusts.
 //! * [`sensors`]: the measurements that the flight computer gets.
 //! * [`balance`]: the centre of pressure of a tail-first fall, which decides whether it is stable.
+//! * `normal`: the random numbers of sensors and gusts.
 //! * [`truth`]: how the true vehicle and the weather of one flight differ from the nominal data, and what can break.
 
 mod aero;
@@ -20,6 +21,7 @@ mod body;
 pub mod ground;
 pub mod hanging;
 mod motor;
+pub(crate) mod normal;
 pub mod sensors;
 mod servo;
 pub mod truth;

@@ -9,102 +9,93 @@ use serde::{Deserialize, Serialize};
 
 use super::whole::WorldError;
 
-/// The true parameters of one flight. [`Truth::default`] is the nominal data in still air.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Truth {
-    /// True impulse over the motor file's.
-    pub impulse_scale: f64,
-    /// True burn time over the motor file's.
-    pub burn_time_scale: f64,
-    /// The motor's curve lies this share of the way from the mission's to the last of its other curves.
-    pub other_curve: f64,
-    /// Time from the ignition command to the first thrust, s.
-    pub ignition_delay_s: f64,
-    /// The motor chuffs: it burns for the first time, goes out for the second, and then burns on, s.
-    pub chuff_s: [f64; 2],
-    /// Time in which the thrust rises to the curve's, s.
-    pub thrust_rise_s: f64,
-    /// Thrust direction with the gimbal at its centre, as gimbal angles (pitch, yaw), rad.
-    pub thrust_misalignment_rad: [f64; 2],
-    /// Offset of the thrust from the axis, along body (y, z), m.
-    pub thrust_offset_m: [f64; 2],
-    /// True mass and inertia over the data's.
-    pub mass_scale: f64,
-    /// True aerodynamic force over the model's.
-    pub drag_scale: f64,
-    /// Offset of the true from the nominal centre of gravity, in body axes (x towards the nose), m.
-    pub cg_offset_m: [f64; 3],
-    /// Mean wind 10 m above the ground, m/s.
-    pub wind_m_s: f64,
-    /// Direction that the wind blows to, from world x towards world y, rad.
-    pub wind_towards_rad: f64,
-    /// Gust intensity over that of the military standard; 0 is none.
-    pub gust_scale: f64,
-    /// Exponent of the mean wind's power law over height.
-    pub wind_exponent: f64,
-    /// Turn of the mean wind's direction with height, from world x towards world y, rad/m.
-    pub wind_veer_rad_m: f64,
-    /// Shape of the thrust curve: the file's thrust is multiplied by `1 + sum over k of a_k cos(k pi s)`, k from 1,
-    /// where `s` is the fraction of the impulse already given. The impulse stays the same: over a whole burn each term's integral is zero.
-    pub thrust_shape: [f64; SHAPE_TERMS],
-    /// Fractions of drag that the exhaust takes away while the motor burns: of the body along its axis, and of the fins.
-    pub plume_body_loss: f64,
-    pub plume_fin_loss: f64,
-    /// Factors on the drag along the body, on the fins and on the drag across the body, each beside `drag_scale`.
-    pub body_drag_scale: f64,
-    pub fin_drag_scale: f64,
-    pub crossflow_scale: f64,
-    /// Drag area of the legs beside the airframe's, m^2.
-    pub leg_drag_m2: f64,
-    /// True moments of inertia over those of the data, beside `mass_scale`.
-    pub inertia_scale: f64,
-    /// Inertia about pitch over that about yaw is one and this, over one less this.
-    pub inertia_split: f64,
-    /// Lean of the principal axis of inertia against the body's axis, about body y and z, rad.
-    pub principal_axis_rad: [f64; 2],
-    /// Turn of the nozzle over the turn of its servo.
-    pub gimbal_gain: f64,
-    /// Play between the gimbal's servos and the nozzle that the data do not know, rad.
-    pub gimbal_slop_rad: f64,
-    /// Misalignment of each fin against its servo, rad.
-    pub fin_offset_rad: [f64; 4],
-    /// Play between the fins' servos and the fins that the data do not know, rad.
-    pub fin_slop_rad: f64,
-    /// Rise of the ground, metre per metre along world x and y; its height at the pad is 0.
-    pub ground_rise: [f64; 2],
+flight::with_defaults! {
+    /// The true parameters of one flight. [`Truth::default`] is the nominal data in still air.
+    #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields, default)]
+    pub struct Truth {
+        /// True impulse over the motor file's.
+        pub impulse_scale: f64 = 1.0,
+        /// True burn time over the motor file's.
+        pub burn_time_scale: f64 = 1.0,
+        /// The motor's curve lies this share of the way from the mission's to the last of its other curves.
+        pub other_curve: f64 = 0.0,
+        /// Time from the ignition command to the first thrust, s.
+        pub ignition_delay_s: f64 = 0.15,
+        /// The motor chuffs: it burns for the first time, goes out for the second, and then burns on, s.
+        pub chuff_s: [f64; 2] = [0.0; 2],
+        /// Time in which the thrust rises to the curve's, s.
+        pub thrust_rise_s: f64 = 0.0,
+        /// Thrust direction with the gimbal at its centre, as gimbal angles (pitch, yaw), rad.
+        pub thrust_misalignment_rad: [f64; 2] = [0.0; 2],
+        /// Offset of the thrust from the axis, along body (y, z), m.
+        pub thrust_offset_m: [f64; 2] = [0.0; 2],
+        /// True mass and inertia over the data's.
+        pub mass_scale: f64 = 1.0,
+        /// True aerodynamic force over the model's.
+        pub drag_scale: f64 = 1.0,
+        /// Offset of the true from the nominal centre of gravity, in body axes (x towards the nose), m.
+        pub cg_offset_m: [f64; 3] = [0.0; 3],
+        /// Mean wind 10 m above the ground, m/s.
+        pub wind_m_s: f64 = 0.0,
+        /// Direction that the wind blows to, from world x towards world y, rad.
+        pub wind_towards_rad: f64 = 0.0,
+        /// Gust intensity over that of the military standard; 0 is none.
+        pub gust_scale: f64 = 1.0,
+        /// Exponent of the mean wind's power law over height.
+        pub wind_exponent: f64 = crate::world::wind::EXPONENT,
+        /// Turn of the mean wind's direction with height, from world x towards world y, rad/m.
+        pub wind_veer_rad_m: f64 = 0.0,
+        /// Shape of the thrust curve: the file's thrust is multiplied by `1 + sum over k of a_k cos(k pi s)`, k from 1,
+        /// where `s` is the fraction of the impulse already given. The impulse stays the same: over a whole burn each term's
+        /// integral is zero.
+        pub thrust_shape: [f64; SHAPE_TERMS] = [0.0; SHAPE_TERMS],
+        /// Fractions of drag that the exhaust takes away while the motor burns: of the body along its axis, and of the fins.
+        pub plume_body_loss: f64 = 0.0,
+        pub plume_fin_loss: f64 = 0.0,
+        /// Factors on the drag along the body, on the fins and on the drag across the body, each beside `drag_scale`.
+        pub body_drag_scale: f64 = 1.0,
+        pub fin_drag_scale: f64 = 1.0,
+        pub crossflow_scale: f64 = 1.0,
+        /// Drag area of the legs beside the airframe's, m^2.
+        pub leg_drag_m2: f64 = 0.0,
+        /// True moments of inertia over those of the data, beside `mass_scale`.
+        pub inertia_scale: f64 = 1.0,
+        /// Inertia about pitch over that about yaw is one and this, over one less this.
+        pub inertia_split: f64 = 0.0,
+        /// Lean of the principal axis of inertia against the body's axis, about body y and z, rad.
+        pub principal_axis_rad: [f64; 2] = [0.0; 2],
+        /// Turn of the nozzle over the turn of its servo.
+        pub gimbal_gain: f64 = 1.0,
+        /// Play between the gimbal's servos and the nozzle that the data do not know, rad.
+        pub gimbal_slop_rad: f64 = 0.0,
+        /// Misalignment of each fin against its servo, rad.
+        pub fin_offset_rad: [f64; 4] = [0.0; 4],
+        /// Play between the fins' servos and the fins that the data do not know, rad.
+        pub fin_slop_rad: f64 = 0.0,
+        /// Rise of the ground, metre per metre along world x and y; its height at the pad is 0.
+        pub ground_rise: [f64; 2] = [0.0; 2],
+    }
 }
 
-/// How the true ascent of one flight differs from its nominal data.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct AscentTruth {
-    /// True impulse of the ascent motor over the motor file's.
-    pub impulse_scale: f64,
-    /// True burn time over the motor file's.
-    pub burn_time_scale: f64,
-    /// Time from the ignition command to the first thrust, s.
-    pub ignition_delay_s: f64,
-    /// Factor on the axial drag of the stack.
-    pub drag_scale: f64,
-    /// Lean of the rail beside its nominal one, about world x and y, rad.
-    pub rail_lean_rad: [f64; 2],
-    /// Cant of the booster's fins, rad.
-    pub fin_cant_rad: f64,
-    /// Rotation rates (pitch, yaw) that the separation gives the vehicle, rad/s.
-    pub tip_off_rad_s: [f64; 2],
-}
-
-impl Default for AscentTruth {
-    fn default() -> Self {
-        Self {
-            impulse_scale: 1.0,
-            burn_time_scale: 1.0,
-            ignition_delay_s: 0.15,
-            drag_scale: 1.0,
-            rail_lean_rad: [0.0; 2],
-            fin_cant_rad: 0.0,
-            tip_off_rad_s: [0.0; 2],
-        }
+flight::with_defaults! {
+    /// How the true ascent of one flight differs from its nominal data.
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    pub struct AscentTruth {
+        /// True impulse of the ascent motor over the motor file's.
+        pub impulse_scale: f64 = 1.0,
+        /// True burn time over the motor file's.
+        pub burn_time_scale: f64 = 1.0,
+        /// Time from the ignition command to the first thrust, s.
+        pub ignition_delay_s: f64 = 0.15,
+        /// Factor on the axial drag of the stack.
+        pub drag_scale: f64 = 1.0,
+        /// Lean of the rail beside its nominal one, about world x and y, rad.
+        pub rail_lean_rad: [f64; 2] = [0.0; 2],
+        /// Cant of the booster's fins, rad.
+        pub fin_cant_rad: f64 = 0.0,
+        /// Rotation rates (pitch, yaw) that the separation gives the vehicle, rad/s.
+        pub tip_off_rad_s: [f64; 2] = [0.0; 2],
     }
 }
 
@@ -139,44 +130,6 @@ impl Truth {
     /// Height of the ground below a place, m.
     pub fn ground_m(&self, x_m: f64, y_m: f64) -> f64 {
         self.ground_rise[0] * x_m + self.ground_rise[1] * y_m
-    }
-}
-
-impl Default for Truth {
-    fn default() -> Self {
-        Self {
-            impulse_scale: 1.0,
-            burn_time_scale: 1.0,
-            other_curve: 0.0,
-            ignition_delay_s: 0.15,
-            chuff_s: [0.0; 2],
-            thrust_rise_s: 0.0,
-            thrust_misalignment_rad: [0.0; 2],
-            thrust_offset_m: [0.0; 2],
-            mass_scale: 1.0,
-            drag_scale: 1.0,
-            cg_offset_m: [0.0; 3],
-            wind_m_s: 0.0,
-            wind_towards_rad: 0.0,
-            gust_scale: 1.0,
-            wind_exponent: crate::world::wind::EXPONENT,
-            wind_veer_rad_m: 0.0,
-            thrust_shape: [0.0; SHAPE_TERMS],
-            plume_body_loss: 0.0,
-            plume_fin_loss: 0.0,
-            body_drag_scale: 1.0,
-            fin_drag_scale: 1.0,
-            crossflow_scale: 1.0,
-            leg_drag_m2: 0.0,
-            inertia_scale: 1.0,
-            inertia_split: 0.0,
-            principal_axis_rad: [0.0; 2],
-            gimbal_gain: 1.0,
-            gimbal_slop_rad: 0.0,
-            fin_offset_rad: [0.0; 4],
-            fin_slop_rad: 0.0,
-            ground_rise: [0.0; 2],
-        }
     }
 }
 

@@ -366,7 +366,17 @@ impl Server {
         let Some(number) = numbers.into_iter().find(is_free) else {
             return request.nak(Refusal::NoSessionsAvailable);
         };
-        self.sessions.push(Session::new(number, client, link, (place, len), now));
+        self.sessions.push(Session {
+            number,
+            client,
+            link,
+            place,
+            len,
+            used_at: now,
+            reads: VecDeque::new(),
+            burst: None,
+            burst_next: false,
+        });
         Packet { session: number, ..request.ack(&len.to_le_bytes()) }
     }
 }
@@ -450,20 +460,6 @@ struct Session {
 }
 
 impl Session {
-    fn new(number: u8, client: Address, link: usize, (place, len): (usize, u32), now: Duration) -> Self {
-        Self {
-            number,
-            client,
-            link,
-            place,
-            len,
-            used_at: now,
-            reads: VecDeque::new(),
-            burst: None,
-            burst_next: false,
-        }
-    }
-
     fn is(&self, client: Address, number: u8) -> bool {
         self.client == client && self.number == number
     }

@@ -395,16 +395,12 @@ pub(super) const BRIEFLY_S: f64 = 0.2;
 /// A radio that has not reported for this long has no say any more, s.
 const RADIO_REPORT_HOLDS_S: f64 = 10.0;
 
-/// What a radio leaves of the budget: less while its buffer is full (RADIO_STATUS).
-#[derive(Debug, Clone, Copy)]
-pub(super) struct RadioShare {
-    share: f64,
-    reported_s: Option<f64>,
-}
-
-impl Default for RadioShare {
-    fn default() -> Self {
-        Self { share: 1.0, reported_s: None }
+flight::with_defaults! {
+    /// What a radio leaves of the budget: less while its buffer is full (RADIO_STATUS).
+    #[derive(Debug, Clone, Copy)]
+    pub(super) struct RadioShare {
+        share: f64 = 1.0,
+        reported_s: Option<f64> = None,
     }
 }
 

@@ -194,15 +194,11 @@ fn acknowledged(asker: Address, kind: u8, result: MavMissionResult) -> MavMessag
 
 // Gives out the vehicle's log (MAVLink FTP), while nobody can be harmed by a thinner telemetry: on the ground, disarmed.
 
-/// The log's files, and what clients have asked for.
-pub(super) struct FileService {
-    server: Server,
-    files: Box<dyn Files + Send>,
-}
-
-impl Default for FileService {
-    fn default() -> Self {
-        Self { server: Server::default(), files: Box::new(NoFiles) }
+flight::with_defaults! {
+    /// The log's files, and what clients have asked for.
+    pub(super) struct FileService {
+        server: Server = Server::default(),
+        files: Box<dyn Files + Send> = Box::new(NoFiles),
     }
 }
 

@@ -124,44 +124,27 @@ struct Refused {
     at_s: f64,
 }
 
-/// All known stations.
-#[derive(Debug, Clone)]
-pub struct Stations {
-    most: usize,
-    known: Vec<Peer>,
-    /// How many there were.
-    numbered: u32,
-    /// The known station that is told next.
-    next: usize,
-    refused: Option<Refused>,
-    refused_count: u16,
-    commander: Option<(Station, Option<Operator>)>,
-    tell_at_s: f64,
-}
-
-impl Default for Stations {
-    fn default() -> Self {
-        Self::at_most(MAX_STATIONS)
+flight::with_defaults! {
+    /// All known stations.
+    #[derive(Debug, Clone)]
+    pub struct Stations {
+        most: usize = MAX_STATIONS,
+        known: Vec<Peer> = Vec::new(),
+        /// How many there were.
+        numbered: u32 = 0,
+        /// The known station that is told next.
+        next: usize = 0,
+        refused: Option<Refused> = None,
+        refused_count: u16 = 0,
+        commander: Option<(Station, Option<Operator>)> = None,
+        tell_at_s: f64 = 0.0,
     }
 }
 
 impl Stations {
     /// No stations yet, of a vehicle with operators.
     pub fn of_a_crew() -> Self {
-        Self::at_most(MAX_STATIONS_OF_A_CREW)
-    }
-
-    fn at_most(most: usize) -> Self {
-        Self {
-            most,
-            known: Vec::new(),
-            numbered: 0,
-            next: 0,
-            refused: None,
-            refused_count: 0,
-            commander: None,
-            tell_at_s: 0.0,
-        }
+        Self { most: MAX_STATIONS_OF_A_CREW, ..Self::default() }
     }
 
     /// Notes an accepted frame.

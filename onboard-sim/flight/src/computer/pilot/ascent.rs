@@ -64,48 +64,29 @@ pub(super) struct AscentReadings {
     pub(super) burn_time_s: f64,
 }
 
-/// The watch's memory.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub(crate) struct AscentWatch {
-    /// Speed that it was pushed to on its rail, m/s; zero while nothing pushes.
-    pub(crate) gained_m_s: f64,
-    lifted_off: bool,
-    lifted_off_at_s: f64,
-    /// More than the accelerometer says that it has lifted off.
-    confirmed: bool,
-    /// What was felt was no lift-off: the accelerometer is not believed alone any more.
-    denied: bool,
-    braking_s: f64,
-    separating_since_s: Option<f64>,
-    parted: bool,
-    falling_frames: u32,
-    highest_m: f64,
-    sunk_s: f64,
-    /// The estimate's largest speed since the pressure shows a fall, m/s.
-    sunk_from_m_s: f64,
-    /// The first pressure altitude.
-    ground_m: Option<f64>,
-    risen_s: f64,
-}
-
-impl Default for AscentWatch {
-    fn default() -> Self {
-        Self {
-            gained_m_s: 0.0,
-            lifted_off: false,
-            lifted_off_at_s: 0.0,
-            confirmed: false,
-            denied: false,
-            braking_s: 0.0,
-            separating_since_s: None,
-            parted: false,
-            falling_frames: 0,
-            highest_m: f64::NEG_INFINITY,
-            sunk_s: 0.0,
-            sunk_from_m_s: 0.0,
-            ground_m: None,
-            risen_s: 0.0,
-        }
+with_defaults! {
+    /// The watch's memory.
+    #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+    pub(crate) struct AscentWatch {
+        /// Speed that it was pushed to on its rail, m/s; zero while nothing pushes.
+        pub(crate) gained_m_s: f64 = 0.0,
+        lifted_off: bool = false,
+        lifted_off_at_s: f64 = 0.0,
+        /// More than the accelerometer says that it has lifted off.
+        confirmed: bool = false,
+        /// What was felt was no lift-off: the accelerometer is not believed alone any more.
+        denied: bool = false,
+        braking_s: f64 = 0.0,
+        separating_since_s: Option<f64> = None,
+        parted: bool = false,
+        falling_frames: u32 = 0,
+        highest_m: f64 = f64::NEG_INFINITY,
+        sunk_s: f64 = 0.0,
+        /// The estimate's largest speed since the pressure shows a fall, m/s.
+        sunk_from_m_s: f64 = 0.0,
+        /// The first pressure altitude.
+        ground_m: Option<f64> = None,
+        risen_s: f64 = 0.0,
     }
 }
 

@@ -107,14 +107,8 @@ impl Pilot {
         let mass = self.model.mass_now(burning_s);
         let height_m = self.estimate.map_or(0.0, |estimate| estimate.state.position_m.z);
         let air = Air::at_height_m(self.model.mission.pad_altitude_m + height_m);
-        let vehicle = VehicleNow::of(
-            self.model.airframe(),
-            &mass,
-            air.density_kg_m3,
-            input.fins_rad,
-            burning_s.is_some() || phase.in_landing_burn(),
-            self.model.mission.lidar_ahead_of_feet_m,
-        );
+        let burns = burning_s.is_some() || phase.in_landing_burn();
+        let vehicle = self.model.now(&mass, air.density_kg_m3, input.fins_rad, burns);
         let (measurements, vehicle) = if phase.before_apogee() {
             on_the_way_up(&measurements, &vehicle, phase)
         } else {
@@ -157,14 +151,8 @@ impl Pilot {
     /// The certified force of the air, body axes, N, and the mass, kg.
     fn air_force_n(&self, phase: Phase, input: &KeptInput, estimate: &Estimate) -> (Vector3<f64>, f64) {
         let mass = self.model.mass_now(self.model.burning_s(input.time_s));
-        let vehicle = VehicleNow::of(
-            self.model.airframe(),
-            &mass,
-            self.model.density_kg_m3(estimate),
-            input.fins_rad,
-            phase.in_landing_burn(),
-            self.model.mission.lidar_ahead_of_feet_m,
-        );
+        let density_kg_m3 = self.model.density_kg_m3(estimate);
+        let vehicle = self.model.now(&mass, density_kg_m3, input.fins_rad, phase.in_landing_burn());
         let burns = self.model.motor.stage() == MotorStage::Burning;
         let vehicle = if burns { vehicle.in_exhaust(&self.model.mission.exhaust) } else { vehicle };
         let through_air_m_s =

@@ -6,7 +6,7 @@ use alloc::sync::Arc;
 use nalgebra::{Vector2, Vector3};
 use serde::Serialize;
 
-use crate::estimation::estimator::Estimate;
+use crate::estimation::estimator::{Estimate, VehicleNow};
 use crate::estimation::motor_estimate::{MotorEstimate, MotorSample};
 use crate::estimation::other_curves::OtherCurves;
 use crate::guidance::powered::{PoweredGuidance, PoweredSituation, Search};
@@ -54,6 +54,18 @@ impl VehicleModel {
     /// Of the air at the estimated height, kg/m3.
     pub(super) fn density_kg_m3(&self, estimate: &Estimate) -> f64 {
         Air::at_height_m(self.mission.pad_altitude_m + estimate.state.position_m.z).density_kg_m3
+    }
+
+    /// The vehicle as the estimator takes it, at this mass, air density and fin openings, rad, and with its motor burning or not.
+    pub(super) fn now(
+        &self,
+        mass: &MassProperties,
+        density_kg_m3: f64,
+        fins_rad: [f64; 4],
+        burns: bool,
+    ) -> VehicleNow {
+        let ahead_m = self.mission.lidar_ahead_of_feet_m;
+        VehicleNow::of(self.airframe(), mass, density_kg_m3, fins_rad, burns, ahead_m)
     }
 
     /// The motor's curve: the expected one, or another that its burn has turned out to have.

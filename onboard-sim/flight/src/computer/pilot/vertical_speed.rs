@@ -33,39 +33,24 @@ pub(super) struct SpeedReadings {
     pub(super) estimated_m_s: f64,
 }
 
-/// The three speeds, up, m/s.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub(super) struct VerticalSpeeds {
-    /// It begins with the estimate.
-    felt_m_s: Option<f64>,
-    gnss_m_s: f64,
-    gnss_at_s: f64,
-    /// The last pressure altitude.
-    altitude_m: f64,
-    same_samples: u32,
-    /// Where and when the present window of [`RATE_OVER_S`] began, m and s.
-    mark_m: f64,
-    marked_at_s: f64,
-    /// What the last one gave, m/s, and when, s.
-    pressure_m_s: f64,
-    pressure_at_s: f64,
-    contradicted_s: f64,
-}
-
-impl Default for VerticalSpeeds {
-    fn default() -> Self {
-        Self {
-            felt_m_s: None,
-            gnss_m_s: 0.0,
-            gnss_at_s: f64::NEG_INFINITY,
-            altitude_m: f64::INFINITY,
-            same_samples: 0,
-            mark_m: 0.0,
-            marked_at_s: f64::NEG_INFINITY,
-            pressure_m_s: 0.0,
-            pressure_at_s: f64::NEG_INFINITY,
-            contradicted_s: 0.0,
-        }
+with_defaults! {
+    /// The three speeds, up, m/s.
+    #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+    pub(super) struct VerticalSpeeds {
+        /// It begins with the estimate.
+        felt_m_s: Option<f64> = None,
+        gnss_m_s: f64 = 0.0,
+        gnss_at_s: f64 = f64::NEG_INFINITY,
+        /// The last pressure altitude.
+        altitude_m: f64 = f64::INFINITY,
+        same_samples: u32 = 0,
+        /// Where and when the present window of [`RATE_OVER_S`] began, m and s.
+        mark_m: f64 = 0.0,
+        marked_at_s: f64 = f64::NEG_INFINITY,
+        /// What the last one gave, m/s, and when, s.
+        pressure_m_s: f64 = 0.0,
+        pressure_at_s: f64 = f64::NEG_INFINITY,
+        contradicted_s: f64 = 0.0,
     }
 }
 

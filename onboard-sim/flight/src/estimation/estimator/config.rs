@@ -9,134 +9,94 @@ use crate::vehicle::mission::StartPoint;
 /// Standard gravity, m/s^2.
 pub const GRAVITY_M_S2: f64 = crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 
-/// Noise of the sensors and other assumptions of the filter. Each value is a standard deviation unless its name says
-/// otherwise.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct EstimatorConfig {
-    /// Length of one frame, s.
-    pub frame_s: f64,
-    pub gravity_m_s2: f64,
-    /// Gyro noise density, deg/s/sqrt(Hz).
-    pub gyro_noise_deg_s_sqrt_hz: f64,
-    /// Wander of the gyro bias, deg/s in one second.
-    pub gyro_bias_walk_deg_s_sqrt_s: f64,
-    /// Accelerometer noise density, mg/sqrt(Hz).
-    pub accelerometer_noise_mg_sqrt_hz: f64,
-    /// Noise density that the motor's vibration adds to the gyro, deg/s/sqrt(Hz).
-    pub burning_gyro_deg_s_sqrt_hz: f64,
-    /// How far the motor's vibration may shift the gyro's bias when it lights, each axis, deg/s.
-    pub burning_gyro_bias_deg_s: f64,
-    /// Noise density that the motor's vibration adds to the accelerometer, mg/sqrt(Hz).
-    pub burning_accelerometer_mg_sqrt_hz: f64,
-    /// Wander of the accelerometer bias, mg in one second. It covers the scale error while the thrust changes.
-    pub accelerometer_bias_walk_mg_sqrt_s: f64,
-    /// Barometer noise of one sample, m.
-    pub barometer_m: f64,
-    /// Age of a barometer sample, the same for all of a flight, s; 0 takes samples for new.
-    pub barometer_late_s: f64,
-    /// Wander of the barometer's offset, m in one second.
-    pub barometer_offset_walk_m_sqrt_s: f64,
-    /// Wander of the ram coefficient, in one second.
-    pub barometer_ram_walk_sqrt_s: f64,
-    /// Suction of the flow across the axis, divided by its dynamic pressure; 0 rules it out. A port on a cylinder feels
-    /// +1 to -1.1 of it, by its place; the mean over a ring of ports is about -0.5 (Hoerner, "Fluid-Dynamic Drag", 1965).
-    pub barometer_suction: f64,
-    /// White noise of a satellite position, horizontal, m.
-    pub gnss_horizontal_m: f64,
-    /// White noise of a satellite position, vertical, m.
-    pub gnss_vertical_m: f64,
-    /// Noise of a satellite velocity, m/s.
-    pub gnss_velocity_m_s: f64,
-    /// Error of the satellite fixes' time tags, the same for all of a flight, s; 0 trusts the tags.
-    pub gnss_time_tag_s: f64,
-    /// Error of each time tag beside that, s; 0 rules it out. This is what the filter believes before the flight: from then
-    /// on the fixes show it.
-    pub gnss_age_jitter_s: f64,
-    /// Wander of the satellite position's offset, horizontal, m in one second.
-    pub gnss_horizontal_walk_m_sqrt_s: f64,
-    /// Wander of the satellite position's offset, vertical, m in one second.
-    pub gnss_vertical_walk_m_sqrt_s: f64,
-    /// Lidar noise of one sample, m.
-    pub lidar_m: f64,
-    /// Age of a lidar sample, the same for all of a flight, s.
-    pub lidar_late_s: f64,
-    /// Slope of the ground about the pad, degrees; 0 takes it as level.
-    pub ground_slope_deg: f64,
-    /// Misalignment of the inertial unit in the vehicle, about each axis, degrees. No sensor shows it: it is added to the
-    /// uncertainty of the attitude.
-    pub mounting_deg: f64,
-    /// Wander of the wind at the vehicle, m/s in one second, from gusts and from the layers that it falls through.
-    pub wind_walk_m_s_sqrt_s: f64,
-    /// Exponent of the wind's power law over height; the estimated wind decreases with it.
-    pub wind_shear_exponent: f64,
-    /// Uncertainty of the sideways aerodynamic force, as a fraction of it.
-    pub sideways_force_share: f64,
-    /// How often the sideways force is linearised for one correction of the wind. Once is enough where the fins feel most of
-    /// the wind; a body without large fins, which feels the square of it, needs about five.
-    pub wind_passes: u32,
-    /// A measurement that differs from its prediction by more than this many standard deviations is rejected.
-    pub gate_sigmas: f64,
-    /// Beyond these limits the estimate is unhealthy.
-    pub health: HealthLimits,
-}
-
-/// Largest standard deviations of a healthy estimate.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct HealthLimits {
-    /// Vertical velocity, m/s.
-    pub velocity_m_s: f64,
-    /// Horizontal velocity, either axis, m/s: legs that crush stand on at 2 m/s.
-    pub lateral_m_s: f64,
-    pub height_m: f64,
-    /// Horizontal position, either axis, m.
-    pub horizontal_m: f64,
-    /// Tilt, either axis, degrees.
-    pub tilt_deg: f64,
-}
-
-impl Default for EstimatorConfig {
-    fn default() -> Self {
-        Self {
-            frame_s: 0.005,
-            gravity_m_s2: GRAVITY_M_S2,
-            gyro_noise_deg_s_sqrt_hz: 0.05,
-            gyro_bias_walk_deg_s_sqrt_s: 0.002,
-            accelerometer_noise_mg_sqrt_hz: 0.65,
-            burning_gyro_deg_s_sqrt_hz: 0.0,
-            burning_gyro_bias_deg_s: 0.0,
-            burning_accelerometer_mg_sqrt_hz: 0.0,
-            accelerometer_bias_walk_mg_sqrt_s: 0.4,
-            barometer_m: 0.08,
-            barometer_late_s: 0.0,
-            barometer_offset_walk_m_sqrt_s: 0.03,
-            barometer_ram_walk_sqrt_s: 0.001,
-            barometer_suction: 0.0,
-            gnss_horizontal_m: 0.2,
-            gnss_vertical_m: 0.3,
-            gnss_velocity_m_s: 0.05,
-            gnss_time_tag_s: 0.0,
-            gnss_age_jitter_s: 0.0,
-            gnss_horizontal_walk_m_sqrt_s: 0.15,
-            gnss_vertical_walk_m_sqrt_s: 0.25,
-            lidar_m: 0.06,
-            lidar_late_s: 0.0,
-            ground_slope_deg: 0.0,
-            mounting_deg: 0.0,
-            wind_walk_m_s_sqrt_s: 0.5,
-            wind_shear_exponent: 1.0 / 7.0,
-            sideways_force_share: 0.1,
-            wind_passes: 1,
-            gate_sigmas: 5.0,
-            health: HealthLimits::default(),
-        }
+with_defaults! {
+    /// Noise of the sensors and other assumptions of the filter. Each value is a standard deviation unless its name says
+    /// otherwise.
+    #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
+    #[serde(deny_unknown_fields, default)]
+    pub struct EstimatorConfig {
+        /// Length of one frame, s.
+        pub frame_s: f64 = 0.005,
+        pub gravity_m_s2: f64 = GRAVITY_M_S2,
+        /// Gyro noise density, deg/s/sqrt(Hz).
+        pub gyro_noise_deg_s_sqrt_hz: f64 = 0.05,
+        /// Wander of the gyro bias, deg/s in one second.
+        pub gyro_bias_walk_deg_s_sqrt_s: f64 = 0.002,
+        /// Accelerometer noise density, mg/sqrt(Hz).
+        pub accelerometer_noise_mg_sqrt_hz: f64 = 0.65,
+        /// Noise density that the motor's vibration adds to the gyro, deg/s/sqrt(Hz).
+        pub burning_gyro_deg_s_sqrt_hz: f64 = 0.0,
+        /// How far the motor's vibration may shift the gyro's bias when it lights, each axis, deg/s.
+        pub burning_gyro_bias_deg_s: f64 = 0.0,
+        /// Noise density that the motor's vibration adds to the accelerometer, mg/sqrt(Hz).
+        pub burning_accelerometer_mg_sqrt_hz: f64 = 0.0,
+        /// Wander of the accelerometer bias, mg in one second. It covers the scale error while the thrust changes.
+        pub accelerometer_bias_walk_mg_sqrt_s: f64 = 0.4,
+        /// Barometer noise of one sample, m.
+        pub barometer_m: f64 = 0.08,
+        /// Age of a barometer sample, the same for all of a flight, s; 0 takes samples for new.
+        pub barometer_late_s: f64 = 0.0,
+        /// Wander of the barometer's offset, m in one second.
+        pub barometer_offset_walk_m_sqrt_s: f64 = 0.03,
+        /// Wander of the ram coefficient, in one second.
+        pub barometer_ram_walk_sqrt_s: f64 = 0.001,
+        /// Suction of the flow across the axis, divided by its dynamic pressure; 0 rules it out. A port on a cylinder feels
+        /// +1 to -1.1 of it, by its place; the mean over a ring of ports is about -0.5 (Hoerner, "Fluid-Dynamic Drag", 1965).
+        pub barometer_suction: f64 = 0.0,
+        /// White noise of a satellite position, horizontal, m.
+        pub gnss_horizontal_m: f64 = 0.2,
+        /// White noise of a satellite position, vertical, m.
+        pub gnss_vertical_m: f64 = 0.3,
+        /// Noise of a satellite velocity, m/s.
+        pub gnss_velocity_m_s: f64 = 0.05,
+        /// Error of the satellite fixes' time tags, the same for all of a flight, s; 0 trusts the tags.
+        pub gnss_time_tag_s: f64 = 0.0,
+        /// Error of each time tag beside that, s; 0 rules it out. This is what the filter believes before the flight: from then
+        /// on the fixes show it.
+        pub gnss_age_jitter_s: f64 = 0.0,
+        /// Wander of the satellite position's offset, horizontal, m in one second.
+        pub gnss_horizontal_walk_m_sqrt_s: f64 = 0.15,
+        /// Wander of the satellite position's offset, vertical, m in one second.
+        pub gnss_vertical_walk_m_sqrt_s: f64 = 0.25,
+        /// Lidar noise of one sample, m.
+        pub lidar_m: f64 = 0.06,
+        /// Age of a lidar sample, the same for all of a flight, s.
+        pub lidar_late_s: f64 = 0.0,
+        /// Slope of the ground about the pad, degrees; 0 takes it as level.
+        pub ground_slope_deg: f64 = 0.0,
+        /// Misalignment of the inertial unit in the vehicle, about each axis, degrees. No sensor shows it: it is added to the
+        /// uncertainty of the attitude.
+        pub mounting_deg: f64 = 0.0,
+        /// Wander of the wind at the vehicle, m/s in one second, from gusts and from the layers that it falls through.
+        pub wind_walk_m_s_sqrt_s: f64 = 0.5,
+        /// Exponent of the wind's power law over height; the estimated wind decreases with it.
+        pub wind_shear_exponent: f64 = 1.0 / 7.0,
+        /// Uncertainty of the sideways aerodynamic force, as a fraction of it.
+        pub sideways_force_share: f64 = 0.1,
+        /// How often the sideways force is linearised for one correction of the wind. Once is enough where the fins feel most of
+        /// the wind; a body without large fins, which feels the square of it, needs about five.
+        pub wind_passes: u32 = 1,
+        /// A measurement that differs from its prediction by more than this many standard deviations is rejected.
+        pub gate_sigmas: f64 = 5.0,
+        /// Beyond these limits the estimate is unhealthy.
+        pub health: HealthLimits = HealthLimits::default(),
     }
 }
 
-impl Default for HealthLimits {
-    fn default() -> Self {
-        Self { velocity_m_s: 0.5, lateral_m_s: 1.2, height_m: 2.5, horizontal_m: 10.0, tilt_deg: 3.0 }
+with_defaults! {
+    /// Largest standard deviations of a healthy estimate.
+    #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
+    #[serde(deny_unknown_fields, default)]
+    pub struct HealthLimits {
+        /// Vertical velocity, m/s.
+        pub velocity_m_s: f64 = 0.5,
+        /// Horizontal velocity, either axis, m/s: legs that crush stand on at 2 m/s.
+        pub lateral_m_s: f64 = 1.2,
+        pub height_m: f64 = 2.5,
+        /// Horizontal position, either axis, m.
+        pub horizontal_m: f64 = 10.0,
+        /// Tilt, either axis, degrees.
+        pub tilt_deg: f64 = 3.0,
     }
 }
 
@@ -176,14 +136,10 @@ impl StartUncertainty {
             height_m: 0.02,
             velocity_m_s: 0.01,
             tilt_deg: 0.2,
-            heading_deg: 2.0,
-            gyro_bias_deg_s: 0.02,
-            accelerometer_bias_mg: 3.0,
-            wind_m_s: 4.0,
             barometer_offset_m: 0.1,
-            barometer_ram: 0.05,
             gnss_horizontal_offset_m: 0.1,
             gnss_vertical_offset_m: 0.1,
+            ..Self::at_apogee()
         }
     }
 

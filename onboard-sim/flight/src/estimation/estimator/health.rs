@@ -55,14 +55,8 @@ impl fmt::Display for Health {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Good => out.write_str("good"),
-            Self::Doubtful(doubt) => doubt.fmt(out),
+            Self::Doubtful(doubt) => out.write_str(doubt.name()),
         }
-    }
-}
-
-impl fmt::Display for Doubt {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        out.write_str(self.name())
     }
 }
 
@@ -89,12 +83,14 @@ pub(super) fn judge(
     doubt.map_or(Health::Good, Health::Doubtful)
 }
 
-/// Whether satellite velocities still fit on average. Each of them may pass its gate although together they differ too
-/// much from their predictions: the test of the normalised innovation squared over time (Y. Bar-Shalom, X. R. Li and T. Kirubarajan,
-/// Estimation with Applications to Tracking and Navigation, 2001, section 5.4), with a memory that fades.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub(super) struct Surprise {
-    mean: f64,
+with_defaults! {
+    /// Whether satellite velocities still fit on average. Each of them may pass its gate although together they differ too
+    /// much from their predictions: the test of the normalised innovation squared over time (Y. Bar-Shalom, X. R. Li and
+    /// T. Kirubarajan, Estimation with Applications to Tracking and Navigation, 2001, section 5.4), with a memory that fades.
+    #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+    pub(super) struct Surprise {
+        mean: f64 = 1.0,
+    }
 }
 
 /// Weight of the newest value in the running mean of the normalised innovation squared: the mean remembers three
@@ -102,12 +98,6 @@ pub(super) struct Surprise {
 const NEWEST: f64 = 0.1;
 /// In a consistent filter a mean this large has a probability below 1e-6 per fix (the expected mean is 1).
 const TOO_MUCH: f64 = 5.0;
-
-impl Default for Surprise {
-    fn default() -> Self {
-        Self { mean: 1.0 }
-    }
-}
 
 impl Surprise {
     /// Takes one normalised innovation squared. Returns true when the filter must increase its uncertainty; the mean

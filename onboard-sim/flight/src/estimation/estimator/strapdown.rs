@@ -19,7 +19,7 @@ const FRAMES_BETWEEN: u32 = 2;
 const LOWEST_SHEAR_M: f64 = 2.0;
 
 /// The estimated state; its error is in the filter.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub(super) struct Nominal {
     pub(super) position_m: Vector3<f64>,
     pub(super) velocity_m_s: Vector3<f64>,
@@ -44,17 +44,7 @@ impl Nominal {
             position_m: state.position_m,
             velocity_m_s: state.velocity_m_s,
             world_from_body: state.world_from_body,
-            gyro_bias_rad_s: Vector3::zeros(),
-            accelerometer_bias_m_s2: Vector3::zeros(),
-            wind_m_s: Vector2::zeros(),
-            barometer_offset_m: 0.0,
-            barometer_ram: 0.0,
-            gnss_offset_m: Vector3::zeros(),
-            gnss_time_tag_s: 0.0,
-            barometer_late_s: 0.0,
-            lidar_late_s: 0.0,
-            slope: Vector2::zeros(),
-            barometer_suction: 0.0,
+            ..Self::default()
         }
     }
 
@@ -138,25 +128,15 @@ impl Noise {
     }
 }
 
-/// The motion over the frames that the covariance does not contain yet.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub(super) struct Pending {
-    frames: u32,
-    felt_m_s: Vector3<f64>,
-    world_from_body_s: Matrix3<f64>,
-    wind_factor: f64,
-    burning: bool,
-}
-
-impl Default for Pending {
-    fn default() -> Self {
-        Self {
-            frames: 0,
-            felt_m_s: Vector3::zeros(),
-            world_from_body_s: Matrix3::zeros(),
-            wind_factor: 1.0,
-            burning: false,
-        }
+with_defaults! {
+    /// The motion over the frames that the covariance does not contain yet.
+    #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+    pub(super) struct Pending {
+        frames: u32 = 0,
+        felt_m_s: Vector3<f64> = Vector3::zeros(),
+        world_from_body_s: Matrix3<f64> = Matrix3::zeros(),
+        wind_factor: f64 = 1.0,
+        burning: bool = false,
     }
 }
 

@@ -36,44 +36,30 @@ pub struct MotorSample {
     pub may_burn: bool,
 }
 
-/// The prior of the motor before ignition, and the noise, as standard deviations.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct MotorPrior {
-    /// Length of a frame, s.
-    pub frame_s: f64,
-    /// Impulse scale. It includes the mass error, because the accelerometer cannot tell the two apart.
-    pub impulse_sigma: f64,
-    /// Burn-time stretch.
-    pub burn_time_sigma: f64,
-    /// Scale of the air force.
-    pub air_sigma: f64,
-    /// Accelerometer noise of one frame, m/s^2.
-    pub accelerometer_m_s2: f64,
-    /// Roughness of the burn around its curve, as a fraction of the thrust.
-    pub roughness_share: f64,
-    /// Deviation of the thrust from the certified shape, as a fraction of the thrust; 0 trusts the shape.
-    pub shape_sigma: f64,
-    /// Correlation time of that deviation, s.
-    pub shape_lasts_s: f64,
-    /// What the exhaust may change of the air force beyond what is assumed, as a fraction of the air force.
-    pub exhaust_sigma: f64,
-}
-
-impl Default for MotorPrior {
-    /// The scatter of certified motors, 1 % of mass, and a hobby accelerometer at 200 Hz.
-    fn default() -> Self {
-        Self {
-            frame_s: 0.005,
-            impulse_sigma: 0.027,
-            burn_time_sigma: 0.04,
-            air_sigma: 0.1,
-            accelerometer_m_s2: 0.09,
-            roughness_share: 0.02,
-            shape_sigma: 0.0,
-            shape_lasts_s: 1.0,
-            exhaust_sigma: 0.0,
-        }
+with_defaults! {
+    /// The prior of the motor before ignition, and the noise, as standard deviations. The defaults are the scatter of certified
+    /// motors, 1 % of mass, and a hobby accelerometer at 200 Hz.
+    #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
+    #[serde(deny_unknown_fields, default)]
+    pub struct MotorPrior {
+        /// Length of a frame, s.
+        pub frame_s: f64 = 0.005,
+        /// Impulse scale. It includes the mass error, because the accelerometer cannot tell the two apart.
+        pub impulse_sigma: f64 = 0.027,
+        /// Burn-time stretch.
+        pub burn_time_sigma: f64 = 0.04,
+        /// Scale of the air force.
+        pub air_sigma: f64 = 0.1,
+        /// Accelerometer noise of one frame, m/s^2.
+        pub accelerometer_m_s2: f64 = 0.09,
+        /// Roughness of the burn around its curve, as a fraction of the thrust.
+        pub roughness_share: f64 = 0.02,
+        /// Deviation of the thrust from the certified shape, as a fraction of the thrust; 0 trusts the shape.
+        pub shape_sigma: f64 = 0.0,
+        /// Correlation time of that deviation, s.
+        pub shape_lasts_s: f64 = 1.0,
+        /// What the exhaust may change of the air force beyond what is assumed, as a fraction of the air force.
+        pub exhaust_sigma: f64 = 0.0,
     }
 }
 

@@ -116,7 +116,6 @@ pub struct PoweredSettings {
     /// Largest number of passes of the solver over an interval in a tick, over all its guesses and final times
     /// (`ocp::Workspace::allow`): the best plan until then stands, and the next tick goes on from it. Without it there is
     /// no bound.
-    #[serde(default)]
     pub max_passes: Option<usize>,
     /// Largest miss of a plan's end (m, rad, m/s or rad/s) that still counts as a landing.
     pub landing_miss: f64,

@@ -1,10 +1,5 @@
 //! The events of a flight, their effects, and the reasons for a refusal.
 
-use alloc::borrow::ToOwned as _;
-
-use alloc::format;
-use alloc::string::String;
-
 use super::{HoldCause, LAST_HOLD_S, Phase, StartPoint};
 
 /// Something that happened or was asked for.
@@ -165,10 +160,11 @@ impl Effects {
     }
 }
 
-/// Why an event changed nothing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// Why an event changed nothing, in words for an operator.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Refusal {
     /// The event belongs to other phases.
+    #[error("cannot {action} in {}: {only}", phase.name())]
     WrongPhase {
         /// The requested action, as a verb.
         action: &'static str,
@@ -177,67 +173,54 @@ pub enum Refusal {
         /// Where the action would be accepted.
         only: &'static str,
     },
+    #[error("an abort is latched: restart the vehicle to clear it")]
     AbortLatched,
+    #[error("the pin is in: pull it before arming")]
     PinIn,
     /// An arming check failed.
+    #[error("an arming check failed")]
     ChecksFailed,
+    #[error("not armed")]
     NotArmed,
+    #[error("the landing motor is inhibited")]
     LandingMotorInhibited,
     /// A countdown is already running.
+    #[error("a countdown is running: disarm to cancel it")]
     CountdownRunning,
     /// There is no countdown to hold.
+    #[error("no countdown is running")]
     NoCountdown,
     /// The countdown is already held.
+    #[error("already held")]
     AlreadyHeld,
     /// The release is too near for a hold.
+    #[error("the last {LAST_HOLD_S} s have begun, and nothing holds any more: abort to stop it")]
     TooLateToHold,
     /// No hold has reached its time limit.
+    #[error("no hold has lasted its time")]
     HoldNotOver,
     /// The countdown has not ended, or was never started.
+    #[error("the countdown has not ended")]
     CountdownNotElapsed,
     /// The countdown's length is not a number of seconds.
+    #[error("the countdown must be a number of seconds, 0 or more")]
     BadCountdown,
     /// The abort is already latched.
+    #[error("already aborted")]
     AlreadyAborted,
     /// Contact with thrust above the weight: the vehicle will not stay down yet.
+    #[error("contact with thrust above weight: not down yet")]
     ThrustAboveWeight,
     /// The landing motor was not lit, and its pin is out.
+    #[error("the landing motor is live: put the pin in")]
     MotorLive,
     /// The landing motor burns.
+    #[error("the landing motor burns")]
     MotorBurning,
     /// The landing motor has burnt out and is still hot.
+    #[error("the landing motor is hot")]
     MotorHot,
     /// The landing motor did not light, and may still light late.
+    #[error("the landing motor may still light late")]
     MisfireWait,
-}
-
-impl Refusal {
-    /// The reason in words for an operator.
-    pub fn reason(&self) -> String {
-        match self {
-            Self::WrongPhase { action, phase, only } => {
-                format!("cannot {action} in {}: {only}", phase.name())
-            }
-            Self::AbortLatched => "an abort is latched: restart the vehicle to clear it".to_owned(),
-            Self::PinIn => "the pin is in: pull it before arming".to_owned(),
-            Self::ChecksFailed => "an arming check failed".to_owned(),
-            Self::NotArmed => "not armed".to_owned(),
-            Self::LandingMotorInhibited => "the landing motor is inhibited".to_owned(),
-            Self::CountdownRunning => "a countdown is running: disarm to cancel it".to_owned(),
-            Self::NoCountdown => "no countdown is running".to_owned(),
-            Self::AlreadyHeld => "already held".to_owned(),
-            Self::TooLateToHold => {
-                format!("the last {LAST_HOLD_S} s have begun, and nothing holds any more: abort to stop it")
-            }
-            Self::HoldNotOver => "no hold has lasted its time".to_owned(),
-            Self::CountdownNotElapsed => "the countdown has not ended".to_owned(),
-            Self::BadCountdown => "the countdown must be a number of seconds, 0 or more".to_owned(),
-            Self::AlreadyAborted => "already aborted".to_owned(),
-            Self::ThrustAboveWeight => "contact with thrust above weight: not down yet".to_owned(),
-            Self::MotorLive => "the landing motor is live: put the pin in".to_owned(),
-            Self::MotorBurning => "the landing motor burns".to_owned(),
-            Self::MotorHot => "the landing motor is hot".to_owned(),
-            Self::MisfireWait => "the landing motor may still light late".to_owned(),
-        }
-    }
 }

@@ -7,7 +7,8 @@ use alloc::string::{String, ToString as _};
 use toml::Value;
 
 use crate::vehicle::airframe::BadValue as BadAirframe;
-use crate::vehicle::lot::Lot;
+use crate::vehicle::drop::LOWEST_ARMED_M;
+use crate::vehicle::launch::Launch;
 use crate::vehicle::mission::Mission;
 
 /// A value outside its range.
@@ -37,7 +38,32 @@ const LEAST: f64 = f64::MIN_POSITIVE;
 const RIGHT: f64 = 89.999_999;
 
 #[rustfmt::skip]
-const RANGES: [Range; 19] = [
+const RANGES: [Range; 40] = [
+    ("0.5 to 10", 0.5, 10.0, &["launch.rail.length_m"]),
+    // NAR Model Rocket Safety Code, rule 5: within 30 degrees of the vertical.
+    ("0 to 30", 0.0, 30.0, &["launch.rail.tilt_deg", "drop.swing_deg"]),
+    ("-360 to 360", -360.0, 360.0, &["launch.rail.towards_deg"]),
+    // Farther away lies beyond the largest fence.
+    ("-1000 to 1000", -1_000.0, 1_000.0, &["launch.rail.x_m", "launch.rail.y_m"]),
+    ("-60 to 60", -60.0, 60.0, &["launch.rail.upwind_s"]),
+    ("0 to 10", 0.0, 10.0, &["launch.separate_before_apogee_s", "drop.speed_max_m_s"]),
+    ("0.05 to 3", 0.05, 3.0, &["launch.booster.length_m"]),
+    ("0.01 to 20", 0.01, 20.0, &["launch.booster.dry_kg"]),
+    ("above 0 to 10", 1e-6, 10.0, &["launch.booster.pitch_inertia_kg_m2", "launch.booster.roll_inertia_kg_m2"]),
+    ("0 to 3", 0.0, 3.0, &["launch.booster.nose.station_m"]),
+    ("0 to 100", 0.0, 100.0, &["launch.booster.stack_drag_coefficient", "launch.booster.nose.slope_per_rad"]),
+    ("0 to 20", 0.0, 20.0, &["launch.booster.separation_impulse_n_s"]),
+    ("10 to 150", LOWEST_ARMED_M, 150.0, &["drop.height_m"]),
+    ("0 to 5", 0.0, 5.0, &["drop.drift_m_s"]),
+    ("0.05 to 10", 0.05, 10.0, &["drop.rope_m"]),
+    ("0 to 45", 0.0, 45.0, &["drop.tilt_max_deg"]),
+    ("0 to 360", 0.0, 360.0, &["drop.rotation_max_deg_s"]),
+    ("0 to 60", 0.0, 60.0, &["drop.release_after_s"]),
+    // The filter of the motor knows scales from 0.7 to 1.3; a motor further off is another motor.
+    ("0.7 to 1.3", 0.7, 1.3, &["lot.impulse.mean", "lot.burn_time.mean"]),
+    ("0 to 0.2", 0.0, 0.2, &["lot.impulse", "lot.burn_time"]),
+    // Kelvin or Fahrenheit are not meant; propellants are sold for -30 to 55 degrees.
+    ("degrees Celsius, -40 to 60", -40.0, 60.0, &["lot.temperature"]),
     // From the Moon to twice the Earth.
     ("from 1 to 20", 1.0, 20.0, &["gravity_m_s2", "estimator.gravity_m_s2"]),
     // From the shore of the Dead Sea to above the highest road.
@@ -83,11 +109,8 @@ pub(super) fn vehicle(mission: &Mission) -> Check {
         .airframe
         .validate()
         .map_err(|bad| BadValue { key: format!("airframe.{}", bad.key), ..bad.into() })?;
-    mission.lot.as_deref().map_or(Ok(()), Lot::validate)?;
-    if let Some(launch) = &mission.launch {
-        launch.validate()?;
-    }
-    mission.drop.map_or(Ok(()), |drop| drop.validate()).map_err(BadValue::from)
+    numbers(mission, &|key| ["lot.", "launch.", "drop."].iter().any(|section| key.starts_with(section)))?;
+    Ok(mission.launch.as_ref().map_or(Ok(()), Launch::validate)?)
 }
 
 /// The motor does not touch the tube before the gimbal meets its stop.

@@ -6,42 +6,28 @@ use serde::{Deserialize, Serialize};
 use super::noise::EJECTION_LASTS_S;
 use super::{MS_S, SensorTruth, Sensors};
 
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct BarometerParams {
-    /// Time between samples, ms; a multiple of the frame's 5 ms.
-    pub period_ms: u32,
-    /// Noise of one sample, m.
-    pub noise_m: f64,
-    /// Offset at the start, m, from weather and warming since the pad.
-    pub offset_m: f64,
-    /// Wander of the offset, m in one second.
-    pub offset_walk_m_sqrt_s: f64,
-    /// Ram coefficient: the pressure error divided by the dynamic pressure.
-    pub ram_coefficient: f64,
-    /// Suction of the flow across the axis, divided by its dynamic pressure: lowest and highest.
-    pub crossflow: [f64; 2],
-    /// Age of a sample beyond what the flight computer assumes, the same for all of a flight, s.
-    pub late_s: f64,
-    /// Offset while the motor burns, m: the exhaust changes the pressure around the vehicle.
-    pub plume_m: f64,
-    /// Height error when the parachute is ejected, m, from the charge's pressure; it leaks out through the vents.
-    pub ejection_m: f64,
-}
-
-impl Default for BarometerParams {
-    fn default() -> Self {
-        Self {
-            period_ms: 20,
-            noise_m: 0.08,
-            offset_m: 0.3,
-            offset_walk_m_sqrt_s: 0.03,
-            ram_coefficient: 0.05,
-            crossflow: [0.0; 2],
-            late_s: 0.0,
-            plume_m: 0.0,
-            ejection_m: 0.0,
-        }
+flight::with_defaults! {
+    #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
+    #[serde(deny_unknown_fields, default)]
+    pub struct BarometerParams {
+        /// Time between samples, ms; a multiple of the frame's 5 ms.
+        pub period_ms: u32 = 20,
+        /// Noise of one sample, m.
+        pub noise_m: f64 = 0.08,
+        /// Offset at the start, m, from weather and warming since the pad.
+        pub offset_m: f64 = 0.3,
+        /// Wander of the offset, m in one second.
+        pub offset_walk_m_sqrt_s: f64 = 0.03,
+        /// Ram coefficient: the pressure error divided by the dynamic pressure.
+        pub ram_coefficient: f64 = 0.05,
+        /// Suction of the flow across the axis, divided by its dynamic pressure: lowest and highest.
+        pub crossflow: [f64; 2] = [0.0; 2],
+        /// Age of a sample beyond what the flight computer assumes, the same for all of a flight, s.
+        pub late_s: f64 = 0.0,
+        /// Offset while the motor burns, m: the exhaust changes the pressure around the vehicle.
+        pub plume_m: f64 = 0.0,
+        /// Height error when the parachute is ejected, m, from the charge's pressure; it leaks out through the vents.
+        pub ejection_m: f64 = 0.0,
     }
 }
 

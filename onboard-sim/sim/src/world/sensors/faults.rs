@@ -4,7 +4,7 @@ use flight::computer::FRAME_S;
 use flight::estimation::estimator::{GRAVITY_M_S2, GnssFix, Measurements};
 use nalgebra::Vector3;
 
-use super::noise::Normal;
+use crate::world::normal::Normal;
 
 /// A sensor that can break.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,11 +42,13 @@ pub enum Defect {
 /// How long a spike lasts, s.
 const SPIKE_S: f64 = 0.1;
 
-/// The broken sensors, in the order in which they broke.
-#[derive(Debug, Clone)]
-pub struct SensorFaults {
-    broken: Vec<Broken>,
-    noise: Normal,
+flight::with_defaults! {
+    /// The broken sensors, in the order in which they broke.
+    #[derive(Debug, Clone)]
+    pub struct SensorFaults {
+        broken: Vec<Broken> = Vec::new(),
+        noise: Normal = Normal::new(0, 0, 1.0),
+    }
 }
 
 #[derive(Debug, Clone)]
@@ -56,12 +58,6 @@ struct Broken {
     since_frames: u32,
     /// What a stuck sensor repeats, or a satellite fix with its velocity.
     held: Option<(Vector3<f64>, Vector3<f64>)>,
-}
-
-impl Default for SensorFaults {
-    fn default() -> Self {
-        Self { broken: Vec::new(), noise: Normal::new(0, 0, 1.0) }
-    }
 }
 
 impl SensorFaults {

@@ -8,66 +8,44 @@ use serde::{Deserialize, Serialize};
 use super::noise::{Fate, Flaws, fate};
 use super::{MS_S, SensorParams, SensorTruth, Sensors};
 
-/// Satellite receiver. Its position is zeroed on the pad before the flight and wanders from then on.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct GnssParams {
-    /// Time between fixes, ms.
-    pub period_ms: u32,
-    /// Age of a fix when it arrives, ms; below the period.
-    pub delay_ms: u32,
-    /// Velocity noise, each axis, m/s.
-    pub velocity_m_s: f64,
-    /// White position noise, horizontal, each axis, m.
-    pub horizontal_white_m: f64,
-    /// White position noise, vertical, m.
-    pub vertical_white_m: f64,
-    /// Wandering position error, horizontal, each axis, m.
-    pub horizontal_wander_m: f64,
-    /// Wandering position error, vertical, m.
-    pub vertical_wander_m: f64,
-    /// Correlation time of the wandering error, s.
-    pub wander_correlation_s: f64,
-    /// Time from the zeroing on the pad to the start of the simulation, s.
-    pub zeroed_before_s: f64,
-    /// Error of the fixes' time tags, the same for all of a flight, s.
-    pub time_tag_s: f64,
-    /// Error of each fix's time tag beside that, s.
-    pub age_jitter_s: f64,
-    /// Wandering velocity error, each axis, m/s, and its correlation time, s.
-    pub velocity_wander_m_s: f64,
-    pub velocity_wander_correlation_s: f64,
-    /// Probability that a fix is lost.
-    pub dropout_share: f64,
-    /// Probability that a fix is an outlier, and how far an outlier's position is off, each axis, m.
-    pub outlier_share: f64,
-    pub outlier_m: f64,
-    /// How much of the sky a lean takes from an antenna that looks along the nose: at 1 beyond 20 degrees of tilt the noise is
-    /// threefold, and beyond 30 half of the fixes are lost.
-    pub shadow_share: f64,
-}
-
-impl Default for GnssParams {
-    fn default() -> Self {
-        Self {
-            period_ms: 200,
-            delay_ms: 120,
-            velocity_m_s: 0.05,
-            horizontal_white_m: 0.2,
-            vertical_white_m: 0.3,
-            horizontal_wander_m: 1.5,
-            vertical_wander_m: 2.5,
-            wander_correlation_s: 200.0,
-            zeroed_before_s: 20.0,
-            time_tag_s: 0.0,
-            age_jitter_s: 0.0,
-            velocity_wander_m_s: 0.0,
-            velocity_wander_correlation_s: 60.0,
-            dropout_share: 0.0,
-            outlier_share: 0.0,
-            outlier_m: 0.0,
-            shadow_share: 0.0,
-        }
+flight::with_defaults! {
+    /// Satellite receiver. Its position is zeroed on the pad before the flight and wanders from then on.
+    #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
+    #[serde(deny_unknown_fields, default)]
+    pub struct GnssParams {
+        /// Time between fixes, ms.
+        pub period_ms: u32 = 200,
+        /// Age of a fix when it arrives, ms; below the period.
+        pub delay_ms: u32 = 120,
+        /// Velocity noise, each axis, m/s.
+        pub velocity_m_s: f64 = 0.05,
+        /// White position noise, horizontal, each axis, m.
+        pub horizontal_white_m: f64 = 0.2,
+        /// White position noise, vertical, m.
+        pub vertical_white_m: f64 = 0.3,
+        /// Wandering position error, horizontal, each axis, m.
+        pub horizontal_wander_m: f64 = 1.5,
+        /// Wandering position error, vertical, m.
+        pub vertical_wander_m: f64 = 2.5,
+        /// Correlation time of the wandering error, s.
+        pub wander_correlation_s: f64 = 200.0,
+        /// Time from the zeroing on the pad to the start of the simulation, s.
+        pub zeroed_before_s: f64 = 20.0,
+        /// Error of the fixes' time tags, the same for all of a flight, s.
+        pub time_tag_s: f64 = 0.0,
+        /// Error of each fix's time tag beside that, s.
+        pub age_jitter_s: f64 = 0.0,
+        /// Wandering velocity error, each axis, m/s, and its correlation time, s.
+        pub velocity_wander_m_s: f64 = 0.0,
+        pub velocity_wander_correlation_s: f64 = 60.0,
+        /// Probability that a fix is lost.
+        pub dropout_share: f64 = 0.0,
+        /// Probability that a fix is an outlier, and how far an outlier's position is off, each axis, m.
+        pub outlier_share: f64 = 0.0,
+        pub outlier_m: f64 = 0.0,
+        /// How much of the sky a lean takes from an antenna that looks along the nose: at 1 beyond 20 degrees of tilt the noise is
+        /// threefold, and beyond 30 half of the fixes are lost.
+        pub shadow_share: f64 = 0.0,
     }
 }
 

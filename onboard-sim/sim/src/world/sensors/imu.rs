@@ -8,61 +8,41 @@ use serde::{Deserialize, Serialize};
 use super::noise::Flaws;
 use super::{SensorParams, SensorTruth, Sensors};
 
-/// Inertial measurement unit.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct ImuParams {
-    /// Gyro noise density, deg/s/sqrt(Hz).
-    pub gyro_noise_deg_s_sqrt_hz: f64,
-    /// Gyro bias that remains after the calibration on the pad, each axis, deg/s. (At turn-on it is ten times larger.)
-    pub gyro_bias_deg_s: f64,
-    /// Wander of the gyro bias, deg/s in one second.
-    pub gyro_bias_walk_deg_s_sqrt_s: f64,
-    /// Largest rate measured, deg/s.
-    pub gyro_range_deg_s: f64,
-    /// Accelerometer noise density, mg/sqrt(Hz).
-    pub accelerometer_noise_mg_sqrt_hz: f64,
-    /// Accelerometer bias, each axis, mg.
-    pub accelerometer_bias_mg: f64,
-    /// Scale error of each accelerometer axis, as a fraction.
-    pub accelerometer_scale_share: f64,
-    /// What each accelerometer axis feels of each other axis, as a fraction.
-    pub accelerometer_cross_axis_share: f64,
-    /// Largest specific force measured, g.
-    pub accelerometer_range_g: f64,
-    /// Vibration while the motor burns, rms of one frame's sample, each axis, g.
-    pub vibration_g: f64,
-    /// Vibration while the motor burns, rms of one frame's sample, each axis, deg/s.
-    pub vibration_deg_s: f64,
-    /// Accelerometer bias while the motor burns, each axis, mg: vibration that the sensor rectifies.
-    pub vibration_bias_mg: f64,
-    /// Gyro bias while the motor burns, each axis, deg/s: vibration that the sensor rectifies.
-    pub vibration_bias_deg_s: f64,
-    /// Misalignment of the unit in the vehicle, about each axis, degrees.
-    pub mounting_deg: f64,
-    /// Distance of the unit from the centre of gravity, each axis, m.
-    pub off_cg_m: f64,
-}
-
-impl Default for ImuParams {
-    fn default() -> Self {
-        Self {
-            gyro_noise_deg_s_sqrt_hz: 0.05,
-            gyro_bias_deg_s: 0.02,
-            gyro_bias_walk_deg_s_sqrt_s: 0.002,
-            gyro_range_deg_s: 2000.0,
-            accelerometer_noise_mg_sqrt_hz: 0.65,
-            accelerometer_bias_mg: 3.0,
-            accelerometer_scale_share: 0.001,
-            accelerometer_cross_axis_share: 0.0,
-            accelerometer_range_g: 16.0,
-            vibration_g: 0.0,
-            vibration_deg_s: 0.0,
-            vibration_bias_mg: 0.0,
-            vibration_bias_deg_s: 0.0,
-            mounting_deg: 0.0,
-            off_cg_m: 0.0,
-        }
+flight::with_defaults! {
+    /// Inertial measurement unit.
+    #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
+    #[serde(deny_unknown_fields, default)]
+    pub struct ImuParams {
+        /// Gyro noise density, deg/s/sqrt(Hz).
+        pub gyro_noise_deg_s_sqrt_hz: f64 = 0.05,
+        /// Gyro bias that remains after the calibration on the pad, each axis, deg/s. (At turn-on it is ten times larger.)
+        pub gyro_bias_deg_s: f64 = 0.02,
+        /// Wander of the gyro bias, deg/s in one second.
+        pub gyro_bias_walk_deg_s_sqrt_s: f64 = 0.002,
+        /// Largest rate measured, deg/s.
+        pub gyro_range_deg_s: f64 = 2000.0,
+        /// Accelerometer noise density, mg/sqrt(Hz).
+        pub accelerometer_noise_mg_sqrt_hz: f64 = 0.65,
+        /// Accelerometer bias, each axis, mg.
+        pub accelerometer_bias_mg: f64 = 3.0,
+        /// Scale error of each accelerometer axis, as a fraction.
+        pub accelerometer_scale_share: f64 = 0.001,
+        /// What each accelerometer axis feels of each other axis, as a fraction.
+        pub accelerometer_cross_axis_share: f64 = 0.0,
+        /// Largest specific force measured, g.
+        pub accelerometer_range_g: f64 = 16.0,
+        /// Vibration while the motor burns, rms of one frame's sample, each axis, g.
+        pub vibration_g: f64 = 0.0,
+        /// Vibration while the motor burns, rms of one frame's sample, each axis, deg/s.
+        pub vibration_deg_s: f64 = 0.0,
+        /// Accelerometer bias while the motor burns, each axis, mg: vibration that the sensor rectifies.
+        pub vibration_bias_mg: f64 = 0.0,
+        /// Gyro bias while the motor burns, each axis, deg/s: vibration that the sensor rectifies.
+        pub vibration_bias_deg_s: f64 = 0.0,
+        /// Misalignment of the unit in the vehicle, about each axis, degrees.
+        pub mounting_deg: f64 = 0.0,
+        /// Distance of the unit from the centre of gravity, each axis, m.
+        pub off_cg_m: f64 = 0.0,
     }
 }
 

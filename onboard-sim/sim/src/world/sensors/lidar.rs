@@ -6,52 +6,35 @@ use serde::{Deserialize, Serialize};
 use super::noise::{Fate, Flaws, fate};
 use super::{SensorParams, SensorTruth, Sensors};
 
-/// Lidar, looking backwards along the axis.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct LidarParams {
-    /// Time between samples, ms; a multiple of the frame's 5 ms.
-    pub period_ms: u32,
-    /// Noise of one range, m.
-    pub noise_m: f64,
-    /// Shortest range, m.
-    pub range_min_m: f64,
-    /// Longest range, m, straight down; it shrinks as the beam leans.
-    pub range_max_m: f64,
-    /// Beyond this tilt the ground gives no echo, degrees.
-    pub tilt_max_deg: f64,
-    /// Its position along the axis, ahead of the feet, m.
-    pub ahead_of_feet_m: f64,
-    /// Below this height of the feet there is no echo while the motor burns, m: dust.
-    pub blind_below_m: f64,
-    /// Lean of the beam against the axis, each way, degrees.
-    pub beam_deg: f64,
-    /// Height of the grass whose tops the beam meets, lowest and highest, m; the feet stand on the ground.
-    pub grass_m: [f64; 2],
-    /// Age of a range beyond what the flight computer assumes, the same for all of a flight, s.
-    pub late_s: f64,
-    /// Probability that a range is lost.
-    pub dropout_share: f64,
-    /// Probability that a range is an outlier: any value within the sensor's limits.
-    pub outlier_share: f64,
-}
-
-impl Default for LidarParams {
-    fn default() -> Self {
-        Self {
-            period_ms: 10,
-            noise_m: 0.06,
-            range_min_m: 0.05,
-            range_max_m: 12.0,
-            tilt_max_deg: 45.0,
-            ahead_of_feet_m: 0.15,
-            blind_below_m: 0.0,
-            beam_deg: 0.0,
-            grass_m: [0.0; 2],
-            late_s: 0.0,
-            dropout_share: 0.0,
-            outlier_share: 0.0,
-        }
+flight::with_defaults! {
+    /// Lidar, looking backwards along the axis.
+    #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
+    #[serde(deny_unknown_fields, default)]
+    pub struct LidarParams {
+        /// Time between samples, ms; a multiple of the frame's 5 ms.
+        pub period_ms: u32 = 10,
+        /// Noise of one range, m.
+        pub noise_m: f64 = 0.06,
+        /// Shortest range, m.
+        pub range_min_m: f64 = 0.05,
+        /// Longest range, m, straight down; it shrinks as the beam leans.
+        pub range_max_m: f64 = 12.0,
+        /// Beyond this tilt the ground gives no echo, degrees.
+        pub tilt_max_deg: f64 = 45.0,
+        /// Its position along the axis, ahead of the feet, m.
+        pub ahead_of_feet_m: f64 = 0.15,
+        /// Below this height of the feet there is no echo while the motor burns, m: dust.
+        pub blind_below_m: f64 = 0.0,
+        /// Lean of the beam against the axis, each way, degrees.
+        pub beam_deg: f64 = 0.0,
+        /// Height of the grass whose tops the beam meets, lowest and highest, m; the feet stand on the ground.
+        pub grass_m: [f64; 2] = [0.0; 2],
+        /// Age of a range beyond what the flight computer assumes, the same for all of a flight, s.
+        pub late_s: f64 = 0.0,
+        /// Probability that a range is lost.
+        pub dropout_share: f64 = 0.0,
+        /// Probability that a range is an outlier: any value within the sensor's limits.
+        pub outlier_share: f64 = 0.0,
     }
 }
 

@@ -24,9 +24,10 @@ pub use self::gnss::GnssParams;
 pub use self::imu::ImuParams;
 pub use self::lidar::LidarParams;
 pub use self::noise::believed_start;
-use self::noise::{Flaws, Normal, Wander};
+use self::noise::{Flaws, Wander};
 pub use self::params::{SensorParamError, SensorParams};
 pub use self::switches::SwitchParams;
+use crate::world::normal::Normal;
 use crate::world::whole::World;
 
 const MS_S: f64 = 1e-3;

@@ -4,47 +4,9 @@
 use flight::estimation::estimator::{GRAVITY_M_S2, StartUncertainty};
 use flight::vehicle::rigid::RigidState;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
-use rand::{Rng as _, SeedableRng as _};
-use rand_chacha::ChaCha12Rng;
 
 use super::SensorParams;
-
-/// Normal numbers by Box and Muller (Annals of Mathematical Statistics 29, 1958), on `libm` so that they are the same on every machine.
-#[derive(Debug, Clone)]
-pub(super) struct Normal {
-    random: ChaCha12Rng,
-    /// The second number of the pair.
-    spare: Option<f64>,
-    sigma: f64,
-}
-
-impl Normal {
-    /// The streams of a seed are independent, so a fault in one sensor does not change the noise of another.
-    pub(super) fn new(seed: u64, stream: u64, sigma: f64) -> Self {
-        let mut random = ChaCha12Rng::seed_from_u64(seed);
-        random.set_stream(stream);
-        Self { random, spare: None, sigma }
-    }
-
-    pub(super) fn next(&mut self) -> f64 {
-        if let Some(spare) = self.spare.take() {
-            return spare;
-        }
-        let radius = libm::sqrt(-2.0 * libm::log(1.0 - self.unit()));
-        let (sin, cos) = libm::sincos(core::f64::consts::TAU * self.unit());
-        self.spare = Some(self.sigma * (radius * sin));
-        self.sigma * (radius * cos)
-    }
-
-    pub(super) fn next3(&mut self) -> Vector3<f64> {
-        Vector3::new(self.next(), self.next(), self.next())
-    }
-
-    /// Uniform in [0, 1), from 53 random bits.
-    pub(super) fn unit(&mut self) -> f64 {
-        (self.random.next_u64() >> 11) as f64 / (1u64 << 53) as f64
-    }
-}
+use crate::world::normal::Normal;
 
 /// A stationary first-order Gauss-Markov process: its correlation decays exponentially (J. A. Farrell, Aided Navigation, 2008,
 /// chapter 4).

@@ -258,20 +258,15 @@ impl World {
     fn command(&mut self, actuators: &Actuators, time_s: f64) {
         let before_rad = self.gimbal_rad();
         let wired_rad = self.wired_rad(actuators);
-        for ((servo, link), command_rad) in self.gimbal.iter_mut().zip(&mut self.gimbal_links).zip(wired_rad)
-        {
+        let gimbal = self.gimbal.iter_mut().zip(&mut self.gimbal_links);
+        let surfaces = gimbal.chain(self.fins.iter_mut().zip(&mut self.fin_links));
+        for ((servo, link), command_rad) in surfaces.zip(wired_rad) {
             servo.step(command_rad);
             link.step(servo.load_rad());
         }
         let now_rad = self.gimbal_rad();
         let rates_rad_s = [0, 1].map(|axis: usize| (now_rad[axis] - before_rad[axis]) / STEP_S);
         self.gimbal_rates_rad_s = [self.gimbal_rates_rad_s[1], rates_rad_s];
-        for ((servo, link), command_rad) in
-            self.fins.iter_mut().zip(&mut self.fin_links).zip(wired_rad.into_iter().skip(2))
-        {
-            servo.step(command_rad);
-            link.step(servo.load_rad());
-        }
         self.motor.current(actuators.ignite, time_s);
         if actuators.parachute {
             self.parachute.eject(time_s);

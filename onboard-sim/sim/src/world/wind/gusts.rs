@@ -13,7 +13,9 @@
 
 use nalgebra::Vector3;
 use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
+use rand_chacha::rand_core::SeedableRng as _;
+
+use crate::world::normal::Normal;
 
 const FEET_M: f64 = 0.304_8;
 const LOWEST_FT: f64 = 10.0;
@@ -23,7 +25,7 @@ const HIGHEST_FT: f64 = 1000.0;
 #[derive(Debug, Clone)]
 pub struct Gusts {
     wind_at_20_ft_m_s: f64,
-    normals: Normals,
+    normals: Normal<ChaCha8Rng>,
     along: f64,
     across: Transverse,
     up: Transverse,
@@ -73,7 +75,7 @@ const CROSS: f64 = 0.25;
 const SECOND_VARIANCE: f64 = 0.25;
 
 impl Transverse {
-    fn stationary(normals: &mut Normals) -> Self {
+    fn stationary(normals: &mut Normal<ChaCha8Rng>) -> Self {
         let first = FIRST_VARIANCE.sqrt() * normals.next();
         let second = CROSS / FIRST_VARIANCE * first
             + (SECOND_VARIANCE - CROSS * CROSS / FIRST_VARIANCE).sqrt() * normals.next();
@@ -81,7 +83,7 @@ impl Transverse {
     }
 
     /// Advances by a fraction of the gust length.
-    fn step(&mut self, share: f64, normals: &mut Normals) {
+    fn step(&mut self, share: f64, normals: &mut Normal<ChaCha8Rng>) {
         let decay = libm::exp(-share);
         let squared = decay * decay;
         let first_noise = FIRST_VARIANCE * (1.0 - squared);
@@ -111,7 +113,7 @@ impl Gusts {
 
     /// Gusts for a wind at 20 ft, m/s, from a seed.
     pub fn new(wind_at_20_ft_m_s: f64, seed: u64) -> Self {
-        let mut normals = Normals::new(ChaCha8Rng::seed_from_u64(seed));
+        let mut normals = Normal::of(ChaCha8Rng::seed_from_u64(seed), 1.0);
         Self {
             wind_at_20_ft_m_s,
             along: normals.next(),
@@ -140,32 +142,6 @@ impl Gusts {
             scales.horizontal_m_s * self.across.output(),
             scales.vertical_m_s * self.up.output(),
         )
-    }
-}
-
-// Standard normal numbers (Box and Muller 1958), two at a time.
-
-#[derive(Debug, Clone)]
-struct Normals {
-    random: ChaCha8Rng,
-    spare: Option<f64>,
-}
-
-impl Normals {
-    fn new(random: ChaCha8Rng) -> Self {
-        Self { random, spare: None }
-    }
-
-    fn next(&mut self) -> f64 {
-        if let Some(spare) = self.spare.take() {
-            return spare;
-        }
-        // 53 bits each; the first is never zero, because its logarithm is taken.
-        let unit = |bits: u64| (bits >> 11) as f64 / (1_u64 << 53) as f64;
-        let radius = (-2.0 * libm::log(1.0 - unit(self.random.next_u64()))).sqrt();
-        let (sin, cos) = libm::sincos(core::f64::consts::TAU * unit(self.random.next_u64()));
-        self.spare = Some(radius * sin);
-        radius * cos
     }
 }
 

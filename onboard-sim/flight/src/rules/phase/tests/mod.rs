@@ -161,7 +161,7 @@ fn every_event_in_every_phase_has_the_result_of_the_table() {
                 assert_eq!(answer.effects, Effects::of(effects), "{context}");
             } else {
                 let refusal = answer.refusal.unwrap_or_else(|| panic!("{context}: accepted"));
-                assert!(!refusal.reason().is_empty(), "{context}");
+                assert!(!refusal.to_string().is_empty(), "{context}");
                 assert_eq!((answer.mode, answer.effects), (mode, Effects::NONE), "{context}");
             }
         }
@@ -235,7 +235,9 @@ fn a_pad_abort_latches_and_shows_the_wait() {
 #[test]
 fn refused_arming_says_why() {
     let reason = |mode: &Mode, checks_passed| {
-        transition(mode, Event::ArmRequested { checks_passed }, 9.0).refusal.map(|refusal| refusal.reason())
+        transition(mode, Event::ArmRequested { checks_passed }, 9.0)
+            .refusal
+            .map(|refusal| refusal.to_string())
     };
     let idle = after(&ARM[..1]);
     assert_eq!(reason(&idle, true).unwrap(), "the pin is in: pull it before arming");

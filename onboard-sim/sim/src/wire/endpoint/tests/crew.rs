@@ -225,11 +225,8 @@ fn the_start_goes_on_while_the_confirmer_taps() {
     launch.sent.clear();
     launch.run(0.5);
     assert!(launch.armed() && !launch.counts_down(), "held");
-    let held = launch.sent.iter().rev().find_map(|frame| match frame.decode() {
-        Ok(MavMessage::TD_FLIGHT_STATUS(status)) => Some(status.hold),
-        _ => None,
-    });
-    assert_eq!(held, Some(TdHold::TD_HOLD_TAP_OVERDUE));
+    let held = decoded!(launch.sent, TD_FLIGHT_STATUS).last();
+    assert_eq!(held.unwrap().hold, TdHold::TD_HOLD_TAP_OVERDUE);
     assert_eq!(launch.crew.clone().unwrap().held_by, 4);
 }
 

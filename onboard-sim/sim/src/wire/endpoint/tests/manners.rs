@@ -95,7 +95,7 @@ fn home_is_the_pad_and_the_compass_shows_where_the_belly_points() {
     // Released in the plane north of the pad, nose up: heading north.
     let hud = avionics::link::telemetry::message(VFR_HUD_DATA::ID, &wire.vehicle.state(), SIMULATED);
     assert!(matches!(&hud, Some(MavMessage::VFR_HUD(hud)) if hud.heading == 0), "{hud:?}");
-    let mut flight = crate::wire::fly::load_flight("mk2").unwrap();
+    let mut flight = load_flight("mk2").unwrap();
     flight.recipe.mission.pad_altitude_m = 510.0;
     let vehicle = Vehicle::on_the_pad(&flight).unwrap();
     let high = avionics::link::telemetry::message(VFR_HUD_DATA::ID, &vehicle.state(), SIMULATED);
@@ -127,19 +127,11 @@ fn a_forced_disarm_disarms_on_the_pad_and_in_the_countdown_and_aborts_in_flight(
     }
 }
 
-/// Clients find out in this way what a vehicle can do.
 impl Wire {
     /// A command of the station with this number; returns the answers.
     fn numbered(&mut self, param1: f32, number: u32) -> Vec<CommandAnswer> {
-        let command = COMMAND_LONG_DATA {
-            param1,
-            param2: number as f32,
-            command: MavCmd::MAV_CMD_COMPONENT_ARM_DISARM,
-            target_system: 1,
-            target_component: 1,
-            ..COMMAND_LONG_DATA::default()
-        };
-        self.tell(&MavMessage::COMMAND_LONG(command));
+        let command = command(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, param1);
+        self.tell(&MavMessage::COMMAND_LONG(COMMAND_LONG_DATA { param2: number as f32, ..command }));
         self.run(0.1).iter().filter_map(CommandAnswer::from_frame).collect()
     }
 }
@@ -172,13 +164,11 @@ fn a_radio_s_report_from_another_address_thins_nothing() {
     let mut wire = Wire::new();
     let report = MavMessage::RADIO_STATUS(protocol::dialect::RADIO_STATUS_DATA::default());
     let before = wire.run(10.0).len();
-    let sent: usize = (0..10)
-        .map(|_| {
-            let full = wire.ground.encode(&report);
-            wire.endpoint.on_frame(0, &full, &wire.vehicle.state());
-            wire.run(1.0).len()
-        })
-        .sum();
+    let mut sent = 0;
+    for _ in 0..10 {
+        wire.tell(&report);
+        sent += wire.run(1.0).len();
+    }
     assert!(sent + 5 > before, "{sent} of {before} frames");
 }
 
@@ -208,8 +198,7 @@ fn twenty_unknown_commands_at_ten_a_second_are_each_answered() {
     let mut wire = Wire::new();
     let mut answers = Vec::new();
     for command in 30_000..30_020 {
-        let params = [0.0; 7];
-        let request = asking(command, params);
+        let request = asking(command, [0.0; 7]);
         wire.endpoint.on_command(0, (&request, None), &wire.vehicle.state());
         answers.extend(wire.run(0.1).iter().filter_map(CommandAnswer::from_frame));
     }
@@ -222,7 +211,7 @@ fn twenty_unknown_commands_at_ten_a_second_are_each_answered() {
 #[test]
 fn what_cannot_be_cancelled_is_answered() {
     let mut wire = Wire::new();
-    for (command, ours) in [(400_u16, true), (54_002, true), (400, false)] {
+    for (command, ours) in [(ARM, true), (CHECK, true), (ARM, false)] {
         let [low, high] = command.to_le_bytes();
         let sent = wire.question(80, &[low, high, if ours { 1 } else { 2 }, 1]);
         let answers: Vec<_> = sent.iter().filter_map(CommandAnswer::from_frame).collect();
@@ -403,17 +392,8 @@ fn arm_for(wire: &mut Wire, params: [f32; 3]) -> (u8, String) {
     wire.beat();
     wire.run(0.5);
     let [param4, param5, param6] = params;
-    let arm = COMMAND_LONG_DATA {
-        command: MavCmd::MAV_CMD_COMPONENT_ARM_DISARM,
-        param1: 1.0,
-        param4,
-        param5,
-        param6,
-        target_system: 1,
-        target_component: 1,
-        ..COMMAND_LONG_DATA::default()
-    };
-    wire.tell(&MavMessage::COMMAND_LONG(arm));
+    let arm = command(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, 1.0);
+    wire.tell(&MavMessage::COMMAND_LONG(COMMAND_LONG_DATA { param4, param5, param6, ..arm }));
     let sent = wire.run(0.5);
     let answers: Vec<_> = sent.iter().filter_map(CommandAnswer::from_frame).collect();
     assert_eq!((answers.len(), answers[0].command), (1, ARM));

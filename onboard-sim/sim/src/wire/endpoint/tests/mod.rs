@@ -106,14 +106,7 @@ fn command(command: MavCmd, param1: f32) -> COMMAND_LONG_DATA {
 
 /// A command to this vehicle, also one that the dialect does not know.
 fn any_command(encoder: &mut Encoder, command: u16, [param1, param2, param3]: [f32; 3]) -> Frame {
-    let payload = COMMAND_LONG_DATA {
-        param1,
-        param2,
-        param3,
-        target_system: 1,
-        target_component: 1,
-        ..COMMAND_LONG_DATA::default()
-    };
+    let payload = COMMAND_LONG_DATA { param2, param3, ..self::command(MavCmd::default(), param1) };
     let mut bytes = [0; 255];
     let len = mavlink::MessageData::ser(&payload, mavlink::MavlinkVersion::V1, &mut bytes);
     bytes[28..30].copy_from_slice(&command.to_le_bytes());
@@ -247,13 +240,8 @@ fn a_refusal_is_answered_and_explained_in_words() {
 fn a_command_for_somebody_else_is_left_alone() {
     let mut wire = Wire::new();
     for target_system in [2, 255] {
-        let command = COMMAND_LONG_DATA {
-            param1: 1.0,
-            command: MavCmd::MAV_CMD_COMPONENT_ARM_DISARM,
-            target_system,
-            target_component: 1,
-            ..COMMAND_LONG_DATA::default()
-        };
+        let arm = command(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, 1.0);
+        let command = COMMAND_LONG_DATA { target_system, ..arm };
         wire.tell(&MavMessage::COMMAND_LONG(command));
     }
     let sent = wire.run(0.5);
@@ -291,7 +279,7 @@ fn a_new_phase_is_sent_at_once_and_only_once() {
 fn a_new_station_gets_the_limits() {
     let mut wire = Wire::new();
     wire.run(1.0);
-    wire.tell(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
+    wire.beat();
     let limits = decoded!(wire.run(0.1), TD_TOUCHDOWN_LIMITS).next();
     let legs = flight::vehicles::mission::builtin("mk2").unwrap().unwrap().leg_limits;
     assert!((f64::from(limits.unwrap().vertical_m_s) - legs.vertical_m_s).abs() < 1e-6, "of the legs");

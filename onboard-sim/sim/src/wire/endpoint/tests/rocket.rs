@@ -146,19 +146,14 @@ fn in_the_descent_the_band_is_told_four_times_a_second() {
     assert!((0.01..5.0).contains(&estimator.pos_vert_accuracy));
     let sensors = MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_GPS
         | MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE;
-    let healthy = sent.iter().any(|frame| {
-        matches!(frame.decode(), Ok(MavMessage::SYS_STATUS(status)) if status.onboard_control_sensors_health.contains(sensors))
-    });
-    assert!(healthy);
+    let mut status = decoded!(sent, SYS_STATUS);
+    assert!(status.any(|status| status.onboard_control_sensors_health.contains(sensors)));
 }
 
 fn findings(sent: &[Frame]) -> Vec<(u8, u8, String)> {
-    let decoded = sent.iter().filter_map(|frame| frame.decode().ok());
-    let findings = decoded.filter_map(|message| match message {
-        MavMessage::TD_FINDING(finding) => Some(finding),
-        _ => None,
-    });
-    findings.map(|found| (found.place, found.found, String::from(found.text.to_str().unwrap()))).collect()
+    decoded!(sent, TD_FINDING)
+        .map(|found| (found.place, found.found, String::from(found.text.to_str().unwrap())))
+        .collect()
 }
 
 /// The station hears what went wrong while it happens and, after the landing, again and again.
@@ -233,8 +228,7 @@ fn a_check_is_told_value_by_value() {
     let mut places = std::collections::BTreeSet::new();
     let mut last = None;
     let sent = airborne.run(24.0);
-    for frame in &sent {
-        let Ok(MavMessage::TD_PAD_CHECK(told)) = frame.decode() else { continue };
+    for told in decoded!(sent, TD_PAD_CHECK) {
         if told.found > 0 {
             places.insert(told.place);
         }

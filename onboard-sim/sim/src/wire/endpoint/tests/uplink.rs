@@ -91,13 +91,7 @@ impl Pad {
     }
 
     fn tell(&mut self, station: usize, command: MavCmd, param1: f32) {
-        let message = MavMessage::COMMAND_LONG(COMMAND_LONG_DATA {
-            param1,
-            command,
-            target_system: 1,
-            target_component: 1,
-            ..COMMAND_LONG_DATA::default()
-        });
+        let message = MavMessage::COMMAND_LONG(super::command(command, param1));
         let frame = self.stations[station].encode(&message);
         self.sent.clear();
         self.endpoint.on_frame(0, &frame, &self.vehicle.state());
