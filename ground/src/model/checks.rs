@@ -5,7 +5,7 @@ use protocol::dialect::{TdCheck, TdHold, TdPhase};
 use super::{Vehicle, words};
 
 /// Sensors name themselves in what is wrong with them; of other checks the vehicle says what it found.
-const SENSORS: TdCheck = TdCheck::TD_CHECK_ACCELEROMETER
+pub const SENSORS: TdCheck = TdCheck::TD_CHECK_ACCELEROMETER
     .union(TdCheck::TD_CHECK_GYRO)
     .union(TdCheck::TD_CHECK_BAROMETER)
     .union(TdCheck::TD_CHECK_GNSS)

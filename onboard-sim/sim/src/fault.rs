@@ -118,15 +118,6 @@ fn surface(number: f64) -> Option<usize> {
         .map(|known| usize::from(known) - 1)
 }
 
-/// The sensors, with their names and units in the text of a fault.
-const SENSORS: [(Sensor, &str, &str); 5] = [
-    (Sensor::Gyro, "gyro", "deg/s"),
-    (Sensor::Accelerometer, "accelerometer", "mg"),
-    (Sensor::Barometer, "barometer", "m"),
-    (Sensor::Gnss, "gnss", "m"),
-    (Sensor::Lidar, "lidar", "m"),
-];
-
 /// The defects of a sensor without a value, and those with one.
 const SILENT: [(&str, Defect); 4] =
     [("out", Defect::Out), ("dead", Defect::Dead), ("stuck", Defect::Stuck), ("nan", Defect::NotANumber)];
@@ -143,7 +134,7 @@ const WRONG: [(&str, OfValue); 6] = [
 /// A sensor's defect by its name; the value it takes, if it takes one, and the unit of that value.
 fn sensor_fault(name: &str, value: Option<f64>) -> Option<(&'static str, Option<Breakage>)> {
     let (sensor, how) = name.rsplit_once('-')?;
-    let (sensor, _, unit) = SENSORS.iter().find(|(_, known, _)| *known == sensor)?;
+    let (sensor, _, unit) = Sensor::ALL.iter().find(|(_, known, _)| *known == sensor)?;
     let silent = SILENT.iter().find(|(known, _)| *known == how);
     if let Some((_, defect)) = silent {
         return Some(("", value.is_none().then_some(Breakage::Sensor(*sensor, *defect))));
@@ -182,7 +173,7 @@ fn known() -> String {
         Takes::Value(meaning, _) => format!("{name}:VALUE ({meaning})"),
     };
     let names = NAMES.iter().map(with_value).collect::<Vec<_>>().join(", ");
-    let sensors = SENSORS.map(|(_, name, unit)| format!("{name} ({unit})")).join(", ");
+    let sensors = Sensor::ALL.map(|(_, name, unit)| format!("{name} ({unit})")).join(", ");
     let (silent, wrong) = (SILENT.map(|(name, _)| name).join(", "), WRONG.map(|(name, _)| name).join(", "));
     format!(
         "{names}, or SENSOR-DEFECT with a sensor of {sensors} and a defect of {silent}, or with :VALUE of {wrong}"

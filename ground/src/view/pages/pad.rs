@@ -11,8 +11,8 @@ use ratatui::text::Line;
 use super::flight::map;
 use super::{Room, columns, events, framed, rows, table};
 use crate::model::{
-    Act, Deflection, LogStanding, Model, Vehicle, hold_words, is_on_pad, unheard_hints, why_not_here,
-    why_untested, words,
+    Act, Deflection, LogStanding, Model, SENSORS, Vehicle, hold_words, is_on_pad, unheard_hints,
+    why_not_here, why_untested, words,
 };
 use crate::view::band::{Item, draw_band, word};
 use crate::view::pictures::attitude::{Side, draw_attitude};
@@ -238,11 +238,8 @@ fn about(vehicle: &Vehicle, check: TdCheck) -> (String, &'static str) {
         }
         TdCheck::TD_CHECK_PIN => (yes_no(TdInterlock::TD_INTERLOCK_PIN_OUT, "out", "in"), "pull the pin"),
         TdCheck::TD_CHECK_SELF_TEST => unseen("not passed"),
-        TdCheck::TD_CHECK_ACCELEROMETER
-        | TdCheck::TD_CHECK_GYRO
-        | TdCheck::TD_CHECK_BAROMETER
-        | TdCheck::TD_CHECK_LIDAR => unseen("no data"),
         TdCheck::TD_CHECK_GNSS => unseen("no fix"),
+        sensor if SENSORS.contains(sensor) => unseen("no data"),
         TdCheck::TD_CHECK_TILT => {
             (number(attitude.map(|a| a.tilt_rad.to_degrees()), 1, "deg"), "not upright")
         }

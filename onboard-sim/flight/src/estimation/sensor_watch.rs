@@ -9,6 +9,9 @@ use serde::Serialize;
 use super::estimator::Measurements;
 use super::estimator::alignment::FELT_AT_REST_M_S2;
 
+/// The sensors, as their arming checks name them.
+pub const SENSORS: [&str; 5] = ["accelerometer", "gyro", "barometer", "GNSS", "lidar"];
+
 /// So many equal inertial samples in a row do not happen to noise.
 const FROZEN_IMU: u32 = 4;
 /// The same of a barometer, half a second, and of satellite fixes, two seconds: both round more coarsely.
@@ -191,9 +194,8 @@ impl SensorWatch {
         self.turns_rad_s.norm()
     }
 
-    /// What is wrong with each sensor of a vehicle at rest, in the crew's words: accelerometer, gyro, barometer, satellites,
-    /// lidar.
-    pub fn defects(&self, rests: Rests) -> [Option<String>; 5] {
+    /// What is wrong with each of the [`SENSORS`] of a vehicle at rest, in the crew's words.
+    pub fn defects(&self, rests: Rests) -> [Option<String>; SENSORS.len()] {
         let time_s = self.time_s;
         let silent = |name: &str, silent_s: f64, longest_s: f64| {
             (silent_s > longest_s).then(|| format!("{name} silent for {silent_s:.1} s"))

@@ -6,6 +6,7 @@ use alloc::vec::Vec;
 use alloc::{format, vec};
 use serde::Serialize;
 
+use crate::estimation::sensor_watch::SENSORS;
 use crate::rules::phase::UPLINK_PROVEN_S;
 use crate::rules::verdict::LandingVerdict;
 use crate::vehicle::drop::LOWEST_ARMED_M;
@@ -57,7 +58,7 @@ pub struct ArmingInput {
     /// A check of the vehicle moves its surfaces, or watches its sensors.
     pub is_checking: bool,
     /// What is wrong with accelerometer, gyro, barometer, satellites and lidar, in words.
-    pub sensor_defects: [Option<String>; 5],
+    pub sensor_defects: [Option<String>; SENSORS.len()],
     /// Height of a vehicle that hangs below a drone, m; `None` on a pad.
     pub hanging_m: Option<f64>,
     /// The estimator has settled.
@@ -107,7 +108,7 @@ pub fn arming_checks(limits: &ArmingLimits, input: &ArmingInput) -> Vec<Check> {
     ];
     // Before what is computed from them: the sensor is named, and not the number that it spoils.
     checks.extend(
-        SENSOR_CHECKS
+        SENSORS
             .into_iter()
             .zip(&input.sensor_defects)
             .map(|(name, defect)| Check::sensor(name, defect.as_ref())),
@@ -146,9 +147,6 @@ pub fn arming_checks(limits: &ArmingLimits, input: &ArmingInput) -> Vec<Check> {
     }
     checks
 }
-
-/// The names of the sensor checks.
-const SENSOR_CHECKS: [&str; 5] = ["accelerometer", "gyro", "barometer", "GNSS", "lidar"];
 
 /// The name of the uplink check, the only check that depends on the ground.
 pub const UPLINK_CHECK: &str = "uplink";
@@ -275,7 +273,7 @@ mod tests {
             speed_m_s: 0.0,
             self_test_passed: true,
             is_checking: false,
-            sensor_defects: [const { None }; 5],
+            sensor_defects: [const { None }; SENSORS.len()],
             hanging_m: None,
             estimator_converged: true,
             fins_answering: [true; 4],

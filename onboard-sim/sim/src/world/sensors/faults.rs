@@ -16,6 +16,17 @@ pub enum Sensor {
     Lidar,
 }
 
+impl Sensor {
+    /// All, with their names and units in the text of a fault.
+    pub const ALL: [(Self, &'static str, &'static str); 5] = [
+        (Self::Gyro, "gyro", "deg/s"),
+        (Self::Accelerometer, "accelerometer", "mg"),
+        (Self::Barometer, "barometer", "m"),
+        (Self::Gnss, "gnss", "m"),
+        (Self::Lidar, "lidar", "m"),
+    ];
+}
+
 /// How it breaks. Values are in the sensor's unit: deg/s, thousandths of gravity, m; on every axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Defect {
