@@ -23,11 +23,12 @@ pub fn auto_ground(folder: &Path, links: &[&str]) -> Command {
 }
 
 /// A vehicle that has flown a profile by itself over one link, is safe on the ground, and stays. It logs to `flight.mcap` in
-/// this folder, and its simulated time runs so fast that its motor is cold after seconds.
+/// this folder, and its simulated time runs so fast that its motor is cold after seconds, and so slowly that a client may be
+/// silent for some before its files are closed (a minute of the vehicle).
 pub fn landed_vehicle(folder: &Path, profile: &str, link: &str, more: &[&str]) -> Running {
     let mut command = program(Program::OnboardSim);
-    command.args(["fly", "--mission", profile, "--seed", "1", "--auto", "--stay", "--speed", "20"]);
-    command.args(["--network-budget", "20000", "--log", "flight.mcap", "--mavlink", link]);
+    command.args(["fly", "--mission", profile, "--seed", "1", "--auto", "--stay", "--speed", "5"]);
+    command.args(["--network-budget", "40000", "--log", "flight.mcap", "--mavlink", link]);
     let mut vehicle = Running::start(command.args(more).current_dir(folder));
     vehicle.wait_for_line("TOUCHDOWN to SAFED");
     vehicle
