@@ -425,22 +425,20 @@ mod tests {
 
     #[test]
     fn wrong_values_are_refused_with_what_would_do() {
-        let refuse =
-            |arguments: &[&str]| Cli::try_parse_from([&["ground"], arguments].concat()).unwrap_err().kind();
-        for wrong in [
-            ["--connect", "tcp:host:1"],
-            ["--forward", "tcpout:host:1"],
-            ["--timeout-s", "-1"],
-            ["--sysid", "0"],
-            ["--speed", "0"],
+        let refuse = |arguments: &[&str]| Cli::try_parse_from([&["ground"], arguments].concat()).unwrap_err();
+        for (wrong, what_would_do) in [
+            (["--connect", "tcp:host:1"], "udpin:ADDRESS:PORT"),
+            (["--forward", "tcpout:host:1"], "udpout:HOST:PORT"),
+            (["--timeout-s", "-1"], "from 0.1 to 86400"),
+            (["--sysid", "0"], "1..=255"),
+            (["--speed", "0"], "0.01"),
         ] {
-            assert_eq!(refuse(&wrong), ErrorKind::ValueValidation, "{wrong:?}");
+            let refused = refuse(&wrong);
+            assert_eq!(refused.kind(), ErrorKind::ValueValidation, "{wrong:?}");
+            assert!(refused.to_string().contains(what_would_do), "{refused}");
         }
-        assert_eq!(listener("tcpout:host:1"), Err("give udpout:HOST:PORT".to_owned()));
-        let told = "`-1` is not a number of seconds from 0.1 to 86400";
-        assert_eq!(seconds("-1"), Err(told.to_owned()));
         let both = ["--connect", "udpin:0.0.0.0:14550", "--seed", "2"];
-        assert_eq!(refuse(&both), ErrorKind::ArgumentConflict);
+        assert_eq!(refuse(&both).kind(), ErrorKind::ArgumentConflict);
     }
 
     #[test]

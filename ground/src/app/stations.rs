@@ -56,11 +56,11 @@ pub(super) fn of(model: &Model, screens: &[Attached]) -> StationStatus {
 
 /// Answers a request to stop this station.
 pub(super) fn stopping(model: &Model, force: bool, now: Duration) -> ToScreen {
-    let log = model.settings.log_path.as_deref().map_or_else(|| "none".to_owned(), absolute);
     let free = force || model.settings.demonstration;
     if let Some(why) = why_not_stop(model, now).filter(|_| !free) {
         return ToScreen::Stopping { stops: false, words: format!("{why}; --force ends the station anyway") };
     }
+    let log = model.settings.log_path.as_deref().map_or_else(|| "none".to_owned(), absolute);
     ToScreen::Stopping { stops: true, words: format!("log: {log}") }
 }
 

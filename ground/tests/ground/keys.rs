@@ -189,6 +189,16 @@ fn the_chord_aborts_in_every_phase_and_the_ladder_arms_only_on_the_pad() {
     }
 }
 
+#[test]
+fn enter_alone_or_too_late_aborts_nothing() {
+    let mut rig = Rig::crewed();
+    rig.keys(&[Key::Enter, Key::Enter, Key::CtrlX]);
+    rig.run(ABORT_TIME_LIMIT.as_secs_f64() + 0.1);
+    rig.key(Key::Enter);
+    rig.run(3.0);
+    assert!(!rig.take_commands().iter().any(is_abort));
+}
+
 /// With Enter at once; with a second Ctrl-X once it is no repeat of a held key.
 #[test]
 fn abort_works_once_from_every_dialog_and_closes_it() {

@@ -511,7 +511,7 @@ impl Sortie {
     /// The true state with its height above the ground below it, which is what a landing needs and what the lidar shows.
     fn over_the_ground(&self) -> RigidState {
         let mut state = *self.world().state();
-        state.position_m.z -= self.world().truth().ground_m(state.position_m.x, state.position_m.y);
+        state.position_m.z = self.world().truth().over_ground_m(&state.position_m);
         state
     }
 

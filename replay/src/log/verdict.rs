@@ -168,16 +168,14 @@ impl Verdicts {
             envelope: verdict.landing.contains(TdLanding::TD_LANDING_ENVELOPE),
             table_2: verdict.landing.contains(TdLanding::TD_LANDING_TABLE_2),
         };
-        let limits = limits_to_log(&envelope);
-        let broken = worst_first(limits.iter().filter(|limit| !limit.passed));
-        let broken = broken.first().map(|(limit, _)| limit.name.as_str());
+        let broken = envelope.worst().map(|limit| limit.name);
         let failure = if self.under_parachute { Some(UNDER_PARACHUTE) } else { broken };
         let ending = FlightEnding { aborted: self.aborted, landing: landing_of(landing), failure };
         Some(v1::LandingVerdict {
             time_s: f64::from(verdict.contact_ms) / 1e3,
             ending: Some(ending.to_string()),
             landing,
-            envelope: limits,
+            envelope: limits_to_log(&envelope),
             ..v1::LandingVerdict::default()
         })
     }

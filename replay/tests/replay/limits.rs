@@ -198,7 +198,11 @@ fn many_facts_many_limits_and_many_words_do_not_fill_the_memory() {
             &["compare", path.to_str().unwrap()],
         ] {
             let (code, said) = within(200, question, &path);
-            assert!([0, 1, 3, 5].contains(&code), "{question:?}: {said}");
+            // Only a comparison answers that there is nothing in common.
+            assert!(
+                [0, 1, 5].contains(&code) || (question[0], code) == ("compare", 3),
+                "{question:?}: {said}"
+            );
         }
     }
 }

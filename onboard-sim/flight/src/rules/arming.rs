@@ -57,7 +57,7 @@ pub struct ArmingInput {
     pub self_test_passed: bool,
     /// A check of the vehicle moves its surfaces, or watches its sensors.
     pub is_checking: bool,
-    /// What is wrong with accelerometer, gyro, barometer, satellites and lidar, in words.
+    /// What is wrong with each of the [`SENSORS`], in words.
     pub sensor_defects: [Option<String>; SENSORS.len()],
     /// Height of a vehicle that hangs below a drone, m; `None` on a pad.
     pub hanging_m: Option<f64>,

@@ -184,10 +184,10 @@ impl LandingVerdict {
         self.results.iter().filter(|result| !result.passed)
     }
 
-    /// The limit that was broken by the largest share of itself.
+    /// The limit that was broken by the largest share of itself; of equal ones the first.
     pub fn worst(&self) -> Option<&LimitResult> {
         let share = |limit: &LimitResult| share_of_limit(limit.value, limit.lowest, limit.highest);
-        self.failures().max_by(|a, b| share(a).total_cmp(&share(b)))
+        self.failures().min_by(|a, b| share(b).total_cmp(&share(a)))
     }
 
     /// One line: "inside every limit", or the broken limits with their values.

@@ -5,6 +5,7 @@ use std::borrow::Cow;
 
 use flight::vehicle::mission::Mission;
 use flight::vehicle::thrust_curve::ThrustCurve;
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::whole::WorldError;
@@ -73,7 +74,7 @@ flight::with_defaults! {
         pub fin_offset_rad: [f64; 4] = [0.0; 4],
         /// Play between the fins' servos and the fins that the data do not know, rad.
         pub fin_slop_rad: f64 = 0.0,
-        /// Rise of the ground, metre per metre along world x and y; its height at the pad is 0.
+        /// Rise of the ground, metre per metre along world x and y; its height at their origin, where the vehicle is to land, is 0.
         pub ground_rise: [f64; 2] = [0.0; 2],
     }
 }
@@ -130,6 +131,11 @@ impl Truth {
     /// Height of the ground below a place, m.
     pub fn ground_m(&self, x_m: f64, y_m: f64) -> f64 {
         self.ground_rise[0] * x_m + self.ground_rise[1] * y_m
+    }
+
+    /// Height of a place over the ground below it, m.
+    pub fn over_ground_m(&self, place_m: &Vector3<f64>) -> f64 {
+        place_m.z - self.ground_m(place_m.x, place_m.y)
     }
 }
 

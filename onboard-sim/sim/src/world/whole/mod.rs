@@ -429,8 +429,7 @@ impl World {
 
     /// Height of the feet above the ground as if the vehicle were upright, m; zero at touchdown.
     pub fn height_m(&self) -> f64 {
-        let place_m = &self.state.position_m;
-        place_m.z - self.truth.ground_m(place_m.x, place_m.y) - self.cg_above_feet_m()
+        self.truth.over_ground_m(&self.state.position_m) - self.cg_above_feet_m()
     }
 
     /// Distance from the feet up to the centre of gravity, along the axis, m.

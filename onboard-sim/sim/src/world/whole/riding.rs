@@ -64,8 +64,7 @@ impl World {
             + rate.cross(&rate.cross(&from_stack_m));
         self.state = at_offset(&after, &from_stack_m);
         let now_s = time_s + STEP_S;
-        let lower_end_m = stack.lower_end_m(&self.state, &cg_m);
-        if !stack.on_rail() && lower_end_m.z < self.truth.ground_m(lower_end_m.x, lower_end_m.y) {
+        if !stack.on_rail() && self.truth.over_ground_m(&stack.lower_end_m(&self.state, &cg_m)) < 0.0 {
             self.touchdown = Some(self.touchdown_at(now_s, &self.state.clone()));
             self.come_to_rest(now_s, RestOutcome::BodyStrike);
         } else if stack.parts(now_s) {
