@@ -30,7 +30,9 @@ fn assert_whole(rig: &mut Rig, size: (u16, u16)) {
         let shown = window.rows();
         let heard = shown.iter().take(3).any(|row| row.contains(" down 0s up 0s"));
         let found = shown.len() == usize::from(size.1) && shown[1].contains("On the pad") && heard;
-        (found && !window.shows("ENTER ABORTS")).then(|| (without_numbers(window), window.bytes().len()))
+        // On a busy machine two keys arrive at once, and a word about that stands there for seconds.
+        let says_more = window.shows("ENTER ABORTS") || shown[1].contains("keys ");
+        (found && !says_more).then(|| (without_numbers(window), window.bytes().len()))
     });
     rig.terminal.type_bytes(b"\x0c");
     rig.terminal.wait_until(
