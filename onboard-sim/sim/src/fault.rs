@@ -122,13 +122,15 @@ fn surface(number: f64) -> Option<usize> {
 const SILENT: [(&str, Defect); 4] =
     [("out", Defect::Out), ("dead", Defect::Dead), ("stuck", Defect::Stuck), ("nan", Defect::NotANumber)];
 type OfValue = fn(f64) -> Defect;
-const WRONG: [(&str, OfValue); 6] = [
+const WRONG: [(&str, OfValue); 8] = [
     ("step", Defect::Step),
     ("bias", Defect::Step),
     ("ramp", Defect::Ramp),
     ("spike", Defect::Spike),
     ("noise", Defect::Noise),
     ("blocked", Defect::Blocked),
+    ("scale", Defect::Scale),
+    ("stale", Defect::Stale),
 ];
 
 /// A sensor's defect by its name; the value it takes, if it takes one, and the unit of that value.
@@ -350,6 +352,8 @@ mod tests {
             "gyro-stuck@descent",
             "accelerometer-nan@descent",
             "gyro-noise:7@powered",
+            "barometer-scale:0.95@pad",
+            "gnss-stale:3.2@boost",
             "lidar-blocked:0.3@armed",
             "ascent-self-lights@pad-armed+3",
             "gimbal-jams:3@powered+0.5..2",

@@ -464,7 +464,7 @@ impl Sortie {
     pub fn break_down(&mut self, breakage: &Breakage) {
         match *breakage {
             Breakage::Vehicle(fault) => self.surroundings.break_down(fault),
-            Breakage::Sensor(sensor, defect) => self.surroundings.faults.break_down(sensor, defect),
+            Breakage::Sensor(sensor, defect) => self.surroundings.break_sensor(sensor, defect),
             Breakage::LinkLoss => self.radio.silent = true,
             Breakage::LinkDelay(delay_s) => self.radio.delay_s = delay_s,
             Breakage::Reboot(down_s) => self.reboot(down_s),

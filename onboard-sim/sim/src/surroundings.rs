@@ -2,7 +2,7 @@
 //! actuators that move it.
 
 use crate::world::sensors::{
-    NEARLY_EXACT, SensorFaults, SensorParamError, SensorTruth, Sensors, believed_start,
+    Defect, NEARLY_EXACT, Sensor, SensorFaults, SensorParamError, SensorTruth, Sensors, believed_start,
 };
 use crate::world::{Actuators, Battery, Fault, World};
 use flight::computer::{Commands, FRAME_MS, FRAME_S, KeptInput, pad_check};
@@ -47,7 +47,7 @@ impl Surroundings {
         } else {
             *world.state()
         };
-        let sensors = sensors(dispersion, drawn)?;
+        let sensors = sensors(mission, dispersion, drawn)?;
         let actuators = at_rest(mission);
         let faults = SensorFaults::default();
         let battery = Battery::new(1.0, surfaces_rad(&world));
@@ -62,7 +62,7 @@ impl Surroundings {
             self.world = world;
             self.broken.iter().for_each(|fault| self.world.inject(fault));
         }
-        if let Ok(sensors) = sensors(dispersion, drawn) {
+        if let Ok(sensors) = sensors(mission, dispersion, drawn) {
             self.sensors = sensors;
         }
         self.actuators = at_rest(mission);
@@ -72,6 +72,14 @@ impl Surroundings {
     pub(crate) fn break_down(&mut self, fault: Fault) {
         self.world.inject(&fault);
         self.broken.push(fault);
+    }
+
+    /// A sensor breaks.
+    pub(crate) fn break_sensor(&mut self, sensor: Sensor, defect: Defect) {
+        match defect {
+            Defect::Stale(for_s) => self.sensors.hold_fixes(self.world.state(), for_s),
+            _ => self.faults.break_down(sensor, defect),
+        }
     }
 
     /// From now on the receiver's times count from this time of its clock, s: the flight computer's do.
@@ -152,9 +160,9 @@ impl Surroundings {
     }
 }
 
-fn sensors(dispersion: &Dispersion, drawn: &Draw) -> Result<Sensors, SensorParamError> {
+fn sensors(mission: &Mission, dispersion: &Dispersion, drawn: &Draw) -> Result<Sensors, SensorParamError> {
     let errors = if dispersion.sensors { 1.0 } else { NEARLY_EXACT };
-    Sensors::new(&dispersion.sensor_params, drawn.flight_seed, errors)
+    Sensors::new(&dispersion.sensor_params, &mission.sensors, drawn.flight_seed, errors)
 }
 
 /// Where gimbal and fins are, rad.

@@ -84,7 +84,8 @@ fn body(
         r#"
 name = "drawn"
 summary = "A vehicle that nobody tuned for"
-lidar_ahead_of_feet_m = {feet_m}
+[sensors]
+lidar_station_m = 0.0
 [airframe]
 motor = "{motor}"
 igniters = {igniters}

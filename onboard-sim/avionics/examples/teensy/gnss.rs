@@ -1,5 +1,7 @@
 //! u-blox over a UART: the message UBX-NAV-PVT (u-blox M10, interface description UBX-21035062), and nothing else.
 
+use flight::estimation::estimator::FixQuality;
+
 /// Sync, class, identifier, and the length of the payload.
 pub(crate) const HEAD: &[u8] = &[0xB5, 0x62, 0x01, 0x07, 92, 0];
 pub(crate) const FRAME_BYTES: usize = 100;
@@ -15,6 +17,8 @@ pub(crate) struct Fix {
     pub(crate) height_m: f64,
     /// North, east, down, m/s.
     pub(crate) velocity_ned_m_s: [f64; 3],
+    /// `numSV`, `hAcc`, `vAcc` and `sAcc`.
+    pub(crate) quality: FixQuality,
 }
 
 /// The fix of a frame, if its checksum is right and the receiver vouches for it.
@@ -31,6 +35,12 @@ pub(crate) fn fix(frame: &[u8; FRAME_BYTES]) -> Option<Fix> {
         latitude_deg: number(28) * 1e-7,
         height_m: number(36) * 1e-3,
         velocity_ned_m_s: [48, 52, 56].map(|at| number(at) * 1e-3),
+        quality: FixQuality {
+            satellites: u32::from(payload[23]),
+            horizontal_m: number(40) * 1e-3,
+            vertical_m: number(44) * 1e-3,
+            speed_m_s: number(68) * 1e-3,
+        },
     })
 }
 

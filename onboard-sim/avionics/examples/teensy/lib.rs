@@ -270,6 +270,7 @@ impl<W: Wiring> TeensyBoard<W> {
             position_m: self.stands_m + self.place.from(ZERO_FIXES, place_m)?,
             velocity_m_s: turned(&WORLD_FROM_NED, fix.velocity_ned_m_s),
             valid_at_s: flight_time_s(self.frame + 1 - self.released_at) - self.build.fix_age_s,
+            quality: fix.quality,
         })
     }
 }

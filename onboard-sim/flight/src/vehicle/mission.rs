@@ -4,6 +4,7 @@ use alloc::boxed::Box;
 use alloc::string::String;
 use alloc::vec::Vec;
 
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use crate::control::aim::AimGains;
@@ -67,6 +68,49 @@ pub struct Start {
     pub carried_share: f64,
     /// Tilt of the nose from the vertical, along the motion, degrees.
     pub tilt_deg: f64,
+}
+
+/// Places of the sensors in the vehicle: stations above the nozzle exit, and distances from the axis
+/// along body y and z, m. A sensor without a station is taken to be at the centre of gravity.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SensorPlaces {
+    /// Inertial unit.
+    pub imu_station_m: Option<f64>,
+    pub imu_across_m: [f64; 2],
+    /// Antenna of the satellite receiver.
+    pub gnss_station_m: Option<f64>,
+    pub gnss_across_m: [f64; 2],
+    /// Static ports of the barometer.
+    pub barometer_station_m: Option<f64>,
+    pub barometer_across_m: [f64; 2],
+    /// Lidar, which looks backwards along the axis.
+    pub lidar_station_m: Option<f64>,
+    pub lidar_across_m: [f64; 2],
+}
+
+/// Lever arms of the sensors from the centre of gravity, body axes, m.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct LeverArms {
+    pub imu_m: Vector3<f64>,
+    pub gnss_m: Vector3<f64>,
+    pub barometer_m: Vector3<f64>,
+    pub lidar_m: Vector3<f64>,
+}
+
+impl SensorPlaces {
+    /// The lever arms from a centre of gravity: its station and its distance from the axis, m.
+    pub fn lever_arms(&self, cg_m: &Vector3<f64>) -> LeverArms {
+        let from_cg = |station_m: Option<f64>, [y_m, z_m]: [f64; 2]| {
+            station_m.map_or_else(Vector3::zeros, |x_m| Vector3::new(x_m, y_m, z_m) - cg_m)
+        };
+        LeverArms {
+            imu_m: from_cg(self.imu_station_m, self.imu_across_m),
+            gnss_m: from_cg(self.gnss_station_m, self.gnss_across_m),
+            barometer_m: from_cg(self.barometer_station_m, self.barometer_across_m),
+            lidar_m: from_cg(self.lidar_station_m, self.lidar_across_m),
+        }
+    }
 }
 
 /// What the exhaust is expected to take away of the drag while the motor burns, as fractions.
@@ -199,8 +243,8 @@ pub struct Mission {
     /// Position of the pad on the Earth.
     #[serde(default)]
     pub site: Site,
-    /// Position of the lidar along the axis, ahead of the feet, m.
-    pub lidar_ahead_of_feet_m: f64,
+    #[serde(default)]
+    pub sensors: SensorPlaces,
     #[serde(default)]
     pub exhaust: Exhaust,
     /// The prior of the motor before ignition.

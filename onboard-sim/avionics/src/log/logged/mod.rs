@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use flight::computer::crew::{Asked, Ending, People, Request};
 use flight::computer::{Commander, KeptInput, LogState, Rehearsed};
 use flight::estimation::estimator::{
-    Doubt, Estimate, GnssFix, Health, HeightSources, ImuSample, Measurements, Sigmas,
+    Doubt, Estimate, FixQuality, GnssFix, Health, HeightSources, ImuSample, Measurements, Sigmas,
 };
 use flight::rules::arming::{PredictedLanding, Uplink};
 use flight::rules::operator::{Name, Operator, Role};
@@ -85,7 +85,8 @@ macro_rules! record {
 
 record!(RigidState as flight_v1::RigidState { position_m, velocity_m_s, world_from_body, rate_rad_s });
 record!(ImuSample as flight_v1::ImuSample { gyro_rad_s, specific_force_m_s2 });
-record!(GnssFix as flight_v1::GnssFix { position_m, velocity_m_s, valid_at_s });
+record!(FixQuality as flight_v1::FixQuality { satellites, horizontal_m, vertical_m, speed_m_s });
+record!(GnssFix as flight_v1::GnssFix { position_m, velocity_m_s, valid_at_s, quality });
 record!(Measurements as flight_v1::Measurements { imu, pressure_altitude_m, gnss, lidar_range_m });
 record!(Sigmas as flight_v1::Sigmas {
     position_m, velocity_m_s, attitude_rad, gyro_bias_rad_s, accelerometer_bias_m_s2, wind_m_s

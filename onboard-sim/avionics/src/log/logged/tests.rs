@@ -52,6 +52,12 @@ fn measurements(numbers: &[f64], there: [bool; 3]) -> Measurements {
         position_m: vector(numbers, 6),
         velocity_m_s: vector(numbers, 9),
         valid_at_s: numbers[12],
+        quality: FixQuality {
+            satellites: 9,
+            horizontal_m: numbers[6],
+            vertical_m: numbers[7],
+            speed_m_s: numbers[8],
+        },
     };
     Measurements {
         imu: ImuSample { gyro_rad_s: vector(numbers, 0), specific_force_m_s2: vector(numbers, 3) },

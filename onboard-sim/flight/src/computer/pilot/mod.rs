@@ -59,8 +59,6 @@ pub struct Pilot {
     /// Apart: a pilot is moved when it is made, and its memory on a board's stack is short.
     estimator: Box<Estimator>,
     estimate: Option<Estimate>,
-    /// Position and velocity of the last fix.
-    last_fix: Option<(Vector3<f64>, Vector3<f64>)>,
     speeds: VerticalSpeeds,
     pub(super) ascent: AscentWatch,
     /// Height at which the fall begins or began, m.
@@ -113,7 +111,6 @@ impl Pilot {
         Self {
             estimator: Box::new(Estimator::new(&mission.estimator, uncertainty, time_s, believed)),
             estimate: None,
-            last_fix: None,
             speeds: VerticalSpeeds::default(),
             ascent: AscentWatch::default(),
             apogee_m: match mission.start.at {

@@ -117,15 +117,12 @@ impl Pilot {
         self.estimator.step(&measurements, &vehicle)
     }
 
-    /// A sensor that repeats itself has stopped, and a fix may be outvoted.
+    /// Removes a pressure that repeats itself, and a fix that estimate and pressure outvote.
     fn silence_what_is_wrong(&mut self, measurements: &mut Measurements, time_s: f64) {
-        let said = measurements.gnss.map(|fix| (fix.position_m, fix.velocity_m_s));
-        let repeated = said.is_some() && said == self.last_fix;
-        self.last_fix = said.or(self.last_fix);
-        let outvoted = said.zip(self.estimate).is_some_and(|((_, velocity_m_s), estimate)| {
-            self.speeds.outvote(velocity_m_s.z, estimate.state.velocity_m_s.z, time_s)
+        let outvoted = measurements.gnss.zip(self.estimate).is_some_and(|(fix, estimate)| {
+            self.speeds.outvote(fix.velocity_m_s.z, estimate.state.velocity_m_s.z, time_s)
         });
-        measurements.gnss = measurements.gnss.filter(|_| !repeated && !outvoted);
+        measurements.gnss = measurements.gnss.filter(|_| !outvoted);
         measurements.pressure_altitude_m =
             measurements.pressure_altitude_m.filter(|altitude_m| !self.speeds.repeats(*altitude_m));
     }
@@ -170,14 +167,14 @@ impl Pilot {
     }
 
     fn watch_the_speeds(&mut self, input: &KeptInput, estimate: &Estimate) {
-        let Measurements { imu, pressure_altitude_m, gnss, .. } = input.measured;
+        let Measurements { imu, pressure_altitude_m, .. } = input.measured;
         self.speeds.take(&SpeedReadings {
             time_s: input.time_s,
             frame_s: self.model.mission.estimator.frame_s,
             vertical_m_s2: (estimate.state.world_from_body * imu.specific_force_m_s2).z
                 - self.model.mission.gravity_m_s2,
             pressure_altitude_m: pressure_altitude_m.filter(|_| !self.ascent.is_charged(input.time_s)),
-            gnss_m_s: gnss.map(|fix| fix.velocity_m_s.z),
+            gnss_m_s: self.estimator.admitted_gnss_m_s().map(|velocity_m_s| velocity_m_s.z),
             estimated_m_s: estimate.state.velocity_m_s.z,
         });
     }

@@ -64,8 +64,8 @@ impl VehicleModel {
         fins_rad: [f64; 4],
         burns: bool,
     ) -> VehicleNow {
-        let ahead_m = self.mission.lidar_ahead_of_feet_m;
-        VehicleNow::of(self.airframe(), mass, density_kg_m3, fins_rad, burns, ahead_m)
+        let levers = self.mission.sensors.lever_arms(&(Vector3::x() * mass.cg_station_m));
+        VehicleNow::of(self.airframe(), mass, density_kg_m3, fins_rad, burns, levers)
     }
 
     /// The motor's curve: the expected one, or another that its burn has turned out to have.

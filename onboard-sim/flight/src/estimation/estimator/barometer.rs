@@ -5,7 +5,8 @@
 
 use super::correction::{DOUBT_POSITION_M, without_last_if};
 use super::covariance::{
-    BAROMETER_LATE, BAROMETER_OFFSET, BAROMETER_RAM, BAROMETER_SUCTION, POSITION, VELOCITY, WIND,
+    BAROMETER_LATE, BAROMETER_OFFSET, BAROMETER_RAM, BAROMETER_SCALE, BAROMETER_SUCTION, POSITION, VELOCITY,
+    WIND,
 };
 use super::{Estimator, HeightSources};
 
@@ -17,9 +18,11 @@ const BAROMETER_REJECTIONS: u32 = 25;
 const OUTVOTED_REJECTIONS: u32 = 15;
 
 impl Estimator {
-    /// The barometer measures height plus its own offset, plus the ram error `-k V^2 / 2 g`, plus the suction `c v^2 / 2 g` of
+    /// The barometer measures the height of its ports by its scale, plus its own offset, plus the ram error `-k V^2 / 2 g`, plus the suction `c v^2 / 2 g` of
     /// the flow across the axis.
-    pub(super) fn take_barometer(&mut self, altitude_m: f64) {
+    pub(super) fn take_barometer(&mut self, altitude_m: f64, lever_m: &nalgebra::Vector3<f64>) {
+        // Zeroed on the pad, where the vehicle stands upright.
+        let altitude_m = altitude_m - (self.nominal.world_from_body * lever_m).z + lever_m.x;
         let gravity = self.config.gravity_m_s2;
         let through_air = self.velocity_through_air_m_s();
         let speed_height_m = through_air.norm_squared() / (2.0 * gravity);
@@ -29,13 +32,14 @@ impl Estimator {
         let across_height_m = across.norm_squared() / (2.0 * gravity);
         let by_velocity =
             through_air * (-state.barometer_ram / gravity) + across * (state.barometer_suction / gravity);
-        let predicted_m = state.position_m.z + state.barometer_offset_m
+        let predicted_m = state.position_m.z * (1.0 + state.barometer_scale) + state.barometer_offset_m
             - state.barometer_ram * speed_height_m
             - state.barometer_late_s * state.velocity_m_s.z
             + state.barometer_suction * across_height_m;
-        let mut sensitivity = [(BAROMETER_SUCTION, across_height_m); 10];
+        let mut sensitivity = [(BAROMETER_SUCTION, across_height_m); 11];
         let known = [
-            (POSITION + 2, 1.0),
+            (POSITION + 2, 1.0 + state.barometer_scale),
+            (BAROMETER_SCALE, state.position_m.z),
             (VELOCITY, by_velocity.x),
             (VELOCITY + 1, by_velocity.y),
             (VELOCITY + 2, by_velocity.z),
@@ -66,8 +70,9 @@ impl Estimator {
             let state = &self.nominal;
             let late_m = state.barometer_late_s * state.velocity_m_s.z;
             self.heights.take_barometer(
-                altitude_m - state.barometer_offset_m + state.barometer_ram * speed_height_m + late_m
-                    - state.barometer_suction * across_height_m,
+                (altitude_m - state.barometer_offset_m + state.barometer_ram * speed_height_m + late_m
+                    - state.barometer_suction * across_height_m)
+                    / (1.0 + state.barometer_scale),
             );
         }
         if self.aids.barometer.refused_in_a_row >= BAROMETER_REJECTIONS {

@@ -43,6 +43,8 @@ with_defaults! {
         /// Suction of the flow across the axis, divided by its dynamic pressure; 0 rules it out. A port on a cylinder feels
         /// +1 to -1.1 of it, by its place; the mean over a ring of ports is about -0.5 (Hoerner, "Fluid-Dynamic Drag", 1965).
         pub barometer_suction: f64 = 0.0,
+        /// Scale error of the barometric height: a day 15 K from the standard atmosphere's temperature.
+        pub barometer_scale: f64 = 0.05,
         /// White noise of a satellite position, horizontal, m.
         pub gnss_horizontal_m: f64 = 0.2,
         /// White noise of a satellite position, vertical, m.

@@ -96,6 +96,12 @@ impl AidStatus {
         self.count(false);
     }
 
+    /// Discards a measurement that says nothing about the estimate.
+    pub(super) fn discard(&mut self) {
+        self.fresh = true;
+        self.refused = self.refused.saturating_add(1);
+    }
+
     /// Counts a verdict and returns it.
     pub(super) fn count(&mut self, accepted: bool) -> bool {
         self.fresh = true;

@@ -6,14 +6,14 @@
 //! (19..22, world, m), error of the satellite fixes' time tags (22, s),
 //! age of a barometer sample (23, s), age of a lidar sample (24, s),
 //! slope of the ground (25..27, rise along world x and y), suction coefficient of the flow across the axis at the barometer
-//! (27).
+//! (27), scale of the barometric height (28).
 
 use nalgebra::{Matrix3, Vector3};
 use serde::ser::SerializeTuple as _;
 use serde::{Serialize, Serializer};
 
 /// Length of the error state.
-pub(super) const N: usize = 28;
+pub(super) const N: usize = 29;
 pub(super) const POSITION: usize = 0;
 pub(super) const VELOCITY: usize = 3;
 pub(super) const ATTITUDE: usize = 6;
@@ -28,6 +28,7 @@ pub(super) const BAROMETER_LATE: usize = 23;
 pub(super) const LIDAR_LATE: usize = 24;
 pub(super) const SLOPE: usize = 25;
 pub(super) const BAROMETER_SUCTION: usize = 27;
+pub(super) const BAROMETER_SCALE: usize = 28;
 
 /// A row of the covariance, and any other vector over the error state.
 pub(super) type Row = [f64; N];

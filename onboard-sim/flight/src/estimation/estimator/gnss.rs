@@ -8,6 +8,7 @@ use super::correction::{DOUBT_POSITION_M, POSITION_REJECTIONS, without_last_if};
 use super::covariance::{
     ACCELEROMETER_BIAS, ATTITUDE, GNSS_OFFSET, GNSS_TIME_TAG, GYRO_BIAS, POSITION, VELOCITY,
 };
+use super::gnss_gate::REPORTED_M;
 use super::strapdown::Since;
 use super::{Estimator, EstimatorConfig, GnssFix, health};
 
@@ -75,9 +76,16 @@ impl Estimator {
         self.catch_up();
         let upright = (self.nominal.world_from_body * nalgebra::Vector3::x()).z;
         let leaning = if upright < libm::cos(LEANS_RAD) { LEANING_NOISE } else { 1.0 };
-        let off_m_s = self
-            .since_fix(fix)
-            .map_or(0.0, |since| (fix.velocity_m_s - self.nominal.velocity_m_s + since.gained_m_s).norm());
+        let [lever_m, lever_m_s] = self.history.lever();
+        let off_m_s = self.since_fix(fix).map_or(0.0, |since| {
+            (fix.velocity_m_s - self.nominal.velocity_m_s - lever_m_s + since.gained_m_s).norm()
+        });
+        let reported_m = |horizontal_m: f64| if horizontal_m > REPORTED_M { horizontal_m } else { 0.0 };
+        let [horizontal_m, vertical_m] = [
+            self.config.gnss_horizontal_m.max(reported_m(fix.quality.horizontal_m)),
+            self.config.gnss_vertical_m.max(reported_m(fix.quality.vertical_m)),
+        ];
+        let sigma_m_s = leaning * self.config.gnss_velocity_m_s.max(fix.quality.speed_m_s);
         for axis in 0..3 {
             let Some(since) = self.since_fix(fix) else {
                 self.aids.gnss_velocity.refuse();
@@ -85,7 +93,8 @@ impl Estimator {
             };
             // The past velocity is the present one minus the gain since. The gain depends on the attitude and the
             // accelerometer bias, which have errors of their own.
-            let felt = since.gained_m_s + nalgebra::Vector3::z() * (self.config.gravity_m_s2 * since.age_s);
+            let felt = since.gained_m_s - lever_m_s
+                + nalgebra::Vector3::z() * (self.config.gravity_m_s2 * since.age_s);
             let by_attitude = felt.cross_matrix();
             let by_bias = self.nominal.world_from_body.to_rotation_matrix().into_inner() * since.age_s;
             let sensitivity = [
@@ -99,9 +108,8 @@ impl Estimator {
                 (GNSS_TIME_TAG, -since.acceleration_m_s2[axis]),
             ];
             let sensitivity = without_last_if(self.config.gnss_time_tag_s <= 0.0, &sensitivity);
-            let predicted = self.nominal.velocity_m_s[axis] - since.gained_m_s[axis];
+            let predicted = self.nominal.velocity_m_s[axis] + lever_m_s[axis] - since.gained_m_s[axis];
             let late = since.acceleration_m_s2[axis];
-            let sigma_m_s = leaning * self.config.gnss_velocity_m_s;
             let noise = sigma_m_s * sigma_m_s + late * late * self.fix_age.variance_s2;
             let correction = self.correct(sensitivity, fix.velocity_m_s[axis] - predicted, noise, |_| true);
             self.aids.gnss_velocity.take_next(axis, &correction);
@@ -115,7 +123,7 @@ impl Estimator {
                 self.aids.gnss_position.refuse();
                 continue;
             };
-            let then_m_s = self.nominal.velocity_m_s[axis] - since.gained_m_s[axis];
+            let then_m_s = self.nominal.velocity_m_s[axis] + lever_m_s[axis] - since.gained_m_s[axis];
             let sensitivity = [
                 (POSITION + axis, 1.0),
                 (VELOCITY + axis, -since.age_s),
@@ -123,17 +131,17 @@ impl Estimator {
                 (GNSS_TIME_TAG, -then_m_s),
             ];
             let sensitivity = without_last_if(self.config.gnss_time_tag_s <= 0.0, &sensitivity);
-            let predicted =
-                self.nominal.position_m[axis] - since.moved_m[axis] + self.nominal.gnss_offset_m[axis];
-            let sigma =
-                leaning * if axis == 2 { self.config.gnss_vertical_m } else { self.config.gnss_horizontal_m };
+            let predicted = self.nominal.position_m[axis] + lever_m[axis] - since.moved_m[axis]
+                + self.nominal.gnss_offset_m[axis];
+            let sigma = leaning * if axis == 2 { vertical_m } else { horizontal_m };
             let aged_m2 = then_m_s * then_m_s * self.fix_age.variance_s2;
             let innovation_m = fix.position_m[axis] - predicted;
             let correction = self.correct(sensitivity, innovation_m, sigma * sigma + aged_m2, |_| true);
             self.aids.gnss_position.take_next(axis, &correction);
             self.fix_age.take(innovation_m, correction.variance - aged_m2, then_m_s);
             if axis == 2 && fix.position_m.z.is_finite() {
-                self.heights.take_gnss(&self.config, fix.position_m.z, since.moved_m.z, aged_m2);
+                let height_m = fix.position_m.z - lever_m.z;
+                self.heights.take_gnss(&self.config, height_m, since.moved_m.z, aged_m2);
             }
         }
         if self.aids.gnss_position.refused_in_a_row >= POSITION_REJECTIONS {
@@ -148,8 +156,10 @@ impl Estimator {
     }
 
     /// The motion since a fix was valid, by its time tag less the tag's estimated error.
-    fn since_fix(&self, fix: &GnssFix) -> Option<Since> {
-        self.history.since(fix.valid_at_s - self.nominal.gnss_time_tag_s, &self.nominal.velocity_m_s)
+    pub(super) fn since_fix(&self, fix: &GnssFix) -> Option<Since> {
+        let [_, lever_m_s] = self.history.lever();
+        let antenna_m_s = self.nominal.velocity_m_s + lever_m_s;
+        self.history.since(fix.valid_at_s - self.nominal.gnss_time_tag_s, &antenna_m_s)
     }
 
     /// Increases the uncertainty of motion and inertial biases: satellite velocities do not fit on average, so an error

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::{Aids, EstimatorConfig, Sigmas};
 
 /// Number of frames without a usable inertial sample that the last sample bridges.
-const BRIDGED_FRAMES: u32 = 4;
+pub(super) const BRIDGED_FRAMES: u32 = 4;
 /// Shortest time that the estimate stays unhealthy after a restart, s.
 pub(super) const DOUBT_AFTER_RESTART_S: f64 = 1.0;
 /// The same after a surprise by velocities that are off by little, s: two fixes, from where on the standard deviations tell. No longer,

@@ -21,7 +21,7 @@ impl Estimator {
     /// The lidar looks along body `-x` from its place behind the centre of gravity. Its range plus that distance is the
     /// height divided by the cosine of the tilt: `s = h / n`, `n` the nose's vertical part. A small turn `d` about the world's axes
     /// adds `d_x n_y - d_y n_x` to `n`, so it adds `-s / n (d_x n_y - d_y n_x)` to `s`.
-    pub(super) fn take_lidar(&mut self, range_m: f64, behind_cg_m: f64) {
+    pub(super) fn take_lidar(&mut self, range_m: f64, lever_m: &nalgebra::Vector3<f64>) {
         let nose = self.nominal.world_from_body * nalgebra::Vector3::x();
         if nose.z < LIDAR_COS_TILT {
             self.aids.lidar.refuse();
@@ -47,7 +47,8 @@ impl Estimator {
             sensitivity[known + 1] = (SLOPE + 1, -hit_m.y / nose.z);
             known += 2;
         }
-        let measured_m = range_m + behind_cg_m;
+        let aside_m = self.nominal.world_from_body * nalgebra::Vector3::new(0.0, lever_m.y, lever_m.z);
+        let measured_m = range_m - lever_m.x - aside_m.z / nose.z;
         // The beam leans as the airframe does, not as the inertial unit does: the same error in many samples.
         let askew_m = slant_m * nose.xy().norm() / nose.z * self.config.mounting_deg.to_radians();
         let noise = self.config.lidar_m * self.config.lidar_m + askew_m * askew_m * ASKEW_SAMPLES;

@@ -20,6 +20,7 @@ mod config;
 mod correction;
 mod covariance;
 mod gnss;
+mod gnss_gate;
 mod health;
 mod lidar;
 mod strapdown;
@@ -33,10 +34,12 @@ use serde::{Deserialize, Serialize};
 pub use self::config::{EstimatorConfig, GRAVITY_M_S2, HealthLimits, StartUncertainty};
 pub use self::correction::{AidStatus, Aids};
 use self::covariance::{
-    ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_LATE, BAROMETER_OFFSET, BAROMETER_RAM, BAROMETER_SUCTION,
-    Covariance, GNSS_OFFSET, GNSS_TIME_TAG, GYRO_BIAS, LIDAR_LATE, N, POSITION, Row, SLOPE, VELOCITY, WIND,
+    ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_LATE, BAROMETER_OFFSET, BAROMETER_RAM, BAROMETER_SCALE,
+    BAROMETER_SUCTION, Covariance, GNSS_OFFSET, GNSS_TIME_TAG, GYRO_BIAS, LIDAR_LATE, N, POSITION, Row,
+    SLOPE, VELOCITY, WIND,
 };
 use self::gnss::FixAge;
+use self::gnss_gate::GnssGate;
 pub use self::health::{Doubt, Health, HeightSources};
 use self::health::{HeightChannel, Surprise};
 use self::strapdown::{History, Noise, Nominal, Pending};
@@ -144,6 +147,7 @@ pub struct Estimator {
     outvoted_from: u32,
     surprise: Surprise,
     fix_age: FixAge,
+    gnss_gate: GnssGate,
     last_imu: ImuSample,
     /// The landing motor has shaken the gyro.
     is_shaken: bool,
@@ -178,6 +182,7 @@ impl Estimator {
             outvoted_from: 0,
             surprise: Surprise::default(),
             fix_age: FixAge::new(config),
+            gnss_gate: GnssGate::new(&state.velocity_m_s),
             is_shaken: false,
             last_imu: ImuSample { gyro_rad_s: state.rate_rad_s, specific_force_m_s2: Vector3::zeros() },
             rate_rad_s: state.rate_rad_s,
@@ -213,15 +218,15 @@ impl Estimator {
                 self.covariance.widen(axis, shift_rad_s * shift_rad_s);
             }
         }
-        self.carry_forward(&measurements.imu, vehicle.motor_burning);
+        self.carry_forward(&measurements.imu, vehicle.motor_burning, &vehicle.levers);
         if let Some(altitude_m) = measurements.pressure_altitude_m {
-            self.take_barometer(altitude_m);
+            self.take_barometer(altitude_m, &vehicle.levers.barometer_m);
         }
-        if let Some(fix) = &measurements.gnss {
-            self.take_gnss(fix);
+        if let Some(fix) = measurements.gnss.filter(|fix| self.admits(fix)) {
+            self.take_gnss(&fix);
         }
         if let Some(range_m) = measurements.lidar_range_m {
-            self.take_lidar(range_m, vehicle.lidar_behind_cg_m);
+            self.take_lidar(range_m, &vehicle.levers.lidar_m);
         }
         self.update_wind(vehicle);
         self.guard();
@@ -240,7 +245,8 @@ impl Estimator {
     /// before it does not show the velocity after it.
     pub(crate) fn take_shock(&mut self, gained_m_s: f64) {
         self.doubt_velocity(&(self.nominal.world_from_body * Vector3::x() * gained_m_s));
-        self.history = History::new(self.time_s());
+        self.history.restart();
+        self.gnss_gate.expect_shock(gained_m_s);
     }
 
     /// The estimate now.
@@ -368,6 +374,7 @@ fn start_covariance(start: &StartUncertainty, config: &EstimatorConfig) -> Covar
     sigmas[LIDAR_LATE] = config.lidar_late_s;
     sigmas[SLOPE..BAROMETER_SUCTION].fill(libm::tan(config.ground_slope_deg.to_radians()));
     sigmas[BAROMETER_SUCTION] = config.barometer_suction;
+    sigmas[BAROMETER_SCALE] = config.barometer_scale;
     Covariance::diagonal(&sigmas.map(|sigma| sigma * sigma))
 }
 
@@ -400,15 +407,30 @@ impl ImuSample {
     }
 }
 
-/// One fix of the satellite receiver. It arrives late: it has the position at the time `valid_at_s`.
+/// One fix of the satellite receiver, of the antenna. It arrives late: it holds for the time `valid_at_s`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GnssFix {
-    /// Position in the world, relative to the pad, m.
+    /// Position of the antenna in the world, relative to the pad, m.
     pub position_m: Vector3<f64>,
     pub velocity_m_s: Vector3<f64>,
-    /// Time of validity on the flight computer's clock, s: from power-up on the pad, and T+ (from the release) in flight. A fix
-    /// that is older than the estimator remembers is not used.
+    /// Time of validity on the flight computer's clock, s: from power-up on the pad, and T+ (from
+    /// the release) in flight. A fix older than the estimator's history is rejected.
     pub valid_at_s: f64,
+    /// The receiver's own statement about the fix.
+    pub quality: FixQuality,
+}
+
+/// The quality that a satellite receiver reports of its fix; zero where it reports none.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct FixQuality {
+    /// Number of satellites used.
+    pub satellites: u32,
+    /// Standard deviation of the horizontal position, m.
+    pub horizontal_m: f64,
+    /// Standard deviation of the height, m.
+    pub vertical_m: f64,
+    /// Standard deviation of the velocity, m/s.
+    pub speed_m_s: f64,
 }
 
 /// All measurements of one frame; a sensor that did not report is `None`.

@@ -7,10 +7,12 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector2, Vector3};
 use serde::Serialize;
 
 use super::covariance::{
-    ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_LATE, BAROMETER_OFFSET, BAROMETER_RAM, BAROMETER_SUCTION,
-    GNSS_OFFSET, GNSS_TIME_TAG, GYRO_BIAS, LIDAR_LATE, N, Row, SLOPE, Transition, VELOCITY, WIND,
+    ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_LATE, BAROMETER_OFFSET, BAROMETER_RAM, BAROMETER_SCALE,
+    BAROMETER_SUCTION, GNSS_OFFSET, GNSS_TIME_TAG, GYRO_BIAS, LIDAR_LATE, N, Row, SLOPE, Transition,
+    VELOCITY, WIND,
 };
 use super::{Estimator, EstimatorConfig, GRAVITY_M_S2, ImuSample};
+use crate::vehicle::mission::LeverArms;
 use crate::vehicle::rigid::RigidState;
 
 /// The covariance is propagated once in this many frames, and before every correction.
@@ -36,6 +38,8 @@ pub(super) struct Nominal {
     /// Rise of the ground along world x and y.
     pub(super) slope: Vector2<f64>,
     pub(super) barometer_suction: f64,
+    /// Error of the barometric height's scale.
+    pub(super) barometer_scale: f64,
 }
 
 impl Nominal {
@@ -65,6 +69,7 @@ impl Nominal {
         self.lidar_late_s += error[LIDAR_LATE];
         self.slope += Vector2::new(error[SLOPE], error[SLOPE + 1]);
         self.barometer_suction += error[BAROMETER_SUCTION];
+        self.barometer_scale += error[BAROMETER_SCALE];
     }
 
     pub(super) fn is_finite(&self) -> bool {
@@ -84,6 +89,7 @@ impl Nominal {
                 &self.barometer_late_s,
                 &self.lidar_late_s,
                 &self.barometer_suction,
+                &self.barometer_scale,
             ])
             .all(|value| value.is_finite())
     }
@@ -143,14 +149,22 @@ with_defaults! {
 impl Estimator {
     /// Integrates one frame: the attitude by the mean rate, the velocity by the mean specific force turned by the
     /// attitude in the middle of the frame.
-    pub(super) fn carry_forward(&mut self, imu: &ImuSample, burning: bool) {
+    pub(super) fn carry_forward(&mut self, imu: &ImuSample, burning: bool, levers: &LeverArms) {
         let interval_s = self.config.frame_s;
-        if self.aids.imu.count(imu.is_plausible()) {
+        let measured = self.aids.imu.count(imu.is_plausible());
+        if measured {
             self.last_imu = *imu;
         }
         let state = &mut self.nominal;
+        let before_rad_s = self.rate_rad_s;
         self.rate_rad_s = self.last_imu.gyro_rad_s - state.gyro_bias_rad_s;
-        self.specific_force_m_s2 = self.last_imu.specific_force_m_s2 - state.accelerometer_bias_m_s2;
+        // At the centre of gravity (Groves 2013, section 5.5): the rate in the middle of two samples.
+        let angular_m_s2 = (self.rate_rad_s - before_rad_s) / interval_s;
+        let middle_rad_s = (self.rate_rad_s + before_rad_s) * 0.5;
+        self.specific_force_m_s2 = self.last_imu.specific_force_m_s2
+            - state.accelerometer_bias_m_s2
+            - angular_m_s2.cross(&levers.imu_m)
+            - middle_rad_s.cross(&middle_rad_s.cross(&levers.imu_m));
 
         let half_turn = UnitQuaternion::from_scaled_axis(self.rate_rad_s * (0.5 * interval_s));
         let middle = state.world_from_body * half_turn;
@@ -159,6 +173,7 @@ impl Estimator {
         state.world_from_body.renormalize_fast();
         let middle = middle.to_rotation_matrix();
         let felt_m_s = middle * self.specific_force_m_s2 * interval_s;
+        self.gnss_gate.begin_frame(felt_m_s.norm(), measured);
         let gained_m_s = felt_m_s - Vector3::z() * (self.config.gravity_m_s2 * interval_s);
         let moved_m = (state.velocity_m_s + gained_m_s * 0.5) * interval_s;
         state.position_m += moved_m;
@@ -177,8 +192,10 @@ impl Estimator {
         self.pending.world_from_body_s += middle.matrix() * interval_s;
         self.pending.wind_factor *= wind_factor;
         self.pending.burning = burning;
+        let antenna_m = state.world_from_body * levers.gnss_m;
+        let antenna_m_s = state.world_from_body * self.rate_rad_s.cross(&levers.gnss_m);
         let time_s = self.time_s();
-        self.history.push(time_s, interval_s, &gained_m_s);
+        self.history.push(time_s, interval_s, &gained_m_s, [antenna_m, antenna_m_s]);
         let velocity_m2_s2 = self.covariance.variance(VELOCITY + 2);
         self.heights.predict(&self.config, moved_m.z, velocity_m2_s2, interval_s);
         if self.pending.frames >= FRAMES_BETWEEN {
@@ -205,7 +222,7 @@ impl Estimator {
     }
 }
 
-// The vehicle's recent motion, for measurements that arrive late.
+// The antenna's recent motion, for fixes that arrive late.
 //
 // The history holds the velocity gained and its integral, not past estimates. The past state is the present estimate
 // run backwards, so it contains every correction made since. (This is the recalculation of Larsen and others,
@@ -218,9 +235,9 @@ const LENGTH: usize = 64;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 struct Sums {
     time_s: f64,
-    /// Velocity gained since the start, world, m/s.
+    /// Velocity gained since the start, and that of the antenna's lever arm, world, m/s.
     velocity_m_s: Vector3<f64>,
-    /// Its integral, m.
+    /// Integral of the velocity gained, and the antenna's lever arm, world, m.
     position_m: Vector3<f64>,
 }
 
@@ -243,27 +260,54 @@ pub(super) struct History {
     ring: [Sums; LENGTH],
     filled: usize,
     newest: usize,
+    /// Lever arm of the antenna, m, and its velocity, m/s, in the newest frame, world.
+    lever: [Vector3<f64>; 2],
 }
 
 impl History {
     pub(super) fn new(time_s: f64) -> Self {
         let start = Sums { time_s, velocity_m_s: Vector3::zeros(), position_m: Vector3::zeros() };
-        Self { ring: [start; LENGTH], filled: 1, newest: 0 }
+        Self { ring: [start; LENGTH], filled: 1, newest: 0, lever: [Vector3::zeros(); 2] }
     }
 
-    /// Adds one frame.
-    pub(super) fn push(&mut self, time_s: f64, interval_s: f64, gained_m_s: &Vector3<f64>) {
+    /// Forgets the motion before the newest frame.
+    pub(super) fn restart(&mut self) {
+        self.filled = 1;
+    }
+
+    /// Adds one frame: the velocity gained by the centre of gravity, m/s, and the antenna's lever arm, m, with its velocity, m/s.
+    pub(super) fn push(
+        &mut self,
+        time_s: f64,
+        interval_s: f64,
+        gained_m_s: &Vector3<f64>,
+        lever: [Vector3<f64>; 2],
+    ) {
         let before = self.ring[self.newest];
+        let [before_m, before_m_s] = self.lever;
+        let [lever_m, lever_m_s] = lever;
+        let cg_m_s = before.velocity_m_s - before_m_s;
         self.newest = (self.newest + 1) % LENGTH;
         self.filled = (self.filled + 1).min(LENGTH);
         self.ring[self.newest] = Sums {
             time_s,
-            velocity_m_s: before.velocity_m_s + gained_m_s,
-            position_m: before.position_m + (before.velocity_m_s + gained_m_s * 0.5) * interval_s,
+            velocity_m_s: cg_m_s + gained_m_s + lever_m_s,
+            position_m: before.position_m - before_m + (cg_m_s + gained_m_s * 0.5) * interval_s + lever_m,
         };
+        self.lever = lever;
     }
 
-    /// The motion since a time, for a vehicle that now has this velocity. `None` for a time in the future or too long
+    /// Lever arm of the antenna, m, and its velocity, m/s, in the newest frame, world.
+    pub(super) fn lever(&self) -> [Vector3<f64>; 2] {
+        self.lever
+    }
+
+    /// Sum of the velocity gained up to the newest frame, m/s.
+    pub(super) fn gained_m_s(&self) -> Vector3<f64> {
+        self.ring[self.newest].velocity_m_s
+    }
+
+    /// The motion since a time, for an antenna that now has this velocity. `None` for a time in the future or too long
     /// ago.
     pub(super) fn since(&self, valid_at_s: f64, velocity_m_s: &Vector3<f64>) -> Option<Since> {
         let now = self.ring[self.newest];
@@ -306,7 +350,7 @@ mod tests {
         let (dt, g) = (0.005, Vector3::new(0.4, 0.0, -9.8));
         let mut history = History::new(0.0);
         for frame in 1..=200 {
-            history.push(f64::from(frame) * dt, dt, &(g * dt));
+            history.push(f64::from(frame) * dt, dt, &(g * dt), [Vector3::zeros(); 2]);
         }
         // The time is 1 s. The velocity at the start, which the history does not contain, was (3, 0, -5).
         let start = Vector3::new(3.0, 0.0, -5.0);

@@ -11,7 +11,7 @@ use super::Estimator;
 use super::covariance::{ACCELEROMETER_BIAS, ATTITUDE, VELOCITY, WIND};
 use crate::vehicle::airframe::{Airframe, MassProperties};
 use crate::vehicle::fins::ROLL;
-use crate::vehicle::mission::Exhaust;
+use crate::vehicle::mission::{Exhaust, LeverArms};
 
 /// Frames whose sideways force is averaged for one update: 20 ms, in which a gust hardly changes.
 const FRAMES: u32 = 4;
@@ -169,20 +169,20 @@ pub struct VehicleNow {
     /// The igniter has been fired, so the landing motor may burn. The wind is then not estimated from the sideways
     /// force, because the motor's own sideways force is not known well enough.
     pub motor_burning: bool,
-    /// Distance of the lidar behind the centre of gravity, m.
-    pub lidar_behind_cg_m: f64,
+    /// Lever arms of the sensors.
+    pub levers: LeverArms,
 }
 
 impl VehicleNow {
-    /// The data from an airframe, its masses, the air density, kg/m^3, the present fin openings, rad, and the lidar's
-    /// distance ahead of the feet, m.
+    /// The data from an airframe, its masses, the air density, kg/m^3, the present fin openings, rad, and
+    /// the sensors' lever arms.
     pub fn of(
         airframe: &Airframe,
         mass: &MassProperties,
         air_density_kg_m3: f64,
         fins_rad: [f64; 4],
         motor_burning: bool,
-        lidar_ahead_of_feet_m: f64,
+        levers: LeverArms,
     ) -> Self {
         let body = &airframe.body;
         let sines = fins_rad.map(libm::sin);
@@ -203,7 +203,7 @@ impl VehicleNow {
             fin_ahead_of_cg_m: airframe.fins.station_m - mass.cg_station_m,
             crossflow_area_m2: body.crossflow_area_m2(),
             motor_burning,
-            lidar_behind_cg_m: airframe.above_feet_m(mass.cg_station_m) - lidar_ahead_of_feet_m,
+            levers,
         }
     }
 
@@ -309,11 +309,12 @@ mod tests {
         let airframe = crate::vehicles::mission::builtin_airframe("mk2").unwrap();
         let mass = crate::vehicle::airframe::MassModel::new(&airframe.mass, 0.2).at(0.0);
         let opening_rad = 1.2;
-        let vehicle = VehicleNow::of(&airframe, &mass, 1.2, [opening_rad; 4], false, 0.15);
+        let vehicle = VehicleNow::of(&airframe, &mass, 1.2, [opening_rad; 4], false, LeverArms::default());
         let area_m2 = vehicle.body_drag_area_m2 + vehicle.fin_drag_area_m2;
         assert!((area_m2 - airframe.drag_area_m2(opening_rad)).abs() < 1e-12);
         assert!(vehicle.fin_lift_area_m2.norm() < 1e-15, "{vehicle:?}");
-        let steered = VehicleNow::of(&airframe, &mass, 1.2, [1.3, 1.1, 1.1, 1.3], false, 0.15);
+        let steered =
+            VehicleNow::of(&airframe, &mass, 1.2, [1.3, 1.1, 1.1, 1.3], false, LeverArms::default());
         assert!(steered.fin_lift_area_m2.norm() > 1e-4, "{steered:?}");
     }
 }

@@ -72,7 +72,7 @@ const RANGES: [Range; 40] = [
     ("-85 to 85", -85.0, 85.0, &["site.latitude_deg"]),
     ("-180 to 180", -180.0, 180.0, &["site.longitude_deg"]),
     // The feet stand up to half a metre below the nozzle.
-    ("from -1 to 3", -1.0, 3.0, &["lidar_ahead_of_feet_m"]),
+    ("from -1 to 3", -1.0, 3.0, &["sensors"]),
     ("-1 to 1", -1.0, 1.0, &["exhaust"]),
     ("0 to 600", 0.0, 600.0, &["start.countdown_s"]),
     ("from 0 to 180", 0.0, 180.0, &["start.tilt_deg"]),

@@ -14,6 +14,8 @@ flight::with_defaults! {
         pub period_ms: u32 = 20,
         /// Noise of one sample, m.
         pub noise_m: f64 = 0.08,
+        /// Scale error of the height: air that is not as warm as the standard's.
+        pub scale_share: f64 = 0.0,
         /// Offset at the start, m, from weather and warming since the pad.
         pub offset_m: f64 = 0.3,
         /// Wander of the offset, m in one second.
@@ -48,8 +50,14 @@ impl Sensors {
             .map_or(0.0, |for_s| self.flaws.barometer_ejection_m * libm::exp(-for_s / EJECTION_LASTS_S));
         let across_m_s = truth.airspeed_across_m_s;
         let suction_m = self.flaws.barometer_crossflow * across_m_s * across_m_s / (2.0 * GRAVITY_M_S2);
+        let lever_m = self.places.lever_arms(&truth.cg_m).barometer_m;
+        let ports_m = (truth.state.world_from_body * lever_m).z - lever_m.x;
         Some(
-            then_m + self.errors.barometer_offset_m + plume_m + ejection_m + suction_m
+            (then_m + ports_m) * self.flaws.barometer_scale
+                + self.errors.barometer_offset_m
+                + plume_m
+                + ejection_m
+                + suction_m
                 - self.errors.barometer_ram * speed_height_m
                 + barometer.noise_m * self.barometer_noise.next(),
         )

@@ -48,6 +48,10 @@ pub enum Defect {
     Spike(f64),
     /// Noise of this standard deviation comes on top.
     Noise(f64),
+    /// Its values are multiplied by this.
+    Scale(f64),
+    /// A receiver keeps reporting its last motion for so long, s, as valid fixes.
+    Stale(f64),
 }
 
 /// How long a spike lasts, s.
@@ -139,7 +143,8 @@ impl Broken {
             Defect::Step(off) => (value + every(off), rate),
             Defect::Ramp(off_s) => (value + every(off_s * since_s), rate + every(off_s)),
             Defect::Spike(off) if since_s < SPIKE_S => (value + every(off), rate),
-            Defect::Spike(_) => measured,
+            Defect::Spike(_) | Defect::Stale(_) => measured,
+            Defect::Scale(factor) => (value * factor, rate * factor),
             Defect::Noise(sigma) => {
                 (value + noise.next3() * (unit * sigma), rate + noise.next3() * (unit * sigma))
             }

@@ -1,6 +1,6 @@
 //! The satellite receiver, whose fixes come late: white and wandering errors (Groves 2013, chapter 9).
 
-use flight::estimation::estimator::{GRAVITY_M_S2, GnssFix};
+use flight::estimation::estimator::{FixQuality, GRAVITY_M_S2, GnssFix};
 use flight::vehicle::rigid::RigidState;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -46,10 +46,20 @@ flight::with_defaults! {
         /// How much of the sky a lean takes from an antenna that looks along the nose: at 1 beyond 20 degrees of tilt the noise is
         /// threefold, and beyond 30 half of the fixes are lost.
         pub shadow_share: f64 = 0.0,
+        /// Time for which the receiver keeps reporting the motion at lift-off, as valid fixes, s.
+        pub stale_s: f64 = 0.0,
     }
 }
 
+/// Spread of position, m, and velocity, m/s, of a receiver that holds its last state.
+const HELD_SPREAD: f64 = 0.02;
+
 impl Sensors {
+    /// Keeps reporting this motion for a time, s, as valid and slightly changing fixes.
+    pub(crate) fn hold_fixes(&mut self, state: &RigidState, for_s: f64) {
+        self.stale = Some((*state, self.elapsed_ms + (for_s / MS_S) as u32));
+    }
+
     pub(super) fn watch_satellites(&mut self, truth: &SensorTruth, out: bool) {
         let gnss = &self.params.gnss;
         if self.elapsed_ms % gnss.period_ms != self.gnss_phase_ms {
@@ -61,7 +71,10 @@ impl Sensors {
         let wandered_m = Vector3::from_fn(|axis, _| self.wander[axis].value) - self.zero_m;
         let white_m = Vector3::new(gnss.horizontal_white_m, gnss.horizontal_white_m, gnss.vertical_white_m);
         let (older_s, slow_m_s) = self.flaws.of_satellites(&self.params);
-        let then = moved_back(truth, older_s);
+        let mut then = moved_back(truth, older_s);
+        let lever_m = self.places.lever_arms(&truth.cg_m).gnss_m;
+        then.velocity_m_s += then.world_from_body * then.rate_rad_s.cross(&lever_m);
+        then.position_m += then.world_from_body * lever_m;
         let beyond = |limit_deg: f64, share: f64| {
             if then.tilt_rad() > limit_deg.to_radians() { share * gnss.shadow_share } else { 0.0 }
         };
@@ -74,12 +87,23 @@ impl Sensors {
                 + slow_m_s
                 + self.gnss_noise.next3() * (gnss.velocity_m_s * noise),
             valid_at_s: self.start_s + f64::from(self.elapsed_ms) * MS_S + self.flaws.gnss_tag_s,
+            quality: FixQuality {
+                satellites: 9,
+                horizontal_m: gnss.horizontal_wander_m,
+                vertical_m: gnss.vertical_wander_m,
+                speed_m_s: gnss.velocity_m_s * noise,
+            },
         };
+        let stale = self.stale.filter(|(_, until_ms)| self.elapsed_ms < *until_ms);
+        if let Some((held, _)) = stale {
+            fix.position_m = held.position_m + self.flaws.satellites.next3() * HELD_SPREAD;
+            fix.velocity_m_s = held.velocity_m_s + self.flaws.satellites.next3() * HELD_SPREAD;
+        }
         let (fate, off_m) = self.flaws.of_fix(&self.params, shadowed_share);
         if fate == Fate::Outlier {
             fix.position_m += off_m;
         }
-        if !out && fate != Fate::Lost {
+        if stale.is_some() || !out && fate != Fate::Lost {
             self.on_its_way = Some((self.elapsed_ms + gnss.delay_ms, fix));
         }
     }

@@ -41,7 +41,7 @@ flight::with_defaults! {
         pub vibration_bias_deg_s: f64 = 0.0,
         /// Misalignment of the unit in the vehicle, about each axis, degrees.
         pub mounting_deg: f64 = 0.0,
-        /// Distance of the unit from the centre of gravity, each axis, m.
+        /// Distance of the unit from its place in the mission, each axis, m.
         pub off_cg_m: f64 = 0.0,
     }
 }
@@ -50,10 +50,11 @@ impl Sensors {
     /// Specific force where the inertial unit sits: that of the centre of gravity, and what turning adds (Stevens
     /// and Lewis, chapter 1).
     pub(super) fn force_at_unit_m_s2(&self, truth: &SensorTruth) -> Vector3<f64> {
-        let (place, rate) = (&self.flaws.unit_m, &truth.state.rate_rad_s);
+        let (lever_m, rate) =
+            (self.places.lever_arms(&truth.cg_m).imu_m + self.flaws.unit_m, &truth.state.rate_rad_s);
         truth.specific_force_m_s2
-            + truth.angular_acceleration_rad_s2.cross(place)
-            + rate.cross(&rate.cross(place))
+            + truth.angular_acceleration_rad_s2.cross(&lever_m)
+            + rate.cross(&rate.cross(&lever_m))
     }
 
     pub(super) fn imu(&mut self, burning: bool) -> ImuSample {

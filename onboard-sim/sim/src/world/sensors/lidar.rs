@@ -21,8 +21,6 @@ flight::with_defaults! {
         pub range_max_m: f64 = 12.0,
         /// Beyond this tilt the ground gives no echo, degrees.
         pub tilt_max_deg: f64 = 45.0,
-        /// Its position along the axis, ahead of the feet, m.
-        pub ahead_of_feet_m: f64 = 0.15,
         /// Below this height of the feet there is no echo while the motor burns, m: dust.
         pub blind_below_m: f64 = 0.0,
         /// Lean of the beam against the axis, each way, degrees.
@@ -35,13 +33,6 @@ flight::with_defaults! {
         pub dropout_share: f64 = 0.0,
         /// Probability that a range is an outlier: any value within the sensor's limits.
         pub outlier_share: f64 = 0.0,
-    }
-}
-
-impl LidarParams {
-    /// Its distance behind the centre of gravity, m, from that centre's height above the feet, m.
-    pub fn behind_cg_m(&self, cg_over_feet_m: f64) -> f64 {
-        cg_over_feet_m - self.ahead_of_feet_m
     }
 }
 
@@ -58,14 +49,12 @@ impl Sensors {
         if tilt_rad > lidar.tilt_max_deg.to_radians() {
             return None;
         }
-        // From the lidar along the axis to the ground: the slant range from the centre of gravity, less the lidar's
-        // distance from it.
-        let then_m = truth.state.position_m.z
+        let lever_m = truth.state.world_from_body * self.places.lever_arms(&truth.cg_m).lidar_m;
+        let then_m = truth.state.position_m.z + lever_m.z
             - truth.ground_m
             - self.flaws.grass_m
             - truth.state.velocity_m_s.z * self.flaws.lidar_late_s;
-        let slant_m = then_m / libm::cos(tilt_rad);
-        let range_m = slant_m - lidar.behind_cg_m(truth.cg_over_feet_m) + noise_m;
+        let range_m = then_m / libm::cos(tilt_rad) + noise_m;
         // Rough ground reflects light in all directions, and less at an angle (Lambert's cosine law). The echo weakens
         // with the square of the range.
         let farthest_m = lidar.range_max_m * libm::cos(tilt_rad).sqrt();

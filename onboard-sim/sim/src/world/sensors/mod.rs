@@ -15,6 +15,7 @@ mod switches;
 
 use flight::computer::FRAME_MS;
 use flight::estimation::estimator::{GRAVITY_M_S2, GnssFix, Measurements};
+use flight::vehicle::mission::SensorPlaces;
 use flight::vehicle::rigid::RigidState;
 use nalgebra::Vector3;
 
@@ -51,6 +52,8 @@ pub struct SensorTruth {
     pub airspeed_across_m_s: f64,
     /// Height of the centre of gravity over the feet when upright, m.
     pub cg_over_feet_m: f64,
+    /// Centre of gravity: its station, and its distance from the axis, m.
+    pub cg_m: Vector3<f64>,
     /// Angular acceleration, body axes, rad/s^2.
     pub angular_acceleration_rad_s2: Vector3<f64>,
     /// Height of the ground where the lidar's beam meets it, m.
@@ -78,6 +81,7 @@ impl SensorTruth {
             airspeed_m_s,
             airspeed_across_m_s: 0.0,
             cg_over_feet_m,
+            cg_m: Vector3::zeros(),
             angular_acceleration_rad_s2: Vector3::zeros(),
             ground_m: 0.0,
             burning: false,
@@ -95,6 +99,7 @@ impl SensorTruth {
             specific_force_m_s2: *world.specific_force_m_s2(),
             airspeed_m_s: world.air_velocity_m_s().norm(),
             cg_over_feet_m: world.cg_above_feet_m(),
+            cg_m: world.cg_m(),
             angular_acceleration_rad_s2: *world.angular_acceleration_rad_s2(),
             ground_m: world.ground_under_beam_m(),
             burning: world.thrust_n() > 0.0 || world.booster_thrust_n() > 0.0,
@@ -123,6 +128,7 @@ pub struct SensorErrors {
 #[derive(Debug, Clone)]
 pub struct Sensors {
     params: SensorParams,
+    places: SensorPlaces,
     start_s: f64,
     elapsed_ms: u32,
     imu_noise: Normal,
@@ -144,6 +150,8 @@ pub struct Sensors {
     contact_ms: Option<u32>,
     /// The last millisecond under the ascent motor.
     boosted_ms: Option<u32>,
+    /// The motion that the receiver keeps reporting, and until when, ms.
+    stale: Option<(RigidState, u32)>,
 }
 
 impl Sensors {
@@ -156,7 +164,12 @@ impl Sensors {
     ///
     /// # Errors
     /// A parameter is out of range.
-    pub fn new(params: &SensorParams, seed: u64, share: f64) -> Result<Self, SensorParamError> {
+    pub fn new(
+        params: &SensorParams,
+        places: &SensorPlaces,
+        seed: u64,
+        share: f64,
+    ) -> Result<Self, SensorParamError> {
         params.validate()?;
         let (imu, gnss) = (&params.imu, &params.gnss);
         let [mut imu_noise, mut barometer_noise, mut gnss_noise, lidar_noise] =
@@ -178,6 +191,7 @@ impl Sensors {
         }
         Ok(Self {
             params: *params,
+            places: *places,
             start_s: 0.0,
             elapsed_ms: 0,
             imu_noise,
@@ -195,6 +209,7 @@ impl Sensors {
             flaws: Flaws::draw(params, seed, share),
             contact_ms: None,
             boosted_ms: None,
+            stale: None,
         })
     }
 
@@ -209,6 +224,9 @@ impl Sensors {
         self.rate_sum_rad_s += truth.state.rate_rad_s;
         self.force_sum_m_s2 += self.force_at_unit_m_s2(truth);
         if truth.boosted {
+            if self.boosted_ms.is_none() && self.params.gnss.stale_s > 0.0 {
+                self.hold_fixes(&truth.state, self.params.gnss.stale_s);
+            }
             self.boosted_ms = Some(self.elapsed_ms);
         }
         let unlocked = self.boosted_ms.is_some_and(|at_ms| self.elapsed_ms - at_ms < REACQUIRED_MS);

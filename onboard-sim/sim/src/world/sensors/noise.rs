@@ -65,6 +65,7 @@ pub(super) struct Flaws {
     pub(super) burning_bias_rad_s: Vector3<f64>,
     pub(super) gnss_tag_s: f64,
     pub(super) barometer_late_s: f64,
+    pub(super) barometer_scale: f64,
     pub(super) barometer_plume_m: f64,
     pub(super) barometer_ejection_m: f64,
     pub(super) lidar_late_s: f64,
@@ -117,6 +118,7 @@ impl Flaws {
             velocity_wander: [(); 3].map(|()| {
                 Wander::new(gnss.velocity_wander_m_s, gnss.velocity_wander_correlation_s, &mut satellites)
             }),
+            barometer_scale: 1.0 + barometer.scale_share * drawn.next(),
             vibration: Normal::new(seed, VIBRATION_STREAM, share),
             gnss: Normal::new(seed, GNSS_STREAM, share),
             lidar: Normal::new(seed, LIDAR_STREAM, share),

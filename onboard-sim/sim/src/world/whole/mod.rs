@@ -277,7 +277,7 @@ impl World {
     }
 
     /// Centre of gravity: x its station, y and z its distance from the axis, m. A swinging motor takes it to the side.
-    fn cg_m(&self) -> Vector3<f64> {
+    pub fn cg_m(&self) -> Vector3<f64> {
         let below_pivot_m = self.airframe.gimbal.pivot_station_m - self.airframe.mass.propellant_station_m;
         let aside_m = below_pivot_m * self.motor_kg() / self.mass.mass_kg;
         let [pitch_rad, yaw_rad] = self.gimbal_rad();

@@ -1,0 +1,161 @@
+//! Admission of satellite fixes: a fix must change as the integrated specific force does.
+//!
+//! Receivers that lose track under boost may keep reporting their last state as valid fixes. From
+//! one fix to the next the inertial unit is far more accurate than over a flight, so the change
+//! between two fixes shows a receiver that does not follow the motion, whatever the estimate is.
+
+use nalgebra::Vector3;
+use serde::Serialize;
+
+use super::health::BRIDGED_FRAMES;
+use super::{Estimator, GnssFix};
+
+/// Largest change of velocity between two fixes that no motion explains, m/s: late time tags and
+/// rounding.
+const UNEXPLAINED_M_S: f64 = 0.4;
+/// The same, in standard deviations of a velocity.
+const UNEXPLAINED_SIGMAS: f64 = 8.0;
+/// Error of the integrated specific force, as a share of the velocity gained: tilt and scale.
+const GAINED_SHARE: f64 = 0.1;
+/// The same, as a share of the integral of the specific force's magnitude.
+const FORCE_SHARE: f64 = 0.05;
+/// Error of a fix's age, s.
+const AGE_ERROR_S: f64 = 0.02;
+/// Difference between the change of position and the two velocities, m, and as a share of it.
+const UNEXPLAINED_M: f64 = 4.0;
+const MOVED_SHARE: f64 = 0.2;
+/// A receiver in doubt has to follow this change of velocity over two fixes, m/s: a receiver that
+/// stands still cannot.
+const FOLLOWED_M_S: f64 = 4.0;
+const FOLLOWED_FIXES: u32 = 2;
+/// Or its velocity has to be this close to the estimate, m/s.
+const NEAR_M_S: f64 = 2.0;
+/// Position error, horizontal or vertical, from which a receiver's own statement counts, m: below,
+/// it is mostly the slow offset that the filter estimates.
+pub(super) const REPORTED_M: f64 = 5.0;
+/// Satellites that a fix in space needs.
+const SATELLITES: u32 = 4;
+
+/// The last fix, whether it was admitted or not.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+struct Reference {
+    position_m: Vector3<f64>,
+    velocity_m_s: Vector3<f64>,
+    valid_at_s: f64,
+    /// Sum of the velocity gained when it was valid, m/s.
+    gained_m_s: Vector3<f64>,
+}
+
+/// What the gate remembers of the receiver.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub(super) struct GnssGate {
+    last: Reference,
+    /// Whether the last reference is a fix, and not the start.
+    has_fix: bool,
+    in_doubt: bool,
+    /// Fixes in a row that followed the motion, and the change of velocity that they showed, m/s.
+    following: u32,
+    followed_m_s: f64,
+    /// Integral of the specific force's magnitude since the last fix, m/s.
+    force_m_s: f64,
+    /// Frames without an inertial sample since then.
+    blind_frames: u32,
+    /// Velocity by unmeasured shocks since then, m/s.
+    shock_m_s: f64,
+    /// Velocity of the fix admitted in this frame, m/s.
+    admitted_m_s: Option<Vector3<f64>>,
+}
+
+impl GnssGate {
+    /// Before the first fix, of a vehicle with this velocity, world, m/s.
+    pub(super) fn new(velocity_m_s: &Vector3<f64>) -> Self {
+        let (zero, velocity_m_s) = (Vector3::zeros(), *velocity_m_s);
+        Self {
+            last: Reference { position_m: zero, velocity_m_s, valid_at_s: 0.0, gained_m_s: zero },
+            has_fix: false,
+            in_doubt: false,
+            following: 0,
+            followed_m_s: 0.0,
+            force_m_s: 0.0,
+            blind_frames: 0,
+            shock_m_s: 0.0,
+            admitted_m_s: None,
+        }
+    }
+
+    /// Notes a change of velocity that no inertial unit measures, m/s.
+    pub(super) fn expect_shock(&mut self, gained_m_s: f64) {
+        self.shock_m_s += gained_m_s;
+    }
+
+    /// Begins a frame with the velocity gained by the specific force, m/s, and whether it was measured.
+    pub(super) fn begin_frame(&mut self, force_m_s: f64, measured: bool) {
+        self.admitted_m_s = None;
+        self.force_m_s += force_m_s;
+        self.blind_frames += u32::from(!measured);
+    }
+}
+
+impl Estimator {
+    /// Velocity of the fix admitted in the last frame, world, m/s.
+    pub(crate) fn admitted_gnss_m_s(&self) -> Option<Vector3<f64>> {
+        self.gnss_gate.admitted_m_s
+    }
+
+    /// Whether a fix may correct the estimate and vote on apogee.
+    pub(super) fn admits(&mut self, fix: &GnssFix) -> bool {
+        let admitted = self.follows_the_motion(fix);
+        if admitted {
+            self.gnss_gate.admitted_m_s = Some(fix.velocity_m_s);
+        } else {
+            self.aids.gnss_velocity.discard();
+            self.aids.gnss_position.discard();
+        }
+        admitted
+    }
+
+    fn follows_the_motion(&mut self, fix: &GnssFix) -> bool {
+        let [_, lever_m_s] = self.history.lever();
+        let velocity_m_s = self.nominal.velocity_m_s + lever_m_s;
+        let enough = fix.quality.satellites == 0 || fix.quality.satellites >= SATELLITES;
+        let finite = fix.position_m.iter().chain(&fix.velocity_m_s).all(|value| value.is_finite());
+        let Some(since) = self.since_fix(fix).filter(|_| enough && finite) else { return false };
+        let sigma_m_s = self.config.gnss_velocity_m_s.max(fix.quality.speed_m_s);
+        let gate = &mut self.gnss_gate;
+        let now = Reference {
+            position_m: fix.position_m,
+            velocity_m_s: fix.velocity_m_s,
+            valid_at_s: fix.valid_at_s,
+            gained_m_s: self.history.gained_m_s() - since.gained_m_s,
+        };
+        let before = core::mem::replace(&mut gate.last, now);
+        let had_fix = core::mem::replace(&mut gate.has_fix, true);
+        let gained_m_s = now.gained_m_s - before.gained_m_s;
+        let unexplained_m_s = (now.velocity_m_s - before.velocity_m_s - gained_m_s).norm();
+        let limit_m_s = UNEXPLAINED_M_S
+            + UNEXPLAINED_SIGMAS * sigma_m_s
+            + GAINED_SHARE * gained_m_s.norm()
+            + FORCE_SHARE * core::mem::take(&mut gate.force_m_s)
+            + AGE_ERROR_S * since.acceleration_m_s2.norm()
+            + core::mem::take(&mut gate.shock_m_s);
+        let moved_m = (now.velocity_m_s + before.velocity_m_s) * (0.5 * (now.valid_at_s - before.valid_at_s));
+        let astray_m = (now.position_m - before.position_m - moved_m).norm();
+        let stays = !had_fix || astray_m <= UNEXPLAINED_M + MOVED_SHARE * moved_m.norm();
+        let repeated =
+            had_fix && (now.position_m, now.velocity_m_s) == (before.position_m, before.velocity_m_s);
+        if core::mem::take(&mut gate.blind_frames) <= BRIDGED_FRAMES {
+            if unexplained_m_s > limit_m_s || !stays {
+                (gate.in_doubt, gate.following, gate.followed_m_s) = (true, 0, 0.0);
+            } else {
+                gate.following += 1;
+                gate.followed_m_s += gained_m_s.norm();
+            }
+        }
+        let off_m_s = (fix.velocity_m_s - velocity_m_s + since.gained_m_s).norm();
+        let follows = gate.following >= FOLLOWED_FIXES && gate.followed_m_s >= FOLLOWED_M_S;
+        if gate.following > 0 && (off_m_s <= NEAR_M_S || follows) {
+            gate.in_doubt = false;
+        }
+        !gate.in_doubt && !repeated
+    }
+}
