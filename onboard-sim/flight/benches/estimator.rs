@@ -4,8 +4,10 @@
 
 use divan::black_box;
 use flight::estimation::estimator::{
-    Estimator, EstimatorConfig, GRAVITY_M_S2, GnssFix, ImuSample, Measurements, StartUncertainty, VehicleNow,
+    Estimator, EstimatorConfig, FixQuality, GRAVITY_M_S2, GnssFix, ImuSample, Measurements, StartUncertainty,
+    VehicleNow,
 };
+use flight::vehicle::mission::LeverArms;
 use flight::vehicle::rigid::RigidState;
 use nalgebra::{Vector2, Vector3};
 
@@ -23,7 +25,7 @@ const VEHICLE: VehicleNow = VehicleNow {
     fin_ahead_of_cg_m: 0.11,
     crossflow_area_m2: 0.09,
     motor_burning: false,
-    lidar_behind_cg_m: 0.4,
+    levers: LeverArms::default(),
 };
 
 /// A second of upright fall at a steady 39 m/s, low enough for the lidar. It is the second with the most work.
@@ -43,6 +45,7 @@ fn second() -> Vec<Measurements> {
                     position_m: Vector3::new(0.0, 0.0, height_m + 39.0 * 0.12),
                     velocity_m_s,
                     valid_at_s: time_s - 0.12,
+                    quality: FixQuality::default(),
                 }),
                 lidar_range_m: frame.is_multiple_of(2).then_some(height_m - 0.4),
             }

@@ -99,12 +99,14 @@ pub mod estimation {
     //! * [`estimator`] finds state and wind from the sensors.
     //! * [`motor_estimate`] finds impulse, burn time and ignition of the motor.
     //! * [`other_curves`] finds out which of the known thrust curves the motor has.
+    //! * `spikes` removes single wrong pressures.
     //! * [`sensor_watch`] says which sensors speak, and what they say that cannot be true.
 
     pub mod estimator;
     pub mod motor_estimate;
     pub mod other_curves;
     pub mod sensor_watch;
+    pub(crate) mod spikes;
 }
 
 pub mod guidance {

@@ -11,6 +11,7 @@ use flight::computer::crew::{Asked, Request};
 use flight::computer::pilot::Pilot;
 use flight::computer::{Commands, Computer, FRAME_S, Input, KeptInput, Output, Rehearsed, flight_time_s};
 use flight::estimation::estimator::Measurements;
+use flight::estimation::estimator::alignment::ImuCalibration;
 use flight::guidance::powered::{ControlLevel, PoweredReport};
 use flight::rules::arming::PredictedLanding;
 use flight::rules::phase::{Mode, Phase};
@@ -409,10 +410,10 @@ impl Sortie {
         &self.radio
     }
 
-    /// The same flight of a computer that has found its state and the bias of its gyro, body, rad/s, on its rail.
+    /// The same flight of a computer that has found its state and the calibration of its inertial unit on its rail.
     #[must_use]
-    pub fn standing(self, believed: &RigidState, gyro_bias_rad_s: Vector3<f64>) -> Self {
-        Self { computer: self.computer.standing(believed, gyro_bias_rad_s), ..self }
+    pub fn standing(self, believed: &RigidState, calibration: &ImuCalibration) -> Self {
+        Self { computer: self.computer.standing(believed, calibration), ..self }
     }
 
     /// The mission as flown.

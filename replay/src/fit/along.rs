@@ -14,6 +14,7 @@
 use flight::computer::FRAME_S;
 use flight::estimation::estimator::VehicleNow;
 use flight::vehicle::airframe::{MassModel, MassProperties};
+use flight::vehicle::mission::LeverArms;
 use flight::vehicle::mission::Mission;
 use nalgebra::{Matrix2, Vector2};
 use sim::world::wind::gusts::GustScales;
@@ -171,7 +172,8 @@ fn samples(
         let state = &frame.estimate.state;
         let fins_rad = frame.fins_since_rad(before);
         let density = trace.density_kg_m3(frame);
-        let vehicle = VehicleNow::of(&trace.mission.airframe, mass, density, fins_rad, false, 0.0);
+        let vehicle =
+            VehicleNow::of(&trace.mission.airframe, mass, density, fins_rad, false, LeverArms::default());
         let body = VehicleNow { fin_drag_area_m2: 0.0, fin_lift_area_m2: Vector2::zeros(), ..vehicle };
         let fins =
             VehicleNow { body_drag_area_m2: 0.0, leg_drag_area_m2: 0.0, crossflow_area_m2: 0.0, ..vehicle };

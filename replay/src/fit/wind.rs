@@ -7,6 +7,7 @@
 
 use flight::computer::FRAME_S;
 use flight::estimation::estimator::VehicleNow;
+use flight::vehicle::mission::LeverArms;
 use nalgebra::{Matrix2, Vector2, Vector3};
 use sim::world::wind::gusts::GustScales;
 use sim::world::wind::{EXPONENT, REFERENCE_HEIGHT_M};
@@ -141,7 +142,14 @@ fn sample(trace: &Trace, along: &Along, frames: &[Frame]) -> Option<Sample> {
     let middle = &frames[frames.len() / 2];
     let density = trace.density_kg_m3(middle) * along.drag().0;
     let felt_at = |frame: &Frame, wind_m_s: Vector2<f64>| -> Vector2<f64> {
-        let vehicle = VehicleNow::of(&trace.mission.airframe, &mass, density, frame.fins_rad, false, 0.0);
+        let vehicle = VehicleNow::of(
+            &trace.mission.airframe,
+            &mass,
+            density,
+            frame.fins_rad,
+            false,
+            LeverArms::default(),
+        );
         let state = &frame.estimate.state;
         let through_air =
             state.world_from_body.inverse_transform_vector(&(state.velocity_m_s - wind_m_s.push(0.0)));

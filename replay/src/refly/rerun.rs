@@ -1,7 +1,7 @@
 //! A recorded flight, flown again frame by frame from the facts in its log.
 
 use avionics::log::frame::accepts_abort;
-use avionics::log::logged::{state_from_log, vector_from_log};
+use avionics::log::logged::{calibration_from_log, state_from_log};
 use flight::computer::FRAME_S;
 use flight::vehicle::mission::Mission;
 use protocol::log::computer_v1::{ComputerFrame, ComputerStart};
@@ -51,8 +51,8 @@ impl Rerun {
         let by_fault = recorded.iter().any(|fault| matches!(fault.breakage, Breakage::Abort));
         let crews = frames.iter().filter(|frame| accepts_abort(frame) && !by_fault);
         let aborts = crews.map(|frame| frame.input.frame).collect();
-        let ComputerStart { believed, gyro_bias_rad_s, .. } = sortie_log::start(&flight);
-        let start = ComputerStart { believed, gyro_bias_rad_s, ..*start };
+        let ComputerStart { believed, calibration, .. } = sortie_log::start(&flight);
+        let start = ComputerStart { believed, calibration, ..*start };
         let records = vec![(0.0, Record::ComputerStart(Box::new(start)))];
         Ok(Self { recipe, number, flight, schedule: None, aborts, last: LastFrame::default(), records })
     }
@@ -144,8 +144,10 @@ pub(crate) fn drawn_from(
 /// It cannot be set up.
 pub(crate) fn begun(recipe: &Recipe, number: u64, start: &ComputerStart) -> Result<Sortie, AgainError> {
     let flight = Sortie::new(recipe, number)?;
-    Ok(match &start.gyro_bias_rad_s {
-        Some(bias) => flight.standing(&state_from_log(&start.believed), vector_from_log(bias)),
+    Ok(match &start.calibration {
+        Some(calibration) => {
+            flight.standing(&state_from_log(&start.believed), &calibration_from_log(calibration))
+        }
         None => flight,
     })
 }

@@ -12,7 +12,7 @@ use embedded_hal::{digital, i2c, pwm, spi};
 use flight::computer::FRAME_MS;
 use flight::computer::crew::{Asked, Request};
 use flight::computer::pad_check::CheckState;
-use flight::estimation::estimator::GRAVITY_M_S2;
+use flight::estimation::estimator::{FixQuality, GRAVITY_M_S2};
 use flight::rules::arming::Uplink;
 use flight::rules::phase::Phase;
 use flight::vehicle::mission::{Mission, StartPoint};
@@ -83,8 +83,18 @@ fn nav_pvt(place_1e7: [i32; 2], height_mm: i32, ned_mm_s: [i32; 3], fixed: bool)
     }
     let [latitude, longitude] = place_1e7;
     let [north, east, down] = ned_mm_s;
-    for (at, value) in [(24, longitude), (28, latitude), (36, height_mm), (48, north), (52, east), (56, down)]
-    {
+    frame[6 + 23] = 9;
+    for (at, value) in [
+        (24, longitude),
+        (28, latitude),
+        (36, height_mm),
+        (40, 1_500),
+        (44, 2_500),
+        (48, north),
+        (52, east),
+        (56, down),
+        (68, 50),
+    ] {
         frame[6 + at..10 + at].copy_from_slice(&value.to_le_bytes());
     }
     let sum = gnss::checksum(&frame[2..]);
@@ -109,6 +119,7 @@ fn val_datasheet_nav_pvt() {
         longitude_deg: -1_178_090_000.0 * 1e-7,
         height_m: 612_345.0 * 1e-3,
         velocity_ned_m_s: [1.5, -0.25, -30.0],
+        quality: FixQuality { satellites: 9, horizontal_m: 1.5, vertical_m: 2.5, speed_m_s: 0.05 },
     };
     let noise = [0xB5, 0xB5, 0x62, 0x01, 0x35, b'$', b'G', 0xB5];
     assert_eq!(parsed(&[&noise, &frame[..], &frame].concat()), [expected, expected]);
@@ -248,7 +259,7 @@ impl Bench {
         prom[7] = u16::from(barometer::crc4(&PROM));
         let bench = Self {
             world,
-            sensors: Sensors::new(&params, drawn.flight_seed, 1.0).unwrap(),
+            sensors: Sensors::new(&params, &mission.sensors, drawn.flight_seed, 1.0).unwrap(),
             pad: Degrees { latitude: mission.site.latitude_deg, longitude: mission.site.longitude_deg },
             frame: 0,
             measured: None,

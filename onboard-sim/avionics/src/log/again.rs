@@ -6,7 +6,7 @@ use flight::vehicle::mission::Mission;
 use protocol::records::computer_v1::{ComputerFrame, ComputerInput, ComputerStart};
 
 use crate::log::frame::{LoggedInput, frame_to_log, input_from_log};
-use crate::log::logged::{RecordError, state_from_log, vector_from_log};
+use crate::log::logged::{RecordError, calibration_from_log, state_from_log};
 
 /// Why a frame was not run again.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -64,8 +64,8 @@ impl RecordedComputer {
         let believed = state_from_log(&start.believed);
         let computer = Computer::at_power_up(mission, &believed);
         let (computer, next) = if start.released {
-            let standing = match &start.gyro_bias_rad_s {
-                Some(bias) => computer.standing(&believed, vector_from_log(bias)),
+            let standing = match &start.calibration {
+                Some(calibration) => computer.standing(&believed, &calibration_from_log(calibration)),
                 None => computer,
             };
             (standing.released(start.frame), Some(start.frame.saturating_add(1)))

@@ -41,7 +41,7 @@ pub fn start_to_log(computer: &Computer) -> v1::ComputerStart {
     v1::ComputerStart {
         frame: if released { computer.frame() } else { 0 },
         believed: estimate.state.to_log(),
-        gyro_bias_rad_s: stood.then(|| estimate.gyro_bias_rad_s.to_log()),
+        calibration: stood.then(|| computer.pilot().estimator().calibration().to_log()),
         rail_m: mission.launched().map(|launch| launch.rail.foot_m().to_log()),
         released,
         aborted_before_s: computer.mode().aborted_before_s,

@@ -44,6 +44,7 @@ use self::table::PhaseTable;
 use crate::control::servo::ServoModel;
 use crate::estimation::estimator::{ImuSample, Measurements};
 use crate::estimation::sensor_watch::SensorWatch;
+use crate::estimation::spikes::SpikeFilter;
 use crate::guidance::powered::ControlLevel;
 use crate::guidance::vertical::EvenLanding;
 use crate::rules::arming::{PredictedLanding, Uplink};
@@ -75,6 +76,7 @@ struct Release {
 #[derive(Debug, Clone, Serialize)]
 pub struct Computer {
     table: PhaseTable,
+    pressure: SpikeFilter,
     /// Which sensors speak.
     sensors: SensorWatch,
     /// The wait on the pad.
@@ -113,7 +115,10 @@ impl Computer {
     /// One frame. In the air: take over a plan that is ready, estimate, answer the crew, decide, pose the next plan, point. On
     /// the pad: answer the crew, and wait. At the end, and nowhere else, the outputs follow from the mode that the frame ends in.
     pub fn step(&mut self, input: &Input<'_>) -> Output {
-        let input = &self.with_silent_servos(input);
+        let mut input = self.with_silent_servos(input);
+        let measured = &mut input.kept.measured;
+        measured.pressure_altitude_m = self.pressure.take(measured.pressure_altitude_m, input.kept.time_s);
+        let input = &input;
         self.table.begin(input.time_s);
         self.report_changes(input);
         self.input = input.kept;

@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::news::Severity;
 use super::{Computer, KeptInput, Release};
 use crate::estimation::estimator::Measurements;
-use crate::estimation::estimator::alignment::{PadAlignment, PadStart};
+use crate::estimation::estimator::alignment::{PadAlignment, PadRecord, PadStart};
 use crate::estimation::sensor_watch::Rests;
 use crate::rules::arming::{ArmingInput, Check, Uplink, arming_checks};
 use crate::rules::phase::{Event, HoldCause, Phase, StartPoint};
@@ -65,6 +65,7 @@ struct PadSecond {
 #[derive(Debug, Clone, Copy, Default, Serialize)]
 pub(super) struct PadWatch {
     alignment: PadAlignment,
+    record: PadRecord,
     frames: u32,
     fixes: u32,
     velocity_sum_m_s: Vector3<f64>,
@@ -95,10 +96,10 @@ impl PadWatch {
             return;
         }
         let over = core::mem::take(self);
-        self.falling_frames = over.falling_frames;
+        (self.falling_frames, self.record) = (over.falling_frames, over.record);
         let across_m_s2 = over.force_sum_m_s2.yz().norm();
         self.found = Some(PadSecond {
-            at_rest: over.alignment.finish(0.0).ok(),
+            at_rest: self.record.take(&over.alignment, 0.0).ok(),
             lean_rad: libm::atan2(across_m_s2, over.force_sum_m_s2.x),
             pressure_altitude_m: over.altitude_sum_m / f64::from(over.pressures),
             // A second without a fix tells no speed; that there is none is a check of its own. Before the first fix this is zero by
@@ -110,9 +111,12 @@ impl PadWatch {
         });
     }
 
-    /// Attitude and motion on the pad, or below a drone, of a vehicle that turns at a rate, rad/s.
-    pub(super) fn stance(&self, hangs: bool, rotation_rad_s: f64) -> Stance {
+    /// Attitude and motion on the pad, or below a drone, of a vehicle whose gyro shows a rate, body, rad/s.
+    pub(super) fn stance(&self, hangs: bool, measured_rad_s: Vector3<f64>) -> Stance {
         let Some(found) = &self.found else { return Stance::UNKNOWN };
+        let bias_rad_s =
+            self.at_rest().map_or_else(Vector3::zeros, |start| start.calibration.gyro_bias_rad_s);
+        let rotation_rad_s = (measured_rad_s - bias_rad_s).norm();
         if hangs {
             return Stance {
                 tilt_rad: found.lean_rad,
@@ -223,11 +227,14 @@ impl Computer {
     fn rests(&self) -> Rests {
         let mission = self.pilot.mission();
         let cg_station_m = mission.airframe.mass.loaded_cg_station_m;
-        match (mission.launched(), self.start_point()) {
-            (Some(launch), _) => Rests::OnRail(launch.standing(cg_station_m).position_m),
-            (None, StartPoint::Drone) => Rests::Hanging,
-            (None, _) => Rests::OnLegs(Vector3::z() * mission.airframe.above_feet_m(cg_station_m)),
-        }
+        let standing = match (mission.launched(), self.start_point()) {
+            (Some(launch), _) => launch.standing(cg_station_m),
+            (None, StartPoint::Drone) => return Rests::Hanging,
+            (None, _) => RigidState::upright(mission.airframe.above_feet_m(cg_station_m)),
+        };
+        let lever_m = mission.sensors.lever_arms(&(Vector3::x() * cg_station_m)).lidar_m;
+        let lidar_m = standing.position_m + standing.world_from_body * lever_m;
+        Rests::Standing { at_m: standing.position_m, range_m: lidar_m.z / standing.nose_in_world().z }
     }
 
     /// The estimated state on the pad, at rest at the origin.
@@ -401,7 +408,7 @@ impl Computer {
             };
             // A lift-off that nobody commanded is felt a moment after it began.
             believed.velocity_m_s = believed.nose_in_world() * self.pilot.ascent.gained_m_s;
-            self.pilot.stand(&believed, start.gyro_bias_rad_s);
+            self.pilot.stand(&believed, &start.calibration);
         }
     }
 
@@ -411,6 +418,6 @@ impl Computer {
         // From rest it falls faster and faster: the speed when the lines are taut.
         let delay_s = parachute.ejection_delay_s;
         let fall_m = 0.5 * STANDARD_GRAVITY_M_S2 * delay_s * delay_s + parachute.inflation_distance_m;
-        self.pad.stance(true, 0.0).hanging_m.is_some_and(|height_m| height_m > fall_m)
+        self.pad.stance(true, Vector3::zeros()).hanging_m.is_some_and(|height_m| height_m > fall_m)
     }
 }

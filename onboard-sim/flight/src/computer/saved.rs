@@ -11,7 +11,6 @@
 //! one is written leaves the other.
 
 use alloc::boxed::Box;
-use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::digest::checksum;
@@ -22,7 +21,9 @@ use super::pilot::{Pilot, SavedPilot};
 use super::table::PhaseTable;
 use super::{Commands, Computer, CrewMemory, FRAME_S, KeptInput, LogState, Release, Severity, flight_time_s};
 use crate::estimation::estimator::StartUncertainty;
+use crate::estimation::estimator::alignment::ImuCalibration;
 use crate::estimation::sensor_watch::SensorWatch;
+use crate::estimation::spikes::SpikeFilter;
 use crate::guidance::powered::ControlLevel;
 use crate::rules::outputs::Outputs;
 use crate::rules::phase::{Event, Interlocks, Latch, Mode};
@@ -192,6 +193,7 @@ impl Computer {
         let uncertainty = StartUncertainty::at_start(mission.start.at);
         Self {
             table: PhaseTable::new(0.0),
+            pressure: SpikeFilter::default(),
             sensors: SensorWatch::default(),
             pad: PadWatch::default(),
             pilot: Box::new(Pilot::starting(mission, 0.0, believed, &uncertainty)),
@@ -227,10 +229,10 @@ impl Computer {
         self
     }
 
-    /// The same computer after it has found its state and the bias of its gyro, body, rad/s, on its rail.
+    /// The same computer after it has found its state and the calibration of its inertial unit on its rail.
     #[must_use]
-    pub fn standing(mut self, believed: &RigidState, gyro_bias_rad_s: Vector3<f64>) -> Self {
-        self.pilot.stand(believed, gyro_bias_rad_s);
+    pub fn standing(mut self, believed: &RigidState, calibration: &ImuCalibration) -> Self {
+        self.pilot.stand(believed, calibration);
         self
     }
 

@@ -14,9 +14,16 @@ pub const SENSORS: [&str; 5] = ["accelerometer", "gyro", "barometer", "GNSS", "l
 
 /// So many equal inertial samples in a row do not happen to noise.
 const FROZEN_IMU: u32 = 4;
-/// The same of a barometer, half a second, and of satellite fixes, two seconds: both round more coarsely.
+/// The same of a barometer, half a second, and of a lidar, a second: both round more coarsely. A receiver at rest
+/// may repeat one fix (static hold).
 const FROZEN_BAROMETER: u32 = 25;
-const FROZEN_FIXES: u32 = 10;
+const FROZEN_RANGES: u32 = 100;
+/// Below this range a lidar need not see the ground, m (TF-Luna, Benewake).
+pub const LIDAR_BLIND_M: f64 = 0.2;
+/// Difference of a range from the one where the vehicle stands, m: noise, grass and slope are smaller.
+const LIDAR_OFF_M: f64 = 0.35;
+/// Ranges in a row that have to be off, 0.2 s: outliers are single.
+const RANGES: usize = 20;
 
 /// The barometer speaks 50 times a second.
 pub const BAROMETER_LOST_S: f64 = 0.25;
@@ -109,15 +116,15 @@ pub struct SensorWatch {
     felt_m_s2: Vector3<f64>,
     /// Where the fixes lie in the mean, world, m.
     fixed_m: Vector3<f64>,
+    /// Ranges of the lidar, the newest first, m.
+    ranges_m: [f64; RANGES],
 }
 
 /// Where a vehicle stands while its sensors are asked.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Rests {
-    /// On its rail, there, m.
-    OnRail(Vector3<f64>),
-    /// On its legs, there, m: the lidar may be too near to see the ground.
-    OnLegs(Vector3<f64>),
+    /// On its rail or its legs, with its centre of gravity there, m, and its lidar this far from the ground, m.
+    Standing { at_m: Vector3<f64>, range_m: f64 },
     /// Below a drone, which moves.
     Hanging,
 }
@@ -128,10 +135,15 @@ impl SensorWatch {
         let frame_s = if self.gyro.spoke { time_s - self.time_s } else { RESTS_OVER_S };
         self.time_s = time_s;
         let imu = &measured.imu;
-        self.gyro.take(Some(imu.gyro_rad_s.into()).filter(|_| imu.is_plausible()), time_s);
-        self.accelerometer.take(Some(imu.specific_force_m_s2.into()).filter(|_| imu.is_plausible()), time_s);
+        self.gyro.take(Some(imu.gyro_rad_s.into()).filter(|_| imu.gyro_is_plausible()), time_s);
+        self.accelerometer
+            .take(Some(imu.specific_force_m_s2.into()).filter(|_| imu.accelerometer_is_plausible()), time_s);
         self.barometer.take(measured.pressure_altitude_m.map(|height_m| [height_m]), time_s);
         self.lidar.take(measured.lidar_range_m.map(|range_m| [range_m]), time_s);
+        if let Some(range_m) = measured.lidar_range_m {
+            self.ranges_m.rotate_right(1);
+            self.ranges_m[0] = range_m;
+        }
         let fix = measured.gnss.map(|fix| {
             let ([x, y, z], [u, v, w]) = (fix.position_m.into(), fix.velocity_m_s.into());
             [x, y, z, u, v, w]
@@ -189,9 +201,9 @@ impl SensorWatch {
         felt_s.max(lost_s(gyro_s, self.gyro.silent_s(self.time_s)))
     }
 
-    /// Mean rotation rate over the last moment, rad/s.
-    pub fn turns_rad_s(&self) -> f64 {
-        self.turns_rad_s.norm()
+    /// Mean of the gyro over the last moment, body, rad/s.
+    pub fn turns_rad_s(&self) -> Vector3<f64> {
+        self.turns_rad_s
     }
 
     /// What is wrong with each of the [`SENSORS`] of a vehicle at rest, in the crew's words.
@@ -213,7 +225,7 @@ impl SensorWatch {
         let gyro = silent("gyro", self.gyro.silent_s(time_s), IMU_LOST_S)
             .or_else(|| repeats("gyro", self.gyro.repeats_for_s(FROZEN_IMU, time_s)));
         let place_m = match rests {
-            Rests::OnRail(place_m) | Rests::OnLegs(place_m) => Some(place_m),
+            Rests::Standing { at_m, .. } => Some(at_m),
             Rests::Hanging => None,
         };
         let barometer = silent("barometer", self.barometer.silent_s(time_s), BAROMETER_LOST_S)
@@ -226,14 +238,21 @@ impl SensorWatch {
         let gnss_silent_s = self.gnss.silent_s(time_s);
         let gnss = (gnss_silent_s > GNSS_LOST_S)
             .then(|| format!("no GNSS fix for {gnss_silent_s:.1} s"))
-            .or_else(|| repeats("GNSS", self.gnss.repeats_for_s(FROZEN_FIXES, time_s)))
             .or_else(|| {
                 let off_m = (self.fixed_m - place_m?).norm();
                 (self.gnss.spoke && off_m > GNSS_OFF_M).then(|| format!("GNSS {off_m:.0} m off"))
             });
         let lidar = match rests {
-            Rests::OnRail(_) => silent("lidar", self.lidar.silent_s(time_s), LIDAR_LOST_S),
-            Rests::OnLegs(_) | Rests::Hanging => None,
+            Rests::Standing { range_m, .. } if range_m >= LIDAR_BLIND_M => {
+                silent("lidar", self.lidar.silent_s(time_s), LIDAR_LOST_S)
+                    .or_else(|| repeats("lidar", self.lidar.repeats_for_s(FROZEN_RANGES, time_s)))
+                    .or_else(|| {
+                        let off = self.ranges_m.iter().all(|found_m| (found_m - range_m).abs() > LIDAR_OFF_M);
+                        let found_m = self.ranges_m[0];
+                        off.then(|| format!("lidar {found_m:.2} m at rest, not {range_m:.2}"))
+                    })
+            }
+            Rests::Standing { .. } | Rests::Hanging => None,
         };
         [accelerometer, gyro, barometer, gnss, lidar]
     }

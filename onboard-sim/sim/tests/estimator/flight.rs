@@ -6,6 +6,7 @@ use core::f64::consts::TAU;
 use flight::estimation::estimator::{
     Estimate, Estimator, EstimatorConfig, GRAVITY_M_S2, Measurements, StartUncertainty, VehicleNow,
 };
+use flight::vehicle::mission::{LeverArms, SensorPlaces};
 use flight::vehicle::rigid::{RigidState, upright};
 use nalgebra::{UnitQuaternion, Vector2, Vector3};
 use sim::world::sensors::{SensorParams, SensorTruth, Sensors, believed_start};
@@ -86,7 +87,8 @@ impl Scene {
     /// Runs the flight until the centre of gravity is 0.1 m above its height at rest.
     pub(crate) fn fly(&self) -> Vec<Frame> {
         let mut estimator = self.estimator();
-        let mut sensors = Sensors::new(&self.sensors, self.seed, 1.0).expect("valid sensor parameters");
+        let mut sensors = Sensors::new(&self.sensors, &SensorPlaces::default(), self.seed, 1.0)
+            .expect("valid sensor parameters");
         let mut state = Self::start();
         let (mut burning, mut ms) = (false, 0_u32);
         let mut frames = Vec::new();
@@ -126,7 +128,7 @@ impl Scene {
                     fin_ahead_of_cg_m: 0.0,
                     crossflow_area_m2: CROSSFLOW_AREA_M2,
                     motor_burning: burning,
-                    lidar_behind_cg_m: self.sensors.lidar.behind_cg_m(CG_OVER_FEET_M),
+                    levers: LeverArms::default(),
                 };
                 let estimate = estimator.step(&measurements, &vehicle);
                 let nees = estimator.nees_of_motion(&state).unwrap_or(f64::NAN);

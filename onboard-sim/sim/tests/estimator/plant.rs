@@ -87,7 +87,8 @@ fn fly(seed: u64) -> Vec<Frame> {
         World::new(&airframe, &curve, &truth, &start(&truth), seed).expect("a valid world").with_fins_at(1.2);
     let masses = MassModel::new(&airframe.mass, curve.propellant_mass_kg());
     let params = SensorParams::default();
-    let mut sensors = Sensors::new(&params, seed, 1.0).expect("valid sensor parameters");
+    let places = flight::vehicles::mission::builtin("mk2").unwrap().unwrap().sensors;
+    let mut sensors = Sensors::new(&params, &places, seed, 1.0).expect("valid sensor parameters");
     let uncertainty = StartUncertainty::at_apogee();
     let believed = believed_start(&start(&truth), &uncertainty, seed);
     let mut estimator = Estimator::new(&EstimatorConfig::default(), &uncertainty, 0.0, &believed);
@@ -114,7 +115,7 @@ fn fly(seed: u64) -> Vec<Frame> {
             Air::at_height_m(height_m).density_kg_m3,
             world.fins_rad(),
             actuators.ignite,
-            params.lidar.ahead_of_feet_m,
+            places.lever_arms(&(Vector3::x() * mass.cg_station_m)),
         );
         let estimate = estimator.step(&measurements, &vehicle);
         let through_air = estimate.state.world_from_body.inverse() * estimate.velocity_through_air_m_s();

@@ -5,6 +5,7 @@ use alloc::vec::Vec;
 
 use flight::computer::crew::{Asked, Ending, People, Request};
 use flight::computer::{Commander, KeptInput, LogState, Rehearsed};
+use flight::estimation::estimator::alignment::ImuCalibration;
 use flight::estimation::estimator::{
     Doubt, Estimate, FixQuality, GnssFix, Health, HeightSources, ImuSample, Measurements, Sigmas,
 };
@@ -85,6 +86,7 @@ macro_rules! record {
 
 record!(RigidState as flight_v1::RigidState { position_m, velocity_m_s, world_from_body, rate_rad_s });
 record!(ImuSample as flight_v1::ImuSample { gyro_rad_s, specific_force_m_s2 });
+record!(ImuCalibration as flight_v1::ImuCalibration { gyro_bias_rad_s, accelerometer_scale });
 record!(FixQuality as flight_v1::FixQuality { satellites, horizontal_m, vertical_m, speed_m_s });
 record!(GnssFix as flight_v1::GnssFix { position_m, velocity_m_s, valid_at_s, quality });
 record!(Measurements as flight_v1::Measurements { imu, pressure_altitude_m, gnss, lidar_range_m });
@@ -303,6 +305,14 @@ pub fn vector_from_log(vector: &flight_v1::Vector3) -> Vector3<f64> {
 /// It had length 1 when it was written; normalising it again could change a bit.
 fn attitude_from_log(attitude: &flight_v1::Quaternion) -> UnitQuaternion<f64> {
     UnitQuaternion::new_unchecked(Quaternion::new(attitude.w, attitude.x, attitude.y, attitude.z))
+}
+
+/// A calibration from its record.
+pub fn calibration_from_log(calibration: &flight_v1::ImuCalibration) -> ImuCalibration {
+    ImuCalibration {
+        gyro_bias_rad_s: vector_from_log(&calibration.gyro_bias_rad_s),
+        accelerometer_scale: calibration.accelerometer_scale,
+    }
 }
 
 /// A recorded state.

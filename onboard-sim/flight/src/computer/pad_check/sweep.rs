@@ -10,7 +10,7 @@ use super::{CheckedValue, Item, SURFACES, SurfaceCommand, larger};
 use crate::computer::pad::ANSWERING_RAD;
 use crate::computer::{FRAME_MS, FRAME_S};
 use crate::estimation::estimator::Measurements;
-use crate::estimation::estimator::alignment::{FELT_AT_REST_M_S2, STILL_RAD_S};
+use crate::estimation::estimator::alignment::{BIAS_MAX_RAD_S, FELT_AT_REST_M_S2};
 use crate::vehicle::airframe::{Airframe, Servo};
 use crate::vehicle::mission::{ArmingLimits, Mission};
 
@@ -306,7 +306,7 @@ impl Still {
         let largest = |spreads: &[Spread; 3]| spreads.iter().map(Spread::sigma).fold(0.0, larger);
         let speed_m_s = (self.velocity_sum_m_s / f64::from(self.fixes)).norm();
         let found = [
-            CheckedValue::at_most(Item::GyroBias, mean(&self.gyro_rad_s), STILL_RAD_S),
+            CheckedValue::at_most(Item::GyroBias, mean(&self.gyro_rad_s), BIAS_MAX_RAD_S),
             CheckedValue::at_most(Item::GyroNoise, largest(&self.gyro_rad_s), SPREAD_MOST * gyro_rad_s),
             CheckedValue::between(
                 Item::Gravity,

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::computer::LogState;
-use crate::estimation::estimator::{GnssFix, ImuSample, Measurements};
+use crate::estimation::estimator::{FixQuality, GnssFix, ImuSample, Measurements};
 use crate::vehicle::airframe::Servo;
 
 fn mission() -> Mission {
@@ -89,6 +89,7 @@ fn at_rest(frame: u32, noise: f64) -> Measurements {
             position_m: Vector3::zeros(),
             velocity_m_s: Vector3::new(0.05 * sign, 0.0, 0.0),
             valid_at_s: 0.0,
+            quality: FixQuality::default(),
         }),
         lidar_range_m: None,
     }

@@ -18,7 +18,6 @@ mod vertical_speed;
 use alloc::boxed::Box;
 use alloc::string::String;
 use alloc::sync::Arc;
-use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use self::ascent::{AscentWatch, FinWatch};
@@ -28,6 +27,7 @@ use self::swing::SwingWatch;
 use self::vehicle_model::VehicleModel;
 use self::vertical_speed::VerticalSpeeds;
 use crate::control::aim::AimLoop;
+use crate::estimation::estimator::alignment::ImuCalibration;
 use crate::estimation::estimator::{Estimate, Estimator, Measurements, StartUncertainty};
 use crate::estimation::motor_estimate::{MotorEstimate, MotorPrior};
 use crate::estimation::other_curves::OtherCurves;
@@ -141,11 +141,11 @@ impl Pilot {
         }
     }
 
-    /// Takes over the state on the rail, and the gyro's bias, body, rad/s, from there.
-    pub(super) fn stand(&mut self, believed: &RigidState, gyro_bias_rad_s: Vector3<f64>) {
+    /// Takes over the state on the rail, and the inertial unit's calibration there.
+    pub(super) fn stand(&mut self, believed: &RigidState, calibration: &ImuCalibration) {
         let config = &self.model.mission.estimator;
         let estimator = Estimator::new(config, &StartUncertainty::on_pad(), 0.0, believed);
-        *self.estimator = estimator.with_gyro_bias(gyro_bias_rad_s);
+        *self.estimator = estimator.calibrated(calibration);
     }
 
     /// Whether a vehicle that nobody has started lifts off from its rail in this frame.
@@ -254,6 +254,7 @@ pub struct SavedPilot {
     motor: MotorEstimate,
     other_curve: Option<usize>,
     estimate: Option<Estimate>,
+    accelerometer_scale: f64,
     speeds: VerticalSpeeds,
     ascent: AscentWatch,
     apogee_m: f64,
@@ -271,6 +272,7 @@ impl Pilot {
             motor: self.model.motor,
             other_curve: self.model.others.chosen(),
             estimate: self.estimate,
+            accelerometer_scale: self.estimator.calibration().accelerometer_scale,
             speeds: self.speeds,
             ascent: self.ascent,
             apogee_m: self.apogee_m,
@@ -305,7 +307,11 @@ impl Pilot {
                     believed.velocity_m_s * lost_s + acceleration_m_s2 * (0.5 * lost_s * lost_s);
                 believed.velocity_m_s += acceleration_m_s2 * lost_s;
                 let estimator = Estimator::new(&mission.estimator, &uncertainty, time_s, &believed);
-                Box::new(estimator.with_gyro_bias(estimate.gyro_bias_rad_s))
+                let calibration = ImuCalibration {
+                    gyro_bias_rad_s: estimate.gyro_bias_rad_s,
+                    accelerometer_scale: saved.accelerometer_scale,
+                };
+                Box::new(estimator.calibrated(&calibration))
             },
         );
         let mut resumed = Self {

@@ -6,21 +6,39 @@ use nalgebra::{UnitQuaternion, Vector3};
 use serde::Serialize;
 
 use super::ImuSample;
+use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use crate::vehicle::rigid::upright;
 
 /// Fewest samples for an alignment: one second at 200 Hz.
 const FEWEST: u32 = 200;
-/// Largest mean rate of a vehicle at rest, rad/s: the turn-on bias of a hobby gyro with some margin.
-pub(crate) const STILL_RAD_S: f64 = 0.017;
-/// Length of the specific force of a vehicle at rest, m/s^2: gravity, with 5 % for scale, bias and place.
-pub(crate) const FELT_AT_REST_M_S2: core::ops::RangeInclusive<f64> = 9.3..=10.3;
+/// Largest turn-on bias of a gyro that is calibrated, rad/s: 10 deg/s. Hobby gyros show up to 7.2.
+pub(crate) const BIAS_MAX_RAD_S: f64 = 0.175;
+/// Length of the specific force of a vehicle at rest, m/s^2: gravity, with 7 % for scale and bias. Hobby
+/// accelerometers show 9.7 to 10.44.
+pub(crate) const FELT_AT_REST_M_S2: core::ops::RangeInclusive<f64> = 9.12..=10.5;
+/// Smaller deviations of the length from gravity are left to the filter's bias.
+const SCALE_UNCALIBRATED: f64 = 0.01;
+/// Largest difference between the two halves of the record of a vehicle at rest: of the gyro, rad/s
+/// (0.3 deg/s, five standard deviations of two seconds' noise), and of the specific force, m/s^2.
+const GYRO_DRIFT_RAD_S: f64 = 0.005;
+const FORCE_DRIFT_M_S2: f64 = 0.15;
 
-/// Running means over the samples taken at rest.
+/// Means over the samples taken at rest in one second.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct PadAlignment {
     samples: u32,
     gyro_rad_s: Vector3<f64>,
     specific_force_m_s2: Vector3<f64>,
+}
+
+/// Seconds of the record.
+const RECORD: usize = 8;
+
+/// The means of the last seconds at rest: a longer mean, and a motion that one second does not show.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct PadRecord {
+    seconds: [PadAlignment; RECORD],
+    filled: usize,
 }
 
 /// Why there is no alignment yet.
@@ -32,14 +50,22 @@ pub enum AlignmentError {
         /// The number of samples.
         found: u32,
     },
-    /// The mean rate is too large for a vehicle at rest.
-    #[error("turns at {found_deg_s:.2} deg/s, at rest is below 0.97 deg/s")]
+    /// The mean rate is too large for the bias of a gyro at rest.
+    #[error("turns at {found_deg_s:.2} deg/s, at rest is below 10 deg/s")]
     Turning {
         /// The mean rate, deg/s.
         found_deg_s: f64,
     },
+    /// Rate or specific force change from second to second.
+    #[error("gyro drifts by {found_deg_s:.2} deg/s, specific force by {found_m_s2:.2} m/s^2")]
+    Drifting {
+        /// Change of the mean rate, deg/s.
+        found_deg_s: f64,
+        /// Change of the mean specific force, m/s^2.
+        found_m_s2: f64,
+    },
     /// The mean specific force is not gravity's.
-    #[error("feels {found_m_s2:.2} m/s^2, at rest is 9.3 to 10.3 m/s^2")]
+    #[error("feels {found_m_s2:.2} m/s^2, at rest is 9.12 to 10.5 m/s^2")]
     NotAtRest {
         /// Its length, m/s^2.
         found_m_s2: f64,
@@ -51,11 +77,65 @@ pub enum AlignmentError {
 pub struct PadStart {
     /// The attitude, with the given heading.
     pub world_from_body: UnitQuaternion<f64>,
-    /// The gyro's bias, body, rad/s, for [`Estimator::with_gyro_bias`](super::Estimator::with_gyro_bias).
+    pub calibration: ImuCalibration,
+}
+
+/// Errors of the inertial unit as measured at rest.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ImuCalibration {
+    /// Bias of the gyro, body, rad/s.
     pub gyro_bias_rad_s: Vector3<f64>,
+    /// Measured specific force over the true one.
+    pub accelerometer_scale: f64,
+}
+
+impl ImuCalibration {
+    /// No error.
+    pub const NONE: Self = Self { gyro_bias_rad_s: Vector3::new(0.0, 0.0, 0.0), accelerometer_scale: 1.0 };
+}
+
+impl PadRecord {
+    /// Adds a second. A second that differs from the record begins a new one.
+    ///
+    /// # Errors
+    /// The second is not of a vehicle at rest, or differs from those before it.
+    pub fn take(&mut self, second: &PadAlignment, heading_rad: f64) -> Result<PadStart, AlignmentError> {
+        let alone = second.finish(heading_rad);
+        if alone.is_err() {
+            self.filled = 0;
+            return alone;
+        }
+        self.seconds.rotate_right(1);
+        self.seconds[0] = *second;
+        self.filled = (self.filled + 1).min(RECORD);
+        let half = self.filled.div_ceil(2);
+        let [newer, older] =
+            [&self.seconds[..half], &self.seconds[half..self.filled]].map(PadAlignment::mean);
+        if older.samples > 0 {
+            let found_deg_s = (newer.gyro_rad_s - older.gyro_rad_s).norm().to_degrees();
+            let found_m_s2 = (newer.specific_force_m_s2 - older.specific_force_m_s2).norm();
+            if found_deg_s > GYRO_DRIFT_RAD_S.to_degrees() || found_m_s2 > FORCE_DRIFT_M_S2 {
+                self.filled = 1;
+                return Err(AlignmentError::Drifting { found_deg_s, found_m_s2 });
+            }
+        }
+        PadAlignment::mean(&self.seconds[..self.filled]).finish(heading_rad)
+    }
 }
 
 impl PadAlignment {
+    /// The mean of several seconds.
+    fn mean(seconds: &[Self]) -> Self {
+        let mut mean = Self::default();
+        for second in seconds {
+            mean.samples += second.samples;
+            let share = f64::from(second.samples) / f64::from(mean.samples.max(1));
+            mean.gyro_rad_s += (second.gyro_rad_s - mean.gyro_rad_s) * share;
+            mean.specific_force_m_s2 += (second.specific_force_m_s2 - mean.specific_force_m_s2) * share;
+        }
+        mean
+    }
+
     /// Takes one sample; an impossible sample is ignored.
     pub fn take(&mut self, imu: &ImuSample) {
         if !imu.is_plausible() {
@@ -76,7 +156,7 @@ impl PadAlignment {
             return Err(AlignmentError::TooShort { found: self.samples });
         }
         let rate = self.gyro_rad_s.norm();
-        if rate > STILL_RAD_S {
+        if rate > BIAS_MAX_RAD_S {
             return Err(AlignmentError::Turning { found_deg_s: rate.to_degrees() });
         }
         let felt = self.specific_force_m_s2.norm();
@@ -88,7 +168,13 @@ impl PadAlignment {
         // The shortest rotation from the measured direction to the vertical does not change the heading.
         let lean = UnitQuaternion::rotation_between(&up_in_world, &Vector3::z())
             .unwrap_or_else(UnitQuaternion::identity);
-        Ok(PadStart { world_from_body: lean * headed, gyro_bias_rad_s: self.gyro_rad_s })
+        let scale = felt / STANDARD_GRAVITY_M_S2;
+        let small = (scale - 1.0).abs() <= SCALE_UNCALIBRATED;
+        let calibration = ImuCalibration {
+            gyro_bias_rad_s: self.gyro_rad_s,
+            accelerometer_scale: if small { 1.0 } else { scale },
+        };
+        Ok(PadStart { world_from_body: lean * headed, calibration })
     }
 }
 
@@ -114,7 +200,7 @@ mod tests {
         }
         let start = alignment.finish(heading).unwrap();
         assert!(start.world_from_body.angle_to(&truth) < 1e-9, "{}", start.world_from_body.angle_to(&truth));
-        assert!((start.gyro_bias_rad_s - Vector3::new(0.002, -0.003, 0.001)).norm() < 1e-12);
+        assert!((start.calibration.gyro_bias_rad_s - Vector3::new(0.002, -0.003, 0.001)).norm() < 1e-12);
     }
 
     #[test]
@@ -129,16 +215,52 @@ mod tests {
         };
         assert_eq!(of(good, 199), "199 samples at rest, 200 are needed");
         assert_eq!(
-            of(ImuSample { gyro_rad_s: Vector3::new(0.0, 0.0, 0.05), ..good }, 300),
-            "turns at 2.86 deg/s, at rest is below 0.97 deg/s"
+            of(ImuSample { gyro_rad_s: Vector3::new(0.0, 0.0, 0.25), ..good }, 300),
+            "turns at 14.32 deg/s, at rest is below 10 deg/s"
         );
         assert_eq!(
             of(ImuSample { specific_force_m_s2: Vector3::new(12.0, 0.0, 0.0), ..good }, 300),
-            "feels 12.00 m/s^2, at rest is 9.3 to 10.3 m/s^2"
+            "feels 12.00 m/s^2, at rest is 9.12 to 10.5 m/s^2"
         );
         assert!(
             of(ImuSample { gyro_rad_s: Vector3::new(f64::NAN, 0.0, 0.0), ..good }, 300)
                 .starts_with("0 samples")
         );
+    }
+
+    /// A second with this rate, deg/s, of an accelerometer with this scale on a vehicle at rest.
+    fn second(rate_deg_s: f64, scale: f64, lean_deg: f64) -> PadAlignment {
+        let lean = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), lean_deg.to_radians()) * upright();
+        let good = at_rest(&lean);
+        let mut second = PadAlignment::default();
+        for _ in 0..200 {
+            second.take(&ImuSample {
+                gyro_rad_s: Vector3::z() * rate_deg_s.to_radians(),
+                specific_force_m_s2: good.specific_force_m_s2 * scale,
+            });
+        }
+        second
+    }
+
+    #[test]
+    fn a_constant_bias_and_a_wrong_scale_are_calibrated() {
+        let mut record = PadRecord::default();
+        for _ in 0..20 {
+            let start = record.take(&second(7.2, 1.06, 1.0), 0.0).unwrap();
+            assert!((start.calibration.gyro_bias_rad_s.z.to_degrees() - 7.2).abs() < 1e-9);
+            assert!((start.calibration.accelerometer_scale - 1.06).abs() < 1e-9);
+        }
+        assert!(record.take(&second(12.0, 1.0, 0.0), 0.0).is_err());
+    }
+
+    #[test]
+    fn a_drifting_bias_and_a_turning_vehicle_are_refused() {
+        let errors = |of: &dyn Fn(f64) -> PadAlignment| {
+            let mut record = PadRecord::default();
+            (0..20).filter(|time_s| record.take(&of(f64::from(*time_s)), 0.0).is_err()).count()
+        };
+        assert_eq!(errors(&|_| second(5.0, 1.0, 0.0)), 0);
+        assert!(errors(&|time_s| second(0.1 * time_s, 1.0, 0.0)) >= 2, "drift");
+        assert!(errors(&|time_s| second(0.5, 1.0, 0.5 * time_s)) >= 4, "turns about a level axis");
     }
 }

@@ -96,10 +96,10 @@ impl AidStatus {
         self.count(false);
     }
 
-    /// Discards a measurement that says nothing about the estimate.
+    /// Discards the three numbers of a fix that says nothing about the estimate.
     pub(super) fn discard(&mut self) {
         self.fresh = true;
-        self.refused = self.refused.saturating_add(1);
+        self.refused = self.refused.saturating_add(3);
     }
 
     /// Counts a verdict and returns it.

@@ -31,6 +31,7 @@ mod wind;
 use nalgebra::{Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
+use self::alignment::ImuCalibration;
 pub use self::config::{EstimatorConfig, GRAVITY_M_S2, HealthLimits, StartUncertainty};
 pub use self::correction::{AidStatus, Aids};
 use self::covariance::{
@@ -148,6 +149,8 @@ pub struct Estimator {
     surprise: Surprise,
     fix_age: FixAge,
     gnss_gate: GnssGate,
+    /// Measured specific force over the true one, from the pad.
+    accelerometer_scale: f64,
     last_imu: ImuSample,
     /// The landing motor has shaken the gyro.
     is_shaken: bool,
@@ -183,6 +186,7 @@ impl Estimator {
             surprise: Surprise::default(),
             fix_age: FixAge::new(config),
             gnss_gate: GnssGate::new(&state.velocity_m_s),
+            accelerometer_scale: 1.0,
             is_shaken: false,
             last_imu: ImuSample { gyro_rad_s: state.rate_rad_s, specific_force_m_s2: Vector3::zeros() },
             rate_rad_s: state.rate_rad_s,
@@ -194,12 +198,21 @@ impl Estimator {
         }
     }
 
-    /// The same filter with a gyro bias known from the pad, body, rad/s.
+    /// The same filter with an inertial unit calibrated on the pad.
     #[must_use]
-    pub fn with_gyro_bias(mut self, gyro_bias_rad_s: Vector3<f64>) -> Self {
-        self.nominal.gyro_bias_rad_s = gyro_bias_rad_s;
+    pub fn calibrated(mut self, calibration: &ImuCalibration) -> Self {
+        self.nominal.gyro_bias_rad_s = calibration.gyro_bias_rad_s;
+        self.accelerometer_scale = calibration.accelerometer_scale;
         self.last_good = self.nominal;
         self
+    }
+
+    /// The inertial unit's calibration, with the gyro bias as estimated now.
+    pub fn calibration(&self) -> ImuCalibration {
+        ImuCalibration {
+            gyro_bias_rad_s: self.nominal.gyro_bias_rad_s,
+            accelerometer_scale: self.accelerometer_scale,
+        }
     }
 
     /// End of the last frame, s.
@@ -402,8 +415,15 @@ impl ImuSample {
     /// Whether an inertial unit can send these numbers: they are below [`LARGEST_RATE_RAD_S`] and
     /// [`LARGEST_SPECIFIC_FORCE_M_S2`] in each axis.
     pub fn is_plausible(&self) -> bool {
+        self.gyro_is_plausible() && self.accelerometer_is_plausible()
+    }
+
+    pub(crate) fn gyro_is_plausible(&self) -> bool {
         self.gyro_rad_s.iter().all(|rate| rate.abs() <= LARGEST_RATE_RAD_S)
-            && self.specific_force_m_s2.iter().all(|force| force.abs() <= LARGEST_SPECIFIC_FORCE_M_S2)
+    }
+
+    pub(crate) fn accelerometer_is_plausible(&self) -> bool {
+        self.specific_force_m_s2.iter().all(|force| force.abs() <= LARGEST_SPECIFIC_FORCE_M_S2)
     }
 }
 

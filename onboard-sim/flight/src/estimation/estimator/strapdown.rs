@@ -161,7 +161,7 @@ impl Estimator {
         // At the centre of gravity (Groves 2013, section 5.5): the rate in the middle of two samples.
         let angular_m_s2 = (self.rate_rad_s - before_rad_s) / interval_s;
         let middle_rad_s = (self.rate_rad_s + before_rad_s) * 0.5;
-        self.specific_force_m_s2 = self.last_imu.specific_force_m_s2
+        self.specific_force_m_s2 = self.last_imu.specific_force_m_s2 / self.accelerometer_scale
             - state.accelerometer_bias_m_s2
             - angular_m_s2.cross(&levers.imu_m)
             - middle_rad_s.cross(&middle_rad_s.cross(&levers.imu_m));

@@ -3,6 +3,7 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::vehicle::mission::LeverArms;
 
 /// A vehicle in its fall, with open fins.
 pub(super) const VEHICLE: VehicleNow = VehicleNow {
@@ -15,8 +16,16 @@ pub(super) const VEHICLE: VehicleNow = VehicleNow {
     fin_ahead_of_cg_m: 0.11,
     crossflow_area_m2: 0.09,
     motor_burning: false,
-    lidar_behind_cg_m: 0.4,
+    levers: LeverArms {
+        imu_m: Vector3::new(0.0, 0.0, 0.0),
+        gnss_m: Vector3::new(0.0, 0.0, 0.0),
+        barometer_m: Vector3::new(0.0, 0.0, 0.0),
+        lidar_m: Vector3::new(-LIDAR_BEHIND_CG_M, 0.0, 0.0),
+    },
 };
+
+/// Distance of the lidar behind the centre of gravity, m.
+const LIDAR_BEHIND_CG_M: f64 = 0.4;
 
 fn at(height_m: f64) -> Estimator {
     let state = RigidState::upright(height_m);
@@ -35,6 +44,7 @@ fn hovering(frame: u64) -> Measurements {
             position_m: Vector3::new(0.0, 0.0, 5.0),
             velocity_m_s: Vector3::zeros(),
             valid_at_s: frame as f64 * 0.005 - 0.12,
+            quality: FixQuality::default(),
         }),
         lidar_range_m: frame.is_multiple_of(2).then_some(4.6),
     }
@@ -112,6 +122,7 @@ fn an_outlier_is_rejected_and_counted() {
         position_m: Vector3::new(500.0, 0.0, 0.0),
         velocity_m_s: Vector3::new(30.0, f64::NAN, f64::INFINITY),
         valid_at_s: 1.9,
+        quality: FixQuality::default(),
     });
     let after = estimator.step(&wild, &VEHICLE);
     assert!((after.state.position_m.z - before).abs() < 1e-3, "{after:?}");
@@ -129,6 +140,7 @@ fn fixes_from_the_future_or_long_ago_are_rejected() {
             position_m: Vector3::new(0.0, 0.0, 5.0),
             velocity_m_s: Vector3::zeros(),
             valid_at_s,
+            quality: FixQuality::default(),
         });
         estimator.step(&measurements, &VEHICLE);
         assert_eq!(estimator.aids().gnss_velocity.refused, 3 * frame);
@@ -172,11 +184,12 @@ fn height_error_over_a_slope(ground_slope_deg: f64) -> (f64, f64) {
             position_m: Vector3::new(SPEED_M_S * valid_at_s, 0.0, 8.0),
             velocity_m_s: Vector3::x() * SPEED_M_S,
             valid_at_s,
+            quality: FixQuality::default(),
         };
         let measurements = Measurements {
             pressure_altitude_m: frame.is_multiple_of(4).then_some(8.0),
             gnss: (frame > 40 && frame.is_multiple_of(40)).then(|| fix(time_s - 0.12)),
-            lidar_range_m: frame.is_multiple_of(2).then_some(over_ground_m - VEHICLE.lidar_behind_cg_m),
+            lidar_range_m: frame.is_multiple_of(2).then_some(over_ground_m - LIDAR_BEHIND_CG_M),
             ..hovering(frame)
         };
         estimator.step(&measurements, &VEHICLE);
@@ -210,7 +223,7 @@ fn height_error_with_a_late_lidar(lidar_late_s: f64) -> (f64, f64) {
         measurements.imu.specific_force_m_s2.x += BRAKING_M_S2;
         measurements.pressure_altitude_m = None;
         measurements.gnss = None;
-        measurements.lidar_range_m = frame.is_multiple_of(2).then_some(late_m - VEHICLE.lidar_behind_cg_m);
+        measurements.lidar_range_m = frame.is_multiple_of(2).then_some(late_m - LIDAR_BEHIND_CG_M);
         estimator.step(&measurements, &VEHICLE);
     }
     let estimate = estimator.estimate();
@@ -361,6 +374,7 @@ fn any_measurements() -> impl Strategy<Value = Measurements> {
                     position_m,
                     velocity_m_s,
                     valid_at_s,
+                    quality: FixQuality::default(),
                 }),
                 lidar_range_m,
             }
@@ -374,10 +388,15 @@ proptest! {
     fn whatever_is_measured_the_estimate_is_a_number(
         log in prop::collection::vec(any_measurements(), 1..80),
         mass_kg in any_number(),
-        lidar_behind_cg_m in any_number(),
+        behind_cg_m in any_number(),
         burning in any::<bool>(),
     ) {
-        let vehicle = VehicleNow { mass_kg, lidar_behind_cg_m, motor_burning: burning, ..VEHICLE };
+        let vehicle = VehicleNow {
+            mass_kg,
+            levers: LeverArms { lidar_m: Vector3::x() * -behind_cg_m, ..VEHICLE.levers },
+            motor_burning: burning,
+            ..VEHICLE
+        };
         let mut estimator = at(20.0);
         for measurements in &log {
             let estimate = estimator.step(measurements, &vehicle);

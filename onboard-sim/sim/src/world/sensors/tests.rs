@@ -2,6 +2,18 @@
 
 use super::*;
 
+/// The centre of gravity is the origin of the stations here.
+const PLACES: SensorPlaces = SensorPlaces {
+    imu_station_m: None,
+    imu_across_m: [0.0; 2],
+    gnss_station_m: None,
+    gnss_across_m: [0.0; 2],
+    barometer_station_m: None,
+    barometer_across_m: [0.0; 2],
+    lidar_station_m: Some(-0.45),
+    lidar_across_m: [0.0; 2],
+};
+
 fn falling(speed_m_s: f64, height_m: f64) -> SensorTruth {
     let mut state = RigidState::upright(height_m);
     state.velocity_m_s.z = -speed_m_s;
@@ -18,7 +30,7 @@ fn frames_with(
     broken: &[(Sensor, Defect)],
     frames: usize,
 ) -> Vec<Measurements> {
-    let mut sensors = Sensors::new(&SensorParams::default(), seed, 1.0).unwrap();
+    let mut sensors = Sensors::new(&SensorParams::default(), &PLACES, seed, 1.0).unwrap();
     let mut faults = SensorFaults::default();
     for (sensor, defect) in broken {
         faults.break_down(*sensor, *defect);
@@ -150,7 +162,7 @@ fn over_many_flights_the_ram_error_has_its_size() {
 }
 
 fn flawed(params: &SensorParams) -> Sensors {
-    Sensors::new(params, 9, 1.0).unwrap()
+    Sensors::new(params, &PLACES, 9, 1.0).unwrap()
 }
 
 /// Without noise and bias.
@@ -219,7 +231,7 @@ fn the_burning_motor_shifts_the_gyros_bias_by_the_stated_size() {
     let n = 400;
     let squares: f64 = (0..n)
         .map(|seed| {
-            let mut sensors = Sensors::new(&params, seed, 1.0).unwrap();
+            let mut sensors = Sensors::new(&params, &PLACES, seed, 1.0).unwrap();
             let mut gyro = |burning: bool| {
                 one_frame(&mut sensors, &SensorTruth { burning, ..falling(10.0, 50.0) }).imu.gyro_rad_s
             };
@@ -283,7 +295,7 @@ fn late_samples_wrong_tags_dust_dropouts_and_switches() {
 
 /// The last measurement of each sensor after 0.4 s: with the same noise for the same seed, whatever the parameters.
 fn last_of_each(params: &SensorParams, truth: &SensorTruth) -> Measurements {
-    let mut sensors = Sensors::new(params, 5, 1.0).unwrap();
+    let mut sensors = Sensors::new(params, &PLACES, 5, 1.0).unwrap();
     let frames = (0..400).filter_map(|_| sensors.observe(truth));
     frames
         .reduce(|last, now| Measurements {
