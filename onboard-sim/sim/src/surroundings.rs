@@ -41,13 +41,14 @@ impl Surroundings {
         drawn: &Draw,
     ) -> Result<(Self, RigidState), SetUpError> {
         let world = world(mission, drawn)?;
-        let believed = if dispersion.sensors {
-            let uncertainty = StartUncertainty::at_start(mission.start.at);
-            believed_start(world.state(), &uncertainty, drawn.flight_seed)
-        } else {
-            *world.state()
-        };
         let sensors = sensors(mission, dispersion, drawn)?;
+        let uncertainty = StartUncertainty::at_start(mission.start.at);
+        let believed = || believed_start(world.state(), &uncertainty, drawn.flight_seed);
+        let believed = match mission.start.at {
+            _ if !dispersion.sensors => *world.state(),
+            StartPoint::Pad => sensors.levelled(world.state(), &believed()),
+            StartPoint::Apogee | StartPoint::Drone => believed(),
+        };
         let actuators = at_rest(mission);
         let faults = SensorFaults::default();
         let battery = Battery::new(1.0, surfaces_rad(&world));

@@ -65,15 +65,17 @@ impl Estimator {
         {
             self.barometer_outvoted = true;
             self.heights.forget_barometer();
+            self.heights_without_lidar.forget_barometer();
         }
         if altitude_m.is_finite() && !self.barometer_outvoted {
             let state = &self.nominal;
             let late_m = state.barometer_late_s * state.velocity_m_s.z;
-            self.heights.take_barometer(
+            let height_m =
                 (altitude_m - state.barometer_offset_m + state.barometer_ram * speed_height_m + late_m
                     - state.barometer_suction * across_height_m)
-                    / (1.0 + state.barometer_scale),
-            );
+                    / (1.0 + state.barometer_scale);
+            self.heights.take_barometer(height_m);
+            self.heights_without_lidar.take_barometer(height_m);
         }
         if self.aids.barometer.refused_in_a_row >= BAROMETER_REJECTIONS {
             self.aids.barometer.refused_in_a_row = 0;

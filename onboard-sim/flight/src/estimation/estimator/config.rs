@@ -128,6 +128,8 @@ pub struct StartUncertainty {
     pub gnss_horizontal_offset_m: f64,
     /// Offset of the satellite position since it was zeroed on the pad, vertical, m.
     pub gnss_vertical_offset_m: f64,
+    /// The lean was found by the accelerometer at rest: it is off by what that errs.
+    pub levelled: bool,
 }
 
 impl StartUncertainty {
@@ -141,6 +143,7 @@ impl StartUncertainty {
             barometer_offset_m: 0.1,
             gnss_horizontal_offset_m: 0.1,
             gnss_vertical_offset_m: 0.1,
+            levelled: true,
             ..Self::at_apogee()
         }
     }
@@ -168,6 +171,7 @@ impl StartUncertainty {
             barometer_ram: 0.05,
             gnss_horizontal_offset_m: 0.65,
             gnss_vertical_offset_m: 1.1,
+            levelled: false,
         }
     }
 

@@ -99,6 +99,18 @@ impl Covariance {
         self.rows.iter().flatten().all(|value| value.is_finite())
     }
 
+    /// Correlates the lean with the accelerometer's bias, of this variance, (m/s^2)^2, which was taken for a part of
+    /// the gravity, m/s^2, as the vehicle was levelled.
+    pub(super) fn level(&mut self, world_from_body: &Matrix3<f64>, bias_m2_s4: f64, gravity_m_s2: f64) {
+        for axis in 0..3 {
+            let column = ACCELEROMETER_BIAS + axis;
+            for (lean, share) in [(0, -world_from_body[(1, axis)]), (1, world_from_body[(0, axis)])] {
+                let both = share * bias_m2_s4 / gravity_m_s2;
+                (self.rows[ATTITUDE + lean][column], self.rows[column][ATTITUDE + lean]) = (both, both);
+            }
+        }
+    }
+
     /// Adds variance to an error.
     pub(super) fn widen(&mut self, index: usize, variance: f64) {
         self.rows[index][index] += variance;

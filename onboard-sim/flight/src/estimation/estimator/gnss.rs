@@ -141,7 +141,9 @@ impl Estimator {
             self.fix_age.take(innovation_m, correction.variance - aged_m2, then_m_s);
             if axis == 2 && fix.position_m.z.is_finite() {
                 let height_m = fix.position_m.z - lever_m.z;
-                self.heights.take_gnss(&self.config, height_m, since.moved_m.z, aged_m2);
+                for heights in [&mut self.heights, &mut self.heights_without_lidar] {
+                    heights.take_gnss(&self.config, height_m, since.moved_m.z, aged_m2);
+                }
             }
         }
         if self.aids.gnss_position.refused_in_a_row >= POSITION_REJECTIONS {

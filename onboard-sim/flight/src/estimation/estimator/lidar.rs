@@ -1,8 +1,9 @@
 //! The lidar: the slant range to the ground behind the vehicle.
 
-use super::Estimator;
 use super::correction::{DOUBT_POSITION_M, POSITION_REJECTIONS};
 use super::covariance::{ATTITUDE, LIDAR_LATE, POSITION, SLOPE};
+use super::{Estimator, HeightSources};
+use crate::estimation::sensor_watch::LIDAR_BLIND_M;
 
 /// A beam that leans wrongly is wrong in the same way in as many samples as come while the vehicle leans the same way:
 /// 20 in 0.2 s.
@@ -17,7 +18,26 @@ const ASTRAY_M: f64 = 8.0;
 /// ground too far away.
 const LIDAR_COS_TILT: f64 = 0.65;
 
+/// At this vertical speed no range repeats the one before it to the centimetre, m/s.
+const MOVES_M_S: f64 = 1.0;
+/// A height by the lidar that is off by more, m, and standard deviations, loses to two others that agree.
+const CONTRADICTS_M: f64 = 1.0;
+const CONTRADICTS_SIGMAS: f64 = 2.0;
+/// They agree if they are apart by less than this share of the farther one's distance from it.
+const AGREE_SHARE: f64 = 0.7;
+
 impl Estimator {
+    /// Whether barometer and inertial height, which know nothing of the lidar, agree against its height, m.
+    fn others_contradict_m(&self, height_m: f64) -> bool {
+        let HeightSources { inertial_m, inertial_sigma_m, barometric_m } =
+            self.heights_without_lidar.sources();
+        let Some(barometric_m) = barometric_m else { return false };
+        let [inertial_off_m, barometric_off_m] =
+            [inertial_m, barometric_m].map(|other_m| (height_m - other_m).abs());
+        inertial_off_m.min(barometric_off_m) > CONTRADICTS_M + CONTRADICTS_SIGMAS * inertial_sigma_m
+            && (barometric_m - inertial_m).abs() < AGREE_SHARE * inertial_off_m.max(barometric_off_m)
+    }
+
     /// The lidar looks along body `-x` from its place behind the centre of gravity. Its range plus that distance is the
     /// height divided by the cosine of the tilt: `s = h / n`, `n` the nose's vertical part. A small turn `d` about the world's axes
     /// adds `d_x n_y - d_y n_x` to `n`, so it adds `-s / n (d_x n_y - d_y n_x)` to `s`.
@@ -58,6 +78,12 @@ impl Estimator {
                 !(ATTITUDE..ATTITUDE + 3).contains(&index)
             })
         };
+        let repeated = range_m.to_bits() == self.last_range_m.to_bits() && climb_m_s.abs() > MOVES_M_S;
+        self.last_range_m = range_m;
+        if repeated || range_m < LIDAR_BLIND_M || self.others_contradict_m(measured_m * nose.z) {
+            self.aids.lidar.refuse();
+            return;
+        }
         let before_m = self.aids.lidar.innovation;
         let correction = take(self);
         self.aids.lidar.take(&correction);

@@ -139,7 +139,11 @@ pub struct Estimator {
     covariance: Covariance,
     pending: Pending,
     history: History,
+    /// The last range of the lidar, m.
+    last_range_m: f64,
     heights: HeightChannel,
+    /// The same without the lidar, which they may contradict.
+    heights_without_lidar: HeightChannel,
     sideways: Sideways,
     aids: Aids,
     /// What was felt and the fixes agree on another height than the barometer's.
@@ -175,10 +179,12 @@ impl Estimator {
             start_s: time_s,
             frames: 0,
             nominal,
-            covariance: start_covariance(start, config),
+            covariance: start_covariance(start, config, state),
             pending: Pending::default(),
             history: History::new(time_s),
-            heights: HeightChannel::new(state.position_m.z, start.height_m, start.gnss_vertical_offset_m),
+            heights: start_heights(start, state.position_m.z),
+            last_range_m: 0.0,
+            heights_without_lidar: start_heights(start, state.position_m.z),
             sideways: Sideways::default(),
             aids: Aids::default(),
             barometer_outvoted: false,
@@ -358,19 +364,21 @@ impl Estimator {
         self.restarts = self.restarts.saturating_add(1);
         self.restarted_at_s = time_s;
         self.nominal = self.last_good;
-        self.covariance = start_covariance(&self.start, &self.config);
+        let start = StartUncertainty { levelled: false, ..self.start };
+        self.covariance = start_covariance(&start, &self.config, &RigidState::upright(0.0));
         self.pending = Pending::default();
         self.history = History::new(time_s);
         self.sideways.clear();
-        self.heights = HeightChannel::new(
-            self.nominal.position_m.z,
-            self.start.height_m,
-            self.start.gnss_vertical_offset_m,
-        );
+        self.heights = start_heights(&self.start, self.nominal.position_m.z);
+        self.heights_without_lidar = self.heights;
     }
 }
 
-fn start_covariance(start: &StartUncertainty, config: &EstimatorConfig) -> Covariance {
+fn start_heights(start: &StartUncertainty, height_m: f64) -> HeightChannel {
+    HeightChannel::new(height_m, start.height_m, start.gnss_vertical_offset_m)
+}
+
+fn start_covariance(start: &StartUncertainty, config: &EstimatorConfig, state: &RigidState) -> Covariance {
     let milli_g = 1e-3 * GRAVITY_M_S2;
     let mut sigmas: Row = [0.0; N];
     sigmas[POSITION..VELOCITY].copy_from_slice(start.position_m().as_slice());
@@ -388,7 +396,13 @@ fn start_covariance(start: &StartUncertainty, config: &EstimatorConfig) -> Covar
     sigmas[SLOPE..BAROMETER_SUCTION].fill(libm::tan(config.ground_slope_deg.to_radians()));
     sigmas[BAROMETER_SUCTION] = config.barometer_suction;
     sigmas[BAROMETER_SCALE] = config.barometer_scale;
-    Covariance::diagonal(&sigmas.map(|sigma| sigma * sigma))
+    let variances = sigmas.map(|sigma| sigma * sigma);
+    let mut covariance = Covariance::diagonal(&variances);
+    if start.levelled {
+        let world_from_body = state.world_from_body.to_rotation_matrix().into_inner();
+        covariance.level(&world_from_body, variances[ACCELEROMETER_BIAS], config.gravity_m_s2);
+    }
+    covariance
 }
 
 // The measurements of one frame, as plain data. A log of them is enough to run the estimator again.

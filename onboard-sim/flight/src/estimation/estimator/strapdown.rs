@@ -197,7 +197,9 @@ impl Estimator {
         let time_s = self.time_s();
         self.history.push(time_s, interval_s, &gained_m_s, [antenna_m, antenna_m_s]);
         let velocity_m2_s2 = self.covariance.variance(VELOCITY + 2);
-        self.heights.predict(&self.config, moved_m.z, velocity_m2_s2, interval_s);
+        for heights in [&mut self.heights, &mut self.heights_without_lidar] {
+            heights.predict(&self.config, moved_m.z, velocity_m2_s2, interval_s);
+        }
         if self.pending.frames >= FRAMES_BETWEEN {
             self.catch_up();
         }

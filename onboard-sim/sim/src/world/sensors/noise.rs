@@ -5,7 +5,7 @@ use flight::estimation::estimator::{GRAVITY_M_S2, StartUncertainty};
 use flight::vehicle::rigid::RigidState;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
-use super::SensorParams;
+use super::{SensorParams, Sensors};
 use crate::world::normal::Normal;
 
 /// A stationary first-order Gauss-Markov process: its correlation decays exponentially (J. A. Farrell, Aided Navigation, 2008,
@@ -155,6 +155,24 @@ pub fn believed_start(truth: &RigidState, uncertainty: &StartUncertainty, seed: 
         world_from_body: UnitQuaternion::from_scaled_axis(normal.next3().component_mul(&turn_rad))
             * truth.world_from_body,
         rate_rad_s: truth.rate_rad_s,
+    }
+}
+
+impl Sensors {
+    /// The estimate of a vehicle that has levelled itself on its pad: the attitude is that of the inertial unit, off by
+    /// what its accelerometer errs at rest, and has the heading of `believed`.
+    pub(crate) fn levelled(&self, truth: &RigidState, believed: &RigidState) -> RigidState {
+        let unit_from_body = UnitQuaternion::from_rotation_matrix(&self.flaws.unit_from_body);
+        let world_from_unit = truth.world_from_body * unit_from_body.inverse();
+        let up_m_s2 = world_from_unit.inverse_transform_vector(&Vector3::z()) * GRAVITY_M_S2;
+        let measured_m_s2 = up_m_s2.component_mul(&self.accelerometer_scale)
+            + self.flaws.cross_axis * up_m_s2
+            + self.errors.accelerometer_bias_m_s2;
+        let lean = UnitQuaternion::rotation_between(&(world_from_unit * measured_m_s2), &Vector3::z());
+        let turned = (believed.world_from_body * truth.world_from_body.inverse()).scaled_axis();
+        let heading = UnitQuaternion::from_scaled_axis(Vector3::z() * turned.z);
+        let world_from_body = heading * lean.unwrap_or_default() * world_from_unit;
+        RigidState { world_from_body, ..*believed }
     }
 }
 
