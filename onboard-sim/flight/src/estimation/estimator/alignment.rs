@@ -31,14 +31,20 @@ pub struct PadAlignment {
     specific_force_m_s2: Vector3<f64>,
 }
 
-/// Seconds of the record.
+/// Newest seconds, which show a drift.
 const RECORD: usize = 8;
+/// Weight of all seconds before them, s: together the white noise of a gyro (0.05 deg/s/sqrt(Hz)) is down to
+/// 0.009 deg/s, as much as its bias walks in 20 s.
+const OLDER_S: u32 = 24;
+/// Largest difference of the older seconds' gyro from the newest ones', rad/s: 0.08 deg/s.
+const OLDER_OFF_RAD_S: f64 = 0.0014;
 
 /// The means of the last seconds at rest: a longer mean, and a motion that one second does not show.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct PadRecord {
     seconds: [PadAlignment; RECORD],
     filled: usize,
+    older: PadAlignment,
 }
 
 /// Why there is no alignment yet.
@@ -102,8 +108,12 @@ impl PadRecord {
     pub fn take(&mut self, second: &PadAlignment, heading_rad: f64) -> Result<PadStart, AlignmentError> {
         let alone = second.finish(heading_rad);
         if alone.is_err() {
-            self.filled = 0;
+            *self = Self::default();
             return alone;
+        }
+        if self.filled == RECORD {
+            self.older = PadAlignment::mean(&[self.older, self.seconds[RECORD - 1]]);
+            self.older.samples = self.older.samples.min(OLDER_S * FEWEST);
         }
         self.seconds.rotate_right(1);
         self.seconds[0] = *second;
@@ -115,11 +125,15 @@ impl PadRecord {
             let found_deg_s = (newer.gyro_rad_s - older.gyro_rad_s).norm().to_degrees();
             let found_m_s2 = (newer.specific_force_m_s2 - older.specific_force_m_s2).norm();
             if found_deg_s > GYRO_DRIFT_RAD_S.to_degrees() || found_m_s2 > FORCE_DRIFT_M_S2 {
-                self.filled = 1;
+                (self.filled, self.older) = (1, PadAlignment::default());
                 return Err(AlignmentError::Drifting { found_deg_s, found_m_s2 });
             }
         }
-        PadAlignment::mean(&self.seconds[..self.filled]).finish(heading_rad)
+        let newest = PadAlignment::mean(&self.seconds[..self.filled]);
+        if (self.older.gyro_rad_s - newest.gyro_rad_s).norm() > OLDER_OFF_RAD_S {
+            self.older = PadAlignment::default();
+        }
+        PadAlignment::mean(&[self.older, newest]).finish(heading_rad)
     }
 }
 

@@ -3,7 +3,7 @@
 //! The error of a static port is in proportion to the dynamic pressure (W. Gracey, Measurement of Aircraft Speed and Altitude, NASA
 //! Reference Publication 1046, 1980).
 
-use super::correction::{DOUBT_POSITION_M, without_last_if};
+use super::correction::{DOUBT_POSITION_M, shown_by_height, without_last_if};
 use super::covariance::{
     BAROMETER_LATE, BAROMETER_OFFSET, BAROMETER_RAM, BAROMETER_SCALE, BAROMETER_SUCTION, POSITION, VELOCITY,
     WIND,
@@ -53,7 +53,7 @@ impl Estimator {
         sensitivity[..known.len()].copy_from_slice(known);
         let sensitivity = &sensitivity[..known.len() + usize::from(self.config.barometer_suction > 0.0)];
         let noise = self.config.barometer_m * self.config.barometer_m;
-        let correction = self.correct(sensitivity, altitude_m - predicted_m, noise, |_| true);
+        let correction = self.correct(sensitivity, altitude_m - predicted_m, noise, shown_by_height);
         self.aids.barometer.take(&correction);
         if correction.accepted {
             (self.barometer_outvoted, self.outvoted_from) = (false, self.aids.gnss_position.used);

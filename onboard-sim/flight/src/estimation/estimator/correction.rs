@@ -6,6 +6,7 @@
 use serde::Serialize;
 
 use super::Estimator;
+use super::covariance::{ACCELEROMETER_BIAS, ATTITUDE, POSITION, VELOCITY};
 
 /// After this many rejected ranges or numbers of satellite positions (three for each fix) in a row the filter assumes that the
 /// estimated position is wrong.
@@ -114,6 +115,13 @@ impl AidStatus {
         }
         accepted
     }
+}
+
+/// Whether a height shows an error: not the attitude, nor the motion along the ground. They depend on each other by the
+/// force of a leaning vehicle, but the flow around static ports and a field that is not level err for seconds.
+pub(super) fn shown_by_height(index: usize) -> bool {
+    ![POSITION, POSITION + 1, VELOCITY, VELOCITY + 1].contains(&index)
+        && !(ATTITUDE..ACCELEROMETER_BIAS).contains(&index)
 }
 
 /// A sensitivity whose last entry is that of an error which the configuration may rule out.

@@ -1,6 +1,6 @@
 //! The lidar: the slant range to the ground behind the vehicle.
 
-use super::correction::{DOUBT_POSITION_M, POSITION_REJECTIONS};
+use super::correction::{DOUBT_POSITION_M, POSITION_REJECTIONS, shown_by_height};
 use super::covariance::{ATTITUDE, LIDAR_LATE, POSITION, SLOPE};
 use super::{Estimator, HeightSources};
 use crate::estimation::sensor_watch::LIDAR_BLIND_M;
@@ -72,11 +72,8 @@ impl Estimator {
         // The beam leans as the airframe does, not as the inertial unit does: the same error in many samples.
         let askew_m = slant_m * nose.xy().norm() / nose.z * self.config.mounting_deg.to_radians();
         let noise = self.config.lidar_m * self.config.lidar_m + askew_m * askew_m * ASKEW_SAMPLES;
-        // The slant range depends on the tilt, too, but no field is level enough to correct the tilt from a range.
         let take = |estimator: &mut Self| {
-            estimator.correct(&sensitivity[..known], measured_m - slant_m, noise, |index| {
-                !(ATTITUDE..ATTITUDE + 3).contains(&index)
-            })
+            estimator.correct(&sensitivity[..known], measured_m - slant_m, noise, shown_by_height)
         };
         let repeated = range_m.to_bits() == self.last_range_m.to_bits() && climb_m_s.abs() > MOVES_M_S;
         self.last_range_m = range_m;
