@@ -7,6 +7,7 @@
 use nalgebra::Vector3;
 use serde::Serialize;
 
+use super::covariance::POSITION;
 use super::health::BRIDGED_FRAMES;
 use super::{Estimator, GnssFix};
 
@@ -24,12 +25,17 @@ const AGE_ERROR_S: f64 = 0.02;
 /// Difference between the change of position and the two velocities, m, and as a share of it.
 const UNEXPLAINED_M: f64 = 4.0;
 const MOVED_SHARE: f64 = 0.2;
-/// A receiver in doubt has to follow this change of velocity over two fixes, m/s: a receiver that
-/// stands still cannot.
-const FOLLOWED_M_S: f64 = 4.0;
-const FOLLOWED_FIXES: u32 = 2;
-/// Or its velocity has to be this close to the estimate, m/s.
+/// A receiver in doubt has to follow the motion, and to come this close to the estimate: its velocity, m/s, and its
+/// position, m, and in standard deviations of the estimate. After an outage of the whole ascent the estimated
+/// velocity is off by 0.3 m/s.
 const NEAR_M_S: f64 = 2.0;
+const NEAR_M: f64 = 30.0;
+const NEAR_SIGMAS: f64 = 5.0;
+/// A receiver in doubt after an outage of this length, s, that is this far from the estimate, m/s, has to follow this change
+/// of velocity instead, m/s: one that stands still cannot.
+const OUTAGE_S: f64 = 1.0;
+const FAR_M_S: f64 = 5.0;
+const FOLLOWED_M_S: f64 = 4.0;
 /// Position error, horizontal or vertical, from which a receiver's own statement counts, m: below,
 /// it is mostly the slow offset that the filter estimates.
 pub(super) const REPORTED_M: f64 = 5.0;
@@ -46,6 +52,13 @@ struct Reference {
     gained_m_s: Vector3<f64>,
 }
 
+impl Reference {
+    /// Velocity beyond the sum gained, m/s: the same for all fixes of receivers without errors.
+    fn surplus_m_s(&self) -> Vector3<f64> {
+        self.velocity_m_s - self.gained_m_s
+    }
+}
+
 /// What the gate remembers of the receiver.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(super) struct GnssGate {
@@ -53,8 +66,9 @@ pub(super) struct GnssGate {
     /// Whether the last reference is a fix, and not the start.
     has_fix: bool,
     in_doubt: bool,
-    /// Fixes in a row that followed the motion, and the change of velocity that they showed, m/s.
-    following: u32,
+    /// The doubt began with the first fix after an outage.
+    doubted_after_outage: bool,
+    /// Change of velocity that the last fixes have followed in a row, m/s.
     followed_m_s: f64,
     /// Integral of the specific force's magnitude since the last fix, m/s.
     force_m_s: f64,
@@ -74,7 +88,7 @@ impl GnssGate {
             last: Reference { position_m: zero, velocity_m_s, valid_at_s: 0.0, gained_m_s: zero },
             has_fix: false,
             in_doubt: false,
-            following: 0,
+            doubted_after_outage: false,
             followed_m_s: 0.0,
             force_m_s: 0.0,
             blind_frames: 0,
@@ -86,6 +100,11 @@ impl GnssGate {
     /// Notes a change of velocity that no inertial unit measures, m/s.
     pub(super) fn expect_shock(&mut self, gained_m_s: f64) {
         self.shock_m_s += gained_m_s;
+    }
+
+    /// Ends the doubt: another sensor confirms the receiver.
+    pub(super) fn trust(&mut self) {
+        self.in_doubt = false;
     }
 
     /// Begins a frame with the velocity gained by the specific force, m/s, and whether it was measured.
@@ -115,7 +134,7 @@ impl Estimator {
     }
 
     fn follows_the_motion(&mut self, fix: &GnssFix) -> bool {
-        let [_, lever_m_s] = self.history.lever();
+        let [lever_m, lever_m_s] = self.history.lever();
         let velocity_m_s = self.nominal.velocity_m_s + lever_m_s;
         let enough = fix.quality.satellites == 0 || fix.quality.satellites >= SATELLITES;
         let finite = fix.position_m.iter().chain(&fix.velocity_m_s).all(|value| value.is_finite());
@@ -131,7 +150,7 @@ impl Estimator {
         let before = core::mem::replace(&mut gate.last, now);
         let had_fix = core::mem::replace(&mut gate.has_fix, true);
         let gained_m_s = now.gained_m_s - before.gained_m_s;
-        let unexplained_m_s = (now.velocity_m_s - before.velocity_m_s - gained_m_s).norm();
+        let unexplained_m_s = (now.surplus_m_s() - before.surplus_m_s()).norm();
         let limit_m_s = UNEXPLAINED_M_S
             + UNEXPLAINED_SIGMAS * sigma_m_s
             + GAINED_SHARE * gained_m_s.norm()
@@ -144,16 +163,21 @@ impl Estimator {
         let repeated =
             had_fix && (now.position_m, now.velocity_m_s) == (before.position_m, before.velocity_m_s);
         if core::mem::take(&mut gate.blind_frames) <= BRIDGED_FRAMES {
-            if unexplained_m_s > limit_m_s || !stays {
-                (gate.in_doubt, gate.following, gate.followed_m_s) = (true, 0, 0.0);
-            } else {
-                gate.following += 1;
+            if unexplained_m_s <= limit_m_s && stays {
                 gate.followed_m_s += gained_m_s.norm();
+            } else {
+                gate.followed_m_s = 0.0;
+                gate.doubted_after_outage = !gate.in_doubt && now.valid_at_s - before.valid_at_s > OUTAGE_S;
+                gate.in_doubt = true;
             }
         }
         let off_m_s = (fix.velocity_m_s - velocity_m_s + since.gained_m_s).norm();
-        let follows = gate.following >= FOLLOWED_FIXES && gate.followed_m_s >= FOLLOWED_M_S;
-        if gate.following > 0 && (off_m_s <= NEAR_M_S || follows) {
+        let off_m = (fix.position_m - self.nominal.position_m - lever_m + since.moved_m).norm();
+        let near_m = NEAR_M + NEAR_SIGMAS * self.covariance.sigmas(POSITION).norm();
+        // After an outage the estimate may be far off, but hardly ever a receiver that follows the motion.
+        let returns =
+            gate.doubted_after_outage && gate.followed_m_s >= FOLLOWED_M_S && off_m_s > FAR_M_S;
+        if gate.followed_m_s > 0.0 && (off_m_s <= NEAR_M_S || returns) && off_m <= near_m {
             gate.in_doubt = false;
         }
         !gate.in_doubt && !repeated

@@ -23,6 +23,7 @@ mod gnss;
 mod gnss_gate;
 mod health;
 mod lidar;
+mod recovery;
 mod strapdown;
 #[cfg(test)]
 mod tests;
@@ -41,6 +42,7 @@ use self::covariance::{
 };
 use self::gnss::FixAge;
 use self::gnss_gate::GnssGate;
+use self::recovery::Contradiction;
 pub use self::health::{Doubt, Health, HeightSources};
 use self::health::{HeightChannel, Surprise};
 use self::strapdown::{History, Noise, Nominal, Pending};
@@ -153,6 +155,7 @@ pub struct Estimator {
     surprise: Surprise,
     fix_age: FixAge,
     gnss_gate: GnssGate,
+    contradiction: Contradiction,
     /// Measured specific force over the true one, from the pad.
     accelerometer_scale: f64,
     last_imu: ImuSample,
@@ -193,6 +196,7 @@ impl Estimator {
             fix_age: FixAge::new(config),
             gnss_gate: GnssGate::new(&state.velocity_m_s),
             accelerometer_scale: 1.0,
+            contradiction: Contradiction::default(),
             is_shaken: false,
             last_imu: ImuSample { gyro_rad_s: state.rate_rad_s, specific_force_m_s2: Vector3::zeros() },
             rate_rad_s: state.rate_rad_s,
@@ -238,6 +242,7 @@ impl Estimator {
             }
         }
         self.carry_forward(&measurements.imu, vehicle.motor_burning, &vehicle.levers);
+        self.recover_if_lost(measurements);
         if let Some(altitude_m) = measurements.pressure_altitude_m {
             self.take_barometer(altitude_m, &vehicle.levers.barometer_m);
         }
