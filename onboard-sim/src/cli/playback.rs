@@ -208,6 +208,9 @@ fn print_sensors(out: &mut impl Write, played: &Played) -> std::io::Result<()> {
         ("GNSS position", 3 * fixes, &aids.gnss_position),
         ("lidar", lidar, &aids.lidar),
     ] {
+        if received == 0 {
+            continue;
+        }
         let withheld = received.saturating_sub(used + refused);
         writeln!(out, "{name:<16}{received:>10}{used:>10}{refused:>10}{withheld:>12}")?;
     }

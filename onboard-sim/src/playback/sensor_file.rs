@@ -45,13 +45,15 @@ pub enum SensorFileError {
     #[error("line {line}: {column} cannot be read: {why}; a number, `nan` or an empty cell is accepted")]
     Cell { line: u64, column: String, why: String },
     #[error("not a table: {0}; CSV with a header and as many cells in each row is accepted")]
-    Table(#[source] csv::Error),
+    Table(csv::Error),
     #[error("no column `{0}`: gyro_x to gyro_z (rad/s) and accel_x to accel_z (m/s2) are required")]
     NoColumn(&'static str),
     #[error("no column `time_s`, and no rate of the rows: give --rate")]
     NoTime,
     #[error("it has a column `time_s`: leave out --rate")]
     TwoClocks,
+    #[error("--rate {given_hz}: {} to {} rows a second are accepted", RATES_HZ.start(), RATES_HZ.end())]
+    GivenRate { given_hz: f64 },
     #[error(
         "line {line}: time_s is {found}, after {before}; a time after that of the row before is accepted"
     )]
@@ -154,6 +156,9 @@ pub fn read(file: impl Read, reading: &Reading) -> Result<RecordedSensors, Senso
     match (has("time_s"), reading.rate_hz) {
         (false, None) => return Err(SensorFileError::NoTime),
         (true, Some(_)) => return Err(SensorFileError::TwoClocks),
+        (_, Some(rate_hz)) if !RATES_HZ.contains(&rate_hz) => {
+            return Err(SensorFileError::GivenRate(rate_hz));
+        }
         _ => {}
     }
     let mut resampler = Resampler::default();
@@ -169,8 +174,13 @@ pub fn read(file: impl Read, reading: &Reading) -> Result<RecordedSensors, Senso
             return Err(SensorFileError::Order { line, found: time_s, before: before_s });
         }
         before_s = time_s;
+        let imu = row.imu(&reading.axes);
+        // Frames begin with the first inertial sample.
+        if first_s.is_none() && imu.is_none() {
+            continue;
+        }
         let first_s = *first_s.get_or_insert(time_s);
-        resampler.take(time_s - first_s, row.imu(&reading.axes), line)?;
+        resampler.take(time_s - first_s, imu, line)?;
         resampler.take_aids(&row, row.fix(time_s, first_s));
     }
     resampler.finish(line)
@@ -196,8 +206,7 @@ struct Resampler {
     /// The frame whose inertial samples are being summed, and how many they are.
     summed: (usize, u32),
     samples: u64,
-    /// Times of the first and of the newest inertial sample, s, and the newest one.
-    first_s: f64,
+    /// The newest inertial sample, and its time since the first one, s.
     newest_s: f64,
     newest: Option<ImuSample>,
     longest_pause_s: f64,
@@ -208,26 +217,28 @@ struct Resampler {
 }
 
 impl Resampler {
-    /// Takes a row at a time since the first one, s.
+    /// Takes a row at a time since the first inertial sample, s.
     fn take(&mut self, time_s: f64, imu: Option<ImuSample>, line: u64) -> Result<(), SensorFileError> {
+        let pause_s = time_s - self.newest_s;
+        if pause_s > LONGEST_PAUSE_S {
+            return Err(SensorFileError::Pause { line, pause_s });
+        }
+        self.longest_pause_s = self.longest_pause_s.max(pause_s);
         self.number = ((time_s / FRAME_S - LATE_SHARE).ceil() as usize).max(1);
-        let Some(imu) = imu else { return self.pause(time_s, line) };
-        self.pause(time_s, line)?;
-        self.grow(imu);
+        // Until their own samples come, frames hold the newest one.
+        let Some(held) = imu.or(self.newest) else { return Ok(()) };
+        self.frames.resize(self.frames.len().max(self.number), Measurements::of_imu(held));
+        let Some(imu) = imu else { return Ok(()) };
         let (summed, count) = self.summed;
         if self.number == summed {
-            let share = 1.0 / f64::from(count + 1);
             let mean = &mut self.frames[summed - 1].imu;
-            *mean = towards(mean, &imu, share);
+            *mean = towards(mean, &imu, 1.0 / f64::from(count + 1));
             self.summed.1 += 1;
         } else {
-            if let Some(newest) = self.newest {
-                for number in summed + 1..self.number {
-                    let share = (flight_time_s(number as u64) - self.newest_s) / (time_s - self.newest_s);
-                    self.frames[number - 1].imu = towards(&newest, &imu, share.clamp(0.0, 1.0));
-                }
-            } else {
-                self.first_s = time_s;
+            let newest = self.newest.unwrap_or(imu);
+            for number in summed + 1..self.number {
+                let share = (flight_time_s(number as u64) - self.newest_s) / (time_s - self.newest_s);
+                self.frames[number - 1].imu = towards(&newest, &imu, share.clamp(0.0, 1.0));
             }
             self.frames[self.number - 1].imu = imu;
             self.summed = (self.number, 1);
@@ -237,22 +248,9 @@ impl Resampler {
         Ok(())
     }
 
-    /// Frames up to the newest row exist. Until they are known they hold the inertial sample given.
-    fn grow(&mut self, imu: ImuSample) {
-        self.frames.resize(self.frames.len().max(self.number), Measurements::of_imu(imu));
-    }
-
-    fn pause(&mut self, time_s: f64, line: u64) -> Result<(), SensorFileError> {
-        let pause_s = if self.newest.is_some() { time_s - self.newest_s } else { 0.0 };
-        self.longest_pause_s = self.longest_pause_s.max(pause_s);
-        if pause_s > LONGEST_PAUSE_S { Err(SensorFileError::Pause { line, pause_s }) } else { Ok(()) }
-    }
-
     /// Takes the other sensors of the row: the newest sample of a frame counts. What a receiver says of its fix beside
     /// position and velocity (`gnss_fix_type`, `gnss_speed_accuracy_m_s` and others) belongs here, too.
     fn take_aids(&mut self, row: &Row, fix: Option<GnssFix>) {
-        let Some(imu) = self.newest else { return };
-        self.grow(imu);
         let frame = &mut self.frames[self.number - 1];
         if let Some(height_m) = finite(row.barometer) {
             frame.pressure_altitude_m = Some(height_m);
@@ -272,7 +270,7 @@ impl Resampler {
         if self.samples < 2 {
             return Err(SensorFileError::Empty);
         }
-        let rate_hz = (self.samples - 1) as f64 / (self.newest_s - self.first_s);
+        let rate_hz = (self.samples - 1) as f64 / self.newest_s;
         let accepted_hz = RATES_HZ.start() * (1.0 - RATE_TOLERANCE)..=RATES_HZ.end() * (1.0 + RATE_TOLERANCE);
         if !accepted_hz.contains(&rate_hz) {
             return Err(SensorFileError::Rate { line, found_hz: rate_hz });
