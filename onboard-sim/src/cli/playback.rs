@@ -54,11 +54,7 @@ pub(crate) fn run(arguments: &PlaybackArguments) -> anyhow::Result<Exit> {
         "mission {mission} has no section `launch`: playback needs a mission that starts on a rail"
     );
     let mut recipe = recipe.starting_at(StartPoint::Pad)?;
-    let mut head = format!(
-        "playback of {} to {}: nothing is connected, nobody arms, no phase is forced",
-        path.display(),
-        recipe.mission.name
-    );
+    let mut overridden = String::new();
     if let Some(burn_time_s) = arguments.burn_time {
         anyhow::ensure!(
             BURN_TIMES_S.contains(&burn_time_s),
@@ -67,8 +63,13 @@ pub(crate) fn run(arguments: &PlaybackArguments) -> anyhow::Result<Exit> {
             BURN_TIMES_S.end()
         );
         recipe = recipe.ascending_for(burn_time_s)?;
-        head += &format!("; OVERRIDE: the ascent motor burns for {burn_time_s} s");
+        overridden = format!("; OVERRIDE: the ascent motor burns for {burn_time_s} s");
     }
+    let head = format!(
+        "playback of {} to {}: nothing is connected, nobody arms, no phase is forced{overridden}",
+        path.display(),
+        recipe.mission.name
+    );
     let reading = Reading { rate_hz: *rate, axes: *axes };
     let recorded = sensor_file::read(opened(path)?, &reading).with_context(|| path.display().to_string())?;
     let recorder = arguments.out.as_ref().map(|out| logging(out, &header(&recipe, path))).transpose()?;

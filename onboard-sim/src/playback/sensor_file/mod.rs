@@ -157,7 +157,7 @@ pub fn read(file: impl Read, reading: &Reading) -> Result<RecordedSensors, Senso
         (false, None) => return Err(SensorFileError::NoTime),
         (true, Some(_)) => return Err(SensorFileError::TwoClocks),
         (_, Some(rate_hz)) if !RATES_HZ.contains(&rate_hz) => {
-            return Err(SensorFileError::GivenRate(rate_hz));
+            return Err(SensorFileError::GivenRate { given_hz: rate_hz });
         }
         _ => {}
     }
