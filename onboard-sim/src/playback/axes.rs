@@ -11,15 +11,9 @@ pub struct Axes(Matrix3<f64>);
 /// Text that is not a mounting.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "`{0}`: the axes of the inertial unit along body x (to the nose), y and z are accepted, each once and right-handed, as `+x,+y,+z` or `+z,-x,-y`"
+    "`{0}`: the axes of the inertial unit along body x (to the nose), y and z are accepted, each once and right-handed, as `+z,-x,-y`"
 )]
 pub struct NotAxes(String);
-
-impl Default for Axes {
-    fn default() -> Self {
-        Self(Matrix3::identity())
-    }
-}
 
 impl Axes {
     pub(super) fn to_body(self, recorded: &Vector3<f64>) -> Vector3<f64> {
@@ -32,19 +26,14 @@ impl FromStr for Axes {
 
     fn from_str(text: &str) -> Result<Self, NotAxes> {
         let row = |axis: &str| {
+            let unsigned = axis.strip_prefix(['+', '-']).unwrap_or(axis);
+            let place = ["x", "y", "z"].iter().position(|name| *name == unsigned)?;
             let sign = if axis.starts_with('-') { -1.0 } else { 1.0 };
-            match axis.strip_prefix(['+', '-']).unwrap_or(axis) {
-                "x" => Some(Vector3::x() * sign),
-                "y" => Some(Vector3::y() * sign),
-                "z" => Some(Vector3::z() * sign),
-                _ => None,
-            }
+            Some(Matrix3::identity().row(place) * sign)
         };
         let rows = text.split(',').map(|axis| row(axis.trim())).collect::<Option<Vec<_>>>();
         match rows.as_deref() {
-            Some([x, y, z]) if x.cross(y) == *z => {
-                Ok(Self(Matrix3::from_rows(&[x.transpose(), y.transpose(), z.transpose()])))
-            }
+            Some([x, y, z]) if x.cross(y) == *z => Ok(Self(Matrix3::from_rows(&[*x, *y, *z]))),
             _ => Err(NotAxes(text.to_owned())),
         }
     }
@@ -58,7 +47,7 @@ mod tests {
     fn a_board_that_lies_on_its_side_measures_in_body_axes() {
         let axes: Axes = "+z, -x, -y".parse().unwrap();
         assert_eq!(axes.to_body(&Vector3::new(1.0, 2.0, 3.0)), Vector3::new(3.0, -1.0, -2.0));
-        assert_eq!("x,y,z".parse(), Ok(Axes::default()));
+        assert_eq!("x,y,z".parse(), Ok(Axes(Matrix3::identity())));
     }
 
     #[test]

@@ -76,13 +76,13 @@ impl Watch for LastFrame {
 }
 
 /// The pilot's estimate after the frame that was just flown.
-pub fn thought(pilot: &Pilot) -> Option<Record> {
+pub fn estimate(pilot: &Pilot) -> Option<Record> {
     thought_to_log(pilot).map(|estimate| Record::Estimate(Box::new(estimate)))
 }
 
 /// What the flight computer thought in the frame that was just flown, and the truth.
 pub fn thought_and_truth(flight: &Sortie) -> Vec<Record> {
-    let thought = thought(flight.pilot()).filter(|_| !flight.computer_is_dead());
+    let thought = estimate(flight.pilot()).filter(|_| !flight.computer_is_dead());
     thought.into_iter().chain([Record::TruthSample(Box::new(truth(flight)))]).collect()
 }
 

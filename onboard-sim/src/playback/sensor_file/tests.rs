@@ -13,7 +13,11 @@ fn even(rate_hz: f64, duration_s: f64) -> impl Iterator<Item = f64> {
 }
 
 fn read_text(text: &str) -> Result<RecordedSensors, SensorFileError> {
-    read(text.as_bytes(), &Reading::default())
+    read_with(text, None)
+}
+
+fn read_with(text: &str, row_rate_hz: Option<f64>) -> Result<RecordedSensors, SensorFileError> {
+    read(text.as_bytes(), row_rate_hz, "+x,+y,+z".parse().unwrap())
 }
 
 fn refused(text: &str) -> String {
@@ -61,8 +65,8 @@ fn other_sensors_belong_to_the_frame_in_which_they_arrive() {
         0,0,0,9.8,0,0,nan,1,2,3,4,5,6,-0.1,,9\n\
         ,,,,,,2.5,1,2,3,4,5,6,-0.1,,9\n\
         0,0,0,9.8,0,0,,1,2,3.5,nan,nan,nan,,0.4,9\n";
-    let reading = Reading { rate_hz: Some(100.0), axes: "-x,-y,+z".parse().unwrap() };
-    let RecordedSensors { frames, .. } = read(text.as_bytes(), &reading).unwrap();
+    let axes = "-x,-y,+z".parse().unwrap();
+    let RecordedSensors { frames, .. } = read(text.as_bytes(), Some(100.0), axes).unwrap();
     let barometer: Vec<_> = frames.iter().map(|frame| frame.pressure_altitude_m).collect();
     assert_eq!(barometer, [Some(1.5), None, None, Some(2.5), None, None]);
     assert_eq!(frames[1].imu.specific_force_m_s2, Vector3::new(-9.8, 0.0, 0.0));
@@ -99,23 +103,30 @@ fn what_cannot_be_played_is_refused_with_its_line() {
     assert!(refused(&rows(even(40.0, 2.0), |_| 0.0)).contains("40.0 inertial samples a second; 50 to 2000"));
     assert!(refused(&rows(even(2_500.0, 0.2), |_| 0.0)).starts_with("lines 2 to 502: 2500.0"));
     let swapped = rows([0.0, 0.005, 0.01, 0.01], |_| 0.0);
-    assert!(refused(&swapped).starts_with("line 5: time_s is 0.01, after 0.01"), "{}", refused(&swapped));
+    assert!(
+        refused(&swapped).starts_with("line 5: the time is 0.01 s, after 0.01 s"),
+        "{}",
+        refused(&swapped)
+    );
     let paused = rows([0.0, 0.005, 0.205], |_| 0.0);
-    assert!(refused(&paused).starts_with("line 4: an inertial sample 0.200 s after the one before"));
+    assert!(
+        refused(&paused).starts_with("line 4: 0.200 s after the last inertial sample"),
+        "{}",
+        refused(&paused)
+    );
     let broken = good.replacen("9.8", "9.8x", 1);
-    assert!(refused(&broken).starts_with("line 2: accel_x cannot be read: "), "{}", refused(&broken));
-    assert!(refused(&good.replacen("9.8,0,0,", "9.8,0", 1)).starts_with("not a table: "));
+    assert!(refused(&broken).starts_with("line 2: accel_x is `9.8x`; a number"), "{}", refused(&broken));
+    assert!(refused(&good.replacen("9.8,0,0,", "9.8,0", 1)).contains("line: 2"));
     assert!(refused(&good.replace("gyro_y", "gyro_q")).starts_with("no column `gyro_y`"));
-    assert!(refused(&good.replace("time_s", "t")).contains("give --rate"));
-    assert_eq!(refused(HEADER), "fewer than two rows with gyro and accelerometer");
-    for (rate_hz, reason) in [(200.0, "leave out --rate"), (0.0, "--rate")] {
-        let reading = Reading { rate_hz: Some(rate_hz), ..Reading::default() };
-        let error = read(good.as_bytes(), &reading).map(|read| read.rate_hz).unwrap_err();
-        assert!(error.to_string().contains(reason), "{error}");
+    assert!(refused(HEADER).starts_with("lines 2 to 1: 0.0 inertial samples a second"));
+    let untimed = good.replace("time_s", "t");
+    for (text, rate_hz) in
+        [(&untimed, None), (&good, Some(200.0)), (&untimed, Some(49.0)), (&untimed, Some(f64::NAN))]
+    {
+        let error = read_with(text, rate_hz).map(|read| read.rate_hz).unwrap_err();
+        assert_eq!(error.to_string(), "a column time_s or --rate HZ, 50 to 2000, is required, and not both");
     }
-    let reading = Reading { rate_hz: Some(f64::NAN), ..Reading::default() };
-    let error = read(good.replace("time_s", "t").as_bytes(), &reading).map(|read| read.rate_hz).unwrap_err();
-    assert!(error.to_string().starts_with("--rate NaN: 50 to 2000"), "{error}");
+    assert!(read_with(&untimed, Some(200.0)).is_ok());
 }
 
 proptest::proptest! {
