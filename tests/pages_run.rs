@@ -68,9 +68,14 @@ const ELSEWHERE: [(&str, &str, &str); 29] = [
 ];
 
 /// What the pages say that a line answers: how the line begins, and words of its answer.
-const SAID: [(&str, &str); 19] = [
+const SAID: [(&str, &str); 21] = [
     ("onboard-sim fly --start pad --fault separation-fails@0", "DOWN UNDER THE PARACHUTE"),
     ("onboard-sim campaign --only 17", "touchdown_vertical_m_s"),
+    (
+        "onboard-sim playback onboard-sim/tests/recorded/hedy.csv.zst",
+        "REFUSES 10 of 10 s  no GNSS fix for 19.0 s",
+    ),
+    ("replay verify hedy.mcap", "11439 of 11439 frames identical"),
     ("replay info flight.mcap", "verdict"),
     ("replay verify flight.mcap ", "frames identical"),
     ("replay verify flight.mcap --explain", "identical bit for bit"),
@@ -144,7 +149,9 @@ fn run_line(folder: &Path, line: &str) -> Option<String> {
 fn run_page(name: &str) -> (usize, Vec<String>) {
     let folder = tempfile::tempdir().expect("a folder");
     // The page names examples as they lie in a clone.
-    std::os::unix::fs::symlink(root().join("replay"), folder.path().join("replay")).expect("a link");
+    for room in ["replay", "onboard-sim"] {
+        std::os::unix::fs::symlink(root().join(room), folder.path().join(room)).expect("a link");
+    }
     let text = page(name);
     let lines: Vec<&str> =
         lines_of_commands(&text).into_iter().filter(|line| !is_elsewhere(name, line)).collect();

@@ -10,6 +10,7 @@
 //! * [`check`]: whether a vehicle that is not built yet will land, and what to change.
 //! * [`frame`]: another motor in an airframe.
 //! * [`card`]: the landing card.
+//! * [`playback`]: recorded sensors played to the flight computer.
 //! * [`scenario`]: faults, and the expected outcome of a flight with them.
 //!
 //! A flight depends only on its recipe and its number. So a campaign can be divided into shards, stopped, continued and
@@ -21,6 +22,7 @@ pub mod figure;
 pub mod files;
 pub mod frame;
 pub mod hazard;
+pub mod playback;
 pub mod progress;
 pub mod row;
 pub mod run;

@@ -62,6 +62,14 @@ enum Command {
     /// ballistic; and the spent booster. Beside it stands the rule of a national association; the larger distance counts.
     #[command(after_help = "Example: onboard-sim hazard --mission mk3 --wind 0,3,6 --svg hazard.svg")]
     Hazard(cli::hazard::HazardArguments),
+    /// Play the recorded sensors of a real flight to the flight computer: what it would have decided.
+    ///
+    /// It prints which arming checks would refuse and why, when lift-off, burnout, separation, apogee and parachute come, and which
+    /// measurements are rejected. Nothing is connected, nobody arms it, no phase is forced.
+    ///
+    /// Exit code 0 if it saw an apogee, 3 if a separation or a parachute came at more than 30 m/s upwards, 5 without an apogee.
+    #[command(after_help = "Example: onboard-sim playback flight.csv --mission mk3 --out flight.mcap")]
+    Playback(cli::playback::PlaybackArguments),
     /// Make a signing key: a new file that only you can read, for --key of vehicle and ground.
     #[command(after_help = "Example: onboard-sim keygen touchdown.key")]
     Keygen {
@@ -110,6 +118,7 @@ fn run(arguments: Arguments) -> anyhow::Result<Exit> {
         Command::Check(arguments) => cli::check::run(&arguments),
         Command::Card(arguments) => cli::card::run(&arguments),
         Command::Hazard(arguments) => cli::hazard::run(&arguments),
+        Command::Playback(arguments) => cli::playback::run(&arguments),
         Command::Keygen { file, passphrase } => make_key(&file, passphrase),
         Command::New(arguments) => cli::new::run(&arguments),
         Command::Missions { show } => missions(show.as_deref()),

@@ -50,7 +50,7 @@ fn recipe() -> Recipe {
 fn begin(sortie: &Sortie) -> Begin {
     Begin {
         toml: recipe().mission_toml,
-        start: sim::wire::record::start(sortie),
+        start: sim::wire::record::start(sortie.computer()),
         on_the_air: None,
         flight: 7,
     }
@@ -218,7 +218,7 @@ impl port::Board for Recorded<'_> {
 }
 
 fn started(recipe: &Recipe, sortie: &Sortie) -> RecordedComputer {
-    RecordedComputer::started(&recipe.mission, &sim::wire::record::start(sortie))
+    RecordedComputer::started(&recipe.mission, &sim::wire::record::start(sortie.computer()))
 }
 
 /// Flies the board to its end, and compares every command with the recorded one.

@@ -3,6 +3,7 @@
 use flight::vehicle::mission::{Mission, StartPoint};
 use flight::vehicles::file_error::FileError;
 use flight::vehicles::mission::MissionError;
+use flight::vehicles::thrust_curve::to_rasp;
 
 use crate::dispersion::{Dispersion, DispersionError};
 use crate::fault::TimedFault;
@@ -33,6 +34,8 @@ pub enum RecipeError {
     /// No built-in mission has this name.
     #[error("no mission is named '{0}'")]
     UnknownMission(String),
+    #[error("mission '{0}' has no section `launch`: it has no ascent motor")]
+    NoAscentMotor(String),
 }
 
 impl Recipe {
@@ -70,6 +73,23 @@ impl Recipe {
     pub fn counting_down(self, countdown_s: f64) -> Result<Self, RecipeError> {
         let mut document = document_of(&self.mission_toml, &self.mission.name)?;
         document["start"]["countdown_s"] = toml_edit::value(countdown_s);
+        let mission_toml = document.to_string();
+        let mission = flight::vehicles::mission::from_toml(&mission_toml, &self.mission.name)?;
+        Ok(Self { mission, mission_toml, ..self })
+    }
+
+    /// This recipe with an ascent motor of the same impulse that burns for another time, s.
+    ///
+    /// # Errors
+    /// The mission has no ascent motor, or does not accept this one.
+    pub fn ascending_for(self, burn_time_s: f64) -> Result<Self, RecipeError> {
+        let Some(launch) = &self.mission.launch else {
+            return Err(RecipeError::NoAscentMotor(self.mission.name));
+        };
+        let curve = &launch.booster.motor_curve;
+        let stretched = curve.scaled(1.0, burn_time_s / curve.burn_time_s());
+        let mut document = document_of(&self.mission_toml, &self.mission.name)?;
+        document["launch"]["booster"]["motor"] = toml_edit::value(to_rasp(&stretched));
         let mission_toml = document.to_string();
         let mission = flight::vehicles::mission::from_toml(&mission_toml, &self.mission.name)?;
         Ok(Self { mission, mission_toml, ..self })

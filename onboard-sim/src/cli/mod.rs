@@ -6,6 +6,7 @@ pub(crate) mod check;
 pub(crate) mod fly;
 pub(crate) mod hazard;
 pub(crate) mod new;
+pub(crate) mod playback;
 mod single;
 
 use std::io::Write as _;

@@ -59,7 +59,7 @@ fn print_row(row: &Row, out: &mut impl std::io::Write) -> std::io::Result<()> {
 
 fn fly_logged(recipe: &Recipe, number: u64, tally: &mut Tally, path: &Path) -> anyhow::Result<PathBuf> {
     let recorder = logging(path, &record::campaign_header(recipe, number))?;
-    recorder.record(Record::ComputerStart(Box::new(record::start(tally.flight()))), 0);
+    recorder.record(Record::ComputerStart(Box::new(record::start(tally.flight().computer()))), 0);
     let mut last = LastFrame::default();
     let mut phase = tally.flight().computer().mode().phase;
     let mut goes_on = true;

@@ -51,7 +51,7 @@ impl Rerun {
         let by_fault = recorded.iter().any(|fault| matches!(fault.breakage, Breakage::Abort));
         let crews = frames.iter().filter(|frame| accepts_abort(frame) && !by_fault);
         let aborts = crews.map(|frame| frame.input.frame).collect();
-        let ComputerStart { believed, calibration, .. } = sortie_log::start(&flight);
+        let ComputerStart { believed, calibration, .. } = sortie_log::start(flight.computer());
         let start = ComputerStart { believed, calibration, ..*start };
         let records = vec![(0.0, Record::ComputerStart(Box::new(start)))];
         Ok(Self { recipe, number, flight, schedule: None, aborts, last: LastFrame::default(), records })

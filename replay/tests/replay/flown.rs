@@ -37,7 +37,7 @@ pub(crate) struct Flight {
 pub(crate) static FLIGHT: LazyLock<Flight> = LazyLock::new(|| {
     let recipe = FlightRecipe::built_in(MISSION, "field").unwrap();
     let mut flight = Sortie::new(&recipe, NUMBER).unwrap();
-    let start = record::start(&flight);
+    let start = record::start(flight.computer());
     let (mut frames, mut thoughts, mut last) = (Vec::new(), Vec::new(), LastFrame::default());
     while frames.len() < FRAMES {
         flight.step_with(&Outside::NOBODY, &mut last);

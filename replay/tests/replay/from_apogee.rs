@@ -34,7 +34,7 @@ pub(crate) fn fly_recipe(recipe: &Recipe) -> Logged {
     let mut tally = Tally::new(recipe, NUMBER).unwrap();
     let file = std::fs::File::create(&log).unwrap();
     let mut writer = LogWriter::new(file, &record::campaign_header(recipe, NUMBER)).unwrap();
-    writer.write(&Record::ComputerStart(Box::new(record::start(tally.flight()))), 0).unwrap();
+    writer.write(&Record::ComputerStart(Box::new(record::start(tally.flight().computer()))), 0).unwrap();
     let mut last = LastFrame::default();
     let mut phase = tally.flight().computer().mode().phase;
     loop {

@@ -9,6 +9,8 @@ use crate::outside::Watch;
 use crate::recipe::Recipe;
 use crate::sortie::Sortie;
 use crate::world::Strain;
+use flight::computer::news::Severity;
+use flight::computer::pilot::Pilot;
 use flight::computer::{Computer, Input, Output};
 use flight::rules::phase::Phase;
 use flight::rules::verdict::{Landing, LandingVerdict};
@@ -41,9 +43,9 @@ pub fn header(writer: &str, recipe: &Recipe, number: u64, start_unix_ns: u64) ->
     }
 }
 
-/// The computer of a flight as it is now: at power-up or at its release, before its first frame there.
-pub fn start(flight: &Sortie) -> ComputerStart {
-    start_to_log(flight.computer())
+/// A computer as it is now: at power-up or at its release, before its first frame there.
+pub fn start(computer: &Computer) -> ComputerStart {
+    start_to_log(computer)
 }
 
 /// Keeps the flight computer's last frame as its record.
@@ -73,10 +75,14 @@ impl Watch for LastFrame {
     }
 }
 
+/// The pilot's estimate after the frame that was just flown.
+pub fn estimate(pilot: &Pilot) -> Option<Record> {
+    thought_to_log(pilot).map(|estimate| Record::Estimate(Box::new(estimate)))
+}
+
 /// What the flight computer thought in the frame that was just flown, and the truth.
 pub fn thought_and_truth(flight: &Sortie) -> Vec<Record> {
-    let thought = thought_to_log(flight.pilot()).filter(|_| !flight.computer_is_dead());
-    let thought = thought.map(|estimate| Record::Estimate(Box::new(estimate)));
+    let thought = estimate(flight.pilot()).filter(|_| !flight.computer_is_dead());
     thought.into_iter().chain([Record::TruthSample(Box::new(truth(flight)))]).collect()
 }
 
@@ -133,13 +139,25 @@ pub fn frame_and_phase(flight: &Sortie, last: &mut LastFrame, phase: Phase) -> V
     records.extend(thought_and_truth(flight));
     let now = flight.computer().mode().phase;
     if now != phase {
-        records.push(Record::Event(Event {
-            level: EventLevel::Info,
-            name: "vehicle".to_owned(),
-            message: format!("phase {} to {}", phase.name(), now.name()),
-        }));
+        records.push(phase_event(phase, now));
     }
     records
+}
+
+/// A message of the vehicle.
+pub fn text_event(severity: Severity, words: &str) -> Record {
+    let level = match severity {
+        Severity::Info | Severity::Notice => EventLevel::Info,
+        Severity::Warning => EventLevel::Warning,
+        Severity::Error => EventLevel::Error,
+        Severity::Critical => EventLevel::Fatal,
+    };
+    Record::Event(Event { level, name: "vehicle".to_owned(), message: words.to_owned() })
+}
+
+/// A change of phase.
+pub fn phase_event(from: Phase, to: Phase) -> Record {
+    text_event(Severity::Info, &format!("phase {} to {}", from.name(), to.name()))
 }
 
 /// The verdict on a finished flight; `None` if it did not come down.

@@ -25,7 +25,7 @@ pub(crate) fn write_log_from(path: &Path, start_unix_ns: u64) {
     let header = header("test", &recipe, 0, start_unix_ns);
     let mut log = LogWriter::new(std::fs::File::create(path).unwrap(), &header).unwrap();
     let mut flight = Sortie::new(&recipe, 0).unwrap();
-    log.write(&Record::ComputerStart(Box::new(start(&flight))), 0).unwrap();
+    log.write(&Record::ComputerStart(Box::new(start(flight.computer()))), 0).unwrap();
     let mut last = LastFrame::default();
     let (name, message) = ("vehicle".to_owned(), "landing motor commanded to light".to_owned());
     log.write(&Record::Event(Event { level: EventLevel::Warning, name, message }), 0).unwrap();

@@ -175,8 +175,7 @@ impl Estimator {
         let off_m = (fix.position_m - self.nominal.position_m - lever_m + since.moved_m).norm();
         let near_m = NEAR_M + NEAR_SIGMAS * self.covariance.sigmas(POSITION).norm();
         // After an outage the estimate may be far off, but hardly ever a receiver that follows the motion.
-        let returns =
-            gate.doubted_after_outage && gate.followed_m_s >= FOLLOWED_M_S && off_m_s > FAR_M_S;
+        let returns = gate.doubted_after_outage && gate.followed_m_s >= FOLLOWED_M_S && off_m_s > FAR_M_S;
         if gate.followed_m_s > 0.0 && (off_m_s <= NEAR_M_S || returns) && off_m <= near_m {
             gate.in_doubt = false;
         }

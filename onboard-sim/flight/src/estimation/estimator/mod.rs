@@ -42,9 +42,9 @@ use self::covariance::{
 };
 use self::gnss::FixAge;
 use self::gnss_gate::GnssGate;
-use self::recovery::Contradiction;
 pub use self::health::{Doubt, Health, HeightSources};
 use self::health::{HeightChannel, Surprise};
+use self::recovery::Contradiction;
 use self::strapdown::{History, Noise, Nominal, Pending};
 use self::wind::Sideways;
 pub use self::wind::VehicleNow;

@@ -9,11 +9,12 @@ use flight::computer::news::Severity;
 use protocol::frame::Frame;
 use protocol::ftp::server::{FileEntry, Files};
 use protocol::log::flight_v1::PilotTiming;
-use protocol::log::record::{Direction, Event, EventLevel, RawFrame, Record};
+use protocol::log::record::{Direction, RawFrame, Record};
 use protocol::log::recorder::Recorder;
 use protocol::log::writer::ending;
 
 use crate::wire::endpoint::{VehicleEndpoint, gives_out_its_log};
+use crate::wire::record::{phase_event, text_event};
 use crate::wire::vehicle::{Vehicle, VehicleEvent};
 
 pub(super) fn nanoseconds(time_s: f64) -> u64 {
@@ -37,8 +38,7 @@ pub(super) fn record_raw(
 
 pub(super) fn note(recorder: Option<&Recorder>, time_s: f64, words: &str) {
     if let Some(recorder) = recorder {
-        let event = Event { level: EventLevel::Info, name: "vehicle".to_owned(), message: words.to_owned() };
-        recorder.record(Record::Event(event), nanoseconds(time_s));
+        recorder.record(text_event(Severity::Info, words), nanoseconds(time_s));
     }
 }
 
@@ -59,21 +59,8 @@ pub(super) fn record(recorder: &Recorder, vehicle: &Vehicle, events: &[VehicleEv
                 solve_time_s: *took_s,
                 deadline_s: *deadline_s,
             }),
-            VehicleEvent::Text { severity, text } => Record::Event(Event {
-                level: match severity {
-                    Severity::Info | Severity::Notice => EventLevel::Info,
-                    Severity::Warning => EventLevel::Warning,
-                    Severity::Error => EventLevel::Error,
-                    Severity::Critical => EventLevel::Fatal,
-                },
-                name: "vehicle".to_owned(),
-                message: text.clone(),
-            }),
-            VehicleEvent::PhaseChanged { from, to } => Record::Event(Event {
-                level: EventLevel::Info,
-                name: "vehicle".to_owned(),
-                message: format!("phase {} to {}", from.name(), to.name()),
-            }),
+            VehicleEvent::Text { severity, text } => text_event(*severity, text),
+            VehicleEvent::PhaseChanged { from, to } => phase_event(*from, *to),
         };
         recorder.record(record, time_ns);
         if matches!(event, VehicleEvent::PhaseChanged { .. }) {

@@ -274,7 +274,7 @@ impl Vehicle {
     /// come before all others, so that a flight begins with the power-up of its computer.
     pub fn computer_records(&self) -> Vec<Record> {
         let Some(frame) = &self.computer_frame else { return Vec::new() };
-        let started = || Record::ComputerStart(Box::new(crate::wire::record::start(&self.sortie)));
+        let started = || Record::ComputerStart(Box::new(crate::wire::record::start(self.computer())));
         let powered_up = (self.frames_decided == 1).then(started);
         let released = frame.output.released.then(started);
         powered_up.into_iter().chain([Record::ComputerFrame(frame.clone())]).chain(released).collect()
