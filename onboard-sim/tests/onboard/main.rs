@@ -12,4 +12,5 @@ mod faults;
 mod findings;
 mod hazard;
 mod own_vehicles;
+mod site;
 mod unbraked;

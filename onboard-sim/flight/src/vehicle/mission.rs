@@ -193,11 +193,6 @@ pub struct Mission {
     /// What comes of the lot; `None` without one.
     #[serde(skip)]
     pub expected: Option<Box<Expectation>>,
-    pub gravity_m_s2: f64,
-    /// Altitude of the pad above the sea, m.
-    pub pad_altitude_m: f64,
-    /// Position of the pad on the Earth.
-    #[serde(default)]
     pub site: Site,
     /// Position of the lidar along the axis, ahead of the feet, m.
     pub lidar_ahead_of_feet_m: f64,
