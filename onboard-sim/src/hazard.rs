@@ -621,10 +621,10 @@ mod tests {
     fn val_hand_a_point_mass_falls_and_drifts() {
         let start_m = Vector3::new(3.0, -2.0, 80.0);
         let calm = Wind::new(0.0, 0.0, 0.0, 0);
-        let [x_m, y_m] = fallen_m(start_m, Vector3::new(10.0, 0.0, 0.0), 0.0, &Site::SEA_LEVEL, &calm);
+        let [x_m, y_m] = fallen_m(start_m, Vector3::new(10.0, 0.0, 0.0), 0.0, &Site::default(), &calm);
         assert!((x_m - 43.39).abs() < 0.1 && (y_m + 2.0).abs() < 1e-9, "{x_m} {y_m}");
         let even = Wind::new(10.0, 0.0, 0.0, 0).over_height(0.0, 0.0);
-        let [x_m, _] = fallen_m(start_m, Vector3::zeros(), 1.0, &Site::SEA_LEVEL, &even);
+        let [x_m, _] = fallen_m(start_m, Vector3::zeros(), 1.0, &Site::default(), &even);
         assert!((x_m - 203.0).abs() < 6.0, "{x_m}");
     }
 

@@ -16,7 +16,7 @@ fn ours(tilt_deg: f64) -> (f64, f64) {
     let truth = Truth { gust_scale: 0.0, crossflow_scale: 0.0, ..Truth::default() };
     let ascent = AscentTruth { ignition_delay_s: 0.0, ..AscentTruth::default() };
     let start = RigidState::upright(1.0);
-    let world = World::new(&Site::SEA_LEVEL, &mission.airframe, &mission.motor_curve, &truth, &start, 1);
+    let world = World::new(&Site::default(), &mission.airframe, &mission.motor_curve, &truth, &start, 1);
     let mut world = world.unwrap().on_rail(&launch, &ascent);
     let from_m = world.state().position_m.z;
     while world.time_s() < 1.0 || world.state().velocity_m_s.z > 0.0 {

@@ -9,8 +9,8 @@ use super::atmosphere::{Air, geopotential_m};
 
 const ZERO_CELSIUS_K: f64 = 273.15;
 
-/// The site of a launch and the temperature of its day.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
+/// The site of a launch and the temperature of its day. The default is level, at sea level, with standard air.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Site {
     /// Latitude of the pad, degrees, north positive, -85 to 85, because close to a pole a path to the east circles the pole.
@@ -26,15 +26,6 @@ pub struct Site {
 }
 
 impl Site {
-    /// A level site at sea level in standard air.
-    pub const SEA_LEVEL: Self = Self {
-        latitude_deg: 0.0,
-        longitude_deg: 0.0,
-        altitude_m: 0.0,
-        temperature_c: None,
-        ground_slope_deg: 0.0,
-    };
-
     /// The air at a height above the pad, m. The whole column differs from the standard as the air at the pad does.
     pub fn air_at_m(&self, above_pad_m: f64) -> Air {
         let warmer_k = self.temperature_c.map_or(0.0, |pad_c| {
@@ -46,15 +37,9 @@ impl Site {
 
 impl fmt::Display for Site {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let pad = self.air_at_m(0.0);
-        let (pad_c, sea_level) = (pad.temperature_k - ZERO_CELSIUS_K, Self::SEA_LEVEL.air_at_m(0.0));
+        let pad_c = self.air_at_m(0.0).temperature_k - ZERO_CELSIUS_K;
         let standard = if self.temperature_c.is_none() { " (standard)" } else { "" };
-        let share = 100.0 * pad.density_kg_m3 / sea_level.density_kg_m3;
-        write!(
-            out,
-            "{:.0} m above sea level, {pad_c:.0} °C{standard}, {share:.0} % of sea-level density",
-            self.altitude_m
-        )
+        write!(out, "{:.0} m above sea level, {pad_c:.0} °C{standard}", self.altitude_m)
     }
 }
 
@@ -62,14 +47,16 @@ impl fmt::Display for Site {
 mod tests {
     use super::*;
 
-    const MOJAVE: Site = Site { altitude_m: 625.0, ..Site::SEA_LEVEL };
+    fn mojave(temperature_c: Option<f64>) -> Site {
+        Site { altitude_m: 625.0, temperature_c, ..Site::default() }
+    }
 
     /// Density altitude by the formula of the National Weather Service (weather.gov/media/epz/wxcalc/densityAltitude.pdf): 940.4 hPa
     /// are 27.77 inHg, and 40 degrees Celsius are 563.67 degrees Rankine.
     #[test]
     fn val_nws_a_hot_day_has_its_density_altitude() {
         let density_altitude_ft = 145_366.0 * (1.0 - (17.326_f64 * 27.77 / 563.67).powf(0.235));
-        let hot = Site { temperature_c: Some(40.0), ..MOJAVE }.air_at_m(0.0);
+        let hot = mojave(Some(40.0)).air_at_m(0.0);
         assert!((hot.pressure_pa / 94_040.0 - 1.0).abs() < 1e-3, "{hot:?}");
         let standard = Air::at_geopotential_m(0.3048 * density_altitude_ft);
         assert!((hot.density_kg_m3 / standard.density_kg_m3 - 1.0).abs() < 1e-3, "{hot:?} {standard:?}");
@@ -77,14 +64,14 @@ mod tests {
 
     #[test]
     fn the_standard_temperature_of_a_site_changes_nothing() {
-        let standard_c = MOJAVE.air_at_m(0.0).temperature_k - ZERO_CELSIUS_K;
-        let stated = Site { temperature_c: Some(standard_c), ..MOJAVE };
+        let standard_c = mojave(None).air_at_m(0.0).temperature_k - ZERO_CELSIUS_K;
+        let stated = mojave(Some(standard_c));
         for above_pad_m in [0.0, 250.0, 1_000.0] {
-            let (stated, standard) = (stated.air_at_m(above_pad_m), MOJAVE.air_at_m(above_pad_m));
+            let (stated, standard) = (stated.air_at_m(above_pad_m), mojave(None).air_at_m(above_pad_m));
             assert!((stated.density_kg_m3 / standard.density_kg_m3 - 1.0).abs() < 1e-14, "{above_pad_m}");
         }
-        let warm = Site { temperature_c: Some(30.0), ..MOJAVE }.air_at_m(100.0);
+        let warm = mojave(Some(30.0)).air_at_m(100.0);
         assert!((warm.temperature_k - (303.15 - 0.65)).abs() < 0.01, "the lapse is the standard's: {warm:?}");
-        assert_eq!(MOJAVE.to_string(), "625 m above sea level, 11 °C (standard), 94 % of sea-level density");
+        assert_eq!(mojave(None).to_string(), "625 m above sea level, 11 °C (standard)");
     }
 }

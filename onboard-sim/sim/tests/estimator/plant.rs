@@ -83,7 +83,7 @@ fn fly(seed: u64) -> Vec<Frame> {
     let airframe = flight::vehicles::mission::builtin_airframe("mk2").expect("a built-in airframe");
     let curve: ThrustCurve = motors::builtin(&airframe.motor).expect("a built-in motor");
     let truth = truth_of(seed);
-    let world = World::new(&Site::SEA_LEVEL, &airframe, &curve, &truth, &start(&truth), seed);
+    let world = World::new(&Site::default(), &airframe, &curve, &truth, &start(&truth), seed);
     let mut world = world.expect("a valid world").with_fins_at(1.2);
     let masses = MassModel::new(&airframe.mass, curve.propellant_mass_kg());
     let params = SensorParams::default();
@@ -111,7 +111,7 @@ fn fly(seed: u64) -> Vec<Frame> {
         let vehicle = VehicleNow::of(
             &airframe,
             &mass,
-            Site::SEA_LEVEL.air_at_m(height_m).density_kg_m3,
+            Site::default().air_at_m(height_m).density_kg_m3,
             world.fins_rad(),
             actuators.ignite,
             params.lidar.ahead_of_feet_m,

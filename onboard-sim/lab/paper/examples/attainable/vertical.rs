@@ -131,9 +131,9 @@ mod tests {
         };
         let mut start = RigidState::upright(200.0);
         start.velocity_m_s.z = -35.0;
-        let world = World::new(&Site::SEA_LEVEL, &airframe, &motor, &truth, &start, 1).unwrap();
+        let world = World::new(&Site::default(), &airframe, &motor, &truth, &start, 1).unwrap();
         let mut world = world.with_fins_at(FRAC_PI_2);
-        let vertical = Vertical::new(&Site::SEA_LEVEL, &airframe, &motor, &truth);
+        let vertical = Vertical::new(&Site::default(), &airframe, &motor, &truth);
         assert!((vertical.cg_above_feet_m() - world.cg_above_feet_m()).abs() < 1e-12);
         let actuators = Actuators { fins_rad: [FRAC_PI_2; 4], ignite: true, ..Actuators::default() };
         // It stops falling after 2.2 s.

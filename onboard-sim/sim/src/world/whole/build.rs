@@ -274,7 +274,7 @@ mod tests {
         let motor = motors::builtin(&airframe.motor).unwrap();
         let truth = Truth { wind_m_s: 4.0, impulse_scale: 1.03, ..Truth::default() };
         let mut world =
-            World::new(&Site::SEA_LEVEL, &airframe, &motor, &truth, &RigidState::upright(80.0), 7).unwrap();
+            World::new(&Site::default(), &airframe, &motor, &truth, &RigidState::upright(80.0), 7).unwrap();
         world.inject(&Fault::WeakMotor { scale: 0.9 });
         world.inject(&Fault::LateLight { delay_s: 0.05 });
         world.inject(&Fault::GimbalSlow { scale: 0.3 });

@@ -110,14 +110,12 @@ pub struct World {
 #[derive(Debug, Clone, Copy)]
 struct AirHere {
     height_m: f64,
-    density_kg_m3: f64,
-    gradient_kg_m4: f64,
+    at_height: Air,
 }
 
 impl AirHere {
     fn at(site: &Site, height_m: f64) -> Self {
-        let Air { density_kg_m3, density_gradient_kg_m4: gradient_kg_m4, .. } = site.air_at_m(height_m);
-        Self { height_m, density_kg_m3, gradient_kg_m4 }
+        Self { height_m, at_height: site.air_at_m(height_m) }
     }
 
     fn follow(&mut self, site: &Site, height_m: f64) {
@@ -127,7 +125,8 @@ impl AirHere {
     }
 
     fn density_kg_m3(&self, height_m: f64) -> f64 {
-        self.density_kg_m3 + self.gradient_kg_m4 * (height_m - self.height_m)
+        let Air { density_kg_m3, density_gradient_kg_m4, .. } = self.at_height;
+        density_kg_m3 + density_gradient_kg_m4 * (height_m - self.height_m)
     }
 }
 
@@ -320,7 +319,7 @@ impl World {
                 fin_sines: [0, 1, 2, 3].map(|fin: usize| libm::sin(self.fin_links[fin].rad())),
                 legs_out: true,
                 parachute_area_m2: self.parachute.drag_area_m2(),
-                plume: self.plume(thrust_n, self.air.density_kg_m3),
+                plume: self.plume(thrust_n, self.air.at_height.density_kg_m3),
                 cg_m,
             },
             stack: None,

@@ -82,7 +82,7 @@ fn legs_bounce_without_damping() {
         let truth = Truth { drag_scale: 0.0, ..Truth::default() };
         let above_feet_m = airframe.above_feet_m(airframe.mass.loaded_cg_station_m);
         let mut world = World::new(
-            &Site::SEA_LEVEL,
+            &Site::default(),
             &airframe,
             &motor,
             &truth,

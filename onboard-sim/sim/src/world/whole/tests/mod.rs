@@ -24,7 +24,7 @@ fn on_springs(name: &str) -> Airframe {
 fn world(name: &str, truth: &Truth, initial: &RigidState) -> World {
     let airframe = on_springs(name);
     let motor = motors::builtin(&airframe.motor).unwrap();
-    World::new(&Site::SEA_LEVEL, &airframe, &motor, truth, initial, 1).unwrap()
+    World::new(&Site::default(), &airframe, &motor, truth, initial, 1).unwrap()
 }
 
 /// Falls from rest, tail first, with the centre of gravity 300 m above the ground. Returns time and speed when the
@@ -32,7 +32,7 @@ fn world(name: &str, truth: &Truth, initial: &RigidState) -> World {
 fn drop(airframe: &Airframe, opening_rad: f64) -> (f64, f64) {
     let motor = motors::builtin(&airframe.motor).unwrap();
     let mut world =
-        World::new(&Site::SEA_LEVEL, airframe, &motor, &Truth::default(), &RigidState::upright(300.0), 1)
+        World::new(&Site::default(), airframe, &motor, &Truth::default(), &RigidState::upright(300.0), 1)
             .unwrap()
             .with_fins_at(opening_rad);
     let actuators = Actuators { fins_rad: [opening_rad; 4], ..Actuators::default() };
@@ -124,7 +124,7 @@ fn val_coesa_1976_terminal_speed_at_3000_m() {
     let motor = motors::builtin(&airframe.motor).unwrap();
     let still = Truth { gust_scale: 0.0, ..Truth::default() };
     let terminal_m_s = |altitude_m: f64, temperature_c: Option<f64>| {
-        let site = Site { altitude_m, temperature_c, ..Site::SEA_LEVEL };
+        let site = Site { altitude_m, temperature_c, ..Site::default() };
         let start = RigidState::upright(600.0);
         let mut world =
             World::new(&site, &airframe, &motor, &still, &start, 1).unwrap().with_fins_at(FRAC_PI_2);
@@ -214,7 +214,7 @@ fn val_hand_a_swinging_motor_turns_the_body_back() {
     let truth = Truth { drag_scale: 0.0, gust_scale: 0.0, ..Truth::default() };
     for axis in 0..2 {
         let mut world =
-            World::new(&Site::SEA_LEVEL, &airframe, &motor, &truth, &RigidState::upright(1000.0), 1).unwrap();
+            World::new(&Site::default(), &airframe, &motor, &truth, &RigidState::upright(1000.0), 1).unwrap();
         let mut actuators = Actuators::default();
         actuators.gimbal_rad[axis] = 1.0;
         world.advance(&actuators, 30);
