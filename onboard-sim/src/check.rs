@@ -575,13 +575,14 @@ mod tests {
         }
     }
 
-    /// 4 x 90 N over 0.06 m, less 3.5 kg of weight: (360 - 34) 0.06 / (0.5 x 3.5) = 11.2 m2/s2. 6.0 m/s is in the mission.
+    /// 4 x 90 N over 0.06 m, less 3.5 kg of weight: (360 - 34) 0.06 / (0.5 x 3.5) = 11.2 m2/s2. The canopy of 2.05 m2 carries 3.7 kg at
+    /// sqrt(2 x 3.7 x 9.80665 / (1.153 x 0.8 x 2.05)) = 6.2 m/s in the air of Mojave, 1.153 kg/m3.
     #[test]
     fn val_hand_legs_and_parachute_of_mk3() {
         let legs = row_of("mk3", |_| {}, "legs");
         assert_eq!((legs.found.as_str(), legs.verdict), ("3.3 m/s into the blocks", Verdict::Ok));
         let parachute = row_of("mk3", |_| {}, "parachute");
-        assert!(parachute.found.starts_with("6.0 m/s, "), "{parachute:?}");
+        assert!(parachute.found.starts_with("6.2 m/s, "), "{parachute:?}");
     }
 
     /// Feet at 0.4 m are 0.283 m from the axis between two of them; as high is 45 degrees.

@@ -85,6 +85,7 @@ fn body(
 name = "drawn"
 summary = "A vehicle that nobody tuned for"
 lidar_ahead_of_feet_m = {feet_m}
+site = {{ latitude_deg = 0.0, longitude_deg = 0.0, altitude_m = 0.0 }}
 [airframe]
 motor = "{motor}"
 igniters = {igniters}
