@@ -575,7 +575,8 @@ mod tests {
         }
     }
 
-    /// 4 x 90 N over 0.06 m, less 3.5 kg of weight: (360 - 34) 0.06 / (0.5 x 3.5) = 11.2 m2/s2. The canopy of 2.05 m2 carries 3.7 kg at
+    /// 4 x 90 N over 0.06 m, less 3.5 kg of weight: (360 - 34) 0.06 / (0.5 x 3.5) = 11.2 m2/s2.
+    /// The canopy of 2.05 m2 carries 3.7 kg at
     /// sqrt(2 x 3.7 x 9.80665 / (1.153 x 0.8 x 2.05)) = 6.2 m/s in the air of Mojave, 1.153 kg/m3.
     #[test]
     fn val_hand_legs_and_parachute_of_mk3() {

@@ -166,7 +166,8 @@ pub struct TeensyBoard<W: Wiring> {
     gnss: Framer<{ gnss::FRAME_BYTES }>,
     lidar: Framer<{ lidar::FRAME_BYTES }>,
     pad: Degrees,
-    /// Air temperature at the pad, in the shade, K: warm air is taller. An error of 3 K makes every height wrong by one per cent.
+    /// Air temperature at the pad, in the shade, K: warm air is taller. An error of 3 K makes every
+    /// height wrong by one per cent.
     air_k: f64,
     /// Where the centre of gravity is while the vehicle stands, world, m.
     stands_m: Vector3<f64>,

@@ -2,8 +2,10 @@
 //!
 //! It has the standard's first two layers: temperature falls by 6.5 K per kilometre of geopotential height up to 11 km
 //! and is 216.65 K above. Heights are above mean sea level. The standard's lowest layer is used down to -5 km, and a
-//! height outside -5 to 20 km gets the air of the nearest end. A warmer day has the standard's pressure at each height, as
-//! density altitude is computed in aviation. [`Site`](super::site::Site) has the air of a flight.
+//! height outside -5 to 20 km gets the air of the nearest end.
+//!
+//! A warmer day has the standard's pressure at each height, as density altitude is computed in
+//! aviation. [`Site`](super::site::Site) has the air of a flight.
 
 pub const STANDARD_GRAVITY_M_S2: f64 = 9.806_65;
 
@@ -37,7 +39,7 @@ impl Air {
         Self::warmer_at_geopotential_m(height_m, 0.0)
     }
 
-    /// The air at a geopotential height, m, on a day that is warmer than the standard by a difference, K.
+    /// The air at a geopotential height, m, on a day that is warmer than the standard by this much, K.
     pub fn warmer_at_geopotential_m(height_m: f64, warmer_k: f64) -> Self {
         let height_m = height_m.clamp(LOWEST_M, HIGHEST_M);
         let standard_k = SEA_LEVEL_TEMPERATURE_K - LAPSE_K_M * height_m.min(TROPOPAUSE_M);

@@ -1,5 +1,5 @@
-//! The launch site: where the pad lies on the Earth, its air and its ground. The computer, the simulated world, the hazard radii,
-//! the card and the check all use the same one.
+//! The launch site: where the pad lies on the Earth, its air and its ground. The computer, the
+//! simulated world, the hazard radii, the card and the check all use the same one.
 
 use core::fmt;
 
@@ -9,24 +9,28 @@ use super::atmosphere::{Air, geopotential_m};
 
 const ZERO_CELSIUS_K: f64 = 273.15;
 
-/// The site of a launch and the temperature of its day. The default is level, at sea level, with standard air.
+/// The site of a launch and the temperature of its day. The default is level, at sea level, with
+/// standard air.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Site {
-    /// Latitude of the pad, degrees, north positive, -85 to 85, because close to a pole a path to the east circles the pole.
+    /// Latitude of the pad, degrees, north positive, -85 to 85, because close to a pole a path to
+    /// the east circles the pole.
     pub latitude_deg: f64,
     /// Longitude of the pad, degrees, east positive, -180 to 180.
     pub longitude_deg: f64,
     /// Altitude of the pad above mean sea level, m, -450 to 6000.
     pub altitude_m: f64,
-    /// Air temperature at the pad, degrees Celsius, -40 to 60; `None` is the standard's at this altitude.
+    /// Air temperature at the pad, degrees Celsius, -40 to 60; `None` is the standard's at this
+    /// altitude.
     pub temperature_c: Option<f64>,
     /// Slope of the ground in each horizontal direction, one standard deviation, degrees.
     pub ground_slope_deg: f64,
 }
 
 impl Site {
-    /// The air at a height above the pad, m. The whole column differs from the standard as the air at the pad does.
+    /// The air at a height above the pad, m. The whole column differs from the standard's
+    /// temperature as the air at the pad does.
     pub fn air_at_m(&self, above_pad_m: f64) -> Air {
         let warmer_k = self.temperature_c.map_or(0.0, |pad_c| {
             pad_c + ZERO_CELSIUS_K - Air::at_geopotential_m(geopotential_m(self.altitude_m)).temperature_k
@@ -51,8 +55,9 @@ mod tests {
         Site { altitude_m: 625.0, temperature_c, ..Site::default() }
     }
 
-    /// Density altitude by the formula of the National Weather Service (weather.gov/media/epz/wxcalc/densityAltitude.pdf): 940.4 hPa
-    /// are 27.77 inHg, and 40 degrees Celsius are 563.67 degrees Rankine.
+    /// Density altitude by the formula of the National Weather Service
+    /// (weather.gov/media/epz/wxcalc/densityAltitude.pdf): 940.4 hPa are 27.77 inHg, and 40 degrees
+    /// Celsius are 563.67 degrees Rankine.
     #[test]
     fn val_nws_a_hot_day_has_its_density_altitude() {
         let density_altitude_ft = 145_366.0 * (1.0 - (17.326_f64 * 27.77 / 563.67).powf(0.235));

@@ -116,8 +116,8 @@ fn val_landing_paper_fig_5() {
     assert!((speed_m_s - terminal_m_s).abs() < 0.2, "{speed_m_s} m/s, terminal {terminal_m_s}");
 }
 
-/// The standard's density at 3,000 m is 0.7422 of that at sea level (table of geometric altitudes): the speed at which drag equals
-/// weight is 1.161 times as high.
+/// The standard's density at 3,000 m is 0.7422 of that at sea level (table of geometric
+/// altitudes): the speed at which drag equals weight is 1.161 times as high.
 #[test]
 fn val_coesa_1976_terminal_speed_at_3000_m() {
     let airframe = on_springs("mk3");
