@@ -60,7 +60,7 @@ mod tests {
     /// Celsius are 563.67 degrees Rankine.
     #[test]
     fn val_nws_a_hot_day_has_its_density_altitude() {
-        let density_altitude_ft = 145_366.0 * (1.0 - (17.326_f64 * 27.77 / 563.67).powf(0.235));
+        let density_altitude_ft = 145_366.0 * (1.0 - libm::pow(17.326 * 27.77 / 563.67, 0.235));
         let hot = mojave(Some(40.0)).air_at_m(0.0);
         assert!((hot.pressure_pa / 94_040.0 - 1.0).abs() < 1e-3, "{hot:?}");
         let standard = Air::at_geopotential_m(0.3048 * density_altitude_ft);

@@ -131,7 +131,7 @@ fn val_coesa_1976_terminal_speed_at_3000_m() {
         while world.state().position_m.z > 2.0 {
             world.step(&OPEN);
         }
-        -world.state().velocity_m_s.z * (STANDARD_GRAVITY_M_S2 / world.specific_force_m_s2().norm()).sqrt()
+        -world.state().velocity_m_s.z * libm::sqrt(STANDARD_GRAVITY_M_S2 / world.specific_force_m_s2().norm())
     };
     let sea_level_m_s = terminal_m_s(0.0, None);
     let ratio = terminal_m_s(3_000.0, None) / sea_level_m_s;
