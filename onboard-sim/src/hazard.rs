@@ -9,9 +9,10 @@ use flight::computer::{AbortEffect, FRAME_MS};
 use flight::rules::outputs::PyroOutput;
 use flight::rules::phase::Phase;
 use flight::rules::verdict::Landing;
-use flight::vehicle::atmosphere::Air;
+use flight::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use flight::vehicle::launch::Launch;
 use flight::vehicle::mission::{Mission, StartPoint};
+use flight::vehicle::site::Site;
 use flight::vehicle::thrust_curve::ThrustCurve;
 use nalgebra::Vector3;
 use sim::draw::{Chance, draw};
@@ -486,7 +487,7 @@ fn spent_booster_m(flight: &Sortie) -> Option<[f64; 2]> {
     let across_m2 = body.crossflow_drag_coefficient * body.diameter_m * booster.length_m;
     let fallen = [along_m2, across_m2].map(|drag_area_m2| {
         let velocity_m_s = state.velocity_m_s - nose * apart_m_s;
-        fallen_m(state.position_m, velocity_m_s, drag_area_m2 / mass_kg, mission.gravity_m_s2, &wind)
+        fallen_m(state.position_m, velocity_m_s, drag_area_m2 / mass_kg, &mission.site, &wind)
     });
     fallen.into_iter().max_by(|one, two| libm::hypot(one[0], one[1]).total_cmp(&libm::hypot(two[0], two[1])))
 }
@@ -496,16 +497,16 @@ fn fallen_m(
     mut place_m: Vector3<f64>,
     mut velocity_m_s: Vector3<f64>,
     drag_area_m2_kg: f64,
-    gravity_m_s2: f64,
+    site: &Site,
     wind: &Wind,
 ) -> [f64; 2] {
     const STEP_S: f64 = 0.005;
     while place_m.z > 0.0 {
         let air_m_s = velocity_m_s - wind.mean_m_s(place_m.z);
-        let density_kg_m3 = Air::at_height_m(place_m.z).density_kg_m3;
+        let density_kg_m3 = site.air_at_m(place_m.z).density_kg_m3;
         let speed_m_s = libm::sqrt(air_m_s.norm_squared());
-        let acceleration =
-            air_m_s * (-0.5 * density_kg_m3 * drag_area_m2_kg * speed_m_s) - Vector3::z() * gravity_m_s2;
+        let acceleration = air_m_s * (-0.5 * density_kg_m3 * drag_area_m2_kg * speed_m_s)
+            - Vector3::z() * STANDARD_GRAVITY_M_S2;
         place_m += velocity_m_s * STEP_S + acceleration * (0.5 * STEP_S * STEP_S);
         velocity_m_s += acceleration * STEP_S;
     }
@@ -620,10 +621,10 @@ mod tests {
     fn val_hand_a_point_mass_falls_and_drifts() {
         let start_m = Vector3::new(3.0, -2.0, 80.0);
         let calm = Wind::new(0.0, 0.0, 0.0, 0);
-        let [x_m, y_m] = fallen_m(start_m, Vector3::new(10.0, 0.0, 0.0), 0.0, 9.80665, &calm);
+        let [x_m, y_m] = fallen_m(start_m, Vector3::new(10.0, 0.0, 0.0), 0.0, &Site::default(), &calm);
         assert!((x_m - 43.39).abs() < 0.1 && (y_m + 2.0).abs() < 1e-9, "{x_m} {y_m}");
         let even = Wind::new(10.0, 0.0, 0.0, 0).over_height(0.0, 0.0);
-        let [x_m, _] = fallen_m(start_m, Vector3::zeros(), 1.0, 9.80665, &even);
+        let [x_m, _] = fallen_m(start_m, Vector3::zeros(), 1.0, &Site::default(), &even);
         assert!((x_m - 203.0).abs() < 6.0, "{x_m}");
     }
 

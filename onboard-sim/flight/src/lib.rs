@@ -77,7 +77,7 @@ pub mod vehicle {
     //! * [`thrust_curve`] is the certified motor, [`lot`] what burns of its lot tell, and [`burn`] the expected burn of this motor.
     //! * [`atmosphere`] and [`fins`] give the air and its forces on the fins.
     //! * [`rigid`] is the state in space.
-    //! * [`site`] is the place of the pad on the Earth.
+    //! * [`site`] is the launch site: position, air and ground.
     //! * [`launch`] is the ascent: the rail, and the booster stage; [`drop`](mod@drop) the release from a drone.
 
     pub mod airframe;

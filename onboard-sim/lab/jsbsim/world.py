@@ -49,8 +49,8 @@ class Plant:
         latitude_deg, longitude_deg = self.degrees(x, -y)
         phi, theta, psi = euler(state["world_from_body"])
         for name, value in (
-            ("terrain-elevation-ft", 0.0), ("lat-geod-deg", latitude_deg), ("long-gc-deg", longitude_deg),
-            ("h-sl-ft", z / M), ("phi-rad", phi), ("theta-rad", theta), ("psi-true-rad", psi),
+            ("terrain-elevation-ft", self.site["altitude_m"] / M), ("lat-geod-deg", latitude_deg), ("long-gc-deg", longitude_deg),
+            ("h-sl-ft", (z + self.site["altitude_m"]) / M), ("phi-rad", phi), ("theta-rad", theta), ("psi-true-rad", psi),
             ("vn-fps", vx / M), ("ve-fps", -vy / M), ("vd-fps", -vz / M),
         ):
             fdm[f"ic/{name}"] = value
@@ -91,7 +91,7 @@ class Plant:
         self.time_s += STEP_S
 
     def height(self):
-        return self.fdm["position/h-sl-ft"] * M
+        return self.fdm["position/h-sl-ft"] * M - self.site["altitude_m"]
 
     def motion(self):
         fdm = self.fdm

@@ -6,6 +6,7 @@
 use core::f64::consts::FRAC_PI_2;
 
 use flight::vehicle::rigid::RigidState;
+use flight::vehicle::site::Site;
 use flight::vehicles::motors;
 use sim::world::{Actuators, Truth, World};
 
@@ -17,7 +18,7 @@ fn windy(height_m: f64) -> World {
     let airframe = flight::vehicles::mission::builtin_airframe("mk2").expect("a built-in airframe");
     let motor = motors::builtin(&airframe.motor).expect("a built-in motor");
     let truth = Truth { wind_m_s: 5.0, ..Truth::default() };
-    World::new(&airframe, &motor, &truth, &RigidState::upright(height_m), 1)
+    World::new(&Site::default(), &airframe, &motor, &truth, &RigidState::upright(height_m), 1)
         .expect("a valid world")
         .with_fins_at(FRAC_PI_2)
 }

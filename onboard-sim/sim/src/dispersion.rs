@@ -107,8 +107,8 @@ pub struct Mismatch {
     pub wind_exponent: f64,
     /// Turn of the wind over the first 100 m of height, degrees.
     pub wind_veer_deg_100m: f64,
-    /// Slope of the ground, degrees, along each axis of the world.
-    pub ground_slope_deg: f64,
+    /// Slope of the ground along each axis of the world, as a multiple of the site's.
+    pub ground_slope_scale: f64,
 }
 
 /// The built-in sets: name and TOML text.

@@ -6,7 +6,6 @@ use crate::world::normal;
 use crate::world::truth::{SHAPE_MOST, SHAPE_TERMS, Truth};
 use crate::world::wind::Wind;
 use crate::world::{AscentTruth, Hanging};
-use flight::vehicle::airframe::Legs;
 use flight::vehicle::mission::Mission;
 use flight::vehicle::rigid::{RigidState, upright};
 use nalgebra::{UnitQuaternion, Vector3};
@@ -80,7 +79,7 @@ pub fn draw(mission: &Mission, dispersion: &Dispersion, seed: u64, number: u64) 
         world_from_body: UnitQuaternion::from_scaled_axis(leaning + tilt) * roll * upright(),
         rate_rad_s: rate,
     };
-    mismatch(&mut truth, &mission.airframe.legs, &sigma.mismatch, seed, number);
+    mismatch(&mut truth, mission, &sigma.mismatch, seed, number);
     // The booster's motor is of another lot.
     let ascent = ascended(mission, dispersion, seed, number);
     let hanging = hung(mission, dispersion, seed, number);
@@ -174,7 +173,7 @@ const CHUFF_S: [f64; 2] = [0.1, 0.2];
 
 /// Draws the differences of flight `number` that the flight computer's models do not have. They come from a generator of their
 /// own: a set without them draws what it always drew.
-fn mismatch(truth: &mut Truth, legs: &Legs, sigma: &Mismatch, seed: u64, number: u64) {
+fn mismatch(truth: &mut Truth, mission: &Mission, sigma: &Mismatch, seed: u64, number: u64) {
     /// Any number that no other draw uses.
     const OF_MISMATCH: u64 = 0x3d15_0000_0000_0002;
     let mut chance = Chance::of(seed ^ OF_MISMATCH, number);
@@ -202,10 +201,12 @@ fn mismatch(truth: &mut Truth, legs: &Legs, sigma: &Mismatch, seed: u64, number:
     truth.fin_offset_rad = [(); 4].map(|()| sigma.fin_offset_deg.to_radians() * chance.normal());
     truth.wind_exponent = (truth.wind_exponent + sigma.wind_exponent * chance.normal()).clamp(0.0, 0.5);
     truth.wind_veer_rad_m = sigma.wind_veer_deg_100m.to_radians() / 100.0 * chance.normal();
-    truth.ground_rise = [(); 2].map(|()| libm::tan(sigma.ground_slope_deg.to_radians()) * chance.normal());
+    let slope_deg = sigma.ground_slope_scale * mission.site.ground_slope_deg;
+    truth.ground_rise = [(); 2].map(|()| libm::tan(slope_deg.to_radians()) * chance.normal());
     truth.principal_axis_rad = [(); 2].map(|()| sigma.principal_axis_deg.to_radians() * chance.normal());
     truth.chuff_s = if chance.unit() < sigma.chuff_share { CHUFF_S } else { [0.0; 2] };
     truth.thrust_rise_s = chance.between(sigma.thrust_rise_s);
+    let legs = &mission.airframe.legs;
     truth.leg_drag_m2 = (legs.drag_area_m2 * sigma.leg_drag_share * chance.normal()
         + chance.between(sigma.leg_drag_m2))
     .max(-legs.drag_area_m2);

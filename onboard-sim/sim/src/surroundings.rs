@@ -188,7 +188,8 @@ pub(crate) fn world(mission: &Mission, drawn: &Draw) -> Result<World, SetUpError
 /// A world with the vehicle in a state.
 pub(crate) fn world_at(mission: &Mission, drawn: &Draw, state: &RigidState) -> Result<World, SetUpError> {
     let Draw { truth, flight_seed, .. } = drawn;
-    Ok(World::new(&mission.airframe, truth.curve(mission)?.as_ref(), truth, state, *flight_seed)?)
+    let curve = truth.curve(mission)?;
+    Ok(World::new(&mission.site, &mission.airframe, curve.as_ref(), truth, state, *flight_seed)?)
 }
 
 /// The draw with the state in which the fall begins.

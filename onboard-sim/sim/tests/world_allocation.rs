@@ -4,6 +4,7 @@
 use core::f64::consts::FRAC_PI_2;
 
 use flight::vehicle::rigid::RigidState;
+use flight::vehicle::site::Site;
 use flight::vehicles::motors;
 use sim::world::{Actuators, Truth, World};
 
@@ -12,8 +13,8 @@ fn steps_do_not_allocate() {
     let airframe = flight::vehicles::mission::builtin_airframe("mk2").expect("a built-in airframe");
     let motor = motors::builtin(&airframe.motor).expect("a built-in motor");
     let truth = Truth { wind_m_s: 5.0, ..Truth::default() };
-    let mut world =
-        World::new(&airframe, &motor, &truth, &RigidState::upright(60.0), 1).expect("a valid world");
+    let mut world = World::new(&Site::default(), &airframe, &motor, &truth, &RigidState::upright(60.0), 1)
+        .expect("a valid world");
     let open = Actuators { fins_rad: [FRAC_PI_2; 4], ..Actuators::default() };
     let allocated = allocation_counter::measure(|| {
         world.advance(&open, 500);

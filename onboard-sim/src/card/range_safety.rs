@@ -2,6 +2,7 @@
 
 use core::fmt::Write as _;
 
+use flight::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use flight::vehicle::launch::Launch;
 use flight::vehicle::mission::{Mission, StartPoint};
 
@@ -82,7 +83,7 @@ pub fn limit_m_s(winds: &[InWind]) -> Option<f64> {
 /// Mean thrust of the first half second over the weight, at the lift-off.
 pub fn thrust_to_weight(mission: &Mission, launch: &Launch) -> f64 {
     const FIRST_S: f64 = 0.5;
-    let weight_n = lift_off_kg(mission, Some(launch)) * mission.gravity_m_s2;
+    let weight_n = lift_off_kg(mission, Some(launch)) * STANDARD_GRAVITY_M_S2;
     launch.booster.motor_curve.mean_thrust_n(0.0, FIRST_S) / weight_n
 }
 

@@ -2,7 +2,7 @@
 //! the back for whoever prepares the vehicle.
 
 use flight::rules::phase::{HOLD_LIMIT_S, MISFIRE_WAIT_S, MOTOR_HOT_S, PAD_ABORT_WAIT_S};
-use flight::vehicle::atmosphere::Air;
+use flight::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use flight::vehicle::launch::Launch;
 use flight::vehicle::mission::StartPoint;
 use flight::vehicle::thrust_curve::ThrustCurve;
@@ -146,9 +146,9 @@ impl Card {
         let (mission, launch) = (&self.recipe.mission, self.launch());
         let (airframe, mass, chute) =
             (&mission.airframe, &mission.airframe.mass, &mission.airframe.parachute);
-        let density_kg_m3 = Air::at_height_m(mission.pad_altitude_m).density_kg_m3;
+        let density_kg_m3 = mission.site.air_at_m(0.0).density_kg_m3;
         let lift_kg_m = density_kg_m3 * chute.drag_coefficient * chute.area_m2;
-        let chute_m_s = libm::sqrt(2.0 * mass.loaded_kg * mission.gravity_m_s2 / lift_kg_m);
+        let chute_m_s = libm::sqrt(2.0 * mass.loaded_kg * STANDARD_GRAVITY_M_S2 / lift_kg_m);
         let igniters = if airframe.igniters > 1 { "every igniter" } else { "the igniter" };
         let motor = |curve: &ThrustCurve| {
             let gone = match flight::vehicles::motors::status(curve.name()) {
@@ -167,6 +167,7 @@ impl Card {
             ("rail", if_so(launch.is_some())),
             ("no rail", if_so(launch.is_none())),
             ("name", Some(mission.name.clone())),
+            ("site", Some(mission.site.to_string())),
             ("hash", Some(self.hash())),
             ("controller", Some(mission.changed.join(", ")).filter(|changed| !changed.is_empty())),
             ("ascent", launch.map(|launch| motor(&launch.booster.motor_curve))),

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use flight::rules::verdict::Landing;
-use flight::vehicle::mission::StartPoint;
+use flight::vehicle::mission::{Mission, StartPoint};
 use onboard_sim::figure::{BLACK_CURVE, Line, Panel, sized_lines_svg};
 use onboard_sim::files::NewFile;
 use onboard_sim::hazard::{self, Flights, Impact, Radius, Rule, Way, keep_out_m, landed_as_planned, widest};
@@ -51,9 +51,8 @@ pub(crate) fn run(arguments: &HazardArguments) -> anyhow::Result<Exit> {
     let impacts =
         on_threads(arguments.asked.jobs, || Ok(hazard::studies(&recipes, flights, &show_flights())?))?;
     let rule = Rule::of(mission);
-    let study =
-        Study { arguments, mission: &mission.name, start: mission.start.at, ways: &ways, impacts: &impacts };
-    study.write_text(&rule, mission.gate.fence_radius_m, &mut std::io::stdout().lock())?;
+    let study = Study { arguments, mission, ways: &ways, impacts: &impacts };
+    study.write_text(&rule, &mut std::io::stdout().lock())?;
     if let Some(path) = &arguments.csv {
         let csv = study.csv()?;
         NewFile::create(path)?.fill(|file| file.write_all(&csv))?;
@@ -77,8 +76,7 @@ fn recipes(arguments: &HazardArguments) -> anyhow::Result<Vec<Recipe>> {
 /// The flights with what was asked.
 struct Study<'a> {
     arguments: &'a HazardArguments,
-    mission: &'a str,
-    start: StartPoint,
+    mission: &'a Mission,
     ways: &'a [Way],
     /// In each wind.
     impacts: &'a [Vec<Impact>],
@@ -89,16 +87,16 @@ impl Study<'_> {
         self.impacts.iter().map(|impacts| Radius::of_way(impacts, way)).collect()
     }
 
-    fn write_text(&self, rule: &Rule, fence_m: f64, out: &mut impl std::io::Write) -> std::io::Result<()> {
+    fn write_text(&self, rule: &Rule, out: &mut impl std::io::Write) -> std::io::Result<()> {
         let HazardArguments { asked: Asked { dispersion, seed, .. }, winds, .. } = self.arguments;
-        let start = match self.start {
+        let Mission { name, site, gate, .. } = self.mission;
+        let start = match self.mission.start.at {
             StartPoint::Apogee => "apogee; how it got there is not in it",
             other => other.name(),
         };
         writeln!(
             out,
-            "{} from {start}: where it comes down, m from the pad. Simulated, not flown.",
-            self.mission
+            "{name} from {start}: where it comes down, m from the pad. Simulated, not flown.\nSite: {site}."
         )?;
         writeln!(
             out,
@@ -123,7 +121,8 @@ impl Study<'_> {
         writeln!(out, "\n\nRule   {rule}\n       ({})", Rule::SOURCE)?;
         writeln!(
             out,
-            "Fence  {fence_m:.0} m: the vehicle lights its landing motor only inside; it holds nothing else back"
+            "Fence  {:.0} m: the vehicle lights its landing motor only inside; it holds nothing else back",
+            gate.fence_radius_m
         )?;
         for (wind_m_s, impacts) in winds.iter().zip(self.impacts) {
             if let Some((way, radius)) = widest(impacts) {
@@ -133,7 +132,7 @@ impl Study<'_> {
                 writeln!(out, "{wind_m_s:>4} m/s: nobody within {apart:.0} m;{open} widest: {}", way.name())?;
             }
         }
-        if self.start == StartPoint::Pad {
+        if self.mission.start.at == StartPoint::Pad {
             writeln!(
                 out,
                 "\nNot in it: a launcher that tips, a motor that bursts, a stack that is not stable, pieces; the booster under its own \
@@ -201,7 +200,7 @@ impl Study<'_> {
         let panels: Vec<Panel> = self.arguments.winds.iter().zip(self.impacts).map(panel).collect();
         let shown = self.arguments.flights.min(SHOWN);
         let title =
-            format!("{}: where it comes down ({shown} flights of each way in each wind)", self.mission);
+            format!("{}: where it comes down ({shown} flights of each way in each wind)", self.mission.name);
         let (columns, size_px) = if panels.len() == 1 { (1, (706, 720)) } else { (2, (486, 500)) };
         Ok(sized_lines_svg(&title, &panels, columns, None, size_px)?)
     }

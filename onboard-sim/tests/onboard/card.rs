@@ -1,6 +1,7 @@
 //! What a card tells the range safety officer.
 
 use flight::rules::verdict::Landing;
+use flight::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use flight::vehicle::mission::StartPoint;
 use onboard_sim::card::Card;
 use onboard_sim::card::range_safety::{
@@ -181,7 +182,7 @@ fn val_hand_what_a_range_officer_asks_of_mk3() {
     let mass_kg = lift_off_kg(&mission, Some(launch));
     let curve = &launch.booster.motor_curve;
     assert!((mass_kg - 4.8195 - curve.propellant_mass_kg()).abs() < 1e-9, "{mass_kg}");
-    let impulse_n_s = thrust_to_weight(&mission, launch) * mass_kg * mission.gravity_m_s2 * 0.5;
+    let impulse_n_s = thrust_to_weight(&mission, launch) * mass_kg * STANDARD_GRAVITY_M_S2 * 0.5;
     assert!((impulse_n_s - curve.impulse_to_n_s(0.5)).abs() < 1e-6, "{impulse_n_s}");
 }
 

@@ -13,4 +13,5 @@ mod findings;
 mod hazard;
 mod own_vehicles;
 mod playback;
+mod site;
 mod unbraked;

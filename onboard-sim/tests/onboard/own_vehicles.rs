@@ -84,6 +84,7 @@ fn body(
         r#"
 name = "drawn"
 summary = "A vehicle that nobody tuned for"
+site = {{ latitude_deg = 0.0, longitude_deg = 0.0, altitude_m = 0.0 }}
 [sensors]
 lidar_station_m = 0.0
 [airframe]

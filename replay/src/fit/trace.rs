@@ -10,7 +10,6 @@ use flight::estimation::estimator::{Estimate, Measurements};
 use flight::rules::outputs::PyroOutput;
 use flight::rules::phase::Phase;
 use flight::vehicle::airframe::MassModel;
-use flight::vehicle::atmosphere::Air;
 use flight::vehicle::mission::Mission;
 use nalgebra::Vector3;
 use protocol::log::computer_v1::ComputerFrame;
@@ -94,7 +93,7 @@ impl Trace {
 
     /// Density of the air around a frame, kg/m^3.
     pub(super) fn density_kg_m3(&self, frame: &Frame) -> f64 {
-        Air::at_height_m(frame.estimate.state.position_m.z + self.mission.pad_altitude_m).density_kg_m3
+        self.mission.site.air_at_m(frame.estimate.state.position_m.z).density_kg_m3
     }
 
     /// The vehicle's mass over its burn, by the mission's data.

@@ -78,7 +78,7 @@ fn about(flight: &Flight, info: &Info) -> Vec<String> {
     let begun = begun.map(|utc| format!("{} UTC", utc.get(..16).unwrap_or(&utc).replace('T', " ")));
     let place = flight.pilot.as_ref().map(|pilot| {
         let (start, site) = (pilot.mission().start.at.name(), pilot.mission().site);
-        format!("from {start} at {:.4}, {:.4}", site.latitude_deg, site.longitude_deg)
+        format!("from {start} at {:.4}, {:.4}, {site}", site.latitude_deg, site.longitude_deg)
     });
     let run = info.run.iter().filter(|(key, value)| *key != "profile" && !value.is_empty());
     let run: Vec<String> = run.map(|(key, value)| format!("{key} {value}")).collect();

@@ -3,6 +3,7 @@
 
 use clients::{ROCKETPY, file};
 use flight::vehicle::rigid::RigidState;
+use flight::vehicle::site::Site;
 use serde_json::Value;
 use sim::world::{Actuators, AscentTruth, Truth, World};
 
@@ -14,9 +15,9 @@ fn ours(tilt_deg: f64) -> (f64, f64) {
     // RocketPy has no drag across the body.
     let truth = Truth { gust_scale: 0.0, crossflow_scale: 0.0, ..Truth::default() };
     let ascent = AscentTruth { ignition_delay_s: 0.0, ..AscentTruth::default() };
-    let world =
-        World::new(&mission.airframe, &mission.motor_curve, &truth, &RigidState::upright(1.0), 1).unwrap();
-    let mut world = world.on_rail(&launch, &ascent);
+    let start = RigidState::upright(1.0);
+    let world = World::new(&Site::default(), &mission.airframe, &mission.motor_curve, &truth, &start, 1);
+    let mut world = world.unwrap().on_rail(&launch, &ascent);
     let from_m = world.state().position_m.z;
     while world.time_s() < 1.0 || world.state().velocity_m_s.z > 0.0 {
         world.step(&Actuators { ignite_booster: true, ..Actuators::NONE });

@@ -137,8 +137,6 @@ pub struct Build {
     pub surfaces: [Surface; 6],
     /// Age of a fix when its last byte arrives, s.
     pub fix_age_s: f64,
-    /// Temperature of the air at the pad, in the shade, K: warm air is taller. 3 K that are wrong make every height wrong by a hundredth.
-    pub air_k: f64,
 }
 
 /// Why a board or a part of it does not start.
@@ -168,6 +166,9 @@ pub struct TeensyBoard<W: Wiring> {
     gnss: Framer<{ gnss::FRAME_BYTES }>,
     lidar: Framer<{ lidar::FRAME_BYTES }>,
     pad: Degrees,
+    /// Air temperature at the pad, in the shade, K: warm air is taller. An error of 3 K makes every
+    /// height wrong by one per cent.
+    air_k: f64,
     /// Where the centre of gravity is while the vehicle stands, world, m.
     stands_m: Vector3<f64>,
     height: Zero,
@@ -221,6 +222,7 @@ pub fn start<W: Wiring>(
         gnss,
         lidar,
         pad: Degrees { latitude: site.latitude_deg, longitude: site.longitude_deg },
+        air_k: site.air_at_m(0.0).temperature_k,
         stands_m,
         height,
         place,
@@ -253,7 +255,7 @@ impl<W: Wiring> TeensyBoard<W> {
         let pressure_altitude_m = pressure_pa.map(pressure_altitude_m).and_then(|height_m| {
             let above_m = self.height.from(ZERO_HEIGHTS, Vector3::repeat(height_m))?.z;
             let standard_k = Air::at_geopotential_m(height_m - above_m).temperature_k;
-            Some(self.stands_m.z + above_m * self.build.air_k / standard_k)
+            Some(self.stands_m.z + above_m * self.air_k / standard_k)
         });
         let lidar_range_m = self.lidar.newest(&mut parts.lidar, lidar::range_m);
         let fix = self.gnss.newest(&mut parts.gnss, gnss::fix);

@@ -16,6 +16,7 @@ use flight::estimation::estimator::{FixQuality, GRAVITY_M_S2};
 use flight::rules::arming::Uplink;
 use flight::rules::phase::Phase;
 use flight::vehicle::mission::{Mission, StartPoint};
+use flight::vehicle::site::Site;
 use prost::bytes::Buf;
 use protocol::motion::Degrees;
 use protocol::records::computer_v1::ComputerStart;
@@ -200,7 +201,6 @@ fn build() -> Build {
             _ => Surface { zero_us: 2050.0, us_per_rad: -550.0 },
         }),
         fix_age_s: 0.12,
-        air_k: AIR_K,
     }
 }
 
@@ -211,6 +211,7 @@ fn recipe() -> Recipe {
 fn mission() -> Mission {
     let mut mission = recipe().mission;
     mission.airframe.servos_tell = false;
+    mission.site = Site { altitude_m: PAD_M, temperature_c: Some(AIR_K - 273.15), ..mission.site };
     mission
 }
 
@@ -248,8 +249,14 @@ impl Bench {
         let recipe = recipe();
         let drawn = draw(mission, &recipe.dispersion, recipe.seed, 0);
         let curve = drawn.truth.curve(mission).unwrap();
-        let world =
-            World::new(&mission.airframe, curve.as_ref(), &drawn.truth, &drawn.apogee, drawn.flight_seed);
+        let world = World::new(
+            &mission.site,
+            &mission.airframe,
+            curve.as_ref(),
+            &drawn.truth,
+            &drawn.apogee,
+            drawn.flight_seed,
+        );
         let world = world.unwrap().on_rail(mission.launched().unwrap(), &drawn.ascent);
         // The board decides when the barometer measures, and a TF-Luna sees 0.2 to 8 m.
         let mut params = recipe.dispersion.sensor_params;

@@ -11,6 +11,7 @@ use flight::rules::operator::Operator;
 use flight::rules::phase::{Mode, Phase};
 use flight::rules::verdict::{Landing, LandingVerdict, Limits, Touchdown};
 use flight::vehicle::airframe::MassModel;
+use flight::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use flight::vehicle::burn::Burn;
 use flight::vehicle::mission::{Mission, StartPoint};
 use flight::vehicle::rigid::RigidState;
@@ -189,7 +190,7 @@ impl<'a> VehicleState<'a> {
 
     /// The pad on the Earth.
     pub fn pad(&self) -> Degrees {
-        let Site { latitude_deg: latitude, longitude_deg: longitude } = self.mission().site;
+        let Site { latitude_deg: latitude, longitude_deg: longitude, .. } = self.mission().site;
         Degrees { latitude, longitude }
     }
 
@@ -229,7 +230,7 @@ impl<'a> VehicleState<'a> {
 
     /// A parachute carries it.
     pub fn is_carried(&self, air: &Airborne<'_>) -> bool {
-        let weights_felt = air.estimate.specific_force_m_s2.norm() / self.mission().gravity_m_s2;
+        let weights_felt = air.estimate.specific_force_m_s2.norm() / STANDARD_GRAVITY_M_S2;
         air.estimate.state.velocity_m_s.z.abs() < CARRIED_M_S && weights_felt > CARRIED_WEIGHTS
     }
 }

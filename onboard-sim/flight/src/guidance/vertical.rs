@@ -20,7 +20,7 @@ use core::array::from_fn;
 use ocp::{larger, smaller};
 use pulp::{Arch, Simd, WithSimd};
 
-use crate::vehicle::atmosphere::Air;
+use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use crate::vehicle::burn::Burn;
 use crate::vehicle::mission::Mission;
 use serde::Serialize;
@@ -45,7 +45,6 @@ pub struct Braking {
 pub struct Column {
     /// Mass before ignition, kg.
     pub mass_at_ignition_kg: f64,
-    pub gravity_m_s2: f64,
     pub air_density_kg_m3: f64,
     /// Drag area of body and legs along the axis, m^2.
     pub body_drag_area_m2: f64,
@@ -102,7 +101,7 @@ impl Column {
     /// The landings on a motor that has burnt for `burning_s`, at any velocity; `None` if the thrust never carries the
     /// vehicle.
     pub fn landings(&self, burn: &Burn<'_>, burning_s: f64) -> Option<Landings> {
-        let carried_until_s = burn.falls_through_weight_s(self.mass_at_ignition_kg, self.gravity_m_s2)?;
+        let carried_until_s = burn.falls_through_weight_s(self.mass_at_ignition_kg)?;
         let soonest_s = carried_until_s.max(burning_s + 0.02);
         let ends_s = from_fn(|i| soonest_s + self.latest_after_s * i as f64 / (END_TIMES - 1) as f64);
         Some(Landings(Falls::new(self, burn, burning_s, ends_s)))
@@ -116,7 +115,8 @@ impl Column {
         let step_s = time_s / steps;
         let area_m2 = self.body_drag_area_m2 + fin_drag_area_m2;
         let drag_per_v2 = 0.5 * self.air_density_kg_m3 * area_m2 / self.mass_at_ignition_kg;
-        let acceleration = |speed_m_s: f64| -self.gravity_m_s2 - drag_per_v2 * speed_m_s * speed_m_s.abs();
+        let acceleration =
+            |speed_m_s: f64| -STANDARD_GRAVITY_M_S2 - drag_per_v2 * speed_m_s * speed_m_s.abs();
         let (mut height_m, mut vertical_m_s) = (height_m, vertical_m_s);
         for _ in 0..steps as u32 {
             let midway_m_s = vertical_m_s + 0.5 * step_s * acceleration(vertical_m_s);
@@ -157,7 +157,7 @@ impl Column {
         if vertical_m_s > -1.0 {
             return true;
         }
-        let carried_until_s = burn.falls_through_weight_s(self.mass_at_ignition_kg, self.gravity_m_s2);
+        let carried_until_s = burn.falls_through_weight_s(self.mass_at_ignition_kg);
         carried_until_s.filter(|end_s| *end_s > burning_s).is_some_and(|end_s| {
             let falls = Falls::new(self, burn, burning_s, [end_s]);
             let [softest] = falls.along::<false, 1>([Way::Even], vertical_m_s, [[1.0]]);
@@ -168,16 +168,18 @@ impl Column {
     /// Terminal speed of the unpowered fall, m/s, positive downwards.
     pub fn terminal_speed_m_s(&self, fin_drag_area_m2: f64) -> f64 {
         let area_m2 = self.body_drag_area_m2 + fin_drag_area_m2;
-        libm::sqrt(2.0 * self.mass_at_ignition_kg * self.gravity_m_s2 / (self.air_density_kg_m3 * area_m2))
+        libm::sqrt(
+            2.0 * self.mass_at_ignition_kg * STANDARD_GRAVITY_M_S2 / (self.air_density_kg_m3 * area_m2),
+        )
     }
 }
 
 /// Speed at the ground, m/s, positive downwards, after a fall from a height with a vertical velocity (up positive)
 /// towards a terminal speed `V_t`: the difference of `v^2` from `V_t^2` falls by a factor of e in each `V_t^2 / (2 g)`
 /// of height. A vehicle that rises is assumed to fall from its present height.
-pub fn fall_ends_m_s(height_m: f64, vertical_m_s: f64, terminal_m_s: f64, gravity_m_s2: f64) -> f64 {
+pub fn fall_ends_m_s(height_m: f64, vertical_m_s: f64, terminal_m_s: f64) -> f64 {
     let [begins, terminal] = [(-vertical_m_s).max(0.0), terminal_m_s].map(|speed_m_s| speed_m_s * speed_m_s);
-    let left = libm::exp(-2.0 * gravity_m_s2 * height_m.max(0.0) / terminal);
+    let left = libm::exp(-2.0 * STANDARD_GRAVITY_M_S2 * height_m.max(0.0) / terminal);
     libm::sqrt(terminal + (begins - terminal) * left)
 }
 
@@ -199,7 +201,6 @@ impl Column {
         let final_box = &mission.powered.final_box;
         Self {
             mass_at_ignition_kg,
-            gravity_m_s2: mission.gravity_m_s2,
             air_density_kg_m3,
             body_drag_area_m2: scaled(airframe.unfinned_drag_area_m2(0.0)),
             burning_body_drag_area_m2: scaled(airframe.unfinned_drag_area_m2(mission.exhaust.body_loss)),
@@ -237,14 +238,14 @@ impl EvenLanding {
         /// Halvings of an interval: to a millimetre, and to a ten thousandth of a degree.
         const HALVINGS: usize = 20;
         let (airframe, curve) = (&mission.airframe, &mission.motor_curve);
-        let density_kg_m3 = Air::at_height_m(mission.pad_altitude_m).density_kg_m3;
+        let density_kg_m3 = mission.site.air_at_m(0.0).density_kg_m3;
         // Gently: the controller's own touchdown follows from this.
         let column = Column {
             touchdown_m_s: -0.2,
             ..Column::of_mission(mission, airframe.mass.loaded_kg, density_kg_m3, 1.0, 0.0)
         };
         let burn = Burn::nominal(curve);
-        let carried_s = burn.falls_through_weight_s(column.mass_at_ignition_kg, column.gravity_m_s2);
+        let carried_s = burn.falls_through_weight_s(column.mass_at_ignition_kg);
         let carried_s = carried_s.unwrap_or_else(|| curve.burn_time_s());
         let half_m2 = airframe.fin_drag_area_m2(&[0.5 * airframe.fins.open_rad(); 4]);
         let braked = |speed_m_s: f64, tilt_rad: f64| {
@@ -266,8 +267,7 @@ impl EvenLanding {
         };
         let terminal_m_s = column.terminal_speed_m_s(airframe.open_fin_drag_area_m2());
         let start_m = mission.start_height_m();
-        let speed_m_s =
-            |height_m: f64| fall_ends_m_s(start_m - height_m, 0.0, terminal_m_s, column.gravity_m_s2);
+        let speed_m_s = |height_m: f64| fall_ends_m_s(start_m - height_m, 0.0, terminal_m_s);
         // The higher the ignition, the slower the fall into it, and the lower it might be.
         let height_m = halved(0.0, start_m, &|height_m| {
             let speed_m_s = speed_m_s(height_m);
@@ -417,7 +417,9 @@ impl<const N: usize> Falls<N> {
             let mixed = |one: f64, i: usize, other: f64| leaning[i] * one + (1.0 - leaning[i]) * other;
             Ahead {
                 pushed_m_s2: shares.map(|share| {
-                    from_fn(|i| thrust_m_s2[i] * mixed(share.thrust, i, upright.thrust) - column.gravity_m_s2)
+                    from_fn(|i| {
+                        thrust_m_s2[i] * mixed(share.thrust, i, upright.thrust) - STANDARD_GRAVITY_M_S2
+                    })
                 }),
                 drag_per_m: shares
                     .map(|share| from_fn(|i| per_kg[i] * mixed(share.drag_per_v2, i, upright.drag_per_v2))),
@@ -602,16 +604,15 @@ mod tests {
             while height_m > 0.0 {
                 (height_m, speed_m_s) = column.fallen(height_m, speed_m_s, fins_m2, 1e-3);
             }
-            let found_m_s = fall_ends_m_s(70.0, vertical_m_s, terminal_m_s, column.gravity_m_s2);
+            let found_m_s = fall_ends_m_s(70.0, vertical_m_s, terminal_m_s);
             assert!((found_m_s + speed_m_s).abs() < 0.02, "{found_m_s} for {speed_m_s}");
         }
-        assert!((fall_ends_m_s(-0.1, -3.0, terminal_m_s, 9.81) - 3.0).abs() < 1e-12, "on the ground already");
+        assert!((fall_ends_m_s(-0.1, -3.0, terminal_m_s) - 3.0).abs() < 1e-12, "on the ground already");
     }
 
     fn column() -> Column {
         Column {
             mass_at_ignition_kg: 3.13,
-            gravity_m_s2: 9.80665,
             air_density_kg_m3: 1.2,
             body_drag_area_m2: 0.0043,
             burning_body_drag_area_m2: 0.0043,
@@ -644,7 +645,7 @@ mod tests {
         let column = column();
         let burn = Burn::nominal(&curve);
         let band = column.band(&burn, 1.0, -25.0).expect("a landing exists");
-        let end_s = burn.falls_through_weight_s(3.13, 9.80665).expect("the thrust carries the vehicle");
+        let end_s = burn.falls_through_weight_s(3.13).expect("the thrust carries the vehicle");
         let falls = Falls::new(&column, &burn, 1.0, [end_s]);
         let mut found = 0;
         for height_m in falls.heights_m(-25.0).into_iter().flatten().flatten() {

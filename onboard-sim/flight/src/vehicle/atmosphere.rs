@@ -3,6 +3,9 @@
 //! It has the standard's first two layers: temperature falls by 6.5 K per kilometre of geopotential height up to 11 km
 //! and is 216.65 K above. Heights are above mean sea level. The standard's lowest layer is used down to -5 km, and a
 //! height outside -5 to 20 km gets the air of the nearest end.
+//!
+//! A warmer day has the standard's pressure at each height, as density altitude is computed in
+//! aviation. [`Site`](super::site::Site) has the air of a flight.
 
 pub const STANDARD_GRAVITY_M_S2: f64 = 9.806_65;
 
@@ -26,34 +29,32 @@ pub struct Air {
     pub temperature_k: f64,
     pub pressure_pa: f64,
     pub density_kg_m3: f64,
+    /// Derivative of the density by height, kg/m^4; negative.
+    pub density_gradient_kg_m4: f64,
 }
 
 impl Air {
-    /// The air at a geopotential height, m.
+    /// The standard air at a geopotential height, m.
     pub fn at_geopotential_m(height_m: f64) -> Self {
+        Self::warmer_at_geopotential_m(height_m, 0.0)
+    }
+
+    /// The air at a geopotential height, m, on a day that is warmer than the standard by this much, K.
+    pub fn warmer_at_geopotential_m(height_m: f64, warmer_k: f64) -> Self {
         let height_m = height_m.clamp(LOWEST_M, HIGHEST_M);
-        let temperature_k = SEA_LEVEL_TEMPERATURE_K - LAPSE_K_M * height_m.min(TROPOPAUSE_M);
+        let standard_k = SEA_LEVEL_TEMPERATURE_K - LAPSE_K_M * height_m.min(TROPOPAUSE_M);
         let mut pressure_pa =
-            SEA_LEVEL_PRESSURE_PA * libm::pow(temperature_k / SEA_LEVEL_TEMPERATURE_K, EXPONENT);
+            SEA_LEVEL_PRESSURE_PA * libm::pow(standard_k / SEA_LEVEL_TEMPERATURE_K, EXPONENT);
         if height_m > TROPOPAUSE_M {
             pressure_pa *= libm::exp((TROPOPAUSE_M - height_m) / isothermal_scale_height_m());
         }
-        Self {
-            temperature_k,
-            pressure_pa,
-            density_kg_m3: pressure_pa / (GAS_CONSTANT_J_KG_K * temperature_k),
-        }
-    }
-
-    /// The air at a geometric height above mean sea level, m.
-    pub fn at_height_m(height_m: f64) -> Self {
-        Self::at_geopotential_m(geopotential_m(height_m))
-    }
-
-    /// Derivative of the density by height, kg/m^4; negative.
-    pub fn density_gradient_kg_m4(&self) -> f64 {
-        let lapse_k_m = if self.temperature_k > TROPOPAUSE_TEMPERATURE_K { LAPSE_K_M } else { 0.0 };
-        -self.density_kg_m3 * (STANDARD_GRAVITY_M_S2 / GAS_CONSTANT_J_KG_K - lapse_k_m) / self.temperature_k
+        let temperature_k = standard_k + warmer_k;
+        let density_kg_m3 = pressure_pa / (GAS_CONSTANT_J_KG_K * temperature_k);
+        let lapse_k_m = if height_m < TROPOPAUSE_M { LAPSE_K_M } else { 0.0 };
+        let share_per_m =
+            lapse_k_m / temperature_k - STANDARD_GRAVITY_M_S2 / (GAS_CONSTANT_J_KG_K * standard_k);
+        let density_gradient_kg_m4 = density_kg_m3 * share_per_m;
+        Self { temperature_k, pressure_pa, density_kg_m3, density_gradient_kg_m4 }
     }
 }
 
@@ -136,11 +137,12 @@ mod tests {
 
     #[test]
     fn the_density_gradient_is_the_slope_of_the_density() {
-        for height_m in [0.0, 300.0, 5_000.0, 15_000.0] {
-            let slope = (Air::at_geopotential_m(height_m + 1.0).density_kg_m3
-                - Air::at_geopotential_m(height_m - 1.0).density_kg_m3)
-                / 2.0;
-            let found = Air::at_geopotential_m(height_m).density_gradient_kg_m4();
+        for (height_m, warmer_k) in
+            [(0.0, 0.0), (300.0, 0.0), (5_000.0, 0.0), (15_000.0, 0.0), (600.0, 25.0), (15_000.0, -30.0)]
+        {
+            let at = |height_m: f64| Air::warmer_at_geopotential_m(height_m, warmer_k);
+            let slope = (at(height_m + 1.0).density_kg_m3 - at(height_m - 1.0).density_kg_m3) / 2.0;
+            let found = at(height_m).density_gradient_kg_m4;
             assert!((found / slope - 1.0).abs() < 1e-6, "{height_m}: {found} and {slope}");
         }
     }

@@ -1,5 +1,6 @@
 //! The expected burn of the landing motor.
 
+use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use crate::vehicle::thrust_curve::ThrustCurve;
 
 /// A certified thrust curve with the scales of this motor: `T(t) = s/b T0(t/b)`, so that `s` scales the impulse and `b`
@@ -90,12 +91,12 @@ impl<'a> Burn<'a> {
     /// weight.
     ///
     /// `mass_at_ignition_kg` is the mass before the burn.
-    pub fn falls_through_weight_s(&self, mass_at_ignition_kg: f64, gravity_m_s2: f64) -> Option<f64> {
+    pub fn falls_through_weight_s(&self, mass_at_ignition_kg: f64) -> Option<f64> {
         let mut time_s = self.time_scale * self.curve.burn_time_s();
         // The burnt propellant changes the weight by one or two per cent, so the fixed-point iteration needs few
         // rounds.
         for _ in 0..4 {
-            let weight_n = (mass_at_ignition_kg - self.burnt_kg(time_s)) * gravity_m_s2;
+            let weight_n = (mass_at_ignition_kg - self.burnt_kg(time_s)) * STANDARD_GRAVITY_M_S2;
             let curve_n =
                 weight_n * self.time_scale / self.impulse_scale / (1.0 + self.deviation.mean(time_s, 0.0));
             time_s = self.time_scale * self.curve.falls_through_s(curve_n)?;
@@ -122,11 +123,11 @@ mod tests {
     fn thrust_equals_weight_at_the_fall_through() {
         let curve = motors::builtin("H45W").expect("a built-in motor");
         let burn = Burn { curve: &curve, impulse_scale: 0.97, time_scale: 1.03, ..Burn::nominal(&curve) };
-        let time_s = burn.falls_through_weight_s(3.13, 9.80665).expect("the thrust carries the vehicle");
+        let time_s = burn.falls_through_weight_s(3.13).expect("the thrust carries the vehicle");
         let weight_n = (3.13 - burn.burnt_kg(time_s)) * 9.80665;
         assert!((burn.thrust_n(time_s) - weight_n).abs() < 1e-3, "{time_s} s");
         assert!(burn.thrust_n(time_s + 0.1) < weight_n);
-        assert_eq!(burn.falls_through_weight_s(30.0, 9.80665), None);
+        assert_eq!(burn.falls_through_weight_s(30.0), None);
     }
 
     #[test]

@@ -237,11 +237,6 @@ pub struct Mission {
     /// What comes of the lot; `None` without one.
     #[serde(skip)]
     pub expected: Option<Box<Expectation>>,
-    pub gravity_m_s2: f64,
-    /// Altitude of the pad above the sea, m.
-    pub pad_altitude_m: f64,
-    /// Position of the pad on the Earth.
-    #[serde(default)]
     pub site: Site,
     #[serde(default)]
     pub sensors: SensorPlaces,

@@ -107,23 +107,31 @@ fn the_countdown_is_range_checked_and_ten_seconds_in_a_text_that_does_not_say() 
 }
 
 #[test]
-fn the_site_is_range_checked_and_a_known_field_by_default() {
-    let (name, text) = BUILTIN[0];
-    let of = |site: &str| from_toml(&text.replace("[start]", &format!("{site}\n[start]")), name);
-    assert_eq!(of("").unwrap().site, Site::default());
-    let given = of("[site]\nlatitude_deg = 48.1\nlongitude_deg = 11.6").unwrap().site;
-    assert_eq!(given, Site { latitude_deg: 48.1, longitude_deg: 11.6 });
-    for (latitude_deg, longitude_deg, said) in [
-        ("89.0", "11.6", "mk2: site.latitude_deg = 89: must be -85 to 85"),
-        ("nan", "11.6", "mk2: site.latitude_deg = NaN: must be -85 to 85"),
-        ("48.1", "181.0", "mk2: site.longitude_deg = 181: must be -180 to 180"),
-    ] {
-        let site = format!("[site]\nlatitude_deg = {latitude_deg}\nlongitude_deg = {longitude_deg}");
-        assert_eq!(told(of(&site)), said);
+fn the_site_is_required_and_range_checked() {
+    for (name, _) in BUILTIN {
+        let Site { altitude_m, temperature_c, ground_slope_deg, .. } = read(name).site;
+        assert_eq!((altitude_m, temperature_c, ground_slope_deg), (625.0, None, 0.5), "{name}: Mojave");
     }
-    assert!(of("[site]\nlatitude_deg = 48.1").is_err(), "a latitude without a longitude is an error");
-    let message = told(with("mk2", "pad_altitude_m", -500.0));
-    assert!(message.contains("pad_altitude_m = -500"), "{message}");
+    for (key, value, message) in [
+        ("site.latitude_deg", 89.0, "site.latitude_deg = 89: must be -85 to 85"),
+        ("site.latitude_deg", f64::NAN, "site.latitude_deg = NaN: must be -85 to 85"),
+        ("site.longitude_deg", 181.0, "site.longitude_deg = 181: must be -180 to 180"),
+        ("site.altitude_m", -500.0, "site.altitude_m = -500: must be -450 to 6000"),
+        ("site.temperature_c", 95.0, "site.temperature_c = 95: must be degrees Celsius, -40 to 60"),
+        ("site.ground_slope_deg", 20.0, "site.ground_slope_deg = 20: must be 0 to 15"),
+        ("estimator.gravity_m_s2", 9.81, "estimator.gravity_m_s2 = 9.81: must be 9.80665"),
+    ] {
+        let refused = told(with("mk2", key, value));
+        assert!(refused.contains(message), "{refused}");
+    }
+    for key in ["latitude_deg", "longitude_deg", "altitude_m"] {
+        let without: String =
+            text_of("mk2").split_inclusive('\n').filter(|line| !line.starts_with(key)).collect();
+        let refused = told(from_toml(&without, "mk2"));
+        assert!(refused.contains(&format!("missing field `{key}`")), "{refused}");
+    }
+    let allowed_deg = with("mk2", "site.ground_slope_deg", 2.0).unwrap().estimator.ground_slope_deg;
+    assert!((allowed_deg - 2.0).abs() < 1e-12, "the estimator allows for the slope of the site");
 }
 
 /// Line and column, counted from 1, of where a text begins in another.

@@ -63,7 +63,7 @@ fn order(mission: &Mission, airframe: &Path, first: usize, draws: &[Draw]) -> Va
             "HP-H45W" => "motors/AeroTech_HP-H45W.eng",
             other => panic!("no file of {other} is named here"),
         }),
-        "site": { "latitude_deg": mission.site.latitude_deg, "longitude_deg": mission.site.longitude_deg },
+        "site": mission.site,
         "mission": vehicles.join(format!("missions/{}.toml", mission.name)),
         "fins_closed_deg": mission.airframe.fins.closed_rad().to_degrees(),
         "flights": flights,

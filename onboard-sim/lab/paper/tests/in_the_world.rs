@@ -2,8 +2,9 @@
 
 use core::f64::consts::FRAC_PI_2;
 
-use flight::vehicle::atmosphere::{Air, STANDARD_GRAVITY_M_S2};
+use flight::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use flight::vehicle::rigid::{RigidState, upright};
+use flight::vehicle::site::Site;
 use flight::vehicle::thrust_curve::{MotorData, ThrustCurve, ThrustPoint};
 use flight::vehicles::mission;
 use nalgebra::{UnitQuaternion, Vector3};
@@ -47,14 +48,14 @@ fn the_planar_equations_are_the_motion_in_the_x_z_plane() {
     let truth = Truth { ignition_delay_s: 0.0, ..Truth::default() };
     let mut expected =
         PlanarState { x_m: 1.0, z_m: 20.0, theta_rad: 1.45, u_m_s: -7.0, w_m_s: 0.8, q_rad_s: -0.2 };
-    let mut world = World::new(&airframe, &motor, &truth, &in_space(&expected), 1).unwrap();
+    let mut world = World::new(&Site::default(), &airframe, &motor, &truth, &in_space(&expected), 1).unwrap();
     let mass_kg = airframe.mass.loaded_kg;
     let model = PlanarModel {
         kind: ModelKind::Consistent,
         mass_kg,
         pitch_inertia_kg_m2: airframe.mass.loaded_pitch_inertia_kg_m2,
         thrust_arm_m: airframe.mass.loaded_cg_station_m,
-        drag_per_m: 0.5 * Air::at_height_m(16.0).density_kg_m3 * airframe.drag_area_m2(0.0) / mass_kg,
+        drag_per_m: 0.5 * Site::default().air_at_m(16.0).density_kg_m3 * airframe.drag_area_m2(0.0) / mass_kg,
         gravity_m_s2: STANDARD_GRAVITY_M_S2,
     };
     for step in 0_u32..1500 {

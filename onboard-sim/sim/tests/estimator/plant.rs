@@ -7,9 +7,9 @@ use flight::control::fins::{Allocation, FinCommand, OpeningRange};
 use flight::estimation::estimator::{Estimate, Estimator, EstimatorConfig, StartUncertainty, VehicleNow};
 use flight::estimation::motor_estimate::{MotorEstimate, MotorPrior, MotorSample, MotorStage};
 use flight::vehicle::airframe::{MassModel, MassProperties};
-use flight::vehicle::atmosphere::Air;
 use flight::vehicle::fins::Moments;
 use flight::vehicle::rigid::RigidState;
+use flight::vehicle::site::Site;
 use flight::vehicle::thrust_curve::ThrustCurve;
 use flight::vehicles::motors;
 use nalgebra::{Vector2, Vector3};
@@ -83,8 +83,8 @@ fn fly(seed: u64) -> Vec<Frame> {
     let airframe = flight::vehicles::mission::builtin_airframe("mk2").expect("a built-in airframe");
     let curve: ThrustCurve = motors::builtin(&airframe.motor).expect("a built-in motor");
     let truth = truth_of(seed);
-    let mut world =
-        World::new(&airframe, &curve, &truth, &start(&truth), seed).expect("a valid world").with_fins_at(1.2);
+    let world = World::new(&Site::default(), &airframe, &curve, &truth, &start(&truth), seed);
+    let mut world = world.expect("a valid world").with_fins_at(1.2);
     let masses = MassModel::new(&airframe.mass, curve.propellant_mass_kg());
     let params = SensorParams::default();
     let places = flight::vehicles::mission::builtin("mk2").unwrap().unwrap().sensors;
@@ -112,7 +112,7 @@ fn fly(seed: u64) -> Vec<Frame> {
         let vehicle = VehicleNow::of(
             &airframe,
             &mass,
-            Air::at_height_m(height_m).density_kg_m3,
+            Site::default().air_at_m(height_m).density_kg_m3,
             world.fins_rad(),
             actuators.ignite,
             places.lever_arms(&(Vector3::x() * mass.cg_station_m)),

@@ -3,6 +3,7 @@
 use avionics::log::logged::state_from_log;
 use flight::computer::pilot::Pilot;
 use flight::estimation::estimator::Estimate;
+use flight::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use flight::vehicle::rigid::RigidState;
 use protocol::log::flight_v1::AidStatus;
 
@@ -115,7 +116,7 @@ fn of_landing(flight: &Flight) -> Vec<Picture<'_>> {
         });
         pictures.push(
             over("burn", Burn, "Thrust, N; dashed the weight")
-                .limits([mission.airframe.mass.loaded_kg * mission.gravity_m_s2])
+                .limits([mission.airframe.mass.loaded_kg * STANDARD_GRAVITY_M_S2])
                 .line("actual", "c", flight.truth(|sample| Some(sample.thrust_n)))
                 .line("expected", "b", expected)
                 .line("inferred", "a", flight.thought(|thought| thought.thrust_n)),

@@ -203,7 +203,7 @@ fn vfr_hud(state: &VehicleState<'_>) -> MavMessage {
         airspeed: motion.airspeed_m_s as f32,
         groundspeed: libm::hypot(north_m_s, east_m_s) as f32,
         // Above mean sea level, as the standard has it; LOCAL_POSITION_NED has the height above the pad.
-        alt: (state.mission().pad_altitude_m - motion.position_m[2]) as f32,
+        alt: (state.mission().site.altitude_m - motion.position_m[2]) as f32,
         climb: -down_m_s as f32,
         heading: libm::round(motion::heading_deg(&motion.ned_from_body)) as i16 % 360,
         throttle: if state.thrust_n() > 0.0 { 100 } else { 0 },

@@ -90,7 +90,7 @@ pub(super) fn position(state: &VehicleState<'_>) -> MavMessage {
         time_boot_ms: boot_ms(state.time_s),
         lat,
         lon,
-        alt: millimetres(state.mission().pad_altitude_m - down_m),
+        alt: millimetres(state.mission().site.altitude_m - down_m),
         relative_alt: millimetres(-down_m),
         vx,
         vy,
@@ -105,7 +105,7 @@ pub(super) fn home(state: &VehicleState<'_>) -> MavMessage {
     MavMessage::HOME_POSITION(HOME_POSITION_DATA {
         latitude,
         longitude,
-        altitude: millimetres(state.mission().pad_altitude_m),
+        altitude: millimetres(state.mission().site.altitude_m),
         x: 0.0,
         y: 0.0,
         z: 0.0,
@@ -143,7 +143,7 @@ pub(super) fn gps(state: &VehicleState<'_>) -> MavMessage {
         GPS_RAW_INT_DATA {
             lat,
             lon,
-            alt: millimetres(state.mission().pad_altitude_m - down_m),
+            alt: millimetres(state.mission().site.altitude_m - down_m),
             vel: libm::round(100.0 * libm::hypot(north_m_s, east_m_s)) as u16,
             cog: libm::round(100.0 * compass_deg(north_m_s, east_m_s)) as u16 % 36_000,
             ..unknown

@@ -188,7 +188,11 @@ impl AscentWatch {
     }
 
     fn separation_is_due(&self, seen: &AscentReadings) -> bool {
-        let to_apogee_s = self.rises_m_s(seen) / STANDARD_GRAVITY_M_S2;
+        // The pressure may only delay it: nothing is parted on the way up.
+        let rises_m_s = self.rises_m_s(seen);
+        let pressure_m_s = (seen.speeds.pressure_m_s(seen.time_s, None))
+            .filter(|m_s| (m_s - rises_m_s).abs() <= APART_OF_TWO_M_S);
+        let to_apogee_s = pressure_m_s.map_or(rises_m_s, |m_s| m_s.max(rises_m_s)) / STANDARD_GRAVITY_M_S2;
         self.separating_since_s.is_none() && to_apogee_s <= seen.separate_before_apogee_s
     }
 

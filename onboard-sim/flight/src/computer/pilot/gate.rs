@@ -13,6 +13,7 @@ use crate::estimation::estimator::{Doubt, Estimate, Health};
 use crate::estimation::sensor_watch::SensorWatch;
 use crate::rules::gate::{self, GATE_CHECKS, GateCheck, GateInput};
 use crate::rules::phase::{Effect, Effects, Event, Mode, Motor, NO_THRUST_TIMEOUT_S, Phase, Refusal};
+use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 
 /// A fin farther than this from its command has not reached it, rad.
 pub(super) const FIN_THERE_RAD: f64 = 0.1;
@@ -101,7 +102,7 @@ impl Pilot {
     pub(crate) fn thrust_and_weight_n(&self, time_s: f64) -> (f64, f64) {
         let burning_s = self.model.burning_s(time_s);
         let thrust_n = burning_s.map_or(0.0, |burning_s| self.model.burn().thrust_n(burning_s));
-        (thrust_n, self.model.mass_now(burning_s).mass_kg * self.model.mission.gravity_m_s2)
+        (thrust_n, self.model.mass_now(burning_s).mass_kg * STANDARD_GRAVITY_M_S2)
     }
 
     fn consider_ignition(&mut self, table: &mut PhaseTable, seen: Seen<'_>) {

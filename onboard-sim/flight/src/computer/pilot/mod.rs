@@ -34,6 +34,7 @@ use crate::estimation::other_curves::OtherCurves;
 use crate::guidance::powered::{ControlLevel, PoweredGuidance, PoweredReport};
 use crate::rules::gate::GATE_CHECKS;
 use crate::vehicle::airframe::MassModel;
+use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use crate::vehicle::mission::{Mission, StartPoint};
 use crate::vehicle::rigid::RigidState;
 use crate::vehicle::thrust_curve::ThrustCurve;
@@ -117,7 +118,7 @@ impl Pilot {
                 // The fall is felt a moment after it began.
                 StartPoint::Drone => {
                     let falls_m_s = believed.velocity_m_s.z;
-                    believed.position_m.z + 0.5 * falls_m_s * falls_m_s / mission.gravity_m_s2
+                    believed.position_m.z + 0.5 * falls_m_s * falls_m_s / STANDARD_GRAVITY_M_S2
                 }
                 _ => mission.start.height_m,
             },
@@ -302,7 +303,7 @@ impl Pilot {
                 believed.world_from_body *= half;
                 let force = believed.world_from_body * estimate.specific_force_m_s2;
                 believed.world_from_body *= half;
-                let acceleration_m_s2 = force - nalgebra::Vector3::z() * mission.gravity_m_s2;
+                let acceleration_m_s2 = force - nalgebra::Vector3::z() * STANDARD_GRAVITY_M_S2;
                 believed.position_m +=
                     believed.velocity_m_s * lost_s + acceleration_m_s2 * (0.5 * lost_s * lost_s);
                 believed.velocity_m_s += acceleration_m_s2 * lost_s;

@@ -15,6 +15,7 @@ use crate::computer::{Computer, FRAME_MS, Rehearsed};
 use crate::estimation::estimator::Estimate;
 use crate::guidance::powered::{LandingSolved, Plan, Search};
 use crate::rules::verdict::Touchdown;
+use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 
 /// Within this time after it was posed a plan is ready, s: a board that needs longer is too slow. Twice the period of plans; the bound
 /// on a plan's work (`powered.max_passes`) is made for it.
@@ -157,7 +158,7 @@ impl VehicleModel {
                 let turned = UnitQuaternion::from_scaled_axis(state.rate_rad_s * EXPECTED_S);
                 let force_m_s2 = state.world_from_body * estimate.specific_force_m_s2;
                 state.world_from_body *= turned;
-                (force_m_s2 - Vector3::z() * self.mission.gravity_m_s2) * EXPECTED_S
+                (force_m_s2 - Vector3::z() * STANDARD_GRAVITY_M_S2) * EXPECTED_S
             };
         state.position_m += (state.velocity_m_s + gained_m_s * 0.5) * EXPECTED_S;
         state.velocity_m_s += gained_m_s;

@@ -103,7 +103,7 @@ impl VehicleModel {
         // The speed after the fall from apogee so far, with drag as certified.
         let terminal_m_s = column.terminal_speed_m_s(self.fins_m2(fins_rad));
         let fallen_m = (apogee_m - state.position_m.z).max(0.0);
-        let shed = libm::exp(-2.0 * self.mission.gravity_m_s2 * fallen_m / (terminal_m_s * terminal_m_s));
+        let shed = libm::exp(-2.0 * STANDARD_GRAVITY_M_S2 * fallen_m / (terminal_m_s * terminal_m_s));
         Prediction {
             commit_height_m: commit_height_m(
                 state.velocity_m_s.norm(),
@@ -141,8 +141,7 @@ impl VehicleModel {
         let settings = &self.mission.powered.homing;
         let homing = Homing { reach_m_s2: SURE_REACH * settings.reach_m_s2, ..*settings };
         let falls_s = ignition.command_in_s?.max(0.0) + self.mission.ignition.delay_s;
-        let burns_s =
-            self.burn().falls_through_weight_s(self.mass.at(0.0).mass_kg, self.mission.gravity_m_s2)?;
+        let burns_s = self.burn().falls_through_weight_s(self.mass.at(0.0).mass_kg)?;
         let RigidState { position_m, velocity_m_s, .. } = estimate.state;
         let onset_m = position_m + velocity_m_s * falls_s;
         Some(onset_m.xy().zip_map(&velocity_m_s.xy(), |onset_m, m_s| homing.target_m(onset_m, m_s, burns_s)))
@@ -171,7 +170,7 @@ impl Pilot {
         let fins_m2 = known.motor.air_scale() * known.airframe().open_fin_drag_area_m2();
         let terminal_m_s = column.terminal_speed_m_s(fins_m2);
         let height_m = state.position_m.z - known.feet_below_cg_m(&known.mass.at(0.0));
-        Some(fall_ends_m_s(height_m, state.velocity_m_s.z, terminal_m_s, known.mission.gravity_m_s2))
+        Some(fall_ends_m_s(height_m, state.velocity_m_s.z, terminal_m_s))
     }
 }
 

@@ -13,7 +13,7 @@ use crate::estimation::estimator::{Estimate, Measurements, VehicleNow};
 use crate::estimation::motor_estimate::{MotorSample, MotorStage};
 use crate::estimation::sensor_watch::SensorWatch;
 use crate::rules::phase::{Event, Mode, Phase};
-use crate::vehicle::atmosphere::Air;
+use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use crate::vehicle::mission::StartPoint;
 
 /// Frames between outlooks while the ignition is seconds away.
@@ -106,7 +106,7 @@ impl Pilot {
         let burning_s = self.model.burning_s(input.time_s);
         let mass = self.model.mass_now(burning_s);
         let height_m = self.estimate.map_or(0.0, |estimate| estimate.state.position_m.z);
-        let air = Air::at_height_m(self.model.mission.pad_altitude_m + height_m);
+        let air = self.model.mission.site.air_at_m(height_m);
         let burns = burning_s.is_some() || phase.in_landing_burn();
         let vehicle = self.model.now(&mass, air.density_kg_m3, input.fins_rad, burns);
         let (measurements, vehicle) = if phase.before_apogee() {
@@ -172,7 +172,7 @@ impl Pilot {
             time_s: input.time_s,
             frame_s: self.model.mission.estimator.frame_s,
             vertical_m_s2: (estimate.state.world_from_body * imu.specific_force_m_s2).z
-                - self.model.mission.gravity_m_s2,
+                - STANDARD_GRAVITY_M_S2,
             pressure_altitude_m: pressure_altitude_m.filter(|_| !self.ascent.is_charged(input.time_s)),
             gnss_m_s: self.estimator.admitted_gnss_m_s().map(|velocity_m_s| velocity_m_s.z),
             estimated_m_s: estimate.state.velocity_m_s.z,

@@ -12,7 +12,6 @@ use crate::estimation::other_curves::OtherCurves;
 use crate::guidance::powered::{PoweredGuidance, PoweredSituation, Search};
 use crate::guidance::vertical::Column;
 use crate::vehicle::airframe::{Airframe, MassModel, MassProperties};
-use crate::vehicle::atmosphere::Air;
 use crate::vehicle::burn::Burn;
 use crate::vehicle::mission::Mission;
 use crate::vehicle::rigid::RigidState;
@@ -53,7 +52,7 @@ impl VehicleModel {
 
     /// Of the air at the estimated height, kg/m3.
     pub(super) fn density_kg_m3(&self, estimate: &Estimate) -> f64 {
-        Air::at_height_m(self.mission.pad_altitude_m + estimate.state.position_m.z).density_kg_m3
+        self.mission.site.air_at_m(estimate.state.position_m.z).density_kg_m3
     }
 
     /// The vehicle as the estimator takes it, at this mass, air density and fin openings, rad, and with its motor burning or not.
@@ -107,8 +106,7 @@ impl VehicleModel {
     /// weaker motor burns out sooner.
     pub(super) fn doubted_burn(&self, burning_s: f64, sigmas: f64) -> Burn<'_> {
         let burn = self.burn();
-        let carried_until_s =
-            burn.falls_through_weight_s(self.mass.at(0.0).mass_kg, self.mission.gravity_m_s2);
+        let carried_until_s = burn.falls_through_weight_s(self.mass.at(0.0).mass_kg);
         let Some(until_s) = carried_until_s.filter(|until_s| *until_s > burning_s) else { return burn };
         let to_come_n_s = burn.mean_thrust_n(burning_s, until_s - burning_s) * (until_s - burning_s);
         let derivatives = [
@@ -132,7 +130,7 @@ impl VehicleModel {
     pub(super) fn guidance(&self) -> (PoweredGuidance, Search) {
         let state = RigidState::upright(self.mission.start.height_m);
         let estimate = Estimate::exact(0.0, state, Vector3::zeros(), Vector2::zeros());
-        let density_kg_m3 = Air::at_height_m(self.mission.pad_altitude_m).density_kg_m3;
+        let density_kg_m3 = self.mission.site.air_at_m(0.0).density_kg_m3;
         let burning =
             Burning { burning_s: 0.0, mass: self.mass.at(0.0), density_kg_m3, lands_in_place: false };
         let fins_m2 = self.airframe().open_fin_drag_area_m2();
@@ -157,7 +155,6 @@ impl VehicleModel {
             arm_m: self.airframe().thrust_arm_m(situation.mass.cg_station_m),
             feet_below_cg_m: self.feet_below_cg_m(&situation.mass),
             foot_radius_m: self.airframe().legs.foot_radius_m,
-            gravity_m_s2: self.mission.gravity_m_s2,
             air_density_kg_m3: situation.density_kg_m3,
             wind_m_s: estimate.wind_m_s.push(0.0),
             body_drag_area_m2: self.motor.air_scale()
@@ -227,8 +224,7 @@ impl VehicleModel {
     /// By how many standard deviations a plan takes the motor to be weaker than estimated: the mission's full caution
     /// early, none in the last moments, when no thrust can be wasted any more.
     fn caution_sigmas(&self, burning_s: f64) -> f64 {
-        let carried_until_s =
-            self.burn().falls_through_weight_s(self.mass.at(0.0).mass_kg, self.mission.gravity_m_s2);
+        let carried_until_s = self.burn().falls_through_weight_s(self.mass.at(0.0).mass_kg);
         let left_s = carried_until_s.unwrap_or(0.0) - burning_s;
         self.mission.caution_sigmas * (left_s / self.mission.caution_fades_s).clamp(0.0, 1.0)
     }

@@ -16,8 +16,6 @@ pub(crate) const BIAS_MAX_RAD_S: f64 = 0.175;
 /// Length of the specific force of a vehicle at rest, m/s^2: gravity, with 7 % for scale and bias. Hobby
 /// accelerometers show 9.7 to 10.44.
 pub(crate) const FELT_AT_REST_M_S2: core::ops::RangeInclusive<f64> = 9.12..=10.5;
-/// Smaller deviations of the length from gravity are left to the filter's bias.
-const SCALE_UNCALIBRATED: f64 = 0.01;
 /// Largest difference between the two halves of the record of a vehicle at rest: of the gyro, rad/s
 /// (0.3 deg/s, five standard deviations of two seconds' noise), and of the specific force, m/s^2.
 const GYRO_DRIFT_RAD_S: f64 = 0.005;
@@ -95,7 +93,21 @@ pub struct ImuCalibration {
     pub accelerometer_scale: f64,
 }
 
+/// Largest deviation of the scale from 1 that is taken for a bias: 25 mg, half of what data sheets allow. One position
+/// cannot tell them apart, but in a boost they differ.
+const BIAS_MAX_SHARE: f64 = 0.025;
+
 impl ImuCalibration {
+    /// The divisor of the measured specific force, and the standard deviation of the bias that is left, m/s^2.
+    pub(super) fn scale_and_bias(&self) -> (f64, f64) {
+        let off = (self.accelerometer_scale - 1.0).abs();
+        if off > BIAS_MAX_SHARE {
+            (self.accelerometer_scale, 0.0)
+        } else {
+            (1.0, 0.5 * off * STANDARD_GRAVITY_M_S2)
+        }
+    }
+
     /// No error.
     pub const NONE: Self = Self { gyro_bias_rad_s: Vector3::new(0.0, 0.0, 0.0), accelerometer_scale: 1.0 };
 }
@@ -182,11 +194,9 @@ impl PadAlignment {
         // The shortest rotation from the measured direction to the vertical does not change the heading.
         let lean = UnitQuaternion::rotation_between(&up_in_world, &Vector3::z())
             .unwrap_or_else(UnitQuaternion::identity);
-        let scale = felt / STANDARD_GRAVITY_M_S2;
-        let small = (scale - 1.0).abs() <= SCALE_UNCALIBRATED;
         let calibration = ImuCalibration {
             gyro_bias_rad_s: self.gyro_rad_s,
-            accelerometer_scale: if small { 1.0 } else { scale },
+            accelerometer_scale: felt / STANDARD_GRAVITY_M_S2,
         };
         Ok(PadStart { world_from_body: lean * headed, calibration })
     }

@@ -156,7 +156,8 @@ pub struct Estimator {
     fix_age: FixAge,
     gnss_gate: GnssGate,
     contradiction: Contradiction,
-    /// Measured specific force over the true one, from the pad.
+    /// Measured specific force over the true one at rest, and what of it is corrected.
+    measured_scale: f64,
     accelerometer_scale: f64,
     last_imu: ImuSample,
     /// The landing motor has shaken the gyro.
@@ -195,6 +196,7 @@ impl Estimator {
             surprise: Surprise::default(),
             fix_age: FixAge::new(config),
             gnss_gate: GnssGate::new(&state.velocity_m_s),
+            measured_scale: 1.0,
             accelerometer_scale: 1.0,
             contradiction: Contradiction::default(),
             is_shaken: false,
@@ -212,7 +214,12 @@ impl Estimator {
     #[must_use]
     pub fn calibrated(mut self, calibration: &ImuCalibration) -> Self {
         self.nominal.gyro_bias_rad_s = calibration.gyro_bias_rad_s;
-        self.accelerometer_scale = calibration.accelerometer_scale;
+        self.measured_scale = calibration.accelerometer_scale;
+        let (scale, sigma_m_s2) = calibration.scale_and_bias();
+        self.accelerometer_scale = scale;
+        for axis in ACCELEROMETER_BIAS..WIND {
+            self.covariance.widen(axis, sigma_m_s2 * sigma_m_s2);
+        }
         self.last_good = self.nominal;
         self
     }
@@ -221,7 +228,7 @@ impl Estimator {
     pub fn calibration(&self) -> ImuCalibration {
         ImuCalibration {
             gyro_bias_rad_s: self.nominal.gyro_bias_rad_s,
-            accelerometer_scale: self.accelerometer_scale,
+            accelerometer_scale: self.measured_scale,
         }
     }
 

@@ -269,7 +269,6 @@ mod tests {
             arm_m: 0.4,
             feet_below_cg_m,
             foot_radius_m: 0.4,
-            gravity_m_s2: 9.80665,
             air_density_kg_m3: 1.2,
             wind_m_s: Vector3::zeros(),
             body_drag_area_m2: 0.003,

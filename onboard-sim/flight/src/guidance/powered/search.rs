@@ -7,6 +7,7 @@ use ocp::landing::{Drag, End, Problem, Push, State, Weights, Workspace};
 
 use super::plan::Plan;
 use super::{PoweredSettings, PoweredSituation, here_m};
+use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use crate::vehicle::rigid::RigidState;
 
 /// Longest horizon, intervals: it sets the memory.
@@ -204,7 +205,7 @@ fn posed(situation: &PoweredSituation<'_>, settings: &PoweredSettings, state: &R
             crossflow: per_m * situation.crossflow_area_m2,
         },
         wind_m_s: [situation.wind_m_s.x, situation.wind_m_s.y],
-        gravity_m_s2: situation.gravity_m_s2,
+        gravity_m_s2: STANDARD_GRAVITY_M_S2,
         target_m: [0.0; 2],
         weights: Weights {
             place: settings.weights.x,

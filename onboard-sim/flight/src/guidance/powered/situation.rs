@@ -22,7 +22,6 @@ pub struct PoweredSituation<'a> {
     pub feet_below_cg_m: f64,
     /// Distance of the feet from the axis, m.
     pub foot_radius_m: f64,
-    pub gravity_m_s2: f64,
     pub air_density_kg_m3: f64,
     pub wind_m_s: Vector3<f64>,
     /// Drag area of body and legs along the axis, m^2.
@@ -47,8 +46,7 @@ impl PoweredSituation<'_> {
     /// The earliest and the latest end of a plan from a height of the feet, m; times from now, s. `None` if the thrust never
     /// carries the vehicle.
     pub(super) fn ends_s(&self, latest_after_s: f64, height_m: f64) -> Option<(f64, f64)> {
-        let carried_until_s =
-            self.burn.falls_through_weight_s(self.mass_at_ignition_kg, self.gravity_m_s2)?;
+        let carried_until_s = self.burn.falls_through_weight_s(self.mass_at_ignition_kg)?;
         let earliest_s = (carried_until_s - self.burning_s).max(0.05);
         // Late in the burn the end waits only for the ground, not for the thrust to fall.
         let to_ground_s = height_m.max(0.0) / 2.0;
@@ -106,7 +104,6 @@ mod tests {
             arm_m: 0.4,
             feet_below_cg_m: 0.44,
             foot_radius_m: 0.4,
-            gravity_m_s2: 9.8,
             air_density_kg_m3: 1.2,
             wind_m_s: Vector3::zeros(),
             body_drag_area_m2: 0.004,

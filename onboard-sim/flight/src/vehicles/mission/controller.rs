@@ -145,6 +145,8 @@ impl Formulas<'_> {
             of("descent.natural_frequency_rad_s", &mut descent.natural_frequency_rad_s, 0.05);
         }
 
+        let estimator = &mut mission.estimator;
+        of("estimator.ground_slope_deg", &mut estimator.ground_slope_deg, mission.site.ground_slope_deg);
         of("motor.shape_lasts_s", &mut mission.motor.shape_lasts_s, carried_s / 3.0);
         let aim = &mut mission.aim;
         let servo = &airframe.gimbal.servo;

@@ -7,6 +7,7 @@ use alloc::string::{String, ToString as _};
 use toml::Value;
 
 use crate::vehicle::airframe::BadValue as BadAirframe;
+use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use crate::vehicle::drop::LOWEST_ARMED_M;
 use crate::vehicle::launch::Launch;
 use crate::vehicle::mission::Mission;
@@ -38,7 +39,7 @@ const LEAST: f64 = f64::MIN_POSITIVE;
 const RIGHT: f64 = 89.999_999;
 
 #[rustfmt::skip]
-const RANGES: [Range; 40] = [
+const RANGES: [Range; 41] = [
     ("0.5 to 10", 0.5, 10.0, &["launch.rail.length_m"]),
     // NAR Model Rocket Safety Code, rule 5: within 30 degrees of the vertical.
     ("0 to 30", 0.0, 30.0, &["launch.rail.tilt_deg", "drop.swing_deg"]),
@@ -63,11 +64,13 @@ const RANGES: [Range; 40] = [
     ("0.7 to 1.3", 0.7, 1.3, &["lot.impulse.mean", "lot.burn_time.mean"]),
     ("0 to 0.2", 0.0, 0.2, &["lot.impulse", "lot.burn_time"]),
     // Kelvin or Fahrenheit are not meant; propellants are sold for -30 to 55 degrees.
-    ("degrees Celsius, -40 to 60", -40.0, 60.0, &["lot.temperature"]),
-    // From the Moon to twice the Earth.
-    ("from 1 to 20", 1.0, 20.0, &["gravity_m_s2", "estimator.gravity_m_s2"]),
+    ("degrees Celsius, -40 to 60", -40.0, 60.0, &["lot.temperature", "site.temperature_c"]),
+    // The simulated world and the guidance have the standard's.
+    ("9.80665", STANDARD_GRAVITY_M_S2, STANDARD_GRAVITY_M_S2, &["estimator.gravity_m_s2"]),
     // From the shore of the Dead Sea to above the highest road.
-    ("-450 to 6000", -450.0, 6_000.0, &["pad_altitude_m"]),
+    ("-450 to 6000", -450.0, 6_000.0, &["site.altitude_m"]),
+    // Beyond a slope of 15 degrees nothing stands.
+    ("0 to 15", 0.0, 15.0, &["site.ground_slope_deg"]),
     // Close to a pole a path to the east circles the pole.
     ("-85 to 85", -85.0, 85.0, &["site.latitude_deg"]),
     ("-180 to 180", -180.0, 180.0, &["site.longitude_deg"]),

@@ -42,7 +42,7 @@ struct Searcher {
 
 impl Searcher {
     fn new(mission: &Mission, drawn: &Draw) -> Self {
-        let vertical = Vertical::new(&mission.airframe, &mission.motor_curve, &drawn.truth);
+        let vertical = Vertical::new(&mission.site, &mission.airframe, &mission.motor_curve, &drawn.truth);
         let most_rad = mission.powered.tilt_max_deg.to_radians();
         let controls = TILTS
             .iter()
@@ -60,7 +60,7 @@ impl Searcher {
             .map(|part| (f64::from(part) + 0.5) * HOLD_S / PARTS as f64)
             .map(|time_s| (vertical.burn().thrust_n(time_s), vertical.mass_kg(time_s)))
             .collect();
-        let ground_air = Air::at_height_m(0.0);
+        let ground_air = mission.site.air_at_m(0.0);
         let fastest = vertical.drag(ground_air.density_kg_m3, 60.0, 0.0);
         let most_n = fastest.body_n + fastest.fins_n[1] + fastest.across_n;
         let thrust_n = parts.iter().fold(0.0, |most: f64, (thrust_n, _)| most.max(*thrust_n));
@@ -88,7 +88,7 @@ impl Searcher {
         let air = &self.ground_air;
         let gained_m_s2 = |h: f64, v: f64| {
             let above_m = h + self.vertical.cg_above_feet_m();
-            let density_kg_m3 = air.density_kg_m3 + air.density_gradient_kg_m4() * above_m;
+            let density_kg_m3 = air.density_kg_m3 + air.density_gradient_kg_m4 * above_m;
             let drag_n = self.vertical.drag(density_kg_m3, v, thrust_n).at_n(tilt, fins);
             (thrust_n * tilt[1] - v.signum() * drag_n) / mass_kg - STANDARD_GRAVITY_M_S2
         };

@@ -2,12 +2,14 @@
 //! attitude dynamics. Tilt and fin opening are given, so the forces are those of a vehicle that turns at once.
 
 use flight::vehicle::airframe::{Airframe, MassModel};
+use flight::vehicle::site::Site;
 use flight::vehicle::thrust_curve::ThrustCurve;
 use sim::world::{TrueBurn, Truth};
 
 /// The vehicle's forces and masses.
 #[derive(Debug, Clone)]
 pub(crate) struct Vertical {
+    pub(crate) site: Site,
     burn: TrueBurn,
     mass_model: MassModel,
     truth: Truth,
@@ -44,7 +46,7 @@ impl Drag {
 impl Vertical {
     /// The vehicle of an airframe and a motor file as the truth changes them. Fins hang exactly at their commanded angle,
     /// without misalignment or play.
-    pub(crate) fn new(airframe: &Airframe, motor: &ThrustCurve, truth: &Truth) -> Self {
+    pub(crate) fn new(site: &Site, airframe: &Airframe, motor: &ThrustCurve, truth: &Truth) -> Self {
         let (body, fins) = (&airframe.body, airframe.fin_model());
         let legs_m2 = airframe.legs.drag_area_m2 + truth.leg_drag_m2;
         let fins_m2 = [airframe.fins.closed_rad(), airframe.fins.open_rad()].map(|opening_rad| {
@@ -55,6 +57,7 @@ impl Vertical {
         let mass_model = MassModel::new(&airframe.mass, motor.propellant_mass_kg()).scaled(truth.mass_scale);
         let cg_station_m = mass_model.at(0.0).cg_station_m + truth.cg_offset_m[0];
         Self {
+            site: *site,
             burn: TrueBurn::new(motor, truth),
             mass_model,
             truth: *truth,
@@ -128,9 +131,9 @@ mod tests {
         };
         let mut start = RigidState::upright(200.0);
         start.velocity_m_s.z = -35.0;
-        let world = World::new(&airframe, &motor, &truth, &start, 1).unwrap();
+        let world = World::new(&Site::default(), &airframe, &motor, &truth, &start, 1).unwrap();
         let mut world = world.with_fins_at(FRAC_PI_2);
-        let vertical = Vertical::new(&airframe, &motor, &truth);
+        let vertical = Vertical::new(&Site::default(), &airframe, &motor, &truth);
         assert!((vertical.cg_above_feet_m() - world.cg_above_feet_m()).abs() < 1e-12);
         let actuators = Actuators { fins_rad: [FRAC_PI_2; 4], ignite: true, ..Actuators::default() };
         // It stops falling after 2.2 s.

@@ -1,6 +1,6 @@
 //! The heights of the ignition command from which a flight lands, found with bang-bang paths.
 
-use flight::vehicle::atmosphere::{Air, STANDARD_GRAVITY_M_S2};
+use flight::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use flight::vehicle::mission::Mission;
 use flight::vehicle::rigid::RigidState;
 use sim::draw::Draw;
@@ -28,7 +28,7 @@ const TRIED: usize = 24;
 /// The window of a flight whose fall begins in this state; `None` if it lands from no height.
 pub(crate) fn window(mission: &Mission, drawn: &Draw, fall: &RigidState) -> Option<Window> {
     let curve = drawn.truth.curve(mission).ok()?;
-    let vertical = Vertical::new(&mission.airframe, curve.as_ref(), &drawn.truth);
+    let vertical = Vertical::new(&mission.site, &mission.airframe, curve.as_ref(), &drawn.truth);
     let apogee_m = fall.position_m.z - vertical.cg_above_feet_m();
     let vertical_m_s = fall.velocity_m_s.z.min(0.0);
     let fall = Fall::new(&vertical, apogee_m, vertical_m_s, drawn.truth.ignition_delay_s)?;
@@ -129,7 +129,7 @@ impl Fall {
     fn new(vertical: &Vertical, height_m: f64, vertical_m_s: f64, delay_s: f64) -> Option<Self> {
         let mass_kg = vertical.mass_kg(-1.0);
         let acceleration_m_s2 = |height_m: f64, vertical_m_s: f64| {
-            let air = Air::at_height_m(height_m + vertical.cg_above_feet_m());
+            let air = vertical.site.air_at_m(height_m + vertical.cg_above_feet_m());
             let drag = vertical.drag(air.density_kg_m3, vertical_m_s, 0.0);
             drag.at_n([0.0, 1.0], 1.0) / mass_kg - STANDARD_GRAVITY_M_S2
         };
@@ -250,7 +250,7 @@ impl Braking {
             [cos, cos * cos, sin * sin * sin]
         });
         // The height of a burn changes the density by half a per cent: linear is enough.
-        let air = Air::at_height_m(vertical.cg_above_feet_m());
+        let air = vertical.site.air_at_m(vertical.cg_above_feet_m());
         let mut braking = Self {
             vertical,
             steps,
@@ -258,7 +258,7 @@ impl Braking {
             leg_m_s,
             carried_until_s,
             ground_density_kg_m3: air.density_kg_m3,
-            density_gradient_kg_m4: air.density_gradient_kg_m4(),
+            density_gradient_kg_m4: air.density_gradient_kg_m4,
             endings: Vec::new(),
         };
         // A vehicle that still stands in the air then is the last to reach the limit of the legs.

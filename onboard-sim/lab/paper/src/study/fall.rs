@@ -8,6 +8,7 @@ use core::f64::consts::FRAC_PI_2;
 
 use flight::vehicle::airframe::Airframe;
 use flight::vehicle::rigid::RigidState;
+use flight::vehicle::site::Site;
 use flight::vehicle::thrust_curve::ThrustCurve;
 use nalgebra::{UnitQuaternion, Vector3};
 use onboard_sim::run::in_parallel;
@@ -93,7 +94,7 @@ impl Vehicle {
         let turned = UnitQuaternion::from_scaled_axis(Vector3::new(0.0, pitch_rad, yaw_rad));
         let start = RigidState { world_from_body: upright.world_from_body * turned, ..upright };
         let truth = Truth { gust_scale: 0.0, ..Truth::default() };
-        let world = World::new(&self.airframe, &self.motor, &truth, &start, 0)?;
+        let world = World::new(&Site::default(), &self.airframe, &self.motor, &truth, &start, 0)?;
         let mut world = world.with_fins_at(opening_rad.min(FRAC_PI_2));
         let held = Actuators { fins_rad: [opening_rad; 4], ..Actuators::NONE };
         let mut fall = vec![moment(&world)];

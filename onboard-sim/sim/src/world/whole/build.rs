@@ -6,6 +6,7 @@ use core::f64::consts::FRAC_PI_2;
 use flight::vehicle::airframe::{Airframe, BadValue, MassModel, Servo as ServoData};
 use flight::vehicle::launch::Launch;
 use flight::vehicle::rigid::RigidState;
+use flight::vehicle::site::Site;
 use flight::vehicle::thrust_curve::ThrustCurve;
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -58,6 +59,7 @@ impl World {
     ///
     /// [`WorldError`] names the value that is not accepted.
     pub fn new(
+        site: &Site,
         airframe: &Airframe,
         motor: &ThrustCurve,
         truth: &Truth,
@@ -79,6 +81,7 @@ impl World {
         let limit_rad = airframe.gimbal.limit_rad();
         let gimbal = || Servo::new(&airframe.gimbal.servo, (-limit_rad, limit_rad), 0.0);
         let mut world = Self {
+            site: *site,
             shape: Shape::new(airframe, truth),
             motor: Motor::new(motor, truth),
             gimbal: [gimbal(), gimbal()],
@@ -92,7 +95,7 @@ impl World {
             certified: motor.clone(),
             wires: core::array::from_fn(|surface| (surface, false)),
             parachute: Parachute::new(&airframe.parachute),
-            air: AirHere::at(initial.position_m.z),
+            air: AirHere::at(site, initial.position_m.z),
             wind: Wind::new(truth.wind_m_s, truth.wind_towards_rad, truth.gust_scale, seed)
                 .over_height(truth.wind_exponent, truth.wind_veer_rad_m),
             ground: Ground::new(airframe, truth.ground_rise),
@@ -215,7 +218,7 @@ impl World {
         motor: &ThrustCurve,
         truth: &Truth,
     ) -> Result<Self, WorldError> {
-        let other = Self::new(airframe, motor, truth, &self.state, 0)?;
+        let other = Self::new(&self.site, airframe, motor, truth, &self.state, 0)?;
         let servo = |here: &Servo, before: &ServoData, after: &Servo| here.changed(before, after);
         let gimbal_data = &self.airframe.gimbal.servo;
         let fin_data = &self.airframe.fins.servo;
@@ -270,7 +273,8 @@ mod tests {
         let airframe = airframe();
         let motor = motors::builtin(&airframe.motor).unwrap();
         let truth = Truth { wind_m_s: 4.0, impulse_scale: 1.03, ..Truth::default() };
-        let mut world = World::new(&airframe, &motor, &truth, &RigidState::upright(80.0), 7).unwrap();
+        let mut world =
+            World::new(&Site::default(), &airframe, &motor, &truth, &RigidState::upright(80.0), 7).unwrap();
         world.inject(&Fault::WeakMotor { scale: 0.9 });
         world.inject(&Fault::LateLight { delay_s: 0.05 });
         world.inject(&Fault::GimbalSlow { scale: 0.3 });

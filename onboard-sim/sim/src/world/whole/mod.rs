@@ -13,6 +13,7 @@ use flight::rules::verdict::Touchdown;
 use flight::vehicle::airframe::{Airframe, MassModel, MassProperties};
 use flight::vehicle::atmosphere::{Air, STANDARD_GRAVITY_M_S2};
 use flight::vehicle::rigid::RigidState;
+use flight::vehicle::site::Site;
 use flight::vehicle::thrust_curve::ThrustCurve;
 use nalgebra::{Rotation3, Vector3};
 
@@ -69,6 +70,7 @@ impl Actuators {
 /// One vehicle, its air and its ground.
 #[derive(Debug, Clone)]
 pub struct World {
+    site: Site,
     airframe: Airframe,
     truth: Truth,
     shape: Shape,
@@ -108,24 +110,23 @@ pub struct World {
 #[derive(Debug, Clone, Copy)]
 struct AirHere {
     height_m: f64,
-    density_kg_m3: f64,
-    gradient_kg_m4: f64,
+    at_height: Air,
 }
 
 impl AirHere {
-    fn at(height_m: f64) -> Self {
-        let air = Air::at_height_m(height_m);
-        Self { height_m, density_kg_m3: air.density_kg_m3, gradient_kg_m4: air.density_gradient_kg_m4() }
+    fn at(site: &Site, height_m: f64) -> Self {
+        Self { height_m, at_height: site.air_at_m(height_m) }
     }
 
-    fn follow(&mut self, height_m: f64) {
+    fn follow(&mut self, site: &Site, height_m: f64) {
         if (height_m - self.height_m).abs() > AIR_M {
-            *self = Self::at(height_m);
+            *self = Self::at(site, height_m);
         }
     }
 
     fn density_kg_m3(&self, height_m: f64) -> f64 {
-        self.density_kg_m3 + self.gradient_kg_m4 * (height_m - self.height_m)
+        let Air { density_kg_m3, density_gradient_kg_m4, .. } = self.at_height;
+        density_kg_m3 + density_gradient_kg_m4 * (height_m - self.height_m)
     }
 }
 
@@ -191,7 +192,7 @@ impl World {
         if wind_changes {
             self.wind.step(self.state.position_m.z, airspeed_m_s * STEP_S * WIND_STEPS as f64);
         }
-        self.air.follow(self.state.position_m.z);
+        self.air.follow(&self.site, self.state.position_m.z);
         self.burnt_kg = self.motor.burnt_kg(time_s + 0.5 * STEP_S);
         self.mass = self.mass_model.at(self.burnt_kg * self.truth.mass_scale);
         if let Some(stack) = self.stack.take() {
@@ -318,7 +319,7 @@ impl World {
                 fin_sines: [0, 1, 2, 3].map(|fin: usize| libm::sin(self.fin_links[fin].rad())),
                 legs_out: true,
                 parachute_area_m2: self.parachute.drag_area_m2(),
-                plume: self.plume(thrust_n, self.air.density_kg_m3),
+                plume: self.plume(thrust_n, self.air.at_height.density_kg_m3),
                 cg_m,
             },
             stack: None,
@@ -500,7 +501,7 @@ impl World {
 
     /// The air at the vehicle.
     pub fn air(&self) -> Air {
-        Air::at_height_m(self.state.position_m.z)
+        self.site.air_at_m(self.state.position_m.z)
     }
 
     /// Whether the parachute was ejected.

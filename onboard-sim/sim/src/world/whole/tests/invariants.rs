@@ -93,7 +93,9 @@ fn the_same_arguments_give_the_same_bits() {
     let fly = |seed: u64| {
         let airframe = flight::vehicles::mission::builtin_airframe("mk2").unwrap();
         let motor = motors::builtin(&airframe.motor).unwrap();
-        let mut world = World::new(&airframe, &motor, &windy(), &leaning(150.0, 0.05, 0.02), seed).unwrap();
+        let mut world =
+            World::new(&Site::default(), &airframe, &motor, &windy(), &leaning(150.0, 0.05, 0.02), seed)
+                .unwrap();
         world.advance(&OPEN, 2000);
         world.advance(&Actuators { gimbal_rad: [0.03, -0.02], ignite: true, ..OPEN }, 4000);
         format!("{:?} {:?} {:?}", world.state(), world.touchdown(), world.rest())
@@ -137,7 +139,7 @@ fn data_out_of_range_are_refused() {
     let motor = motors::builtin("H45W").unwrap();
     let start = RigidState::upright(100.0);
     let refuse = |truth: &Truth, start: &RigidState| {
-        World::new(&airframe, &motor, truth, start, 1).unwrap_err().to_string()
+        World::new(&Site::default(), &airframe, &motor, truth, start, 1).unwrap_err().to_string()
     };
     let truth = Truth { mass_scale: f64::NAN, ..Truth::default() };
     assert_eq!(refuse(&truth, &start), "truth.mass_scale is NaN; 0.1 to 10 is accepted");
@@ -155,6 +157,6 @@ fn data_out_of_range_are_refused() {
     assert!(refuse(&Truth::default(), &nowhere).starts_with("the initial state is "));
     let mut light = airframe.clone();
     light.mass.loaded_kg = 0.15;
-    let error = World::new(&light, &motor, &Truth::default(), &start, 1).unwrap_err();
+    let error = World::new(&Site::default(), &light, &motor, &Truth::default(), &start, 1).unwrap_err();
     assert!(matches!(error, WorldError::Motor { propellant_kg, .. } if propellant_kg > 0.19), "{error}");
 }

@@ -81,8 +81,15 @@ fn legs_bounce_without_damping() {
         let motor = motors::builtin(&airframe.motor).unwrap();
         let truth = Truth { drag_scale: 0.0, ..Truth::default() };
         let above_feet_m = airframe.above_feet_m(airframe.mass.loaded_cg_station_m);
-        let mut world =
-            World::new(&airframe, &motor, &truth, &RigidState::upright(above_feet_m + 0.05), 1).unwrap();
+        let mut world = World::new(
+            &Site::default(),
+            &airframe,
+            &motor,
+            &truth,
+            &RigidState::upright(above_feet_m + 0.05),
+            1,
+        )
+        .unwrap();
         let mut peak_m: f64 = 0.0;
         while world.time_s() < 0.4 {
             world.step(&OPEN);

@@ -21,7 +21,7 @@ fn on_blocks(crush: Crush) -> Airframe {
 fn placed(airframe: &Airframe, truth: &Truth, state: &RigidState) -> World {
     let motor = motors::builtin(&airframe.motor).unwrap();
     let truth = Truth { drag_scale: 0.0, gust_scale: 0.0, ..*truth };
-    World::new(airframe, &motor, &truth, state, 1).unwrap()
+    World::new(&Site::default(), airframe, &motor, &truth, state, 1).unwrap()
 }
 
 fn until_rest(world: &mut World) -> (RestOutcome, Strain) {

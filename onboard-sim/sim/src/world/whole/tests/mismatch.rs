@@ -22,7 +22,7 @@ fn air_n(truth: &Truth, lit: bool) -> f64 {
 fn val_hand_scales_and_exhaust_change_body_and_fin_drag() {
     let airframe = flight::vehicles::mission::builtin_airframe("mk2").unwrap();
     let (body_m2, all_m2) = (airframe.drag_area_m2(0.0), airframe.drag_area_m2(FRAC_PI_2));
-    let pressure_pa = 0.5 * Air::at_height_m(100.0).density_kg_m3 * 900.0;
+    let pressure_pa = 0.5 * Site::default().air_at_m(100.0).density_kg_m3 * 900.0;
     let expect = |truth: &Truth, lit: bool, area_m2: f64| {
         let found_n = air_n(truth, lit);
         // Speed changes by half a step of braking, thrust by half a step of burning.

@@ -24,16 +24,17 @@ fn on_springs(name: &str) -> Airframe {
 fn world(name: &str, truth: &Truth, initial: &RigidState) -> World {
     let airframe = on_springs(name);
     let motor = motors::builtin(&airframe.motor).unwrap();
-    World::new(&airframe, &motor, truth, initial, 1).unwrap()
+    World::new(&Site::default(), &airframe, &motor, truth, initial, 1).unwrap()
 }
 
 /// Falls from rest, tail first, with the centre of gravity 300 m above the ground. Returns time and speed when the
 /// centre of gravity would reach the ground.
 fn drop(airframe: &Airframe, opening_rad: f64) -> (f64, f64) {
     let motor = motors::builtin(&airframe.motor).unwrap();
-    let mut world = World::new(airframe, &motor, &Truth::default(), &RigidState::upright(300.0), 1)
-        .unwrap()
-        .with_fins_at(opening_rad);
+    let mut world =
+        World::new(&Site::default(), airframe, &motor, &Truth::default(), &RigidState::upright(300.0), 1)
+            .unwrap()
+            .with_fins_at(opening_rad);
     let actuators = Actuators { fins_rad: [opening_rad; 4], ..Actuators::default() };
     loop {
         let before = *world.state();
@@ -115,6 +116,31 @@ fn val_landing_paper_fig_5() {
     assert!((speed_m_s - terminal_m_s).abs() < 0.2, "{speed_m_s} m/s, terminal {terminal_m_s}");
 }
 
+/// The standard's density at 3,000 m is 0.7422 of that at sea level (table of geometric
+/// altitudes): the speed at which drag equals weight is 1.161 times as high.
+#[test]
+fn val_coesa_1976_terminal_speed_at_3000_m() {
+    let airframe = on_springs("mk3");
+    let motor = motors::builtin(&airframe.motor).unwrap();
+    let still = Truth { gust_scale: 0.0, ..Truth::default() };
+    let terminal_m_s = |altitude_m: f64, temperature_c: Option<f64>| {
+        let site = Site { altitude_m, temperature_c, ..Site::default() };
+        let start = RigidState::upright(600.0);
+        let mut world =
+            World::new(&site, &airframe, &motor, &still, &start, 1).unwrap().with_fins_at(FRAC_PI_2);
+        while world.state().position_m.z > 2.0 {
+            world.step(&OPEN);
+        }
+        -world.state().velocity_m_s.z * libm::sqrt(STANDARD_GRAVITY_M_S2 / world.specific_force_m_s2().norm())
+    };
+    let sea_level_m_s = terminal_m_s(0.0, None);
+    let ratio = terminal_m_s(3_000.0, None) / sea_level_m_s;
+    assert!((ratio - 1.161).abs() < 1e-3, "{ratio}");
+    // Density falls as the absolute temperature rises: 15 to 45 degrees Celsius at sea level.
+    let hot = terminal_m_s(0.0, Some(45.0)) / sea_level_m_s;
+    assert!((hot - libm::sqrt(318.15 / 288.15)).abs() < 1e-3, "{hot}");
+}
+
 /// Without air and thrust the mechanical energy and the angular momentum are constant.
 #[test]
 fn energy_is_conserved_without_air() {
@@ -187,7 +213,8 @@ fn val_hand_a_swinging_motor_turns_the_body_back() {
     let motor = motors::builtin(&airframe.motor).unwrap();
     let truth = Truth { drag_scale: 0.0, gust_scale: 0.0, ..Truth::default() };
     for axis in 0..2 {
-        let mut world = World::new(&airframe, &motor, &truth, &RigidState::upright(1000.0), 1).unwrap();
+        let mut world =
+            World::new(&Site::default(), &airframe, &motor, &truth, &RigidState::upright(1000.0), 1).unwrap();
         let mut actuators = Actuators::default();
         actuators.gimbal_rad[axis] = 1.0;
         world.advance(&actuators, 30);
