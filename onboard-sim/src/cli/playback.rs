@@ -74,6 +74,8 @@ pub(crate) fn run(arguments: &PlaybackArguments) -> anyhow::Result<Exit> {
             recorder.record(record, time_ns);
         }
     });
+    let log = recorder.map(|recorder| recorder.finish()).transpose();
+    let log = log.context("the flight was played, but its log is incomplete")?;
     let mut out = std::io::stdout().lock();
     writeln!(out, "{head}")?;
     let (frames, pause_ms) = (recorded.frames.len(), 1e3 * recorded.longest_pause_s);
@@ -85,8 +87,7 @@ pub(crate) fn run(arguments: &PlaybackArguments) -> anyhow::Result<Exit> {
     print_checks(&mut out, &played)?;
     print_moments(&mut out, &played)?;
     print_sensors(&mut out, &played)?;
-    if let Some(recorder) = recorder {
-        let log = recorder.finish().context("the flight was played, but its log is incomplete")?;
+    if let Some(log) = log {
         writeln!(out, "log {}", log.display())?;
     }
     Ok(match played.moment("apogee") {
