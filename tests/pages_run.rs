@@ -23,12 +23,9 @@ const PAGES: [&str; 9] = [
 ];
 
 /// Lines that do not run here: their page, how they begin, and why.
-const ELSEWHERE: [(&str, &str, &str); 29] = [
+const ELSEWHERE: [(&str, &str, &str); 26] = [
     ("README.md", "cargo run ", "compiles; tests/demo.rs flies the same demonstration"),
     ("README.md", "cargo test", "is this test among all others"),
-    ("ENGINEER.md", "sbatch ", "needs a Slurm cluster; tests/clients/tests/cluster.rs runs it"),
-    ("ENGINEER.md", "parallel ", "needs GNU parallel; tests/clients/tests/cluster.rs runs it"),
-    ("ENGINEER.md", "onboard-sim campaign merge part-*", "needs the parts of both lines above"),
     ("ENGINEER.md", "npm ", "installs from the network"),
     ("ENGINEER.md", "onboard-sim check mini-f10 --from node_modules", "needs what npm installs"),
     ("ENGINEER.md", "pip ", "installs from the network"),
