@@ -43,7 +43,7 @@ pub(crate) const IN_ORDER_NS: u64 = 1_000_000_000;
 
 /// Of one time: what the computer starts from at power-up, a frame, what that led to, and the start at the release.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Place {
+enum Place {
     PowerUp,
     Frame,
     Other,
@@ -52,7 +52,7 @@ pub(crate) enum Place {
 
 impl Place {
     /// The place of a record; a start is that of a release.
-    pub(crate) fn of(topic: &str) -> Self {
+    fn of(topic: &str) -> Self {
         match topic {
             TOPIC_COMPUTER_START => Self::Release,
             TOPIC_COMPUTER_FRAME => Self::Frame,
@@ -345,7 +345,7 @@ pub enum LogError {
     /// MCAP allows any order; a flight is told from its beginning to its end.
     #[error(
         "{name}: is not in order of time: a record on {topic} comes {back_s:.3} s late, behind one that it belongs before; \
-        `replay recover` sorts it"
+        `mcap sort` sorts it"
     )]
     NotInOrder { name: String, topic: String, back_s: f64 },
     /// An MCAP file of another program.
