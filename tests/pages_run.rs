@@ -74,7 +74,7 @@ const SAID: [(&str, &str); 19] = [
     ("replay recover cut.mcap", "whole.mcap"),
     ("replay compare mk2 mk3", "mk3 differs from mk2 in"),
     ("replay refly flight.mcap --without-fault gnss-out", "flown again"),
-    ("replay compare flight.mcap without.mcap --tolerances tolerances.toml", "without.mcap"),
+    ("replay compare flight.mcap without.mcap", "without.mcap"),
     ("replay export flight.mcap --to csv", "tables"),
     ("replay fit flight.mcap ", "drag"),
     ("replay fit fits.json --mission mk3 --flights", "GO"),

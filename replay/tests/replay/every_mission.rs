@@ -120,9 +120,9 @@ const TABLE: [Row; 19] = [
     ),
     row(
         "compare {log} {log}",
-        (0, &["is within tolerance of", "are identical", "stands undamaged"]),
-        (0, &["is within tolerance of", "are identical", "not landed"]),
-        (3, &["is NOT within tolerance of", "is of an INCOMPLETE flight"]),
+        (0, &["is like", "are identical", "stands undamaged"]),
+        (0, &["is like", "are identical", "not landed"]),
+        (3, &["is NOT like", "is of an INCOMPLETE flight"]),
     ),
     row("compare {mission} {mission}", SAME_MISSION, SAME_MISSION, SAME_MISSION),
     row(

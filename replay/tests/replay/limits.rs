@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use protocol::log::computer_v1::{ComputerFrame, Request};
 use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::writer::{LogHeader, LogWriter};
-use replay::compare::{Flown, Tolerances, compare};
+use replay::compare::{Flown, compare};
 use replay::evaluate::evaluate;
 use replay::log::{Moment, Recording};
 use replay::refly::{ReflyOptions, refly};
@@ -331,10 +331,10 @@ proptest! {
                 prop_assert!(report.frames > 0);
             }
         }
-        prop_assert!(report(&path, None).unwrap().html.ends_with("</html>\n"));
+        prop_assert!(report(&path).unwrap().html.ends_with("</html>\n"));
         let flown = Flown::open(&path).unwrap();
         // A flight is equal to itself, in all samples that are in order and before a cut.
-        let compared = compare(&flown, &flown.clone(), &Tolerances::default()).unwrap();
+        let compared = compare(&flown, &flown.clone());
         let of_record = |failure: &String| failure.contains("are out of order") || failure.contains("INCOMPLETE");
         prop_assert!(compared.failures.iter().all(of_record), "{:?}", compared.failures);
     }
