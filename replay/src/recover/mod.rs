@@ -15,7 +15,6 @@ use mcap::records::Metadata;
 use protocol::log::record::{METADATA_RECOVERY, RECOVERY_FAULT_ENTRY};
 use protocol::program::Exit;
 use scan::{LostStretch, Records};
-pub use scan::{Summary, summary_of};
 use serde::Serialize;
 use write::Rescue;
 

@@ -12,7 +12,6 @@ use mcap::records::{Channel, Record, SchemaHeader, Statistics, op};
 use protocol::log::reader::{
     METADATA_LIMIT_BYTES, RECORD_LIMIT_BYTES, RecordError, parse_record, records_of_chunk,
 };
-use protocol::log::record::TOPIC_COMPUTER_FRAME;
 
 use crate::log::{LogError, open_regular, take_magic};
 
@@ -68,27 +67,6 @@ pub(crate) struct FileSummary {
     pub(crate) schemas: BTreeMap<u16, (SchemaHeader, Vec<u8>)>,
     pub(crate) channels: BTreeMap<u16, Channel>,
     pub(crate) statistics: Option<Statistics>,
-}
-
-/// What the summary of a file tells.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Summary {
-    /// Frames of the flight computer in the file.
-    pub frames: u64,
-    /// Time of the last message, ns since the Unix epoch.
-    pub last_log_time_ns: u64,
-}
-
-/// What the summary of a file tells, if it is whole. The whole file is read for it.
-pub fn summary_of(path: &Path) -> Option<Summary> {
-    let FileSummary { channels, statistics, .. } = Records::open(path).ok()?.contents().ok()?.summary;
-    let statistics = statistics?;
-    let of_frames = |id: &u16| channels.get(id).is_some_and(|channel| channel.topic == TOPIC_COMPUTER_FRAME);
-    let counts = statistics.channel_message_counts.iter().filter(|(id, _)| of_frames(id));
-    Some(Summary {
-        frames: counts.map(|(_, count)| *count).fold(0, u64::saturating_add),
-        last_log_time_ns: statistics.message_end_time,
-    })
 }
 
 /// A file being read record by record.

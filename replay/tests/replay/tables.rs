@@ -231,35 +231,3 @@ proptest! {
         }
     }
 }
-
-/// The dictionary has every column of every table, with units, meanings and words.
-#[test]
-fn every_column_is_in_the_dictionary_with_its_unit_and_words() {
-    let directory = export(&WITH_FRAMES, "dictionary");
-    let text = read_text(&directory.join("dictionary.csv"));
-    let mut columns = 0;
-    for entry in std::fs::read_dir(&directory).unwrap().map(|entry| entry.unwrap().path()) {
-        let table = entry.file_stem().unwrap().to_string_lossy().into_owned();
-        if table == "dictionary" {
-            continue;
-        }
-        for column in csv::Reader::from_path(&entry).unwrap().headers().unwrap() {
-            columns += 1;
-            assert!(text.contains(&format!("\n{table},{column},")), "{table} {column}");
-        }
-    }
-    assert_eq!(text.lines().count(), columns + 1);
-    for row in [
-        "computer_frame,input.time_s,number,s,,\n",
-        "computer_frame,output.gimbal_1_rad,number,rad,",
-        "mavlink_1_1_td_flight_status,time_boot_ms,whole number,ms,Time since boot.,\n",
-        // A component has the vector's unit and meaning.
-        "vehicle_truth3d,state.velocity_m_s.x,number,m/s,In the world.,\n",
-        "vehicle_truth3d,state.world_from_body.w,number,,Rotation from body to world axes.,\n",
-    ] {
-        assert!(text.contains(row), "{row}");
-    }
-    let phase = text.lines().find(|row| row.starts_with("computer_frame,output.phase,")).unwrap();
-    let meaning = "Index of the flight phase, as in the dialect's TD_PHASE.";
-    assert!(phase.contains(meaning) && phase.contains("9 TD_PHASE_POWERED"), "{phase}");
-}
