@@ -18,7 +18,7 @@
 //!   tell of the next day.
 //! * [`table`]: reads a log as tables; [`compare`](mod@compare): compares flights signal by signal.
 //! * [`report`](mod@report): writes a flight as one HTML page; [`open`]: shows it in another program.
-//! * [`export`]: converts logs to and from other formats; [`recover`](mod@recover): repairs a damaged log.
+//! * [`export`]: converts logs to other formats; [`recover`](mod@recover): repairs a damaged log.
 //! * [`output`](onboard_sim::files): writes files completely or not at all, each new one under a name that is free.
 //! * [`print`](mod@print): what answers have in common: columns, two verdicts beside each other, JSON.
 
@@ -117,10 +117,8 @@ enum Command {
     /// Opens a log in a viewer that is installed, with our layout: Rerun, Foxglove or Lichtblick.
     #[command(after_help = "Example: replay open flight.mcap")]
     Open(open::Args),
-    /// Writes a log's content as CSV or a Rerun recording; makes a log of a .tlog.
-    #[command(
-        after_help = "Examples:\n  replay export flight.mcap --to csv --out tables\n  replay export flight.tlog"
-    )]
+    /// Writes a log's content as CSV or a Rerun recording.
+    #[command(after_help = "Example: replay export flight.mcap --to csv --out tables")]
     Export(export::Args),
     /// Recovers a readable log from a damaged one, and reports what was recovered and what time span is lost.
     #[command(after_help = "Example: replay recover cut.mcap whole.mcap")]

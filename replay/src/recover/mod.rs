@@ -19,7 +19,7 @@ use serde::Serialize;
 use write::Rescue;
 
 use crate::cli::{Answer, give};
-use crate::log::{LogError, is_tlog};
+use crate::log::LogError;
 use crate::output::WriteError;
 use crate::print::counted;
 
@@ -29,9 +29,6 @@ pub enum RecoverError {
     /// The file is not an MCAP file, or cannot be read.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// Nothing has to be recovered.
-    #[error("{}: is a .tlog, of which every command reads what can be read; `replay export` makes a log of that", path.display())]
-    Tlog { path: PathBuf },
     /// No message could be kept.
     #[error("{name}: no message can be recovered{}", reason.as_ref().map(|why| format!(": {why}")).unwrap_or_default())]
     Nothing {
@@ -136,9 +133,6 @@ impl Recovery {
 /// # Errors
 /// The input is not an MCAP file, cannot be read, or holds no message that can be kept; or the output cannot be written.
 pub fn recover(input: &Path, output: &Path) -> Result<Recovery, RecoverError> {
-    if is_tlog(input).unwrap_or_default() {
-        return Err(RecoverError::Tlog { path: input.to_owned() });
-    }
     let mut records = Records::open(input)?;
     let contents = records.contents()?;
     let input = input.display().to_string();

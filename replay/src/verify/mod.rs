@@ -21,7 +21,6 @@
 
 mod again;
 mod baseline;
-pub(crate) use baseline::logs_of;
 pub mod book;
 mod difference;
 pub mod explain;
@@ -44,7 +43,7 @@ use protocol::log::v1::LandingVerdict;
 use protocol::program::Exit;
 use serde::Serialize;
 
-use crate::cli::{Answer, give_each, say, warn_of_loss};
+use crate::cli::{Answer, give_each, logs_of, say, warn_of_loss};
 use crate::controller::FrameError;
 use crate::log::{
     BuildComparison, Cut, Entry, FlightLog, Gap, Head, LogError, LoggedFlight, Recording, Verdict,

@@ -146,7 +146,7 @@ fn a_question_without_an_answer_exits_1_with_the_reason() {
     let empty = tempfile::tempdir().unwrap();
     for (none, why) in [
         (files.directory.path().join("none.mcap"), "cannot be read"),
-        (empty.path().to_owned(), "holds no log (*.mcap, *.tlog)"),
+        (empty.path().to_owned(), "holds no log (*.mcap)"),
     ] {
         assert!(refusal(&mut replay("info", &none)).contains(why));
     }

@@ -150,7 +150,6 @@ fn a_hole_is_not_read_as_a_summary() {
     let footer = [&(data.len() as u64).to_le_bytes()[..], &[0; 12]].concat();
     let end = [&record(mcap::records::op::FOOTER, &footer)[..], mcap::MAGIC].concat();
     std::os::unix::fs::FileExt::write_all_at(&file, &end, (data.len() as u64) + (1 << 30)).unwrap();
-    assert_eq!(replay::recover::summary_of(&path), None);
     let (code, said) = within(200, &["info"], &path);
     assert!(code == 0 && said.contains("type 0, which does not exist"), "{said}");
 }

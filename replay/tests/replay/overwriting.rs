@@ -70,7 +70,7 @@ fn what_exists_is_kept_and_the_next_free_name_is_said() {
 }
 
 #[test]
-fn tables_get_a_folder_of_their_own_and_an_import_a_free_name() {
+fn tables_get_a_folder_of_their_own() {
     let (directory, log) = copied(&WITH_FRAMES.log);
     let at = |name: &str| directory.path().join(name);
     std::fs::create_dir_all(at("tables")).unwrap();
@@ -89,13 +89,6 @@ fn tables_get_a_folder_of_their_own_and_an_import_a_free_name() {
     let mut here = replay("export", &log);
     let (code, _, stderr) = run(here.args(["--to", "csv", "--out", "."]).current_dir(at("empty")));
     assert!(code == 0 && at("empty").join("events.csv").is_file(), "{stderr}");
-    let tlog = at("flight.tlog");
-    std::fs::copy(crate::simulated::tlog(&WITH_FRAMES, "overwriting.tlog"), &tlog).unwrap();
-    let before = std::fs::read(&log).unwrap();
-    // Without an output name, the default name is that of the flight's own log.
-    let (code, _, stderr) = run(&mut replay("export", &tlog));
-    assert!(code == 0 && at("flight-2.mcap").is_file(), "{stderr}");
-    assert_eq!(std::fs::read(&log).unwrap(), before);
 }
 
 /// A page with the default name does not replace a page that was edited.

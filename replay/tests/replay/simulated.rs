@@ -5,9 +5,11 @@ use std::num::NonZeroU32;
 use std::path::PathBuf;
 use std::sync::LazyLock;
 
-use protocol::log::record::{Direction, RawFrame, Record};
+use protocol::frame::Framer;
+use protocol::log::record::{Direction, Event, EventLevel, RawFrame, Record};
 use protocol::log::recorder::Recorder;
-use protocol::log::tlog::TlogWriter;
+use protocol::log::writer::{LogHeader, LogWriter};
+use protocol::told::Told;
 use protocol::transport::LinkAddress;
 use replay::log::{Entry, FlightLog, Recording};
 use sim::recipe::Recipe;
@@ -18,6 +20,11 @@ use tokio::sync::watch;
 
 /// Start of every run, so that the logs do not depend on the day.
 const START_UNIX_NS: u64 = 1_760_000_000_000_000_000;
+
+/// A station was started this long before its vehicle, records its state so often, and its crew notes something in the burn, ns.
+pub(crate) const STATION_EARLIER_NS: u64 = 3_000_000_000;
+const STATION_PERIOD_NS: u64 = 100_000_000;
+const NOTED_NS: u64 = 25_000_000_000;
 
 /// A directory with the log of one flight in it.
 pub(crate) struct Simulated {
@@ -40,19 +47,40 @@ pub(crate) fn to_nobody(fly: impl FnOnce(LinkAddress) -> Simulated) -> Simulated
     fly(format!("udpout:{}", sink.local_addr().unwrap()).parse().unwrap())
 }
 
-/// The frames in a log, in a `.tlog` beside it as a station writes one.
-pub(crate) fn tlog(flight: &Simulated, name: &str) -> PathBuf {
+/// The log that a station writes which hears every frame of a vehicle, beside the vehicle's own.
+pub(crate) fn station_log(flight: &Simulated, name: &str) -> PathBuf {
     let path = flight.beside(name);
-    let mut log = FlightLog::open(&flight.log).unwrap();
-    let mut writer = TlogWriter::new(File::create(&path).unwrap(), 0);
-    while let Some(stamped) = log.next_entry().unwrap() {
-        if stamped.entry == Entry::RawFrame {
-            let (link, bytes) = (String::new(), stamped.data);
-            let frame = RawFrame { direction: Direction::Rx, endpoint: "ground", link, bytes };
-            writer.write(&Record::RawFrame(frame), stamped.log_time_ns).unwrap();
+    let mut from = FlightLog::open(&flight.log).unwrap();
+    let header =
+        LogHeader { writer: "ground".to_owned(), start_unix_ns: START_UNIX_NS, ..LogHeader::default() };
+    let mut log = LogWriter::new(File::create(&path).unwrap(), &header).unwrap();
+    let (mut told, mut due_ns, mut noted) = (Told::default(), 0, false);
+    while let Some(stamped) = from.next_entry().unwrap() {
+        if stamped.entry != Entry::RawFrame {
+            continue;
+        }
+        let at_ns = STATION_EARLIER_NS + stamped.log_time_ns - START_UNIX_NS;
+        let mut framer = Framer::new();
+        framer.push_datagram(&stamped.data);
+        let message = framer.next_frame().unwrap().decode().unwrap();
+        let raw = RawFrame {
+            direction: Direction::Rx,
+            endpoint: "ground",
+            link: "udpin:0.0.0.0:14550".to_owned(),
+            bytes: stamped.data,
+        };
+        log.write(&Record::RawFrame(raw), at_ns).unwrap();
+        if told.hear(&message) && at_ns >= due_ns {
+            due_ns = at_ns + STATION_PERIOD_NS;
+            log.write(&Record::Telemetry(Box::new(told.record(at_ns as f64 / 1e9))), at_ns).unwrap();
+        }
+        if at_ns > NOTED_NS && !noted {
+            noted = true;
+            let (name, message) = ("ground".to_owned(), "note (screen 1, Ann): a gust".to_owned());
+            log.write(&Record::Event(Event { level: EventLevel::Info, name, message }), at_ns).unwrap();
         }
     }
-    writer.flush().unwrap();
+    log.finish().unwrap();
     path
 }
 

@@ -1,17 +1,13 @@
-//! Tests comparisons, exports and imports of simulated flights.
+//! Tests comparisons and exports of simulated flights.
 
 use std::path::Path;
 
-use proptest::prelude::*;
 use replay::compare::{Align, Flown, compare};
 use replay::export::export_tables;
-use replay::info::{GradeLevel, info};
-use replay::log::{FlightLog, ImportError, Recording, import_tlog};
+use replay::log::FlightLog;
 use replay::refly::{ReflyOptions, refly_flight, write_log};
-use replay::verify::{Verification, verify};
 
-use crate::command_line::{replay, run};
-use crate::simulated::{MK2, Simulated, WITH_FRAMES, tlog};
+use crate::simulated::{MK2, Simulated};
 
 fn read_text(path: &Path) -> String {
     std::fs::read_to_string(path).unwrap()
@@ -121,113 +117,4 @@ fn the_csv_holds_the_recorded_numbers_bit_for_bit() {
     assert!(read_text(&directory.join("events.csv")).lines().count() > 1);
     // A head, the four limits of the envelope, what the legs bore, and the six of Table 2.
     assert_eq!(read_text(&directory.join("verdict_limits.csv")).lines().count(), 1 + 4 + 2 + 6);
-}
-
-/// The same frames as in the log, and the telemetry that a ground station would have had.
-#[test]
-fn a_tlog_comes_in() {
-    let path = tlog(&WITH_FRAMES, "out.tlog");
-    let imported_path = WITH_FRAMES.beside("imported.mcap");
-    let imported = import_tlog(&path, &imported_path).unwrap();
-    assert!(imported.frames > 100 && imported.telemetry > 20, "{imported:?}");
-    assert_eq!((imported.not_understood, imported.mavlink1, imported.garbage_bytes), (0, 0, 0));
-    let facts = info(&imported_path).unwrap();
-    assert_eq!(facts.grade.level, GradeLevel::TelemetryOnly);
-    let (then, now) = (Recording::open(&WITH_FRAMES.log).unwrap(), Recording::open(&imported_path).unwrap());
-    let (then, now) = (then.verdict.unwrap(), now.verdict.unwrap());
-    assert_eq!((then.landing, then.envelope.len()), (now.landing, now.envelope.len()));
-    for (a, b) in then.envelope.iter().zip(&now.envelope) {
-        // Single precision over the air.
-        let near = |x: f64, y: f64| (x - y).abs() <= 1e-5 * (1.0 + x.abs());
-        assert!(a.name == b.name && near(a.value, b.value) && near(a.maximum, b.maximum), "{a:?} {b:?}");
-    }
-    assert_eq!(verify(&imported_path).unwrap()[0].outcome, Verification::NotReplayable);
-    // A file that exists is kept.
-    assert_ne!(import_tlog(&path, &imported_path).unwrap().output, imported_path);
-}
-
-/// Every command reads a `.tlog` as it reads the log made of it.
-#[test]
-fn a_tlog_is_read_like_the_log_made_of_it() {
-    let named_otherwise = WITH_FRAMES.beside("telemetry.bin");
-    std::fs::copy(tlog(&WITH_FRAMES, "read.tlog"), &named_otherwise).unwrap();
-    let imported = WITH_FRAMES.beside("read.mcap");
-    import_tlog(&named_otherwise, &imported).unwrap();
-    // Only their names and sizes differ.
-    let of_the_file = |line: &&str| line.contains("imported_from") || line.contains(" kB");
-    let answer = |command: &str, log: &Path| {
-        let (code, said, error) = run(&mut replay(command, log));
-        let lines = said.lines().filter(|line| !of_the_file(line));
-        (code, lines.collect::<Vec<_>>().join("\n"), error.replace(log.to_str().unwrap(), "LOG"))
-    };
-    for command in ["info", "evaluate"] {
-        assert_eq!(answer(command, &named_otherwise), answer(command, &imported), "{command}");
-    }
-    let rows = |log: &Path, name: &str| {
-        let directory = WITH_FRAMES.beside(name);
-        export_tables(&mut FlightLog::open(log).unwrap(), &directory).unwrap();
-        read_text(&directory.join("telemetry.csv"))
-    };
-    assert_eq!(rows(&named_otherwise, "of-tlog"), rows(&imported, "of-mcap"));
-    let (code, _, error) = run(replay("recover", &named_otherwise).arg(WITH_FRAMES.beside("none.mcap")));
-    assert!(code == 1 && error.contains("is a .tlog"), "{error}");
-}
-
-/// What some programs save of a link: one frame after the other.
-#[test]
-fn frames_without_times_are_refused_as_what_they_are() {
-    let clean = std::fs::read(tlog(&WITH_FRAMES, "timed.tlog")).unwrap();
-    let (mut frames, mut reader) = (Vec::new(), protocol::log::tlog::TlogReader::new(clean.as_slice()));
-    while let Some(frame) = reader.next_frame().unwrap() {
-        frames.extend(frame.bytes);
-    }
-    let (raw, log) = (WITH_FRAMES.beside("raw.tlog"), WITH_FRAMES.beside("raw.mcap"));
-    let log_name = log.to_str().unwrap();
-    // As a whole, and from the middle of a frame on.
-    for begin in [0, 5] {
-        std::fs::write(&raw, &frames[begin..]).unwrap();
-        for question in [
-            &["export", "--to", "mcap", "--out", log_name][..],
-            &["export"],
-            &["export", "--to", "csv", "--out", log_name],
-            &["info"],
-            &["verify"],
-            &["report", "--out", log_name],
-        ] {
-            let (code, stdout, stderr) = run(replay(question[0], &raw).args(&question[1..]));
-            assert_eq!((code, stdout.as_str(), log.exists()), (1, "", false), "{question:?}: {stderr}");
-            assert!(stderr.contains("a raw stream of MAVLink frames"), "{question:?}: {stderr}");
-        }
-        assert_eq!(run(replay("recover", &raw).arg(&log)).0, 1);
-    }
-}
-
-#[test]
-fn a_tlog_is_found_between_garbage() {
-    let clean = std::fs::read(tlog(&WITH_FRAMES, "clean.tlog")).unwrap();
-    let mut dirty = vec![0x00, 0xfd, 0x11];
-    dirty.extend(&clean);
-    dirty.extend([0xfd; 5]);
-    let path = WITH_FRAMES.beside("dirty.tlog");
-    std::fs::write(&path, dirty).unwrap();
-    let imported = import_tlog(&path, &WITH_FRAMES.beside("dirty.mcap")).unwrap();
-    assert_eq!((imported.not_understood, imported.garbage_bytes), (0, 8));
-    std::fs::write(&path, b"no frames here at all, only text").unwrap();
-    let refused = import_tlog(&path, &WITH_FRAMES.beside("none.mcap")).unwrap_err();
-    assert!(matches!(refused, ImportError::NoFrames { .. }));
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig { cases: 128, ..ProptestConfig::default() })]
-
-    #[test]
-    fn random_bytes_are_no_tlog(bytes in prop::collection::vec(any::<u8>(), 0..2000)) {
-        let directory = tempfile::tempdir().unwrap();
-        let (input, output) = (directory.path().join("in.tlog"), directory.path().join("out.mcap"));
-        std::fs::write(&input, &bytes).unwrap();
-        if let Ok(imported) = import_tlog(&input, &output) {
-            prop_assert!(imported.frames > 0);
-            prop_assert!(info(&output).is_ok());
-        }
-    }
 }
