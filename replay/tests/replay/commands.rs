@@ -10,7 +10,8 @@ use serde_json::Value;
 use crate::command_line::{Files, data, refusal, replay, run};
 use crate::flown::{FLIGHT, Recipe, WHOLE, write_log};
 use crate::from_apogee::{LANDED, fly};
-use crate::simulated::{DISPERSED, MK2, WITH_FRAMES, station_log};
+use crate::simulated::{DISPERSED, MK2, WITH_FRAMES};
+use crate::station::station_log;
 
 /// Every log of a folder has its line, also one that cannot be read.
 #[test]
@@ -43,7 +44,7 @@ fn a_folder_is_a_season() {
 #[test]
 fn a_season_has_what_a_station_heard_and_says_what_is_damaged() {
     let season = tempfile::tempdir().unwrap();
-    std::fs::copy(station_log(&WITH_FRAMES, "season.mcap"), season.path().join("heard.mcap")).unwrap();
+    std::fs::copy(station_log(&WITH_FRAMES.log, "season.mcap"), season.path().join("heard.mcap")).unwrap();
     let (code, stdout, _) = run(&mut replay("info", season.path()));
     assert!(code == 0 && stdout.contains("STANDS UNDAMAGED") && stdout.contains("heard.mcap"), "{stdout}");
     std::fs::write(season.path().join("cut.mcap"), &WHOLE.bytes[..WHOLE.bytes.len() / 2]).unwrap();

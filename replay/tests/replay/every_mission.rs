@@ -18,7 +18,8 @@ use replay::verify::explain::explain;
 use sim::recipe::Recipe;
 
 use crate::command_line::run;
-use crate::simulated::{Simulated, simulate_recipe, station_log, to_nobody};
+use crate::simulated::{Simulated, simulate_recipe, to_nobody};
+use crate::station::station_log;
 
 /// An exit code, and what the answer says; what begins with `!` is what it does not say.
 type Answer = (i32, &'static [&'static str]);
@@ -194,7 +195,7 @@ impl Case {
         });
         let frames = info(&flown.log).unwrap().frames.unwrap().last;
         let name = format!("{mission} from {} with {fault:?}", start.name());
-        station_log(&flown, "told.mcap");
+        station_log(&flown.log, "told.mcap");
         Self { mission, name, ends, flown, frames, planned }
     }
 

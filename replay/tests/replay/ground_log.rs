@@ -9,9 +9,10 @@ use replay::info::{GradeLevel, info};
 use replay::log::{Clock, ClockTime, FlightLog, Recording};
 use replay::verify::{Verification, verify};
 
-use crate::simulated::{STATION_EARLIER_NS, WITH_FRAMES, station_log};
+use crate::simulated::WITH_FRAMES;
+use crate::station::{EARLIER_NS, station_log};
 
-static GROUND: LazyLock<PathBuf> = LazyLock::new(|| station_log(&WITH_FRAMES, "ground.mcap"));
+static GROUND: LazyLock<PathBuf> = LazyLock::new(|| station_log(&WITH_FRAMES.log, "ground.mcap"));
 
 /// The verdict that was heard is the vehicle's own, to the precision of a message.
 #[test]
@@ -38,7 +39,7 @@ fn the_report_of_a_ground_log_marks_the_touchdown_on_its_own_clock() {
     let contact_s = recording.contact_s().unwrap();
     let own = info(&WITH_FRAMES.log).unwrap();
     let own_s = own.clocks.convert(own.verdict.unwrap().contact(), Clock::Boot).unwrap().time_s;
-    assert!((contact_s - own_s - STATION_EARLIER_NS as f64 / 1e9).abs() < 0.2, "{contact_s} {own_s}");
+    assert!((contact_s - own_s - EARLIER_NS as f64 / 1e9).abs() < 0.2, "{contact_s} {own_s}");
     let page = replay::report::report(&GROUND).unwrap().html;
     assert!(page.contains("STANDS UNDAMAGED") && page.contains(">touchdown</text>"));
     // The crew's note stands in the pictures, too.

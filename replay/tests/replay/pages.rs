@@ -10,7 +10,8 @@ use sim::recipe::{Recipe as Flown, toml_starting_at};
 
 use crate::flown::{FLIGHT, Recipe, WHOLE, write_log};
 use crate::from_apogee::{LANDED, fly, fly_recipe};
-use crate::simulated::{DISPERSED, MK2, WITH_FRAMES, station_log};
+use crate::simulated::{DISPERSED, MK2, WITH_FRAMES};
+use crate::station::station_log;
 
 /// The page of a log: every tag is closed, and it refers to nothing outside itself.
 fn page_of(log: &Path) -> String {
@@ -144,7 +145,7 @@ fn a_poor_log_has_a_page_that_says_what_is_missing() {
         let page = page_of(&path);
         assert!(words.iter().all(|words| page.contains(words)), "{name}: {page}");
     }
-    let log = station_log(&WITH_FRAMES, "page.mcap");
+    let log = station_log(&WITH_FRAMES.log, "page.mcap");
     says_in_order(&page_of(&log), &["STANDS UNDAMAGED", "From the telemetry of a ground station"]);
 }
 

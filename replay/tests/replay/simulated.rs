@@ -1,17 +1,12 @@
 //! Flies the simulated vehicle, with the logs that it writes itself.
 
-use std::fs::File;
 use std::num::NonZeroU32;
 use std::path::PathBuf;
 use std::sync::LazyLock;
 
-use protocol::frame::Framer;
-use protocol::log::record::{Direction, Event, EventLevel, RawFrame, Record};
 use protocol::log::recorder::Recorder;
-use protocol::log::writer::{LogHeader, LogWriter};
-use protocol::told::Told;
 use protocol::transport::LinkAddress;
-use replay::log::{Entry, FlightLog, Recording};
+use replay::log::Recording;
 use sim::recipe::Recipe;
 use sim::wire::fly::{FlyOptions, OnTheWire, Speed, fly, load_flight};
 use sim::wire::vehicle::RocketFlight;
@@ -20,11 +15,6 @@ use tokio::sync::watch;
 
 /// Start of every run, so that the logs do not depend on the day.
 const START_UNIX_NS: u64 = 1_760_000_000_000_000_000;
-
-/// A station was started this long before its vehicle, records its state so often, and its crew notes something in the burn, ns.
-pub(crate) const STATION_EARLIER_NS: u64 = 3_000_000_000;
-const STATION_PERIOD_NS: u64 = 100_000_000;
-const NOTED_NS: u64 = 25_000_000_000;
 
 /// A directory with the log of one flight in it.
 pub(crate) struct Simulated {
@@ -45,43 +35,6 @@ pub(crate) static WITH_FRAMES: LazyLock<Simulated> = LazyLock::new(|| to_nobody(
 pub(crate) fn to_nobody(fly: impl FnOnce(LinkAddress) -> Simulated) -> Simulated {
     let sink = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
     fly(format!("udpout:{}", sink.local_addr().unwrap()).parse().unwrap())
-}
-
-/// The log that a station writes which hears every frame of a vehicle, beside the vehicle's own.
-pub(crate) fn station_log(flight: &Simulated, name: &str) -> PathBuf {
-    let path = flight.beside(name);
-    let mut from = FlightLog::open(&flight.log).unwrap();
-    let header =
-        LogHeader { writer: "ground".to_owned(), start_unix_ns: START_UNIX_NS, ..LogHeader::default() };
-    let mut log = LogWriter::new(File::create(&path).unwrap(), &header).unwrap();
-    let (mut told, mut due_ns, mut noted) = (Told::default(), 0, false);
-    while let Some(stamped) = from.next_entry().unwrap() {
-        if stamped.entry != Entry::RawFrame {
-            continue;
-        }
-        let at_ns = STATION_EARLIER_NS + stamped.log_time_ns - START_UNIX_NS;
-        let mut framer = Framer::new();
-        framer.push_datagram(&stamped.data);
-        let message = framer.next_frame().unwrap().decode().unwrap();
-        let raw = RawFrame {
-            direction: Direction::Rx,
-            endpoint: "ground",
-            link: "udpin:0.0.0.0:14550".to_owned(),
-            bytes: stamped.data,
-        };
-        log.write(&Record::RawFrame(raw), at_ns).unwrap();
-        if told.hear(&message) && at_ns >= due_ns {
-            due_ns = at_ns + STATION_PERIOD_NS;
-            log.write(&Record::Telemetry(Box::new(told.record(at_ns as f64 / 1e9))), at_ns).unwrap();
-        }
-        if at_ns > NOTED_NS && !noted {
-            noted = true;
-            let (name, message) = ("ground".to_owned(), "note (screen 1, Ann): a gust".to_owned());
-            log.write(&Record::Event(Event { level: EventLevel::Info, name, message }), at_ns).unwrap();
-        }
-    }
-    log.finish().unwrap();
-    path
 }
 
 impl Simulated {
