@@ -50,20 +50,18 @@ fn code_in_sentences(page: &str) -> Vec<String> {
     spans.filter(|span| !span.contains('…')).map(|span| span.replace('\n', " ")).collect()
 }
 
-/// The commands of a line: several after a semicolon or `&&`, one after a pipe, one in the quotes of `sbatch`.
+/// The commands of a line: several after a semicolon or `&&`, one after a pipe.
 pub(crate) fn commands_of(line: &str) -> Vec<(Program, Vec<String>)> {
-    let parts = line.split([';', '|', '\'']).flat_map(|part| part.split("&&"));
+    let parts = line.split([';', '|']).flat_map(|part| part.split("&&"));
     let words_of = |part: &str| -> Vec<String> {
-        // Slurm and GNU parallel fill in a number.
-        let filled_in = |word: &str| word.replace("$SLURM_ARRAY_TASK_ID", "1").replace("{}", "1");
-        let words = part.split_whitespace().map(|word| filled_in(word.trim_matches('"')));
-        // What follows is not of the program: parallel's list, or where output goes.
-        words.take_while(|word| word != ":::" && !word.starts_with('>') && !word.starts_with("2>")).collect()
+        let words = part.split_whitespace().map(|word| word.trim_matches('"').to_owned());
+        // What follows is not of the program: where output goes.
+        words.take_while(|word| !word.starts_with('>') && !word.starts_with("2>")).collect()
     };
     parts
         .filter_map(|part| {
             let words = words_of(part);
-            let first = words.iter().position(|word| !matches!(word.as_str(), "parallel" | "if" | "!"))?;
+            let first = words.iter().position(|word| !matches!(word.as_str(), "if" | "!"))?;
             let named = words[first].trim_start_matches("target/release/");
             let (_, program) = PROGRAMS.into_iter().find(|(name, _)| *name == named)?;
             Some((program, words[first + 1..].to_vec()))

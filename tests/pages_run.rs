@@ -23,12 +23,9 @@ const PAGES: [&str; 9] = [
 ];
 
 /// Lines that do not run here: their page, how they begin, and why.
-const ELSEWHERE: [(&str, &str, &str); 29] = [
+const ELSEWHERE: [(&str, &str, &str); 26] = [
     ("README.md", "cargo run ", "compiles; tests/demo.rs flies the same demonstration"),
     ("README.md", "cargo test", "is this test among all others"),
-    ("ENGINEER.md", "sbatch ", "needs a Slurm cluster; tests/clients/tests/cluster.rs runs it"),
-    ("ENGINEER.md", "parallel ", "needs GNU parallel; tests/clients/tests/cluster.rs runs it"),
-    ("ENGINEER.md", "onboard-sim campaign merge part-*", "needs the parts of both lines above"),
     ("ENGINEER.md", "npm ", "installs from the network"),
     ("ENGINEER.md", "onboard-sim check mini-f10 --from node_modules", "needs what npm installs"),
     ("ENGINEER.md", "pip ", "installs from the network"),
@@ -82,7 +79,7 @@ const SAID: [(&str, &str); 21] = [
     ("replay recover cut.mcap", "whole.mcap"),
     ("replay compare mk2 mk3", "mk3 differs from mk2 in"),
     ("replay refly flight.mcap --without-fault gnss-out", "flown again"),
-    ("replay compare flight.mcap without.mcap --tolerances tolerances.toml", "without.mcap"),
+    ("replay compare flight.mcap without.mcap", "without.mcap"),
     ("replay export flight.mcap --to csv", "tables"),
     ("replay fit flight.mcap ", "drag"),
     ("replay fit fits.json --mission mk3 --flights", "GO"),

@@ -27,7 +27,7 @@ Examples:
 /// Without --connect it always flies a demonstration: a simulated vehicle in this process, from its pad to touchdown,
 /// with real MAVLink over a loopback UDP socket. On a terminal it shows the full screen (? lists the keys). Without a
 /// terminal it prints one line per event and the landing verdict; the exit code tells how the flight ended. Colours,
-/// keys, voice and bell stand in the settings (`ground config example`).
+/// voice and bell stand in the settings (`ground config example`).
 #[derive(Debug, Clone, Parser)]
 #[command(name = "ground", version, after_help = format!("{EXAMPLES}\n\n{EXIT_CODES}"), args_conflicts_with_subcommands = true)]
 pub struct Cli {

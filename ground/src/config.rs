@@ -10,7 +10,7 @@ use serde::{Deserialize, Deserializer, de};
 use toml::{Table, Value};
 
 use crate::cli::{Characters, Flags, LinkArgs, StationArgs, seconds};
-use crate::model::{Amount, Bindings, Degrees, Talk};
+use crate::model::{Amount, Degrees, Talk};
 use crate::view::theme::Palette;
 
 /// A file with every key, its meaning and its default; `ground config example` prints it.
@@ -32,7 +32,6 @@ pub struct Config {
     /// `None` lets the environment decide.
     #[serde(deserialize_with = "palette")]
     pub theme: Option<Palette>,
-    pub keys: Bindings,
     #[serde(deserialize_with = "command")]
     pub voice: Option<String>,
     pub talk: Amount,
@@ -196,7 +195,6 @@ mod tests {
             ("voice = \"\"", "voice", "\"none\""),
             ("talk = \"loud\"", "talk", "few"),
             ("talk_every_s = 0.0", "talk_every_s", "from 0.1 to 86400"),
-            ("keys = { arm = \"a\" }", "keys", "capital letter"),
             ("alarm_command = \" \"", "alarm_command", "empty"),
         ] {
             let wrong = Config::parse(text).unwrap_err();

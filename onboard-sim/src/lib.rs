@@ -13,8 +13,8 @@
 //! * [`playback`]: recorded sensors played to the flight computer.
 //! * [`scenario`]: faults, and the expected outcome of a flight with them.
 //!
-//! A flight depends only on its recipe and its number. So a campaign can be divided into shards, stopped, continued and
-//! run on any number of threads with the same results.
+//! A flight depends only on its recipe and its number. So a campaign can be stopped, continued and run on any
+//! number of threads with the same results.
 
 pub mod card;
 pub mod check;

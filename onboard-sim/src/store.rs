@@ -42,13 +42,11 @@ pub struct Manifest {
     pub faults: Vec<String>,
     /// The program.
     pub build: String,
-    /// Which part of the campaign.
-    pub shard: Shard,
 }
 
 impl Manifest {
     /// Of so many flights of a recipe; `build` names the program.
-    pub fn of(recipe: &Recipe, flights: u64, build: &str, shard: Shard) -> Self {
+    pub fn of(recipe: &Recipe, flights: u64, build: &str) -> Self {
         Self {
             mission: recipe.mission.name.clone(),
             mission_sha256: sha256(&recipe.mission_toml),
@@ -58,7 +56,6 @@ impl Manifest {
             flights,
             faults: recipe.faults.iter().map(ToString::to_string).collect(),
             build: build.to_owned(),
-            shard,
         }
     }
 
@@ -78,47 +75,6 @@ impl Manifest {
         let words = |(key, here): (&String, _)| format!("its {key} is {}, this run's is {here}", there[key]);
         let difference = differs.map_or_else(|| format!("another {MANIFEST}"), words);
         Err(StoreError::OtherCampaign { path: directory.to_owned(), difference })
-    }
-}
-
-/// Part `index` of `count`, counted from 1.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Shard {
-    /// The number of the part, from 1.
-    pub index: u64,
-    /// The number of parts.
-    pub count: u64,
-}
-
-impl Shard {
-    /// The whole campaign as one part.
-    pub const WHOLE: Self = Self { index: 1, count: 1 };
-
-    /// Whether a flight belongs to this part.
-    pub fn has(self, number: u64) -> bool {
-        number % self.count + 1 == self.index
-    }
-}
-
-/// Why the text of a shard is wrong.
-#[derive(Debug, thiserror::Error)]
-#[error("shard `{0}` is not I/N with 1 <= I <= N")]
-pub struct ShardError(String);
-
-impl core::str::FromStr for Shard {
-    type Err = ShardError;
-
-    fn from_str(text: &str) -> Result<Self, ShardError> {
-        text.split_once('/')
-            .and_then(|(index, count)| Some(Self { index: index.parse().ok()?, count: count.parse().ok()? }))
-            .filter(|shard| (1..=shard.count).contains(&shard.index))
-            .ok_or_else(|| ShardError(text.to_owned()))
-    }
-}
-
-impl core::fmt::Display for Shard {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        write!(f, "{}/{}", self.index, self.count)
     }
 }
 
@@ -148,10 +104,6 @@ pub enum StoreError {
     Foreign(PathBuf),
     #[error("{} is in use by another process", .0.display())]
     InUse(PathBuf),
-    #[error("flight {0} is in none of the directories; fly the missing ones first")]
-    Missing(u64),
-    #[error("{} has another result for flight {number} than a part before it", path.display())]
-    Contradiction { path: PathBuf, number: u64 },
 }
 
 impl StoreError {
@@ -207,8 +159,7 @@ impl Store {
     /// The numbers of the flights that are not flown yet.
     pub fn missing(&self) -> Vec<u64> {
         let (rows, _) = &*self.rows.lock().unwrap_or_else(PoisonError::into_inner);
-        let is_missing = |number: &u64| self.manifest.shard.has(*number) && !rows.contains_key(number);
-        (0..self.manifest.flights).filter(is_missing).collect()
+        (0..self.manifest.flights).filter(|number| !rows.contains_key(number)).collect()
     }
 
     /// Writes the row of a flight, whole or not at all.
@@ -271,7 +222,7 @@ fn read_rows(directory: &Path, manifest: &Manifest) -> Result<BTreeMap<u64, Row>
     }
     let rows = reader.into_deserialize().map(|row: csv::Result<Row>| {
         let row = row.map_err(|error| StoreError::content(&path, &error))?;
-        if row.number >= manifest.flights || !manifest.shard.has(row.number) {
+        if row.number >= manifest.flights {
             return Err(StoreError::content(
                 &path,
                 &format!("has flight {}, which is not of it", row.number),
@@ -288,39 +239,6 @@ fn to_csv<'a>(rows: impl IntoIterator<Item = &'a Row>, has_header: bool) -> Resu
     let written = rows.into_iter().try_for_each(|row| writer.serialize(row));
     written.map_err(|error| StoreError::content(Path::new(FLIGHTS), &error))?;
     writer.into_inner().map_err(|error| StoreError::content(Path::new(FLIGHTS), &error))
-}
-
-/// Merges the parts of a campaign into one directory.
-///
-/// # Errors
-/// The parts belong to different campaigns, contradict each other, or some flights are missing.
-pub fn merge(parts: &[PathBuf], out: &Path) -> Result<Summary, StoreError> {
-    let first = parts.first().ok_or(StoreError::Missing(0))?;
-    let whole = Manifest { shard: Shard::WHOLE, ..Manifest::read(first)? };
-    let mut rows = BTreeMap::new();
-    for part in parts {
-        let manifest = Manifest::read(part)?;
-        let rows_of_part = read_rows(part, &manifest)?;
-        whole.refuse_other(part, &Manifest { shard: Shard::WHOLE, ..manifest })?;
-        for (number, row) in rows_of_part {
-            if rows.insert(number, row.clone()).is_some_and(|known| known != row) {
-                return Err(StoreError::Contradiction { path: part.clone(), number });
-            }
-        }
-    }
-    if let Some(number) = (0..whole.flights).find(|number| !rows.contains_key(number)) {
-        return Err(StoreError::Missing(number));
-    }
-    let read = |name: &str| {
-        let path = first.join(name);
-        fs::read_to_string(&path).map_err(unreadable(&path))
-    };
-    let (mission, dispersion) = (read(MISSION)?, read(DISPERSION)?);
-    let recipe = Recipe::from_texts((MISSION, &mission), (&whole.dispersion, &dispersion));
-    let recipe = recipe.map_err(|error| StoreError::content(first, &error))?;
-    let store = Store::open(out, &recipe, whole)?;
-    rows.into_values().try_for_each(|row| store.add(row))?;
-    store.publish()
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use crate::row::{COLUMNS, Row};
 use crate::statistics::{Landings, Share, quantile, sorted};
-use crate::store::{Manifest, Shard};
+use crate::store::Manifest;
 
 /// Columns whose percentiles are in the summary.
 const TOLD: [&str; 14] = [
@@ -233,9 +233,6 @@ pub fn to_markdown(summary: &Summary) -> String {
 fn what(manifest: &Manifest) -> String {
     let mut what =
         format!("{}, dispersion {}, seed {}", manifest.mission, manifest.dispersion, manifest.seed);
-    if manifest.shard != Shard::WHOLE {
-        what = format!("{what}, shard {}", manifest.shard);
-    }
     if !manifest.faults.is_empty() {
         what = format!("{what}, faults {}", manifest.faults.join(" "));
     }

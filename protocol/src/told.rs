@@ -1,5 +1,4 @@
-//! What a vehicle has told of itself, as one record of the log. A station records it as it hears, and `replay` makes the same of
-//! a `.tlog`.
+//! What a vehicle has told of itself, as one record of the log: a station records it as it hears.
 
 use mavlink::MessageData as _;
 use num_traits::FromPrimitive as _;

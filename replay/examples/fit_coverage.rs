@@ -4,6 +4,8 @@
 //!
 //! With `--table FILE FLIGHTS SEED` it writes instead what the intervals lack, the table that `replay fit` widens them by.
 
+mod truth;
+
 use std::collections::BTreeMap;
 use std::io::Write as _;
 
@@ -12,10 +14,11 @@ use flight::vehicle::mission::StartPoint;
 use onboard_sim::run::in_parallel;
 use onboard_sim::statistics::{Share, quantile, sorted};
 use replay::fit::calibration::{Entry, Table};
-use replay::fit::truth::truth;
 use replay::fit::{Fit, Trace, Z_95, fit, uncalibrated};
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
+
+use truth::truth;
 
 /// The table is made of these vehicles in these sets.
 const VEHICLES: [&str; 2] = ["mk2", "mk3"];
@@ -66,7 +69,7 @@ fn tallied(recipe: &Recipe, flights: u64, fitted: fn(&Trace) -> Fit) -> anyhow::
                 Some(parameter) => found.push(Found {
                     error: parameter.value - true_value,
                     sigma: parameter.sigma,
-                    held: parameter.holds(true_value),
+                    held: (parameter.low..=parameter.high).contains(&true_value),
                 }),
             }
         }

@@ -85,15 +85,13 @@ pub(crate) fn give_each<A: Answer>(
     Ok(worse(given, outcome))
 }
 
-/// The logs of a directory with these endings, in subdirectories, too. Each regular file counts once, however many links lead to
-/// it; what has the name of a log and is no file (a pipe, a link to nothing) is never opened, and is told, as is a `.tlog` where
-/// only the vehicle's logs are wanted.
-pub(crate) fn files_of(directory: &Path, endings: &[&str]) -> Result<Vec<PathBuf>> {
+/// The logs of a directory, in subdirectories, too. Each regular file counts once, however many links lead to it; what has the
+/// name of a log and is no file (a pipe, a link to nothing) is never opened, and is told.
+pub(crate) fn logs_of(directory: &Path) -> Result<Vec<PathBuf>> {
     let (mut seen, mut logs, mut left) =
         (BTreeSet::new(), Vec::new(), VecDeque::from([directory.to_owned()]));
     while let Some(path) = left.pop_back() {
-        let ending = path.extension().and_then(OsStr::to_str).unwrap_or_default();
-        let (is_log, is_wanted) = (["mcap", "tlog"].contains(&ending), endings.contains(&ending));
+        let is_wanted = path.extension() == Some(OsStr::new("mcap"));
         let failed = || format!("{}: cannot be read", path.display());
         match path.metadata() {
             Ok(found) if found.is_dir() && seen.insert(path.canonicalize().with_context(failed)?) => {
@@ -110,11 +108,10 @@ pub(crate) fn files_of(directory: &Path, endings: &[&str]) -> Result<Vec<PathBuf
             Ok(found) if is_wanted && found.is_file() && seen.insert(path.canonicalize()?) => logs.push(path),
             Err(error) if path == directory => return Err(error).with_context(failed),
             _ if is_wanted => say(&format!("left out: {}: no file, or here already", path.display())),
-            _ if is_log => say(&format!("left out: {}: not a vehicle's own log", path.display())),
             _ => {}
         }
     }
-    ensure!(!logs.is_empty(), "{}: holds no log (*.{})", directory.display(), endings.join(", *."));
+    ensure!(!logs.is_empty(), "{}: holds no log (*.mcap)", directory.display());
     logs.sort();
     Ok(logs)
 }

@@ -18,7 +18,7 @@
 //!   tell of the next day.
 //! * [`table`]: reads a log as tables; [`compare`](mod@compare): compares flights signal by signal.
 //! * [`report`](mod@report): writes a flight as one HTML page; [`open`]: shows it in another program.
-//! * [`export`]: converts logs to and from other formats; [`recover`](mod@recover): repairs a damaged log, sorts another.
+//! * [`export`]: converts logs to other formats; [`recover`](mod@recover): repairs a damaged log.
 //! * [`output`](onboard_sim::files): writes files completely or not at all, each new one under a name that is free.
 //! * [`print`](mod@print): what answers have in common: columns, two verdicts beside each other, JSON.
 
@@ -52,7 +52,7 @@ use protocol::program::{EXIT_CODES, Exit, Manual, Shown};
 ///
 /// The answer is no, and the exit code 3: of verify, if something differs or cannot be, or with --strict not all that can be
 /// compared was; with --baseline, if some flight got worse, lands no longer, diverged or is lost; with --book, if a book is broken,
-/// or its end is not proven; of compare, if more differs or is missing than is tolerated, or the verdicts differ; of fit, if it is
+/// or its end is not proven; of compare, if the verdicts differ, signals are missing or a log is damaged; of fit, if it is
 /// NO-GO. It is 5 if verify cannot run some frame again (no frames, no profile, frames missing) and all others are identical, if no
 /// log has a book, and if some of several logs could not be read and the answer of the others is not no.
 ///
@@ -105,8 +105,8 @@ enum Command {
     Refly(refly::Args),
     /// Compares flights: the answer in one sentence, then verdicts, signals (RMS, maximum and when), words.
     ///
-    /// Signals are named as in an export. Exit code 3 if a tolerance is exceeded or the verdicts differ. Two missions are compared
-    /// setting by setting; exit code 3 if one differs.
+    /// Signals are named as in an export. Exit code 3 if the verdicts differ, if one flight lacks a signal or if one log is
+    /// damaged. Two missions are compared setting by setting; exit code 3 if one differs.
     #[command(
         after_help = "Examples:\n  replay compare old.mcap new.mcap\n  replay compare mk3 day/mission.toml"
     )]
@@ -117,13 +117,10 @@ enum Command {
     /// Opens a log in a viewer that is installed, with our layout: Rerun, Foxglove or Lichtblick.
     #[command(after_help = "Example: replay open flight.mcap")]
     Open(open::Args),
-    /// Writes a log's content as CSV or a Rerun recording; makes a log of a .tlog.
-    #[command(
-        after_help = "Examples:\n  replay export flight.mcap --to csv --out tables\n  replay export flight.tlog"
-    )]
+    /// Writes a log's content as CSV or a Rerun recording.
+    #[command(after_help = "Example: replay export flight.mcap --to csv --out tables")]
     Export(export::Args),
-    /// Recovers a whole log from a damaged one, and says what was kept and what time span is lost; sorts one that is not in order
-    /// of time.
+    /// Recovers a readable log from a damaged one, and reports what was recovered and what time span is lost.
     #[command(after_help = "Example: replay recover cut.mcap whole.mcap")]
     Recover(recover::Args),
     /// Finds drag, thrust, delays, gimbal and wind of flights, with 95 % intervals, and says what it cannot find.

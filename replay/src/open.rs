@@ -7,7 +7,7 @@ use anyhow::{Context as _, Result, ensure};
 use protocol::program::Exit;
 
 use crate::cli::say;
-use crate::log::{FlightLog, is_tlog};
+use crate::log::FlightLog;
 
 /// How a log is shown: programs with their words, one after the other, and what is left to do by hand. LOG and LAYOUT are
 /// files, and a name with a dot a file of the viewer.
@@ -51,11 +51,6 @@ pub(crate) struct Args {
 impl Args {
     pub(crate) fn run(self) -> Result<Exit> {
         FlightLog::open(&self.file)?;
-        let name = self.file.display();
-        ensure!(
-            !is_tlog(&self.file)?,
-            "{name}: is a .tlog, which viewers do not read: `replay export {name}` makes a log of it"
-        );
         let (programs, by_hand) = way(|name| found(name).is_some()).context(NOTHING)?;
         // A viewer reads its files as long as it runs, and some go on after their command.
         let folder = tempfile::tempdir().context("a folder for the viewer's files")?.keep();

@@ -21,8 +21,7 @@ use crate::config::Config;
 use crate::exit;
 use crate::exit::Exit;
 use crate::model::{
-    Action, Bindings, CommandKind, Model, Request, Role, Seat, Settings, Speaker, Talk, Unfinished,
-    asked_words,
+    Action, CommandKind, Model, Request, Role, Seat, Settings, Speaker, Talk, Unfinished, asked_words,
 };
 use crate::update::{Msg, update};
 
@@ -42,7 +41,6 @@ const LINES_ONLY: &[u8] =
 pub struct Viewer {
     pub watch: bool,
     pub operator: String,
-    pub keys: Bindings,
     pub talk: Talk,
 }
 
@@ -279,7 +277,6 @@ fn settings(hello: &Hello, viewer: &Viewer) -> Settings {
     Settings {
         role: if viewer.watch { Role::Watching } else { Role::Attached },
         seat: Seat::new(hello.screen, viewer.operator.clone()),
-        keys: viewer.keys.clone(),
         talk: viewer.talk,
         interactive: true,
         ..hello.station.clone()

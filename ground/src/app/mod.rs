@@ -109,7 +109,6 @@ pub fn run(given: &ArgMatches) -> anyhow::Result<Exit> {
                 // Nobody can command without keys.
                 watch: args.watch || !interactive,
                 operator: operator(who.as_deref()),
-                keys: config.keys.clone(),
                 talk: config.talk(),
             };
             runtime.block_on(attached::session(socket.as_deref(), &viewer, &config, interactive))
@@ -257,7 +256,6 @@ async fn start(
         auto,
         // A daemon also keeps running after a flight.
         interactive: interactive || is_daemon,
-        keys: config.keys.clone(),
         talk: config.talk(),
         time_limit: time_limit.or(auto.then_some(AUTO_TIME_LIMIT)),
         ..Settings::on_screen(links.join(" and "))

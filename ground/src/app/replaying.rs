@@ -18,7 +18,7 @@ use crate::config::Config;
 use crate::exit;
 use crate::exit::Exit;
 use crate::key::Key;
-use crate::model::{Bindings, Model, Role, Settings, words};
+use crate::model::{Model, Role, Settings, words};
 use crate::replay::Player;
 use crate::replay::recording::Recording;
 use crate::update::{Action, Msg};
@@ -57,7 +57,7 @@ pub async fn session(
     announce(path);
     let recording = Recording::load(path, vehicle)?;
     let damage = recording.damage.clone();
-    let mut player = Player::new(recording, settings(&path.display().to_string(), &config.keys));
+    let mut player = Player::new(recording, settings(&path.display().to_string()));
     match from {
         None => {}
         Some(ReplayFrom::Time(at)) => player.seek(at),
@@ -83,13 +83,8 @@ pub async fn session(
 }
 
 /// The settings of a screen that shows this recording.
-fn settings(log: &str, keys: &Bindings) -> Settings {
-    Settings {
-        log_path: Some(log.to_owned()),
-        role: Role::Replaying,
-        keys: keys.clone(),
-        ..Settings::on_screen(log)
-    }
+fn settings(log: &str) -> Settings {
+    Settings { log_path: Some(log.to_owned()), role: Role::Replaying, ..Settings::on_screen(log) }
 }
 
 /// Says that a large log takes a while.
@@ -195,7 +190,7 @@ impl Again {
         }
         let Some((name, told)) = &self.loading else { return Ok(false) };
         let Ok(loaded) = told.try_recv() else { return Ok(false) };
-        let settings = settings(name, &model.settings.keys);
+        let settings = settings(name);
         self.loading = None;
         let mut player = Player::new(loaded?, settings);
         if let Some(lit) = player.recording().begin_of(TdPhase::TD_PHASE_IGNITION) {

@@ -1,12 +1,8 @@
-//! Everything that one key does, with its name in the settings, its usual key and its words; which key the crew has
-//! chosen for it; and the palette, which lists it all.
+//! Every action of one key, with its name, its key and its words; and the palette, which lists them.
 //!
-//! The abort is not among them: its keys cannot be changed. What commands the vehicle only opens a dialog.
+//! The abort is not among them. What commands the vehicle only opens a dialog.
 
-use std::collections::BTreeMap;
 use std::time::Duration;
-
-use serde::Deserialize;
 
 use super::{
     Model, Page, Role, Vehicle,
@@ -61,12 +57,12 @@ pub enum Act {
     Quit,
 }
 
-/// An action, its name in the settings, its usual key, and what it does.
+/// An action: its name, its key and its effect in words.
 pub struct Definition {
     effect: Effect,
     pub act: Act,
     pub name: &'static str,
-    pub usual: Key,
+    pub key: Key,
     pub words: &'static str,
 }
 
@@ -83,20 +79,20 @@ enum Effect {
     Acts,
 }
 
-const fn shows(act: Act, name: &'static str, usual: char, words: &'static str) -> Definition {
-    Definition { effect: Effect::Shows, act, name, usual: Key::Char(usual), words }
+const fn shows(act: Act, name: &'static str, key: char, words: &'static str) -> Definition {
+    Definition { effect: Effect::Shows, act, name, key: Key::Char(key), words }
 }
 
-const fn asks(act: Act, name: &'static str, usual: char, words: &'static str) -> Definition {
-    Definition { effect: Effect::Asks, act, name, usual: Key::Char(usual), words }
+const fn asks(act: Act, name: &'static str, key: char, words: &'static str) -> Definition {
+    Definition { effect: Effect::Asks, act, name, key: Key::Char(key), words }
 }
 
-const fn commands(act: Act, name: &'static str, usual: char, words: &'static str) -> Definition {
-    Definition { effect: Effect::Commands, act, name, usual: Key::Char(usual), words }
+const fn commands(act: Act, name: &'static str, key: char, words: &'static str) -> Definition {
+    Definition { effect: Effect::Commands, act, name, key: Key::Char(key), words }
 }
 
-const fn acts(act: Act, name: &'static str, usual: char, words: &'static str) -> Definition {
-    Definition { effect: Effect::Acts, act, name, usual: Key::Char(usual), words }
+const fn acts(act: Act, name: &'static str, key: char, words: &'static str) -> Definition {
+    Definition { effect: Effect::Acts, act, name, key: Key::Char(key), words }
 }
 
 /// Every action; the most important first.
@@ -140,7 +136,7 @@ pub const DEFINITIONS: [Definition; 36] = [
     acts(Act::ReplayFlight, "replay", 'R', "the flight just flown, again on this screen; q ends it"),
     acts(Act::Report, "report", 'W', "write the report of the flight beside the log"),
     acts(Act::MovePin, "pin", 'I', "demonstration: put the vehicle's pin in, or pull it, by hand"),
-    Definition { usual: Key::CtrlL, ..shows(Act::Redraw, "redraw", ' ', "draw the screen again") },
+    Definition { key: Key::CtrlL, ..shows(Act::Redraw, "redraw", ' ', "draw the screen again") },
     acts(Act::Quit, "quit", 'q', "quit; while it is not over: then type QUIT and Enter"),
 ];
 
@@ -220,94 +216,35 @@ impl Act {
     }
 }
 
-// Which key does what. The crew may choose other keys in the settings.
-//
-// Ctrl-X, Enter and Esc are not here and cannot be taken: the abort, the confirmations and the way out always keep
-// their keys. An action that opens a ladder keeps a capital letter, so that no slip of a finger opens it.
+// Ctrl-X, Enter and Esc have no action: the abort, the confirmations and the way out. An action that opens a ladder has a
+// capital letter, so that no slip of a finger opens it.
 
-/// The keys of all actions, in the order of [`DEFINITIONS`].
-#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
-#[serde(try_from = "BTreeMap<String, String>")]
-pub struct Bindings([Key; DEFINITIONS.len()]);
-
-impl Default for Bindings {
-    fn default() -> Self {
-        Self(DEFINITIONS.map(|definition| definition.usual))
-    }
-}
-
-impl Bindings {
-    /// The action of a key. A letter also counts with Shift, unless its capital letter has an action of its own.
-    pub fn act(&self, key: Key) -> Option<Act> {
-        self.exactly(key).or_else(|| match key {
+impl Act {
+    /// The action of a key. A letter also counts with Shift, unless its capital letter has an action.
+    pub fn of_key(key: Key) -> Option<Self> {
+        Self::exactly(key).or_else(|| match key {
             Key::Char(letter) if letter.is_ascii_uppercase() => {
-                self.exactly(Key::Char(letter.to_ascii_lowercase()))
+                Self::exactly(Key::Char(letter.to_ascii_lowercase()))
             }
-            Key::F1 => Some(Act::Show(Page::Help)),
-            Key::CtrlC => Some(Act::Quit),
-            Key::Escape => Some(Act::Follow),
+            Key::F1 => Some(Self::Show(Page::Help)),
+            Key::CtrlC => Some(Self::Quit),
+            Key::Escape => Some(Self::Follow),
             _ => None,
         })
     }
 
-    fn exactly(&self, key: Key) -> Option<Act> {
-        let place = self.0.iter().position(|bound| *bound == key)?;
-        Some(DEFINITIONS[place].act)
+    fn exactly(key: Key) -> Option<Self> {
+        DEFINITIONS.iter().find(|definition| definition.key == key).map(|definition| definition.act)
     }
 
-    /// The key of an action, if it has one.
-    pub fn key(&self, act: Act) -> Option<Key> {
-        let place = DEFINITIONS.iter().position(|definition| definition.act == act)?;
-        self.0.get(place).copied()
-    }
-
-    /// The name of the key of an action; empty without one.
-    pub fn name(&self, act: Act) -> String {
-        self.key(act).map_or_else(String::new, Key::name)
+    /// The name of the action's key; empty without one.
+    pub fn key_name(self) -> String {
+        self.definition().map_or_else(String::new, |definition| definition.key.name())
     }
 
     /// The action that this small letter would have opened as a capital letter.
-    pub fn meant_as_capital(&self, letter: char) -> Option<Act> {
-        self.exactly(Key::Char(letter.to_ascii_uppercase())).filter(|act| act.opens_confirmation())
-    }
-}
-
-fn key_for(definition: &Definition, given: &str) -> Result<Key, String> {
-    let action = definition.name;
-    let mut letters = given.chars();
-    let letter = match (given, letters.next(), letters.next()) {
-        ("Space", ..) => ' ',
-        (_, Some(letter), None) if letter.is_ascii_graphic() => letter,
-        _ => {
-            let give = "give one printable ASCII character or Space";
-            return Err(format!("{action}: `{given}` cannot be chosen; {give}"));
-        }
-    };
-    if definition.act.opens_confirmation() && !letter.is_ascii_uppercase() {
-        return Err(format!("{action}: `{given}` is no capital letter, and {action} needs one"));
-    }
-    Ok(Key::Char(letter))
-}
-
-impl TryFrom<BTreeMap<String, String>> for Bindings {
-    type Error = String;
-
-    fn try_from(chosen: BTreeMap<String, String>) -> Result<Self, String> {
-        let mut bindings = Self::default();
-        for (name, given) in chosen {
-            let place = DEFINITIONS.iter().position(|definition| definition.name == name);
-            let names = || DEFINITIONS.map(|definition| definition.name).join(", ");
-            let place = place.ok_or_else(|| format!("`{name}` is no action; give one of {}", names()))?;
-            bindings.0[place] = key_for(&DEFINITIONS[place], &given)?;
-        }
-        for (place, key) in bindings.0.iter().enumerate() {
-            if let Some(other) = bindings.0[..place].iter().position(|bound| bound == key) {
-                let (first, second) = (DEFINITIONS[other].name, DEFINITIONS[place].name);
-                let key = key.name();
-                return Err(format!("{first} and {second} have the same key `{key}`; give each its own"));
-            }
-        }
-        Ok(bindings)
+    pub fn meant_as_capital(letter: char) -> Option<Self> {
+        Self::exactly(Key::Char(letter.to_ascii_uppercase())).filter(|act| act.opens_confirmation())
     }
 }
 
@@ -347,8 +284,8 @@ pub fn palette_entries(model: &Model, typed: &str, now: Duration) -> Vec<Palette
 fn every_entry(model: &Model, now: Duration) -> impl Iterator<Item = PaletteEntry> {
     let entry = |words: String, key: String, action| PaletteEntry { words, key, action };
     let abort = entry(ABORT_WORDS.to_owned(), "Ctrl-X".to_owned(), PaletteAction::TellAbort);
-    let acts = DEFINITIONS.iter().map(move |Definition { act, words, .. }| {
-        entry((*words).to_owned(), model.settings.keys.name(*act), PaletteAction::Act(*act))
+    let acts = DEFINITIONS.iter().map(move |Definition { act, key, words, .. }| {
+        entry((*words).to_owned(), key.name(), PaletteAction::Act(*act))
     });
     let others = model.other_boots(now);
     let own = model.vehicle.boot.number().filter(|_| !others.is_empty());
@@ -366,76 +303,40 @@ fn every_entry(model: &Model, now: Duration) -> impl Iterator<Item = PaletteEntr
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::Page;
-    use proptest::prelude::*;
 
-    fn chosen(pairs: &[(&str, &str)]) -> Result<Bindings, String> {
-        let pairs = pairs.iter().map(|(name, key)| ((*name).to_owned(), (*key).to_owned()));
-        Bindings::try_from(pairs.collect::<BTreeMap<_, _>>())
+    #[test]
+    fn each_key_is_used_once_and_a_ladder_has_a_capital_letter() {
+        for definition in &DEFINITIONS {
+            assert_eq!(Act::of_key(definition.key), Some(definition.act), "{}", definition.name);
+            if definition.act.opens_confirmation() {
+                let is_capital = matches!(definition.key, Key::Char(letter) if letter.is_ascii_uppercase());
+                assert!(is_capital, "{}", definition.name);
+            }
+        }
     }
 
     #[test]
-    fn the_usual_keys_are_each_used_once() {
-        let usual = Bindings::default();
-        for definition in &DEFINITIONS {
-            assert_eq!(usual.act(definition.usual), Some(definition.act), "{}", definition.name);
-        }
-        assert_eq!(chosen(&[]), Ok(usual));
+    fn no_action_takes_a_key_of_the_abort_or_of_the_way_out() {
+        assert_eq!(Act::of_key(Key::CtrlX), None);
+        assert_eq!(Act::of_key(Key::Enter), None);
+        assert_eq!(Act::of_key(Key::Escape), Some(Act::Follow));
     }
 
     /// The ascent shares the key of the descent: it has no definition, and was the first action, which arms.
     #[test]
     fn an_action_without_a_definition_is_no_other_action() {
-        let keys = Bindings::default();
-        let defined =
-            DEFINITIONS.iter().filter(|definition| keys.key(definition.act) == Some(definition.usual));
-        assert_eq!(defined.count(), DEFINITIONS.len());
         let ascent = Act::Show(Page::Ascent);
-        assert!(ascent.definition().is_none() && keys.key(ascent).is_none());
-        assert_eq!(keys.name(ascent), "");
-    }
-
-    #[test]
-    fn a_wrong_choice_is_refused_with_what_would_do() {
-        let refused = |given: &str| chosen(&[given.split_once('=').unwrap()]).unwrap_err();
-        assert!(refused("abort=x").contains("`abort` is no action; give one of arm, start"));
-        let one = "give one printable ASCII character or Space";
-        assert_eq!(refused("theme=Enter"), format!("theme: `Enter` cannot be chosen; {one}"));
-        assert_eq!(refused("theme="), format!("theme: `` cannot be chosen; {one}"));
-        assert_eq!(refused("arm=a"), "arm: `a` is no capital letter, and arm needs one");
-        assert_eq!(refused("theme=t"), "plot and theme have the same key `t`; give each its own");
+        assert!(ascent.definition().is_none());
+        assert_eq!(ascent.key_name(), "");
     }
 
     #[test]
     fn shift_counts_unless_the_capital_letter_has_its_own_action() {
-        let keys = chosen(&[("theme", "a"), ("hold", "J")]).unwrap();
-        assert_eq!(keys.act(Key::Char('a')), Some(Act::NextTheme));
-        assert_eq!(keys.act(Key::Char('A')), Some(Act::Arm));
-        assert_eq!(keys.act(Key::Char('T')), Some(Act::Tap));
-        assert_eq!(keys.act(Key::Char('j')), None);
-        assert_eq!(keys.meant_as_capital('d'), Some(Act::Disarm));
-        assert_eq!(keys.meant_as_capital('h'), Some(Act::HoldCountdown));
-        assert_eq!(keys.meant_as_capital('j'), None, "it opens no ladder");
-    }
-
-    proptest! {
-        /// Whatever is chosen, the keys of the abort, of confirmations and of the way out keep their meaning.
-        #[test]
-        fn no_choice_takes_a_key_of_the_abort(
-            pairs in prop::collection::vec((0..DEFINITIONS.len(), "[ -~]|Enter|Ctrl-X|Esc|Space"), 0..6),
-        ) {
-            let list: Vec<(&str, &str)> =
-                pairs.iter().map(|(place, key)| (DEFINITIONS[*place].name, key.as_str())).collect();
-            if let Ok(keys) = chosen(&list) {
-                prop_assert_eq!(keys.act(Key::CtrlX), None);
-                prop_assert_eq!(keys.act(Key::Enter), None);
-                prop_assert_eq!(keys.act(Key::Escape), Some(Act::Follow));
-                for act in [Act::Arm, Act::Start, Act::Disarm] {
-                    let key = keys.key(act).unwrap();
-                    prop_assert!(matches!(key, Key::Char(letter) if letter.is_ascii_uppercase()), "{key:?}");
-                    prop_assert_eq!(keys.act(key), Some(act));
-                }
-            }
-        }
+        assert_eq!(Act::of_key(Key::Char('F')), Some(Act::Show(Page::Find)));
+        assert_eq!(Act::of_key(Key::Char('T')), Some(Act::Tap));
+        assert_eq!(Act::of_key(Key::Char('j')), None);
+        assert_eq!(Act::meant_as_capital('d'), Some(Act::Disarm));
+        assert_eq!(Act::meant_as_capital('h'), Some(Act::HoldCountdown));
+        assert_eq!(Act::meant_as_capital('r'), None, "it opens no ladder");
     }
 }

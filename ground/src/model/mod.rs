@@ -110,9 +110,6 @@ pub struct Settings {
     /// Whether a person watches a screen; then the end of the flight does not end the program.
     #[serde(skip)]
     pub interactive: bool,
-    /// Which key does what.
-    #[serde(skip)]
-    pub keys: Bindings,
     /// What is called out, and how.
     #[serde(skip)]
     pub talk: Talk,

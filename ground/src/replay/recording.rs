@@ -270,7 +270,7 @@ impl LogEvents {
                     };
                     self.latest_ns = self.latest_ns.max(log_time_ns);
                     if i128::from(self.latest_ns - log_time_ns) > CLOCK_SET_BACK_NS {
-                        let words = "it is not in order of time; `replay recover` sorts it";
+                        let words = "it is not in order of time; `mcap sort` sorts it";
                         return Err(io::Error::other(words));
                     }
                     (side, log_time_ns, data)

@@ -255,7 +255,7 @@ fn layout(letter: char) -> String {
 }
 
 fn on_free_key(model: &mut Model, key: Key, touch: KeyOrigin, now: Duration) {
-    let act = model.settings.keys.act(key);
+    let act = Act::of_key(key);
     model.key_timing.hurried = touch != KeyOrigin::Typed;
     if model.key_timing.hurried && !act.is_some_and(|act| act.only_shows_or_asks(model)) {
         return drop_run(model, now);
@@ -279,9 +279,8 @@ fn on_free_key(model: &mut Model, key: Key, touch: KeyOrigin, now: Duration) {
         Key::PageDown => scroll(model, -SCROLL_PAGE),
         Key::Home => scroll(model, SCROLL_MAX),
         Key::End => scroll(model, -SCROLL_MAX),
-        Key::Char(letter) if model.settings.keys.meant_as_capital(letter).is_some() => {
-            let keys = &model.settings.keys;
-            let [arm, start, disarm] = [Act::Arm, Act::Start, Act::Disarm].map(|act| keys.name(act));
+        Key::Char(letter) if Act::meant_as_capital(letter).is_some() => {
+            let [arm, start, disarm] = [Act::Arm, Act::Start, Act::Disarm].map(Act::key_name);
             let words = format!("capital letters: {arm} arms, {start} starts, {disarm} disarms (caps lock?)");
             model.info(now, words);
         }
@@ -570,7 +569,7 @@ fn perform_entry(model: &mut Model, action: PaletteAction, now: Duration) {
         // Enter has chosen it, and a held Enter would confirm it.
         PaletteAction::Act(
             act @ (Act::Disarm | Act::HoldCountdown | Act::SignStep | Act::VoidStep | Act::Tap),
-        ) => model.info(now, format!("press {}: only this key does it", model.settings.keys.name(act))),
+        ) => model.info(now, format!("press {}: only this key does it", act.key_name())),
         PaletteAction::Act(act) => perform(model, act, now),
         PaletteAction::Choose(boot) => match model.settings.role.why_not_command() {
             None => request(model, Request::Choose(boot), now),

@@ -143,7 +143,6 @@ fn commander(model: &Model) -> String {
 fn notice(model: &Model, theme: Theme, now: Duration) -> Option<Titled> {
     let plain = |text: String| theme.line(text, TextRole::Plain);
     let strong = |text: String| theme.line(text, TextRole::Caution);
-    let keys = &model.settings.keys;
     let own = model.own_number();
     if let Some(ask) = model.ask(now) {
         let (left_s, act) = (ask.left.as_secs_f64(), ask.act_name());
@@ -153,7 +152,7 @@ fn notice(model: &Model, theme: Theme, now: Duration) -> Option<Titled> {
             let words = format!("{others} must confirm within {left_s:.0} s.");
             return Some(("ASKED", vec![plain(format!("You ask to {act}.")), strong(words)]));
         }
-        let key = keys.name(if ask.act == TdAct::TD_ACT_START { Act::Start } else { Act::Arm });
+        let key = if ask.act == TdAct::TD_ACT_START { Act::Start } else { Act::Arm }.key_name();
         let words = match model.ask_to_confirm(now) {
             Some(_) if why_not_here(model).is_none() => strong(format!(
                 "Press {key} within {left_s:.0} s, then type {CONFIRM_WORD} and Enter to confirm."
@@ -165,7 +164,7 @@ fn notice(model: &Model, theme: Theme, now: Duration) -> Option<Titled> {
     let (by, left) = model.tapping(now)?;
     let left_s = left.as_secs_f64();
     if by == own && why_not_here(model).is_none() {
-        let key = keys.name(Act::Tap);
+        let key = Act::Tap.key_name();
         let words = format!("Tap {key}: {left_s:.1} s left, or the countdown is held.");
         return Some(("TAP twice a second", vec![strong(words)]));
     }

@@ -220,7 +220,6 @@ pub fn draw_keys(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
     if let Some(playing) = &model.playing {
         return draw_line(frame, left, replay_line(playing, model.pages.entry.as_ref(), theme));
     }
-    let keys = &model.settings.keys;
     let rings = model.alarms.unacknowledged() > 0;
     // In flight no command but the abort does anything, and the page matters.
     let holds = model.vehicle.in_flight() && model.pages.held.is_none();
@@ -230,7 +229,7 @@ pub fn draw_keys(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
     let spans = KEYS
         .into_iter()
         .filter(works)
-        .map(|act| [theme.key(format!(" {}", keys.name(act))), theme.label(format!(" {} ", act.short()))]);
+        .map(|act| [theme.key(format!(" {}", act.key_name())), theme.label(format!(" {} ", act.short()))]);
     let fits = |pair: &[Span; 2]| {
         let width = pair.iter().map(Span::width).sum();
         let fits = width <= room;
@@ -242,14 +241,13 @@ pub fn draw_keys(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
 
 fn pages(model: &Model, theme: Theme, room: u16) -> Line<'static> {
     let shown = model.page();
-    let keys = &model.settings.keys;
     let (word, role) = match model.pages.held {
         Some(_) => (" HELD 0", TextRole::Caution),
         None => (" auto", TextRole::Good),
     };
-    let more = theme.label(format!(" {}more", keys.name(Act::Palette)));
+    let more = theme.label(format!(" {}more", Act::Palette.key_name()));
     let of = |page: Page| {
-        let key = keys.name(Act::Show(page));
+        let key = Act::Show(page).key_name();
         if page == shown.keyed() {
             // Ascent and descent share a key.
             theme.key(format!(" [{key}{}]", shown.name()))

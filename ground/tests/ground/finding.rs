@@ -1,9 +1,7 @@
-//! The palette, plotted numbers, and keys of the crew's choice.
-
-use std::collections::BTreeMap;
+//! The palette and plotted numbers.
 
 use ground::key::Key;
-use ground::model::{Bindings, DEFINITIONS, Page, PaletteAction, Prompt, palette_entries, quantity};
+use ground::model::{DEFINITIONS, Page, PaletteAction, Prompt, palette_entries, quantity};
 use ground::update::{Action, Msg};
 use proptest::prelude::*;
 use protocol::dialect::TdPhase;
@@ -17,19 +15,13 @@ fn choose(rig: &mut Rig, text: &str) {
     rig.keys(&[typed(":"), typed(text), vec![Key::Enter]].concat());
 }
 
-/// Keys of the crew's choice.
-fn chosen(pairs: &[(&str, &str)]) -> Bindings {
-    let pairs = pairs.iter().map(|(name, key)| ((*name).to_owned(), (*key).to_owned()));
-    Bindings::try_from(pairs.collect::<BTreeMap<_, _>>()).expect("a valid choice")
-}
-
 #[test]
 fn the_palette_lists_every_action_with_its_key() {
     let rig = on_the_pad();
     let listed = palette_entries(&rig.model, "", rig.now);
     for definition in &DEFINITIONS {
         let entry = listed.iter().find(|entry| entry.action == PaletteAction::Act(definition.act)).unwrap();
-        assert_eq!((entry.words.as_str(), &entry.key), (definition.words, &definition.usual.name()));
+        assert_eq!((entry.words.as_str(), &entry.key), (definition.words, &definition.key.name()));
     }
     assert!(listed.iter().any(|entry| entry.action == PaletteAction::TellAbort && entry.key == "Ctrl-X"));
     for quantity in &quantity::ALL {
@@ -95,9 +87,7 @@ fn the_palette_only_tells_how_to_abort() {
 #[test]
 fn the_abort_works_in_the_palette() {
     for opened in [typed(":"), typed(":arm"), typed("t")] {
-        let mut settings = settings(false, true);
-        settings.keys = chosen(&[("theme", "m"), ("plot", "M")]);
-        let mut rig = Rig::new(settings);
+        let mut rig = Rig::new(settings(false, true));
         rig.run(1.0);
         rig.keys(&opened);
         rig.abort();
@@ -127,24 +117,6 @@ proptest! {
         }
         prop_assert!(rig.commands().iter().all(|command| !is_arm(command) && !is_abort(command)));
     }
-}
-
-#[test]
-fn other_keys_open_the_same_ladder() {
-    let mut settings = settings(false, true);
-    settings.keys = chosen(&[("arm", "Z"), ("theme", "w")]);
-    let mut rig = Rig::new(settings);
-    rig.run(1.0);
-    rig.key(Key::Char('A'));
-    assert_eq!(rig.model.dialog, None, "no longer its key");
-    assert!(rig.screen(80, 24).contains("Z, type ARM, Enter"), "{}", rig.screen(80, 24));
-    rig.key(Key::Char('Z'));
-    rig.key(Key::Enter);
-    assert!(rig.take_commands().is_empty(), "the word is still needed");
-    rig.keys(&[typed("ZARM"), vec![Key::Enter]].concat());
-    assert!(rig.take_commands().iter().any(is_arm));
-    rig.key(Key::Char('w'));
-    assert!(rig.actions.contains(&Action::NextTheme));
 }
 
 #[test]

@@ -271,8 +271,7 @@ fn a_log_that_is_not_in_order_of_time_is_refused() {
         }
         log.finish().unwrap();
         let refused = load(&path).err().map(|error| format!("{:#}", anyhow::Error::from(error)));
-        let says =
-            refused.map(|words| words.ends_with("it is not in order of time; `replay recover` sorts it"));
+        let says = refused.map(|words| words.ends_with("it is not in order of time; `mcap sort` sorts it"));
         assert_eq!(says, (late_ns > 1_000_000_000).then_some(true));
     }
 }

@@ -5,12 +5,12 @@ use std::path::PathBuf;
 use std::{fmt, fs};
 
 use anyhow::Context as _;
-use clap::{Args, Subcommand};
+use clap::Args;
 use flight::vehicle::mission::StartPoint;
 use onboard_sim::files::write_folder;
 use onboard_sim::run::{self, Counts};
 use onboard_sim::scenario::{Expected, Scenario};
-use onboard_sim::store::{Manifest, Shard, Store, merge, sha256};
+use onboard_sim::store::{Manifest, Store, sha256};
 use onboard_sim::summary::to_text;
 use protocol::log::build::build_info;
 use protocol::program::Exit;
@@ -22,10 +22,7 @@ use sim::recipe::Recipe;
 use super::{Asked, Progress, on_threads, read, single};
 
 #[derive(Args)]
-#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 pub(crate) struct CampaignArguments {
-    #[command(subcommand)]
-    command: Option<CampaignCommand>,
     #[command(flatten)]
     asked: Asked,
     /// Where the flights begin: pad, apogee or drone, if the mission has that start [default: the mission's].
@@ -34,9 +31,6 @@ pub(crate) struct CampaignArguments {
     /// Number of flights; they are numbered from 0.
     #[arg(long, default_value_t = 1000, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     flights: u64,
-    /// Fly only this part of the flights, counted from 1.
-    #[arg(long, default_value = "1/1", value_name = "I/N")]
-    shard: Shard,
     /// Break something in every flight; may be repeated.
     #[arg(long = "fault", value_name = "FAULT", long_help = format!("Break something in every flight; may be given more than once. Write {}", how_to_write()))]
     faults: Vec<TimedFault>,
@@ -48,37 +42,18 @@ pub(crate) struct CampaignArguments {
     #[arg(long, alias = "log", value_name = "PATH", required_unless_present = "only")]
     out: Option<PathBuf>,
     /// Fly only this flight, and print its row.
-    #[arg(long, value_name = "NUMBER", conflicts_with_all = ["shard", "jobs"])]
+    #[arg(long, value_name = "NUMBER", conflicts_with = "jobs")]
     only: Option<u64>,
-}
-
-#[derive(Subcommand)]
-enum CampaignCommand {
-    /// Merge the parts of a campaign that was flown in shards.
-    #[command(after_help = "Example: onboard-sim campaign merge part-1 part-2 --out whole")]
-    Merge {
-        /// Directories of the parts.
-        #[arg(required = true, value_name = "DIR")]
-        parts: Vec<PathBuf>,
-        /// Directory of the whole.
-        #[arg(long, value_name = "DIR")]
-        out: PathBuf,
-    },
 }
 
 pub(crate) fn run(arguments: &CampaignArguments) -> anyhow::Result<Exit> {
     let mut stdout = std::io::stdout().lock();
-    if let Some(CampaignCommand::Merge { parts, out }) = &arguments.command {
-        let summary = merge(parts, out)?;
-        writeln!(stdout, "{}results {}", to_text(&summary), out.display())?;
-        return Ok(Exit::Yes);
-    }
     let (recipe, expected) = flights(arguments)?;
     if let Some(number) = arguments.only {
         return single::fly(&recipe, number, expected, arguments.out.as_deref());
     }
     let out = arguments.out.as_deref().context("--out is missing")?;
-    let manifest = Manifest::of(&recipe, arguments.flights, &program()?, arguments.shard);
+    let manifest = Manifest::of(&recipe, arguments.flights, &program()?);
     let store = Store::open(out, &recipe, manifest)?;
     let progress = Progress::start();
     let cost = on_threads(arguments.asked.jobs, || {

@@ -7,7 +7,7 @@ use std::path::Path;
 use flight::rules::verdict::Landing;
 use onboard_sim::row::Row;
 use onboard_sim::run::{run, threads};
-use onboard_sim::store::{Manifest, Shard, Store, StoreError, merge};
+use onboard_sim::store::{Manifest, Store, StoreError};
 use onboard_sim::tally;
 use sim::dispersion;
 use sim::recipe::Recipe;
@@ -21,13 +21,13 @@ fn recipe(seed: u64) -> Recipe {
     Recipe { seed, ..Recipe::from_texts((name, &low), dispersion::BUILTIN[2]).unwrap() }
 }
 
-fn open(out: &Path, recipe: &Recipe, build: &str, shard: Shard) -> Result<Store, StoreError> {
-    Store::open(out, recipe, Manifest::of(recipe, FLIGHTS, build, shard))
+fn open(out: &Path, recipe: &Recipe, build: &str) -> Result<Store, StoreError> {
+    Store::open(out, recipe, Manifest::of(recipe, FLIGHTS, build))
 }
 
 /// How many flights were flown.
-fn fly(recipe: &Recipe, shard: Shard, jobs: usize, out: &Path) -> u64 {
-    let store = open(out, recipe, "test", shard).unwrap();
+fn fly(recipe: &Recipe, jobs: usize, out: &Path) -> u64 {
+    let store = open(out, recipe, "test").unwrap();
     let flown = threads(Some(jobs)).unwrap().install(|| run(recipe, &store, &|_| ()).unwrap().flown);
     store.publish().unwrap();
     flown
@@ -40,39 +40,22 @@ fn assert_same(one: &Path, two: &Path) {
 }
 
 #[test]
-fn the_results_do_not_depend_on_threads_shards_or_a_stop() {
+fn the_results_do_not_depend_on_threads_or_a_stop() {
     let root = tempfile::tempdir().unwrap();
     let at = |name: &str| root.path().join(name);
     let recipe = recipe(1);
-    assert_eq!(fly(&recipe, Shard::WHOLE, 1, &at("one")), FLIGHTS);
-    assert_eq!(fly(&recipe, Shard::WHOLE, 3, &at("killed")), FLIGHTS);
+    assert_eq!(fly(&recipe, 1, &at("one")), FLIGHTS);
+    assert_eq!(fly(&recipe, 3, &at("killed")), FLIGHTS);
     assert_same(&at("one"), &at("killed"));
-
-    let parts = [at("part-1"), at("part-2")];
-    let shards = (1..=2).map(|index| Shard { index, count: 2 });
-    let flown: u64 = shards.zip(&parts).map(|(shard, part)| fly(&recipe, shard, 1, part)).sum();
-    assert_eq!(flown, FLIGHTS);
-    merge(&parts, &at("merged")).unwrap();
-    assert_same(&at("one"), &at("merged"));
 
     // As a killed campaign leaves it: some flights in the order in which they ended, and a part of a line.
     let csv = fs::read_to_string(at("one").join("flights.csv")).unwrap();
     let lines: Vec<&str> = csv.split_inclusive('\n').collect();
     let cut = lines[4].trim_end();
     fs::write(at("killed").join("flights.csv"), [lines[0], lines[8], lines[3], cut].concat()).unwrap();
-    assert_eq!(fly(&recipe, Shard::WHOLE, 2, &at("killed")), FLIGHTS - 2);
+    assert_eq!(fly(&recipe, 2, &at("killed")), FLIGHTS - 2);
     assert_same(&at("one"), &at("killed"));
-    assert_eq!(fly(&recipe, Shard::WHOLE, 2, &at("killed")), 0);
-
-    let error = merge(&parts[..1], &at("half")).unwrap_err();
-    assert_eq!(error.to_string(), "flight 1 is in none of the directories; fly the missing ones first");
-    fly(&self::recipe(2), Shard { index: 2, count: 2 }, 1, &at("other"));
-    let error = merge(&[at("part-1"), at("other")], &at("both")).unwrap_err().to_string();
-    assert!(error.ends_with("its seed is 2, this run's is 1; give another directory"), "{error}");
-    let rows = at("part-1").join("flights.csv");
-    fs::write(&rows, fs::read_to_string(&rows).unwrap().replace(",true,", ",false,")).unwrap();
-    let error = merge(&[at("one"), at("part-1")], &at("forged")).unwrap_err();
-    assert!(matches!(error, StoreError::Contradiction { number: 0, .. }), "{error}");
+    assert_eq!(fly(&recipe, 2, &at("killed")), 0);
 
     read_them(&at("one"));
 }
@@ -94,42 +77,39 @@ fn read_them(out: &Path) {
 fn a_directory_of_another_campaign_or_in_use_is_refused_with_the_reason() {
     let root = tempfile::tempdir().unwrap();
     let own = recipe(1);
-    let store = open(root.path(), &own, "test", Shard::WHOLE).unwrap();
-    let again = open(root.path(), &own, "test", Shard::WHOLE).unwrap_err();
+    let store = open(root.path(), &own, "test").unwrap();
+    let again = open(root.path(), &own, "test").unwrap_err();
     assert!(matches!(again, StoreError::InUse { .. }), "{again}");
     drop(store);
-    let half = Shard { index: 1, count: 2 };
-    for (recipe, build, shard, difference) in [
-        (&recipe(2), "test", Shard::WHOLE, "its seed is 1, this run's is 2"),
-        (&own, "other", Shard::WHOLE, "its build is \"test\", this run's is \"other\""),
-        (&own, "test", half, r#"its shard is {"count":1,"index":1}, this run's is {"count":2,"index":1}"#),
+    for (recipe, build, difference) in [
+        (&recipe(2), "test", "its seed is 1, this run's is 2"),
+        (&own, "other", "its build is \"test\", this run's is \"other\""),
     ] {
-        let error = open(root.path(), recipe, build, shard).unwrap_err().to_string();
+        let error = open(root.path(), recipe, build).unwrap_err().to_string();
         let holds = format!("{} holds other results: {difference}", root.path().display());
         assert_eq!(error, format!("{holds}; give another directory"));
     }
     let mut heavier = own.clone();
     heavier.mission_toml.push('\n');
-    assert!(open(root.path(), &heavier, "test", Shard::WHOLE).is_err());
+    assert!(open(root.path(), &heavier, "test").is_err());
 }
 
-/// Rows with the columns of another program, and a flight that another part or campaign has.
+/// Rows with the columns of another program, and a flight beyond the campaign's last.
 #[test]
 fn rows_that_are_not_of_the_campaign_are_refused() {
     let root = tempfile::tempdir().unwrap();
-    let (own, half) = (recipe(1), Shard { index: 1, count: 2 });
-    let store = open(root.path(), &own, "test", half).unwrap();
+    let own = recipe(1);
+    let store = open(root.path(), &own, "test").unwrap();
     store.add(tally::fly(&own, 0).unwrap()).unwrap();
     drop(store);
     let path = root.path().join("flights.csv");
     let text = fs::read_to_string(&path).unwrap();
     for (wrong, why) in [
-        (text.replacen("\n0,", "\n1,", 1), "flight 1, which is not of it"),
         (text.replacen("\n0,", "\n1000000,", 1), "flight 1000000, which is not of it"),
         (text.replacen("touchdown_", "contact_", 1), "the columns of another version"),
     ] {
         fs::write(&path, wrong).unwrap();
-        let error = open(root.path(), &own, "test", half).unwrap_err().to_string();
+        let error = open(root.path(), &own, "test").unwrap_err().to_string();
         assert!(error.contains(why), "{error}");
     }
 }
@@ -141,20 +121,8 @@ fn files_that_no_campaign_wrote_are_never_overwritten() {
         let root = tempfile::tempdir().unwrap();
         let path = root.path().join(name);
         fs::write(&path, "notes").unwrap();
-        let refused = open(root.path(), &recipe(1), "test", Shard::WHOLE);
+        let refused = open(root.path(), &recipe(1), "test");
         assert!(matches!(refused, Err(StoreError::Foreign(_))), "{name}");
         assert_eq!(fs::read_to_string(&path).unwrap(), "notes", "{name}");
-    }
-}
-
-#[test]
-fn a_flight_is_in_one_shard() {
-    let shards: Vec<Shard> = ["1/3", "2/3", "3/3"].iter().map(|text| text.parse().unwrap()).collect();
-    for number in 0..20 {
-        assert_eq!(shards.iter().filter(|shard| shard.has(number)).count(), 1);
-    }
-    for wrong in ["", "0/2", "3/2", "1", "a/b", "1/0"] {
-        let error = wrong.parse::<Shard>().unwrap_err();
-        assert_eq!(error.to_string(), format!("shard `{wrong}` is not I/N with 1 <= I <= N"));
     }
 }

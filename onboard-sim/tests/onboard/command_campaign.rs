@@ -27,11 +27,9 @@ fn a_wrong_request_is_refused_with_the_reason() {
         (&["--out", "x", "--flights", "0"][..], "0 is not in 1.."),
         (&["--out", "x", "--dispersion", "windy"], "neither a built-in set of dispersions"),
         (&["--out", "x", "--mission", "mk9"], "neither a built-in mission (mk2"),
-        (&["--out", "x", "--shard", "3/2"], "I/N"),
         (&["--out", "x", "--fault", "gnss@5"], "no fault is named"),
         (&["--only", "1", "--jobs", "2"], "cannot be used with"),
         (&[], "--out"),
-        (&["merge", "nowhere", "--out", "x"], "nowhere"),
     ] {
         let refused = campaign(directory.path(), arguments);
         assert!(!refused.status.success() && stderr(&refused).contains(words), "{}", stderr(&refused));

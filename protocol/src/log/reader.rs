@@ -81,7 +81,7 @@ pub enum Damage {
     /// The log can be read to its end, and its summary counts other messages or chunks.
     #[error("its summary counts {counted}, and {read} are there: a part was cut out or is there twice")]
     Miscounted { counted: String, read: String },
-    /// The log was recovered, or made of a `.tlog`, and that lacked something.
+    /// The log was recovered, and the damaged one lacked something.
     #[error("it was made of a damaged log: {0}")]
     Recovered(String),
 }

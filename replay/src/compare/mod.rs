@@ -6,31 +6,27 @@
 //! in one of the two differs, because interpolation would hide a lost record.
 //!
 //! Tables of words (events, limits) are compared row by row, without times.
-//!
-//! The log of a ground station has no frames of the flight computer. It is compared with the vehicle's own log by the MAVLink
-//! messages that both have, over the vehicle's time in them, while both recorded.
 
+mod difference;
 mod missions;
 mod print;
 mod series;
-mod tolerance;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, Result, ensure};
+use anyhow::Result;
+pub use difference::SignalDifference;
 pub(crate) use missions::compared;
 pub use missions::{MissionComparison, SettingDifference};
 use missions::{compare_missions, is_mission};
 use protocol::program::Exit;
 use serde::Serialize;
 pub use series::{Align, Flown, Series};
-pub use tolerance::SignalDifference;
-pub use tolerance::{Tolerance, Tolerances};
 
 use crate::cli::{give, warn_of_loss};
 use crate::log::Verdict;
-use crate::print::word;
+use crate::print::{counted, word};
 
 /// One flight against another.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -42,12 +38,9 @@ pub struct Comparison {
     pub align: Align,
     /// Offset added to the times of the other flight, s.
     pub shift_s: f64,
-    /// If one log is a ground station's: from when to when both recorded, vehicle time of the baseline, s. Only that is
-    /// compared.
-    pub both_recorded_s: Option<[f64; 2]>,
     /// The two verdicts.
     pub verdicts: (Option<Verdict>, Option<Verdict>),
-    /// Signals that both flights have; those that exceed their tolerance first, then by name.
+    /// Signals that both flights have, by name.
     pub signals: Vec<SignalDifference>,
     /// Signals that only the baseline has.
     pub missing: Vec<String>,
@@ -55,7 +48,7 @@ pub struct Comparison {
     pub added: Vec<String>,
     /// Rows of words that only one of the two has.
     pub words: Vec<WordsOfOne>,
-    /// Violations of the tolerances, in words.
+    /// Why the second is not like the first, in words.
     pub failures: Vec<String>,
 }
 
@@ -83,61 +76,57 @@ impl Comparison {
 }
 
 /// Compares a flight with a baseline.
-///
-/// # Errors
-/// A tolerance names a signal that neither flight has.
-pub fn compare(baseline: &Flown, other: &Flown, tolerances: &Tolerances) -> Result<Comparison> {
+pub fn compare(baseline: &Flown, other: &Flown) -> Comparison {
     let (align, shift_s) = Align::of(baseline, other);
-    let over_the_air = baseline.only_one_has_frames(other);
-    let both_recorded_s = over_the_air
-        .then(|| series::common_s(&baseline.over_the_air, &other.over_the_air, shift_s))
-        .flatten();
-    let parts;
-    let (a, b) = match both_recorded_s {
-        Some([from_s, to_s]) => {
-            parts = [
-                series::within(&baseline.over_the_air, [from_s, to_s]),
-                series::within(&other.over_the_air, [from_s - shift_s, to_s - shift_s]),
-            ];
-            (&parts[0], &parts[1])
-        }
-        None if over_the_air => (&baseline.over_the_air, &other.over_the_air),
-        None => (&baseline.signals, &other.signals),
-    };
-    let (ours, theirs): (Vec<String>, Vec<String>) =
-        (a.keys().cloned().collect(), b.keys().cloned().collect());
-    tolerances.check_names(&ours.iter().chain(&theirs))?;
-    let missing: Vec<String> = ours.iter().filter(|name| !b.contains_key(*name)).cloned().collect();
-    let added: Vec<String> = theirs.iter().filter(|name| !a.contains_key(*name)).cloned().collect();
+    let (a, b) = (&baseline.signals, &other.signals);
+    let missing: Vec<String> = a.keys().filter(|name| !b.contains_key(*name)).cloned().collect();
+    let added: Vec<String> = b.keys().filter(|name| !a.contains_key(*name)).cloned().collect();
     let both = a.iter().filter_map(|(name, ours)| Some((name.as_str(), ours, b.get(name)?)));
-    let of = |(name, ours, theirs)| SignalDifference::of(name, ours, theirs, shift_s, tolerances.of(name));
-    let mut signals: Vec<_> = both.map(of).collect();
-    let mut failures = tolerances.record_failures([baseline, other]);
-    failures.extend(signals.iter().filter_map(SignalDifference::failure));
-    signals.sort_by(|a, b| (a.passed, &a.signal).cmp(&(b.passed, &b.signal)));
-    failures.extend(tolerances.count_failures(missing.len(), added.len()));
+    let signals: Vec<_> =
+        both.map(|(name, ours, theirs)| SignalDifference::of(name, ours, theirs, shift_s)).collect();
+    let mut failures = incomplete([baseline, other]);
+    for (signals, what) in [(&missing, "missing"), (&added, "added")] {
+        let failure = || format!("{} {what}", counted(signals.len() as u64, "signal"));
+        failures.extend((!signals.is_empty()).then(failure));
+    }
     if signals.is_empty() {
         // For example two logs with different topics. "No differences" would be misleading here.
         failures.push("the logs have no signal in common: nothing was compared".to_owned());
     }
     let verdicts = (baseline.verdict.clone(), other.verdict.clone());
     let (then, now) = (word(verdicts.0.as_ref()), word(verdicts.1.as_ref()));
-    if tolerances.verdict_must_agree() && then != now {
+    if then != now {
         failures.push(format!("the verdicts differ: {then} and {now}"));
     }
-    Ok(Comparison {
+    Comparison {
         baseline: baseline.name.clone(),
         other: other.name.clone(),
         align,
         shift_s,
-        both_recorded_s,
         verdicts,
         signals,
         missing,
         added,
         words: words_of_one(baseline, other),
         failures,
-    })
+    }
+}
+
+/// Parts of the flights that were not compared because of damage or a missing end.
+fn incomplete(flights: [&Flown; 2]) -> Vec<String> {
+    let mut failures = Vec::new();
+    for Flown { name, damage, cut, out_of_order, .. } in flights {
+        if *out_of_order > 0 {
+            failures.push(format!("{name}: {out_of_order} numbers are out of order and were not compared"));
+        }
+        let damage = damage.as_ref();
+        failures.extend(
+            damage.map(|damage| format!("{name} is damaged: {damage}; nothing after that was compared")),
+        );
+        failures.extend(cut.as_ref().map(|cut| format!("{name} is of an INCOMPLETE flight: it {cut}")));
+    }
+    failures.dedup();
+    failures
 }
 
 /// The rows of words that only one log has, of the tables that both have.
@@ -167,14 +156,6 @@ pub(crate) struct Args {
     /// The other flights, or missions.
     #[arg(required = true)]
     others: Vec<PathBuf>,
-    /// Tolerances, a TOML file.
-    ///
-    /// [signals."NAME"] with rms and max in the signal's own unit; a * at the end of NAME matches any rest. Before
-    /// that: `verdict = false` lets the verdicts differ; `missing = N` and `added = N` allow this many signals that
-    /// only one flight has; `damaged = true` allows logs that are damaged or end before their flight did. Anything left
-    /// out is not tolerated.
-    #[arg(long, value_name = "FILE")]
-    tolerances: Option<PathBuf>,
     /// Answer in JSON.
     #[arg(long)]
     json: bool,
@@ -183,22 +164,15 @@ pub(crate) struct Args {
 impl Args {
     pub(crate) fn run(self) -> Result<Exit> {
         if is_mission(&self.baseline) {
-            return self.missions();
+            let others: Vec<&Path> = self.others.iter().map(PathBuf::as_path).collect();
+            return give(&compare_missions(&self.baseline, &others)?, self.json);
         }
-        let tolerances = self.tolerances.as_deref().map(read).transpose()?.unwrap_or_default();
         let baseline = open(&self.baseline)?;
         let mut comparisons = Vec::new();
         for path in &self.others {
-            let other = open(path)?;
-            comparisons.push(compare(&baseline, &other, &tolerances)?);
+            comparisons.push(compare(&baseline, &open(path)?));
         }
         give(&comparisons, self.json)
-    }
-
-    fn missions(&self) -> Result<Exit> {
-        ensure!(self.tolerances.is_none(), "missions are compared without tolerances");
-        let others: Vec<&Path> = self.others.iter().map(PathBuf::as_path).collect();
-        give(&compare_missions(&self.baseline, &others)?, self.json)
     }
 }
 
@@ -206,10 +180,4 @@ fn open(path: &Path) -> Result<Flown> {
     let flown = Flown::open(path)?;
     warn_of_loss(&flown.name, flown.damage.as_deref(), flown.cut.as_ref());
     Ok(flown)
-}
-
-fn read(path: &Path) -> Result<Tolerances> {
-    let name = path.display().to_string();
-    let text = std::fs::read_to_string(path).with_context(|| format!("{name}: cannot be read"))?;
-    Tolerances::from_toml(&text, &name)
 }

@@ -5,7 +5,7 @@ use crate::cli::Answer;
 use crate::print::{columns, counted, limits_of_both, verdict_table, word};
 use protocol::program::Exit;
 
-/// Most signals listed that differ within their tolerance or have no tolerance.
+/// Most signals listed that differ.
 const SIGNALS_SHOWN: usize = 60;
 /// Limits that are nearer, as a share of their range, are the same: a station hears them as `f32`.
 const SAME: f64 = 1e-4;
@@ -23,9 +23,6 @@ impl Answer for Comparison {
         let mut lines = self.landings();
         lines.push(self.sentence());
         lines.push(format!("aligned on {aligned}: {:+.6} s added to the second's times", self.shift_s));
-        lines.extend(self.both_recorded_s.map(|[from_s, to_s]| {
-            format!("compared while both recorded: {from_s:.3} to {to_s:.3} s since power-up")
-        }));
         lines.push(format!(
             "{} of both flights, {} of them identical; {} missing, {} added",
             counted(self.signals.len() as u64, "signal"),
@@ -35,11 +32,10 @@ impl Answer for Comparison {
         ));
         let differing: Vec<_> = self.signals.iter().filter(|signal| !signal.is_identical()).collect();
         if !differing.is_empty() {
-            let shown = SIGNALS_SHOWN.max(differing.iter().filter(|signal| !signal.passed).count());
-            let head = ["signal", "samples", "rms", "max", "at s", "tolerance"].map(str::to_owned);
-            let rows = differing.iter().take(shown).map(|signal| signal.row());
-            lines.extend(columns(['<', '>', '>', '>', '>', '<'], std::iter::once(head).chain(rows)));
-            lines.extend(more(differing.len(), shown));
+            let head = ["signal", "samples", "rms", "max", "at s"].map(str::to_owned);
+            let rows = differing.iter().take(SIGNALS_SHOWN).map(|signal| signal.row());
+            lines.extend(columns(['<', '>', '>', '>', '>'], std::iter::once(head).chain(rows)));
+            lines.extend(more(differing.len(), SIGNALS_SHOWN));
         }
         for (what, names) in [("missing", &self.missing), ("added", &self.added)] {
             if !names.is_empty() {
@@ -58,7 +54,7 @@ impl Answer for Comparison {
             lines.extend(more(self.words.len(), NAMES_SHOWN));
         }
         if self.failures.len() > 1 {
-            lines.push("NOT within tolerance:".to_owned());
+            lines.push("NOT like the first:".to_owned());
             lines.extend(self.failures.iter().map(|failure| format!("- {failure}")));
         }
         lines
@@ -95,27 +91,19 @@ impl Comparison {
         let (all, differing) = (counted(signals.len() as u64, "signal"), signals.len() - self.identical());
         match failures.as_slice() {
             [] if differing == 0 => {
-                format!("{other} is within tolerance of {baseline}: all {all} of {tables} are identical")
+                format!("{other} is like {baseline}: all {all} of {tables} are identical")
             }
-            [] => {
-                format!("{other} is within tolerance of {baseline}: {differing} of {all} of {tables} differ")
+            [] => format!("{other} is like {baseline}: {differing} of {all} of {tables} differ"),
+            [only] => format!("{other} is NOT like {baseline}: {only}"),
+            [first, more @ ..] => {
+                format!("{other} is NOT like {baseline}: {first}; and {} more below", more.len())
             }
-            [only] => format!("{other} is NOT within tolerance of {baseline}: {only}"),
-            [first, more @ ..] => format!(
-                "{other} is NOT within tolerance of {baseline}: {first}; and {} more below",
-                more.len()
-            ),
         }
     }
 }
 
 impl SignalDifference {
-    fn row(&self) -> [String; 6] {
-        let tolerance = match (self.tolerance, self.passed) {
-            (None, _) => "",
-            (Some(_), true) => "within",
-            (Some(_), false) => "EXCEEDED",
-        };
+    fn row(&self) -> [String; 5] {
         let [ours, theirs] = self.samples_of;
         let samples = if ours == theirs { ours.to_string() } else { format!("{ours}, {theirs}") };
         [
@@ -124,7 +112,6 @@ impl SignalDifference {
             format!("{:.4e}", self.rms),
             format!("{:.4e}", self.max),
             self.max_at_s.map(|at_s| format!("{at_s:.3}")).unwrap_or_default(),
-            tolerance.to_owned(),
         ]
     }
 }

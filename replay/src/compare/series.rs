@@ -14,14 +14,10 @@ const VALUES_MAX: usize = 20_000_000;
 
 /// Begins the names of the tables of MAVLink messages.
 const MESSAGES: &str = "mavlink_";
-/// The vehicle's time in them, ms since power-up.
-const TIME_BOOT_MS: &str = "time_boot_ms";
 
 /// Columns that are not signals: times, record numbers, and durations measured on the wall clock.
-const NO_SIGNALS: [&str; 11] = [
+const NO_SIGNALS: [&str; 9] = [
     FLIGHT_TIME_S,
-    TIME_BOOT_MS,
-    "frame_sequence",
     "log_time_ns",
     "time_s",
     "input.time_s",
@@ -76,12 +72,8 @@ pub struct Flown {
     pub name: String,
     /// The signals, by name.
     pub signals: BTreeMap<String, Series>,
-    /// The numbers in MAVLink messages that carry the vehicle's time, over that time (since power-up).
-    pub over_the_air: BTreeMap<String, Series>,
     /// The rows of tables of words, without times and numbers, with how often each is there.
     pub(super) words: BTreeMap<String, BTreeMap<String, usize>>,
-    /// The log has what the vehicle decided, not only what was heard of it.
-    pub has_frames: bool,
     /// Ignition of the landing motor, vehicle time, s.
     pub ignition_s: Option<f64>,
     /// The landing verdict.
@@ -95,11 +87,6 @@ pub struct Flown {
 }
 
 impl Flown {
-    /// Whether only one of two logs has what the vehicle decided: then they are compared by what went over the air.
-    pub(super) fn only_one_has_frames(&self, other: &Self) -> bool {
-        self.has_frames != other.has_frames
-    }
-
     /// Reads a log file.
     ///
     /// # Errors
@@ -116,7 +103,7 @@ impl Flown {
         reader.read::<_, RecordingError>(&mut log, |shape, row| {
             let log_ns = row.cells.first().and_then(Cell::number).unwrap_or(0.0);
             let since_s = (log_ns - *first_ns.get_or_insert(log_ns)) / 1e9;
-            if shape.name == NO_SIGNAL_TABLE {
+            if shape.name == NO_SIGNAL_TABLE || shape.name.starts_with(MESSAGES) {
                 return Ok(());
             }
             if WORDS.contains(&shape.name.as_str()) {
@@ -127,9 +114,7 @@ impl Flown {
                     .or_default() += 1;
                 return Ok(());
             }
-            let time_s = if shape.name.starts_with(MESSAGES) {
-                boot_time_of(shape, &row.cells)
-            } else if let Some(place) = shape.place_of(FLIGHT_TIME_S) {
+            let time_s = if let Some(place) = shape.place_of(FLIGHT_TIME_S) {
                 // Outside the flight a frame has no time in it.
                 row.cells.get(place).and_then(Cell::number)
             } else {
@@ -160,11 +145,10 @@ impl Flown {
             if held > VALUES_MAX { Err(too_long()) } else { Ok(()) }
         })?;
         log.flights().refuse_several(&name)?;
-        let [mut signals, mut over_the_air] = [(); 2].map(|()| BTreeMap::<String, Series>::new());
+        let mut signals = BTreeMap::<String, Series>::new();
         // The limits and times of a verdict stand beside the signals.
         for (shape, columns) in reader.shapes().iter().zip(read).filter(|(shape, _)| shape.name != "verdict")
         {
-            let signals = if shape.name.starts_with(MESSAGES) { &mut over_the_air } else { &mut signals };
             for (column, series) in shape.columns.iter().zip(columns) {
                 let series = series.filter(|series| !series.values.is_empty());
                 signals.extend(series.map(|series| (format!("{}.{}", shape.name, column.name), series)));
@@ -179,9 +163,7 @@ impl Flown {
         Ok(Self {
             name,
             signals,
-            over_the_air,
             words,
-            has_frames: !log.flights().found().is_empty(),
             ignition_s,
             verdict: log.verdict().as_ref().map(Verdict::found),
             damage: log.damage().map(ToString::to_string),
@@ -204,12 +186,6 @@ fn is_signal(column: &str) -> bool {
     !NO_SIGNALS.contains(&column) && !NO_SIGNALS_OF.iter().any(|beginning| column.starts_with(beginning))
 }
 
-/// The vehicle's time in a message, s since power-up.
-fn boot_time_of(shape: &TableShape, cells: &[Cell]) -> Option<f64> {
-    let place = shape.place_of(TIME_BOOT_MS)?;
-    cells.get(place)?.number().map(|time_ms| time_ms / 1e3)
-}
-
 /// The vehicle time in the record, s.
 fn time_of(shape: &TableShape, cells: &[Cell]) -> Option<f64> {
     let place = shape.place_of("time_s")?;
@@ -227,46 +203,13 @@ pub enum Align {
 }
 
 impl Align {
-    /// On ignition if both flights have one, else on time; and what to add to the other flight's times, s. What went over the
-    /// air has the vehicle's own time.
+    /// On ignition if both flights have one, else on time; and what to add to the other flight's times, s.
     pub(super) fn of(baseline: &Flown, other: &Flown) -> (Self, f64) {
         match (baseline.ignition_s, other.ignition_s) {
-            (Some(ours_s), Some(theirs_s)) if !baseline.only_one_has_frames(other) => {
-                (Self::Ignition, ours_s - theirs_s)
-            }
+            (Some(ours_s), Some(theirs_s)) => (Self::Ignition, ours_s - theirs_s),
             _ => (Self::Time, 0.0),
         }
     }
-}
-
-/// Signals of one log, by name.
-type Signals = BTreeMap<String, Series>;
-
-/// The time between the first and the last sample of a log, s.
-fn recorded_s(signals: &Signals) -> Option<[f64; 2]> {
-    let first = signals.values().filter_map(|series| series.times_s.first().copied()).reduce(f64::min)?;
-    let last = signals.values().filter_map(|series| series.times_s.last().copied()).reduce(f64::max)?;
-    Some([first, last])
-}
-
-/// The time that two logs have in common, in the first's time, s; the second's times are shifted. `None` if there is none.
-pub(super) fn common_s(a: &Signals, b: &Signals, shift_s: f64) -> Option<[f64; 2]> {
-    let ([from_a, to_a], [from_b, to_b]) = (recorded_s(a)?, recorded_s(b)?);
-    let common = [from_a.max(from_b + shift_s), to_a.min(to_b + shift_s)];
-    (common[0] < common[1]).then_some(common)
-}
-
-/// The signals with what lies within a time. Of the instants at both ends a log may have a part of the messages, so they
-/// are left out.
-pub(super) fn within(signals: &Signals, [from_s, to_s]: [f64; 2]) -> Signals {
-    let part = |(name, series): (&String, &Series)| {
-        let kept = series.times_s.partition_point(|time_s| *time_s <= from_s)
-            ..series.times_s.partition_point(|time_s| *time_s < to_s);
-        let (times_s, values) = (series.times_s.get(kept.clone())?, series.values.get(kept)?);
-        let some = Series { times_s: times_s.to_vec(), values: values.to_vec(), whole: series.whole };
-        (!times_s.is_empty()).then(|| (name.clone(), some))
-    };
-    signals.iter().filter_map(part).collect()
 }
 
 #[cfg(test)]
@@ -283,27 +226,5 @@ mod tests {
         series.whole = true;
         assert_eq!(series.at(1.9), Some(10.0));
         assert_eq!(series.at(2.1), None);
-    }
-
-    fn log(times: &[(&str, &[f64])]) -> Signals {
-        let series = |times_s: &[f64]| Series {
-            times_s: times_s.to_vec(),
-            values: times_s.iter().map(|time_s| 10.0 * time_s).collect(),
-            whole: false,
-        };
-        times.iter().map(|(name, times_s)| ((*name).to_owned(), series(times_s))).collect()
-    }
-
-    #[test]
-    fn only_the_time_that_both_recorded_is_kept() {
-        let vehicle = log(&[("x", &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0]), ("start", &[0.0]), ("end", &[5.0])]);
-        let station = log(&[("x", &[-8.0, -7.0, -6.0]), ("start", &[]), ("end", &[])]);
-        let common = common_s(&vehicle, &station, 9.0);
-        assert_eq!(common, Some([1.0, 3.0]));
-        assert_eq!(within(&vehicle, [1.0, 3.0]), log(&[("x", &[2.0])]));
-        assert_eq!(common_s(&vehicle, &station, 0.0), None);
-        assert_eq!(common_s(&vehicle, &Signals::new(), 0.0), None);
-        // A time that ends before it begins holds nothing.
-        assert_eq!(within(&vehicle, [3.0, 1.0]), Signals::new());
     }
 }

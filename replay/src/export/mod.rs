@@ -14,18 +14,17 @@ use clap::ValueEnum;
 pub use tables::{ExportedFile, export_tables};
 
 use crate::cli::{Answer, give, warn_of_loss};
-use crate::log::{FlightLog, ImportedTlog, import_tlog, is_tlog};
+use crate::log::FlightLog;
 use protocol::program::Exit;
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// The log, an MCAP file, or the telemetry log of a ground station, a .tlog.
+    /// The log, an MCAP file.
     file: PathBuf,
-    /// The format; a .tlog becomes a log.
+    /// The format.
     #[arg(long, value_enum)]
     to: Option<Format>,
-    /// Output: a directory for csv (one file for each table), otherwise a file; of a .tlog its name with .mcap
-    /// if left out.
+    /// Output: a directory for csv (one file for each table), otherwise a file.
     #[arg(long, short, alias = "output", value_name = "PATH")]
     out: Option<PathBuf>,
     /// Answer in JSON.
@@ -39,25 +38,17 @@ enum Format {
     Csv,
     /// Rerun; a separate program writes it.
     Rrd,
-    /// A log, of a .tlog.
-    Mcap,
 }
 
 impl Args {
     pub(crate) fn run(self) -> Result<Exit> {
-        let is_tlog = is_tlog(&self.file).with_context(|| self.file.display().to_string())?;
-        if !is_tlog {
-            // What is no log needs no format.
-            FlightLog::open(&self.file)?;
-        }
-        let format = self.to.or(is_tlog.then_some(Format::Mcap));
-        let format = format.context("--to is missing: csv or rrd")?;
-        let output = self.out.clone().or_else(|| is_tlog.then(|| self.file.with_extension("mcap")));
-        let output = output.context("--out is missing: where to write")?;
+        // What is no log needs no format.
+        FlightLog::open(&self.file)?;
+        let format = self.to.context("--to is missing: csv or rrd")?;
+        let output = self.out.as_deref().context("--out is missing: where to write")?;
         match format {
-            Format::Csv => self.tables(&output),
-            Format::Rrd => self.rerun(&output),
-            Format::Mcap => give(&import_tlog(&self.file, &output)?, self.json),
+            Format::Csv => self.tables(output),
+            Format::Rrd => self.rerun(output),
         }
     }
 
@@ -95,16 +86,5 @@ impl Args {
 impl Answer for ExportedFile {
     fn sentences(&self) -> Vec<String> {
         vec![format!("{}: {} rows of {} columns", self.path.display(), self.rows, self.columns)]
-    }
-}
-
-impl Answer for ImportedTlog {
-    fn sentences(&self) -> Vec<String> {
-        let Self { output, frames, not_understood, telemetry, mavlink1, garbage_bytes } = self;
-        vec![format!(
-            "{}: {frames} frames, {not_understood} of them not understood, and {telemetry} records of telemetry; left out: \
-             {mavlink1} frames of MAVLink 1, {garbage_bytes} bytes of no frame",
-            output.display()
-        )]
     }
 }

@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use crate::log::FlightLog;
 use crate::output::{NewFile, WriteError, new_folder};
-use crate::table::{Cell, Column, Kind, Meaning, TableReader, TableShape};
+use crate::table::{Cell, TableReader, TableShape};
 
 /// A file that was written.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -28,8 +28,7 @@ pub fn export_tables<R: Read>(log: &mut FlightLog<R>, directory: &Path) -> Resul
     // It is made with the first table, so that a file that is not a flight log leaves nothing behind.
     let mut folder = None;
     let mut open: BTreeMap<usize, (ExportedFile, csv::Writer<NewFile>)> = BTreeMap::new();
-    let mut reader = TableReader::new();
-    reader.read::<R, anyhow::Error>(log, |shape, row| {
+    TableReader::new().read::<R, anyhow::Error>(log, |shape, row| {
         let (file, csv) = match open.entry(row.table) {
             std::collections::btree_map::Entry::Occupied(entry) => entry.into_mut(),
             std::collections::btree_map::Entry::Vacant(entry) => {
@@ -49,13 +48,7 @@ pub fn export_tables<R: Read>(log: &mut FlightLog<R>, directory: &Path) -> Resul
         let written = written.map_err(WriteError::at(&file.path))?;
         Ok((file, written))
     });
-    let mut whole: Vec<(ExportedFile, NewFile)> = finished.collect::<Result<_>>()?;
-    if let Some((folder, _held)) = &folder {
-        let path = folder.join(DICTIONARY);
-        let file = NewFile::replace(&path)?;
-        let (written, rows) = dictionary(file, reader.shapes()).map_err(WriteError::at(&path))?;
-        whole.push((ExportedFile { path, rows, columns: DICTIONARY_COLUMNS.len() }, written));
-    }
+    let whole: Vec<(ExportedFile, NewFile)> = finished.collect::<Result<_>>()?;
     let mut files = Vec::new();
     for (file, written) in whole {
         written.commit()?;
@@ -79,35 +72,6 @@ fn text_of(cell: &Cell) -> String {
         Cell::Text(text) => text.clone(),
         Cell::Absent => String::new(),
     }
-}
-
-/// The name of its file.
-const DICTIONARY: &str = "dictionary.csv";
-const DICTIONARY_COLUMNS: [&str; 6] = ["table", "column", "type", "unit", "meaning", "values"];
-
-/// Writes the dictionary of some tables. Returns the complete file, still under its temporary name, and its rows.
-fn dictionary(file: NewFile, shapes: &[TableShape]) -> io::Result<(NewFile, u64)> {
-    let mut csv = csv::Writer::from_writer(file);
-    csv.write_record(DICTIONARY_COLUMNS)?;
-    let mut rows = 0;
-    for (shape, Column { name, kind, meaning }) in
-        shapes.iter().flat_map(|shape| shape.columns.iter().map(move |column| (shape, column)))
-    {
-        let kind = match kind {
-            Kind::Float => "number",
-            Kind::Integer => "whole number",
-            Kind::Text => "text",
-        };
-        csv.write_record([&shape.name, name, kind, &meaning.unit, &meaning.words, &values(meaning)])?;
-        rows += 1;
-    }
-    Ok((csv.into_inner().map_err(csv::IntoInnerError::into_error)?, rows))
-}
-
-/// The words for the numbers of a column, as in `9 TD_PHASE_POWERED; 10 TD_PHASE_TOUCHDOWN`.
-fn values(meaning: &Meaning) -> String {
-    let values = meaning.values().iter().map(|(number, word)| format!("{number} {word}"));
-    values.collect::<Vec<_>>().join("; ")
 }
 
 #[cfg(test)]

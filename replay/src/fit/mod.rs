@@ -9,7 +9,8 @@
 //! * [`along`]: drag and thrust along the nose. [`burn`] is the model of the thrust, and of a burn on a test stand.
 //! * [`turning`]: the gimbal, from the rotation while the motor burns. [`servo`] is its model.
 //! * [`wind`]: the mean wind, from the force across the nose.
-//! * [`calibration`]: by how much the intervals are wider than the noise says. [`truth`](mod@truth) is what they have to hold.
+//! * [`calibration`]: by how much the intervals are wider than the noise says. `examples/fit_coverage.rs` measures
+//!   whether they hold the truth.
 //! * [`pooled`]: several flights together. [`patched`]: the mission with what was found.
 //! * [`lot`] and [`day`]: what all flights so far tell of the next one.
 //! * [`least_squares`]: most likely values, where the noise is a slow disturbance.
@@ -22,7 +23,6 @@ mod least_squares;
 pub mod lot;
 mod servo;
 mod trace;
-pub mod truth;
 mod turning;
 mod wind;
 
@@ -82,11 +82,6 @@ impl Parameter {
         let (name, unit) = (name.to_owned(), unit.to_owned());
         let (low, high) = (value - Z_95 * sigma, value + Z_95 * sigma);
         Self { name, unit, value, sigma, low, high, systematic: None }
-    }
-
-    /// Whether its interval holds a value.
-    pub fn holds(&self, truth: f64) -> bool {
-        (self.low..=self.high).contains(&truth)
     }
 
     /// Standard deviation without the systematic part.
@@ -153,9 +148,6 @@ pub struct Fit {
     pub damage: Option<String>,
     /// Whether the flight landed; `None` of a test stand, and of a log that does not say.
     pub landed: Option<bool>,
-    /// The truth of a simulated flight by the names of its parameters, if that was asked.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub truth: BTreeMap<String, f64>,
     /// Names what was recorded: one flight is one flight, under however many names.
     pub content: Option<String>,
 }
@@ -494,15 +486,7 @@ impl Answer for FitReport {
             ));
         }
         said.extend(self.together.iter().map(|Pooled { mean, flights, scatter }| {
-            let ours = self.fits.iter().filter_map(|fit| fit.get(&mean.name).zip(fit.truth.get(&mean.name)));
-            let ours: Vec<_> = ours.collect();
-            let held = ours.iter().filter(|(found, truth)| found.holds(**truth)).count();
-            let truth = ours.iter().map(|(_, truth)| **truth).sum::<f64>() / ours.len() as f64;
-            let truth = match ours.len() {
-                0 => String::new(),
-                of => format!("; truth {} in the mean, held by {held} of {of}", digits(truth, mean.sigma)),
-            };
-            format!("  {}   scatter {} in {flights}{truth}", line(mean), digits(*scatter, mean.sigma))
+            format!("  {}   scatter {} in {flights}", line(mean), digits(*scatter, mean.sigma))
         }));
         if let Some(day) = &self.day {
             said.push(String::new());
@@ -520,13 +504,7 @@ impl Answer for FitReport {
 impl Answer for Fit {
     fn sentences(&self) -> Vec<String> {
         let mut said = vec![self.head(), format!("95 % intervals, {}", self.widened())];
-        said.extend(self.found.iter().map(|parameter| {
-            let Some(truth) = self.truth.get(&parameter.name) else {
-                return format!("  {}", line(parameter));
-            };
-            let held = if parameter.holds(*truth) { "held" } else { "MISSED" };
-            format!("  {:<68}  truth {} {held}", line(parameter), digits(*truth, parameter.sigma))
-        }));
+        said.extend(self.found.iter().map(|parameter| format!("  {}", line(parameter))));
         for (title, lacks) in [
             ("not calibrated: the interval is that of the noise alone", &self.not_calibrated),
             ("not found", &self.not_found),
@@ -566,9 +544,6 @@ pub(crate) struct Args {
     /// mission that was flown.
     #[arg(long, alias = "write", value_name = "FILE.toml")]
     out: Option<PathBuf>,
-    /// Put the truth of a simulated flight beside what was found, and whether the interval holds it.
-    #[arg(long)]
-    against_truth: bool,
     #[command(flatten)]
     day: day::Arguments,
     /// Answer in JSON.
@@ -637,10 +612,7 @@ impl Args {
         }
         let recording = Recording::open(file)?;
         let trace = Trace::of(&recording)?;
-        let mut found = fit(&trace);
-        if self.against_truth {
-            found.truth = truth::truth(&crate::refly::as_it_began(&recording)?, &found);
-        }
+        let found = fit(&trace);
         if let Some(path) = &self.out {
             write_into(path, file, &trace, &found)?;
         }

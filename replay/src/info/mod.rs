@@ -10,7 +10,6 @@ use std::path::{Path, PathBuf};
 pub use self::counts::{Channel, Frames, PhaseSource, PhaseSpan, PhaseTimeline, SolveTimes};
 use self::counts::{ChannelCounter, EndingTracker, FrameCounter, PhaseTracker};
 use anyhow::{Result, ensure};
-use protocol::log::reader::Damage;
 use protocol::log::record::SCHEMA_VERSION;
 use protocol::log::v1::LimitResult;
 use protocol::program::Exit;
@@ -25,7 +24,6 @@ use crate::log::{
     Verdict,
 };
 use crate::print::{beyond, counted};
-use crate::recover::{Summary, summary_of};
 
 /// Describes a log file.
 ///
@@ -44,24 +42,21 @@ pub fn info(path: &Path) -> Result<Info, LogError> {
 /// The same without the findings, for who holds the recording to look for them.
 pub(crate) fn described(path: &Path) -> Result<Info, LogError> {
     let mut log = FlightLog::open(path)?;
-    let mut info = info_of(&mut log, || summary_of(path))?;
+    let mut info = info_of(&mut log)?;
     info.size_bytes = std::fs::metadata(path).ok().map(|metadata| metadata.len());
     Ok(info)
 }
 
-/// Describes a log that is being read. `summary` is asked for the file's summary if the log is damaged.
+/// Describes a log that is being read.
 ///
 /// # Errors
 /// As [`info`].
-pub fn info_of<R: Read>(
-    log: &mut FlightLog<R>,
-    summary: impl FnOnce() -> Option<Summary>,
-) -> Result<Info, LogError> {
+pub fn info_of<R: Read>(log: &mut FlightLog<R>) -> Result<Info, LogError> {
     let mut seen = Seen::default();
     while let Some(stamped) = log.next_entry()? {
         seen.take(&stamped);
     }
-    Ok(seen.into_info(log, summary))
+    Ok(seen.into_info(log))
 }
 
 /// What was seen while the log was read.
@@ -112,7 +107,7 @@ impl Seen {
         self.highest_m = height_m.into_iter().chain(self.highest_m).reduce(f64::max);
     }
 
-    fn into_info<R: Read>(self, log: &FlightLog<R>, summary: impl FnOnce() -> Option<Summary>) -> Info {
+    fn into_info<R: Read>(self, log: &FlightLog<R>) -> Info {
         let head = log.head();
         let profile = Profile::of(head);
         let frames = self.frames.into_facts();
@@ -142,7 +137,7 @@ impl Seen {
             build_comparison: head.compare_build(),
             run: head.run.clone(),
             profile,
-            completeness: Completeness::of(log, span.as_ref(), &channels, summary),
+            completeness: Completeness::of(log, span.as_ref(), &channels),
             span,
             channels,
             phases: timelines
@@ -315,8 +310,6 @@ pub struct Completeness {
     pub counted: bool,
     /// The last time that could be read, s after the first record.
     pub readable_until_s: Option<f64>,
-    /// How much is missing after that, s; known only if the end of the file can be read.
-    pub missing_s: Option<f64>,
     /// Messages missing before the last of their channel.
     pub messages_lost: u64,
     /// Number of flights with frames: more than one in a joined log.
@@ -331,25 +324,14 @@ impl Completeness {
         warn_of_loss(name, self.damage.as_deref(), self.cut.as_ref());
     }
 
-    fn of<R: Read>(
-        log: &FlightLog<R>,
-        span: Option<&Span>,
-        channels: &[Channel],
-        summary: impl FnOnce() -> Option<Summary>,
-    ) -> Self {
+    fn of<R: Read>(log: &FlightLog<R>, span: Option<&Span>, channels: &[Channel]) -> Self {
         let (damage, cut) = (log.damage(), log.flights().cut());
-        // The summary of a recovered log says nothing about the damaged one.
-        let missing_s = damage.filter(|damage| !matches!(damage, Damage::Recovered(_))).and_then(|_| {
-            let end_ns = summary()?.last_log_time_ns;
-            Some(seconds(end_ns.checked_sub(span?.last_ns)?))
-        });
         let messages_lost = channels.iter().map(|channel| channel.lost).sum();
         Self {
             complete: damage.is_none() && messages_lost == 0 && cut.is_none(),
             damage: damage.map(ToString::to_string),
             counted: log.is_counted(),
             readable_until_s: span.map(|span| span.duration_s),
-            missing_s,
             messages_lost,
             flights: log.flights().flown(),
             cut,
@@ -455,7 +437,6 @@ impl Info {
                 None => "no record could be read".to_owned(),
                 Some(until_s) => format!("readable until {until_s:.3} s after the first record"),
             });
-            faults.extend(found.missing_s.map(|missing_s| format!("{missing_s:.3} s after that are lost")));
         }
         if found.messages_lost > 0 {
             faults.push(format!("{} lost", counted(found.messages_lost, "message")));
@@ -641,8 +622,7 @@ impl Args {
 
 fn description(file: &std::path::Path) -> Result<Info, LogError> {
     if file.as_os_str() == STDIN {
-        // A stream has no end to look for a summary at.
-        return info_of(&mut FlightLog::read("standard input".to_owned(), std::io::stdin().lock())?, || None);
+        return info_of(&mut FlightLog::read("standard input".to_owned(), std::io::stdin().lock())?);
     }
     info(file)
 }

@@ -7,7 +7,7 @@ use protocol::program::Exit;
 use serde::Serialize;
 
 use super::{Info, info, utc};
-use crate::cli::{Answer, files_of};
+use crate::cli::{Answer, logs_of};
 use crate::log::worst_first;
 use crate::print::columns;
 
@@ -79,7 +79,7 @@ pub fn season(folder: &Path) -> Result<Vec<Flown>> {
             |info| Flown::of(&info),
         )
     };
-    let mut flown: Vec<Flown> = files_of(folder, &["mcap", "tlog"])?.into_iter().map(line).collect();
+    let mut flown: Vec<Flown> = logs_of(folder)?.into_iter().map(line).collect();
     // The same minute: by name.
     flown.sort_by(|a, b| a.date.cmp(&b.date));
     Ok(flown)

@@ -8,7 +8,6 @@ mod flights;
 mod head;
 mod record;
 mod recording;
-mod tlog;
 mod verdict;
 
 use std::fs::File;
@@ -27,8 +26,6 @@ use protocol::text::printable;
 pub use record::{Entry, LoggedFrame, StampedEntry};
 pub(crate) use record::{RECORD_MAX_BYTES, frame_descriptor, misread_frame};
 pub use recording::{Recording, RecordingError};
-pub use tlog::{ImportError, ImportedTlog, import_tlog};
-pub(crate) use tlog::{is_tlog, open_log};
 pub(crate) use verdict::frame_of;
 use verdict::{Found, Verdicts, contradiction, heard_message};
 pub use verdict::{Verdict, share, worst_first};
@@ -43,7 +40,7 @@ pub(crate) const IN_ORDER_NS: u64 = 1_000_000_000;
 
 /// Of one time: what the computer starts from at power-up, a frame, what that led to, and the start at the release.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Place {
+enum Place {
     PowerUp,
     Frame,
     Other,
@@ -52,7 +49,7 @@ pub(crate) enum Place {
 
 impl Place {
     /// The place of a record; a start is that of a release.
-    pub(crate) fn of(topic: &str) -> Self {
+    fn of(topic: &str) -> Self {
         match topic {
             TOPIC_COMPUTER_START => Self::Release,
             TOPIC_COMPUTER_FRAME => Self::Frame,
@@ -96,8 +93,6 @@ pub struct FlightLog<R: Read> {
     flights: Flights,
     clocks: Clocks,
     verdicts: Verdicts,
-    /// Its times need not be in order.
-    may_go_back: bool,
     order: ComputerOrder,
     in_flight: InFlight,
     /// The first verdict that contradicts itself.
@@ -116,18 +111,14 @@ pub(crate) fn open_regular(path: &Path) -> std::io::Result<File> {
 }
 
 impl FlightLog<BufReader<File>> {
-    /// Opens a log file. A `.tlog` is read as the log that a station would have written.
+    /// Opens a log file.
     ///
     /// # Errors
     /// The file cannot be read, or is no log.
     pub fn open(path: &Path) -> Result<Self, LogError> {
         let name = path.display().to_string();
-        match open_log(path) {
-            Ok((file, of_tlog)) => {
-                let log = Self::read(name, BufReader::with_capacity(BUFFER_BYTES, file))?;
-                // The clock of another station may have been set back; its frames are in the order in which they came.
-                Ok(Self { may_go_back: of_tlog, ..log })
-            }
+        match open_regular(path) {
+            Ok(file) => Self::read(name, BufReader::with_capacity(BUFFER_BYTES, file)),
             Err(source) => Err(LogError::Read { name, source }),
         }
     }
@@ -162,7 +153,6 @@ impl<R: Read> FlightLog<R> {
             flights: Flights::default(),
             clocks: Clocks::default(),
             verdicts: Verdicts::default(),
-            may_go_back: false,
             order: ComputerOrder::default(),
             in_flight: InFlight::default(),
             contradiction: None,
@@ -250,7 +240,7 @@ impl<R: Read> FlightLog<R> {
                     let channel = self.reader.channel(channel_id);
                     let topic = channel.map_or("", |channel| channel.topic.as_str());
                     let is_broken = self.order.is_broken_by(topic, log_time_ns);
-                    if (is_broken || back_ns > IN_ORDER_NS) && !self.may_go_back {
+                    if is_broken || back_ns > IN_ORDER_NS {
                         return Err(LogError::NotInOrder {
                             name: self.name.clone(),
                             topic: printable(topic.as_bytes()),
@@ -324,8 +314,8 @@ pub enum LogError {
     },
     /// The file is of another kind.
     #[error(
-        "{name}: is not a flight log: it begins with {}, and an MCAP file with 89 4d 43 41 50 30 0d 0a; a .tlog has \
-        MAVLink 2 frames, each after a time of 8 bytes",
+        "{name}: is not a flight log: it begins with {}, and an MCAP file with 89 4d 43 41 50 30 0d 0a; \
+        `ground --replay` shows a .tlog",
         hex(found)
     )]
     NotMcap {
@@ -345,7 +335,7 @@ pub enum LogError {
     /// MCAP allows any order; a flight is told from its beginning to its end.
     #[error(
         "{name}: is not in order of time: a record on {topic} comes {back_s:.3} s late, behind one that it belongs before; \
-        `replay recover` sorts it"
+        `mcap sort` sorts it"
     )]
     NotInOrder { name: String, topic: String, back_s: f64 },
     /// An MCAP file of another program.

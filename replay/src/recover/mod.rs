@@ -1,27 +1,25 @@
-//! Recovers a whole log from a damaged one.
+//! Recovers a readable log from a damaged one.
 //!
 //! A recorder that was killed leaves a log without its end; a bad disk or a cable may damage the middle. Every chunk with a
-//! correct checksum is kept, also after a broken one. The chunks are the truth: what the summary lists and counts helps only if
-//! the summary is whole. The report lists what is lost, and so does the recovered log itself ([`METADATA_RECOVERY`]). Nothing is
-//! invented: a message is kept unchanged or not at all. A log that is not in order of time is sorted.
+//! correct checksum is recovered, also after a broken one. The report lists what is lost, and so does the recovered log
+//! ([`METADATA_RECOVERY`]). Nothing is invented: a message is recovered unchanged or not at all.
 
 mod scan;
 mod write;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use mcap::records::Metadata;
 use protocol::log::record::{METADATA_RECOVERY, RECOVERY_FAULT_ENTRY};
 use protocol::program::Exit;
-use scan::{ChunkName, Contents, LostStretch, Records};
-pub use scan::{Summary, summary_of};
+use scan::{LostStretch, Records};
 use serde::Serialize;
 use write::Rescue;
 
 use crate::cli::{Answer, give};
-use crate::log::{IN_ORDER_NS, LogError, is_tlog};
+use crate::log::LogError;
 use crate::output::WriteError;
 use crate::print::counted;
 
@@ -31,9 +29,6 @@ pub enum RecoverError {
     /// The file is not an MCAP file, or cannot be read.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// Nothing has to be recovered.
-    #[error("{}: is a .tlog, of which every command reads what can be read; `replay export` makes a log of that", path.display())]
-    Tlog { path: PathBuf },
     /// No message could be kept.
     #[error("{name}: no message can be recovered{}", reason.as_ref().map(|why| format!(": {why}")).unwrap_or_default())]
     Nothing {
@@ -49,7 +44,7 @@ pub enum RecoverError {
 /// A stretch of a file that could not be kept.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Lost {
-    /// Its first byte; of a chunk that is not there, its first byte in the file as it was.
+    /// Its first byte.
     pub from_byte: u64,
     /// Its length.
     pub bytes: u64,
@@ -75,16 +70,14 @@ pub struct Recovery {
     pub kept_s: Option<f64>,
     /// What was lost.
     pub lost: Vec<Lost>,
-    /// Messages that the summary counts and that were not kept; `None` without a summary.
-    pub messages_lost: Option<u64>,
+    /// Number of messages by the summary; `None` without an intact one.
+    pub messages_counted: Option<u64>,
     /// Messages of a channel that nothing describes.
     pub undecodable: u64,
-    /// Somebody has added, repeated or moved chunks: they are not those of the summary. All that can be read is kept.
-    pub changed: bool,
-    /// Messages were not in order of time, which is no damage; they are now.
-    pub sorted: bool,
-    /// What was wrong with the summary; no message is lost with it.
-    pub summary_fault: Option<&'static str>,
+    /// Some message comes later than one that belongs behind it.
+    pub out_of_order: bool,
+    /// The summary is there and its checksum is right; no message is lost without it.
+    pub summary_is_whole: bool,
     /// Whether the log has its end mark, so nothing is missing at the end.
     pub ended: bool,
 }
@@ -115,16 +108,19 @@ impl Recovery {
                 lost.from_byte
             )
         }));
-        faults.extend(
-            self.messages_lost.filter(|lost| *lost > 0).map(|lost| format!("{lost} messages are lost")),
-        );
+        let counted = self.messages_counted.filter(|counted| *counted != self.messages);
+        faults.extend(counted.map(|counted| {
+            format!("its summary counts {counted} messages, and {} are there", self.messages)
+        }));
         if self.undecodable > 0 {
             faults.push(format!("{} messages of an unknown channel were dropped", self.undecodable));
         }
-        if self.changed {
-            faults.push("the log was changed: its chunks are not those that its summary lists".to_owned());
+        if self.out_of_order {
+            faults.push("it is not in order of time (`mcap sort` sorts it)".to_owned());
         }
-        faults.extend(self.summary_fault.map(|fault| format!("{fault}, and no message with it")));
+        if self.ended && !self.summary_is_whole {
+            faults.push("its summary is damaged, and no message with it".to_owned());
+        }
         if !self.ended {
             faults.push("it had no end mark, so its end may be lost".to_owned());
         }
@@ -137,79 +133,38 @@ impl Recovery {
 /// # Errors
 /// The input is not an MCAP file, cannot be read, or holds no message that can be kept; or the output cannot be written.
 pub fn recover(input: &Path, output: &Path) -> Result<Recovery, RecoverError> {
-    if is_tlog(input).unwrap_or_default() {
-        return Err(RecoverError::Tlog { path: input.to_owned() });
-    }
     let mut records = Records::open(input)?;
     let contents = records.contents()?;
-    let mut recovery = Recovery {
-        input: input.display().to_string(),
-        ended: contents.ended,
-        changed: was_changed(&contents),
-        sorted: is_sorted_anew(&contents),
-        summary_fault: contents.summary_fault,
-        ..Recovery::default()
-    };
+    let input = input.display().to_string();
     let rescue = Rescue::of(output, &mut records, &contents)?;
     let kept = rescue.kept;
     let Some((first_ns, last_ns)) = kept.span_ns else {
         let reason = contents.lost.first().map(|lost| lost.reason.clone());
-        return Err(RecoverError::Nothing { name: recovery.input, reason });
+        return Err(RecoverError::Nothing { name: input, reason });
     };
-    recovery.messages = kept.messages;
-    recovery.chunks = kept.chunks;
-    recovery.records_about = kept.records_about;
-    recovery.undecodable = kept.undecodable;
-    recovery.kept_s = Some(last_ns.saturating_sub(first_ns) as f64 / 1e9);
-    let told = contents.told.statistics.as_ref();
-    // What is there twice, or of another log, makes up for nothing.
-    let told = told.filter(|_| !recovery.changed);
-    recovery.messages_lost = told.map(|told| told.message_count.saturating_sub(kept.messages));
-    // With every message kept, no chunk is lost.
-    let told = if recovery.messages_lost == Some(0) { &[] } else { &contents.told.chunks[..] };
-    recovery.lost = lost_of(&contents, told, first_ns);
+    let since_s = |ns: u64| (ns as f64 - first_ns as f64) / 1e9;
+    let lost = |LostStretch { from_byte, bytes, span_ns, reason }: &LostStretch| Lost {
+        from_byte: *from_byte,
+        bytes: *bytes,
+        span_s: span_ns.map(|(from, until)| (since_s(from), since_s(until))),
+        reason: reason.clone(),
+    };
+    let mut recovery = Recovery {
+        input,
+        output: PathBuf::new(),
+        messages: kept.messages,
+        chunks: kept.chunks,
+        records_about: kept.records_about,
+        kept_s: Some(since_s(last_ns)),
+        lost: contents.lost.iter().map(lost).collect(),
+        messages_counted: contents.summary.statistics.as_ref().map(|statistics| statistics.message_count),
+        undecodable: kept.undecodable,
+        out_of_order: kept.out_of_order,
+        summary_is_whole: contents.summary.is_whole,
+        ended: contents.ended,
+    };
     recovery.output = rescue.finish(&recovery.about())?;
     Ok(recovery)
-}
-
-/// Whether there are other chunks than those of the summary, or they are in another order. Without a summary nothing says so.
-fn was_changed(contents: &Contents) -> bool {
-    let mut told = contents.told.chunks.iter().map(|(.., name)| name);
-    let mut there = contents.good.iter().filter_map(|piece| piece.chunk);
-    !contents.told.chunks.is_empty() && there.any(|there| told.all(|name| *name != there))
-}
-
-/// Whether the messages are out of order. A chunk is moved by less than what a log of ours may go back, too.
-fn is_sorted_anew(contents: &Contents) -> bool {
-    contents.is_mixed || contents.back_ns > if was_changed(contents) { 0 } else { IN_ORDER_NS }
-}
-
-/// What is lost, with times after the first message kept: the stretches that cannot be read, with the times of the chunks of the
-/// summary that lay there, and the chunks that no stretch covers.
-fn lost_of(contents: &Contents, told: &[(u64, u64, ChunkName)], first_ns: u64) -> Vec<Lost> {
-    let there: BTreeSet<ChunkName> = contents.good.iter().filter_map(|piece| piece.chunk).collect();
-    let mut lost = contents.lost.clone();
-    for (offset, bytes, name) in told.iter().filter(|(.., name)| !there.contains(name)) {
-        let span = (name.first_ns, name.last_ns);
-        let covers = |stretch: &&mut LostStretch| {
-            stretch.span_ns == Some(span)
-                || (stretch.from_byte..stretch.from_byte + stretch.bytes).contains(offset)
-        };
-        if let Some(stretch) = lost.iter_mut().find(covers) {
-            let (from, until) = stretch.span_ns.unwrap_or(span);
-            stretch.span_ns = Some((from.min(span.0), until.max(span.1)));
-        } else {
-            let reason = "a chunk that the summary names is not there".to_owned();
-            lost.push(LostStretch { from_byte: *offset, bytes: *bytes, span_ns: Some(span), reason });
-        }
-    }
-    lost.sort_by_key(|stretch| stretch.from_byte);
-    let since_s = |ns: u64| (ns as f64 - first_ns as f64) / 1e9;
-    let in_seconds = |LostStretch { from_byte, bytes, span_ns, reason }| {
-        let span_s = span_ns.map(|(from, until)| (since_s(from), since_s(until)));
-        Lost { from_byte, bytes, span_s, reason }
-    };
-    lost.into_iter().map(in_seconds).collect()
 }
 
 impl Answer for Recovery {
@@ -230,9 +185,6 @@ impl Answer for Recovery {
             );
             format!("lost {} from byte {from_byte}, {span}: {reason}", counted(*bytes, "byte"))
         }));
-        if self.sorted {
-            lines.push("the log was not in order of time; the new one is".to_owned());
-        }
         lines.push(match self.fault() {
             None => "the log was whole: nothing is lost".to_owned(),
             Some(fault) => format!("the log was DAMAGED: {fault}; the recovered log says so, too"),

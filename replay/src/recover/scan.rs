@@ -12,9 +12,8 @@ use mcap::records::{Channel, Record, SchemaHeader, Statistics, op};
 use protocol::log::reader::{
     METADATA_LIMIT_BYTES, RECORD_LIMIT_BYTES, RecordError, parse_record, records_of_chunk,
 };
-use protocol::log::record::TOPIC_COMPUTER_FRAME;
 
-use crate::log::{ComputerOrder, LogError, open_regular, take_magic};
+use crate::log::{LogError, open_regular, take_magic};
 
 /// Size of the type and length before every record.
 const HEAD_BYTES: usize = 9;
@@ -31,26 +30,15 @@ const LOST_MAX: usize = 10_000;
 /// The part of the footer that its checksum covers.
 const FOOTER_CHECKED_BYTES: usize = 16;
 
-/// What tells one chunk from another, in its own head and in the summary.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct ChunkName {
-    pub(crate) first_ns: u64,
-    pub(crate) last_ns: u64,
-    pub(crate) uncompressed_bytes: u64,
-    pub(crate) compressed_bytes: u64,
-}
-
 /// A good record, or a chunk whose checksum is right.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Good {
-    /// Its first byte in the file.
+    /// Position of its first byte in the file.
     pub(crate) at: u64,
     pub(crate) opcode: u8,
-    /// The name of a chunk.
-    pub(crate) chunk: Option<ChunkName>,
 }
 
-/// A stretch of the file that cannot be kept.
+/// A stretch of the file that cannot be recovered.
 #[derive(Debug, Clone)]
 pub(crate) struct LostStretch {
     pub(crate) from_byte: u64,
@@ -59,58 +47,26 @@ pub(crate) struct LostStretch {
     pub(crate) reason: String,
 }
 
-/// What a file consists of.
+/// The parts of a file.
 #[derive(Debug, Default)]
 pub(crate) struct Contents {
     pub(crate) good: Vec<Good>,
     pub(crate) lost: Vec<LostStretch>,
     /// The end mark is there.
     pub(crate) ended: bool,
-    /// A message comes this long after later ones, ns.
-    pub(crate) back_ns: u64,
-    latest_ns: u64,
-    /// The flight computer's own records are not in their order.
-    pub(crate) is_mixed: bool,
-    order: ComputerOrder,
-    topics: BTreeMap<u16, String>,
-    pub(crate) told: WriterReport,
-    /// What is wrong with the summary. The chunks before it do not depend on it.
-    pub(crate) summary_fault: Option<&'static str>,
+    /// Library that wrote the file, from its head.
+    pub(crate) library: String,
+    pub(crate) summary: FileSummary,
 }
 
-/// What the summary behind the end mark tells. Its schemas and channels are used as far as they can be read, its list of
-/// chunks and its count only if it is whole. Its own index is not used: bytes that were lost have shifted it.
+/// The summary behind the end mark. Its schemas and channels are used as far as they can be read, its statistics only if
+/// its checksum is right.
 #[derive(Debug, Default)]
-pub(crate) struct WriterReport {
-    /// Who wrote it, from the head of the file.
-    pub(crate) library: String,
+pub(crate) struct FileSummary {
+    pub(crate) is_whole: bool,
     pub(crate) schemas: BTreeMap<u16, (SchemaHeader, Vec<u8>)>,
     pub(crate) channels: BTreeMap<u16, Channel>,
-    /// Where each chunk began, its length and its name.
-    pub(crate) chunks: Vec<(u64, u64, ChunkName)>,
-    /// How many messages there were.
     pub(crate) statistics: Option<Statistics>,
-}
-
-/// What the summary of a file tells.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Summary {
-    /// Frames of the flight computer in the file.
-    pub frames: u64,
-    /// Time of the last message, ns since the Unix epoch.
-    pub last_log_time_ns: u64,
-}
-
-/// What the summary of a file tells, if it is whole. The whole file is read for it.
-pub fn summary_of(path: &Path) -> Option<Summary> {
-    let WriterReport { channels, statistics, .. } = Records::open(path).ok()?.contents().ok()?.told;
-    let statistics = statistics?;
-    let of_frames = |id: &u16| channels.get(id).is_some_and(|channel| channel.topic == TOPIC_COMPUTER_FRAME);
-    let counts = statistics.channel_message_counts.iter().filter(|(id, _)| of_frames(id));
-    Some(Summary {
-        frames: counts.map(|(_, count)| *count).fold(0, u64::saturating_add),
-        last_log_time_ns: statistics.message_end_time,
-    })
 }
 
 /// A file being read record by record.
@@ -174,7 +130,6 @@ impl Records {
                 continue;
             }
             let body = self.read(end_of_head, length)?;
-            let chunk = (opcode == op::CHUNK).then(|| ChunkHead::read(&body)).flatten();
             if opcode == op::DATA_END {
                 contents.ended = true;
                 let told = body.first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
@@ -183,12 +138,7 @@ impl Records {
                         "the checksum over all data does not fit: something between the records was changed";
                     contents.lose(at, 0, None, reason);
                 }
-                contents.summary_fault = self.read_summary(next, &mut contents.told)?;
-                if contents.summary_fault.is_some() {
-                    // What is left of a list looks like a shorter one.
-                    contents.told.chunks.clear();
-                    contents.told.statistics = None;
-                }
+                contents.summary = self.read_summary(next)?;
                 break;
             }
             match contents.check(opcode, &body) {
@@ -197,13 +147,13 @@ impl Records {
                     hasher.update(&length.to_le_bytes());
                     hasher.update(&body);
                     if keeps {
-                        let chunk = chunk.map(|head| head.name);
-                        contents.good.push(Good { at, opcode, chunk });
+                        contents.good.push(Good { at, opcode });
                     }
                     at = next;
                 }
                 Err(error) => {
                     let what = if opcode == op::CHUNK { "a chunk" } else { "a record" };
+                    let chunk = (opcode == op::CHUNK).then(|| ChunkHead::read(&body)).flatten();
                     let span_ns = chunk.and_then(|head| head.span_ns());
                     let reason = format!("{what} is broken: {error}");
                     if self.begins_record(next)? {
@@ -219,15 +169,12 @@ impl Records {
         Ok(contents)
     }
 
-    /// Reads from here to the end of the file; says what is wrong.
-    fn read_summary(
-        &mut self,
-        from_byte: u64,
-        told: &mut WriterReport,
-    ) -> Result<Option<&'static str>, LogError> {
-        let mut checksum = crc32fast::Hasher::new();
+    /// Reads the summary that begins here.
+    fn read_summary(&mut self, from_byte: u64) -> Result<FileSummary, LogError> {
+        let mut summary = FileSummary::default();
+        let (mut checksum, mut statistics) = (crc32fast::Hasher::new(), None);
         let mut at = from_byte;
-        // Records of types that a reader does not know may stand anywhere.
+        // Records of types that a reader does not support may be anywhere.
         while let Some((opcode, length)) = self.head(at)?.filter(|(opcode, length)| {
             *opcode != 0 && *length <= (RECORD_LIMIT_BYTES as u64).min(self.size - at - HEAD_BYTES as u64)
         }) {
@@ -237,41 +184,25 @@ impl Records {
             at += HEAD_BYTES as u64 + length;
             match parse_record(opcode, &body) {
                 Ok(Record::Schema { header, data }) => {
-                    told.schemas.insert(header.id, (header, data.into_owned()));
+                    summary.schemas.insert(header.id, (header, data.into_owned()));
                 }
                 Ok(Record::Channel(channel)) => {
-                    told.channels.insert(channel.id, channel);
+                    summary.channels.insert(channel.id, channel);
                 }
-                Ok(Record::ChunkIndex(index)) if told.chunks.len() < GOOD_MAX => {
-                    let name = ChunkName {
-                        first_ns: index.message_start_time,
-                        last_ns: index.message_end_time,
-                        uncompressed_bytes: index.uncompressed_size,
-                        compressed_bytes: index.compressed_size,
-                    };
-                    told.chunks.push((index.chunk_start_offset, index.chunk_length, name));
-                }
-                Ok(Record::Statistics(statistics)) => told.statistics = Some(statistics),
+                Ok(Record::Statistics(found)) => statistics = Some(found),
                 Ok(Record::Footer(footer)) => {
                     checksum.update(body.get(..FOOTER_CHECKED_BYTES).unwrap_or_default());
-                    // What the bits of a number were cannot be seen from it.
-                    if footer.summary_crc != 0 && footer.summary_crc != checksum.finalize() {
-                        return Ok(Some("the checksum over its summary does not fit"));
-                    }
-                    // A writer may list no chunk at all.
-                    let counted = told.statistics.as_ref().map(|statistics| statistics.chunk_count as usize);
-                    if !told.chunks.is_empty() && counted.is_some_and(|count| count != told.chunks.len()) {
-                        return Ok(Some("its summary does not list as many chunks as it counts"));
-                    }
                     let ends = self.read(at, mcap::MAGIC.len() as u64 + 1)? == mcap::MAGIC;
-                    return Ok((!ends).then_some("the file does not end behind its footer"));
+                    summary.is_whole = ends && [0, checksum.finalize()].contains(&footer.summary_crc);
+                    summary.statistics = statistics.filter(|_| summary.is_whole);
+                    break;
                 }
                 Err(_) => break,
                 Ok(_) => {}
             }
             checksum.update(&body);
         }
-        Ok(Some("its summary is cut off"))
+        Ok(summary)
     }
 
     /// Loses what comes until the next chunk or the end mark, and returns where that is.
@@ -359,47 +290,21 @@ impl Records {
 }
 
 impl Contents {
-    /// Whether a chunk is of another log: the summary does not name it, and misses none of its size, whose head was changed.
-    pub(crate) fn is_foreign(&self, name: &ChunkName) -> bool {
-        let is_there = |told: &ChunkName| self.good.iter().any(|piece| piece.chunk == Some(*told));
-        let sizes = |name: &ChunkName| (name.uncompressed_bytes, name.compressed_bytes);
-        let could_be = |told: &ChunkName| told == name || (sizes(told) == sizes(name) && !is_there(told));
-        !self.told.chunks.is_empty() && !self.told.chunks.iter().any(|(_, _, told)| could_be(told))
-    }
-
-    /// Whether a record is kept, if it can be read: indexes are made anew. Notes the times of its messages.
+    /// Returns whether a readable record is recovered; indexes are written anew.
     fn check(&mut self, opcode: u8, body: &[u8]) -> Result<bool, RecordError> {
         match opcode {
-            op::CHUNK => records_of_chunk(body, |record| {
-                self.note_order(&record);
-                Ok(())
-            })
-            .map(|()| true),
+            op::CHUNK => records_of_chunk(body, |_| Ok(())).map(|()| true),
             op::METADATA if body.len() > METADATA_LIMIT_BYTES => {
                 Err(RecordError::TooLarge(body.len() as u64))
             }
             op::HEADER | op::SCHEMA | op::CHANNEL | op::MESSAGE | op::METADATA | op::ATTACHMENT => {
-                let record = parse_record(opcode, body)?;
-                self.note_order(&record);
-                if let Record::Header(header) = record {
-                    self.told.library = header.library;
+                if let Record::Header(header) = parse_record(opcode, body)? {
+                    self.library = header.library;
                     return Ok(false);
                 }
                 Ok(true)
             }
             _ => Ok(false),
-        }
-    }
-
-    fn note_order(&mut self, record: &Record) {
-        if let Record::Channel(channel) = record {
-            self.topics.insert(channel.id, channel.topic.clone());
-        }
-        if let Record::Message { header, .. } = record {
-            let topic = self.topics.get(&header.channel_id).map_or("", String::as_str);
-            self.is_mixed |= self.order.is_broken_by(topic, header.log_time);
-            self.back_ns = self.back_ns.max(self.latest_ns.saturating_sub(header.log_time));
-            self.latest_ns = self.latest_ns.max(header.log_time);
         }
     }
 
@@ -420,8 +325,10 @@ impl Contents {
 /// The fields at the beginning of a chunk.
 #[derive(Debug, Clone, Copy)]
 struct ChunkHead {
-    name: ChunkName,
-    /// The length of the whole body that follows from its fields.
+    first_ns: u64,
+    last_ns: u64,
+    uncompressed_bytes: u64,
+    /// Length of the complete body that follows from its fields.
     body_bytes: u64,
 }
 
@@ -430,20 +337,20 @@ impl ChunkHead {
     fn read(body: &[u8]) -> Option<Self> {
         let compression_bytes = u64::from(u32::from_le_bytes(*body.get(28..)?.first_chunk()?));
         let compression = body.get(32..)?.get(..usize::try_from(compression_bytes).ok()?)?;
-        let name = ChunkName {
+        let compressed_bytes = number_at(body, 32 + usize::try_from(compression_bytes).ok()?)?;
+        let head = Self {
             first_ns: number_at(body, 0)?,
             last_ns: number_at(body, 8)?,
             uncompressed_bytes: number_at(body, 16)?,
-            compressed_bytes: number_at(body, 32 + usize::try_from(compression_bytes).ok()?)?,
+            body_bytes: (CHUNK_FIELDS_BYTES + compression_bytes).checked_add(compressed_bytes)?,
         };
         let known = matches!(compression, b"" | b"lz4" | b"zstd");
-        let body_bytes = (CHUNK_FIELDS_BYTES + compression_bytes).checked_add(name.compressed_bytes)?;
-        (known && name.first_ns <= name.last_ns).then_some(Self { name, body_bytes })
+        (known && head.first_ns <= head.last_ns).then_some(head)
     }
 
     /// First and last time of its messages, ns; `None` for an empty chunk.
     fn span_ns(&self) -> Option<(u64, u64)> {
-        (self.name.first_ns > 0).then_some((self.name.first_ns, self.name.last_ns))
+        (self.first_ns > 0).then_some((self.first_ns, self.last_ns))
     }
 }
 
@@ -459,9 +366,7 @@ fn may_begin(bytes: &[u8], left: u64) -> bool {
         return length == 4 && next.is_some_and(|next| (op::FOOTER..op::DATA_END).contains(next));
     }
     let head = ChunkHead::read(&bytes[HEAD_BYTES..]);
-    head.is_some_and(|head| {
-        head.body_bytes == length && head.name.uncompressed_bytes <= RECORD_LIMIT_BYTES as u64
-    })
+    head.is_some_and(|head| head.body_bytes == length && head.uncompressed_bytes <= RECORD_LIMIT_BYTES as u64)
 }
 
 fn number_at(bytes: &[u8], place: usize) -> Option<u64> {

@@ -2,15 +2,14 @@
 
 use std::collections::BTreeMap;
 use std::io::BufWriter;
-use std::mem::take;
 use std::path::{Path, PathBuf};
 
 use mcap::records::{MessageHeader, Metadata, Record, op};
 use protocol::log::reader::{RecordError, parse_record, records_of_chunk};
 
-use super::scan::{Contents, Records, WriterReport};
-use super::{RecoverError, is_sorted_anew};
-use crate::log::Place;
+use super::RecoverError;
+use super::scan::{Contents, FileSummary, Records};
+use crate::log::{ComputerOrder, IN_ORDER_NS};
 use crate::output::{NewFile, WriteError};
 
 /// Chunk size as in the recorder's own logs.
@@ -20,25 +19,14 @@ type Writer = mcap::Writer<BufWriter<NewFile>>;
 
 pub(crate) struct Rescue<'a> {
     path: PathBuf,
-    /// What the file's own summary tells of its channels, for messages whose channel record is lost.
-    told: &'a WriterReport,
+    /// The file's summary, for messages whose channel record is lost.
+    summary: &'a FileSummary,
     writer: Writer,
-    /// The file's schemas and channels by their numbers there.
+    /// The file's schemas, and its channels with their topics, by their numbers there.
     schemas: BTreeMap<u16, u16>,
     channels: BTreeMap<u16, (u16, String)>,
-    /// The chunk at hand is of another log.
-    is_foreign: bool,
+    order: ComputerOrder,
     pub(crate) kept: Kept,
-    /// Messages wait until the end, and are then written in order of time.
-    sorts: bool,
-    waiting: Vec<Waiting>,
-}
-
-struct Waiting {
-    header: MessageHeader,
-    data: Vec<u8>,
-    /// Among the messages of one time.
-    place: Place,
 }
 
 /// What was kept.
@@ -50,10 +38,12 @@ pub(crate) struct Kept {
     pub(crate) records_about: u64,
     /// Messages whose channel nothing describes.
     pub(crate) undecodable: u64,
+    /// Some message comes later than one that belongs behind it.
+    pub(crate) out_of_order: bool,
 }
 
 impl<'a> Rescue<'a> {
-    /// Copies what can be read of a log and is kept; sorted, if it was not in order of time.
+    /// Copies the good records of a log into a new file.
     pub(crate) fn of(
         output: &Path,
         records: &mut Records,
@@ -64,30 +54,21 @@ impl<'a> Rescue<'a> {
         let options = mcap::WriteOptions::new()
             .compression(Some(mcap::Compression::Lz4))
             .chunk_size(Some(CHUNK_BYTES))
-            .library(&contents.told.library);
+            .library(&contents.library);
         let mut rescue = Self {
-            told: &contents.told,
+            summary: &contents.summary,
             writer: options
                 .create(BufWriter::new(file))
                 .map_err(|error| WriteError::at(&path)(std::io::Error::other(error)))?,
             path,
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
-            is_foreign: false,
+            order: ComputerOrder::default(),
             kept: Kept::default(),
-            sorts: is_sorted_anew(contents),
-            waiting: Vec::new(),
         };
         for piece in &contents.good {
             let body = records.body(piece.at)?;
-            // A chunk of another log has numbers of channels of its own.
-            let is_foreign = piece.chunk.is_some_and(|name| contents.is_foreign(&name));
-            let own = is_foreign.then(|| (take(&mut rescue.schemas), take(&mut rescue.channels)));
-            rescue.is_foreign = is_foreign;
             rescue.keep(piece.opcode, &body)?;
-            if let Some(own) = own {
-                (rescue.schemas, rescue.channels) = own;
-            }
         }
         Ok(rescue)
     }
@@ -147,14 +128,12 @@ impl<'a> Rescue<'a> {
             return Ok(());
         }
         let (channel_id, topic) = &self.channels[&header.channel_id];
+        let is_broken = self.order.is_broken_by(topic, header.log_time);
         let header = MessageHeader { channel_id: *channel_id, ..header };
-        if self.sorts {
-            self.waiting.push(Waiting { header, data: data.to_vec(), place: Place::of(topic) });
-        } else {
-            self.writer.write_to_known_channel(&header, data)?;
-        }
+        self.writer.write_to_known_channel(&header, data)?;
         self.kept.messages += 1;
         let (first, last) = self.kept.span_ns.unwrap_or((header.log_time, header.log_time));
+        self.kept.out_of_order |= is_broken || last.saturating_sub(header.log_time) > IN_ORDER_NS;
         self.kept.span_ns = Some((first.min(header.log_time), last.max(header.log_time)));
         Ok(())
     }
@@ -164,8 +143,8 @@ impl<'a> Rescue<'a> {
         if self.channels.contains_key(&id) {
             return Ok(true);
         }
-        let Some(told) = self.told.channels.get(&id).filter(|_| !self.is_foreign) else { return Ok(false) };
-        let schema = match self.told.schemas.get(&told.schema_id) {
+        let Some(told) = self.summary.channels.get(&id) else { return Ok(false) };
+        let schema = match self.summary.schemas.get(&told.schema_id) {
             Some((schema, data)) => self.writer.add_schema(&schema.name, &schema.encoding, data)?,
             None => 0,
         };
@@ -182,15 +161,6 @@ impl<'a> Rescue<'a> {
     }
 
     fn close(mut self, about: &Metadata) -> mcap::McapResult<NewFile> {
-        let mut waiting = take(&mut self.waiting);
-        let starts = waiting.iter_mut().filter(|message| message.place == Place::Release);
-        if let Some(first) = starts.min_by_key(|message| message.header.log_time) {
-            first.place = Place::PowerUp;
-        }
-        waiting.sort_by_key(|message| (message.header.log_time, message.place));
-        for Waiting { header, data, .. } in waiting {
-            self.writer.write_to_known_channel(&header, &data)?;
-        }
         self.writer.write_metadata(about)?;
         self.writer.finish()?;
         Ok(self.writer.into_inner().into_inner().map_err(std::io::IntoInnerError::into_error)?)

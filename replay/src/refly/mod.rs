@@ -32,7 +32,7 @@ use protocol::log::writer::{LogHeader, LogWriter};
 use protocol::program::Exit;
 use serde::Serialize;
 use sim::draw::draw;
-use sim::sortie::{SetUpError, Sortie};
+use sim::sortie::SetUpError;
 use sim::wire::record;
 
 pub use self::others::{OtherFlights, other_flights};
@@ -141,14 +141,6 @@ pub struct ReflownFlight {
     pub run: BTreeMap<String, String>,
     /// The landing verdict; `None` if it did not come down.
     pub verdict: Option<v1::LandingVerdict>,
-}
-
-/// A simulated flight as it began, with its drawn world.
-///
-/// # Errors
-/// The log does not say what its flight was drawn from.
-pub(crate) fn as_it_began(recording: &Recording) -> Result<Sortie, AgainError> {
-    Ok(Rerun::of(recording, &FaultChanges::default())?.flight)
 }
 
 /// Flies a recorded flight again.

@@ -16,7 +16,7 @@ use protocol::program::Exit;
 use track::Flight;
 
 use crate::cli::answer;
-use crate::info::{Completeness, Info, described};
+use crate::info::{Completeness, described};
 use crate::log::{Recording, RecordingError};
 use crate::output::NewFile;
 
@@ -31,28 +31,18 @@ pub struct Report {
     pub completeness: Completeness,
 }
 
-/// Builds the page of a log file; `with` is another one, whose flight is drawn into the same pictures behind its verdict.
+/// Builds the page of a log file.
 ///
 /// # Errors
-/// A file is not a flight log, cannot be read or is longer than any flight. Damage is part of the page.
-pub fn report(path: &Path, with: Option<&Path>) -> Result<Report, RecordingError> {
-    let (flight, info) = told(path)?;
-    let mut sections = section::all(&flight, &info);
-    if let Some((other, others)) = with.map(told).transpose()? {
-        let html = section::overlay::html([(&flight, &info), (&other, &others)]);
-        sections.insert(1, section::Section { id: "both", title: "Two flights", html });
-    }
-    let html = html::page(&flight, &info, &sections);
-    Ok(Report { name: info.file, html, completeness: info.completeness })
-}
-
-/// A flight and the description of its log.
-fn told(path: &Path) -> Result<(Flight, Info), RecordingError> {
+/// The file is not a flight log, cannot be read or is longer than any flight. Damage is part of the page.
+pub fn report(path: &Path) -> Result<Report, RecordingError> {
     let recording = Recording::open(path)?;
     let mut info = described(path)?;
     // The date says it.
     info.run.remove("start_unix_ns");
-    Ok((Flight::of(recording, &mut info), info))
+    let flight = Flight::of(recording, &mut info);
+    let html = html::page(&flight, &info, &section::all(&flight, &info));
+    Ok(Report { name: info.file, html, completeness: info.completeness })
 }
 
 #[derive(Debug, clap::Args)]
@@ -62,15 +52,12 @@ pub(crate) struct Args {
     /// The page to write, or - for standard output; the log's name with .html if left out.
     #[arg(long, short, alias = "output", value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Another log, whose flight is drawn into the same pictures.
-    #[arg(long, value_name = "LOG")]
-    with: Option<PathBuf>,
 }
 
 impl Args {
     pub(crate) fn run(self) -> Result<Exit> {
         use std::io::Write as _;
-        let page = report(&self.file, self.with.as_deref())?;
+        let page = report(&self.file)?;
         let path = self.out.unwrap_or_else(|| self.file.with_extension("html"));
         let html = page.html.as_bytes();
         if path.as_os_str() == "-" {

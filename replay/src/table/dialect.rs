@@ -1,4 +1,4 @@
-//! The messages and enums of the MAVLink dialect, from its XML.
+//! The messages of the MAVLink dialect, from its XML.
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
@@ -7,34 +7,11 @@ use protocol::dialect::XML_FILES;
 use protocol::frame::Frame;
 use roxmltree::{Document, Node};
 
-use super::{Cell, Column, Kind, Meaning, TableShape};
+use super::{Cell, Column, Kind, TableShape};
 
-/// The dialect.
-static DIALECT: LazyLock<Dialect> = LazyLock::new(|| {
-    let mut dialect = Dialect::default();
-    for xml in XML_FILES {
-        parse(xml, &mut dialect);
-    }
-    dialect
-});
-
-/// What the XML says.
-#[derive(Debug, Default)]
-struct Dialect {
-    messages: BTreeMap<u32, Message>,
-    /// The words for the numbers of each enum.
-    enums: BTreeMap<String, Vec<(i64, String)>>,
-}
-
-/// A message of the dialect.
-pub(super) fn message(id: u32) -> Option<&'static Message> {
-    DIALECT.messages.get(&id)
-}
-
-/// The words for the numbers of an enum; empty if the dialect has none of that name.
-pub(super) fn words_of(name: &str) -> &'static [(i64, String)] {
-    DIALECT.enums.get(name).map_or(&[], Vec::as_slice)
-}
+/// The messages of the dialect.
+static MESSAGES: LazyLock<BTreeMap<u32, Message>> =
+    LazyLock::new(|| XML_FILES.into_iter().flat_map(messages).collect());
 
 /// A message and its fields in the order of the XML.
 #[derive(Debug, Default)]
@@ -52,7 +29,6 @@ pub(super) struct Field {
     extension: bool,
     /// Place of its first byte in the payload.
     pub(super) at: usize,
-    pub(super) meaning: Meaning,
 }
 
 /// A type on the wire.
@@ -121,33 +97,20 @@ impl Wire {
     }
 }
 
-/// Adds the messages and enums of a file. The files come with the program: that each can be read is tested.
-fn parse(xml: &str, dialect: &mut Dialect) {
-    let document = Document::parse(xml);
-    for node in document.iter().flat_map(Document::descendants) {
-        let name = node.attribute("name").unwrap_or_default().to_owned();
-        match node.tag_name().name() {
-            "message" => {
-                let Some(id) = node.attribute("id").and_then(|id| id.parse().ok()) else { continue };
-                let mut extension = false;
-                let mut fields = Vec::new();
-                for child in node.children() {
-                    extension |= child.has_tag_name("extensions");
-                    fields.extend(field(child, extension));
-                }
-                place(&mut fields);
-                dialect.messages.insert(id, Message { name, fields });
-            }
-            "enum" => {
-                let words = dialect.enums.entry(name).or_default();
-                // A number that is written otherwise than in decimal digits is left out.
-                words.extend(node.children().filter_map(|entry| {
-                    Some((entry.attribute("value")?.parse().ok()?, entry.attribute("name")?.to_owned()))
-                }));
-            }
-            _ => {}
+/// The messages of a file by their numbers. The files come with the program: that each can be read is tested.
+fn messages(xml: &str) -> Vec<(u32, Message)> {
+    let message = |node: Node<'_, '_>| {
+        let id = node.attribute("id").filter(|_| node.has_tag_name("message"))?.parse().ok()?;
+        let mut extension = false;
+        let mut fields = Vec::new();
+        for child in node.children() {
+            extension |= child.has_tag_name("extensions");
+            fields.extend(field(child, extension));
         }
-    }
+        place(&mut fields);
+        Some((id, Message { name: node.attribute("name")?.to_owned(), fields }))
+    };
+    Document::parse(xml).iter().flat_map(Document::descendants).filter_map(message).collect()
 }
 
 fn field(node: Node<'_, '_>, extension: bool) -> Option<Field> {
@@ -156,14 +119,8 @@ fn field(node: Node<'_, '_>, extension: bool) -> Option<Field> {
         None => (given, None),
         Some((wire, rest)) => (wire, Some(rest.trim_end_matches(']').parse().ok()?)),
     };
-    let meaning = Meaning {
-        unit: node.attribute("units").unwrap_or_default().to_owned(),
-        // A meaning is one line, however the file breaks it.
-        words: node.text().unwrap_or_default().split_whitespace().collect::<Vec<_>>().join(" "),
-        values_of: node.attribute("enum").map(str::to_owned),
-    };
     let name = node.attribute("name")?.to_owned();
-    Some(Field { name, wire: Wire::named(wire)?, count, extension, at: 0, meaning })
+    Some(Field { name, wire: Wire::named(wire)?, count, extension, at: 0 })
 }
 
 /// On the wire the largest types come first, and extensions last, in their own order.
@@ -190,7 +147,7 @@ const OF_FRAME: [(&str, Kind); 4] = [
 
 /// The table of a frame's message, if the dialect has the message.
 pub(super) fn shape_of_frame(frame: &Frame) -> Option<TableShape> {
-    let message = message(frame.message_id())?;
+    let message = MESSAGES.get(&frame.message_id())?;
     let source = frame.source();
     let name =
         format!("mavlink_{}_{}_{}", source.system_id, source.component_id, message.name.to_ascii_lowercase());
@@ -199,14 +156,12 @@ pub(super) fn shape_of_frame(frame: &Frame) -> Option<TableShape> {
         let kind = field.wire.kind();
         match field.count.filter(|_| kind != Kind::Text) {
             None => {
-                let column = Column { name: field.name.clone(), kind, meaning: field.meaning.clone() };
-                shape.columns.push(column);
+                shape.columns.push(Column { name: field.name.clone(), kind });
             }
-            Some(count) => shape.columns.extend((1..=count).map(|k| Column {
-                name: format!("{}_{k}", field.name),
-                kind,
-                meaning: field.meaning.clone(),
-            })),
+            Some(count) => {
+                let column = |k| Column { name: format!("{}_{k}", field.name), kind };
+                shape.columns.extend((1..=count).map(column));
+            }
         }
     }
     Some(shape)
@@ -218,7 +173,7 @@ pub(super) fn cells_of_frame(frame: &Frame, [recorded_by, direction, link]: [&st
     let sequence = Cell::Integer(i64::from(frame.sequence()));
     let mut cells = vec![text(recorded_by), text(direction), text(link), sequence];
     let payload = frame.padded_payload();
-    for field in message(frame.message_id()).map(|message| &message.fields).into_iter().flatten() {
+    for field in MESSAGES.get(&frame.message_id()).map(|message| &message.fields).into_iter().flatten() {
         let size = field.wire.size();
         let bytes = |at: usize, length: usize| payload.get(at..at + length).unwrap_or_default();
         match field.count {
@@ -243,25 +198,13 @@ mod tests {
     #[test]
     fn every_message_of_the_dialect_has_its_fields() {
         assert!(XML_FILES.iter().all(|xml| Document::parse(xml).is_ok()));
-        assert!(DIALECT.messages.len() > 200, "{}", DIALECT.messages.len());
-        for (id, message) in &DIALECT.messages {
+        assert!(MESSAGES.len() > 200, "{}", MESSAGES.len());
+        for (id, message) in &*MESSAGES {
             let Some(name) = protocol::dialect::message_name(*id) else { continue };
             assert_eq!(message.name, name);
             let end = |field: &Field| field.at + field.wire.size() * field.count.unwrap_or(1);
             assert!(message.fields.iter().map(end).max().is_some_and(|end| end <= 255), "{name}");
         }
-    }
-
-    #[test]
-    fn a_field_has_its_unit_its_meaning_and_its_words() {
-        let status = DIALECT.messages.values().find(|message| message.name == "TD_FLIGHT_STATUS").unwrap();
-        let field = |name: &str| status.fields.iter().find(|field| field.name == name).unwrap();
-        assert_eq!(field("time_boot_ms").meaning.unit, "ms");
-        assert_eq!(field("time_boot_ms").meaning.words, "Time since boot.");
-        let words = words_of(field("phase").meaning.values_of.as_deref().unwrap());
-        assert!(words.contains(&(9, "TD_PHASE_POWERED".to_owned())), "{words:?}");
-        let meanings = DIALECT.messages.values().flat_map(|message| &message.fields);
-        assert!(meanings.into_iter().all(|field| !field.meaning.words.contains('\n')), "one line each");
     }
 
     fn row(message: &MavMessage) -> (TableShape, BTreeMap<String, Cell>) {

@@ -22,31 +22,16 @@ use protocol::log::reader::LogChannel;
 use protocol::log::record::{TOPIC_EVENTS, TOPIC_RAW_RX, TOPIC_VERDICT};
 use protocol::log::v1;
 
-use self::dialect::{cells_of_frame, shape_of_frame, words_of};
+use self::dialect::{cells_of_frame, shape_of_frame};
 use crate::log::{Entry, FlightLog, LogError, RECORD_MAX_BYTES, StampedEntry, frame_of};
 
 /// A list up to this length has one column for each element; a longer one, has none.
 const LIST_MAX: usize = 8;
 
-/// Unit suffixes of field names and their units, the longest first.
-const UNITS: [(&str, &str); 13] = [
-    ("_rad_s2", "rad/s2"),
-    ("_rad_s", "rad/s"),
-    ("_m_s2", "m/s2"),
-    ("_m_s", "m/s"),
-    ("_kg_m2", "kg m2"),
-    ("_bytes", "bytes"),
-    ("_rad", "rad"),
-    ("_deg", "deg"),
-    ("_kg", "kg"),
-    ("_ms", "ms"),
-    ("_m", "m"),
-    ("_n", "N"),
-    ("_s", "s"),
+/// Unit suffixes of field names, the longest first.
+const UNITS: [&str; 13] = [
+    "_rad_s2", "_rad_s", "_m_s2", "_m_s", "_kg_m2", "_bytes", "_rad", "_deg", "_kg", "_ms", "_m", "_n", "_s",
 ];
-
-/// The components of vectors and quaternions.
-const COMPONENTS: [&str; 4] = ["x", "y", "z", "w"];
 
 /// Column of the flight computer's frames that is not in the record: time since the release, s.
 pub(crate) const FLIGHT_TIME_S: &str = "flight_time_s";
@@ -67,59 +52,12 @@ pub struct Column {
     /// Its name, with its unit.
     pub name: String,
     pub kind: Kind,
-    pub meaning: Meaning,
 }
 
 impl Column {
-    fn of(name: &str, kind: Kind, unit: &str, words: &str) -> Self {
-        let meaning = Meaning { unit: unit.to_owned(), words: words.to_owned(), values_of: None };
-        Self { name: name.to_owned(), kind, meaning }
+    fn of(name: &str, kind: Kind) -> Self {
+        Self { name: name.to_owned(), kind }
     }
-}
-
-/// What the numbers of a column mean, from the schema or the dialect.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Meaning {
-    /// As in `m/s`; empty without one.
-    pub unit: String,
-    /// In words; empty if neither schema nor dialect says more than the name.
-    pub words: String,
-    /// The enum of the dialect that has words for the numbers.
-    pub(super) values_of: Option<String>,
-}
-
-impl Meaning {
-    /// The words for the numbers of the column, if it is an enum.
-    pub fn values(&self) -> &'static [(i64, String)] {
-        self.values_of.as_deref().map_or(&[], words_of)
-    }
-
-    /// The meaning of a field of a record, from the names and the comments in its schema; `path` has the fields from the
-    /// outside in. The components of a vector have the unit of the vector, and a field without a comment has that of the
-    /// field around it.
-    fn of(path: &[FieldDescriptor]) -> Self {
-        let unit_of = |field: &FieldDescriptor| {
-            UNITS.into_iter().find(|(suffix, _)| field.name().ends_with(suffix)).map(|(_, unit)| unit)
-        };
-        let mut inside_out = path.iter().rev().skip_while(|field| COMPONENTS.contains(&field.name()));
-        let unit = inside_out.next().and_then(unit_of).unwrap_or_default();
-        let mut comments = path.iter().rev().map(comment_on);
-        let words = comments.find(|words| !words.is_empty()).unwrap_or_default();
-        // "As in the dialect's TD_PHASE."
-        let of_field = path.last().map(comment_on).unwrap_or_default();
-        let mut all = of_field.split(|c: char| !(c.is_ascii_uppercase() || c == '_'));
-        let values_of = all.find(|word| word.starts_with("TD_") && !words_of(word).is_empty());
-        Self { unit: unit.to_owned(), values_of: values_of.map(str::to_owned), words }
-    }
-}
-
-/// The comment before a field in its schema, in one line.
-fn comment_on(field: &FieldDescriptor) -> String {
-    let file = field.parent_file();
-    let info = file.file_descriptor_proto().source_code_info.as_ref();
-    let found = info.and_then(|info| info.location.iter().find(|location| location.path == field.path()));
-    let comment = found.and_then(|location| location.leading_comments.as_deref()).unwrap_or_default();
-    comment.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 /// The name and the columns of a table.
@@ -140,8 +78,8 @@ pub(super) struct Place {
 
 impl TableShape {
     pub(super) fn new(name: &str, columns: &[(&str, Kind)]) -> Self {
-        let time = Column::of("log_time_ns", Kind::Integer, "ns", "Unix time of the record.");
-        let others = columns.iter().map(|(name, kind)| Column::of(name, *kind, "", ""));
+        let time = Column::of("log_time_ns", Kind::Integer);
+        let others = columns.iter().map(|(name, kind)| Column::of(name, *kind));
         Self { name: name.to_owned(), columns: std::iter::once(time).chain(others).collect() }
     }
 
@@ -191,13 +129,11 @@ fn walk(
             (_, Some(kind), Some(Value::List(items))) if field.is_list() && items.len() <= LIST_MAX => {
                 for element in 0..items.len() {
                     let place = Place { fields: above.clone(), element: Some(element) };
-                    let meaning = Meaning::of(above);
-                    take(Column { name: element_name(&name, element), kind, meaning }, place);
+                    take(Column { name: element_name(&name, element), kind }, place);
                 }
             }
             (_, Some(kind), _) if !field.is_list() => {
-                let meaning = Meaning::of(above);
-                take(Column { name, kind, meaning }, Place { fields: above.clone(), element: None });
+                take(Column { name, kind }, Place { fields: above.clone(), element: None });
             }
             _ => {}
         }
@@ -207,8 +143,7 @@ fn walk(
 
 /// The second element of `fins_rad` is `fins_2_rad`: the unit stays at the end.
 fn element_name(name: &str, element: usize) -> String {
-    let unit = UNITS.into_iter().map(|(suffix, _)| suffix).find(|suffix| name.ends_with(suffix));
-    let unit = unit.unwrap_or_default();
+    let unit = UNITS.into_iter().find(|suffix| name.ends_with(suffix)).unwrap_or_default();
     format!("{}_{}{unit}", name.strip_suffix(unit).unwrap_or(name), element + 1)
 }
 
@@ -356,8 +291,7 @@ impl TableReader {
                     let first = DynamicMessage::decode(descriptor.clone(), stamped.data.as_slice()).ok()?;
                     let (mut shape, places) = TableShape::of_record(&table_name(&channel.topic), &first);
                     if matches!(stamped.entry, Entry::ComputerFrame(_)) {
-                        let words = "Time since the release; empty on the pad and after the flight.";
-                        shape.columns.push(Column::of(FLIGHT_TIME_S, Kind::Float, "s", words));
+                        shape.columns.push(Column::of(FLIGHT_TIME_S, Kind::Float));
                     }
                     // Two channels with one topic share a table.
                     let table = shapes.iter().position(|known| *known == shape).unwrap_or_else(|| {

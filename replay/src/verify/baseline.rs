@@ -12,7 +12,7 @@ use protocol::program::Exit;
 use serde::{Deserialize, Serialize};
 
 use super::{Obstacle, Verification, VerifyReport, verify};
-use crate::cli::{Answer, files_of, give, say};
+use crate::cli::{Answer, give, logs_of, say};
 use crate::digest::digest;
 use crate::log::{Entry, FlightLog, LogError, Moment, Recording};
 use crate::output::NewFile;
@@ -183,11 +183,6 @@ fn content_of(path: &Path) -> Option<String> {
     }
     let run = log.head().run.iter().flat_map(|(fact, value)| [fact.as_bytes(), value.as_bytes()]);
     (!records.is_empty()).then(|| format!("{:016x}", digest(run.chain(records.iter().map(Vec::as_slice)))))
-}
-
-/// The logs of a directory that a vehicle wrote.
-pub(crate) fn logs_of(directory: &Path) -> Result<Vec<PathBuf>> {
-    files_of(directory, &["mcap"])
 }
 
 /// How a directory of logs is held against a baseline.

@@ -18,7 +18,7 @@ use protocol::program::Exit;
 use serde::Serialize;
 
 use crate::cli::{Answer, give};
-use crate::log::{LogError, frame_of, open_log, take_magic};
+use crate::log::{LogError, frame_of, open_regular, take_magic};
 
 /// The result for one book.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -141,7 +141,7 @@ struct Contents {
 fn read(path: &Path) -> Result<Contents, LogError> {
     let name = path.display().to_string();
     let failed = |source| LogError::Read { name: name.clone(), source };
-    let mut log = BufReader::new(open_log(path).map_err(failed)?.0);
+    let mut log = BufReader::new(open_regular(path).map_err(failed)?);
     take_magic(&name, &mut log)?;
     let mut reader = LogReader::new(mcap::MAGIC.chain(log));
     let mut contents = Contents { name: name.clone(), ..Contents::default() };

@@ -1,7 +1,6 @@
 //! Verifies one flight of a log, record by record.
 
 use std::io::Read;
-use std::path::Path;
 
 use avionics::log::frame::thought_to_log;
 use protocol::log::computer_v1::ComputerStart;
@@ -20,7 +19,6 @@ use crate::log::{
     Cut, Entry, FlightLog, FrameOrder, Gap, Head, LogError, LoggedFrame, Recording, StampedEntry, Verdict,
     misread_frame,
 };
-use crate::recover::summary_of;
 use crate::refly::{ReflyOptions, refly};
 
 /// One flight being verified.
@@ -285,7 +283,6 @@ impl FlightVerifier {
             obstacle,
             cut,
             damage: damage.map(ToString::to_string),
-            unread: None,
             build: head.compare_build(),
             strict: self.strict,
         };
@@ -338,26 +335,6 @@ impl FlightVerifier {
 
 /// What an input that nothing contradicts was held to.
 const JUDGED: &str = "judged by range and step alone: what decides nothing can be another value inside both";
-
-/// The unread part of a damaged log.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Unread {
-    /// Frames that were not read, and their number in the whole file; `None` if the end of the file does not say.
-    pub frames: Option<(u64, u64)>,
-    /// Time from the last record read to the last record of the file, s.
-    pub seconds: Option<f64>,
-}
-
-impl Unread {
-    pub(super) fn of(path: &Path, frames_read: u64, read_until_ns: Option<u64>) -> Self {
-        let summary = summary_of(path);
-        let all = summary.as_ref().map(|summary| summary.frames).filter(|all| *all >= frames_read);
-        let seconds = summary.zip(read_until_ns).and_then(|(summary, until_ns)| {
-            Some(summary.last_log_time_ns.checked_sub(until_ns)? as f64 / 1e9)
-        });
-        Self { frames: all.map(|all| (all - frames_read, all)), seconds }
-    }
-}
 
 /// Whether this build's controller would land differently if it flew from the first frame that differs. This is closed
 /// loop, unlike the comparison itself.

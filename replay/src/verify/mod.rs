@@ -21,7 +21,6 @@
 
 mod again;
 mod baseline;
-pub(crate) use baseline::logs_of;
 pub mod book;
 mod difference;
 pub mod explain;
@@ -34,18 +33,17 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use self::again::WorldAgain;
+pub use self::flight::Consequence;
 use self::flight::FlightVerifier;
-pub use self::flight::{Consequence, Unread};
 use anyhow::{Result, bail};
 pub use difference::{Divergence, FieldDifference, FieldValue, differences, ulp_distance};
 pub use parts::Part;
-use protocol::log::reader::Damage;
 use protocol::log::record::{SCHEMA_VERSION, TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START, TOPIC_VERDICT};
 use protocol::log::v1::LandingVerdict;
 use protocol::program::Exit;
 use serde::Serialize;
 
-use crate::cli::{Answer, give_each, say, warn_of_loss};
+use crate::cli::{Answer, give_each, logs_of, say, warn_of_loss};
 use crate::controller::FrameError;
 use crate::log::{
     BuildComparison, Cut, Entry, FlightLog, Gap, Head, LogError, LoggedFlight, Recording, Verdict,
@@ -79,12 +77,6 @@ fn verify_as(path: &Path, strict: bool) -> Result<Vec<VerifyReport>, LogError> {
         while whole.next_entry()?.is_some() {}
         Ok(whole.head().clone())
     })?;
-    let read = reports.iter().map(|report| report.frames_recorded).sum();
-    // A recovered log is read to its end; what is lost is not in it.
-    let unread = !matches!(log.damage(), Some(Damage::Recovered(_)));
-    for report in reports.iter_mut().filter(|report| unread && report.damage.is_some()) {
-        report.unread = Some(Unread::of(path, read, log.last_log_time_ns()));
-    }
     // A log that is too long to be flown again, or has several flights, has still been compared.
     if let [report] = reports.as_mut_slice()
         && let Some(first) = &report.first_divergence
@@ -244,8 +236,6 @@ pub struct VerifyReport {
     pub cut: Option<Cut>,
     /// Why the log could not be read to its end.
     pub damage: Option<String>,
-    /// The part that was not read because of the damage; only for files.
-    pub unread: Option<Unread>,
     /// Comparison of the build that wrote the log with this one.
     pub build: BuildComparison,
     /// Only a whole flight of which everything was compared is identical.
@@ -401,15 +391,7 @@ impl VerifyReport {
     /// What is missing from the part of the flight that was read.
     fn what_is_missing(&self) -> String {
         let cut = self.cut.as_ref().map(|cut| format!(" of an INCOMPLETE flight: {cut}"));
-        let unread = self.damage.as_ref().map(|damage| {
-            let frames = match self.unread.and_then(|unread| unread.frames) {
-                Some((unread, all)) => format!("{unread} of {all} frames were not read"),
-                None => "how many frames were not read is not known".to_owned(),
-            };
-            let seconds = self.unread.and_then(|unread| unread.seconds);
-            let seconds = seconds.map(|seconds| format!(" ({seconds:.3} s)")).unwrap_or_default();
-            format!("; {frames}{seconds}: {damage}")
-        });
+        let unread = self.damage.as_ref().map(|damage| format!("; not all of it was read: {damage}"));
         [cut, unread].into_iter().flatten().collect()
     }
 }

@@ -25,12 +25,11 @@ fn flipped(log: &Path, directory: &tempfile::TempDir) -> PathBuf {
 fn a_log_with_a_flipped_byte_does_not_pass() {
     let directory = tempfile::tempdir().unwrap();
     for log in [&LANDED.log, &MK2.log] {
-        let all = Held::read(log).frames();
+        let all = Held::read(log).frames() as u64;
         let path = flipped(log, &directory);
         let report = only(verify(&path).unwrap());
-        let (read, all) = (report.frames_recorded, all as u64);
-        assert!(0 < read && read < all, "{report:?}");
-        assert_eq!(report.unread.unwrap().frames, Some((all - read, all)));
+        assert!(0 < report.frames_recorded && report.frames_recorded < all, "{report:?}");
+        assert!(report.damage.is_some());
         let (code, _, _) = run(replay("verify", &path).arg("--strict"));
         assert_eq!(code, 3);
     }

@@ -1,117 +1,18 @@
 //! Tests the log of a ground station, which has what was heard and nothing that the vehicle recorded.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::LazyLock;
 
-use protocol::log::record::{Direction, Event, EventLevel, RawFrame, Record};
-use protocol::log::tlog::TlogReader;
-use protocol::log::writer::{LogHeader, LogWriter};
 use replay::export::export_tables;
-use replay::info::info;
-use replay::log::{Clock, ClockTime, Entry, FlightLog, Recording, import_tlog};
+use replay::info::{GradeLevel, info};
+use replay::log::{Clock, ClockTime, FlightLog, Recording};
+use replay::verify::{Verification, verify};
 
-use crate::command_line::{data, replay};
-use crate::simulated::{Simulated, WITH_FRAMES, tlog};
+use crate::simulated::WITH_FRAMES;
+use crate::station::{EARLIER_NS, station_log};
 
-/// The station was started this long before the vehicle, ns.
-const EARLIER_NS: u64 = 3_000_000_000;
-const START_UNIX_NS: u64 = 1_760_000_000_000_000_000;
-
-/// The log that a station writes which hears every frame of a vehicle.
-fn heard(flight: &Simulated) -> PathBuf {
-    heard_while(flight, "ground", |_| true)
-}
-
-/// The same of a station that hears the frames at some times since the first, ns.
-fn heard_while(flight: &Simulated, name: &str, hears: impl Fn(u64) -> bool) -> PathBuf {
-    let imported = flight.beside(&format!("sent-{name}.mcap"));
-    import_tlog(&tlog(flight, &format!("sent-{name}.tlog")), &imported).unwrap();
-    let path = flight.beside(&format!("{name}.mcap"));
-    let header =
-        LogHeader { writer: "ground".to_owned(), start_unix_ns: START_UNIX_NS, ..LogHeader::default() };
-    let mut log = LogWriter::new(std::fs::File::create(&path).unwrap(), &header).unwrap();
-    let mut from = FlightLog::open(&imported).unwrap();
-    let (mut first_ns, mut noted) = (None, false);
-    while let Some(stamped) = from.next_entry().unwrap() {
-        let since_ns = stamped.log_time_ns - *first_ns.get_or_insert(stamped.log_time_ns);
-        if !hears(since_ns) {
-            continue;
-        }
-        let at_ns = EARLIER_NS + since_ns;
-        let record = match stamped.entry {
-            Entry::RawFrame => Record::RawFrame(RawFrame {
-                direction: Direction::Rx,
-                endpoint: "ground",
-                link: "udpin:0.0.0.0:14550".to_owned(),
-                bytes: stamped.data,
-            }),
-            Entry::Telemetry(mut telemetry) => {
-                telemetry.time_s = at_ns as f64 / 1e9;
-                Record::Telemetry(telemetry)
-            }
-            _ => continue,
-        };
-        log.write(&record, at_ns).unwrap();
-        if !noted && since_ns > NOTED_NS {
-            let (name, message) = ("ground".to_owned(), "note (screen 1, Ann): a gust".to_owned());
-            log.write(&Record::Event(Event { level: EventLevel::Info, name, message }), at_ns).unwrap();
-            noted = true;
-        }
-    }
-    log.finish().unwrap();
-    path
-}
-
-/// In the burn.
-const NOTED_NS: u64 = 22_000_000_000;
-
-static GROUND: LazyLock<PathBuf> = LazyLock::new(|| heard(&WITH_FRAMES));
-/// A laptop at the field gets its time from the network when it has one, and a clock that nobody has set begins in 1970.
-#[test]
-fn a_clock_that_is_set_while_it_records_loses_no_frame() {
-    let read = |path: &Path| {
-        let mut frames = TlogReader::new(std::fs::File::open(path).unwrap());
-        std::iter::from_fn(|| frames.next_frame().unwrap()).collect::<Vec<_>>()
-    };
-    let directory = tempfile::tempdir().unwrap();
-    let plain = tlog(&WITH_FRAMES, "as-sent.tlog");
-    let imported = |name: &str, path: &Path| import_tlog(path, &directory.path().join(name)).unwrap();
-    let as_sent = imported("as-sent.mcap", &plain);
-    let frames = read(&plain);
-    let begins_us = frames[0].time_us;
-    // What passes between two frames is lost with the clock: set it where the second follows at once.
-    let half = (frames.len() / 3..2 * frames.len() / 3)
-        .min_by_key(|number| frames[*number].time_us.abs_diff(frames[number - 1].time_us))
-        .unwrap();
-    let clocks: [fn(u64, u64) -> u64; 2] =
-        [|time_us, _| time_us - 3_600_000_000, |time_us, begins_us| time_us - begins_us + 1];
-    for (place, set) in clocks.into_iter().enumerate() {
-        for first_half in [true, false] {
-            if place == 0 && first_half {
-                // An hour ahead is an hour of silence for all that anybody knows.
-                continue;
-            }
-            let bytes = frames.iter().enumerate().flat_map(|(number, frame)| {
-                let is_set = (number < half) == first_half;
-                let time_us = if is_set { set(frame.time_us, begins_us) } else { frame.time_us };
-                [&time_us.to_be_bytes(), &frame.bytes[..]].concat()
-            });
-            let path = directory.path().join("set.tlog");
-            std::fs::write(&path, bytes.collect::<Vec<u8>>()).unwrap();
-            let set = imported(&format!("set-{place}-{first_half}.mcap"), &path);
-            assert_eq!((set.frames, set.garbage_bytes), (as_sent.frames, 0));
-            // Its telemetry goes on: no silence, and no jump of an hour.
-            assert!(set.telemetry.abs_diff(as_sent.telemetry) <= 2, "{set:?} {as_sent:?}");
-            let lasts_s = |output: &Path| {
-                let recording = Recording::open(output).unwrap();
-                recording.telemetry.last().unwrap().time_s
-            };
-            let apart_s = lasts_s(&set.output) - lasts_s(&as_sent.output);
-            assert!(apart_s.abs() < 1.0, "{apart_s}");
-        }
-    }
-}
+static GROUND: LazyLock<PathBuf> = LazyLock::new(|| station_log(&WITH_FRAMES.log, "ground.mcap"));
 
 /// The verdict that was heard is the vehicle's own, to the precision of a message.
 #[test]
@@ -128,6 +29,8 @@ fn a_ground_log_has_the_verdict_that_was_heard() {
         assert!((heard.maximum - own.maximum).abs() < 1e-4, "{heard:?} {own:?}");
     }
     assert!(heard.phases.iter().any(|phases| phases.spans.len() > 3));
+    assert_eq!(heard.grade.level, GradeLevel::TelemetryOnly);
+    assert_eq!(verify(&GROUND).unwrap()[0].outcome, Verification::NotReplayable);
 }
 
 #[test]
@@ -137,7 +40,7 @@ fn the_report_of_a_ground_log_marks_the_touchdown_on_its_own_clock() {
     let own = info(&WITH_FRAMES.log).unwrap();
     let own_s = own.clocks.convert(own.verdict.unwrap().contact(), Clock::Boot).unwrap().time_s;
     assert!((contact_s - own_s - EARLIER_NS as f64 / 1e9).abs() < 0.2, "{contact_s} {own_s}");
-    let page = replay::report::report(&GROUND, None).unwrap().html;
+    let page = replay::report::report(&GROUND).unwrap().html;
     assert!(page.contains("STANDS UNDAMAGED") && page.contains(">touchdown</text>"));
     // The crew's note stands in the pictures, too.
     assert!(page.matches(">a gust</text>").count() > 2);
@@ -196,21 +99,4 @@ fn the_crews_clock_is_the_clock_of_the_log() {
         }
     }
     assert!(flown > 10, "{flown}");
-}
-
-/// The same messages at both ends of the link: nothing differs, at the vehicle's own times. A station that was started late and
-/// ended early is compared while it heard the vehicle.
-#[test]
-fn a_ground_log_is_compared_with_the_vehicles_own_while_both_recorded() {
-    const SECOND_NS: u64 = 1_000_000_000;
-    let late = heard_while(&WITH_FRAMES, "late", |at_ns| (3 * SECOND_NS..11 * SECOND_NS).contains(&at_ns));
-    for (log, expected, failures) in [(&*GROUND, 0, 0), (&late, 3, 1)] {
-        let (code, report) = data(replay("compare", &WITH_FRAMES.log).arg(log));
-        assert_eq!((code, report[0]["failures"].as_array().unwrap().len()), (expected, failures), "{report}");
-        let signals = report[0]["signals"].as_array().unwrap();
-        let names = || signals.iter().map(|signal| signal["signal"].as_str().unwrap());
-        assert!(signals.len() > 50 && names().all(|name| name.starts_with("mavlink_1_1_")));
-        assert!(names().any(|name| name == "mavlink_1_1_local_position_ned.x"));
-        assert!(report[0]["both_recorded_s"].is_array() && report[0]["missing"] == report[0]["added"]);
-    }
 }

@@ -69,6 +69,6 @@ fn a_flight_is_flown_again_across_the_loss() {
 #[test]
 fn the_report_says_up_to_which_frame_the_log_can_be_run_again() {
     let (after, _) = around_the_loss(&Recording::open(&RECOVERED).unwrap());
-    let page = report(&RECOVERED, None).unwrap().html;
+    let page = report(&RECOVERED).unwrap().html;
     assert!(page.contains(&format!("bit-exact: up to frame {after} of")), "grade");
 }

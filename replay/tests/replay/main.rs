@@ -41,6 +41,7 @@ mod recovery;
 mod reflown_logs;
 mod simulated;
 mod solve_times;
+mod station;
 mod strict;
 mod tables;
 mod tampered;

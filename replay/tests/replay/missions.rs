@@ -49,7 +49,7 @@ fn info_and_report_say_which_keys_are_not_those_of_the_standard_controller() {
         let expected = ["powered.weights.theta", "soft_tilt_deg"];
         assert_eq!(changed, if is_standard { &[][..] } else { &expected });
         let words = "not the standard one: powered.weights.theta, soft_tilt_deg";
-        let answers = [run(&mut replay("info", &log)).1, replay::report::report(&log, None).unwrap().html];
+        let answers = [run(&mut replay("info", &log)).1, replay::report::report(&log).unwrap().html];
         assert!(answers.iter().all(|said| said.contains(words) != is_standard));
     }
 }

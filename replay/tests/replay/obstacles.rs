@@ -15,7 +15,7 @@ use crate::flown::{FLIGHT, MISSION, Recipe, WHOLE, only, verify_bytes, verify_fr
 use crate::tampered::Held;
 
 fn info_of_bytes(bytes: &[u8]) -> Info {
-    info_of(&mut FlightLog::read("test.mcap".to_owned(), bytes).unwrap(), || None).unwrap()
+    info_of(&mut FlightLog::read("test.mcap".to_owned(), bytes).unwrap()).unwrap()
 }
 
 #[test]

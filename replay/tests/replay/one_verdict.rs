@@ -17,7 +17,7 @@ fn said_alike(log: &std::path::Path) -> String {
     let ending = info.ending.clone().unwrap();
     let row = format!("verdict     {ending}");
     assert!(info.sentences().iter().any(|line| line.starts_with(&row)), "{ending}: {info:?}");
-    assert!(report(log, None).unwrap().html.contains(&format!("\">{ending}</h1>")), "{ending}");
+    assert!(report(log).unwrap().html.contains(&format!("\">{ending}</h1>")), "{ending}");
     ending
 }
 

@@ -4,7 +4,7 @@ use std::os::unix::fs::PermissionsExt as _;
 use std::path::Path;
 
 use crate::command_line::replay;
-use crate::simulated::{MK2, WITH_FRAMES, tlog};
+use crate::simulated::MK2;
 
 /// Without a viewer it says what installs one; with one it runs it on the log, and what that fails with is an error.
 #[test]
@@ -32,12 +32,6 @@ fn a_log_is_opened_in_the_viewer_that_is_installed_or_the_answer_says_what_insta
     std::fs::write(&program, script(7)).unwrap();
     let (code, said) = run(&MK2.log);
     assert_eq!(code, Some(1), "{said}");
-    // No viewer reads a .tlog.
-    let (code, said) = run(&tlog(&WITH_FRAMES, "opened.tlog"));
-    assert!(
-        code == Some(1) && said.contains("`replay export ") && !said.contains("lichtblick"),
-        "{code:?} {said}"
-    );
     // A file that is no log is named before anything is started.
     std::fs::remove_file(&told).unwrap();
     let (code, said) = run(&program);

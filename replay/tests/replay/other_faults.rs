@@ -107,7 +107,7 @@ fn a_wait_that_ends_on_the_pad_has_findings() {
     let lost = found.iter().find(|finding| finding.words.contains("no GNSS fix")).expect("GNSS is lost");
     assert!(lost.since().to_string().starts_with("log "), "{found:?}");
     // The report has the same on the same clock.
-    let page = report(&log, None).unwrap().html;
+    let page = report(&log).unwrap().html;
     assert!(
         page.contains(&format!("<b>{:.2}</b>", lost.since())) && !page.contains("Nothing was looked for")
     );

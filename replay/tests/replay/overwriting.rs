@@ -70,7 +70,7 @@ fn what_exists_is_kept_and_the_next_free_name_is_said() {
 }
 
 #[test]
-fn tables_get_a_folder_of_their_own_and_an_import_a_free_name() {
+fn tables_get_a_folder_of_their_own() {
     let (directory, log) = copied(&WITH_FRAMES.log);
     let at = |name: &str| directory.path().join(name);
     std::fs::create_dir_all(at("tables")).unwrap();
@@ -80,22 +80,15 @@ fn tables_get_a_folder_of_their_own_and_an_import_a_free_name() {
     assert_eq!(listed(&at("tables")), ["notes.txt"]);
     assert!(at("tables-2").join("vehicle_truth3d.csv").is_file());
     // A folder that has no other name.
-    let before = std::fs::read(at("tables-2").join("dictionary.csv")).unwrap();
+    let before = std::fs::read(at("tables-2").join("events.csv")).unwrap();
     let mut here = replay("export", &log);
     let refused = refusal(here.args(["--to", "csv", "--out", "."]).current_dir(at("tables-2")));
     assert!(refused.contains(".: cannot be written"), "{refused}");
-    assert_eq!(std::fs::read(at("tables-2").join("dictionary.csv")).unwrap(), before);
+    assert_eq!(std::fs::read(at("tables-2").join("events.csv")).unwrap(), before);
     std::fs::create_dir(at("empty")).unwrap();
     let mut here = replay("export", &log);
     let (code, _, stderr) = run(here.args(["--to", "csv", "--out", "."]).current_dir(at("empty")));
-    assert!(code == 0 && at("empty").join("dictionary.csv").is_file(), "{stderr}");
-    let tlog = at("flight.tlog");
-    std::fs::copy(crate::simulated::tlog(&WITH_FRAMES, "overwriting.tlog"), &tlog).unwrap();
-    let before = std::fs::read(&log).unwrap();
-    // Without an output name, the default name is that of the flight's own log.
-    let (code, _, stderr) = run(&mut replay("export", &tlog));
-    assert!(code == 0 && at("flight-2.mcap").is_file(), "{stderr}");
-    assert_eq!(std::fs::read(&log).unwrap(), before);
+    assert!(code == 0 && at("empty").join("events.csv").is_file(), "{stderr}");
 }
 
 /// A page with the default name does not replace a page that was edited.

@@ -10,11 +10,12 @@ use sim::recipe::{Recipe as Flown, toml_starting_at};
 
 use crate::flown::{FLIGHT, Recipe, WHOLE, write_log};
 use crate::from_apogee::{LANDED, fly, fly_recipe};
-use crate::simulated::{DISPERSED, MK2, WITH_FRAMES, tlog};
+use crate::simulated::{DISPERSED, MK2, WITH_FRAMES};
+use crate::station::station_log;
 
 /// The page of a log: every tag is closed, and it refers to nothing outside itself.
-fn page_of(log: &Path, with: Option<&Path>) -> String {
-    let html = report(log, with).unwrap().html;
+fn page_of(log: &Path) -> String {
+    let html = report(log).unwrap().html;
     let options = roxmltree::ParsingOptions { allow_dtd: true, ..roxmltree::ParsingOptions::default() };
     let document = roxmltree::Document::parse_with_options(&html, options).unwrap();
     for tag in document.descendants() {
@@ -57,7 +58,7 @@ fn script_data(page: &str) -> serde_json::Value {
 fn the_report_says_the_verdict_first_and_then_why() {
     let mk3 = fly_recipe(&Flown::built_in("mk3", "none").unwrap());
     for log in [&LANDED.log, &MK2.log, &DISPERSED.log, &WITH_FRAMES.log, &mk3.log] {
-        let page = page_of(log, None);
+        let page = page_of(log);
         let order = "STANDS UNDAMAGED|Worst of the legs' limits: |Touchdown at T+|Findings, first in time|\
             <th>limits of the legs</th>|<th>the paper's Table 2</th>|Height over the whole flight, m|\
             Place from above, m|fence 120 m|>planned</span>|The same closer, m|<td>ignition</td>|\
@@ -102,7 +103,7 @@ fn the_report_says_the_verdict_first_and_then_why() {
 /// What flew, when and where stand at the top, and every phase above the height.
 #[test]
 fn the_first_screen_says_when_and_where_and_names_every_phase() {
-    let page = page_of(&WITH_FRAMES.log, None);
+    let page = page_of(&WITH_FRAMES.log);
     let log = replay::info::info(&WITH_FRAMES.log).unwrap();
     let head = page.split_once("<header><p>").unwrap().1.split_once("</p>").unwrap().0;
     let date =
@@ -141,18 +142,17 @@ fn a_poor_log_has_a_page_that_says_what_is_missing() {
     for (name, bytes, words) in cases {
         let path = directory.path().join(name);
         std::fs::write(&path, bytes).unwrap();
-        let page = page_of(&path, None);
+        let page = page_of(&path);
         assert!(words.iter().all(|words| page.contains(words)), "{name}: {page}");
     }
-    let log = WITH_FRAMES.beside("page.mcap");
-    replay::log::import_tlog(&tlog(&WITH_FRAMES, "page.tlog"), &log).unwrap();
-    says_in_order(&page_of(&log, None), &["STANDS UNDAMAGED", "From the telemetry of a ground station"]);
+    let log = station_log(&WITH_FRAMES.log, "page.mcap");
+    says_in_order(&page_of(&log), &["STANDS UNDAMAGED", "From the telemetry of a ground station"]);
 }
 
 /// A motor that never lit has no thrust in words, legends and grounds.
 #[test]
 fn the_report_of_a_motor_that_never_lit_says_nothing_of_thrust() {
-    let page = page_of(&fly(&["no-light@0"]).log, None);
+    let page = page_of(&fly(&["no-light@0"]).log);
     assert!(page.contains("landing motor did not light") && page.contains(">Flight</h2>"));
     for words in [">burn</span>", ">Burn</h2>", "<b>Thrust, N", "class=\"hot\""] {
         assert!(!page.contains(words), "{words}");
@@ -165,7 +165,7 @@ fn the_report_of_a_flight_from_the_pad_shows_the_ascent() {
     let mut recipe = Flown::built_in("mk2", "field").unwrap();
     recipe.mission_toml = toml_starting_at(&recipe.mission_toml, "mk2", StartPoint::Pad).unwrap();
     recipe.mission = flight::vehicles::mission::from_toml(&recipe.mission_toml, "mk2").unwrap();
-    let page = page_of(&fly_recipe(&recipe).log, None);
+    let page = page_of(&fly_recipe(&recipe).log);
     let moments = ["lift-off", "burn-out", "separation", "apogee", "ignition", "contact"];
     let cells = moments.map(|moment| format!("<td>{moment}</td>"));
     says_in_order(&page, &cells.each_ref().map(String::as_str));
@@ -181,7 +181,7 @@ fn the_report_of_a_flight_from_the_pad_shows_the_ascent() {
 #[test]
 fn errors_of_the_estimate_are_drawn_in_every_direction_and_only_in_the_air() {
     let contact_s = Recording::open(&LANDED.log).unwrap().contact_s().unwrap();
-    let page = page_of(&LANDED.log, None);
+    let page = page_of(&LANDED.log);
     let title = "Estimated place less true, m";
     let figure = page.split("<figure id=").find(|figure| figure.contains(title)).unwrap();
     assert_eq!(figure.matches("<path class=\"l ").count(), 3);
@@ -190,23 +190,10 @@ fn errors_of_the_estimate_are_drawn_in_every_direction_and_only_in_the_air() {
     assert!(until_s <= contact_s && until_s > contact_s - 0.1, "{until_s}, {contact_s}");
 }
 
-/// Two flights in the same pictures: both are named, and every picture has a line of each.
-#[test]
-fn a_report_with_another_log_draws_both_flights() {
-    page_of(&MK2.log, Some(&LANDED.log));
-    let page = page_of(&MK2.log, Some(&DISPERSED.log));
-    let both = section(&page, ">Two flights");
-    let words = ["STANDS UNDAMAGED", "Both: Path from above, m", "Both: Height, m", "Both: Gimbal yaw, deg"];
-    says_in_order(both, &words);
-    for figure in both.split("<figure").skip(1) {
-        assert!(["a", "b"].iter().all(|class| figure.contains(&format!("class=\"l {class}\""))), "{figure}");
-    }
-}
-
 /// The first screen names the cause with its number, links to where more of it stands, and says what the flight is without it.
 #[test]
 fn the_report_of_a_broken_flight_names_its_cause_first() {
-    let page = page_of(&fly(&["gimbal-jams:4@powered"]).log, None);
+    let page = page_of(&fly(&["gimbal-jams:4@powered"]).log);
     let cause = "gimbal pitch 10.8 deg from where its commands take it, at 3.7 deg";
     says_in_order(
         &page,

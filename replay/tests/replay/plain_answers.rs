@@ -10,7 +10,7 @@ use crate::simulated::MK2;
 
 /// A flight and a log without signals have none in common, which does not count as agreement.
 #[test]
-fn flights_with_nothing_in_common_are_not_within_tolerance() {
+fn flights_with_nothing_in_common_are_not_alike() {
     let nothing = MK2.beside("nothing.mcap");
     std::fs::write(&nothing, write_log(&[], &Recipe { with_frames: false, ..Recipe::default() }).bytes)
         .unwrap();

@@ -1,15 +1,12 @@
 //! Flies the simulated vehicle, with the logs that it writes itself.
 
-use std::fs::File;
 use std::num::NonZeroU32;
 use std::path::PathBuf;
 use std::sync::LazyLock;
 
-use protocol::log::record::{Direction, RawFrame, Record};
 use protocol::log::recorder::Recorder;
-use protocol::log::tlog::TlogWriter;
 use protocol::transport::LinkAddress;
-use replay::log::{Entry, FlightLog, Recording};
+use replay::log::Recording;
 use sim::recipe::Recipe;
 use sim::wire::fly::{FlyOptions, OnTheWire, Speed, fly, load_flight};
 use sim::wire::vehicle::RocketFlight;
@@ -38,22 +35,6 @@ pub(crate) static WITH_FRAMES: LazyLock<Simulated> = LazyLock::new(|| to_nobody(
 pub(crate) fn to_nobody(fly: impl FnOnce(LinkAddress) -> Simulated) -> Simulated {
     let sink = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
     fly(format!("udpout:{}", sink.local_addr().unwrap()).parse().unwrap())
-}
-
-/// The frames in a log, in a `.tlog` beside it as a station writes one.
-pub(crate) fn tlog(flight: &Simulated, name: &str) -> PathBuf {
-    let path = flight.beside(name);
-    let mut log = FlightLog::open(&flight.log).unwrap();
-    let mut writer = TlogWriter::new(File::create(&path).unwrap(), 0);
-    while let Some(stamped) = log.next_entry().unwrap() {
-        if stamped.entry == Entry::RawFrame {
-            let (link, bytes) = (String::new(), stamped.data);
-            let frame = RawFrame { direction: Direction::Rx, endpoint: "ground", link, bytes };
-            writer.write(&Record::RawFrame(frame), stamped.log_time_ns).unwrap();
-        }
-    }
-    writer.flush().unwrap();
-    path
 }
 
 impl Simulated {

@@ -37,12 +37,12 @@ fn solve_times_are_printed_only_if_they_were_recorded() {
     let count = MK2.recording().timings.len();
     let words = format!("deadline 100 ms: 0 over it, of {count} frames that planned\n");
     assert!(stdout.contains(&words), "{stdout}");
-    let page = report(&MK2.log, None).unwrap().html;
+    let page = report(&MK2.log).unwrap().html;
     for part in ["deadline 100 ms", "From posing a plan to taking it over"] {
         assert!(page.contains(part), "{part}");
     }
 
     assert_eq!(info(&LANDED.log).unwrap().frames.unwrap().solve_time, None);
-    assert!(!report(&LANDED.log, None).unwrap().html.contains("From posing a plan to taking it over"));
+    assert!(!report(&LANDED.log).unwrap().html.contains("From posing a plan to taking it over"));
     assert_eq!(Recording::open(&LANDED.log).unwrap().timings, []);
 }

@@ -12,6 +12,8 @@ use std::process::Command;
 use std::sync::LazyLock;
 
 use clients::{FOXGLOVE, NODE_MCAP, READERS, RERUN, file, found};
+use protocol::log::record::{Direction, RawFrame, Record};
+use protocol::log::tlog::TlogWriter;
 use replay::export::export_tables;
 use replay::info::info;
 use replay::log::{Entry, FlightLog, Recording};
@@ -19,7 +21,7 @@ use replay::recover::recover;
 use replay::refly::{ReflyOptions, refly_flight, write_log};
 
 use from_apogee::LANDED;
-use simulated::{DISPERSED, MK2, WITH_FRAMES, tlog};
+use simulated::{DISPERSED, MK2, WITH_FRAMES};
 
 fn said(command: &mut Command) -> String {
     let output = command.output().unwrap();
@@ -174,7 +176,17 @@ fn a_table_is_read_by_pandas_polars_and_pyarrow() {
 
 #[test]
 fn a_tlog_is_read_by_pymavlink() {
-    let path = tlog(&WITH_FRAMES, "flight.tlog");
+    let path = WITH_FRAMES.beside("flight.tlog");
+    let mut log = FlightLog::open(&WITH_FRAMES.log).unwrap();
+    let mut writer = TlogWriter::new(std::fs::File::create(&path).unwrap(), 0);
+    while let Some(stamped) = log.next_entry().unwrap() {
+        if stamped.entry == Entry::RawFrame {
+            let (link, bytes) = (String::new(), stamped.data);
+            let frame = RawFrame { direction: Direction::Rx, endpoint: "ground", link, bytes };
+            writer.write(&Record::RawFrame(frame), stamped.log_time_ns).unwrap();
+        }
+    }
+    writer.flush().unwrap();
     let mut command = READERS.python();
     let read = said(command.arg(file("readers/read_tlog.py")).arg(&path).env("MAVLINK20", "1"));
     for name in ["HEARTBEAT", "ATTITUDE_QUATERNION", "LOCAL_POSITION_NED"] {

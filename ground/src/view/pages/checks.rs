@@ -46,8 +46,7 @@ pub fn checks_lines(model: &Model, theme: Theme, now: Duration, columns: usize) 
 /// What runs, or what came of it, and the keys.
 fn headline(model: &Model, check: Option<&PadCheck>, theme: Theme, now: Duration) -> Line<'static> {
     use TdPadCheckState as S;
-    let keys = &model.settings.keys;
-    let [all, still] = [Act::Check, Act::CheckStill].map(|act| keys.name(act));
+    let [all, still] = [Act::Check, Act::CheckStill].map(Act::key_name);
     let begin = format!("  {all} checks (MOVES), {still} without motion");
     if standing(model, now) == Standing::MayRun {
         return Line::from(vec![
@@ -68,7 +67,7 @@ fn headline(model: &Model, check: Option<&PadCheck>, theme: Theme, now: Duration
         S::TD_PAD_CHECK_STATE_PASSED if check.awaits_eyes() => (
             format!(" CHECK {} PASSED but for what only people see", check.told.run),
             TextRole::Caution,
-            format!("  {} says it", keys.name(Act::Seen)),
+            format!("  {} says it", Act::Seen.key_name()),
         ),
         S::TD_PAD_CHECK_STATE_PASSED => (format!(" CHECK {} PASSED", check.told.run), TextRole::Good, begin),
         S::TD_PAD_CHECK_STATE_FAILED => {
@@ -165,8 +164,7 @@ fn cell(value: &TD_PAD_CHECK_DATA, theme: Theme) -> Vec<Span<'static>> {
 /// The radio range test in one line, because the smallest whole screen has no more: what was found with its limits.
 fn radio(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     let Some(test) = model.range_test.as_ref() else {
-        let begins =
-            format!("  {} begins one: 30 s, antennas as in flight", model.settings.keys.name(Act::RangeTest));
+        let begins = format!("  {} begins one: 30 s, antennas as in flight", Act::RangeTest.key_name());
         return Line::from(vec![theme.plain(" radio: no range test yet"), theme.label(begins)]);
     };
     let found = test.found.unwrap_or_else(|| test.so_far(None));

@@ -140,16 +140,15 @@ pub fn help_lines(model: &Model, theme: Theme, now: Duration, columns: usize) ->
     if model.playing.is_some() {
         lines.extend(REPLAY.map(|(key, words)| line(key.to_owned(), words)));
     }
-    let keys = &model.settings.keys;
     let works = DEFINITIONS.iter().filter(|definition| definition.act.works(model, now));
     // The smallest screen has no room for every key. The palette lists these, too, and the page of the checks its own.
     let elsewhere =
         |act: Act| matches!(act, Act::Show(_) | Act::Redraw | Act::Check | Act::CheckStill | Act::RangeTest);
     for definition in works.filter(|definition| !elsewhere(definition.act)) {
-        lines.push(line(keys.name(definition.act), definition.words));
+        lines.push(line(definition.act.key_name(), definition.words));
     }
     let pages = DEFINITIONS.iter().filter_map(|definition| match definition.act {
-        Act::Show(page) => Some(format!("{}{}", keys.name(definition.act), page.name())),
+        Act::Show(page) => Some(format!("{}{}", definition.act.key_name(), page.name())),
         _ => None,
     });
     let pages = pages.collect::<Vec<_>>().join(" ");

@@ -73,11 +73,10 @@ pub fn draw_pad(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
 
 /// The band: GO or NO-GO, and the next step large.
 fn draw_go(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) -> Rect {
-    let keys = &model.settings.keys;
     let counts = model.vehicle.counts_down();
     let (words, role) = summary(model, now);
     let next = [(Act::Arm, "ARM"), (Act::Start, "START")].into_iter().find(|(act, _)| act.works(model, now));
-    let next = next.filter(|_| role == TextRole::Good && !counts).map(|(act, typed)| (keys.name(act), typed));
+    let next = next.filter(|_| role == TextRole::Good && !counts).map(|(act, typed)| (act.key_name(), typed));
     let step = next.as_ref().map(|(key, typed)| {
         word("next: press, then type, Enter", &format!("{key} {typed}"), TextRole::Title)
     });
@@ -87,7 +86,7 @@ fn draw_go(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: 
             ("seconds to the release; only the ABORT ends it now".to_owned(), TextRole::Plain)
         }
         _ if counts => {
-            let key = keys.name(Act::HoldCountdown);
+            let key = Act::HoldCountdown.key_name();
             (format!("seconds to the release; {key} Enter holds"), TextRole::Plain)
         }
         Some((key, typed)) if model.settings.demonstration => {
@@ -107,7 +106,7 @@ fn draw_go(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: 
 
 fn draw_checklist(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let (done, all) = model.steps_done(now).unwrap_or_default();
-    let [sign, void] = [Act::SignStep, Act::VoidStep].map(|act| model.settings.keys.name(act));
+    let [sign, void] = [Act::SignStep, Act::VoidStep].map(Act::key_name);
     let title = format!("Checklist {done} of {all}: {sign} signs, {void} voids");
     let inside = framed(&title, Line::default(), theme, frame, area);
     let size = (usize::from(inside.width), usize::from(inside.height));
@@ -287,15 +286,14 @@ fn ladder(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
         on_pad && vehicle.status.as_ref().is_some_and(|status| status.value.checks_failed.is_empty());
     let pin_out = vehicle.interlocks().is_some_and(|locks| locks.contains(TdInterlock::TD_INTERLOCK_PIN_OUT));
     let counting = vehicle.countdown_s().is_some();
-    let keys = &model.settings.keys;
     let two = model.people() == Some(2);
     let then = |act: Act, word: &str| {
-        let key = keys.name(act);
+        let key = act.key_name();
         if two { format!("{key}, {word}, Enter; CONFIRM") } else { format!("{key}, type {word}, Enter") }
     };
     let checks = model.steps_done(now).map_or_else(
         || "every check passes".to_owned(),
-        |(done, all)| format!("checks; checklist {done}/{all} ({})", keys.name(Act::Checklist)),
+        |(done, all)| format!("checks; checklist {done}/{all} ({})", Act::Checklist.key_name()),
     );
     let rungs = [
         (model.link.state(now).carries(), "the vehicle is heard".to_owned()),

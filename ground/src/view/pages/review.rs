@@ -23,9 +23,8 @@ pub fn draw_review(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     let ended = panels::ending_role(model, now).map(|(ending, role)| (ending.sentence(&model.vehicle), role));
     let (words, role) = ended.unwrap_or(("no verdict received yet".to_owned(), TextRole::Caution));
     let silent = unheard(model, now).map_or_else(String::new, |words| format!("; {words}"));
-    let keys = &model.settings.keys;
     let again = Act::ReplayFlight.works(model, now).then(|| {
-        let [again, report] = [Act::ReplayFlight, Act::Report].map(|act| keys.name(act));
+        let [again, report] = [Act::ReplayFlight, Act::Report].map(Act::key_name);
         theme.label(format!("  {again} shows it again, {report} writes the report"))
     });
     let mut sentence = Line::from(theme.span(format!(" {words}{silent}"), role));

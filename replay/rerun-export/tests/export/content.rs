@@ -5,9 +5,10 @@ use std::collections::BTreeSet;
 use re_lenses::Selector;
 use replay_rerun::{FLIGHT_TIME, PLOTS, component, export};
 
-use crate::flown::{MK2, WITH_FRAMES, tlog};
+use crate::flown::{MK2, WITH_FRAMES};
 use crate::logs::{FRAMES, START_UNIX_NS, cleared, folder, write_log, write_log_from};
 use crate::read_back::Recording;
+use crate::station::station_log;
 
 #[test]
 fn a_flight_is_exported_whole() {
@@ -58,11 +59,9 @@ fn the_pose_and_the_events_are_what_a_viewer_draws() {
 /// A plot whose field does not exist is empty in the viewer, and nothing says so.
 #[test]
 fn every_plot_of_the_layout_has_its_fields() {
-    let (folder, log, rrd) = folder();
-    let station = folder.path().join("station.mcap");
+    let (_folder, log, rrd) = folder();
+    let station = station_log(&WITH_FRAMES.log, "station.mcap");
     write_log(&log);
-    let tlog = tlog(&WITH_FRAMES, "station.tlog");
-    replay::log::import_tlog(&tlog, &station).unwrap();
     for (title, [topic, message], fields) in PLOTS {
         let log = match topic {
             "/pilot/timing" => &MK2.log,

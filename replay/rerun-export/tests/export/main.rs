@@ -10,3 +10,5 @@ mod flown;
 mod logs;
 mod outside_reader;
 mod read_back;
+#[path = "../../../tests/replay/station.rs"]
+mod station;

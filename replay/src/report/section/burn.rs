@@ -29,43 +29,36 @@ const VIEWS: [(&str, &str, [usize; 2], &str); 3] = [
     ("Path from above, m", "1 0", [1, 0], "east, m"),
 ];
 
-/// The flights' paths to their landings, each with its name and class, from three sides; of a single flight with its plans and
-/// its attitude.
-pub(super) fn paths(flights: &[(&'static str, &'static str, &Flight)]) -> String {
+/// The path to the landing with plans and attitude, from three sides.
+fn paths(flight: &Flight) -> String {
+    let parts = [Part::Burn, Part::Air];
+    let shown = |sample: &&Sample| parts.iter().all(|part| flight.has(*part, sample.time_s));
+    let (made, flown) = (flight.made(), flight.track.iter().filter(shown).copied().collect::<Vec<_>>());
     let picture = |(title, axes, [right, up], x_name): (&str, &'static str, [usize; 2], &'static str)| {
         let see = |state: &State| (state[right], state[up]);
-        let flown = |flight: &'_ Flight| -> Vec<Sample> {
-            let parts = [Part::Burn, Part::Air];
-            let shown = |sample: &&Sample| parts.iter().all(|part| flight.has(*part, sample.time_s));
-            flight.track.iter().filter(shown).copied().collect()
+        let path = |(_, plan): &(&Thought, &Plan)| -> Series {
+            // A plan that does not land ends below the ground.
+            let above = plan.states().iter().map(planned).take_while(|state| state[HEIGHT] >= -GROUND_M);
+            above.map(|state| see(&state)).chain([GAP]).collect()
         };
-        let mut lines = Vec::new();
-        if let [(.., flight)] = flights {
-            let (made, flown) = (flight.made(), flown(flight));
-            let path = |(_, plan): &(&Thought, &Plan)| -> Series {
-                // A plan that does not land ends below the ground.
-                let above = plan.states().iter().map(planned).take_while(|state| state[HEIGHT] >= -GROUND_M);
-                above.map(|state| see(&state)).chain([GAP]).collect()
-            };
-            let nose = |sample: &Sample| {
-                let nose = sample.attitude? * Vector3::x();
-                // East is against y.
-                let along = [nose.x, -nose.y, nose.z].map(|share| NOSE_M * share);
-                let (x, y) = see(&sample.state);
-                Some([(x, y), (x + along[right], y + along[up]), GAP])
-            };
-            let every = |all: usize, drawn: usize| all.div_ceil(drawn).max(1);
-            let later = made.iter().skip(1).step_by(every(made.len(), PLANS_DRAWN)).flat_map(path);
-            let noses = flown.iter().step_by(every(flown.len(), NOSES_DRAWN)).filter_map(nose).flatten();
-            lines.push(line("later plans", "thin", later.collect()));
-            lines.push(line(PLANNED, "b", made.first().map(path).unwrap_or_default()));
-            lines.push(line("nose", "nose", noses.collect()));
-        }
-        lines.extend(flights.iter().map(|(name, class, flight)| {
-            line(name, class, flown(flight).iter().map(|sample| see(&sample.state)).collect())
-        }));
-        let title = if flights.len() > 1 { format!("Both: {title}") } else { title.to_owned() };
-        Chart { title, axes, x_name, size_px: Some((348.0, 300.0)), lines, ..Chart::default() }.svg()
+        let nose = |sample: &Sample| {
+            let nose = sample.attitude? * Vector3::x();
+            // East is against y.
+            let along = [nose.x, -nose.y, nose.z].map(|share| NOSE_M * share);
+            let (x, y) = see(&sample.state);
+            Some([(x, y), (x + along[right], y + along[up]), GAP])
+        };
+        let every = |all: usize, drawn: usize| all.div_ceil(drawn).max(1);
+        let later = made.iter().skip(1).step_by(every(made.len(), PLANS_DRAWN)).flat_map(path);
+        let noses = flown.iter().step_by(every(flown.len(), NOSES_DRAWN)).filter_map(nose).flatten();
+        let lines = vec![
+            line("later plans", "thin", later.collect()),
+            line(PLANNED, "b", made.first().map(path).unwrap_or_default()),
+            line("nose", "nose", noses.collect()),
+            line("flown", "a", flown.iter().map(|sample| see(&sample.state)).collect()),
+        ];
+        let (title, size_px) = (title.to_owned(), Some((348.0, 300.0)));
+        Chart { title, axes, x_name, size_px, lines, ..Chart::default() }.svg()
     };
     charts(&VIEWS.map(picture).concat())
 }
@@ -75,7 +68,7 @@ pub(super) fn words(flight: &Flight) -> String {
     let Some(source) = flight.source else {
         return paragraph("The log has no positions of the vehicle.");
     };
-    paragraph(&format!("{source} {}", thrust(flight))) + &paths(&[("flown", "a", flight)])
+    paragraph(&format!("{source} {}", thrust(flight))) + &paths(flight)
 }
 
 /// A motor that is further off than this was another one than the mission expected: one of twenty of its own lot is.

@@ -3,7 +3,6 @@
 mod burn;
 mod first;
 pub(super) mod motion;
-pub(super) mod overlay;
 mod pictures;
 mod place;
 mod whole;

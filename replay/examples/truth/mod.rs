@@ -2,12 +2,11 @@
 
 use std::collections::BTreeMap;
 
+use replay::fit::Fit;
 use sim::sortie::Sortie;
 
-use super::Fit;
-
 /// The truth by the names of a fit's parameters.
-pub fn truth(flight: &Sortie, fit: &Fit) -> BTreeMap<String, f64> {
+pub(crate) fn truth(flight: &Sortie, fit: &Fit) -> BTreeMap<String, f64> {
     let body_share = fit.body_share.unwrap_or(0.5);
     let drawn = flight.drawn();
     let truth = &drawn.truth;
