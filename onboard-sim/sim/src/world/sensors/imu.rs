@@ -1,5 +1,7 @@
 //! The inertial unit: white noise by its density, a bias that walks, scale, axes and range (Groves 2013, chapter 4).
 
+use core::f64::consts::FRAC_1_SQRT_2;
+
 use flight::computer::{FRAME_MS, FRAME_S};
 use flight::estimation::estimator::{GRAVITY_M_S2, ImuSample};
 use nalgebra::Vector3;
@@ -98,10 +100,13 @@ impl Sensors {
 }
 
 impl Flaws {
-    /// Vibration of one frame's sample: rotation rate, rad/s, and specific force, m/s^2.
+    /// Vibration of one frame's sample: rotation rate, rad/s, and specific force, m/s^2. The mean rate over a frame is the
+    /// difference of two angles, which a vibration does not let grow; the mean force is one of two velocities.
     fn vibration(&mut self, params: &SensorParams) -> (Vector3<f64>, Vector3<f64>) {
         let imu = &params.imu;
-        let rate = self.vibration.next3() * imu.vibration_deg_s.to_radians();
-        (rate, self.vibration.next3() * (imu.vibration_g * GRAVITY_M_S2))
+        let now = [self.vibration.next3(), self.vibration.next3()];
+        let before = core::mem::replace(&mut self.shaken, now);
+        let [rate, force] = [0, 1].map(|which: usize| (now[which] - before[which]) * FRAC_1_SQRT_2);
+        (rate * imu.vibration_deg_s.to_radians(), force * (imu.vibration_g * GRAVITY_M_S2))
     }
 }

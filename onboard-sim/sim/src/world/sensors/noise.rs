@@ -80,6 +80,8 @@ pub(super) struct Flaws {
     pub(super) grass_m: f64,
     pub(super) velocity_wander: [Wander; 3],
     pub(super) vibration: Normal,
+    /// The vibration's last numbers: of angle and velocity.
+    pub(super) shaken: [Vector3<f64>; 2],
     pub(super) gnss: Normal,
     pub(super) lidar: Normal,
     pub(super) satellites: Normal,
@@ -120,6 +122,7 @@ impl Flaws {
             }),
             barometer_scale: 1.0 + barometer.scale_share * drawn.next(),
             vibration: Normal::new(seed, VIBRATION_STREAM, share),
+            shaken: [Vector3::zeros(); 2],
             gnss: Normal::new(seed, GNSS_STREAM, share),
             lidar: Normal::new(seed, LIDAR_STREAM, share),
             satellites,
