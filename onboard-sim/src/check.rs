@@ -13,7 +13,7 @@ use flight::vehicle::airframe::{Airframe, MassModel, MassProperties};
 use flight::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use flight::vehicle::burn::Burn;
 use flight::vehicle::fins::{PITCH, YAW};
-use flight::vehicle::mission::Mission;
+use flight::vehicle::mission::{Mission, SensorPlaces};
 use flight::vehicle::thrust_curve::ThrustCurve;
 use flight::vehicles::motors;
 use sim::dispersion::may_be_kinder;
@@ -175,6 +175,20 @@ pub fn built_in() -> Vec<Candidate> {
     found.collect()
 }
 
+/// A row that names the sensors without a station; `None` if each has one.
+fn without_place(places: &SensorPlaces) -> Option<Row> {
+    let stations = [
+        ("imu", places.imu_station_m),
+        ("gnss", places.gnss_station_m),
+        ("barometer", places.barometer_station_m),
+        ("lidar", places.lidar_station_m),
+    ];
+    let missing = stations.into_iter().filter(|(_, station_m)| station_m.is_none());
+    let keys = missing.map(|(sensor, _)| format!("{sensor}_station_m")).collect::<Vec<_>>().join(", ");
+    let beside = "a station in [sensors]; without, at the centre of gravity".to_owned();
+    (!keys.is_empty()).then(|| Row::new("sensors", Verdict::Tight, format!("no {keys}"), beside))
+}
+
 /// Why there is no page.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckError {
@@ -202,6 +216,7 @@ pub fn check(
         row.change = Some(proposal(recipe, motors, verdict)?);
     }
     rows.extend(vehicle.stands());
+    rows.extend(without_place(&recipe.mission.sensors));
     if flights > 0 {
         rows.push(flown(recipe, &fly(recipe, flights, done)?));
     }

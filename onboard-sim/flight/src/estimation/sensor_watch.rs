@@ -13,7 +13,7 @@ use super::estimator::alignment::FELT_AT_REST_M_S2;
 pub const SENSORS: [&str; 5] = ["accelerometer", "gyro", "barometer", "GNSS", "lidar"];
 
 /// So many equal inertial samples in a row do not happen to noise.
-const FROZEN_IMU: u32 = 4;
+pub(super) const FROZEN_IMU: u32 = 4;
 /// The same of a barometer, half a second, and of a lidar, a second: both round more coarsely. A receiver at rest
 /// may repeat one fix (static hold).
 const FROZEN_BAROMETER: u32 = 25;

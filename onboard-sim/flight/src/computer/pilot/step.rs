@@ -41,6 +41,7 @@ impl Pilot {
     pub(crate) fn estimate_state(&mut self, phase: Phase, input: &KeptInput, sensors: &SensorWatch) {
         // Also on the ground, where the gimbal goes on to balance.
         let burns = self.model.motor.stage() == MotorStage::Burning;
+        self.speeds.watch_accelerometer(sensors.accelerometer_is_lost());
         let thrust_felt = !(burns && sensors.accelerometer_is_lost());
         let estimate = self.estimated(phase, input, thrust_felt);
         self.estimate = Some(estimate);

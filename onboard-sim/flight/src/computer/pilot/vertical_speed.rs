@@ -51,10 +51,16 @@ with_defaults! {
         pressure_m_s: f64 = 0.0,
         pressure_at_s: f64 = f64::NEG_INFINITY,
         contradicted_s: f64 = 0.0,
+        /// The accelerometer repeats itself or is silent: the estimate follows it.
+        accelerometer_lost: bool = false,
     }
 }
 
 impl VerticalSpeeds {
+    pub(super) fn watch_accelerometer(&mut self, lost: bool) {
+        self.accelerometer_lost = lost;
+    }
+
     /// After a reset what was felt meanwhile is in the estimate alone.
     pub(super) fn resumed(self) -> Self {
         Self { felt_m_s: None, ..self }
@@ -141,6 +147,12 @@ impl VerticalSpeeds {
     /// How fast the vehicle rises: as estimated, unless the three say otherwise. Of two that contradict each other the one that
     /// rises faster counts: nothing is parted or opened on the way up.
     pub(super) fn rises_m_s(&self, estimated_m_s: f64, time_s: f64, through_gas_s: Option<f64>) -> f64 {
+        let others = [self.pressure_m_s(time_s, through_gas_s), self.gnss_m_s(time_s)];
+        if let Some(fastest_m_s) =
+            others.into_iter().flatten().reduce(f64::max).filter(|_| self.accelerometer_lost)
+        {
+            return fastest_m_s;
+        }
         let apart = |m_s: f64, most_m_s: f64| (m_s - estimated_m_s).abs() > most_m_s;
         if let Some(middle_m_s) = self.middle_m_s(time_s, through_gas_s) {
             return if apart(middle_m_s, APART_OF_THREE_M_S) { middle_m_s } else { estimated_m_s };

@@ -10,6 +10,7 @@ use serde::Serialize;
 use super::covariance::POSITION;
 use super::health::BRIDGED_FRAMES;
 use super::{Estimator, GnssFix};
+use crate::estimation::sensor_watch::FROZEN_IMU;
 
 /// Largest change of velocity between two fixes that no motion explains, m/s: late time tags and
 /// rounding.
@@ -72,8 +73,9 @@ pub(super) struct GnssGate {
     followed_m_s: f64,
     /// Integral of the specific force's magnitude since the last fix, m/s.
     force_m_s: f64,
-    /// Frames without an inertial sample since then.
+    /// Frames without a usable inertial sample since then, and with the same one in a row.
     blind_frames: u32,
+    repeated_frames: u32,
     /// Velocity by unmeasured shocks since then, m/s.
     shock_m_s: f64,
     /// Velocity of the fix admitted in this frame, m/s.
@@ -92,6 +94,7 @@ impl GnssGate {
             followed_m_s: 0.0,
             force_m_s: 0.0,
             blind_frames: 0,
+            repeated_frames: 0,
             shock_m_s: 0.0,
             admitted_m_s: None,
         }
@@ -107,11 +110,14 @@ impl GnssGate {
         self.in_doubt = false;
     }
 
-    /// Begins a frame with the velocity gained by the specific force, m/s, and whether it was measured.
-    pub(super) fn begin_frame(&mut self, force_m_s: f64, measured: bool) {
+    /// Begins a frame with the velocity gained by the specific force, m/s, whether it was measured, and whether it repeats
+    /// the sample before.
+    pub(super) fn begin_frame(&mut self, force_m_s: f64, measured: bool, repeated: bool) {
         self.admitted_m_s = None;
         self.force_m_s += force_m_s;
-        self.blind_frames += u32::from(!measured);
+        self.repeated_frames = if repeated { self.repeated_frames.saturating_add(1) } else { 0 };
+        let blind = !measured || self.repeated_frames >= FROZEN_IMU;
+        self.blind_frames = self.blind_frames.saturating_add(u32::from(blind));
     }
 }
 

@@ -152,6 +152,7 @@ impl Estimator {
     pub(super) fn carry_forward(&mut self, imu: &ImuSample, burning: bool, levers: &LeverArms) {
         let interval_s = self.config.frame_s;
         let measured = self.aids.imu.count(imu.is_plausible());
+        let repeated = imu.specific_force_m_s2 == self.last_imu.specific_force_m_s2;
         if measured {
             self.last_imu = *imu;
         }
@@ -173,7 +174,7 @@ impl Estimator {
         state.world_from_body.renormalize_fast();
         let middle = middle.to_rotation_matrix();
         let felt_m_s = middle * self.specific_force_m_s2 * interval_s;
-        self.gnss_gate.begin_frame(felt_m_s.norm(), measured);
+        self.gnss_gate.begin_frame(felt_m_s.norm(), measured, repeated);
         let gained_m_s = felt_m_s - Vector3::z() * (self.config.gravity_m_s2 * interval_s);
         let moved_m = (state.velocity_m_s + gained_m_s * 0.5) * interval_s;
         state.position_m += moved_m;
