@@ -1,6 +1,8 @@
 //! Figures as SVG, drawn with `plotters`: the best maintained plotting crate that writes SVG without fonts, images or a browser
 //! (three small crates, 6 s of a build); ticks, axes and escaping are its own.
 
+use std::collections::BTreeSet;
+
 use plotters::backend::SVGBackend;
 use plotters::chart::{ChartBuilder, ChartContext};
 use plotters::coord::Shift;
@@ -66,9 +68,6 @@ fn axes<'a, 'b>(
     [x, y]: [(f64, f64); 2],
     [x_label, y_label]: [&str; 2],
 ) -> Drawn<Chart<'a, 'b>> {
-    if ![x.0, x.1, y.0, y.1].iter().all(|end| end.is_finite()) {
-        return Err("an axis is not finite".into());
-    }
     let mut chart = ChartBuilder::on(area)
         .margin(12)
         .x_label_area_size(42)
@@ -100,55 +99,11 @@ fn number((from, to): (f64, f64)) -> impl Fn(&f64) -> String {
     }
 }
 
-/// Width of a letter and of a sample with the room around it, px. SVG does not tell how wide a text is.
-const LETTER_PX: i32 = 7;
+/// Width of a sample, of an entry of the legend and of the margin, and height of a row, px.
 const SAMPLE_PX: i32 = 26;
-const GAP_PX: i32 = 18;
+const ENTRY_PX: u32 = 240;
 const LEFT_PX: i32 = 16;
 const ROW_PX: i32 = 24;
-/// Letters of a name that count.
-const LONGEST: i32 = 1000;
-
-/// Names at their places.
-struct Legend {
-    names: Vec<String>,
-    /// Left end and middle of each name's sample, px.
-    places: Vec<(i32, i32)>,
-}
-
-impl Legend {
-    /// Names in rows of a width, px.
-    fn new(names: Vec<String>, width_px: u32) -> Self {
-        let (mut left_px, mut row) = (LEFT_PX, 0);
-        let mut place = |name: &String| {
-            let letters = i32::try_from(name.chars().count()).unwrap_or(LONGEST).min(LONGEST);
-            let entry_px = SAMPLE_PX + LETTER_PX * letters + GAP_PX;
-            if left_px > LEFT_PX && left_px + entry_px > width_px.cast_signed() {
-                (left_px, row) = (LEFT_PX, row + 1);
-            }
-            let place = (left_px, row * ROW_PX + ROW_PX / 2);
-            left_px += entry_px;
-            place
-        };
-        let places = names.iter().map(&mut place).collect();
-        Self { names, places }
-    }
-
-    /// Height of all rows, px.
-    fn height_px(&self) -> u32 {
-        let last = self.places.last().map_or(0, |(_, middle)| middle + ROW_PX / 2);
-        last as u32 + ROW_PX as u32 / 2
-    }
-
-    /// Draws every name behind what `sample` draws for it from a place, px.
-    fn draw(&self, area: &Area<'_>, mut sample: impl FnMut(&Area<'_>, usize, (i32, i32)) -> Drawn) -> Drawn {
-        for (entry, (name, (left, middle))) in self.names.iter().zip(&self.places).enumerate() {
-            sample(area, entry, (*left, *middle))?;
-            area.draw(&Text::new(name.clone(), (left + SAMPLE_PX, middle - 7), FONT))?;
-        }
-        Ok(())
-    }
-}
 
 /// Length of the dashes and of the gaps, px.
 const DASH_PX: (i32, i32) = (8, 5);
@@ -192,24 +147,29 @@ pub(crate) fn lines_svg(
     let (panel_width_px, panel_height_px) = if panels.len() == 1 { (720, 500) } else { (400, 340) };
     let rows = panels.len().div_ceil(columns.max(1));
     let (width_px, panels_px) = (columns as u32 * panel_width_px, rows as u32 * panel_height_px);
-    let mut named: Vec<&Line> = Vec::new();
-    for line in panels.iter().flat_map(|panel| &panel.lines).filter(|line| !line.name.is_empty()) {
-        if !named.iter().any(|known| known.name == line.name) {
-            named.push(line);
-        }
-    }
+    let mut names = BTreeSet::new();
+    let mut lines: Vec<&Line> = panels.iter().flat_map(|panel| &panel.lines).collect();
+    lines.retain(|line| names.insert(&line.name));
     let kinds = panels.first().map_or(&[][..], |panel| &panel.kinds);
-    let names = kinds.iter().map(|(name, _)| name).chain(named.iter().map(|line| &line.name));
-    let legend = Legend::new(names.cloned().chain(cross_name.map(str::to_owned)).collect(), width_px);
-    drawn(title, (width_px, panels_px + legend.height_px()), |root| {
+    let names = kinds.iter().map(|(name, _)| name).chain(lines.iter().map(|line| &line.name));
+    let names: Vec<&str> = names.map(String::as_str).chain(cross_name).collect();
+    let per_row = (width_px / ENTRY_PX) as usize;
+    let legend_px = names.len().div_ceil(per_row) as u32 * ROW_PX as u32;
+    drawn(title, (width_px, panels_px + legend_px), |root| {
         let (upper, lower) = root.split_vertically(panels_px);
         for (area, panel) in upper.split_evenly((rows, columns)).iter().zip(panels) {
             draw_panel(area, panel)?;
         }
-        legend.draw(&lower, |area, entry, (left, middle)| match entry.checked_sub(kinds.len()) {
-            None => Ok(area.draw(&(EmptyElement::at((left + 10, middle)) + mark(entry)))?),
-            Some(line) => draw_sample(area, named.get(line).copied(), (left, middle)),
-        })
+        for (entry, name) in names.iter().enumerate() {
+            let left = LEFT_PX + ENTRY_PX as i32 * (entry % per_row) as i32;
+            let middle = ROW_PX * (entry / per_row) as i32 + ROW_PX / 2;
+            match entry.checked_sub(kinds.len()) {
+                None => lower.draw(&(EmptyElement::at((left + 10, middle)) + mark(entry)))?,
+                Some(line) => draw_sample(&lower, lines.get(line).copied(), (left, middle))?,
+            }
+            lower.draw(&Text::new(*name, (left + SAMPLE_PX, middle - 7), FONT))?;
+        }
+        Ok(())
     })
 }
 
