@@ -138,9 +138,7 @@ fn a_command_that_there_is_not_is_wrong_usage_and_the_commands_are_listed() {
     let wrong = run(Path::new("."), &["man", "land"]);
     assert_eq!((wrong.status.code(), stdout(&wrong)), (Some(2), String::new()));
     assert!(stderr(&wrong).contains("no command `land`, but: fly, campaign, check"), "{}", stderr(&wrong));
-    let inner = run(Path::new("."), &["man", "campaign", "fly"]);
-    assert!(stderr(&inner).contains("no command `fly`, but: merge"), "{}", stderr(&inner));
-    assert_eq!(run(Path::new("."), &["man", "campaign", "merge"]).status.code(), Some(0));
+    assert_eq!(run(Path::new("."), &["man", "campaign"]).status.code(), Some(0));
     // Nobody reads it.
     let (reader, writer) = std::io::pipe().unwrap();
     drop(reader);
