@@ -101,7 +101,7 @@ fn number((from, to): (f64, f64)) -> impl Fn(&f64) -> String {
 
 /// Width of a sample, of an entry of the legend and of the margin, and height of a row, px.
 const SAMPLE_PX: i32 = 26;
-const ENTRY_PX: u32 = 240;
+const ENTRY_PX: u32 = 230;
 const LEFT_PX: i32 = 16;
 const ROW_PX: i32 = 24;
 
