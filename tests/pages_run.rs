@@ -23,7 +23,7 @@ const PAGES: [&str; 9] = [
 ];
 
 /// Lines that do not run here: their page, how they begin, and why.
-const ELSEWHERE: [(&str, &str, &str); 26] = [
+const ELSEWHERE: [(&str, &str, &str); 27] = [
     ("README.md", "cargo run ", "compiles; tests/demo.rs flies the same demonstration"),
     ("README.md", "cargo test", "is this test among all others"),
     ("ENGINEER.md", "npm ", "installs from the network"),
@@ -42,7 +42,8 @@ const ELSEWHERE: [(&str, &str, &str); 26] = [
         "compiles for ten minutes; .ci/run exports a log to Rerun",
     ),
     ("ENGINEER.md", "replay-rerun ", "needs the line above"),
-    ("ENGINEER.md", "replay open ", "opens a window; replay/tests tells which viewer it starts"),
+    ("ENGINEER.md", "rerun ", "opens a window"),
+    ("ENGINEER.md", "lichtblick ", "opens a window"),
     ("MK3.md", "onboard-sim campaign ", "flies for minutes; ENGINEER.md has shorter campaigns"),
     ("CONTRIBUTING.md", "cargo run ", "compiles; tests/demo.rs flies it"),
     ("CONTRIBUTING.md", "cargo test", "is or holds this test"),

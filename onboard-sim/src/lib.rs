@@ -5,20 +5,18 @@
 //! * [`run`]: the same work on many things, on several threads; flies the missing flights.
 //! * [`progress`]: how far something long is.
 //! * [`files`]: texts that are built in or files, and files that are written whole.
-//! * [`statistics`], [`summary`]: percentiles, texts and pictures from the rows; [`figure`] draws.
+//! * [`statistics`], [`summary`]: percentiles and texts from the rows.
 //! * [`hazard`]: where a flight comes down in each way that it can end.
 //! * [`check`]: whether a vehicle that is not built yet will land, and what to change.
 //! * [`frame`]: another motor in an airframe.
 //! * [`card`]: the landing card.
 //! * [`playback`]: recorded sensors played to the flight computer.
-//! * [`scenario`]: faults, and the expected outcome of a flight with them.
 //!
 //! A flight depends only on its recipe and its number. So a campaign can be stopped, continued and run on any
 //! number of threads with the same results.
 
 pub mod card;
 pub mod check;
-pub mod figure;
 pub mod files;
 pub mod frame;
 pub mod hazard;
@@ -26,7 +24,6 @@ pub mod playback;
 pub mod progress;
 pub mod row;
 pub mod run;
-pub mod scenario;
 pub mod statistics;
 pub mod store;
 pub mod summary;

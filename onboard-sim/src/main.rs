@@ -60,7 +60,7 @@ enum Command {
     ///
     /// Landed or not, aborted in each part of the flight, without its landing motor, with its booster, lifted off by itself,
     /// ballistic; and the spent booster. Beside it stands the rule of a national association; the larger distance counts.
-    #[command(after_help = "Example: onboard-sim hazard --mission mk3 --wind 0,3,6 --svg hazard.svg")]
+    #[command(after_help = "Example: onboard-sim hazard --mission mk3 --wind 0,3,6 --csv hazard.csv")]
     Hazard(cli::hazard::HazardArguments),
     /// Play the recorded sensors of a real flight to the flight computer: what it would have decided.
     ///

@@ -5,37 +5,28 @@
 //! * [`flight_v1`]: the pilot, and the simulated truth.
 //! * [`computer_v1`]: the whole flight computer, from power-up on.
 
-/// The records of `proto/touchdown/log/v1.proto`, generated.
-pub mod v1 {
-    #![allow(
-        unreachable_pub,
-        clippy::pedantic,
-        clippy::allow_attributes_without_reason,
-        reason = "generated code; its documentation is in the .proto"
-    )]
-    include!(concat!(env!("OUT_DIR"), "/touchdown.log.v1.rs"));
+macro_rules! generated {
+    ($($(#[$about:meta])* $module:ident = $file:literal,)*) => {$(
+        $(#[$about])*
+        pub mod $module {
+            #![allow(
+                unreachable_pub,
+                clippy::pedantic,
+                clippy::allow_attributes_without_reason,
+                reason = "generated code; its documentation is in the .proto"
+            )]
+            include!(concat!(env!("OUT_DIR"), $file));
+        }
+    )*};
 }
 
-/// The records of `proto/touchdown/flight/v1.proto`, generated.
-pub mod flight_v1 {
-    #![allow(
-        unreachable_pub,
-        clippy::pedantic,
-        clippy::allow_attributes_without_reason,
-        reason = "generated code; its documentation is in the .proto"
-    )]
-    include!(concat!(env!("OUT_DIR"), "/touchdown.flight.v1.rs"));
-}
-
-/// The records of `proto/touchdown/computer/v1.proto`, generated.
-pub mod computer_v1 {
-    #![allow(
-        unreachable_pub,
-        clippy::pedantic,
-        clippy::allow_attributes_without_reason,
-        reason = "generated code; its documentation is in the .proto"
-    )]
-    include!(concat!(env!("OUT_DIR"), "/touchdown.computer.v1.rs"));
+generated! {
+    /// The records of `proto/touchdown/log/v1.proto`.
+    v1 = "/touchdown.log.v1.rs",
+    /// The records of `proto/touchdown/flight/v1.proto`.
+    flight_v1 = "/touchdown.flight.v1.rs",
+    /// The records of `proto/touchdown/computer/v1.proto`.
+    computer_v1 = "/touchdown.computer.v1.rs",
 }
 
 /// Serialised `google.protobuf.FileDescriptorSet` of [`computer_v1`] and what it imports.

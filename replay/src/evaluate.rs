@@ -16,7 +16,7 @@ pub use crate::controller::Decided;
 use crate::controller::{AgainError, LoggedComputer, phase_name};
 use crate::log::Recording;
 use crate::print::columns;
-use crate::settings::{Setting, SettingArguments};
+use crate::settings::Setting;
 use crate::verify::explain::degrees;
 
 /// Sections that a flight computer never sees: the limits of the verdict, and the random draw.
@@ -278,8 +278,11 @@ fn yes_no(answer: Option<bool>) -> &'static str {
 pub(crate) struct Args {
     /// The log, an MCAP file.
     file: PathBuf,
-    #[command(flatten)]
-    settings: SettingArguments,
+    /// Another setting, PATH=VALUE or PATH=VALUE@S.
+    ///
+    /// With @6.5 it applies from that vehicle time on, s. May be given more than once.
+    #[arg(long = "set", value_name = "SETTING")]
+    settings: Vec<Setting>,
     /// Answer in JSON, with every frame.
     #[arg(long)]
     json: bool,
@@ -289,7 +292,7 @@ impl Args {
     pub(crate) fn run(self) -> Result<Exit> {
         let recording = Recording::open(&self.file)?;
         warn_of_what_is_missing(&recording);
-        let report = evaluate(&recording, &self.settings.all()?)?;
+        let report = evaluate(&recording, &self.settings)?;
         give(&report, self.json)
     }
 }

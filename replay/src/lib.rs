@@ -17,7 +17,7 @@
 //! * [`fit`](mod@fit): what a flight tells of its vehicle, its motor and its day, with intervals; what all flights so far
 //!   tell of the next day.
 //! * [`table`]: reads a log as tables; [`compare`](mod@compare): compares flights signal by signal.
-//! * [`report`](mod@report): writes a flight as one HTML page; [`open`]: shows it in another program.
+//! * [`report`](mod@report): writes a flight as one HTML page.
 //! * [`export`]: converts logs to other formats; [`recover`](mod@recover): repairs a damaged log.
 //! * [`output`](onboard_sim::files): writes files completely or not at all, each new one under a name that is free.
 //! * [`print`](mod@print): what answers have in common: columns, two verdicts beside each other, JSON.
@@ -33,7 +33,6 @@ pub mod findings;
 pub mod fit;
 pub mod info;
 pub mod log;
-pub mod open;
 pub mod print;
 pub mod recover;
 pub mod refly;
@@ -114,9 +113,6 @@ enum Command {
     /// Writes a flight as one HTML page with its pictures inside: no network, whole without its script.
     #[command(after_help = "Example: replay report flight.mcap")]
     Report(report::Args),
-    /// Opens a log in a viewer that is installed, with our layout: Rerun, Foxglove or Lichtblick.
-    #[command(after_help = "Example: replay open flight.mcap")]
-    Open(open::Args),
     /// Writes a log's content as CSV or a Rerun recording.
     #[command(after_help = "Example: replay export flight.mcap --to csv --out tables")]
     Export(export::Args),
@@ -154,7 +150,6 @@ impl Cli {
             Command::Refly(args) => args.run(),
             Command::Compare(args) => args.run(),
             Command::Report(args) => args.run(),
-            Command::Open(args) => args.run(),
             Command::Export(args) => args.run(),
             Command::Recover(args) => args.run(),
             Command::Fit(args) => args.run(),

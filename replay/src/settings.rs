@@ -6,11 +6,8 @@
 
 use std::collections::BTreeSet;
 use std::fmt;
-use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use anyhow::{Context as _, Result};
-use clap::Args;
 use flight::vehicle::mission::Mission;
 use sim::world::Truth;
 
@@ -91,39 +88,25 @@ impl fmt::Display for Setting {
     }
 }
 
-/// Every key of a settings file, as settings. `origin` is used in messages only.
-///
-/// # Errors
-/// The text is not TOML.
-pub fn settings_of_file(text: &str, origin: &str) -> Result<Vec<Setting>, SettingError> {
-    let table = parsed_table(text, origin)?;
-    let mut settings = Vec::new();
-    collect_leaves("", &table, &mut |path, value| {
-        settings.push(Setting { path, value: value.clone(), at_s: None });
-    });
-    Ok(settings)
-}
-
 /// Every setting that a mission's text states; `origin` is used in messages only. A whole number is the same as with a decimal
 /// point.
 ///
 /// # Errors
 /// The text is not TOML.
 pub(crate) fn settings_of_mission(text: &str, origin: &str) -> Result<Vec<Setting>, SettingError> {
-    let mut settings = settings_of_file(text, origin)?;
-    for setting in &mut settings {
-        setting.value = as_whole(&setting.value);
-    }
+    let table = text.parse().map_err(|error: toml::de::Error| SettingError::Toml {
+        origin: origin.to_owned(),
+        reason: error.to_string(),
+    })?;
+    let mut settings = Vec::new();
+    collect_leaves("", &table, &mut |path, value| {
+        settings.push(Setting { path, value: as_whole(value), at_s: None });
+    });
     Ok(settings)
 }
 
 fn listed(settings: &[Setting]) -> String {
     settings.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ")
-}
-
-fn parsed_table(text: &str, origin: &str) -> Result<toml::Table, SettingError> {
-    text.parse::<toml::Table>()
-        .map_err(|error| SettingError::Toml { origin: origin.to_owned(), reason: error.to_string() })
 }
 
 fn collect_leaves(prefix: &str, table: &toml::Table, take: &mut impl FnMut(String, &toml::Value)) {
@@ -288,39 +271,6 @@ impl<T> Schedule<T> {
     }
 }
 
-/// Other settings than the recorded ones.
-#[derive(Debug, Args)]
-pub(crate) struct SettingArguments {
-    /// Another setting, PATH=VALUE or PATH=VALUE@S.
-    ///
-    /// With @6.5 it applies from that vehicle time on, s. May be given more than once.
-    #[arg(long = "set", value_name = "SETTING")]
-    pub(crate) set: Vec<Setting>,
-    /// File of settings, TOML with the keys of a mission to change.
-    ///
-    /// --set overrides it.
-    #[arg(long, value_name = "FILE", hide_short_help = true)]
-    pub(crate) settings: Vec<PathBuf>,
-}
-
-impl SettingArguments {
-    /// All settings, those from files first.
-    pub(crate) fn all(&self) -> Result<Vec<Setting>> {
-        let mut all = Vec::new();
-        for path in &self.settings {
-            all.extend(read(path)?);
-        }
-        all.extend(self.set.iter().cloned());
-        Ok(all)
-    }
-}
-
-fn read(path: &Path) -> Result<Vec<Setting>> {
-    let name = path.display().to_string();
-    let text = std::fs::read_to_string(path).with_context(|| format!("{name}: cannot be read"))?;
-    Ok(settings_of_file(&text, &name)?)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -337,15 +287,6 @@ mod tests {
         for bad in ["powered.weights.theta", "=3", "a=", "a=3@nan", "a=@3"] {
             assert!(bad.parse::<Setting>().is_err(), "{bad}");
         }
-    }
-
-    #[test]
-    fn a_file_of_settings_has_the_missions_shape() {
-        let settings =
-            settings_of_file("powered.weights.theta = 90\n[ignition]\ndelay_s = 0.2\n", "x.toml").unwrap();
-        let shown: Vec<String> = settings.iter().map(ToString::to_string).collect();
-        assert_eq!(shown, ["ignition.delay_s=0.2", "powered.weights.theta=90"]);
-        assert!(settings_of_file("= 3", "x.toml").unwrap_err().to_string().starts_with("x.toml: "));
     }
 
     fn toml() -> &'static str {

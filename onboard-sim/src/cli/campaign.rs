@@ -9,17 +9,14 @@ use clap::Args;
 use flight::vehicle::mission::StartPoint;
 use onboard_sim::files::write_folder;
 use onboard_sim::run::{self, Counts};
-use onboard_sim::scenario::{Expected, Scenario};
 use onboard_sim::store::{Manifest, Store, sha256};
 use onboard_sim::summary::to_text;
 use protocol::log::build::build_info;
 use protocol::program::Exit;
 use serde::Serialize;
-
 use sim::fault::{TimedFault, how_to_write};
-use sim::recipe::Recipe;
 
-use super::{Asked, Progress, on_threads, read, single};
+use super::{Asked, Progress, on_threads, single};
 
 #[derive(Args)]
 pub(crate) struct CampaignArguments {
@@ -34,9 +31,6 @@ pub(crate) struct CampaignArguments {
     /// Break something in every flight; may be repeated.
     #[arg(long = "fault", value_name = "FAULT", long_help = format!("Break something in every flight; may be given more than once. Write {}", how_to_write()))]
     faults: Vec<TimedFault>,
-    /// Inject the faults of a scenario file.
-    #[arg(long, value_name = "FILE")]
-    scenario: Option<PathBuf>,
     /// Directory of the results. If it holds part of the same campaign, the campaign is continued. With --only: the flight's log
     /// (MCAP); a file that exists is kept, and the log gets the next free name.
     #[arg(long, alias = "log", value_name = "PATH", required_unless_present = "only")]
@@ -48,9 +42,10 @@ pub(crate) struct CampaignArguments {
 
 pub(crate) fn run(arguments: &CampaignArguments) -> anyhow::Result<Exit> {
     let mut stdout = std::io::stdout().lock();
-    let (recipe, expected) = flights(arguments)?;
+    let mut recipe = arguments.asked.recipe(arguments.start)?;
+    recipe.faults.clone_from(&arguments.faults);
     if let Some(number) = arguments.only {
-        return single::fly(&recipe, number, expected, arguments.out.as_deref());
+        return single::fly(&recipe, number, arguments.out.as_deref());
     }
     let out = arguments.out.as_deref().context("--out is missing")?;
     let manifest = Manifest::of(&recipe, arguments.flights, &program()?);
@@ -68,16 +63,6 @@ pub(crate) fn run(arguments: &CampaignArguments) -> anyhow::Result<Exit> {
     }
     writeln!(stdout, "results {}", out.display())?;
     Ok(Exit::Yes)
-}
-
-/// What is flown, and how it should end.
-fn flights(arguments: &CampaignArguments) -> anyhow::Result<(Recipe, Option<Expected>)> {
-    let mut recipe = arguments.asked.recipe(arguments.start)?;
-    recipe.faults.clone_from(&arguments.faults);
-    let Some(path) = &arguments.scenario else { return Ok((recipe, None)) };
-    let scenario: Scenario = toml::from_str(&read(path)?).with_context(|| path.display().to_string())?;
-    recipe.faults.extend(scenario.faults);
-    Ok((recipe, scenario.expected))
 }
 
 /// The build and a digest of the running program, so that results of different programs are not mixed.

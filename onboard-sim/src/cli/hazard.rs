@@ -6,7 +6,6 @@ use std::path::PathBuf;
 use clap::Args;
 use flight::rules::verdict::Landing;
 use flight::vehicle::mission::{Mission, StartPoint};
-use onboard_sim::figure::{BLACK_CURVE, Line, Panel, sized_lines_svg};
 use onboard_sim::files::NewFile;
 use onboard_sim::hazard::{self, Flights, Impact, Radius, Rule, Way, keep_out_m, landed_as_planned, widest};
 use onboard_sim::statistics::Landings;
@@ -15,9 +14,6 @@ use sim::dispersion::may_be_kinder;
 use sim::recipe::Recipe;
 
 use super::{Asked, in_wind, on_threads, show_flights};
-
-/// Flights of each kind that the picture shows.
-const SHOWN: u64 = 30;
 
 #[derive(Args)]
 pub(crate) struct HazardArguments {
@@ -38,9 +34,6 @@ pub(crate) struct HazardArguments {
     /// Write where each flight came down (CSV).
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
-    /// Write the places and the radii as a picture (SVG), one wind a panel.
-    #[arg(long, value_name = "FILE")]
-    svg: Option<PathBuf>,
 }
 
 pub(crate) fn run(arguments: &HazardArguments) -> anyhow::Result<Exit> {
@@ -56,10 +49,6 @@ pub(crate) fn run(arguments: &HazardArguments) -> anyhow::Result<Exit> {
     if let Some(path) = &arguments.csv {
         let csv = study.csv()?;
         NewFile::create(path)?.fill(|file| file.write_all(&csv))?;
-    }
-    if let Some(path) = &arguments.svg {
-        let svg = study.svg(&rule)?;
-        NewFile::create(path)?.fill(|file| file.write_all(svg.as_bytes()))?;
     }
     Ok(Exit::Yes)
 }
@@ -83,10 +72,6 @@ struct Study<'a> {
 }
 
 impl Study<'_> {
-    fn radii(&self, way: Way) -> Vec<Option<Radius>> {
-        self.impacts.iter().map(|impacts| Radius::of_way(impacts, way)).collect()
-    }
-
     fn write_text(&self, rule: &Rule, out: &mut impl std::io::Write) -> std::io::Result<()> {
         let HazardArguments { asked: Asked { dispersion, seed, .. }, winds, .. } = self.arguments;
         let Mission { name, site, gate, .. } = self.mission;
@@ -104,21 +89,21 @@ impl Study<'_> {
              (its 95 % interval by order statistics; ?: too few flights for an upper end), the farthest; number of flights.\n",
             if may_be_kinder(dispersion) { ", which may be kinder than `real`" } else { "" }
         )?;
-        write!(out, "{:<26}", "")?;
-        winds.iter().try_for_each(|wind_m_s| write!(out, "{:<29}", format!("{wind_m_s} m/s")))?;
-        writeln!(out)?;
+        let of_each = |cell: &dyn Fn(&Vec<Impact>) -> String| {
+            self.impacts.iter().map(|impacts| format!("{:<29}", cell(impacts))).collect::<String>()
+        };
+        let heads = winds.iter().map(|wind_m_s| format!("{:<29}", format!("{wind_m_s} m/s")));
+        writeln!(out, "{:<26}{}", "", heads.collect::<String>())?;
         for way in self.ways {
-            write!(out, "{:<26}", way.name())?;
-            self.radii(*way).iter().try_for_each(|radius| write!(out, "{:<29}", cell(radius.as_ref())))?;
-            writeln!(out)?;
+            let cells = of_each(&|impacts| cell(Radius::of_way(impacts, *way).as_ref()));
+            writeln!(out, "{:<26}{cells}", way.name())?;
         }
         let landed = |impacts: &Vec<Impact>| {
             let Landings { stands, envelope, .. } = landed_as_planned(impacts);
             format!("{} of {}, {} inside", stands.count, stands.of, envelope.count)
         };
-        write!(out, "\n{:<26}", "stand, inside the envelope")?;
-        self.impacts.iter().try_for_each(|impacts| write!(out, "{:<29}", landed(impacts)))?;
-        writeln!(out, "\n\nRule   {rule}\n       ({})", Rule::SOURCE)?;
+        writeln!(out, "\n{:<26}{}", "stand, inside the envelope", of_each(&landed))?;
+        writeln!(out, "\nRule   {rule}\n       ({})", Rule::SOURCE)?;
         writeln!(
             out,
             "Fence  {:.0} m: the vehicle lights its landing motor only inside; it holds nothing else back",
@@ -151,77 +136,14 @@ impl Study<'_> {
                 let Impact { way, number, place_m, landing, .. } = impact;
                 let two =
                     |m: Option<[f64; 2]>| m.map_or_else(Default::default, |m| m.map(|m| format!("{m:.2}")));
-                let ([x, y], [downwind, across]) = (two(*place_m), two(impact.in_wind_m()));
-                let (wind, number, flags) = (wind_m_s.to_string(), number.to_string(), landing.flags());
-                let told = [&wind, way.name(), &number, &x, &y, &downwind, &across];
-                table.write_record(
-                    told.into_iter().chain(flags.map(|flag| if flag { "true" } else { "false" })),
-                )?;
+                let ([x, y], in_wind) = (two(*place_m), two(impact.in_wind_m()));
+                let wind = wind_m_s.to_string();
+                table.serialize((wind, way.name(), number, x, y, in_wind, landing.flags()))?;
             }
         }
         Ok(table.into_inner()?)
     }
-
-    /// One wind a panel, with its own radius.
-    fn svg(&self, rule: &Rule) -> anyhow::Result<String> {
-        let panel = |(wind_m_s, impacts): (&f64, &Vec<Impact>)| {
-            let places = KINDS.map(|(kind, ways)| {
-                let shown =
-                    impacts.iter().filter(|impact| ways.contains(&impact.way) && impact.number < SHOWN);
-                let places = shown.filter_map(Impact::in_wind_m).map(|[along_m, left_m]| (-left_m, along_m));
-                (kind.to_owned(), places.collect())
-            });
-            let widest = widest(impacts).map(|(_, radius)| radius);
-            let keep_out_m = widest.map_or(f64::NAN, |radius| keep_out_m(&radius, rule));
-            let at_least = if widest.is_none_or(|radius| radius.high_m.is_none()) { "at least " } else { "" };
-            let rule_m = rule.distance_m();
-            let tip_m = if keep_out_m.is_finite() { keep_out_m } else { rule_m };
-            let head = [(0.0, 0.0), (0.0, 1.0), (-0.03, 0.94), (0.0, 1.0), (0.03, 0.94)];
-            let arrow = Line {
-                name: "where the wind blows to".to_owned(),
-                colour: BLACK_CURVE,
-                dashed: false,
-                points: head.map(|(x, y)| (tip_m * x, tip_m * y)).to_vec(),
-            };
-            Panel {
-                title: format!("{wind_m_s} m/s: nobody within {at_least}{keep_out_m:.0} m"),
-                x_label: "across the wind, m".to_owned(),
-                y_label: "downwind, m".to_owned(),
-                kinds: places.to_vec(),
-                lines: vec![
-                    Line::circle("nobody within", keep_out_m, false),
-                    Line::circle(&format!("rule of NAR: {rule_m:.0} m"), rule_m, true),
-                    arrow,
-                ],
-                crosses: vec![(0.0, 0.0, BLACK_CURVE)],
-                equal_scales: true,
-            }
-        };
-        let panels: Vec<Panel> = self.arguments.winds.iter().zip(self.impacts).map(panel).collect();
-        let shown = self.arguments.flights.min(SHOWN);
-        let title =
-            format!("{}: where it comes down ({shown} flights of each way in each wind)", self.mission.name);
-        let (columns, size_px) = if panels.len() == 1 { (1, (706, 720)) } else { (2, (486, 500)) };
-        Ok(sized_lines_svg(&title, &panels, columns, None, size_px)?)
-    }
 }
-
-/// The kinds of a picture, each with its ways.
-const KINDS: [(&str, &[Way]); 4] = [
-    ("as planned, or aborted low", &[Way::AsPlanned, Way::AbortTooLow, Way::AbortUnderThrust, Way::NoLight]),
-    ("ballistic", &[Way::Ballistic, Way::BallisticWithBooster]),
-    (
-        "under the parachute",
-        &[
-            Way::AbortInAscent,
-            Way::ParachuteFromApogee,
-            Way::AbortInDescent,
-            Way::NoSeparation,
-            Way::Uncommanded,
-        ],
-    ),
-    ("spent booster", &[Way::Booster]),
-];
 
 fn cell(radius: Option<&Radius>) -> String {
     radius.map_or_else(String::new, |radius| {

@@ -35,9 +35,6 @@ fn a_wrong_request_is_refused_with_the_reason() {
         assert!(!refused.status.success() && stderr(&refused).contains(words), "{}", stderr(&refused));
         assert!(!directory.path().join("x").exists(), "{words}");
     }
-    let scenario = "name = \"dark\"\nfaults = [\"no-light@0\"]\nexpected = \"inhibit\"";
-    fs::write(directory.path().join("dark.toml"), scenario).unwrap();
-    let dark = campaign(directory.path(), &["--only", "0", "--scenario", "dark.toml"]);
-    assert!(String::from_utf8_lossy(&dark.stdout).contains("expected to inhibit: it did"), "{dark:?}");
-    assert_eq!(dark.status.code(), Some(0));
+    let dark = campaign(directory.path(), &["--only", "0", "--fault", "no-light@0"]);
+    assert_eq!(dark.status.code(), Some(3), "{dark:?}");
 }

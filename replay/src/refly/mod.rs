@@ -42,7 +42,7 @@ use crate::controller::{AgainError, LoggedComputer, SETTINGS_IN_FLIGHT, phase_na
 use crate::log::{Clock, ClockTime, Moment, Recording, Verdict, share};
 use crate::output::{NewFile, WriteError};
 use crate::print::{counted, verdict_table};
-use crate::settings::{Setting, SettingArguments, mission_with, truth_with};
+use crate::settings::{Setting, mission_with, truth_with};
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct StartState {
@@ -507,8 +507,11 @@ impl Answer for ReflyReport {
 pub(crate) struct Args {
     /// The log, an MCAP file.
     file: PathBuf,
-    #[command(flatten)]
-    settings: SettingArguments,
+    /// Another setting, PATH=VALUE or PATH=VALUE@S.
+    ///
+    /// With @6.5 it applies from that vehicle time on, s. May be given more than once.
+    #[arg(long = "set", value_name = "SETTING")]
+    settings: Vec<Setting>,
     /// Another setting of the plant alone.
     ///
     /// As in truth.impulse_scale=0.97. The controller does not know about it. Also airframe.motor=G33, truth.wind_m_s=7. May be given more than once.
@@ -552,7 +555,7 @@ impl Args {
         warn_of_what_is_missing(&recording);
         let options = ReflyOptions {
             start: self.at,
-            settings: self.settings.all()?,
+            settings: self.settings,
             plant_settings: self.plant,
             seed: self.seed,
             faults: FaultChanges { with: self.faults, without: self.without_fault },

@@ -32,7 +32,6 @@ mod missions;
 mod obstacles;
 mod one_verdict;
 #[cfg(unix)]
-mod opened;
 mod other_faults;
 mod overwriting;
 mod pages;

@@ -6,8 +6,8 @@
 use core::f64::consts::FRAC_PI_2;
 
 use super::fall::{ANGLES_DEG, Fate, Moment, OPENINGS_DEG, Stability, TILTS_DEG, Vehicle};
+use super::figure::{Line, Panel, lines_svg};
 use super::{PaperError, Row, Sample, Table};
-use onboard_sim::figure::{FigureError, Line, Panel, sized_lines_svg};
 
 /// Pitch and yaw at the start of Fig. 5, degrees.
 const FIG_5_START_DEG: [f64; 2] = [2.0, 1.0];
@@ -100,17 +100,6 @@ fn fig_6(rows: &[Row]) -> Result<String, PaperError> {
     ];
     let title = "Fig. 6: descents for three input weights P, which coincide (first panel); states and input for P = 1 (others)";
     Ok(lines_svg(title, &panels, 4, Some(CROSSES))?)
-}
-
-/// Panels in rows of `columns`, smaller ones if there are several.
-fn lines_svg(
-    title: &str,
-    panels: &[Panel],
-    columns: usize,
-    cross_name: Option<&str>,
-) -> Result<String, FigureError> {
-    let size_px = if panels.len() == 1 { (720, 500) } else { (400, 340) };
-    sized_lines_svg(title, panels, columns, cross_name, size_px)
 }
 
 /// The pitch plane.

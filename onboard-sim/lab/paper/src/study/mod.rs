@@ -7,11 +7,12 @@
 //! exactly as printed.
 //!
 //! * [`Objective`]: Table 3's J under every definition that the paper leaves open.
-//! * [`figures`]: Figures 5 to 9 from these runs.
+//! * [`figures`]: Figures 5 to 9 from these runs; `figure` draws.
 //! * [`fall`]: the fall of its Fig. 5, in space, and from which tilts that vehicle settles.
 
 mod cases;
 pub(crate) mod fall;
+mod figure;
 pub(crate) mod figures;
 mod flown;
 mod objective;
@@ -22,9 +23,9 @@ use paper::plane::dynamics::PlanarState;
 use sim::world::whole::WorldError;
 
 pub(crate) use cases::{Case, Table};
+use figure::FigureError;
 pub(crate) use flown::{AsPrinted, as_printed};
 pub(crate) use objective::Objective;
-use onboard_sim::figure::FigureError;
 pub(crate) use text::{write_stability, write_tables};
 
 /// One experiment: the paper's result and ours.

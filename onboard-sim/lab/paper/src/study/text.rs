@@ -18,25 +18,22 @@ pub(crate) fn write_tables(
     printed: &AsPrinted,
 ) -> io::Result<()> {
     let rows = &experiments.rows;
-    writeln!(out, "Final states: the landing paper's, and ours with its cost, conditions and start")?;
-    writeln!(out, "(consistent equations, T = 33.3 N). Verdict by the paper's Table 2.")?;
+    writeln!(
+        out,
+        "Final states: the landing paper's, and ours with its cost, conditions and start\n\
+         (consistent equations, T = 33.3 N). Verdict by the paper's Table 2."
+    )?;
+    let heads = "                                   x m        z m pitch deg    u m/s    w m/s  q deg/s         J  Table 2";
     for table in Table::ALL {
-        writeln!(out)?;
-        writeln!(out, "{}", table.title())?;
-        writeln!(
-            out,
-            "{:<16} {:<11} {:>9} {:>10} {:>9} {:>8} {:>8} {:>8} {:>9}  Table 2",
-            "", "", "x m", "z m", "pitch deg", "u m/s", "w m/s", "q deg/s", "J"
-        )?;
+        writeln!(out, "\n{}\n{heads}", table.title())?;
         for row in rows.iter().filter(|row| row.case.table == table) {
             write_row(out, row)?;
         }
     }
     let landed = |pick: fn(&Row) -> bool| rows.iter().filter(|row| pick(row)).count();
-    writeln!(out)?;
     writeln!(
         out,
-        "inside Table 2: open loop {} of {n}, closed loop {} of {n}; the paper {} of the {} rows it prints",
+        "\ninside Table 2: open loop {} of {n}, closed loop {} of {n}; the paper {} of the {} rows it prints",
         landed(|row| row.open_loop.landed()),
         landed(|row| row.closed_loop.landed()),
         landed(|row| row.paper_landed == Some(true)),
@@ -59,10 +56,9 @@ fn write_objective(out: &mut impl Write, objective: &Objective) -> io::Result<()
         let row: String = values.iter().map(value).collect();
         writeln!(out, "{name:<56} {row}   1 : {:.2} : {:.2}", ratio(1), ratio(2))
     };
-    writeln!(out)?;
     let weights = objective.weights.iter().map(|p| format!("{:>12}", format!("P = {p}")));
     let weights = weights.collect::<Vec<_>>().concat();
-    writeln!(out, "{:<56} {weights}   ratios 0.5 : 1 : 2", "J of Table 3")?;
+    writeln!(out, "\n{:<56} {weights}   ratios 0.5 : 1 : 2", "J of Table 3")?;
     line(out, "the paper", &objective.paper)?;
     line(out, "Eq. 28 at the paper's own final states", &objective.at_paper_finals)?;
     writeln!(out, "ours, by")?;
@@ -73,21 +69,12 @@ fn write_objective(out: &mut impl Write, objective: &Objective) -> io::Result<()
     let [Some(half), Some(one), Some(two), ..] = objective.paper[..] else { return Ok(()) };
     writeln!(
         out,
-        "No definition gives the paper's column. Three optima cannot, whatever A and B >= 0 are in J = A + P B:"
-    )?;
-    writeln!(
-        out,
-        "  the landing of P = 1 costs at most {:.2} with P = 2, so a landing of {two} is no optimum;",
-        2.0 * one
-    )?;
-    writeln!(
-        out,
-        "  the least J is concave in P, so between {half} and {two} it is at least {:.2} at P = 1, not {one}.",
+        "No definition gives the paper's column. Three optima cannot, whatever A and B >= 0 are in J = A + P B:\n  \
+         the landing of P = 1 costs at most {:.2} with P = 2, so a landing of {two} is no optimum;\n  \
+         the least J is concave in P, so between {half} and {two} it is at least {:.2} at P = 1, not {one}.\n  \
+         Both hold if the last row is the P = 5 of the paper's Fig. 6, not the P = 2 of its Table 3.",
+        2.0 * one,
         chord(1.0, [(0.5, half), (2.0, two)])
-    )?;
-    writeln!(
-        out,
-        "  Both hold if the last row is the P = 5 of the paper's Fig. 6, not the P = 2 of its Table 3."
     )
 }
 
@@ -135,37 +122,21 @@ fn write_state(
 }
 
 fn write_printed(out: &mut impl Write, printed: &AsPrinted) -> io::Result<()> {
-    writeln!(out)?;
-    writeln!(out, "As printed")?;
-    writeln!(
-        out,
-        "  {} N: NOT LANDABLE. Upright under full thrust all the way, which no other input can beat, the",
-        printed.thrust_n
-    )?;
-    writeln!(
-        out,
-        "  vehicle still touches down at {:.2} m/s; a landing allows {} m/s.",
-        printed.best_touchdown_speed_m_s, printed.limit_m_s
-    )?;
+    let AsPrinted { thrust_n, best_touchdown_speed_m_s, limit_m_s, promised_lowest_m, .. } = printed;
     let [by_printed, by_corrected] = printed.energy_error_j_kg;
-    writeln!(
-        out,
-        "  Eq. 18-22 do not conserve energy: one second of coasting at 30 deg of tilt changes it by {by_printed:+.2} J/kg"
-    )?;
-    writeln!(out, "  (the corrected equations: {by_corrected:+.1e} J/kg).")?;
     let converged = if printed.promise_converged { "" } else { " (not converged)" };
     writeln!(
         out,
-        "  A solver that uses them predicts with {} N to be at z = {:.3} m after the burn, moving at {:+.2} m/s,",
-        printed.thrust_n,
+        "\nAs printed\n  \
+         {thrust_n} N: NOT LANDABLE. Upright under full thrust all the way, which no other input can beat, the\n  \
+         vehicle still touches down at {best_touchdown_speed_m_s:.2} m/s; a landing allows {limit_m_s} m/s.\n  \
+         Eq. 18-22 do not conserve energy: one second of coasting at 30 deg of tilt changes it by {by_printed:+.2} J/kg\n  \
+         (the corrected equations: {by_corrected:+.1e} J/kg).\n  \
+         A solver that uses them predicts with {thrust_n} N to be at z = {:.3} m after the burn, moving at {:+.2} m/s,\n  \
+         {:.0} deg from upright, having come back up from {promised_lowest_m:.2} m{converged}.",
         printed.promised.z_m.abs(),
-        printed.promised_vertical_m_s
-    )?;
-    writeln!(
-        out,
-        "  {:.0} deg from upright, having come back up from {:.2} m{converged}.",
+        printed.promised_vertical_m_s,
         (printed.promised.theta_rad.to_degrees() - 90.0).abs(),
-        printed.promised_lowest_m
     )?;
     match printed.happens {
         Some(contact) => {
@@ -192,15 +163,11 @@ pub(crate) fn write_stability(
 ) -> io::Result<()> {
     writeln!(
         out,
-        "The paper's vehicle (centre of gravity {} m above the nozzle) falling passively from rest at {HEIGHT_M} m,",
-        stability.cg_station_m
-    )?;
-    writeln!(
-        out,
-        "tilted at the start in {} directions about its axis: # settles in all, o in some, . flips in all",
+        "The paper's vehicle (centre of gravity {} m above the nozzle) falling passively from rest at {HEIGHT_M} m,\n\
+         tilted at the start in {} directions about its axis: # settles in all, o in some, . flips in all\nfins deg",
+        stability.cg_station_m,
         ROLLS_DEG.len()
     )?;
-    writeln!(out, "fins deg")?;
     for (opening, opening_deg) in OPENINGS_DEG.iter().enumerate().rev() {
         let signs = (0..TILTS_DEG.len()).map(|tilt| stability.fate(opening, tilt).sign());
         let signs: String = signs.flat_map(|sign| [' ', ' ', sign]).collect();
@@ -211,15 +178,11 @@ pub(crate) fn write_stability(
     let cells = stability.fates.len();
     writeln!(
         out,
-        "{} of {cells} cells settle, {} depend on the direction, {} flip",
+        "{} of {cells} cells settle, {} depend on the direction, {} flip\n\n\
+         Static margin: centre of pressure above the centre of gravity, mm (above 0: stable); worst and best plane",
         stability.count(Fate::Settles),
         stability.count(Fate::DependsOnRoll),
         stability.count(Fate::Flips)
-    )?;
-    writeln!(out)?;
-    writeln!(
-        out,
-        "Static margin: centre of pressure above the centre of gravity, mm (above 0: stable); worst and best plane"
     )?;
     let angles = ANGLES_DEG.map(|angle_deg| format!("{:>14}", format!("{angle_deg} deg"))).concat();
     writeln!(out, "fins deg {angles}  to the wind")?;
@@ -231,18 +194,11 @@ pub(crate) fn write_stability(
     }
     writeln!(
         out,
-        "The fins' force across the axis grows with the sine of the angle, the body's, which acts at its middle, 0.17 m"
-    )?;
-    writeln!(out, "below the centre of gravity, with its square: beyond some angle the body wins.")?;
-    writeln!(out)?;
-    writeln!(
-        out,
-        "With the centre of gravity {} m above the nozzle, a quarter of the length from the tail instead of the nose, every",
-        heavy_tail.cg_station_m
-    )?;
-    writeln!(
-        out,
-        "margin is {:.0} mm larger: {} of {cells} cells settle.",
+        "The fins' force across the axis grows with the sine of the angle, the body's, which acts at its middle, 0.17 m\n\
+         below the centre of gravity, with its square: beyond some angle the body wins.\n\n\
+         With the centre of gravity {} m above the nozzle, a quarter of the length from the tail instead of the nose, every\n\
+         margin is {:.0} mm larger: {} of {cells} cells settle.",
+        heavy_tail.cg_station_m,
         1e3 * (stability.cg_station_m - heavy_tail.cg_station_m),
         heavy_tail.count(Fate::Settles)
     )

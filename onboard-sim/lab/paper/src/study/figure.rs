@@ -1,5 +1,7 @@
-//! Figures as SVG, drawn with `plotters`: the best kept plotting crate that writes SVG without fonts, images or a browser
+//! Figures as SVG, drawn with `plotters`: the best maintained plotting crate that writes SVG without fonts, images or a browser
 //! (three small crates, 6 s of a build); ticks, axes and escaping are its own.
+
+use std::collections::BTreeSet;
 
 use plotters::backend::SVGBackend;
 use plotters::chart::{ChartBuilder, ChartContext};
@@ -14,7 +16,7 @@ use plotters::style::{BLACK, Color as _, RGBColor, ShapeStyle, TRANSPARENT, WHIT
 /// A figure cannot be drawn: its axes are not finite, or too small for their labels.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("cannot draw the figure '{title}': {reason}")]
-pub struct FigureError {
+pub(crate) struct FigureError {
     title: String,
     reason: String,
 }
@@ -28,8 +30,6 @@ const COLOURS: [RGBColor; 6] = [
     RGBColor(0, 0, 0),
     FAINT,
 ];
-/// The place of black among them.
-pub const BLACK_CURVE: usize = 4;
 const FAINT: RGBColor = RGBColor(130, 130, 130);
 
 /// Font and size, px, of titles and of everything else.
@@ -62,18 +62,12 @@ fn drawn(
     Ok(svg)
 }
 
-/// Room for margins, ticks and names: beside and below the axes, px.
-const ROOM_PX: (u32, u32) = (24 + 62, 24 + 42);
-
 /// Axes over two ranges, with ticks and names.
 fn axes<'a, 'b>(
     area: &'a Area<'b>,
     [x, y]: [(f64, f64); 2],
     [x_label, y_label]: [&str; 2],
 ) -> Drawn<Chart<'a, 'b>> {
-    if ![x.0, x.1, y.0, y.1].iter().all(|end| end.is_finite()) {
-        return Err("an axis is not finite".into());
-    }
     let mut chart = ChartBuilder::on(area)
         .margin(12)
         .x_label_area_size(42)
@@ -105,55 +99,11 @@ fn number((from, to): (f64, f64)) -> impl Fn(&f64) -> String {
     }
 }
 
-/// Width of a letter and of a sample with the room around it, px. SVG does not tell how wide a text is.
-const LETTER_PX: i32 = 7;
+/// Width of a sample, of an entry of the legend and of the margin, and height of a row, px.
 const SAMPLE_PX: i32 = 26;
-const GAP_PX: i32 = 18;
+const ENTRY_PX: u32 = 230;
 const LEFT_PX: i32 = 16;
 const ROW_PX: i32 = 24;
-/// Letters of a name that count.
-const LONGEST: i32 = 1000;
-
-/// Names at their places.
-struct Legend {
-    names: Vec<String>,
-    /// Left end and middle of each name's sample, px.
-    places: Vec<(i32, i32)>,
-}
-
-impl Legend {
-    /// Names in rows of a width, px.
-    fn new(names: Vec<String>, width_px: u32) -> Self {
-        let (mut left_px, mut row) = (LEFT_PX, 0);
-        let mut place = |name: &String| {
-            let letters = i32::try_from(name.chars().count()).unwrap_or(LONGEST).min(LONGEST);
-            let entry_px = SAMPLE_PX + LETTER_PX * letters + GAP_PX;
-            if left_px > LEFT_PX && left_px + entry_px > width_px.cast_signed() {
-                (left_px, row) = (LEFT_PX, row + 1);
-            }
-            let place = (left_px, row * ROW_PX + ROW_PX / 2);
-            left_px += entry_px;
-            place
-        };
-        let places = names.iter().map(&mut place).collect();
-        Self { names, places }
-    }
-
-    /// Height of all rows, px.
-    fn height_px(&self) -> u32 {
-        let last = self.places.last().map_or(0, |(_, middle)| middle + ROW_PX / 2);
-        last as u32 + ROW_PX as u32 / 2
-    }
-
-    /// Draws every name behind what `sample` draws for it from a place, px.
-    fn draw(&self, area: &Area<'_>, mut sample: impl FnMut(&Area<'_>, usize, (i32, i32)) -> Drawn) -> Drawn {
-        for (entry, (name, (left, middle))) in self.names.iter().zip(&self.places).enumerate() {
-            sample(area, entry, (*left, *middle))?;
-            area.draw(&Text::new(name.clone(), (left + SAMPLE_PX, middle - 7), FONT))?;
-        }
-        Ok(())
-    }
-}
 
 /// Length of the dashes and of the gaps, px.
 const DASH_PX: (i32, i32) = (8, 5);
@@ -162,98 +112,75 @@ const ROOM: f64 = 0.06;
 
 /// A curve.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Line {
+pub(crate) struct Line {
     /// In the legend; curves of one name share their entry.
-    pub name: String,
+    pub(crate) name: String,
     /// Which colour, counted from 0.
-    pub colour: usize,
-    pub dashed: bool,
+    pub(crate) colour: usize,
+    pub(crate) dashed: bool,
     /// In the panel's own units.
-    pub points: Vec<(f64, f64)>,
-}
-
-impl Line {
-    /// A black circle about the origin; nothing without a finite radius.
-    pub fn circle(name: &str, radius: f64, dashed: bool) -> Self {
-        const CORNERS: u32 = 180;
-        let corner = |corner: u32| {
-            let (sin, cos) = libm::sincos(core::f64::consts::TAU * f64::from(corner) / f64::from(CORNERS));
-            (radius * cos, radius * sin)
-        };
-        let points = if radius.is_finite() { (0..=CORNERS).map(corner).collect() } else { Vec::new() };
-        Self { name: name.to_owned(), colour: BLACK_CURVE, dashed, points }
-    }
+    pub(crate) points: Vec<(f64, f64)>,
 }
 
 /// One pair of axes.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Panel {
-    /// Above it; nothing if it is empty.
-    pub title: String,
-    pub x_label: String,
-    pub y_label: String,
-    pub lines: Vec<Line>,
+pub(crate) struct Panel {
+    pub(crate) x_label: String,
+    pub(crate) y_label: String,
+    pub(crate) lines: Vec<Line>,
     /// Places of several kinds, each kind with its name. All panels of a figure have the same kinds.
-    pub kinds: Vec<(String, Vec<(f64, f64)>)>,
+    pub(crate) kinds: Vec<(String, Vec<(f64, f64)>)>,
     /// Crosses, each with the colour of a curve.
-    pub crosses: Vec<(f64, f64, usize)>,
-    /// Both axes have one scale.
-    pub equal_scales: bool,
+    pub(crate) crosses: Vec<(f64, f64, usize)>,
 }
 
-/// Panels of a size, px, in rows of `columns`, below a title. `cross_name` says what the crosses are.
+/// Panels in rows of `columns`, smaller ones if there are several, below a title. `cross_name` says what the crosses are.
 ///
 /// # Errors
 /// A panel has no finite point, or is too small.
-pub fn sized_lines_svg(
+pub(crate) fn lines_svg(
     title: &str,
     panels: &[Panel],
     columns: usize,
     cross_name: Option<&str>,
-    (panel_width_px, panel_height_px): (u32, u32),
 ) -> Result<String, FigureError> {
+    let (panel_width_px, panel_height_px) = if panels.len() == 1 { (720, 500) } else { (400, 340) };
     let rows = panels.len().div_ceil(columns.max(1));
     let (width_px, panels_px) = (columns as u32 * panel_width_px, rows as u32 * panel_height_px);
-    let mut named: Vec<&Line> = Vec::new();
-    for line in panels.iter().flat_map(|panel| &panel.lines).filter(|line| !line.name.is_empty()) {
-        if !named.iter().any(|known| known.name == line.name) {
-            named.push(line);
-        }
-    }
+    let mut names = BTreeSet::new();
+    let mut lines: Vec<&Line> = panels.iter().flat_map(|panel| &panel.lines).collect();
+    lines.retain(|line| names.insert(&line.name));
     let kinds = panels.first().map_or(&[][..], |panel| &panel.kinds);
-    let names = kinds.iter().map(|(name, _)| name).chain(named.iter().map(|line| &line.name));
-    let legend = Legend::new(names.cloned().chain(cross_name.map(str::to_owned)).collect(), width_px);
-    drawn(title, (width_px, panels_px + legend.height_px()), |root| {
+    let names = kinds.iter().map(|(name, _)| name).chain(lines.iter().map(|line| &line.name));
+    let names: Vec<&str> = names.map(String::as_str).chain(cross_name).collect();
+    let per_row = (width_px / ENTRY_PX) as usize;
+    let legend_px = names.len().div_ceil(per_row) as u32 * ROW_PX as u32;
+    drawn(title, (width_px, panels_px + legend_px), |root| {
         let (upper, lower) = root.split_vertically(panels_px);
         for (area, panel) in upper.split_evenly((rows, columns)).iter().zip(panels) {
-            let titled =
-                if panel.title.is_empty() { area.clone() } else { area.titled(&panel.title, TITLE_FONT)? };
-            draw_panel(&titled, panel)?;
+            draw_panel(area, panel)?;
         }
-        legend.draw(&lower, |area, entry, (left, middle)| match entry.checked_sub(kinds.len()) {
-            None => Ok(area.draw(&(EmptyElement::at((left + 10, middle)) + mark(entry)))?),
-            Some(line) => draw_sample(area, named.get(line).copied(), (left, middle)),
-        })
+        for (entry, name) in names.iter().enumerate() {
+            let left = LEFT_PX + ENTRY_PX as i32 * (entry % per_row) as i32;
+            let middle = ROW_PX * (entry / per_row) as i32 + ROW_PX / 2;
+            match entry.checked_sub(kinds.len()) {
+                None => lower.draw(&(EmptyElement::at((left + 10, middle)) + mark(entry)))?,
+                Some(line) => draw_sample(&lower, lines.get(line).copied(), (left, middle))?,
+            }
+            lower.draw(&Text::new(*name, (left + SAMPLE_PX, middle - 7), FONT))?;
+        }
+        Ok(())
     })
 }
 
-/// The ends of a panel's axes; `None` without a finite point.
-fn ends(panel: &Panel, (width_px, height_px): (u32, u32)) -> Option<[(f64, f64); 2]> {
+fn draw_panel(area: &Area<'_>, panel: &Panel) -> Drawn {
     let points = || {
         let of_lines = panel.lines.iter().flat_map(|line| line.points.iter().copied());
         let of_kinds = panel.kinds.iter().flat_map(|(_, places)| places.iter().copied());
         of_lines.chain(of_kinds).chain(panel.crosses.iter().map(|(x, y, _)| (*x, *y)))
     };
-    let x = extent(points().map(|point| point.0))?;
-    let mut ends = [x, extent(points().map(|point| point.1))?];
-    if panel.equal_scales {
-        equalise(&mut ends, [width_px.saturating_sub(ROOM_PX.0), height_px.saturating_sub(ROOM_PX.1)]);
-    }
-    Some(ends)
-}
-
-fn draw_panel(area: &Area<'_>, panel: &Panel) -> Drawn {
-    let [x, y] = ends(panel, area.dim_in_pixel()).ok_or("no finite point")?;
+    let x = extent(points().map(|point| point.0)).ok_or("no finite point")?;
+    let y = extent(points().map(|point| point.1)).ok_or("no finite point")?;
     let mut chart = axes(area, [x, y], [&panel.x_label, &panel.y_label])?;
     for (kind, (_, places)) in panel.kinds.iter().enumerate() {
         let finite = places.iter().filter(|(x, y)| x.is_finite() && y.is_finite());
@@ -299,16 +226,6 @@ fn extent(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     (least <= most).then_some((least - room, most + room))
 }
 
-/// Widens the axis that has more pixels a unit until both have the same.
-fn equalise(ends: &mut [(f64, f64); 2], size_px: [u32; 2]) {
-    let scale = |place: usize| f64::from(size_px[place].max(1)) / (ends[place].1 - ends[place].0);
-    let wanted = scale(0).min(scale(1));
-    for ((from, to), pixels) in ends.iter_mut().zip(size_px) {
-        let (middle, half) = (0.5 * (*from + *to), 0.5 * f64::from(pixels.max(1)) / wanted);
-        (*from, *to) = (middle - half, middle + half);
-    }
-}
-
 /// The mark of a kind: no meaning is in a colour alone.
 fn mark(kind: usize) -> PathElement<(i32, i32)> {
     const SHAPES: [&[(i32, i32)]; 4] = [
@@ -323,8 +240,6 @@ fn mark(kind: usize) -> PathElement<(i32, i32)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    const SIZE_PX: (u32, u32) = (720, 500);
 
     #[test]
     fn ticks_have_the_decimals_of_their_axis() {
@@ -343,42 +258,28 @@ mod tests {
     #[test]
     fn a_figure_names_its_axes_and_curves_and_a_curve_without_points_is_refused() {
         let panels = [panel(vec![(0.0, 0.0), (1.0, 2.0)]), panel(vec![(0.0, 1.0), (1.0, 1.0)])];
-        let svg = sized_lines_svg("Fig. 0", &panels, 2, Some("paper"), SIZE_PX).unwrap();
+        let svg = lines_svg("Fig. 0", &panels, 2, Some("paper")).unwrap();
         for text in ["Fig. 0", "time, s", "height, m", "a &lt; b", "paper"] {
             assert!(svg.contains(text), "{text}");
         }
         assert_eq!(svg.matches("a &lt; b").count(), 1);
         let empty = Panel { crosses: vec![], ..panel(vec![(f64::NAN, 1.0)]) };
-        let error = sized_lines_svg("Fig. 0", &[empty], 1, None, SIZE_PX).unwrap_err();
+        let error = lines_svg("Fig. 0", &[empty], 1, None).unwrap_err();
         assert_eq!(error.to_string(), "cannot draw the figure 'Fig. 0': no finite point");
     }
 
-    /// 10 by 110 in a picture that is twice as wide as high: the width becomes 220.
     #[test]
-    fn both_axes_have_one_scale() {
-        let mut ends = [(0.0, 10.0), (0.0, 110.0)];
-        equalise(&mut ends, [200, 100]);
-        assert_eq!(ends, [(-105.0, 115.0), (0.0, 110.0)]);
-    }
-
-    #[test]
-    fn every_panel_has_its_title_and_the_legend_names_every_kind_and_circle_once() {
-        let panel = |title: &str, radius: f64| Panel {
-            title: title.to_owned(),
-            y_label: "downwind, m".to_owned(),
-            kinds: vec![
-                ("as planned".to_owned(), vec![(1.0, 2.0), (3.0, f64::NAN)]),
+    fn the_legend_names_every_kind_once() {
+        let kinds = || {
+            vec![
+                ("settles".to_owned(), vec![(1.0, 2.0), (3.0, f64::NAN)]),
                 ("a < b".to_owned(), vec![(-40.0, 5.0)]),
-            ],
-            lines: vec![Line::circle("nobody within", radius, false), Line::circle("NAR", 61.0, true)],
-            equal_scales: true,
-            ..Panel::default()
+            ]
         };
-        let panels = [panel("0 m/s", 150.0), panel("3 m/s", 310.0), panel("6 m/s", f64::NAN)];
-        let svg = sized_lines_svg("mk2", &panels, 2, None, (400, 400)).unwrap();
-        for text in ["as planned", "a &lt; b", "nobody within", "NAR", "0 m/s", "3 m/s", "6 m/s"] {
+        let panels = [(); 2].map(|()| Panel { kinds: kinds(), ..Panel::default() });
+        let svg = lines_svg("falls", &panels, 2, None).unwrap();
+        for text in ["settles", "a &lt; b"] {
             assert_eq!(svg.matches(text).count(), 1, "{text}");
         }
-        assert_eq!(svg.matches("downwind, m").count(), 3, "one wind a panel");
     }
 }
