@@ -25,7 +25,12 @@ const VEHICLE: VehicleNow = VehicleNow {
     fin_ahead_of_cg_m: 0.11,
     crossflow_area_m2: 0.09,
     motor_burning: false,
-    levers: LeverArms::default(),
+    levers: LeverArms {
+        imu_m: Vector3::new(0.0, 0.0, 0.0),
+        gnss_m: Vector3::new(0.0, 0.0, 0.0),
+        barometer_m: Vector3::new(0.0, 0.0, 0.0),
+        lidar_m: Vector3::new(-0.4, 0.0, 0.0),
+    },
 };
 
 /// A second of upright fall at a steady 39 m/s, low enough for the lidar. It is the second with the most work.

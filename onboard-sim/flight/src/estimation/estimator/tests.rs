@@ -32,8 +32,9 @@ fn at(height_m: f64) -> Estimator {
     Estimator::new(&EstimatorConfig::default(), &StartUncertainty::at_apogee(), 0.0, &state)
 }
 
-/// The measurements of every sensor in an upright hover.
+/// The measurements of every sensor in an upright hover. No fix repeats the one before it: such a fix is stale.
 fn hovering(frame: u64) -> Measurements {
+    let unrepeated_m = if frame.is_multiple_of(80) { 1e-9 } else { 0.0 };
     Measurements {
         imu: ImuSample {
             gyro_rad_s: Vector3::zeros(),
@@ -41,7 +42,7 @@ fn hovering(frame: u64) -> Measurements {
         },
         pressure_altitude_m: frame.is_multiple_of(4).then_some(5.0),
         gnss: frame.is_multiple_of(40).then(|| GnssFix {
-            position_m: Vector3::new(0.0, 0.0, 5.0),
+            position_m: Vector3::new(unrepeated_m, 0.0, 5.0),
             velocity_m_s: Vector3::zeros(),
             valid_at_s: frame as f64 * 0.005 - 0.12,
             quality: FixQuality::default(),
@@ -81,7 +82,7 @@ fn a_turn_on_gyro_bias_found_on_the_pad_does_not_turn_the_attitude() {
     let pad = alignment.finish(0.0).unwrap();
     let state = RigidState { world_from_body: pad.world_from_body, ..RigidState::upright(5.0) };
     let mut estimator = Estimator::new(&EstimatorConfig::default(), &StartUncertainty::on_pad(), 0.0, &state)
-        .with_gyro_bias(pad.gyro_bias_rad_s);
+        .calibrated(&pad.calibration);
     for frame in 1..=2000 {
         estimator.step(&on_pad(frame), &VEHICLE);
     }
@@ -239,17 +240,17 @@ fn a_filter_that_expects_a_late_lidar_doubts_its_ranges() {
     assert!(expecting_m.abs() < trusting_m.abs(), "{expecting_m} m, trusting {trusting_m} m");
 }
 
-/// Hovers 5 m over the ground where barometer and satellites say 8 m, and from `first` on measures the ranges to the ground, the
-/// tenth of which is `tenth_m`. Returns the estimated heights after each frame from then on.
-fn heights_with_ranges_from(first: u64, tenth_m: f64) -> Vec<f64> {
+/// Hovers 5 m over the ground where the satellites, and the barometer if there is one, show 8 m. From `first` on measures the
+/// ranges to the ground, the tenth of which is `tenth_m`. Returns the estimated heights after each frame from then on.
+fn heights_with_ranges_from(first: u64, tenth_m: f64, has_barometer: bool) -> Vec<f64> {
     let mut estimator = at(8.0);
     (1..first + 40)
         .map(|frame| {
             let measured = hovering(frame);
-            let fix = |fix: GnssFix| GnssFix { position_m: Vector3::z() * 8.0, ..fix };
+            let fix = |fix: GnssFix| GnssFix { position_m: fix.position_m + Vector3::z() * 3.0, ..fix };
             let range_m = if frame == first + 18 { tenth_m } else { 4.6 };
             let measurements = Measurements {
-                pressure_altitude_m: measured.pressure_altitude_m.map(|_| 8.0),
+                pressure_altitude_m: measured.pressure_altitude_m.filter(|_| has_barometer).map(|_| 8.0),
                 gnss: measured.gnss.map(fix),
                 lidar_range_m: measured.lidar_range_m.filter(|_| frame >= first).map(|_| range_m),
                 ..measured
@@ -260,18 +261,25 @@ fn heights_with_ranges_from(first: u64, tenth_m: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Whichever of the frames has the barometer's sample: it must not end the doubt at its own height.
+/// Against one other height.
 #[test]
 fn ranges_that_agree_for_a_tenth_of_a_second_are_believed_at_once() {
     for first in [402, 404] {
         // An outlier as the tenth: the next two decide.
         for (tenth_m, believed_after) in [(4.6, 18), (9.0, 22)] {
-            let heights_m = heights_with_ranges_from(first, tenth_m);
+            let heights_m = heights_with_ranges_from(first, tenth_m, false);
             let (before_m, after_m) = heights_m.split_at(believed_after);
             assert!(before_m.iter().all(|height_m| (height_m - 8.0).abs() < 0.1), "{first}: {heights_m:?}");
             assert!(after_m.iter().all(|height_m| (height_m - 5.0).abs() < 0.3), "{first}: {heights_m:?}");
         }
     }
+}
+
+/// Barometer and satellites agree against the lidar.
+#[test]
+fn two_other_heights_outvote_ranges_that_agree() {
+    let heights_m = heights_with_ranges_from(402, 4.6, true);
+    assert!(heights_m.iter().all(|height_m| (height_m - 8.0).abs() < 0.1), "{heights_m:?}");
 }
 
 /// Hovers for 10 s at 5 m, out of the lidar's sight, and from the fifth second on the barometer and the fixes are higher by these, m.
