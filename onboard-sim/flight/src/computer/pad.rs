@@ -11,6 +11,7 @@ use super::{Computer, KeptInput, Release};
 use crate::estimation::estimator::Measurements;
 use crate::estimation::estimator::alignment::{PadAlignment, PadRecord, PadStart};
 use crate::estimation::sensor_watch::Rests;
+use crate::estimation::spikes::SpikeFilter;
 use crate::rules::arming::{ArmingInput, Check, Uplink, arming_checks};
 use crate::rules::phase::{Event, HoldCause, Phase, StartPoint};
 use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
@@ -400,6 +401,8 @@ impl Computer {
     /// A vehicle that stood on its rail knows its attitude and the bias of its gyro from there.
     fn begin_flight(&mut self) {
         self.release = Some(Release { frame: self.input.frame, time_s: self.table.time_s() });
+        // A flight that is simulated from apogee is suddenly there.
+        self.pressure = SpikeFilter::default();
         let mission = self.pilot.mission();
         if let (Some(launch), Some(start)) = (mission.launched(), self.pad.at_rest()) {
             let mut believed = RigidState {

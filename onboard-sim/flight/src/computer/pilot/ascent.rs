@@ -209,8 +209,12 @@ impl AscentWatch {
     }
 
     fn rises_m_s(&self, seen: &AscentReadings) -> f64 {
-        let charged = self.separating_since_s.is_some().then_some(CHARGE_LASTS_S + 3.0 * RATE_OVER_S);
-        seen.speeds.rises_m_s(seen.vertical_m_s, seen.time_s, charged)
+        seen.speeds.rises_m_s(seen.vertical_m_s, seen.time_s, self.through_gas_s())
+    }
+
+    /// For how long a speed by the pressure before the separation charge counts, s.
+    pub(super) fn through_gas_s(&self) -> Option<f64> {
+        self.separating_since_s.is_some().then_some(CHARGE_LASTS_S + 3.0 * RATE_OVER_S)
     }
 
     /// The gas of the separation charge is still in the vehicle.

@@ -168,14 +168,19 @@ impl Pilot {
     }
 
     fn watch_the_speeds(&mut self, input: &KeptInput, estimate: &Estimate) {
-        let Measurements { imu, pressure_altitude_m, .. } = input.measured;
+        let Measurements { imu, pressure_altitude_m, gnss, .. } = input.measured;
+        // No fix follows the motion that a wrong inertial unit measures: the pressure confirms it instead.
+        let confirmed_m_s = gnss
+            .map(|fix| fix.velocity_m_s.z)
+            .filter(|m_s| self.speeds.pressure_agrees(*m_s, input.time_s, self.ascent.through_gas_s()));
+        let admitted_m_s = self.estimator.admitted_gnss_m_s().map(|velocity_m_s| velocity_m_s.z);
         self.speeds.take(&SpeedReadings {
             time_s: input.time_s,
             frame_s: self.model.mission.estimator.frame_s,
             vertical_m_s2: (estimate.state.world_from_body * imu.specific_force_m_s2).z
                 - STANDARD_GRAVITY_M_S2,
             pressure_altitude_m: pressure_altitude_m.filter(|_| !self.ascent.is_charged(input.time_s)),
-            gnss_m_s: self.estimator.admitted_gnss_m_s().map(|velocity_m_s| velocity_m_s.z),
+            gnss_m_s: admitted_m_s.or(confirmed_m_s),
             estimated_m_s: estimate.state.velocity_m_s.z,
         });
     }

@@ -112,6 +112,12 @@ impl VerticalSpeeds {
         })
     }
 
+    /// Whether the pressure shows about this speed, m/s.
+    pub(super) fn pressure_agrees(&self, gnss_m_s: f64, time_s: f64, through_gas_s: Option<f64>) -> bool {
+        let pressure_m_s = self.pressure_m_s(time_s, through_gas_s);
+        pressure_m_s.is_some_and(|m_s| (m_s - gnss_m_s).abs() <= APART_OF_THREE_M_S)
+    }
+
     /// The last pressure altitude, m, of a barometer that is heard and does not repeat itself.
     pub(super) fn altitude_m(&self, time_s: f64) -> Option<f64> {
         (time_s - self.pressure_at_s <= 2.0 * RATE_OVER_S && self.same_samples < FROZEN_SAMPLES)

@@ -43,6 +43,8 @@ pub struct PadRecord {
     seconds: [PadAlignment; RECORD],
     filled: usize,
     older: PadAlignment,
+    /// The first second is over. It is not recorded: at power-up the vehicle may still sway on its legs.
+    begun: bool,
 }
 
 /// Why there is no alignment yet.
@@ -121,6 +123,9 @@ impl PadRecord {
         let alone = second.finish(heading_rad);
         if alone.is_err() {
             *self = Self::default();
+            return alone;
+        }
+        if !core::mem::replace(&mut self.begun, true) {
             return alone;
         }
         if self.filled == RECORD {

@@ -6,7 +6,7 @@ use flight::computer::pad_check::{CheckState, Item, Verdict};
 use flight::vehicle::mission::StartPoint;
 use proptest::prelude::*;
 
-use super::space::{flight_of, in_phase};
+use super::space::{flight_of, in_phase, mission_of};
 use super::*;
 use crate::wire::fly::load_flight;
 
@@ -227,6 +227,38 @@ fn an_empty_battery_is_found_refuses_the_arming_and_is_told() {
     let battery = rocket.state().battery.unwrap();
     let left = battery.left.is_some_and(|left| (left - 0.08).abs() < 0.01);
     assert!(left && (7.0..7.4).contains(&battery.volts), "{battery:?}");
+}
+
+/// The answer to an arming with this fault of mk3, whose lidar is above its blind range.
+fn armed_with(fault: &str) -> Answer {
+    let mut rocket = Told::of(Vehicle::on_the_pad(&mission_of("mk3", "none", &[fault])).unwrap());
+    rocket.run_until(|rocket| rocket.time_s() > 6.0);
+    rocket.request(Asked::Arm)
+}
+
+#[test]
+fn a_sensor_that_is_wrong_on_the_pad_is_named_and_refuses_the_arming() {
+    for (fault, named) in [
+        ("gyro-nan@pad", "gyro silent"),
+        ("lidar-dead@pad", "lidar"),
+        ("lidar-stuck@pad", "lidar repeats one value"),
+        ("lidar-step:5@pad", "lidar 5."),
+        ("lidar-step:-5@pad", "lidar"),
+    ] {
+        let answer = armed_with(fault);
+        let reason = answer.reason.unwrap_or_default();
+        assert!(answer.ending != Ending::Accepted && reason.contains(named), "{fault}: {reason}");
+        assert!(!reason.contains("accelerometer"), "{fault}: {reason}");
+    }
+}
+
+/// A receiver may repeat a fix at rest, and a turn-on bias of 7 deg/s is calibrated.
+#[test]
+fn repeated_fixes_and_a_large_gyro_bias_do_not_refuse_the_arming() {
+    for fault in ["gnss-stuck@pad", "gyro-step:4@pad"] {
+        let answer = armed_with(fault);
+        assert_eq!(answer.ending, Ending::Accepted, "{fault}: {answer:?}");
+    }
 }
 
 #[test]
