@@ -73,9 +73,7 @@ pub enum MotorStage {
     /// The thrust is that of the scaled curve.
     Burning,
     /// The thrust fell far below the curve at this time, s: the motor burnt out early.
-    EndedEarly {
-        at_s: f64,
-    },
+    EndedEarly { at_s: f64 },
 }
 
 /// Thrust with its uncertainty.
@@ -275,8 +273,8 @@ impl MotorEstimate {
                 self.stage = MotorStage::Rising;
                 // A motor that chuffed goes on along its curve.
                 let begun_s = rise_s(curve, mark_n).max(self.rise.chuffed_s);
-                self.rise.flame_s = crossed_s;
-                self.mean[IGNITION] = crossed_s - begun_s;
+                self.rise.flame_s = crossed_s - begun_s;
+                self.mean[IGNITION] = self.rise.flame_s;
                 self.covariance[(AIR, AIR)] += self.prior.exhaust_sigma * self.prior.exhaust_sigma;
             }
         }
@@ -384,29 +382,31 @@ impl MotorEstimate {
     /// Follows the thrust to its curve, and shifts the ignition to where the impulse so far lies on the curve: a slow rise burns
     /// the propellant later, and loses none. Returns whether the thrust still rises.
     fn rise(&mut self, curve: &ThrustCurve, measured_n: f64, middle_s: f64) -> bool {
-        self.rise.take(curve, measured_n, self.prior.frame_s);
+        let share_now = self.rise.take(curve, measured_n, self.prior.frame_s);
         let since_s = middle_s - self.rise.flame_s;
-        if since_s < SPIKE_S {
-            return true;
+        let Rise { share, earlier_share, .. } = self.rise;
+        if share < FLAME_SHARE && since_s >= SPIKE_S {
+            self.chuff(self.rise.along_s);
         }
-        let Rise { along_s, share, earlier_share, .. } = self.rise;
-        if share < FLAME_SHARE {
-            self.chuff(along_s);
+        if since_s < SPIKE_S || share_now < 0.5 * share || self.stage == MotorStage::Waiting {
             return true;
         }
         let weak = share - earlier_share < STILL_RISING || since_s > RISE_MAX_S;
         let risen = weak || share >= RISEN_SHARE;
-        // A linear rise to a share r in a time t has come along by r t / 2, and is delayed by t (1 - r)^2 / (2 r) more.
-        let missing = (1.0 - share).max(0.0) / share;
-        let ahead_s = if weak { -missing } else { missing * missing } * along_s;
-        let ignition_s = middle_s + 0.5 * self.prior.frame_s - along_s + ahead_s;
-        let later_s = ignition_s - self.mean[IGNITION];
-        if later_s > SLOW_RISE_S || self.rise.slow {
-            self.rise.slow = true;
-            self.mean[IGNITION] = ignition_s;
+        if weak {
+            self.rise.given_n_s /= share.min(1.0);
+            self.rise.advance(curve);
         }
+        let along_s = self.rise.along_s;
+        // A linear rise to a share r in a time t has come along by r t / 2, and is delayed by t (1 - r)^2 / (2 r) more.
+        let missing = if risen { 0.0 } else { (1.0 - share) / share };
+        let ignition_s = middle_s + 0.5 * self.prior.frame_s - along_s + missing * missing * along_s;
+        let slow = ignition_s - self.rise.flame_s > SLOW_RISE_S;
+        self.mean[IGNITION] = if slow { ignition_s } else { self.rise.flame_s };
         if risen {
             self.stage = MotorStage::Burning;
+            let sigma_s = if slow { self.prior.burn_time_sigma * along_s } else { 0.0 };
+            self.covariance[(IGNITION, IGNITION)] += sigma_s * sigma_s;
         }
         !risen
     }
@@ -530,7 +530,7 @@ const SLOW_RISE_S: f64 = 0.01;
 /// The rise of the thrust.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Rise {
-    /// When the thrust was first measured, s.
+    /// Instant of ignition by the first thrust, s.
     flame_s: f64,
     /// Time on the curve by which it has given the measured impulse, s; and the impulse, N s.
     along_s: f64,
@@ -538,23 +538,27 @@ struct Rise {
     /// Measured thrust over that of the curve there, with two time constants.
     share: f64,
     earlier_share: f64,
-    /// The thrust rises more slowly than the curve.
-    slow: bool,
     /// How long the motor had burnt along its curve when it chuffed, s; 0 if it did not.
     chuffed_s: f64,
 }
 
 impl Rise {
-    /// Takes a frame's mean thrust.
-    fn take(&mut self, curve: &ThrustCurve, thrust_n: f64, frame_s: f64) {
+    /// Takes a frame's mean thrust. Returns its share of the curve's thrust.
+    fn take(&mut self, curve: &ThrustCurve, thrust_n: f64, frame_s: f64) -> f64 {
         let peak_n = curve.peak_thrust_n();
         self.given_n_s = (self.given_n_s + frame_s * thrust_n).max(curve.impulse_to_n_s(self.chuffed_s));
-        while curve.impulse_to_n_s(self.along_s) < self.given_n_s && self.along_s < curve.burn_time_s() {
-            self.along_s += RISE_STEP_S;
-        }
+        self.advance(curve);
         let share = thrust_n / curve.thrust_at_n(self.along_s).max(CAUGHT_SHARE * peak_n);
         self.share += (share - self.share) * (frame_s / SHARE_S).min(1.0);
         self.earlier_share += (share - self.earlier_share) * (frame_s / EARLIER_SHARE_S).min(1.0);
+        share
+    }
+
+    /// Moves along the curve to the measured impulse.
+    fn advance(&mut self, curve: &ThrustCurve) {
+        while curve.impulse_to_n_s(self.along_s) < self.given_n_s && self.along_s < curve.burn_time_s() {
+            self.along_s += RISE_STEP_S;
+        }
     }
 }
 
