@@ -71,6 +71,8 @@ pub struct Mismatch {
     pub chuff_share: f64,
     /// Time in which the thrust rises to its curve's, s.
     pub thrust_rise_s: [f64; 2],
+    /// Mean of an exponentially distributed ignition delay beyond that of the igniter, s: the propellant does not catch at once.
+    pub ignition_tail_s: f64,
     /// Fraction of the body's axial drag that the exhaust takes away.
     pub plume_body_loss: [f64; 2],
     /// Fraction of the fins' drag that the exhaust takes away.
