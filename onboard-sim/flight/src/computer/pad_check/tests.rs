@@ -81,9 +81,9 @@ fn at_rest(frame: u32, noise: f64) -> Measurements {
             specific_force_m_s2: Vector3::new(9.80665, force_m_s2, 0.0),
         },
         pressure_altitude_m: frame.is_multiple_of(4).then_some(if frame.is_multiple_of(8) {
-            0.08 * noise
+            0.3 * noise
         } else {
-            -0.08 * noise
+            -0.3 * noise
         }),
         gnss: frame.is_multiple_of(40).then_some(GnssFix {
             position_m: Vector3::zeros(),

@@ -40,7 +40,7 @@ impl Pilot {
     /// Estimates the vehicle's state, and its motor and drag.
     pub(crate) fn estimate_state(&mut self, phase: Phase, input: &KeptInput, sensors: &SensorWatch) {
         // Also on the ground, where the gimbal goes on to balance.
-        let burns = matches!(self.model.motor.stage(), MotorStage::Rising | MotorStage::Burning);
+        let burns = self.model.motor.stage() == MotorStage::Burning;
         self.speeds.watch_accelerometer(sensors.accelerometer_is_lost());
         let thrust_felt = !(burns && sensors.accelerometer_is_lost());
         let estimate = self.estimated(phase, input, thrust_felt);
@@ -151,7 +151,7 @@ impl Pilot {
         let mass = self.model.mass_now(self.model.burning_s(input.time_s));
         let density_kg_m3 = self.model.density_kg_m3(estimate);
         let vehicle = self.model.now(&mass, density_kg_m3, input.fins_rad, phase.in_landing_burn());
-        let burns = matches!(self.model.motor.stage(), MotorStage::Rising | MotorStage::Burning);
+        let burns = self.model.motor.stage() == MotorStage::Burning;
         let vehicle = if burns { vehicle.in_exhaust(&self.model.mission.exhaust) } else { vehicle };
         let through_air_m_s =
             estimate.state.world_from_body.inverse_transform_vector(&estimate.velocity_through_air_m_s());
