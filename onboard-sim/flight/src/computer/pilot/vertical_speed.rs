@@ -17,8 +17,8 @@ const APART_OF_THREE_M_S: f64 = 8.0;
 pub(super) const APART_OF_TWO_M_S: f64 = 15.0;
 /// For how long the middle one of three contradicts an estimate that is given up, s.
 const CONTRADICTED_S: f64 = 0.5;
-/// Fixes that the pressure has to confirm, 0.8 s: a spike lasts for two windows of the pressure's speed.
-const CONFIRMED_FIXES: u32 = 4;
+/// Change of the fixes' speed that the pressure has to confirm, m/s: half a second of coasting.
+const CONFIRMED_M_S: f64 = 5.0;
 
 /// What is new in a frame.
 #[derive(Debug, Clone, Copy)]
@@ -55,8 +55,8 @@ with_defaults! {
         contradicted_s: f64 = 0.0,
         /// The accelerometer repeats itself or is silent: the estimate follows it.
         accelerometer_lost: bool = false,
-        /// Fixes in a row that the pressure has confirmed.
-        confirmed_fixes: u32 = 0,
+        /// Speed of the first of the fixes that the pressure has confirmed in a row, m/s.
+        confirmed_from_m_s: Option<f64> = None,
     }
 }
 
@@ -116,8 +116,8 @@ impl VerticalSpeeds {
         })
     }
 
-    /// Whether the pressure has shown about the speed of the fixes, m/s, for several of them in a row: a spike of the pressure
-    /// agrees by chance with one that stands still.
+    /// Whether the pressure has shown about the speed of the fixes, m/s, while that changed: a spike, or the flow at Mach 1, agrees
+    /// by chance with a receiver that keeps reporting its last speed.
     pub(super) fn pressure_confirms(
         &mut self,
         gnss_m_s: f64,
@@ -126,8 +126,8 @@ impl VerticalSpeeds {
     ) -> bool {
         let pressure_m_s = self.pressure_m_s(time_s, through_gas_s);
         let agrees = pressure_m_s.is_some_and(|m_s| (m_s - gnss_m_s).abs() <= APART_OF_THREE_M_S);
-        self.confirmed_fixes = if agrees { self.confirmed_fixes.saturating_add(1) } else { 0 };
-        self.confirmed_fixes >= CONFIRMED_FIXES
+        self.confirmed_from_m_s = self.confirmed_from_m_s.or(Some(gnss_m_s)).filter(|_| agrees);
+        self.confirmed_from_m_s.is_some_and(|from_m_s| (gnss_m_s - from_m_s).abs() >= CONFIRMED_M_S)
     }
 
     /// The last pressure altitude, m, of a barometer that is heard and does not repeat itself.
