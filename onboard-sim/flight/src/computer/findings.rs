@@ -232,7 +232,7 @@ impl Findings {
 const GNSS_LOST_IN_BOOST_S: f64 = 6.0;
 /// Where the lidar must see the ground: from this slant range, m, down to the dust, and while its beam leans less than this
 /// (40 deg).
-const LIDAR_SEES_M: [f64; 2] = [3.0, 10.0];
+const LIDAR_SEES_M: [f64; 2] = [3.0, 7.0];
 const LIDAR_COS_TILT: f64 = 0.766;
 /// Beyond this tilt (60 deg) the nose is astray: no plan leans so far.
 const ASTRAY_COS_TILT: f64 = 0.5;
@@ -251,7 +251,7 @@ const ASCENT_WEAK: f64 = 0.8;
 const CHUTE_FILLS_S: f64 = 4.0;
 const CHUTE_CARRIES_M_S: f64 = 15.0;
 /// A delay beyond the mission's by more than this is not known, s.
-const LATE_S: f64 = 0.2;
+const LATE_S: f64 = 0.3;
 /// An impact is felt for less time than this, s.
 const SHOCK_S: f64 = 0.1;
 /// So many standard deviations of the prior is no motor of this kind.

@@ -195,10 +195,14 @@ impl SensorWatch {
 
     /// For how long nothing was felt, s: accelerometer or gyro repeat one sample, or say nothing that can be.
     pub fn feels_nothing_for_s(&self) -> f64 {
-        let lost_s = |frozen_s: Option<f64>, silent_s: f64| frozen_s.unwrap_or(0.0).max(silent_s);
-        let felt_s = lost_s(self.accelerometer_frozen_s(), self.accelerometer.silent_s(self.time_s));
-        let gyro_s = self.gyro.repeats_for_s(FROZEN_IMU, self.time_s);
-        felt_s.max(lost_s(gyro_s, self.gyro.silent_s(self.time_s)))
+        let gyro_s = self.gyro.repeats_for_s(FROZEN_IMU, self.time_s).unwrap_or(0.0);
+        self.accelerometer_lost_s().max(gyro_s).max(self.gyro.silent_s(self.time_s))
+    }
+
+    /// For how long the accelerometer has repeated one sample, or sent none, s.
+    pub fn accelerometer_lost_s(&self) -> f64 {
+        let frozen_s = self.accelerometer_frozen_s().unwrap_or(0.0);
+        frozen_s.max(self.accelerometer.silent_s(self.time_s))
     }
 
     /// Mean of the gyro over the last moment, body, rad/s.

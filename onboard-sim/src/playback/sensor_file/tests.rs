@@ -74,7 +74,7 @@ fn other_sensors_belong_to_the_frame_in_which_they_arrive() {
         position_m: Vector3::new(1.0, 2.0, 3.0),
         velocity_m_s: Vector3::new(4.0, 5.0, 6.0),
         valid_at_s: -0.1,
-        quality: FixQuality { satellites: 0, horizontal_m: 0.0, vertical_m: 0.0, speed_m_s: 0.0 },
+        quality: FixQuality { satellites: 9, horizontal_m: 0.0, vertical_m: 0.0, speed_m_s: 0.0 },
     };
     assert_eq!(frames[1].gnss, Some(fix));
     assert_eq!(frames[3].gnss, None, "the same fix again");

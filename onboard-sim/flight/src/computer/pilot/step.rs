@@ -19,6 +19,9 @@ use crate::vehicle::mission::StartPoint;
 /// Frames between outlooks while the ignition is seconds away.
 const FRAMES_PER_FAR_LOOK: u64 = 4 * FRAMES_PER_PLAN;
 
+/// An estimate outlives a pause of the accelerometer of this length, s.
+const ACCELEROMETER_LOST_S: f64 = 0.5;
+
 /// What a frame adds to the doubt about the velocity when the force is not felt but expected, m/s: it is off by some 0.3 m/s^2
 /// for half a second.
 const EXPECTED_FORCE_M_S: f64 = 0.02;
@@ -41,7 +44,7 @@ impl Pilot {
     pub(crate) fn estimate_state(&mut self, phase: Phase, input: &KeptInput, sensors: &SensorWatch) {
         // Also on the ground, where the gimbal goes on to balance.
         let burns = self.model.motor.stage() == MotorStage::Burning;
-        self.speeds.watch_accelerometer(sensors.accelerometer_is_lost());
+        self.speeds.watch_accelerometer(sensors.accelerometer_lost_s() >= ACCELEROMETER_LOST_S);
         let thrust_felt = !(burns && sensors.accelerometer_is_lost());
         let estimate = self.estimated(phase, input, thrust_felt);
         self.estimate = Some(estimate);
