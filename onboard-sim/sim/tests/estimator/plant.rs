@@ -87,7 +87,8 @@ fn fly(seed: u64) -> Vec<Frame> {
     let mut world = world.expect("a valid world").with_fins_at(1.2);
     let masses = MassModel::new(&airframe.mass, curve.propellant_mass_kg());
     let params = SensorParams::default();
-    let places = flight::vehicles::mission::builtin("mk2").unwrap().unwrap().sensors;
+    let mission = flight::vehicles::mission::builtin("mk2").expect("a built-in name");
+    let places = mission.expect("a valid mission").sensors;
     let mut sensors = Sensors::new(&params, &places, seed, 1.0).expect("valid sensor parameters");
     let uncertainty = StartUncertainty::at_apogee();
     let believed = believed_start(&start(&truth), &uncertainty, seed);
