@@ -90,10 +90,10 @@ impl Study<'_> {
             if may_be_kinder(dispersion) { ", which may be kinder than `real`" } else { "" }
         )?;
         let of_each = |cell: &dyn Fn(&Vec<Impact>) -> String| {
-            self.impacts.iter().map(|impacts| format!("{:<29}", cell(impacts))).collect::<String>()
+            self.impacts.iter().map(|impacts| format!("{:<29}", cell(impacts))).collect::<Vec<_>>().concat()
         };
         let heads = winds.iter().map(|wind_m_s| format!("{:<29}", format!("{wind_m_s} m/s")));
-        writeln!(out, "{:<26}{}", "", heads.collect::<String>())?;
+        writeln!(out, "{:<26}{}", "", heads.collect::<Vec<_>>().concat())?;
         for way in self.ways {
             let cells = of_each(&|impacts| cell(Radius::of_way(impacts, *way).as_ref()));
             writeln!(out, "{:<26}{cells}", way.name())?;

@@ -103,7 +103,7 @@ fn number((from, to): (f64, f64)) -> impl Fn(&f64) -> String {
 const SAMPLE_PX: i32 = 26;
 const ENTRY_PX: u32 = 230;
 const LEFT_PX: i32 = 16;
-const ROW_PX: i32 = 24;
+const ROW_PX: u32 = 24;
 
 /// Length of the dashes and of the gaps, px.
 const DASH_PX: (i32, i32) = (8, 5);
@@ -153,16 +153,16 @@ pub(crate) fn lines_svg(
     let kinds = panels.first().map_or(&[][..], |panel| &panel.kinds);
     let names = kinds.iter().map(|(name, _)| name).chain(lines.iter().map(|line| &line.name));
     let names: Vec<&str> = names.map(String::as_str).chain(cross_name).collect();
-    let per_row = (width_px / ENTRY_PX) as usize;
-    let legend_px = names.len().div_ceil(per_row) as u32 * ROW_PX as u32;
+    let per_row = width_px / ENTRY_PX;
+    let legend_px = (names.len() as u32).div_ceil(per_row) * ROW_PX;
     drawn(title, (width_px, panels_px + legend_px), |root| {
         let (upper, lower) = root.split_vertically(panels_px);
         for (area, panel) in upper.split_evenly((rows, columns)).iter().zip(panels) {
             draw_panel(area, panel)?;
         }
-        for (entry, name) in names.iter().enumerate() {
-            let left = LEFT_PX + ENTRY_PX as i32 * (entry % per_row) as i32;
-            let middle = ROW_PX * (entry / per_row) as i32 + ROW_PX / 2;
+        for ((entry, name), place) in names.iter().enumerate().zip(0..) {
+            let left = LEFT_PX + (ENTRY_PX * (place % per_row)).cast_signed();
+            let middle = (ROW_PX * (place / per_row) + ROW_PX / 2).cast_signed();
             match entry.checked_sub(kinds.len()) {
                 None => lower.draw(&(EmptyElement::at((left + 10, middle)) + mark(entry)))?,
                 Some(line) => draw_sample(&lower, lines.get(line).copied(), (left, middle))?,
