@@ -86,6 +86,9 @@ name = "drawn"
 summary = "A vehicle that nobody tuned for"
 site = {{ latitude_deg = 0.0, longitude_deg = 0.0, altitude_m = 0.0 }}
 [sensors]
+imu_station_m = {cg_m}
+gnss_station_m = {cg_m}
+barometer_station_m = {cg_m}
 lidar_station_m = 0.0
 [airframe]
 motor = "{motor}"
