@@ -77,11 +77,11 @@ fn a_sensor_that_dies_is_no_impossible_input() {
 
 #[test]
 fn what_a_sensor_remembers_of_the_pad_is_not_recorded_and_that_is_said() {
-    let flown = Flown::from(StartPoint::Pad, &armed_and_started(2_600), &["lidar-stuck@pad"]);
+    let flown = Flown::from(StartPoint::Pad, &armed_and_started(2_600), &["gnss-stuck@pad"]);
     let report = only(verify_strictly(&flown.log()).unwrap());
     assert_eq!((report.outcome, report.is_all_compared()), (Verification::Identical, false), "{report:?}");
     let why = report.part("metadata").and_then(|part| part.why.clone()).unwrap_or_default();
-    assert!(why.starts_with("cannot be flown again: ") && why.contains("lidar-stuck@pad"), "{why}");
+    assert!(why.starts_with("cannot be flown again: ") && why.contains("gnss-stuck@pad"), "{why}");
 }
 
 /// Changes the frames that are wanted.
