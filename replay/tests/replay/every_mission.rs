@@ -285,7 +285,7 @@ fn every_command_answers_about_every_mission() {
 
 /// Limits that the flight keeps away from: changed by half they change no command. With this value each of them acts.
 const DO_NOT_ACT: [(&str, f64, &str); 12] = [
-    ("ignition.late_s", 0.6, "the band of heights has room for igniters that are late by half as much again"),
+    ("ignition.late_s", 0.0, "the band of heights has room for igniters that are late by half as much again"),
     (
         "powered.contact_quiet_s",
         3.0,
