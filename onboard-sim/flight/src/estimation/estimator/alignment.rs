@@ -109,9 +109,6 @@ impl ImuCalibration {
             (1.0, 0.5 * off * STANDARD_GRAVITY_M_S2)
         }
     }
-
-    /// No error.
-    pub const NONE: Self = Self { gyro_bias_rad_s: Vector3::new(0.0, 0.0, 0.0), accelerometer_scale: 1.0 };
 }
 
 impl PadRecord {

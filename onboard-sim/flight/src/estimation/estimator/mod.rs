@@ -2,7 +2,7 @@
 //!
 //! An error-state Kalman filter with a multiplicative quaternion (Solà, "Quaternion kinematics for the error-state
 //! Kalman filter", 2017; here the attitude error is in world axes). The inertial unit propagates the whole state in
-//! every frame. The error of the state, 28 numbers, is corrected by scalar measurements: barometer with offset, age and ram
+//! every frame. The error of the state, 29 numbers, is corrected by scalar measurements: barometer with offset, age and ram
 //! error, late satellite fixes with a slowly wandering offset and an error of their time tags, lidar, and the sideways force that shows the wind.
 //!
 //! * [`Measurements`] and [`VehicleNow`] are the only inputs of a frame: with a log of them the estimator gives the
@@ -156,8 +156,7 @@ pub struct Estimator {
     fix_age: FixAge,
     gnss_gate: GnssGate,
     contradiction: Contradiction,
-    /// Measured specific force over the true one at rest, and what of it is corrected.
-    measured_scale: f64,
+    /// Measured specific force over the true one, at rest on the pad.
     accelerometer_scale: f64,
     last_imu: ImuSample,
     /// The landing motor has shaken the gyro.
@@ -196,7 +195,6 @@ impl Estimator {
             surprise: Surprise::default(),
             fix_age: FixAge::new(config),
             gnss_gate: GnssGate::new(&state.velocity_m_s),
-            measured_scale: 1.0,
             accelerometer_scale: 1.0,
             contradiction: Contradiction::default(),
             is_shaken: false,
@@ -214,9 +212,8 @@ impl Estimator {
     #[must_use]
     pub fn calibrated(mut self, calibration: &ImuCalibration) -> Self {
         self.nominal.gyro_bias_rad_s = calibration.gyro_bias_rad_s;
-        self.measured_scale = calibration.accelerometer_scale;
-        let (scale, sigma_m_s2) = calibration.scale_and_bias();
-        self.accelerometer_scale = scale;
+        self.accelerometer_scale = calibration.accelerometer_scale;
+        let (_, sigma_m_s2) = calibration.scale_and_bias();
         for axis in ACCELEROMETER_BIAS..WIND {
             self.covariance.widen(axis, sigma_m_s2 * sigma_m_s2);
         }
@@ -228,7 +225,7 @@ impl Estimator {
     pub fn calibration(&self) -> ImuCalibration {
         ImuCalibration {
             gyro_bias_rad_s: self.nominal.gyro_bias_rad_s,
-            accelerometer_scale: self.measured_scale,
+            accelerometer_scale: self.accelerometer_scale,
         }
     }
 

@@ -156,13 +156,14 @@ impl Estimator {
         if measured {
             self.last_imu = *imu;
         }
+        let (scale, _) = self.calibration().scale_and_bias();
         let state = &mut self.nominal;
         let before_rad_s = self.rate_rad_s;
         self.rate_rad_s = self.last_imu.gyro_rad_s - state.gyro_bias_rad_s;
         // At the centre of gravity (Groves 2013, section 5.5): the rate in the middle of two samples.
         let angular_m_s2 = (self.rate_rad_s - before_rad_s) / interval_s;
         let middle_rad_s = (self.rate_rad_s + before_rad_s) * 0.5;
-        self.specific_force_m_s2 = self.last_imu.specific_force_m_s2 / self.accelerometer_scale
+        self.specific_force_m_s2 = self.last_imu.specific_force_m_s2 / scale
             - state.accelerometer_bias_m_s2
             - angular_m_s2.cross(&levers.imu_m)
             - middle_rad_s.cross(&middle_rad_s.cross(&levers.imu_m));
