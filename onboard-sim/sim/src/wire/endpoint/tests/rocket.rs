@@ -121,8 +121,8 @@ fn its_whole_flight_stays_within_the_radio_s_budget_in_every_second_and_refusals
     let span_s = at_s[at_s.len() - 1] - at_s[0];
     assert!(span_s > flown_s - 0.3, "{span_s} of {flown_s} s");
     let hz = (at_s.len() - 1) as f64 / span_s;
-    // Eight a second are due. In the burn plans and changes of phase take the room of some: 7.5 over this flight, which began at sea
-    // level with 8.0 before.
+    // Eight a second are due. Predictions in the burn and the texts of the touchdown take the room of some: 7.5 of them over this
+    // flight.
     assert!((7.3..8.2).contains(&hz), "{hz} positions a second in {flown_s} s");
 }
 
