@@ -1,4 +1,5 @@
-//! Generates the MAVLink dialect from its XML and the records of the log from their `.proto` files, and notes which build this is, so that every log can name it.
+//! Generates the MAVLink dialect from its XML and the records of the log from their `.proto` files,
+//! and notes which build this is, so that every log can name it.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -55,8 +56,8 @@ fn generate_records(out_dir: &Path, package: &str) -> Result<()> {
     config.enable_type_names().compile_fds(descriptors).with_context(|| file.clone())
 }
 
-/// What a vehicle says and hears of the standard's messages; beside them it knows all of ours. The code of all 254 messages would
-/// not fit into a flight computer's flash.
+/// What a vehicle says and hears of the standard's messages; beside them it knows all of ours. The
+/// code of all 254 messages would not fit into a flight computer's flash.
 const OF_A_VEHICLE: &str = include_str!("dialect/of_a_vehicle.txt");
 
 /// Writes the dialect's files without all other messages.
@@ -87,8 +88,8 @@ fn only_messages_of_a_vehicle(folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// A development build names no commit: it contains later edits, and a name that changes with every commit would make
-/// Cargo compile everything that depends on this crate again.
+/// A development build names no commit: it contains later edits, and a name that changes with every
+/// commit would make Cargo compile everything that depends on this crate again.
 fn commit_of_a_release() -> Result<String> {
     if env::var("PROFILE").context("PROFILE")? != "release" {
         return Ok("none: a development build".to_owned());

@@ -1,5 +1,5 @@
-//! Checks ARCHITECTURE.md against the workspace: every member has its row, every public module of a library its line,
-//! and the arrows are those of the manifests.
+//! Checks ARCHITECTURE.md against the workspace: every member has its row, every public module of a
+//! library its line, and the arrows are those of the manifests.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

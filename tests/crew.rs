@@ -1,4 +1,5 @@
-//! CREW.md as it stands: every command of ours on it. Addresses and devices of the page are those of this test.
+//! CREW.md as it stands: every command of ours on it. Addresses and devices of the page are those
+//! of this test.
 
 use std::fs;
 use std::net::SocketAddr;
@@ -128,7 +129,8 @@ fn a_recorded_flight_is_shown_as_the_crews_page_says() {
     drop(places.screen(folder.path(), "ground --replay", "REPLAY"));
 }
 
-/// One vehicle after the other on the three links of the page: UDP, a radio, and UDP that is signed.
+/// One vehicle after the other on the three links of the page: UDP, a radio, and UDP that is
+/// signed.
 #[test]
 fn the_links_of_the_crews_page_join_vehicle_and_station() {
     for (begins, meets) in [

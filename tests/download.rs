@@ -1,4 +1,5 @@
-//! The vehicle's own log, fetched by the ground over real links: whole, checked, never overwritten, and not in flight.
+//! The vehicle's own log, fetched by the ground over real links: whole, checked, never overwritten,
+//! and not in flight.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -30,7 +31,8 @@ fn the_log_of_a_landed_vehicle_is_fetched_over_signed_udp_and_replays_bit_for_bi
         std::fs::read_dir(on_ground.path()).unwrap().map(|entry| entry.unwrap().path()).collect();
     assert_eq!(there, std::slice::from_ref(&log), "nothing else is left");
     expect_identical_replay(on_ground.path(), "vehicle1-flight.mcap");
-    // All of the flight is in it: recording went on behind it, so the log on board has it as its beginning.
+    // All of the flight is in it: recording went on behind it, so the log on board has it as its
+    // beginning.
     let (fetched_bytes, kept_bytes) =
         (std::fs::read(&log).unwrap(), std::fs::read(on_board.path().join("flight.mcap")).unwrap());
     let common = fetched_bytes.iter().zip(&kept_bytes).take_while(|(fetched, kept)| fetched == kept).count();
@@ -59,8 +61,8 @@ fn the_log_is_refused_in_flight() {
     vehicle.wait();
 }
 
-/// A vehicle that was aborted on its pad gives out its log over a radio of 57,600 baud. The ground is killed on the way,
-/// and begins again with what it has.
+/// A vehicle that was aborted on its pad gives out its log over a radio of 57,600 baud. The ground
+/// is killed on the way, and begins again with what it has.
 #[test]
 fn a_download_over_a_serial_line_goes_on_after_a_kill() {
     let folder = tempfile::tempdir().unwrap();

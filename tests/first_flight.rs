@@ -1,4 +1,5 @@
-//! FIRST_FLIGHT.md as it stands: every command of ours on it, in its order, with a simulated pair of radios.
+//! FIRST_FLIGHT.md as it stands: every command of ours on it, in its order, with a simulated pair
+//! of radios.
 
 use std::path::Path;
 use std::process::Command;
@@ -47,14 +48,15 @@ fn a_first_flight_goes_as_its_page_says() {
     screen.wait_for("every arming check passes");
     screen.type_until(b"AARM\r", " ARMED ");
     screen.type_until(b"SSTART\r", "START  commanded");
-    // A busy machine may leave the radio silent for a second, which holds the countdown: then it is started again, and armed, if
-    // nobody started it for long.
+    // A busy machine may leave the radio silent for a second, which holds the countdown: then it is
+    // started again, and armed, if nobody started it for long.
     while screen.wait_within(COUNTDOWN, |window| window.shows(" T+").then_some(())).is_none() {
         if screen.window().shows(" disarmed On the pad") {
             screen.type_until(b"AARM\r", " ARMED ");
         }
         screen.type_by_hand(b"SSTART\r");
-        // The words of the first start are still there: only the question whether a person typed is waited for.
+        // The words of the first start are still there: only the question whether a person typed is
+        // waited for.
         screen.confirm_if_asked("STANDS UNDAMAGED, inside");
     }
     screen.wait_for("STANDS UNDAMAGED, inside");

@@ -1,4 +1,5 @@
-//! The log of a ground station that flew a real vehicle: what it says agrees with the vehicle's own log.
+//! The log of a ground station that flew a real vehicle: what it says agrees with the vehicle's own
+//! log.
 
 use std::path::Path;
 
@@ -74,7 +75,8 @@ fn what_a_station_recorded_agrees_with_the_vehicles_own_log() {
         for row in &received {
             assert!(sent.contains(row), "{table}: {row:?} was never sent");
         }
-        // Nothing is lost on this machine, but the station ends with the verdict and the vehicle a little later.
+        // Nothing is lost on this machine, but the station ends with the verdict and the vehicle a
+        // little later.
         let of_all = if table.ends_with("verdict") { 0 } else { sent.len() * 9 / 10 };
         assert!(received.len() >= of_all, "{table}: {} of {}", received.len(), sent.len());
     }
@@ -82,7 +84,8 @@ fn what_a_station_recorded_agrees_with_the_vehicles_own_log() {
     its_tlog_tells_the_same(folder);
 }
 
-/// What a station records ten times a second, of the vehicle's state: which of its moments it takes depends on the machine.
+/// What a station records ten times a second, of the vehicle's state: which of its moments it takes
+/// depends on the machine.
 const STATE: [&str; 8] =
     ["phase", "north_m", "east_m", "altitude_m", "north_m_s", "climb_m_s", "tilt_rad", "turn_rate_rad_s"];
 
@@ -117,8 +120,8 @@ fn told_by_each_frame(tlog: &Path) -> Vec<[Option<f64>; 8]> {
     }
 }
 
-/// What the station recorded is the vehicle's state after one of the frames in its `.tlog`, and the later record after the later
-/// frame. The vehicle rolls as it falls.
+/// What the station recorded is the vehicle's state after one of the frames in its `.tlog`, and the
+/// later record after the later frame. The vehicle rolls as it falls.
 fn its_tlog_tells_the_same(folder: &Path) {
     let told = told_by_each_frame(&folder.join("ground.tlog"));
     let columns = STATE.map(|name| column(&folder.join("ground/telemetry.csv"), name));

@@ -1,4 +1,5 @@
-//! The countdown holds when the uplink fails: the real vehicle and a test's ground station, joined by a lossy proxy.
+//! The countdown holds when the uplink fails: the real vehicle and a test's ground station, joined
+//! by a lossy proxy.
 #![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
 use e2e::{ACCEPTED, ARM, BareGround, Impairment, Running, START, Signal, UdpProxy, vehicle};
@@ -39,8 +40,8 @@ fn wait_for_uplink(ground: &mut BareGround, wanted: impl Fn(&TD_UPLINK_DATA) -> 
     })
 }
 
-/// Nothing arrives on the uplink while the downlink works: the vehicle holds and reports it, and continues only after
-/// a new start command.
+/// Nothing arrives on the uplink while the downlink works: the vehicle holds and reports it, and
+/// continues only after a new start command.
 #[test]
 fn a_silent_uplink_holds_the_countdown() {
     // The last one hangs below a drone.
@@ -75,8 +76,8 @@ fn a_silent_uplink_holds_the_countdown() {
     }
 }
 
-/// These are a few real countdowns. The probability of a hold by chance is computed in the tests of the vehicle's
-/// stations.
+/// These are a few real countdowns. The probability of a hold by chance is computed in the tests of
+/// the vehicle's stations.
 #[test]
 fn a_countdown_continues_when_a_quarter_of_the_datagrams_is_lost() {
     for _ in 0..3 {

@@ -38,7 +38,8 @@ fn at_115200_baud_they_land() {
     expect_landing(vehicle, Running::start(&mut auto_ground(folder.path(), &[&line.far_link()])));
 }
 
-/// Ten times slower than what telemetry takes over a radio. Nothing piles up, so the commands are answered and observed.
+/// Ten times slower than what telemetry takes over a radio. Nothing piles up, so the commands are
+/// answered and observed.
 #[test]
 fn at_4800_baud_they_land_signed() {
     let line = SerialLine::new(4_800);
@@ -135,12 +136,13 @@ fn a_ground_that_restarts_is_answered_again() {
     expect_landing(vehicle, Running::start(&mut auto_ground(folder.path(), &[&link])));
 }
 
-/// The most processor time that a vehicle on its pad may use while its serial line is gone, as a share of the elapsed
-/// time. It needs a small part of this; a loop that never waits takes four times as much.
+/// The most processor time that a vehicle on its pad may use while its serial line is gone, as a
+/// share of the elapsed time. It needs a small part of this; a loop that never waits takes four
+/// times as much.
 const PROCESSOR_SHARE_MAX: f64 = 0.25;
 
-/// A serial line is unplugged and plugged in again. The vehicle waits without using the processor, and is heard
-/// again.
+/// A serial line is unplugged and plugged in again. The vehicle waits without using the processor,
+/// and is heard again.
 #[test]
 fn a_serial_line_may_be_unplugged_and_plugged_in_again() {
     let folder = tempfile::tempdir().unwrap();
@@ -180,7 +182,8 @@ struct Relay {
 impl Relay {
     fn to(to: u16) -> Self {
         let (stop, stopped) = std::sync::mpsc::sync_channel::<()>(0);
-        // The ground keeps calling this address after the relay is gone, and no other program may answer there.
+        // The ground keeps calling this address after the relay is gone, and no other program may
+        // answer there.
         let address = unshared_address();
         let listener = std::net::TcpListener::bind(address).unwrap();
         std::thread::Builder::new()

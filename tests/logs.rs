@@ -6,8 +6,9 @@ use e2e::{Ended, Program, Running, Signal, frames_of, program};
 use prost::Message as _;
 use protocol::log::computer_v1::ComputerFrame;
 
-/// The C library then chooses its mathematical functions as on a processor without these instructions. Nothing else does:
-/// our solver asks the processor itself. `onboard-sim/lab/cortex-m7/emulate` runs on a processor that has no such instructions.
+/// The C library then chooses its mathematical functions as on a processor without these
+/// instructions. Nothing else does: our solver asks the processor itself.
+/// `onboard-sim/lab/cortex-m7/emulate` runs on a processor that has no such instructions.
 const OTHER_C_LIBRARY: (&str, &str) = ("GLIBC_TUNABLES", "glibc.cpu.hwcaps=-FMA,-AVX2,-FMA4");
 
 fn fly(folder: &Path, log: &str, environment: Option<(&str, &str)>) -> Ended {

@@ -48,7 +48,8 @@ fn a_crew_checks_its_vehicle_and_then_arms_it() {
     let vehicle = vehicle(folder.path(), &link, &[]);
     screen.wait_for("every arming check passes");
     screen.type_until(b"X\r", "RUNS");
-    // Meanwhile an arming is refused, and ends the check. It is not typed again behind the refusal: then it would arm.
+    // Meanwhile an arming is refused, and ends the check. It is not typed again behind the refusal:
+    // then it would arm.
     screen.type_until(b"AARM\r", "ARM REFUSED by the vehicle");
     screen.wait_for("STOPPED early");
     screen.type_until(b"6", "a check of the vehicle ran");

@@ -1,6 +1,7 @@
-//! No page shows a command that its program would refuse: every command of ours, in a block of code or in a sentence, is given
-//! to the program with `--help` at its end, so that it is read and not run ([`crate::pages_run`] runs those in blocks). And a
-//! figure that stands on two pages is the same on both.
+//! No page shows a command that its program would refuse: every command of ours, in a block of code
+//! or in a sentence, is given to the program with `--help` at its end, so that it is read and not
+//! run ([`crate::pages_run`] runs those in blocks). And a figure that stands on two pages is the
+//! same on both.
 
 use std::fs;
 use std::path::{Path, PathBuf};

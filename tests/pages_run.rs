@@ -1,6 +1,7 @@
-//! The commands of the pages run as they stand: each line of a page's blocks, one after the other, in one folder, as
-//! somebody pastes them; and what it says is what the page says. [`crate::first_flight`] and [`crate::crew`] run the two
-//! pages whose programs wait for each other and for keys.
+//! The commands of the pages run as they stand: each line of a page's blocks, one after the other,
+//! in one folder, as somebody pastes them; and what it says is what the page says.
+//! [`crate::first_flight`] and [`crate::crew`] run the two pages whose programs wait for each other
+//! and for keys.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -110,7 +111,8 @@ fn is_elsewhere(page: &str, line: &str) -> bool {
     ELSEWHERE.iter().any(|(of, begin, _)| *of == page && line.starts_with(begin))
 }
 
-/// Whether a program has answered with this code: a flight may end outside its limits, and the answer may be no.
+/// Whether a program has answered with this code: a flight may end outside its limits, and the
+/// answer may be no.
 fn has_answered(line: &str, code: Option<i32>) -> bool {
     let flies =
         ["onboard-sim fly", "onboard-sim campaign --only"].iter().any(|begin| line.starts_with(begin));
@@ -126,7 +128,8 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-/// Runs a line in the folder as a user's shell with our programs in its path does; says what was wrong.
+/// Runs a line in the folder as a user's shell with our programs in its path does; says what was
+/// wrong.
 fn run_line(folder: &Path, line: &str) -> Option<String> {
     let ours = Path::new(program(Program::Replay).get_program()).parent().expect("a folder").to_owned();
     let theirs = std::env::var_os("PATH").unwrap_or_default();

@@ -1,4 +1,5 @@
-//! The pin of a simulated vehicle, which somebody moves by hand, and an abort on the pad that outlives the power switch.
+//! The pin of a simulated vehicle, which somebody moves by hand, and an abort on the pad that
+//! outlives the power switch.
 
 use std::io::Write as _;
 use std::path::Path;
@@ -16,7 +17,8 @@ fn type_line(input: &mut ChildStdin, words: &str) {
     writeln!(input, "{words}").expect("a program that reads its input");
 }
 
-/// A flight that ends under its parachute with a motor that was not lit; in the air, and after it, its time runs faster.
+/// A flight that ends under its parachute with a motor that was not lit; in the air, and after it,
+/// its time runs faster.
 #[test]
 fn a_crew_practises_from_the_start_to_may_be_approached_with_the_pin_in_its_hand() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -37,7 +39,8 @@ fn a_crew_practises_from_the_start_to_may_be_approached_with_the_pin_in_its_hand
     vehicle.wait_for_line("type `pin in` or `pin out`");
     type_line(&mut hand, "pin out");
     screen.wait_for("every arming check passes");
-    // A busy machine may leave the vehicle without its station for a second of its time, which holds the countdown.
+    // A busy machine may leave the vehicle without its station for a second of its time, which
+    // holds the countdown.
     let lands = |window: &Window| window.shows("do not approach for").then_some(());
     let flown = (0..3).any(|_| {
         screen.type_until(b"0AARM\r", " ARMED ");

@@ -1,4 +1,5 @@
-//! A rocket that flies from apogee: alone, with the ground station over UDP and over a serial radio, and aborted.
+//! A rocket that flies from apogee: alone, with the ground station over UDP and over a serial
+//! radio, and aborted.
 
 use e2e::{
     ABORT, ACCEPTED, ARM, BareGround, Program, Running, START, SerialLine, Signal, auto_ground,

@@ -64,8 +64,8 @@ fn with_another_key_neither_side_accepts_anything() {
             assert!(station.output.contains("wrongly signed"), "{}", station.output);
             assert!(!station.output.contains("PAD_IDLE"), "{}", station.output);
         } else {
-            // A ground without a key sees the vehicle. The vehicle does not obey it, and the ground reports the
-            // reason.
+            // A ground without a key sees the vehicle. The vehicle does not obey it, and the ground
+            // reports the reason.
             assert!(station.output.contains("UPLINK LOST"), "{}", station.output);
             assert!(station.output.contains("not signed, is the key missing here?"), "{}", station.output);
         }
@@ -92,8 +92,8 @@ fn a_key_that_others_can_read_is_refused_by_name() {
     assert!(station.output.contains("chmod 600 open.key"), "{}", station.output);
 }
 
-/// A vehicle made of one socket. It asks the ground for its time with TIMESYNC, and the ground answers only frames
-/// that it accepts.
+/// A vehicle made of one socket. It asks the ground for its time with TIMESYNC, and the ground
+/// answers only frames that it accepts.
 struct TimesyncVehicle {
     socket: UdpSocket,
     encoder: Encoder,

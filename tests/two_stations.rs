@@ -83,8 +83,8 @@ impl Launch {
     }
 }
 
-/// One person asks and the other one confirms: the keys of each, and what the other one then sees. On a busy machine the 10 s between
-/// them may pass, and both do it again.
+/// One person asks and the other one confirms: the keys of each, and what the other one then sees.
+/// On a busy machine the 10 s between them may pass, and both do it again.
 fn agreed(asks: (&mut Terminal, &[u8], &str), confirms: (&mut Terminal, &[u8], &str)) {
     let (one, asking, asked) = asks;
     let (other, confirming, confirmed) = confirms;

@@ -1,5 +1,5 @@
-//! Two vehicles at one station, somebody else's vehicle, two stations under one id, and screens of other people: the real
-//! processes, typed at by hand.
+//! Two vehicles at one station, somebody else's vehicle, two stations under one id, and screens of
+//! other people: the real processes, typed at by hand.
 #![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
 use std::net::UdpSocket;
@@ -39,7 +39,8 @@ fn listening(folder: &Path) -> (Terminal, u16) {
     (terminal, port)
 }
 
-/// A vehicle that only sends heartbeats and answers TIMESYNC, as a foreign one does. It notes what it is commanded.
+/// A vehicle that only sends heartbeats and answers TIMESYNC, as a foreign one does. It notes what
+/// it is commanded.
 struct Beating {
     commands: Arc<Mutex<Vec<CommandRequest>>>,
     runs: Arc<AtomicBool>,
@@ -132,7 +133,8 @@ fn a_second_vehicle_does_not_hide_a_countdown_which_its_station_holds() {
     screen.wait_until("two vehicles and the one that is armed", |window| {
         let rows = window.rows();
         assert!(!window.shows("REBOOTED") && !rows[1].contains(" disarmed "), "{rows:?}");
-        // The station holds as soon as it hears both, so the countdown may stand on no screen with two vehicles.
+        // The station holds as soon as it hears both, so the countdown may stand on no screen with
+        // two vehicles.
         (rows[0].contains("TWO VEHICLES under id 1") && rows[1].starts_with(" ARMED ")).then_some(())
     });
     first.wait_for_line("hold");
@@ -164,7 +166,8 @@ fn two_vehicles_with_one_boot_number_are_two() {
     }
 }
 
-/// What a station that listens commands goes to the vehicle that it shows, and an abort to everybody.
+/// What a station that listens commands goes to the vehicle that it shows, and an abort to
+/// everybody.
 #[test]
 fn commands_go_only_to_where_the_shown_vehicle_is_heard() {
     let folder = tempfile::tempdir().unwrap();
@@ -327,7 +330,8 @@ fn a_screen_whose_daemon_was_killed_claims_nothing_and_keeps_an_unsent_abort_unt
     assert!(!output.contains("ABORT"), "{output}");
 }
 
-/// The vehicle accepts both: it is so. A station that has heard before its Enter that it is armed sends nothing, and says so.
+/// The vehicle accepts both: it is so. A station that has heard before its Enter that it is armed
+/// sends nothing, and says so.
 #[test]
 fn two_stations_that_arm_at_once_are_both_told() {
     let folder = tempfile::tempdir().unwrap();
@@ -362,8 +366,8 @@ fn two_stations_that_arm_at_once_are_both_told() {
     vehicle.wait();
 }
 
-/// The one that armed and started is killed in the countdown; the other one's heartbeats, under the same id, do not stand in
-/// for it.
+/// The one that armed and started is killed in the countdown; the other one's heartbeats, under the
+/// same id, do not stand in for it.
 #[test]
 fn a_second_station_under_the_same_id_neither_commands_nor_keeps_a_countdown_alive() {
     let folder = tempfile::tempdir().unwrap();

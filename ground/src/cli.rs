@@ -24,10 +24,11 @@ Examples:
 
 /// Terminal ground station for a rocket that lands on its own thrust.
 ///
-/// Without --connect it always flies a demonstration: a simulated vehicle in this process, from its pad to touchdown,
-/// with real MAVLink over a loopback UDP socket. On a terminal it shows the full screen (? lists the keys). Without a
-/// terminal it prints one line per event and the landing verdict; the exit code tells how the flight ended. Colours,
-/// voice and bell stand in the settings (`ground config example`).
+/// Without --connect it always flies a demonstration: a simulated vehicle in this process, from its
+/// pad to touchdown, with real MAVLink over a loopback UDP socket. On a terminal it shows the full
+/// screen (? lists the keys). Without a terminal it prints one line per event and the landing
+/// verdict; the exit code tells how the flight ended. Colours, voice and bell stand in the settings
+/// (`ground config example`).
 #[derive(Debug, Clone, Parser)]
 #[command(name = "ground", version, after_help = format!("{EXAMPLES}\n\n{EXIT_CODES}"), args_conflicts_with_subcommands = true)]
 pub struct Cli {
@@ -51,7 +52,8 @@ pub struct Cli {
     #[arg(long, help_heading = "Without a screen")]
     pub headless: bool,
 
-    /// Print how the flight ended and where the log is, as one JSON object, and nothing else; without a screen.
+    /// Print how the flight ended and where the log is, as one JSON object, and nothing else;
+    /// without a screen.
     #[arg(long, conflicts_with = "replay", help_heading = "Without a screen")]
     pub json: bool,
 
@@ -86,7 +88,8 @@ pub struct OperatorArgs {
 /// The socket of a station.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Args)]
 pub struct SocketArgs {
-    /// Socket between a station and its screens. Default: one socket per station; `ground status` lists them.
+    /// Socket between a station and its screens. Default: one socket per station; `ground status`
+    /// lists them.
     #[arg(long, value_name = "PATH", help_heading = "Station")]
     pub socket: Option<PathBuf>,
 }
@@ -95,26 +98,30 @@ pub struct SocketArgs {
 #[derive(Debug, Clone, Default, PartialEq, Eq, Args)]
 #[command(next_help_heading = "Link and vehicle")]
 pub struct LinkArgs {
-    /// Link to a vehicle: udpin:ADDRESS:PORT, udpout:HOST:PORT, tcpin:ADDRESS:PORT, tcpout:HOST:PORT or
-    /// serial:DEVICE:BAUD; may be given more than once for several links to the same vehicle.
+    /// Link to a vehicle: udpin:ADDRESS:PORT, udpout:HOST:PORT, tcpin:ADDRESS:PORT,
+    /// tcpout:HOST:PORT or serial:DEVICE:BAUD; may be given more than once for several links to the
+    /// same vehicle.
     #[arg(long, value_name = "LINK")]
     pub connect: Vec<LinkAddress>,
 
-    /// This station's own MAVLink system id; every station on a link needs a different one. Default: 255.
+    /// This station's own MAVLink system id; every station on a link needs a different one.
+    /// Default: 255.
     #[arg(long, value_name = "ID", value_parser = clap::value_parser!(u8).range(1..))]
     pub sysid: Option<u8>,
 
-    /// MAVLink system id of the vehicle to show and command; other systems are ignored. Default: 1; for a replay the
-    /// first vehicle in the log.
+    /// MAVLink system id of the vehicle to show and command; other systems are ignored. Default: 1;
+    /// for a replay the first vehicle in the log.
     #[arg(long, value_name = "ID", value_parser = clap::value_parser!(u8).range(1..))]
     pub vehicle_sysid: Option<u8>,
 
-    /// Sign every frame with this key, and accept only frames signed with it. `onboard-sim keygen` creates a key.
+    /// Sign every frame with this key, and accept only frames signed with it. `onboard-sim keygen`
+    /// creates a key.
     #[arg(long, value_name = "FILE")]
     pub key: Option<PathBuf>,
 
-    /// People who may command (TOML), as the vehicle has them; --operator says who sits here, --key is the key that all
-    /// share. Without the name of somebody who has a key this station only looks on.
+    /// People who may command (TOML), as the vehicle has them; --operator says who sits here, --key
+    /// is the key that all share. Without the name of somebody who has a key this station only
+    /// looks on.
     #[arg(long, value_name = "FILE")]
     pub crew: Option<PathBuf>,
 
@@ -139,16 +146,18 @@ pub struct Flags {
     #[command(flatten)]
     pub socket: SocketArgs,
 
-    /// The mission, built-in name or file. The demonstration flies it; default: mk3. A vehicle over --connect has to fly it: arming is
-    /// refused if it flies another one.
+    /// The mission, built-in name or file. The demonstration flies it; default: mk3. A vehicle over
+    /// --connect has to fly it: arming is refused if it flies another one.
     #[arg(long, value_name = "NAME|FILE", alias = "profile", help_heading = "Station")]
     pub mission: Option<String>,
 
-    /// Checklist (TOML): arming is refused until every step is signed. `checklist-example.toml` is one.
+    /// Checklist (TOML): arming is refused until every step is signed. `checklist-example.toml` is
+    /// one.
     #[arg(long, value_name = "FILE", help_heading = "Station")]
     pub checklist: Option<PathBuf>,
 
-    /// Log to write (MCAP), or `none`. An existing file is kept: the log then gets the next free name, and says so.
+    /// Log to write (MCAP), or `none`. An existing file is kept: the log then gets the next free
+    /// name, and says so.
     ///
     /// Default: touchdown-YYYYMMDD-HHMMSS.mcap (UTC) in the current directory.
     #[arg(long, value_name = "FILE|none", help_heading = "Station")]
@@ -156,12 +165,13 @@ pub struct Flags {
 
     /// Telemetry log to write beside the log (`.tlog`, for other ground stations), or `none`.
     ///
-    /// Default: with --connect the name of the log with this extension; the demonstration writes none.
+    /// Default: with --connect the name of the log with this extension; the demonstration writes
+    /// none.
     #[arg(long, value_name = "FILE|none", help_heading = "Station")]
     pub tlog: Option<LogChoice>,
 
-    /// Send every frame that is heard on to udpout:HOST:PORT, for a map, an antenna tracker or an overlay; may be given more
-    /// than once. One way: what comes back is never read.
+    /// Send every frame that is heard on to udpout:HOST:PORT, for a map, an antenna tracker or an
+    /// overlay; may be given more than once. One way: what comes back is never read.
     #[arg(long, value_name = "LINK", value_parser = listener, help_heading = "Station")]
     pub forward: Vec<String>,
 }
@@ -175,8 +185,9 @@ pub struct StationArgs {
     #[command(flatten)]
     pub config: ConfigArgs,
 
-    /// Where the demonstration begins: pad, apogee or drone, if the mission has that start. Default: the pad, if it has one. With
-    /// --connect and --mission: where that flight should begin; arming is refused if it begins elsewhere.
+    /// Where the demonstration begins: pad, apogee or drone, if the mission has that start.
+    /// Default: the pad, if it has one. With --connect and --mission: where that flight should
+    /// begin; arming is refused if it begins elsewhere.
     #[arg(long, value_name = "START", help_heading = "Demonstration")]
     pub start: Option<StartPoint>,
 
@@ -188,7 +199,8 @@ pub struct StationArgs {
     #[arg(long, value_name = "FACTOR|max", conflicts_with = "connect", help_heading = "Demonstration")]
     pub speed: Option<Speed>,
 
-    /// Arm and start automatically; only with a simulated vehicle. The demonstration without a screen always does.
+    /// Arm and start automatically; only with a simulated vehicle. The demonstration without a
+    /// screen always does.
     #[arg(long, help_heading = "Demonstration")]
     pub auto: bool,
 }
@@ -196,7 +208,8 @@ pub struct StationArgs {
 /// The commands of `ground` besides a station with its screen.
 #[derive(Debug, Clone, Subcommand)]
 pub enum Command {
-    /// A station without a screen: holds the link, records, and serves screens until `ground stop` or SIGTERM ends it.
+    /// A station without a screen: holds the link, records, and serves screens until `ground stop`
+    /// or SIGTERM ends it.
     ///
     /// It keeps running when its screens close and when the session that started it ends.
     #[command(after_help = "Example: ground daemon --connect serial:/dev/ttyUSB0:57600 --log flight.mcap")]
@@ -204,13 +217,16 @@ pub enum Command {
         #[command(flatten)]
         station: Box<StationArgs>,
     },
-    /// A screen for a station in another process on this machine. Quitting does not affect the station.
+    /// A screen for a station in another process on this machine. Quitting does not affect the
+    /// station.
     #[command(after_help = "Examples:\n  ground attach\n  ground attach --watch")]
     Attach(AttachArgs),
-    /// Fetch the log that the vehicle has written itself, over --connect, when it is disarmed on the ground.
+    /// Fetch the log that the vehicle has written itself, over --connect, when it is disarmed on
+    /// the ground.
     ///
-    /// The log is checked; a file that exists is kept, and it gets the next free name. What has arrived is kept: the same command goes on with
-    /// it. A station that holds a serial line has to end first.
+    /// The log is checked; a file that exists is kept, and it gets the next free name. What has
+    /// arrived is kept: the same command goes on with it. A station that holds a serial line has to
+    /// end first.
     #[command(
         after_help = "Example: ground download --connect serial:/dev/ttyUSB0:57600 --key touchdown.key --out logs"
     )]

@@ -1,5 +1,6 @@
-//! The settings file (TOML). [`EXAMPLE`] documents every key. What changes from one start to the next is a flag: its key has the
-//! flag's name and values, and the flag overrides it. What a person or a place keeps stands in [`Config`] and has none.
+//! The settings file (TOML). [`EXAMPLE`] documents every key. What changes from one start to the
+//! next is a flag: its key has the flag's name and values, and the flag overrides it. What a person
+//! or a place keeps stands in [`Config`] and has none.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -113,8 +114,8 @@ impl Config {
         Ok(Self { flags, ..config })
     }
 
-    /// Puts the file under the flags of a station that the command line gives. A bare `ground` takes no link from the file: it
-    /// must always be the demonstration.
+    /// Puts the file under the flags of a station that the command line gives. A bare `ground`
+    /// takes no link from the file: it must always be the demonstration.
     ///
     /// # Errors
     /// The flags are of another command.
@@ -236,7 +237,8 @@ mod tests {
         }
     }
 
-    /// A bare `ground` flies the demonstration; it must not command a real vehicle over a link in the settings.
+    /// A bare `ground` flies the demonstration; it must not command a real vehicle over a link in
+    /// the settings.
     #[test]
     fn a_demonstration_takes_no_link_and_no_key_from_the_settings() {
         let file = "connect = [\"udpin:0.0.0.0:14550\"]\nkey = \"a\"\ncrew = \"b\"\nmission = \"c\"\nchecklist = \"d\"";

@@ -1,8 +1,8 @@
-//! The embedded simulator for the demonstration: a vehicle in this process that sends and receives over a real
-//! socket.
+//! The embedded simulator for the demonstration: a vehicle in this process that sends and receives
+//! over a real socket.
 //!
-//! It runs in its own thread with its own runtime, so that the screen cannot delay the vehicle. Only the log is
-//! shared; telemetry and commands go over the link.
+//! It runs in its own thread with its own runtime, so that the screen cannot delay the vehicle.
+//! Only the log is shared; telemetry and commands go over the link.
 
 use std::io;
 use std::thread::JoinHandle;
@@ -23,7 +23,8 @@ use crate::cli::StationArgs;
 const STOP_WITHIN: Duration = Duration::from_secs(3);
 
 const DEMO_SEED: u64 = 1;
-/// Long enough to see what holds a countdown and to hold it: from 2 s before the release on nothing does.
+/// Long enough to see what holds a countdown and to hold it: from 2 s before the release on nothing
+/// does.
 const QUICK_COUNTDOWN_S: f64 = 5.0;
 
 /// What is simulated.
@@ -112,7 +113,8 @@ impl Demo {
         let _ = self.pin_out.send(out);
     }
 
-    /// Waits until the simulator ends by itself and returns why, if it failed. After that it waits for ever.
+    /// Waits until the simulator ends by itself and returns why, if it failed. After that it waits
+    /// for ever.
     pub async fn ended(&mut self) -> Option<String> {
         match &mut self.ended {
             None => std::future::pending().await,

@@ -10,7 +10,8 @@ pub fn decide(outcome: &FlightSoFar, interactive: bool) -> Exit {
         _ if outcome.error.is_some() => Exit::Error,
         _ if outcome.aborted_at.is_some() => Exit::RefusedOrAborted,
         Some((stands, _)) => Exit::of(stands),
-        // At rest without a verdict: the vehicle came down under a parachute or without a landing burn.
+        // At rest without a verdict: the vehicle came down under a parachute or without a landing
+        // burn.
         None if outcome.started && outcome.safed_at.is_some() => Exit::No,
         None if outcome.started => Exit::NotSeen,
         None if outcome.refusal.is_some() => Exit::RefusedOrAborted,

@@ -14,7 +14,8 @@ fn main() -> ExitCode {
         Ok(given) => given,
         Err(message) => return Exit::unread(&message).into(),
     };
-    // While it unwound, the panic has printed its message, restored the terminal and finished the log.
+    // While it unwound, the panic has printed its message, restored the terminal and finished the
+    // log.
     let ended = std::panic::catch_unwind(AssertUnwindSafe(|| ground::app::run(&given)));
     match ended {
         Ok(Ok(exit)) => exit,

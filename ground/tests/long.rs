@@ -21,7 +21,8 @@ const HOURS: u64 = 10;
 /// The allowed growth between the first and the last hour, for variations of the allocator.
 const GROWTH_MAX_BYTES: u64 = 1024 * 1024;
 
-/// The resident memory of this process, bytes (Linux: the second number of `statm`, in pages of 4 KiB).
+/// The resident memory of this process, bytes (Linux: the second number of `statm`, in pages of 4
+/// KiB).
 fn resident_bytes() -> u64 {
     let statm = std::fs::read_to_string("/proc/self/statm").unwrap();
     statm.split(' ').nth(1).unwrap().parse::<u64>().unwrap() * 4096

@@ -1,5 +1,5 @@
-//! Hashes of flight decisions: what every frame commands, and how the vehicle meets the ground. A change that must not change
-//! a decision prints the same lines before and after, on any machine.
+//! Hashes of flight decisions: what every frame commands, and how the vehicle meets the ground. A
+//! change that must not change a decision prints the same lines before and after, on any machine.
 //!
 //! `cargo bench -p onboard-sim --bench fence` flies 200 flights of each kind; `-- 20` flies 20.
 #![expect(clippy::unwrap_used, reason = "a built-in mission that cannot be flown ends the program")]

@@ -1,8 +1,8 @@
-//! How much work plans are: the solver's passes over an interval in each planned landing, in the unit of
-//! `powered.max_passes`.
+//! How much work plans are: the solver's passes over an interval in each planned landing, in the
+//! unit of `powered.max_passes`.
 //!
-//! `cargo bench -p onboard-sim --bench work` flies 200 flights of each kind; `-- 20` flies 20; `-- 20 6000 mk2 mk3` flies only
-//! these missions, with a bound of 6,000.
+//! `cargo bench -p onboard-sim --bench work` flies 200 flights of each kind; `-- 20` flies 20; `--
+//! 20 6000 mk2 mk3` flies only these missions, with a bound of 6,000.
 #![expect(clippy::unwrap_used, reason = "a built-in mission that cannot be flown ends the program")]
 #![expect(clippy::print_stdout, reason = "the table is its output")]
 

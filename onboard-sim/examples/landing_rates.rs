@@ -1,8 +1,10 @@
-//! Writes into `onboard-sim/landing_rates.csv` how often campaigns landed. A test compares the pages with it.
+//! Writes into `onboard-sim/landing_rates.csv` how often campaigns landed. A test compares the
+//! pages with it.
 //!
 //! `cargo run -p onboard-sim --example landing_rates -- DIR...`
 //!
-//! Each DIR is the `--out` of an `onboard-sim campaign`. A row with the same mission and dispersion is replaced where it stands; others stay.
+//! Each DIR is the `--out` of an `onboard-sim campaign`. A row with the same mission and dispersion
+//! is replaced where it stands; others stay.
 
 use anyhow::{Context as _, Result};
 use flight::rules::verdict::Landing;

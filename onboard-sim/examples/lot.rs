@@ -1,9 +1,11 @@
-//! What it is worth to tell a mission of its motor's lot: how often the same vehicles land, told and not told.
+//! What it is worth to tell a mission of its motor's lot: how often the same vehicles land, told
+//! and not told.
 //!
 //! `cargo run --release -p onboard-sim --example lot -- MISSION SET FLIGHTS SEED ROWS`
 //!
-//! The motors of a row are those of a lot, drawn with what is known of it. Each flight is flown by a mission that knows this
-//! lot, and by one that was told less (ROWS is part of the names of rows; default: all): motor, vehicle, day and chance are the same.
+//! The motors of a row are those of a lot, drawn with what is known of it. Each flight is flown by
+//! a mission that knows this lot, and by one that was told less (ROWS is part of the names of rows;
+//! default: all): motor, vehicle, day and chance are the same.
 
 use std::io::Write as _;
 
@@ -83,7 +85,8 @@ fn main() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The draw of a world whose motor another mission expects to be another: its scales are over that mission's curve.
+/// The draw of a world whose motor another mission expects to be another: its scales are over that
+/// mission's curve.
 fn seen_by(pilot: &Mission, world: &Mission, drawn: &Draw) -> Draw {
     let (curve, expected) = (&world.motor_curve, &pilot.motor_curve);
     let impulse = curve.total_impulse_n_s() / expected.total_impulse_n_s();

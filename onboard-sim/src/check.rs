@@ -1,7 +1,8 @@
-//! Whether the vehicle of a mission will land, and what to change if not, before anything is built: one page of rows, each with what
-//! the mission's data come to beside what is asked of it.
+//! Whether the vehicle of a mission will land, and what to change if not, before anything is built:
+//! one page of rows, each with what the mission's data come to beside what is asked of it.
 //!
-//! All but the last row are formulas on the expected motor in still air or in a steady wind. The last one flies.
+//! All but the last row are formulas on the expected motor in still air or in a steady wind. The
+//! last one flies.
 
 use core::fmt;
 
@@ -54,21 +55,26 @@ impl Least {
 const AT_FIRST: Least = Least(0.5, 1.0);
 /// Mean thrust over weight while the thrust exceeds the weight.
 const CARRIED: Least = Least(1.1, 1.3);
-/// Thrust over weight [`ENDS_S`] before the thrust falls through the weight, as a limit from above: what ends at once leaves no time
-/// to correct. `mk3` has 1.2, `vlr-f15` 1.3, and of drawn vehicles with 2.3 a third stood.
+/// Thrust over weight [`ENDS_S`] before the thrust falls through the weight, as a limit from above:
+/// what ends at once leaves no time to correct. `mk3` has 1.2, `vlr-f15` 1.3, and of drawn vehicles
+/// with 2.3 a third stood.
 const AT_LAST: Least = Least(-2.15, -1.35);
 const ENDS_S: f64 = 0.3;
-/// Lean that lands the expected motor, degrees: with less a weak motor does not stop it. [`EvenLanding::MOST_TILT_RAD`] is the most.
+/// Lean that lands the expected motor, degrees: with less a weak motor does not stop it.
+/// [`EvenLanding::MOST_TILT_RAD`] is the most.
 const LEAN_DEG: Least = Least(0.0, 15.0);
-/// Width of the heights that suit every motor, over what two deviations of the igniter to either side cover. Below zero no height
-/// suits all.
+/// Width of the heights that suit every motor, over what two deviations of the igniter to either
+/// side cover. Below zero no height suits all.
 const BAND: Least = Least(-0.3, 1.0);
-/// Angular acceleration at the gimbal's stop over what is asked at once. With 0.6 nine of ten drawn vehicles still stood.
+/// Angular acceleration at the gimbal's stop over what is asked at once. With 0.6 nine of ten drawn
+/// vehicles still stood.
 const GIMBAL: Least = Least(0.3, 1.5);
-/// The same over what the motor's direction alone asks: eight tenths of a degree, of which five degrees are six times as much.
+/// The same over what the motor's direction alone asks: eight tenths of a degree, of which five
+/// degrees are six times as much.
 const STEERED: Least = Least(1.0, 6.4);
-/// Angular acceleration by a side wind of a vehicle whose fins do not steer, degrees/s2, as a limit from above. With 80 to 200 half of
-/// the drawn vehicles ended under the parachute, with 13 or less none.
+/// Angular acceleration by a side wind of a vehicle whose fins do not steer, degrees/s2, as a limit
+/// from above. With 80 to 200 half of the drawn vehicles ended under the parachute, with 13 or less
+/// none.
 const TURNED_DEG_S2: Least = Least(f64::NEG_INFINITY, -40.0);
 /// Moment of the fins over that which holds their largest lean. With less they lean less.
 const FINS: Least = Least(0.0, 1.0);
@@ -81,7 +87,8 @@ const EXPECTED_M_S: f64 = 1.5;
 const FEET_DEG: Least = Least(15.0, 25.0);
 /// Speed under the canopy, m/s, as a limit from above.
 const CANOPY_M_S: Least = Least(-12.0, -8.0);
-/// How long before the ignition the parachute must be decided, s, as a limit from above: what then goes wrong has none.
+/// How long before the ignition the parachute must be decided, s, as a limit from above: what then
+/// goes wrong has none.
 const DECIDED_S: Least = Least(f64::NEG_INFINITY, -0.5);
 /// Radius of the fence over the farthest that it may come down.
 const FENCE: Least = Least(0.25, 1.0);
@@ -159,7 +166,8 @@ fn worst(rows: &[Row]) -> Verdict {
 /// A motor to propose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
-    /// What a mission's `airframe.motor` says: the name of a built-in motor, or the text of its file.
+    /// What a mission's `airframe.motor` says: the name of a built-in motor, or the text of its
+    /// file.
     pub motor: String,
     pub curve: ThrustCurve,
     /// Its maker still makes it, as far as is known.
@@ -198,8 +206,8 @@ pub enum CheckError {
     Fly(#[from] RunError),
 }
 
-/// The page of a recipe's mission. Other motors are proposed of `motors`. So many flights of the recipe are flown; without any their row
-/// is left out. `done` gets how many are flown.
+/// The page of a recipe's mission. Other motors are proposed of `motors`. So many flights of the
+/// recipe are flown; without any their row is left out. `done` gets how many are flown.
 ///
 /// # Errors
 /// The motor cannot be taken out of the airframe, or a flight cannot be set up.
@@ -369,7 +377,8 @@ impl<'a> Vehicle<'a> {
         0.5 * self.column.air_density_kg_m3 * speed_m_s * speed_m_s
     }
 
-    /// Moment with which the air turns the nose into the wind, N m, at an angle of attack with the fins of a drag area.
+    /// Moment with which the air turns the nose into the wind, N m, at an angle of attack with the
+    /// fins of a drag area.
     fn air_n_m(&self, mass: &MassProperties, speed_m_s: f64, angle_rad: f64, fins_m2: f64) -> f64 {
         let airframe = &self.mission.airframe;
         let behind_m = mass.cg_station_m - 0.5 * airframe.body.length_m;
@@ -446,7 +455,8 @@ impl<'a> Vehicle<'a> {
             .or(|| "longer fins, or hinges nearer to the nose".to_owned())
     }
 
-    /// Time of a fall from rest with open fins to a speed, s: `V_t tanh(g t / V_t)` is the speed after `t`.
+    /// Time of a fall from rest with open fins to a speed, s: `V_t tanh(g t / V_t)` is the speed
+    /// after `t`.
     fn falls_s(&self, speed_m_s: f64) -> f64 {
         let share = (speed_m_s / self.terminal_m_s).min(1.0 - 1e-9);
         self.terminal_m_s / STANDARD_GRAVITY_M_S2 * libm::atanh(share)
@@ -458,7 +468,8 @@ impl<'a> Vehicle<'a> {
         let burn_m = self.mission.powered.homing.reach_m_s2 * carried_s * carried_s;
         let steered_s = falls_s - self.falls_s(LEAST_AIRSPEED_M_S);
         let fall_m = if self.mission.descent.steers() && steered_s > 0.0 {
-            // The mean of the squared speed: the integral of tanh^2 is t - tanh. A push one way and back is a quarter of a t^2.
+            // The mean of the squared speed: the integral of tanh^2 is t - tanh. A push one way and
+            // back is a quarter of a t^2.
             let terminal2 = self.terminal_m_s * self.terminal_m_s;
             let gained_s = (speed_m_s - LEAST_AIRSPEED_M_S) / STANDARD_GRAVITY_M_S2;
             let pressure_pa = self.pressure_pa(libm::sqrt(terminal2 * (1.0 - gained_s / steered_s)));
@@ -515,12 +526,14 @@ impl<'a> Vehicle<'a> {
         })
     }
 
-    /// A row only if an inertia is not that of such a vehicle: one in another unit makes a vehicle that tumbles.
+    /// A row only if an inertia is not that of such a vehicle: one in another unit makes a vehicle
+    /// that tumbles.
     fn inertia(&self) -> Option<Row> {
         let Airframe { mass, body, legs, .. } = &self.mission.airframe;
         let gyration_m = |inertia_kg_m2: f64| libm::sqrt(inertia_kg_m2 / mass.loaded_kg);
         let [pitch_m, roll_m] = [mass.loaded_pitch_inertia_kg_m2, mass.roll_inertia_kg_m2].map(gyration_m);
-        // A rod has 0.29 of its length, the built-in vehicles 0.27 to 0.31; a tube has its radius, and legs reach their feet.
+        // A rod has 0.29 of its length, the built-in vehicles 0.27 to 0.31; a tube has its radius,
+        // and legs reach their feet.
         let is_such = (0.15..0.45).contains(&(pitch_m / body.length_m))
             && (0.3 * body.diameter_m..0.6 * legs.foot_radius_m).contains(&roll_m);
         let found = format!("radii of {:.0} and {:.0} mm", 1e3 * pitch_m, 1e3 * roll_m);

@@ -1,5 +1,5 @@
-//! Texts that are built in or files; and files that are written whole: each is complete or absent. What exists is kept: a new file or
-//! folder gets the next free name.
+//! Texts that are built in or files; and files that are written whole: each is complete or absent.
+//! What exists is kept: a new file or folder gets the next free name.
 
 use std::fs::{File, TryLockError};
 use std::io::{self, Seek, SeekFrom, Write};
@@ -49,15 +49,17 @@ impl WriteError {
     }
 }
 
-/// Says that something gets another name than the one that was asked for. If nobody reads it, it is written anyway.
+/// Says that something gets another name than the one that was asked for. If nobody reads it, it is
+/// written anyway.
 pub fn say_other(asked: &Path, free: &Path) {
     if let Some(words) = other_name(asked, free) {
         let _ = writeln!(io::stderr(), "{words}");
     }
 }
 
-/// Makes a folder under the next free name, and says it if it is another one. An empty folder is taken as it is. No other process
-/// takes it before the returned file is dropped; then something should be in it.
+/// Makes a folder under the next free name, and says it if it is another one. An empty folder is
+/// taken as it is. No other process takes it before the returned file is dropped; then something
+/// should be in it.
 ///
 /// # Errors
 /// It cannot be made, or no name is free.
@@ -75,8 +77,8 @@ pub fn new_folder(asked: &Path) -> Result<(PathBuf, File), WriteError> {
     Ok(made)
 }
 
-/// Writes the files of a folder, which is made if it is not there: all or none, under hidden temporary names first. They replace those
-/// of an earlier part of the same work.
+/// Writes the files of a folder, which is made if it is not there: all or none, under hidden
+/// temporary names first. They replace those of an earlier part of the same work.
 ///
 /// # Errors
 /// A file cannot be written.
@@ -92,7 +94,8 @@ pub fn write_folder(folder: &Path, files: &[(&str, impl AsRef<[u8]>)]) -> Result
     complete.into_iter().try_for_each(|file| file.commit().map(drop))
 }
 
-/// A file being written, under a temporary name in the same directory until it is complete. If dropped, it is removed.
+/// A file being written, under a temporary name in the same directory until it is complete. If
+/// dropped, it is removed.
 #[derive(Debug)]
 pub struct NewFile {
     /// The name that was asked for.
@@ -104,7 +107,8 @@ pub struct NewFile {
 }
 
 impl NewFile {
-    /// Creates a file. If there is one of this name when it is complete, it gets the next free name, and says it.
+    /// Creates a file. If there is one of this name when it is complete, it gets the next free
+    /// name, and says it.
     ///
     /// # Errors
     /// It cannot be created in its directory.
@@ -185,7 +189,8 @@ fn unfinished(beside: &Path) -> io::Result<NamedTempFile> {
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt as _;
-        // The user's umask applies as to any new file; a temporary file would be readable by its owner only.
+        // The user's umask applies as to any new file; a temporary file would be readable by its
+        // owner only.
         unfinished.permissions(std::fs::Permissions::from_mode(0o666));
     }
     let folder = beside.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));

@@ -1,8 +1,8 @@
 //! The airframe without its landing motor, and a mission with another motor or mass.
 //!
-//! A motor is a rod of even mass on the axis that begins at the nozzle: its casing stays, its propellant burns in its
-//! middle. Ballast is a point at the centre of gravity of the rest. So a heavier or longer motor moves mass, centre of gravity
-//! and inertia together.
+//! A motor is a rod of even mass on the axis that begins at the nozzle: its casing stays, its
+//! propellant burns in its middle. Ballast is a point at the centre of gravity of the rest. So a
+//! heavier or longer motor moves mass, centre of gravity and inertia together.
 
 use flight::vehicle::airframe::Mass;
 use flight::vehicle::mission::Mission;
@@ -98,7 +98,8 @@ fn squared(value: f64) -> f64 {
     value * value
 }
 
-/// A recipe with another mass, and with another motor if `motor`, a built-in name or the text of a motor file, is not the mission's.
+/// A recipe with another mass, and with another motor if `motor`, a built-in name or the text of a
+/// motor file, is not the mission's.
 ///
 /// # Errors
 /// The reader of missions refuses the vehicle.
@@ -166,8 +167,10 @@ mod tests {
         mission
     }
 
-    /// 0.5 kg of motor at 0.1 m leave 2.5 kg at (1.5 - 0.05) / 2.5 m with 0.2 - 0.5 (0.04 / 12 + 0.0016 / 16) - 0.5 * 0.16
-    /// - 2.5 * 0.0064 kg m2. A motor of 1 kg and 0.4 m and 0.5 kg at 0.58 m make 4 kg at (1.45 + 0.2 + 0.29) / 4 m.
+    /// 0.5 kg of motor at 0.1 m leave 2.5 kg at (1.5 - 0.05) / 2.5 m with 0.2 - 0.5 (0.04 / 12 +
+    /// 0.0016 / 16) - 0.5 * 0.16
+    /// - 2.5 * 0.0064 kg m2. A motor of 1 kg and 0.4 m and 0.5 kg at 0.58 m make 4 kg at (1.45 +
+    ///   0.2 + 0.29) / 4 m.
     #[test]
     fn val_hand_another_motor_moves_mass_centre_of_gravity_and_inertia() {
         let frame = Frame::of(&mission()).unwrap();
@@ -222,8 +225,8 @@ mod tests {
         }
     }
 
-    /// With its own motor a mission keeps what is known of the lot, but not the weight of another ballast; with another one
-    /// nothing of it.
+    /// With its own motor a mission keeps what is known of the lot, but not the weight of another
+    /// ballast; with another one nothing of it.
     #[test]
     fn a_lot_and_the_other_motors_of_its_name_stay_with_a_motor() {
         let lot = "name = \"2609\"\nburns = 3\nimpulse = { mean = 1.02 }\nweighed = { vehicle_kg = 3.65 }";

@@ -1,7 +1,9 @@
-//! Where a vehicle comes down, in each way that a flight can end: what says how near people may stand.
+//! Where a vehicle comes down, in each way that a flight can end: what says how near people may
+//! stand.
 //!
-//! Each flight is flown as it is drawn. On its way copies of it are aborted, each at a moment drawn evenly from one part of
-//! that very flight. The ways with a fault are flights of their own with the same draws.
+//! Each flight is flown as it is drawn. On its way copies of it are aborted, each at a moment drawn
+//! evenly from one part of that very flight. The ways with a fault are flights of their own with
+//! the same draws.
 
 use core::fmt;
 
@@ -43,7 +45,8 @@ flight::numbered_enum! {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Way {
     AsPlanned = "as planned",
-    /// Aborted in the boost or in the coast: the parachute opens at apogee, the longest way under it.
+    /// Aborted in the boost or in the coast: the parachute opens at apogee, the longest way under
+    /// it.
     AbortInAscent = "aborted in boost, coast",
     /// Aborted at apogee, of a flight that begins there.
     ParachuteFromApogee = "parachute from apogee",
@@ -61,7 +64,8 @@ pub enum Way {
     Ballistic = "ballistic",
     /// Nothing happens any more after the lift-off, as with a dead flight computer.
     BallisticWithBooster = "ballistic, with booster",
-    /// The booster without its own parachute: along its axis or tumbling across it, whichever carries it farther.
+    /// The booster without its own parachute: along its axis or tumbling across it, whichever
+    /// carries it farther.
     Booster = "spent booster, ballistic",
 }
 }
@@ -134,7 +138,8 @@ pub struct Impact {
     pub way: Way,
     /// Number of the flight.
     pub number: u64,
-    /// Place from the pad, m along world x and y; `None` if it was still in the air after a quarter of an hour.
+    /// Place from the pad, m along world x and y; `None` if it was still in the air after a quarter
+    /// of an hour.
     pub place_m: Option<[f64; 2]>,
     /// Where the wind of this flight blows to, from world x towards y.
     pub downwind_rad: f64,
@@ -149,7 +154,8 @@ pub struct Course {
     pub highest_m: f64,
     /// Speed at the end of the rail, m/s; of a flight that is looked at from its rail on.
     pub rail_m_s: Option<f64>,
-    /// Lowest height of the feet in the fall from which an abort would still have opened the parachute, m.
+    /// Lowest height of the feet in the fall from which an abort would still have opened the
+    /// parachute, m.
     pub chute_down_to_m: Option<f64>,
     /// Height of the feet when the landing motor got its current, m.
     pub lit_at_m: Option<f64>,
@@ -209,22 +215,23 @@ pub struct Radius {
     pub flights: usize,
     /// The least radius that holds 99 % of these flights.
     pub holds_m: f64,
-    /// Ends of the 95 % interval of the radius that holds 99 % of all flights there could be. Fewer than 368 flights have
-    /// no upper end.
+    /// Ends of the 95 % interval of the radius that holds 99 % of all flights there could be. Fewer
+    /// than 368 flights have no upper end.
     pub low_m: f64,
     pub high_m: Option<f64>,
     pub farthest_m: f64,
 }
 
 impl Radius {
-    /// The radius of distances, m; `None` without any. The ends are order statistics: how many of n flights come down inside
-    /// the true radius is binomial (W. J. Conover, Practical Nonparametric Statistics, section 3.2), for any
-    /// distribution of the distances.
+    /// The radius of distances, m; `None` without any. The ends are order statistics: how many of n
+    /// flights come down inside the true radius is binomial (W. J. Conover, Practical Nonparametric
+    /// Statistics, section 3.2), for any distribution of the distances.
     pub fn of(mut distances_m: Vec<f64>) -> Option<Self> {
         distances_m.sort_by(f64::total_cmp);
         let (flights, farthest_m) = (distances_m.len(), *distances_m.last()?);
         let inside = Binomial::new(HELD, flights as u64).ok()?;
-        // The k-th nearest is beyond the true radius with the probability that fewer than k are inside of it.
+        // The k-th nearest is beyond the true radius with the probability that fewer than k are
+        // inside of it.
         let fewer_than = |k: usize| k.checked_sub(1).map_or(0.0, |most| inside.cdf(most as u64));
         let lowest = (1..=flights).rev().find(|k| fewer_than(*k) <= TAIL);
         let highest = (1..=flights).find(|k| fewer_than(*k) >= 1.0 - TAIL);
@@ -243,7 +250,8 @@ impl Radius {
         Self::of(impacts.iter().filter(|impact| impact.way == way).map(Impact::distance_m).collect())
     }
 
-    /// The radius outside of which people may stand as far as these flights tell: the upper end, or the farthest.
+    /// The radius outside of which people may stand as far as these flights tell: the upper end, or
+    /// the farthest.
     pub fn outside_m(&self) -> f64 {
         self.high_m.map_or(self.farthest_m, |high_m| high_m.max(self.holds_m))
     }
@@ -258,7 +266,8 @@ pub struct Flights {
     pub of_widest: u64,
 }
 
-/// A way of which the farthest flight of the survey comes down at this share of the farthest of all is one of the widest.
+/// A way of which the farthest flight of the survey comes down at this share of the farthest of all
+/// is one of the widest.
 const NEARLY: f64 = 0.9;
 
 /// [`study`] of each recipe. `done` gets how many flights of all are flown, of about how many.
@@ -280,8 +289,8 @@ pub fn studies(
     of_each.collect()
 }
 
-/// Flies every way of a recipe's mission, and the widest ones as often as is asked. `done` gets how many flights are flown,
-/// of how many: before the widest ways are known, of one of them.
+/// Flies every way of a recipe's mission, and the widest ones as often as is asked. `done` gets how
+/// many flights are flown, of how many: before the widest ways are known, of one of them.
 ///
 /// # Errors
 /// A flight cannot be set up.
@@ -313,8 +322,8 @@ pub fn study(
     Ok(impacts)
 }
 
-/// The radius outside of which people may stand as far as flights tell: the widest of all ways, with its way; `None` without
-/// flights.
+/// The radius outside of which people may stand as far as flights tell: the widest of all ways,
+/// with its way; `None` without flights.
 pub fn widest(impacts: &[Impact]) -> Option<(Way, Radius)> {
     let radii = Way::ALL.into_iter().filter_map(|way| Some((way, Radius::of_way(impacts, way)?)));
     // Of ways that reach alike far the one with an upper end.
@@ -414,8 +423,8 @@ impl Branch {
         Self { way, aborted: None, frames: 0 }
     }
 
-    /// Keeps this frame or the one that is kept, so that each is as likely (J. S. Vitter, Random Sampling with a Reservoir,
-    /// 1985). At apogee the first one stays.
+    /// Keeps this frame or the one that is kept, so that each is as likely (J. S. Vitter, Random
+    /// Sampling with a Reservoir, 1985). At apogee the first one stays.
     fn take(&mut self, flight: &Sortie, chance: &mut Chance) {
         self.frames += 1;
         let first = self.way == Way::ParachuteFromApogee;
@@ -426,8 +435,8 @@ impl Branch {
     }
 }
 
-/// Flies until the vehicle lies still, and looks at every frame before it is flown, which says whether to go on. Where it
-/// lies, m, and how it came there.
+/// Flies until the vehicle lies still, and looks at every frame before it is flown, which says
+/// whether to go on. Where it lies, m, and how it came there.
 fn come_down(flight: &mut Sortie, mut look: impl FnMut(&Sortie) -> bool) -> (Option<[f64; 2]>, Course) {
     let mut course = Course::default();
     let goes_on = |flight: &Sortie| {
@@ -471,8 +480,8 @@ fn uncommanded(recipe: &Recipe, number: u64) -> Result<Sortie, SetUpError> {
     Ok(flight)
 }
 
-/// Where the booster of a flight comes down that has just been separated, m; without a parachute, as a point mass in the mean
-/// wind. `None` without a booster.
+/// Where the booster of a flight comes down that has just been separated, m; without a parachute,
+/// as a point mass in the mean wind. `None` without a booster.
 fn spent_booster_m(flight: &Sortie) -> Option<[f64; 2]> {
     let (mission, world) = (flight.mission(), flight.world());
     let booster = &mission.launch.as_ref()?.booster;
@@ -531,7 +540,8 @@ impl Rule {
     pub const SOURCE: &str = "NAR High Power Rocket Safety Code (August 2012), minimum distance table; NAR Model Rocket Safety \
         Code, rule 5; both as tabled on lunar.org/wp/?p=98";
 
-    /// The rule for a mission with all its motors. A model rocket has up to 160 N s, 125 g of propellant and 1,500 g.
+    /// The rule for a mission with all its motors. A model rocket has up to 160 N s, 125 g of
+    /// propellant and 1,500 g.
     pub fn of(mission: &Mission) -> Self {
         let booster = mission.launched();
         let booster = booster.map(|launch| &launch.booster);
@@ -566,7 +576,8 @@ pub fn lift_off_kg(mission: &Mission, launch: Option<&Launch>) -> f64 {
 
 /// Least distance of people by the total impulse, N s, feet.
 fn high_power_ft(impulse_n_s: f64, complex: bool) -> f64 {
-    /// Up to this impulse, N s: the distance from a rocket with one motor, and from one with more, feet.
+    /// Up to this impulse, N s: the distance from a rocket with one motor, and from one with more,
+    /// feet.
     const TABLE: [(f64, [f64; 2]); 6] = [
         (1_280.0, [100.0, 200.0]),
         (2_560.0, [200.0, 300.0]),
@@ -600,8 +611,9 @@ impl fmt::Display for Rule {
 mod tests {
     use super::*;
 
-    /// 0.99^367 = 0.02501 and 0.99^368 = 0.02476: 368 flights are the fewest of which the farthest is an upper end. Of 400
-    /// flights fewer than 393 are inside with a probability of 0.0507, fewer than 392 with 0.0206.
+    /// 0.99^367 = 0.02501 and 0.99^368 = 0.02476: 368 flights are the fewest of which the farthest
+    /// is an upper end. Of 400 flights fewer than 393 are inside with a probability of 0.0507,
+    /// fewer than 392 with 0.0206.
     #[test]
     fn val_binomial_the_interval_of_a_radius() {
         let distances = |count: u32| (1..=count).map(f64::from).collect::<Vec<f64>>();
@@ -615,8 +627,8 @@ mod tests {
         assert!(Radius::of(vec![1.0, f64::INFINITY]).unwrap().outside_m().is_infinite());
     }
 
-    /// 80 m high at 10 m/s: sqrt(160 / 9.80665) = 4.0392 s. With much drag it drifts with the wind: 10 m/s, and a sink of
-    /// sqrt(2 * 9.80665 / 1.225) = 4.0 m/s for 1 m^2/kg.
+    /// 80 m high at 10 m/s: sqrt(160 / 9.80665) = 4.0392 s. With much drag it drifts with the wind:
+    /// 10 m/s, and a sink of sqrt(2 * 9.80665 / 1.225) = 4.0 m/s for 1 m^2/kg.
     #[test]
     fn val_hand_a_point_mass_falls_and_drifts() {
         let start_m = Vector3::new(3.0, -2.0, 80.0);

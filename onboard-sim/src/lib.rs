@@ -12,8 +12,8 @@
 //! * [`card`]: the landing card.
 //! * [`playback`]: recorded sensors played to the flight computer.
 //!
-//! A flight depends only on its recipe and its number. So a campaign can be stopped, continued and run on any
-//! number of threads with the same results.
+//! A flight depends only on its recipe and its number. So a campaign can be stopped, continued and
+//! run on any number of threads with the same results.
 
 pub mod card;
 pub mod check;

@@ -32,42 +32,53 @@ struct Arguments {
 enum Command {
     /// Fly one flight.
     ///
-    /// Without --mavlink the vehicle arms and starts itself; with it, it waits for a ground station.
+    /// Without --mavlink the vehicle arms and starts itself; with it, it waits for a ground
+    /// station.
     ///
-    /// Exit code 0 if it stands undamaged, 3 if not, 4 if it was refused or aborted, 5 if it was stopped.
+    /// Exit code 0 if it stands undamaged, 3 if not, 4 if it was refused or aborted, 5 if it was
+    /// stopped.
     #[command(
         after_help = "Examples:\n  onboard-sim fly --mission mk3 --log flight.mcap\n  onboard-sim fly --mavlink udpout:127.0.0.1:14550 --seed 7"
     )]
     Fly(cli::fly::FlyArguments),
-    /// Fly a mission many times, from apogee to the ground, each time with another vehicle, motor and weather.
+    /// Fly a mission many times, from apogee to the ground, each time with another vehicle, motor
+    /// and weather.
     #[command(
         after_help = "Example: onboard-sim campaign --mission mk3 --dispersion real --flights 1000 --out mk3-real"
     )]
     Campaign(cli::campaign::CampaignArguments),
-    /// Say whether the vehicle of a mission will land, and what to change if not: one page, before anything is built.
+    /// Say whether the vehicle of a mission will land, and what to change if not: one page, before
+    /// anything is built.
     ///
     /// Exit code 0 if it is ok or tight, 3 if the answer is no.
     #[command(after_help = "Example: onboard-sim check mk3")]
     Check(cli::check::CheckArguments),
-    /// Write the sheet that a team takes to the field, and the mission to load; refused for what cannot land.
+    /// Write the sheet that a team takes to the field, and the mission to load; refused for what
+    /// cannot land.
     ///
-    /// The folder gets card.html and card.txt (the same sheet: its front is for the range safety officer, its back for whoever
-    /// prepares the vehicle) and mission.toml (the mission that was given, byte for byte). In each wind every way in which a flight
-    /// can end is flown 100 times, and the farthest ones 400 times: some minutes.
+    /// The folder gets card.html and card.txt (the same sheet: its front is for the range safety
+    /// officer, its back for whoever prepares the vehicle) and mission.toml (the mission that was
+    /// given, byte for byte). In each wind every way in which a flight can end is flown 100 times,
+    /// and the farthest ones 400 times: some minutes.
     #[command(after_help = "Example: onboard-sim card --mission mini-f10 --wind-from 270 --out card")]
     Card(cli::card::CardArguments),
-    /// Show where a vehicle comes down, in each way that a flight can end: how near people may stand.
+    /// Show where a vehicle comes down, in each way that a flight can end: how near people may
+    /// stand.
     ///
-    /// Landed or not, aborted in each part of the flight, without its landing motor, with its booster, lifted off by itself,
-    /// ballistic; and the spent booster. Beside it stands the rule of a national association; the larger distance counts.
+    /// Landed or not, aborted in each part of the flight, without its landing motor, with its
+    /// booster, lifted off by itself, ballistic; and the spent booster. Beside it stands the rule
+    /// of a national association; the larger distance counts.
     #[command(after_help = "Example: onboard-sim hazard --mission mk3 --wind 0,3,6 --csv hazard.csv")]
     Hazard(cli::hazard::HazardArguments),
-    /// Play the recorded sensors of a real flight to the flight computer: what it would have decided.
+    /// Play the recorded sensors of a real flight to the flight computer: what it would have
+    /// decided.
     ///
-    /// It prints which arming checks would refuse and why, when lift-off, burnout, separation, apogee and parachute come, and which
-    /// measurements are rejected. Nothing is connected, nobody arms it, no phase is forced.
+    /// It prints which arming checks would refuse and why, when lift-off, burnout, separation,
+    /// apogee and parachute come, and which measurements are rejected. Nothing is connected, nobody
+    /// arms it, no phase is forced.
     ///
-    /// Exit code 0 if it saw an apogee, 3 if a separation or a parachute came at more than 30 m/s upwards, 5 without an apogee.
+    /// Exit code 0 if it saw an apogee, 3 if a separation or a parachute came at more than 30 m/s
+    /// upwards, 5 without an apogee.
     #[command(after_help = "Example: onboard-sim playback flight.csv --mission mk3 --out flight.mcap")]
     Playback(cli::playback::PlaybackArguments),
     /// Make a signing key: a new file that only you can read, for --key of vehicle and ground.
@@ -76,15 +87,18 @@ enum Command {
         /// The file. If it exists there is no second key: give another name.
         #[arg(value_name = "FILE")]
         file: PathBuf,
-        /// Derive it from a passphrase, read as a line from standard input, as MAVProxy's `signing key` does (SHA-256).
+        /// Derive it from a passphrase, read as a line from standard input, as MAVProxy's `signing
+        /// key` does (SHA-256).
         ///
-        /// Anybody who records one signed frame can try passphrases on it: use six random words or more.
+        /// Anybody who records one signed frame can try passphrases on it: use six random words or
+        /// more.
         #[arg(long)]
         passphrase: bool,
     },
     /// Write a mission file for a rocket of one's own.
     ///
-    /// On a terminal it asks for what a club measures, one question a line. With --like it does not ask.
+    /// On a terminal it asks for what a club measures, one question a line. With --like it does not
+    /// ask.
     #[command(
         after_help = "Examples:\n  onboard-sim new ours\n  onboard-sim new ours --from openrocket.csv --length 0.7\n  onboard-sim new ours --motor stand.csv --motor-data ours 38 200 0.19 0.365"
     )]

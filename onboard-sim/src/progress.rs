@@ -1,5 +1,5 @@
-//! Shows on standard error how far something long is, and how long the rest will take: a bar on a terminal, elsewhere a line every
-//! ten seconds and one at the end.
+//! Shows on standard error how far something long is, and how long the rest will take: a bar on a
+//! terminal, elsewhere a line every ten seconds and one at the end.
 
 use std::fmt::Display;
 use std::io::Write as _;

@@ -1,7 +1,8 @@
 //! One row per flight: its random draws, its outcome and the work of its solver.
 //!
-//! The columns and their units are named only here. The cell of a quantity that a flight does not have (such as the height of an
-//! ignition that never came) is empty. A number in CSV has enough digits to read the same bits back.
+//! The columns and their units are named only here. The cell of a quantity that a flight does not
+//! have (such as the height of an ignition that never came) is empty. A number in CSV has enough
+//! digits to read the same bits back.
 
 use flight::rules::verdict::Landing;
 use serde::{Deserialize, Serialize};
@@ -66,7 +67,8 @@ row! {
     apogee_rate_deg_s: f64,
     /// The landing motor was commanded to light.
     ignited: bool,
-    /// The motor was commanded to light while a check of the ignition gate failed. This must never happen.
+    /// The motor was commanded to light while a check of the ignition gate failed. This must never
+    /// happen.
     ignition_outside_gate: bool,
     /// The parachute was deployed.
     parachute: bool,
@@ -96,8 +98,8 @@ row! {
     touchdown_y_m: Option<f64>,
     /// Thrust over weight at contact.
     touchdown_thrust_over_weight: Option<f64>,
-    /// The load of the contact on the legs as a fraction of their limit, the largest of all limits; above 1 is too
-    /// much.
+    /// The load of the contact on the legs as a fraction of their limit, the largest of all limits;
+    /// above 1 is too much.
     leg_use: Option<f64>,
     /// It stands undamaged ([`Landing`]).
     stands: bool,
@@ -123,7 +125,8 @@ row! {
     phase: String,
     /// Plans that converged and land.
     plans_converged: u64,
-    /// Plans that were flown although they did not converge or missed their end conditions slightly.
+    /// Plans that were flown although they did not converge or missed their end conditions
+    /// slightly.
     plans_best_feasible: u64,
     /// Ticks on which the previous plan was continued.
     plans_shifted: u64,
@@ -143,11 +146,11 @@ row! {
     error_height_m: f64,
     /// Largest error of the estimated direction of the nose below 10 m, degrees.
     error_nose_deg: f64,
-    /// Normalised error squared of the estimated impulse and burn time 3 s after the first thrust: chi-square with 2
-    /// degrees of freedom in a consistent filter.
+    /// Normalised error squared of the estimated impulse and burn time 3 s after the first thrust:
+    /// chi-square with 2 degrees of freedom in a consistent filter.
     nees_of_motor: Option<f64>,
-    /// Normalised error squared of estimated position, velocity and attitude, mean from the first thrust to contact: 9 in a
-    /// consistent filter.
+    /// Normalised error squared of estimated position, velocity and attitude, mean from the first
+    /// thrust to contact: 9 in a consistent filter.
     nees_of_motion: Option<f64>,
     /// Faults that happened.
     faults: u64,

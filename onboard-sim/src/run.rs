@@ -1,7 +1,7 @@
 //! The same work on many things, on several threads.
 //!
-//! What a thread does depends only on its thing (of a flight on the recipe and its number), so no result depends on the
-//! number of threads.
+//! What a thread does depends only on its thing (of a flight on the recipe and its number), so no
+//! result depends on the number of threads.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -26,7 +26,8 @@ pub fn threads(jobs: Option<usize>) -> Result<ThreadPool, ThreadPoolBuildError> 
     ThreadPoolBuilder::new().num_threads(jobs.map_or(0, |jobs| jobs.max(1))).build()
 }
 
-/// Results of `work` for each item, in the order of the items. `done` gets how many items are finished, after each.
+/// Results of `work` for each item, in the order of the items. `done` gets how many items are
+/// finished, after each.
 pub fn in_parallel<'a, T: Sync, R: Send>(
     items: &'a [T],
     work: impl Fn(&'a T) -> R + Sync,
@@ -101,7 +102,8 @@ pub fn run(recipe: &Recipe, store: &Store, progress: &(dyn Fn(&Counts) + Sync)) 
     Ok(total.into_inner().unwrap_or_else(PoisonError::into_inner))
 }
 
-/// Flies flights 0 to `flights` of a recipe, those of a campaign with it, and keeps their rows. `done` gets how many are flown.
+/// Flies flights 0 to `flights` of a recipe, those of a campaign with it, and keeps their rows.
+/// `done` gets how many are flown.
 ///
 /// # Errors
 /// The first flight that cannot be set up or panics.

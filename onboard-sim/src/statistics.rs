@@ -23,8 +23,8 @@ pub struct Share {
 }
 
 impl Share {
-    /// Uses E. B. Wilson's score interval (Journal of the American Statistical Association 22, 1927), which unlike the
-    /// normal approximation is right near 0 and 1.
+    /// Uses E. B. Wilson's score interval (Journal of the American Statistical Association 22,
+    /// 1927), which unlike the normal approximation is right near 0 and 1.
     pub fn new(count: u64, of: u64) -> Self {
         if of == 0 {
             return Self { count, of, share: 0.0, low: 0.0, high: 1.0 };
@@ -80,8 +80,8 @@ impl fmt::Display for Landings {
     }
 }
 
-/// The quantile of a fraction, with linear interpolation between neighbours (R's type 7); `None` without values.
-/// `sorted` must be in ascending order.
+/// The quantile of a fraction, with linear interpolation between neighbours (R's type 7); `None`
+/// without values. `sorted` must be in ascending order.
 pub fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
     let last = sorted.len().checked_sub(1)?;
     let place = share.clamp(0.0, 1.0) * last as f64;

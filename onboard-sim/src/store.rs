@@ -1,7 +1,8 @@
 //! A campaign's directory: what its results depend on, and a row for each flight that is flown.
 //!
-//! Rows are appended as the flights end, and sorted when all are flown. A stopped campaign continues with the flights that have no
-//! whole line. A directory belongs to one campaign; another one is refused.
+//! Rows are appended as the flights end, and sorted when all are flown. A stopped campaign
+//! continues with the flights that have no whole line. A directory belongs to one campaign; another
+//! one is refused.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -199,7 +200,8 @@ impl Store {
     }
 }
 
-/// Refuses a directory with files of these names but without a manifest, because no campaign wrote them.
+/// Refuses a directory with files of these names but without a manifest, because no campaign wrote
+/// them.
 fn refuse_foreign(directory: &Path) -> Result<(), StoreError> {
     let names = [MISSION, DISPERSION, FLIGHTS, "summary.json", "summary.md", "cost.json"];
     let found =
@@ -207,7 +209,8 @@ fn refuse_foreign(directory: &Path) -> Result<(), StoreError> {
     found.map_or(Ok(()), |path| Err(StoreError::Foreign(path)))
 }
 
-/// The rows in a directory, but for a last line that was cut. They have this program's columns and the manifest's flights.
+/// The rows in a directory, but for a last line that was cut. They have this program's columns and
+/// the manifest's flights.
 fn read_rows(directory: &Path, manifest: &Manifest) -> Result<BTreeMap<u64, Row>, StoreError> {
     let path = directory.join(FLIGHTS);
     let bytes = match fs::read(&path) {

@@ -1,6 +1,7 @@
 //! The summary of a campaign, as data, plain text and Markdown.
 //!
-//! It does not depend on a clock, a thread or a machine, so it is the same however the campaign was run.
+//! It does not depend on a clock, a thread or a machine, so it is the same however the campaign was
+//! run.
 
 use core::cmp::Reverse;
 use core::fmt::{self, Write};
@@ -96,8 +97,9 @@ pub struct Distribution {
 
 /// How many landings a drawn quantity costs.
 ///
-/// A flight's deviation is the distance of its draw from the nominal value, or the draw itself where more is worse
-/// (wind, distance and motion at apogee). The median deviation divides the flights into an inner and an outer half.
+/// A flight's deviation is the distance of its draw from the nominal value, or the draw itself
+/// where more is worse (wind, distance and motion at apogee). The median deviation divides the
+/// flights into an inner and an outer half.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Sensitivity {
     /// The quantity, with its unit.
@@ -115,8 +117,8 @@ impl Sensitivity {
         self.inner.share - self.outer.share
     }
 
-    /// The 95 % interval of the cost: Newcombe's, from the Wilson intervals of both halves (Statistics in Medicine 17, 873-890,
-    /// method 10).
+    /// The 95 % interval of the cost: Newcombe's, from the Wilson intervals of both halves
+    /// (Statistics in Medicine 17, 873-890, method 10).
     pub fn cost_interval(&self) -> [f64; 2] {
         let Self { inner, outer, .. } = self;
         let down = libm::hypot(inner.share - inner.low, outer.high - outer.share);

@@ -1,9 +1,9 @@
-//! Compares encoding and decoding with rust-mavlink's own typed reader and writer, on the same stream in the same
-//! run.
+//! Compares encoding and decoding with rust-mavlink's own typed reader and writer, on the same
+//! stream in the same run.
 //!
-//! `cargo bench -p protocol --bench throughput`. Rounds alternate between the two, so that a machine that slows down
-//! slows both; the shortest rounds are compared. "and keep" is our decoder with a copy of every frame's bytes, which
-//! rust-mavlink does not make.
+//! `cargo bench -p protocol --bench throughput`. Rounds alternate between the two, so that a
+//! machine that slows down slows both; the shortest rounds are compared. "and keep" is our decoder
+//! with a copy of every frame's bytes, which rust-mavlink does not make.
 
 use std::hint::black_box;
 use std::io::{Read, Write as _};

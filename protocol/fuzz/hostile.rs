@@ -1,7 +1,7 @@
 //! Feeds hostile input to every decoder of `protocol`; the fuzz targets and its tests call it.
 //!
-//! Each function accepts any bytes and panics only if a decoder breaks a promise. It corrects checksums, so that the
-//! code behind the checksum is reached as well.
+//! Each function accepts any bytes and panics only if a decoder breaks a promise. It corrects
+//! checksums, so that the code behind the checksum is reached as well.
 
 use std::io::Cursor;
 use std::sync::LazyLock;
@@ -24,8 +24,8 @@ use protocol::parameter::ParamRequest;
 use protocol::signing::{Key, Memory, Signing};
 use protocol::text::{Reassembler, printable};
 
-/// Builds a frame from these bytes: message id (low byte, then high), source, payload. Returns `None` for an id
-/// outside the dialect.
+/// Builds a frame from these bytes: message id (low byte, then high), source, payload. Returns
+/// `None` for an id outside the dialect.
 pub fn frame_of(bytes: &[u8]) -> Option<Frame> {
     let [low, high, system_id, component_id, payload @ ..] = bytes else { return None };
     let source = Address { system_id: *system_id, component_id: *component_id };
@@ -34,7 +34,8 @@ pub fn frame_of(bytes: &[u8]) -> Option<Frame> {
     Encoder::new(source).encode_payload(u32::from(u16::from_le_bytes([*low, *high])), payload)
 }
 
-/// Frames a stream in pieces whose sizes come from the bytes themselves, and checks that every byte is counted.
+/// Frames a stream in pieces whose sizes come from the bytes themselves, and checks that every byte
+/// is counted.
 ///
 /// # Panics
 /// A byte was not counted as framed or as garbage.
@@ -145,8 +146,8 @@ fn datagram(bytes: Vec<u8>) -> Received {
     Received::Datagram { from: ([127, 0, 0, 1], 1).into(), bytes }
 }
 
-/// Reads the bytes as a flight log, and then a good log in which these bytes change others: two bytes of position and
-/// one of value for each change.
+/// Reads the bytes as a flight log, and then a good log in which these bytes change others: two
+/// bytes of position and one of value for each change.
 ///
 /// # Panics
 /// A good log cannot be written to memory, or a log in memory cannot be read to its end.

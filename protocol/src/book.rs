@@ -1,13 +1,14 @@
 //! The book of a station: who did what when, with a hash over all of it that is signed.
 //!
-//! Whoever changes an entry gets another hash, which they cannot sign. The vehicle keeps the signed hashes that it was sent,
-//! so a book that was cut is shorter than what the vehicle has of it.
+//! Whoever changes an entry gets another hash, which they cannot sign. The vehicle keeps the signed
+//! hashes that it was sent, so a book that was cut is shorter than what the vehicle has of it.
 //!
-//! The way of an entry: the ground's `update` enters a line for a key, a command, an answer, a signature of the checklist or a
-//! word of the vehicle. Its `app` adds the time of day; here it is numbered and hashed, and it goes to `/book` of the station's
-//! log. At most every 2 s, and at the close, the hash of all entries is signed, recorded (`/book/head`) and sent to the vehicle
-//! until the vehicle confirms it. The frame is in the vehicle's log before the confirmation leaves. `replay verify --book`
-//! compares all of them ([`audit`]).
+//! The way of an entry: the ground's `update` enters a line for a key, a command, an answer, a
+//! signature of the checklist or a word of the vehicle. Its `app` adds the time of day; here it is
+//! numbered and hashed, and it goes to `/book` of the station's log. At most every 2 s, and at the
+//! close, the hash of all entries is signed, recorded (`/book/head`) and sent to the vehicle until
+//! the vehicle confirms it. The frame is in the vehicle's log before the confirmation leaves.
+//! `replay verify --book` compares all of them ([`audit`]).
 
 use std::fmt;
 
@@ -150,7 +151,8 @@ impl SignedHead {
 
 // The key that signs a book's head: Ed25519, so that who checks a book needs no secret.
 
-/// The seed of the signing key is the hash of this and the station's secret: the secret itself signs frames only.
+/// The seed of the signing key is the hash of this and the station's secret: the secret itself
+/// signs frames only.
 const SEED_DOMAIN: &[u8] = b"touchdown book key 1";
 const HEAD_DOMAIN: &[u8] = b"touchdown book head 1";
 
@@ -169,7 +171,8 @@ impl fmt::Debug for BookKey {
 pub struct PublicKey(VerifyingKey);
 
 impl BookKey {
-    /// The key that belongs to a station's secret key. Vehicle and station share that secret, so both could sign.
+    /// The key that belongs to a station's secret key. Vehicle and station share that secret, so
+    /// both could sign.
     pub fn of(key: &Key) -> Self {
         let seed = Sha256::new().chain_update(SEED_DOMAIN).chain_update(key.secret()).finalize();
         Self(SigningKey::from_bytes(&seed.into()))
@@ -253,7 +256,8 @@ pub struct Audit {
     pub key: Option<PublicKey>,
     /// The first that is wrong; `None` if the book is whole.
     pub broken: Option<Broken>,
-    /// The entries under a signature in the station's log: only the owner of the key can have written them.
+    /// The entries under a signature in the station's log: only the owner of the key can have
+    /// written them.
     pub signed: u32,
     /// The entries whose hash a vehicle has: they cannot have been changed or cut since.
     pub witnessed: u32,
@@ -261,8 +265,8 @@ pub struct Audit {
     pub closed: bool,
 }
 
-/// Checks the entries of one book, in the order of the log, against the signed heads of it. `trusted` is the key that the auditor
-/// trusts; without it the key in the first entry is taken.
+/// Checks the entries of one book, in the order of the log, against the signed heads of it.
+/// `trusted` is the key that the auditor trusts; without it the key in the first entry is taken.
 pub fn audit(entries: &[v1::BookEntry], heads: &[RecordedHead], trusted: Option<PublicKey>) -> Audit {
     let mut audit = Audit {
         key: entries.first().and_then(|first| first.text.split_whitespace().find_map(PublicKey::from_hex)),

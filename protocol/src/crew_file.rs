@@ -1,6 +1,8 @@
-//! Reads the file that names the people who may command: who they are, their roles, and where their keys are.
+//! Reads the file that names the people who may command: who they are, their roles, and where their
+//! keys are.
 //!
-//! The vehicle reads everybody's key. A station reads its own operator's only, so the others' need not be there.
+//! The vehicle reads everybody's key. A station reads its own operator's only, so the others' need
+//! not be there.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -84,7 +86,8 @@ impl CrewFile {
     /// Reads a file. Keys are named relative to its folder; they are not read here.
     ///
     /// # Errors
-    /// It cannot be read, or a person in it is wrong; the message names the person and what would be accepted.
+    /// It cannot be read, or a person in it is wrong; the message names the person and what would
+    /// be accepted.
     pub fn open(path: &Path) -> Result<Self, CrewFileError> {
         let text = std::fs::read_to_string(path)
             .map_err(|source| CrewFileError::Read { path: path.to_owned(), source })?;

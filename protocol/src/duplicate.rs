@@ -8,10 +8,12 @@ use core::time::Duration;
 use crate::frame::Frame;
 use crate::identity::Address;
 
-/// A frame may arrive this much later over one link than over another. A SiK radio lags by about 0.3 s; an overloaded
-/// link, or all of them after the computer slept, by seconds. If a copy were not detected, its command would be executed again.
+/// A frame may arrive this much later over one link than over another. A SiK radio lags by about
+/// 0.3 s; an overloaded link, or all of them after the computer slept, by seconds. If a copy were
+/// not detected, its command would be executed again.
 const MAX_DELAY: Duration = Duration::from_secs(10);
-/// So many frames with the same number are remembered: 4,096 of a source, more than it sends in that time.
+/// So many frames with the same number are remembered: 4,096 of a source, more than it sends in
+/// that time.
 const MAX_OF_A_NUMBER: usize = 16;
 /// At most this many sources are remembered, so that a flood of forged ids cannot fill the memory.
 const MAX_SOURCES: usize = 16;
@@ -29,9 +31,10 @@ struct Heard {
 
 /// Tells copies apart from new frames.
 ///
-/// A component numbers its frames once for all links, so a copy has the sequence number and the checksum of a frame
-/// that arrived over other links shortly before, and not over this one. A frame that arrives twice over the same link is no
-/// copy: its sender sent it twice, has used all its numbers since, or does not number its frames.
+/// A component numbers its frames once for all links, so a copy has the sequence number and the
+/// checksum of a frame that arrived over other links shortly before, and not over this one. A frame
+/// that arrives twice over the same link is no copy: its sender sent it twice, has used all its
+/// numbers since, or does not number its frames.
 #[derive(Debug, Default)]
 pub struct Duplicates {
     /// Of each source the frames that may still have copies, by sequence number, oldest first.
@@ -43,8 +46,9 @@ impl Duplicates {
         Self::default()
     }
 
-    /// Notes a frame that this operator has signed (0: the shared key, or none) and returns whether it is a copy. Nobody
-    /// can turn another one's frame into a copy. Over a link from the 65th on nothing is a copy.
+    /// Notes a frame that this operator has signed (0: the shared key, or none) and returns whether
+    /// it is a copy. Nobody can turn another one's frame into a copy. Over a link from the 65th on
+    /// nothing is a copy.
     pub fn is_copy(&mut self, frame: &Frame, operator: u8, link: usize, now: Duration) -> bool {
         let source = frame.source();
         if !self.sources.contains_key(&source) && self.sources.len() >= MAX_SOURCES {
@@ -111,7 +115,8 @@ mod tests {
         }
     }
 
-    /// A computer that slept hears some seconds of each link at once: more frames than there are numbers.
+    /// A computer that slept hears some seconds of each link at once: more frames than there are
+    /// numbers.
     #[test]
     fn a_link_that_is_read_long_after_another_one_has_copies_alone() {
         let mut encoder = Encoder::new(VEHICLE);

@@ -1,9 +1,10 @@
 //! Converts bytes into checked MAVLink frames and messages into frames, without I/O.
 //!
-//! [`Framer`] keeps what the crate `mavlink` would drop: the exact bytes of a frame (for the log), counters of what
-//! was rejected and why, and frames whose fields hold values outside the dialect (so that an unknown command can
-//! still be answered). It accepts MAVLink 2 only: MAVLink 1 has a one-byte marker and unchecked ids, so its framer
-//! would wait on noise for bytes that never come. Wire format: <https://mavlink.io/en/guide/serialization.html>.
+//! [`Framer`] keeps what the crate `mavlink` would drop: the exact bytes of a frame (for the log),
+//! counters of what was rejected and why, and frames whose fields hold values outside the dialect
+//! (so that an unknown command can still be answered). It accepts MAVLink 2 only: MAVLink 1 has a
+//! one-byte marker and unchecked ids, so its framer would wait on noise for bytes that never come.
+//! Wire format: <https://mavlink.io/en/guide/serialization.html>.
 
 use alloc::string::{String, ToString as _};
 use alloc::vec::Vec;
@@ -70,8 +71,8 @@ impl Frame {
         self.bytes[2] & INCOMPAT_SIGNED != 0
     }
 
-    /// Returns link id, timestamp and the first six bytes of the hash, as they are on the wire; `None` if the frame
-    /// is unsigned.
+    /// Returns link id, timestamp and the first six bytes of the hash, as they are on the wire;
+    /// `None` if the frame is unsigned.
     pub(crate) fn signature(&self) -> Option<&[u8]> {
         self.is_signed().then(|| &self.bytes[self.bytes.len() - SIGNATURE_LEN..])
     }
@@ -82,8 +83,9 @@ impl Frame {
         Some(stamp.iter().rev().fold(0, |stamp, byte| stamp << 8 | u64::from(*byte)))
     }
 
-    /// Returns the number of the key that its signature names; 0 for the shared key, and without a signature. It says
-    /// nothing until [`crate::signing::Signing`] has checked the frame against that key.
+    /// Returns the number of the key that its signature names; 0 for the shared key, and without a
+    /// signature. It says nothing until [`crate::signing::Signing`] has checked the frame against
+    /// that key.
     pub fn key_number(&self) -> u8 {
         self.signature().map_or(0, |signature| crate::signing::key_number(signature[0]))
     }
@@ -99,8 +101,9 @@ impl Frame {
         if self.is_signed() { self.with_flags(0) } else { self.clone() }
     }
 
-    /// Returns the bytes that may be logged: without the signature, and `None` for a message that contains a key. A
-    /// piece of a file is logged without its content: a log that is downloaded would contain itself.
+    /// Returns the bytes that may be logged: without the signature, and `None` for a message that
+    /// contains a key. A piece of a file is logged without its content: a log that is downloaded
+    /// would contain itself.
     pub fn for_log(&self) -> Option<Vec<u8>> {
         if self.message_id() == SETUP_SIGNING_ID {
             return None;
@@ -173,7 +176,8 @@ pub struct DecodeError {
 
 /// Returns the dialect's CRC seed (CRC_EXTRA) of a message; `None` for an id outside the dialect.
 ///
-/// The generated lookup answers 0 for unknown ids, and 0 is also a possible seed, so both cases must be distinguished.
+/// The generated lookup answers 0 for unknown ids, and 0 is also a possible seed, so both cases
+/// must be distinguished.
 #[inline]
 fn crc_extra(message_id: u32) -> Option<u8> {
     match MavMessage::extra_crc(message_id) {
@@ -273,9 +277,10 @@ impl core::ops::AddAssign for FramerCounters {
 
 /// Finds frames in a stream of bytes.
 ///
-/// After a rejected candidate the search continues at its second byte, so that a start marker inside garbage never
-/// hides the frame behind it. A candidate that waits for bytes is rejected once no more bytes will come: at the end
-/// of a datagram, and when a serial line falls silent. The framer keeps at most one partial frame between calls.
+/// After a rejected candidate the search continues at its second byte, so that a start marker
+/// inside garbage never hides the frame behind it. A candidate that waits for bytes is rejected
+/// once no more bytes will come: at the end of a datagram, and when a serial line falls silent. The
+/// framer keeps at most one partial frame between calls.
 #[derive(Debug, Default)]
 pub struct Framer {
     buffer: Vec<u8>,
@@ -298,16 +303,16 @@ impl Framer {
         self.ended = false;
     }
 
-    /// Appends a whole datagram; no frame continues in the next one. Call [`Framer::next_frame`] until it returns
-    /// `None` afterwards.
+    /// Appends a whole datagram; no frame continues in the next one. Call [`Framer::next_frame`]
+    /// until it returns `None` afterwards.
     pub fn push_datagram(&mut self, bytes: &[u8]) {
         self.push(bytes);
         self.ended = true;
     }
 
-    /// Notes that the stream has paused for longer than a frame may, so that an incomplete frame will stay
-    /// incomplete. Call [`Framer::next_frame`] until it returns `None` afterwards: a whole frame may follow the
-    /// incomplete one.
+    /// Notes that the stream has paused for longer than a frame may, so that an incomplete frame
+    /// will stay incomplete. Call [`Framer::next_frame`] until it returns `None` afterwards: a
+    /// whole frame may follow the incomplete one.
     pub fn on_silence(&mut self) {
         self.ended = true;
     }

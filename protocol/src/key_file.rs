@@ -73,11 +73,12 @@ impl KeyFile {
         writeln!(file, "{}", key.to_hex()).and_then(|()| file.sync_all()).map_err(failed)
     }
 
-    /// Reads a key and the timestamps of `user` beside it (`FILE.USER.stamps`). Vehicle and ground may use one key
-    /// file on the same machine, but each has its own timestamps.
+    /// Reads a key and the timestamps of `user` beside it (`FILE.USER.stamps`). Vehicle and ground
+    /// may use one key file on the same machine, but each has its own timestamps.
     ///
     /// # Errors
-    /// The file cannot be read, other users can read it, or it contains no key; or the timestamps cannot be parsed.
+    /// The file cannot be read, other users can read it, or it contains no key; or the timestamps
+    /// cannot be parsed.
     pub fn open(path: &Path, user: &str) -> Result<(Self, Signing), KeyFileError> {
         let key = Self::read_key(path)?;
         let mut stamps_path = path.as_os_str().to_owned();
@@ -113,8 +114,9 @@ impl KeyFile {
         Key::from_hex(text.trim_end()).ok_or_else(no_key)
     }
 
-    /// Stores timestamps, so that they survive this process however it ends. It is cheap enough to be called before
-    /// every accepted frame is acted on: it writes a line of some thirty bytes for each stream.
+    /// Stores timestamps, so that they survive this process however it ends. It is cheap enough to
+    /// be called before every accepted frame is acted on: it writes a line of some thirty bytes for
+    /// each stream.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -138,8 +140,8 @@ impl KeyFile {
         Ok(())
     }
 
-    /// Writes a new file and then renames it, so that it is complete or absent. A file to which appending failed is
-    /// replaced as well: its last line may have been cut off.
+    /// Writes a new file and then renames it, so that it is complete or absent. A file to which
+    /// appending failed is replaced as well: its last line may have been cut off.
     fn write_anew(&self, memory: &Memory) -> Result<File, KeyFileError> {
         let mut beside = self.stamps_path.clone().into_os_string();
         beside.push(".new");

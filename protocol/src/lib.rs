@@ -1,9 +1,10 @@
-//! The code that vehicle, ground station and replay share: MAVLink messages and their frames, commands, signing, links
-//! and the flight log.
+//! The code that vehicle, ground station and replay share: MAVLink messages and their frames,
+//! commands, signing, links and the flight log.
 //!
-//! The core has no sockets, no clocks and no threads: bytes go in, frames come out, and `now` is an argument (a
-//! [`std::time::Duration`] since an epoch that the caller chooses). Only [`log::recorder`] (a thread that writes a
-//! file) and the modules of the feature `transport` do I/O.
+//! The core has no sockets, no clocks and no threads: bytes go in, frames come out, and `now` is an
+//! argument (a [`std::time::Duration`] since an epoch that the caller chooses). Only
+//! [`log::recorder`] (a thread that writes a file) and the modules of the feature `transport` do
+//! I/O.
 //!
 //! In reading order:
 //!
@@ -16,9 +17,11 @@
 //! * [`hub`]: several links to one peer, made of the modules above;
 //! * `transport` (a feature): UDP, TCP and serial links;
 //! * `links` (the same feature): the open links of a program, together;
-//! * `key_file` and `crew_file` (the same feature): the file of a signing key, and of the people who have keys;
+//! * `key_file` and `crew_file` (the same feature): the file of a signing key, and of the people
+//!   who have keys;
 //! * [`mission`]: which mission is meant;
-//! * [`motion`]: where a vehicle is and how it turns, from its messages; `told`: all of it as a record of the log;
+//! * [`motion`]: where a vehicle is and how it turns, from its messages; `told`: all of it as a
+//!   record of the log;
 //! * [`book`]: who did what, with a signed hash over all of it;
 //! * [`records`]: the records of the flight log, generated;
 //! * [`log`]: the flight log;
@@ -26,9 +29,9 @@
 //!
 //! # On a flight computer
 //!
-//! Bytes from a UART, a socket or a test go into a [`hub::Hub`]; valid frames that were not heard before come out. A
-//! message is sent through a [`frame::Encoder`], one for each component, and then through the hub, which signs it for
-//! each link. Nothing here waits or reads a clock:
+//! Bytes from a UART, a socket or a test go into a [`hub::Hub`]; valid frames that were not heard
+//! before come out. A message is sent through a [`frame::Encoder`], one for each component, and
+//! then through the hub, which signs it for each link. Nothing here waits or reads a clock:
 //!
 //! ```
 //! use std::time::Duration;
@@ -64,8 +67,8 @@
 //! With a key, the caller must pass the time of day, as far as it is known, and must store
 //! [`hub::Hub::signing_memory`] so that it survives a power cycle.
 //!
-//! Without the feature `std` the crate needs a heap and no operating system; then it has no log, no book and no files, and its
-//! dialect has the messages that a vehicle says and hears.
+//! Without the feature `std` the crate needs a heap and no operating system; then it has no log, no
+//! book and no files, and its dialect has the messages that a vehicle says and hears.
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 
 extern crate alloc;

@@ -1,5 +1,5 @@
-//! Measures one link: the rates, the loss and the age of what arrived over the last ten seconds, in total and for
-//! each component.
+//! Measures one link: the rates, the loss and the age of what arrived over the last ten seconds, in
+//! total and for each component.
 
 use alloc::collections::{BTreeMap, VecDeque};
 use alloc::vec::Vec;
@@ -155,8 +155,9 @@ impl LinkStats {
         self.bucket(now).tx_bytes += count as u64;
     }
 
-    /// Counts a frame that arrived. A late frame was counted as lost before, so the loss is corrected. A sequence
-    /// number that jumps back by more than a few dozen means that the sender has restarted.
+    /// Counts a frame that arrived. A late frame was counted as lost before, so the loss is
+    /// corrected. A sequence number that jumps back by more than a few dozen means that the sender
+    /// has restarted.
     pub fn on_frame(&mut self, frame: &Frame, now: Duration) {
         let (address, sequence) = (frame.source(), frame.sequence());
         let known = self.sources.get(&address).map(|known| known.last_sequence);
@@ -245,10 +246,11 @@ impl LinkStats {
 
 /// How old the newest content of a vehicle is, with the time that it has spent in queues.
 ///
-/// The vehicle's messages carry its own clock. When one arrives, the clocks differ by at most `arrival - clock`, because
-/// nothing arrives before it was sent. The answer to a TIMESYNC was given after the question left, so they differ by at
-/// least `question - clock`. The latter decides, if there is one: then the age is rather given too great, by the time that the
-/// question took.
+/// The vehicle's messages carry its own clock. When one arrives, the clocks differ by at most
+/// `arrival - clock`, because nothing arrives before it was sent. The answer to a TIMESYNC was
+/// given after the question left, so they differ by at least `question - clock`. The latter
+/// decides, if there is one: then the age is rather given too great, by the time that the question
+/// took.
 #[derive(Debug, Clone, Default)]
 pub struct ContentAge {
     /// The newest time on the vehicle's clock, us, and the first one that was heard.
@@ -261,7 +263,8 @@ pub struct ContentAge {
 
 /// So many minutes are remembered. In ten minutes two quartz clocks drift apart by some 60 ms.
 const CLOCK_MINUTES: usize = 10;
-/// A vehicle's clock that goes back by more than this has begun anew, us. Messages may overtake each other.
+/// A vehicle's clock that goes back by more than this has begun anew, us. Messages may overtake
+/// each other.
 const ANEW_US: i64 = 1_000_000;
 
 fn us(time: Duration) -> i64 {
@@ -288,7 +291,8 @@ impl ContentAge {
         }
         let (newest_us, first_us) = self.heard_us.unwrap_or((clock_us, clock_us));
         self.heard_us = Some((newest_us.max(clock_us), first_us));
-        // It arrived before it could have been sent: the vehicle's clock runs faster than was thought.
+        // It arrived before it could have been sent: the vehicle's clock runs faster than was
+        // thought.
         if self.at_least_us().is_some_and(|least_us| offset_us < least_us) {
             self.lower.clear();
         }
@@ -335,8 +339,9 @@ mod tests {
         Duration::from_millis(milliseconds)
     }
 
-    /// Messages every 100 ms that take `delay` of their time of sending to arrive; a question every 5 s, which takes 30 ms,
-    /// and its answer as long as everything else. Returns the worst error of the age, ms, from a time on.
+    /// Messages every 100 ms that take `delay` of their time of sending to arrive; a question every
+    /// 5 s, which takes 30 ms, and its answer as long as everything else. Returns the worst error
+    /// of the age, ms, from a time on.
     fn worst_error_ms(delay: impl Fn(u64) -> u64, asks: bool, from_ms: u64) -> u64 {
         // The vehicle has run for 1,000 s when the station starts.
         let clock = |now: u64| ms(1_000_000 + now);

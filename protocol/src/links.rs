@@ -1,4 +1,5 @@
-//! The open links of a program, together: their transports, the hub over them, and the file of the key that signs.
+//! The open links of a program, together: their transports, the hub over them, and the file of the
+//! key that signs.
 
 use std::io;
 use std::time::Duration;
@@ -126,8 +127,8 @@ impl Links {
         events
     }
 
-    /// Sends a frame over one link, to everybody there or `to` one of them. For a slow line it may wait until
-    /// [`Self::send_what_waits`].
+    /// Sends a frame over one link, to everybody there or `to` one of them. For a slow line it may
+    /// wait until [`Self::send_what_waits`].
     pub fn send(&mut self, number: usize, frame: &Frame, to: Option<Origin>, now: Now, on_sent: OnSent<'_>) {
         if let Some(bytes) = self.hub.send(number, frame, now.stamp) {
             self.hand_over(number, frame, bytes, to, now, on_sent);
@@ -167,7 +168,8 @@ impl Links {
         of_lines + self.open.iter().map(|link| link.sender.dropped()).sum::<u64>()
     }
 
-    /// Whether the signing timestamps were last saved a second ago or earlier; then they count as saved now.
+    /// Whether the signing timestamps were last saved a second ago or earlier; then they count as
+    /// saved now.
     pub fn saves_timestamps_at(&mut self, stamp: u64) -> bool {
         let due = stamp.saturating_sub(self.saved_at) >= SAVE_EVERY;
         if due {

@@ -4,9 +4,10 @@ use core::fmt;
 
 use sha2::{Digest as _, Sha256};
 
-/// The first eight bytes of the SHA-256 of a mission's text, as in TD_MISSION. Any edit changes it, also of a comment, but for the
-/// line that says where a flight begins (`at` in `[start]`): that is chosen anew for each flight (`--start`).
-/// 64 bits tell missions apart; they are no protection against somebody who searches for a text with the same hash.
+/// The first eight bytes of the SHA-256 of a mission's text, as in TD_MISSION. Any edit changes it,
+/// also of a comment, but for the line that says where a flight begins (`at` in `[start]`): that is
+/// chosen anew for each flight (`--start`). 64 bits tell missions apart; they are no protection
+/// against somebody who searches for a text with the same hash.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "transport", derive(serde::Serialize, serde::Deserialize))]
 pub struct MissionHash(pub [u8; 8]);
@@ -44,8 +45,8 @@ pub enum Expected {
 }
 
 impl MissionHash {
-    /// The hash as parameters 4 to 6 of MAV_CMD_COMPONENT_ARM_DISARM: 22 bits each, the lowest first, plus one, so that 0
-    /// means that none is given. A float holds each of them exactly.
+    /// The hash as parameters 4 to 6 of MAV_CMD_COMPONENT_ARM_DISARM: 22 bits each, the lowest
+    /// first, plus one, so that 0 means that none is given. A float holds each of them exactly.
     pub fn to_params(self) -> [f32; 3] {
         let bits = u64::from_le_bytes(self.0);
         [0, 1, 2].map(|place| ((bits >> (BITS_A_PARAM * place)) & MASK) as f32 + 1.0)

@@ -1,5 +1,5 @@
-//! Position, velocity and attitude of a vehicle, converted from north-east-down on the wire to north, east and up; and places on
-//! the Earth.
+//! Position, velocity and attitude of a vehicle, converted from north-east-down on the wire to
+//! north, east and up; and places on the Earth.
 
 use alloc::format;
 use alloc::string::String;
@@ -56,7 +56,8 @@ impl Degrees {
         (along_m.to_radians(), (across_m * libm::cos(latitude_rad)).to_radians())
     }
 
-    /// The point at a distance north and east of this one, m; exact to a millimetre within a kilometre.
+    /// The point at a distance north and east of this one, m; exact to a millimetre within a
+    /// kilometre.
     #[must_use]
     pub fn moved(self, north_m: f64, east_m: f64) -> Self {
         let (north_m_deg, east_m_deg) = self.metres_per_degree();
@@ -151,8 +152,8 @@ impl Deflection {
 }
 
 impl Attitude {
-    /// `None` if the quaternion is no rotation. Pitch and tilt come from the direction of the nose, which has no
-    /// singularity at upright.
+    /// `None` if the quaternion is no rotation. Pitch and tilt come from the direction of the nose,
+    /// which has no singularity at upright.
     pub fn of(data: &ATTITUDE_QUATERNION_DATA) -> Option<Self> {
         let [w, x, y, z] = [data.q1, data.q2, data.q3, data.q4].map(f64::from);
         let norm_squared = w * w + x * x + y * y + z * z;
@@ -193,7 +194,8 @@ impl Motion {
         }
     }
 
-    /// Height above the pad and climb of a vehicle that sends no local position. Not of VFR_HUD: its height is above mean sea level.
+    /// Height above the pad and climb of a vehicle that sends no local position. Not of VFR_HUD:
+    /// its height is above mean sea level.
     pub fn of_global(data: &GLOBAL_POSITION_INT_DATA) -> Self {
         Self::vertical(f64::from(data.relative_alt) / 1e3, -f64::from(data.vz) / 1e2)
     }
@@ -249,8 +251,8 @@ mod tests {
         assert!((found - expected).abs() < 1e-5, "{found} is not {expected}");
     }
 
-    /// A rocket that leans 10 deg towards the east, which the plane of north and up does not show: a rotation about
-    /// east by 90 deg, then about north by 10 deg.
+    /// A rocket that leans 10 deg towards the east, which the plane of north and up does not show:
+    /// a rotation about east by 90 deg, then about north by 10 deg.
     #[test]
     fn a_lean_towards_the_east_is_a_tilt() {
         let (sin, cos) = libm::sincos(5.0_f64.to_radians());

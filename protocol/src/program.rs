@@ -12,7 +12,8 @@ use clap_complete::Shell;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Exit {
-    /// It stands undamaged, it is the same, it is done; or the crew closed the screen before a flight began.
+    /// It stands undamaged, it is the same, it is done; or the crew closed the screen before a
+    /// flight began.
     Yes = 0,
     /// Something failed: a file, a socket, the simulator.
     Error = 1,
@@ -32,7 +33,8 @@ impl Exit {
         if yes { Self::Yes } else { Self::No }
     }
 
-    /// How a command line ended that was not run: help and version are an answer. Prints it; if nobody reads it, nothing is lost.
+    /// How a command line ended that was not run: help and version are an answer. Prints it; if
+    /// nobody reads it, nothing is lost.
     pub fn unread(message: &clap::Error) -> Self {
         let _ = message.print();
         if message.use_stderr() { Self::Usage } else { Self::Yes }

@@ -1,5 +1,5 @@
-//! The records of the flight log, as plain types: generated from `proto/touchdown/`. Without `std`, so that a flight
-//! computer on a board reads and writes the same records.
+//! The records of the flight log, as plain types: generated from `proto/touchdown/`. Without `std`,
+//! so that a flight computer on a board reads and writes the same records.
 //!
 //! * [`v1`]: the verdict, telemetry, operators.
 //! * [`flight_v1`]: the pilot, and the simulated truth.

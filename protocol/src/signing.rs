@@ -1,8 +1,8 @@
 //! Signs MAVLink 2 frames and checks signatures, without clocks and files.
 //!
-//! A signature is the first six bytes of SHA-256 over key, frame, link id and timestamp. Timestamps count 10 us units
-//! since 2015-01-01 UTC. For each system, component and link they only grow, so a recorded frame cannot be replayed.
-//! <https://mavlink.io/en/guide/message_signing.html>
+//! A signature is the first six bytes of SHA-256 over key, frame, link id and timestamp. Timestamps
+//! count 10 us units since 2015-01-01 UTC. For each system, component and link they only grow, so a
+//! recorded frame cannot be replayed. <https://mavlink.io/en/guide/message_signing.html>
 //!
 //! Keys are copied as files, never sent by radio: SETUP_SIGNING is ignored.
 
@@ -21,12 +21,12 @@ use crate::identity::Address;
 
 /// A new stream may begin at most this far behind our own time: one minute.
 const NEW_STREAM_LAG: u64 = 60 * STAMPS_PER_S;
-/// A frame may be at most this far ahead of a clock that is known to be set: one day. A clock set to another time
-/// zone is off by less, and must not separate vehicle and ground at the pad. A station with a wrong year must not
-/// lock out all others for ever.
+/// A frame may be at most this far ahead of a clock that is known to be set: one day. A clock set
+/// to another time zone is off by less, and must not separate vehicle and ground at the pad. A
+/// station with a wrong year must not lock out all others for ever.
 const MAX_AHEAD: u64 = 24 * 3600 * STAMPS_PER_S;
-/// 2026-01-01 00:00 UTC, 4,018 days after 2015-01-01. This program is newer, so a clock that shows an earlier time
-/// was never set.
+/// 2026-01-01 00:00 UTC, 4,018 days after 2015-01-01. This program is newer, so a clock that shows
+/// an earlier time was never set.
 const PROGRAM_WRITTEN: u64 = 4_018 * 24 * 3600 * STAMPS_PER_S;
 
 /// A secret signing key.
@@ -157,8 +157,9 @@ pub(crate) fn key_number(link_id: u8) -> u8 {
 
 /// Signs frames that are sent and checks frames that arrive.
 ///
-/// Without operators everybody has one key. With operators each of them has a key of their own, and the link id of a
-/// signature selects the key to check against; the vehicle itself and whoever only looks on use the shared one.
+/// Without operators everybody has one key. With operators each of them has a key of their own, and
+/// the link id of a signature selects the key to check against; the vehicle itself and whoever only
+/// looks on use the shared one.
 #[derive(Debug, Clone)]
 pub struct Signing {
     /// The key that signs, and its number.
@@ -187,20 +188,22 @@ impl Signing {
         }
     }
 
-    /// Signs as the operator of this number from now on; what the vehicle sends is checked with the key that all share.
+    /// Signs as the operator of this number from now on; what the vehicle sends is checked with the
+    /// key that all share.
     #[must_use]
     pub fn as_operator(self, number: u8, shared: Key) -> Self {
         Self { own: (key_number(number), self.own.1), shared, ..self }
     }
 
-    /// Checks frames that name an operator with that operator's key. A frame that names an unknown one is refused.
+    /// Checks frames that name an operator with that operator's key. A frame that names an unknown
+    /// one is refused.
     #[must_use]
     pub fn with_operators(self, operators: BTreeMap<u8, Key>) -> Self {
         Self { operators, ..self }
     }
 
-    /// The link id of frames over a link: its number, and the number of the key. Links beyond the 16th share an id,
-    /// which costs nothing but exact statistics.
+    /// The link id of frames over a link: its number, and the number of the key. Links beyond the
+    /// 16th share an id, which costs nothing but exact statistics.
     pub fn link_id(&self, link: usize) -> u8 {
         (link as u8) << KEY_BITS | self.own.0
     }
@@ -218,8 +221,9 @@ impl Signing {
         self.operators.get(&number)
     }
 
-    /// Signs an unsigned frame for one link. `clock` is the time of the system's clock, which may stand still or be
-    /// wrong. A frame that is sent again must be signed again, which gives it a newer timestamp.
+    /// Signs an unsigned frame for one link. `clock` is the time of the system's clock, which may
+    /// stand still or be wrong. A frame that is sent again must be signed again, which gives it a
+    /// newer timestamp.
     #[must_use]
     pub fn sign(&mut self, frame: &Frame, link_id: u8, clock: u64) -> Frame {
         self.memory.ours = clock.max(self.memory.ours + 1).min(MAX_STAMP);
@@ -256,8 +260,8 @@ impl Signing {
         let stamp = frame.stamp().ok_or(Rejection::Unsigned)?;
         let stream = (frame.source(), signature[0]);
         self.memory.clock = self.memory.clock.max(clock);
-        // A clock that is known to be set shows the right time. Otherwise the latest timestamp that was heard is
-        // taken for the time.
+        // A clock that is known to be set shows the right time. Otherwise the latest timestamp that
+        // was heard is taken for the time.
         let is_set = self.is_set(clock);
         if is_set && stamp > clock + MAX_AHEAD {
             return Err(Rejection::TooNew);
@@ -284,8 +288,9 @@ impl Signing {
         self.memory.streams.keys().filter(|(_, link_id)| key_number(*link_id) == operator).count()
     }
 
-    /// Returns whether our clock is known to be set: it shows a time after this program was written, and it has not
-    /// gone back since earlier runs. A board whose clock stops without power fails one of the two.
+    /// Returns whether our clock is known to be set: it shows a time after this program was
+    /// written, and it has not gone back since earlier runs. A board whose clock stops without
+    /// power fails one of the two.
     fn is_set(&self, clock: u64) -> bool {
         clock >= PROGRAM_WRITTEN.max(self.clock_before)
     }
@@ -295,8 +300,9 @@ impl Signing {
         self.counters
     }
 
-    /// Returns the timestamps to be stored. Store them before acting on an accepted frame, so that it is not accepted
-    /// twice, and at least once a second, so that no own timestamp is used twice.
+    /// Returns the timestamps to be stored. Store them before acting on an accepted frame, so that
+    /// it is not accepted twice, and at least once a second, so that no own timestamp is used
+    /// twice.
     pub fn memory(&self) -> Memory {
         let ours = (self.memory.ours + LEAD).min(MAX_STAMP);
         Memory { ours, ..self.memory.clone() }
@@ -317,8 +323,8 @@ pub fn stamp_of(since_unix_epoch: Duration) -> u64 {
     u64::try_from(since.as_micros() / 10).unwrap_or(MAX_STAMP).min(MAX_STAMP)
 }
 
-/// The time of day at one instant, from which on only elapsed time counts. So the stamps of a run do not follow a clock
-/// that is set while it runs, forward or back.
+/// The time of day at one instant, from which on only elapsed time counts. So the stamps of a run
+/// do not follow a clock that is set while it runs, forward or back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Anchor(Duration);
 
@@ -334,9 +340,11 @@ impl Anchor {
     }
 }
 
-// The timestamps that must survive a restart, as lines of text to which further lines may be appended.
+// The timestamps that must survive a restart, as lines of text to which further lines may be
+// appended.
 
-/// Stored timestamps are this far ahead of the ones in use, so that no timestamp is used twice after a restart.
+/// Stored timestamps are this far ahead of the ones in use, so that no timestamp is used twice
+/// after a restart.
 const LEAD: u64 = 5 * STAMPS_PER_S;
 /// At most this many streams of one key are remembered. Only holders of the key can begin one.
 const MAX_STREAMS: usize = 64;
@@ -354,7 +362,8 @@ pub enum MemoryError {
     NoOwnStamp,
 }
 
-/// The timestamps that must survive a restart: our own, our clock's, and those of each stream that was heard.
+/// The timestamps that must survive a restart: our own, our clock's, and those of each stream that
+/// was heard.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Memory {
     /// The last timestamp that was used for signing, plus a margin: see [`Signing::memory`].
@@ -369,8 +378,8 @@ impl Memory {
         [self.own_lines()].into_iter().chain(self.streams.iter().map(heard)).collect()
     }
 
-    /// Returns the lines that update `other`, an older memory, to this one. While the margin of the own timestamps is
-    /// at least half left, they are not written again.
+    /// Returns the lines that update `other`, an older memory, to this one. While the margin of the
+    /// own timestamps is at least half left, they are not written again.
     pub fn lines_since(&self, other: &Self) -> String {
         let news = self.streams.iter().filter(|(stream, stamp)| other.streams.get(stream) != Some(stamp));
         let own = (self.ours > other.ours + LEAD / 2).then(|| self.own_lines());
@@ -381,7 +390,8 @@ impl Memory {
         format!("ours {}\nclock {}\n", self.ours, self.clock)
     }
 
-    /// Notes that what [`Memory::lines_since`] returned was written, so that it is not written again.
+    /// Notes that what [`Memory::lines_since`] returned was written, so that it is not written
+    /// again.
     pub fn catch_up(&mut self, with: &Self) {
         if with.ours > self.ours + LEAD / 2 {
             (self.ours, self.clock) = (with.ours, with.clock);
@@ -389,8 +399,8 @@ impl Memory {
         self.streams.clone_from(&with.streams);
     }
 
-    /// Parses the lines of a timestamp file; later lines override earlier ones. An incomplete last line was cut off
-    /// while it was written. Its frame was not acted on, so the line is ignored.
+    /// Parses the lines of a timestamp file; later lines override earlier ones. An incomplete last
+    /// line was cut off while it was written. Its frame was not acted on, so the line is ignored.
     ///
     /// # Errors
     /// A line cannot be parsed, or the own timestamp is missing.
@@ -436,7 +446,8 @@ fn heard((stream, stamp): (&(Address, u8), &u64)) -> String {
     format!("heard {system_id} {component_id} {link_id} {stamp}\n")
 }
 
-// Notices that every frame of a sender is refused for its time stamp although its key is right, and says what to do.
+// Notices that every frame of a sender is refused for its time stamp although its key is right, and
+// says what to do.
 
 /// A sender is locked out when for this long only such frames arrived.
 const AFTER: Duration = Duration::from_secs(2);
@@ -463,8 +474,8 @@ impl Lockouts {
         }
     }
 
-    /// Notes a refused frame. Returns the words for the crew when they are due. `clock` is the time that the frame was judged
-    /// by, as a time stamp.
+    /// Notes a refused frame. Returns the words for the crew when they are due. `clock` is the time
+    /// that the frame was judged by, as a time stamp.
     pub fn refused(&mut self, frame: &Frame, why: Rejection, now: Duration, clock: u64) -> Option<String> {
         let stamp = frame.stamp()?;
         if !matches!(why, Rejection::Replayed | Rejection::TooOld | Rejection::TooNew) {

@@ -1,4 +1,5 @@
-//! Splits a text into the 50-byte chunks of STATUSTEXT, reassembles texts, and removes control characters.
+//! Splits a text into the 50-byte chunks of STATUSTEXT, reassembles texts, and removes control
+//! characters.
 //!
 //! <https://mavlink.io/en/messages/common.html#STATUSTEXT>
 
@@ -18,8 +19,8 @@ const MAX_CHUNKS: usize = 8;
 /// A text whose chunks are not complete after this time is shown with a gap.
 const REASSEMBLY_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// Splits a text into STATUSTEXT messages. `id` marks the chunks of one text and must differ from the ids of the
-/// texts before it. A text that fits into one chunk is sent with id 0.
+/// Splits a text into STATUSTEXT messages. `id` marks the chunks of one text and must differ from
+/// the ids of the texts before it. A text that fits into one chunk is sent with id 0.
 pub fn chunks(severity: MavSeverity, text: &str, id: u16) -> Vec<STATUSTEXT_DATA> {
     let bytes = &text.as_bytes()[..text.len().min(CHUNK_LEN * MAX_CHUNKS)];
     let single = bytes.len() <= CHUNK_LEN;
@@ -70,7 +71,8 @@ pub struct Reassembler {
 }
 
 impl Reassembler {
-    /// This many texts may wait for their chunks at the same time; the oldest one is given up first.
+    /// This many texts may wait for their chunks at the same time; the oldest one is given up
+    /// first.
     pub const MAX_PARTIAL: usize = 16;
 
     pub fn new() -> Self {
@@ -153,8 +155,8 @@ impl Partial {
     }
 }
 
-/// Makes received bytes safe for a terminal: bytes that are not UTF-8 and control characters become U+FFFD, so that
-/// no escape sequence that was sent by radio reaches the terminal.
+/// Makes received bytes safe for a terminal: bytes that are not UTF-8 and control characters become
+/// U+FFFD, so that no escape sequence that was sent by radio reaches the terminal.
 pub fn printable(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes)
         .chars()

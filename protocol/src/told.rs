@@ -12,7 +12,8 @@ use crate::identity::PHASE_BITS;
 use crate::log::v1::Telemetry;
 use crate::motion::{Attitude, Deflection, Motion};
 
-/// Whether a heartbeat is one that our vehicles send. Whether it is ours only its `TD_FLIGHT_STATUS` shows.
+/// Whether a heartbeat is one that our vehicles send. Whether it is ours only its
+/// `TD_FLIGHT_STATUS` shows.
 pub fn may_be_ours(beat: &HEARTBEAT_DATA) -> bool {
     beat.autopilot == MavAutopilot::MAV_AUTOPILOT_GENERIC && beat.mavtype == MavType::MAV_TYPE_ROCKET
 }
@@ -27,8 +28,8 @@ pub fn phase_from_number(number: u32) -> Option<TdPhase> {
     TdPhase::from_u32(number)
 }
 
-/// The boot that a frame of a vehicle of ours names: a HEARTBEAT above the phase, our own messages in their first number. `None`
-/// if it names none.
+/// The boot that a frame of a vehicle of ours names: a HEARTBEAT above the phase, our own messages
+/// in their first number. `None` if it names none.
 pub fn boot_of(frame: &Frame) -> Option<u32> {
     let payload = frame.padded_payload();
     let number =
@@ -156,7 +157,8 @@ mod tests {
     use super::*;
     use crate::dialect::{ATTITUDE_QUATERNION_DATA, LOCAL_POSITION_NED_DATA};
 
-    /// The record of a vehicle that falls with 20 m/s, after rotations about its own axes: to its pitch, then a roll.
+    /// The record of a vehicle that falls with 20 m/s, after rotations about its own axes: to its
+    /// pitch, then a roll.
     fn falling(pitch_deg: f64, roll_deg: f64, sign: f64) -> Telemetry {
         let half = |angle_deg: f64| libm::sincos(angle_deg.to_radians() / 2.0);
         let ((sin_p, cos_p), (sin_r, cos_r)) = (half(pitch_deg), half(roll_deg));
@@ -170,7 +172,8 @@ mod tests {
         told.record(0.0)
     }
 
-    /// A roll does not change where the nose points, and both signs of a quaternion are one attitude.
+    /// A roll does not change where the nose points, and both signs of a quaternion are one
+    /// attitude.
     #[test]
     fn tilt_does_not_depend_on_the_roll() {
         for roll_deg in [0.0, 50.0, 180.0, 300.0] {

@@ -95,8 +95,8 @@ proptest! {
         let written = book(&texts, &key(1));
         let mut forged_texts = texts.clone();
         forged_texts[at.index(texts.len())].push('x');
-        // With the hashes that were signed; signed again with another key, and the vehicle knows better; without the
-        // vehicle, and the auditor has the key.
+        // With the hashes that were signed; signed again with another key, and the vehicle knows
+        // better; without the vehicle, and the auditor has the key.
         let kept = Written { entries: book(&forged_texts, &key(1)).entries, ..book(&texts, &key(1)) };
         let is_changed = matches!(check(&kept, None).broken, Some(Broken::Changed { .. }));
         prop_assert!(is_changed);

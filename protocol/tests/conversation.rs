@@ -195,7 +195,8 @@ fn a_restarted_sender_is_not_taken_for_loss() {
     for frame in heartbeats(&mut Encoder::new(VEHICLE), 200) {
         stats.on_frame(&frame, ms(0));
     }
-    // From 199 back to 0 is a jump of 56 forwards: below half the range it counts as loss, above it does not.
+    // From 199 back to 0 is a jump of 56 forwards: below half the range it counts as loss, above it
+    // does not.
     for frame in heartbeats(&mut Encoder::new(VEHICLE), 60) {
         stats.on_frame(&frame, ms(1_000));
     }

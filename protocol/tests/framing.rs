@@ -53,7 +53,8 @@ fn every_chunk_size_finds_every_frame_between_garbage() {
         stream.extend_from_slice(&garbage);
         stream.extend_from_slice(frame.as_bytes());
     }
-    // A candidate that begins in the garbage may need up to one frame's length of bytes before it is rejected.
+    // A candidate that begins in the garbage may need up to one frame's length of bytes before it
+    // is rejected.
     stream.extend_from_slice(&[0; 300]);
     for chunk in 1..=stream.len() {
         let mut framer = Framer::new();
@@ -81,7 +82,8 @@ fn bytes(hex: &str) -> Vec<u8> {
     (0..hex.len()).step_by(2).map(|at| u8::from_str_radix(&hex[at..at + 2], 16).unwrap()).collect()
 }
 
-/// Frames packed by pymavlink 2.4.50 (MAVLink 2, system 1, component 1). We decode them and encode the same bytes.
+/// Frames packed by pymavlink 2.4.50 (MAVLink 2, system 1, component 1). We decode them and encode
+/// the same bytes.
 #[test]
 fn val_pymavlink_frames_byte_for_byte() {
     let by_pymavlink = [
@@ -132,7 +134,8 @@ fn a_frame_does_not_continue_in_the_next_datagram() {
     assert_eq!(framer.next_frame().as_ref(), Some(frame));
 }
 
-/// Stray bytes, among them markers of both protocol versions, and the beginnings of frames whose rest is lost.
+/// Stray bytes, among them markers of both protocol versions, and the beginnings of frames whose
+/// rest is lost.
 fn noises() -> Vec<Vec<u8>> {
     let cut = frames()[1].as_bytes()[..20].to_vec();
     vec![vec![0xFE], vec![0xFD], vec![0xFE, 0xFD], vec![0xFD, 0xFF, 0x00], vec![0xFD, 0xFF, 0x01, 0x00], cut]

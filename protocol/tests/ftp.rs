@@ -187,8 +187,8 @@ impl World {
 const RADIO: LineSettings =
     LineSettings { bytes_s: 5760.0, latency_s: 0.05, loss: 0.3, double: 0.0, late: (0.0, 0.0) };
 
-/// Ten megabytes over 57,600 baud with 30 % loss both ways; the ground's process is killed five times, and begins
-/// again with what is on disk.
+/// Ten megabytes over 57,600 baud with 30 % loss both ways; the ground's process is killed five
+/// times, and begins again with what is on disk.
 #[test]
 fn ten_megabytes_arrive_whole_over_a_bad_line_although_the_ground_is_killed_five_times() {
     const LEN: usize = 10_000_000;

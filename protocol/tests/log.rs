@@ -95,7 +95,8 @@ fn a_whole_log_is_read_as_written() {
     assert_eq!(flight_v1::TruthSample::decode(contents.messages[3].1.as_slice()).unwrap(), truth);
 }
 
-/// An encoder may drop a field that equals its default, and -0.0 equals 0.0; our schema must prevent that.
+/// An encoder may drop a field that equals its default, and -0.0 equals 0.0; our schema must
+/// prevent that.
 #[test]
 fn both_zeros_and_every_nan_survive() {
     for bits in
@@ -166,8 +167,8 @@ fn a_recorder_never_overwrites_and_ends_its_file() {
     assert_eq!((contents.messages.len(), contents.damage), (20_000, None));
 }
 
-/// A flipped bit costs a chunk or the rest of the log, but never changes a message, because checksums protect all of
-/// them.
+/// A flipped bit costs a chunk or the rest of the log, but never changes a message, because
+/// checksums protect all of them.
 #[test]
 fn no_flipped_bit_changes_a_message() {
     let records: Vec<_> = (0..12).map(operator).collect();

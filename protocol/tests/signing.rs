@@ -46,7 +46,8 @@ fn a_signed_frame_is_accepted_once() {
     assert_eq!((counters.accepted, counters.replayed, counters.rejected()), (2, 1, 1));
 }
 
-/// Frames signed by pymavlink 2.4.50 with key 0 to 31, link 3 and the first timestamp 37,000,000,000,000.
+/// Frames signed by pymavlink 2.4.50 with key 0 to 31, link 3 and the first timestamp
+/// 37,000,000,000,000.
 #[test]
 fn val_pymavlink_signatures_are_accepted_and_ours_are_the_same_bytes() {
     let by_pymavlink = [
@@ -132,13 +133,15 @@ fn a_timestamp_far_ahead_is_refused_if_our_own_clock_is_known_to_be_set() {
         Ok(()),
         "other senders are not locked out"
     );
-    // A clock of another time zone is less than a day ahead; it must not lock out clocks that are right.
+    // A clock of another time zone is less than a day ahead; it must not lock out clocks that are
+    // right.
     let mut vehicle = side(7);
     assert_eq!(vehicle.check(&side(7).sign(&beat(), 0, NOW + 14 * 3600 * SECOND), NOW), Ok(()));
     assert_eq!(vehicle.check(&side(7).sign(&beat(), 1, NOW), NOW), Ok(()));
 }
 
-/// The clock of the vehicle's computer is set three days forward while it runs, and back again. The vehicle asks it once.
+/// The clock of the vehicle's computer is set three days forward while it runs, and back again. The
+/// vehicle asks it once.
 #[test]
 fn the_stamps_of_a_run_follow_no_clock_that_is_set_while_it_runs() {
     // 2026-11-23: 20,780 days.
@@ -288,8 +291,8 @@ fn the_link_id_selects_the_key_and_nothing_else() {
     }
 }
 
-/// Whoever only looks on has the shared key: they can neither use up the streams of an operator nor put one's stream
-/// into the future, and thereby delay an abort.
+/// Whoever only looks on has the shared key: they can neither use up the streams of an operator nor
+/// put one's stream into the future, and thereby delay an abort.
 #[test]
 fn an_observer_locks_no_operator_out() {
     let (mut vehicle, [mut observer, mut ann, _]) = crew();

@@ -2,9 +2,11 @@
 //!
 //! `cargo run --release -p replay --example clubs -- MISSION FLIGHTS SEED`
 //!
-//! Each simulated club has a motor lot as the prior has them and five or ten flights behind it, knows its motors as well as fits do,
-//! and simulates its next day in `real` or `wild`. Its own world is that one, or `wild` although it simulates `real`. FLIGHTS flights of each world, whose motors scatter
-//! more than any lot's, tell how a motor lands there: as the 40 flights with the nearest motors did.
+//! Each simulated club has a motor lot as the prior has them and five or ten flights behind it,
+//! knows its motors as well as fits do, and simulates its next day in `real` or `wild`. Its own
+//! world is that one, or `wild` although it simulates `real`. FLIGHTS flights of each world, whose
+//! motors scatter more than any lot's, tell how a motor lands there: as the 40 flights with the
+//! nearest motors did.
 
 use std::io::Write as _;
 

@@ -1,8 +1,10 @@
-//! Flies simulated flights, fits each from what its log would hold, and counts how often the 95 % intervals hold the truth.
+//! Flies simulated flights, fits each from what its log would hold, and counts how often the 95 %
+//! intervals hold the truth.
 //!
 //! `cargo run --release -p replay --example fit_coverage -- MISSION DISPERSION FLIGHTS SEED [pad]`
 //!
-//! With `--table FILE FLIGHTS SEED` it writes instead what the intervals lack, the table that `replay fit` widens them by.
+//! With `--table FILE FLIGHTS SEED` it writes instead what the intervals lack, the table that
+//! `replay fit` widens them by.
 
 mod truth;
 
@@ -40,7 +42,8 @@ fn flown(recipe: &Recipe, number: u64) -> anyhow::Result<(Trace, Sortie)> {
     }
 }
 
-/// What was found of one parameter: error and standard deviation, and whether the interval holds the truth.
+/// What was found of one parameter: error and standard deviation, and whether the interval holds
+/// the truth.
 #[derive(Debug, Clone, Copy)]
 struct Found {
     error: f64,
@@ -117,8 +120,8 @@ fn print_coverage(tallies: &Tallies) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// What share of the intervals must hold the truth, in each set: 95 % where the world is not the model's, and nearly as often
-/// where it also does what nobody had thought of.
+/// What share of the intervals must hold the truth, in each set: 95 % where the world is not the
+/// model's, and nearly as often where it also does what nobody had thought of.
 const HOLD: [f64; 2] = [0.95, 0.9];
 /// An interval that holds more often than this says less than was found.
 const TOO_WIDE: f64 = 0.985;

@@ -60,8 +60,8 @@ pub(crate) fn give(found: &impl Answer, json: bool) -> Result<Exit> {
     Ok(found.outcome())
 }
 
-/// Prints what is found of each file, the only one's as it is and those of several as a list. One that cannot be read does not
-/// hide the others.
+/// Prints what is found of each file, the only one's as it is and those of several as a list. One
+/// that cannot be read does not hide the others.
 pub(crate) fn give_each<A: Answer>(
     files: &[PathBuf],
     json: bool,
@@ -85,8 +85,9 @@ pub(crate) fn give_each<A: Answer>(
     Ok(worse(given, outcome))
 }
 
-/// The logs of a directory, in subdirectories, too. Each regular file counts once, however many links lead to it; what has the
-/// name of a log and is no file (a pipe, a link to nothing) is never opened, and is told.
+/// The logs of a directory, in subdirectories, too. Each regular file counts once, however many
+/// links lead to it; what has the name of a log and is no file (a pipe, a link to nothing) is never
+/// opened, and is told.
 pub(crate) fn logs_of(directory: &Path) -> Result<Vec<PathBuf>> {
     let (mut seen, mut logs, mut left) =
         (BTreeSet::new(), Vec::new(), VecDeque::from([directory.to_owned()]));
@@ -99,7 +100,8 @@ pub(crate) fn logs_of(directory: &Path) -> Result<Vec<PathBuf>> {
                 let mut entries = entries.with_context(failed)?;
                 entries.sort_by_key(DirEntry::path);
                 for entry in entries {
-                    // What is itself here comes before what only leads here, so that it keeps its name.
+                    // What is itself here comes before what only leads here, so that it keeps its
+                    // name.
                     let is_link = entry.path().is_symlink();
                     if is_link { left.push_front(entry.path()) } else { left.push_back(entry.path()) }
                 }

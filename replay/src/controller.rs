@@ -65,8 +65,9 @@ pub(crate) fn phase_name(output: &ComputerOutput) -> &'static str {
 /// Run fact of a re-flown flight's log: the settings that changed in flight, one on each line.
 pub const SETTINGS_IN_FLIGHT: &str = "settings_in_flight";
 
-/// A flight computer that is run on the frames of a log, from its power-up or its release on; frames must come in order.
-/// Missing frames mean that the computer was restarted: it is restarted here, too.
+/// A flight computer that is run on the frames of a log, from its power-up or its release on;
+/// frames must come in order. Missing frames mean that the computer was restarted: it is restarted
+/// here, too.
 #[derive(Debug, Clone)]
 pub struct LoggedComputer {
     computer: RecordedComputer,
@@ -84,8 +85,9 @@ pub fn settings_in_flight(run: &BTreeMap<String, String>) -> Result<Vec<Setting>
 }
 
 impl LoggedComputer {
-    /// The flight computer that a log's frames came from, before its first frame. It is built from the mission, from the
-    /// changes of settings that the run facts name, and from the `other` settings, which apply last.
+    /// The flight computer that a log's frames came from, before its first frame. It is built from
+    /// the mission, from the changes of settings that the run facts name, and from the `other`
+    /// settings, which apply last.
     ///
     /// # Errors
     /// This build cannot use the text as a mission, or a name is unknown.
@@ -102,7 +104,8 @@ impl LoggedComputer {
         Ok(Self { computer, schedule, compares_digests: true })
     }
 
-    /// The same computer where digests are not compared: one that did not wait on the pad remembers less.
+    /// The same computer where digests are not compared: one that did not wait on the pad remembers
+    /// less.
     #[must_use]
     pub fn without_digests(self) -> Self {
         Self { compares_digests: false, ..self }
@@ -137,7 +140,8 @@ impl LoggedComputer {
     /// Runs a recorded frame again: the result has the recorded input and the new decision.
     ///
     /// # Errors
-    /// The recorded input cannot be given to this build's flight computer, or the frame is out of order.
+    /// The recorded input cannot be given to this build's flight computer, or the frame is out of
+    /// order.
     pub fn run_again(&mut self, frame: &ComputerFrame) -> Result<ComputerFrame, FrameError> {
         let read = self.read(frame)?;
         let output = self.computer.step(&read);
@@ -153,7 +157,8 @@ impl LoggedComputer {
         }
     }
 
-    /// Reads an input, and applies the restarts and the changes of settings that come before its frame.
+    /// Reads an input, and applies the restarts and the changes of settings that come before its
+    /// frame.
     fn read(&mut self, frame: &ComputerFrame) -> Result<LoggedInput, FrameError> {
         let (number, next) = (frame.input.frame, self.computer.next());
         let flew = self.computer.computer().released_at_s().is_some();
@@ -187,7 +192,8 @@ impl LoggedComputer {
     }
 }
 
-/// The plan that a flight computer took over in the frame it has just run; `None` if it flies an earlier plan or none.
+/// The plan that a flight computer took over in the frame it has just run; `None` if it flies an
+/// earlier plan or none.
 pub fn new_plan<'a>(pilot: &'a Pilot, output: &ComputerOutput) -> Option<&'a Plan> {
     let posed_at_s = pilot.report().posed_at_s;
     pilot.powered().planned().filter(|plan| output.planned && plan.begins_s() >= posed_at_s)

@@ -1,9 +1,10 @@
 //! Open loop: runs the controller alone on the recorded inputs, with other settings.
 //!
-//! Every frame gets its recorded input, so the vehicle moves as it did in flight, for any command. The answer
-//! is what the controller *would have commanded*, beside what it did command. What *would have happened* is a question
-//! for the [closed loop](mod@crate::refly). For example, a flight computer that lights its motor earlier than in flight
-//! measures no thrust until the recorded ignition.
+//! Every frame gets its recorded input, so the vehicle moves as it did in flight, for any command.
+//! The answer is what the controller *would have commanded*, beside what it did command. What
+//! *would have happened* is a question for the [closed loop](mod@crate::refly). For example, a
+//! flight computer that lights its motor earlier than in flight measures no thrust until the
+//! recorded ignition.
 
 use std::path::PathBuf;
 
@@ -57,8 +58,8 @@ pub struct EvaluateReport {
     pub file: String,
     /// The changed settings.
     pub settings: Vec<String>,
-    /// Frames that this build decides differently from the record even with nothing changed: differences there may come
-    /// from the build and not from the settings.
+    /// Frames that this build decides differently from the record even with nothing changed:
+    /// differences there may come from the build and not from the settings.
     pub unchanged_different: usize,
     /// Number of frames whose gimbal command differs in any bit.
     pub commands_different: usize,
@@ -77,7 +78,8 @@ pub struct EvaluateReport {
 }
 
 impl EvaluateReport {
-    /// Whether a frame has another command than recorded: to the gimbal, to the fins, or by its phase to igniter or parachute.
+    /// Whether a frame has another command than recorded: to the gimbal, to the fins, or by its
+    /// phase to igniter or parachute.
     fn a_command_differs(&self) -> bool {
         self.frames.iter().any(|EvaluatedFrame { recorded: a, evaluated: b, .. }| {
             (&a.gimbal_rad, &a.fins_rad, a.phase) != (&b.gimbal_rad, &b.fins_rad, b.phase)
@@ -85,9 +87,9 @@ impl EvaluateReport {
     }
 }
 
-/// Evaluates a recorded flight under other settings: two flight computers run on every frame. The recorded decision comes from
-/// the record; what the record leaves out (cost and iterations of a plan) comes from `then`, which runs with the recorded
-/// settings.
+/// Evaluates a recorded flight under other settings: two flight computers run on every frame. The
+/// recorded decision comes from the record; what the record leaves out (cost and iterations of a
+/// plan) comes from `then`, which runs with the recorded settings.
 ///
 /// # Errors
 /// See [`AgainError`].
@@ -117,7 +119,8 @@ pub fn evaluate(recording: &Recording, settings: &[Setting]) -> Result<EvaluateR
     Ok(summarise(recording, settings, frames, unchanged_different))
 }
 
-/// Refuses settings that the flight computer does not have, or that cannot change on recorded inputs.
+/// Refuses settings that the flight computer does not have, or that cannot change on recorded
+/// inputs.
 fn refuse(settings: &[Setting], name: &str, recorded_s: f64, last_s: f64) -> Result<(), AgainError> {
     let why_not = |Setting { path, at_s, .. }: &Setting| {
         let why = if NOT_THE_PILOTS.iter().any(|section| path.starts_with(section)) {

@@ -1,5 +1,5 @@
-//! What went wrong in a flight: what its computer shows when it is run again on the log's frames, and the limits that the
-//! landing broke.
+//! What went wrong in a flight: what its computer shows when it is run again on the log's frames,
+//! and the limits that the landing broke.
 
 use flight::computer::findings::{Findings, Sign};
 use foxglove::messages::log::Level;
@@ -31,14 +31,16 @@ impl Finding {
     }
 }
 
-/// The findings of a recorded flight, first in time; `None` if its computer cannot be run again, or decides otherwise than it
-/// did: what it would have commanded says nothing of surfaces that followed other commands.
+/// The findings of a recorded flight, first in time; `None` if its computer cannot be run again, or
+/// decides otherwise than it did: what it would have commanded says nothing of surfaces that
+/// followed other commands.
 pub(crate) fn of(recording: &Recording, verdict: Option<&Verdict>) -> Option<Vec<Finding>> {
     let again = run_again(recording, LoggedComputer::run_again);
     facts(recording, verdict, again.and_then(|(_, findings)| findings))
 }
 
-/// What the vehicle itself reported before its release, each once; all it reported if it was never released.
+/// What the vehicle itself reported before its release, each once; all it reported if it was never
+/// released.
 fn on_the_pad(recording: &Recording) -> Vec<Finding> {
     let (clock, zero_s, end_s) = match recording.clocks.flight_zero_s {
         Some(zero_s) => (Clock::Flight, zero_s, zero_s),
@@ -55,8 +57,8 @@ fn on_the_pad(recording: &Recording) -> Vec<Finding> {
     facts
 }
 
-/// The computer of a recorded flight after all its frames, each of which `run` has run again; `None` if that cannot be. Beside
-/// it what it shows; `None` if it decides otherwise than it did.
+/// The computer of a recorded flight after all its frames, each of which `run` has run again;
+/// `None` if that cannot be. Beside it what it shows; `None` if it decides otherwise than it did.
 pub(crate) fn run_again(
     recording: &Recording,
     mut run: impl FnMut(&mut LoggedComputer, &ComputerFrame) -> Result<ComputerFrame, FrameError>,
@@ -75,8 +77,8 @@ pub(crate) fn run_again(
     Some((computer, findings))
 }
 
-/// What the vehicle said on its pad, the findings of a computer that was run again with the recorded decisions, and the limits
-/// that were broken.
+/// What the vehicle said on its pad, the findings of a computer that was run again with the
+/// recorded decisions, and the limits that were broken.
 pub(crate) fn facts(
     recording: &Recording,
     verdict: Option<&Verdict>,
@@ -121,7 +123,8 @@ fn picture(sign: Sign) -> &'static str {
     }
 }
 
-/// The limits that a landing broke, the worst first, and what the motor still pushed; `None` if it kept all.
+/// The limits that a landing broke, the worst first, and what the motor still pushed; `None` if it
+/// kept all.
 fn broken(verdict: &Verdict, findings: &Findings, nothing_else: bool) -> Option<String> {
     // A vehicle that comes down under its parachute is judged by nothing else.
     let judged = verdict.deciding().all(|limit| limit.maximum > limit.minimum);

@@ -1,26 +1,31 @@
-//! Answers questions about flight logs after the flight: what is in a log, whether the controller of this build makes
-//! the recorded decisions again, what it would have done with other settings, and how flights differ.
+//! Answers questions about flight logs after the flight: what is in a log, whether the controller
+//! of this build makes the recorded decisions again, what it would have done with other settings,
+//! and how flights differ.
 //!
 //! In reading order:
 //!
-//! * [`Cli`] and [`cli`]: the command line. A command is one file with its arguments and its answer ([`cli::Answer`]: data, and
-//!   what it says), and its line here.
+//! * [`Cli`] and [`cli`]: the command line. A command is one file with its arguments and its answer
+//!   ([`cli::Answer`]: data, and what it says), and its line here.
 //! * [`log`]: opens a log and streams its records in bounded memory, or holds a whole flight.
 //! * [`info`]: describes what is in a log, how complete it is and what can be done with it.
 //! * [`findings`]: what went wrong in a flight, first in time.
 //! * [`controller`]: builds the flight computer that a log's frames came from.
-//! * [`verify`]: runs every frame again on its recorded input and compares the results bit for bit; explains one,
-//!   holds a directory of logs against a baseline, and proves the books of ground stations.
+//! * [`verify`]: runs every frame again on its recorded input and compares the results bit for bit;
+//!   explains one, holds a directory of logs against a baseline, and proves the books of ground
+//!   stations.
 //! * [`settings`]: other settings for a recorded flight, named as in its mission.
-//! * [`evaluate`](mod@evaluate): runs the controller alone with other settings on recorded inputs (open loop).
+//! * [`evaluate`](mod@evaluate): runs the controller alone with other settings on recorded inputs
+//!   (open loop).
 //! * [`refly`](mod@refly): flies the flight again in simulation from a chosen moment (closed loop).
-//! * [`fit`](mod@fit): what a flight tells of its vehicle, its motor and its day, with intervals; what all flights so far
-//!   tell of the next day.
+//! * [`fit`](mod@fit): what a flight tells of its vehicle, its motor and its day, with intervals;
+//!   what all flights so far tell of the next day.
 //! * [`table`]: reads a log as tables; [`compare`](mod@compare): compares flights signal by signal.
 //! * [`report`](mod@report): writes a flight as one HTML page.
 //! * [`export`]: converts logs to other formats; [`recover`](mod@recover): repairs a damaged log.
-//! * [`output`](onboard_sim::files): writes files completely or not at all, each new one under a name that is free.
-//! * [`print`](mod@print): what answers have in common: columns, two verdicts beside each other, JSON.
+//! * [`output`](onboard_sim::files): writes files completely or not at all, each new one under a
+//!   name that is free.
+//! * [`print`](mod@print): what answers have in common: columns, two verdicts beside each other,
+//!   JSON.
 
 pub mod cli;
 pub mod compare;
@@ -49,13 +54,16 @@ use protocol::program::{EXIT_CODES, Exit, Manual, Shown};
 ///
 /// Answers go to standard output, warnings and errors to standard error.
 ///
-/// The answer is no, and the exit code 3: of verify, if something differs or cannot be, or with --strict not all that can be
-/// compared was; with --baseline, if some flight got worse, lands no longer, diverged or is lost; with --book, if a book is broken,
-/// or its end is not proven; of compare, if the verdicts differ, signals are missing or a log is damaged; of fit, if it is
-/// NO-GO. It is 5 if verify cannot run some frame again (no frames, no profile, frames missing) and all others are identical, if no
-/// log has a book, and if some of several logs could not be read and the answer of the others is not no.
+/// The answer is no, and the exit code 3: of verify, if something differs or cannot be, or with
+/// --strict not all that can be compared was; with --baseline, if some flight got worse, lands no
+/// longer, diverged or is lost; with --book, if a book is broken, or its end is not proven; of
+/// compare, if the verdicts differ, signals are missing or a log is damaged; of fit, if it is
+/// NO-GO. It is 5 if verify cannot run some frame again (no frames, no profile, frames missing) and
+/// all others are identical, if no log has a book, and if some of several logs could not be read
+/// and the answer of the others is not no.
 ///
-/// A damaged log is used up to the damage, with a warning and exit code 0, except by verify --strict and by compare.
+/// A damaged log is used up to the damage, with a warning and exit code 0, except by verify
+/// --strict and by compare.
 #[derive(Debug, Parser)]
 #[command(
     name = "replay",
@@ -78,57 +86,69 @@ enum Command {
     Info(info::Args),
     /// Runs the flight computer of a log again and compares its decisions bit for bit.
     ///
-    /// The flight computer is built from the profile in the log and run on the recorded inputs, from power-up or from where
-    /// the log begins. Outputs, digests of the memory, estimates and the start at the release are compared, and the inputs
-    /// are judged; a table says what was compared. With --strict a simulated flight is also flown again, and its
-    /// measurements and its verdict are compared; truth, events and measured times never are. For a divergence the report
-    /// says whether the landing would end differently (simulated from the first frame that differs).
+    /// The flight computer is built from the profile in the log and run on the recorded inputs,
+    /// from power-up or from where the log begins. Outputs, digests of the memory, estimates and
+    /// the start at the release are compared, and the inputs are judged; a table says what was
+    /// compared. With --strict a simulated flight is also flown again, and its measurements and its
+    /// verdict are compared; truth, events and measured times never are. For a divergence the
+    /// report says whether the landing would end differently (simulated from the first frame that
+    /// differs).
     ///
-    /// With --explain the plan of a recorded frame is solved again and judged: cost, what is broken, warm against cold start,
-    /// predicted path. With --baseline a directory of flights is held against one: every flight verified, flown again
-    /// and compared; exit code 0 if none got worse, 3 if some did. With --book the books of ground
-    /// stations are proven (who did what when), or the first broken link is named.
+    /// With --explain the plan of a recorded frame is solved again and judged: cost, what is
+    /// broken, warm against cold start, predicted path. With --baseline a directory of flights is
+    /// held against one: every flight verified, flown again and compared; exit code 0 if none got
+    /// worse, 3 if some did. With --book the books of ground stations are proven (who did what
+    /// when), or the first broken link is named.
     #[command(
         after_help = "Examples:\n  replay verify flight.mcap\n  replay verify flight.mcap --explain 6400\n  replay verify logs --baseline baseline.json\n  replay verify --book ground.mcap vehicle.mcap"
     )]
     Verify(verify::Args),
-    /// Open loop: what the controller alone would have commanded with other settings, on the recorded inputs.
+    /// Open loop: what the controller alone would have commanded with other settings, on the
+    /// recorded inputs.
     #[command(after_help = "Example: replay evaluate flight.mcap --set powered.weights.theta=90@6.5")]
     Evaluate(evaluate::Args),
     /// Closed loop: flies a flight again from a chosen moment, with other settings.
     ///
-    /// The flight is flown again from its start with the recorded draw up to that moment, because a log does not hold the
-    /// internal states of gusts, servos and sensors; the record is not used afterwards. The answer says how many recorded
-    /// frames were reproduced: with nothing changed, all of a simulated flight, bit for bit.
+    /// The flight is flown again from its start with the recorded draw up to that moment, because a
+    /// log does not hold the internal states of gusts, servos and sensors; the record is not used
+    /// afterwards. The answer says how many recorded frames were reproduced: with nothing changed,
+    /// all of a simulated flight, bit for bit.
     #[command(after_help = "Example: replay refly flight.mcap --plant truth.impulse_scale=0.99")]
     Refly(refly::Args),
-    /// Compares flights: the answer in one sentence, then verdicts, signals (RMS, maximum and when), words.
+    /// Compares flights: the answer in one sentence, then verdicts, signals (RMS, maximum and
+    /// when), words.
     ///
-    /// Signals are named as in an export. Exit code 3 if the verdicts differ, if one flight lacks a signal or if one log is
-    /// damaged. Two missions are compared setting by setting; exit code 3 if one differs.
+    /// Signals are named as in an export. Exit code 3 if the verdicts differ, if one flight lacks a
+    /// signal or if one log is damaged. Two missions are compared setting by setting; exit code 3
+    /// if one differs.
     #[command(
         after_help = "Examples:\n  replay compare old.mcap new.mcap\n  replay compare mk3 day/mission.toml"
     )]
     Compare(compare::Args),
-    /// Writes a flight as one HTML page with its pictures inside: no network, whole without its script.
+    /// Writes a flight as one HTML page with its pictures inside: no network, whole without its
+    /// script.
     #[command(after_help = "Example: replay report flight.mcap")]
     Report(report::Args),
     /// Writes a log's content as CSV or a Rerun recording.
     #[command(after_help = "Example: replay export flight.mcap --to csv --out tables")]
     Export(export::Args),
-    /// Recovers a readable log from a damaged one, and reports what was recovered and what time span is lost.
+    /// Recovers a readable log from a damaged one, and reports what was recovered and what time
+    /// span is lost.
     #[command(after_help = "Example: replay recover cut.mcap whole.mcap")]
     Recover(recover::Args),
-    /// Finds drag, thrust, delays, gimbal and wind of flights, with 95 % intervals, and says what it cannot find.
+    /// Finds drag, thrust, delays, gimbal and wind of flights, with 95 % intervals, and says what
+    /// it cannot find.
     ///
-    /// Only sensor samples, commands, feedback and the flight computer's estimates are used. Scales are over the data of the
-    /// mission in the log, per mass: weigh the vehicle. Several logs are also put together. A burn on a test stand (CSV) is
-    /// compared with its motor's certified curve.
+    /// Only sensor samples, commands, feedback and the flight computer's estimates are used. Scales
+    /// are over the data of the mission in the log, per mass: weigh the vehicle. Several logs are
+    /// also put together. A burn on a test stand (CSV) is compared with its motor's certified
+    /// curve.
     ///
-    /// With --day a motor lot, an airframe and a site are learnt from all flights so far, and mission and dispersions of the
-    /// next day are written. With --flights that day is simulated with motors that the lot may have, and the landing rate
-    /// gets an interval: GO (exit code 0) if the probability of a rate below the limit is at most the risk that is taken,
-    /// NO-GO (exit code 3) if not.
+    /// With --day a motor lot, an airframe and a site are learnt from all flights so far, and
+    /// mission and dispersions of the next day are written. With --flights that day is simulated
+    /// with motors that the lot may have, and the landing rate gets an interval: GO (exit code 0)
+    /// if the probability of a rate below the limit is at most the risk that is taken, NO-GO (exit
+    /// code 3) if not.
     #[command(
         after_help = "Examples:\n  replay fit flight.mcap --out ours.toml\n  replay fit stand.csv --motor H45W\n  replay fit fits.json --mission mk3 --day day --flights 1000"
     )]

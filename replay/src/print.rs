@@ -1,4 +1,5 @@
-//! What answers have in common: columns, two verdicts beside each other, JSON. `cli` removes what steers a terminal.
+//! What answers have in common: columns, two verdicts beside each other, JSON. `cli` removes what
+//! steers a terminal.
 
 use std::io;
 use std::io::Write;
@@ -29,10 +30,12 @@ pub(crate) fn nearest<'a>(given: &str, names: impl Iterator<Item = &'a String>) 
     most.cloned().unwrap_or_default()
 }
 
-/// A cell that is wider does not push the others away. (A width of more than 16 bits cannot be formatted.)
+/// A cell that is wider does not push the others away. (A width of more than 16 bits cannot be
+/// formatted.)
 const WIDEST: usize = 200;
 
-/// Rows as lines of columns, each as wide as its widest cell: a column begins at the left (`<`) or ends at the right (`>`).
+/// Rows as lines of columns, each as wide as its widest cell: a column begins at the left (`<`) or
+/// ends at the right (`>`).
 pub(crate) fn columns<const N: usize>(
     sides: [char; N],
     rows: impl IntoIterator<Item = [String; N]>,
@@ -61,8 +64,8 @@ pub(crate) fn beyond(limit: &LimitResult) -> &'static str {
     if (limit.minimum..=limit.maximum).contains(&limit.value) { "AT ITS LIMIT" } else { "OUTSIDE" }
 }
 
-/// Every limit that one of two verdicts has, the most different first: how far apart they are over its range, and its name, both
-/// values and its ends.
+/// Every limit that one of two verdicts has, the most different first: how far apart they are over
+/// its range, and its name, both values and its ends.
 pub(crate) fn limits_of_both(both: [Option<&Verdict>; 2]) -> Vec<(f64, [String; 4])> {
     let mut limits: Vec<&LimitResult> = Vec::new();
     for limit in both.into_iter().rev().flatten().flat_map(Verdict::of_the_legs) {

@@ -1,8 +1,9 @@
-//! Other settings for a recorded flight, named as in its mission and checked against the known names.
+//! Other settings for a recorded flight, named as in its mission and checked against the known
+//! names.
 //!
-//! A setting is `path=value` or, to change it in flight, `path=value@seconds` of vehicle time. A file of settings is a
-//! TOML file with the structure of the mission and only the keys to change. An unknown name is refused, and the most
-//! similar known name is suggested.
+//! A setting is `path=value` or, to change it in flight, `path=value@seconds` of vehicle time. A
+//! file of settings is a TOML file with the structure of the mission and only the keys to change.
+//! An unknown name is refused, and the most similar known name is suggested.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -88,8 +89,8 @@ impl fmt::Display for Setting {
     }
 }
 
-/// Every setting that a mission's text states; `origin` is used in messages only. A whole number is the same as with a decimal
-/// point.
+/// Every setting that a mission's text states; `origin` is used in messages only. A whole number is
+/// the same as with a decimal point.
 ///
 /// # Errors
 /// The text is not TOML.
@@ -192,7 +193,8 @@ pub fn truth_with(truth: &Truth, settings: &[Setting]) -> Result<Truth, SettingE
     })
 }
 
-/// A whole number of a range, `10.0`, as `10`: a key that takes whole numbers takes it, and so does one that takes all.
+/// A whole number of a range, `10.0`, as `10`: a key that takes whole numbers takes it, and so does
+/// one that takes all.
 fn as_whole(value: &toml::Value) -> toml::Value {
     let whole = value.as_float().map(|number| (number, libm::trunc(number) as i64));
     let same = whole.filter(|(number, whole)| (*whole as f64).to_bits() == number.to_bits());
@@ -231,7 +233,8 @@ pub struct Schedule<T> {
 }
 
 impl<T> Schedule<T> {
-    /// Calls `build` for the settings from the beginning, then again with each timed one from its time.
+    /// Calls `build` for the settings from the beginning, then again with each timed one from its
+    /// time.
     ///
     /// # Errors
     /// Those of `build`.

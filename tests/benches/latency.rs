@@ -1,9 +1,9 @@
 //! Measures how old a value is when it reaches the ground's model.
 //!
-//! `cargo bench -p e2e --bench latency`. The vehicle's own run loop flies a landing in real time; the ground's own
-//! links and model receive it. The benchmark notes the time of each controller tick. The time since boot in a message
-//! then gives the time of its state, counted from the tick before it. Vehicle and ground are in one process and use
-//! one clock.
+//! `cargo bench -p e2e --bench latency`. The vehicle's own run loop flies a landing in real time;
+//! the ground's own links and model receive it. The benchmark notes the time of each controller
+//! tick. The time since boot in a message then gives the time of its state, counted from the tick
+//! before it. Vehicle and ground are in one process and use one clock.
 
 use std::collections::BTreeMap;
 use std::io::Write as _;
@@ -75,7 +75,8 @@ fn boot_ms_of(message: &MavMessage) -> Option<u32> {
     }
 }
 
-/// Receives with the ground's own links and model until the vehicle's flight has ended; returns the latencies.
+/// Receives with the ground's own links and model until the vehicle's flight has ended; returns the
+/// latencies.
 async fn receive(listening: LinkAddress, vehicle: Option<LinkAddress>) -> Result<Vec<Duration>, Failure> {
     let clock = Clock::start();
     let mut wire =
@@ -113,7 +114,8 @@ async fn receive(listening: LinkAddress, vehicle: Option<LinkAddress>) -> Result
     Ok(latencies)
 }
 
-/// The time at which the vehicle had the state of this time since boot, counted from the controller tick before it.
+/// The time at which the vehicle had the state of this time since boot, counted from the controller
+/// tick before it.
 fn state_was_at(ticks: &Ticks, boot_ms: u32) -> Option<Instant> {
     let ticks = ticks.lock().unwrap_or_else(PoisonError::into_inner);
     let (tick_ms, tick_at) = ticks.range(..=boot_ms).next_back()?;

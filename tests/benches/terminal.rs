@@ -1,9 +1,11 @@
-//! Measures what the ground station costs on a real terminal, and how long an abort takes from the key to the wire.
+//! Measures what the ground station costs on a real terminal, and how long an abort takes from the
+//! key to the wire.
 //!
-//! `cargo bench -p e2e --bench terminal`. The programs and the terminal are real: a pseudo-terminal of 80 by 24
-//! cells, whose other end types keys and counts the bytes written to it. For the abort, a vehicle made of one socket
-//! reports a landing at the usual rates, so that the screen is drawn ten times a second. Each time runs from the
-//! write of the chord's last key to the arrival of the datagram with the command.
+//! `cargo bench -p e2e --bench terminal`. The programs and the terminal are real: a pseudo-terminal
+//! of 80 by 24 cells, whose other end types keys and counts the bytes written to it. For the abort,
+//! a vehicle made of one socket reports a landing at the usual rates, so that the screen is drawn
+//! ten times a second. Each time runs from the write of the chord's last key to the arrival of the
+//! datagram with the command.
 
 use std::io::Write as _;
 use std::net::{SocketAddr, UdpSocket};
@@ -149,8 +151,8 @@ fn wait_for_abort(socket: &UdpSocket) -> Result<Option<Instant>, Failure> {
     }
 }
 
-/// The latency of each abort that was sent. On a busy machine two Ctrl-X may arrive as if the key was held, and then
-/// no abort is sent.
+/// The latency of each abort that was sent. On a busy machine two Ctrl-X may arrive as if the key
+/// was held, and then no abort is sent.
 fn abort_latency(hand: &Hand) -> Result<Vec<Duration>, Failure> {
     let folder = tempfile::tempdir()?;
     let mut terminal = ground(&folder, hand.tells_repeats);
@@ -214,8 +216,8 @@ fn cost_so_far(terminal: &Terminal) -> (Instant, Duration, u64) {
     (now(), terminal.processor_time(), terminal.written())
 }
 
-/// Flies a real flight, armed and started by typed keys, and adds up what the screen cost on the pad and during the
-/// landing.
+/// Flies a real flight, armed and started by typed keys, and adds up what the screen cost on the
+/// pad and during the landing.
 fn fly(idle: &mut Cost, landing: &mut Cost, watched: Duration) -> Result<(), Failure> {
     let folder = tempfile::tempdir()?;
     let mut watch = BareGround::new();
@@ -230,7 +232,8 @@ fn fly(idle: &mut Cost, landing: &mut Cost, watched: Duration) -> Result<(), Fai
     std::thread::sleep(watched);
     idle.add(&terminal, before);
     terminal.type_by_hand(b"AARM\r");
-    // The ground offers the start once a heartbeat says armed; it receives that heartbeat when we do.
+    // The ground offers the start once a heartbeat says armed; it receives that heartbeat when we
+    // do.
     watch.wait_for("an armed heartbeat", |_, message| match message {
         Some(MavMessage::HEARTBEAT(beat)) => {
             beat.base_mode.contains(MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED).then_some(())

@@ -1,4 +1,5 @@
-//! A ground station that a test controls. It sends requests that the real ground station would never send.
+//! A ground station that a test controls. It sends requests that the real ground station would
+//! never send.
 
 use std::net::{SocketAddr, UdpSocket};
 use std::time::{Duration, Instant};
@@ -15,7 +16,8 @@ use protocol::text::printable;
 use crate::time::{left, now};
 use crate::{PATIENCE, UdpProxy};
 
-/// It sends heartbeats at this interval while it waits, as a ground station does while a vehicle is armed.
+/// It sends heartbeats at this interval while it waits, as a ground station does while a vehicle is
+/// armed.
 const HEARTBEAT_INTERVAL: Duration = Duration::from_millis(100);
 
 /// The command that arms with param1 = 1 and disarms with 0.

@@ -13,8 +13,8 @@ pub fn vehicle(folder: &Path, links: &[&str]) -> Command {
     command
 }
 
-/// A ground station without a screen that arms and starts by itself over these links, and logs to `ground.mcap` in this
-/// folder.
+/// A ground station without a screen that arms and starts by itself over these links, and logs to
+/// `ground.mcap` in this folder.
 pub fn auto_ground(folder: &Path, links: &[&str]) -> Command {
     let mut command = program(Program::Ground);
     command.args(["--headless", "--auto", "--log", "ground.mcap"]).current_dir(folder);
@@ -22,9 +22,10 @@ pub fn auto_ground(folder: &Path, links: &[&str]) -> Command {
     command
 }
 
-/// A vehicle that has flown a profile by itself over one link, is safe on the ground, and stays. It logs to `flight.mcap` in
-/// this folder, and its simulated time runs so fast that its motor is cold after seconds, and so slowly that a client may be
-/// silent for some before its files are closed (a minute of the vehicle).
+/// A vehicle that has flown a profile by itself over one link, is safe on the ground, and stays. It
+/// logs to `flight.mcap` in this folder, and its simulated time runs so fast that its motor is cold
+/// after seconds, and so slowly that a client may be silent for some before its files are closed (a
+/// minute of the vehicle).
 pub fn landed_vehicle(folder: &Path, profile: &str, link: &str, more: &[&str]) -> Running {
     let mut command = program(Program::OnboardSim);
     command.args(["fly", "--mission", profile, "--seed", "1", "--auto", "--stay", "--speed", "5"]);

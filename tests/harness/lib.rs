@@ -1,7 +1,8 @@
-//! What the end-to-end tests share: the built programs, running processes, terminals, serial lines, a UDP proxy that
-//! impairs a link, and a ground station that a test controls.
+//! What the end-to-end tests share: the built programs, running processes, terminals, serial lines,
+//! a UDP proxy that impairs a link, and a ground station that a test controls.
 //!
-//! A helper that waits has a time limit, waits for an event, and panics (fails the test) if the event does not come.
+//! A helper that waits has a time limit, waits for an event, and panics (fails the test) if the
+//! event does not come.
 #![expect(clippy::missing_panics_doc, reason = "a helper that panics fails its test, which is its purpose")]
 
 mod appears;

@@ -1,8 +1,9 @@
 //! Finds ports and addresses that no other program takes.
 //!
-//! A program under test binds port 0, and [`bound_port`] finds out which port the system gave it. A port that must stay
-//! the same while a program is restarted belongs to an [`unshared_address`]. No test binds a port only to learn a free
-//! number: another program may take that port before it is used.
+//! A program under test binds port 0, and [`bound_port`] finds out which port the system gave it. A
+//! port that must stay the same while a program is restarted belongs to an [`unshared_address`]. No
+//! test binds a port only to learn a free number: another program may take that port before it is
+//! used.
 
 use std::collections::BTreeSet;
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr};
@@ -28,8 +29,9 @@ pub enum Bound {
 
 /// A loopback address with a port that only this process uses, also while nothing is bound to it.
 ///
-/// The network address is made from the process id, which Linux keeps below 2^22. The port lies below the range from
-/// which Linux chooses ports by itself, so a socket that is bound to every address cannot have it by chance.
+/// The network address is made from the process id, which Linux keeps below 2^22. The port lies
+/// below the range from which Linux chooses ports by itself, so a socket that is bound to every
+/// address cannot have it by chance.
 pub fn unshared_address() -> SocketAddr {
     static NEXT_PORT: AtomicU16 = AtomicU16::new(20_000);
     let [_, a, b, c] = (std::process::id() << 2).to_be_bytes();
@@ -64,8 +66,8 @@ fn port_of(process: u32, bound: Bound) -> Option<u16> {
     tables.flat_map(|table| ports_in(&table, &sockets, bound)).next()
 }
 
-/// The loopback ports of these sockets in one of the kernel's tables. Sockets bound to every address are left out: a
-/// program only sends from them.
+/// The loopback ports of these sockets in one of the kernel's tables. Sockets bound to every
+/// address are left out: a program only sends from them.
 fn ports_in(table: &str, sockets: &BTreeSet<String>, bound: Bound) -> Vec<u16> {
     let port = |line: &str| {
         let fields: Vec<&str> = line.split_whitespace().collect();

@@ -144,7 +144,8 @@ impl Drop for Running {
 /// The processor time that a process has used so far.
 pub(crate) fn processor_time_of(process: u32) -> Duration {
     let stat = std::fs::read_to_string(format!("/proc/{process}/stat")).expect("it runs");
-    // The fields after the name, which may contain spaces. User and system time are the 14th and 15th.
+    // The fields after the name, which may contain spaces. User and system time are the 14th and
+    // 15th.
     let fields: Vec<&str> = stat.rsplit(')').next().unwrap_or_default().split_whitespace().collect();
     let clock_ticks: u64 = fields[11..13].iter().map(|field| field.parse::<u64>().unwrap_or(0)).sum();
     // Linux counts 100 clock ticks a second.

@@ -22,8 +22,9 @@ pub fn program(program: Program) -> Command {
     Command::new(built().join(name))
 }
 
-/// The folder with the programs of this build. Cargo tells a test only the paths of its own package's programs, so
-/// they are built here, with the profile and into the target folder of the test itself.
+/// The folder with the programs of this build. Cargo tells a test only the paths of its own
+/// package's programs, so they are built here, with the profile and into the target folder of the
+/// test itself.
 fn built() -> &'static PathBuf {
     static BUILT: OnceLock<PathBuf> = OnceLock::new();
     BUILT.get_or_init(|| {
@@ -32,8 +33,9 @@ fn built() -> &'static PathBuf {
         let folder = test.ancestors().nth(2).expect("the folder of the profile").to_owned();
         let target = folder.parent().expect("the target folder");
         let mut build = Command::new(env!("CARGO"));
-        // Building one test as well makes Cargo choose the same dependency features as `cargo test`, which has built
-        // the programs already. Otherwise half of the dependencies would be built again.
+        // Building one test as well makes Cargo choose the same dependency features as `cargo
+        // test`, which has built the programs already. Otherwise half of the dependencies would be
+        // built again.
         build.current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
         build.args(["build", "--quiet", "--bins", "--test", "igniter"]);
         build.arg("--target-dir").arg(target);

@@ -1,4 +1,5 @@
-//! Two serial ports joined by a line of limited speed: two pseudo-terminals with a paced copy between them.
+//! Two serial ports joined by a line of limited speed: two pseudo-terminals with a paced copy
+//! between them.
 
 use std::fs::File;
 use std::io::{Read as _, Write as _};
@@ -101,7 +102,8 @@ fn raw_terminal() -> (File, OwnedFd) {
     (File::from(pair.master), pair.slave)
 }
 
-/// Waits until a port takes bytes. A port that nobody reads is full after some thousand; returns `false` if the line is cut then.
+/// Waits until a port takes bytes. A port that nobody reads is full after some thousand; returns
+/// `false` if the line is cut then.
 fn takes_bytes(port: &File, cut: &AtomicBool) -> bool {
     while !cut.load(Ordering::Relaxed) {
         let mut ready = [PollFd::new(port.as_fd(), PollFlags::POLLOUT)];

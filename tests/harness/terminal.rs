@@ -1,5 +1,5 @@
-//! A program on a real terminal: a pseudo-terminal whose other end types keys, keeps the screen and answers requests,
-//! as a terminal's window does.
+//! A program on a real terminal: a pseudo-terminal whose other end types keys, keeps the screen and
+//! answers requests, as a terminal's window does.
 
 use std::fs::File;
 use std::io::{Read as _, Write as _};
@@ -19,15 +19,16 @@ use crate::process::processor_time_of;
 use crate::time::{left, now};
 use crate::window::Window;
 
-/// The program asks with this whether the terminal distinguishes a held key's repeats from presses (kitty's keyboard
-/// protocol).
+/// The program asks with this whether the terminal distinguishes a held key's repeats from presses
+/// (kitty's keyboard protocol).
 const REPEATS_QUERY: &[u8] = b"\x1b[?u";
 /// The answer of a terminal that knows the protocol and has no flag set.
 const REPEATS_ANSWER: &[u8] = b"\x1b[?0u";
 /// Every terminal answers this when it is asked what it is; it ends the wait for the answer above.
 const DEVICE_ATTRIBUTES: &[u8] = b"\x1b[?62c";
 
-/// The program asks with this whether the terminal still takes what is written, and any terminal answers.
+/// The program asks with this whether the terminal still takes what is written, and any terminal
+/// answers.
 const STATUS_QUERY: &[u8] = b"\x1b[5n";
 const STATUS_ANSWER: &[u8] = b"\x1b[0n";
 
@@ -66,10 +67,12 @@ impl Shown {
 }
 
 impl Terminal {
-    /// Starts a program on a terminal of this size (columns, rows). `tells_repeats` says whether the terminal
-    /// distinguishes key repeats from presses. `setsid` (util-linux) makes it the program's controlling terminal.
+    /// Starts a program on a terminal of this size (columns, rows). `tells_repeats` says whether
+    /// the terminal distinguishes key repeats from presses. `setsid` (util-linux) makes it the
+    /// program's controlling terminal.
     pub fn start(command: &Command, (columns, rows): (u16, u16), tells_repeats: bool) -> Self {
-        // Other programs do not inherit it: a copy in another test's program would keep the terminal open.
+        // Other programs do not inherit it: a copy in another test's program would keep the
+        // terminal open.
         let flags = OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC;
         let keyboard = openpt(flags).expect("a pseudo-terminal");
         unlockpt(&keyboard).expect("a pseudo-terminal");
@@ -134,8 +137,8 @@ impl Terminal {
         }
     }
 
-    /// Types these keys repeatedly until the words are shown; returns how often. On a busy machine keys may arrive
-    /// together, and the program asks whether a person typed them: it is told so.
+    /// Types these keys repeatedly until the words are shown; returns how often. On a busy machine
+    /// keys may arrive together, and the program asks whether a person typed them: it is told so.
     pub fn type_until(&mut self, keys: &[u8], words: &str) -> usize {
         for typed in 1..=20 {
             self.type_by_hand(keys);
@@ -147,8 +150,8 @@ impl Terminal {
         panic!("no `{words}` on:\n{}", self.window().rows().join("\n"));
     }
 
-    /// Waits until these words are shown, or the question whether a person typed the keys, and answers the question.
-    /// Returns whether it was asked.
+    /// Waits until these words are shown, or the question whether a person typed the keys, and
+    /// answers the question. Returns whether it was asked.
     pub fn confirm_if_asked(&mut self, words: &str) -> bool {
         let asked = self.wait_within(RETYPE_AFTER, |window| {
             let asked = window.shows(HURRIED_QUESTION);
@@ -161,8 +164,8 @@ impl Terminal {
         asked == Some(true)
     }
 
-    /// Types these keys by hand over a connection that delivers them in pieces of these lengths, each after a stall of
-    /// half a second.
+    /// Types these keys by hand over a connection that delivers them in pieces of these lengths,
+    /// each after a stall of half a second.
     pub fn type_in_bunches(&mut self, keys: &[u8], lengths: &[usize]) {
         let mut rest = keys;
         for length in lengths {
@@ -174,7 +177,8 @@ impl Terminal {
         assert!(rest.is_empty(), "the lengths are those of all keys");
     }
 
-    /// Holds a key down for this many repeats. The keyboard repeats it after half a second and then every 33 ms.
+    /// Holds a key down for this many repeats. The keyboard repeats it after half a second and then
+    /// every 33 ms.
     pub fn hold(&mut self, key: u8, repeats: usize) {
         self.type_bytes(&[key]);
         pause(Duration::from_millis(500));
@@ -230,14 +234,15 @@ impl Terminal {
 
     /// Changes the size of the window (columns, rows).
     pub fn resize(&self, (columns, rows): (u16, u16)) {
-        // The lock makes sure that no output is processed between the change of the window and the program's
-        // notification.
+        // The lock makes sure that no output is processed between the change of the window and the
+        // program's notification.
         let mut window = self.shown.lock();
         window.resize((columns, rows));
         tcsetwinsize(&self.keyboard, window_size((columns, rows))).expect("a terminal with a size");
     }
 
-    /// Whether modes, screen, cursor and keyboard of the terminal are as before the program started.
+    /// Whether modes, screen, cursor and keyboard of the terminal are as before the program
+    /// started.
     pub fn is_restored(&self) -> bool {
         let modes = tcgetattr(&self.keyboard).expect("a terminal's modes");
         let window = self.window();

@@ -1,5 +1,5 @@
-//! A UDP proxy between a vehicle and a ground station. It loses, duplicates, delays and drops datagrams as a test
-//! requests.
+//! A UDP proxy between a vehicle and a ground station. It loses, duplicates, delays and drops
+//! datagrams as a test requests.
 
 use std::net::{SocketAddr, UdpSocket};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -35,8 +35,8 @@ pub struct Impairment {
     pub drops_uplink: bool,
 }
 
-/// A proxy between one vehicle and one ground station; both send to it first. A program that is restarted replaces
-/// the one before it.
+/// A proxy between one vehicle and one ground station; both send to it first. A program that is
+/// restarted replaces the one before it.
 pub struct UdpProxy {
     to_vehicle: UdpSocket,
     to_ground: UdpSocket,
@@ -122,7 +122,8 @@ impl UdpProxy {
         self.to_ground.send_to(datagram, ground).expect("sent");
     }
 
-    /// Waits until the ground sends a datagram. It sends at least its heartbeat, from the loop that does everything.
+    /// Waits until the ground sends a datagram. It sends at least its heartbeat, from the loop that
+    /// does everything.
     pub fn wait_for_ground(&self) {
         let before = lock(&self.state).from_ground;
         let deadline = now() + PATIENCE;

@@ -115,7 +115,8 @@ impl Window {
         self.parser.callbacks().bells
     }
 
-    /// How often the program asked for a title, the clipboard or another size, which it should never do.
+    /// How often the program asked for a title, the clipboard or another size, which it should
+    /// never do.
     pub fn forbidden_requests(&self) -> usize {
         let asked = self.parser.callbacks();
         asked.titles + asked.clipboard + asked.resizes

@@ -1,7 +1,8 @@
 //! Hostile datagrams of every kind, sent to a vehicle and a ground station that fly a landing.
 //!
-//! By default the tests send as many as an ordinary test run has time for. `TOUCHDOWN_HOSTILE_DATAGRAMS=10000000
-//! cargo test --release -p e2e hostile -- --nocapture` sends more and prints the numbers.
+//! By default the tests send as many as an ordinary test run has time for.
+//! `TOUCHDOWN_HOSTILE_DATAGRAMS=10000000 cargo test --release -p e2e hostile -- --nocapture` sends
+//! more and prints the numbers.
 #![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
 mod strangers;
@@ -32,7 +33,8 @@ fn datagrams_wanted() -> u64 {
         .unwrap_or(DEFAULT_COUNT)
 }
 
-/// A frame of these bytes: message id (low byte, then high), source, payload; `None` for an id outside the dialect.
+/// A frame of these bytes: message id (low byte, then high), source, payload; `None` for an id
+/// outside the dialect.
 fn frame_of(bytes: &[u8]) -> Option<Frame> {
     let [low, high, system_id, component_id, payload @ ..] = bytes else { return None };
     let source = Address { system_id: *system_id, component_id: *component_id };
@@ -139,8 +141,8 @@ fn with_key() -> tempfile::TempDir {
     folder
 }
 
-/// The vehicle waits on the pad under a flood: it keeps sending, its memory does not grow, and nothing is armed,
-/// started or terminated.
+/// The vehicle waits on the pad under a flood: it keeps sending, its memory does not grow, and
+/// nothing is armed, started or terminated.
 #[test]
 fn a_vehicle_survives_a_flood() {
     let folder = with_key();
@@ -175,8 +177,8 @@ fn a_vehicle_survives_a_flood() {
     assert!(!ended.output.contains("PAD_ARMED"), "{}", ended.output);
 }
 
-/// A landing is flown while a port of the ground and one of the vehicle are flooded; the vehicle also has a link of
-/// its own to the ground.
+/// A landing is flown while a port of the ground and one of the vehicle are flooded; the vehicle
+/// also has a link of its own to the ground.
 #[test]
 fn a_landing_succeeds_under_a_flood() {
     let folder = with_key();
@@ -202,8 +204,8 @@ fn a_landing_succeeds_under_a_flood() {
     expect_identical_replay(folder.path(), "vehicle.mcap");
 }
 
-/// A ground station without a vehicle under a flood: it keeps running, its memory does not grow, and it accepts
-/// nothing.
+/// A ground station without a vehicle under a flood: it keeps running, its memory does not grow,
+/// and it accepts nothing.
 #[test]
 fn a_ground_survives_a_flood() {
     let folder = with_key();

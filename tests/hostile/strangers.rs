@@ -1,4 +1,5 @@
-//! Many unknown senders at once do not displace the true ground or the true vehicle, and do not delay an abort.
+//! Many unknown senders at once do not displace the true ground or the true vehicle, and do not
+//! delay an abort.
 
 use std::io::ErrorKind;
 use std::net::{SocketAddr, UdpSocket};
@@ -54,7 +55,8 @@ impl Strangers {
         Self { stop, sent, thread: Some(thread) }
     }
 
-    /// Waits until the strangers have sent for a while, so that they have taken every place that they can.
+    /// Waits until the strangers have sent for a while, so that they have taken every place that
+    /// they can.
     fn wait_until_settled(&self) {
         while self.sent.load(Ordering::Relaxed)
             < u64::from(SENDERS) * DATAGRAMS_PER_BURST * u64::from(BURSTS_PER_S) / 2
@@ -80,7 +82,8 @@ fn send_all(target: SocketAddr, kind: Traffic, stop: &AtomicBool, sent: &AtomicU
         .collect();
     let mut random = Random(2);
     let mut forger = Signing::new(Key::new([9; Key::LEN]), Memory::default());
-    // The commands come from another system id: without a key, a command in the ground's name is obeyed.
+    // The commands come from another system id: without a key, a command in the ground's name is
+    // obeyed.
     let mut other_ground = Encoder::new(Address { system_id: 99, component_id: 190 });
     let begun = now();
     let mut number = 0;
@@ -94,7 +97,8 @@ fn send_all(target: SocketAddr, kind: Traffic, stop: &AtomicBool, sent: &AtomicU
                         let beat = MavMessage::HEARTBEAT(HEARTBEAT_DATA::default());
                         encoder.encode(&beat).as_bytes().to_vec()
                     }
-                    // Only the kinds that command nothing, because without a key a command is obeyed.
+                    // Only the kinds that command nothing, because without a key a command is
+                    // obeyed.
                     (Traffic::Mixed, _) => hostile(&mut random, &mut forger, &mut other_ground, number % 2),
                 };
                 // The system refuses it if its queue is full; then it does not count.
@@ -127,7 +131,8 @@ impl Counted {
     }
 }
 
-/// A ground station on one socket. It sends first and measures how long the vehicle takes to answer.
+/// A ground station on one socket. It sends first and measures how long the vehicle takes to
+/// answer.
 struct TimedGround {
     socket: UdpSocket,
     vehicle: SocketAddr,
@@ -170,7 +175,8 @@ impl TimedGround {
         }
     }
 
-    /// Continues from another port, as a station behind a router that lost its state, or a restarted one.
+    /// Continues from another port, as a station behind a router that lost its state, or a
+    /// restarted one.
     fn move_to_another_port(&mut self) {
         self.socket = UdpSocket::bind("127.0.0.1:0").unwrap();
     }
@@ -245,7 +251,8 @@ impl TimedGround {
         }
     }
 
-    /// Waits until the vehicle hears and is heard; returns how long that took. Delays before that do not count.
+    /// Waits until the vehicle hears and is heard; returns how long that took. Delays before that
+    /// do not count.
     fn wait_until_connected(&mut self, within: Duration) -> Duration {
         let began = now();
         self.answer_at = began;
@@ -257,7 +264,8 @@ impl TimedGround {
         began.elapsed()
     }
 
-    /// Sends ABORT twenty times a second until the vehicle has accepted it; returns how long that took.
+    /// Sends ABORT twenty times a second until the vehicle has accepted it; returns how long that
+    /// took.
     fn abort(&mut self) -> Duration {
         let began = now();
         while !self.accepted && began.elapsed() < Duration::from_secs(30) {
@@ -313,8 +321,8 @@ fn check_abort(attempt: &Attempt, case: &str) {
     );
 }
 
-/// A heartbeat in each second of the vehicle's clock, also if the machine is so busy that they come late. The kernel's queue
-/// may lose single questions, but not most.
+/// A heartbeat in each second of the vehicle's clock, also if the machine is so busy that they come
+/// late. The kernel's queue may lose single questions, but not most.
 fn check_counted(attempt: &Attempt, case: &str) {
     let Counted { heartbeats, asked, answered, .. } = attempt.counted;
     let whole_seconds = attempt.counted.vehicle_s().floor();
@@ -322,7 +330,8 @@ fn check_counted(attempt: &Attempt, case: &str) {
     assert!(whole_seconds > 1.0 && 2 * answered > asked, "{case}: answers are missing: {attempt:?}");
 }
 
-/// HEARTBEAT is sent once a second and may be half a second late, and not five answers in a row are missing: on an idle machine.
+/// HEARTBEAT is sent once a second and may be half a second late, and not five answers in a row are
+/// missing: on an idle machine.
 fn check_gaps(attempt: &Attempt, case: &str) {
     assert!(
         attempt.worst_beat <= Duration::from_millis(1_500),
@@ -344,8 +353,8 @@ fn strangers_do_not_delay_an_abort() {
     }
 }
 
-/// The whole measurement is six hundred aborts and takes about half an hour: `cargo test --release -p e2e -- --ignored
-/// --nocapture a_hundred`.
+/// The whole measurement is six hundred aborts and takes about half an hour: `cargo test --release
+/// -p e2e -- --ignored --nocapture a_hundred`.
 #[test]
 #[ignore = "takes half an hour"]
 fn a_hundred_aborts_of_each_kind_are_latched_within_half_a_second() {
@@ -406,8 +415,8 @@ fn a_listening_ground_flies_its_vehicle_among_strangers() {
         let (_, station) = expect_landing(flight, station);
         let output = &station.output;
         assert!(!output.contains("link lost"), "{output}");
-        // The flight takes half a minute, with one line in ten seconds and a few named peers. Without a key many
-        // strangers are peers.
+        // The flight takes half a minute, with one line in ten seconds and a few named peers.
+        // Without a key many strangers are peers.
         let about = |line: &&str| line.contains("unknown senders") || line.contains("further peers");
         let about_strangers = output.lines().filter(about).count();
         assert!((1..=6).contains(&about_strangers), "{about_strangers} lines:\n{output}");

@@ -1,5 +1,5 @@
-//! A launch day on a simulated clock: one station's model, and every hour another vehicle, which waits on its pad, flies and
-//! stays where it landed.
+//! A launch day on a simulated clock: one station's model, and every hour another vehicle, which
+//! waits on its pad, flies and stays where it landed.
 
 use std::time::Duration;
 

@@ -1,4 +1,5 @@
-//! A launch day: one station with three screens, and a flight every few minutes over a link that comes and goes.
+//! A launch day: one station with three screens, and a flight every few minutes over a link that
+//! comes and goes.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -168,7 +169,8 @@ impl Field {
     }
 }
 
-/// How many different verdicts a station has recorded: no two flights touch down alike to the last bit.
+/// How many different verdicts a station has recorded: no two flights touch down alike to the last
+/// bit.
 fn verdicts_in(log: &Path) -> Result<usize, Failure> {
     let mut heard: Vec<TD_LANDING_VERDICT_DATA> = Vec::new();
     for bytes in raw_frames_of(log, "rx") {

@@ -6,13 +6,16 @@ use e2e::{resident_bytes, status_of};
 
 use crate::SAMPLE_EVERY;
 
-/// Growth of resident memory that is called flat: what the `long` test of `ground` allows for its allocator in nine hours.
+/// Growth of resident memory that is called flat: what the `long` test of `ground` allows for its
+/// allocator in nine hours.
 pub(crate) const GROWTH_MAX_BYTES: u64 = 1024 * 1024;
 
-/// What a log's recorder keeps until its end: where each chunk is. Five chunks a second take 4 MB an hour (measured).
+/// What a log's recorder keeps until its end: where each chunk is. Five chunks a second take 4 MB
+/// an hour (measured).
 pub(crate) const LOG_INDEX_BYTES_H: u64 = 5_000_000;
-/// What a station keeps besides for screens that are attached later: telemetry, up to 24 MiB of it. Measured: 21 MB an hour
-/// with the index of its log, until that bound is reached after about two hours.
+/// What a station keeps besides for screens that are attached later: telemetry, up to 24 MiB of it.
+/// Measured: 21 MB an hour with the index of its log, until that bound is reached after about two
+/// hours.
 pub(crate) const HISTORY_BYTES_H: u64 = 25_000_000;
 
 /// What a process holds at one moment.

@@ -1,9 +1,10 @@
-//! A simulated day and two real hours of a launch site: a station with three screens and a flight every few minutes, and beside it a pad that
-//! nobody leaves. Links come and go, a disk fills, a clock steps, programs stop and continue. Memory, descriptors, threads
-//! and logs must stay flat, and nothing may be lost that was promised.
+//! A simulated day and two real hours of a launch site: a station with three screens and a flight
+//! every few minutes, and beside it a pad that nobody leaves. Links come and go, a disk fills, a
+//! clock steps, programs stop and continue. Memory, descriptors, threads and logs must stay flat,
+//! and nothing may be lost that was promised.
 //!
-//! `cargo bench -p e2e --bench soak -- 24 120 /tmp/soak` (simulated hours, real minutes, and a folder that does not exist
-//! yet).
+//! `cargo bench -p e2e --bench soak -- 24 120 /tmp/soak` (simulated hours, real minutes, and a
+//! folder that does not exist yet).
 
 mod day;
 mod field;

@@ -1,5 +1,5 @@
-//! A pad that nobody leaves: one vehicle and one station that never fly, while the clock of the laptop steps, the disk
-//! fills, the link goes and programs stop for a while.
+//! A pad that nobody leaves: one vehicle and one station that never fly, while the clock of the
+//! laptop steps, the disk fills, the link goes and programs stop for a while.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -35,7 +35,8 @@ const EVENTS: [Event; 7] = [
 const LASTS: Duration = Duration::from_secs(12);
 
 pub(crate) struct Pad {
-    /// The file that names the step of the laptop's clock; `None` without the library that changes it.
+    /// The file that names the step of the laptop's clock; `None` without the library that changes
+    /// it.
     clock: Option<PathBuf>,
     proxy: UdpProxy,
     vehicle: Running,

@@ -27,7 +27,8 @@ fn an_abort_without_a_station_is_reported_on_every_screen_and_sent_by_the_next_s
     assert_eq!(aborts_sent(&pad), 0);
     let second = pad.daemon("second.mcap");
     for shown in [&screen, &watching] {
-        // The second station has another clock than the first; its values must not look old, nor the link lost.
+        // The second station has another clock than the first; its values must not look old, nor
+        // the link lost.
         shown.wait_until("the abort, by the second station", |window| {
             let rows = window.rows();
             let heard = rows[0].contains(" down 0s up 0s") && rows[1].contains(" On the pad ");
@@ -83,8 +84,8 @@ fn the_station_after_one_that_hung_says_which_abort_was_asked_and_not_confirmed(
     assert_eq!(second.wait().code, Some(4), "the exit code of an aborted flight");
 }
 
-/// Whether a sequence of ECMA-48's SGR sets a colour: 30 to 37 and 40 to 47, 38 and 48 with more behind them. A place of the
-/// cursor may have the same numbers.
+/// Whether a sequence of ECMA-48's SGR sets a colour: 30 to 37 and 40 to 47, 38 and 48 with more
+/// behind them. A place of the cursor may have the same numbers.
 fn has_colour(bytes: &[u8]) -> bool {
     let text = String::from_utf8_lossy(bytes);
     let sequences = text.split("\x1b[").skip(1).filter_map(|rest| {

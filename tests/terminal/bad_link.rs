@@ -1,4 +1,5 @@
-//! Loss, lost answers, refusals and silence: what the screen shows, and that the crew can still act.
+//! Loss, lost answers, refusals and silence: what the screen shows, and that the crew can still
+//! act.
 
 use std::time::Duration;
 
@@ -67,7 +68,8 @@ fn an_arm_whose_answers_are_lost_is_repeated_for_two_seconds_done_once_and_the_h
     let mut rig = Rig::new("mk2");
     rig.terminal.wait_for("every arming check passes");
     rig.proxy.impair(Impairment { drops_answers: true, ..Impairment::default() });
-    // A hand types again only if nothing was sent: keys may arrive so bunched that they are asked again.
+    // A hand types again only if nothing was sent: keys may arrive so bunched that they are asked
+    // again.
     rig.type_until(b"AARM\r", "ARM    commanded");
     rig.wait_for_fact("ARM", "acknowledged NEVER  observed yes");
     rig.terminal.wait_for(" ARMED ");

@@ -6,7 +6,8 @@ use protocol::identity::VEHICLE;
 
 use super::rig::Rig;
 
-/// Sequences that a terminal would obey, or bytes that are no text. Each ends in a word that must be shown.
+/// Sequences that a terminal would obey, or bytes that are no text. Each ends in a word that must
+/// be shown.
 const ATTACKS: [&[u8]; 16] = [
     b"\x1b[2J\x1b[HCLEARED01",
     b"\x1b]0;title\x07TITLED02",
@@ -26,8 +27,8 @@ const ATTACKS: [&[u8]; 16] = [
     "e\u{301}\u{200b}\u{feff}\u{7f}JOINED16".as_bytes(),
 ];
 
-/// The beginnings of sequences that the ground never writes: strings for the terminal, requests, full resets,
-/// scrolling regions, and control characters other than bell and escape.
+/// The beginnings of sequences that the ground never writes: strings for the terminal, requests,
+/// full resets, scrolling regions, and control characters other than bell and escape.
 const NEVER_WRITTEN: [&[u8]; 14] = [
     b"\x1b]",
     b"\x1bP",
@@ -110,7 +111,8 @@ fn assert_harmless(rig: &Rig) {
     assert!(std::str::from_utf8(window.bytes()).is_ok(), "bytes that are not UTF-8 reached the terminal");
 }
 
-/// Waits until the newest message is shown on the last line but one, with everything around it in place.
+/// Waits until the newest message is shown on the last line but one, with everything around it in
+/// place.
 fn wait_for_newest(rig: &Rig, page: &str, word: &str) {
     rig.terminal.wait_until(&format!("{word} on {page}"), |window| {
         let rows = window.rows();

@@ -1,4 +1,5 @@
-//! Screens that hang in a countdown: a stopped process, a connection that died, a terminal without a screen.
+//! Screens that hang in a countdown: a stopped process, a connection that died, a terminal without
+//! a screen.
 
 use e2e::{Running, Signal, Terminal};
 

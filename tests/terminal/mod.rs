@@ -1,5 +1,5 @@
-//! The ground station on a real terminal with typed keys, and the real simulator behind a proxy that loses, delays
-//! and forges datagrams.
+//! The ground station on a real terminal with typed keys, and the real simulator behind a proxy
+//! that loses, delays and forges datagrams.
 //!
 //! A test reads only the terminal's window and the datagrams that passed the proxy.
 #![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]

@@ -1,5 +1,5 @@
-//! Pasted text, held keys and bytes that arrive too fast: they arm, start or quit nothing by themselves, and keys that
-//! a bad connection delivers in bunches are not lost.
+//! Pasted text, held keys and bytes that arrive too fast: they arm, start or quit nothing by
+//! themselves, and keys that a bad connection delivers in bunches are not lost.
 
 use std::process::Command;
 
@@ -92,7 +92,8 @@ fn the_rest_of_a_paste_does_not_reach_the_shell() {
     let mut terminal = Terminal::start(&shell, SIZE, false);
     terminal.wait_for("[1Pad]");
     let text = long_text().replace('\n', "\r");
-    // `setsid` has become the shell, and the station is its child, which is terminated in the middle of a paste.
+    // `setsid` has become the shell, and the station is its child, which is terminated in the
+    // middle of a paste.
     let pid = std::fs::read_to_string(format!("/proc/{0}/task/{0}/children", terminal.pid())).unwrap();
     terminal.type_bytes(&text.as_bytes()[..4_000]);
     assert!(Command::new("kill").args(["-s", "TERM", pid.trim()]).status().unwrap().success());

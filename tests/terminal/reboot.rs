@@ -93,7 +93,8 @@ fn the_wait_after_an_abort_goes_on_over_a_power_cycle() {
     rig.terminal.wait_for_end();
 }
 
-/// Vehicle and station are both switched off during the wait, and started again by the same commands.
+/// Vehicle and station are both switched off during the wait, and started again by the same
+/// commands.
 #[test]
 fn the_wait_after_an_abort_goes_on_when_vehicle_and_station_are_started_again() {
     let mut rig = aborted();

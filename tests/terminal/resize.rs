@@ -4,12 +4,14 @@ use e2e::{Signal, Window};
 
 use super::rig::{Rig, SIZE};
 
-/// The smallest and the largest screen, both extreme shapes, and the sizes on both sides of where panels appear.
+/// The smallest and the largest screen, both extreme shapes, and the sizes on both sides of where
+/// panels appear.
 const SIZES: [(u16, u16); 8] =
     [(20, 5), (300, 90), (300, 5), (20, 90), (80, 24), (79, 24), (80, 23), (133, 41)];
 const STORM: u16 = 400;
 
-/// The rows without their numbers, which change from frame to frame; on a pad everything else stays the same.
+/// The rows without their numbers, which change from frame to frame; on a pad everything else stays
+/// the same.
 fn without_numbers(window: &Window) -> Vec<String> {
     let digits = |c: char| c.is_ascii_digit() || matches!(c, '.' | '-');
     window.rows().iter().map(|row| row.split(digits).map(str::trim).collect()).collect()
@@ -18,19 +20,20 @@ fn without_numbers(window: &Window) -> Vec<String> {
 /// Clears the whole screen (ECMA-48, ED 2).
 const CLEAR: &[u8] = b"\x1b[2J";
 
-/// Changes the size and checks that nothing of the previous size is left: when the screen is drawn again from
-/// scratch, it looks the same.
+/// Changes the size and checks that nothing of the previous size is left: when the screen is drawn
+/// again from scratch, it looks the same.
 fn assert_whole(rig: &mut Rig, size: (u16, u16)) {
     rig.terminal.resize(size);
-    // A frame that shows the effect of a key was drawn after the key, so at the new size. These keys change nothing
-    // else.
+    // A frame that shows the effect of a key was drawn after the key, so at the new size. These
+    // keys change nothing else.
     rig.type_until(b"z\x18", "ENTER ABORTS");
     rig.terminal.type_bytes(b"z");
     let (before, written) = rig.terminal.wait_until("everything in its place", |window| {
         let shown = window.rows();
         let heard = shown.iter().take(3).any(|row| row.contains(" down 0s up 0s"));
         let found = shown.len() == usize::from(size.1) && shown[1].contains("On the pad") && heard;
-        // On a busy machine two keys arrive at once, and a word about that stands there for seconds.
+        // On a busy machine two keys arrive at once, and a word about that stands there for
+        // seconds.
         let says_more = window.shows("ENTER ABORTS") || shown[1].contains("keys ");
         (found && !says_more).then(|| (without_numbers(window), window.bytes().len()))
     });

@@ -1,4 +1,5 @@
-//! What the terminal tests share: a vehicle, a proxy, a ground station on a terminal, and the keys that a crew types.
+//! What the terminal tests share: a vehicle, a proxy, a ground station on a terminal, and the keys
+//! that a crew types.
 
 use std::path::Path;
 use std::process::Command;
@@ -37,7 +38,8 @@ impl Rig {
         rig
     }
 
-    /// The same on a terminal of this kind; `tells_repeats` says whether it distinguishes key repeats from presses.
+    /// The same on a terminal of this kind; `tells_repeats` says whether it distinguishes key
+    /// repeats from presses.
     pub(crate) fn on_terminal(profile: &'static str, tells_repeats: bool, kind: &str) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let proxy = UdpProxy::new();
@@ -73,7 +75,8 @@ impl Rig {
         self.terminal.type_until(keys, words)
     }
 
-    /// Types the arming sequence until the vehicle reports that it is armed; returns how often it was typed.
+    /// Types the arming sequence until the vehicle reports that it is armed; returns how often it
+    /// was typed.
     pub(crate) fn arm(&mut self) -> usize {
         self.terminal.wait_for("every arming check passes");
         let climbed = self.type_until(b"AARM\r", " ARMED ");
@@ -92,7 +95,8 @@ impl Rig {
         self.wait_for_fact("ABORT", "acknowledged ");
     }
 
-    /// Waits until the facts about a command contain these words; returns the number of attempts shown.
+    /// Waits until the facts about a command contain these words; returns the number of attempts
+    /// shown.
     pub(crate) fn wait_for_fact(&self, name: &str, words: &str) -> usize {
         attempts(&self.terminal.wait_for_fact(name, words))
     }

@@ -1,4 +1,5 @@
-//! A station that stood still while its vehicle flew: Ctrl-Z and `fg`, a busy computer, a laptop whose lid was closed.
+//! A station that stood still while its vehicle flew: Ctrl-Z and `fg`, a busy computer, a laptop
+//! whose lid was closed.
 
 use e2e::Signal;
 

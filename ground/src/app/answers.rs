@@ -1,8 +1,10 @@
-//! Asks the terminal whether it still shows what is written to it, and takes its answers out of what is typed.
+//! Asks the terminal whether it still shows what is written to it, and takes its answers out of
+//! what is typed.
 //!
-//! Bytes that a program has written may wait for ever: in a terminal that hangs, or for a connection that is dead. Only an answer
-//! to a question that went the same way shows that somebody may be reading. crossterm drops such an answer without a word. So
-//! this stands between the terminal and crossterm: a thread reads the terminal, and passes on everything else over a
+//! Bytes that a program has written may wait for ever: in a terminal that hangs, or for a
+//! connection that is dead. Only an answer to a question that went the same way shows that somebody
+//! may be reading. crossterm drops such an answer without a word. So this stands between the
+//! terminal and crossterm: a thread reads the terminal, and passes on everything else over a
 //! pseudo-terminal, which crossterm takes for standard input.
 
 use std::fs::File;
@@ -27,7 +29,8 @@ const REST_WITHIN: Timespec = Timespec { tv_sec: 0, tv_nsec: 50_000_000 };
 const LAST_WITHIN: Duration = Duration::from_millis(500);
 const LOOK_AGAIN_AFTER: Duration = Duration::from_millis(2);
 
-/// Answers that nobody has taken note of yet, and questions without an answer. There is only one terminal.
+/// Answers that nobody has taken note of yet, and questions without an answer. There is only one
+/// terminal.
 static ANSWERS: AtomicU32 = AtomicU32::new(0);
 static OPEN_QUESTIONS: AtomicI32 = AtomicI32::new(0);
 
@@ -44,7 +47,8 @@ pub(super) fn has_answered() -> bool {
     ANSWERS.swap(0, Ordering::Relaxed) > 0
 }
 
-/// Begins to stand between the terminal, which is in raw mode already, and crossterm, which has read nothing yet.
+/// Begins to stand between the terminal, which is in raw mode already, and crossterm, which has
+/// read nothing yet.
 ///
 /// # Errors
 /// The system gives no pseudo-terminal.
@@ -69,7 +73,8 @@ pub(super) fn begin() -> io::Result<()> {
     std::thread::Builder::new().name("keyboard".to_owned()).spawn(pass).map(drop)
 }
 
-/// Gives standard input back. The last answers are waited for, or they would be typed into the shell.
+/// Gives standard input back. The last answers are waited for, or they would be typed into the
+/// shell.
 pub(super) fn end() {
     for _ in 0..LAST_WITHIN.as_millis() / LOOK_AGAIN_AFTER.as_millis() {
         if OPEN_QUESTIONS.load(Ordering::Relaxed) <= 0 {
@@ -77,7 +82,8 @@ pub(super) fn end() {
         }
         std::thread::sleep(LOOK_AGAIN_AFTER);
     }
-    // The pseudo-terminal's other end is closed by this: crossterm sees no end of it, at which it would loop.
+    // The pseudo-terminal's other end is closed by this: crossterm sees no end of it, at which it
+    // would loop.
     if let Some((stdin, _ours)) = replaced().take() {
         // Fails only if there is no standard input, and then nobody reads it.
         let _ = rustix::stdio::dup2_stdin(&stdin);

@@ -25,7 +25,8 @@ use crate::model::{
 };
 use crate::update::{Msg, update};
 
-/// The period of the screen's own ticks: dialogs and chords expire even while the station sends nothing.
+/// The period of the screen's own ticks: dialogs and chords expire even while the station sends
+/// nothing.
 const TICK: Duration = Duration::from_millis(100);
 /// A station that says nothing for so long hangs: its next message of its past takes a moment.
 const ANSWERS_WITHIN: Duration = Duration::from_secs(5);
@@ -44,8 +45,8 @@ pub struct Viewer {
     pub talk: Talk,
 }
 
-/// Shows the station until the person at the screen quits; the station keeps running. Without a terminal it prints
-/// the events as lines.
+/// Shows the station until the person at the screen quits; the station keeps running. Without a
+/// terminal it prints the events as lines.
 ///
 /// # Errors
 /// No station runs there, or the terminal failed.
@@ -211,8 +212,8 @@ async fn act(
     quit
 }
 
-/// Finds the station on the named socket, otherwise the one that now holds the same link; never a station of another
-/// vehicle.
+/// Finds the station on the named socket, otherwise the one that now holds the same link; never a
+/// station of another vehicle.
 async fn find_again(named: Option<&Path>, links: &str, viewer: &Viewer) -> Option<StationConnection> {
     let place = match named {
         Some(path) => path.to_owned(),
@@ -221,8 +222,8 @@ async fn find_again(named: Option<&Path>, links: &str, viewer: &Viewer) -> Optio
     StationConnection::open(&place, viewer).await.ok()
 }
 
-/// Keeps an abort beside the station's log while its station has not sent it, for the next station and its screens. A station
-/// that goes on keeps it by itself.
+/// Keeps an abort beside the station's log while its station has not sent it, for the next station
+/// and its screens. A station that goes on keeps it by itself.
 fn keep_unsent(is_kept: &mut bool, model: &mut Model, unix_s: u64, now: Duration) {
     let abort = model.link.why_abort_not_sent(now).map(|_| asked_words(unix_s, &model.settings.seat));
     let changes = abort.is_some() != std::mem::replace(is_kept, abort.is_some());
@@ -256,7 +257,8 @@ fn report_unsent(model: &mut Model, request: &Request, now: Duration) {
     model.say(now, Speaker::Ground, EventLevel::Error, text);
 }
 
-/// Takes what the station tells. Returns what this screen does about it: the station does the other actions.
+/// Takes what the station tells. Returns what this screen does about it: the station does the other
+/// actions.
 fn take(model: &mut Model, told: ToScreen, at: Duration, viewer: &Viewer) -> Vec<Action> {
     match told {
         ToScreen::Hello(hello) => model.settings = settings(&hello, viewer),

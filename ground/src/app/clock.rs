@@ -63,7 +63,8 @@ fn since_boot() -> Duration {
 pub enum LogTime {
     /// Time since the start of the run.
     Run(Clock),
-    /// The clock of the simulated vehicle, which writes into the same log and may run faster or slower.
+    /// The clock of the simulated vehicle, which writes into the same log and may run faster or
+    /// slower.
     Vehicle(LogClock),
 }
 
@@ -87,7 +88,8 @@ const SIGABRT: i32 = 6;
 
 // Waits for the signals that end the program. None of them affects the vehicle.
 
-/// The signals that end the program, with their names: every one that would otherwise leave the terminal as the screen has it.
+/// The signals that end the program, with their names: every one that would otherwise leave the
+/// terminal as the screen has it.
 pub struct Signals([(Signal, &'static str); 7]);
 
 impl Signals {

@@ -1,5 +1,6 @@
-//! `ground download`: fetches the vehicle's own log (MAVLink FTP) over a link of its own. It sends no heartbeat: nothing that it
-//! does may look like a station that watches over the vehicle. `protocol::ftp::download` decides what to ask for.
+//! `ground download`: fetches the vehicle's own log (MAVLink FTP) over a link of its own. It sends
+//! no heartbeat: nothing that it does may look like a station that watches over the vehicle.
+//! `protocol::ftp::download` decides what to ask for.
 
 use std::fs::File;
 use std::io;
@@ -112,8 +113,8 @@ fn in_words(progress: &Progress) -> String {
     format!("{here:.2} of {whole:.2} MB, {:.1} kB/s{left}", progress.bytes_s / 1000.0)
 }
 
-// The files of a download: the beginning of the log that has arrived, with the checksum of the whole in its name
-// (`.1A2B3C4D.part`), and the log once it is whole. An existing log is kept.
+// The files of a download: the beginning of the log that has arrived, with the checksum of the
+// whole in its name (`.1A2B3C4D.part`), and the log once it is whole. An existing log is kept.
 
 /// Bytes read at once for a checksum.
 const READ_AT_ONCE: usize = 256 * 1024;
@@ -128,7 +129,8 @@ struct Kept {
 }
 
 impl Kept {
-    /// Opens the file for the vehicle's log of this name and checksum, and returns how much an earlier download has left.
+    /// Opens the file for the vehicle's log of this name and checksum, and returns how much an
+    /// earlier download has left.
     ///
     /// # Errors
     /// This log is here already, or a file cannot be made.
@@ -157,7 +159,8 @@ impl Kept {
             anyhow::bail!("what arrived is not what the vehicle has: the checksums differ; fetch it again");
         }
         file.sync_all()?;
-        // A link fails if the name is taken; a rename would overwrite. Some file systems have no such links.
+        // A link fails if the name is taken; a rename would overwrite. Some file systems have no
+        // such links.
         let named = under_free_name(&whole, |name| match std::fs::hard_link(&beginning, name) {
             Err(_) if name.symlink_metadata().is_err() => std::fs::rename(&beginning, name),
             linked => linked.and_then(|()| std::fs::remove_file(&beginning)),

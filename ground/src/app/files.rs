@@ -1,4 +1,5 @@
-//! The files that a station writes: the log, the book in it, the signatures of a checklist, the last place.
+//! The files that a station writes: the log, the book in it, the signatures of a checklist, the
+//! last place.
 
 use std::fs;
 use std::fs::File;
@@ -22,8 +23,8 @@ use crate::model::{
     remembered,
 };
 
-/// Opens the chosen log and the telemetry log beside it; `Ok(None)` if no log is wanted. A log that exists is kept: the new one
-/// gets the next free name.
+/// Opens the chosen log and the telemetry log beside it; `Ok(None)` if no log is wanted. A log that
+/// exists is kept: the new one gets the next free name.
 ///
 /// # Errors
 /// A file cannot be created, or a telemetry log is wanted without a log.
@@ -127,7 +128,8 @@ impl Log {
     /// Takes the names again, for what is in the removed files.
     pub(super) fn take_names(&self) {
         for (path, _) in self.removed() {
-            // Somebody else may have the name by now, or the folder is gone: then it is said at the end.
+            // Somebody else may have the name by now, or the folder is gone: then it is said at the
+            // end.
             let _ = File::create_new(path);
         }
     }
@@ -228,7 +230,8 @@ impl StationBook {
         Record::BookEntry(self.book.enter(line))
     }
 
-    /// Signs the end if it has changed and the last signature is old enough, or `at_once`. Returns it with its record.
+    /// Signs the end if it has changed and the last signature is old enough, or `at_once`. Returns
+    /// it with its record.
     pub(super) fn sign(&mut self, now: Duration, at_once: bool) -> Option<(SignedHead, Record)> {
         let head = self.book.head()?;
         let is_recent = |at: Duration| !at_once && now.saturating_sub(at) < SIGNED_EVERY;
@@ -263,7 +266,8 @@ pub(super) struct SignatureFile {
     hash: String,
 }
 
-/// Opens a checklist, and marks what has been signed for it today. Also returns what to report to the crew.
+/// Opens a checklist, and marks what has been signed for it today. Also returns what to report to
+/// the crew.
 ///
 /// # Errors
 /// The checklist is wrong, its signatures cannot be written, or another station keeps them.
@@ -322,7 +326,8 @@ fn lock(file: &File, path: &Path) -> anyhow::Result<()> {
 }
 
 impl Drop for SignatureFile {
-    /// A program that is being started has a copy of every open file until it runs, and a copy keeps the lock.
+    /// A program that is being started has a copy of every open file until it runs, and a copy
+    /// keeps the lock.
     fn drop(&mut self) {
         for file in self.file.iter().chain([&self.checklist]) {
             // The file is closed next, which unlocks it, too.
@@ -332,7 +337,8 @@ impl Drop for SignatureFile {
 }
 
 impl SignatureFile {
-    /// Adds a change and waits until it is on the disk: a signature must survive the next power cut.
+    /// Adds a change and waits until it is on the disk: a signature must survive the next power
+    /// cut.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -354,7 +360,8 @@ impl SignatureFile {
     }
 }
 
-// The files with the last place of a vehicle, beside the log, for each boot of a vehicle: one for a restart, and a KML.
+// The files with the last place of a vehicle, beside the log, for each boot of a vehicle: one for a
+// restart, and a KML.
 
 /// What the names of the files begin with; the vehicle's boot number follows.
 const PLACE_NAME: &str = "touchdown-place-";

@@ -1,4 +1,5 @@
-//! The run loops and everything that touches the outside: terminal, links, log file, clock, signals, sockets.
+//! The run loops and everything that touches the outside: terminal, links, log file, clock,
+//! signals, sockets.
 
 mod answers;
 pub mod attached;
@@ -297,7 +298,8 @@ async fn start(
     Ok((station, model, wire))
 }
 
-/// Says what the demonstration is, before anything else, and if the log has another name than was asked for.
+/// Says what the demonstration is, before anything else, and if the log has another name than was
+/// asked for.
 fn announce(model: &mut Model, auto: bool, renamed: Option<String>, now: Duration) {
     if let Some(name) = &model.settings.vehicle_name {
         let by_whom = if auto { "it arms and starts itself" } else { "you arm and start it" };
@@ -321,8 +323,8 @@ fn go_on_with_what_is_kept(model: &mut Model, log: Option<&Recorder>, now: Durat
     }
 }
 
-/// Opens the socket for screens: for a station with a real vehicle and for every daemon. A demonstration on a
-/// terminal needs none.
+/// Opens the socket for screens: for a station with a real vehicle and for every daemon. A
+/// demonstration on a terminal needs none.
 async fn serve(
     args: &StationArgs,
     model: &mut Model,

@@ -1,9 +1,9 @@
-//! Ends the log of a station that runs for days, and begins the next one beside it, while nobody flies; also one whose files
-//! somebody has removed.
+//! Ends the log of a station that runs for days, and begins the next one beside it, while nobody
+//! flies; also one whose files somebody has removed.
 //!
-//! Everything that records does so in the run loop, so no frame comes between the two logs: the one before has all until then, the
-//! next one all after it. The book is closed in the one and opened in the other, whose first entry names the log before and the
-//! end of its book.
+//! Everything that records does so in the run loop, so no frame comes between the two logs: the one
+//! before has all until then, the next one all after it. The book is closed in the one and opened
+//! in the other, whose first entry names the log before and the end of its book.
 
 use std::path::Path;
 use std::sync::mpsc::{Receiver, TryRecvError};
@@ -75,7 +75,8 @@ fn file_name(path: &Path) -> String {
 }
 
 impl Station {
-    /// Begins the next log if the present one is long and nobody flies, or at once if it was removed.
+    /// Begins the next log if the present one is long and nobody flies, or at once if it was
+    /// removed.
     pub(super) fn keep_logs_short(&mut self, model: &mut Model, wire: &mut Wire) {
         let now = self.clock.now();
         let ended = self.next_log.ending.as_ref().map(Receiver::try_recv);
@@ -87,7 +88,8 @@ impl Station {
         }
         let is_long = self.log_space.bytes() >= LONG_BYTES;
         let waits = now < self.next_log.not_before || matches!(ended, Some(Err(TryRecvError::Empty)));
-        // A demonstration has one log, in which its vehicle writes, too: that is written anew at the end.
+        // A demonstration has one log, in which its vehicle writes, too: that is written anew at
+        // the end.
         let is_removed = model.log.removed && self.next_log.is_removed();
         if is_removed && !waits && !model.settings.demonstration {
             if let Some(log) = &*self.next_log.guarded() {

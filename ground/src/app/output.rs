@@ -154,7 +154,8 @@ impl Lines {
         Self { seen: 0, closed: true }
     }
 
-    /// Prints the new events. If nobody reads the output any more, printing stops and the flight continues.
+    /// Prints the new events. If nobody reads the output any more, printing stops and the flight
+    /// continues.
     pub fn show(&mut self, model: &Model) {
         if self.closed || is_quiet() || self.seen == model.events.total() {
             return;
@@ -171,8 +172,8 @@ impl Lines {
     }
 }
 
-/// Whether an event is about the flight rather than about how it was commanded: a demonstration without a screen is read by somebody
-/// who wants to see what flies. The log has every event.
+/// Whether an event is about the flight rather than about how it was commanded: a demonstration
+/// without a screen is read by somebody who wants to see what flies. The log has every event.
 fn is_of_the_flight(event: &Event) -> bool {
     let told = ["demonstration", "phase ", Ending::Stands.word()];
     let by_ground = event.speaker == Speaker::Ground && event.level == EventLevel::Info;

@@ -1,5 +1,6 @@
-//! Decides when the screen is drawn: soon after an input, less often otherwise, and rarely enough for a slow line. Important
-//! changes are drawn at once in any case, but the pictures of a flight, which are most of the bytes, once a second.
+//! Decides when the screen is drawn: soon after an input, less often otherwise, and rarely enough
+//! for a slow line. Important changes are drawn at once in any case, but the pictures of a flight,
+//! which are most of the bytes, once a second.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -25,7 +26,8 @@ const IDLE_FRAME: Duration = Duration::from_secs(1);
 /// The shortest time between two drawings of the pictures of a flight.
 const PICTURES: Duration = Duration::from_secs(1);
 
-/// While the terminal has not taken what was written so long ago, nothing new is drawn: it would be seen late.
+/// While the terminal has not taken what was written so long ago, nothing new is drawn: it would be
+/// seen late.
 const LATE: Duration = Duration::from_millis(500);
 /// An answer that has not come for so long is lost: a whole page of 140x45 takes 3.2 s over 2 kB/s.
 const LOST_AFTER: Duration = Duration::from_secs(5);
@@ -34,8 +36,9 @@ const LOST_AFTER: Duration = Duration::from_secs(5);
 const WINDOW: Duration = Duration::from_secs(1);
 /// Cells of an 80x24 terminal.
 const SMALL_CELLS: u32 = 80 * 24;
-/// How many bytes per second frames that can wait may use: numbers and pictures once a second. The rest of the 5 kB (80x24) or 8 kB
-/// per second is left for a frame that cannot wait: a change of page takes up to 3 kB at 80x24.
+/// How many bytes per second frames that can wait may use: numbers and pictures once a second. The
+/// rest of the 5 kB (80x24) or 8 kB per second is left for a frame that cannot wait: a change of
+/// page takes up to 3 kB at 80x24.
 const SMALL_ROOM_BYTES: usize = 1_000;
 const LARGE_ROOM_BYTES: usize = 1_200;
 
@@ -126,7 +129,8 @@ impl Pace {
         }
     }
 
-    /// Draws a frame, with the pictures of the one before if they wait. `model_now` is the same moment on the model's clock.
+    /// Draws a frame, with the pictures of the one before if they wait. `model_now` is the same
+    /// moment on the model's clock.
     ///
     /// # Errors
     /// The terminal cannot be written.
@@ -177,8 +181,8 @@ impl Pace {
         room_at
     }
 
-    /// Whether the terminal is to be asked, behind all that was written, to answer: one question at a time, so that a lost answer
-    /// is only lost.
+    /// Whether the terminal is to be asked, behind all that was written, to answer: one question at
+    /// a time, so that a lost answer is only lost.
     pub fn asks(&mut self, now: Duration) -> bool {
         let asks = self.waits(now).is_none_or(|waits| waits > LOST_AFTER);
         self.asked = if asks { Some(now) } else { self.asked };

@@ -9,7 +9,8 @@ use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 /// How many callouts wait for the command; further ones are dropped, because late words mislead.
 const WAITING_MAX: usize = 4;
 
-/// Passes lines to the command from a thread of its own, so that a command that hangs delays nothing.
+/// Passes lines to the command from a thread of its own, so that a command that hangs delays
+/// nothing.
 #[derive(Debug)]
 pub struct Voice {
     lines: SyncSender<String>,
@@ -75,7 +76,8 @@ fn speak(mut child: Child, lines: &Receiver<String>) {
 
 // Runs the command that reports an alarm to people who are not at the screen.
 
-/// Runs the command with `sh -c` and the text of the alarm in `TOUCHDOWN_ALARM`, without waiting for it.
+/// Runs the command with `sh -c` and the text of the alarm in `TOUCHDOWN_ALARM`, without waiting
+/// for it.
 ///
 /// # Errors
 /// The command, or the thread that waits for it, cannot be started.

@@ -1,4 +1,5 @@
-//! Replays on a screen: of a recording without a link, and of the flight just flown while the station goes on.
+//! Replays on a screen: of a recording without a link, and of the flight just flown while the
+//! station goes on.
 
 use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
@@ -41,7 +42,8 @@ fn newest_log(folder: &Path) -> anyhow::Result<PathBuf> {
         .context("the current directory has no touchdown-*.mcap; give --replay a file")
 }
 
-/// Shows a recorded flight until the person at the screen quits; without a screen, prints its events at once.
+/// Shows a recorded flight until the person at the screen quits; without a screen, prints its
+/// events at once.
 ///
 /// # Errors
 /// The log cannot be read, the terminal failed, or the recording has no such phase.
@@ -134,8 +136,8 @@ async fn watch(player: &mut Player, config: &Config) -> anyhow::Result<()> {
     }
 }
 
-/// Gives a replay what was typed. Returns what the screen has to do: what the ground did is part of the recording. Held or
-/// pasted keys count only if they scroll or move the time.
+/// Gives a replay what was typed. Returns what the screen has to do: what the ground did is part of
+/// the recording. Held or pasted keys count only if they scroll or move the time.
 fn typed(player: &mut Player, msg: &Msg) -> Vec<Action> {
     let Msg::Keys(keys) = msg else { return Vec::new() };
     let mut actions = Vec::new();
@@ -149,10 +151,11 @@ fn typed(player: &mut Player, msg: &Msg) -> Vec<Action> {
     actions
 }
 
-// The flight just flown, again on the screen of a running station. The link, the log and the alarms go on; an alarm, the
-// abort key, or a vehicle that is armed end the replay at once.
+// The flight just flown, again on the screen of a running station. The link, the log and the alarms
+// go on; an alarm, the abort key, or a vehicle that is armed end the replay at once.
 
-/// The flight just flown is shown again from this long before its landing motor was lit; `g` goes to its begin.
+/// The flight just flown is shown again from this long before its landing motor was lit; `g` goes
+/// to its begin.
 const BEFORE_IGNITION: Duration = Duration::from_secs(2);
 
 /// The replay of a screen.
@@ -206,8 +209,8 @@ impl Again {
         self.playing.take().is_some()
     }
 
-    /// Takes what was typed while a replay is shown. Returns what the live screen has to do, and what of the message is
-    /// for it: everything but keys, and the abort.
+    /// Takes what was typed while a replay is shown. Returns what the live screen has to do, and
+    /// what of the message is for it: everything but keys, and the abort.
     pub(super) fn take(&mut self, msg: Msg) -> (Vec<Action>, Option<Msg>) {
         if self.playing.is_none() {
             return (Vec::new(), Some(msg));

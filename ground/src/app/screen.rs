@@ -50,16 +50,16 @@ const ASK_EVERY: Duration = Duration::from_millis(250);
 /// The reason when a screen ends without a signal.
 pub const GONE: &str = "the terminal is gone";
 
-/// Whether the terminal is in full-screen mode. It is restored only once: leaving the alternate screen twice would
-/// move the cursor, and the next output would overwrite a panic message.
+/// Whether the terminal is in full-screen mode. It is restored only once: leaving the alternate
+/// screen twice would move the cursor, and the next output would overwrite a panic message.
 static TAKEN: AtomicBool = AtomicBool::new(false);
 /// Whether the keyboard flags were pushed and must be popped.
 static KEYBOARD_ENHANCED: AtomicBool = AtomicBool::new(false);
 
 /// The terminal in full-screen mode; restored when it goes out of scope, also during a panic.
 pub struct Screen {
-    /// Never dropped: its own clean-up would print to a terminal that may be gone, and panic. [`restore`] does the
-    /// clean-up.
+    /// Never dropped: its own clean-up would print to a terminal that may be gone, and panic.
+    /// [`restore`] does the clean-up.
     terminal: ManuallyDrop<Terminal<DiffBackend<FrameBuffer>>>,
     writer: TerminalWriter,
     events: EventStream,
@@ -116,8 +116,8 @@ impl Screen {
             return Ok(());
         }
         if std::mem::take(&mut self.whole) {
-            // `Terminal::clear` is not used: it asks for the cursor position and blocks for two seconds, because our
-            // own key reader takes the answer.
+            // `Terminal::clear` is not used: it asks for the cursor position and blocks for two
+            // seconds, because our own key reader takes the answer.
             let size = self.terminal.size()?;
             self.terminal.resize(size.into())?;
         }
@@ -146,7 +146,8 @@ impl Screen {
         KEYBOARD_ENHANCED.load(Ordering::Relaxed)
     }
 
-    /// Whether the terminal has answered since the last call. Asks it again if that is due, and if it has taken what was written.
+    /// Whether the terminal has answered since the last call. Asks it again if that is due, and if
+    /// it has taken what was written.
     pub fn answers(&mut self, now: Duration) -> bool {
         if now >= self.ask_at && matches!(self.writer.is_busy(), Ok(false)) {
             self.ask(now);
@@ -196,8 +197,8 @@ impl Screen {
                 Poll::Pending => break None,
                 Poll::Ready(Some(Ok(Event::Key(event)))) => keys.extend(Key::from_event(&event)),
                 Poll::Ready(Some(Ok(Event::Paste(_)))) => break Some(Msg::Pasted),
-                // Also needed if the size returns to the old one before the next frame: the terminal has cut its
-                // content.
+                // Also needed if the size returns to the old one before the next frame: the
+                // terminal has cut its content.
                 Poll::Ready(Some(Ok(Event::Resize(..)))) => self.clear(),
                 Poll::Ready(Some(Ok(_))) => {}
                 Poll::Ready(Some(Err(_)) | None) => {
@@ -260,8 +261,8 @@ fn request_repeat_reports() -> io::Result<()> {
     Ok(())
 }
 
-/// Restores the terminal. It may be gone (a dropped session); then errors are ignored, because printing them would
-/// panic and leave the log unfinished.
+/// Restores the terminal. It may be gone (a dropped session); then errors are ignored, because
+/// printing them would panic and leave the log unfinished.
 fn restore() {
     if !TAKEN.swap(false, Ordering::Relaxed) {
         return;
@@ -313,8 +314,8 @@ fn restore_before_panic_message() {
     }));
 }
 
-// Writes frames to the terminal in a thread of its own, so that a blocked terminal (stopped output, a hanging
-// session) does not stop link, log and abort.
+// Writes frames to the terminal in a thread of its own, so that a blocked terminal (stopped output,
+// a hanging session) does not stop link, log and abort.
 
 /// Whether a frame is being written. There is only one terminal.
 static WRITING: AtomicBool = AtomicBool::new(false);

@@ -1,4 +1,5 @@
-//! The station's side of its socket: sends history and news to attached screens, and receives their requests.
+//! The station's side of its socket: sends history and news to attached screens, and receives their
+//! requests.
 
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -20,10 +21,11 @@ use crate::attach::{Hello, ToScreen, ToStation, socket};
 use crate::model::{Model, Seat, Settings};
 use crate::update::Msg;
 
-/// The size of the kept history: an hour of telemetry in flight, half a minute of the worst flood. It is most of what a station
-/// ever needs.
+/// The size of the kept history: an hour of telemetry in flight, half a minute of the worst flood.
+/// It is most of what a station ever needs.
 const HISTORY_BYTES_MAX: usize = 16 * 1024 * 1024;
-/// Messages are kept together in blocks of this size: one by one, each would take as much again for its place.
+/// Messages are kept together in blocks of this size: one by one, each would take as much again for
+/// its place.
 const BLOCK_BYTES: usize = 64 * 1024;
 /// A screen that is this many messages behind is disconnected; it attaches again.
 const BEHIND_MAX: usize = 4_096;
@@ -250,7 +252,8 @@ async fn serve(
     hear_out(write, listening).await;
 }
 
-/// Reads the last requests of a screen that can no longer be written to; there may be an abort among them.
+/// Reads the last requests of a screen that can no longer be written to; there may be an abort
+/// among them.
 async fn hear_out(write: OwnedWriteHalf, mut listening: tokio::task::JoinHandle<()>) {
     // Closes our side; the screen then closes its own.
     drop(write);

@@ -1,4 +1,5 @@
-//! The run loop of a station: link, log, clock, signals, screen and attached screens around the model.
+//! The run loop of a station: link, log, clock, signals, screen and attached screens around the
+//! model.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -67,7 +68,8 @@ pub(super) struct Attached {
     answers: Answers,
 }
 
-/// A screen that has not answered for so many ticks does not count; together they are `UNATTENDED_MAX`.
+/// A screen that has not answered for so many ticks does not count; together they are
+/// `UNATTENDED_MAX`.
 const SILENT_AFTER: u8 = 8;
 
 /// Whether a screen's terminal answers.
@@ -115,8 +117,8 @@ impl Station {
             let (demo, server) = (&mut self.demo, &mut self.server);
             let wakes_at = model.wakes_at();
             let msgs = tokio::select! {
-                // The order matters. Keys come before the clock, because a waiting key may show that Ctrl-X is held.
-                // The link comes last, because it can be busy all the time.
+                // The order matters. Keys come before the clock, because a waiting key may show
+                // that Ctrl-X is held. The link comes last, because it can be busy all the time.
                 biased;
                 signal = signals.next() => vec![Msg::Terminate(signal)],
                 Some(news) = OptionFuture::from(server.as_mut().map(Server::next)) => self.hear(news, model),
@@ -195,7 +197,8 @@ impl Station {
         }
     }
 
-    /// Whether to report the links: periodically on a tick, and at once when a link goes up or down.
+    /// Whether to report the links: periodically on a tick, and at once when a link goes up or
+    /// down.
     fn is_report_due(&mut self, msgs: &[Msg]) -> bool {
         let now = self.clock.now();
         let due = msgs.iter().any(|msg| match msg {
@@ -209,8 +212,8 @@ impl Station {
         due
     }
 
-    /// Whether the station keeps running without its screen: yes with a real vehicle, no for a demonstration on a
-    /// terminal.
+    /// Whether the station keeps running without its screen: yes with a real vehicle, no for a
+    /// demonstration on a terminal.
     fn outlives_its_screen(&self) -> bool {
         self.demo.is_none() || (self.server.is_some() && self.output.screen.is_none())
     }
@@ -377,7 +380,8 @@ impl Station {
         }
     }
 
-    /// Tells every screen what is kept from before this run: the checklist, the last place, what is unfinished.
+    /// Tells every screen what is kept from before this run: the checklist, the last place, what is
+    /// unfinished.
     pub(super) fn publish_kept(&mut self, model: &Model, now: Duration) {
         if let Some((kept, _)) = &model.kept {
             self.publish(&Msg::Unfinished(Box::new(kept.clone())), now);

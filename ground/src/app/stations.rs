@@ -93,7 +93,8 @@ pub(super) async fn stations() -> io::Result<Vec<Found>> {
             Ok(ToScreen::Status(status)) => Ok(status),
             Ok(_) => Err("unexpected answer".to_owned()),
             Err(error) if matches!(error.kind(), ErrorKind::ConnectionRefused | ErrorKind::NotFound) => {
-                // The station is gone. If its socket cannot be removed, it is skipped again next time.
+                // The station is gone. If its socket cannot be removed, it is skipped again next
+                // time.
                 let _ = std::fs::remove_file(&path);
                 continue;
             }

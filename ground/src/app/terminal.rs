@@ -1,8 +1,9 @@
 //! Writes what changed on the screen in few bytes, for a slow line.
 //!
-//! The backend of ratatui says both colours of a cell whenever one of them changes, 20 bytes of which half say nothing new, and
-//! goes from row to row, where panels beside each other have other colours. This one writes all cells of a style together, takes
-//! the shortest way of the cursor, and says nothing about the letters of a blank. In flight that is less than half the bytes. Each
+//! The backend of ratatui says both colours of a cell whenever one of them changes, 20 bytes of
+//! which half say nothing new, and goes from row to row, where panels beside each other have other
+//! colours. This one writes all cells of a style together, takes the shortest way of the cursor,
+//! and says nothing about the letters of a blank. In flight that is less than half the bytes. Each
 //! frame stands for itself, so that what another program writes between two is no more than a blot.
 
 use std::io;
@@ -23,10 +24,12 @@ pub struct DiffBackend<W: Write> {
     pub terminal: CrosstermBackend<W>,
     /// Whether the terminal shows colours of 24 bits.
     pub has_true_colour: bool,
-    /// The rightmost column that was ever drawn. Behind the last one of the terminal the cursor stands where it likes.
+    /// The rightmost column that was ever drawn. Behind the last one of the terminal the cursor
+    /// stands where it likes.
     rightmost: u16,
     cursor_is_hidden: bool,
-    /// Whether the terminal erases with the background that was said last, as all do but GNU Screen.
+    /// Whether the terminal erases with the background that was said last, as all do but GNU
+    /// Screen.
     pub erases: bool,
 }
 
@@ -93,13 +96,15 @@ struct Run {
 }
 
 impl Run {
-    /// Whether every terminal gives it the same columns: not a letter of two, which is a run of its own.
+    /// Whether every terminal gives it the same columns: not a letter of two, which is a run of its
+    /// own.
     fn is_narrow(&self) -> bool {
         self.symbols.chars().count() == usize::from(self.columns)
     }
 }
 
-/// The cells as runs, from row to row. Blanks belong to the letters beside them, whatever colour these have.
+/// The cells as runs, from row to row. Blanks belong to the letters beside them, whatever colour
+/// these have.
 fn runs<'a>(content: impl Iterator<Item = (u16, u16, &'a Cell)>, shown: fn(Color) -> Color) -> Vec<Run> {
     let mut runs: Vec<Run> = Vec::new();
     for (column, row, cell) in content {
@@ -157,7 +162,8 @@ fn way(cursor: Option<(u16, u16)>, (row, column): (u16, u16)) -> String {
     along.filter(|along| along.len() < at_once.len()).unwrap_or(at_once)
 }
 
-/// From so many blanks on it is shorter to erase the cells and to step over them (ECMA-48, ECH and CUF).
+/// From so many blanks on it is shorter to erase the cells and to step over them (ECMA-48, ECH and
+/// CUF).
 const ERASED_FROM: usize = 12;
 
 /// Writes letters, and erases many blanks.

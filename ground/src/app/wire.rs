@@ -21,7 +21,8 @@ use crate::model::{GONE_AFTER, LinkReport};
 use crate::update::Msg;
 
 const FLIGHT_STATUS_ID: u32 = 54_000;
-/// A run loop that has not come round for so long stood still: stopped, swapped out, or asleep with its computer.
+/// A run loop that has not come round for so long stood still: stopped, swapped out, or asleep with
+/// its computer.
 const STOOD_STILL: Duration = Duration::from_secs(1);
 /// What arrives for so long after it has waited.
 const WAITED_FOR: Duration = Duration::from_millis(500);
@@ -143,13 +144,15 @@ impl Wire {
         self.links.each().map(|(address, _)| address)
     }
 
-    /// What the only link carries, bytes per second; `None` if no bound is known, and for several links.
+    /// What the only link carries, bytes per second; `None` if no bound is known, and for several
+    /// links.
     pub fn capacity_bytes_s(&self) -> Option<u32> {
         let mut all = self.endpoints();
         all.next().filter(|_| all.next().is_none())?.capacity_bytes_s()
     }
 
-    /// The next data of any link, with the number of the link. What waits for a slow line is sent meanwhile.
+    /// The next data of any link, with the number of the link. What waits for a slow line is sent
+    /// meanwhile.
     pub async fn receive(&mut self) -> (usize, Received) {
         loop {
             let (clock, due_at) = (self.clock, self.links.hub().due_at());
@@ -216,7 +219,8 @@ impl Wire {
                         msgs.push(Msg::HeardOver(number));
                     }
                     if frame.source() == self.vehicle {
-                        // On a link with one peer it is the same source after the line was opened again.
+                        // On a link with one peer it is the same source after the line was opened
+                        // again.
                         let several = name.starts_with("udp") || name.starts_with("tcpin");
                         msgs.extend(self.sources.turn_to((number, from.filter(|_| several))));
                     }
@@ -228,7 +232,8 @@ impl Wire {
                 }
                 LinkEvent::Believed(_) => taken.believed = true,
                 LinkEvent::UnknownSenders(words) => msgs.push(Msg::LinkSays(self.named(&name, words))),
-                // Counted and shown in the report of the link; a sender that is locked out is reported.
+                // Counted and shown in the report of the link; a sender that is locked out is
+                // reported.
                 LinkEvent::Rejected(frame, why) => {
                     msgs.extend(self.lockouts.refused(&frame, why, now.time, now.stamp).map(Msg::LinkSays));
                 }
@@ -264,9 +269,10 @@ impl Wire {
         }
     }
 
-    /// Sends a message over every link and returns the message that counts the bytes. For a slow line it may wait. On a link
-    /// that listens, what is meant for the vehicle goes only to where its shown `boot` was heard; a heartbeat, an abort, a
-    /// hold and a disarm go to everybody there. 0: the vehicle has reported no boot.
+    /// Sends a message over every link and returns the message that counts the bytes. For a slow
+    /// line it may wait. On a link that listens, what is meant for the vehicle goes only to where
+    /// its shown `boot` was heard; a heartbeat, an abort, a hold and a disarm go to everybody
+    /// there. 0: the vehicle has reported no boot.
     pub fn send(&mut self, message: &MavMessage, boot: u32) -> Msg {
         let frame = self.encoder.encode(message);
         let now = self.now();
@@ -358,7 +364,8 @@ fn report_of(address: &LinkAddress, link: &HubLink, now: Duration) -> LinkReport
     }
 }
 
-/// How many sources are distinguished; a reboot gives a vehicle that connects by itself another one.
+/// How many sources are distinguished; a reboot gives a vehicle that connects by itself another
+/// one.
 const SOURCES_MAX: usize = 64;
 
 /// From where the vehicle is heard: a number for each link and address.
@@ -370,7 +377,8 @@ struct Sources {
 }
 
 impl Sources {
-    /// Frames come from this source from now on. Returns what tells it, if the last ones came from another source.
+    /// Frames come from this source from now on. Returns what tells it, if the last ones came from
+    /// another source.
     fn turn_to(&mut self, source: (usize, Option<Origin>)) -> Option<Msg> {
         let known = self.known.iter().find(|(known, _)| *known == source).map(|(_, number)| *number);
         let number = known.unwrap_or_else(|| {

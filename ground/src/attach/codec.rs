@@ -32,8 +32,8 @@ pub enum CodecError {
     Bytes(&'static str),
 }
 
-/// Encodes a message to a screen. `None` for messages that stay in the station (its own keys, its own end) and for
-/// messages that are too long.
+/// Encodes a message to a screen. `None` for messages that stay in the station (its own keys, its
+/// own end) and for messages that are too long.
 pub fn encode_to_screen(told: &ToScreen, now: Duration) -> Option<Vec<u8>> {
     // The station answers these by what it does.
     let is_answered =
@@ -71,7 +71,8 @@ pub fn decode_to_station(bytes: &[u8]) -> Result<ToStation, CodecError> {
     Ok(asked)
 }
 
-/// The messages of a connection, each without its length. The connection ends with one that is too long.
+/// The messages of a connection, each without its length. The connection ends with one that is too
+/// long.
 pub fn messages<R: AsyncRead>(read: R) -> FramedRead<R, LengthDelimitedCodec> {
     LengthDelimitedCodec::builder().little_endian().max_frame_length(LENGTH_MAX).new_read(read)
 }
@@ -210,7 +211,8 @@ mod tests {
         }
     }
 
-    /// A screen disconnects on a message that is too long, so none is sent. No memory is taken for what is not there.
+    /// A screen disconnects on a message that is too long, so none is sent. No memory is taken for
+    /// what is not there.
     #[test]
     fn a_message_that_is_too_long_is_not_sent_and_a_wrong_count_ends_with_the_bytes() {
         let links = |count| ToScreen::Msg(Msg::Links { links: vec![link(); count], signing: None });

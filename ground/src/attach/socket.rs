@@ -1,7 +1,7 @@
 //! The sockets of this user's stations: where they are, and that no other user can reach them.
 //!
-//! Each station has its own socket in one directory, named after its process id. A socket at another path is linked
-//! from that directory.
+//! Each station has its own socket in one directory, named after its process id. A socket at
+//! another path is linked from that directory.
 
 use std::io;
 use std::os::unix::fs::{DirBuilderExt as _, MetadataExt as _, PermissionsExt as _};

@@ -1,4 +1,5 @@
-//! Every action of one key, with its name, its key and its words; and the palette, which lists them.
+//! Every action of one key, with its name, its key and its words; and the palette, which lists
+//! them.
 //!
 //! The abort is not among them. What commands the vehicle only opens a dialog.
 
@@ -206,7 +207,8 @@ impl Act {
         matches!(self.effect(), Effect::Asks | Effect::Commands)
     }
 
-    /// Whether it changes only what is shown, or opens a dialog: it works however fast its key arrives.
+    /// Whether it changes only what is shown, or opens a dialog: it works however fast its key
+    /// arrives.
     pub fn only_shows_or_asks(self, model: &Model) -> bool {
         if self == Self::Quit {
             model.is_at_risk()
@@ -216,11 +218,12 @@ impl Act {
     }
 }
 
-// Ctrl-X, Enter and Esc have no action: the abort, the confirmations and the way out. An action that opens a ladder has a
-// capital letter, so that no slip of a finger opens it.
+// Ctrl-X, Enter and Esc have no action: the abort, the confirmations and the way out. An action
+// that opens a ladder has a capital letter, so that no slip of a finger opens it.
 
 impl Act {
-    /// The action of a key. A letter also counts with Shift, unless its capital letter has an action.
+    /// The action of a key. A letter also counts with Shift, unless its capital letter has an
+    /// action.
     pub fn of_key(key: Key) -> Option<Self> {
         Self::exactly(key).or_else(|| match key {
             Key::Char(letter) if letter.is_ascii_uppercase() => {
@@ -322,7 +325,8 @@ mod tests {
         assert_eq!(Act::of_key(Key::Escape), Some(Act::Follow));
     }
 
-    /// The ascent shares the key of the descent: it has no definition, and was the first action, which arms.
+    /// The ascent shares the key of the descent: it has no definition, and was the first action,
+    /// which arms.
     #[test]
     fn an_action_without_a_definition_is_no_other_action() {
         let ascent = Act::Show(Page::Ascent);

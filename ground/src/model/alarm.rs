@@ -1,4 +1,5 @@
-//! Alarms: a condition raises them, and the bell rings until a person has acknowledged them. And what is called out.
+//! Alarms: a condition raises them, and the bell rings until a person has acknowledged them. And
+//! what is called out.
 
 use std::time::Duration;
 
@@ -103,13 +104,15 @@ impl Alarm {
 #[derive(Debug, Default)]
 pub struct Alarms {
     list: Vec<Alarm>,
-    /// Whether what arrives is still the past: nothing rings until a screen has received its history.
+    /// Whether what arrives is still the past: nothing rings until a screen has received its
+    /// history.
     pub(crate) in_history: bool,
     rung_at: Option<Duration>,
 }
 
 impl Alarms {
-    /// The history has been received. Alarms that ended in it are past; alarms that still hold ring.
+    /// The history has been received. Alarms that ended in it are past; alarms that still hold
+    /// ring.
     pub(crate) fn history_ends(&mut self) {
         if std::mem::take(&mut self.in_history) {
             for alarm in &mut self.list {
@@ -123,8 +126,8 @@ impl Alarms {
         &self.list
     }
 
-    /// The most urgent alarm: first what nobody has acknowledged (past ones last), of that what holds, of that by its kind,
-    /// of that the newest.
+    /// The most urgent alarm: first what nobody has acknowledged (past ones last), of that what
+    /// holds, of that by its kind, of that the newest.
     pub fn foremost(&self) -> Option<&Alarm> {
         self.list.iter().max_by_key(|alarm| {
             let unseen = if alarm.acknowledged { 0 } else { 2 - u8::from(alarm.past) };
@@ -142,8 +145,8 @@ impl Alarms {
         self.list.iter().filter(|alarm| !alarm.acknowledged).count()
     }
 
-    /// Takes the conditions that hold now and returns the alarms that they raise. A condition that returns raises a
-    /// new alarm with a new age, which must be acknowledged again.
+    /// Takes the conditions that hold now and returns the alarms that they raise. A condition that
+    /// returns raises a new alarm with a new age, which must be acknowledged again.
     pub(crate) fn watch(&mut self, now: Duration, conditions: Vec<Condition>) -> Vec<Alarm> {
         for alarm in &mut self.list {
             if !conditions.iter().any(|condition| condition.kind == alarm.what.kind) {
@@ -206,7 +209,8 @@ impl Alarms {
     }
 }
 
-// What has been called out to the crew so far, how much is called out, and the bells that are still to ring.
+// What has been called out to the crew so far, how much is called out, and the bells that are still
+// to ring.
 
 /// How much is called out.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Deserialize, ValueEnum)]
@@ -264,7 +268,8 @@ mod tests {
         vec![condition(AlarmKind::LinkLost, 1)]
     }
 
-    /// The link that is lost later hides neither an abort that does not work nor a station that is gone.
+    /// The link that is lost later hides neither an abort that does not work nor a station that is
+    /// gone.
     #[test]
     fn the_most_urgent_alarm_is_foremost_and_of_equal_ones_the_newest() {
         let unsent = condition(AlarmKind::Unanswered(CommandKind::Abort), 3);

@@ -1,8 +1,10 @@
-//! Which power-ups of which vehicles are heard under the id, and which one of them the screen shows.
+//! Which power-ups of which vehicles are heard under the id, and which one of them the screen
+//! shows.
 //!
-//! A *boot* is one vehicle from one power-up on. `TD_FLIGHT_STATUS` tells which one: by the vehicle's unique id, the number of the
-//! boot and the vehicle's clock. A heartbeat and our own messages have the number. What else is heard belongs to the boot whose
-//! clock, or whose sequence numbers, it fits.
+//! A *boot* is one vehicle from one power-up on. `TD_FLIGHT_STATUS` tells which one: by the
+//! vehicle's unique id, the number of the boot and the vehicle's clock. A heartbeat and our own
+//! messages have the number. What else is heard belongs to the boot whose clock, or whose sequence
+//! numbers, it fits.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -14,24 +16,27 @@ use super::{Foreign, KeepAway, Model, Vehicle, words};
 
 /// Messages of a slow and a fast link mix: a vehicle's clock, ms, may go back by this much.
 const REORDERED_MS: i64 = 5_000;
-/// Two boots of one vehicle follow each other. This much of an overlap, ms, are the delays of its links.
+/// Two boots of one vehicle follow each other. This much of an overlap, ms, are the delays of its
+/// links.
 const OVERLAP_MS: i64 = 500;
-/// Over different links one clock arrives with different delays, up to this, ms; beyond it there are two clocks.
+/// Over different links one clock arrives with different delays, up to this, ms; beyond it there
+/// are two clocks.
 const LINKS_APART_MS: i64 = 2_000;
 /// Of several vehicles under one id, one that is silent for this long is gone.
 pub const GONE_AFTER: Duration = Duration::from_secs(10);
-/// A vehicle that was shown, and whose next boot is heard from the same source, was reset if it is silent for this long: twenty
-/// reports on a network, and more than one on the slowest line.
+/// A vehicle that was shown, and whose next boot is heard from the same source, was reset if it is
+/// silent for this long: twenty reports on a network, and more than one on the slowest line.
 const RESET_AFTER: Duration = Duration::from_secs(2);
 /// How many boots are remembered: the shown one, and a few that stand beside it or came before it.
 const BOOTS_MAX: usize = 4;
-/// How many reports in [`STEADY_WITHIN`] show that a boot goes on: a single frame that anybody may have sent does not.
+/// How many reports in [`STEADY_WITHIN`] show that a boot goes on: a single frame that anybody may
+/// have sent does not.
 const STEADY_REPORTS: usize = 3;
 const STEADY_WITHIN: Duration = Duration::from_secs(3);
 /// How many sources of one boot are distinguished.
 const SOURCES_MAX: usize = 4;
-/// Sequence number and clock of one sender rise together. Reports this near to each other, ms, have fewer than 128 frames
-/// between them.
+/// Sequence number and clock of one sender rise together. Reports this near to each other, ms, have
+/// fewer than 128 frames between them.
 const NEAR_MS: i64 = 500;
 /// A source that was heard so recently is where a boot reports.
 const ALIVE_WITHIN: Duration = Duration::from_secs(2);
@@ -49,7 +54,8 @@ pub struct StatusReport {
     pub clock_ms: u32,
     /// The sequence number of the frame.
     pub sequence: u8,
-    /// From where the frame came: a number for each link and address, with that of the link in its upper byte.
+    /// From where the frame came: a number for each link and address, with that of the link in its
+    /// upper byte.
     pub source: u16,
 }
 
@@ -169,8 +175,8 @@ impl HeardBoot {
         self.contradicted_at.drain(..self.contradicted_at.len().saturating_sub(CONTRADICTIONS));
     }
 
-    /// Whether a report comes from another address of the link over which this boot reports, and does not keep step with it: what
-    /// another way brings of the same vehicle does.
+    /// Whether a report comes from another address of the link over which this boot reports, and
+    /// does not keep step with it: what another way brings of the same vehicle does.
     fn is_out_of_step(&self, report: &StatusReport, now: Duration) -> bool {
         let recent = self.sources.iter().filter(|source| is_within(source.heard_at, ALIVE_WITHIN, now));
         // The newest one: a vehicle that gets another address goes on from there.
@@ -266,7 +272,8 @@ impl Boots {
         self.of(id).zip(self.of(former)).is_some_and(|(boot, former)| boot.follows(former))
     }
 
-    /// Whether a flight status only claims to be of the shown boot. It is noted: two vehicles may have one boot and unique id.
+    /// Whether a flight status only claims to be of the shown boot. It is noted: two vehicles may
+    /// have one boot and unique id.
     pub fn disowns(&mut self, report: &StatusReport, now: Duration) -> bool {
         let shown = self.shown;
         let boot = self.list.iter_mut().find(|boot| Some(boot.id) == shown);
@@ -299,8 +306,9 @@ impl Boots {
         id
     }
 
-    /// Which boot another message comes from: the one that it names, or the only one at this source, else by its clock or its sequence
-    /// number; `None` before the first flight status. What fits several goes to the shown one.
+    /// Which boot another message comes from: the one that it names, or the only one at this
+    /// source, else by its clock or its sequence number; `None` before the first flight status.
+    /// What fits several goes to the shown one.
     pub fn speaker(
         &self,
         source: u16,
@@ -322,13 +330,14 @@ impl Boots {
         Some(nearest.unwrap_or(shown).id)
     }
 
-    /// Whether a message names a boot that has not reported yet: it is of somebody who has not said who it is.
+    /// Whether a message names a boot that has not reported yet: it is of somebody who has not said
+    /// who it is.
     pub fn is_stray(&self, number: u32) -> bool {
         self.shown.is_some() && !self.list.iter().any(|boot| boot.is_number(number))
     }
 
-    /// Whether a source is another address of the link over which the shown boot reports, and no boot has reported from it: somebody
-    /// else speaks there, and has not said yet who it is.
+    /// Whether a source is another address of the link over which the shown boot reports, and no
+    /// boot has reported from it: somebody else speaks there, and has not said yet who it is.
     pub fn is_strange(&self, source: u16, now: Duration) -> bool {
         let reports_beside = |boot: &HeardBoot| {
             let beside = |known: &Source| link_of(known.number) == link_of(source);
@@ -346,9 +355,9 @@ impl Boots {
 
     /// Decides which boot is shown. Returns the one that takes the screen.
     ///
-    /// The shown one keeps it for as long as it is heard, and a single frame of another one never takes it. It goes to a boot that
-    /// was chosen by name; to the next boot of the same vehicle, after a reset; and from an idle vehicle to one from the same
-    /// source that is armed or flies.
+    /// The shown one keeps it for as long as it is heard, and a single frame of another one never
+    /// takes it. It goes to a boot that was chosen by name; to the next boot of the same vehicle,
+    /// after a reset; and from an idle vehicle to one from the same source that is armed or flies.
     pub fn settle(&mut self, now: Duration) -> Option<BootId> {
         let shown = self.shown_boot()?;
         let chosen =
@@ -372,7 +381,8 @@ impl Boots {
         changed.then_some(next)
     }
 
-    /// The crew chooses this boot by name. Returns false if it is not heard, or not the only one of its number.
+    /// The crew chooses this boot by name. Returns false if it is not heard, or not the only one of
+    /// its number.
     pub fn choose(&mut self, number: u32, now: Duration) -> bool {
         let only = self.only(|boot| boot.number == number && boot.is_heard(now));
         self.chosen = only.or(self.chosen);
@@ -391,8 +401,8 @@ impl Boots {
         others.chain(twin.then_some(Beside::Twin)).collect()
     }
 
-    /// Whether the crew has chosen the shown one among several, and a command can name it: its boot has a number that no
-    /// other one has.
+    /// Whether the crew has chosen the shown one among several, and a command can name it: its boot
+    /// has a number that no other one has.
     pub fn is_chosen(&self, now: Duration) -> bool {
         let Some(shown) = self.shown_boot() else { return false };
         let same = self.list.iter().filter(|boot| boot.number == shown.number && boot.is_heard(now)).count();
@@ -426,7 +436,8 @@ impl Model {
         (!words.is_empty()).then(|| words.join(", "))
     }
 
-    /// A row for each vehicle while there are several: its boot, phase, whether it is armed, its countdown and its age.
+    /// A row for each vehicle while there are several: its boot, phase, whether it is armed, its
+    /// countdown and its age.
     pub fn vehicle_rows(&self, now: Duration) -> Vec<String> {
         let beside = self.boots.beside(now);
         let row = |lead: &str, vehicle: &Vehicle, age: Option<Duration>| {
@@ -475,7 +486,8 @@ fn state_words(vehicle: &Vehicle) -> String {
     format!("{phase} {armed}{left}")
 }
 
-/// Whether a vehicle is armed, in a countdown, in flight, or down and not yet safe: then it keeps the screen.
+/// Whether a vehicle is armed, in a countdown, in flight, or down and not yet safe: then it keeps
+/// the screen.
 pub(crate) fn is_busy(vehicle: &Vehicle, now: Duration) -> bool {
     let is_armed_on_pad = vehicle.phase_now() == Some(TdPhase::TD_PHASE_PAD_ARMED);
     vehicle.is_armed() || is_armed_on_pad || vehicle.in_flight() || KeepAway::of(vehicle, now).is_some()
@@ -580,7 +592,8 @@ mod tests {
         }
     }
 
-    /// From another address of the same link, with the boot, the unique id and about the clock of the vehicle.
+    /// From another address of the same link, with the boot, the unique id and about the clock of
+    /// the vehicle.
     #[test]
     fn a_status_that_only_claims_to_be_the_vehicle_s_is_not_taken_and_seen_as_a_second_one() {
         let mut boots = Boots::default();
@@ -590,7 +603,8 @@ mod tests {
             let report = ours.report(ms);
             assert!(!boots.disowns(&report, at(ms)));
             boots.hear(&report, at(ms));
-            // The same over another link, and a copy that another way of the same link brings first.
+            // The same over another link, and a copy that another way of the same link brings
+            // first.
             for (source, later) in [(0x201, 0), (0x102, 1)] {
                 let copy = StatusReport {
                     source,
@@ -630,7 +644,8 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever else is heard, in any order and at any rate: the shown vehicle keeps the screen while it is heard.
+        /// Whatever else is heard, in any order and at any rate: the shown vehicle keeps the screen
+        /// while it is heard.
         #[test]
         fn nothing_takes_the_screen_from_a_vehicle_that_is_heard(
             others in prop::collection::vec(
@@ -663,7 +678,8 @@ mod tests {
             }
         }
 
-        /// An unsigned frame every 4 s that says it is the same vehicle, or another one, with any boot, clock and source.
+        /// An unsigned frame every 4 s that says it is the same vehicle, or another one, with any
+        /// boot, clock and source.
         #[test]
         fn a_forged_frame_now_and_then_takes_nothing(
             forged in prop::collection::vec((0_u16..2, 0_u32..3, 0_u32..200_000, 0_u16..2, any::<u8>()), 5),
@@ -688,8 +704,8 @@ mod tests {
             }
         }
 
-        /// One vehicle that reboots, over a link that is late by any time up to 4 s and 0.4 s more or less, is never two, and
-        /// its last boot is shown in the end.
+        /// One vehicle that reboots, over a link that is late by any time up to 4 s and 0.4 s more
+        /// or less, is never two, and its last boot is shown in the end.
         #[test]
         fn one_vehicle_is_never_two(
             boots_s in prop::collection::vec(5_u64..60, 1..6),

@@ -1,7 +1,8 @@
-//! The checklist of a mission: its steps, who signs each, and what has been signed; and its text form.
+//! The checklist of a mission: its steps, who signs each, and what has been signed; and its text
+//! form.
 //!
-//! The station keeps it; every screen of the station shows the same. The vehicle is not armed from here before every
-//! step is done.
+//! The station keeps it; every screen of the station shows the same. The vehicle is not armed from
+//! here before every step is done.
 
 use std::fmt::Write as _;
 use std::time::Duration;
@@ -27,7 +28,8 @@ pub struct Checklist {
     pub name: String,
     /// The name of the only mission that it is for, as the vehicle tells it; `None` for any.
     pub mission: Option<String>,
-    /// The first sixteen hexadecimal digits of the SHA-256 of its text. Signatures count for this text only.
+    /// The first sixteen hexadecimal digits of the SHA-256 of its text. Signatures count for this
+    /// text only.
     pub hash: String,
     pub steps: Vec<Step>,
 }
@@ -39,7 +41,8 @@ pub struct Step {
     /// The role that signs; `None` for anybody who may command.
     #[serde(with = "role_words")]
     pub role: Option<TdRole>,
-    /// A value of the vehicle that must keep its limits, when the step is signed and as long as it counts.
+    /// A value of the vehicle that must keep its limits, when the step is signed and as long as it
+    /// counts.
     pub value: Option<Limits>,
     pub mark: Mark,
 }
@@ -259,8 +262,9 @@ impl Model {
 
 // Reads a checklist (TOML) and the list of its signatures, and writes one signature as text.
 //
-// The signatures are in a file of their own that only grows: one line of JSON for each change, so that nothing that was
-// signed is ever lost. A line begins with a line break, so one that a crash has cut off hides no other.
+// The signatures are in a file of their own that only grows: one line of JSON for each change, so
+// that nothing that was signed is ever lost. A line begins with a line break, so one that a crash
+// has cut off hides no other.
 
 /// A signature older than this, when the station starts, no longer counts: it was for another day.
 pub const SIGNED_FOR_S: u64 = 12 * 3_600;

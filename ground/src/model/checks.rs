@@ -1,10 +1,12 @@
-//! The vehicle's arming checks: which fail, in its own words, and for which it has held the countdown.
+//! The vehicle's arming checks: which fail, in its own words, and for which it has held the
+//! countdown.
 
 use protocol::dialect::{TdCheck, TdHold, TdPhase};
 
 use super::{Vehicle, words};
 
-/// Sensors name themselves in what is wrong with them; of other checks the vehicle says what it found.
+/// Sensors name themselves in what is wrong with them; of other checks the vehicle says what it
+/// found.
 pub const SENSORS: TdCheck = TdCheck::TD_CHECK_ACCELEROMETER
     .union(TdCheck::TD_CHECK_GYRO)
     .union(TdCheck::TD_CHECK_BAROMETER)
@@ -33,8 +35,8 @@ impl Vehicle {
         (!failing.is_empty()).then(|| failing.join(", "))
     }
 
-    /// The first check that forbids the start, by its name and in words. The uplink of the station that asks is the vehicle's
-    /// to judge, and has an alarm of its own.
+    /// The first check that forbids the start, by its name and in words. The uplink of the station
+    /// that asks is the vehicle's to judge, and has an alarm of its own.
     pub fn unfit(&self) -> Option<(String, String)> {
         let fails = |(check, _): &(TdCheck, String)| *check != TdCheck::TD_CHECK_UPLINK;
         self.failing().into_iter().find(fails).map(|(check, words)| (name(check), words))
@@ -109,7 +111,8 @@ fn check_of(text: &str) -> Option<TdCheck> {
     named.filter(is_about).max_by_key(|(name, _)| name.len()).map(|(_, check)| check)
 }
 
-/// Without what was required, and without a time, which grows on: `no GNSS fix for 9 s` becomes `no GNSS fix`.
+/// Without what was required, and without a time, which grows on: `no GNSS fix for 9 s` becomes `no
+/// GNSS fix`.
 fn in_short(text: &str, check: TdCheck) -> String {
     let text = text.split_once(", required ").map_or(text, |(found, _)| found);
     let text = match text.rsplit_once(" for ") {

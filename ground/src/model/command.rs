@@ -1,4 +1,5 @@
-//! Commands and their three separate facts: commanded, acknowledged, observed. And whether the ground may give them.
+//! Commands and their three separate facts: commanded, acknowledged, observed. And whether the
+//! ground may give them.
 
 use std::time::Duration;
 
@@ -13,8 +14,8 @@ use super::{
     is_on_pad, words,
 };
 
-/// The effect of an accepted command should show in the vehicle's state within this time: a little over two
-/// heartbeats.
+/// The effect of an accepted command should show in the vehicle's state within this time: a little
+/// over two heartbeats.
 pub const OBSERVE_WITHIN: Duration = Duration::from_millis(2_500);
 
 /// A command that the crew can give.
@@ -50,7 +51,8 @@ pub(crate) struct CommandRow {
     moves: bool,
     /// How often the command is resent.
     pub(crate) resend: Resend,
-    /// What in the vehicle's own state shows the effect, for the event "observed"; `None` if its answer has to do.
+    /// What in the vehicle's own state shows the effect, for the event "observed"; `None` if its
+    /// answer has to do.
     pub(crate) seen: Option<&'static str>,
 }
 
@@ -59,8 +61,9 @@ impl CommandKind {
 
     /// What a command is, but for when it may be given.
     ///
-    /// A repetition has the number of the command, and the vehicle does it once: a late one arms nothing that was disarmed since.
-    /// A tap is for one moment. A check is not repeated either: it would move what somebody has just laid hands on.
+    /// A repetition has the number of the command, and the vehicle does it once: a late one arms
+    /// nothing that was disarmed since. A tap is for one moment. A check is not repeated either: it
+    /// would move what somebody has just laid hands on.
     pub(crate) fn row(self) -> CommandRow {
         use MavCmd::{
             MAV_CMD_COMPONENT_ARM_DISARM as ARM, MAV_CMD_DO_FLIGHTTERMINATION as TERMINATE,
@@ -96,13 +99,14 @@ impl CommandKind {
         self.row().mav
     }
 
-    /// Whether it can make something move or light: then it names the boot that it is meant for, and is sent only to
-    /// the vehicle that is shown.
+    /// Whether it can make something move or light: then it names the boot that it is meant for,
+    /// and is sent only to the vehicle that is shown.
     pub fn moves(self) -> bool {
         self.row().moves
     }
 
-    /// Whether only the owner of the station's key gives it: everything but what anybody may do to stop something.
+    /// Whether only the owner of the station's key gives it: everything but what anybody may do to
+    /// stop something.
     pub fn needs_the_owner(self) -> bool {
         !matches!(self, Self::Hold | Self::Abort | Self::EndCheck)
     }
@@ -119,7 +123,8 @@ impl CommandKind {
                 counting || status.value.phase as u32 > TdPhase::TD_PHASE_PAD_ARMED as u32
             }),
             Self::Hold => status.is_some_and(|status| status.value.countdown_ms == i32::MAX),
-            // Only the latch counts: the stabiliser may also fly, and show DEGRADED, without an abort.
+            // Only the latch counts: the stabiliser may also fly, and show DEGRADED, without an
+            // abort.
             Self::Abort => {
                 let latched = TdInterlock::TD_INTERLOCK_ABORT_LATCHED;
                 heartbeat.is_some_and(|heartbeat| heartbeat.value.terminated)
@@ -130,7 +135,8 @@ impl CommandKind {
         }
     }
 
-    /// Whether the vehicle's own state, on its pad, shows that an effect that was observed is no longer so, in words.
+    /// Whether the vehicle's own state, on its pad, shows that an effect that was observed is no
+    /// longer so, in words.
     pub fn no_longer(self, vehicle: &Vehicle, since: Duration) -> Option<&'static str> {
         let heartbeat = vehicle.heartbeat.filter(|heartbeat| heartbeat.received_at > since)?.value;
         let status = vehicle.status.as_ref().filter(|status| status.received_at > since)?;
@@ -229,7 +235,8 @@ impl Commands {
 
 // Whether the ground may command to arm and to start.
 
-/// Why nothing that can move is commanded now: it is not certain which vehicle, or which station, would be obeyed.
+/// Why nothing that can move is commanded now: it is not certain which vehicle, or which station,
+/// would be obeyed.
 pub fn why_nothing_moves(model: &Model, now: Duration) -> Option<String> {
     let Settings { us, vehicle: of, .. } = &model.settings;
     let vehicle = &model.vehicle;
@@ -251,7 +258,8 @@ pub fn why_nothing_moves(model: &Model, now: Duration) -> Option<String> {
     })
 }
 
-/// Why no command reaches the vehicle that is meant: it is silent, what it says arrives late, or nothing may be commanded.
+/// Why no command reaches the vehicle that is meant: it is silent, what it says arrives late, or
+/// nothing may be commanded.
 pub fn why_not_reached(model: &Model, now: Duration) -> Option<String> {
     if !model.link.state(now).carries() {
         return Some("the vehicle is not heard".to_owned());
@@ -277,7 +285,8 @@ pub fn why_not_here(model: &Model) -> Option<String> {
     by_role.or_else(|| why_not_seat(model, &model.settings.seat)).or_else(|| why_no_key(model))
 }
 
-/// Why the ground does not command to arm. Failing checks are left for the vehicle to refuse, with its own text.
+/// Why the ground does not command to arm. Failing checks are left for the vehicle to refuse, with
+/// its own text.
 pub fn why_not_arm(model: &Model, now: Duration) -> Option<String> {
     let uplink = &model.link.uplink;
     why_not_reached(model, now)
@@ -298,7 +307,8 @@ pub fn why_not_arm(model: &Model, now: Duration) -> Option<String> {
         .or_else(|| model.why_no_log(now))
 }
 
-/// Why the vehicle is not ready to be armed, its own checks among it. What a screen says as NO-GO, and the voice.
+/// Why the vehicle is not ready to be armed, its own checks among it. What a screen says as NO-GO,
+/// and the voice.
 pub fn why_no_go(model: &Model, now: Duration) -> Option<String> {
     let uplink = || "uplink not proven, every other check passes".to_owned();
     why_not_reached(model, now)
@@ -310,8 +320,9 @@ pub fn why_no_go(model: &Model, now: Duration) -> Option<String> {
         .or_else(|| model.why_no_log(now))
 }
 
-/// Why a real vehicle's motor is not known well enough: no burn of its lot has confirmed the certified curve, as far as the
-/// vehicle has said. `None` if one has, on a simulated vehicle, and once the crew goes on nevertheless.
+/// Why a real vehicle's motor is not known well enough: no burn of its lot has confirmed the
+/// certified curve, as far as the vehicle has said. `None` if one has, on a simulated vehicle, and
+/// once the crew goes on nevertheless.
 pub fn why_untested(model: &Model) -> Option<String> {
     let boot = model.vehicle.boot.number();
     if model.vehicle.is_simulated() || (boot.is_some() && model.untested == boot) {
@@ -410,7 +421,8 @@ pub fn why_other_mission(model: &Model) -> Option<String> {
 
 // How far the automatic mode has come.
 
-/// After a temporary refusal, what the vehicle says about its checks is believed again only after this.
+/// After a temporary refusal, what the vehicle says about its checks is believed again only after
+/// this.
 const RETRY_AFTER: Duration = Duration::from_secs(1);
 
 /// The steps of the automatic mode.
@@ -433,8 +445,8 @@ impl Default for AutoStep {
 }
 
 impl AutoStep {
-    /// The vehicle has temporarily refused to arm. Returns whether the automatic mode will command it again once the
-    /// checks pass, as a new command and never by resending the old frame.
+    /// The vehicle has temporarily refused to arm. Returns whether the automatic mode will command
+    /// it again once the checks pass, as a new command and never by resending the old frame.
     pub(crate) fn retry_after_refusal(&mut self, now: Duration) -> bool {
         let retries = *self == Self::WaitForArmed;
         if retries {

@@ -1,4 +1,5 @@
-//! The crew: who sits at the screens that can command, and the two people who arm and start together.
+//! The crew: who sits at the screens that can command, and the two people who arm and start
+//! together.
 
 use std::fmt;
 use std::time::Duration;
@@ -8,12 +9,12 @@ use serde::{Deserialize, Serialize};
 
 use super::{Model, why_not_seat};
 
-/// How long a countdown may continue without a commanding screen that answers. The vehicle is to be held 1 s after the last one has gone: the
-/// rest is for the hold and its way.
+/// How long a countdown may continue without a commanding screen that answers. The vehicle is to be
+/// held 1 s after the last one has gone: the rest is for the hold and its way.
 pub const UNATTENDED_MAX: Duration = Duration::from_millis(800);
 
-/// The seats at commanding screens: the station's own screen and the attached ones without `--watch`, as long as
-/// their terminals answer.
+/// The seats at commanding screens: the station's own screen and the attached ones without
+/// `--watch`, as long as their terminals answer.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Crew {
     seats: Vec<Seat>,
@@ -28,7 +29,8 @@ pub struct Crew {
 }
 
 impl Crew {
-    /// Sets who is there now, and which screens do not answer: they have been silent for [`UNATTENDED_MAX`] already.
+    /// Sets who is there now, and which screens do not answer: they have been silent for
+    /// [`UNATTENDED_MAX`] already.
     pub fn set_seats(&mut self, seats: Vec<Seat>, silent: Vec<Seat>, now: Duration) {
         if !seats.is_empty() {
             self.gone_at = None;
@@ -117,7 +119,8 @@ impl fmt::Display for Seat {
     }
 }
 
-// Two people who arm and start together, as the vehicle tells it: who asks, who has to confirm or to tap, who commands.
+// Two people who arm and start together, as the vehicle tells it: who asks, who has to confirm or
+// to tap, who commands.
 
 /// An ask or a tap is shown for this long after the vehicle was last heard of it.
 const TOLD_FOR: Duration = Duration::from_secs(3);

@@ -1,12 +1,13 @@
 //! Predicts the position of the vehicle after the link is lost in flight.
 //!
-//! Under thrust the vehicle is assumed to follow its last plan. Otherwise [`LastMotion`] continues the last known
-//! motion, with the drag estimated from the last second's acceleration, the wind, and the height at which the motor
-//! was to be lit.
+//! Under thrust the vehicle is assumed to follow its last plan. Otherwise [`LastMotion`] continues
+//! the last known motion, with the drag estimated from the last second's acceleration, the wind,
+//! and the height at which the motor was to be lit.
 //!
-//! The error circle is meant to contain the vehicle in 19 of 20 cases. It grows with the time `t` since the last
-//! position: errors of position, speed and acceleration add up to `s0 + sv t + sa t^2 / 2`. If a burn is expected,
-//! the circle also reaches the position without a burn. It stops growing once the vehicle must have landed.
+//! The error circle is meant to contain the vehicle in 19 of 20 cases. It grows with the time `t`
+//! since the last position: errors of position, speed and acceleration add up to `s0 + sv t + sa
+//! t^2 / 2`. If a burn is expected, the circle also reaches the position without a burn. It stops
+//! growing once the vehicle must have landed.
 
 use std::time::Duration;
 
@@ -24,8 +25,8 @@ const STEERED_ERROR_M_S2: f64 = 2.0;
 const OPENING_ERROR_M_S2: f64 = 5.0;
 /// The same while a boost motor of unknown thrust burns.
 const LIFTED_ERROR_M_S2: f64 = 20.0;
-/// Surplus thrust of a burn is directed sideways, in an unknown direction: at most this acceleration, m/s2,
-/// for this time, s. The resulting speed is kept.
+/// Surplus thrust of a burn is directed sideways, in an unknown direction: at most this
+/// acceleration, m/s2, for this time, s. The resulting speed is kept.
 const SWERVE_M_S2: f64 = 6.0;
 const SWERVE_S: f64 = 1.0;
 /// A landing is at most this share of the predicted time, plus this time, s, later than predicted.
@@ -49,8 +50,8 @@ pub struct PredictedPosition {
     pub is_down: bool,
 }
 
-/// The predicted position of a vehicle in flight whose last position is stale. `None` while the vehicle is heard or
-/// on the ground, or if no position in flight is known.
+/// The predicted position of a vehicle in flight whose last position is stale. `None` while the
+/// vehicle is heard or on the ground, or if no position in flight is known.
 pub fn predict_position(vehicle: &Vehicle, now: Duration) -> Option<PredictedPosition> {
     let motion = vehicle.best_motion()?;
     if !is_unheard(vehicle, now) {
@@ -58,7 +59,8 @@ pub fn predict_position(vehicle: &Vehicle, now: Duration) -> Option<PredictedPos
     }
     let phase = vehicle.phase()?.value;
     let on_plan = along_plan(vehicle, phase, now);
-    // A position on the pad says nothing about a flight from apogee; only a boost starts on the pad.
+    // A position on the pad says nothing about a flight from apogee; only a boost starts on the
+    // pad.
     let in_flight = vehicle.left_pad_at.is_some_and(|at| motion.received_at >= at);
     if !in_flight && phase != TdPhase::TD_PHASE_BOOST && on_plan.is_none() {
         return None;
@@ -87,9 +89,9 @@ pub fn predict_position(vehicle: &Vehicle, now: Duration) -> Option<PredictedPos
 const COURSE_STEP_S: f64 = 0.5;
 const COURSE_LONGEST_S: f64 = 120.0;
 
-/// Where the vehicle is expected to be: times from now, s, and places, to the ground as far as that can be told. On the way up
-/// only to apogee: nobody has told yet how it falls. Under the ascent motor, whose thrust is not known, and under a parachute that
-/// still fills, nothing.
+/// Where the vehicle is expected to be: times from now, s, and places, to the ground as far as that
+/// can be told. On the way up only to apogee: nobody has told yet how it falls. Under the ascent
+/// motor, whose thrust is not known, and under a parachute that still fills, nothing.
 pub fn course(vehicle: &Vehicle, now: Duration) -> Vec<(f64, NorthEastUp)> {
     let (Some(motion), Some(phase)) = (vehicle.best_motion(), vehicle.phase_now()) else { return Vec::new() };
     let left_pad = vehicle.left_pad_at.is_some_and(|at| motion.received_at >= at);
@@ -126,8 +128,8 @@ pub fn course(vehicle: &Vehicle, now: Duration) -> Vec<(f64, NorthEastUp)> {
     course
 }
 
-/// For how long the vehicle may have been in the air: its countdown ran when it was last heard, and has reached zero since.
-/// A hold or an abort in the silence is not known here.
+/// For how long the vehicle may have been in the air: its countdown ran when it was last heard, and
+/// has reached zero since. A hold or an abort in the silence is not known here.
 pub fn may_have_left(vehicle: &Vehicle, now: Duration) -> Option<Duration> {
     let status = vehicle.status.as_ref().filter(|status| status.is_stale(now))?;
     let counted =
@@ -167,13 +169,14 @@ fn swerve_m(burning_s: f64) -> f64 {
     SWERVE_M_S2 * swerving_s * (burning_s - 0.5 * swerving_s)
 }
 
-/// Under thrust, the present position on the plan. Its points are evenly spaced in time, and say how far north and how high it
-/// is. The motion to the east is assumed to stop when the plan ends.
+/// Under thrust, the present position on the plan. Its points are evenly spaced in time, and say
+/// how far north and how high it is. The motion to the east is assumed to stop when the plan ends.
 fn along_plan(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> Option<Extrapolated> {
     let (path, prediction) = (vehicle.path.as_ref()?, vehicle.prediction?);
     let motion = vehicle.best_motion()?;
     let last = path.value.len().checked_sub(1)?;
-    // The duration of the plan, from the time of its path: path and time to go come in separate messages.
+    // The duration of the plan, from the time of its path: path and time to go come in separate
+    // messages.
     let apart_s = prediction.received_at.as_secs_f64() - path.received_at.as_secs_f64();
     let total_s = prediction.value.time_to_go_s + apart_s;
     if !is_burning(phase) || total_s.partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater) {
@@ -196,19 +199,21 @@ fn along_plan(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> Option<Extrap
     })
 }
 
-// Continues the last known motion of the vehicle: falling with drag, braking, or accelerating under thrust.
+// Continues the last known motion of the vehicle: falling with drag, braking, or accelerating under
+// thrust.
 //
-// A fall has the drag `k V^2` against its motion through the air. `k` is chosen so that drag explains the difference
-// between gravity and the last second's acceleration: at terminal speed the speed is kept, shortly after apogee the
-// vehicle falls freely. Below the height at which the motor was to be lit, a constant deceleration brings the
-// vehicle to rest on the ground.
+// A fall has the drag `k V^2` against its motion through the air. `k` is chosen so that drag
+// explains the difference between gravity and the last second's acceleration: at terminal speed the
+// speed is kept, shortly after apogee the vehicle falls freely. Below the height at which the motor
+// was to be lit, a constant deceleration brings the vehicle to rest on the ground.
 
 /// Below this airspeed, m/s, drag cannot be distinguished from noise.
 const DRAG_SEEN_M_S: f64 = 8.0;
-/// The largest believable drag, 1/m: a terminal speed of 2 m/s, slower than under an open parachute.
+/// The largest believable drag, 1/m: a terminal speed of 2 m/s, slower than under an open
+/// parachute.
 const DRAG_MAX_PER_M: f64 = GRAVITY_M_S2 / 4.0;
-/// Integration step, s: small against the fastest change, the 0.5 s in which a fall under a parachute reaches its
-/// terminal speed.
+/// Integration step, s: small against the fastest change, the 0.5 s in which a fall under a
+/// parachute reaches its terminal speed.
 const STEP_S: f64 = 0.02;
 /// The longest extrapolation, s; a fall from any height that is flown takes less.
 const LONGEST_S: f64 = 300.0;
@@ -306,8 +311,8 @@ impl LastMotion {
         Extrapolated { place, or_else_m, burning_s, landed_after_s, basis }
     }
 
-    /// Place, when it landed, s, and for how long the motor burnt, s. Integrates with the midpoint rule: exact for free fall, second
-    /// order for drag.
+    /// Place, when it landed, s, and for how long the motor burnt, s. Integrates with the midpoint
+    /// rule: exact for free fall, second order for drag.
     fn follow(&self, seconds: f64) -> (NorthEastUp, Option<f64>, f64) {
         let (mut place, mut velocity) = (self.at_m, self.velocity_m_s);
         let mut braking = None;
@@ -326,7 +331,8 @@ impl LastMotion {
             passed_s += step_s;
             let burns = !matches!(self.forces, Forces::Air { .. }) || braking.is_some();
             burning_s += if burns { step_s } else { 0.0 };
-            // Braked to rest, close to the ground as far as the last values were right; or on the ground.
+            // Braked to rest, close to the ground as far as the last values were right; or on the
+            // ground.
             let stands = burns && velocity[2] >= 0.0 && self.velocity_m_s[2] < 0.0;
             if stands || place[2] <= 0.0 {
                 return (place, Some(passed_s), burning_s);
@@ -359,8 +365,8 @@ impl LastMotion {
     }
 }
 
-/// The drag that explains the difference between acceleration and gravity, 1/m; `None` if the airspeed is too low to
-/// tell.
+/// The drag that explains the difference between acceleration and gravity, 1/m; `None` if the
+/// airspeed is too low to tell.
 fn drag_per_m(change: &Change, wind: &NorthEastUp) -> Option<f64> {
     let through_air: NorthEastUp = std::array::from_fn(|axis| change.velocity_m_s[axis] - wind[axis]);
     let speed = size(&through_air);
@@ -374,7 +380,8 @@ fn drag_per_m(change: &Change, wind: &NorthEastUp) -> Option<f64> {
     drag.is_finite().then(|| drag.clamp(0.0, DRAG_MAX_PER_M))
 }
 
-/// The drag with which a canopy carries the weight at this sink, 1/m: it is slower than drag is seen at. `None` without sink.
+/// The drag with which a canopy carries the weight at this sink, 1/m: it is slower than drag is
+/// seen at. `None` without sink.
 fn canopy_drag_per_m(sinks_m_s: f64) -> Option<f64> {
     (sinks_m_s > 0.0).then(|| (GRAVITY_M_S2 / (sinks_m_s * sinks_m_s)).min(DRAG_MAX_PER_M))
 }
@@ -407,8 +414,8 @@ mod tests {
         predict_position(vehicle, SEEN + Duration::from_secs_f64(seconds)).unwrap()
     }
 
-    /// A vehicle in this phase at 100 m altitude and 1 m north, with this velocity, m/s, and mean acceleration over the
-    /// last second, m/s2.
+    /// A vehicle in this phase at 100 m altitude and 1 m north, with this velocity, m/s, and mean
+    /// acceleration over the last second, m/s2.
     fn moving(phase: TdPhase, velocity: [f64; 3], acceleration: Option<[f64; 3]>) -> Vehicle {
         let [vx_m_s, vy_m_s, climb_m_s] = velocity;
         let motion = Motion { x_m: 1.0, y_m: 0.0, vx_m_s, vy_m_s, ..Motion::vertical(100.0, climb_m_s) };
@@ -451,8 +458,9 @@ mod tests {
         assert_eq!(after(&moving(TdPhase::TD_PHASE_COAST, [0.0; 3], None), 2.0).basis, Basis::FreeFall);
     }
 
-    /// A fall from rest with terminal speed V: `V^2/g ln cosh(g t / V)`; here 40 m/s, with the link lost after 3 s. The
-    /// last second shows the mean of a growing drag, which costs at most 0.5 % of the distance.
+    /// A fall from rest with terminal speed V: `V^2/g ln cosh(g t / V)`; here 40 m/s, with the link
+    /// lost after 3 s. The last second shows the mean of a growing drag, which costs at most 0.5 %
+    /// of the distance.
     #[test]
     fn val_a_fall_with_drag_follows_its_closed_form() {
         let (terminal_m_s, seen_s) = (40.0, 3.0);
@@ -499,7 +507,8 @@ mod tests {
         assert!((after(&vehicle, 9.0).y_m - 2.0).abs() < 1e-9);
         assert!(after(&vehicle, 2.0).error_m < after(&vehicle, 3.0).error_m);
         assert!(after(&vehicle, 3.0).error_m < after(&vehicle, 9.0).error_m);
-        // The path arrived one second before the time to go, so the vehicle is one second further along.
+        // The path arrived one second before the time to go, so the vehicle is one second further
+        // along.
         let sooner = Duration::from_secs(99);
         vehicle.path = Some(Sample::new(vec![(4.0, 40.0), (2.0, 10.0), (0.0, 0.0)], sooner));
         assert!((after(&vehicle, 1.6).altitude_m - (10.0 - 0.04 * 10.0)).abs() < 1e-9);
@@ -517,7 +526,8 @@ mod tests {
         assert!((found.altitude_m - 66.0).abs() < 1e-9 && (found.y_m - 3.0).abs() < 1e-9, "{found:?}");
     }
 
-    /// At terminal speed, with the motor to be lit at 50 m: from there, 40 m/s are braked to zero in 2.5 s.
+    /// At terminal speed, with the motor to be lit at 50 m: from there, 40 m/s are braked to zero
+    /// in 2.5 s.
     #[test]
     fn the_planned_burn_brakes_and_the_circle_covers_a_fall_without_it() {
         let mut vehicle = moving(TdPhase::TD_PHASE_LAND_ARMED, [0.0, 0.0, -40.0], Some([0.0; 3]));
@@ -572,7 +582,8 @@ mod tests {
     }
 
     proptest! {
-        /// At terminal speed the forces balance: the speed is kept, whatever the speed and the wind.
+        /// At terminal speed the forces balance: the speed is kept, whatever the speed and the
+        /// wind.
         #[test]
         fn at_terminal_speed_the_speed_is_kept(
             down_m_s in 8.5..60.0_f64,
@@ -594,7 +605,8 @@ mod tests {
             }
         }
 
-        /// Whatever was last received, the prediction is finite if the last position was, and the circle never shrinks.
+        /// Whatever was last received, the prediction is finite if the last position was, and the
+        /// circle never shrinks.
         #[test]
         fn any_last_report_gives_a_finite_position_and_a_growing_circle(
             phase in 3_u32..13,

@@ -1,5 +1,5 @@
-//! What stands between a key and its effect: the dialog that takes the keys (typing a word, or confirming), the abort
-//! chord, and whether the keys were typed by hand.
+//! What stands between a key and its effect: the dialog that takes the keys (typing a word, or
+//! confirming), the abort chord, and whether the keys were typed by hand.
 
 use std::time::Duration;
 
@@ -14,13 +14,16 @@ pub const WORD_TIME_LIMIT: Duration = Duration::from_secs(10);
 pub const CONFIRM_TIME_LIMIT: Duration = Duration::from_secs(5);
 /// The word that confirms what another operator asks.
 pub const CONFIRM_WORD: &str = "CONFIRM";
-/// The key that confirms what was completed by keys that arrived faster than a hand types; no text contains it.
+/// The key that confirms what was completed by keys that arrived faster than a hand types; no text
+/// contains it.
 pub const AGAIN_KEY: Key = Key::CtrlY;
-/// That key counts this long after the question: a paste has no such pause before it, and who reads first needs longer.
+/// That key counts this long after the question: a paste has no such pause before it, and who reads
+/// first needs longer.
 pub const AGAIN_AFTER: Duration = Duration::from_millis(500);
 /// How long the crew has for that key.
 pub const AGAIN_TIME_LIMIT: Duration = Duration::from_secs(10);
-/// The first letter of a word whose dialog does not open, or has closed, is swallowed for this long, and then the word until Enter.
+/// The first letter of a word whose dialog does not open, or has closed, is swallowed for this
+/// long, and then the word until Enter.
 const REST_WITHIN: Duration = Duration::from_secs(1);
 
 /// What the crew is to confirm.
@@ -68,7 +71,8 @@ impl Prompt {
         Dialog { prompt: self, typed: String::new(), until: now + limit, again_from: None }
     }
 
-    /// Whether it acts only on keys that were typed by hand, or else asks again. Whatever stops something acts at once.
+    /// Whether it acts only on keys that were typed by hand, or else asks again. Whatever stops
+    /// something acts at once.
     pub fn needs_a_hand(self) -> bool {
         !matches!(self, Self::Hold | Self::Disarm | Self::AbortForeign)
     }
@@ -115,8 +119,8 @@ impl Prompt {
     }
 }
 
-/// The open dialog. It accepts the next letter of its word (in either case), or Enter after the whole word. Any other
-/// key closes it. The abort chord works in every dialog.
+/// The open dialog. It accepts the next letter of its word (in either case), or Enter after the
+/// whole word. Any other key closes it. The abort chord works in every dialog.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dialog {
     pub prompt: Prompt,
@@ -124,7 +128,8 @@ pub struct Dialog {
     pub typed: String,
     /// When it closes by itself.
     pub until: Duration,
-    /// Keys that arrived faster than a hand types have completed it: [`AGAIN_KEY`] confirms it, from this time on.
+    /// Keys that arrived faster than a hand types have completed it: [`AGAIN_KEY`] confirms it,
+    /// from this time on.
     pub again_from: Option<Duration>,
 }
 
@@ -156,8 +161,8 @@ impl Dialog {
     }
 }
 
-/// What is left of a typed word whose dialog did not open, or has closed: the crew types on, and no letter of it may act
-/// as a key.
+/// What is left of a typed word whose dialog did not open, or has closed: the crew types on, and no
+/// letter of it may act as a key.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RestOfWord {
     /// The words that the crew may be typing, and how many of their letters have passed.
@@ -168,8 +173,8 @@ pub struct RestOfWord {
 }
 
 impl RestOfWord {
-    /// The word of a dialog that did not open, or the one that confirms what a second person asks. The key of a take-over is the
-    /// first letter of that one.
+    /// The word of a dialog that did not open, or the one that confirms what a second person asks.
+    /// The key of a take-over is the first letter of that one.
     pub fn refused(prompt: Prompt, why: String, now: Duration) -> Self {
         let passed = usize::from(prompt == Prompt::TakeCommand);
         let words = prompt.word().map(|word| (word, 0)).into_iter().chain([(CONFIRM_WORD, passed)]).collect();
@@ -189,8 +194,8 @@ impl RestOfWord {
         Some(Self { words, why, until: now + REST_WITHIN })
     }
 
-    /// Whether this letter belongs to the word: its first, or after that any later one, because letters may be missing
-    /// or wrong.
+    /// Whether this letter belongs to the word: its first, or after that any later one, because
+    /// letters may be missing or wrong.
     pub fn takes(&mut self, letter: char, now: Duration) -> bool {
         let letter = letter.to_ascii_uppercase();
         let goes_on = |(word, passed): &(&'static str, usize)| {
@@ -213,18 +218,19 @@ impl RestOfWord {
 
 // The abort chord: Ctrl-X then Enter, or Ctrl-X twice, distinguished from a held Ctrl-X.
 //
-// Enter completes the chord at once on every terminal. A second Ctrl-X is harder to recognise. Many terminals send a
-// held key as the same bytes over and over: once at the press, again after the keyboard's delay (250 ms or more),
-// then every 20 to 100 ms. The first repeat looks like a second press; the repeats after it do not. So a second
-// Ctrl-X counts only if no further one follows within [`REPEATS_WITHIN`], and a held key is one press. On a terminal
-// that reports repeats, the second Ctrl-X counts at once.
+// Enter completes the chord at once on every terminal. A second Ctrl-X is harder to recognise. Many
+// terminals send a held key as the same bytes over and over: once at the press, again after the
+// keyboard's delay (250 ms or more), then every 20 to 100 ms. The first repeat looks like a second
+// press; the repeats after it do not. So a second Ctrl-X counts only if no further one follows
+// within [`REPEATS_WITHIN`], and a held key is one press. On a terminal that reports repeats, the
+// second Ctrl-X counts at once.
 
 /// How long the second key may take, from the first press or from the end of its hold.
 pub const ABORT_TIME_LIMIT: Duration = Duration::from_secs(2);
 /// An Enter that comes this soon after Ctrl-X, and after that time, was meant for it.
 const LATE_WITHIN: Duration = Duration::from_secs(10);
-/// Presses closer together than this are repeats of a held key: keyboards repeat every 20 to 100 ms, fingers are
-/// slower. A second press also waits this long to show that it is no repeat.
+/// Presses closer together than this are repeats of a held key: keyboards repeat every 20 to 100
+/// ms, fingers are slower. A second press also waits this long to show that it is no repeat.
 pub const REPEATS_WITHIN: Duration = Duration::from_millis(120);
 
 /// The state of the chord.
@@ -266,8 +272,8 @@ impl AbortChord {
         };
     }
 
-    /// A key that cannot be a repeat of the first was pressed: Enter, or Ctrl-X on a terminal that reports repeats.
-    /// Returns whether it completes the chord, which then starts over.
+    /// A key that cannot be a repeat of the first was pressed: Enter, or Ctrl-X on a terminal that
+    /// reports repeats. Returns whether it completes the chord, which then starts over.
     pub fn confirm(&mut self, now: Duration) -> bool {
         let complete = self.is_begun(now);
         if complete {
@@ -276,8 +282,8 @@ impl AbortChord {
         complete
     }
 
-    /// Another key was pressed, so Ctrl-X is no longer held. Returns whether the chord is complete; then it starts
-    /// over. A chord that has only begun stays begun until its time limit.
+    /// Another key was pressed, so Ctrl-X is no longer held. Returns whether the chord is complete;
+    /// then it starts over. A chord that has only begun stays begun until its time limit.
     pub fn end(&mut self) -> bool {
         let complete = matches!(self, Self::Twice(_));
         if complete {
@@ -298,23 +304,26 @@ impl AbortChord {
         self.acts_at().is_some_and(|at| now >= at) && self.end()
     }
 
-    /// Enter was pressed: whether it came too late, a moment after the question had run out. It is asked once.
+    /// Enter was pressed: whether it came too late, a moment after the question had run out. It is
+    /// asked once.
     pub fn take_late_enter(&mut self, now: Duration) -> bool {
         matches!(std::mem::take(self), Self::Once(at) if now.saturating_sub(at) <= LATE_WITHIN)
     }
 }
 
-// Tells from their timing whether keys were typed, repeated by a held key, or arrived faster than a hand types.
+// Tells from their timing whether keys were typed, repeated by a held key, or arrived faster than a
+// hand types.
 //
-// Keys that arrive too fast may be a paste, but also typed keys that a slow connection delivered in bunches. So they
-// only show and prepare; what they complete is asked again ([`Dialog::again`]). The keys of the abort
-// count in every case.
+// Keys that arrive too fast may be a paste, but also typed keys that a slow connection delivered in
+// bunches. So they only show and prepare; what they complete is asked again ([`Dialog::again`]).
+// The keys of the abort count in every case.
 
-/// Different keys closer together than this were not typed by hand. Two fingers are about 40 ms apart; pasted text
-/// arrives at 1 ms a letter on a serial console at 9,600 baud, 8 ms at 1,200 baud, and at once everywhere else.
+/// Different keys closer together than this were not typed by hand. Two fingers are about 40 ms
+/// apart; pasted text arrives at 1 ms a letter on a serial console at 9,600 baud, 8 ms at 1,200
+/// baud, and at once everywhere else.
 pub const FINGERS_APART: Duration = Duration::from_millis(25);
-/// After a key that has no meaning among keys that arrive too fast, the others are dropped until none has arrived for
-/// this long. A connection may pause within a paste, and a hand is no faster.
+/// After a key that has no meaning among keys that arrive too fast, the others are dropped until
+/// none has arrived for this long. A connection may pause within a paste, and a hand is no faster.
 const RUN_ENDS: Duration = REPEATS_WITHIN;
 /// Dropped keys are reported at most this often.
 const REPORTED_EVERY: Duration = Duration::from_secs(2);
@@ -383,7 +392,8 @@ mod chord_tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Presses Ctrl-X at these times and lets time pass every 10 ms. Returns how often the chord was completed.
+    /// Presses Ctrl-X at these times and lets time pass every 10 ms. Returns how often the chord
+    /// was completed.
     fn aborts(presses_ms: &[u64]) -> usize {
         let mut chord = AbortChord::default();
         let end = presses_ms.last().copied().unwrap_or(0) + 3_000;

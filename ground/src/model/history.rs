@@ -30,7 +30,8 @@ impl History {
     }
 }
 
-// Every quantity over time, in a bounded number of rows: the recent past in full, the distant past in steps.
+// Every quantity over time, in a bounded number of rows: the recent past in full, the distant past
+// in steps.
 
 /// The most rows. When they are full, every second one is dropped.
 const ROWS_MAX: usize = 1_200;

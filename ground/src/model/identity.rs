@@ -1,4 +1,5 @@
-//! Which vehicle is heard: which of its boots, whether it is simulated, whether it is one of ours at all.
+//! Which vehicle is heard: which of its boots, whether it is simulated, whether it is one of ours
+//! at all.
 
 use std::num::NonZeroU32;
 use std::time::Duration;
@@ -25,15 +26,15 @@ impl Boot {
         self.number.map(NonZeroU32::get)
     }
 
-    /// The boot number as a parameter of a command. 0 names no boot: the vehicle has reported none, or one that a parameter
-    /// cannot hold exactly.
+    /// The boot number as a parameter of a command. 0 names no boot: the vehicle has reported none,
+    /// or one that a parameter cannot hold exactly.
     pub fn parameter(&self) -> f32 {
         let number = self.number().filter(|number| *number <= LARGEST_BOOT_NUMBER);
         number.map_or(0.0, |number| number as f32)
     }
 
-    /// Whether both flags have been set in every message since this boot's number was first received. A missing or
-    /// contradictory flag means a real vehicle.
+    /// Whether both flags have been set in every message since this boot's number was first
+    /// received. A missing or contradictory flag means a real vehicle.
     pub fn is_simulated(&self) -> bool {
         self.number.is_some() && self.hil == Some(true) && self.flagged == Some(true)
     }
@@ -80,14 +81,15 @@ pub(crate) fn time_boot_ms(message: &MavMessage) -> Option<u32> {
     }
 }
 
-/// A vehicle of ours sends its status at least once a second, on any line. For so long it may be lost.
+/// A vehicle of ours sends its status at least once a second, on any line. For so long it may be
+/// lost.
 const NO_STATUS_FOR: Duration = Duration::from_secs(3);
 /// A vehicle with another version of the dialect sends more frames that do not fit in that time.
 const MISFITS: u64 = 10;
 
 impl Model {
-    /// Whether the vehicle beats as one of ours, but what it says fits no message of this station's: the other has another
-    /// version of the dialect.
+    /// Whether the vehicle beats as one of ours, but what it says fits no message of this
+    /// station's: the other has another version of the dialect.
     pub fn speaks_another_version(&self, now: Duration) -> bool {
         let link = &self.link;
         let misfits = link.framing.crc_errors + link.framing.unknown_ids + link.undecodable;
@@ -99,7 +101,8 @@ impl Model {
     }
 }
 
-// A vehicle with another autopilot: it is shown as what its heartbeat says, and never armed or started from here.
+// A vehicle with another autopilot: it is shown as what its heartbeat says, and never armed or
+// started from here.
 
 /// What another autopilot tells in its heartbeat.
 #[derive(Debug, Clone)]

@@ -1,5 +1,5 @@
-//! The link to the vehicle in both directions: what it carries, what was rejected, when the vehicle was heard, and
-//! whether it hears us.
+//! The link to the vehicle in both directions: what it carries, what was rejected, when the vehicle
+//! was heard, and whether it hears us.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -19,8 +19,9 @@ pub const RADIO_FRESH: Duration = Duration::from_secs(5);
 /// Nothing is armed or started for this long after another station was heard under our address.
 const SAME_ID_FOR: Duration = Duration::from_secs(10);
 
-/// An attached screen that got nothing for longer than this has a silent station: twenty of its ticks. Less than the
-/// silence after which a vehicle is lost, so that the two are not mistaken for each other.
+/// An attached screen that got nothing for longer than this has a silent station: twenty of its
+/// ticks. Less than the silence after which a vehicle is lost, so that the two are not mistaken for
+/// each other.
 const STATION_SILENT_AFTER: Duration = Duration::from_secs(2);
 
 /// The state of one of several links.
@@ -68,14 +69,16 @@ pub struct Link {
     pub send_drops: u64,
     /// Why no link works, if none does.
     pub trouble: Option<String>,
-    /// The crew has asked for an abort that reached no station. The screen sends it to the next station that it
-    /// finds.
+    /// The crew has asked for an abort that reached no station. The screen sends it to the next
+    /// station that it finds.
     pub abort_unsent: bool,
-    /// When this attached screen has asked its station for an abort that the station has not taken yet.
+    /// When this attached screen has asked its station for an abort that the station has not taken
+    /// yet.
     pub abort_asked_at: Option<Duration>,
     /// On an attached screen: the last tick of its station. `None` in the station itself.
     pub(crate) station_at: Option<Duration>,
-    /// On an attached screen: its station has ended. The screen shows the past, and commands nothing.
+    /// On an attached screen: its station has ended. The screen shows the past, and commands
+    /// nothing.
     pub(crate) station_gone: bool,
     /// The first heartbeat of the vehicle.
     pub first_heartbeat_at: Option<Duration>,
@@ -104,7 +107,8 @@ impl Link {
         report.map(|report| report.name.as_str())
     }
 
-    /// Whether another station uses our address, or has used it a moment ago: it may be the one that the vehicle obeys.
+    /// Whether another station uses our address, or has used it a moment ago: it may be the one
+    /// that the vehicle obeys.
     pub fn shares_our_id(&self, now: Duration) -> bool {
         self.same_id_at.is_some_and(|at| now.saturating_sub(at) < SAME_ID_FOR)
     }
@@ -129,12 +133,14 @@ impl Link {
         self.station_gone.then(|| now.saturating_sub(self.station_at.unwrap_or(now)))
     }
 
-    /// Until when it is known what the station hears: in an attached screen its last tick, otherwise now.
+    /// Until when it is known what the station hears: in an attached screen its last tick,
+    /// otherwise now.
     pub(crate) fn known_until(&self, now: Duration) -> Duration {
         self.station_at.map_or(now, |at| at.min(now))
     }
 
-    /// The state of the downlink: whether the vehicle is heard. It counts as a vehicle from its first heartbeat.
+    /// The state of the downlink: whether the vehicle is heard. It counts as a vehicle from its
+    /// first heartbeat.
     pub fn state(&self, now: Duration) -> LinkState {
         LinkState::of(self.first_heartbeat_at.and(self.heard_at), now)
     }
@@ -147,7 +153,8 @@ impl Link {
         }
     }
 
-    /// The downlink as the header shows it: by the age of what the vehicle has said last, which may have waited in a queue.
+    /// The downlink as the header shows it: by the age of what the vehicle has said last, which may
+    /// have waited in a queue.
     pub fn down(&self, now: Duration) -> LinkState {
         let content = self.content.age(now).map(|age| now.saturating_sub(age));
         let last = self.first_heartbeat_at.and(self.heard_at);
@@ -162,13 +169,14 @@ impl Link {
 
 // Whether one direction of the link works, by the age of the last frame that arrived on it.
 
-/// After this long without a frame a direction of the link is doubtful: one and a half heartbeat periods.
+/// After this long without a frame a direction of the link is doubtful: one and a half heartbeat
+/// periods.
 pub const AMBER_AFTER: Duration = Duration::from_millis(1_500);
 /// After longer than this without a frame a direction of the link is lost: three heartbeat periods.
 pub const RED_AFTER: Duration = Duration::from_secs(3);
 
-/// The state of one direction of the link, with the age of its last frame. Reports of a radio about itself do not
-/// count.
+/// The state of one direction of the link, with the age of its last frame. Reports of a radio about
+/// itself do not count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LinkState {
     NeverHeard,
@@ -199,7 +207,8 @@ impl LinkState {
 
 // Whether the vehicle hears this station. Hearing the vehicle does not prove it.
 
-/// How long a proof of the uplink is valid: the vehicle must have heard the station that arms it within this time.
+/// How long a proof of the uplink is valid: the vehicle must have heard the station that arms it
+/// within this time.
 pub const PROVEN_WITHIN: Duration = Duration::from_secs(2);
 
 /// The last frame that the vehicle refused.
@@ -221,7 +230,8 @@ pub struct Uplink {
     pub(crate) is_reported: bool,
     /// When it last accepted a frame of this station, as it reports.
     accepted_at: Option<Duration>,
-    /// When the last TIMESYNC was sent that it has answered: the proof for a vehicle of another make.
+    /// When the last TIMESYNC was sent that it has answered: the proof for a vehicle of another
+    /// make.
     answered_at: Option<Duration>,
     /// Whether this station armed the vehicle.
     pub armed_by_us: bool,
@@ -234,7 +244,8 @@ pub struct Uplink {
 }
 
 impl Uplink {
-    /// Takes a report about this station, or about no station because the vehicle has accepted nothing yet.
+    /// Takes a report about this station, or about no station because the vehicle has accepted
+    /// nothing yet.
     pub(crate) fn hear(&mut self, told: &TD_UPLINK_DATA, now: Duration) {
         let ago = |age_ms: u16| {
             (age_ms != u16::MAX).then(|| now.saturating_sub(Duration::from_millis(age_ms.into())))
@@ -297,14 +308,16 @@ pub fn refusal(why: TdFrameRefusal) -> &'static str {
     }
 }
 
-// What to say while the vehicle has never been heard, and while frames are refused for their signature.
+// What to say while the vehicle has never been heard, and while frames are refused for their
+// signature.
 
 /// A vehicle that is switched on sends a HEARTBEAT every second.
 pub const HINTS_AFTER: Duration = Duration::from_secs(5);
 /// Refused frames raise an alarm for this long after the last of them.
 const REFUSED_SHOWN: Duration = Duration::from_secs(5);
 
-/// What to check, the most likely first; `None` once the vehicle was heard, and in the first seconds.
+/// What to check, the most likely first; `None` once the vehicle was heard, and in the first
+/// seconds.
 pub fn unheard_hints(model: &Model, now: Duration) -> Option<Vec<String>> {
     let live = model.settings.role != Role::Replaying && model.link.station_silence(now).is_none();
     if !live || now < HINTS_AFTER || model.link.state(now) != LinkState::NeverHeard {
@@ -339,7 +352,8 @@ fn what_the_link_does(link: &str) -> String {
     }
 }
 
-/// How many frames were refused for their signature, while that goes on and the vehicle is not heard.
+/// How many frames were refused for their signature, while that goes on and the vehicle is not
+/// heard.
 pub fn refused_frames(model: &Model, now: Duration) -> Option<String> {
     let goes_on = now.saturating_sub(model.link.refused_at?) < REFUSED_SHOWN;
     let counts: SigningCounters =

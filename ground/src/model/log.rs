@@ -14,7 +14,8 @@ use super::{LinkState, Model, Settings, Vehicle, is_on_pad};
 
 /// With less free space nothing is armed: several minutes of the busiest link.
 const SPACE_MIN_BYTES: u64 = 64 << 20;
-/// With less time left at the present rate nothing is armed: a countdown with its holds, a flight, and the wait after it.
+/// With less time left at the present rate nothing is armed: a countdown with its holds, a flight,
+/// and the wait after it.
 const TIME_MIN: Duration = Duration::from_mins(15);
 /// From this many times either on the crew is warned.
 const WARNED_TIMES: u32 = 4;
@@ -99,8 +100,8 @@ impl Model {
         }
     }
 
-    /// Whether the station may end its log and begin another: the vehicle is disarmed on the pad, or nothing is heard, and no
-    /// vehicle that was heard flies or is about to.
+    /// Whether the station may end its log and begin another: the vehicle is disarmed on the pad,
+    /// or nothing is heard, and no vehicle that was heard flies or is about to.
     pub fn may_change_log(&self, now: Duration) -> bool {
         let rests = |of: &Vehicle| !of.is_armed() && !of.in_flight() && !of.counts_down();
         let is_silent = match self.link.state(now) {
@@ -110,13 +111,15 @@ impl Model {
         };
         let stands = self.vehicle.armed().is_some() && self.vehicle.phase_now().is_some_and(is_on_pad);
         let Settings { interactive, demonstration, auto, .. } = self.settings;
-        // The others end with their flight, and the log of a demonstration begins with the flight computer's start.
+        // The others end with their flight, and the log of a demonstration begins with the flight
+        // computer's start.
         let is_a_station = interactive && !demonstration && !auto;
         let all_rest = std::iter::once(&self.vehicle).chain(self.others.values()).all(rests);
         is_a_station && all_rest && !self.commands.is_aborting() && (is_silent || stands)
     }
 
-    /// Why nothing is armed or started from here; `None` if the log is fit, or if the crew goes on without it.
+    /// Why nothing is armed or started from here; `None` if the log is fit, or if the crew goes on
+    /// without it.
     pub fn why_no_log(&self, now: Duration) -> Option<String> {
         self.unfit_log(now).map(|(_, words)| format!("station log {words}"))
     }

@@ -1,7 +1,7 @@
 //! Everything that the ground knows, as plain data.
 //!
-//! Every received value carries the time of its reception. The model decides nothing, and it imports neither `update`
-//! nor `view`.
+//! Every received value carries the time of its reception. The model decides nothing, and it
+//! imports neither `update` nor `view`.
 
 mod act;
 mod alarm;
@@ -78,8 +78,8 @@ pub struct Settings {
     pub tlog_path: Option<String>,
     /// The station's own MAVLink address.
     pub us: Address,
-    /// The session of the station: drawn at its start, so that another station with the same address is another one. 0:
-    /// none, in a replay.
+    /// The session of the station: drawn at its start, so that another station with the same
+    /// address is another one. 0: none, in a replay.
     pub session: u32,
     /// The vehicle's MAVLink address. No other system on the link is shown or commanded.
     pub vehicle: Address,
@@ -88,7 +88,8 @@ pub struct Settings {
     /// This screen and its operator.
     #[serde(skip)]
     pub seat: Seat,
-    /// The operator whose key signs what the station sends; `None` without a crew, and for an observer.
+    /// The operator whose key signs what the station sends; `None` without a crew, and for an
+    /// observer.
     pub key_owner: Option<KeyOwner>,
     /// The mission that the vehicle should fly, if the station knows it.
     pub mission: Option<MissionHash>,
@@ -119,7 +120,8 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// A station with a person at its screen, without a log or a time limit, on a link of unknown capacity.
+    /// A station with a person at its screen, without a log or a time limit, on a link of unknown
+    /// capacity.
     pub fn on_screen(link_name: impl Into<String>) -> Self {
         let link_name = link_name.into();
         Self { link_name, us: GROUND, vehicle: VEHICLE, interactive: true, ..Self::default() }
@@ -193,7 +195,8 @@ pub struct Model {
     pub key_timing: KeyTiming,
     /// Who can command, and from which screens.
     pub crew: Crew,
-    /// Whether the terminal distinguishes a held key's repeats from presses, so that repeats never arrive here.
+    /// Whether the terminal distinguishes a held key's repeats from presses, so that repeats never
+    /// arrive here.
     pub repeats_reported: bool,
     /// How late the terminal shows what was drawn.
     pub screen_late: Duration,
@@ -216,7 +219,8 @@ pub struct Model {
     pub(crate) sign_refused: Option<(String, Duration)>,
     /// The last place of the vehicle: of this flight, or kept from before a restart.
     pub place: Option<LastPlace>,
-    /// An abort of an earlier run of this station, or of its screen, that was asked for and not confirmed.
+    /// An abort of an earlier run of this station, or of its screen, that was asked for and not
+    /// confirmed.
     pub(crate) abort_before: Option<String>,
     /// What is kept of it beside the log, and since when.
     pub(crate) kept: Option<(Unfinished, Duration)>,
@@ -247,7 +251,8 @@ pub struct Model {
 impl Model {
     /// A model that knows nothing yet.
     ///
-    /// A screen of a station in another process first receives the history, until [`Self::history_ends`].
+    /// A screen of a station in another process first receives the history, until
+    /// [`Self::history_ends`].
     pub fn new(settings: Settings) -> Self {
         let mut model = Self::default();
         model.alarms.in_history = matches!(settings.role, Role::Attached | Role::Watching);
@@ -261,7 +266,8 @@ impl Model {
         self.alarms.history_ends();
     }
 
-    /// Whether the vehicle is armed, in flight or being aborted, so that quitting must be confirmed.
+    /// Whether the vehicle is armed, in flight or being aborted, so that quitting must be
+    /// confirmed.
     pub fn is_at_risk(&self) -> bool {
         let armed = self.vehicle.is_armed();
         armed || self.commands.is_aborting() || self.vehicle.in_flight()
@@ -278,7 +284,8 @@ impl Model {
         self.pages.shown(self.vehicle.phase_now())
     }
 
-    /// The alarm that Space acknowledges: the chosen one on the list of alarms, otherwise the foremost.
+    /// The alarm that Space acknowledges: the chosen one on the list of alarms, otherwise the
+    /// foremost.
     pub fn pointed_at(&self) -> Option<&Alarm> {
         let listed = self.page() == Page::Alarms;
         let chosen = self.pages.chosen.filter(|_| listed);
@@ -411,7 +418,8 @@ pub enum Action {
     Redraw,
     /// Change the screen's colours to the next theme.
     NextTheme,
-    /// The crew asks for this: a screen in another process asks its station, the station tells its other screens.
+    /// The crew asks for this: a screen in another process asks its station, the station tells its
+    /// other screens.
     Request(Request),
     /// Give the terminal back and continue without a screen.
     LeaveScreen,

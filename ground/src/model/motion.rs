@@ -17,8 +17,8 @@ const SPAN_MIN_MS: u32 = 300;
 /// How many samples are kept at most.
 const TREND_KEPT: usize = 64;
 
-/// The velocities of the last second under the same forces, by the vehicle's clock, so that radio delays do not look
-/// like accelerations.
+/// The velocities of the last second under the same forces, by the vehicle's clock, so that radio
+/// delays do not look like accelerations.
 #[derive(Debug, Clone, Default)]
 pub struct Trend {
     acting: Option<TdPhase>,

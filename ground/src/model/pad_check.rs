@@ -1,4 +1,5 @@
-//! The checks on the pad: the vehicle's own check as it tells it value by value, and the radio range test.
+//! The checks on the pad: the vehicle's own check as it tells it value by value, and the radio
+//! range test.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
@@ -10,15 +11,18 @@ use protocol::link_stats::FrameCounts;
 
 use super::{Acknowledgement, CommandKind, Model, Seat};
 
-/// A check with motion takes 13 s, and 40 s if people watch the surfaces. If neither answer nor end of one that was asked for is heard, it may run for so long.
+/// A check with motion takes 13 s, and 40 s if people watch the surfaces. If neither answer nor end
+/// of one that was asked for is heard, it may run for so long.
 const LONGEST: Duration = Duration::from_secs(50);
-/// What the vehicle reported before it had a command may arrive so much later than the command was given.
+/// What the vehicle reported before it had a command may arrive so much later than the command was
+/// given.
 const LATE: Duration = Duration::from_secs(3);
 /// Whoever presses the key again to end a check that has just ended does not want another one.
 const JUST_ENDED: Duration = Duration::from_secs(3);
 
-/// The surfaces in the order in which a check moves them, the number of the first item of each, and what people see. Fins
-/// have their numbers painted on: seen from the nose they count counter-clockwise (MK3.md, Axes and signs).
+/// The surfaces in the order in which a check moves them, the number of the first item of each, and
+/// what people see. Fins have their numbers painted on: seen from the nose they count
+/// counter-clockwise (MK3.md, Axes and signs).
 pub const SURFACES: [(&str, u32, &str); 6] = [
     ("gimbal pitch", 0, "nozzle swings towards fins 1 and 4, then towards 2 and 3"),
     ("gimbal yaw", 3, "nozzle swings towards fins 1 and 2, then towards 3 and 4"),
@@ -94,7 +98,8 @@ impl PadCheck {
         self.told.state == TdPadCheckState::TD_PAD_CHECK_STATE_RUNNING
     }
 
-    /// Whether it moved surfaces that tell nothing, and nothing else was wrong: people say what they saw.
+    /// Whether it moved surfaces that tell nothing, and nothing else was wrong: people say what
+    /// they saw.
     pub fn awaits_eyes(&self) -> bool {
         let told = |item: TdPadCheckItem| self.of(item).map(|value| value.verdict);
         self.told.state == TdPadCheckState::TD_PAD_CHECK_STATE_PASSED
@@ -170,8 +175,8 @@ pub fn shown(value: &TD_PAD_CHECK_DATA) -> (String, &'static str, f64, usize) {
 
 // The radio range test: how much is lost both ways, and how far the signal is above the noise.
 //
-// It asks the vehicle for the time five times a second and counts the answers, and the gaps in what the vehicle sends. It
-// sends nothing that commands.
+// It asks the vehicle for the time five times a second and counts the answers, and the gaps in what
+// the vehicle sends. It sends nothing that commands.
 
 /// How long it asks. With 150 questions a loss of 5 % is known to 3.5 percentage points (95 %).
 pub const ASKS_FOR: Duration = Duration::from_secs(30);
@@ -179,11 +184,11 @@ pub const ASKS_EVERY: Duration = Duration::from_millis(200);
 /// Then it waits for the last answers: a slow radio with a full queue takes a second.
 pub const WAITS_FOR: Duration = Duration::from_secs(2);
 
-/// Most loss either way that passes. Without a margin to show, a link that loses every twentieth frame on the ground is
-/// at its end; one that does not loses nearly none.
+/// Most loss either way that passes. Without a margin to show, a link that loses every twentieth
+/// frame on the ground is at its end; one that does not loses nearly none.
 pub const LOSS_MOST: f64 = 0.05;
-/// Least signal above the noise that passes, dB: a tenth of the power may be lost to a turning antenna, a hand or wet
-/// grass. In free space 6 dB more carry twice as far, 20 dB ten times.
+/// Least signal above the noise that passes, dB: a tenth of the power may be lost to a turning
+/// antenna, a hand or wet grass. In free space 6 dB more carry twice as far, 20 dB ten times.
 pub const MARGIN_LEAST_DB: f64 = 10.0;
 /// Steps of a SiK radio's RSSI in 1 dB: its manual gives RSSI = 1.9 (dBm + 127).
 const STEPS_PER_DB: f64 = 1.9;

@@ -37,7 +37,8 @@ pub enum Page {
 }
 
 impl Page {
-    /// Every page that a key shows: those with a digit in that order, then those with a letter or a mark.
+    /// Every page that a key shows: those with a digit in that order, then those with a letter or a
+    /// mark.
     pub fn all() -> impl Iterator<Item = Self> {
         Self::VARIANTS.iter().copied().filter(|page| page.keyed() == *page)
     }

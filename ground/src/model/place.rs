@@ -1,4 +1,5 @@
-//! Where to look for the vehicle after a flight: the last place where it was heard, the predicted one, and its file for maps.
+//! Where to look for the vehicle after a flight: the last place where it was heard, the predicted
+//! one, and its file for maps.
 
 use std::time::Duration;
 
@@ -15,7 +16,8 @@ const HEARD_ERROR_M: f64 = 1.5;
 pub struct Spot {
     pub north_m: f64,
     pub east_m: f64,
-    /// The radius around it in which it may be, m; of a place where it was or is, in 19 of 20 cases.
+    /// The radius around it in which it may be, m; of a place where it was or is, in 19 of 20
+    /// cases.
     pub error_m: f64,
 }
 
@@ -104,8 +106,9 @@ impl Model {
         })
     }
 
-    /// Where a vehicle that left the pad unheard is meant to come down: at the touchdown that it predicted, else at the pad,
-    /// anywhere inside the fence of its mission. `None` if it has reported no fence.
+    /// Where a vehicle that left the pad unheard is meant to come down: at the touchdown that it
+    /// predicted, else at the pad, anywhere inside the fence of its mission. `None` if it has
+    /// reported no fence.
     pub fn meant_to_come_down(&self) -> Option<Spot> {
         let fence_m = self.vehicle.fence_m()?;
         let predicted = self.vehicle.descent().map(|descent| descent.value);
@@ -119,8 +122,8 @@ impl Model {
     }
 }
 
-// The last known place of a vehicle as KML, for maps. What the station needs after a restart is kept beside it, also while nobody
-// knows where the pad is on the Earth.
+// The last known place of a vehicle as KML, for maps. What the station needs after a restart is
+// kept beside it, also while nobody knows where the pad is on the Earth.
 
 /// Corners of the polygon that stands for the circle of uncertainty.
 const CORNERS: u32 = 36;
@@ -165,7 +168,8 @@ mod place_tests {
 
     const PAD: Degrees = Degrees { latitude: 45.0, longitude: 10.0 };
 
-    /// Length of a degree of latitude and of longitude at 45 degrees north on WGS 84, m: 111,131.75 and 78,846.81.
+    /// Length of a degree of latitude and of longitude at 45 degrees north on WGS 84, m: 111,131.75
+    /// and 78,846.81.
     #[test]
     fn val_wgs84_a_hundredth_of_a_degree_is_as_long_as_it_should_be() {
         let moved = PAD.moved(1_111.317_5, 788.468_1);

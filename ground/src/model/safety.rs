@@ -1,4 +1,5 @@
-//! What keeps people safe: the landing motor, holds, aborts and their effect, and how a flight ended.
+//! What keeps people safe: the landing motor, holds, aborts and their effect, and how a flight
+//! ended.
 
 use std::time::Duration;
 
@@ -47,7 +48,8 @@ pub struct KeepAway {
 }
 
 impl KeepAway {
-    /// The present warning. `None` while a vehicle is being prepared, and while it flies as planned.
+    /// The present warning. `None` while a vehicle is being prepared, and while it flies as
+    /// planned.
     ///
     /// A waiting time goes on without the link: a burnt motor cools, and nothing can make it worse.
     pub fn of(vehicle: &Vehicle, now: Duration) -> Option<Self> {
@@ -99,7 +101,8 @@ impl KeepAway {
     }
 }
 
-/// How long people wait for a vehicle that was reset before it could tell how long, s: its longest waiting time.
+/// How long people wait for a vehicle that was reset before it could tell how long, s: its longest
+/// waiting time.
 const UNTOLD_WAIT_S: u16 = 60;
 
 impl Vehicle {
@@ -111,7 +114,8 @@ impl Vehicle {
         (left_s > 0).then_some(KeepAway { wait_s: Some(left_s), ..before.value })
     }
 
-    /// The same, and after it that the motor may be live, until the vehicle says of it what ends that.
+    /// The same, and after it that the motor may be live, until the vehicle says of it what ends
+    /// that.
     fn away_before(&self, now: Duration) -> Option<KeepAway> {
         let live = || {
             let may_be = !matches!(self.before?.value.danger, Danger::Hot | Danger::Wait);
@@ -250,7 +254,8 @@ pub fn why_not_stop(model: &Model, now: Duration) -> Option<String> {
     KeepAway::of(&model.vehicle, now).map(|away| format!("people must keep away, {}", away.sentence()))
 }
 
-/// Why quitting has to be confirmed: as for [`why_not_stop`]. Nobody stands near the vehicle of a demonstration.
+/// Why quitting has to be confirmed: as for [`why_not_stop`]. Nobody stands near the vehicle of a
+/// demonstration.
 pub fn why_not_quit(model: &Model, now: Duration) -> Option<String> {
     let asks = model.settings.role.why_not_command().is_none();
     let is_near =
@@ -258,8 +263,8 @@ pub fn why_not_quit(model: &Model, now: Duration) -> Option<String> {
     why_not_stop(model, now).filter(|_| asks && is_near)
 }
 
-/// Whether the motor matters to people on the ground: the flight is over or does not go as planned, or a waiting time
-/// runs.
+/// Whether the motor matters to people on the ground: the flight is over or does not go as planned,
+/// or a waiting time runs.
 fn concerns(status: &TD_FLIGHT_STATUS_DATA) -> bool {
     let amiss = TdInterlock::TD_INTERLOCK_ABORT_LATCHED
         | TdInterlock::TD_INTERLOCK_NO_LIGHT
@@ -277,12 +282,14 @@ fn concerns(status: &TD_FLIGHT_STATUS_DATA) -> bool {
     }
 }
 
-/// In a countdown the vehicle notices after this long what is lost, s: station, screen, tap or link.
+/// In a countdown the vehicle notices after this long what is lost, s: station, screen, tap or
+/// link.
 const NOTICED_AFTER_S: f64 = 1.0;
 
 impl Model {
-    /// The time before the release, as it is shown here, from which on a hold comes too late, s: what is shown is old by the way
-    /// down, and a hold takes the way up. `None` if the vehicle does not tell it.
+    /// The time before the release, as it is shown here, from which on a hold comes too late, s:
+    /// what is shown is old by the way down, and a hold takes the way up. `None` if the vehicle
+    /// does not tell it.
     pub fn last_hold_s(&self) -> Option<f64> {
         self.last_hold_of(&self.vehicle)
     }
@@ -342,11 +349,11 @@ pub fn hold_words(vehicle: &Vehicle, armed_here: bool) -> Option<String> {
 
 // How a flight ended: one of four ends, each with its word.
 
-/// A vehicle that hits the ground at this speed or faster, m/s, is a wreck: that of a fall from 5 m. Its legs withstand
-/// 1 m/s, and under an open parachute it comes down at 6 m/s.
+/// A vehicle that hits the ground at this speed or faster, m/s, is a wreck: that of a fall from 5
+/// m. Its legs withstand 1 m/s, and under an open parachute it comes down at 6 m/s.
 const WRECKED_FROM_M_S: f64 = 10.0;
-/// After this long without a word, a vehicle in flight whose fall cannot be predicted is down: 300 m under a parachute
-/// take 50 s.
+/// After this long without a word, a vehicle in flight whose fall cannot be predicted is down: 300
+/// m under a parachute take 50 s.
 const SURELY_DOWN_AFTER: Duration = Duration::from_mins(2);
 
 /// The ends of a flight.
@@ -469,7 +476,8 @@ pub struct Touchdown {
     pub tilt_rad: f64,
     /// Size of the rotation rate, rad/s.
     pub rate_rad_s: f64,
-    /// The limits that the vehicle reports as violated: those of the design envelope of its legs, and a plan's height.
+    /// The limits that the vehicle reports as violated: those of the design envelope of its legs,
+    /// and a plan's height.
     pub violated: TdLimit,
 }
 
@@ -498,7 +506,8 @@ impl Touchdown {
 
 // Why the landing motor is inhibited for good.
 
-/// A text of the vehicle this long before its latch is still about it: the text waits for the radio.
+/// A text of the vehicle this long before its latch is still about it: the text waits for the
+/// radio.
 const TEXT_APART: Duration = Duration::from_secs(2);
 /// How many of the newest events are searched for the text.
 const TEXTS_SEARCHED: usize = 100;
@@ -523,7 +532,8 @@ pub fn is_liftoff_by_itself(vehicle: &Vehicle) -> bool {
     climbs && latch == Some(TdLatch::TD_LATCH_UNCOMMANDED_LIFTOFF)
 }
 
-/// The latch in words, with its cause; `None` while nothing is latched. A motor that did not light has words of its own.
+/// The latch in words, with its cause; `None` while nothing is latched. A motor that did not light
+/// has words of its own.
 pub fn latch_words(model: &Model) -> Option<String> {
     let vehicle = &model.vehicle;
     let aborted = vehicle.interlocks()?.contains(TdInterlock::TD_INTERLOCK_ABORT_LATCHED);
@@ -541,7 +551,8 @@ pub fn latch_words(model: &Model) -> Option<String> {
     Some(cause.map_or_else(|| word.to_owned(), |cause| format!("{word}: {cause}")))
 }
 
-/// Which check kept the ignition gate shut: what the vehicle has found, or has said when it gave the gate up.
+/// Which check kept the ignition gate shut: what the vehicle has found, or has said when it gave
+/// the gate up.
 fn why_gate_stayed_shut(model: &Model) -> Option<String> {
     let vehicle = &model.vehicle;
     vehicle.status.as_ref().filter(|status| status.value.latch == TdLatch::TD_LATCH_GATE)?;
@@ -554,8 +565,8 @@ fn why_gate_stayed_shut(model: &Model) -> Option<String> {
     found.or_else(said).map(|why| format!("gate stayed shut: {why}"))
 }
 
-/// The first grave text of the vehicle about the time of its latch, for a cause that only a text tells: what follows is about the
-/// consequences.
+/// The first grave text of the vehicle about the time of its latch, for a cause that only a text
+/// tells: what follows is about the consequences.
 fn text_of_the_latch(model: &Model) -> Option<String> {
     let since = model.outcome.aborted_at?.saturating_sub(TEXT_APART);
     let mut events = model.events.newest(TEXTS_SEARCHED);
@@ -566,14 +577,15 @@ fn text_of_the_latch(model: &Model) -> Option<String> {
     found.map(|event| event.text.clone())
 }
 
-// Whether an abort that is sent now would arrive too late. The vehicle reports what an abort would do at this
-// moment; the command takes time to reach it.
+// Whether an abort that is sent now would arrive too late. The vehicle reports what an abort would
+// do at this moment; the command takes time to reach it.
 
-/// The assumed one-way delay before a round trip has been measured: a telemetry radio's usual uplink latency.
+/// The assumed one-way delay before a round trip has been measured: a telemetry radio's usual
+/// uplink latency.
 const ONE_WAY_UNMEASURED: Duration = Duration::from_millis(250);
 
-/// Why an abort sent now would be too late for what the vehicle offers; `None` if it is in time, or if that is
-/// unknown.
+/// Why an abort sent now would be too late for what the vehicle offers; `None` if it is in time, or
+/// if that is unknown.
 pub fn abort_too_late(model: &Model, now: Duration) -> Option<&'static str> {
     // A report from before a loss of the link still counts: the time keeps running.
     let offered = model.vehicle.status.as_ref()?.value.abort_effect;

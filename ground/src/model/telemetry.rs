@@ -49,7 +49,8 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) {
         }
         MavMessage::GLOBAL_POSITION_INT(data) => {
             vehicle.hud = Some(Sample::new(Motion::of_global(data), now));
-            // Until the vehicle tells its pad. The two positions are at most a quarter of a second apart.
+            // Until the vehicle tells its pad. The two positions are at most a quarter of a second
+            // apart.
             vehicle.pad = vehicle.pad.or_else(|| {
                 let motion = vehicle.motion?.value;
                 Some(Degrees::of_e7(data.lat, data.lon)?.moved(-motion.x_m, -motion.y_m))
@@ -91,7 +92,8 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) {
     }
 }
 
-/// A vehicle on its pad seems to climb more slowly than this, m/s; one that lifts off is faster within a tenth of a second.
+/// A vehicle on its pad seems to climb more slowly than this, m/s; one that lifts off is faster
+/// within a tenth of a second.
 const MOVES_M_S: f64 = 1.0;
 
 // What is converted when it is asked for.
@@ -163,7 +165,8 @@ impl Vehicle {
     }
 }
 
-/// Takes a message of another autopilot. Returns whether it is one: nothing of it is read as a message of our vehicles.
+/// Takes a message of another autopilot. Returns whether it is one: nothing of it is read as a
+/// message of our vehicles.
 fn hear_foreign(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) -> bool {
     match message {
         MavMessage::HEARTBEAT(beat) if !may_be_ours(beat) => {
@@ -200,7 +203,8 @@ fn name(bytes: &[u8]) -> String {
     protocol::text::printable(&bytes[..end])
 }
 
-/// Distance, height, vertical and lateral speed, tilt and rate at touchdown, as both messages tell them.
+/// Distance, height, vertical and lateral speed, tilt and rate at touchdown, as both messages tell
+/// them.
 fn touchdown(at: [f32; 6], violated: TdLimit) -> Touchdown {
     let [distance_m, height_m, vertical_m_s, lateral_m_s, tilt_rad, rate_rad_s] = at.map(f64::from);
     Touchdown { distance_m, height_m, vertical_m_s, lateral_m_s, tilt_rad, rate_rad_s, violated }

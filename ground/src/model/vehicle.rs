@@ -122,7 +122,8 @@ pub struct Vehicle {
     pub motion: Option<Sample<Motion>>,
     /// What goes into the log's record of it.
     pub told: Told,
-    /// `GLOBAL_POSITION_INT`: height above the pad and climb, for a vehicle that sends no local position.
+    /// `GLOBAL_POSITION_INT`: height above the pad and climb, for a vehicle that sends no local
+    /// position.
     pub hud: Option<Sample<Motion>>,
     /// Where its pad is on the Earth: by `HOME_POSITION`, before that by its two positions.
     pub pad: Option<Degrees>,
@@ -144,7 +145,8 @@ pub struct Vehicle {
     pub has_lifted: bool,
     /// The present boot of the vehicle.
     pub boot: Boot,
-    /// What was said of approaching before a power cycle, and when: a waiting time goes on through a boot.
+    /// What was said of approaching before a power cycle, and when: a waiting time goes on through
+    /// a boot.
     pub(crate) before: Option<Sample<KeepAway>>,
     /// The vehicle with another autopilot that was heard under this id.
     pub foreign: Option<Foreign>,
@@ -153,7 +155,8 @@ pub struct Vehicle {
 /// What the vehicle says went wrong in its flight, as far as it has arrived.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Findings {
-    /// How many there are; `None` if the vehicle has not said so, which it does after the flight if there is none.
+    /// How many there are; `None` if the vehicle has not said so, which it does after the flight if
+    /// there is none.
     pub count: Option<u8>,
     /// When each began, s since the release, and a short sentence, by its place.
     arrived: BTreeMap<u8, (f64, String)>,
@@ -178,7 +181,8 @@ impl Findings {
 }
 
 impl Vehicle {
-    /// The last message of this type. What is converted or put together from several is a field above.
+    /// The last message of this type. What is converted or put together from several is a field
+    /// above.
     pub fn last<M: MessageData>(&self) -> Option<Sample<M>> {
         let payload = self.payloads.get(&M::ID)?;
         let message = M::deser(MavlinkVersion::V2, &payload.value).ok()?;
@@ -265,7 +269,8 @@ impl Vehicle {
         known.then(|| Sample::new(f64::from(status.value.countdown_ms) / 1_000.0, status.received_at))
     }
 
-    /// The time before the release, s, from which on no key and no silence holds the countdown; `None` if the vehicle does not tell it.
+    /// The time before the release, s, from which on no key and no silence holds the countdown;
+    /// `None` if the vehicle does not tell it.
     pub fn last_hold_s(&self) -> Option<f64> {
         let told_ds = self.status.as_ref()?.value.last_hold_ds;
         (told_ds > 0).then(|| f64::from(told_ds) / 10.0)
@@ -276,8 +281,8 @@ impl Vehicle {
         better(self.motion, self.hud, STALE_AFTER)
     }
 
-    /// Height above the pad, m: from the position while it is fresh, otherwise from `TD_DESCENT`. Every part of the
-    /// screen shows this value.
+    /// Height above the pad, m: from the position while it is fresh, otherwise from `TD_DESCENT`.
+    /// Every part of the screen shows this value.
     pub fn height_m(&self) -> Option<Sample<f64>> {
         better(self.of_motion(|motion| motion.altitude_m), self.of_descent(|d| d.height_m), STALE_AFTER)
     }
@@ -300,8 +305,9 @@ impl Vehicle {
         self.limits().map(|limits| f64::from(limits.fence_m)).filter(|m| m.is_finite() && *m > 0.0)
     }
 
-    /// A coordinate of the predicted touchdown. At the beginning of the fall, until the vehicle knows its ignition band, it follows
-    /// from a sink rate of nearly zero and is far off: that counts as not known.
+    /// A coordinate of the predicted touchdown. At the beginning of the fall, until the vehicle
+    /// knows its ignition band, it follows from a sink rate of nearly zero and is far off: that
+    /// counts as not known.
     pub fn of_touchdown(&self, pick: fn(&TD_DESCENT_DATA) -> f32) -> Option<Sample<f64>> {
         use TdPhase as P;
         let begins = matches!(self.phase_now(), Some(P::TD_PHASE_DEPLOY | P::TD_PHASE_AERO_DESCENT));
@@ -323,8 +329,8 @@ impl Vehicle {
         self.of_attitude(|attitude| attitude.tilt_rad.to_degrees())
     }
 
-    /// Time from now until the landing motor is to be lit, s. It keeps counting between two messages. `None` if the
-    /// motor will not be lit, or the time has passed.
+    /// Time from now until the landing motor is to be lit, s. It keeps counting between two
+    /// messages. `None` if the motor will not be lit, or the time has passed.
     pub fn ignition_in_s(&self, now: Duration) -> Option<Sample<f64>> {
         count_down(self.of_descent(|d| d.time_to_ignition_s).filter(|_| self.may_light())?, now)
     }

@@ -1,4 +1,5 @@
-//! Turns values of the dialect, and numbers, into words for the crew. A number has a bounded width for every value.
+//! Turns values of the dialect, and numbers, into words for the crew. A number has a bounded width
+//! for every value.
 
 use std::borrow::Cow;
 use std::fmt::Debug;
@@ -17,8 +18,8 @@ pub fn phase(phase: TdPhase) -> String {
     without_prefix(&phase, "TD_PHASE_")
 }
 
-/// A phase in the words of the crew, as in `Ready to light`, and the event that begins it, as the timeline names it; `None` if the
-/// crew need not see it there.
+/// A phase in the words of the crew, as in `Ready to light`, and the event that begins it, as the
+/// timeline names it; `None` if the crew need not see it there.
 pub fn doing_and_event(phase: TdPhase) -> (&'static str, Option<&'static str>) {
     match phase {
         TdPhase::TD_PHASE_SAFE => ("Safe", None),
@@ -36,8 +37,8 @@ pub fn doing_and_event(phase: TdPhase) -> (&'static str, Option<&'static str>) {
     }
 }
 
-/// What an event says to the crew; `None` if it tells them nothing that other events or the state do not. The log keeps its own
-/// words.
+/// What an event says to the crew; `None` if it tells them nothing that other events or the state
+/// do not. The log keeps its own words.
 pub fn of_event(text: &str) -> Option<Cow<'_, str>> {
     if let Some(phases) = text.strip_prefix("phase ") {
         // The vehicle itself says what lights, and on the pad the crew does it.
@@ -75,7 +76,8 @@ pub fn phase_from_name(name: &str) -> Option<TdPhase> {
         .find(|known| phase(*known).eq_ignore_ascii_case(name))
 }
 
-/// An enum value of the dialect as words: `TD_SOLVER_STATUS_NOT_RUN` without its prefix is `not run`.
+/// An enum value of the dialect as words: `TD_SOLVER_STATUS_NOT_RUN` without its prefix is `not
+/// run`.
 pub fn lower_case(value: &impl Debug, prefix: &str) -> String {
     without_prefix(value, prefix).to_lowercase().replace('_', " ")
 }
@@ -109,7 +111,8 @@ pub fn abort_effect(status: &TD_FLIGHT_STATUS_DATA) -> String {
     words.to_owned()
 }
 
-/// The name of an arming check. The vehicle's log is named as such, because the station has one of its own.
+/// The name of an arming check. The vehicle's log is named as such, because the station has one of
+/// its own.
 pub fn check(name: &str) -> String {
     let words = lower_case_name(name);
     if words.starts_with("log") { format!("vehicle {words}") } else { words }
@@ -136,7 +139,8 @@ pub fn fixed(value: f64, decimals: usize) -> String {
     }
 }
 
-/// A number without unneeded digits: `20`, `0.1`, `82.5`. Rounding to three decimals hides the error of an `f32`.
+/// A number without unneeded digits: `20`, `0.1`, `82.5`. Rounding to three decimals hides the
+/// error of an `f32`.
 pub fn shortest(value: f64) -> String {
     let text = fixed(value, 3);
     match text.split_once('.') {

@@ -1,7 +1,7 @@
 //! Plays a recorded flight on the same screens.
 //!
-//! [`recording`] reads a log; [`Player`] turns its events into messages for the same `update` that handles live frames.
-//! Nothing is sent or recorded.
+//! [`recording`] reads a log; [`Player`] turns its events into messages for the same `update` that
+//! handles live frames. Nothing is sent or recorded.
 
 pub mod recording;
 
@@ -156,7 +156,8 @@ impl Player {
         self.model.pages.entry = Some(TextEntry::Jump { typed, refused });
     }
 
-    /// Goes to a time since the first frame, to one since the release, as in `T+12`, or to the start of a phase.
+    /// Goes to a time since the first frame, to one since the release, as in `T+12`, or to the
+    /// start of a phase.
     fn jump(&mut self, to: &str) -> Option<()> {
         let since_release = to.strip_prefix("T+").map(str::parse);
         match since_release.unwrap_or_else(|| to.parse()).ok()? {

@@ -1,5 +1,5 @@
-//! A recorded flight in an MCAP log or a `.tlog`: its length and its phases. Its events are read from the file while
-//! it is played, so that memory does not grow with the log.
+//! A recorded flight in an MCAP log or a `.tlog`: its length and its phases. Its events are read
+//! from the file while it is played, so that memory does not grow with the log.
 
 use std::collections::VecDeque;
 use std::fs::File;
@@ -18,7 +18,8 @@ use protocol::log::tlog::{TlogFrame, TlogReader, is_tlog};
 
 use crate::model::{CommandKind, telemetry::phase_of as phase_of_heartbeat};
 
-/// A larger step back in time means that the clock was set back, not that frames of two links are out of order. An MCAP log has none.
+/// A larger step back in time means that the clock was set back, not that frames of two links are
+/// out of order. An MCAP log has none.
 const CLOCK_SET_BACK_NS: i128 = 1_000_000_000;
 /// A longer gap is skipped: the log was continued on another day, or a time stamp is wrong.
 const LEFT_OUT_NS: i128 = 3_600 * 1_000_000_000;
@@ -58,8 +59,8 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// Reads a log once for the flight of this vehicle (`None`: the first that was heard). What has the
-    /// content of a `.tlog` is read as such, everything else as MCAP.
+    /// Reads a log once for the flight of this vehicle (`None`: the first that was heard). What has
+    /// the content of a `.tlog` is read as such, everything else as MCAP.
     ///
     /// # Errors
     /// The file cannot be read, or holds nothing to show.
@@ -206,7 +207,8 @@ enum Side {
     Vehicle,
 }
 
-/// A log that is being read from its beginning. The addresses of vehicle and ground are the first that are heard, unless given.
+/// A log that is being read from its beginning. The addresses of vehicle and ground are the first
+/// that are heard, unless given.
 struct LogEvents {
     format: Format,
     vehicle: Option<Address>,
@@ -225,8 +227,8 @@ enum Format {
 }
 
 impl LogEvents {
-    /// Starts at the beginning of an open file, for this vehicle or the first that is heard. What has the content of a
-    /// `.tlog` is read as such, everything else as MCAP.
+    /// Starts at the beginning of an open file, for this vehicle or the first that is heard. What
+    /// has the content of a `.tlog` is read as such, everything else as MCAP.
     fn begin(file: &File, vehicle: Option<Address>) -> io::Result<Self> {
         let mut file = file.try_clone()?;
         file.rewind()?;
@@ -292,7 +294,8 @@ impl LogEvents {
         }
     }
 
-    /// The event of a frame: a frame of the vehicle, the first sending of a command, or another frame of the ground.
+    /// The event of a frame: a frame of the vehicle, the first sending of a command, or another
+    /// frame of the ground.
     fn event_of(&mut self, frame: Frame) -> Option<RecordedEvent> {
         let source = frame.source();
         if source.component_id == VEHICLE.component_id {

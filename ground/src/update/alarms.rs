@@ -17,13 +17,14 @@ use crate::model::{
 const UNANSWERED_FOR: Duration = Duration::from_secs(1);
 /// How long the stabiliser may fly after ignition, until the first plan is used, without an alarm.
 const FIRST_PLAN_WITHIN: Duration = Duration::from_millis(300);
-/// Six minutes of the simulated vehicle, and where the voltage of lithium-polymer cells begins to fall steeply.
+/// Six minutes of the simulated vehicle, and where the voltage of lithium-polymer cells begins to
+/// fall steeply.
 const BATTERY_LOW_PERCENT: u8 = 10;
 /// How long a reboot holds as an alarm condition.
 const REBOOT_SHOWN: Duration = Duration::from_secs(10);
 
-/// An alarm: what it is about, how urgent it is, whether it belongs to one boot of the vehicle and ends with it, and its words
-/// while it holds.
+/// An alarm: what it is about, how urgent it is, whether it belongs to one boot of the vehicle and
+/// ends with it, and its words while it holds.
 struct AlarmRow {
     kind: AlarmKind,
     urgency: u8,
@@ -31,8 +32,8 @@ struct AlarmRow {
     holds: fn(&Model, Duration) -> Option<String>,
 }
 
-// What hides what: an abort that does not work, then whether this screen and its vehicle are what they seem, then the vehicle,
-// then everything else.
+// What hides what: an abort that does not work, then whether this screen and its vehicle are what
+// they seem, then the vehicle, then everything else.
 const ABORT: u8 = 3;
 const WHO: u8 = 2;
 const VEHICLE: u8 = 1;
@@ -175,7 +176,8 @@ pub(super) fn watch(model: &mut Model, now: Duration) {
 
 /// Whether the vehicle is heard and is known not to hear this station.
 fn is_unheard(model: &Model, now: Duration) -> bool {
-    // A report from before a silence says nothing about the present: the vehicle has this long to report.
+    // A report from before a silence says nothing about the present: the vehicle has this long to
+    // report.
     let heard_for = model.link.alive_since.map_or(Duration::ZERO, |at| now.saturating_sub(at));
     let silent = !model.link.uplink.state(now).carries() && heard_for > RED_AFTER;
     // While nothing is received, an alarm that holds stays.
@@ -263,11 +265,13 @@ const EVENT: u8 = 1;
 const WATCH: u8 = 2;
 const WRONG: u8 = 3;
 
-/// How much is called out with it, its words, and its bells. It is said anew when what stands before a colon changes.
+/// How much is called out with it, its words, and its bells. It is said anew when what stands
+/// before a colon changes.
 type Callout = (Amount, String, u8);
 type Present = fn(&Model, Duration) -> Option<Callout>;
 
-/// A state is called out when it changes, and stays while it is not known; anything else as soon as it is so.
+/// A state is called out when it changes, and stays while it is not known; anything else as soon as
+/// it is so.
 const STATE: bool = true;
 const NEWS: bool = false;
 

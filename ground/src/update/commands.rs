@@ -1,5 +1,5 @@
-//! Decides whether a command is sent, and follows it: sent, answered or given up, observed. The automatic mode and the unattended countdown give
-//! their commands here too.
+//! Decides whether a command is sent, and follows it: sent, answered or given up, observed. The
+//! automatic mode and the unattended countdown give their commands here too.
 
 use std::time::Duration;
 
@@ -18,8 +18,8 @@ use crate::model::{
 /// Of the many attempts of an abort, only the first and every n-th become an event.
 const ABORT_REPORTED_EVERY: u32 = 100;
 
-/// The crew goes on without the station's log. That it did is recorded wherever something still records: in the vehicle's
-/// log by the station's book, and on every screen.
+/// The crew goes on without the station's log. That it did is recorded wherever something still
+/// records: in the vehicle's log by the station's book, and on every screen.
 pub(super) fn without_log(model: &mut Model, by: &Seat, now: Duration) {
     let LogStanding::Unfit(fault, words) = model.station_log(now) else {
         return model.info(now, "the station's log is fit: nothing to go on without");
@@ -33,8 +33,8 @@ pub(super) fn without_log(model: &mut Model, by: &Seat, now: Duration) {
     model.tell_act(now, "without log", by, EventLevel::Warning, text);
 }
 
-/// The crew arms a motor that no burn of its lot has confirmed. Who did is recorded as for [`without_log`]; it counts until
-/// the vehicle's next power-up.
+/// The crew arms a motor that no burn of its lot has confirmed. Who did is recorded as for
+/// [`without_log`]; it counts until the vehicle's next power-up.
 pub(super) fn untested(model: &mut Model, by: &Seat, now: Duration) {
     let Some(why) = why_untested(model) else {
         return model.info(now, "burns confirm the motor, or it was overruled: nothing to go on with");
@@ -47,7 +47,8 @@ pub(super) fn untested(model: &mut Model, by: &Seat, now: Duration) {
     model.tell_act(now, "untested motor", by, EventLevel::Warning, text);
 }
 
-/// Sends a command, unless the vehicle has changed in the meantime or the same command is already being sent.
+/// Sends a command, unless the vehicle has changed in the meantime or the same command is already
+/// being sent.
 pub(super) fn command(model: &mut Model, kind: CommandKind, by: &Seat, now: Duration) {
     let theirs = why_not_seat(model, by).filter(|_| kind.needs_the_owner());
     let why_not = match kind {
@@ -99,8 +100,9 @@ pub(super) fn submit(model: &mut Model, kind: CommandKind, by: Seat, now: Durati
     let commands = &mut model.commands;
     let aborting = commands.is_aborting();
     if kind == CommandKind::Abort || (kind == CommandKind::Disarm && !aborting) {
-        // An abort or a disarm ends the resending of every other command: a start that arrives later would undo it.
-        // The effects of the others will not be observed, and that is no error.
+        // An abort or a disarm ends the resending of every other command: a start that arrives
+        // later would undo it. The effects of the others will not be observed, and that is no
+        // error.
         commands.sender.withdraw_all(now);
         for track in &mut commands.tracks {
             track.not_observed_reported = true;
@@ -116,7 +118,8 @@ pub(super) fn submit(model: &mut Model, kind: CommandKind, by: Seat, now: Durati
         model.warn(now, format!("the ABORT goes to every vehicle that is heard under id {id}"));
     }
     let commands = &mut model.commands;
-    // An abort that is commanded again while it is being sent is sent at once, and its attempts keep counting.
+    // An abort that is commanded again while it is being sent is sent at once, and its attempts
+    // keep counting.
     let earlier = commands.of(kind).filter(|_| kind == CommandKind::Abort && aborting).cloned();
     let ticket = send(model, kind, now);
     let commands = &mut model.commands;
@@ -200,7 +203,8 @@ fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
             track.attempts += 1;
             let attempt = track.attempts;
             if kind == CommandKind::Abort && attempt > 1 {
-                // An abort is repeated whether answered or not; an event for each attempt would hide everything else.
+                // An abort is repeated whether answered or not; an event for each attempt would
+                // hide everything else.
                 if attempt % ABORT_REPORTED_EVERY != 0 {
                     return;
                 }
@@ -287,8 +291,8 @@ fn stop_aborting(model: &mut Model, now: Duration) {
     }
 }
 
-/// The vehicle has rebooted. Its earlier acknowledgements are void; only an abort that is still being sent is sent
-/// again. Returns the names of the void commands.
+/// The vehicle has rebooted. Its earlier acknowledgements are void; only an abort that is still
+/// being sent is sent again. Returns the names of the void commands.
 pub(super) fn restart_after_reboot(model: &mut Model, now: Duration) -> Vec<&'static str> {
     let aborting = model.commands.is_aborting();
     let by = model.commands.of(CommandKind::Abort).map(|track| track.by.clone()).unwrap_or_default();
@@ -334,7 +338,8 @@ pub(super) fn observe(model: &mut Model, now: Duration) {
 
 /// How long the vehicle may take to become ready, from its first heartbeat.
 const READY_WITHIN: Duration = Duration::from_secs(10);
-/// The same while another station uses our ids: one that ran before under the same ids is in the way for up to 15 s.
+/// The same while another station uses our ids: one that ran before under the same ids is in the
+/// way for up to 15 s.
 const FREE_WITHIN: Duration = Duration::from_secs(20);
 pub(super) fn step_auto(model: &mut Model, now: Duration) {
     if !model.settings.auto || !model.link.down(now).carries() {
@@ -376,7 +381,8 @@ pub(super) fn step_auto(model: &mut Model, now: Duration) {
     }
 }
 
-/// A computer that was busy or asleep for a second holds a countdown. Its link carries again, so the run goes on.
+/// A computer that was busy or asleep for a second holds a countdown. Its link carries again, so
+/// the run goes on.
 fn start_anew_if_silent(model: &mut Model, now: Duration) {
     let silent = |hold| matches!(hold, TdHold::TD_HOLD_UPLINK_SILENT | TdHold::TD_HOLD_STATION_DEAF);
     let held = model.vehicle.status.as_ref().is_some_and(|status| silent(status.value.hold));
@@ -435,7 +441,8 @@ fn start_auto(model: &mut Model, now: Duration) {
     }
 }
 
-// Holds a countdown that this station's crew started when no commanding screen is left, or the station's log fails.
+// Holds a countdown that this station's crew started when no commanding screen is left, or the
+// station's log fails.
 
 /// How often the hold is sent; the countdown itself shows whether it worked.
 const HOLD_EVERY: Duration = Duration::from_millis(100);

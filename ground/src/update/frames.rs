@@ -19,7 +19,8 @@ const HEARTBEAT_ID: u32 = 0;
 const RADIO_STATUS_ID: u32 = 109;
 /// A station that the vehicle heard this recently, ms, still counts as one that uses our address.
 const SAME_ID_WITHIN_MS: u16 = 5_000;
-/// The vehicle tells of a station for 5 s after it has ended. The rest is for the report and its way.
+/// The vehicle tells of a station for 5 s after it has ended. The rest is for the report and its
+/// way.
 const OUR_PAST_FOR: Duration = Duration::from_secs(7);
 /// How many other systems are remembered, so that each is reported once.
 const STRANGERS_MAX: usize = 8;
@@ -81,7 +82,8 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
         return;
     };
     let named = boot_of(frame);
-    // Of somebody who has not said yet who it is only texts are taken, and that another autopilot beats.
+    // Of somebody who has not said yet who it is only texts are taken, and that another autopilot
+    // beats.
     let is_nobodys = match &message {
         MavMessage::HEARTBEAT(beat) if !may_be_ours(beat) => false,
         MavMessage::TD_FLIGHT_STATUS(_) | MavMessage::STATUSTEXT(_) => false,
@@ -102,7 +104,8 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
     }
     let speaker = speaker(model, frame, (&message, named), now);
     if let Some(other) = speaker.filter(|boot| model.boots.shown() != Some(*boot)) {
-        // Answers and texts are the crew's, whoever sends them; all else of another vehicle is kept beside.
+        // Answers and texts are the crew's, whoever sends them; all else of another vehicle is kept
+        // beside.
         if !matches!(message, MavMessage::STATUSTEXT(_)) {
             let vehicle = model.others.entry(other).or_default();
             telemetry::apply(vehicle, &message, now);
@@ -156,7 +159,8 @@ fn report(status: &TD_FLIGHT_STATUS_DATA, frame: &Frame, source: u16) -> StatusR
     }
 }
 
-/// Which vehicle has sent a message, and since which power-up; `None` before the first flight status.
+/// Which vehicle has sent a message, and since which power-up; `None` before the first flight
+/// status.
 fn speaker(
     model: &mut Model,
     frame: &Frame,
@@ -176,8 +180,8 @@ fn speaker(
     }
 }
 
-/// A PING with target 0 asks for an answer to its sender. A PING with any other target is an answer itself; answering
-/// it would never end.
+/// A PING with target 0 asks for an answer to its sender. A PING with any other target is an answer
+/// itself; answering it would never end.
 #[expect(deprecated, reason = "superseded by TIMESYNC, yet vehicles in use still ask")]
 fn answer_to_ping(message: &MavMessage, source: Address) -> Option<MavMessage> {
     let MavMessage::PING(data) = message else { return None };
@@ -200,11 +204,11 @@ pub(super) fn add_vehicle_text(model: &mut Model, text: &Text, now: Duration) {
     model.say(now, Speaker::Vehicle, level, text.text.clone());
 }
 
-/// A report of the vehicle about its uplink. Without a target it concerns every station: the vehicle has not accepted
-/// any frame yet.
+/// A report of the vehicle about its uplink. Without a target it concerns every station: the
+/// vehicle has not accepted any frame yet.
 ///
-/// A station believes what is said about its own session alone: another station may have its address. The session is unknown
-/// in a replay.
+/// A station believes what is said about its own session alone: another station may have its
+/// address. The session is unknown in a replay.
 fn on_uplink(model: &mut Model, data: &TD_UPLINK_DATA, now: Duration) {
     let target = Address { system_id: data.target_system, component_id: data.target_component };
     let to_all = target == Address { system_id: 0, component_id: 0 };
@@ -214,7 +218,8 @@ fn on_uplink(model: &mut Model, data: &TD_UPLINK_DATA, now: Duration) {
     }
     let is_ours = to_all || data.session == settings.session || settings.role == Role::Replaying;
     let another = data.session != 0 && data.accepted_age_ms <= SAME_ID_WITHIN_MS;
-    // Until then it may be this station before it was started again; the vehicle arms for nobody meanwhile.
+    // Until then it may be this station before it was started again; the vehicle arms for nobody
+    // meanwhile.
     let is_told = now >= OUR_PAST_FOR && settings.role != Role::Replaying;
     if is_told && (data.same_id > 0 || (!is_ours && another)) {
         let age = if is_ours { 0 } else { data.accepted_age_ms };

@@ -1,10 +1,10 @@
 //! What the keys of the crew do.
 //!
-//! No single key is dangerous. Arming, starting, and quitting in flight take a letter, a typed word and Enter;
-//! disarming takes a letter and Enter; an abort takes Ctrl-X and Enter (or Ctrl-X twice); each within a time limit.
-//! The abort counts however its keys arrive. Other keys count if they were typed by hand. Keys that arrive faster may be
-//! a paste, or typed over a connection that delivers them in bunches: what they complete is asked again, except for
-//! what holds or disarms.
+//! No single key is dangerous. Arming, starting, and quitting in flight take a letter, a typed word
+//! and Enter; disarming takes a letter and Enter; an abort takes Ctrl-X and Enter (or Ctrl-X
+//! twice); each within a time limit. The abort counts however its keys arrive. Other keys count if
+//! they were typed by hand. Keys that arrive faster may be a paste, or typed over a connection that
+//! delivers them in bunches: what they complete is asked again, except for what holds or disarms.
 
 use std::time::Duration;
 
@@ -24,7 +24,8 @@ const SCROLL_PAGE: i32 = 10;
 /// The furthest scroll position; no list is longer.
 const SCROLL_MAX: i32 = 4_000;
 
-/// Keys from one read of the terminal: one if typed by hand, several from a paste, a held key or a slow line.
+/// Keys from one read of the terminal: one if typed by hand, several from a paste, a held key or a
+/// slow line.
 pub(super) fn on_keys(model: &mut Model, keys: &[Key], now: Duration) {
     for key in keys {
         let touch = match model.settings.role {
@@ -81,7 +82,8 @@ fn on_key(model: &mut Model, key: Key, touch: KeyOrigin, now: Duration) {
     }
 }
 
-/// Records a key. The letters of a word that is being typed are one line, with the key that ends it.
+/// Records a key. The letters of a word that is being typed are one line, with the key that ends
+/// it.
 fn record_key(model: &mut Model, key: Key, now: Duration) {
     let types = model.pages.entry.is_some() || model.dialog.is_some();
     let told = match key {
@@ -92,7 +94,8 @@ fn record_key(model: &mut Model, key: Key, now: Duration) {
     model.record_operator(now, "key", &model.settings.seat.clone(), &told);
 }
 
-/// Swallows what is left of a word that is no longer wanted, and says again why. Returns whether the key was part of it.
+/// Swallows what is left of a word that is no longer wanted, and says again why. Returns whether
+/// the key was part of it.
 fn on_rest_of_word(model: &mut Model, key: Key, now: Duration) -> bool {
     let Some(mut rest) = model.rest_of_word.take() else { return false };
     match key {
@@ -111,18 +114,20 @@ pub(super) fn drop_run(model: &mut Model, now: Duration) {
     }
 }
 
-/// The abort chord comes first: no paste, no typing speed and no dialog blocks it. Returns whether the key has been
-/// used.
+/// The abort chord comes first: no paste, no typing speed and no dialog blocks it. Returns whether
+/// the key has been used.
 fn on_abort_key(model: &mut Model, key: Key, now: Duration) -> bool {
     if key == Key::CtrlX {
         if let Some(why) = model.settings.role.why_not_command() {
             model.info(now, why);
             return true;
         }
-        // An Enter that comes too late for the abort must not confirm a dialog that was open before.
+        // An Enter that comes too late for the abort must not confirm a dialog that was open
+        // before.
         model.dialog = None;
         model.pages.entry = None;
-        // If the terminal reports repeats, a second Ctrl-X was really pressed, however soon it came.
+        // If the terminal reports repeats, a second Ctrl-X was really pressed, however soon it
+        // came.
         if model.repeats_reported && model.abort_chord.confirm(now) {
             abort(model, now);
         } else {
@@ -148,8 +153,8 @@ fn on_abort_key(model: &mut Model, key: Key, now: Duration) -> bool {
     complete || model.abort_chord.is_begun(now)
 }
 
-/// A key while a dialog is open: the next letter of its word, or Enter after the whole word; every other key cancels
-/// it.
+/// A key while a dialog is open: the next letter of its word, or Enter after the whole word; every
+/// other key cancels it.
 fn on_dialog_key(model: &mut Model, mut dialog: Dialog, key: Key, touch: KeyOrigin, now: Duration) {
     let by_hand = touch == KeyOrigin::Typed;
     match key {
@@ -206,7 +211,8 @@ fn confirmed(model: &mut Model, prompt: Prompt, now: Duration) {
         return model.warn(now, format!("nothing is confirmed: {why}"));
     }
     let Some(wanted) = prompt.request() else {
-        // A live station must keep running without its screen; a demonstration or an attached screen may end.
+        // A live station must keep running without its screen; a demonstration or an attached
+        // screen may end.
         let stays = model.settings.role == Role::Station && !model.settings.demonstration;
         let leaves = stays && why_not_quit(model, now).is_some();
         return model.outbox.push(if leaves { Action::LeaveScreen } else { Action::Quit });
@@ -289,7 +295,8 @@ fn on_free_key(model: &mut Model, key: Key, touch: KeyOrigin, now: Duration) {
     }
 }
 
-/// Does what a key or an entry of the palette stands for. What commands the vehicle only opens its dialog.
+/// Does what a key or an entry of the palette stands for. What commands the vehicle only opens its
+/// dialog.
 pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
     if let Some(why) = model.settings.role.why_not_command().filter(|_| act.opens_confirmation()) {
         model.info(now, why);
@@ -401,8 +408,8 @@ fn ask_for_report(model: &mut Model, now: Duration) {
     }
 }
 
-/// Opens the dialog of a rung of the ladder, or the one that overrules what alone is in the way. If it is refused, the word
-/// that the crew would have typed is swallowed.
+/// Opens the dialog of a rung of the ladder, or the one that overrules what alone is in the way. If
+/// it is refused, the word that the crew would have typed is swallowed.
 fn open_unless(model: &mut Model, prompt: Prompt, verb: &str, why_not: Option<String>, now: Duration) {
     let Some(why) = why_not else { return open(model, prompt, now) };
     if let Some(overrules) = overruled_by(model, &why, now) {
@@ -413,7 +420,8 @@ fn open_unless(model: &mut Model, prompt: Prompt, verb: &str, why_not: Option<St
     model.rest_of_word = Some(RestOfWord::refused(prompt, why, now));
 }
 
-/// Swallows the word that the crew types on after a key that this screen refuses: no letter of it may act as a key.
+/// Swallows the word that the crew types on after a key that this screen refuses: no letter of it
+/// may act as a key.
 fn swallow_word(model: &mut Model, act: Act, why: String, now: Duration) {
     let prompt = match act {
         Act::Arm => Prompt::Arm,
@@ -428,8 +436,9 @@ fn open(model: &mut Model, prompt: Prompt, now: Duration) {
     model.dialog = Some(prompt.open(now));
 }
 
-/// Opens the dialog that confirms what another operator asks, if one does. Two people who press the same key at the same
-/// moment both ask: the vehicle takes the first ask, and the other one hears of it.
+/// Opens the dialog that confirms what another operator asks, if one does. Two people who press the
+/// same key at the same moment both ask: the vehicle takes the first ask, and the other one hears
+/// of it.
 fn confirms(model: &mut Model, act: TdAct, now: Duration) -> bool {
     let Some(ask) = model.ask_to_confirm(now).filter(|ask| ask.act == act) else { return false };
     open_unless(model, Prompt::Confirm(ask), "confirm", why_not_confirm(model, &ask, now), now);
@@ -448,8 +457,8 @@ fn choose_step(model: &mut Model, up: bool, now: Duration) {
     model.pages.step = Some(beside(at, up, last));
 }
 
-/// Scrolls up by this many lines; down if negative. Events are listed from the newest line, link values from
-/// the first.
+/// Scrolls up by this many lines; down if negative. Events are listed from the newest line, link
+/// values from the first.
 fn scroll(model: &mut Model, up: i32) {
     let away = if model.page() == Page::Link { -up } else { up };
     let lines = i32::try_from(model.pages.scroll).unwrap_or(SCROLL_MAX);
@@ -563,7 +572,8 @@ fn on_entry_key(model: &mut Model, key: Key, now: Duration) {
     model.pages.entry = Some(TextEntry::Palette { typed, chosen });
 }
 
-/// Does what an entry of the palette says. It goes the way of its key, so it never does more than the key.
+/// Does what an entry of the palette says. It goes the way of its key, so it never does more than
+/// the key.
 fn perform_entry(model: &mut Model, action: PaletteAction, now: Duration) {
     match action {
         // Enter has chosen it, and a held Enter would confirm it.

@@ -1,6 +1,8 @@
-//! Every decision of the ground: one pure function from a message and the time to a changed model and actions.
+//! Every decision of the ground: one pure function from a message and the time to a changed model
+//! and actions.
 //!
-//! Nothing here reads a clock, a socket or a file. The actions are what the run loop is to do: send, record, quit.
+//! Nothing here reads a clock, a socket or a file. The actions are what the run loop is to do:
+//! send, record, quit.
 
 pub mod alarms;
 pub mod commands;
@@ -30,8 +32,8 @@ pub type SignalName = &'static str;
 
 /// A message for the model: an input of the crew, a frame, a state of the links, or a tick.
 ///
-/// A station tells its screens what it takes, but for its own keys and its own end, and what only a replay or an attached
-/// screen uses.
+/// A station tells its screens what it takes, but for its own keys and its own end, and what only a
+/// replay or an attached screen uses.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Msg {
     Frame(#[serde(with = "frame_bytes")] Frame),
@@ -46,8 +48,8 @@ pub enum Msg {
         seats: Vec<Seat>,
         silent: Vec<Seat>,
     },
-    /// The crew has quit the station's own screen while the vehicle was armed or in flight; the station keeps
-    /// running.
+    /// The crew has quit the station's own screen while the vehicle was armed or in flight; the
+    /// station keeps running.
     ScreenQuit,
     /// The station has this checklist, in this state.
     Checklist(Box<Checklist>),
@@ -106,7 +108,8 @@ pub enum Msg {
     /// What an earlier run of the station, or its screen, has left unfinished.
     Unfinished(Box<Unfinished>),
     // Skipped ones come last: the others are numbered without them.
-    /// What one read of the terminal brought: one key if it was typed by hand, several from a paste, a held key or a slow line.
+    /// What one read of the terminal brought: one key if it was typed by hand, several from a
+    /// paste, a held key or a slow line.
     #[serde(skip)]
     Keys(Vec<Key>),
     /// The terminal reports that text was pasted.
@@ -201,7 +204,8 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
         Msg::HeardFrom(source) => model.link.source = source,
         Msg::Links { links, signing } => on_reports(model, links, signing, now),
         Msg::Log(health) => on_log_health(model, health, now),
-        // The log before is complete. What was flown is in it, and not in the one that is replayed and reported from now on.
+        // The log before is complete. What was flown is in it, and not in the one that is replayed
+        // and reported from now on.
         Msg::LogBegins { log, tlog } => {
             model.info(now, format!("the log goes on in {log}"));
             (model.settings.log_path, model.settings.tlog_path) = (Some(log), tlog);

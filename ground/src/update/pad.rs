@@ -1,4 +1,5 @@
-//! What the crew does on the pad: signs and voids steps of the checklist, tests the radio, notes the vehicle's check.
+//! What the crew does on the pad: signs and voids steps of the checklist, tests the radio, notes
+//! the vehicle's check.
 
 use std::time::Duration;
 
@@ -26,7 +27,8 @@ pub(super) fn open_sign_dialog(model: &mut Model, void: bool, now: Duration) {
     model.dialog = Some(Prompt::Sign { step, void }.open(now));
 }
 
-/// Signs or voids a step for a person at a screen of this station, unless the step or the person does not fit.
+/// Signs or voids a step for a person at a screen of this station, unless the step or the person
+/// does not fit.
 pub(super) fn sign(model: &mut Model, (step, void): (usize, bool), by: &Seat, now: Duration) {
     match signature(model, (step, void), by, now) {
         Ok(signature) => {
@@ -163,7 +165,8 @@ pub(super) fn pass_range_test(model: &mut Model, now: Duration) {
     }
 }
 
-/// Enters a check that is over, once every value of it has arrived, with the first values outside their limits.
+/// Enters a check that is over, once every value of it has arrived, with the first values outside
+/// their limits.
 pub(super) fn enter_check(model: &mut Model, now: Duration) {
     let Some(check) = model.vehicle.pad_check.as_ref().filter(|check| check.is_whole()) else { return };
     let which = (model.vehicle.boot.number().unwrap_or(0), check.told.run);

@@ -1,4 +1,5 @@
-//! What happens on each tick: heartbeats, resends, time limits, the loss of the link, the end of a run.
+//! What happens on each tick: heartbeats, resends, time limits, the loss of the link, the end of a
+//! run.
 
 use std::time::Duration;
 
@@ -14,8 +15,8 @@ use crate::model::{
 };
 
 const HEARTBEAT_EVERY: Duration = Duration::from_secs(1);
-/// An armed vehicle holds its countdown if it hears nothing for 1 s. With ten heartbeats in that time and 25 % loss, all are
-/// lost once in a million times.
+/// An armed vehicle holds its countdown if it hears nothing for 1 s. With ten heartbeats in that
+/// time and 25 % loss, all are lost once in a million times.
 const FAST_HEARTBEAT_EVERY: Duration = Duration::from_millis(100);
 const TIMESYNC_EVERY: Duration = Duration::from_secs(5);
 /// For a vehicle whose answers are the only proof that it hears this station.
@@ -24,8 +25,8 @@ const PROVING_TIMESYNC_EVERY: Duration = Duration::from_secs(1);
 const ASKED_MAX: usize = 64;
 const SEEMS_OLD: Duration = Duration::from_secs(1);
 const TELEMETRY_RECORD_EVERY: Duration = Duration::from_millis(100);
-/// A station that has heard nothing of an armed vehicle for this long says so. The vehicle is to know it 1 s after the loss:
-/// the rest is for the next heartbeat and its way.
+/// A station that has heard nothing of an armed vehicle for this long says so. The vehicle is to
+/// know it 1 s after the loss: the rest is for the next heartbeat and its way.
 const DEAF_AFTER: Duration = Duration::from_millis(800);
 /// Without a screen: how long the program waits for further messages after a flight.
 const WAIT_AFTER_FLIGHT: Duration = Duration::from_secs(2);
@@ -33,7 +34,8 @@ const WAIT_AFTER_FLIGHT: Duration = Duration::from_secs(2);
 const LOST_FOR_GOOD: Duration = Duration::from_secs(10);
 
 pub(super) fn on_tick(model: &mut Model, now: Duration) {
-    // An attached screen has its own ticks for its keys; the ticks of the station are only repeated there.
+    // An attached screen has its own ticks for its keys; the ticks of the station are only repeated
+    // there.
     if matches!(model.settings.role, Role::Station | Role::Replaying) {
         keys::pass(model, now);
     }
@@ -104,8 +106,8 @@ fn is_due(due: &mut Duration, every: Duration, now: Duration) -> bool {
     true
 }
 
-/// Whether the vehicle must hear this station frequently: it is armed on the pad by nobody else, or is about to be. A countdown
-/// that is no longer heard may still run.
+/// Whether the vehicle must hear this station frequently: it is armed on the pad by nobody else, or
+/// is about to be. A countdown that is no longer heard may still run.
 fn must_be_heard(model: &Model, now: Duration) -> bool {
     let hears = model.link.state(now).carries();
     let on_pad = model.vehicle.phase_now().is_some_and(is_on_pad);
@@ -181,7 +183,8 @@ fn telemetry_record(model: &Model, now: Duration) -> Telemetry {
     }
 }
 
-// Follows the last place of the vehicle, and has it kept, so that a lost vehicle can be found also after a restart.
+// Follows the last place of the vehicle, and has it kept, so that a lost vehicle can be found also
+// after a restart.
 
 /// How often it is kept in flight.
 const KEPT_EVERY: Duration = Duration::from_secs(2);

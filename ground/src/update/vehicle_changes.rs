@@ -1,4 +1,5 @@
-//! Reports changes of the vehicle's state as events and in the book, and updates the outcome of the flight.
+//! Reports changes of the vehicle's state as events and in the book, and updates the outcome of the
+//! flight.
 
 use std::time::Duration;
 
@@ -19,7 +20,8 @@ pub(super) struct Announced {
     phase: Option<TdPhase>,
     armed: Option<bool>,
     counting: bool,
-    /// The phase by the flight status, which names its boot, and whether it counted down. A heartbeat may be of another boot.
+    /// The phase by the flight status, which names its boot, and whether it counted down. A
+    /// heartbeat may be of another boot.
     status: Option<(TdPhase, bool)>,
     aborted: bool,
     hold: Option<TdHold>,
@@ -120,7 +122,8 @@ pub(super) fn choose(model: &mut Model, boot: u32, by: &Seat, now: Duration) {
     }
 }
 
-/// The flight computer has restarted within one power-up, as it says, or as a return to its self-test shows. Both tell of one reset.
+/// The flight computer has restarted within one power-up, as it says, or as a return to its
+/// self-test shows. Both tell of one reset.
 pub(super) fn note_reset(model: &mut Model, did: &'static str, now: Duration) {
     if model.rebooted.as_ref().is_some_and(|(_, at)| now.saturating_sub(*at) < ONE_RESET) {
         return;
@@ -131,7 +134,8 @@ pub(super) fn note_reset(model: &mut Model, did: &'static str, now: Duration) {
     model.outbox.push(Action::SyncLog);
 }
 
-/// Another boot has the screen: after a reset, and what the vehicle did then, or of another vehicle.
+/// Another boot has the screen: after a reset, and what the vehicle did then, or of another
+/// vehicle.
 fn on_shown(model: &mut Model, reset: Option<&'static str>, now: Duration) {
     let number = model.vehicle.boot.number();
     let which = number.map_or_else(String::new, |number| format!(", boot {}", words::boot(number)));
@@ -205,8 +209,8 @@ pub(super) fn on_change(model: &mut Model, before: &Announced, after: &Announced
     }
 }
 
-/// Reports whether people may approach, because the log must show when they may not. A waiting time ends without a word of
-/// the vehicle, too.
+/// Reports whether people may approach, because the log must show when they may not. A waiting time
+/// ends without a word of the vehicle, too.
 pub(super) fn watch_approach(model: &mut Model, now: Duration) {
     let away = KeepAway::of(&model.vehicle, now);
     let approach = Approach::of(&model.vehicle, now);
@@ -257,8 +261,8 @@ fn on_verdict(model: &mut Model, verdict: &Verdict, now: Duration) {
     model.outbox.push(Action::SyncLog);
 }
 
-// Tells the vehicle the end of the station's book until it has confirmed it, and enters what the vehicle says of its
-// crew.
+// Tells the vehicle the end of the station's book until it has confirmed it, and enters what the
+// vehicle says of its crew.
 
 /// How often the end is sent at most.
 const SENT_EVERY: Duration = Duration::from_secs(2);

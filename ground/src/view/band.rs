@@ -1,4 +1,5 @@
-//! The band of a page: the one number or word of the present moment in large letters, and beside it two or three others.
+//! The band of a page: the one number or word of the present moment in large letters, and beside it
+//! two or three others.
 
 use std::time::Duration;
 
@@ -86,7 +87,8 @@ impl Item {
     }
 }
 
-/// The alphabet: each letter as often as it is wide, and under it its five rows of pixels. A zero is open, so that it is no eight.
+/// The alphabet: each letter as often as it is wide, and under it its five rows of pixels. A zero
+/// is open, so that it is no eight.
 const ALPHABET: &str = include_str!("letters.txt");
 /// Pixels of a digit with the gap behind it.
 const DIGIT_PIXELS: u16 = 5;
@@ -115,7 +117,8 @@ const fn rows_of((_, halves): Size) -> u16 {
     (5 * halves).div_ceil(2)
 }
 
-/// Draws the main item at the left with the line under it, the others to its right, and returns the area below.
+/// Draws the main item at the left with the line under it, the others to its right, and returns the
+/// area below.
 pub fn draw_band(
     (main, below, others): (&Item, Line<'static>, &[Item]),
     theme: Theme,
@@ -208,7 +211,8 @@ fn big(item: &Item, size: Size, theme: Theme, frame: &mut Frame, at: Rect) {
 mod tests {
     use super::*;
 
-    /// From afar a zero must not look like an eight, and every letter of the large words is in the alphabet.
+    /// From afar a zero must not look like an eight, and every letter of the large words is in the
+    /// alphabet.
     #[test]
     fn no_two_letters_look_alike_but_zero_and_o() {
         let all: Vec<char> = ('0'..='9').chain('A'..='Z').chain(".-+:?".chars()).collect();

@@ -31,7 +31,8 @@ pub fn legend(measured: [&'static str; 2], predicted: [&'static str; 2], theme: 
     Line::from([of(measured, Ink::Measured), of(predicted, Ink::Predicted)].concat())
 }
 
-/// A bar in one row from one share of it to another, with a mark across it. Half a row high, so that rows stay apart.
+/// A bar in one row from one share of it to another, with a mark across it. Half a row high, so
+/// that rows stay apart.
 fn bar([from, to]: [f64; 2], ink: Style, mark: Option<(f64, Style)>, frame: &mut Frame, at: Rect) {
     if at.width < 3 || at.height == 0 {
         return;

@@ -237,7 +237,8 @@ pub fn draw_palette(model: &Model, theme: Theme, now: Duration, frame: &mut Fram
     draw_lines(frame, inside, &palette_lines(model, theme, now, rows));
 }
 
-/// The typed text and this many of the actions found, the marked one among them. Empty while it is closed.
+/// The typed text and this many of the actions found, the marked one among them. Empty while it is
+/// closed.
 pub fn palette_lines(model: &Model, theme: Theme, now: Duration, rows: usize) -> Vec<Line<'static>> {
     let (typed, chosen) = match &model.pages.entry {
         Some(TextEntry::Palette { typed, chosen }) => (typed, chosen),

@@ -1,4 +1,5 @@
-//! The last rows of every page: an alarm, a message, or the flight along its time; and the keys that do something now.
+//! The last rows of every page: an alarm, a message, or the flight along its time; and the keys
+//! that do something now.
 
 use std::time::Duration;
 
@@ -20,8 +21,9 @@ use crate::view::pictures::seconds_since;
 /// From this width on the flight has a second row, for the names of its events with their times.
 const TWO_ROWS_COLUMNS: usize = 120;
 
-/// The rows above the keys: an alarm that nobody has seen; else a message, the flight along its time, or the newest event. While an
-/// alarm rings, a message has a row of its own. Where the flight has two rows, an alarm or a message takes the second.
+/// The rows above the keys: an alarm that nobody has seen; else a message, the flight along its
+/// time, or the newest event. While an alarm rings, a message has a row of its own. Where the
+/// flight has two rows, an alarm or a message takes the second.
 pub fn message_rows(model: &Model, theme: Theme, now: Duration, columns: u16) -> Vec<Line<'static>> {
     let columns = usize::from(columns);
     let rings = model.alarms.unacknowledged() > 0 && model.playing.is_none();
@@ -45,14 +47,15 @@ pub fn message_rows(model: &Model, theme: Theme, now: Duration, columns: u16) ->
     over
 }
 
-// The flight along its time: what has been, what is expected, warnings and errors, and the shown moment.
+// The flight along its time: what has been, what is expected, warnings and errors, and the shown
+// moment.
 
 /// How long the line of a flight in progress is, so that it is rarely drawn anew, s.
 pub const LENGTHS_S: [f64; 10] = [20.0, 30.0, 45.0, 60.0, 120.0, 300.0, 600.0, 1_800.0, 7_200.0, 36_000.0];
 /// The steps of what is expected, in lengths of the line.
 const EXPECTED_STEP: f64 = 1.0 / 40.0;
-/// The mark of the shown moment, of what has been, of what is expected, of a warning or an error; the time that has passed, and
-/// that is to come.
+/// The mark of the shown moment, of what has been, of what is expected, of a warning or an error;
+/// the time that has passed, and that is to come.
 const NOW: char = '◆';
 const BEEN: char = '●';
 const EXPECTED: char = '○';
@@ -212,7 +215,8 @@ const KEYS: [Act; 15] = [
 /// At least this many columns are for the keys, if every page need not be named.
 const KEY_COLUMNS: u16 = 34;
 
-/// Draws the keys that do something now, and the pages with the shown one in brackets and whether it is held.
+/// Draws the keys that do something now, and the pages with the shown one in brackets and whether
+/// it is held.
 pub fn draw_keys(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let pages = pages(model, theme, area.width.saturating_sub(KEY_COLUMNS));
     let [left, right] = side_by_side(area, [Fill(1), Length(pages.width() as u16)]);

@@ -1,5 +1,5 @@
-//! What must be seen first: the words on approaching and of a flight that does not go as planned, and the large number or word of
-//! each phase.
+//! What must be seen first: the words on approaching and of a flight that does not go as planned,
+//! and the large number or word of each phase.
 
 use std::time::Duration;
 
@@ -15,8 +15,9 @@ use crate::model::{
 };
 use protocol::dialect::TdPhase;
 
-// The largest words of every page, when people may be in danger or have waited for the word: DO NOT APPROACH, ONE
-// PERSON: PIN IN, MAY BE APPROACHED, LIFT-OFF, MAY BE IN THE AIR, LOST. While they stand, no page shows a headline of its own.
+// The largest words of every page, when people may be in danger or have waited for the word: DO NOT
+// APPROACH, ONE PERSON: PIN IN, MAY BE APPROACHED, LIFT-OFF, MAY BE IN THE AIR, LOST. While they
+// stand, no page shows a headline of its own.
 
 /// What is said of a vehicle that has left the pad, and nobody commanded it.
 const LIFT_OFF: &str = "LIFT-OFF";
@@ -68,7 +69,8 @@ pub fn banner(model: &Model, now: Duration) -> Option<Banner> {
     })
 }
 
-/// Since when, and where it is meant to come down. The moment stands still; the clock in the line above runs.
+/// Since when, and where it is meant to come down. The moment stands still; the clock in the line
+/// above runs.
 fn may_fly(model: &Model) -> Banner {
     let left_s = model.vehicle.countdown_s().map_or(0.0, |left| left.value);
     let place = match model.meant_to_come_down() {
@@ -107,7 +109,8 @@ pub fn pad(model: &Model, now: Duration) -> Item {
     word("", &text, role)
 }
 
-/// The name of the check for which the countdown is held, or the armed vehicle is NO-GO: it stands beside the word.
+/// The name of the check for which the countdown is held, or the armed vehicle is NO-GO: it stands
+/// beside the word.
 pub fn pad_check(model: &Model) -> Option<Item> {
     let (name, _) = model.vehicle.held_for().or_else(|| model.vehicle.unfit_while_armed())?;
     Some(word("", &name, TextRole::Alarm))
@@ -140,7 +143,8 @@ fn pad_word(model: &Model, now: Duration) -> (String, TextRole) {
     }
 }
 
-/// After a loss of the link in flight: the predicted height instead of an old one, its error, and the silence.
+/// After a loss of the link in flight: the predicted height instead of an old one, its error, and
+/// the silence.
 fn lost(model: &Model, now: Duration) -> (Item, Vec<Item>) {
     let at = predict_position(&model.vehicle, now);
     let sample = |value: f64| Some(Sample::new(value, now));

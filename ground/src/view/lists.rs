@@ -18,8 +18,9 @@ const NARROW_COLUMNS: usize = 50;
 /// Narrower than this, a text is cut rather than wrapped.
 const WRAP_COLUMNS_MIN: usize = 20;
 
-/// The newest events, oldest first, in this many lines of this width. Long texts wrap, because the end of a refusal is its reason.
-/// The newest is whole: if it alone has more lines, its beginning is drawn.
+/// The newest events, oldest first, in this many lines of this width. Long texts wrap, because the
+/// end of a refusal is its reason. The newest is whole: if it alone has more lines, its beginning
+/// is drawn.
 pub fn events(model: &Model, theme: Theme, columns: usize, rows: usize) -> Vec<Line<'static>> {
     // In a narrow panel the speaker is left out.
     let is_narrow = columns < NARROW_COLUMNS;
@@ -58,7 +59,8 @@ pub fn said(model: &Model) -> impl Iterator<Item = (&Event, Cow<'_, str>)> {
     newest.filter_map(|event| Some((event, words::of_event(&event.text)?)))
 }
 
-/// The time of an event: from the lift-off once there was one, otherwise since the start of the run. The longest lose their tenth.
+/// The time of an event: from the lift-off once there was one, otherwise since the start of the
+/// run. The longest lose their tenth.
 pub fn clock_time(at: Duration, lift_off: Option<Duration>) -> String {
     let Some(lift_off) = lift_off else { return format!("{:.1}", at.as_secs_f64()) };
     let since_s = seconds_since(at, lift_off);
@@ -81,7 +83,8 @@ const FRONT_COLUMNS: usize = 9;
 /// How long the reason why a step was not signed stands below the steps.
 const REFUSAL_SHOWN: Duration = Duration::from_secs(15);
 
-/// The steps around the chosen one, on at most this many rows; below them who signs the chosen one, or who did.
+/// The steps around the chosen one, on at most this many rows; below them who signs the chosen one,
+/// or who did.
 pub fn checklist_rows(
     model: &Model,
     theme: Theme,

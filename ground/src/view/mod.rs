@@ -1,9 +1,11 @@
 //! Draws the screen: one pure function from the model and the time to a frame.
 //!
-//! Every page has the same frame: [`top_lines`] (identity, link, recording; the state and what an abort would do in the
-//! colour of the danger), the page, and [`footer`] (the flight along its time, the keys). [`pages`] has the pages; [`panels`], [`pictures`],
-//! [`lists`] and [`widgets`] are what they are made of. From 80x22 on, the panels are side by side; on smaller terminals
-//! there are plain lines: state, abort, alarm and messages, and the pages that are lines. For terminals without Unicode, [`theme`] converts the result.
+//! Every page has the same frame: [`top_lines`] (identity, link, recording; the state and what an
+//! abort would do in the colour of the danger), the page, and [`footer`] (the flight along its
+//! time, the keys). [`pages`] has the pages; [`panels`], [`pictures`], [`lists`] and [`widgets`]
+//! are what they are made of. From 80x22 on, the panels are side by side; on smaller terminals
+//! there are plain lines: state, abort, alarm and messages, and the pages that are lines. For
+//! terminals without Unicode, [`theme`] converts the result.
 
 pub mod band;
 pub mod bars;
@@ -36,7 +38,8 @@ use widgets::{STALE_MARK, age_mark, fixed, quantity_row, seconds, shortest, text
 const WIDE_COLUMNS: u16 = 80;
 const WIDE_ROWS: u16 = 22;
 
-/// Draws the screen. Returns where the pictures of a flight are, which may be older than the numbers above them.
+/// Draws the screen. Returns where the pictures of a flight are, which may be older than the
+/// numbers above them.
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame) -> Option<Rect> {
     let area = frame.area();
     frame.buffer_mut().set_style(area, theme.ground());
@@ -84,8 +87,9 @@ fn draw_line(frame: &mut Frame, area: Rect, line: Line) {
     draw_lines(frame, Rect { height: area.height.min(1), ..area }, &[line]);
 }
 
-// The layout from 80x22 on, the same on every page: who and what is seen; the state in the colour of its danger; the words on
-// approaching; the page; the flight along its time, or an alarm; the keys.
+// The layout from 80x22 on, the same on every page: who and what is seen; the state in the colour
+// of its danger; the words on approaching; the page; the flight along its time, or an alarm; the
+// keys.
 
 fn draw_wide(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) -> Option<Rect> {
     let banner = headline::banner(model, now);
@@ -126,7 +130,8 @@ fn draw_wide(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area
     pictures.filter(|_| !is_covered)
 }
 
-// The layout for terminals smaller than 80x22: plain lines, the most important first. Of a page of panels nothing is left.
+// The layout for terminals smaller than 80x22: plain lines, the most important first. Of a page of
+// panels nothing is left.
 
 /// With fewer rows an open dialog replaces the line of countdown and link.
 const DIALOG_ROWS: u16 = 8;

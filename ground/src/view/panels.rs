@@ -1,4 +1,5 @@
-//! Rows of the pages: what steers the burn, the limits of a touchdown, and the predicted position of a lost vehicle.
+//! Rows of the pages: what steers the burn, the limits of a touchdown, and the predicted position
+//! of a lost vehicle.
 
 use std::time::Duration;
 
@@ -37,7 +38,8 @@ pub fn ending_role(model: &Model, now: Duration) -> Option<(Ending, TextRole)> {
     Some((ending, role))
 }
 
-// Each limit of a touchdown with the value reached, as text for the screens and for the closing lines.
+// Each limit of a touchdown with the value reached, as text for the screens and for the closing
+// lines.
 
 /// One limit and the value compared with it, in the units of the screen.
 #[derive(Debug, Clone, PartialEq)]

@@ -21,7 +21,8 @@ fn is_large(page: Page, phase: TdPhase) -> bool {
     timed && matches!(page, Page::Ascent | Page::Descent | Page::Landing)
 }
 
-/// The next event of a flight; `None` on the pad, where the crew decides. Without its time if that is large `beside` it.
+/// The next event of a flight; `None` on the pad, where the crew decides. Without its time if that
+/// is large `beside` it.
 pub fn next_event(model: &Model, now: Duration, beside: bool) -> Option<String> {
     let phase = model.vehicle.phase()?;
     let (event, left, rest) = event(&model.vehicle, phase.value, now)?;
@@ -90,7 +91,8 @@ fn ignition(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> (String, String
     ("IGNITION".to_owned(), within(left_s), format!("{at}{armed}"))
 }
 
-/// Until the canopy carries the vehicle nothing is known of the time: it falls fast, and will not for long.
+/// Until the canopy carries the vehicle nothing is known of the time: it falls fast, and will not
+/// for long.
 fn under_chute(vehicle: &Vehicle, now: Duration) -> (String, String, String) {
     let live = vehicle.status.as_ref().is_some_and(|status| status.value.motor == TdMotor::TD_MOTOR_LIVE);
     let motor = if live { ", LIVE MOTOR" } else { "" };
@@ -172,8 +174,8 @@ pub fn replay_line(playing: &Playback, entry: Option<&TextEntry>, theme: Theme) 
     )
 }
 
-/// The foremost alarm, its age and the number of further alarms. Only the text of the alarm is shortened; the key
-/// that acknowledges a new alarm is never cut.
+/// The foremost alarm, its age and the number of further alarms. Only the text of the alarm is
+/// shortened; the key that acknowledges a new alarm is never cut.
 pub fn alarm_text(model: &Model, theme: Theme, now: Duration, columns: usize) -> Option<Line<'static>> {
     let alarm = model.alarms.foremost()?;
     let more = match model.alarms.list().len() {
@@ -195,7 +197,8 @@ pub fn alarm_text(model: &Model, theme: Theme, now: Duration, columns: usize) ->
     Some(Line::from(spans))
 }
 
-/// Whether an alarm holds and a person has seen it; for how long it has held, or how long ago it ended, in whole seconds.
+/// Whether an alarm holds and a person has seen it; for how long it has held, or how long ago it
+/// ended, in whole seconds.
 pub fn alarm_state(alarm: &Alarm, now: Duration) -> (&'static str, String, TextRole) {
     let since_s = |at: Duration| now.saturating_sub(at).as_secs();
     let (word, role) = match alarm.ended_at {
@@ -211,8 +214,8 @@ pub fn alarm_state(alarm: &Alarm, now: Duration) -> (&'static str, String, TextR
     (word, age, role)
 }
 
-/// Shortens a text to this many columns; a shortened text ends in `..`. Whole words are kept, unless that would lose more
-/// than a third of what fits.
+/// Shortens a text to this many columns; a shortened text ends in `..`. Whole words are kept,
+/// unless that would lose more than a third of what fits.
 pub fn cut(text: &str, columns: usize) -> String {
     if Span::raw(text).width() <= columns {
         return text.to_owned();

@@ -1,8 +1,9 @@
-//! Gives each role of a text, and each part of a picture, its style. Colour only repeats what a word or a mark
-//! already says.
+//! Gives each role of a text, and each part of a picture, its style. Colour only repeats what a
+//! word or a mark already says.
 //!
-//! Dark and light paint their own background, in colours whose values are fixed (the upper 240 of the 256 of xterm, and what a
-//! terminal of 24 bits shows for them), so that their contrast is known. In the sun only the light theme can be read.
+//! Dark and light paint their own background, in colours whose values are fixed (the upper 240 of
+//! the 256 of xterm, and what a terminal of 24 bits shows for them), so that their contrast is
+//! known. In the sun only the light theme can be read.
 
 use std::borrow::Cow;
 
@@ -30,7 +31,8 @@ pub enum TextRole {
     Key,
 }
 
-/// A part of a picture: what was measured, what is predicted and what limits have one colour each, everywhere.
+/// A part of a picture: what was measured, what is predicted and what limits have one colour each,
+/// everywhere.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ink {
     /// Drawn as a thick line.
@@ -97,7 +99,8 @@ impl Palette {
     }
 }
 
-/// Numbers of xterm's 256 colours: half the bytes of a colour by its parts, and every terminal with colours has them.
+/// Numbers of xterm's 256 colours: half the bytes of a colour by its parts, and every terminal with
+/// colours has them.
 struct Colours {
     back: u8,
     /// Behind the header, the large numbers and the keys.
@@ -136,7 +139,8 @@ const LIGHT: Colours = Colours {
     levels: [(231, 239), (16, 214), (231, 124), (231, 22)],
 };
 
-/// The numbers of the palettes but 231, which stays white, and what a terminal of 24 bits shows for each: red, green and blue.
+/// The numbers of the palettes but 231, which stays white, and what a terminal of 24 bits shows for
+/// each: red, green and blue.
 const NUMBERS: [u8; 22] =
     [16, 19, 22, 23, 75, 79, 88, 90, 124, 195, 214, 215, 218, 221, 233, 234, 238, 239, 240, 246, 249, 255];
 #[expect(clippy::unreadable_literal, reason = "two digits each for red, green and blue")]
@@ -161,8 +165,9 @@ pub struct Theme {
 }
 
 impl Theme {
-    /// Reads what the terminal can show from the environment: `TERM`, `COLORTERM`, `COLORFGBG`, `NO_COLOR`, and the
-    /// first of `LC_ALL`, `LC_CTYPE` and `LANG` that is set (POSIX.1-2017, 8.2).
+    /// Reads what the terminal can show from the environment: `TERM`, `COLORTERM`, `COLORFGBG`,
+    /// `NO_COLOR`, and the first of `LC_ALL`, `LC_CTYPE` and `LANG` that is set (POSIX.1-2017,
+    /// 8.2).
     pub fn of_environment(variable: impl Fn(&str) -> Option<String>) -> Self {
         let set = |name: &str| variable(name).filter(|value| !value.is_empty());
         let term = set("TERM").unwrap_or_default();
@@ -177,7 +182,8 @@ impl Theme {
         let locale = ["LC_ALL", "LC_CTYPE", "LANG"].into_iter().find_map(set).unwrap_or_default();
         let locale = locale.to_ascii_lowercase();
         let unicode = locale.contains("utf-8") || locale.contains("utf8");
-        // The console of Linux has at most 512 characters: none of its fonts has braille or parts of blocks.
+        // The console of Linux has at most 512 characters: none of its fonts has braille or parts
+        // of blocks.
         let old = ["vt1", "vt2", "vt3", "linux"].iter().any(|name| term.starts_with(name));
         Self { palette, ascii: !unicode || old }
     }
@@ -275,7 +281,8 @@ fn reversed() -> Style {
     Style::new().add_modifier(Modifier::REVERSED)
 }
 
-// Converts a drawn screen to ASCII, cell by cell, for terminals without Unicode (`LANG=C`, a vt100).
+// Converts a drawn screen to ASCII, cell by cell, for terminals without Unicode (`LANG=C`, a
+// vt100).
 
 /// The first braille pattern; the low eight bits of a pattern are its dots.
 const BRAILLE: u32 = 0x2800;

@@ -1,4 +1,5 @@
-//! The top lines of every screen: identity, phase, armed, countdown, link, abort, and the latest command.
+//! The top lines of every screen: identity, phase, armed, countdown, link, abort, and the latest
+//! command.
 
 use std::time::Duration;
 
@@ -21,7 +22,8 @@ use crate::model::{
 
 /// Columns of the state: armed, phase, clock, each in its place.
 const STATE_COLUMNS: [u16; 3] = [9, 15, 9];
-/// From this width on the state and what an abort would do, with its key, stand in one row, otherwise in two.
+/// From this width on the state and what an abort would do, with its key, stand in one row,
+/// otherwise in two.
 pub const ONE_ROW_COLUMNS: u16 = 160;
 const ABORT_COLUMNS: u16 = 87;
 /// From this width on the rate and the loss of the link are shown beside its ages.
@@ -69,8 +71,8 @@ pub fn level(model: &Model, now: Duration) -> Level {
     }
 }
 
-/// Draws the rows in the colour of the danger: state and what comes next, or an alarm that was seen; what an abort would do, and
-/// its key.
+/// Draws the rows in the colour of the danger: state and what comes next, or an alarm that was
+/// seen; what an abort would do, and its key.
 pub fn draw_state(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     frame.buffer_mut().set_style(area, theme.level(level(model, now)));
     let first = Rect { height: area.height.min(1), ..area };
@@ -114,8 +116,8 @@ fn in_the_middle(model: &Model, theme: Theme, now: Duration, columns: usize) -> 
     Some(Line::from(status_lines::cut(&words, columns)))
 }
 
-/// What an abort would do, or how far it is, and its key at the right end. What a begun or unsent abort says has its keys in
-/// it, and the whole row if it needs it.
+/// What an abort would do, or how far it is, and its key at the right end. What a begun or unsent
+/// abort says has its keys in it, and the whole row if it needs it.
 fn draw_abort(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let key = format!(" {} ", abort_key(model));
     let [words, key_area] = side_by_side(area, [Fill(1), Length(key.len() as u16)]);
@@ -202,7 +204,8 @@ fn crew(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
     let text = match model.settings.role {
         Role::Replaying => "nobody".to_owned(),
         Role::Station | Role::Attached if model.vehicle.as_foreign().is_some() => "ABORT only".to_owned(),
-        // First, whoever else sits at this station: the silence of this station holds the countdown.
+        // First, whoever else sits at this station: the silence of this station holds the
+        // countdown.
         _ if model.link.uplink.armed_by_us && model.link.state(now).carries() => "armed here".to_owned(),
         _ if model.link.uplink.armed_by_us => "~armed here".to_owned(),
         _ if model.crew.seats().iter().any(|seat| *seat != model.settings.seat) => {
@@ -214,10 +217,11 @@ fn crew(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
     theme.plain(format!(" {text}"))
 }
 
-// The top lines of every screen: phase, armed, countdown, link, abort, and the line of the latest command.
+// The top lines of every screen: phase, armed, countdown, link, abort, and the line of the latest
+// command.
 
-/// In flight, a command whose effect is not observed is shown instead of the next event for this long, and on the pad an
-/// answered one instead of a NO-GO. Its alarm stays.
+/// In flight, a command whose effect is not observed is shown instead of the next event for this
+/// long, and on the pad an answered one instead of a NO-GO. Its alarm stays.
 const OPEN_SHOWN: Duration = Duration::from_secs(10);
 const ABORT_KEY: &str = "Ctrl-X Enter";
 pub const ABORT_LABEL: &str = " abort now: ";
@@ -291,8 +295,9 @@ pub fn countdown(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
     }
 }
 
-/// Both directions of the link, each with the age of its last frame: hearing the vehicle does not prove that it hears
-/// us. Whole seconds, because heartbeats come only once a second. On an attached screen, that its station is silent.
+/// Both directions of the link, each with the age of its last frame: hearing the vehicle does not
+/// prove that it hears us. Whole seconds, because heartbeats come only once a second. On an
+/// attached screen, that its station is silent.
 pub fn link(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     if let Some(gone) = model.link.station_gone_for(now) {
         return theme.line(format!("STATION GONE {}s", gone.as_secs()), TextRole::Alarm);
@@ -301,7 +306,8 @@ pub fn link(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
         let words = format!("STATION SILENT {}s", silence.as_secs());
         return theme.line(words, TextRole::Alarm);
     }
-    // Another autopilot dates few of its messages: the age of the last one that it dates says nothing about the link.
+    // Another autopilot dates few of its messages: the age of the last one that it dates says
+    // nothing about the link.
     let foreign = model.vehicle.as_foreign().is_some();
     let down = if foreign { model.link.state(now) } else { model.link.down(now) };
     if down == LinkState::NeverHeard {
@@ -390,7 +396,8 @@ pub fn hands_off(model: &Model, theme: Theme, now: Duration) -> Option<Line<'sta
     Some(theme.line(words, TextRole::Caution))
 }
 
-/// The three facts of a command, in as many columns: commanded, acknowledged, observed. First its time is left out.
+/// The three facts of a command, in as many columns: commanded, acknowledged, observed. First its
+/// time is left out.
 fn command_facts(track: &TrackedCommand, columns: usize, theme: Theme, now: Duration) -> Line<'static> {
     // Other names are longer.
     let room = "DISARM".len().saturating_sub(track.kind.name().len());
@@ -439,7 +446,8 @@ fn refusal(result: u8) -> &'static str {
     }
 }
 
-/// What the row above the keys says instead of the flight: that a check moves the surfaces, a command, or a hold.
+/// What the row above the keys says instead of the flight: that a check moves the surfaces, a
+/// command, or a hold.
 pub fn message(model: &Model, theme: Theme, now: Duration, columns: usize) -> Option<Line<'static>> {
     let latest = model.commands.tracks.iter().rfind(|track| track.kind != CommandKind::Abort);
     let is_past = |at: Duration| now.saturating_sub(at) >= OPEN_SHOWN;
@@ -458,8 +466,8 @@ pub fn message(model: &Model, theme: Theme, now: Duration, columns: usize) -> Op
         .or_else(|| latest.filter(is_news).map(facts))
 }
 
-/// Whether the vehicle may be armed: GO only if every check passes and the uplink is proven. `None` before the
-/// vehicle has reported its checks, and off the pad, where it makes none.
+/// Whether the vehicle may be armed: GO only if every check passes and the uplink is proven. `None`
+/// before the vehicle has reported its checks, and off the pad, where it makes none.
 pub fn readiness(model: &Model, now: Duration) -> Option<(String, TextRole)> {
     let status = model.vehicle.status.as_ref().filter(|status| is_on_pad(status.value.phase))?;
     if status.is_stale(now) {

@@ -19,7 +19,8 @@ pub fn age_mark<T>(sample: &Sample<T>, now: Duration) -> (&'static str, TextRole
     if sample.is_stale(now) { (STALE_MARK, TextRole::Stale) } else { (" ", TextRole::Plain) }
 }
 
-/// A row with the name, the value and the unit of a quantity. A stale value is marked; a missing one is `--`.
+/// A row with the name, the value and the unit of a quantity. A stale value is marked; a missing
+/// one is `--`.
 pub fn quantity_row(quantity: &Quantity, model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     let value = quantity.read(model, now);
     let text = value.map_or_else(|| "--".to_owned(), |sample| fixed(sample.value, quantity.decimals));

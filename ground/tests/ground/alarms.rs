@@ -240,7 +240,8 @@ fn an_abort_that_would_arrive_too_late_says_so() {
     rig.expect_screen("abort now: lands here");
 }
 
-/// With two alarms, one Space acknowledges one of them; the list marks which, and another can be chosen.
+/// With two alarms, one Space acknowledges one of them; the list marks which, and another can be
+/// chosen.
 #[test]
 fn alarms_are_listed_and_acknowledged_one_by_one() {
     let mut rig = Rig::crewed();
@@ -278,7 +279,8 @@ fn a_long_alarm_text_never_hides_the_key_that_acknowledges() {
     }
 }
 
-/// A station on a wrong port says what it listens on and what to check, on the page and once as an event.
+/// A station on a wrong port says what it listens on and what to check, on the page and once as an
+/// event.
 #[test]
 fn a_vehicle_that_was_never_heard_has_hints_on_the_main_page() {
     let mut rig = Rig::new(settings(false, true));

@@ -1,5 +1,6 @@
-//! Counts the bytes that a whole flight writes to the terminal: the real vehicle on a simulated clock, the real
-//! screen on a terminal in memory, which shows after every frame what was drawn: all of it of that moment, except for pictures.
+//! Counts the bytes that a whole flight writes to the terminal: the real vehicle on a simulated
+//! clock, the real screen on a terminal in memory, which shows after every frame what was drawn:
+//! all of it of that moment, except for pictures.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -60,7 +61,8 @@ struct SlowTerminal {
 }
 
 impl SlowTerminal {
-    /// Takes a frame that is drawn now, and perhaps a question behind it. Returns when it will have been taken.
+    /// Takes a frame that is drawn now, and perhaps a question behind it. Returns when it will have
+    /// been taken.
     fn take(&mut self, bytes: usize, asks: bool, now: Duration) -> Duration {
         self.free_at = self.free_at.max(now) + Duration::from_secs_f64(bytes as f64 / self.bytes_per_s);
         self.answers_at = if asks { Some(self.free_at) } else { self.answers_at };
@@ -152,7 +154,8 @@ fn flight_over(
             pace.drew(&model, u32::from(columns) * u32::from(rows), bytes, now);
             if let Some(slow) = &mut slow {
                 let late = slow.take(bytes, pace.asks(now), now).saturating_sub(now);
-                // A whole page of this size takes 3.5 s on this line; nothing waits behind more than half a second of another.
+                // A whole page of this size takes 3.5 s on this line; nothing waits behind more
+                // than half a second of another.
                 assert!(late < Duration::from_secs(4), "{now:?}: {late:?}");
                 let first: String = symbols_of(buffer.buffer).remove(0);
                 assert_eq!(
@@ -192,8 +195,8 @@ fn worst(frames: &[(Duration, usize, TdPhase)]) -> (usize, Duration, TdPhase) {
 
 #[test]
 fn no_second_of_a_landing_writes_more_than_a_slow_line_carries() {
-    // At 140x45 the goal is 8,000. Measured: 8,336, of which 6,372 are one frame, the change of page at the touchdown, which may
-    // not be delayed.
+    // At 140x45 the goal is 8,000. Measured: 8,336, of which 6,372 are one frame, the change of
+    // page at the touchdown, which may not be delayed.
     for (columns, rows, most) in [(80, 24, 3_800), (140, 45, 8_400)] {
         let frames = flight("mk2", columns, rows);
         // The first frame is the whole screen, before any flight.

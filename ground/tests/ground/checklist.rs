@@ -1,4 +1,5 @@
-//! The checklist: who signs what, with which values; NO-GO until it is done; the same on every screen.
+//! The checklist: who signs what, with which values; NO-GO until it is done; the same on every
+//! screen.
 
 use std::path::Path;
 
@@ -125,7 +126,8 @@ fn a_step_of_another_role_is_refused_on_the_page_with_the_reason() {
         let screen = rig.screen(size.0, size.1);
         assert!(screen.contains(why) && !screen.contains("SIGN a step"), "{screen}");
     }
-    // A dialog that was open before the vehicle was armed elsewhere, and a screen that does not know the roles.
+    // A dialog that was open before the vehicle was armed elsewhere, and a screen that does not
+    // know the roles.
     asked(&mut rig, 1, false, "Ann");
     let told = rig.actions.iter().rev().find_map(|action| match action {
         Action::RefuseSignature(why) => Some(why.clone()),

@@ -47,7 +47,8 @@ fn every_check_that_fails_while_it_is_armed_is_an_alarm_with_its_name_and_no_go(
 
 #[test]
 fn a_hold_names_the_check_for_which_the_vehicle_held_also_when_it_passes_again() {
-    // The text may come before the status or after it, or be lost; the check may pass again before a status shows it.
+    // The text may come before the status or after it, or be lost; the check may pass again before
+    // a status shows it.
     for (text_first, text_last, seen_failing) in
         [(true, false, true), (true, false, false), (false, true, false), (false, false, true)]
     {

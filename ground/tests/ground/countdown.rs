@@ -1,4 +1,5 @@
-//! What is lost in a countdown: the real station and the real vehicle on one simulated clock, and a link that can fail.
+//! What is lost in a countdown: the real station and the real vehicle on one simulated clock, and a
+//! link that can fail.
 
 use std::sync::LazyLock;
 use std::time::Duration;
@@ -152,7 +153,8 @@ impl Pad {
     }
 }
 
-/// "What is lost before T-3 s holds the countdown; what is lost later may fly." Nothing holds from T-2 s on.
+/// "What is lost before T-3 s holds the countdown; what is lost later may fly." Nothing holds from
+/// T-2 s on.
 #[test]
 fn what_is_lost_before_t_minus_three_seconds_holds_and_what_is_lost_in_the_last_two_flies() {
     let pad = Pad::counting_until(20, 6.0);
@@ -198,7 +200,8 @@ fn nothing_is_armed_or_started_on_news_older_than_three_seconds() {
     assert_eq!(pad.left_s(), None);
 }
 
-/// Half a second each way: what the screen shows as the last moment is one in which a hold still arrives in time.
+/// Half a second each way: what the screen shows as the last moment is one in which a hold still
+/// arrives in time.
 #[test]
 fn the_last_moment_of_a_hold_counts_the_round_trip() {
     let mut pad = Pad::counting_until(500, 6.0);

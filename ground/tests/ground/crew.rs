@@ -1,4 +1,5 @@
-//! The crew: operators in the log, two screens that command at once, and a countdown without a commanding screen.
+//! The crew: operators in the log, two screens that command at once, and a countdown without a
+//! commanding screen.
 
 use ground::key::Key;
 use ground::model::{CommandKind, Seat, Settings};

@@ -15,8 +15,8 @@ fn is_disarm(command: &COMMAND_LONG_DATA) -> bool {
     command.command == ARM && command.param1 < 0.5
 }
 
-/// Both have the command number 400. An answer to the arming that arrives after the disarm was sent says nothing
-/// about the disarm.
+/// Both have the command number 400. An answer to the arming that arrives after the disarm was sent
+/// says nothing about the disarm.
 #[test]
 fn a_late_answer_to_an_arming_does_not_end_the_disarm() {
     // Disarms while the arming still waits for its answer, and after it was given up.

@@ -13,7 +13,8 @@ use ground::view::top_lines;
 use crate::rig::{MONO, Rig};
 use crate::screens::{counting, descending, powered};
 
-/// A verdict on a vehicle that fell from the descent: vertical and horizontal speed at contact, m/s.
+/// A verdict on a vehicle that fell from the descent: vertical and horizontal speed at contact,
+/// m/s.
 fn judged(speeds_m_s: [f32; 2], landing: TdLanding, violated: TdLimit, chute: TdChute) -> Rig {
     let mut rig = descending();
     rig.limits();
@@ -38,7 +39,8 @@ pub(crate) fn reason(rig: &Rig) -> Option<String> {
     banner(&rig.model, rig.now).map(|banner| banner.reason())
 }
 
-/// Whether the smallest whole screen shows the line above the large words on every page with one of these keys.
+/// Whether the smallest whole screen shows the line above the large words on every page with one of
+/// these keys.
 fn is_on_pages(rig: &mut Rig, keys: &str) -> bool {
     keys.chars().all(|key| {
         rig.key(Key::Char(key));
@@ -51,8 +53,8 @@ fn next(rig: &Rig) -> Option<String> {
     next_event(&rig.model, rig.now, false)
 }
 
-/// Each of the ends has its own word on the review, on the landing page, in the events, in the alarm and on small
-/// screens.
+/// Each of the ends has its own word on the review, on the landing page, in the events, in the
+/// alarm and on small screens.
 #[test]
 fn each_end_has_its_word_everywhere() {
     use TdChute::{TD_CHUTE_OPEN as OPEN, TD_CHUTE_STOWED as STOWED};
@@ -118,7 +120,8 @@ fn without_a_verdict_an_open_parachute_is_known_and_nothing_else_is_claimed() {
     assert_eq!(ending(&rig), None);
 }
 
-/// A vehicle that falls silent is in flight until it must be down; then it is lost until it is heard again.
+/// A vehicle that falls silent is in flight until it must be down; then it is lost until it is
+/// heard again.
 #[test]
 fn a_vehicle_that_fell_silent_in_flight_is_lost_once_it_must_be_down() {
     let mut rig = descending();
@@ -186,7 +189,8 @@ fn a_latch_has_its_reason_beside_it() {
     assert!(alarm_texts(&rig).contains(&words));
 }
 
-/// A cause without a value of its own: the grave text about that time is the reason, or there is none.
+/// A cause without a value of its own: the grave text about that time is the reason, or there is
+/// none.
 #[test]
 fn a_text_is_the_reason_of_a_latch_without_one() {
     let latched = |before: &str, at_the_latch: Option<&str>| {
@@ -262,7 +266,8 @@ fn a_verdict_or_a_later_phase_means_that_the_vehicle_has_left_the_pad() {
     assert!(rig.model.outcome.started, "a flight was flown");
 }
 
-/// The largest letters of every page, while it climbs; and the abort does not say that nothing is left.
+/// The largest letters of every page, while it climbs; and the abort does not say that nothing is
+/// left.
 #[test]
 fn a_liftoff_that_nobody_commanded_is_the_largest_word_of_every_page() {
     let mut rig = Rig::crewed();

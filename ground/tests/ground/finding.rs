@@ -43,7 +43,8 @@ fn an_entry_is_found_by_parts_of_its_words_and_does_what_its_key_does() {
     assert_eq!((rig.model.pages.entry.clone(), rig.model.page()), (None, Page::Find), "Esc only closes it");
 }
 
-/// The palette opens the dialog of a ladder and goes no further: the word and Enter are still to be typed.
+/// The palette opens the dialog of a ladder and goes no further: the word and Enter are still to be
+/// typed.
 #[test]
 fn the_palette_opens_a_ladder_and_does_not_shorten_it() {
     let mut rig = on_the_pad();
@@ -164,7 +165,8 @@ fn a_paste_into_the_palette_does_nothing() {
     assert!(rig.take_commands().is_empty());
 }
 
-/// A vehicle that stands a hand below zero has no tick at -100 m, and ticks are as far apart as what they tell.
+/// A vehicle that stands a hand below zero has no tick at -100 m, and ticks are as far apart as
+/// what they tell.
 #[test]
 fn the_ticks_of_a_plot_are_at_their_places() {
     let mut rig = flying(TdPhase::TD_PHASE_TOUCHDOWN);

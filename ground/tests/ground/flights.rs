@@ -72,8 +72,9 @@ fn missed_by_m(predicted: &PredictedPosition, flight: &Model) -> f64 {
     libm::hypot(across_m, motion.altitude_m - predicted.altitude_m)
 }
 
-/// The link is lost at every half second of five flights, and each prediction is compared with the later telemetry. A
-/// circle that is too large would be useless, so most must be smaller than the remaining height.
+/// The link is lost at every half second of five flights, and each prediction is compared with the
+/// later telemetry. A circle that is too large would be useless, so most must be smaller than the
+/// remaining height.
 #[test]
 fn the_true_path_stays_inside_the_error_circle_in_19_of_20_cases() {
     let half = Duration::from_millis(500);
@@ -100,7 +101,8 @@ fn the_true_path_stays_inside_the_error_circle_in_19_of_20_cases() {
     assert!(2 * useful > all, "{useful} of {all}");
 }
 
-/// Whatever the screen says of the time under the parachute has to come true, and it says it as soon as the canopy carries.
+/// Whatever the screen says of the time under the parachute has to come true, and it says it as
+/// soon as the canopy carries.
 #[test]
 fn the_time_that_is_told_under_the_parachute_is_the_time_that_is_flown() {
     let mut told = 0;
@@ -126,7 +128,8 @@ fn the_time_that_is_told_under_the_parachute_is_the_time_that_is_flown() {
             let told_s: f64 = rest.split(' ').next().unwrap_or_default().parse().expect("seconds");
             let flown_s = down.saturating_sub(now).as_secs_f64();
             let settled = now.checked_sub(carried_since.unwrap()) > Some(Duration::from_secs(2));
-            // The canopy still brakes when it begins to carry, and gusts and the estimated height move what is told.
+            // The canopy still brakes when it begins to carry, and gusts and the estimated height
+            // move what is told.
             let share = if settled { 0.15 } else { 0.5 };
             assert!(
                 (told_s - flown_s).abs() <= share * flown_s + 1.0,

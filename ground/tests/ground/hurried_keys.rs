@@ -1,5 +1,5 @@
-//! Keys that arrive faster than a hand types: typed ones that a slow connection delivers in bunches are never lost, and
-//! pasted ones never act by themselves.
+//! Keys that arrive faster than a hand types: typed ones that a slow connection delivers in bunches
+//! are never lost, and pasted ones never act by themselves.
 
 use std::time::Duration;
 
@@ -43,7 +43,8 @@ fn connection() -> impl Strategy<Value = Connection> {
     ]
 }
 
-/// Types keys at these intervals over a connection. What arrives within a millisecond arrives in one read.
+/// Types keys at these intervals over a connection. What arrives within a millisecond arrives in
+/// one read.
 fn type_over(rig: &mut Rig, connection: &Connection, keys: &[Key], apart_ms: &[u64]) {
     let mut at = 0;
     let pressed: Vec<u64> = apart_ms
@@ -148,7 +149,8 @@ fn a_question_closes_when_the_vehicle_reboots() {
     assert_eq!(rig.model.dialog, None);
 }
 
-/// A paste on a console that does not mark pastes: at once, or one letter per 1 ms (9,600 baud) or 8 ms (1,200 baud).
+/// A paste on a console that does not mark pastes: at once, or one letter per 1 ms (9,600 baud) or
+/// 8 ms (1,200 baud).
 #[test]
 fn a_pasted_ladder_does_nothing_by_itself() {
     for apart_ms in [0, 1, 8, 20] {
@@ -279,8 +281,8 @@ proptest! {
         prop_assert!(rig.take_commands().iter().any(is_abort), "{}", rig.events());
     }
 
-    /// Scripts of the station's own words, in pieces of any size with stalls between them; each line has keys that came
-    /// together.
+    /// Scripts of the station's own words, in pieces of any size with stalls between them; each
+    /// line has keys that came together.
     #[test]
     fn a_pasted_script_never_arms_starts_or_quits(
         lines in prop::collection::vec(

@@ -99,12 +99,14 @@ fn down(motor: TdMotor, wait_s: u16, interlocks: TdInterlock) -> Rig {
     rig
 }
 
-/// The row of the words, which is the same on every page from 80x24 on, and the large letters under it.
+/// The row of the words, which is the same on every page from 80x24 on, and the large letters under
+/// it.
 fn large(rig: &Rig) -> String {
     rig.screen(80, 24).lines().skip(3).take(4).collect::<Vec<_>>().join("\n")
 }
 
-/// The words with their reason are one row on every page, and large under it; small screens have them as their second line.
+/// The words with their reason are one row on every page, and large under it; small screens have
+/// them as their second line.
 fn stands_on_every_page(rig: &mut Rig, words: &str, reason: &str) {
     rig.key(Key::Char('1'));
     let expected = large(rig);
@@ -125,7 +127,8 @@ fn stands_on_every_page(rig: &mut Rig, words: &str, reason: &str) {
     rig.key(Key::Char('0'));
 }
 
-/// After a failed ignition, an inhibit or an abort: on every page and size, as an alarm and in the log.
+/// After a failed ignition, an inhibit or an abort: on every page and size, as an alarm and in the
+/// log.
 #[test]
 fn a_live_motor_after_a_flight_keeps_people_away_until_it_is_safe() {
     for locks in [

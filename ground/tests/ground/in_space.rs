@@ -23,8 +23,8 @@ fn regress_landed_on_the_legs() {
     snapshot("landed_on_the_legs", &rig);
 }
 
-/// A vehicle that moves and leans towards the east, which the plane of north and up does not show; and the gimbal's yaw counts as
-/// much as its pitch.
+/// A vehicle that moves and leans towards the east, which the plane of north and up does not show;
+/// and the gimbal's yaw counts as much as its pitch.
 #[test]
 fn motion_and_lean_towards_the_east_count_in_every_value() {
     let mut rig = powered();
@@ -64,13 +64,15 @@ fn pad_and_vehicle_are_on_the_map_at_every_bearing() {
             for mark in ["+", "pad", "fence 120 m"] {
                 assert!(screen.contains(mark), "{mark} {bearing_deg} deg\n{screen}");
             }
-            // One in the header, one on the height and one on the map; where it is wide, the begin of the flight along its time.
+            // One in the header, one on the height and one on the map; where it is wide, the begin
+            // of the flight along its time.
             assert_eq!(screen.matches('●').count(), points, "{bearing_deg} deg\n{screen}");
         }
     }
 }
 
-/// On the pad the map shows where the crew stands, once both places are known: 0.001 degrees of latitude are 111 m.
+/// On the pad the map shows where the crew stands, once both places are known: 0.001 degrees of
+/// latitude are 111 m.
 #[test]
 fn the_map_of_the_pad_shows_the_crew() {
     let mut rig = crate::screens::on_the_pad();
@@ -115,7 +117,8 @@ fn regress_powered_in_space() {
     insta::assert_snapshot!("powered_in_space_120x40", rig.screen(120, 40));
 }
 
-/// The link is lost in the descent, four seconds before the burn: the fall continues, then the burn is expected.
+/// The link is lost in the descent, four seconds before the burn: the fall continues, then the burn
+/// is expected.
 #[test]
 fn regress_link_lost_in_the_descent() {
     let mut rig = armed();

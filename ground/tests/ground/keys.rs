@@ -150,7 +150,8 @@ fn other_keys_do_not_cancel_the_abort_chord() {
     }
 }
 
-/// Over a slow line both keys of the chord may arrive in one read among other keys; pastes do not cancel it either.
+/// Over a slow line both keys of the chord may arrive in one read among other keys; pastes do not
+/// cancel it either.
 #[test]
 fn no_typing_speed_and_no_paste_blocks_the_abort() {
     for keys in [
@@ -451,7 +452,8 @@ fn sigint_does_not_end_a_live_station_at_risk_and_sigterm_does() {
     }
 }
 
-/// The first repeat of a held key looks like a second press; only the later repeats show that it is held.
+/// The first repeat of a held key looks like a second press; only the later repeats show that it is
+/// held.
 #[test]
 fn a_held_ctrl_x_does_not_abort_and_one_more_press_does() {
     for delay_ms in [250, 400, 500, 600] {

@@ -1,8 +1,9 @@
-//! Properties of the keyboard: only a complete ladder that was typed by hand, or confirmed by another key after a pause,
-//! arms, starts or quits; only a complete one disarms; and an abort always works.
+//! Properties of the keyboard: only a complete ladder that was typed by hand, or confirmed by
+//! another key after a pause, arms, starts or quits; only a complete one disarms; and an abort
+//! always works.
 //!
-//! The ladders are defined here a second time, as a small oracle that reads a history of keys backwards and does not
-//! use dialogs.
+//! The ladders are defined here a second time, as a small oracle that reads a history of keys
+//! backwards and does not use dialogs.
 
 use std::time::Duration;
 
@@ -41,7 +42,8 @@ fn typed_by_hand(history: &[Input]) -> Vec<(Option<Key>, Duration)> {
     told
 }
 
-/// Whether the history ends in one of these keys, the word (in either case) and Enter, within the time.
+/// Whether the history ends in one of these keys, the word (in either case) and Enter, within the
+/// time.
 fn ends_in_ladder(history: &[Input], opens: &[Key], word: &str, within_s: u64) -> bool {
     let told = typed_by_hand(history);
     let Some(begin) = told.len().checked_sub(word.len() + 2) else { return false };
@@ -96,8 +98,8 @@ fn ends_in_confirmed_ladder(history: &[Input], opens: &[Key], word: &str, within
     by_hand && ends_at_any_speed(before, opens, word, within_s)
 }
 
-/// Whether the history ends in an abort chord: Ctrl-X and Enter within 2 s, or Ctrl-X twice but not held. Other keys
-/// may come in between.
+/// Whether the history ends in an abort chord: Ctrl-X and Enter within 2 s, or Ctrl-X twice but not
+/// held. Other keys may come in between.
 fn ends_in_chord(history: &[Input]) -> bool {
     let presses: Vec<Duration> =
         history.iter().filter(|came| came.key == Some(Key::CtrlX)).map(|came| came.at).collect();
@@ -325,8 +327,8 @@ fn some_keys() -> impl Strategy<Value = Vec<Key>> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
 
-    /// Held keys, pastes, random bytes, near misses and whole ladders, in any order, with an armed or disarmed
-    /// vehicle.
+    /// Held keys, pastes, random bytes, near misses and whole ladders, in any order, with an armed
+    /// or disarmed vehicle.
     #[test]
     fn nothing_happens_without_its_whole_ladder(streams in prop::collection::vec(stream(), 1..25), armed in any::<bool>()) {
         let mut rig = if armed { armed_on_pad() } else { Rig::crewed() };

@@ -79,7 +79,8 @@ fn line(rig: &Rig, begins: &str) -> String {
     lines.collect::<Vec<_>>().join("\n")
 }
 
-/// Every fourth frame of the radio is lost and none of the vehicle: each component has its own loss.
+/// Every fourth frame of the radio is lost and none of the vehicle: each component has its own
+/// loss.
 #[test]
 fn loss_is_shown_for_each_component() {
     let mut rig = Rig::crewed();
@@ -101,7 +102,8 @@ fn loss_is_shown_for_each_component() {
     assert_eq!(line(&rig, "51/68 radio"), "51/68 radio 0.0 unknown ~12.0 s");
 }
 
-/// Each of several links has its own rates for each component; ages keep growing between two reports.
+/// Each of several links has its own rates for each component; ages keep growing between two
+/// reports.
 #[test]
 fn loss_is_shown_for_each_link_and_component() {
     let mut rig = Rig::crewed();

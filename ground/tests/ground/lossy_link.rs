@@ -1,5 +1,5 @@
-//! An abort over a link that loses half of the frames in both directions: the real station and the real vehicle on
-//! one simulated clock.
+//! An abort over a link that loses half of the frames in both directions: the real station and the
+//! real vehicle on one simulated clock.
 
 use std::time::Duration;
 
@@ -54,8 +54,8 @@ fn is_abort(frame: &Frame) -> bool {
     CommandRequest::from_frame(frame).is_some_and(|request| request.command == abort)
 }
 
-/// The result of one abort: when it was latched and acknowledged, s after the key; how often it was sent, in all and
-/// after both were known.
+/// The result of one abort: when it was latched and acknowledged, s after the key; how often it was
+/// sent, in all and after both were known.
 struct Run {
     latched_s: f64,
     acknowledged_s: f64,

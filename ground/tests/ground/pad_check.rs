@@ -1,4 +1,5 @@
-//! The checks on the pad as the crew sees them: keys, values, alarms, the radio range test, and the book.
+//! The checks on the pad as the crew sees them: keys, values, alarms, the radio range test, and the
+//! book.
 
 use crate::rig::{Rig, settings, typed};
 use ground::key::Key;
@@ -117,7 +118,8 @@ fn a_check_takes_a_letter_and_enter_and_the_same_letter_ends_it() {
     assert!(alarms(&rig.model).is_empty(), "{:?}", rig.model.alarms.list());
 }
 
-/// Servos that tell nothing: while they move and afterwards the page says what people see, and one person's word takes a word.
+/// Servos that tell nothing: while they move and afterwards the page says what people see, and one
+/// person's word takes a word.
 #[test]
 fn what_only_people_see_is_on_the_page_and_takes_a_letter_and_a_word() {
     let shown = Verdict::TD_PAD_CHECK_VERDICT_NOT_JUDGED;

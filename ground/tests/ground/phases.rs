@@ -115,7 +115,8 @@ fn regress_land_armed() {
     snapshot("land_armed", &rig);
 }
 
-/// What the vehicle tells of its gate: above the band, with a fin that is 6 degrees behind, and not yet armed it waits for three.
+/// What the vehicle tells of its gate: above the band, with a fin that is 6 degrees behind, and not
+/// yet armed it waits for three.
 #[test]
 fn the_gate_waits_for_what_the_vehicle_tells() {
     let mut rig = descending();
@@ -160,7 +161,8 @@ fn regress_chute() {
     snapshot("chute", &rig);
 }
 
-/// The vehicle checks for arming only on the pad, so in flight the pad page shows no check as passed.
+/// The vehicle checks for arming only on the pad, so in flight the pad page shows no check as
+/// passed.
 #[test]
 fn in_flight_no_arming_check_is_shown_as_passed() {
     let mut rig = powered();
@@ -170,7 +172,8 @@ fn in_flight_no_arming_check_is_shown_as_passed() {
     assert!(!screen.contains(" GO ") && screen.contains("▶ every check passes"), "{screen}");
 }
 
-/// Whether something on the page between the rows of the state and those of the keys looks like a fault.
+/// Whether something on the page between the rows of the state and those of the keys looks like a
+/// fault.
 fn looks_wrong(rig: &Rig) -> bool {
     let theme = Theme { palette: Palette::Dark, ascii: false };
     let (caution, alarm) = (theme.style(TextRole::Caution).fg, theme.style(TextRole::Alarm).bg);
@@ -179,8 +182,9 @@ fn looks_wrong(rig: &Rig) -> bool {
     page.iter().any(|cell| Some(cell.fg) == caution || Some(cell.bg) == alarm)
 }
 
-/// At the beginning of the fall the vehicle predicts its touchdown from a sink rate of nearly zero, hundreds of metres off, and
-/// knows no band. Neither counts until it knows one; only then a touchdown beyond the fence is one.
+/// At the beginning of the fall the vehicle predicts its touchdown from a sink rate of nearly zero,
+/// hundreds of metres off, and knows no band. Neither counts until it knows one; only then a
+/// touchdown beyond the fence is one.
 #[test]
 fn what_has_not_settled_is_no_fault() {
     let mut rig = coasting();

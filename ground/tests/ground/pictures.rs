@@ -1,9 +1,11 @@
-//! Every page at three sizes and in every theme: nothing is cut, every letter can be read, colour says nothing alone.
+//! Every page at three sizes and in every theme: nothing is cut, every letter can be read, colour
+//! says nothing alone.
 //!
-//! The pictures are written to `target/tmp/pictures`. `UPDATE_PICTURES=1 cargo test -p ground --test ground pictures`
-//! also writes those that README.md and CREW.md show, the moving one included, to `ground/pictures`, from the flight that is recorded there:
-//! `onboard-sim fly --start pad --dispersion real --seed 2001 --mavlink udpin:127.0.0.1:14550` and
-//! `ground --auto --connect udpout:127.0.0.1:14550 --log flight.mcap --tlog flight.tlog`.
+//! The pictures are written to `target/tmp/pictures`. `UPDATE_PICTURES=1 cargo test -p ground
+//! --test ground pictures` also writes those that README.md and CREW.md show, the moving one
+//! included, to `ground/pictures`, from the flight that is recorded there: `onboard-sim fly --start
+//! pad --dispersion real --seed 2001 --mavlink udpin:127.0.0.1:14550` and `ground --auto --connect
+//! udpout:127.0.0.1:14550 --log flight.mcap --tlog flight.tlog`.
 
 use std::fs;
 use std::path::Path;
@@ -216,7 +218,8 @@ fn no_page_cuts_what_it_shows() {
     assert!(cut.is_empty(), "{}", cut.join("\n"));
 }
 
-/// Every theme shows the same characters, so no meaning is in a colour alone; and every letter can be read.
+/// Every theme shows the same characters, so no meaning is in a colour alone; and every letter can
+/// be read.
 #[test]
 fn every_theme_shows_the_same_text_with_enough_contrast() {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("pictures");
@@ -274,7 +277,8 @@ fn inks(theme: Theme) -> Vec<Color> {
     Ink::ALL.into_iter().map(|ink| theme.ink(ink)).chain(styles).collect()
 }
 
-/// Every colour can be read on every ground of its theme, on terminals of 256 colours and of 24 bits.
+/// Every colour can be read on every ground of its theme, on terminals of 256 colours and of 24
+/// bits.
 #[test]
 fn every_colour_of_a_theme_can_be_read() {
     for palette in [Palette::Dark, Palette::Light] {
@@ -384,7 +388,8 @@ fn no_key_disarms_in_flight() {
     }
 }
 
-/// A moment of the recorded flight: a station that has heard everything up to it, and the vehicle's last words.
+/// A moment of the recorded flight: a station that has heard everything up to it, and the vehicle's
+/// last words.
 struct Moment {
     rig: Rig,
     phase: TdPhase,
@@ -456,7 +461,8 @@ fn regress(name: &str, svg: &str) {
     assert!(kept == svg, "{} is out of date; see the head of this file", path.display());
 }
 
-/// The pictures on the pages are what the screen shows at three moments of one recorded flight, at the height that the vehicle sent.
+/// The pictures on the pages are what the screen shows at three moments of one recorded flight, at
+/// the height that the vehicle sent.
 #[test]
 fn regress_the_pictures_of_the_pages() {
     for (name, palette, moment) in moments() {
@@ -477,8 +483,8 @@ const FLOWN: [TdPhase; 5] = [
     TdPhase::TD_PHASE_IGNITION,
 ];
 
-/// The moving picture of README.md is the whole recorded flight: pad and verdict stay long enough to be read, the burn is as slow as it
-/// is, the rest twice as fast. It goes through every phase.
+/// The moving picture of README.md is the whole recorded flight: pad and verdict stay long enough
+/// to be read, the burn is as slow as it is, the rest twice as fast. It goes through every phase.
 #[test]
 fn regress_the_moving_picture() {
     let (mut screens, mut phases) = (Vec::new(), Vec::new());

@@ -1,4 +1,5 @@
-//! Whether a command was accepted can be read on every screen: in every state, at every danger, in every theme and width.
+//! Whether a command was accepted can be read on every screen: in every state, at every danger, in
+//! every theme and width.
 
 use ground::key::Key;
 use ground::model::{Acknowledgement, CommandKind};
@@ -72,7 +73,8 @@ fn in_every_state(rig: &mut Rig, kind: CommandKind, mut see: impl FnMut(&str, &R
     rig.now = now;
 }
 
-/// The letters of the first four and the last three rows that cannot be read, on a terminal of 256 colours or of 24 bits.
+/// The letters of the first four and the last three rows that cannot be read, on a terminal of 256
+/// colours or of 24 bits.
 fn unreadable(rig: &Rig, (columns, rows): (u16, u16), theme: Theme) -> Vec<String> {
     let terminal = rig.draw(columns, rows, theme);
     let cells = terminal.backend().buffer().content.chunks(usize::from(columns)).enumerate();

@@ -37,7 +37,8 @@ const S: fn(u64) -> Duration = Duration::from_secs;
 /// When the recordings here begin, us since the Unix epoch.
 const START_US: u64 = 1_760_000_000_000_000;
 
-/// One heartbeat per second for a minute: on the pad, descending from second 20, under thrust from 40, landed at 50.
+/// One heartbeat per second for a minute: on the pad, descending from second 20, under thrust from
+/// 40, landed at 50.
 static HEARTBEATS: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
     let mut encoder = Encoder::new(VEHICLE);
     let mut bytes = Vec::new();
@@ -205,7 +206,8 @@ fn a_typed_time_or_phase_is_jumped_to() {
         (player.position(), phase(&player)),
         (Duration::from_millis(45_500), TdPhase::TD_PHASE_POWERED)
     );
-    // The release is where the fall begins: second 20. No key of the page counts while a time is typed.
+    // The release is where the fall begins: second 20. No key of the page counts while a time is
+    // typed.
     types(&mut player, "jT+12");
     assert_eq!((player.position(), player.model.page()), (S(32), Page::Descent));
     types(&mut player, "jtouchdown");
@@ -284,11 +286,13 @@ fn peak_kb(process: u32) -> Option<u64> {
     line.split_whitespace().nth(1)?.parse().ok()
 }
 
-/// A log of 36 MB needs little more memory than one of a few bytes, and its reading progress is reported.
+/// A log of 36 MB needs little more memory than one of a few bytes, and its reading progress is
+/// reported.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_long_tlog_is_played_in_bounded_memory() {
-    // Measured: 11 MB for a log of one frame, 12 MB for this one; keeping all frames in memory takes 130 MB.
+    // Measured: 11 MB for a log of one frame, 12 MB for this one; keeping all frames in memory
+    // takes 130 MB.
     const MOST_KB: u64 = 40_000;
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("long.tlog");

@@ -128,8 +128,9 @@ fn regress_ascii() {
     }
 }
 
-/// At every size from 1x1 to 60x20 and in every state: nothing panics; and as far as the rows reach, the banner's sentence stands in
-/// the second row, and what an abort would do in the row after state and clock: whole if it fits, else cut with a mark.
+/// At every size from 1x1 to 60x20 and in every state: nothing panics; and as far as the rows
+/// reach, the banner's sentence stands in the second row, and what an abort would do in the row
+/// after state and clock: whole if it fits, else cut with a mark.
 #[test]
 fn the_abort_is_on_every_small_screen_that_has_room_for_it() {
     for (name, rig) in states() {

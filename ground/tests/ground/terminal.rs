@@ -1,6 +1,7 @@
 //! The program on a terminal that disappears: link and log continue, and a screen can attach again.
 //!
-//! `script` (util-linux) provides the terminal; without it the test reports that and checks nothing.
+//! `script` (util-linux) provides the terminal; without it the test reports that and checks
+//! nothing.
 
 use std::io::Write as _;
 use std::path::Path;

@@ -1,4 +1,5 @@
-//! Two people at two stations: what one asks is on the other's screen, and only the other's ladder confirms it.
+//! Two people at two stations: what one asks is on the other's screen, and only the other's ladder
+//! confirms it.
 
 use ground::key::Key;
 use ground::model::{KeyOwner, Seat, Settings};
@@ -118,7 +119,8 @@ fn an_ask_that_has_lapsed_or_changed_is_not_confirmed() {
     assert_eq!(rig.take_commands(), []);
     asks(&mut rig, BOB, TdAct::TD_ACT_ARM, 9_000);
     rig.keys(&typed("ACONFIRM"));
-    // Bob has taken it back and asks anew: the ask that was on the screen is no longer the one that waits.
+    // Bob has taken it back and asks anew: the ask that was on the screen is no longer the one that
+    // waits.
     crew(
         &mut rig,
         TD_CREW_DATA {

@@ -1,4 +1,5 @@
-//! What must not be forgotten: an abort that was not sent or not confirmed, and that people must keep away.
+//! What must not be forgotten: an abort that was not sent or not confirmed, and that people must
+//! keep away.
 
 use std::time::Duration;
 

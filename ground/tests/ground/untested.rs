@@ -23,8 +23,8 @@ fn real(motor_burns: u8) -> Rig {
     rig
 }
 
-/// NO-GO with its reason on the pad page, until a word is typed; who typed it is in the log and in the book. Then the ladder is
-/// the usual one.
+/// NO-GO with its reason on the pad page, until a word is typed; who typed it is in the log and in
+/// the book. Then the ladder is the usual one.
 #[test]
 fn an_unconfirmed_motor_of_a_real_vehicle_is_armed_by_a_word_that_is_recorded() {
     let mut rig = real(0);
@@ -68,7 +68,8 @@ fn a_confirmed_or_a_simulated_motor_needs_no_word() {
     }
 }
 
-/// A real vehicle that has not told its mission has not said that burns confirm it; and another power-up is another motor.
+/// A real vehicle that has not told its mission has not said that burns confirm it; and another
+/// power-up is another motor.
 #[test]
 fn the_word_counts_for_one_power_up_only() {
     let mut rig = on_the_pad();
@@ -84,8 +85,8 @@ fn the_word_counts_for_one_power_up_only() {
     assert!(why_untested(&rig.model).is_some());
 }
 
-/// An attached screen asks its station to go on with an untested motor, or without a log. The station decides, and records who
-/// asked.
+/// An attached screen asks its station to go on with an untested motor, or without a log. The
+/// station decides, and records who asked.
 #[test]
 fn an_attached_screen_asks_its_station_to_go_on_nevertheless() {
     let failed = LogHealth { failed: true, ..LogHealth::default() };

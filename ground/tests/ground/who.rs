@@ -1,5 +1,5 @@
-//! Who commands which vehicle: two vehicles under one id, two stations under one id, whose key a screen uses, and vehicles
-//! with another autopilot.
+//! Who commands which vehicle: two vehicles under one id, two stations under one id, whose key a
+//! screen uses, and vehicles with another autopilot.
 
 use std::time::Duration;
 
@@ -612,8 +612,9 @@ impl Random {
     }
 }
 
-/// A million random steps of two stations with their screens and one vehicle: nothing that can move is ever sent for a seat
-/// that is not the owner of the station's key, and what the vehicle takes for two people is never one.
+/// A million random steps of two stations with their screens and one vehicle: nothing that can move
+/// is ever sent for a seat that is not the owner of the station's key, and what the vehicle takes
+/// for two people is never one.
 #[test]
 fn no_screen_acts_with_the_key_of_another_person() {
     const PEOPLE: [&str; 6] = ["Ann", "Bob", "Cyd", "", "ann", "Ann on pts/3"];
@@ -676,8 +677,8 @@ fn no_screen_acts_with_the_key_of_another_person() {
     assert!(sent > 1_000 && agreed > 100, "{sent} sent, {agreed} agreed: or this proves nothing");
 }
 
-/// A million random steps of vehicles with other autopilots, which may send anything, also our own messages: they are never
-/// armed or started.
+/// A million random steps of vehicles with other autopilots, which may send anything, also our own
+/// messages: they are never armed or started.
 #[test]
 fn no_foreign_vehicle_is_ever_armed_or_started() {
     const AUTOPILOTS: [MavAutopilot; 4] = [

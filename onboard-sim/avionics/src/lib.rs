@@ -1,5 +1,5 @@
-//! The outside of the flight computer, simulated or real: what it says and hears, what is recorded of it, and the loop that
-//! steps it on a board.
+//! The outside of the flight computer, simulated or real: what it says and hears, what is recorded
+//! of it, and the loop that steps it on a board.
 //!
 //! * [`link`]: the vehicle's end of MAVLink.
 //! * [`log`]: flights as log records, and back, bit for bit.

@@ -1,4 +1,5 @@
-//! A simulated flight as a stream: the answers are what was recorded, and what is wrong with a stream is said.
+//! A simulated flight as a stream: the answers are what was recorded, and what is wrong with a
+//! stream is said.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::cell::Cell;
@@ -24,8 +25,8 @@ use sim::recipe::Recipe;
 use sim::sortie::Sortie;
 use sim::wire::record::LastFrame;
 
-/// More than the messages of a frame need, bytes, with the parts that they are put together from: 1,073 at ignition, when the
-/// gate says every number that it has looked at.
+/// More than the messages of a frame need, bytes, with the parts that they are put together from:
+/// 1,073 at ignition, when the gate says every number that it has looked at.
 const NEWS_BYTES_MAX: u64 = 2048;
 
 /// What a board answers to bytes that arrive a few at a time, as a serial line gives them.
@@ -102,7 +103,8 @@ fn a_flight_through_a_stream_is_answered_as_it_was_flown_bit_for_bit() {
     }
 }
 
-/// Every frame is asked twice, with the flight's beginning, and comes through noise and with broken copies.
+/// Every frame is asked twice, with the flight's beginning, and comes through noise and with broken
+/// copies.
 #[test]
 fn a_bad_wire_changes_no_answer() {
     let mut sortie = Sortie::new(&recipe(), 0).unwrap();
@@ -159,8 +161,8 @@ fn every_frame_before_a_reset_is_answered_before_it() {
     assert_eq!(resets.found, [(frames[100].input.frame, 100)]);
 }
 
-/// A board whose main context is a thread. It senses what was recorded, has a plan in the frame in which the recorded computer had it,
-/// and notes its commands.
+/// A board whose main context is a thread. It senses what was recorded, has a plan in the frame in
+/// which the recorded computer had it, and notes its commands.
 struct Recorded<'f> {
     frames: std::slice::Iter<'f, ComputerFrame>,
     ready: bool,
@@ -244,7 +246,8 @@ fn commands_the_same(computer: Computer, frames: &[ComputerFrame]) -> Frames {
     flight
 }
 
-/// However late the plans are, a board whose main context plans decides what the simulator has decided with plans as late.
+/// However late the plans are, a board whose main context plans decides what the simulator has
+/// decided with plans as late.
 #[test]
 fn a_board_that_senses_the_same_commands_the_same() {
     for slower in [1, 4] {
@@ -258,8 +261,8 @@ fn a_board_that_senses_the_same_commands_the_same() {
     }
 }
 
-/// From power-up: it rehearses by itself, its crew arms and starts it, and it lands. The world is moved by a computer that decides the
-/// same in every frame.
+/// From power-up: it rehearses by itself, its crew arms and starts it, and it lands. The world is
+/// moved by a computer that decides the same in every frame.
 #[test]
 fn a_board_rehearses_arms_and_lands() {
     let mut sortie = Sortie::on_the_pad(&recipe(), 0).unwrap();
@@ -289,8 +292,8 @@ fn a_board_rehearses_arms_and_lands() {
     assert_eq!(flight.computer().mode().phase, sortie.computer().mode().phase);
 }
 
-/// On a board the heap is for set-up. In flight there are only the lists of a frame's news, which go with the frame. vlr wants
-/// more intervals in flight than on the ground.
+/// On a board the heap is for set-up. In flight there are only the lists of a frame's news, which
+/// go with the frame. vlr wants more intervals in flight than on the ground.
 #[test]
 fn in_flight_only_news_allocate() {
     for mission in ["mk2", "mk3", "vlr"] {

@@ -1,4 +1,5 @@
-//! Times the estimator: one second of flight (200 frames, with every sensor at its rate), and one frame.
+//! Times the estimator: one second of flight (200 frames, with every sensor at its rate), and one
+//! frame.
 //!
 //! `cargo bench -p flight --bench estimator`
 
@@ -33,7 +34,8 @@ const VEHICLE: VehicleNow = VehicleNow {
     },
 };
 
-/// A second of upright fall at a steady 39 m/s, low enough for the lidar. It is the second with the most work.
+/// A second of upright fall at a steady 39 m/s, low enough for the lidar. It is the second with the
+/// most work.
 fn second() -> Vec<Measurements> {
     (1..=200_u32)
         .map(|frame| {

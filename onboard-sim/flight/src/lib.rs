@@ -1,8 +1,8 @@
 //! This crate is the flight software: it turns sensor samples into commands, and does nothing else.
 //!
-//! The crate is pure: state, inputs and time are arguments, and the same arguments give the same bits on any machine.
-//! It uses no clock, socket, file, thread or random source, and it needs no operating system. So a log of the inputs
-//! is enough to fly a flight again.
+//! The crate is pure: state, inputs and time are arguments, and the same arguments give the same
+//! bits on any machine. It uses no clock, socket, file, thread or random source, and it needs no
+//! operating system. So a log of the inputs is enough to fly a flight again.
 //!
 //! The modules, in reading order:
 //!
@@ -13,9 +13,11 @@
 //! * [`rules`] decides what the vehicle may do: phases, checks and limits.
 //! * [`computer`] is the flight computer: one frame, from sensor samples to commands.
 //!
-//! With the feature `files`, `vehicles` reads the files that describe a vehicle. The crate [`ocp`] solves the landing problem.
+//! With the feature `files`, `vehicles` reads the files that describe a vehicle. The crate [`ocp`]
+//! solves the landing problem.
 //!
-//! Units are SI and radians; names carry units and frames. The frames are those of [`vehicle::rigid`].
+//! Units are SI and radians; names carry units and frames. The frames are those of
+//! [`vehicle::rigid`].
 #![cfg_attr(not(test), no_std)]
 
 extern crate alloc;
@@ -52,7 +54,8 @@ macro_rules! numbered_enum {
     };
 }
 
-/// A struct that has a default value beside each field, as Rust's `default_field_values` will have it.
+/// A struct that has a default value beside each field, as Rust's `default_field_values` will have
+/// it.
 #[macro_export]
 macro_rules! with_defaults {
     ($(#[$attribute:meta])* $seen:vis struct $name:ident {
@@ -72,13 +75,16 @@ macro_rules! with_defaults {
 pub mod vehicle {
     //! Describes the rocket, its motor, the air and a mission as data.
     //!
-    //! * [`mission`] holds a flight from apogee: the vehicle, the start, the settings and the limits.
+    //! * [`mission`] holds a flight from apogee: the vehicle, the start, the settings and the
+    //!   limits.
     //! * [`airframe`] holds masses, shape and actuators.
-    //! * [`thrust_curve`] is the certified motor, [`lot`] what burns of its lot tell, and [`burn`] the expected burn of this motor.
+    //! * [`thrust_curve`] is the certified motor, [`lot`] what burns of its lot tell, and [`burn`]
+    //!   the expected burn of this motor.
     //! * [`atmosphere`] and [`fins`] give the air and its forces on the fins.
     //! * [`rigid`] is the state in space.
     //! * [`site`] is the launch site: position, air and ground.
-    //! * [`launch`] is the ascent: the rail, and the booster stage; [`drop`](mod@drop) the release from a drone.
+    //! * [`launch`] is the ascent: the rail, and the booster stage; [`drop`](mod@drop) the release
+    //!   from a drone.
 
     pub mod airframe;
     pub mod atmosphere;
@@ -113,7 +119,8 @@ pub mod guidance {
     //! Decides where to steer, when to light the motor, and how to land.
     //!
     //! * [`descent`] steers by the fins before ignition.
-    //! * [`vertical`] computes the band of heights from which a landing exists, [`ignition`] when to light the motor.
+    //! * [`vertical`] computes the band of heights from which a landing exists, [`ignition`] when
+    //!   to light the motor.
     //! * [`powered`] plans and flies the landing burn.
 
     pub mod descent;
@@ -139,7 +146,8 @@ pub mod rules {
     //! * [`phase`] has the flight phases and the one table that moves between them.
     //! * [`arming`] has the checks before arming, [`gate`] the checks before ignition.
     //! * [`outputs`] says which igniter, charge or parachute has current.
-    //! * [`operator`] has the people who may command; [`two_person`] lets two of them arm and start together.
+    //! * [`operator`] has the people who may command; [`two_person`] lets two of them arm and start
+    //!   together.
     //! * [`verdict`] has the touchdown limits, and whether a landing kept them.
 
     pub mod arming;

@@ -2,8 +2,9 @@
 //!
 //! `cargo run --release -p judge --example agreement -- FLIGHTS EVERY MISSION/SET...`
 //!
-//! Flies so many flights of each mission and set of dispersions, and judges every so manyth plan of the landing burns. The
-//! judge begins from its own guesses, and from the plan that flew. Prints a table in Markdown.
+//! Flies so many flights of each mission and set of dispersions, and judges every so manyth plan of
+//! the landing burns. The judge begins from its own guesses, and from the plan that flew. Prints a
+//! table in Markdown.
 
 use std::io::Write as _;
 

@@ -1,5 +1,5 @@
-//! The landing in space, written from the equations in the documentation of [`ocp::landing`]: dynamics of an interval for any
-//! kind of number, running cost, and conditions.
+//! The landing in space, written from the equations in the documentation of [`ocp::landing`]:
+//! dynamics of an interval for any kind of number, running cost, and conditions.
 
 use nalgebra::{SMatrix, SVector, Vector3};
 use num_dual::{DualNum, DualNumCopy, HyperDual64};
@@ -8,8 +8,8 @@ use ocp::landing::{INPUTS, Problem, STATES};
 /// States and inputs of a node, one after the other.
 pub(crate) const BOTH: usize = STATES + INPUTS;
 
-/// A node: position of the feet, m; velocity, m/s; leans, rad; their rates, rad/s; gimbal angles, rad; share of the fins.
-/// The last node has no inputs: they are zero.
+/// A node: position of the feet, m; velocity, m/s; leans, rad; their rates, rad/s; gimbal angles,
+/// rad; share of the fins. The last node has no inputs: they are zero.
 pub(crate) type Node = SVector<f64, BOTH>;
 
 /// A state as a vector.
@@ -75,7 +75,8 @@ where
     ]
 }
 
-/// The end of interval `k`, its derivatives by states and inputs, and the second derivatives of its product with a costate.
+/// The end of interval `k`, its derivatives by states and inputs, and the second derivatives of its
+/// product with a costate.
 pub(crate) struct Tangent {
     pub(crate) end: Column,
     pub(crate) by: SMatrix<f64, STATES, BOTH>,
@@ -102,7 +103,8 @@ impl Tangent {
     }
 }
 
-/// Weights of the cost at node `k`, and the node that costs nothing: the cost is half the weighted sum of squares.
+/// Weights of the cost at node `k`, and the node that costs nothing: the cost is half the weighted
+/// sum of squares.
 pub(crate) fn cost_at(problem: &Problem, k: usize) -> (Node, Node) {
     let Problem { weights, step_s, target_m: [x_m, y_m], .. } = problem;
     let mut weight = Node::zeros();

@@ -1,12 +1,14 @@
 //! This crate solves the landing in space a second time, to judge the plans that flew.
 //!
-//! It shares with the solver that flies ([`ocp::landing::solve`]) the data of a problem, and no function: dynamics, cost and
-//! conditions (`landing`) are written again from their documentation, and their derivatives are those of hyper-dual numbers.
-//! The method is another one (`sqp`): sequential quadratic programming, whose subproblems Clarabel solves. It takes about a
-//! second where the flying solver takes a millisecond.
+//! It shares with the solver that flies ([`ocp::landing::solve`]) the data of a problem, and no
+//! function: dynamics, cost and conditions (`landing`) are written again from their documentation,
+//! and their derivatives are those of hyper-dual numbers. The method is another one (`sqp`):
+//! sequential quadratic programming, whose subproblems Clarabel solves. It takes about a second
+//! where the flying solver takes a millisecond.
 //!
-//! As in flight a condition on a state is an exact penalty at the price [`terminal_penalty`](ocp::landing::SolverLimits), so a
-//! problem without a landing has an answer as well, and of two plans the one with the lower [`Score::merit`] is better.
+//! As in flight a condition on a state is an exact penalty at the price
+//! [`terminal_penalty`](ocp::landing::SolverLimits), so a problem without a landing has an answer
+//! as well, and of two plans the one with the lower [`Score::merit`] is better.
 
 mod landing;
 mod sqp;
@@ -18,8 +20,8 @@ use ocp::landing::{INPUTS, Problem, STATES, State};
 use self::landing::{Node, Range, after, cost_at, ranges};
 use self::sqp::Search;
 
-/// A plan by the judge's own dynamics and conditions. NaN throughout if the plan has another number of intervals, or does not fly
-/// on finite numbers.
+/// A plan by the judge's own dynamics and conditions. NaN throughout if the plan has another number
+/// of intervals, or does not fly on finite numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Score {
     /// The running cost.
@@ -30,7 +32,8 @@ pub struct Score {
     pub miss: f64,
     /// Which condition misses most, and its node; `None` if all hold.
     pub worst: Option<(&'static str, usize)>,
-    /// Largest difference between a state and the end of the interval before it (m, m/s, rad or rad/s).
+    /// Largest difference between a state and the end of the interval before it (m, m/s, rad or
+    /// rad/s).
     pub defect: f64,
 }
 
@@ -48,12 +51,13 @@ pub struct Judgement {
     pub inputs: Vec<[f64; INPUTS]>,
 }
 
-/// The judge's own guesses: turns of the lean, and how far from the problem's direction it begins, rad.
+/// The judge's own guesses: turns of the lean, and how far from the problem's direction it begins,
+/// rad.
 const GUESSES: [(f64, f64); 5] = [(1.0, 0.0), (-1.0, 0.0), (1.0, PI), (-1.0, PI), (0.0, 0.0)];
 
-/// Solves a landing from the judge's own guesses, and from a plan if there is one; the best is the answer. A plan with
-/// another number of intervals is not used. The final time is that of the problem. The score is NaN if the problem has no
-/// intervals, or numbers that are not finite.
+/// Solves a landing from the judge's own guesses, and from a plan if there is one; the best is the
+/// answer. A plan with another number of intervals is not used. The final time is that of the
+/// problem. The score is NaN if the problem has no intervals, or numbers that are not finite.
 pub fn solve(problem: &Problem, start: Option<(&[State], &[[f64; INPUTS]])>) -> Judgement {
     let search = Search::of(problem);
     let given = start.and_then(|(states, inputs)| nodes(problem, states, inputs));

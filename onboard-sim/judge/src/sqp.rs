@@ -1,12 +1,15 @@
 //! Sequential quadratic programming. One iteration:
 //!
-//! 1. A backward pass makes the quadratic model: derivatives of every interval, costates, and the exact Hessian of the
-//!    Lagrangian. A Riccati recursion moves curvature between the stages until each stage is convex, which leaves the solution
-//!    of the subproblem as it was (Verschueren, Zanon, Quirynen, Diehl, "A sparsity preserving convexification procedure for
-//!    indefinite quadratic programs arising in direct optimal control", SIAM J. Optim. 27, 2017).
-//! 2. Clarabel solves the subproblem: nodes and misses are its variables, intervals and conditions its rows.
-//! 3. The step is flown: the inputs follow it, and correct with the recursion's gains what the tangents did not see. So every
-//!    iterate is flyable, and its merit is the one of its [`score`](crate::score). The step is halved until the merit falls.
+//! 1. A backward pass makes the quadratic model: derivatives of every interval, costates, and the
+//!    exact Hessian of the Lagrangian. A Riccati recursion moves curvature between the stages until
+//!    each stage is convex, which leaves the solution of the subproblem as it was (Verschueren,
+//!    Zanon, Quirynen, Diehl, "A sparsity preserving convexification procedure for indefinite
+//!    quadratic programs arising in direct optimal control", SIAM J. Optim. 27, 2017).
+//! 2. Clarabel solves the subproblem: nodes and misses are its variables, intervals and conditions
+//!    its rows.
+//! 3. The step is flown: the inputs follow it, and correct with the recursion's gains what the
+//!    tangents did not see. So every iterate is flyable, and its merit is the one of its
+//!    [`score`](crate::score). The step is halved until the merit falls.
 
 use std::f64::consts::TAU;
 
@@ -24,26 +27,30 @@ const ITERATIONS: usize = 60;
 /// A plan has converged when the subproblem promises less than this share of its merit.
 const TOLERANCE: f64 = 1e-7;
 
-/// Share of the promised decrease of the merit that a step has to keep, and how many shares are tried.
+/// Share of the promised decrease of the merit that a step has to keep, and how many shares are
+/// tried.
 const KEPT: f64 = 1e-4;
 const SHARES: usize = 10;
 
-/// The merit must be less than the largest of so many before: a full step along a curved condition raises it for a moment.
+/// The merit must be less than the largest of so many before: a full step along a curved condition
+/// raises it for a moment.
 const MEMORY: usize = 8;
 
-/// So many iterations first go without the dynamics' curvature. With it from the second on, the best of three guesses ends beside
-/// the best known landing in 3 of 12 landings like those of the tests; after these in none.
+/// So many iterations first go without the dynamics' curvature. With it from the second on, the
+/// best of three guesses ends beside the best known landing in 3 of 12 landings like those of the
+/// tests; after these in none.
 const ROUGH: usize = 10;
 
 /// Smallest curvature of a stage, and the smallest of the inputs relative to their largest.
 const CURVATURE: f64 = 1e-6;
 const INPUT_CURVATURE: f64 = 1e-4;
 
-/// Curvature across a condition that holds with a multiplier, relative to the penalty. The subproblem cannot move there, so
-/// its solution stays, and the rest is convex more often.
+/// Curvature across a condition that holds with a multiplier, relative to the penalty. The
+/// subproblem cannot move there, so its solution stays, and the rest is convex more often.
 const STIFFNESS: f64 = 1.0;
 
-/// A multiplier this close to zero or to its penalty, relative to the penalty, does not show that its condition holds.
+/// A multiplier this close to zero or to its penalty, relative to the penalty, does not show that
+/// its condition holds.
 const UNSETTLED: f64 = 1e-4;
 
 /// Largest number of sweeps of the eigenvalue iteration.
@@ -58,7 +65,8 @@ pub(crate) struct Search<'a> {
     pub(crate) ranges: Vec<Range>,
 }
 
-/// Where a search ended: if it has not converged, at its best iterate; without nodes if nothing flies.
+/// Where a search ended: if it has not converged, at its best iterate; without nodes if nothing
+/// flies.
 pub(crate) struct End {
     pub(crate) converged: bool,
     pub(crate) iterations: usize,
@@ -88,7 +96,8 @@ impl<'a> Search<'a> {
         Self { problem, ranges: ranges(problem) }
     }
 
-    /// The straight line to rest at the target, and a lean that turns around so often, from a direction.
+    /// The straight line to rest at the target, and a lean that turns around so often, from a
+    /// direction.
     pub(crate) fn guess(&self, (turns, from_rad): (f64, f64)) -> Vec<Node> {
         let Problem { initial, target_m: [x_m, y_m], guess_lean_rad, guess_towards_rad, .. } = self.problem;
         let last = self.problem.pushes.len();

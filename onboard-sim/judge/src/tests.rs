@@ -7,7 +7,8 @@ mod problem;
 
 use problem::{GRAVITY_M_S2, problem};
 
-/// The landing of 2.0 has two optima whose merits differ by 0.2 %: there each solver finds another one.
+/// The landing of 2.0 has two optima whose merits differ by 0.2 %: there each solver finds another
+/// one.
 #[test]
 fn val_flying_solver_agrees_with_the_judges_own_guesses() {
     for (thrust_over_weight, sideways_m_s, optima) in

@@ -1,17 +1,17 @@
 //! Input limits and elastic conditions, with their slacks and multipliers.
 //!
-//! An input limit is a hard inequality. A condition `c(x)` on one state component is an exact penalty at the penalty
-//! `M`: with slacks `c = s - e`, `s > 0` above and `e > 0` below,
+//! An input limit is a hard inequality. A condition `c(x)` on one state component is an exact
+//! penalty at the penalty `M`: with slacks `c = s - e`, `s > 0` above and `e > 0` below,
 //!
 //! ```text
 //! inequality  c >= 0   cost M e          0 < y < M     s y       = mu    e (M - y) = mu
 //! equality    c  = 0   cost M (s + e)   -M < y < M     s (M + y) = mu    e (M - y) = mu
 //! ```
 //!
-//! so the penalty limits `y`, and a condition that cannot be met is missed by as little as the penalty allows. Conditions
-//! are linear, so `c = s - e` holds at every iterate if it holds at the first. The elimination of slacks and multiplier
-//! from the Newton system leaves a diagonal term `1 / D`, `D = s / (y + l) + e / (M - y)`, on the condition's
-//! component.
+//! so the penalty limits `y`, and a condition that cannot be met is missed by as little as the
+//! penalty allows. Conditions are linear, so `c = s - e` holds at every iterate if it holds at the
+//! first. The elimination of slacks and multiplier from the Newton system leaves a diagonal term `1
+//! / D`, `D = s / (y + l) + e / (M - y)`, on the condition's component.
 
 use crate::model::InputRange;
 
@@ -37,7 +37,8 @@ impl Limits {
         Self { lower: barrier / range.below(input), upper: barrier / range.above(input) }
     }
 
-    /// Raises multipliers to the barrier, and returns the input moved away from the limits with a multiplier.
+    /// Raises multipliers to the barrier, and returns the input moved away from the limits with a
+    /// multiplier.
     pub(crate) fn raise(&mut self, input: f64, range: &InputRange, barrier: f64) -> f64 {
         let room = 0.5 * range.reach();
         let below = range.below(input).max((barrier / self.lower).min(room));
@@ -67,8 +68,8 @@ impl Limits {
 
 /// Slacks and multiplier of a condition.
 ///
-/// The multiplier is kept as its distances `a = y + l` and `b = M - y`, so that it stays exact when it is next to an
-/// end of its range.
+/// The multiplier is kept as its distances `a = y + l` and `b = M - y`, so that it stays exact when
+/// it is next to an end of its range.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Elastic {
     a: f64,
@@ -106,8 +107,8 @@ impl Elastic {
 
     /// The elastic of a condition at value `c` with a multiplier from an earlier solution.
     pub(crate) fn warm(c: f64, multiplier: f64, equality: bool, penalty: f64, barrier: f64) -> Self {
-        /// Smallest distance of a multiplier from the ends of its range, as a fraction of its value on the central
-        /// path.
+        /// Smallest distance of a multiplier from the ends of its range, as a fraction of its value
+        /// on the central path.
         const KEPT: f64 = 0.1;
         let least = if equality { penalty } else { 0.0 };
         let nearest = KEPT * barrier / c.abs().max(SLACK);
@@ -116,7 +117,8 @@ impl Elastic {
         Self { a, b, above: barrier / a, below: barrier / b, least, penalty }.fitted(c)
     }
 
-    /// The elastic of a condition at value `c` with the multiplier of an optimum, which may be at an end of its range.
+    /// The elastic of a condition at value `c` with the multiplier of an optimum, which may be at
+    /// an end of its range.
     pub(crate) fn settled(c: f64, multiplier: f64, equality: bool, penalty: f64, barrier: f64) -> Self {
         /// Smallest distance from the ends: negligible, but above zero.
         const NOTHING: f64 = 1e-9;

@@ -1,30 +1,34 @@
-//! Newton's method that treats the active limits and conditions as equations: the fast way to an optimum that is close.
+//! Newton's method that treats the active limits and conditions as equations: the fast way to an
+//! optimum that is close.
 //!
-//! A barrier must be raised and lowered again when a limit or condition changes sides. Here each has a side, and one
-//! Newton step of the equations for these sides moves directly to the point where they would hold:
+//! A barrier must be raised and lowered again when a limit or condition changes sides. Here each
+//! has a side, and one Newton step of the equations for these sides moves directly to the point
+//! where they would hold:
 //!
 //! ```text
 //! input      free, or at its lower or upper limit
 //! condition  held at zero, its multiplier free; or the multiplier at an end of its range (`barrier`), the value free
 //! ```
 //!
-//! After each step an input beyond its limit is put on the limit, and an input that pulls away from its limit is
-//! released. If the multiplier of a held condition leaves its range, it is put at that end of the range; a condition
-//! that comes back to zero is held again. With the right sides, this is Newton's method on the optimality conditions.
-//! It is the primal-dual active set strategy (Hintermueller, Ito, Kunisch, SIAM J. Optim. 13, 2003) and needs no line
-//! search.
+//! After each step an input beyond its limit is put on the limit, and an input that pulls away from
+//! its limit is released. If the multiplier of a held condition leaves its range, it is put at that
+//! end of the range; a condition that comes back to zero is held again. With the right sides, this
+//! is Newton's method on the optimality conditions. It is the primal-dual active set strategy
+//! (Hintermueller, Ito, Kunisch, SIAM J. Optim. 13, 2003) and needs no line search.
 //!
-//! Where inputs change a held condition only to second order, its equation gives a step that is far too long. Therefore
-//! `bend` shortens a long first step with its second-order terms. If that is not possible, held conditions are springs
-//! at first (the method of multipliers: Bertsekas, *Constrained Optimization and Lagrange Multiplier Methods*, 1982),
-//! which get stiffer with every step.
+//! Where inputs change a held condition only to second order, its equation gives a step that is far
+//! too long. Therefore `bend` shortens a long first step with its second-order terms. If that is
+//! not possible, held conditions are springs at first (the method of multipliers: Bertsekas,
+//! *Constrained Optimization and Lagrange Multiplier Methods*, 1982), which get stiffer with every
+//! step.
 //!
-//! The last one or two steps are so short that the second derivatives of the previous step are good enough (a chord
-//! instead of a tangent, Ortega and Rheinboldt, *Iterative Solution of Nonlinear Equations in Several Variables*, 1970,
-//! section 7.1). Such a step costs only the sweeps of the slopes.
+//! The last one or two steps are so short that the second derivatives of the previous step are good
+//! enough (a chord instead of a tangent, Ortega and Rheinboldt, *Iterative Solution of Nonlinear
+//! Equations in Several Variables*, 1970, section 7.1). Such a step costs only the sweeps of the
+//! slopes.
 //!
-//! This method need not converge from a distant start. So it stops after some steps, and the barrier method starts from
-//! the same point. `sides` has the parts of a step.
+//! This method need not converge from a distant start. So it stops after some steps, and the
+//! barrier method starts from the same point. `sides` has the parts of a step.
 
 use crate::barrier::LAST_BARRIER;
 use crate::model::Model;
@@ -40,7 +44,8 @@ const MOST_STEPS: usize = 12;
 const STRAY_STEPS: usize = 8;
 const STRAY: f64 = 100.0;
 
-/// Second derivative by a held condition's value: so stiff that after a step the value is zero except for rounding.
+/// Second derivative by a held condition's value: so stiff that after a step the value is zero
+/// except for rounding.
 const STIFF: f64 = 1e9;
 
 /// The same if a stiff step is long, because the path bends before its end.
@@ -55,11 +60,12 @@ const HARDENING: f64 = 30.0;
 /// A first step of the inputs this long, in their units, counts as long.
 const CAREFUL_STEP: f64 = 0.03;
 
-/// A step of the inputs this small, in their units, is probably the last one, so derivatives are only evaluated if it
-/// is not.
+/// A step of the inputs this small, in their units, is probably the last one, so derivatives are
+/// only evaluated if it is not.
 const LAST_STEP: f64 = 1e-3;
 
-/// How much more than the ratio of the step lengths a step with old second derivatives reduces the residual.
+/// How much more than the ratio of the step lengths a step with old second derivatives reduces the
+/// residual.
 const CHORD_LOSS: f64 = 2.0;
 
 /// After a step of the inputs this large, in their units, the solution is not close.
@@ -71,10 +77,12 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
     /// With few iterations it may end at their limit, with `current` after so many steps.
     ///
     /// # Errors
-    /// The numbers of steps and sweeps, if the optimum is not close; `current` must then not be used.
+    /// The numbers of steps and sweeps, if the optimum is not close; `current` must then not be
+    /// used.
     pub(crate) fn pursue(&mut self, model: &M, cap: usize) -> Result<SolveEnd, (usize, u32)> {
-        // Half of the iterations are reserved for the methods that can start from further away. Of few there is nothing to
-        // reserve: none of those methods is nearer to the optimum after so few.
+        // Half of the iterations are reserved for the methods that can start from further away. Of
+        // few there is nothing to reserve: none of those methods is nearer to the optimum after so
+        // few.
         let few = cap < MOST_STEPS;
         let most = if few { cap } else { MOST_STEPS.min(cap / 2) };
         self.take_sides(model);
@@ -162,8 +170,8 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
         Err((most, sweeps))
     }
 
-    /// The Newton step that belongs to the sides; whether it has the whole curvature of the dynamics, `None` without
-    /// the right inertia.
+    /// The Newton step that belongs to the sides; whether it has the whole curvature of the
+    /// dynamics, `None` without the right inertia.
     fn step_for_sides(&mut self, model: &M, stiffness: f64, sweeps: &mut u32) -> Option<bool> {
         self.assemble_sides(model, stiffness);
         let share = CURVATURE_SHARES.into_iter().position(|share| {
@@ -178,14 +186,14 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
 
 // A solve from an earlier solution.
 
-/// Largest difference between the start and the earlier solution's expected state at which that solution may still be
-/// optimal.
+/// Largest difference between the start and the earlier solution's expected state at which that
+/// solution may still be optimal.
 const AS_EXPECTED: f64 = 1e-6;
 
 impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
-    /// Solves from an earlier solution. It is returned unchanged if it is still optimal. Otherwise the steps of
-    /// `clamped`, the barrier method and a cold solve are tried in this order until one succeeds, in at most `cap`
-    /// iterations in total.
+    /// Solves from an earlier solution. It is returned unchanged if it is still optimal. Otherwise
+    /// the steps of `clamped`, the barrier method and a cold solve are tried in this order until
+    /// one succeeds, in at most `cap` iterations in total.
     pub(crate) fn warm(&mut self, model: &M, warm: &Start<NX, NU>, cap: usize) -> SolveEnd {
         let complete = start::warm(model, &self.conditions, warm, LAST_BARRIER, &mut self.current);
         let expected = warm.states.first().is_some_and(|state| {
@@ -222,9 +230,9 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
 
 // Shortens a long first step with its second-order terms.
 //
-// Where inputs change a condition only to second order (a tilt near upright: the height), its linear equation gives a
-// step that is far too long. With the path rolled out at the whole step, the states are known to second order in the
-// fraction `t` of the step,
+// Where inputs change a condition only to second order (a tilt near upright: the height), its
+// linear equation gives a step that is far too long. With the path rolled out at the whole step,
+// the states are known to second order in the fraction `t` of the step,
 //
 // ```text
 // x(t) = x + drift + t (step - drift) + t^2 (rolled out - x - step)
@@ -245,8 +253,8 @@ fn first_root(c: f64, b: f64, a: f64) -> Option<f64> {
 }
 
 impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
-    /// Takes the fraction of a long step at which the one held condition, an equality, is met. Returns false if there
-    /// is none, or if another condition is held, too.
+    /// Takes the fraction of a long step at which the one held condition, an equality, is met.
+    /// Returns false if there is none, or if another condition is held, too.
     pub(crate) fn bend(&mut self, model: &M, stiffness: f64) -> bool {
         let Self { conditions, current, trial, newton, sides, scratch, .. } = self;
         let mut held =

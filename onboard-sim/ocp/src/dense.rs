@@ -1,5 +1,5 @@
-//! Intervals as whole matrices, for models without a structure that is worth its own code; and the factors of a
-//! symmetric matrix.
+//! Intervals as whole matrices, for models without a structure that is worth its own code; and the
+//! factors of a symmetric matrix.
 #![expect(clippy::inline_always, reason = "inlined into the sweeps, to be compiled for their vectors")]
 
 use alloc::vec::Vec;
@@ -7,8 +7,8 @@ use core::array::from_fn;
 
 use crate::intervals::{Curvature, Feedback, Hessian, Interval, Intervals, Stage, add_times};
 
-/// One interval. [`Model::evaluate`](crate::Model::evaluate) fills in `end`, `pulled_x` and `pulled_u`, and the other
-/// fields if derivatives are asked for.
+/// One interval. [`Model::evaluate`](crate::Model::evaluate) fills in `end`, `pulled_x` and
+/// `pulled_u`, and the other fields if derivatives are asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Dense<const NX: usize, const NU: usize> {
     /// `F`.

@@ -1,6 +1,7 @@
-//! The dynamics at a point, as the solver reads them. [`DenseIntervals`](crate::DenseIntervals) has whole matrices;
-//! a model whose matrices have a known structure can have its own. Also what the backward sweep makes of them:
-//! its stages, the value function, and second derivatives of the cost.
+//! The dynamics at a point, as the solver reads them. [`DenseIntervals`](crate::DenseIntervals) has
+//! whole matrices; a model whose matrices have a known structure can have its own. Also what the
+//! backward sweep makes of them: its stages, the value function, and second derivatives of the
+//! cost.
 #![expect(clippy::inline_always, reason = "a fixed-size kernel of a few dozen instructions")]
 
 use core::array::from_fn;
@@ -10,11 +11,11 @@ use crate::dense::{Factor, add_multiple};
 
 /// All intervals of a horizon, evaluated at a point: where each ends, and its derivatives.
 ///
-/// `A` and `B` are the derivatives of the end `F(x, u)` by state and input, `lambda` is the costate of the node after
-/// the interval, at which the intervals were evaluated.
+/// `A` and `B` are the derivatives of the end `F(x, u)` by state and input, `lambda` is the costate
+/// of the node after the interval, at which the intervals were evaluated.
 pub trait Intervals<const NX: usize, const NU: usize>: Clone + Debug + Default {
-    /// Number of leading states on which no derivative depends, like positions in a uniform field: their columns of `A`
-    /// are those of the identity.
+    /// Number of leading states on which no derivative depends, like positions in a uniform field:
+    /// their columns of `A` are those of the identity.
     const INTEGRALS: usize = 0;
 
     /// One interval's derivatives.
@@ -28,15 +29,16 @@ pub trait Intervals<const NX: usize, const NU: usize>: Clone + Debug + Default {
     /// `F` of interval `k`.
     fn end(&self, k: usize) -> [f64; NX];
 
-    /// `(A' lambda, B' lambda)` of interval `k`, with `A` and `B` at the last evaluation, even if that was one without
-    /// derivatives. The same `lambda` is given again.
+    /// `(A' lambda, B' lambda)` of interval `k`, with `A` and `B` at the last evaluation, even if
+    /// that was one without derivatives. The same `lambda` is given again.
     fn pulled(&self, k: usize, lambda: &[f64; NX]) -> ([f64; NX], [f64; NU]);
 
     /// The derivatives of interval `k` at the last evaluation with derivatives.
     fn interval(&self, k: usize) -> Self::Interval<'_>;
 }
 
-/// The derivatives of one interval, as operations. They are inlined into the sweeps, so mark them `#[inline(always)]`.
+/// The derivatives of one interval, as operations. They are inlined into the sweeps, so mark them
+/// `#[inline(always)]`.
 pub trait Interval<const NX: usize, const NU: usize> {
     /// `(A' g, B' g)`.
     fn pull(&self, g: &[f64; NX]) -> ([f64; NX], [f64; NU]);
@@ -45,8 +47,9 @@ pub trait Interval<const NX: usize, const NU: usize> {
     fn push(&self, dx: &[f64; NX], du: &[f64; NU]) -> [f64; NX];
 
     /// One stage of the backward sweep: from the value function of the node after the interval,
-    /// `dx' after dx / 2 + slope' dx`, to that of the node before it, with the feedback of the inputs. `None` if the matrix of
-    /// the inputs is not positive definite; `before` and `slope` must then not be used.
+    /// `dx' after dx / 2 + slope' dx`, to that of the node before it, with the feedback of the
+    /// inputs. `None` if the matrix of the inputs is not positive definite; `before` and `slope`
+    /// must then not be used.
     ///
     /// [`Dense`](crate::Dense) has the formulas.
     fn eliminate<C: Curvature<NX>, R: Curvature<NU>>(
@@ -77,7 +80,8 @@ pub struct Hessian<const NX: usize, const NU: usize> {
 /// Smallest curvature by an input that counts as positive, relative to the input's own terms.
 const LEAST_CURVATURE: f64 = 1e-11;
 
-/// An interval to be eliminated, apart from its own derivatives: the objective at the node before it and by its inputs.
+/// An interval to be eliminated, apart from its own derivatives: the objective at the node before
+/// it and by its inputs.
 #[derive(Debug, Clone, Copy)]
 pub struct Stage<'a, C, R, const NX: usize, const NU: usize> {
     /// Difference between the end of the interval and the next node.
@@ -86,13 +90,14 @@ pub struct Stage<'a, C, R, const NX: usize, const NU: usize> {
     pub share: f64,
     /// Second and first derivative of the objective by the state.
     pub state_terms: (&'a C, &'a [f64; NX]),
-    /// Second and first derivative of the objective by the inputs, apart from what comes through the states.
+    /// Second and first derivative of the objective by the inputs, apart from what comes through
+    /// the states.
     pub input_terms: (&'a R, &'a [f64; NU]),
 }
 
 impl<C: Curvature<NX>, R: Curvature<NU>, const NX: usize, const NU: usize> Stage<'_, C, R, NX, NU> {
-    /// Adds the inputs' own curvature to the one that comes through the states, and factorises the sum if it is positive
-    /// definite.
+    /// Adds the inputs' own curvature to the one that comes through the states, and factorises the
+    /// sum if it is positive definite.
     #[inline(always)]
     pub fn factor(&self, mut by_inputs: [[f64; NU]; NU]) -> Option<Factor<NU>> {
         let (own, _) = self.input_terms;
@@ -100,9 +105,9 @@ impl<C: Curvature<NX>, R: Curvature<NU>, const NX: usize, const NU: usize> Stage
         Factor::of(by_inputs, &from_fn(|i| LEAST_CURVATURE * (1.0 + own.diagonal(i))))
     }
 
-    /// Eliminates the inputs: from the second derivatives by states (`xx`), inputs and states, and inputs that come through the
-    /// node after the interval, and the slopes that do, to the value function of the node before it. `None` as in
-    /// [`Interval::eliminate`].
+    /// Eliminates the inputs: from the second derivatives by states (`xx`), inputs and states, and
+    /// inputs that come through the node after the interval, and the slopes that do, to the value
+    /// function of the node before it. `None` as in [`Interval::eliminate`].
     #[inline(always)]
     pub fn without_inputs(
         &self,
@@ -171,8 +176,8 @@ pub(crate) fn add_times<const NX: usize>(matrix: &[[f64; NX]; NX], vector: &[f64
 
 // Second derivatives of the cost: only the diagonal, or the whole matrix.
 
-/// The second derivative of a cost by `N` variables. `[f64; N]` is a diagonal, `[[f64; N]; N]` a whole symmetric
-/// matrix.
+/// The second derivative of a cost by `N` variables. `[f64; N]` is a diagonal, `[[f64; N]; N]` a
+/// whole symmetric matrix.
 pub trait Curvature<const N: usize>: Copy + Debug {
     const ZERO: Self;
 

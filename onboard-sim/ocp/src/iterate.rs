@@ -1,5 +1,5 @@
-//! An iterate: the states, inputs and multipliers of every node, with the intervals evaluated there,
-//! and its distance from optimality.
+//! An iterate: the states, inputs and multipliers of every node, with the intervals evaluated
+//! there, and its distance from optimality.
 
 use alloc::vec::Vec;
 use core::array::from_fn;
@@ -27,7 +27,8 @@ pub(crate) struct Iterate<M: Model<NX, NU>, const NX: usize, const NU: usize> {
 empty!(Iterate { states, inputs, costates, limits, elastics, intervals });
 
 impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Iterate<M, NX, NU> {
-    /// Makes room for the point, not for its intervals; allocates only if no earlier problem was this long.
+    /// Makes room for the point, not for its intervals; allocates only if no earlier problem was
+    /// this long.
     pub(crate) fn resize(&mut self, intervals: usize, conditions: usize) {
         self.states.resize(intervals + 1, [0.0; NX]);
         self.inputs.resize(intervals, [0.0; NU]);
@@ -36,7 +37,8 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Iterate<M, NX, NU> {
         self.elastics.resize(conditions, Elastic::default());
     }
 
-    /// Moves to the point of another iterate of the same size. The intervals there are not evaluated yet.
+    /// Moves to the point of another iterate of the same size. The intervals there are not
+    /// evaluated yet.
     pub(crate) fn move_to(&mut self, point: &Self) {
         self.states.copy_from_slice(&point.states);
         self.inputs.copy_from_slice(&point.inputs);
@@ -79,7 +81,8 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Iterate<M, NX, NU> {
         conditions.iter().map(|row| row.violation(row.value(&self.states))).fold(0.0, f64::max)
     }
 
-    /// The objective of the barrier problem: cost, elastics at their penalty and the logarithms of all slacks.
+    /// The objective of the barrier problem: cost, elastics at their penalty and the logarithms of
+    /// all slacks.
     pub(crate) fn barrier_objective(&self, model: &M, barrier: f64) -> f64 {
         /// Number of factors per logarithm, small enough that their product does not underflow.
         const FACTORS: usize = 8;
@@ -136,7 +139,8 @@ impl Residual {
         products: (f64::INFINITY, f64::INFINITY),
     };
 
-    /// The residuals at an evaluated iterate; `pushes` is scratch for the objective's slope at each node.
+    /// The residuals at an evaluated iterate; `pushes` is scratch for the objective's slope at each
+    /// node.
     pub(crate) fn of<M: Model<NX, NU>, const NX: usize, const NU: usize>(
         model: &M,
         conditions: &[Condition],

@@ -6,8 +6,8 @@ use crate::intervals::{Curvature, Intervals};
 
 /// An optimal-control problem with `NX` states and `NU` inputs, at least one input.
 ///
-/// Every method must be a function of the model and its arguments alone, so that equal problems have equal solutions,
-/// bit by bit.
+/// Every method must be a function of the model and its arguments alone, so that equal problems
+/// have equal solutions, bit by bit.
 pub trait Model<const NX: usize, const NU: usize> {
     /// The evaluated intervals.
     type Intervals: Intervals<NX, NU>;
@@ -25,19 +25,20 @@ pub trait Model<const NX: usize, const NU: usize> {
     /// The limits of each input, the same in every interval.
     fn input_ranges(&self) -> [InputRange; NU];
 
-    /// Appends the conditions, the same number for the same number of intervals; allocates only if the vector never
-    /// held as many.
+    /// Appends the conditions, the same number for the same number of intervals; allocates only if
+    /// the vector never held as many.
     fn append_conditions(&self, conditions: &mut Vec<Condition>);
 
     fn settings(&self) -> Settings;
 
-    /// Writes the states and inputs from which the cold solve `index` starts, 0 to `guesses + spare_guesses - 1` of the
-    /// settings. The first state is the initial one, the inputs are inside their limits, and the path may have defects.
-    /// Newton's method keeps a symmetry, so a guess should not have one that the best path breaks.
+    /// Writes the states and inputs from which the cold solve `index` starts, 0 to `guesses +
+    /// spare_guesses - 1` of the settings. The first state is the initial one, the inputs are
+    /// inside their limits, and the path may have defects. Newton's method keeps a symmetry, so a
+    /// guess should not have one that the best path breaks.
     fn guess(&self, index: usize, states: &mut [[f64; NX]], inputs: &mut [[f64; NU]]);
 
-    /// Evaluates every interval `k` from node `k`, with the costate of node `k + 1`. Without `derivatives` those of the
-    /// last evaluation stay as they are.
+    /// Evaluates every interval `k` from node `k`, with the costate of node `k + 1`. Without
+    /// `derivatives` those of the last evaluation stay as they are.
     fn evaluate(
         &self,
         states: &[[f64; NX]],
@@ -50,21 +51,22 @@ pub trait Model<const NX: usize, const NU: usize> {
     /// The state after interval `k`, as [`evaluate`](Self::evaluate) has it except for rounding.
     fn next(&self, k: usize, state: &[f64; NX], input: &[f64; NU]) -> [f64; NX];
 
-    /// The cost of a path, without penalties. The first state's part may be left out, because nothing changes it.
+    /// The cost of a path, without penalties. The first state's part may be left out, because
+    /// nothing changes it.
     fn cost(&self, states: &[[f64; NX]], inputs: &[[f64; NU]]) -> f64;
 
     /// First derivative of the cost by the state of a node.
     fn state_slope(&self, node: usize, state: &[f64; NX]) -> [f64; NX];
 
-    /// Second derivative of the cost by the state of a node. Where it is not positive semidefinite, the solver may
-    /// fail.
+    /// Second derivative of the cost by the state of a node. Where it is not positive semidefinite,
+    /// the solver may fail.
     fn state_curvature(&self, node: usize, state: &[f64; NX]) -> Self::StateCurvature;
 
     /// First derivative of the cost by the input of interval `k`.
     fn input_slope(&self, k: usize, input: &[f64; NU]) -> [f64; NU];
 
-    /// Second derivative of the cost by the input of interval `k`. Where it is not positive semidefinite, the solver
-    /// may fail.
+    /// Second derivative of the cost by the input of interval `k`. Where it is not positive
+    /// semidefinite, the solver may fail.
     fn input_curvature(&self, k: usize, input: &[f64; NU]) -> Self::InputCurvature;
 }
 
@@ -120,11 +122,13 @@ pub struct Settings {
     pub tolerance: f64,
     /// Penalty of one unit by which a condition is missed.
     pub penalty: f64,
-    /// Barrier of a cold solve's first iteration, of the order of the penalty, so that nothing is active yet.
+    /// Barrier of a cold solve's first iteration, of the order of the penalty, so that nothing is
+    /// active yet.
     pub first_barrier: f64,
     /// Number of guesses of a cold solve; the cheapest result is kept.
     pub guesses: usize,
-    /// Number of further guesses, tried if the cheapest result has not converged or misses a condition.
+    /// Number of further guesses, tried if the cheapest result has not converged or misses a
+    /// condition.
     pub spare_guesses: usize,
     /// Largest miss of a condition that counts as none.
     pub acceptable_miss: f64,
@@ -132,8 +136,8 @@ pub struct Settings {
 
 // Conditions on the states.
 
-/// A scalar condition on one state component of one node: `sign * component - offset` must be zero (an equality) or not
-/// negative, in the state's units.
+/// A scalar condition on one state component of one node: `sign * component - offset` must be zero
+/// (an equality) or not negative, in the state's units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Condition {
     /// The node, 1 to the number of intervals.

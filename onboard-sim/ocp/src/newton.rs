@@ -1,5 +1,5 @@
-//! The Newton system of the barrier problem at an iterate: its assembly, its solution, and the step to a trial point
-//! that the filter accepts.
+//! The Newton system of the barrier problem at an iterate: its assembly, its solution, and the step
+//! to a trial point that the filter accepts.
 
 use alloc::vec::Vec;
 
@@ -187,11 +187,12 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Newton<M, NX, NU> {
     }
 }
 
-// Accepts trial points with smaller defects or a lower objective than the present point and all points in the filter.
+// Accepts trial points with smaller defects or a lower objective than the present point and all
+// points in the filter.
 //
-// After Waechter and Biegler, "Line search filter methods for nonlinear programming" (SIAM J. Optim. 16, 2005) and
-// "On the implementation of an interior-point filter line-search algorithm" (Math. Program. 106, 2006), whose
-// constants these are.
+// After Waechter and Biegler, "Line search filter methods for nonlinear programming" (SIAM J.
+// Optim. 16, 2005) and "On the implementation of an interior-point filter line-search algorithm"
+// (Math. Program. 106, 2006), whose constants these are.
 
 /// Fraction of the defects by which either measure must fall.
 const MARGIN: f64 = 1e-5;
@@ -259,8 +260,9 @@ impl Filter {
         self.oldest = 0;
     }
 
-    /// Whether a trial point at `fraction` of a step is progress over `now`. If the point is accepted but the step was
-    /// not a descent of the objective, `now` enters the filter. `slope` is the objective's slope along the whole step.
+    /// Whether a trial point at `fraction` of a step is progress over `now`. If the point is
+    /// accepted but the step was not a descent of the objective, `now` enters the filter. `slope`
+    /// is the objective's slope along the whole step.
     pub(crate) fn accepts(&mut self, now: Measures, trial: Measures, slope: f64, fraction: f64) -> bool {
         if !trial.is_finite() {
             return false;

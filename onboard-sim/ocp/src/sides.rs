@@ -1,4 +1,5 @@
-//! The side of every limit and condition, and the parts of a Newton step that treats them as equations.
+//! The side of every limit and condition, and the parts of a Newton step that treats them as
+//! equations.
 
 use alloc::vec::Vec;
 
@@ -11,8 +12,8 @@ use crate::solver::Workspace;
 /// Second derivative by an input on its limit.
 const PINNED: f64 = 1e200;
 
-/// Largest slack of an input on its limit, in the input's unit, and smallest multiplier of an input off its limit:
-/// negligible, but above zero for the barrier.
+/// Largest slack of an input on its limit, in the input's unit, and smallest multiplier of an input
+/// off its limit: negligible, but above zero for the barrier.
 const HAIR: f64 = 1e-11;
 const NO_MULTIPLIER: f64 = 1e-9;
 
@@ -98,8 +99,8 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
         }
     }
 
-    /// Releases the inputs that pull away from their limits. Returns whether there was none, and the largest residual
-    /// of the optimality conditions for the sides.
+    /// Releases the inputs that pull away from their limits. Returns whether there was none, and
+    /// the largest residual of the optimality conditions for the sides.
     pub(crate) fn update_roles(&mut self, model: &M) -> (bool, f64) {
         let (current, sides) = (&self.current, &mut self.sides);
         let count = current.inputs.len();
@@ -215,7 +216,8 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
         changed
     }
 
-    /// Gives limits and conditions the slacks and multipliers of the barrier method; returns the residual with them.
+    /// Gives limits and conditions the slacks and multipliers of the barrier method; returns the
+    /// residual with them.
     pub(crate) fn settle(&mut self, model: &M) -> Residual {
         let ranges = model.input_ranges();
         let penalty = model.settings().penalty;

@@ -11,28 +11,32 @@ use crate::sides::Sides;
 use crate::start;
 use crate::start::{Outcome, SolveEnd, Start, Status};
 
-/// When limits and conditions change sides, the barrier is raised at least to this value and by this factor.
+/// When limits and conditions change sides, the barrier is raised at least to this value and by
+/// this factor.
 pub(crate) const RAISED_BARRIER: f64 = 1e-2;
 const RAISING_FACTOR: f64 = 100.0;
 
 /// Largest number of times that the barrier is raised.
 const RAISES: u32 = 4;
 
-/// How much longer the descent may be that begins where the best cold one ended at its cap beside a saddle: there the
-/// residual grows by a hundredth in each iteration. Of 30,000 cold starts in the box around the landing paper's problem on which
-/// nothing was chosen, one still ends at its cap, with its condition missed by 1.6 mm.
+/// How much longer the descent may be that begins where the best cold one ended at its cap beside a
+/// saddle: there the residual grows by a hundredth in each iteration. Of 30,000 cold starts in the
+/// box around the landing paper's problem on which nothing was chosen, one still ends at its cap,
+/// with its condition missed by 1.6 mm.
 const LONGER: usize = 10;
 
-/// If less than this fraction of a step is possible, primal or dual, the iterate is jammed between limits.
+/// If less than this fraction of a step is possible, primal or dual, the iterate is jammed between
+/// limits.
 const STEP_FRACTION_MIN: f64 = 0.1;
 
-/// After so many whole steps in a row with less than the dynamics' curvature the descent creeps along a saddle, and the barrier
-/// is raised. Fewer, and the steps beside some saddles are too few to leave them: with six, two of 30,000 cold starts of the
-/// landing paper's problem end at their cap, with eight none.
+/// After so many whole steps in a row with less than the dynamics' curvature the descent creeps
+/// along a saddle, and the barrier is raised. Fewer, and the steps beside some saddles are too few
+/// to leave them: with six, two of 30,000 cold starts of the landing paper's problem end at their
+/// cap, with eight none.
 const CREEPS: u32 = 8;
 
-/// If the line search shortens a step to less than this fraction, the Hessian is nearly singular, and the next step has less of
-/// the dynamics' curvature.
+/// If the line search shortens a step to less than this fraction, the Hessian is nearly singular,
+/// and the next step has less of the dynamics' curvature.
 const SHORT_STEP: f64 = 0.1;
 
 /// A barrier problem is solved when its residual is at most this multiple of the barrier.
@@ -42,25 +46,27 @@ const BARRIER_TOLERANCE: f64 = 30.0;
 const BARRIER_FACTOR: f64 = 0.2;
 const BARRIER_EXPONENT: f64 = 1.8;
 
-/// Bounds of the fraction of a slack or multiplier that a step must leave; between them it equals the barrier.
+/// Bounds of the fraction of a slack or multiplier that a step must leave; between them it equals
+/// the barrier.
 const KEPT_LEAST: f64 = 1e-4;
 const KEPT_MOST: f64 = 1e-2;
 
-/// Fractions of the dynamics' curvature that are tried until the inertia is right, beginning with the one before the
-/// last that was right; after one that was wrong, with that which was right. Without the curvature the Hessian is that of Gauss
-/// and Newton, whose inertia is always right. The second is nearly the whole: with half of it at once, landings in space creep,
-/// and take a fifth more iterations.
+/// Fractions of the dynamics' curvature that are tried until the inertia is right, beginning with
+/// the one before the last that was right; after one that was wrong, with that which was right.
+/// Without the curvature the Hessian is that of Gauss and Newton, whose inertia is always right.
+/// The second is nearly the whole: with half of it at once, landings in space creep, and take a
+/// fifth more iterations.
 pub(crate) const CURVATURE_SHARES: [f64; 4] = [1.0, 0.9, 0.5, 0.0];
 
 /// Shortest fraction that is tried of the step that the slacks allow.
 const SHORTEST_STEP: f64 = 1.0 / 1024.0;
 
-/// A step of the inputs this small, in their units, is taken without a test: the objective's rounding error is larger
-/// than its possible decrease.
+/// A step of the inputs this small, in their units, is taken without a test: the objective's
+/// rounding error is larger than its possible decrease.
 const TINY_STEP: f64 = 1e-7;
 
-/// Buffers of a solve, kept so that the next solve does not allocate. The result does not depend on them, except on what
-/// is left of the [allowance](Self::allow).
+/// Buffers of a solve, kept so that the next solve does not allocate. The result does not depend on
+/// them, except on what is left of the [allowance](Self::allow).
 #[derive(Debug, Clone)]
 pub struct Workspace<M: Model<NX, NU>, const NX: usize, const NU: usize> {
     pub(crate) conditions: Vec<Condition>,
@@ -78,8 +84,8 @@ pub struct Workspace<M: Model<NX, NU>, const NX: usize, const NU: usize> {
 empty!(Workspace { conditions, current, trial, best, newton, sides, filter, scratch, allowance });
 
 impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
-    /// Solves a problem, warm if there is a start with as many inputs as the problem has intervals, otherwise cold. It
-    /// does not allocate if a problem of this length was solved before.
+    /// Solves a problem, warm if there is a start with as many inputs as the problem has intervals,
+    /// otherwise cold. It does not allocate if a problem of this length was solved before.
     pub fn solve(&mut self, model: &M, start: Option<&Start<NX, NU>>) -> Outcome {
         self.resize(model);
         let cap = model.settings().max_iterations;
@@ -104,7 +110,8 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
         self.scratch.resize(intervals + 1, [0.0; NX]);
     }
 
-    /// Solves from the model's guesses with at most `cap` iterations each; `current` is then the best result.
+    /// Solves from the model's guesses with at most `cap` iterations each; `current` is then the
+    /// best result.
     pub(crate) fn cold(&mut self, model: &M, cap: usize) -> SolveEnd {
         let mut best: Option<(SolveEnd, f64)> = None;
         let (mut iterations, mut sweeps) = (0, 0);
@@ -137,7 +144,8 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
             && best.miss <= settings.acceptable_miss
             && !self.allowance.is_spent()
         {
-            // It creeps along a saddle. From where it ended, with the slacks opened again, it gets time to find the way down.
+            // It creeps along a saddle. From where it ended, with the slacks opened again, it gets
+            // time to find the way down.
             self.current.move_to(&self.best);
             start::raise(model, &self.conditions, RAISED_BARRIER, &mut self.current);
             let mut again = self.descend(model, RAISED_BARRIER, LONGER * cap);
@@ -225,7 +233,8 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
         SolveEnd { status, iterations, sweeps, residual, ..SolveEnd::BAD }
     }
 
-    /// Line search along the step from `current`. Returns the fraction at which a point was accepted; it is then `current`.
+    /// Line search along the step from `current`. Returns the fraction at which a point was
+    /// accepted; it is then `current`.
     fn advance(&mut self, model: &M, barrier: f64, fractions: Fractions, infeasibility: f64) -> Option<f64> {
         let slope = self.newton.slope(model, &self.current, barrier);
         let objective = self.current.barrier_objective(model, barrier);
@@ -261,10 +270,11 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
     }
 }
 
-// How much a workspace may still work: a bound on the time of several solves together that no clock decides.
+// How much a workspace may still work: a bound on the time of several solves together that no clock
+// decides.
 
-/// Passes made and allowed. A pass is one interval evaluated with its derivatives, or eliminated by a backward sweep: nearly all
-/// of a solve's time is in these two.
+/// Passes made and allowed. A pass is one interval evaluated with its derivatives, or eliminated by
+/// a backward sweep: nearly all of a solve's time is in these two.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Allowance {
     made: usize,
@@ -283,9 +293,10 @@ impl Allowance {
 }
 
 impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
-    /// Allows the coming solves so many passes together, or any number; a pass is one interval evaluated with its derivatives, or
-    /// eliminated by a backward sweep. An iteration that has begun is finished. A solve without passes ends
-    /// with [`Status::WorkLimit`]: cold with its first guess, warm with the start's inputs.
+    /// Allows the coming solves so many passes together, or any number; a pass is one interval
+    /// evaluated with its derivatives, or eliminated by a backward sweep. An iteration that has
+    /// begun is finished. A solve without passes ends with [`Status::WorkLimit`]: cold with its
+    /// first guess, warm with the start's inputs.
     pub fn allow(&mut self, passes: Option<usize>) {
         self.allowance = Allowance { made: 0, most: passes };
     }
@@ -301,12 +312,14 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
     }
 }
 
-// The Lagrangian of a problem at the solution of another problem. By the envelope theorem, its derivative by a
-// parameter of dynamics, cost or conditions equals the derivative of the optimal merit.
+// The Lagrangian of a problem at the solution of another problem. By the envelope theorem, its
+// derivative by a parameter of dynamics, cost or conditions equals the derivative of the optimal
+// merit.
 
 impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
-    /// Cost, plus costates times the defects of the dynamics, minus the conditions times their multipliers, at a
-    /// solution of a problem with as many intervals; NaN if it has another number.
+    /// Cost, plus costates times the defects of the dynamics, minus the conditions times their
+    /// multipliers, at a solution of a problem with as many intervals; NaN if it has another
+    /// number.
     pub fn lagrangian(&mut self, model: &M, solution: &Start<NX, NU>) -> f64 {
         let count = model.intervals();
         if solution.states.len() != count + 1 || solution.costates.len() != count + 1 {
@@ -334,7 +347,8 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
 // The single layers of an iteration, for benchmarks.
 
 impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
-    /// Starts from a warm start whose length fits, and raises the barrier until the sweeps are well scaled.
+    /// Starts from a warm start whose length fits, and raises the barrier until the sweeps are well
+    /// scaled.
     pub fn load(&mut self, model: &M, warm: &Start<NX, NU>) {
         self.resize(model);
         start::warm(model, &self.conditions, warm, LAST_BARRIER, &mut self.current);
@@ -346,7 +360,8 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
         self.current.evaluate(model, true);
     }
 
-    /// One Newton step at the evaluated intervals: backward and forward sweep; whether the inertia was right.
+    /// One Newton step at the evaluated intervals: backward and forward sweep; whether the inertia
+    /// was right.
     pub fn sweep(&mut self, model: &M) -> bool {
         self.newton.assemble(model, &self.conditions, &self.current, RAISED_BARRIER);
         let solved = self.newton.sweep.backward(&self.current, 1.0);

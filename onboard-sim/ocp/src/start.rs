@@ -1,4 +1,5 @@
-//! The start of a solve: cold, from an earlier solution, or again with a larger barrier; and its end.
+//! The start of a solve: cold, from an earlier solution, or again with a larger barrier; and its
+//! end.
 
 use serde::Serialize;
 
@@ -14,7 +15,8 @@ pub struct Start<'a, const NX: usize, const NU: usize> {
     pub states: &'a [[f64; NX]],
     /// The inputs of each interval. Another number than that of the intervals makes a cold solve.
     pub inputs: &'a [[f64; NU]],
-    /// Multiplier of the dynamics into each node, one more than inputs, the first unused; empty if unknown.
+    /// Multiplier of the dynamics into each node, one more than inputs, the first unused; empty if
+    /// unknown.
     pub costates: &'a [[f64; NX]],
     /// Multipliers of the lower and upper limit of each interval's inputs; empty if unknown.
     pub limit_multipliers: &'a [[[f64; 2]; NU]],
@@ -22,7 +24,8 @@ pub struct Start<'a, const NX: usize, const NU: usize> {
     pub condition_multipliers: &'a [f64],
 }
 
-/// A cold start from the model's guess. Costates are zero, so the first Hessian is that of Gauss and Newton.
+/// A cold start from the model's guess. Costates are zero, so the first Hessian is that of Gauss
+/// and Newton.
 pub(crate) fn cold<M: Model<NX, NU>, const NX: usize, const NU: usize>(
     model: &M,
     conditions: &[Condition],
@@ -39,10 +42,10 @@ pub(crate) fn cold<M: Model<NX, NU>, const NX: usize, const NU: usize>(
     }
 }
 
-/// A start from an earlier solution, shifted to the present. All states except the first stay the same. So the
-/// difference between the expected and the present state becomes one defect, and no limit or condition jumps. If
-/// states, costates or limit multipliers are missing or not finite, the inputs are rolled out. Returns whether all were
-/// there.
+/// A start from an earlier solution, shifted to the present. All states except the first stay the
+/// same. So the difference between the expected and the present state becomes one defect, and no
+/// limit or condition jumps. If states, costates or limit multipliers are missing or not finite,
+/// the inputs are rolled out. Returns whether all were there.
 pub(crate) fn warm<M: Model<NX, NU>, const NX: usize, const NU: usize>(
     model: &M,
     conditions: &[Condition],
@@ -85,8 +88,8 @@ pub(crate) fn warm<M: Model<NX, NU>, const NX: usize, const NU: usize>(
     complete
 }
 
-/// The same states with slacks and multipliers raised to a larger barrier, because too many limits and conditions
-/// change sides for the old one.
+/// The same states with slacks and multipliers raised to a larger barrier, because too many limits
+/// and conditions change sides for the old one.
 pub(crate) fn raise<M: Model<NX, NU>, const NX: usize, const NU: usize>(
     model: &M,
     conditions: &[Condition],

@@ -25,7 +25,8 @@ fn windy(height_m: f64) -> World {
 
 const OPEN: Actuators = Actuators { gimbal_rad: [0.0; 2], fins_rad: [FRAC_PI_2; 4], ..Actuators::NONE };
 
-/// A thousand steps of the fall, in wind and gusts: a microsecond in the table is a nanosecond per step.
+/// A thousand steps of the fall, in wind and gusts: a microsecond in the table is a nanosecond per
+/// step.
 #[divan::bench]
 fn a_thousand_steps_in_the_air(bencher: divan::Bencher) {
     bencher.with_inputs(|| windy(500.0)).bench_refs(|world| world.advance(&OPEN, 1000));

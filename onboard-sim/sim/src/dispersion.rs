@@ -3,7 +3,8 @@
 use crate::world::sensors::SensorParams;
 use serde::Deserialize;
 
-/// A set of dispersions. Each value is the standard deviation of a normal distribution unless its name says otherwise.
+/// A set of dispersions. Each value is the standard deviation of a normal distribution unless its
+/// name says otherwise.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Dispersion {
@@ -17,7 +18,8 @@ pub struct Dispersion {
     pub impulse_even_share: f64,
     /// Burn time, as a fraction.
     pub burn_time_share: f64,
-    /// Ignition delay of a single igniter, s; the airframe scales it. The drawn delay is never below 20 ms.
+    /// Ignition delay of a single igniter, s; the airframe scales it. The drawn delay is never
+    /// below 20 ms.
     pub ignition_delay_s: f64,
     /// Ignition delay of a single igniter, s: uniform between minus and plus this value.
     pub ignition_delay_even_s: f64,
@@ -52,18 +54,19 @@ pub struct Dispersion {
     pub fin_cant_deg: f64,
     /// Height of a drop, m.
     pub drop_height_m: f64,
-    /// Differences between the vehicle and its data that the flight computer's own models do not have.
+    /// Differences between the vehicle and its data that the flight computer's own models do not
+    /// have.
     pub mismatch: Mismatch,
 }
 
-/// How the true vehicle, the weather and the ground differ from the flight computer's models. Each value is the standard
-/// deviation of a normal distribution unless its name says otherwise; a pair is the lowest and highest value of a uniform
-/// one.
+/// How the true vehicle, the weather and the ground differ from the flight computer's models. Each
+/// value is the standard deviation of a normal distribution unless its name says otherwise; a pair
+/// is the lowest and highest value of a uniform one.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Mismatch {
-    /// Shape of the thrust curve: rms over the burn, as a fraction of the thrust. Slow deviations are larger than fast
-    /// ones; the impulse stays.
+    /// Shape of the thrust curve: rms over the burn, as a fraction of the thrust. Slow deviations
+    /// are larger than fast ones; the impulse stays.
     pub thrust_shape_share: f64,
     /// How far the curve lies on the way from the mission's to the last of its other ones, 0 to 1.
     pub other_curve: [f64; 2],
@@ -71,7 +74,8 @@ pub struct Mismatch {
     pub chuff_share: f64,
     /// Time in which the thrust rises to its curve's, s.
     pub thrust_rise_s: [f64; 2],
-    /// Mean of an exponentially distributed ignition delay beyond that of the igniter, s: the propellant does not catch at once.
+    /// Mean of an exponentially distributed ignition delay beyond that of the igniter, s: the
+    /// propellant does not catch at once.
     pub ignition_tail_s: f64,
     /// Fraction of the body's axial drag that the exhaust takes away.
     pub plume_body_loss: [f64; 2],
@@ -89,7 +93,8 @@ pub struct Mismatch {
     pub leg_drag_m2: [f64; 2],
     /// Moments of inertia, as a fraction.
     pub inertia_share: f64,
-    /// How far the inertias about pitch and yaw lie from their mean, as a fraction, in either direction.
+    /// How far the inertias about pitch and yaw lie from their mean, as a fraction, in either
+    /// direction.
     pub inertia_split_share: f64,
     /// Lean of the principal axis of inertia against the body's axis, each way, degrees.
     pub principal_axis_deg: f64,
@@ -124,11 +129,12 @@ pub const BUILTIN: &[(&str, &str)] = &[
     ("wild", include_str!("dispersions/wild.toml")),
 ];
 
-/// The set behind every number that a person acts on, if no other is asked for: the one with an error in everything.
+/// The set behind every number that a person acts on, if no other is asked for: the one with an
+/// error in everything.
 pub const DEFAULT: &str = "real";
 
-/// Whether a number from this set may be kinder than one from [`DEFAULT`]: every set but this one, twice its errors, and
-/// it with more.
+/// Whether a number from this set may be kinder than one from [`DEFAULT`]: every set but this one,
+/// twice its errors, and it with more.
 pub fn may_be_kinder(name: &str) -> bool {
     !["real", "real-harsh", "wild"].contains(&name)
 }

@@ -19,8 +19,8 @@ use crate::dispersion::{Dispersion, Mismatch};
 pub struct Draw {
     /// The vehicle and the day.
     pub truth: Truth,
-    /// The state in which the fall begins: at apogee, or when it is felt after a drone let go. A flight from the pad rises
-    /// to an apogee of its own.
+    /// The state in which the fall begins: at apogee, or when it is felt after a drone let go. A
+    /// flight from the pad rises to an apogee of its own.
     pub apogee: RigidState,
     /// The ascent of a flight from the pad.
     pub ascent: AscentTruth,
@@ -32,8 +32,8 @@ pub struct Draw {
 
 /// Draws flight `number` of a seed.
 ///
-/// Every value is drawn in a fixed order, even if its deviation is zero. So a changed deviation does not change the
-/// other draws, and two sets of dispersions can be compared flight by flight.
+/// Every value is drawn in a fixed order, even if its deviation is zero. So a changed deviation
+/// does not change the other draws, and two sets of dispersions can be compared flight by flight.
 pub fn draw(mission: &Mission, dispersion: &Dispersion, seed: u64, number: u64) -> Draw {
     let mut chance = Chance::of(seed, number);
     let sigma = &known(mission, dispersion);
@@ -86,8 +86,9 @@ pub fn draw(mission: &Mission, dispersion: &Dispersion, seed: u64, number: u64) 
     Draw { truth, apogee, ascent, hanging, flight_seed }
 }
 
-/// The set, which scatters landing motors as certified curves differ, with the scatter that the mission knows of its lot, and
-/// a vehicle that was weighed. What the set does not scatter stays as it is.
+/// The set, which scatters landing motors as certified curves differ, with the scatter that the
+/// mission knows of its lot, and a vehicle that was weighed. What the set does not scatter stays as
+/// it is.
 fn known(mission: &Mission, set: &Dispersion) -> Dispersion {
     let (Some(lot), Some(expected)) = (&mission.lot, &mission.expected) else { return *set };
     let weighed = lot.weighed.vehicle_kg.map_or(set.mass_share, |_| set.mass_share.min(expected.mass_share));
@@ -131,8 +132,9 @@ fn ascended(mission: &Mission, sigma: &Dispersion, seed: u64, number: u64) -> As
     }
 }
 
-/// Where the crew of flight `number` places a rail that should stand upwind of the pad by a time, s, times the wind: by the wind
-/// that it measures, x and y, m. It measures from a generator of its own.
+/// Where the crew of flight `number` places a rail that should stand upwind of the pad by a time,
+/// s, times the wind: by the wind that it measures, x and y, m. It measures from a generator of its
+/// own.
 pub(crate) fn rail_upwind_m(
     upwind_s: f64,
     sigma: &Dispersion,
@@ -171,8 +173,8 @@ fn hung(mission: &Mission, sigma: &Dispersion, seed: u64, number: u64) -> Option
 /// How long a chuffing motor burns, and how long it is out before it burns on, s.
 const CHUFF_S: [f64; 2] = [0.1, 0.2];
 
-/// Draws the differences of flight `number` that the flight computer's models do not have. They come from a generator of their
-/// own: a set without them draws what it always drew.
+/// Draws the differences of flight `number` that the flight computer's models do not have. They
+/// come from a generator of their own: a set without them draws what it always drew.
 fn mismatch(truth: &mut Truth, mission: &Mission, sigma: &Mismatch, seed: u64, number: u64) {
     /// Any number that no other draw uses.
     const OF_MISMATCH: u64 = 0x3d15_0000_0000_0002;
@@ -215,8 +217,8 @@ fn mismatch(truth: &mut Truth, mission: &Mission, sigma: &Mismatch, seed: u64, n
     truth.ignition_delay_s -= sigma.ignition_tail_s * libm::log(1.0 - chance.unit());
 }
 
-/// Fractions of a delay, uniform in [0, 1), for the faults of flight `number`. They come from a generator of their
-/// own, so that a fault changes no other draw of the flight.
+/// Fractions of a delay, uniform in [0, 1), for the faults of flight `number`. They come from a
+/// generator of their own, so that a fault changes no other draw of the flight.
 pub(crate) fn fault_shares(seed: u64, number: u64, faults: usize) -> Vec<f64> {
     /// Any number that no other draw uses.
     const OF_FAULTS: u64 = 0xfa17_0000_0000_0001;
@@ -269,7 +271,8 @@ mod tests {
         draw(&mission, &Dispersion::builtin(set).unwrap(), 7, 3).truth
     }
 
-    /// The same draw, as far from the mean as the lot's motors scatter; without burns as far as the set's.
+    /// The same draw, as far from the mean as the lot's motors scatter; without burns as far as the
+    /// set's.
     #[test]
     fn a_lot_scatters_as_it_did_on_the_stand() {
         let lot = "\n[lot]\nname = \"2609\"\nburns = 400\nimpulse = { mean = 1.0, scatter = 0.01 }\nburn_time = { mean = 1.0, scatter = 0.015 }\n";
@@ -290,7 +293,8 @@ mod tests {
         }
     }
 
-    /// A crew that measures well walks 7 m for each m/s, against the wind; one that does not, not always to the same place.
+    /// A crew that measures well walks 7 m for each m/s, against the wind; one that does not, not
+    /// always to the same place.
     #[test]
     fn the_rail_stands_upwind_of_the_pad() {
         let day =
@@ -303,14 +307,16 @@ mod tests {
         let rough = Dispersion::builtin("real").unwrap();
         let walked = |number| rail_upwind_m(7.0, &rough, &day(4.0), 7, number);
         let mean_y_m = (0..400).map(|number| walked(number)[1]).sum::<f64>() / 400.0;
-        // The mean of cosines of errors of 20 degrees is 0.94; 7 m of scatter over the root of 400 is 0.35 m.
+        // The mean of cosines of errors of 20 degrees is 0.94; 7 m of scatter over the root of 400
+        // is 0.35 m.
         assert!((mean_y_m + 0.94 * 28.0).abs() < 1.05, "{mean_y_m}");
         assert!(
             (0..20).any(|number| walked(number)[0] > 5.0) && (0..20).any(|number| walked(number)[0] < -5.0)
         );
     }
 
-    /// Of 400 delays with a tail of 0.1 s, a third is longer than its mean, and 1 / e^3 than three times that; nothing else changes.
+    /// Of 400 delays with a tail of 0.1 s, a third is longer than its mean, and 1 / e^3 than three
+    /// times that; nothing else changes.
     #[test]
     fn val_hand_ignition_delays_have_a_tail() {
         let mission = flight::vehicles::mission::builtin("mk3").unwrap().unwrap();

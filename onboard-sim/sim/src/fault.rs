@@ -1,8 +1,9 @@
 //! What breaks in a flight, and when; and its injection at that time.
 //!
 //! On a command line a fault is written `NAME[:VALUE]@WHEN`, for example `gnss-out@5`,
-//! `fin-stuck:2@apogee`, `gimbal-slow:0.3@ignition+0.3`. `WHEN` is a time since the start of the flight in seconds, or a phase with an
-//! optional delay in seconds after the phase was entered. A delay `+0.5..4` is drawn uniformly for each flight.
+//! `fin-stuck:2@apogee`, `gimbal-slow:0.3@ignition+0.3`. `WHEN` is a time since the start of the
+//! flight in seconds, or a phase with an optional delay in seconds after the phase was entered. A
+//! delay `+0.5..4` is drawn uniformly for each flight.
 
 use core::fmt;
 use core::str::FromStr;

@@ -1,7 +1,7 @@
 //! This crate simulates one flight: a world, a flight computer, faults and random differences.
 //!
-//! But for `wire` it has no clock and no network. The live vehicle, a campaign and a replay all use it, so all three
-//! fly the same flight.
+//! But for `wire` it has no clock and no network. The live vehicle, a campaign and a replay all use
+//! it, so all three fly the same flight.
 //!
 //! * [`world`]: the simulated truth.
 //! * [`recipe`]: everything that a flight is made from.

@@ -1,4 +1,5 @@
-//! Everything that a flight is made from. The same recipe and flight number give the same flight, bit for bit.
+//! Everything that a flight is made from. The same recipe and flight number give the same flight,
+//! bit for bit.
 
 use flight::vehicle::mission::{Mission, StartPoint};
 use flight::vehicles::file_error::FileError;
@@ -113,7 +114,8 @@ fn document_of(mission_toml: &str, origin: &str) -> Result<toml_edit::DocumentMu
     })
 }
 
-/// The text of a mission with another start; comments and order stay. `origin` names it in messages.
+/// The text of a mission with another start; comments and order stay. `origin` names it in
+/// messages.
 ///
 /// # Errors
 /// The text is not TOML.

@@ -1,8 +1,8 @@
-//! One flight of a rocket in space, from power-up until it is at rest: from its rail, from below a drone, or from an
-//! apogee that it is put to.
+//! One flight of a rocket in space, from power-up until it is at rest: from its rail, from below a
+//! drone, or from an apogee that it is put to.
 //!
-//! A frame is 5 ms: the world moves under the last commands, the sensors measure it, and the flight computer decides.
-//! On the pad the same flight is rehearsed with nominal data.
+//! A frame is 5 ms: the world moves under the last commands, the sensors measure it, and the flight
+//! computer decides. On the pad the same flight is rehearsed with nominal data.
 
 use crate::world::sensors::SensorParamError;
 use crate::world::whole::WorldError;
@@ -115,7 +115,8 @@ impl Sortie {
         Ok(Self::of(mission, dispersion, drawn)?.released())
     }
 
-    /// Flight `number` of a recipe at power-up: upright on its pad, on its rail, or below its drone.
+    /// Flight `number` of a recipe at power-up: upright on its pad, on its rail, or below its
+    /// drone.
     ///
     /// # Errors
     /// It cannot be set up.
@@ -152,7 +153,8 @@ impl Sortie {
         Self { slower: times, ..self }
     }
 
-    /// The same flight of a vehicle that was aborted on its pad in an earlier power-up, at this vehicle time, s: before zero.
+    /// The same flight of a vehicle that was aborted on its pad in an earlier power-up, at this
+    /// vehicle time, s: before zero.
     #[must_use]
     pub fn aborted_before(self, at_s: f64) -> Self {
         Self { computer: self.computer.aborted_before(at_s), ..self }
@@ -244,8 +246,9 @@ impl Sortie {
         Some(output)
     }
 
-    /// Flies the frame of this number since the release, that another computer has just flown: its commands move the world. What it felt before it decided; `None` if
-    /// the computer of this flight would have been dead, or would have lived in a frame that the other has missed.
+    /// Flies the frame of this number since the release, that another computer has just flown: its
+    /// commands move the world. What it felt before it decided; `None` if the computer of this
+    /// flight would have been dead, or would have lived in a frame that the other has missed.
     pub fn follow(&mut self, frame: u64, computer: &Computer) -> Option<KeptInput> {
         while self.frame + 1 < frame {
             if self.feel().is_some() {
@@ -263,8 +266,9 @@ impl Sortie {
         self.followed.unwrap_or_else(|| Decision::of(&self.computer))
     }
 
-    /// The world moves for one frame. What the computer feels in it, apart from its crew; `None` if it is dead, or if there is no sample:
-    /// then there is no frame, and what was commanded goes on.
+    /// The world moves for one frame. What the computer feels in it, apart from its crew; `None` if
+    /// it is dead, or if there is no sample: then there is no frame, and what was commanded goes
+    /// on.
     fn feel(&mut self) -> Option<KeptInput> {
         let Decision { mode, released, .. } = self.decision();
         for breakage in self.injector.due(self.surroundings.world.time_s(), mode.phase) {
@@ -339,12 +343,14 @@ impl Sortie {
         self.abort = true;
     }
 
-    /// Stops the flight computer, which starts again after a time, s. The servos keep their last command meanwhile.
+    /// Stops the flight computer, which starts again after a time, s. The servos keep their last
+    /// command meanwhile.
     pub fn reboot(&mut self, down_s: f64) {
         self.frames_down = libm::ceil(down_s / FRAME_S).max(1.0) as u64;
     }
 
-    /// Changes the mission from now on, for the flight computer and for the verdict. The world does not change.
+    /// Changes the mission from now on, for the flight computer and for the verdict. The world does
+    /// not change.
     pub fn reconfigure(&mut self, mission: &Mission) {
         self.computer.reconfigure(mission);
         self.mission = mission.clone();
@@ -410,7 +416,8 @@ impl Sortie {
         &self.radio
     }
 
-    /// The same flight of a computer that has found its state and the calibration of its inertial unit on its rail.
+    /// The same flight of a computer that has found its state and the calibration of its inertial
+    /// unit on its rail.
     #[must_use]
     pub fn standing(self, believed: &RigidState, calibration: &ImuCalibration) -> Self {
         Self { computer: self.computer.standing(believed, calibration), ..self }
@@ -501,7 +508,8 @@ impl EstimatorErrors {
 }
 
 impl Sortie {
-    /// Normalised estimation error squared of the motion ([`Estimator::nees_of_motion`]); `None` while its computer is dead.
+    /// Normalised estimation error squared of the motion ([`Estimator::nees_of_motion`]); `None`
+    /// while its computer is dead.
     ///
     /// [`Estimator::nees_of_motion`]: flight::estimation::estimator::Estimator::nees_of_motion
     pub fn nees_of_motion(&self) -> Option<f64> {
@@ -509,16 +517,18 @@ impl Sortie {
         self.pilot().estimator().nees_of_motion(&self.over_the_ground())
     }
 
-    /// The true state with its height above the ground below it, which is what a landing needs and what the lidar shows.
+    /// The true state with its height above the ground below it, which is what a landing needs and
+    /// what the lidar shows.
     fn over_the_ground(&self) -> RigidState {
         let mut state = *self.world().state();
         state.position_m.z = self.world().truth().over_ground_m(&state.position_m);
         state
     }
 
-    /// Normalised estimation error squared of the motor's impulse scale and burn time ([`MotorEstimate::nees_of_scales`]);
-    /// `None` before the motor has lit, and where its scales are over another curve than the truth's. The accelerometer cannot
-    /// tell more impulse from less mass.
+    /// Normalised estimation error squared of the motor's impulse scale and burn time
+    /// ([`MotorEstimate::nees_of_scales`]); `None` before the motor has lit, and where its scales
+    /// are over another curve than the truth's. The accelerometer cannot tell more impulse from
+    /// less mass.
     ///
     /// [`MotorEstimate::nees_of_scales`]: flight::estimation::motor_estimate::MotorEstimate::nees_of_scales
     pub fn nees_of_motor(&self) -> Option<f64> {
@@ -548,8 +558,9 @@ impl Sortie {
 
 // The rehearsal on the pad: one flight of the mission with its nominal data, faster than real time.
 //
-// It shows whether the flight computer's solver works, and whether a landing is possible with this vehicle, motor and
-// mission. It knows neither the wind of the day nor the scatter of the real motor.
+// It shows whether the flight computer's solver works, and whether a landing is possible with this
+// vehicle, motor and mission. It knows neither the wind of the day nor the scatter of the real
+// motor.
 
 /// Frames rehearsed in each frame on the pad: the whole flight takes a second or two.
 const FRAMES_AT_ONCE: u32 = 20;

@@ -1,5 +1,5 @@
-//! Everything of a flight but its flight computer: the world and how it begins, the sensors that look at it, and the
-//! actuators that move it.
+//! Everything of a flight but its flight computer: the world and how it begins, the sensors that
+//! look at it, and the actuators that move it.
 
 use crate::world::sensors::{
     Defect, NEARLY_EXACT, Sensor, SensorFaults, SensorParamError, SensorTruth, Sensors, believed_start,
@@ -56,8 +56,8 @@ impl Surroundings {
         Ok((Self { world, sensors, faults, broken, actuators, battery, measured, finite }, believed))
     }
 
-    /// Goes to the start of the flight from wherever the vehicle waited. Both were already set up at power-up, which
-    /// would have found any error.
+    /// Goes to the start of the flight from wherever the vehicle waited. Both were already set up
+    /// at power-up, which would have found any error.
     pub(crate) fn begin(&mut self, mission: &Mission, dispersion: &Dispersion, drawn: &Draw) {
         if let Ok(world) = world(mission, drawn) {
             self.world = world;
@@ -83,13 +83,14 @@ impl Surroundings {
         }
     }
 
-    /// From now on the receiver's times count from this time of its clock, s: the flight computer's do.
+    /// From now on the receiver's times count from this time of its clock, s: the flight computer's
+    /// do.
     pub(crate) fn count_from(&mut self, release_s: f64) {
         self.sensors.count_from(release_s);
     }
 
-    /// The world moves for one frame, and the sensors measure it. `None` if they have given no sample: what is true is then known to
-    /// nobody.
+    /// The world moves for one frame, and the sensors measure it. `None` if they have given no
+    /// sample: what is true is then known to nobody.
     pub(crate) fn sample_sensors(&mut self) -> Option<Measurements> {
         let mut measured = None;
         for _ in 0..FRAME_MS {
@@ -103,7 +104,8 @@ impl Surroundings {
         self.measured
     }
 
-    /// What feedback and switches say after the frame, and nothing else; `released`: contact counts.
+    /// What feedback and switches say after the frame, and nothing else; `released`: contact
+    /// counts.
     pub(crate) fn feedback(&mut self, released: bool) -> KeptInput {
         let (gimbal_rad, fins_rad) = if self.world.airframe().servos_tell {
             (self.world.gimbal_feedback_rad(), self.sensors.fins_rad(&self.world.fins_feedback_rad()))
@@ -141,7 +143,8 @@ impl Surroundings {
         self.finite && self.world.rest().is_none() && self.world.time_s() < LONGEST_S
     }
 
-    /// The outcome so far of a flight whose computer is in this phase; `ignited`: it has fired the landing motor's igniter.
+    /// The outcome so far of a flight whose computer is in this phase; `ignited`: it has fired the
+    /// landing motor's igniter.
     pub(crate) fn outcome(&self, mission: &Mission, phase: Phase, ignited: bool) -> Outcome {
         let ending = Ending {
             touchdown: self.world.touchdown().copied(),

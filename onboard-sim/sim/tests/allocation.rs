@@ -1,4 +1,5 @@
-//! In the air the flight computer allocates only for the buffers of its first plans and for its messages.
+//! In the air the flight computer allocates only for the buffers of its first plans and for its
+//! messages.
 
 use flight::computer::{Computer, Input, Output};
 use flight::rules::phase::Phase;
@@ -39,7 +40,8 @@ fn after_the_first_plans_a_frame_without_a_message_does_not_allocate() {
         flight.step_with(&Outside::NOBODY, &mut shadow);
     }
     assert!(shadow.silent_frames > 2_000 && flight.outcome().landing.stands);
-    // The first plans of a flight allocate the solver's workspace and the two plans that it fills in turn.
+    // The first plans of a flight allocate the solver's workspace and the two plans that it fills
+    // in turn.
     assert!(shadow.allocating.iter().all(|(_, plans, _)| *plans <= 2), "{:?}", shadow.allocating);
     assert!(shadow.plans > 20, "{}", shadow.plans);
 }

@@ -1,5 +1,6 @@
-//! What MK3.md tells a builder to measure, and when to stop, follows from the airframe, its motor, the limits of the pad
-//! check, and what `real` scatters: two deviations to either side, because a part outside of them is wrong rather than unlucky.
+//! What MK3.md tells a builder to measure, and when to stop, follows from the airframe, its motor,
+//! the limits of the pad check, and what `real` scatters: two deviations to either side, because a
+//! part outside of them is wrong rather than unlucky.
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::f64::consts::TAU;
@@ -69,7 +70,8 @@ fn the_bounds_for_a_builder_follow_from_the_data() {
         ("gimbal servo", &mk3.gimbal.servo, 2.0 * limit_deg),
         ("fin servo", &mk3.fins.servo, mk3.fins.open_deg - mk3.fins.closed_deg),
     ] {
-        // The pad check allows 20 ms more. A servo that is faster than 1.5 times its data makes the loop another one.
+        // The pad check allows 20 ms more. A servo that is faster than 1.5 times its data makes the
+        // loop another one.
         let whole_ms = |rate: f64| 1e3 * (servo.delay_s + way_deg / (rate * servo.rate_deg_s));
         says(name, [whole_ms(1.0), whole_ms(1.5), whole_ms(1.0) + 20.0], 0);
     }
@@ -86,8 +88,8 @@ fn the_bounds_for_a_builder_follow_from_the_data() {
     says("IMU, square", [0.0, 0.0, SIGMAS * real.sensor_params.imu.mounting_deg], 1);
 }
 
-/// Drag of an open fin at 36 m/s at sea level, at half the fin's length; a servo that keeps half its unloaded speed needs twice
-/// that at a stall.
+/// Drag of an open fin at 36 m/s at sea level, at half the fin's length; a servo that keeps half
+/// its unloaded speed needs twice that at a stall.
 #[test]
 fn val_hand_the_servo_of_a_fin() {
     let mk3 = mission::builtin_airframe("mk3").unwrap();

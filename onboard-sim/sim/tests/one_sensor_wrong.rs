@@ -1,5 +1,5 @@
-//! One sensor wrong in each way and each phase: no event out of its phase, no parachute above its speed, and nothing lost that two
-//! other sensors could have saved.
+//! One sensor wrong in each way and each phase: no event out of its phase, no parachute above its
+//! speed, and nothing lost that two other sensors could have saved.
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
 use flight::vehicle::mission::StartPoint;
@@ -96,8 +96,9 @@ fn fly_with(mission: &str, dispersion: &str, faults: &[String], seed: u64) -> Fl
     }
 }
 
-/// Where nothing else can help: in the burn the gyro alone knows the attitude, and an accelerometer that is wrong by half a g on
-/// every axis passes for motion. One that says nothing is replaced by what is known of the motor and the air.
+/// Where nothing else can help: in the burn the gyro alone knows the attitude, and an accelerometer
+/// that is wrong by half a g on every axis passes for motion. One that says nothing is replaced by
+/// what is known of the motor and the air.
 fn may_be_lost(defect: &str, when: &str) -> bool {
     let of_the_unit = defect.starts_with("gyro") || defect.starts_with("accelerometer");
     let pushes = defect.starts_with("accelerometer-step") || defect.starts_with("accelerometer-spike");
@@ -117,7 +118,8 @@ fn fly_all(mission: &str, dispersion: &str) {
             let Flown { apogee_m_s, ejected_m_s, impact_m_s, landed } =
                 fly(mission, dispersion, &format!("{defect}@{when}"), 1);
             let context = format!("{mission} {dispersion} {defect}@{when}: {impact_m_s} m/s");
-            // A second before or after the apogee; the parachute bears the speed of a fall on open fins.
+            // A second before or after the apogee; the parachute bears the speed of a fall on open
+            // fins.
             assert!((-10.0..10.0).contains(&apogee_m_s), "{context}, apogee at {apogee_m_s} m/s");
             assert!(ejected_m_s.is_none_or(|m_s| (-50.0..10.0).contains(&m_s)), "{context}, {ejected_m_s:?}");
             let saved = landed || impact_m_s.abs() < 10.0;
@@ -164,8 +166,9 @@ fn landed(faults: &[&str], flights: u64) -> usize {
     (0..flights).filter(|number| stands(*number)).count()
 }
 
-/// What recorded flights show of receivers, barometers and lidars. Of 120 flights (seeds 771 and 4021) with each of these 106 to 119
-/// land: a lidar that is off by 5 m is the worst.
+/// Faults that recorded flights show in receivers, barometers and lidars. Of 120 flights with each
+/// (seeds 771 and 4021; a stuck lidar also 3, 4 and 5) 106 to 119 land. The limits lie two
+/// standard deviations below: with a stuck lidar 89 % land, which is 21.3 of 24, give or take 1.5.
 #[test]
 fn faults_of_recorded_sensors_are_survived() {
     for (fault, at_least) in [
@@ -174,7 +177,7 @@ fn faults_of_recorded_sensors_are_survived() {
         ("barometer-scale:0.9@0", 22),
         ("barometer-scale:1.1@0", 22),
         ("barometer-spike:3000@descent+2", 22),
-        ("lidar-stuck@descent+2", 20),
+        ("lidar-stuck@descent+2", 18),
         ("lidar-dead@coast", 20),
         ("lidar-blocked:0.3@descent", 20),
         ("lidar-step:5@coast", 18),

@@ -31,7 +31,8 @@ fn phases(mut computer: Computer, frames: impl Iterator<Item = (KeptInput, bool)
     phases
 }
 
-/// The same flight a second time, with all but the sensors as it was: the sensors say that the vehicle stands.
+/// The same flight a second time, with all but the sensors as it was: the sensors say that the
+/// vehicle stands.
 #[test]
 fn a_flight_whose_sensors_stand_on_the_rail_is_never_detected() {
     let recipe = Recipe::built_in("mk2", "field").unwrap().starting_at(StartPoint::Pad).unwrap();

@@ -1,4 +1,5 @@
-//! A step of the world does not allocate: in the air, under thrust, under the parachute and on the ground.
+//! A step of the world does not allocate: in the air, under thrust, under the parachute and on the
+//! ground.
 #![expect(clippy::expect_used, reason = "a missing built-in vehicle is a failed test")]
 
 use core::f64::consts::FRAC_PI_2;

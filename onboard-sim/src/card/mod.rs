@@ -1,7 +1,8 @@
-//! The landing card: what a team takes to the field for one mission, as it is loaded; one side of it is for the [`range_safety`]
-//! officer.
+//! The landing card: what a team takes to the field for one mission, as it is loaded; one side of
+//! it is for the [`range_safety`] officer.
 //!
-//! It is computed, not looked up: the mission is flown in several winds in every way in which a flight can end, and at other masses.
+//! It is computed, not looked up: the mission is flown in several winds in every way in which a
+//! flight can end, and at other masses.
 
 pub mod range_safety;
 mod sheet;
@@ -55,8 +56,9 @@ pub enum CardError {
 }
 
 impl Card {
-    /// Computes the card of a recipe from its flights in each mean wind, m/s, rising. `wind_from_deg` is where the wind of the day comes
-    /// from, degrees clockwise from north, if it is known.
+    /// Computes the card of a recipe from its flights in each mean wind, m/s, rising.
+    /// `wind_from_deg` is where the wind of the day comes from, degrees clockwise from north, if it
+    /// is known.
     ///
     /// # Errors
     /// The vehicle does not land, or what was asked for cannot be had.
@@ -104,8 +106,8 @@ fn refuse_without_a_landing(recipe: &Recipe, told: &(dyn Fn(usize, usize) + Sync
     Err(CardError::NoneLanded { flights: FIRST, set: recipe.dispersion_name.clone(), reason })
 }
 
-/// How many land at the mission's own mass and at others, on each side up to the first at which fewer than nine of ten do. Ballast is
-/// at the centre of gravity.
+/// How many land at the mission's own mass and at others, on each side up to the first at which
+/// fewer than nine of ten do. Ballast is at the centre of gravity.
 fn masses(
     recipe: &Recipe,
     own: Landings,

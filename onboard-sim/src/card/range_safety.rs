@@ -1,4 +1,5 @@
-//! The side of a card for the range safety officer: who stands where in which wind, and what an abort does.
+//! The side of a card for the range safety officer: who stands where in which wind, and what an
+//! abort does.
 
 use core::fmt::Write as _;
 
@@ -66,8 +67,8 @@ fn farthest_m(impacts: &[Impact]) -> [f64; 3] {
     [most(|[along_m, _]| along_m), most(|[_, across_m]| across_m.abs()), most(|[along_m, _]| -along_m)]
 }
 
-/// The strongest of these winds up to which at least nine tenths as many flights land as in the calmest one; `None` if too few
-/// flights tell of it.
+/// The strongest of these winds up to which at least nine tenths as many flights land as in the
+/// calmest one; `None` if too few flights tell of it.
 pub fn limit_m_s(winds: &[InWind]) -> Option<f64> {
     const KEPT: f64 = 0.9;
     let calmest = winds.first()?.landed?;
@@ -87,7 +88,8 @@ pub fn thrust_to_weight(mission: &Mission, launch: &Launch) -> f64 {
     launch.booster.motor_curve.mean_thrust_n(0.0, FIRST_S) / weight_n
 }
 
-/// How far the stack's centre of pressure lies behind its centre of gravity at the lift-off, in diameters of the body.
+/// How far the stack's centre of pressure lies behind its centre of gravity at the lift-off, in
+/// diameters of the body.
 pub fn calibres(mission: &Mission, launch: &Launch) -> f64 {
     let (booster, mass, body) = (&launch.booster, &mission.airframe.mass, &mission.airframe.body);
     let propellant_kg = booster.motor_curve.propellant_mass_kg();
@@ -105,7 +107,8 @@ pub fn calibres(mission: &Mission, launch: &Launch) -> f64 {
     (gravity_m - pressure_m) / body.diameter_m
 }
 
-/// What an abort does, when and what, of flights that begin so, or of all; with the height of the feet from which a parachute opens.
+/// What an abort does, when and what, of flights that begin so, or of all; with the height of the
+/// feet from which a parachute opens.
 pub fn aborts(start: Option<StartPoint>, height: &str) -> Vec<Vec<String>> {
     let only = |of: &[StartPoint]| start.is_none_or(|start| of.contains(&start)).then(String::new);
     words_of(
@@ -119,16 +122,17 @@ pub fn aborts(start: Option<StartPoint>, height: &str) -> Vec<Vec<String>> {
     )
 }
 
-/// Half the width and half the height of the plan, how far the farthest crew stands in it, and the length of its line, in its own
-/// units.
+/// Half the width and half the height of the plan, how far the farthest crew stands in it, and the
+/// length of its line, in its own units.
 const HALF: [f64; 2] = [140.0, 98.0];
 const WIDEST: f64 = 72.0;
 const LINE: f64 = 84.0;
 /// Room of a circle's name across the wind.
 const NAME: f64 = 28.0;
 
-/// The circles of the winds to fly in from above, to scale, with the line downwind. `wind_from_deg` is where the wind comes from,
-/// clockwise from north, which is up then; without it up is downwind. `None` without a circle.
+/// The circles of the winds to fly in from above, to scale, with the line downwind. `wind_from_deg`
+/// is where the wind comes from, clockwise from north, which is up then; without it up is downwind.
+/// `None` without a circle.
 pub fn plan(winds: &[InWind], wind_from_deg: Option<f64>) -> Option<String> {
     let limit_m_s = limit_m_s(winds)?;
     let may_fly = winds.iter().filter(|wind| wind.wind_m_s <= limit_m_s);

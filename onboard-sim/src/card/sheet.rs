@@ -1,5 +1,5 @@
-//! What stands on a card, as text and as HTML. Both show the same sheet of two sides: the front for the range safety officer,
-//! the back for whoever prepares the vehicle.
+//! What stands on a card, as text and as HTML. Both show the same sheet of two sides: the front for
+//! the range safety officer, the back for whoever prepares the vehicle.
 
 use flight::rules::phase::{HOLD_LIMIT_S, MISFIRE_WAIT_S, MOTOR_HOT_S, PAD_ABORT_WAIT_S};
 use flight::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
@@ -38,7 +38,8 @@ enum Content {
     Blanks(Vec<Vec<String>>),
 }
 
-/// The cells of each line of a part of the card's words, with values by their names. A line with a value that is `None` is left out.
+/// The cells of each line of a part of the card's words, with values by their names. A line with a
+/// value that is `None` is left out.
 pub(super) fn words_of(part: &str, values: &[(&str, Option<String>)]) -> Vec<Vec<String>> {
     const WORDS: &str = include_str!("words.txt");
     let lines = WORDS.split("\n# ").find_map(|text| text.strip_prefix(part)).unwrap_or_default();

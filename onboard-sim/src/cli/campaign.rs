@@ -22,7 +22,8 @@ use super::{Asked, Progress, on_threads, single};
 pub(crate) struct CampaignArguments {
     #[command(flatten)]
     asked: Asked,
-    /// Where the flights begin: pad, apogee or drone, if the mission has that start [default: the mission's].
+    /// Where the flights begin: pad, apogee or drone, if the mission has that start [default: the
+    /// mission's].
     #[arg(long, value_name = "START")]
     start: Option<StartPoint>,
     /// Number of flights; they are numbered from 0.
@@ -31,8 +32,9 @@ pub(crate) struct CampaignArguments {
     /// Break something in every flight; may be repeated.
     #[arg(long = "fault", value_name = "FAULT", long_help = format!("Break something in every flight; may be given more than once. Write {}", how_to_write()))]
     faults: Vec<TimedFault>,
-    /// Directory of the results. If it holds part of the same campaign, the campaign is continued. With --only: the flight's log
-    /// (MCAP); a file that exists is kept, and the log gets the next free name.
+    /// Directory of the results. If it holds part of the same campaign, the campaign is continued.
+    /// With --only: the flight's log (MCAP); a file that exists is kept, and the log gets the next
+    /// free name.
     #[arg(long, alias = "log", value_name = "PATH", required_unless_present = "only")]
     out: Option<PathBuf>,
     /// Fly only this flight, and print its row.
@@ -65,7 +67,8 @@ pub(crate) fn run(arguments: &CampaignArguments) -> anyhow::Result<Exit> {
     Ok(Exit::Yes)
 }
 
-/// The build and a digest of the running program, so that results of different programs are not mixed.
+/// The build and a digest of the running program, so that results of different programs are not
+/// mixed.
 fn program() -> anyhow::Result<String> {
     let path = std::env::current_exe().context("which program this is")?;
     let bytes = fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;

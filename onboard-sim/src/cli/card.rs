@@ -21,14 +21,16 @@ pub(crate) struct CardArguments {
     /// Mean winds 10 m above the ground, m/s, each with a radius and a rate of its own.
     #[arg(long = "wind", value_delimiter = ',', default_value = "0,3,6,10", value_name = "M/S,...")]
     winds: Vec<f64>,
-    /// Where the wind of the day comes from, degrees clockwise from north: the plan has north up and the line downwind. By default
-    /// downwind is up.
+    /// Where the wind of the day comes from, degrees clockwise from north: the plan has north up
+    /// and the line downwind. By default downwind is up.
     #[arg(long, value_name = "DEG", value_parser = degrees)]
     wind_from: Option<f64>,
-    /// Flights in each wind of every way in which a flight can end. Fewer than 100 give neither a rate nor a radius.
+    /// Flights in each wind of every way in which a flight can end. Fewer than 100 give neither a
+    /// rate nor a radius.
     #[arg(long, default_value_t = 100, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=CARD_FLIGHTS_MAX))]
     flights: u64,
-    /// Flights in each wind of the ways that come down farthest. Below 368 the interval has no upper end.
+    /// Flights in each wind of the ways that come down farthest. Below 368 the interval has no
+    /// upper end.
     #[arg(long, default_value_t = 400, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=CARD_FLIGHTS_MAX))]
     hazard_flights: u64,
     /// Folder of the card; one that exists is kept, and the card gets the next free name.

@@ -1,4 +1,5 @@
-//! `onboard-sim check`: whether a vehicle that is not built yet will land, and what to change if not.
+//! `onboard-sim check`: whether a vehicle that is not built yet will land, and what to change if
+//! not.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -17,14 +18,15 @@ pub(crate) struct CheckArguments {
     /// Built-in mission or TOML file.
     #[arg(value_name = "NAME|FILE")]
     mission: String,
-    /// Motors to propose: an .eng or .rse file, a folder of them, or the .json of the npm package thrustcurve-db; may be repeated. The
-    /// built-in motors if not given.
+    /// Motors to propose: an .eng or .rse file, a folder of them, or the .json of the npm package
+    /// thrustcurve-db; may be repeated. The built-in motors if not given.
     #[arg(long, value_name = "DIR|FILE")]
     from: Vec<PathBuf>,
     /// Flights that are flown as a check of the other rows; 0 leaves them out.
     #[arg(long, default_value_t = 100, value_name = "N", value_parser = clap::value_parser!(u64).range(..=10_000))]
     flights: u64,
-    /// Built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh, wild) or TOML file.
+    /// Built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh, wild) or
+    /// TOML file.
     #[arg(long, default_value = "field", value_name = "NAME|FILE")]
     dispersion: String,
     /// Seed of everything random.
@@ -46,7 +48,8 @@ pub(crate) fn run(arguments: &CheckArguments) -> anyhow::Result<Exit> {
     Ok(Exit::of(page.verdict() != Verdict::No))
 }
 
-/// Reads a motor file, the files of a folder in the order of their names, or a list. It says which motor cannot be used, and why.
+/// Reads a motor file, the files of a folder in the order of their names, or a list. It says which
+/// motor cannot be used, and why.
 fn read_motors(path: &Path, motors: &mut Vec<Candidate>) -> anyhow::Result<()> {
     const ENDINGS: [&str; 3] = ["eng", "rse", "json"];
     let origin = path.display();
@@ -125,7 +128,8 @@ fn of_entry(entry: serde_json::Value) -> anyhow::Result<Candidate> {
 mod tests {
     use super::*;
 
-    /// An Estes D12 as thrustcurve-db 3.0.4 has it (<https://www.npmjs.com/package/thrustcurve-db>, ISC licence).
+    /// An Estes D12 as thrustcurve-db 3.0.4 has it (<https://www.npmjs.com/package/thrustcurve-db>,
+    /// ISC licence).
     const D12: &str = r#"{ "availability": "regular", "designation": "D12", "diameter": 24, "length": 70, "manufacturerAbbrev": "Estes",
         "propWeightG": 21.1, "totalWeightG": 44, "samples": [
         [0, 0], [0.049, 2.569], [0.116, 9.369], [0.184, 17.27], [0.237, 24.26], [0.282, 29.73], [0.297, 27.01], [0.311, 22.59],

@@ -45,29 +45,30 @@ pub(crate) struct FlyArguments {
     /// Sign every frame with this key, and ignore frames that are not signed with it. See keygen.
     #[arg(long, value_name = "FILE")]
     key: Option<PathBuf>,
-    /// People who may command, each with a key of their own (TOML; see the README): arming and start by one or by two of
-    /// them. Needs --key, which all share.
+    /// People who may command, each with a key of their own (TOML; see the README): arming and
+    /// start by one or by two of them. Needs --key, which all share.
     #[arg(long, value_name = "FILE", requires = "key")]
     crew: Option<PathBuf>,
-    /// Budget of a network link, bytes per second, 2000 to 1000000: 2000 if a radio carries it on. Above 2000, attitude, speed,
-    /// battery, mode and GNSS go out in the messages of other ground stations, too, and the place more often than every 2 s.
+    /// Budget of a network link, bytes per second, 2000 to 1000000: 2000 if a radio carries it on.
+    /// Above 2000, attitude, speed, battery, mode and GNSS go out in the messages of other ground
+    /// stations, too, and the place more often than every 2 s.
     #[arg(long, value_name = "BYTES_S", default_value_t = NETWORK_BUDGET_BYTES_S,
         value_parser = clap::value_parser!(u32).range(i64::from(RADIO_BUDGET_BYTES_S)..=1_000_000))]
     network_budget: u32,
-    /// Budget of a serial link, bytes per second, 2000 to 1000000: what the radio behind it carries, and at most four fifths
-    /// of what its baud rate does.
+    /// Budget of a serial link, bytes per second, 2000 to 1000000: what the radio behind it
+    /// carries, and at most four fifths of what its baud rate does.
     #[arg(long, value_name = "BYTES_S", default_value_t = RADIO_BUDGET_BYTES_S,
         value_parser = clap::value_parser!(u32).range(i64::from(RADIO_BUDGET_BYTES_S)..=1_000_000))]
     serial_budget: u32,
     /// Number of this boot on the wire, 1 to 16777215, instead of a random one.
     #[arg(long, value_name = "NUMBER", value_parser = boot_number)]
     boot_number: Option<NonZeroU32>,
-    /// Keep the vehicle's unique id, a random number, in this file, so that a station knows the vehicle again after a power
-    /// cycle. Without it each start is another vehicle.
+    /// Keep the vehicle's unique id, a random number, in this file, so that a station knows the
+    /// vehicle again after a power cycle. Without it each start is another vehicle.
     #[arg(long, value_name = "FILE")]
     uid_file: Option<PathBuf>,
-    /// Log to write (MCAP), or `none`, as without this option. An existing file is kept: the log then gets the next free name,
-    /// and says so.
+    /// Log to write (MCAP), or `none`, as without this option. An existing file is kept: the log
+    /// then gets the next free name, and says so.
     #[arg(long, value_name = "FILE|none")]
     log: Option<PathBuf>,
     /// Seed of the dispersions.
@@ -76,10 +77,12 @@ pub(crate) struct FlyArguments {
     /// Which flight of the seed, as in campaign --only.
     #[arg(long, default_value_t = 0, value_name = "NUMBER")]
     flight: u64,
-    /// Where the flight begins: pad, apogee or drone, if the mission has that start [default: the mission's].
+    /// Where the flight begins: pad, apogee or drone, if the mission has that start [default: the
+    /// mission's].
     #[arg(long, value_name = "START")]
     start: Option<StartPoint>,
-    /// Built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh, wild) or TOML file.
+    /// Built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh, wild) or
+    /// TOML file.
     #[arg(long, default_value = "field", value_name = "NAME|FILE")]
     dispersion: String,
     /// Mean wind 10 m above the ground, m/s, instead of the set's.
@@ -94,12 +97,13 @@ pub(crate) struct FlyArguments {
     /// Arm and start without a ground station, also with --mavlink.
     #[arg(long)]
     auto: bool,
-    /// Keep serving the links after the flight, until interrupted; after an abort on the pad they are served anyway.
+    /// Keep serving the links after the flight, until interrupted; after an abort on the pad they
+    /// are served anyway.
     #[arg(long)]
     stay: bool,
-    /// The flight computer of a board decides every frame, too, over the pipes `frames` and `answers` in this
-    /// folder, and speaks MAVLink on its own radio (onboard-sim/lab/cortex-m7/emulate). A frame that it decides otherwise ends the
-    /// flight.
+    /// The flight computer of a board decides every frame, too, over the pipes `frames` and
+    /// `answers` in this folder, and speaks MAVLink on its own radio
+    /// (onboard-sim/lab/cortex-m7/emulate). A frame that it decides otherwise ends the flight.
     #[arg(long, value_name = "FOLDER", conflicts_with_all = ["mavlink", "key", "auto"])]
     board: Option<PathBuf>,
     /// Print how the flight ended and where its log is, as one JSON object, and nothing else.
@@ -139,7 +143,8 @@ async fn fly(arguments: FlyArguments) -> anyhow::Result<Exit> {
     };
     // People stand at it: a flight by itself keeps nobody away.
     let crewed = !arguments.auto && !arguments.mavlink.is_empty();
-    // Beside the first of these that the vehicle has: they make it the same vehicle when it is switched on again.
+    // Beside the first of these that the vehicle has: they make it the same vehicle when it is
+    // switched on again.
     let own = arguments.uid_file.as_ref().or(arguments.key.as_ref()).or(log);
     let abort_file = own.filter(|_| crewed).map(|file| file.with_added_extension("aborted"));
     let options = FlyOptions {
@@ -232,7 +237,8 @@ fn pin_as_typed() -> std::io::Result<watch::Receiver<bool>> {
     Ok(moved)
 }
 
-/// Until the end of standard input. That of a background job is left alone: reading it would stop the job.
+/// Until the end of standard input. That of a background job is left alone: reading it would stop
+/// the job.
 fn read_pin(pin: &watch::Sender<bool>) {
     let stdin = std::io::stdin();
     let mut typed = Vec::new();

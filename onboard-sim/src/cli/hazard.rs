@@ -19,7 +19,8 @@ use super::{Asked, in_wind, on_threads, show_flights};
 pub(crate) struct HazardArguments {
     #[command(flatten)]
     asked: Asked,
-    /// Where the flights begin: pad, apogee or drone [default: pad if the mission has a booster, else the mission's].
+    /// Where the flights begin: pad, apogee or drone [default: pad if the mission has a booster,
+    /// else the mission's].
     #[arg(long, value_name = "START")]
     start: Option<StartPoint>,
     /// Mean winds 10 m above the ground, m/s.
@@ -28,7 +29,8 @@ pub(crate) struct HazardArguments {
     /// Flights in each wind of every way, by which the ways are known that come down farthest.
     #[arg(long, default_value_t = 100, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
     flights: u64,
-    /// Flights in each wind of the ways that come down farthest. 368 are needed for an upper end of the interval.
+    /// Flights in each wind of the ways that come down farthest. 368 are needed for an upper end of
+    /// the interval.
     #[arg(long, default_value_t = 400, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
     hazard_flights: u64,
     /// Write where each flight came down (CSV).

@@ -1,4 +1,5 @@
-//! The subcommands of the program, and what they have in common: the texts that they read, and the threads that they use.
+//! The subcommands of the program, and what they have in common: the texts that they read, and the
+//! threads that they use.
 
 pub(crate) mod campaign;
 pub(crate) mod card;
@@ -32,7 +33,8 @@ pub(crate) struct Asked {
     /// Built-in mission or TOML file.
     #[arg(long, alias = "profile", default_value = mission::DEFAULT, value_name = "NAME|FILE")]
     mission: String,
-    /// Built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh, wild) or TOML file.
+    /// Built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh, wild) or
+    /// TOML file.
     #[arg(long, default_value = dispersion::DEFAULT, value_name = "NAME|FILE")]
     dispersion: String,
     /// Seed of everything random.
@@ -49,7 +51,8 @@ impl Asked {
     }
 }
 
-/// Does work on so many threads, or on as many as there are processors; the results do not depend on it.
+/// Does work on so many threads, or on as many as there are processors; the results do not depend
+/// on it.
 fn on_threads<T: Send>(
     jobs: Option<usize>,
     work: impl FnOnce() -> anyhow::Result<T> + Send,
@@ -64,7 +67,8 @@ fn logging(path: &Path, header: &LogHeader) -> anyhow::Result<Recorder> {
     Ok(recorder)
 }
 
-/// Says on standard error what is no error, unless --quiet is given. If nobody reads it, nothing is lost.
+/// Says on standard error what is no error, unless --quiet is given. If nobody reads it, nothing is
+/// lost.
 fn say(text: &str) {
     if !is_quiet() {
         let _ = writeln!(std::io::stderr(), "{text}");
@@ -78,7 +82,8 @@ fn read(path: &Path) -> anyhow::Result<String> {
         .unwrap_or_else(|error| error.as_bytes().iter().copied().map(char::from).collect()))
 }
 
-/// The flights of a seed: a mission, with a start if one is given, and a set of dispersions, each built in or a file.
+/// The flights of a seed: a mission, with a start if one is given, and a set of dispersions, each
+/// built in or a file.
 fn recipe(mission_name: &str, start: Option<StartPoint>, set: &str, seed: u64) -> anyhow::Result<Recipe> {
     let mission_toml = text_of(mission_name, mission::BUILTIN, "mission")?;
     let set_toml = text_of(set, dispersion::BUILTIN, "set of dispersions")?;
@@ -89,7 +94,8 @@ fn recipe(mission_name: &str, start: Option<StartPoint>, set: &str, seed: u64) -
     })
 }
 
-/// The same flights in another mean wind, m/s. The log keeps the text of the set, and a replay draws from it again.
+/// The same flights in another mean wind, m/s. The log keeps the text of the set, and a replay
+/// draws from it again.
 fn in_wind(recipe: &Recipe, wind_m_s: f64) -> anyhow::Result<Recipe> {
     const MOST_M_S: f64 = 30.0;
     anyhow::ensure!((0.0..=MOST_M_S).contains(&wind_m_s), "--wind {wind_m_s}: must be 0 to {MOST_M_S} m/s");

@@ -1,5 +1,5 @@
-//! A mission file for a rocket of one's own: what a club measures, each with its unit and how it is measured. What is not told is
-//! another mission's, scaled.
+//! A mission file for a rocket of one's own: what a club measures, each with its unit and how it is
+//! measured. What is not told is another mission's, scaled.
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
@@ -28,17 +28,20 @@ const START: &str = "start.at";
 pub(crate) struct NewArguments {
     /// The vehicle's name: NAME.toml is written.
     name: String,
-    /// Mission that has what is not told, scaled by mass, length and diameter: built-in or TOML file [default: mk3].
+    /// Mission that has what is not told, scaled by mass, length and diameter: built-in or TOML
+    /// file [default: mk3].
     #[arg(long, value_name = "NAME|FILE")]
     like: Option<String>,
-    /// OpenRocket's export of a simulated flight (CSV) of the landing vehicle alone, without its booster: its first row has mass,
-    /// centre of gravity, inertias and cross section, in any units. Its drag is that of a flight nose first, and is not used.
+    /// OpenRocket's export of a simulated flight (CSV) of the landing vehicle alone, without its
+    /// booster: its first row has mass, centre of gravity, inertias and cross section, in any
+    /// units. Its drag is that of a flight nose first, and is not used.
     #[arg(long, value_name = "FILE")]
     from: Option<PathBuf>,
     /// Length from the nozzle exit to the tip of the nose, m: OpenRocket counts from the nose.
     #[arg(long, value_name = "M")]
     length: Option<f64>,
-    /// Landing motor: a built-in one, a .eng or .rse file, or a test stand's table (.csv with columns such as time_s, thrust_n).
+    /// Landing motor: a built-in one, a .eng or .rse file, or a test stand's table (.csv with
+    /// columns such as time_s, thrust_n).
     #[arg(long, value_name = "NAME|FILE")]
     motor: Option<String>,
     /// What a test stand's table does not say of its motor.
@@ -73,7 +76,8 @@ pub(crate) fn run(arguments: &NewArguments) -> anyhow::Result<Exit> {
     Ok(Exit::Yes)
 }
 
-/// The text of the mission, which can be loaded; asks for everything if `asks`, else only for what must be told.
+/// The text of the mission, which can be loaded; asks for everything if `asks`, else only for what
+/// must be told.
 fn made(arguments: &NewArguments, asks: bool, ask: Ask<'_>, path: &str) -> anyhow::Result<String> {
     let NewArguments { name, like, from, length, motor, motor_data, .. } = arguments;
     let mut draft = Draft::like(like.as_deref().unwrap_or(mission::DEFAULT))?;
@@ -241,7 +245,8 @@ impl Draft {
         Ok(())
     }
 
-    /// Asks for a value, until there is one that can be taken; one that is far from what was expected is asked for twice.
+    /// Asks for a value, until there is one that can be taken; one that is far from what was
+    /// expected is asked for twice.
     fn ask(&mut self, key: &Key, ask: Ask<'_>) -> anyhow::Result<()> {
         let number_of = |draft: &Self| draft.value(key)?.0.as_float();
         let (expected, mut doubt) = (number_of(self), String::new());
@@ -315,8 +320,8 @@ fn rounded(number: f64) -> Value {
     Value::Float(format!("{number:.3e}").parse().unwrap_or(number))
 }
 
-/// A number in a unit: of an answer that has the number alone, or another unit behind it, or for an inertia what was measured of
-/// a vehicle of this mass that swings on two wires.
+/// A number in a unit: of an answer that has the number alone, or another unit behind it, or for an
+/// inertia what was measured of a vehicle of this mass that swings on two wires.
 fn number(answer: &str, unit: &str, mass_kg: f64) -> anyhow::Result<Value> {
     let float = |text: &str| {
         text.replace(',', ".").parse::<f64>().ok().with_context(|| format!("'{text}' is no number"))
@@ -388,7 +393,8 @@ mod tests {
         }
     }
 
-    /// MK3.md, "What a builder measures": ten swings of mk3 on wires of 1 m, 0.4 m apart, take 19.3 s.
+    /// MK3.md, "What a builder measures": ten swings of mk3 on wires of 1 m, 0.4 m apart, take 19.3
+    /// s.
     #[test]
     fn val_hand_answers_are_scaled_converted_and_swung() {
         let answers = "HP-H45W\n4100 g\n80 m\n0,8\n\nhalf\n40\n0.4\n20.1 1 0.4\n1 kg m2\n\n130 mm\n\n8\n1500 ft\n95\n35\nabove\nDrone\n140\n\n\n\n\n\n";

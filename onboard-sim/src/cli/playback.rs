@@ -22,9 +22,11 @@ use super::{logging, recipe};
 pub(crate) struct PlaybackArguments {
     /// Recorded sensors: CSV, or CSV compressed by zstd (.zst).
     ///
-    /// Columns: time_s; gyro_x, gyro_y, gyro_z (rad/s); accel_x, accel_y, accel_z (m/s2, +9.8 upwards at rest); barometer (m above the
-    /// pad) or pressure_pa; gnss_x, gnss_y, gnss_z (m from the pad, z up), gnss_vx, gnss_vy, gnss_vz (m/s), gnss_time_s; lidar (m). An
-    /// empty cell or nan is no new sample. Only time, gyro and accelerometer are required, 50 to 2,000 times a second.
+    /// Columns: time_s; gyro_x, gyro_y, gyro_z (rad/s); accel_x, accel_y, accel_z (m/s2, +9.8
+    /// upwards at rest); barometer (m above the pad) or pressure_pa; gnss_x, gnss_y, gnss_z (m from
+    /// the pad, z up), gnss_vx, gnss_vy, gnss_vz (m/s), gnss_time_s; lidar (m). An empty cell or
+    /// nan is no new sample. Only time, gyro and accelerometer are required, 50 to 2,000 times a
+    /// second.
     #[arg(value_name = "SENSORS.csv")]
     sensors: PathBuf,
     /// Built-in mission or TOML file, with a section `launch`.
@@ -39,7 +41,8 @@ pub(crate) struct PlaybackArguments {
     /// Rows a second of a file without time_s.
     #[arg(long, value_name = "HZ")]
     rate: Option<f64>,
-    /// Burn time of the ascent motor that flew, s, instead of the mission's: before 0.6 of it no burnout is detected.
+    /// Burn time of the ascent motor that flew, s, instead of the mission's: before 0.6 of it no
+    /// burnout is detected.
     #[arg(long, value_name = "S")]
     burn_time: Option<f64>,
 }
@@ -155,7 +158,8 @@ fn print_moments(out: &mut impl Write, played: &Played) -> std::io::Result<()> {
 fn print_sensors(out: &mut impl Write, played: &Played) -> std::io::Result<()> {
     writeln!(out, "\nin flight         received      used  rejected not offered")?;
     let (aids, [barometer, fixes, lidar]) = (&played.aids, played.received);
-    // A fix has three numbers of each kind. What the computer withholds from its estimator was never offered.
+    // A fix has three numbers of each kind. What the computer withholds from its estimator was
+    // never offered.
     for (name, received, AidStatus { used, refused, .. }) in [
         ("barometer", barometer, &aids.barometer),
         ("GNSS velocity", 3 * fixes, &aids.gnss_velocity),

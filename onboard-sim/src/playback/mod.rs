@@ -1,8 +1,10 @@
-//! Plays recorded sensors to the flight computer: what it would have decided aboard a rocket that flew without it.
+//! Plays recorded sensors to the flight computer: what it would have decided aboard a rocket that
+//! flew without it.
 //!
-//! The computer is stepped as on a board that is powered up with the first row: it is not armed, waits on its rail, and
-//! detects the lift-off by itself. Nothing is connected to it. Servos are where they were commanded, the pin is out,
-//! igniters have continuity, the wire to the booster breaks with the command to separate. No phase is forced.
+//! The computer is stepped as on a board that is powered up with the first row: it is not armed,
+//! waits on its rail, and detects the lift-off by itself. Nothing is connected to it. Servos are
+//! where they were commanded, the pin is out, igniters have continuity, the wire to the booster
+//! breaks with the command to separate. No phase is forced.
 
 mod axes;
 pub mod sensor_file;
@@ -24,12 +26,14 @@ pub use self::axes::{Axes, NotAxes};
 
 /// Beside those of the sensors, the arming checks that depend on recorded samples alone.
 const RECORDED_CHECKS: [&str; 4] = ["rotation", "tilt from vertical", "speed", "estimator"];
-/// The arming checks are made once a second; of the seconds before the lift-off the last ones count.
+/// The arming checks are made once a second; of the seconds before the lift-off the last ones
+/// count.
 const CHECK_FRAMES: u64 = 200;
 const CHECKED_S: usize = 10;
 /// The lift-off begins up to so many frames before it is detected.
 const LIFTING_OFF_FRAMES: u64 = 100;
-/// A climb from the barometer compares its means over so many frames before and after, half a second.
+/// A climb from the barometer compares its means over so many frames before and after, half a
+/// second.
 const CLIMB_FRAMES: usize = 100;
 /// A faster climb tears a parachute or a stack that separates, m/s.
 pub const CLIMB_MAX_M_S: f64 = 30.0;
@@ -60,7 +64,8 @@ pub struct Played {
     /// How many seconds these are.
     pub checked_s: usize,
     pub moments: Vec<Moment>,
-    /// What the estimator used and rejected from the lift-off on, and its restarts, each because a state was not a number.
+    /// What the estimator used and rejected from the lift-off on, and its restarts, each because a
+    /// state was not a number.
     pub aids: Aids,
     pub restarts: u32,
     /// Samples from the lift-off on: barometer, fixes, lidar.
@@ -82,8 +87,8 @@ pub fn applies(check: &str) -> bool {
     SENSORS.contains(&check) || RECORDED_CHECKS.contains(&check)
 }
 
-/// Plays the sensors to the computer of a mission that starts on its pad, and gives each record of its log with its time,
-/// ns from power-up.
+/// Plays the sensors to the computer of a mission that starts on its pad, and gives each record of
+/// its log with its time, ns from power-up.
 pub fn play(sensors: &[Measurements], mission: &Mission, mut log: impl FnMut(Record, u64)) -> Played {
     let computer = Computer::at_power_up(mission, &RigidState::upright(0.0));
     let mut player =

@@ -1,5 +1,5 @@
-//! After an abort with the landing motor lit the vehicle still lands. The motor has no cut-off, so it lands on the
-//! ground below.
+//! After an abort with the landing motor lit the vehicle still lands. The motor has no cut-off, so
+//! it lands on the ground below.
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
 
 use flight::computer::AbortEffect;
@@ -8,7 +8,8 @@ use onboard_sim::row::Row;
 use onboard_sim::tally::{self, Tally};
 use sim::recipe::Recipe;
 
-/// An abort at a random moment of the burn, which lasts at least 4.4 s from the command to the ground.
+/// An abort at a random moment of the burn, which lasts at least 4.4 s from the command to the
+/// ground.
 const IN_THE_BURN: &str = "abort@ignition+0..4.4";
 const LATEST_S: f64 = 4.4;
 /// A seed whose flights were not used for tuning.
@@ -50,8 +51,8 @@ fn regress_flights_with_an_abort_in_the_burn_land_as_often_as_without() {
     assert!(otherwise.count() >= 3 * 35, "an abort ends the homing to the pad");
 }
 
-/// Too low for the parachute, at the first moment that the gate is open: the motor is lit at the height that was chosen. A fall
-/// would end at about 37 m/s.
+/// Too low for the parachute, at the first moment that the gate is open: the motor is lit at the
+/// height that was chosen. A fall would end at about 37 m/s.
 #[test]
 fn an_abort_before_the_ignition_with_the_gate_open_burns_at_its_height_and_lands_in_place() {
     let recipe = recipe(None);

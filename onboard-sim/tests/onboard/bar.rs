@@ -1,5 +1,5 @@
-//! Landing rates with a few flights of each set of dispersions, so that a change that costs landings is seen at once.
-//! For exact rates run a campaign of a thousand flights.
+//! Landing rates with a few flights of each set of dispersions, so that a change that costs
+//! landings is seen at once. For exact rates run a campaign of a thousand flights.
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
 
 use onboard_sim::row::Row;
@@ -18,7 +18,8 @@ fn flown_by(recipe: &Recipe, flights: u64) -> Vec<Row> {
 
 #[test]
 fn regress_flights_without_dispersions_and_with_motor_scatter_end_inside_the_envelope() {
-    // With plans that took no time they ended inside Table 2; with late ones mk3 turns by 2.7 deg/s, where Table 2 has 2.0.
+    // With plans that took no time they ended inside Table 2; with late ones mk3 turns by 2.7
+    // deg/s, where Table 2 has 2.0.
     assert!(flown("none", 2).iter().all(|row| row.envelope));
     assert!(flown("thrust-only", 10).iter().all(|row| row.envelope));
 }
@@ -30,8 +31,9 @@ fn regress_flights_with_field_dispersions_land_on_their_legs() {
     assert!(landed >= 18, "{landed} of 20");
 }
 
-/// The vehicle expects the certified curve, and its motor has one half way to that of old stock: 89 of 100 flights stand. The old
-/// one itself, with 10 % less impulse, lands 20 of 100. With thrust that rises slowly, too, 31 of 40 stand (38 of 40 without).
+/// The vehicle expects the certified curve, and its motor has one half way to that of old stock: 89
+/// of 100 flights stand. The old one itself, with 10 % less impulse, lands 20 of 100. With thrust
+/// that rises slowly, too, 31 of 40 stand (38 of 40 without).
 #[test]
 fn regress_a_motor_half_way_to_the_other_of_its_name_is_landed_on() {
     let mut recipe = Recipe::built_in("mk3", "real").unwrap();

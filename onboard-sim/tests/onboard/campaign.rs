@@ -48,7 +48,8 @@ fn the_results_do_not_depend_on_threads_or_a_stop() {
     assert_eq!(fly(&recipe, 3, &at("killed")), FLIGHTS);
     assert_same(&at("one"), &at("killed"));
 
-    // As a killed campaign leaves it: some flights in the order in which they ended, and a part of a line.
+    // As a killed campaign leaves it: some flights in the order in which they ended, and a part of
+    // a line.
     let csv = fs::read_to_string(at("one").join("flights.csv")).unwrap();
     let lines: Vec<&str> = csv.split_inclusive('\n').collect();
     let cut = lines[4].trim_end();

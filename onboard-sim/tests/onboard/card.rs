@@ -114,7 +114,8 @@ fn circle(wind_m_s: f64, keep_out_m: f64) -> InWind {
     in_winds(&[(wind_m_s, impacts)], &rule()).remove(0)
 }
 
-/// Wind from the west: the line goes to the right, with north up. Without a direction downwind is up.
+/// Wind from the west: the line goes to the right, with north up. Without a direction downwind is
+/// up.
 #[test]
 fn val_compass_the_line_of_a_west_wind_points_east() {
     let winds = [circle(3.0, 310.0)];
@@ -131,8 +132,8 @@ fn val_compass_the_line_of_a_west_wind_points_east() {
     );
 }
 
-/// 360 of 400 in calm air: 324 is nine tenths of it, 323 is less. 100 flights give a radius without an upper end, and nobody can
-/// stand outside of that.
+/// 360 of 400 in calm air: 324 is nine tenths of it, 323 is less. 100 flights give a radius without
+/// an upper end, and nobody can stand outside of that.
 #[test]
 fn val_hand_the_wind_to_fly_in_keeps_nine_tenths_of_the_landings() {
     let of = |flights: usize, landed: usize| -> Vec<Impact> {
@@ -173,7 +174,8 @@ fn val_safety_md_the_abort_table_is_the_same() {
     assert!(!shown[0].contains(&all[1]) && shown[2].contains(&all[1]), "a drone's row on its own card alone");
 }
 
-/// The mission of mk3 says 2.4 calibres; the rest by hand: 3.70 + 1.1195 + 0.2121 kg, and I243's first half second.
+/// The mission of mk3 says 2.4 calibres; the rest by hand: 3.70 + 1.1195 + 0.2121 kg, and I243's
+/// first half second.
 #[test]
 fn val_hand_what_a_range_officer_asks_of_mk3() {
     let mission = flight::vehicles::mission::builtin("mk3").unwrap().unwrap();

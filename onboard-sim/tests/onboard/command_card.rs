@@ -1,4 +1,5 @@
-//! Tests the command lines of `check`, `card` and `hazard`: their answers, files and refusals, and that what they write is flown.
+//! Tests the command lines of `check`, `card` and `hazard`: their answers, files and refusals, and
+//! that what they write is flown.
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
 
 use std::fs;

@@ -7,7 +7,8 @@ use std::net::UdpSocket;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-/// What `fly` says with this log besides its error. A key that does not exist ends it before the flight.
+/// What `fly` says with this log besides its error. A key that does not exist ends it before the
+/// flight.
 fn fly(directory: &Path, log: &str) -> String {
     let program = env!("CARGO_BIN_EXE_onboard-sim");
     let arguments = ["fly", "--log", log, "--key", "missing.key"];

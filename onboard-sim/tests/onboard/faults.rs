@@ -10,8 +10,8 @@ use sim::recipe::Recipe;
 /// Nominal data, with sensors, in still air.
 const SENSORS_ONLY: &str = "sensors = true";
 
-/// The expected outcome of each fault with nominal data, sensors and still air, and why. With real dispersions fewer flights
-/// land.
+/// The expected outcome of each fault with nominal data, sensors and still air, and why. With real
+/// dispersions fewer flights land.
 const EXPECTED: &str = include_str!("expected-faults.csv");
 
 /// The expected outcome of a flight with a fault.
@@ -20,16 +20,18 @@ const EXPECTED: &str = include_str!("expected-faults.csv");
 enum Expected {
     /// The vehicle stands undamaged.
     Land,
-    /// The flight may not land, but the vehicle uses what still works: the motor is ignited inside the gate, and the
-    /// vehicle reaches the ground more slowly than without the motor.
+    /// The flight may not land, but the vehicle uses what still works: the motor is ignited inside
+    /// the gate, and the vehicle reaches the ground more slowly than without the motor.
     Degrade,
-    /// The landing motor is not ignited, or gives no thrust. The fins are open, and the loss is recorded.
+    /// The landing motor is not ignited, or gives no thrust. The fins are open, and the loss is
+    /// recorded.
     Inhibit,
     /// The vehicle comes down under the parachute.
     Parachute,
 }
 
-/// A degraded flight reaches the ground more slowly than this, m/s. Without braking the speed would be 40 m/s.
+/// A degraded flight reaches the ground more slowly than this, m/s. Without braking the speed would
+/// be 40 m/s.
 const DEGRADED_M_S: f64 = 35.0;
 
 impl Expected {

@@ -58,7 +58,8 @@ fn all_flown(recipe: &Recipe, flights: u64) -> Vec<(bool, Vec<Finding>)> {
     threads(None).unwrap().install(|| in_parallel(&numbers, |number| flown(recipe, *number, None), &|_| {}))
 }
 
-/// How often each fault is named first, and how often something is found in a flight that lands with nothing broken.
+/// How often each fault is named first, and how often something is found in a flight that lands
+/// with nothing broken.
 fn named(mission: &str, each: u64, unbroken: u64, seed: u64) -> (Vec<(&'static str, usize)>, usize, String) {
     let mut table = String::new();
     let named = BREAKS.map(|(fault, signs)| {

@@ -39,8 +39,9 @@ fn a_flight_from_the_pad_that_ends_otherwise_comes_down_beyond_the_fence() {
     assert!(farthest_m(Way::AsPlanned) < 120.0);
 }
 
-/// The study holds the fins and moves the world alone once the parachute is out. A flight with its computer to the end
-/// comes down at the same place, to the bit; and an abort in the boost where one in the coast does.
+/// The study holds the fins and moves the world alone once the parachute is out. A flight with its
+/// computer to the end comes down at the same place, to the bit; and an abort in the boost where
+/// one in the coast does.
 #[test]
 fn under_the_parachute_the_computer_changes_nothing() {
     let recipe = recipe("mk2", StartPoint::Pad);

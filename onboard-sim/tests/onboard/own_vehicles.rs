@@ -19,9 +19,10 @@ fn between(rng: &mut ChaCha12Rng, [least, most]: [f64; 2]) -> f64 {
     least + (most - least) * rng.random::<f64>()
 }
 
-/// The mission of a vehicle as a club may build it: 0.6 to 6 kg on a real motor, 1.15 to 2.2 times as strong as its weight at
-/// ignition, which burns for 1 to 8 s. Servos of hobby class, a gimbal of 3 to 8 degrees as far as the tube has room, fins that
-/// steer or only brake, legs with blocks of mk3's proportions, let go at apogee or by a drone.
+/// The mission of a vehicle as a club may build it: 0.6 to 6 kg on a real motor, 1.15 to 2.2 times
+/// as strong as its weight at ignition, which burns for 1 to 8 s. Servos of hobby class, a gimbal
+/// of 3 to 8 degrees as far as the tube has room, fins that steer or only brake, legs with blocks
+/// of mk3's proportions, let go at apogee or by a drone.
 fn drawn(number: u64) -> String {
     let rng = &mut ChaCha12Rng::seed_from_u64(number);
     let (motor, curve, mass_kg) = loop {
@@ -143,7 +144,8 @@ fn stand(text: &str, set: &str, seed: u64, flights: u64) -> u64 {
     rows.iter().filter(|row| row.landing().stands).count() as u64
 }
 
-/// Of the vehicles from a number on, those that the check calls so, each with its number, its text and its page.
+/// Of the vehicles from a number on, those that the check calls so, each with its number, its text
+/// and its page.
 fn of_verdict(first: u64, verdict: Verdict) -> impl Iterator<Item = (u64, String, Page)> {
     (first..).filter_map(move |number| {
         let text = drawn(number);
@@ -152,8 +154,8 @@ fn of_verdict(first: u64, verdict: Verdict) -> impl Iterator<Item = (u64, String
     })
 }
 
-/// Tells many vehicles of a verdict (`VERDICT=no`): `VEHICLES=60 FLIGHTS=100 cargo test --release -p onboard-sim --test onboard own_vehicles --
-/// --ignored --nocapture`.
+/// Tells many vehicles of a verdict (`VERDICT=no`): `VEHICLES=60 FLIGHTS=100 cargo test --release
+/// -p onboard-sim --test onboard own_vehicles -- --ignored --nocapture`.
 #[test]
 #[ignore = "takes minutes: the table of many vehicles"]
 fn table() {
@@ -179,8 +181,8 @@ fn table() {
     }
 }
 
-/// Of what the check calls ok nine tenths land. Of the whole table, of 60 vehicles with 50 flights each, 97 % of what perfect
-/// information lands do in the median of `field`.
+/// Of what the check calls ok nine tenths land. Of the whole table, of 60 vehicles with 50 flights
+/// each, 97 % of what perfect information lands do in the median of `field`.
 #[test]
 fn what_the_check_calls_ok_lands() {
     const FLIGHTS: u64 = 10;

@@ -10,7 +10,8 @@ use protocol::log::record::Record;
 use sim::recipe::Recipe;
 
 const HEDY: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/recorded/hedy.csv.zst");
-/// From the source: lift-off in the file, s; apogee after it, s, and above the pad, m; burn time, s.
+/// From the source: lift-off in the file, s; apogee after it, s, and above the pad, m; burn time,
+/// s.
 const LIFT_OFF_S: f64 = 20.0;
 const APOGEE_S: f64 = 34.2;
 const APOGEE_M: f64 = 5_234.0;
@@ -58,7 +59,8 @@ fn val_rocketpy_hedy_the_computer_recognises_a_real_flight() {
     );
 }
 
-/// The file has neither satellites nor a lidar. An arming check that is renamed would no longer apply.
+/// The file has neither satellites nor a lidar. An arming check that is renamed would no longer
+/// apply.
 #[test]
 fn arming_checks_name_what_the_recording_lacks() {
     let played = played(&mk3(), |_, _| {});

@@ -1,7 +1,8 @@
 //! Parses MAVLink commands, builds their answers, and sends commands with retries.
 //!
-//! Protocol: <https://mavlink.io/en/services/command.html>. Requests and answers hold numbers instead of the
-//! dialect's enums, because a command that the dialect does not know must still be answered UNSUPPORTED.
+//! Protocol: <https://mavlink.io/en/services/command.html>. Requests and answers hold numbers
+//! instead of the dialect's enums, because a command that the dialect does not know must still be
+//! answered UNSUPPORTED.
 
 mod sender;
 
@@ -31,7 +32,8 @@ pub struct CommandRequest {
 }
 
 impl CommandRequest {
-    /// Parses the request in a COMMAND_LONG or COMMAND_INT frame; returns `None` for any other message.
+    /// Parses the request in a COMMAND_LONG or COMMAND_INT frame; returns `None` for any other
+    /// message.
     pub fn from_frame(frame: &Frame) -> Option<Self> {
         let payload = frame.padded_payload();
         let float =
@@ -57,7 +59,8 @@ impl CommandRequest {
         })
     }
 
-    /// The command that a COMMAND_CANCEL frame names, without its parameters; `None` for any other message.
+    /// The command that a COMMAND_CANCEL frame names, without its parameters; `None` for any other
+    /// message.
     pub fn cancelled_by(frame: &Frame) -> Option<Self> {
         if frame.message_id() != COMMAND_CANCEL_ID {
             return None;
@@ -72,13 +75,15 @@ impl CommandRequest {
         })
     }
 
-    /// The number of this command, in parameter 2: its repetitions have the same one. `None` from other ground stations, which
-    /// leave it at 0 or NaN, or put a force code or the number of a mission item there.
+    /// The number of this command, in parameter 2: its repetitions have the same one. `None` from
+    /// other ground stations, which leave it at 0 or NaN, or put a force code or the number of a
+    /// mission item there.
     pub fn number(&self) -> Option<u32> {
         number_in(self.params[1])
     }
 
-    /// Reads parameter 7 of a command that can move something. Other ground stations leave it at 0 or NaN.
+    /// Reads parameter 7 of a command that can move something. Other ground stations leave it at 0
+    /// or NaN.
     pub fn meant_boot(&self) -> MeantBoot {
         let param7 = self.params[6];
         if param7.is_nan() || param7.abs() < 0.5 {
@@ -128,8 +133,9 @@ pub struct CommandAnswer {
     pub result: u8,
     /// Percent done while the result is MAV_RESULT_IN_PROGRESS; 255 means unknown.
     pub progress: u8,
-    /// RESULT_PARAM2: the number of the command, negative if a second person has to confirm it. Of a command without a number
-    /// it is the number of the ask that has to be confirmed; 0 if there is none.
+    /// RESULT_PARAM2: the number of the command, negative if a second person has to confirm it. Of
+    /// a command without a number it is the number of the ask that has to be confirmed; 0 if there
+    /// is none.
     pub detail: i32,
     /// The component that the answer is for.
     pub target: Address,

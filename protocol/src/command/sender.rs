@@ -1,5 +1,5 @@
-//! The sender's side of the command protocol: decides when to send a command again, and which answer belongs to which
-//! command.
+//! The sender's side of the command protocol: decides when to send a command again, and which
+//! answer belongs to which command.
 
 use alloc::vec::Vec;
 use core::time::Duration;
@@ -15,9 +15,10 @@ pub enum Resend {
     Never,
     /// Sent this many further times, under one number: the vehicle does it once.
     Times(u8),
-    /// Sent until it is withdrawn, whatever the answer is: twenty times a second until it is accepted, then five times a
-    /// second. For aborting: if half of the frames are lost, all twenty of a second are lost once in a million times, and
-    /// after an outage one of them arrives within 50 ms.
+    /// Sent until it is withdrawn, whatever the answer is: twenty times a second until it is
+    /// accepted, then five times a second. For aborting: if half of the frames are lost, all twenty
+    /// of a second are lost once in a million times, and after an outage one of them arrives within
+    /// 50 ms.
     UntilWithdrawn,
 }
 
@@ -28,7 +29,8 @@ const SILENCE: Duration = Duration::from_millis(100);
 /// Interval between the sendings of an accepted abort.
 const STEADY_INTERVAL: Duration = Duration::from_millis(200);
 
-/// What happened to a command. Acknowledged is not observed: only the vehicle's state shows that a command was done.
+/// What happened to a command. Acknowledged is not observed: only the vehicle's state shows that a
+/// command was done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CommandEvent {
     Sent {
@@ -49,8 +51,8 @@ pub enum CommandEvent {
         /// A second person has to confirm.
         asks: bool,
     },
-    /// The final answer to a command that is no longer waited for, because it was given up or replaced by another
-    /// command with its number.
+    /// The final answer to a command that is no longer waited for, because it was given up or
+    /// replaced by another command with its number.
     AnsweredLate {
         command: u16,
         result: u8,
@@ -102,8 +104,8 @@ impl Pending {
     fn due_after(&self, now: Duration) -> Duration {
         match self.resend {
             Resend::UntilWithdrawn if self.is_accepted() => now + STEADY_INTERVAL,
-            // Counted from the time at which it was due, so that a poll that comes late now and then does not lower the
-            // rate.
+            // Counted from the time at which it was due, so that a poll that comes late now and
+            // then does not lower the rate.
             Resend::UntilWithdrawn => (self.due_at + URGENT_INTERVAL).max(now + URGENT_INTERVAL / 2),
             Resend::Never | Resend::Times(_) => now + ANSWER_TIMEOUT,
         }
@@ -130,14 +132,17 @@ impl Pending {
     }
 }
 
-/// The sender's side of the command protocol, without I/O: [`CommandSender::poll`] returns what to send.
+/// The sender's side of the command protocol, without I/O: [`CommandSender::poll`] returns what to
+/// send.
 ///
-/// A command that is sent until it is withdrawn may be answered many times; each answer that differs from the one
-/// before is reported.
+/// A command that is sent until it is withdrawn may be answered many times; each answer that
+/// differs from the one before is reported.
 ///
-/// MAVLink's answers name the kind of their command alone, and arming and disarming are one kind. So each command but one that is
-/// sent until it is withdrawn has a number in parameter 2, which our vehicles repeat in the answer: a late answer to an arming is
-/// not taken for that to the disarming which has replaced it. Whoever answers without a number answers the command that waits.
+/// MAVLink's answers name the kind of their command alone, and arming and disarming are one kind.
+/// So each command but one that is sent until it is withdrawn has a number in parameter 2, which
+/// our vehicles repeat in the answer: a late answer to an arming is not taken for that to the
+/// disarming which has replaced it. Whoever answers without a number answers the command that
+/// waits.
 #[derive(Debug, Default)]
 pub struct CommandSender {
     pending: Vec<Pending>,
@@ -160,8 +165,8 @@ impl CommandSender {
         FIRST_NUMBER + (counted % u64::from(NUMBERS_END - FIRST_NUMBER)) as u32
     }
 
-    /// Queues a command. A pending command of the same kind is replaced. Parameter 2 is the number, unless it is sent until it is
-    /// withdrawn.
+    /// Queues a command. A pending command of the same kind is replaced. Parameter 2 is the number,
+    /// unless it is sent until it is withdrawn.
     pub fn submit(
         &mut self,
         target: Address,
@@ -205,8 +210,9 @@ impl CommandSender {
         self.withdraw(now, |pending| pending.ticket == ticket);
     }
 
-    /// Notes that something was heard from the target. After a silence an abort that is not accepted yet is due at once: an
-    /// outage may be over, and the next one may begin soon. Returns whether that is so.
+    /// Notes that something was heard from the target. After a silence an abort that is not
+    /// accepted yet is due at once: an outage may be over, and the next one may begin soon. Returns
+    /// whether that is so.
     pub fn on_heard(&mut self, now: Duration) -> bool {
         let heard_at = self.heard_at.replace(now);
         let mut due = false;
@@ -222,7 +228,8 @@ impl CommandSender {
         due
     }
 
-    /// Returns when [`CommandSender::poll`] has something to do next; `None` while no command is pending.
+    /// Returns when [`CommandSender::poll`] has something to do next; `None` while no command is
+    /// pending.
     pub fn due_at(&self) -> Option<Duration> {
         self.pending.iter().map(|pending| pending.due_at).min()
     }
@@ -289,7 +296,8 @@ impl CommandSender {
             }
             return true;
         }
-        // A screen and a replay follow the commands of a station that has counted others before: its numbers are not theirs.
+        // A screen and a replay follow the commands of a station that has counted others before:
+        // its numbers are not theirs.
         let of_its_kind = || self.pending.iter().position(|p| p.message.command as u16 == answer.command);
         let Some(index) = waiting.or_else(of_its_kind) else { return false };
         if self.pending[index].resend == Resend::UntilWithdrawn {
@@ -306,8 +314,9 @@ impl CommandSender {
         true
     }
 
-    /// Notes an answer to a command that is sent until it is withdrawn, and reports it if it differs from the one
-    /// before. Once accepted it stays accepted: copies that arrive later find nothing left to do.
+    /// Notes an answer to a command that is sent until it is withdrawn, and reports it if it
+    /// differs from the one before. Once accepted it stays accepted: copies that arrive later find
+    /// nothing left to do.
     fn note_answer(&mut self, index: usize, answer: CommandAnswer, final_answer: bool) {
         let known = &mut self.pending[index].answered;
         if *known == Some(answer.result) || *known == Some(MavResult::MAV_RESULT_ACCEPTED as u8) {
@@ -344,8 +353,8 @@ mod tests {
         Duration::from_millis(milliseconds)
     }
 
-    /// Submits an arming at 0 and a disarming at `disarmed_ms`; of the two, the first or the second is answered at these times, ms.
-    /// Returns the events about answers.
+    /// Submits an arming at 0 and a disarming at `disarmed_ms`; of the two, the first or the second
+    /// is answered at these times, ms. Returns the events about answers.
     fn events(disarmed_ms: u64, answers_ms: &[(u64, i32)]) -> Vec<CommandEvent> {
         let mut sender = CommandSender::new(7);
         sender.submit(VEHICLE, ARM, [1.0; 7], Resend::Times(4), ms(0));
@@ -437,7 +446,8 @@ mod tests {
         };
         let mut latest = 0;
         for _ in 0..2_000 {
-            // Alternating spans, ms: dead 0.1 to 3 s, alive 7/3 of that on average; it begins somewhere in a dead one.
+            // Alternating spans, ms: dead 0.1 to 3 s, alive 7/3 of that on average; it begins
+            // somewhere in a dead one.
             let mut spans = vec![(false, 1 + (3_000.0 * random()) as u64)];
             for _ in 0..6 {
                 spans.push((true, 60 + (7_000.0 * random()) as u64));
@@ -455,7 +465,8 @@ mod tests {
             sender.submit(VEHICLE, abort, [1.0; 7], Resend::UntilWithdrawn, ms(0));
             let arrived = (0..10_000).find(|now| {
                 let up = alive(*now) == Some(true);
-                // The vehicle is heard thirty times a second, and the station looks when it hears it or something is due.
+                // The vehicle is heard thirty times a second, and the station looks when it hears
+                // it or something is due.
                 let due = sender.due_at().is_some_and(|at| at <= ms(*now));
                 (due || (up && now % 33 == 0 && sender.on_heard(ms(*now))))
                     && !sender.poll(ms(*now)).is_empty()

@@ -1,5 +1,5 @@
-//! The messages of the MAVLink dialect, generated at build time from `dialect/touchdown.xml`, which includes
-//! `common.xml`.
+//! The messages of the MAVLink dialect, generated at build time from `dialect/touchdown.xml`, which
+//! includes `common.xml`.
 
 use mavlink::Message as _;
 

@@ -1,8 +1,9 @@
 //! The side of MAVLink FTP that fetches a file.
 //!
-//! Packets go in with [`Download::take`], packets to send come out of [`Download::poll`], and the file comes out in order
-//! as [`DownloadEvent`]s. The caller writes it, says with [`Download::resume`] how much of it is there from before, and
-//! compares the checksum of the whole file in the end.
+//! Packets go in with [`Download::take`], packets to send come out of [`Download::poll`], and the
+//! file comes out in order as [`DownloadEvent`]s. The caller writes it, says with
+//! [`Download::resume`] how much of it is there from before, and compares the checksum of the whole
+//! file in the end.
 
 use alloc::collections::{BTreeMap, VecDeque};
 use alloc::format;
@@ -13,20 +14,23 @@ use core::time::Duration;
 use super::LOG_DIRECTORY;
 use super::packet::{DATA_LEN, Opcode, Packet, Refusal};
 
-/// A request that is not answered for this long is sent again; all requests to read, when none was answered.
+/// A request that is not answered for this long is sent again; all requests to read, when none was
+/// answered.
 const ASK_AGAIN: Duration = Duration::from_millis(900);
 /// A vehicle that has said nothing about files for this long is given up.
 const GIVE_UP: Duration = Duration::from_secs(30);
 /// Requests to close the file before it is left to the vehicle to close it.
 const CLOSE_TRIES: u32 = 3;
-/// Most pieces that are asked for at once. A line of 57,600 baud carries them in 1.5 s, so it has something to carry
-/// while a lost request is noticed.
+/// Most pieces that are asked for at once. A line of 57,600 baud carries them in 1.5 s, so it has
+/// something to carry while a lost request is noticed.
 const MAX_WAITING: usize = 32;
-/// Pieces this far behind the first one that is missing are not asked for, bytes: they wait in memory.
+/// Pieces this far behind the first one that is missing are not asked for, bytes: they wait in
+/// memory.
 const AHEAD: u32 = 1024 * DATA_LEN as u32;
 /// The rate is a mean over this many seconds.
 const RATE_OVER_S: usize = 10;
-/// A listing ends here, so that a vehicle that lists without end fills no memory: a flight every minute for a week.
+/// A listing ends here, so that a vehicle that lists without end fills no memory: a flight every
+/// minute for a week.
 const MAX_LISTED: usize = 10_000;
 
 /// Why a download has failed.
@@ -109,8 +113,8 @@ pub struct Download {
 }
 
 impl Download {
-    /// A download of the file of this name, or of the newest. `first_sequence` should differ from that of an earlier
-    /// process.
+    /// A download of the file of this name, or of the newest. `first_sequence` should differ from
+    /// that of an earlier process.
     pub fn new(name: Option<&str>, first_sequence: u16) -> Self {
         Self {
             phase: if name.is_some() { Phase::Opening } else { Phase::Listing },
@@ -326,7 +330,8 @@ impl Download {
             request.offset == packet.offset && usize::from(request.size) == packet.data.len()
         };
         let place = self.waiting.iter().position(is_this)?;
-        // Only a new piece keeps the download alive: a vehicle that repeats itself for ever is given up.
+        // Only a new piece keeps the download alive: a vehicle that repeats itself for ever is
+        // given up.
         self.heard_at = Some(now);
         let request = self.waiting.remove(place)?;
         if request.is_answered_by(packet) {

@@ -16,7 +16,8 @@ pub const PAYLOAD_LEN: usize = 254;
 const ADDRESS_LEN: usize = 3;
 const HEADER_LEN: usize = 12;
 
-/// What a packet asks for, or how it answers: a MAV_FTP_OPCODE. Any other number writes, or it is unknown.
+/// What a packet asks for, or how it answers: a MAV_FTP_OPCODE. Any other number writes, or it is
+/// unknown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Opcode(pub u8);
 
@@ -32,8 +33,8 @@ impl Opcode {
     pub const ACK: Self = Self(128);
     pub const NAK: Self = Self(129);
 
-    /// Whether it changes a file or a directory: create, write, remove, make and remove a directory, open for writing, truncate,
-    /// rename.
+    /// Whether it changes a file or a directory: create, write, remove, make and remove a
+    /// directory, open for writing, truncate, rename.
     pub fn writes(self) -> bool {
         (6..=13).contains(&self.0)
     }
@@ -230,8 +231,8 @@ fn packet_in(frame: &Frame) -> Option<(Address, Packet)> {
     Some((target, Packet::from_bytes(&bytes[ADDRESS_LEN..PAYLOAD_LEN])?))
 }
 
-/// Whether a frame carries a piece of a file, and where in its payload that piece begins. A log does not keep it:
-/// a log that is downloaded would contain itself.
+/// Whether a frame carries a piece of a file, and where in its payload that piece begins. A log
+/// does not keep it: a log that is downloaded would contain itself.
 pub(crate) fn piece_begins_at(message_id: u32, payload: &[u8]) -> Option<usize> {
     let opcode = |place: usize| payload.get(ADDRESS_LEN + place).copied().map(Opcode);
     let is_piece = message_id == FILE_TRANSFER_PROTOCOL_ID
@@ -250,8 +251,8 @@ pub struct FileRequest {
 }
 
 impl FileRequest {
-    /// Parses the request in a FILE_TRANSFER_PROTOCOL frame; returns `None` for any other message and for answers,
-    /// which must not be answered.
+    /// Parses the request in a FILE_TRANSFER_PROTOCOL frame; returns `None` for any other message
+    /// and for answers, which must not be answered.
     pub fn from_frame(frame: &Frame) -> Option<Self> {
         let (target, packet) = packet_in(frame)?;
         (!packet.opcode.is_answer()).then_some(Self { source: frame.source(), target, packet })

@@ -1,7 +1,8 @@
 //! A line of a known speed: what waits for it, what goes next, and when.
 //!
-//! What a driver was given cannot be taken back. So the line gets no more than it can have sent by now. Everything else
-//! waits here, where the present state of a sender replaces an older one, and an abort overtakes what came before it.
+//! What a driver was given cannot be taken back. So the line gets no more than it can have sent by
+//! now. Everything else waits here, where the present state of a sender replaces an older one, and
+//! an abort overtakes what came before it.
 
 use alloc::collections::VecDeque;
 use core::time::Duration;
@@ -17,15 +18,18 @@ use crate::dialect::{
 };
 use crate::frame::Frame;
 
-/// The share of the line that is used on average. The rest is for clocks that differ, and for what a radio adds.
+/// The share of the line that is used on average. The rest is for clocks that differ, and for what
+/// a radio adds.
 pub const SHARE: f64 = 0.8;
-/// The line may be given a frame this long before it has sent the last one, because its owner looks only now and then.
+/// The line may be given a frame this long before it has sent the last one, because its owner looks
+/// only now and then.
 const AHEAD: Duration = Duration::from_millis(20);
 /// Frames wait at most this long, and the average may be exceeded for this long.
 const HOLDS: Duration = Duration::from_millis(300);
 /// So many frames that are not dropped for others may wait.
 const MOST_KEPT: usize = 64;
-/// The share of its budget that a line keeps in spite of a radio's reports: anybody can forge a report.
+/// The share of its budget that a line keeps in spite of a radio's reports: anybody can forge a
+/// report.
 const LEAST: f64 = 0.25;
 /// A radio that has not reported for this long has no say any more.
 const REPORT_HOLDS: Duration = Duration::from_secs(10);
@@ -135,7 +139,8 @@ impl Line {
         frame.as_bytes().len() + self.added
     }
 
-    /// Notes how much of its buffer a radio has free, percent. Below a half it is given less, above three quarters more.
+    /// Notes how much of its buffer a radio has free, percent. Below a half it is given less, above
+    /// three quarters more.
     pub(super) fn on_radio(&mut self, free_percent: u8, now: Duration) {
         self.radio = (slowed(self.left(now), free_percent), now);
     }
@@ -145,7 +150,8 @@ impl Line {
         if now.saturating_sub(at) > REPORT_HOLDS { 1.0 } else { left }
     }
 
-    /// Queues a frame. What it makes needless goes, and telemetry that would have to wait for too long.
+    /// Queues a frame. What it makes needless goes, and telemetry that would have to wait for too
+    /// long.
     pub(super) fn push(&mut self, frame: Frame) {
         self.waiting.retain(|old| !replaces(&frame, old));
         self.waiting.push_back(frame);
@@ -175,7 +181,8 @@ impl Line {
         if self.due_at()? > now {
             return None;
         }
-        // What is repeated takes turns with the rest: a heartbeat passes between two sendings of an abort.
+        // What is repeated takes turns with the rest: a heartbeat passes between two sendings of an
+        // abort.
         let again = |frame: &Frame| self.last.as_ref().is_some_and(|last| replaces(frame, last));
         let (place, _) =
             self.waiting.iter().enumerate().min_by_key(|(_, frame)| (again(frame), rank(frame)))?;
@@ -194,8 +201,8 @@ impl Line {
     }
 }
 
-/// The share of a budget that is used after a radio has reported how much of its buffer is free, percent. SiK radios
-/// report once a second.
+/// The share of a budget that is used after a radio has reported how much of its buffer is free,
+/// percent. SiK radios report once a second.
 pub fn slowed(share: f64, free_percent: u8) -> f64 {
     let factor = match free_percent {
         0..25 => 0.7,

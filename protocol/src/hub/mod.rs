@@ -1,8 +1,8 @@
-//! Combines several links to the same peer, without I/O: it takes the bytes of each link and returns frames and link
-//! events; it takes a frame and returns the bytes for each link.
+//! Combines several links to the same peer, without I/O: it takes the bytes of each link and
+//! returns frames and link events; it takes a frame and returns the bytes for each link.
 //!
-//! A frame that arrives over more than one link is passed on once. With a key, a frame without a valid signature is
-//! not passed on. Every link has its own framing and its own statistics.
+//! A frame that arrives over more than one link is passed on once. With a key, a frame without a
+//! valid signature is not passed on. Every link has its own framing and its own statistics.
 
 pub mod line;
 
@@ -36,8 +36,8 @@ pub enum LinkEvent {
     Copy(Frame),
     /// A frame whose signature is missing or wrong although a key is set; it must not be acted on.
     Rejected(Frame, Rejection),
-    /// A frame of this sender was accepted; that frame follows. The caller must pass this on to the link
-    /// (`transport::TransportSender::believe`).
+    /// A frame of this sender was accepted; that frame follows. The caller must pass this on to the
+    /// link (`transport::TransportSender::believe`).
     Believed(Origin),
     /// The link does not answer some senders; the text says how many.
     UnknownSenders(String),
@@ -97,7 +97,8 @@ impl HubLink {
             }
             Received::Stream(id, bytes) => {
                 if self.streams.len() >= MAX_STREAMS && !self.streams.contains_key(&id) {
-                    // The transport opens no more streams than this; the bytes of a further one are dropped.
+                    // The transport opens no more streams than this; the bytes of a further one are
+                    // dropped.
                     return Taken::Nothing;
                 }
                 let framer = self.streams.entry(id).or_default();
@@ -149,7 +150,8 @@ pub struct Hub {
 }
 
 impl Hub {
-    /// Creates this many links. With `signing`, frames that are sent are signed and frames that arrive are checked.
+    /// Creates this many links. With `signing`, frames that are sent are signed and frames that
+    /// arrive are checked.
     pub fn new(links: usize, signing: Option<Signing>) -> Self {
         Self {
             links: (0..links).map(|_| HubLink::default()).collect(),
@@ -158,7 +160,8 @@ impl Hub {
         }
     }
 
-    /// Sets what each link carries, bytes per second, where that is known. Frames wait for such a link in the hub.
+    /// Sets what each link carries, bytes per second, where that is known. Frames wait for such a
+    /// link in the hub.
     #[must_use]
     pub fn over(mut self, carried_bytes_s: &[Option<u32>]) -> Self {
         let added = if self.signing.is_some() { SIGNATURE_LEN } else { 0 };
@@ -173,8 +176,9 @@ impl Hub {
         &self.links
     }
 
-    /// Takes what a link received. `clock` is the wall clock as a timestamp ([`crate::signing::stamp_of`]), which
-    /// only signatures need. An unknown link number is ignored.
+    /// Takes what a link received. `clock` is the wall clock as a timestamp
+    /// ([`crate::signing::stamp_of`]), which only signatures need. An unknown link number is
+    /// ignored.
     pub fn take(&mut self, link: usize, received: Received, now: Duration, clock: u64) -> Vec<LinkEvent> {
         let Some(of) = self.links.get_mut(link) else { return Vec::new() };
         let (frames, origin) = match of.take(received, now) {
@@ -190,7 +194,8 @@ impl Hub {
         news
     }
 
-    /// With a key the frame must be signed: a radio's report is accepted unsigned, and anybody can forge one.
+    /// With a key the frame must be signed: a radio's report is accepted unsigned, and anybody can
+    /// forge one.
     fn proves_its_sender(&self, news: &LinkEvent) -> bool {
         match news {
             LinkEvent::Frame(frame) | LinkEvent::Copy(frame) => self.signing.is_none() || frame.is_signed(),
@@ -199,8 +204,9 @@ impl Hub {
     }
 
     fn judge(&mut self, link: usize, frame: Frame, now: Duration, clock: u64) -> LinkEvent {
-        // A radio has no key: the report about itself is the only message that is accepted unsigned, and only on a serial line,
-        // where the radio is. Over a network anybody could say that a radio is full.
+        // A radio has no key: the report about itself is the only message that is accepted
+        // unsigned, and only on a serial line, where the radio is. Over a network anybody could say
+        // that a radio is full.
         let is_the_radio_s = frame.message_id() == RADIO_STATUS_ID && self.links[link].line.is_some();
         if let Some(signing) = &mut self.signing
             && (frame.is_signed() || !is_the_radio_s)
@@ -233,8 +239,8 @@ impl Hub {
         }
     }
 
-    /// Takes a frame for a link. Without a known speed it leaves at once, and otherwise when the line is free for it:
-    /// [`Hub::leaving`].
+    /// Takes a frame for a link. Without a known speed it leaves at once, and otherwise when the
+    /// line is free for it: [`Hub::leaving`].
     pub fn send(&mut self, link: usize, frame: &Frame, clock: u64) -> Option<Vec<u8>> {
         match &mut self.links.get_mut(link)?.line {
             Some(line) => {
@@ -245,8 +251,8 @@ impl Hub {
         }
     }
 
-    /// Returns the frame that leaves over a link of a known speed now, and its bytes. Call it until it returns `None`, after
-    /// [`Hub::send`] and at [`Hub::due_at`].
+    /// Returns the frame that leaves over a link of a known speed now, and its bytes. Call it until
+    /// it returns `None`, after [`Hub::send`] and at [`Hub::due_at`].
     pub fn leaving(&mut self, link: usize, now: Duration, clock: u64) -> Option<(Frame, Vec<u8>)> {
         let frame = self.links.get_mut(link)?.line.as_mut()?.pop(now)?;
         let bytes = self.bytes_for(link, &frame, clock);
@@ -278,7 +284,8 @@ impl Hub {
 
 // Defines what a transport hands to the hub.
 
-/// The number of one stream of a link. A TCP server has a stream for each client. Numbers are not used twice.
+/// The number of one stream of a link. A TCP server has a stream for each client. Numbers are not
+/// used twice.
 pub type StreamId = u64;
 
 /// The sender of some bytes, as a link tells its senders apart.
@@ -302,7 +309,8 @@ pub enum Received {
     /// The stream has paused for longer than a frame may; an incomplete frame will stay incomplete.
     Silence(StreamId),
     Gone(StreamId),
-    /// The link does not answer some senders; the text says how many. It comes at most once in ten seconds.
+    /// The link does not answer some senders; the text says how many. It comes at most once in ten
+    /// seconds.
     UnknownSenders(String),
     /// The link works; the text names the peer.
     Up(String),

@@ -35,7 +35,8 @@ fn ms(milliseconds: u64) -> Duration {
 fn over_two_lossy_links_every_frame_is_passed_on_once() {
     let mut hub = Hub::new(2, None);
     let mut heard = Vec::new();
-    // Link 0 loses every third frame, link 1 loses every fifth and lags; there are 300 frames at 20 a second.
+    // Link 0 loses every third frame, link 1 loses every fifth and lags; there are 300 frames at 20
+    // a second.
     let frames = beats(300);
     let mut arrivals: Vec<(u64, usize, &Frame)> = Vec::new();
     for (place, frame) in frames.iter().enumerate() {
@@ -164,7 +165,8 @@ fn a_radio_reports_without_a_signature_on_its_serial_line_alone() {
     }
 }
 
-/// An observer who repeats an operator's frame over another link, with the key that all share, hides nothing.
+/// An observer who repeats an operator's frame over another link, with the key that all share,
+/// hides nothing.
 #[test]
 fn nobody_turns_another_one_s_frame_into_a_copy() {
     let [shared, ann] = [7, 8].map(|byte| Key::new([byte; Key::LEN]));

@@ -1,10 +1,10 @@
-//! Writes and reads the flight log: an MCAP file of raw frames, controller ticks, simulated truth, telemetry,
-//! operator actions and events.
+//! Writes and reads the flight log: an MCAP file of raw frames, controller ticks, simulated truth,
+//! telemetry, operator actions and events.
 //!
-//! The format is MCAP (<https://mcap.dev/spec>). The schemas are those of `crate::records` and, where one fits,
-//! Foxglove's own.
-//! [`SCHEMA_VERSION`](record::SCHEMA_VERSION) is the version of a log's contents. Records are flushed so often that a
-//! killed process loses at most a fraction of a second ([`recorder`]).
+//! The format is MCAP (<https://mcap.dev/spec>). The schemas are those of `crate::records` and,
+//! where one fits, Foxglove's own. [`SCHEMA_VERSION`](record::SCHEMA_VERSION) is the version of a
+//! log's contents. Records are flushed so often that a killed process loses at most a fraction of a
+//! second ([`recorder`]).
 
 pub mod reader;
 pub mod record;
@@ -20,7 +20,8 @@ pub use crate::records::{
 pub mod build {
     use std::collections::BTreeMap;
 
-    /// Returns version, commit, compiler, target and hash of the lock file of this build, as every log contains them.
+    /// Returns version, commit, compiler, target and hash of the lock file of this build, as every
+    /// log contains them.
     pub fn build_info() -> BTreeMap<String, String> {
         [
             ("version", env!("CARGO_PKG_VERSION")),

@@ -1,8 +1,9 @@
 //! Reads a log: everything before the first damage, and a description of the damage.
 //!
-//! The reader goes from front to back with bounded memory. It needs no summary and no footer, so it reads the log of
-//! a recorder that was killed. It returns the content of a chunk only if the chunk's checksum is right. A record that is
-//! too large to be held in memory is passed over by its length, and what follows is read.
+//! The reader goes from front to back with bounded memory. It needs no summary and no footer, so it
+//! reads the log of a recorder that was killed. It returns the content of a chunk only if the
+//! chunk's checksum is right. A record that is too large to be held in memory is passed over by its
+//! length, and what follows is read.
 
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -27,7 +28,8 @@ pub struct LogChannel {
     pub message_encoding: String,
     /// Name of the schema; empty if there is none.
     pub schema_name: String,
-    /// The schema itself; for a `protobuf` channel it is a serialised `google.protobuf.FileDescriptorSet`.
+    /// The schema itself; for a `protobuf` channel it is a serialised
+    /// `google.protobuf.FileDescriptorSet`.
     pub schema: Arc<[u8]>,
     /// The channel's metadata; for raw frames `link`, `endpoint` and `dialect`.
     pub metadata: BTreeMap<String, String>,
@@ -172,13 +174,14 @@ impl<R: Read> LogReader<R> {
         self.bytes_read
     }
 
-    /// Returns the first thing that is wrong with the log; `None` for an undamaged log that was read to its end.
+    /// Returns the first thing that is wrong with the log; `None` for an undamaged log that was
+    /// read to its end.
     pub fn damage(&self) -> Option<&Damage> {
         self.damage.as_ref()
     }
 
-    /// Returns whether a summary at the end says how many messages the log has. Without one, nothing shows that its last
-    /// records are missing.
+    /// Returns whether a summary at the end says how many messages the log has. Without one,
+    /// nothing shows that its last records are missing.
     pub fn is_counted(&self) -> bool {
         self.is_counted
     }
@@ -269,8 +272,8 @@ impl<R: Read> LogReader<R> {
         let unpacked = if opcode == op::CHUNK { unpacked_bytes(body) } else { 0 };
         let mut damage = None;
         if opcode == op::DATA_END && !self.saw_data_end {
-            // A record between two chunks, or a whole chunk, may be damaged beyond recognition; only this checksum shows
-            // that.
+            // A record between two chunks, or a whole chunk, may be damaged beyond recognition;
+            // only this checksum shows that.
             let told = body.first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
             if told != 0 && told != self.checksum.clone().finalize() {
                 damage = Some("the checksum over all data does not fit");
@@ -298,8 +301,8 @@ impl<R: Read> LogReader<R> {
         Ok(())
     }
 
-    /// Reads to the end of a record without keeping it. Attachments of other programs may have any size: only without the
-    /// others is the log damaged.
+    /// Reads to the end of a record without keeping it. Attachments of other programs may have any
+    /// size: only without the others is the log damaged.
     fn pass_over(&mut self, head: &[u8], bytes: u64) -> std::io::Result<()> {
         self.checksum.update(head);
         let checksum = &mut self.checksum;
@@ -348,7 +351,8 @@ impl<R: Read> LogReader<R> {
         }
     }
 
-    /// The input ended too early. If it is shorter than the magic, it was not a log in the first place.
+    /// The input ended too early. If it is shorter than the magic, it was not a log in the first
+    /// place.
     fn cut(&self) -> Damage {
         let shorter_than_magic = self.bytes_read < mcap::MAGIC.len() as u64;
         if shorter_than_magic { Damage::NotMcap } else { Damage::Truncated { bytes: self.bytes_read } }
@@ -460,7 +464,8 @@ fn with_causes(error: &mcap::McapError) -> String {
     words
 }
 
-/// Parses one record of an MCAP file from its type and its body; it never panics, whatever the body is.
+/// Parses one record of an MCAP file from its type and its body; it never panics, whatever the body
+/// is.
 ///
 /// # Errors
 /// The body does not fit the type.
@@ -472,11 +477,12 @@ pub fn parse_record(opcode: u8, data: &[u8]) -> mcap::McapResult<McapRecord<'sta
     mcap::parse_record(opcode, data).map(McapRecord::into_owned)
 }
 
-/// Calls `keep` for every record of a chunk, from its body, if its checksum is right. It holds one record and what the
-/// chunk unpacks to, at most [`RECORD_LIMIT_BYTES`].
+/// Calls `keep` for every record of a chunk, from its body, if its checksum is right. It holds one
+/// record and what the chunk unpacks to, at most [`RECORD_LIMIT_BYTES`].
 ///
 /// # Errors
-/// The chunk cannot be read, or `keep` failed. Without a checksum in the chunk some records may have been kept by then.
+/// The chunk cannot be read, or `keep` failed. Without a checksum in the chunk some records may
+/// have been kept by then.
 pub fn records_of_chunk(
     body: &[u8],
     mut keep: impl FnMut(McapRecord<'static>) -> mcap::McapResult<()>,
@@ -509,8 +515,8 @@ pub fn records_of_chunk(
     Ok(())
 }
 
-/// Returns whether an attachment has room for two times, two length-prefixed strings, the length of its data and a
-/// checksum.
+/// Returns whether an attachment has room for two times, two length-prefixed strings, the length of
+/// its data and a checksum.
 fn attachment_fits(data: &[u8]) -> bool {
     const TIMES_BYTES: usize = 16;
     const DATA_LENGTH_AND_CHECKSUM_BYTES: usize = 12;

@@ -69,7 +69,8 @@ pub enum Record {
     PilotTiming(flight_v1::PilotTiming),
     /// `/pilot/estimate`.
     Estimate(Box<flight_v1::Estimate>),
-    /// `/vehicle/truth3d`, and with it `/tf`: the same pose as a transform from `world` to `rocket`.
+    /// `/vehicle/truth3d`, and with it `/tf`: the same pose as a transform from `world` to
+    /// `rocket`.
     TruthSample(Box<flight_v1::TruthSample>),
 }
 
@@ -122,8 +123,8 @@ pub const ATTACHMENT_SCENARIO: &str = "scenario.toml";
 /// Name of the attachment with the dialect.
 pub const ATTACHMENT_DIALECT: &str = "touchdown.xml";
 
-/// Converts the pose of the vehicle into a Foxglove transform. World: x north, y west, z up; the rocket's x axis points
-/// to its nose.
+/// Converts the pose of the vehicle into a Foxglove transform. World: x north, y west, z up; the
+/// rocket's x axis points to its nose.
 pub(super) fn transform(truth: &flight_v1::TruthSample, time_ns: u64) -> FrameTransform {
     let (place, turn) = (&truth.state.position_m, &truth.state.world_from_body);
     FrameTransform {

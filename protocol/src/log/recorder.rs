@@ -1,12 +1,15 @@
-//! Writes a log file in a thread of its own, so that neither the control loop nor the screen waits for a disk.
+//! Writes a log file in a thread of its own, so that neither the control loop nor the screen waits
+//! for a disk.
 //!
-//! The queue is bounded. [`Recorder::record`] waits for room (for a simulation, whose clock can wait);
-//! [`Recorder::try_record`] never waits and counts what it drops. At least every 200 ms and at every
-//! [`Recorder::sync_soon`] the open chunk is ended and written to the operating system, so a killed process loses no
-//! more than that. A second thread syncs the file to the disk, so that a slow disk does not lengthen the 200 ms.
+//! The queue is bounded. [`Recorder::record`] waits for room (for a simulation, whose clock can
+//! wait); [`Recorder::try_record`] never waits and counts what it drops. At least every 200 ms and
+//! at every [`Recorder::sync_soon`] the open chunk is ended and written to the operating system, so
+//! a killed process loses no more than that. A second thread syncs the file to the disk, so that a
+//! slow disk does not lengthen the 200 ms.
 //!
-//! The system reports a disk error once for an open file: the sync after it succeeds although data is lost. So every failure is
-//! kept where it happens, and [`Recorder::is_whole`] and [`Recorder::finish`] read what was kept.
+//! The system reports a disk error once for an open file: the sync after it succeeds although data
+//! is lost. So every failure is kept where it happens, and [`Recorder::is_whole`] and
+//! [`Recorder::finish`] read what was kept.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Seek, Write};
@@ -24,8 +27,8 @@ use crate::text::printable;
 
 const QUEUE_RECORDS: usize = 8192;
 const FLUSH_INTERVAL: Duration = Duration::from_millis(200);
-/// What asks to be synced soon is synced at most this often: each time ends a chunk, of which the writer keeps an entry for the
-/// index at the end.
+/// What asks to be synced soon is synced at most this often: each time ends a chunk, of which the
+/// writer keeps an entry for the index at the end.
 const SYNC_APART: Duration = Duration::from_millis(100);
 
 /// Why recording could not start or did not end well.
@@ -112,11 +115,12 @@ pub enum TlogName<'a> {
     Own(&'a Path),
 }
 
-/// Makes something under the first of `flight.mcap`, `flight-2.mcap`, `flight-3.mcap` and so on that is free, and returns it with its
-/// name.
+/// Makes something under the first of `flight.mcap`, `flight-2.mcap`, `flight-3.mcap` and so on
+/// that is free, and returns it with its name.
 ///
 /// # Errors
-/// It cannot be made, or no name is free. `make` fails with [`io::ErrorKind::AlreadyExists`] where something is that could be lost.
+/// It cannot be made, or no name is free. `make` fails with [`io::ErrorKind::AlreadyExists`] where
+/// something is that could be lost.
 pub fn under_free_name<T>(
     asked: &Path,
     mut make: impl FnMut(&Path) -> io::Result<T>,
@@ -136,8 +140,8 @@ pub fn other_name(asked: &Path, free: &Path) -> Option<String> {
     (asked != free).then(|| printable(words().as_bytes()))
 }
 
-/// Whether a path is a pipe or a device: it has no content that could be lost, and no other name. So is what lies in `/dev` itself:
-/// `/dev/stdout` may be a file.
+/// Whether a path is a pipe or a device: it has no content that could be lost, and no other name.
+/// So is what lies in `/dev` itself: `/dev/stdout` may be a file.
 pub fn is_device(path: &Path) -> bool {
     path.parent() == Some(Path::new("/dev"))
         || std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
@@ -153,9 +157,10 @@ fn numbered(path: &Path, number: u32) -> PathBuf {
 }
 
 impl Recorder {
-    /// Creates the file and starts the writing thread, under the first free name of `flight.mcap`, `flight-2.mcap`, `flight-3.mcap`
-    /// and so on: nothing is overwritten, and the same command works again after a crash. The telemetry log, of the ground's raw
-    /// frames, is named after the name that was found, or has a name of its own that gets the same number.
+    /// Creates the file and starts the writing thread, under the first free name of `flight.mcap`,
+    /// `flight-2.mcap`, `flight-3.mcap` and so on: nothing is overwritten, and the same command
+    /// works again after a crash. The telemetry log, of the ground's raw frames, is named after the
+    /// name that was found, or has a name of its own that gets the same number.
     ///
     /// # Errors
     /// No name is free, a file cannot be created, or the header cannot be written.
@@ -173,7 +178,8 @@ impl Recorder {
                 TlogName::OfTheLog => log.with_extension("tlog"),
                 TlogName::Own(own) => numbered(own, number),
             };
-            // The log file was created a moment ago and is empty; if it stayed, the next attempt would fail.
+            // The log file was created a moment ago and is empty; if it stayed, the next attempt
+            // would fail.
             let made = create(&tlog).inspect_err(|_refused| _ = std::fs::remove_file(log))?;
             Ok((file, Some((tlog, TlogWriter::new(BufWriter::new(made), header.start_unix_ns)))))
         });
@@ -279,8 +285,8 @@ impl Recorder {
         let _ = self.orders.try_send(Order::SyncSoon);
     }
 
-    /// Asks for a mark here: everything before it can be read from the file, and does not change any more. Returns
-    /// whether there was room in the queue.
+    /// Asks for a mark here: everything before it can be read from the file, and does not change
+    /// any more. Returns whether there was room in the queue.
     pub fn mark_soon(&self) -> bool {
         self.orders.try_send(Order::Mark).is_ok()
     }
@@ -290,11 +296,12 @@ impl Recorder {
         Some(self.shared.marked_bytes.load(Ordering::Acquire)).filter(|bytes| *bytes > 0)
     }
 
-    /// Ends the log with its summary and waits until it is written. Records that other handles send later count as
-    /// dropped.
+    /// Ends the log with its summary and waits until it is written. Records that other handles send
+    /// later count as dropped.
     ///
     /// # Errors
-    /// A record could not be written or, at any time, not synced; everything synced before it can still be read.
+    /// A record could not be written or, at any time, not synced; everything synced before it can
+    /// still be read.
     pub fn finish(&self) -> Result<PathBuf, RecorderError> {
         let path = self.shared.path.clone();
         let thread = self.shared.thread.lock().ok().and_then(|mut slot| slot.take());
@@ -310,7 +317,8 @@ impl Recorder {
         }
     }
 
-    /// Ends the log and removes its files, because the run has failed before it began: their names are free for the next try.
+    /// Ends the log and removes its files, because the run has failed before it began: their names
+    /// are free for the next try.
     ///
     /// # Errors
     /// A file cannot be removed. Whether it was written completely does not matter any more.
@@ -377,8 +385,8 @@ fn write_until_finished(
     }
 }
 
-/// Writes everything to the operating system, which keeps it even if this process is killed, and asks the other
-/// thread to sync it to the disk, which may take longer than one flush interval.
+/// Writes everything to the operating system, which keeps it even if this process is killed, and
+/// asks the other thread to sync it to the disk, which may take longer than one flush interval.
 fn hand_over(
     writer: &mut LogWriter<impl Write + Seek>,
     tlog: Option<&mut TlogWriter<BufWriter<File>>>,

@@ -1,7 +1,8 @@
 //! Writes and reads `.tlog` files, the telemetry logs of other ground stations.
 //!
-//! Each entry is the time in microseconds since the Unix epoch (eight bytes, big-endian), followed by the raw frame.
-//! MAVProxy's `mavtee` and `MAVExplorer`, Mission Planner and pymavlink's `mavlogfile` read it.
+//! Each entry is the time in microseconds since the Unix epoch (eight bytes, big-endian), followed
+//! by the raw frame. MAVProxy's `mavtee` and `MAVExplorer`, Mission Planner and pymavlink's
+//! `mavlogfile` read it.
 
 use std::io;
 use std::io::{BufReader, Read, Write};
@@ -20,7 +21,8 @@ const FRAME_MAX_BYTES: usize = 280;
 /// Times after the year 2100 are treated as garbage. A clock that nobody has set begins in 1970.
 const PLAUSIBLE_US: std::ops::Range<u64> = 0..4_102_444_800_000_000;
 
-/// Two frames without a byte between them stand in the first bytes of any `.tlog`, also of one whose beginning is damaged.
+/// Two frames without a byte between them stand in the first bytes of any `.tlog`, also of one
+/// whose beginning is damaged.
 const RECOGNISED_WITHIN_BYTES: u64 = 1 << 16;
 
 /// Whether a file has the content of a `.tlog`, whatever its name is; reads its first bytes.
@@ -59,7 +61,8 @@ pub struct TlogFrame {
     pub bytes: Vec<u8>,
 }
 
-/// Reads frames and their times, and counts the bytes between them. It keeps one frame in memory at a time.
+/// Reads frames and their times, and counts the bytes between them. It keeps one frame in memory at
+/// a time.
 pub struct TlogReader<R> {
     input: BufReader<R>,
     buffer: Vec<u8>,

@@ -57,7 +57,8 @@ pub struct LogWriter<W: Write + Seek> {
 }
 
 impl<W: Write + Seek> LogWriter<W> {
-    /// Starts a log with its header, the metadata of build and run, and the attached profile, scenario and dialect.
+    /// Starts a log with its header, the metadata of build and run, and the attached profile,
+    /// scenario and dialect.
     ///
     /// # Errors
     /// The underlying writer failed.

@@ -1,8 +1,10 @@
-//! Moves bytes between this process and a link. Framing, signing and statistics are the caller's ([`crate::hub`]).
+//! Moves bytes between this process and a link. Framing, signing and statistics are the caller's
+//! ([`crate::hub`]).
 //!
-//! A [`Transport`] is two bounded queues and a task. The task survives failures: it tries twice a second to reopen a
-//! serial line or a connection that broke, and it finds a UDP peer that restarts on another port. A link that anybody
-//! can send to answers only those senders of which its owner has accepted a frame.
+//! A [`Transport`] is two bounded queues and a task. The task survives failures: it tries twice a
+//! second to reopen a serial line or a connection that broke, and it finds a UDP peer that restarts
+//! on another port. A link that anybody can send to answers only those senders of which its owner
+//! has accepted a frame.
 
 mod stream;
 mod udp;
@@ -17,8 +19,8 @@ use tokio::sync::mpsc;
 use crate::hub::{Origin, Received};
 
 const QUEUE_LEN: usize = 1024;
-/// This many notices of accepted senders may wait for the link. If the queue is full, a notice is dropped, and the
-/// sender's next frame repeats it.
+/// This many notices of accepted senders may wait for the link. If the queue is full, a notice is
+/// dropped, and the sender's next frame repeats it.
 const BELIEVED_QUEUE_LEN: usize = 256;
 
 /// Bytes to send. With an origin, a link that answers several senders sends them to that one alone.
@@ -40,14 +42,14 @@ pub struct TransportSender {
 }
 
 impl TransportSender {
-    /// Queues bytes to be sent and returns whether there was room. A link that is too slow drops bytes and counts the
-    /// drops.
+    /// Queues bytes to be sent and returns whether there was room. A link that is too slow drops
+    /// bytes and counts the drops.
     pub fn send(&self, bytes: Vec<u8>) -> bool {
         self.send_to(bytes, None)
     }
 
-    /// As [`TransportSender::send`]. On a link that listens, only this origin gets the bytes; `None` stands for all that
-    /// are answered.
+    /// As [`TransportSender::send`]. On a link that listens, only this origin gets the bytes;
+    /// `None` stands for all that are answered.
     pub fn send_to(&self, bytes: Vec<u8>, to: Option<Origin>) -> bool {
         let queued = self.queue.try_send((bytes, to)).is_ok();
         if !queued {
@@ -56,8 +58,9 @@ impl TransportSender {
         queued
     }
 
-    /// Tells the link that a frame of this sender was accepted ([`crate::hub::LinkEvent::Believed`]). Only then is the
-    /// sender answered and protected from being displaced by other senders.
+    /// Tells the link that a frame of this sender was accepted
+    /// ([`crate::hub::LinkEvent::Believed`]). Only then is the sender answered and protected from
+    /// being displaced by other senders.
     pub fn believe(&self, origin: Origin) {
         // When the queue is full, the sender's next frame repeats this.
         let _ = self.believed.try_send(origin);
@@ -73,8 +76,9 @@ impl Transport {
     /// Opens a link. It must be called within a tokio runtime.
     ///
     /// # Errors
-    /// The address cannot be bound or, for UDP, resolved. A missing serial device and a TCP server that does not
-    /// answer are no errors, because they may appear later; until then the link reports [`Received::Down`].
+    /// The address cannot be bound or, for UDP, resolved. A missing serial device and a TCP server
+    /// that does not answer are no errors, because they may appear later; until then the link
+    /// reports [`Received::Down`].
     pub async fn open(mut address: LinkAddress) -> io::Result<Self> {
         let is_udp = matches!(address, LinkAddress::UdpIn(_) | LinkAddress::UdpOut(_));
         let (inbox, received) = mpsc::channel(if is_udp { udp::INBOX_LEN } else { QUEUE_LEN });
@@ -106,7 +110,8 @@ impl Transport {
         Ok(Self { address, received, sender })
     }
 
-    /// Returns the link's address. For `udpin` and `tcpin` with port 0 it names the port that the system chose.
+    /// Returns the link's address. For `udpin` and `tcpin` with port 0 it names the port that the
+    /// system chose.
     pub fn address(&self) -> &LinkAddress {
         &self.address
     }

@@ -74,8 +74,9 @@ pub(super) async fn keep_open<L: Line>(line: L, inbox: Sender<Received>, mut out
     }
 }
 
-/// Carries bytes until the stream fails, and returns why; returns `None` once the owner has dropped the link. Reading
-/// does not wait for writing: a peer that takes no bytes may still deliver an abort.
+/// Carries bytes until the stream fails, and returns why; returns `None` once the owner has dropped
+/// the link. Reading does not wait for writing: a peer that takes no bytes may still deliver an
+/// abort.
 async fn carry<L: Line>(
     io: L::Io,
     stream_id: StreamId,
@@ -98,8 +99,8 @@ async fn carry<L: Line>(
     }
 }
 
-/// Reads until the stream ends, and returns the error that ended it, if any. Returns `None` once the owner has
-/// dropped the link.
+/// Reads until the stream ends, and returns the error that ended it, if any. Returns `None` once
+/// the owner has dropped the link.
 pub(super) async fn read_all(
     mut reader: impl AsyncRead + Unpin,
     stream_id: StreamId,
@@ -139,7 +140,8 @@ struct Port {
 
 impl Line for Port {
     type Io = SerialStream;
-    /// Bytes of one frame follow each other without a pause: at 9,600 baud the longest frame takes 0.3 s.
+    /// Bytes of one frame follow each other without a pause: at 9,600 baud the longest frame takes
+    /// 0.3 s.
     const SILENCE: Duration = Duration::from_millis(100);
     const ENDED: &str = "the line was closed";
     /// A serial line stays one stream however often it is reopened.
@@ -156,10 +158,11 @@ impl Line for Port {
 
 // TCP links: `tcpin` serves a few clients; `tcpout` connects, and reconnects after a failure.
 
-/// This many clients are served at the same time. A further one takes the place of the one that has said nothing valid for
-/// longest; if all have spoken lately, it is disconnected.
+/// This many clients are served at the same time. A further one takes the place of the one that has
+/// said nothing valid for longest; if all have spoken lately, it is disconnected.
 const MAX_CLIENTS: usize = 4;
-/// Whoever was accepted keeps the place for this long without another accepted frame: ten heartbeats of a station.
+/// Whoever was accepted keeps the place for this long without another accepted frame: ten
+/// heartbeats of a station.
 const KEEPS_PLACE_FOR: Duration = Duration::from_secs(10);
 /// This many writes wait for each client; a slow client loses the oldest ones.
 const CLIENT_QUEUE: usize = 256;
@@ -168,7 +171,8 @@ const CONNECT_WITHIN: Duration = Duration::from_secs(5);
 /// A pause this long means that no more bytes of a begun frame will follow.
 const SILENCE: Duration = Duration::from_secs(1);
 
-/// Binds and serves. Returns the bound address, which names the port that the system chose if `address` has port 0.
+/// Binds and serves. Returns the bound address, which names the port that the system chose if
+/// `address` has port 0.
 pub(super) async fn listen_tcp(
     address: &str,
     inbox: Sender<Received>,
@@ -234,8 +238,8 @@ async fn serve(
                     tokio::spawn(serve_client(stream, stream_id, inbox.clone(), (all.subscribe(), left)));
                     stream_id += 1;
                 }
-                // This happens when no file descriptor is left, for instance. Trying again at once would use a whole
-                // core.
+                // This happens when no file descriptor is left, for instance. Trying again at once
+                // would use a whole core.
                 Err(_) => tokio::time::sleep(REOPEN_AFTER).await,
             },
             Some(origin) = believed.recv() => note_believed(&mut clients, origin),
@@ -261,7 +265,8 @@ async fn serve_client(
     inbox: Sender<Received>,
     (mut all, left): (broadcast::Receiver<Outgoing>, oneshot::Receiver<()>),
 ) {
-    // Without this, TCP delays telemetry to collect more bytes. If the option cannot be set, the delay is accepted.
+    // Without this, TCP delays telemetry to collect more bytes. If the option cannot be set, the
+    // delay is accepted.
     let _ = stream.set_nodelay(true);
     let (reader, mut writer) = stream.into_split();
     let write = async {
@@ -311,8 +316,8 @@ impl Line for Connection {
             .await
             .map_err(|_elapsed| format!("no answer within {CONNECT_WITHIN:?}"))?
             .map_err(|error| error.to_string())?;
-        // Without this, TCP delays commands to collect more bytes. If the option cannot be set, the delay is
-        // accepted.
+        // Without this, TCP delays commands to collect more bytes. If the option cannot be set, the
+        // delay is accepted.
         let _ = stream.set_nodelay(true);
         Ok(stream)
     }
@@ -322,7 +327,8 @@ impl Line for Connection {
 mod tests {
     use super::*;
 
-    /// Clients whose last accepted frame is this many seconds old; `None`: they were never accepted.
+    /// Clients whose last accepted frame is this many seconds old; `None`: they were never
+    /// accepted.
     fn clients(ages_s: &[Option<u64>], now: Instant) -> (Vec<Client>, Vec<oneshot::Receiver<()>>) {
         let client = |(stream_id, age_s): (usize, &Option<u64>)| {
             let (leave, left) = oneshot::channel();

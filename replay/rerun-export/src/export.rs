@@ -67,8 +67,8 @@ pub struct Exported {
     pub mission_problem: Option<String>,
 }
 
-/// Writes the recording of a log, and of another one beside it. The file appears when it is complete; returns its name, and what was
-/// exported of each.
+/// Writes the recording of a log, and of another one beside it. The file appears when it is
+/// complete; returns its name, and what was exported of each.
 ///
 /// # Errors
 /// A log cannot be used, or the recording cannot be written.
@@ -144,7 +144,8 @@ impl Survey {
         Ok(found)
     }
 
-    /// Records what never moves: the shape of the rocket in its own axes, the pad, and the path that was flown.
+    /// Records what never moves: the shape of the rocket in its own axes, the pad, and the path
+    /// that was flown.
     fn draw(
         &self,
         recording: &RecordingStream,
@@ -219,7 +220,8 @@ impl Survey {
     }
 }
 
-/// What the import makes of well-known messages: the events as text, and `/tf` as the pose of the entity that is drawn.
+/// What the import makes of well-known messages: the events as text, and `/tf` as the pose of the
+/// entity that is drawn.
 fn lenses() -> Result<Lenses, LensBuilderError> {
     let transform = |entity: &str| Lens::scatter("foxglove.FrameTransform:message").output_entity(entity);
     let position = || Selector::parse(".translation | pack(.x!, .y!, .z!)");

@@ -1,8 +1,9 @@
 //! Exports flight logs as recordings for the Rerun viewer (<https://rerun.io>).
 //!
-//! The viewer opens a log by itself: its import of MCAP makes series of every field, a text log of the events and a
-//! transform of `/tf`. Here is what it cannot know: the [`shape`](mod@shape) of the vehicle that moves there, the pad, the
-//! path that was flown, a [`layout`], and a second flight [`beside`](BESIDE) the first, on the same clock.
+//! The viewer opens a log by itself: its import of MCAP makes series of every field, a text log of
+//! the events and a transform of `/tf`. Here is what it cannot know: the [`shape`](mod@shape) of
+//! the vehicle that moves there, the pad, the path that was flown, a [`layout`], and a second
+//! flight [`beside`](BESIDE) the first, on the same clock.
 //!
 //! This is a separate crate because Rerun costs more to compile than everything else here together.
 

@@ -9,12 +9,12 @@ use replay_rerun::{ExportError, Exported, export};
 
 /// Turns a flight log into a recording for the Rerun viewer.
 ///
-/// Rerun opens a log by itself (`rerun FLIGHT.mcap`), with every field, the events and the pose. The recording adds the
-/// shape of the rocket, the pad, the path that was flown, and the layout to show them. Open it with `rerun FLIGHT.rrd`,
-/// Rerun 0.36 or newer.
+/// Rerun opens a log by itself (`rerun FLIGHT.mcap`), with every field, the events and the pose.
+/// The recording adds the shape of the rocket, the pad, the path that was flown, and the layout to
+/// show them. Open it with `rerun FLIGHT.rrd`, Rerun 0.36 or newer.
 ///
-/// Exit codes: 0 written, also from the readable part of a damaged log; 1 not written: no flight log, or the recording cannot be
-/// written; 2 the command line was not understood.
+/// Exit codes: 0 written, also from the readable part of a damaged log; 1 not written: no flight
+/// log, or the recording cannot be written; 2 the command line was not understood.
 #[derive(Debug, Parser)]
 #[command(name = "replay-rerun", version, about, long_about, after_help = EXAMPLES)]
 struct Cli {

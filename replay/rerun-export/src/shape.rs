@@ -1,4 +1,5 @@
-//! The shape of the rocket, seen from its centre of gravity: cylinders about its x axis, which points to the nose.
+//! The shape of the rocket, seen from its centre of gravity: cylinders about its x axis, which
+//! points to the nose.
 
 use flight::vehicle::airframe::{Airframe, MassModel};
 use rerun::archetypes::{Cylinders3D, Ellipsoids3D, LineStrips3D};

@@ -1,4 +1,5 @@
-//! Compares missions: every setting that only one of two has, or that has another value, with the airframe's.
+//! Compares missions: every setting that only one of two has, or that has another value, with the
+//! airframe's.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -12,7 +13,8 @@ use crate::cli::{Answer, text_of};
 use crate::print::{columns, counted};
 use crate::settings::{SettingError, settings_of_mission};
 
-/// A setting in which two missions differ; `None`: it is not in that text, and has its default or means nothing there.
+/// A setting in which two missions differ; `None`: it is not in that text, and has its default or
+/// means nothing there.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SettingDifference {
     pub setting: String,

@@ -1,9 +1,10 @@
 //! Compares two flights: every table that both have.
 //!
-//! Every number of both logs becomes a signal, named as in [`table`](crate::table) (`computer_frame.output.…`). The
-//! second flight is shifted so that the ignition of both coincides, if both have one. It is then read at the times of the
-//! first flight: linear between samples, whole numbers held. Measured solve times are not signals. A signal with more samples
-//! in one of the two differs, because interpolation would hide a lost record.
+//! Every number of both logs becomes a signal, named as in [`table`](crate::table)
+//! (`computer_frame.output.…`). The second flight is shifted so that the ignition of both
+//! coincides, if both have one. It is then read at the times of the first flight: linear between
+//! samples, whole numbers held. Measured solve times are not signals. A signal with more samples in
+//! one of the two differs, because interpolation would hide a lost record.
 //!
 //! Tables of words (events, limits) are compared row by row, without times.
 

@@ -28,7 +28,8 @@ const NO_SIGNALS: [&str; 9] = [
     "state_digest",
 ];
 
-/// Beginnings of columns that are not signals: the crew and the log, which are others in every flight.
+/// Beginnings of columns that are not signals: the crew and the log, which are others in every
+/// flight.
 const NO_SIGNALS_OF: [&str; 6] =
     ["input.log_", "input.uplink", "input.commander", "input.people", "input.rehearsed", "output.answers"];
 
@@ -90,7 +91,8 @@ impl Flown {
     /// Reads a log file.
     ///
     /// # Errors
-    /// The file is not a flight log, cannot be read, holds several flights or is longer than any flight.
+    /// The file is not a flight log, cannot be read, holds several flights or is longer than any
+    /// flight.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
         let mut log = FlightLog::open(path)?;
         let name = log.name().to_owned();
@@ -203,7 +205,8 @@ pub enum Align {
 }
 
 impl Align {
-    /// On ignition if both flights have one, else on time; and what to add to the other flight's times, s.
+    /// On ignition if both flights have one, else on time; and what to add to the other flight's
+    /// times, s.
     pub(super) fn of(baseline: &Flown, other: &Flown) -> (Self, f64) {
         match (baseline.ignition_s, other.ignition_s) {
             (Some(ours_s), Some(theirs_s)) => (Self::Ignition, ours_s - theirs_s),

@@ -60,8 +60,8 @@ impl Args {
         Ok(outcome)
     }
 
-    /// Rerun costs more to compile than all the rest, so a separate program does this export. If it was built, it lies
-    /// beside this one.
+    /// Rerun costs more to compile than all the rest, so a separate program does this export. If it
+    /// was built, it lies beside this one.
     fn rerun(&self, output: &Path) -> Result<Exit> {
         let program =
             std::env::current_exe().context("where this program lies")?.with_file_name("replay-rerun");

@@ -1,4 +1,5 @@
-//! Writes tables into files: comma-separated values (RFC 4180), numbers in the shortest form that reads back as the same.
+//! Writes tables into files: comma-separated values (RFC 4180), numbers in the shortest form that
+//! reads back as the same.
 
 use std::collections::BTreeMap;
 use std::io::{self, Read};
@@ -19,13 +20,14 @@ pub struct ExportedFile {
     pub columns: usize,
 }
 
-/// Writes every table of a log into a new folder. Memory does not grow with the log. The files get their names when all of them are
-/// complete.
+/// Writes every table of a log into a new folder. Memory does not grow with the log. The files get
+/// their names when all of them are complete.
 ///
 /// # Errors
 /// The log cannot be read, or a file cannot be written.
 pub fn export_tables<R: Read>(log: &mut FlightLog<R>, directory: &Path) -> Result<Vec<ExportedFile>> {
-    // It is made with the first table, so that a file that is not a flight log leaves nothing behind.
+    // It is made with the first table, so that a file that is not a flight log leaves nothing
+    // behind.
     let mut folder = None;
     let mut open: BTreeMap<usize, (ExportedFile, csv::Writer<NewFile>)> = BTreeMap::new();
     TableReader::new().read::<R, anyhow::Error>(log, |shape, row| {

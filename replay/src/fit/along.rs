@@ -1,15 +1,18 @@
-//! Along the nose: drag of body and fins, thrust, burn time, shape of the curve, ignition, and what the exhaust takes
-//! away of the drag.
+//! Along the nose: drag of body and fins, thrust, burn time, shape of the curve, ignition, and what
+//! the exhaust takes away of the drag.
 //!
-//! The accelerometer feels `f = (T + d_b B + d_f F) / m + bias`, with the air force on the body `B` and on the fins `F`
-//! as the airframe's data have them at the estimated speed, and the mass `m` of the data. While the vehicle falls there
-//! is no `T`, and the fins' changing openings tell `F` from `B`; then `d_b` and `d_f` are known when the motor is lit.
-//! All is fitted at once, over the fall and the burn.
+//! The accelerometer feels `f = (T + d_b B + d_f F) / m + bias`, with the air force on the body `B`
+//! and on the fins `F` as the airframe's data have them at the estimated speed, and the mass `m` of
+//! the data. While the vehicle falls there is no `T`, and the fins' changing openings tell `F` from
+//! `B`; then `d_b` and `d_f` are known when the motor is lit. All is fitted at once, over the fall
+//! and the burn.
 //!
-//! The accelerometer cannot tell a stronger motor from a lighter vehicle: every scale is per mass of the data.
+//! The accelerometer cannot tell a stronger motor from a lighter vehicle: every scale is per mass
+//! of the data.
 //!
-//! The largest error is the wind along the nose, which nothing on board measures: it is a process with the spectrum of
-//! vertical gusts (MIL-F-8785C, section 3.7.3.4) and an intensity that the same samples tell.
+//! The largest error is the wind along the nose, which nothing on board measures: it is a process
+//! with the spectrum of vertical gusts (MIL-F-8785C, section 3.7.3.4) and an intensity that the
+//! same samples tell.
 
 use flight::computer::FRAME_S;
 use flight::estimation::estimator::VehicleNow;
@@ -23,22 +26,25 @@ use super::burn::{Burn, SHAPE_TERMS, shape_sigmas};
 use super::least_squares::{NoiseStep, Prior, Solution, Whitener, inflate, lowest, solve, solve_from};
 use super::trace::{Frame, Trace};
 
-/// The fall counts from this speed on, m/s: a slower vehicle lies across a wind that is not known yet. From 5 m/s on, 4 of 60
-/// `field` flights have an error of the drag of 4 to 13 %, from 15 m/s on one has 6 %.
+/// The fall counts from this speed on, m/s: a slower vehicle lies across a wind that is not known
+/// yet. From 5 m/s on, 4 of 60 `field` flights have an error of the drag of 4 to 13 %, from 15 m/s
+/// on one has 6 %.
 const SLOWEST_M_S: f64 = 15.0;
 const SLOWEST_OF_DROP_M_S: f64 = 5.0;
 /// Samples whose residuals may be correlated by errors of the model: a quarter of a second.
 pub(super) const BLOCK: usize = 50;
-/// Frames before the reported contact that are left out: a switch may be 10 ms late, and the feet push before it.
+/// Frames before the reported contact that are left out: a switch may be 10 ms late, and the feet
+/// push before it.
 const FRAMES_BEFORE_CONTACT: usize = 4;
 /// Fewer frames of fall (half a second) tell nothing of the drag.
 const FEWEST_FRAMES: usize = 100;
-/// Standard deviation of an accelerometer's scale: 0.1 % is what hobby units are calibrated to. Nothing on board shows it,
-/// and it goes into every scale.
+/// Standard deviation of an accelerometer's scale: 0.1 % is what hobby units are calibrated to.
+/// Nothing on board shows it, and it goes into every scale.
 pub(super) const ACCELEROMETER_SCALE_SIGMA: f64 = 0.001;
 
-/// Factor on the deviation of the whole drag. A fall has only a few vertical gusts, so their strength is badly known, too. With
-/// this factor the 95 % intervals hold the truth in about 95 % of the 1,100 `field` flights of seeds 5 and 7, without it in 91.6 %.
+/// Factor on the deviation of the whole drag. A fall has only a few vertical gusts, so their
+/// strength is badly known, too. With this factor the 95 % intervals hold the truth in about 95 %
+/// of the 1,100 `field` flights of seeds 5 and 7, without it in 91.6 %.
 const DRAG_LACKING: f64 = 1.2;
 
 pub(super) const BODY: usize = 0;
@@ -62,7 +68,8 @@ struct Sample {
     fins_n: f64,
     /// Air force along the nose for a metre per second of wind upwards, N s/m.
     by_updraught: f64,
-    /// Way through the air since the frame before, as a fraction of the length of vertical gusts; `None` after a gap.
+    /// Way through the air since the frame before, as a fraction of the length of vertical gusts;
+    /// `None` after a gap.
     way: Option<f64>,
     /// The cosine of the angle between thrust and nose.
     thrust_along: f64,
@@ -91,7 +98,8 @@ impl Along {
         Some(self.commanded_s? + delay_s)
     }
 
-    /// Drag of body and fins together, as they were opened in this fall, over that of the data, and its standard deviation.
+    /// Drag of body and fins together, as they were opened in this fall, over that of the data, and
+    /// its standard deviation.
     pub(super) fn drag(&self) -> (f64, f64) {
         let shares = [self.body_share, 1.0 - self.body_share];
         let total: f64 = (0..2).map(|place| shares[place] * self.solution.values[place]).sum();
@@ -121,8 +129,8 @@ fn burn_of<'a>(trace: &'a Trace, values: &[f64]) -> Burn<'a> {
     }
 }
 
-/// The frames of the fall and the burn: from the first fast one after apogee until the contact. A vehicle that is dropped and
-/// lit soon counts from a lower speed on.
+/// The frames of the fall and the burn: from the first fast one after apogee until the contact. A
+/// vehicle that is dropped and lit soon counts from a lower speed on.
 pub(super) fn falling(trace: &Trace) -> &[Frame] {
     let from = |speed_m_s: f64| -> &[Frame] {
         let falls = |frame: &Frame| {
@@ -211,15 +219,16 @@ pub(super) fn gust_step(way: Option<f64>, by_gust: f64, white: f64) -> NoiseStep
     }
 }
 
-/// Variance of the noise of each sample from the third differences of the series, which hardly see a smooth motion: that of
-/// a difference is 20 times that of a sample.
+/// Variance of the noise of each sample from the third differences of the series, which hardly see
+/// a smooth motion: that of a difference is 20 times that of a sample.
 pub(super) fn white_variance(values: &[f64]) -> Option<f64> {
     let thirds: Vec<f64> =
         values.windows(4).map(|four| four[3] - 3.0 * four[2] + 3.0 * four[1] - four[0]).collect();
     if thirds.is_empty() {
         return None;
     }
-    // Steps of fins and igniter are outliers: the median of the squares is 0.4549 of the variance of normal numbers.
+    // Steps of fins and igniter are outliers: the median of the squares is 0.4549 of the variance
+    // of normal numbers.
     let mut squares: Vec<f64> = thirds.iter().map(|third| third * third).collect();
     squares.sort_by(f64::total_cmp);
     let median = squares[squares.len() / 2];
@@ -294,8 +303,8 @@ impl<'a> Series<'a> {
         let missed = self.samples.iter().map(|sample| {
             let to_s = sample.end_s - begins_s;
             let (mut thrust_n, mut mass_kg) = (0.0, self.loaded_kg);
-            // The part of the frame in which the motor burns: a whole frame's loss would be a step over the delay, and would
-            // hold the delay on the grid of the frames.
+            // The part of the frame in which the motor burns: a whole frame's loss would be a step
+            // over the delay, and would hold the delay on the grid of the frames.
             let burning = ((to_s + 0.5 * burn.rise_s) / FRAME_S).clamp(0.0, 1.0);
             if burning > 0.0 {
                 thrust_n = burn.mean_n(to_s - FRAME_S, to_s);
@@ -335,18 +344,21 @@ impl<'a> Series<'a> {
         let lit_s = thrust_seen_s(&self.samples[self.fallen..], commanded_s, self.loaded_kg, mission)
             .ok_or("no thrust was seen after the igniter was fired")?;
         priors.extend([WIDE, WIDE, Prior { mean: mission.ignition.delay_s, sigma: 0.2 }]);
-        // A mission that trusts its curve still gets one of the catalogue: 2 % of shape remain after a club's own burn.
+        // A mission that trusts its curve still gets one of the catalogue: 2 % of shape remain
+        // after a club's own burn.
         let rms = if mission.motor.shape_sigma > 0.0 { mission.motor.shape_sigma } else { 0.02 };
         priors.extend(shape_sigmas(rms).map(|sigma| Prior { mean: 0.0, sigma }));
-        // Nobody has data for a jet against the wind, and what a mission flies by is chosen to be safe: the body may lose
-        // anything between nothing and all, and the fins, which sit outside the jet, between -2 and 12 %.
+        // Nobody has data for a jet against the wind, and what a mission flies by is chosen to be
+        // safe: the body may lose anything between nothing and all, and the fins, which sit outside
+        // the jet, between -2 and 12 %.
         priors.push(Prior { mean: 0.5, sigma: 0.3 });
         priors.push(Prior { mean: 0.05, sigma: 0.05 });
         // Composite propellant comes up within a tenth of a second.
         priors.push(Prior { mean: 0.0, sigma: 0.05 });
         let whitener = self.noises(self.samples.len(), updraught_m_s);
         let residuals = |values: &[f64]| whitener.apply(&self.missed(values));
-        // The thrust's corner can hold the iteration on its wrong side: it begins before and behind it.
+        // The thrust's corner can hold the iteration on its wrong side: it begins before and behind
+        // it.
         let solved = [0.0, 0.02].into_iter().filter_map(|earlier_s| {
             let mut start: Vec<f64> = priors.iter().map(|prior| prior.mean).collect();
             start[DELAY] = (lit_s - commanded_s - earlier_s).max(0.0);
@@ -364,8 +376,9 @@ impl<'a> Series<'a> {
 
     /// Whether the model's thrust is the one that was felt; an error says where it is not.
     fn is_of_the_curve(&self, values: &[f64]) -> Result<(), String> {
-        /// A chuff, a motor that goes out, a nozzle that is lost: the thrust is off by a tenth of the curve's highest for a tenth
-        /// of a second. Shape, gusts and vibration together reach a third of that.
+        /// A chuff, a motor that goes out, a nozzle that is lost: the thrust is off by a tenth of
+        /// the curve's highest for a tenth of a second. Shape, gusts and vibration together reach a
+        /// third of that.
         const FRAMES: usize = 20;
         const SHARE: f64 = 0.1;
         let missed = self.missed(values);
@@ -434,8 +447,9 @@ const WIDE: Prior = Prior { mean: 1.0, sigma: 0.5 };
 
 const NOT_SOLVED: &str = "the model of drag and thrust does not fit the samples";
 
-/// When the thrust is first seen, s: the samples rise by a tenth of the curve's highest thrust over what was felt when the
-/// igniter was fired, for three frames. `None` if they do not, or if the burn is not seen for half a second.
+/// When the thrust is first seen, s: the samples rise by a tenth of the curve's highest thrust over
+/// what was felt when the igniter was fired, for three frames. `None` if they do not, or if the
+/// burn is not seen for half a second.
 fn thrust_seen_s(samples: &[Sample], commanded_s: f64, mass_kg: f64, mission: &Mission) -> Option<f64> {
     const SEEN_FRAMES: usize = 100;
     let rise_m_s2 = 0.1 * mission.motor_curve.peak_thrust_n() / mass_kg;

@@ -1,12 +1,14 @@
-//! A burn that differs from its certified curve: `T(t) = s/b T0(t/b) (1 + sum over k of a_k cos(k pi i))` for the impulse
-//! scale `s`, the burn-time scale `b`, and the fraction `i` of the impulse that the curve has given by then.
+//! A burn that differs from its certified curve: `T(t) = s/b T0(t/b) (1 + sum over k of a_k cos(k
+//! pi i))` for the impulse scale `s`, the burn-time scale `b`, and the fraction `i` of the impulse
+//! that the curve has given by then.
 //!
-//! The cosines have no mean over the impulse: a shape changes neither the impulse nor, by itself, the burn time. Any
-//! slow deviation from a curve is a sum of few of them.
+//! The cosines have no mean over the impulse: a shape changes neither the impulse nor, by itself,
+//! the burn time. Any slow deviation from a curve is a sum of few of them.
 //!
-//! A thrust that rises slowly comes along its curve at a rate that grows from 0 to 1 within the rise: the whole burn is late
-//! by half of the rise, and no impulse is lost. The delay of an ignition is that of the impulse, which is what brakes:
-//! where the rise begins is half of the rise before it.
+//! A thrust that rises slowly comes along its curve at a rate that grows from 0 to 1 within the
+//! rise: the whole burn is late by half of the rise, and no impulse is lost. The delay of an
+//! ignition is that of the impulse, which is what brakes: where the rise begins is half of the rise
+//! before it.
 
 use core::f64::consts::PI;
 
@@ -17,8 +19,8 @@ use super::along::white_variance;
 use super::least_squares::{Prior, inflate, solve_from};
 use super::{Basis, Fit, Row};
 
-/// Terms of the shape. Five follow a deviation that turns around four times in a burn; faster ones change neither speed
-/// nor height at the ground.
+/// Terms of the shape. Five follow a deviation that turns around four times in a burn; faster ones
+/// change neither speed nor height at the ground.
 pub(super) const SHAPE_TERMS: usize = 5;
 
 #[derive(Debug, Clone, Copy)]
@@ -64,7 +66,8 @@ impl Burn<'_> {
     }
 }
 
-/// How far the terms of a shape of this rms may go, as standard deviations: slow deviations are larger than fast ones.
+/// How far the terms of a shape of this rms may go, as standard deviations: slow deviations are
+/// larger than fast ones.
 pub(super) fn shape_sigmas(rms: f64) -> [f64; SHAPE_TERMS] {
     let terms: [f64; SHAPE_TERMS] = core::array::from_fn(|k| 1.0 / (k + 1) as f64);
     // The rms of a cosine is its amplitude over the root of 2.
@@ -120,7 +123,8 @@ pub(super) fn fit_stand(source: &str, rows: &[(f64, f64)], curve: &ThrustCurve) 
         Prior { mean: 1.0, sigma: 0.5 },
         Prior { mean: begins_s, sigma: 1.0 },
     ];
-    // On a stand nothing else hides the shape: five per cent is more than certified curves differ by.
+    // On a stand nothing else hides the shape: five per cent is more than certified curves differ
+    // by.
     priors.extend(shape_sigmas(0.05).map(|sigma| Prior { mean: 0.0, sigma }));
     let residuals = |values: &[f64]| -> Vec<f64> {
         let burn = Burn {
@@ -178,7 +182,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// A trapezium of 120 N s: 1 s up to 40 N, 2 s level, 1 s down; 10 % more impulse in twice the time.
+    /// A trapezium of 120 N s: 1 s up to 40 N, 2 s level, 1 s down; 10 % more impulse in twice the
+    /// time.
     #[test]
     fn val_hand_a_scaled_trapezium() {
         let curve =
@@ -206,8 +211,8 @@ mod tests {
         flight::vehicles::thrust_curve::from_rasp("T40 38 200 P 0.12 0.3 M\n0.2 40\n3 36\n4 0\n").unwrap()
     }
 
-    /// The curve with 4 % more impulse in a burn that is 5 % shorter, 0.21 s after the command, with a tare of 1.5 N and a
-    /// noise of 0.2 N that repeats itself every 7 rows.
+    /// The curve with 4 % more impulse in a burn that is 5 % shorter, 0.21 s after the command,
+    /// with a tare of 1.5 N and a noise of 0.2 N that repeats itself every 7 rows.
     #[test]
     fn val_hand_a_synthetic_burn() {
         let curve = curve();

@@ -1,10 +1,11 @@
 //! By how much intervals are wider than a flight's own noise says.
 //!
-//! A fit knows the noise of its samples, and not what its models lack: a crooked inertial unit, a shape of the thrust that
-//! five cosines do not follow, gusts that are not the military standard's. `examples/fit_coverage.rs` flies vehicles whose
-//! truth it knows in sets of dispersions whose world is not the model's, fits each flight, and writes into `calibration.toml`
-//! the deviation that has to be added (as squares) for 95 % of the intervals to hold the truth. What it cannot make hold
-//! has the reason there instead.
+//! A fit knows the noise of its samples, and not what its models lack: a crooked inertial unit, a
+//! shape of the thrust that five cosines do not follow, gusts that are not the military standard's.
+//! `examples/fit_coverage.rs` flies vehicles whose truth it knows in sets of dispersions whose
+//! world is not the model's, fits each flight, and writes into `calibration.toml` the deviation
+//! that has to be added (as squares) for 95 % of the intervals to hold the truth. What it cannot
+//! make hold has the reason there instead.
 
 use std::collections::BTreeMap;
 

@@ -1,11 +1,14 @@
-//! What all flights so far tell of a motor lot, an airframe and a site, and what the next flight may expect of them.
+//! What all flights so far tell of a motor lot, an airframe and a site, and what the next flight
+//! may expect of them.
 //!
-//! * [`Posterior`]: a lot's mean and scatter, from the prior of a set of dispersions and the burns so far.
-//! * [`predict`]: the landing rate with its interval, from simulated flights with motors of the posterior.
+//! * [`Posterior`]: a lot's mean and scatter, from the prior of a set of dispersions and the burns
+//!   so far.
+//! * [`predict`]: the landing rate with its interval, from simulated flights with motors of the
+//!   posterior.
 //! * [`Day`]: the mission and the set of dispersions of the day, as files.
 //!
-//! Everything is per mass of the mission's data, as the fits are: the vehicle is taken as weighed, and its mass does not
-//! scatter beside its thrust.
+//! Everything is per mass of the mission's data, as the fits are: the vehicle is taken as weighed,
+//! and its mass does not scatter beside its thrust.
 
 use std::fmt::Write as _;
 use std::num::NonZeroUsize;
@@ -65,8 +68,8 @@ pub struct Learnt {
     pub lot_toml: String,
     /// Drag and gimbal of the airframe, over the flights.
     pub airframe: Vec<Pooled>,
-    /// The gimbal's rate that the next day is flown with, deg/s, and the fit that it is from: the slowest, if it is slower than the
-    /// mission's. What has slowed down does not recover.
+    /// The gimbal's rate that the next day is flown with, deg/s, and the fit that it is from: the
+    /// slowest, if it is slower than the mission's. What has slowed down does not recover.
     pub slow_gimbal: Option<(f64, String)>,
     /// Mean wind at the site, lowest and highest of an even distribution, m/s.
     pub wind_m_s: [f64; 2],
@@ -193,7 +196,8 @@ impl Outcomes {
     }
 }
 
-/// The landing rate by the simulation and by the outcomes of flights: one distribution for rate, interval and risk.
+/// The landing rate by the simulation and by the outcomes of flights: one distribution for rate,
+/// interval and risk.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Expected {
     /// Probability that the simulation is of the club's world.
@@ -206,13 +210,15 @@ pub struct Expected {
     pub risk: f64,
 }
 
-/// Before its first flight one club of ten lives in a world that its simulation does not have: any rate may be there. More of
-/// them, and no club could fly before it has flown ten times; fewer, and five flights are no evidence against a simulation.
+/// Before its first flight one club of ten lives in a world that its simulation does not have: any
+/// rate may be there. More of them, and no club could fly before it has flown ten times; fewer, and
+/// five flights are no evidence against a simulation.
 const OTHER_WORLD: f64 = 0.1;
 
 impl Expected {
-    /// A mixture: the rates that the simulation thinks possible, and a rate of which nothing is known, each with the likelihood of
-    /// the outcomes (Gelman et al., Bayesian Data Analysis, 3rd ed., 2.4 and 7.4).
+    /// A mixture: the rates that the simulation thinks possible, and a rate of which nothing is
+    /// known, each with the likelihood of the outcomes (Gelman et al., Bayesian Data Analysis, 3rd
+    /// ed., 2.4 and 7.4).
     pub fn of(simulated: &Prediction, Outcomes { landed, of, .. }: Outcomes, limit: f64) -> Option<Self> {
         let [landed, lost] = [landed, of - landed].map(|count| count as f64);
         let likelihood = |rate: f64| libm::pow(rate, landed) * libm::pow(1.0 - rate, lost);
@@ -239,7 +245,8 @@ impl Expected {
     }
 }
 
-/// Refuses fits of other vehicles and motors than the mission's, by their names; a test stand has no vehicle.
+/// Refuses fits of other vehicles and motors than the mission's, by their names; a test stand has
+/// no vehicle.
 fn one_vehicle(fits: &[Fit], known: [&str; 2]) -> Result<()> {
     for fit in fits {
         for (found, known) in [&fit.mission, &fit.motor].into_iter().zip(known) {
@@ -267,7 +274,8 @@ fn airframe(fits: &[Fit]) -> Vec<Pooled> {
     found.collect()
 }
 
-/// The slowest gimbal that a fit has found for certain, deg/s, and which one, if it is below the mission's.
+/// The slowest gimbal that a fit has found for certain, deg/s, and which one, if it is below the
+/// mission's.
 fn slow_gimbal(fits: &[Fit], of_mission_deg_s: f64) -> Option<(f64, String)> {
     let found = fits.iter().filter_map(|fit| Some((fit.get("gimbal_rate")?, &fit.source)));
     let slow = found.filter(|(rate, _)| rate.high < of_mission_deg_s * SLOWER);
@@ -278,8 +286,8 @@ fn slow_gimbal(fits: &[Fit], of_mission_deg_s: f64) -> Option<(f64, String)> {
 /// A servo at another voltage or load is as much slower.
 const SLOWER: f64 = 0.9;
 
-/// The mean wind of the next day: the prior's range is a mean and a deviation, the flights' winds are values of them, and the
-/// next value's deviation is a range again.
+/// The mean wind of the next day: the prior's range is a mean and a deviation, the flights' winds
+/// are values of them, and the next value's deviation is a range again.
 fn wind(fits: &[Fit], set: &Dispersion) -> [f64; 2] {
     let [low, high] = set.wind_m_s;
     let speeds: Vec<f64> = fits
@@ -368,8 +376,8 @@ impl Day {
         let mission = mission_with(&mission_toml, &[])?;
         let mut table: toml::Table = set_toml.parse().with_context(|| set.to_owned())?;
         let mut change = |key: &str, value: toml::Value| table.insert(key.to_owned(), value);
-        // Impulse and burn time scatter as the mission's lot does.
-        // A set's delays scatter around the nominal one; a lot with another mean gets its distance as scatter, too.
+        // Impulse and burn time scatter as the mission's lot does. A set's delays scatter around
+        // the nominal one; a lot with another mean gets its distance as scatter, too.
         let apart_s = delay.mean - Truth::default().ignition_delay_s;
         let scatter_scale = mission.airframe.igniter_scatter().max(1e-3);
         change("ignition_delay_s", float(libm::hypot(delay.next_sigma(), apart_s) / scatter_scale));
@@ -394,8 +402,8 @@ fn head(what: &str, set: &str, sources: &[String]) -> String {
     head
 }
 
-/// The mission without what it knows of burns and of a day, and its `[lot]`: scales are over its curve, and the next day has
-/// weights and temperatures of its own.
+/// The mission without what it knows of burns and of a day, and its `[lot]`: scales are over its
+/// curve, and the next day has weights and temperatures of its own.
 fn unburnt(mission_toml: &str) -> Result<(String, toml::Table)> {
     let mut mission: toml::Table = mission_toml.parse()?;
     let Some(toml::Value::Table(lot)) = mission.get_mut("lot") else {
@@ -486,18 +494,21 @@ impl Answer for Learnt {
 #[derive(Debug, Args)]
 #[group(id = "learnt")]
 pub(super) struct Arguments {
-    /// Learn the motor lot, the airframe and the site, and write mission.toml and dispersion.toml of the next day into this
-    /// directory, for `onboard-sim campaign`. If it exists, it is kept, and the next free name is taken.
+    /// Learn the motor lot, the airframe and the site, and write mission.toml and dispersion.toml
+    /// of the next day into this directory, for `onboard-sim campaign`. If it exists, it is kept,
+    /// and the next free name is taken.
     #[arg(long, value_name = "DIR", conflicts_with = "out")]
     day: Option<PathBuf>,
-    /// Simulate this many flights of the next day for the landing rate, and GO or NO-GO; a thousand take some minutes.
+    /// Simulate this many flights of the next day for the landing rate, and GO or NO-GO; a thousand
+    /// take some minutes.
     #[arg(long, value_name = "N")]
     flights: Option<usize>,
-    /// Mission of the next day: built-in or TOML file [default: that of the first log]. Scales of fits over other data of
-    /// the same vehicle and motor are converted.
+    /// Mission of the next day: built-in or TOML file [default: that of the first log]. Scales of
+    /// fits over other data of the same vehicle and motor are converted.
     #[arg(long, value_name = "NAME|FILE")]
     mission: Option<String>,
-    /// Prior: built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh, wild) or TOML file.
+    /// Prior: built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh, wild)
+    /// or TOML file.
     #[arg(long, default_value = sim::dispersion::DEFAULT, value_name = "NAME|FILE")]
     prior: String,
     /// Seed of the simulated flights.
@@ -569,8 +580,9 @@ mod tests {
         assert!(error.starts_with("a is of H45W, and the mission of H53"), "{error}");
     }
 
-    /// A range of 0 to 6 is 3 with 1.732; one flight in 5 m/s makes the mean 4 and the squares 3 + 2 (worth one value and one
-    /// more): the next deviation is the root of (3 + 2) / 3 * 1.5, the range 1.732 times that to both sides.
+    /// A range of 0 to 6 is 3 with 1.732; one flight in 5 m/s makes the mean 4 and the squares 3 +
+    /// 2 (worth one value and one more): the next deviation is the root of (3 + 2) / 3 * 1.5, the
+    /// range 1.732 times that to both sides.
     #[test]
     fn val_hand_the_wind_of_the_next_day() {
         let set = Dispersion { wind_m_s: [0.0, 6.0], ..Dispersion::default() };
@@ -594,8 +606,8 @@ mod tests {
         assert_eq!(slow_gimbal(&fits[..1], 300.0), None);
     }
 
-    /// A simulation that says 0.8 and 1 with the same weight, and three of four landed: 0.8^3 0.2 = 0.1024 of the first, nothing of the
-    /// second. Of any rate it is B(4, 2) = 3! 1! / 5! = 0.05.
+    /// A simulation that says 0.8 and 1 with the same weight, and three of four landed: 0.8^3 0.2 =
+    /// 0.1024 of the first, nothing of the second. Of any rate it is B(4, 2) = 3! 1! / 5! = 0.05.
     #[test]
     fn val_hand_what_was_flown_decides() {
         let simulated = Prediction { rate: 0.9, low: 0.8, high: 1.0, rates: vec![0.8, 1.0] };

@@ -1,7 +1,8 @@
 //! Nonlinear least squares with a normal prior: the most likely parameters, and their covariance.
 //!
-//! Gauss-Newton with Levenberg's damping on the normal equations. (The crate `levenberg-marquardt` is built on another
-//! version of nalgebra than the flight code, and a second one would have to be compiled and could not share a type.)
+//! Gauss-Newton with Levenberg's damping on the normal equations. (The crate `levenberg-marquardt`
+//! is built on another version of nalgebra than the flight code, and a second one would have to be
+//! compiled and could not share a type.)
 
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
@@ -25,14 +26,16 @@ pub(super) struct Solution {
 }
 
 const ROUNDS: usize = 40;
-/// Step of a derivative, as a fraction of the prior's standard deviation: a millisecond of an ignition, a quarter of one of a
-/// servo. Smaller steps stay within one branch of a play, and the iteration stops at its end.
+/// Step of a derivative, as a fraction of the prior's standard deviation: a millisecond of an
+/// ignition, a quarter of one of a servo. Smaller steps stay within one branch of a play, and the
+/// iteration stops at its end.
 const STEP: f64 = 5e-3;
 /// The iteration ends when no parameter moves by more than this fraction of its standard deviation.
 const SMALL: f64 = 1e-3;
 const MOST_DAMPING: f64 = 1e9;
 
-/// The most likely parameters for whitened residuals; `None` if they are not finite or no step helps at the start.
+/// The most likely parameters for whitened residuals; `None` if they are not finite or no step
+/// helps at the start.
 pub(super) fn solve(priors: &[Prior], residuals: impl Fn(&[f64]) -> Vec<f64>) -> Option<Solution> {
     let start: Vec<f64> = priors.iter().map(|prior| prior.mean).collect();
     solve_from(&start, priors, residuals)
@@ -95,10 +98,11 @@ pub(super) fn solve_from(
 
 /// Widens a solution where its residuals say that the model is wrong.
 ///
-/// Residuals that are independent, and as large as they were taken for, push the parameters as hard as the covariance says.
-/// How hard they do push is summed over blocks of neighbours, within which they may be correlated (the sandwich covariance:
-/// H. White, Econometrica 50, 1982; K.-Y. Liang and S. Zeger, Biometrika 73, 1986). Where that gives a larger deviation, it
-/// counts; the correction for few blocks is the usual one.
+/// Residuals that are independent, and as large as they were taken for, push the parameters as hard
+/// as the covariance says. How hard they do push is summed over blocks of neighbours, within which
+/// they may be correlated (the sandwich covariance: H. White, Econometrica 50, 1982; K.-Y. Liang
+/// and S. Zeger, Biometrika 73, 1986). Where that gives a larger deviation, it counts; the
+/// correction for few blocks is the usual one.
 pub(super) fn inflate(solution: &mut Solution, residuals: impl Fn(&[f64]) -> Vec<f64>, block: usize) {
     let Solution { values, priors, .. } = &*solution;
     let now = residuals(values);
@@ -228,7 +232,8 @@ impl Whitener {
     }
 }
 
-/// The place of the lowest value of a function with one minimum between two ends, by the golden section.
+/// The place of the lowest value of a function with one minimum between two ends, by the golden
+/// section.
 pub(super) fn lowest(from: f64, to: f64, rounds: usize, mut value: impl FnMut(f64) -> f64) -> f64 {
     const GOLDEN: f64 = 0.618_033_988_749_895;
     let (mut low, mut high) = (from, to);
@@ -252,8 +257,8 @@ pub(super) fn lowest(from: f64, to: f64, rounds: usize, mut value: impl FnMut(f6
 mod tests {
     use super::*;
 
-    /// A line through (0, 1), (1, 3), (2, 5.3) with a noise of 0.1 and a prior that says nothing: the normal equations
-    /// give 0.95 + 2.15 x, and the covariance is 0.01 [5/6, -1/2; -1/2, 1/2].
+    /// A line through (0, 1), (1, 3), (2, 5.3) with a noise of 0.1 and a prior that says nothing:
+    /// the normal equations give 0.95 + 2.15 x, and the covariance is 0.01 [5/6, -1/2; -1/2, 1/2].
     #[test]
     fn val_hand_a_straight_line() {
         let priors = [Prior { mean: 0.0, sigma: 1e4 }; 2];
@@ -266,7 +271,8 @@ mod tests {
         }
     }
 
-    /// A sample of 3 with a noise of 1 and a prior of 0 with 2: the mean is 3 * 4 / 5, the variance 4 / 5.
+    /// A sample of 3 with a noise of 1 and a prior of 0 with 2: the mean is 3 * 4 / 5, the variance
+    /// 4 / 5.
     #[test]
     fn val_hand_a_prior_and_a_sample() {
         let found = solve(&[Prior { mean: 0.0, sigma: 2.0 }], |values| vec![values[0] - 3.0]).unwrap();
@@ -275,8 +281,8 @@ mod tests {
         assert!((found.covariance[(0, 0)] - 0.8).abs() < 1e-9);
     }
 
-    /// A mean of 40 samples that come in pairs of equal ones, +1 and -1 in turn: as independent numbers they have a
-    /// variance of 1 / 40, as 20 pairs one of 1 / 20; few blocks add 20 / 19.
+    /// A mean of 40 samples that come in pairs of equal ones, +1 and -1 in turn: as independent
+    /// numbers they have a variance of 1 / 40, as 20 pairs one of 1 / 20; few blocks add 20 / 19.
     #[test]
     fn val_hand_correlated_residuals_widen_the_interval() {
         let prior = [Prior { mean: 0.0, sigma: 1e6 }];
@@ -296,8 +302,9 @@ mod tests {
         assert!(solve(&prior, |_| vec![f64::NAN]).is_none());
     }
 
-    /// A process with variance 1 and correlation 1/2 from sample to sample, seen without noise: the first innovation is
-    /// the value, the next is the value less half of the one before, over the root of 3/4.
+    /// A process with variance 1 and correlation 1/2 from sample to sample, seen without noise: the
+    /// first innovation is the value, the next is the value less half of the one before, over the
+    /// root of 3/4.
     #[test]
     fn val_hand_innovations_of_a_first_order_process() {
         let step = |first: bool| NoiseStep {

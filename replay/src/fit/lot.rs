@@ -1,7 +1,9 @@
-//! How often the next day lands, from a lot's posterior ([`flight::vehicle::lot`]) and simulated flights with motors of it.
+//! How often the next day lands, from a lot's posterior ([`flight::vehicle::lot`]) and simulated
+//! flights with motors of it.
 //!
-//! The next value of a posterior has a Student t distribution. The errors of the fits count as scatter: they are a tenth of it
-//! and widen it by half a per cent. What all fits of a vehicle may have in common is no scatter: it widens the mean by itself.
+//! The next value of a posterior has a Student t distribution. The errors of the fits count as
+//! scatter: they are a tenth of it and widen it by half a per cent. What all fits of a vehicle may
+//! have in common is no scatter: it widens the mean by itself.
 
 use flight::vehicle::lot::{Burnt, Posterior};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
@@ -23,11 +25,12 @@ pub fn draw_lot(lot: &Posterior, chance: &mut Chance) -> (f64, f64) {
     (lot.mean + libm::hypot(sigma / libm::sqrt(lot.worth), lot.common) * chance.normal(), sigma)
 }
 
-/// Lots that are drawn from the posterior: the ends of the interval are then known to a tenth of its width.
+/// Lots that are drawn from the posterior: the ends of the interval are then known to a tenth of
+/// its width.
 const DRAWS: usize = 800;
 
-/// Places and weights of Gauss and Hermite for the mean over a normal variable, exact for polynomials of ninth order
-/// (Abramowitz and Stegun, table 25.10, in standard deviations).
+/// Places and weights of Gauss and Hermite for the mean over a normal variable, exact for
+/// polynomials of ninth order (Abramowitz and Stegun, table 25.10, in standard deviations).
 const NORMAL: [(f64, f64); 5] = [
     (-2.856_970_013_872_806, 0.011_257_411_327_720_7),
     (-1.355_626_179_974_266, 0.222_075_922_005_613),
@@ -36,7 +39,8 @@ const NORMAL: [(f64, f64); 5] = [
     (2.856_970_013_872_806, 0.011_257_411_327_720_7),
 ];
 
-/// A simulated flight: what its motor was drawn as, in the order of the lots, and whether it landed.
+/// A simulated flight: what its motor was drawn as, in the order of the lots, and whether it
+/// landed.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Trial {
     pub drawn: Vec<f64>,
@@ -108,9 +112,10 @@ fn burns(properties: usize) -> Vec<(Vec<f64>, f64)> {
     })
 }
 
-/// Prior standard deviations of the mean log-odds and of every other coefficient: of flights that all land or all fail
-/// the rate stays a number between. With 1, intervals hold the rate of 95.5 and 95.6 % of simulated clubs (in the two
-/// worlds of the test in `rate`), with 0.5 of 97.1 and 96.1 %, with 2 of 96.6 and 96.5 %.
+/// Prior standard deviations of the mean log-odds and of every other coefficient: of flights that
+/// all land or all fail the rate stays a number between. With 1, intervals hold the rate of 95.5
+/// and 95.6 % of simulated clubs (in the two worlds of the test in `rate`), with 0.5 of 97.1 and
+/// 96.1 %, with 2 of 96.6 and 96.5 %.
 const MEAN_SIGMA: f64 = 5.0;
 const SLOPE_SIGMA: f64 = 1.0;
 
@@ -133,7 +138,8 @@ struct Surface {
 }
 
 impl Surface {
-    /// The surface of flights whose motors were drawn for the next burn of these lots; `None` if a motor is not a number.
+    /// The surface of flights whose motors were drawn for the next burn of these lots; `None` if a
+    /// motor is not a number.
     pub(super) fn fit(lots: &[Posterior], trials: &[Trial]) -> Option<Self> {
         let scales: Vec<(f64, f64)> = lots.iter().map(|lot| (lot.mean, lot.next_sigma())).collect();
         let count = 1 + lots.len() + lots.len() * (lots.len() + 1) / 2;
@@ -265,8 +271,9 @@ mod tests {
         assert!((found / lot.next_sigma() - 1.0).abs() < 0.03, "{found} {}", lot.next_sigma());
     }
 
-    /// Chance that mk2 lands in `real` with a motor of so much impulse (rows) and burn time (columns), by what its mission
-    /// expects: 4,000 flights of seed 4001 with a scatter of 4.5 and 6.5 %, each weighed by its distance (normal, 1.2 and 1.7 %).
+    /// Chance that mk2 lands in `real` with a motor of so much impulse (rows) and burn time
+    /// (columns), by what its mission expects: 4,000 flights of seed 4001 with a scatter of 4.5 and
+    /// 6.5 %, each weighed by its distance (normal, 1.2 and 1.7 %).
     const LANDS: [[f64; 7]; 7] = [
         [0.04, 0.11, 0.45, 0.49, 0.25, 0.14, 0.04],
         [0.20, 0.44, 0.76, 0.79, 0.64, 0.35, 0.13],
@@ -288,15 +295,16 @@ mod tests {
         between(LANDS[row]) + down * (between(LANDS[row + 1]) - between(LANDS[row]))
     }
 
-    /// A vehicle that lands with motors between 4 % too weak and 5 % too strong, which burn for no more than 6 % too long or
-    /// too short, and never with one flight of fifty: edges that the surface cannot have.
+    /// A vehicle that lands with motors between 4 % too weak and 5 % too strong, which burn for no
+    /// more than 6 % too long or too short, and never with one flight of fifty: edges that the
+    /// surface cannot have.
     fn lands_within_edges(motor: [f64; 2]) -> f64 {
         let within = (0.96..1.05).contains(&motor[0]) && (0.94..1.06).contains(&motor[1]);
         if within { 0.98 } else { 0.0 }
     }
 
-    /// The share of clubs whose interval holds their true rate. Their lots are as the prior has them; each has burnt five motors,
-    /// and its mission expects what it has learnt.
+    /// The share of clubs whose interval holds their true rate. Their lots are as the prior has
+    /// them; each has burnt five motors, and its mission expects what it has learnt.
     fn held(clubs: u64, lands: fn([f64; 2]) -> f64) -> f64 {
         const FLOWN: u32 = 4000;
         let priors = [Posterior::prior(1.0, 0.025), Posterior::prior(1.0, 0.04)];
@@ -358,8 +366,8 @@ mod tests {
         assert!(many.rate > 0.99 && many.low < 1.0 && risk(&many) < 0.02, "{many:?}");
     }
 
-    /// One property, and a chance of which the log-odds are 2 + 1.5 u - 0.7 u^2: 20,000 flights find the coefficients to
-    /// their standard deviations, and the draws scatter by these.
+    /// One property, and a chance of which the log-odds are 2 + 1.5 u - 0.7 u^2: 20,000 flights
+    /// find the coefficients to their standard deviations, and the draws scatter by these.
     #[test]
     fn val_simulation_the_surface_of_many_flights_is_found() {
         const TRUE: [f64; 3] = [2.0, 1.5, -0.7];

@@ -1,16 +1,18 @@
-//! What a flight tells of its vehicle, its motor and its day: values with 95 % intervals, and what could not be told, with
-//! the reason.
+//! What a flight tells of its vehicle, its motor and its day: values with 95 % intervals, and what
+//! could not be told, with the reason.
 //!
-//! Only what a real flight's log holds is used: sensor samples, commands, feedback, and the flight computer's estimates.
+//! Only what a real flight's log holds is used: sensor samples, commands, feedback, and the flight
+//! computer's estimates.
 //!
 //! In reading order:
 //!
 //! * [`trace`]: a flight's frames.
-//! * [`along`]: drag and thrust along the nose. [`burn`] is the model of the thrust, and of a burn on a test stand.
+//! * [`along`]: drag and thrust along the nose. [`burn`] is the model of the thrust, and of a burn
+//!   on a test stand.
 //! * [`turning`]: the gimbal, from the rotation while the motor burns. [`servo`] is its model.
 //! * [`wind`]: the mean wind, from the force across the nose.
-//! * [`calibration`]: by how much the intervals are wider than the noise says. `examples/fit_coverage.rs` measures
-//!   whether they hold the truth.
+//! * [`calibration`]: by how much the intervals are wider than the noise says.
+//!   `examples/fit_coverage.rs` measures whether they hold the truth.
 //! * [`pooled`]: several flights together. [`patched`]: the mission with what was found.
 //! * [`lot`] and [`day`]: what all flights so far tell of the next one.
 //! * [`least_squares`]: most likely values, where the noise is a slow disturbance.
@@ -54,9 +56,9 @@ use crate::settings::{Setting, SettingError, mission_toml_with_reasons, mission_
 /// 97.5 % point of the normal distribution.
 pub const Z_95: f64 = 1.959_963_984_540_054;
 
-/// A parameter counts as found if its standard deviation is below this fraction of its prior's: then the flight tells at
-/// least eight times as much of it as was known before, and the prior moves it by less than its own standard deviation
-/// over three.
+/// A parameter counts as found if its standard deviation is below this fraction of its prior's:
+/// then the flight tells at least eight times as much of it as was known before, and the prior
+/// moves it by less than its own standard deviation over three.
 const FOUND: f64 = 1.0 / 3.0;
 
 /// A value with its 95 % interval.
@@ -70,8 +72,8 @@ pub struct Parameter {
     /// Ends of the 95 % interval.
     pub low: f64,
     pub high: f64,
-    /// The part of `sigma` that the models lack, from flights with a known truth: a vehicle's flights have it in common.
-    /// `None`: not calibrated, the interval is that of the noise alone.
+    /// The part of `sigma` that the models lack, from flights with a known truth: a vehicle's
+    /// flights have it in common. `None`: not calibrated, the interval is that of the noise alone.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub systematic: Option<f64>,
 }
@@ -137,7 +139,8 @@ pub struct Fit {
     pub basis: Basis,
     pub found: Vec<Parameter>,
     pub not_found: Vec<NotFound>,
-    /// Fraction of the air force in this fall that is the body's by the mission's data: `drag_per_mass_scale` is that of the sum.
+    /// Fraction of the air force in this fall that is the body's by the mission's data:
+    /// `drag_per_mass_scale` is that of the sum.
     pub body_share: Option<f64>,
     /// What intervals were widened by; `None`: they are those of the noise alone.
     pub calibration: Option<Calibration>,
@@ -273,7 +276,8 @@ pub fn uncalibrated(trace: &Trace) -> Fit {
     fit
 }
 
-/// Both directions, each with what the other found: the thrust turns the vehicle, and the turned nozzle loses some of it.
+/// Both directions, each with what the other found: the thrust turns the vehicle, and the turned
+/// nozzle loses some of it.
 fn along_and_turning(trace: &Trace) -> Result<(Along, Result<Solution, String>), &'static str> {
     let gimbal = &trace.mission.airframe.gimbal;
     let frames = &trace.frames;
@@ -349,8 +353,9 @@ fn gimbal(fit: &mut Fit, turning: Result<Solution, String>) {
     }
 }
 
-/// The text of a mission with what a fit found of its vehicle: comments and order stay, and a changed line says from which flight
-/// it is. `flown` is the mission that the fit's scales are over, and `flight` its name and day.
+/// The text of a mission with what a fit found of its vehicle: comments and order stay, and a
+/// changed line says from which flight it is. `flown` is the mission that the fit's scales are
+/// over, and `flight` its name and day.
 ///
 /// # Errors
 /// The mission's text is none, or a value that was found is outside the range of its key.
@@ -406,7 +411,8 @@ fn missions(fits: &[Fit]) -> BTreeSet<&str> {
     fits.iter().map(|fit| fit.mission.as_str()).filter(|mission| !mission.is_empty()).collect()
 }
 
-/// Every parameter that at least two fits have, in the order of the first fit that has it; none of different missions.
+/// Every parameter that at least two fits have, in the order of the first fit that has it; none of
+/// different missions.
 pub fn pooled(fits: &[Fit]) -> Vec<Pooled> {
     let mut names: Vec<&str> = Vec::new();
     let fits = if missions(fits).len() > 1 { &[] } else { fits };
@@ -427,8 +433,8 @@ fn pool(values: &[&Parameter]) -> Option<Pooled> {
     if values.len() < 2 || values.iter().any(|value| value.sigma.is_nan() || value.sigma <= 0.0) {
         return None;
     }
-    // What the models lack is the same in every flight of a vehicle, as far as anybody knows: it neither scatters from one to
-    // the next nor averages out.
+    // What the models lack is the same in every flight of a vehicle, as far as anybody knows: it
+    // neither scatters from one to the next nor averages out.
     let common = values.iter().filter_map(|value| value.systematic).reduce(f64::max);
     let noise: Vec<f64> = values.iter().map(|value| value.noise()).collect();
     let weighted = |variance: f64| {
@@ -533,15 +539,15 @@ fn digits(value: f64, sigma: f64) -> String {
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// Logs of vehicles (MCAP), tables of a test stand (CSV with time_s from the ignition command, and thrust_n), and earlier
-    /// answers in JSON.
+    /// Logs of vehicles (MCAP), tables of a test stand (CSV with time_s from the ignition command,
+    /// and thrust_n), and earlier answers in JSON.
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// The motor that a table is compared with: a built-in one, or a .eng or .rse file.
     #[arg(long, value_name = "NAME|FILE")]
     motor: Option<String>,
-    /// Put what was found in the only log into this mission's file; its comments stay. If there is no such file, it gets the
-    /// mission that was flown.
+    /// Put what was found in the only log into this mission's file; its comments stay. If there is
+    /// no such file, it gets the mission that was flown.
     #[arg(long, alias = "write", value_name = "FILE.toml")]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -693,8 +699,9 @@ mod tests {
         assert!((over(100.0).sigma - 0.011).abs() < 1e-12);
     }
 
-    /// 1, 2 and 3 with errors of 0.1: the weights are equal, the mean is 2, the variance between is 1 - 0.01, and the
-    /// interval is 4.3027 (97.5 % of Student's t with 2 degrees) times the root of 1/3.
+    /// 1, 2 and 3 with errors of 0.1: the weights are equal, the mean is 2, the variance between is
+    /// 1 - 0.01, and the interval is 4.3027 (97.5 % of Student's t with 2 degrees) times the root
+    /// of 1/3.
     #[test]
     fn val_hand_three_flights() {
         let found = pooled(&fits("drag_per_mass_scale", UNIT, [(1.0, 0.1), (2.0, 0.1), (3.0, 0.1)]));
@@ -703,8 +710,9 @@ mod tests {
         assert!((mean.high - 2.0 - 4.302_65 / libm::sqrt(3.0)).abs() < 1e-4, "{mean:?}");
     }
 
-    /// Two equal values do not scatter. With a noise of 0.1 and a systematic part of 0.3: the noise of the mean is 0.1 over the
-    /// root of 2, and the systematic part stays, however many flights there are. One flight is not pooled.
+    /// Two equal values do not scatter. With a noise of 0.1 and a systematic part of 0.3: the noise
+    /// of the mean is 0.1 over the root of 2, and the systematic part stays, however many flights
+    /// there are. One flight is not pooled.
     #[test]
     fn val_hand_what_all_flights_have_in_common_does_not_average_out() {
         for common in [0.0, 0.3] {

@@ -1,5 +1,5 @@
-//! A servo as a fit sees it: commands in, angles out, for any delay. Unlike the simulated one it has no grid of time, so
-//! that its angles follow a change of the delay smoothly.
+//! A servo as a fit sees it: commands in, angles out, for any delay. Unlike the simulated one it
+//! has no grid of time, so that its angles follow a change of the delay smoothly.
 
 /// The unknown properties of a servo.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -12,13 +12,15 @@ pub(super) struct ServoModel {
     pub(super) limit_rad: f64,
 }
 
-/// Parts of a frame, of a millisecond each. In a part the angle is the one that it ends with, as in the simulated vehicle,
-/// whose delay is defined so; a delay between two angles' means would be half a millisecond shorter.
+/// Parts of a frame, of a millisecond each. In a part the angle is the one that it ends with, as in
+/// the simulated vehicle, whose delay is defined so; a delay between two angles' means would be
+/// half a millisecond shorter.
 pub(super) const PARTS: usize = 5;
 
 impl ServoModel {
-    /// The load's angles, rad: of every frame those of its parts and the angle at its end. `commands_rad[k]` is given
-    /// at the end of frame `k`; before the first the servo rests at `rests_rad`.
+    /// The load's angles, rad: of every frame those of its parts and the angle at its end.
+    /// `commands_rad[k]` is given at the end of frame `k`; before the first the servo rests at
+    /// `rests_rad`.
     pub(super) fn angles_rad(
         &self,
         rests_rad: f64,
@@ -37,7 +39,8 @@ impl ServoModel {
         };
         (0..commands_rad.len())
             .map(|frame| {
-                // In this frame it obeys first the older command, and after the rest of the delay the newer one.
+                // In this frame it obeys first the older command, and after the rest of the delay
+                // the newer one.
                 let (older, newer) = (given(frame, whole + 2), given(frame, whole + 1));
                 let parts = core::array::from_fn(|part| {
                     let from = part as f64 / PARTS as f64;
@@ -64,8 +67,8 @@ mod tests {
         servo.angles_rad(0.0, commands_rad, 0.005).into_iter().map(|(_, end_rad)| end_rad).collect()
     }
 
-    /// A step of 0.05 rad at the end of frame 0, 12 ms of delay, 5 rad/s: it moves from 12 ms after frame 0 to 22 ms, and
-    /// is at 0.015 rad after three frames, at 0.04 after four.
+    /// A step of 0.05 rad at the end of frame 0, 12 ms of delay, 5 rad/s: it moves from 12 ms after
+    /// frame 0 to 22 ms, and is at 0.015 rad after three frames, at 0.04 after four.
     #[test]
     fn val_hand_delay_rate_and_play() {
         let servo = ServoModel { delay_s: 0.012, rate_rad_s: 5.0, play_rad: 0.0, limit_rad: 0.12 };

@@ -1,5 +1,5 @@
-//! What a flight's log gives to a fit: sensor samples, commands and the flight computer's own estimates. The simulated
-//! truth that some logs have beside them is never read.
+//! What a flight's log gives to a fit: sensor samples, commands and the flight computer's own
+//! estimates. The simulated truth that some logs have beside them is never read.
 
 use std::path::Path;
 
@@ -132,7 +132,8 @@ impl Trace {
     /// Reads a vehicle's log.
     ///
     /// # Errors
-    /// It says what the log lacks: it cannot be read, is too long, or has several flights, no usable mission, or no frames.
+    /// It says what the log lacks: it cannot be read, is too long, or has several flights, no
+    /// usable mission, or no frames.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
         Self::of(&Recording::open(path)?)
     }

@@ -1,13 +1,14 @@
-//! Across the nose while the motor burns: how late and how far the gimbal follows its commands, and where it points when
-//! it is commanded to point along the axis.
+//! Across the nose while the motor burns: how late and how far the gimbal follows its commands, and
+//! where it points when it is commanded to point along the axis.
 //!
-//! `I q' = -T l sin(g p + p0) + air + rest`, with the thrust `T` that was found along the nose, the arm `l` and the
-//! inertia `I` of the data, the servo's angle `p`, and a rest that wanders (gusts, what the exhaust does to the fins). The
-//! pilot's commands answer to that rest, so it has to be a part of the model: treated as noise without memory it would
-//! pass for an effect of the commands (L. Ljung, System Identification, 2nd edition, section 13.4).
+//! `I q' = -T l sin(g p + p0) + air + rest`, with the thrust `T` that was found along the nose, the
+//! arm `l` and the inertia `I` of the data, the servo's angle `p`, and a rest that wanders (gusts,
+//! what the exhaust does to the fins). The pilot's commands answer to that rest, so it has to be a
+//! part of the model: treated as noise without memory it would pass for an effect of the commands
+//! (L. Ljung, System Identification, 2nd edition, section 13.4).
 //!
-//! The data's inertia cannot be told from the gimbal's gain, and a centre of gravity beside the axis not from a crooked
-//! nozzle: gain and misalignment are those of the whole.
+//! The data's inertia cannot be told from the gimbal's gain, and a centre of gravity beside the
+//! axis not from a crooked nozzle: gain and misalignment are those of the whole.
 
 use flight::computer::FRAME_S;
 use flight::vehicle::airframe::Airframe;
@@ -34,18 +35,19 @@ const FEEDBACK_RAD: f64 = 0.001_745;
 const FEWEST_FRAMES: usize = 100;
 /// The frames before the thrust in which the servo may already move.
 const LEAD_FRAMES: usize = 60;
-/// The frames before those whose commands move the model to where the servo is: the gimbal swings in the fall. Longer than any delay
-/// of a servo.
+/// The frames before those whose commands move the model to where the servo is: the gimbal swings
+/// in the fall. Longer than any delay of a servo.
 const SETTLING_FRAMES: usize = 40;
-/// Factors on the deviations of delay, gain and offsets. The rest is estimated from the residuals. The fit has already taken a
-/// part of the rest out of them, so the deviations are too small (R. N. Kackar and D. A. Harville, Journal of the American
-/// Statistical Association 79, 1984). By how much was measured: without these factors the 95 % intervals hold the truth in 92,
-/// 91 and 88 % of 600 `field` flights of seed 5, with them in 95 %.
+/// Factors on the deviations of delay, gain and offsets. The rest is estimated from the residuals.
+/// The fit has already taken a part of the rest out of them, so the deviations are too small (R. N.
+/// Kackar and D. A. Harville, Journal of the American Statistical Association 79, 1984). By how
+/// much was measured: without these factors the 95 % intervals hold the truth in 92, 91 and 88 % of
+/// 600 `field` flights of seed 5, with them in 95 %.
 const LACKING: [(usize, f64); 4] = [(DELAY, 1.12), (GAIN, 1.23), (PITCH, 1.45), (YAW, 1.45)];
 /// Printed linkages have half a degree to a degree of play behind the servo.
 pub(super) const LINK_RAD: f64 = 0.017_453;
-/// A servo's feedback that is further off its model (rms), rad, is of a servo that does not follow: half a degree, five times
-/// the noise of a potentiometer.
+/// A servo's feedback that is further off its model (rms), rad, is of a servo that does not follow:
+/// half a degree, five times the noise of a potentiometer.
 const FOLLOWS_RAD: f64 = 0.008_727;
 const NOT_SOLVED: &str = "the model of the gimbal does not fit the rotation";
 
@@ -247,7 +249,8 @@ impl Model<'_> {
                     };
                     let by_rad_s = (turn + sample.known_rad_s2[axis]) * part_s;
                     rate_rad_s += by_rad_s;
-                    // As the simulated unit, which adds up the rates at the end of each millisecond.
+                    // As the simulated unit, which adds up the rates at the end of each
+                    // millisecond.
                     let turned_back_rad_s = sample.turned_back * (nozzle_rad - before_rad) / part_s;
                     mean_rad_s += (rate_rad_s - turned_back_rad_s) / PARTS as f64;
                 }
@@ -267,7 +270,8 @@ impl Model<'_> {
         of_axis(0).chain(of_axis(1)).collect()
     }
 
-    /// Whether the feedback is that of a servo that follows these commands; an error says by how much it is not.
+    /// Whether the feedback is that of a servo that follows these commands; an error says by how
+    /// much it is not.
     fn is_a_servo(&self, values: &[f64], reported_rad: &[[f64; 2]]) -> Result<(), String> {
         let missed = self.feedback(values, reported_rad);
         let squares = missed.iter().map(|whitened| whitened * whitened).sum::<f64>();
@@ -328,8 +332,8 @@ fn samples(trace: &Trace, along: &Along, first: usize, begins_s: f64) -> Vec<Sam
 /// Strips of the body: with four the damping moment is exact to 2 %.
 const STRIPS: usize = 4;
 
-/// Moment about the centre of gravity at a station, m, in body axes, N m, for a velocity through the air in body axes,
-/// m/s, a rotation rate, rad/s, and the fins' openings, rad.
+/// Moment about the centre of gravity at a station, m, in body axes, N m, for a velocity through
+/// the air in body axes, m/s, a rotation rate, rad/s, and the fins' openings, rad.
 pub(super) fn air_moment_n_m(
     airframe: &Airframe,
     cg_station_m: f64,
@@ -370,10 +374,11 @@ pub(super) fn air_moment_n_m(
 mod tests {
     use super::*;
 
-    /// Fins open at 90 degrees on mk2, 30 m/s down the axis and 1 m/s along body y: the four drags are 1.55 0.0043 0.6
-    /// V (30, -1), V = 30.0167, and act 0.23 m ahead of a centre of gravity at 0.4 m; of the lifts of equal fins, 1.28 0.0043
-    /// 0.6 V each, a side wind of 1 m/s leaves 4 sin 30 cos 30 times their radius of 0.087 m. The body has
-    /// 1.2 0.074 0.7 m^2 in the middle, at 0.35 m: 0.6 0.06216 1, 0.05 m behind.
+    /// Fins open at 90 degrees on mk2, 30 m/s down the axis and 1 m/s along body y: the four drags
+    /// are 1.55 0.0043 0.6 V (30, -1), V = 30.0167, and act 0.23 m ahead of a centre of gravity at
+    /// 0.4 m; of the lifts of equal fins, 1.28 0.0043 0.6 V each, a side wind of 1 m/s leaves 4 sin
+    /// 30 cos 30 times their radius of 0.087 m. The body has 1.2 0.074 0.7 m^2 in the middle, at
+    /// 0.35 m: 0.6 0.06216 1, 0.05 m behind.
     #[test]
     fn val_hand_equal_fins_and_a_side_wind() {
         let mut airframe = flight::vehicles::mission::builtin_airframe("mk2").unwrap();
@@ -388,8 +393,8 @@ mod tests {
         assert!((moment.z - (0.23 * side_n - 0.05 * body_n + lifts_n_m)).abs() < 1e-6, "{moment}");
     }
 
-    /// The same side wind, with closed fins, on legs of 0.01 m^2 at 0.1 m, 0.3 m behind the centre of gravity: 0.6 0.01 V is 0.1801 N
-    /// against body y. The body's part is that of above.
+    /// The same side wind, with closed fins, on legs of 0.01 m^2 at 0.1 m, 0.3 m behind the centre
+    /// of gravity: 0.6 0.01 V is 0.1801 N against body y. The body's part is that of above.
     #[test]
     fn val_hand_legs_in_a_side_wind() {
         let mut airframe = flight::vehicles::mission::builtin_airframe("mk2").unwrap();

@@ -1,9 +1,10 @@
 //! The mean wind, from the force of the air across the nose while the vehicle falls.
 //!
-//! In a fall only the air pushes sideways. Every tenth of a second the wind is solved for that makes the airframe's data,
-//! with the drag that was found along the nose, push as the accelerometer felt. The mean over the fall is that of a wind
-//! that grows by the power law, with horizontal gusts of MIL-F-8785C around it: a fall of 300 m meets hardly more than one
-//! gust, and that is what makes the mean uncertain.
+//! In a fall only the air pushes sideways. Every tenth of a second the wind is solved for that
+//! makes the airframe's data, with the drag that was found along the nose, push as the
+//! accelerometer felt. The mean over the fall is that of a wind that grows by the power law, with
+//! horizontal gusts of MIL-F-8785C around it: a fall of 300 m meets hardly more than one gust, and
+//! that is what makes the mean uncertain.
 
 use flight::computer::FRAME_S;
 use flight::estimation::estimator::VehicleNow;
@@ -37,11 +38,13 @@ struct Sample {
     by_wind: f64,
 }
 
-/// Factor on the deviation: the gusts of a fall are not exactly those of the model. Without it the 95 % intervals hold the truth
-/// in 93 % of the 1,600 `field` flights of seeds 5, 7 and 8, and with it in 94 % of the 500 of seed 10.
+/// Factor on the deviation: the gusts of a fall are not exactly those of the model. Without it the
+/// 95 % intervals hold the truth in 93 % of the 1,600 `field` flights of seeds 5, 7 and 8, and with
+/// it in 94 % of the 500 of seed 10.
 const LACKING: f64 = 1.1;
 
-/// The mean wind 10 m above the ground, towards world x and y, m/s; an error is the reason why there is none.
+/// The mean wind 10 m above the ground, towards world x and y, m/s; an error is the reason why
+/// there is none.
 pub(super) fn fit_wind(trace: &Trace, along: &Along) -> Result<Vec<Parameter>, &'static str> {
     let (fall, _) = fall_and_burn(trace);
     let samples: Vec<Sample> = fall
@@ -75,8 +78,8 @@ pub(super) fn fit_wind(trace: &Trace, along: &Along) -> Result<Vec<Parameter>, &
             variances[axis] = found.covariance[(0, 0)];
         }
     }
-    // What does not average out over a fall: a wrong attitude turns the fall's own speed into wind, a biased accelerometer
-    // feels wind, and the drag is known as well as it was found.
+    // What does not average out over a fall: a wrong attitude turns the fall's own speed into wind,
+    // a biased accelerometer feels wind, and the drag is known as well as it was found.
     let of_last = fall.last().map(|frame| frame.estimate.sigmas);
     let count = samples.len() as f64;
     let mean = |of: fn(&Sample) -> f64| samples.iter().map(of).sum::<f64>() / count;
@@ -94,12 +97,13 @@ pub(super) fn fit_wind(trace: &Trace, along: &Along) -> Result<Vec<Parameter>, &
     Ok(found.collect())
 }
 
-/// Whether the flight computer's wind is one wind over the fall; an error says how far it is not. Where it swings, the
-/// computer blames on the wind what comes from elsewhere (the suction at a barometer's port, an attitude that is 10 degrees
-/// off), and neither its way through the air nor its biases can be used.
+/// Whether the flight computer's wind is one wind over the fall; an error says how far it is not.
+/// Where it swings, the computer blames on the wind what comes from elsewhere (the suction at a
+/// barometer's port, an attitude that is 10 degrees off), and neither its way through the air nor
+/// its biases can be used.
 pub(super) fn is_one_wind(trace: &Trace) -> Result<(), String> {
-    /// Gusts let it swing by this, and by this share of the wind. In 200 `real` flights of mk2 and mk3 it never was as much, and in
-    /// `wild` flights with more the drag was off by 13 to 30 %.
+    /// Gusts let it swing by this, and by this share of the wind. In 200 `real` flights of mk2 and
+    /// mk3 it never was as much, and in `wild` flights with more the drag was off by 13 to 30 %.
     const GUSTS_M_S: f64 = 1.0;
     const GUSTS_SHARE: f64 = 0.1;
     let (fall, _) = fall_and_burn(trace);

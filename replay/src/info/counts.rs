@@ -1,4 +1,5 @@
-//! What is counted while a log is read: channels, frames, phases, solve times, and how the flight ended.
+//! What is counted while a log is read: channels, frames, phases, solve times, and how the flight
+//! ended.
 
 use std::collections::BTreeMap;
 

@@ -188,7 +188,8 @@ pub struct Info {
     pub highest_m: Option<f64>,
     /// How the flight ended, in one sentence, if the log says so.
     pub ending: Option<String>,
-    /// What went wrong, first in time; `None` of a log whose flight this build does not run again as it was.
+    /// What went wrong, first in time; `None` of a log whose flight this build does not run again
+    /// as it was.
     pub findings: Option<Vec<Finding>>,
     /// How the clocks of the log differ.
     pub clocks: Clocks,
@@ -306,7 +307,8 @@ pub struct Completeness {
     pub complete: bool,
     /// Why the log could not be read to its end, if so.
     pub damage: Option<String>,
-    /// The log says how many records it has. Otherwise nothing shows that the last ones are missing.
+    /// The log says how many records it has. Otherwise nothing shows that the last ones are
+    /// missing.
     pub counted: bool,
     /// The last time that could be read, s after the first record.
     pub readable_until_s: Option<f64>,

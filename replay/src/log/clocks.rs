@@ -1,7 +1,8 @@
 //! The clocks of a log and how they differ.
 //!
-//! `T+` counts from the release of the vehicle (the end of its countdown), `boot` from the power-up of its computer, and
-//! `log` from the first record. The flight computer's frames and the simulated truth count in T+.
+//! `T+` counts from the release of the vehicle (the end of its countdown), `boot` from the power-up
+//! of its computer, and `log` from the first record. The flight computer's frames and the simulated
+//! truth count in T+.
 
 use std::fmt;
 use std::str::FromStr;
@@ -33,7 +34,8 @@ pub struct Clocks {
     pub boot_zero_s: Option<f64>,
     /// What a ground station calls 0 in its telemetry records.
     pub telemetry_zero_s: Option<f64>,
-    /// The release as the vehicle told it over the air, s since its power-up: what T+0 follows from where no frames are.
+    /// The release as the vehicle told it over the air, s since its power-up: what T+0 follows from
+    /// where no frames are.
     #[serde(skip)]
     heard_release_s: Option<f64>,
 }
@@ -165,7 +167,8 @@ fn release_s(message: &MavMessage) -> Option<f64> {
     (status.countdown_ms < 0).then_some(release_ms as f64 / 1e3)
 }
 
-/// The time since power-up in a message of the vehicle, s, for the messages that are sent most often.
+/// The time since power-up in a message of the vehicle, s, for the messages that are sent most
+/// often.
 fn boot_time_s(message: &MavMessage) -> Option<f64> {
     use MavMessage as M;
     let time_ms = match message {

@@ -1,9 +1,10 @@
 //! Separates the flights of a log: where each begins, and whether it was recorded to its end.
 //!
-//! A log normally has one flight. A log joined by other tools has several, and a log cut by a tool may end in the
-//! middle of its flight although every checksum is right. A flight begins with its record `/computer/start`; a second one
-//! at the release belongs to it. A vehicle records until its flight computer says that the flight is over; a flight that
-//! begins at its release, until it is judged.
+//! A log normally has one flight. A log joined by other tools has several, and a log cut by a tool
+//! may end in the middle of its flight although every checksum is right. A flight begins with its
+//! record `/computer/start`; a second one at the release belongs to it. A vehicle records until its
+//! flight computer says that the flight is over; a flight that begins at its release, until it is
+//! judged.
 
 use std::fmt;
 
@@ -76,7 +77,8 @@ impl LoggedFlight {
         }
     }
 
-    /// Where the record ends, if that is before the end of the flight; `None` also for a flight without frames.
+    /// Where the record ends, if that is before the end of the flight; `None` also for a flight
+    /// without frames.
     pub fn cut(&self) -> Option<Cut> {
         let flown = self.last.map(|last| (last, Clock::Flight));
         let ((time_s, phase), clock) = flown.or(self.on_the_pad.map(|last| (last, Clock::Boot)))?;
@@ -98,8 +100,8 @@ impl LoggedFlight {
     }
 }
 
-/// Finds the frames in flight: from the release until the flight computer says that the flight is over. Frames of a flight
-/// without a pad are all in flight.
+/// Finds the frames in flight: from the release until the flight computer says that the flight is
+/// over. Frames of a flight without a pad are all in flight.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct InFlight {
     /// The start of the flight was seen: at its power-up or at its release.
@@ -160,7 +162,8 @@ pub struct Flights {
 impl Flights {
     pub(super) fn note(&mut self, stamped: &StampedEntry) {
         match &stamped.entry {
-            // If the log has the power-up of this flight computer, its release does not begin another flight.
+            // If the log has the power-up of this flight computer, its release does not begin
+            // another flight.
             Entry::ComputerStart(start)
                 if start.released
                     && self.found.last().is_some_and(|flight| flight.powered_up && flight.frames == 0) => {}
@@ -222,8 +225,8 @@ pub struct FrameOrder {
     pub(crate) last_frame: u64,
     /// The sequence number of the channel's next record if none is lost.
     next_record: u32,
-    /// Another flight comes before this one in the log. Sequence numbers may continue or start again, so the number of
-    /// the flight's first frame shows whether frames are lost.
+    /// Another flight comes before this one in the log. Sequence numbers may continue or start
+    /// again, so the number of the flight's first frame shows whether frames are lost.
     behind_another: bool,
 }
 
@@ -236,7 +239,8 @@ impl FrameOrder {
         Self { behind_another: true, ..Self::default() }
     }
 
-    /// Takes a frame and the sequence number of its record; returns the gap before it, if records are lost there.
+    /// Takes a frame and the sequence number of its record; returns the gap before it, if records
+    /// are lost there.
     pub fn note(&mut self, frame: u64, record: u32) -> Option<Gap> {
         let gap = Gap { after: self.last_frame, before: frame };
         let lost = if self.behind_another { frame > FIRST_FRAME } else { record > self.next_record };

@@ -1,7 +1,7 @@
 //! Opens a flight log and reads its head, then its records in file order.
 //!
-//! Records are streamed, so memory does not grow with the log. Damage ends the stream and can then be queried
-//! ([`FlightLog::damage`]); every record before the damage has been returned.
+//! Records are streamed, so memory does not grow with the log. Damage ends the stream and can then
+//! be queried ([`FlightLog::damage`]); every record before the damage has been returned.
 
 mod clocks;
 mod flights;
@@ -35,10 +35,12 @@ const MCAP_MAGIC: [u8; 8] = [0x89, b'M', b'C', b'A', b'P', b'0', b'\r', b'\n'];
 
 const BUFFER_BYTES: usize = 1 << 20;
 
-/// A record may come this long after later ones, ns: writers of several threads do so. Beyond it, a log is not in order.
+/// A record may come this long after later ones, ns: writers of several threads do so. Beyond it, a
+/// log is not in order.
 pub(crate) const IN_ORDER_NS: u64 = 1_000_000_000;
 
-/// Of one time: what the computer starts from at power-up, a frame, what that led to, and the start at the release.
+/// Of one time: what the computer starts from at power-up, a frame, what that led to, and the start
+/// at the release.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Place {
     PowerUp,
@@ -70,7 +72,8 @@ impl ComputerOrder {
         if ![TOPIC_COMPUTER_START, TOPIC_COMPUTER_FRAME, TOPIC_ESTIMATE].contains(&topic) {
             return false;
         }
-        // The start at a release is of the time of its frame; one that comes later powers up another flight.
+        // The start at a release is of the time of its frame; one that comes later powers up
+        // another flight.
         let powers_up =
             topic == TOPIC_COMPUTER_START && self.last.is_none_or(|(last_ns, _)| last_ns < log_time_ns);
         let place = if powers_up { Place::PowerUp } else { Place::of(topic) };
@@ -160,8 +163,9 @@ impl<R: Read> FlightLog<R> {
         })
     }
 
-    /// The same log, of which only records of these topics are decoded: the others are [`Entry::Other`]. Frames that differ
-    /// from what is computed may have been misread: [`misread_frame`].
+    /// The same log, of which only records of these topics are decoded: the others are
+    /// [`Entry::Other`]. Frames that differ from what is computed may have been misread:
+    /// [`misread_frame`].
     #[must_use]
     pub fn decoding(self, topics: &'static [&'static str]) -> Self {
         Self { wanted: Some(topics), ..self }
@@ -172,8 +176,8 @@ impl<R: Read> FlightLog<R> {
         &self.name
     }
 
-    /// The head as read so far: complete once the entries are exhausted, and in our own logs already at the first
-    /// entry.
+    /// The head as read so far: complete once the entries are exhausted, and in our own logs
+    /// already at the first entry.
     pub fn head(&self) -> &Head {
         &self.head
     }
@@ -188,13 +192,14 @@ impl<R: Read> FlightLog<R> {
         self.reader.channel(id)
     }
 
-    /// What is wrong with the log, or that it was recovered from one that lacked something; `None` for a whole log, once
-    /// the entries are exhausted.
+    /// What is wrong with the log, or that it was recovered from one that lacked something; `None`
+    /// for a whole log, once the entries are exhausted.
     pub fn damage(&self) -> Option<&Damage> {
         self.reader.damage().or(self.contradiction.as_ref()).or(self.head.recovered.as_ref())
     }
 
-    /// Whether the log says how many records it has. Otherwise nothing shows that the last ones are missing.
+    /// Whether the log says how many records it has. Otherwise nothing shows that the last ones are
+    /// missing.
     pub fn is_counted(&self) -> bool {
         self.reader.is_counted()
     }
@@ -227,8 +232,8 @@ impl<R: Read> FlightLog<R> {
     /// The next entry.
     ///
     /// # Errors
-    /// The input cannot be read; or, at the end, nothing in the file belonged to a flight log, or it is damaged before its
-    /// first message.
+    /// The input cannot be read; or, at the end, nothing in the file belonged to a flight log, or
+    /// it is damaged before its first message.
     pub fn next_entry(&mut self) -> Result<Option<StampedEntry>, LogError> {
         loop {
             let item = self.reader.next_item();
@@ -278,7 +283,8 @@ impl<R: Read> FlightLog<R> {
     }
 
     fn end(&self) -> Result<(), LogError> {
-        // Without a message, what is missing (frames, the schema's version) says nothing about the log.
+        // Without a message, what is missing (frames, the schema's version) says nothing about the
+        // log.
         if let Some(damage) = self.damage()
             && self.last_log_time_ns.is_none()
         {

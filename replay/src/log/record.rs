@@ -47,7 +47,8 @@ impl LoggedFrame {
         self.since_release.map(flight_time_s)
     }
 
-    /// The frame on the clock of its flight: number and time count from the release. `None` outside the flight.
+    /// The frame on the clock of its flight: number and time count from the release. `None` outside
+    /// the flight.
     pub fn in_flight(self) -> Option<computer_v1::ComputerFrame> {
         let frame = self.since_release?;
         let mut record = self.record;
@@ -91,8 +92,8 @@ impl Entry {
         !matches!(self, Self::Event(_) | Self::Other)
     }
 
-    /// The content of a message on `channel`, if it can be understood exactly. Of a frame of the flight computer that is not
-    /// looked at if `trusted`: see [`misread_frame`].
+    /// The content of a message on `channel`, if it can be understood exactly. Of a frame of the
+    /// flight computer that is not looked at if `trusted`: see [`misread_frame`].
     pub(super) fn decode(channel: Option<&LogChannel>, data: &[u8], trusted: bool) -> Self {
         let Some(channel) = channel else {
             return Self::Other;
@@ -140,8 +141,8 @@ fn decoded<M: Message + Default>(
     decoded_if(true, channel, accepted, data, kind)
 }
 
-/// Why a frame's bytes cannot be understood exactly; `None` if they can. Where a frame is encoded again to be compared with
-/// its bytes, this is asked only if they differ.
+/// Why a frame's bytes cannot be understood exactly; `None` if they can. Where a frame is encoded
+/// again to be compared with its bytes, this is asked only if they differ.
 pub(crate) fn misread_frame(data: &[u8]) -> Option<String> {
     complaint("touchdown.computer.v1.ComputerFrame", data)
         .map(|complaint| format!("{TOPIC_COMPUTER_FRAME}: {complaint}"))
@@ -175,7 +176,8 @@ fn decoded_if<M: Message + Default>(
             return Entry::Unreadable { reason: format!("{}: {error}", channel.topic) };
         }
     };
-    // The decoder fills missing fields with zeros and skips unknown ones, so encoding again would give different bytes.
+    // The decoder fills missing fields with zeros and skips unknown ones, so encoding again would
+    // give different bytes.
     if exactly
         && message.encode_to_vec() != data
         && let Some(complaint) = complaint(accepted, data)

@@ -1,7 +1,7 @@
 //! Holds a whole flight in memory, for questions that need more than one pass.
 //!
-//! Plans and raw frames are left out, so a flight of some minutes takes some tens of megabytes. A log that is longer than any
-//! real flight is refused.
+//! Plans and raw frames are left out, so a flight of some minutes takes some tens of megabytes. A
+//! log that is longer than any real flight is refused.
 
 use std::path::Path;
 
@@ -90,14 +90,16 @@ pub struct Recording {
     pub name: String,
     /// Metadata and attachments of the log.
     pub head: Head,
-    /// The start record of the flight computer at its release, where its frames and their times begin.
+    /// The start record of the flight computer at its release, where its frames and their times
+    /// begin.
     pub start: Option<ComputerStart>,
-    /// The log has the power-up: the digests of its frames cover what the computer remembers of the pad.
+    /// The log has the power-up: the digests of its frames cover what the computer remembers of the
+    /// pad.
     pub from_power_up: bool,
     /// Its frames in flight, in file order: numbers and times count from the release.
     pub frames: Vec<ComputerFrame>,
-    /// What is added to the number of a frame in flight for its number in the log, which counts from power-up and is the one
-    /// that people read.
+    /// What is added to the number of a frame in flight for its number in the log, which counts
+    /// from power-up and is the one that people read.
     pub release_frame: u64,
     /// Number of frames before the first lost one.
     pub frames_unbroken: usize,
@@ -131,8 +133,8 @@ impl Recording {
     /// Reads a log file.
     ///
     /// # Errors
-    /// The file is not a flight log, cannot be read, holds several flights or is longer than any flight. Damage is not
-    /// an error.
+    /// The file is not a flight log, cannot be read, holds several flights or is longer than any
+    /// flight. Damage is not an error.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
         Self::read(&mut FlightLog::open(path)?)
     }

@@ -31,7 +31,8 @@ pub struct Verdict {
     pub clock: Clock,
     /// At contact, by the design envelope of the legs.
     pub envelope: Vec<LimitResult>,
-    /// What legs that can give way have borne, and what else went wrong; a ground station hears nothing of it.
+    /// What legs that can give way have borne, and what else went wrong; a ground station hears
+    /// nothing of it.
     pub borne: Vec<LimitResult>,
     /// At contact, by the landing paper's Table 2; a ground station hears no limits of it.
     pub table_2: Vec<LimitResult>,
@@ -63,7 +64,8 @@ impl Verdict {
         }
     }
 
-    /// The limits that decide whether it stands undamaged: of legs that can give way what they bore, else their envelope.
+    /// The limits that decide whether it stands undamaged: of legs that can give way what they
+    /// bore, else their envelope.
     pub fn deciding(&self) -> impl Iterator<Item = &LimitResult> {
         let give_way = self.borne.iter().any(|limit| limit.maximum > limit.minimum);
         self.envelope.iter().filter(move |_| !give_way).chain(&self.borne)
@@ -91,7 +93,8 @@ impl Verdict {
 pub(crate) struct Verdicts {
     recorded: Option<v1::LandingVerdict>,
     has_frames: bool,
-    /// What the vehicle said over the air: its limits, its verdict, and whether it had aborted or hung under its parachute.
+    /// What the vehicle said over the air: its limits, its verdict, and whether it had aborted or
+    /// hung under its parachute.
     limits: Option<TD_TOUCHDOWN_LIMITS_DATA>,
     heard: Option<TD_LANDING_VERDICT_DATA>,
     aborted: bool,
@@ -216,7 +219,8 @@ pub(super) fn contradiction(verdict: &v1::LandingVerdict) -> Option<String> {
     Some(format!("{is_not} `{}`, against its limits", Landing::WORDS[place]))
 }
 
-/// The message of a raw frame that a ground station has received, decoded once for everybody who wants it.
+/// The message of a raw frame that a ground station has received, decoded once for everybody who
+/// wants it.
 pub(crate) fn heard_message(channel: Option<&LogChannel>, stamped: &StampedEntry) -> Option<MavMessage> {
     let heard = stamped.entry == Entry::RawFrame && heard_by_ground(channel);
     if heard { frame_of(&stamped.data)?.decode().ok() } else { None }

@@ -1,8 +1,9 @@
 //! Recovers a readable log from a damaged one.
 //!
-//! A recorder that was killed leaves a log without its end; a bad disk or a cable may damage the middle. Every chunk with a
-//! correct checksum is recovered, also after a broken one. The report lists what is lost, and so does the recovered log
-//! ([`METADATA_RECOVERY`]). Nothing is invented: a message is recovered unchanged or not at all.
+//! A recorder that was killed leaves a log without its end; a bad disk or a cable may damage the
+//! middle. Every chunk with a correct checksum is recovered, also after a broken one. The report
+//! lists what is lost, and so does the recovered log ([`METADATA_RECOVERY`]). Nothing is invented:
+//! a message is recovered unchanged or not at all.
 
 mod scan;
 mod write;
@@ -131,7 +132,8 @@ impl Recovery {
 /// Recovers a log into a new file.
 ///
 /// # Errors
-/// The input is not an MCAP file, cannot be read, or holds no message that can be kept; or the output cannot be written.
+/// The input is not an MCAP file, cannot be read, or holds no message that can be kept; or the
+/// output cannot be written.
 pub fn recover(input: &Path, output: &Path) -> Result<Recovery, RecoverError> {
     let mut records = Records::open(input)?;
     let contents = records.contents()?;

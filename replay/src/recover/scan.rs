@@ -1,7 +1,8 @@
-//! Reads a damaged file from front to back: which records and chunks are good, and what lies between them.
+//! Reads a damaged file from front to back: which records and chunks are good, and what lies
+//! between them.
 //!
-//! Where no record begins, it looks for the next chunk: a byte that says so, lengths that fit each other and the file, and
-//! then the chunk's own checksum.
+//! Where no record begins, it looks for the next chunk: a byte that says so, lengths that fit each
+//! other and the file, and then the chunk's own checksum.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -23,7 +24,8 @@ const CHUNK_FIELDS_BYTES: u64 = 40;
 const WINDOW_BYTES: usize = 1 << 20;
 /// More than the head and the fields of a chunk: the windows overlap by it.
 const OVERLAP_BYTES: usize = 64;
-/// No log has more chunks and records outside of chunks; a file of tiny records must not fill the memory.
+/// No log has more chunks and records outside of chunks; a file of tiny records must not fill the
+/// memory.
 const GOOD_MAX: usize = 500_000;
 const LOST_MAX: usize = 10_000;
 
@@ -59,8 +61,8 @@ pub(crate) struct Contents {
     pub(crate) summary: FileSummary,
 }
 
-/// The summary behind the end mark. Its schemas and channels are used as far as they can be read, its statistics only if
-/// its checksum is right.
+/// The summary behind the end mark. Its schemas and channels are used as far as they can be read,
+/// its statistics only if its checksum is right.
 #[derive(Debug, Default)]
 pub(crate) struct FileSummary {
     pub(crate) is_whole: bool,
@@ -160,7 +162,8 @@ impl Records {
                         contents.lose(at, next - at, span_ns, &reason);
                         at = next;
                     } else {
-                        // Bytes are missing, or were added: the next record does not begin where this length says.
+                        // Bytes are missing, or were added: the next record does not begin where
+                        // this length says.
                         at = self.skip(&mut contents, at, span_ns, &reason)?;
                     }
                 }
@@ -218,7 +221,8 @@ impl Records {
         Ok(until)
     }
 
-    /// Whether a record that the format defines begins here and fits into the file; also the end of the file.
+    /// Whether a record that the format defines begins here and fits into the file; also the end of
+    /// the file.
     fn begins_record(&mut self, at: u64) -> Result<bool, LogError> {
         if at == self.size {
             return Ok(true);

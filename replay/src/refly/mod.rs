@@ -1,17 +1,19 @@
 //! Closed loop: the flight flown again in simulation from a chosen moment, with other settings.
 //!
-//! The recorded truth is not enough, because no log holds the internal states of gusts, servos and sensors. So the flight
-//! is flown again from its start, with the recorded draw and seed, up to that moment, and compared with the record frame
-//! by frame on the way. From there on the changed settings apply to world and flight computer. Nothing of the record is
-//! used after the start, so this answers what *would have* happened; [`evaluate`](mod@crate::evaluate) answers what the
-//! flight computer alone *would have commanded* on the recorded inputs. With nothing changed, a simulated flight is
-//! reproduced bit for bit.
+//! The recorded truth is not enough, because no log holds the internal states of gusts, servos and
+//! sensors. So the flight is flown again from its start, with the recorded draw and seed, up to
+//! that moment, and compared with the record frame by frame on the way. From there on the changed
+//! settings apply to world and flight computer. Nothing of the record is used after the start, so
+//! this answers what *would have* happened; [`evaluate`](mod@crate::evaluate) answers what the
+//! flight computer alone *would have commanded* on the recorded inputs. With nothing changed, a
+//! simulated flight is reproduced bit for bit.
 //!
-//! Faults may be added and taken away ("would it have landed without the GNSS outage?"): then the flight is flown from
-//! its beginning with the other faults, and the settings apply from the start, as always.
+//! Faults may be added and taken away ("would it have landed without the GNSS outage?"): then the
+//! flight is flown from its beginning with the other faults, and the settings apply from the start,
+//! as always.
 //!
-//! Settings change both flight computer and world. Settings "of the plant" change the world only, timed ones the flight
-//! computer only. The crew's abort comes at its recorded frame.
+//! Settings change both flight computer and world. Settings "of the plant" change the world only,
+//! timed ones the flight computer only. The crew's abort comes at its recorded frame.
 
 mod others;
 pub(crate) mod rerun;
@@ -60,8 +62,8 @@ pub struct StartState {
 /// Options of a re-flown flight.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ReflyOptions {
-    /// Where to begin: at the frame, at the first one of that time, or at the one after the one that entered the phase. `None`:
-    /// at the landing's first frame.
+    /// Where to begin: at the frame, at the first one of that time, or at the one after the one
+    /// that entered the phase. `None`: at the landing's first frame.
     pub start: Option<Moment>,
     /// Settings of controller and plant; timed ones change the controller only.
     pub settings: Vec<Setting>,
@@ -78,7 +80,8 @@ pub struct ReflyOptions {
 pub struct FaultChanges {
     /// Faults that happen as well, as on the command line of a simulated flight.
     pub with: Vec<String>,
-    /// Recorded faults that do not happen: each by its name, or in full as it was given; `all` for every one.
+    /// Recorded faults that do not happen: each by its name, or in full as it was given; `all` for
+    /// every one.
     pub without: Vec<String>,
 }
 
@@ -119,8 +122,8 @@ pub struct ReflyReport {
     pub reflown: Option<Verdict>,
     /// Whether one of the two stands undamaged and the other does not; `None` if either is unknown.
     pub verdict_changed: Option<bool>,
-    /// The smallest distance to a limit that decides whether it stands undamaged, as a fraction of the limit: 1 far from it, 0 on
-    /// it, negative outside. `None` without a contact.
+    /// The smallest distance to a limit that decides whether it stands undamaged, as a fraction of
+    /// the limit: 1 far from it, 0 on it, negative outside. `None` without a contact.
     pub margin: Option<f64>,
     /// Frames that the controller ran.
     pub frames: usize,
@@ -151,8 +154,9 @@ pub fn refly(recording: &Recording, options: &ReflyOptions) -> Result<ReflyRepor
     Ok(refly_flight(recording, options)?.0)
 }
 
-/// Flies a recorded flight again and keeps the flight itself. The frames before the start are the re-flown ones, too:
-/// recorded frames may come from another build or be partly lost, and the flight after the start would not continue them.
+/// Flies a recorded flight again and keeps the flight itself. The frames before the start are the
+/// re-flown ones, too: recorded frames may come from another build or be partly lost, and the
+/// flight after the start would not continue them.
 ///
 /// # Errors
 /// See [`AgainError`].
@@ -237,8 +241,9 @@ fn reached(recording: &Recording, rerun: &Rerun, before: &[ComputerFrame]) -> Re
     reached
 }
 
-/// Whether two frames are of the same flight: what was felt, what was decided, and what is remembered, unless that covers a
-/// pad. What only a crew or a log's disk makes different does not count.
+/// Whether two frames are of the same flight: what was felt, what was decided, and what is
+/// remembered, unless that covers a pad. What only a crew or a log's disk makes different does not
+/// count.
 fn is_same_flight(now: &ComputerFrame, then: &ComputerFrame, same_memory: bool) -> bool {
     let compared = |frame: &ComputerFrame| {
         let output = ComputerOutput { answers: Vec::new(), released: false, ..frame.output.clone() };
@@ -261,12 +266,13 @@ pub(crate) fn felt(input: &ComputerInput) -> ComputerInput {
     }
 }
 
-/// The settings as timed ones. None applies before the start (half a frame before the end of its first frame), because until
-/// then the flight is the recorded one.
+/// The settings as timed ones. None applies before the start (half a frame before the end of its
+/// first frame), because until then the flight is the recorded one.
 fn in_flight(options: &ReflyOptions, first_frame: u64) -> Vec<Setting> {
     let start_s = (first_frame as f64 - 0.5) * FRAME_S;
     let mut in_flight = options.settings.clone();
-    // Of two settings that take effect at the start, the later setting wins, as it would have in flight.
+    // Of two settings that take effect at the start, the later setting wins, as it would have in
+    // flight.
     in_flight.sort_by(|a, b| a.at_s.unwrap_or(f64::MIN).total_cmp(&b.at_s.unwrap_or(f64::MIN)));
     for setting in &mut in_flight {
         setting.at_s = Some(setting.at_s.map_or(start_s, |at_s| at_s.max(start_s)));
@@ -274,8 +280,8 @@ fn in_flight(options: &ReflyOptions, first_frame: u64) -> Vec<Setting> {
     in_flight
 }
 
-/// Changes the flight from here on. The world gets its airframe from all settings without a time, and its draw from the
-/// settings of the draw.
+/// Changes the flight from here on. The world gets its airframe from all settings without a time,
+/// and its draw from the settings of the draw.
 fn change(
     recording: &Recording,
     options: &ReflyOptions,
@@ -302,8 +308,8 @@ fn change(
     Ok(())
 }
 
-/// The plant takes settings of the airframe and of the draw, from the beginning; the controller takes all but those of the
-/// draw and of its estimator.
+/// The plant takes settings of the airframe and of the draw, from the beginning; the controller
+/// takes all but those of the draw and of its estimator.
 fn refuse_misplaced(options: &ReflyOptions) -> Result<(), AgainError> {
     type IsWrong = fn(&Setting) -> bool;
     let refused: [(&[Setting], IsWrong, &str); 4] = [
@@ -335,8 +341,8 @@ fn refuse_misplaced(options: &ReflyOptions) -> Result<(), AgainError> {
     misplaced.next().map_or(Ok(()), Err)
 }
 
-/// The index of the frame to start with. For a phase it is the frame after the one that entered it, because changes
-/// cannot act earlier.
+/// The index of the frame to start with. For a phase it is the frame after the one that entered it,
+/// because changes cannot act earlier.
 fn find(recording: &Recording, frames: &[ComputerFrame], start: Option<Moment>) -> Result<usize, AgainError> {
     let logged = |frame: &ComputerFrame| recording.release_frame + frame.input.frame;
     let in_phase = |wanted: &dyn Fn(Phase) -> bool| {
@@ -375,8 +381,8 @@ fn find(recording: &Recording, frames: &[ComputerFrame], start: Option<Moment>) 
     found.ok_or_else(|| AgainError::Refused { of: recording.name.clone(), reason })
 }
 
-/// The smallest distance to a limit as a fraction of it; see [`ReflyReport::margin`]. A vehicle that fell over is as far from standing
-/// as load, speed and tilt at its contact say.
+/// The smallest distance to a limit as a fraction of it; see [`ReflyReport::margin`]. A vehicle
+/// that fell over is as far from standing as load, speed and tilt at its contact say.
 pub fn margin(verdict: &Verdict) -> f64 {
     let has_width = |limit: &&LimitResult| limit.maximum > limit.minimum;
     let fell = verdict.deciding().any(|limit| !has_width(&limit) && !limit.passed);
@@ -514,7 +520,8 @@ pub(crate) struct Args {
     settings: Vec<Setting>,
     /// Another setting of the plant alone.
     ///
-    /// As in truth.impulse_scale=0.97. The controller does not know about it. Also airframe.motor=G33, truth.wind_m_s=7. May be given more than once.
+    /// As in truth.impulse_scale=0.97. The controller does not know about it. Also
+    /// airframe.motor=G33, truth.wind_m_s=7. May be given more than once.
     #[arg(long, value_name = "SETTING")]
     plant: Vec<Setting>,
     /// Another fault, as in gnss-out@5.
@@ -534,11 +541,13 @@ pub(crate) struct Args {
     seed: Option<u64>,
     /// Begin at T+12.9, POWERED or frame:1290.
     ///
-    /// A time is in seconds, on the clock that its name says: T+12.9 or 12.9 (since the release), boot:19.8 (since power-up),
-    /// log:19.7 (since the first record). A frame has its number in the log. Without this, it is the landing's first frame.
+    /// A time is in seconds, on the clock that its name says: T+12.9 or 12.9 (since the release),
+    /// boot:19.8 (since power-up), log:19.7 (since the first record). A frame has its number in the
+    /// log. Without this, it is the landing's first frame.
     #[arg(long, value_name = "WHERE")]
     at: Option<Moment>,
-    /// Fly this many other flights of the recorded mission and dispersions, too, as recorded and with the changes.
+    /// Fly this many other flights of the recorded mission and dispersions, too, as recorded and
+    /// with the changes.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
     flights: Option<u64>,
     /// Write the flight as a new log.

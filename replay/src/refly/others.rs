@@ -12,7 +12,8 @@ use crate::controller::AgainError;
 use crate::log::Recording;
 use crate::settings::{mission_toml_with, mission_with};
 
-/// Other flights of the recorded mission and dispersions, each flown as recorded and with the changes.
+/// Other flights of the recorded mission and dispersions, each flown as recorded and with the
+/// changes.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct OtherFlights {
     pub flights: usize,
@@ -25,10 +26,12 @@ pub struct OtherFlights {
     pub lost: usize,
 }
 
-/// What settings without a time and faults do to as many other flights of the recorded seed. A flight may be a lucky one.
+/// What settings without a time and faults do to as many other flights of the recorded seed. A
+/// flight may be a lucky one.
 ///
 /// # Errors
-/// See [`AgainError`]; a change of the plant alone, of the seed or in flight belongs to the recorded flight.
+/// See [`AgainError`]; a change of the plant alone, of the seed or in flight belongs to the
+/// recorded flight.
 pub fn other_flights(
     recording: &Recording,
     options: &ReflyOptions,

@@ -38,8 +38,8 @@ impl Rerun {
     /// A recorded flight at its start, with other faults.
     ///
     /// # Errors
-    /// The log lacks a part of its recipe, or this build does not know it; a fault to leave out is not there, or a fault to
-    /// add is unknown.
+    /// The log lacks a part of its recipe, or this build does not know it; a fault to leave out is
+    /// not there, or a fault to add is unknown.
     pub(super) fn of(recording: &Recording, changes: &FaultChanges) -> Result<Self, AgainError> {
         let (start, frames) = recording.recorded_frames()?;
         let (mut recipe, number) =

@@ -1,12 +1,13 @@
 //! A picture of the page: an SVG in the page's colours, which stands without a script and on paper.
 //!
-//! What is drawn lies in an inner picture in tenths of a pixel: it is cut at its frame, and a part of the time is another
-//! `viewBox`. The script reads its values from the lines themselves.
+//! What is drawn lies in an inner picture in tenths of a pixel: it is cut at its frame, and a part
+//! of the time is another `viewBox`. The script reads its values from the lines themselves.
 
 use super::html::escaped;
 use super::track::{Series, Span};
 
-/// Room for ticks to the left and below, beside the last tick, for the findings' numbers, and for a row of names, px.
+/// Room for ticks to the left and below, beside the last tick, for the findings' numbers, and for a
+/// row of names, px.
 const LEFT: f64 = 44.0;
 const BELOW: f64 = 18.0;
 const RIGHT: f64 = 10.0;
@@ -16,7 +17,8 @@ const ROW: f64 = 13.0;
 const LETTER: f64 = 7.0;
 /// Units of the inner picture in a px.
 const FINE: f64 = 10.0;
-/// Points that lie so near to the line without them are left out, and those between two that are so near in time, units.
+/// Points that lie so near to the line without them are left out, and those between two that are so
+/// near in time, units.
 const UNSEEN: f64 = 3.0;
 const NARROW: f64 = 4.0;
 /// Samples that are this many times the mean gap apart are not joined.
@@ -29,7 +31,8 @@ const ROOM: f64 = 1.12;
 /// The axes of a picture over time.
 pub(super) const TIME: &str = "time";
 
-/// A line: its name, if it is not alone, and its class in the page's style: `a` to `d`, `thin` and others.
+/// A line: its name, if it is not alone, and its class in the page's style: `a` to `d`, `thin` and
+/// others.
 #[derive(Clone)]
 pub(super) struct Line {
     name: String,
@@ -45,7 +48,8 @@ pub(super) fn line(name: &str, class: &'static str, points: Series) -> Line {
 #[derive(Clone, Default)]
 pub(super) struct Chart {
     pub(super) title: String,
-    /// [`TIME`]; two numbers, which of north, east and height is to the right and which up, in one scale; or neither.
+    /// [`TIME`]; two numbers, which of north, east and height is to the right and which up, in one
+    /// scale; or neither.
     pub(super) axes: &'static str,
     /// What is to the right.
     pub(super) x_name: &'static str,
@@ -162,7 +166,8 @@ impl Chart {
         self.spans.iter().filter(|span| !span.shade.is_empty()).map(span).chain(paths).collect()
     }
 
-    /// What stands beside the lines, and how much of it above them, px: names, ticks, numbers and places.
+    /// What stands beside the lines, and how much of it above them, px: names, ticks, numbers and
+    /// places.
     fn beside(&self, frame: &Frame) -> (f64, String) {
         let (width, height) = frame.size_px;
         let name_px = width - LETTER * (self.x_name.len() + 1) as f64;
@@ -214,7 +219,8 @@ impl Chart {
         (ROW * rows + ABOVE, drawn)
     }
 
-    /// A line as a path. Nothing is known at a gap, and between samples that are much further apart than usual.
+    /// A line as a path. Nothing is known at a gap, and between samples that are much further apart
+    /// than usual.
     fn drawn(&self, points: &[(f64, f64)], frame: &Frame) -> String {
         let (far, narrow) = match (self.axes, points) {
             (TIME, [first, .., last]) => ((last.0 - first.0) / points.len() as f64 * FAR_GAPS, NARROW),
@@ -259,7 +265,8 @@ fn extent(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     finite.reduce(|(least, most), (value, _)| (least.min(value), most.max(value)))
 }
 
-/// Round values of an axis with their words, about one each 55 px; a value up needs less room than one to the right.
+/// Round values of an axis with their words, about one each 55 px; a value up needs less room than
+/// one to the right.
 fn ticks((from, to): (f64, f64), px: f64) -> Vec<(f64, String)> {
     let rough = (to - from) * 55.0_f64.min(0.3 * px) / px;
     let ten = libm::pow(10.0, libm::floor(libm::log10(rough)));
@@ -269,7 +276,8 @@ fn ticks((from, to): (f64, f64), px: f64) -> Vec<(f64, String)> {
     values.map(|value| (value, format!("{:.decimals$}", value + 0.0))).collect()
 }
 
-/// Appends the points after the first without which the line would be drawn elsewhere (D. H. Douglas and T. K. Peucker, 1973).
+/// Appends the points after the first without which the line would be drawn elsewhere (D. H.
+/// Douglas and T. K. Peucker, 1973).
 fn put_seen(points: &[[f64; 2]], narrow: f64, seen: &mut Vec<[f64; 2]>) {
     let [first, .., last] = points else { return };
     let [along, down] = [last[0] - first[0], last[1] - first[1]];
@@ -305,7 +313,8 @@ mod tests {
         let mut points: Series = (0..100_000).map(|k| (f64::from(k), 0.0)).collect();
         points[77_777].1 = 9.0;
         let svg = with_line(points).svg();
-        // From the lower end of the picture to its upper one, less the room beside the outermost points.
+        // From the lower end of the picture to its upper one, less the room beside the outermost
+        // points.
         assert!(
             svg.len() < 3_000 && svg.contains(" d=\"M0 1230 2707 1230 2707 70 2707 1230 3480 1230 \""),
             "{svg}"
@@ -322,7 +331,8 @@ mod tests {
         assert_eq!(Chart::default().svg(), "");
     }
 
-    /// Both axes of the ground have one scale: 10 by 110 in 348 by 130 px becomes 298 wide, and some room.
+    /// Both axes of the ground have one scale: 10 by 110 in 348 by 130 px becomes 298 wide, and
+    /// some room.
     #[test]
     fn a_path_over_the_ground_is_drawn_in_one_scale() {
         let chart = Chart { axes: "1 2", ..with_line(vec![(0.0, 0.0), (10.0, 110.0)]) };
@@ -356,7 +366,8 @@ mod tests {
         assert_eq!(words(16.1, 19.9), ["17", "18", "19"]);
     }
 
-    /// Of two spans too short for their names each name has its row, and two findings at one time their heights.
+    /// Of two spans too short for their names each name has its row, and two findings at one time
+    /// their heights.
     #[test]
     fn names_and_numbers_do_not_cover_each_other() {
         let span = |from: f64, name: &str| Span { from, to: from + 0.1, name: name.to_owned(), shade: "hot" };

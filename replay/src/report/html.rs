@@ -8,7 +8,8 @@ use super::section::{Section, motion};
 use super::track::Flight;
 use crate::info::{Info, utc};
 
-/// A table, or nothing without rows: headings, then rows; a heading that begins with `#` marks a column of numbers.
+/// A table, or nothing without rows: headings, then rows; a heading that begins with `#` marks a
+/// column of numbers.
 pub(super) fn table<R: AsRef<[String]>>(heads: &[&str], rows: impl IntoIterator<Item = R>) -> String {
     let cell = |tag: &str, place: usize, words: &str| {
         let is_number = heads.get(place).is_some_and(|head| head.starts_with('#'));
@@ -41,7 +42,8 @@ pub(super) fn charts(drawn: &str) -> String {
 
 const STYLE: &str = include_str!("style.css");
 
-/// One time in every picture, the vehicle at that time, and a part of the time. Without it the page is whole.
+/// One time in every picture, the vehicle at that time, and a part of the time. Without it the page
+/// is whole.
 const SCRIPT: &str = include_str!("script.js");
 
 /// The whole page.

@@ -1,8 +1,10 @@
-//! Writes a flight as one HTML page with its pictures inside, without network access, whole without its script.
+//! Writes a flight as one HTML page with its pictures inside, without network access, whole without
+//! its script.
 //!
-//! The first screen tells the flight: verdict, findings, limits, moments, height and place. Then come burn, fall, sensors and
-//! estimator, solver, battery, link, mission, events, and how complete the log is. What the log lacks is named at the end. The
-//! script has one time for all pictures, and the vehicle at that time.
+//! The first screen tells the flight: verdict, findings, limits, moments, height and place. Then
+//! come burn, fall, sensors and estimator, solver, battery, link, mission, events, and how complete
+//! the log is. What the log lacks is named at the end. The script has one time for all pictures,
+//! and the vehicle at that time.
 
 mod chart;
 mod html;
@@ -34,7 +36,8 @@ pub struct Report {
 /// Builds the page of a log file.
 ///
 /// # Errors
-/// The file is not a flight log, cannot be read or is longer than any flight. Damage is part of the page.
+/// The file is not a flight log, cannot be read or is longer than any flight. Damage is part of the
+/// page.
 pub fn report(path: &Path) -> Result<Report, RecordingError> {
     let recording = Recording::open(path)?;
     let mut info = described(path)?;

@@ -1,6 +1,7 @@
 //! A recorded flight, prepared for the report.
 //!
-//! The plans are not in the log, so the flight computer is run again on its inputs, bit for bit, to get them.
+//! The plans are not in the log, so the flight computer is run again on its inputs, bit for bit, to
+//! get them.
 
 use avionics::log::frame::phase_of;
 use avionics::log::logged::state_from_log;
@@ -22,8 +23,8 @@ use crate::log::Recording;
 /// Records of the world this close to a frame belong to the same moment, s.
 const SAME_MOMENT_S: f64 = 1e-4;
 
-/// Position north and east of the pad, and height of the feet, m; level and vertical speed, m/s; tilt, rad; rotation rate
-/// without roll, rad/s.
+/// Position north and east of the pad, and height of the feet, m; level and vertical speed, m/s;
+/// tilt, rad; rotation rate without roll, rad/s.
 pub(super) type State = [f64; 7];
 
 /// Values over time, s on the report's axis.
@@ -77,7 +78,8 @@ pub(super) enum Part {
 /// A recorded flight and what the report derives from it.
 pub(super) struct Flight {
     pub(super) recording: Recording,
-    /// At the end; `None` for a log without frames that can be run again, such as that of a ground station.
+    /// At the end; `None` for a log without frames that can be run again, such as that of a ground
+    /// station.
     pub(super) pilot: Option<Pilot>,
     /// At the planning frames.
     pub(super) thoughts: Vec<Thought>,
@@ -98,8 +100,9 @@ pub(super) struct Flight {
 }
 
 impl Flight {
-    /// A recorded flight and the description of its log, which gets its findings here, if its computer decides again as it did.
-    /// Without mission, start or frames the sections report what is missing.
+    /// A recorded flight and the description of its log, which gets its findings here, if its
+    /// computer decides again as it did. Without mission, start or frames the sections report what
+    /// is missing.
     pub(super) fn of(recording: Recording, info: &mut Info) -> Self {
         let mut thoughts = Vec::new();
         let again = findings::run_again(&recording, |computer, recorded| {

@@ -97,7 +97,8 @@ impl Wire {
     }
 }
 
-/// The messages of a file by their numbers. The files come with the program: that each can be read is tested.
+/// The messages of a file by their numbers. The files come with the program: that each can be read
+/// is tested.
 fn messages(xml: &str) -> Vec<(u32, Message)> {
     let message = |node: Node<'_, '_>| {
         let id = node.attribute("id").filter(|_| node.has_tag_name("message"))?.parse().ok()?;
@@ -137,7 +138,8 @@ fn place(fields: &mut [Field]) {
     }
 }
 
-/// The columns before the fields: who recorded the frame, whether it was received or sent, on which link, its number.
+/// The columns before the fields: who recorded the frame, whether it was received or sent, on which
+/// link, its number.
 const OF_FRAME: [(&str, Kind); 4] = [
     ("recorded_by", Kind::Text),
     ("direction", Kind::Text),
@@ -194,7 +196,8 @@ mod tests {
     use protocol::frame::Encoder;
     use protocol::identity::VEHICLE;
 
-    /// The generated code and the XML agree on the name of every message, and no payload is longer than a frame's.
+    /// The generated code and the XML agree on the name of every message, and no payload is longer
+    /// than a frame's.
     #[test]
     fn every_message_of_the_dialect_has_its_fields() {
         assert!(XML_FILES.iter().all(|xml| Document::parse(xml).is_ok()));

@@ -1,5 +1,6 @@
-//! The world of a simulated flight, drawn again from the facts in its log: the commands of the computer that is verified move
-//! it. What does not follow from the computer's inputs (its measurements, the verdict) follows from the seed.
+//! The world of a simulated flight, drawn again from the facts in its log: the commands of the
+//! computer that is verified move it. What does not follow from the computer's inputs (its
+//! measurements, the verdict) follows from the seed.
 
 use avionics::log::logged::Logged as _;
 use flight::computer::Computer;
@@ -69,7 +70,8 @@ impl WorldAgain {
         self.over = !self.flight.goes_on();
     }
 
-    /// Whether the flight, whose log has ended, has the recorded verdict and follows from the run facts, and what is to be said of each.
+    /// Whether the flight, whose log has ended, has the recorded verdict and follows from the run
+    /// facts, and what is to be said of each.
     pub(super) fn judge(&self, recorded: Option<&LandingVerdict>) -> [(bool, Option<String>); 2] {
         let bytes = |verdict: Option<&LandingVerdict>| verdict.map(LandingVerdict::encode_to_vec);
         let same = bytes(recorded) == bytes(record::verdict(&self.flight).as_ref());

@@ -1,7 +1,7 @@
 //! Holds the logs of a directory against a baseline: did this build make any flight worse?
 //!
-//! Each log is verified (the recorded decisions, made again) and flown again closed loop. The baseline is a file that an
-//! earlier run wrote.
+//! Each log is verified (the recorded decisions, made again) and flown again closed loop. The
+//! baseline is a file that an earlier run wrote.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -19,9 +19,11 @@ use crate::output::NewFile;
 use crate::print::{columns, counted, print_json};
 use crate::refly::{ReflyOptions, margin, refly};
 
-/// A margin that changed by no more than this is the same; 1 is from the middle of the limits to their edge.
+/// A margin that changed by no more than this is the same; 1 is from the middle of the limits to
+/// their edge.
 const SAME_MARGIN: f64 = 0.02;
-/// This many of the first records of the flight computer name a flight: its power-up and half a second.
+/// This many of the first records of the flight computer name a flight: its power-up and half a
+/// second.
 const NAMING_RECORDS: usize = 100;
 
 /// What this build makes of the log of a flight.
@@ -30,7 +32,8 @@ const NAMING_RECORDS: usize = 100;
 struct Flight {
     /// Which flight it is, by its content.
     content: Option<String>,
-    /// The recorded decisions are made again, bit for bit; `None` if not all of them could be compared.
+    /// The recorded decisions are made again, bit for bit; `None` if not all of them could be
+    /// compared.
     identical: Option<bool>,
     /// When flown again; `None` if it did not come down, or cannot be flown again.
     stands: Option<bool>,
@@ -189,11 +192,12 @@ fn content_of(path: &Path) -> Option<String> {
 #[derive(Debug, clap::Args)]
 #[group(id = "held")]
 pub(super) struct Arguments {
-    /// Hold the logs of a directory (*.mcap), in subdirectories, too, against the outcomes that were accepted, a JSON file.
+    /// Hold the logs of a directory (*.mcap), in subdirectories, too, against the outcomes that
+    /// were accepted, a JSON file.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["explain", "strict"])]
     pub(super) baseline: Option<PathBuf>,
-    /// Write the outcomes of this build as the new baseline; exit code 0 whatever changed. A log that cannot be verified
-    /// is not accepted.
+    /// Write the outcomes of this build as the new baseline; exit code 0 whatever changed. A log
+    /// that cannot be verified is not accepted.
     #[arg(long, requires = "baseline")]
     accept: bool,
     /// Let this build decide differently from the record, as long as no flight gets worse.

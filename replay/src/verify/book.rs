@@ -1,7 +1,7 @@
 //! Prints the books of ground stations, and proves them or says what is broken.
 //!
-//! A log of a station holds its book. A log of the vehicle holds the ends of books that stations sent: whoever changes a
-//! station's log cannot change those.
+//! A log of a station holds its book. A log of the vehicle holds the ends of books that stations
+//! sent: whoever changes a station's log cannot change those.
 
 use std::io::{BufReader, Read as _};
 use std::path::{Path, PathBuf};
@@ -47,7 +47,8 @@ pub struct BookFound {
 }
 
 impl BookFound {
-    /// Whether nothing is broken and its end is vouched for: by a closing entry under a signature, or by a vehicle.
+    /// Whether nothing is broken and its end is vouched for: by a closing entry under a signature,
+    /// or by a vehicle.
     pub fn is_proven(&self) -> bool {
         let to_its_end = (self.closed && self.signed == self.entries) || self.witnessed == self.entries;
         self.broken.is_none() && to_its_end
@@ -68,7 +69,8 @@ impl AuditFound {
     }
 }
 
-/// Audits every book in these logs against the signed hashes in all of them. `trusted` is the station's public key.
+/// Audits every book in these logs against the signed hashes in all of them. `trusted` is the
+/// station's public key.
 ///
 /// # Errors
 /// A log cannot be read.
@@ -237,11 +239,12 @@ impl BookFound {
 #[derive(Debug, Args)]
 #[group(id = "books")]
 pub(super) struct Arguments {
-    /// Print and prove the books of ground stations (who did what when) in logs of stations and of the vehicle: only the
-    /// vehicle's log shows that a book was cut.
+    /// Print and prove the books of ground stations (who did what when) in logs of stations and of
+    /// the vehicle: only the vehicle's log shows that a book was cut.
     #[arg(long, conflicts_with_all = ["strict", "explain", "baseline"])]
     pub(super) book: bool,
-    /// The station's public key, 64 hexadecimal digits, as the first entry of its book and the answer show it.
+    /// The station's public key, 64 hexadecimal digits, as the first entry of its book and the
+    /// answer show it.
     #[arg(long, requires = "book", value_name = "HEX", value_parser = public_key)]
     public_key: Option<PublicKey>,
 }

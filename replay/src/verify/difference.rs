@@ -22,7 +22,8 @@ pub struct FieldDifference {
     pub ulps: Option<u64>,
 }
 
-/// A value as text, of a floating-point number with its bits: JSON has no NaN and no infinity, and many readers have no -0.0.
+/// A value as text, of a floating-point number with its bits: JSON has no NaN and no infinity, and
+/// many readers have no -0.0.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct FieldValue {
     /// The shortest text that reads back as the same number, with the sign of zero.
@@ -44,8 +45,8 @@ impl FieldValue {
     }
 }
 
-/// Distance of two numbers in representable numbers: 0 for equal bits, 1 for neighbours; -0.0 and 0.0 are 1 apart.
-/// `None` if either is NaN.
+/// Distance of two numbers in representable numbers: 0 for equal bits, 1 for neighbours; -0.0 and
+/// 0.0 are 1 apart. `None` if either is NaN.
 pub fn ulp_distance(a: f64, b: f64) -> Option<u64> {
     (!a.is_nan() && !b.is_nan()).then(|| rank(a).abs_diff(rank(b)))
 }

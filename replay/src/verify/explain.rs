@@ -1,8 +1,9 @@
 //! Solves the plans of a recorded flight again, and judges them.
 //!
-//! The controller first runs every earlier frame, so that it has the warm start it had in flight. The landing that a frame
-//! planned is then solved cold, and by the [`judge`], which is written independently and solves another way. Both plans
-//! are counted by the judge's own dynamics and conditions.
+//! The controller first runs every earlier frame, so that it has the warm start it had in flight.
+//! The landing that a frame planned is then solved cold, and by the [`judge`], which is written
+//! independently and solves another way. Both plans are counted by the judge's own dynamics and
+//! conditions.
 
 use std::path::Path;
 
@@ -24,7 +25,8 @@ use crate::controller::{AgainError, LoggedComputer, phase_name};
 use crate::log::Recording;
 use crate::print::columns;
 
-/// Plans whose costs differ by less than this share, and whose first gimbal angles by less than this, are the same.
+/// Plans whose costs differ by less than this share, and whose first gimbal angles by less than
+/// this, are the same.
 const SAME_SHARE: f64 = 0.01;
 const SAME_DEG: f64 = 0.5;
 
@@ -59,7 +61,8 @@ pub struct Judged {
     pub cold_merit: f64,
     /// The judge's.
     pub judge: CountedPlan,
-    /// How much more the flown plan costs than the judge's, as a share, with the price of what it breaks; negative: less.
+    /// How much more the flown plan costs than the judge's, as a share, with the price of what it
+    /// breaks; negative: less.
     pub flown_dearer: f64,
     /// How far the first gimbal angles are apart, deg.
     pub first_input_deg: f64,
@@ -84,7 +87,8 @@ pub struct FrameReport {
     pub recorded_gimbal_rad: Vec<f64>,
     /// The gimbal commands of this build, rad.
     pub gimbal_rad: Vec<f64>,
-    /// Whether the whole output is equal to the recorded one, bit for bit; and the memory, unless it covers the pad.
+    /// Whether the whole output is equal to the recorded one, bit for bit; and the memory, unless
+    /// it covers the pad.
     pub identical: bool,
     /// `None` if this frame planned nothing.
     pub judged: Option<Judged>,
@@ -100,7 +104,8 @@ struct Explained {
     solved: Option<LandingSolved>,
 }
 
-/// Runs a recorded flight again, up to a frame or to its end, and solves what the frame, or each, planned.
+/// Runs a recorded flight again, up to a frame or to its end, and solves what the frame, or each,
+/// planned.
 fn inspected(recording: &Recording, only: Option<u64>) -> Result<Vec<Explained>, AgainError> {
     let (start, frames) = recording.replayable_frames()?;
     let computer = LoggedComputer::recorded(recording.profile_toml()?, start, &recording.head.run, &[])?;

@@ -45,7 +45,8 @@ pub(super) struct FlightVerifier {
     /// Why some record could not be read.
     unreadable: Option<String>,
     strict: bool,
-    /// Of a strict verification from the release on: the world, if the log is of a drawn flight, or why it cannot be drawn again.
+    /// Of a strict verification from the release on: the world, if the log is of a drawn flight, or
+    /// why it cannot be drawn again.
     world: Option<Result<WorldAgain, String>>,
 }
 
@@ -71,8 +72,9 @@ struct Parts {
 }
 
 impl FlightVerifier {
-    /// A flight before its first record. `strict`: its world is drawn again. `behind_another`: another flight comes before it in
-    /// the log. `unreadable`: why a record that may have been its beginning could not be read.
+    /// A flight before its first record. `strict`: its world is drawn again. `behind_another`:
+    /// another flight comes before it in the log. `unreadable`: why a record that may have been its
+    /// beginning could not be read.
     pub(super) fn new(strict: bool, behind_another: bool, unreadable: Option<String>) -> Self {
         let order = if behind_another { FrameOrder::behind_another() } else { FrameOrder::default() };
         Self { order, unreadable, strict, ..Self::default() }
@@ -104,8 +106,8 @@ impl FlightVerifier {
         Ok(())
     }
 
-    /// Builds the computer: at power-up; or at the release, if there was no power-up or frames on the pad were lost. Then it
-    /// remembers less, and digests are not compared.
+    /// Builds the computer: at power-up; or at the release, if there was no power-up or frames on
+    /// the pad were lost. Then it remembers less, and digests are not compared.
     fn start<R: Read>(
         &mut self,
         start: &ComputerStart,
@@ -166,7 +168,8 @@ impl FlightVerifier {
         Ok(())
     }
 
-    /// Runs a frame again and compares it; `data` and `sequence` are the bytes of its record and its number in the channel.
+    /// Runs a frame again and compares it; `data` and `sequence` are the bytes of its record and
+    /// its number in the channel.
     fn check(&mut self, frame: &LoggedFrame, data: &[u8], sequence: u32) {
         self.frames += 1;
         self.flies |= frame.since_release.is_some();
@@ -246,7 +249,8 @@ impl FlightVerifier {
         let parts = self.parts(log.head());
         let Tally { compared, different, first, last, .. } = self.tally;
         let obstacle = match (self.obstacle.or(self.on_the_pad), self.unreadable) {
-            // An unreadable frame leaves a gap; the reason why it is unreadable says more than the gap.
+            // An unreadable frame leaves a gap; the reason why it is unreadable says more than the
+            // gap.
             (None | Some(Obstacle::Gap(_) | Obstacle::BeginningMissing(_)), Some(reason)) => {
                 Some(Obstacle::Unreadable(reason))
             }
@@ -336,8 +340,8 @@ impl FlightVerifier {
 /// What an input that nothing contradicts was held to.
 const JUDGED: &str = "judged by range and step alone: what decides nothing can be another value inside both";
 
-/// Whether this build's controller would land differently if it flew from the first frame that differs. This is closed
-/// loop, unlike the comparison itself.
+/// Whether this build's controller would land differently if it flew from the first frame that
+/// differs. This is closed loop, unlike the comparison itself.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Consequence {
     /// The frame from which the flight was flown again.
@@ -353,7 +357,8 @@ pub struct Consequence {
 }
 
 impl Consequence {
-    /// Flies from a frame, or from the beginning of the landing if that comes later or the divergence lies on the pad.
+    /// Flies from a frame, or from the beginning of the landing if that comes later or the
+    /// divergence lies on the pad.
     pub(super) fn of(recording: &Recording, first_divergence: Option<u64>) -> Self {
         match refly(recording, &ReflyOptions::default()) {
             Ok(report) => Self {

@@ -1,7 +1,7 @@
 //! Judges the inputs of a flight computer: some values are impossible in any flight.
 //!
-//! What decides nothing could be changed in a log without a divergence. A value far outside of what any sensor can say, or one
-//! that does not follow from the frame before it, gives that away.
+//! What decides nothing could be changed in a log without a divergence. A value far outside of what
+//! any sensor can say, or one that does not follow from the frame before it, gives that away.
 
 use avionics::log::frame::phase_of;
 use flight::computer::{FRAME_S, flight_time_s};
@@ -63,7 +63,8 @@ struct LastInput {
 }
 
 impl Inputs {
-    /// Why the input of a frame cannot be; `None` if it can. `since_release`: the frame's number in flight.
+    /// Why the input of a frame cannot be; `None` if it can. `since_release`: the frame's number in
+    /// flight.
     pub(super) fn judge(&mut self, frame: &ComputerFrame, since_release: Option<u64>) -> Option<String> {
         let ComputerFrame { input, output, .. } = frame;
         if let Some(number) = since_release {

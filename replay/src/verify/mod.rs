@@ -1,23 +1,25 @@
 //! Checks whether the controller makes the recorded decisions again, bit for bit.
 //!
-//! [`verify`] builds the flight computer from the mission in the log and runs it on every recorded input. It compares every
-//! field of the output, the digest of the memory, what the pilot thought, and the computer at its release with the record.
-//! The inputs themselves are judged: some cannot be. [`verify_strictly`] also draws the world of a simulated flight again,
-//! and compares its measurements and its verdict. The answer lists what was compared and what was not; truth, events and
-//! measured times are not.
+//! [`verify`] builds the flight computer from the mission in the log and runs it on every recorded
+//! input. It compares every field of the output, the digest of the memory, what the pilot thought,
+//! and the computer at its release with the record. The inputs themselves are judged: some cannot
+//! be. [`verify_strictly`] also draws the world of a simulated flight again, and compares its
+//! measurements and its verdict. The answer lists what was compared and what was not; truth, events
+//! and measured times are not.
 //!
-//! A vehicle's log has every frame from power-up on, so self-test, arming, countdown, gate and abort are compared as well. A
-//! frame in flight is a *frame* and counts from the release; a log of a flight that begins there has only frames, and the
-//! report says so.
+//! A vehicle's log has every frame from power-up on, so self-test, arming, countdown, gate and
+//! abort are compared as well. A frame in flight is a *frame* and counts from the release; a log of
+//! a flight that begins there has only frames, and the report says so.
 //!
-//! The computer remembers its plan, so a frame can be re-executed only if every frame before it can be. The comparison
-//! ends at a gap, and the report says so.
+//! The computer remembers its plan, so a frame can be re-executed only if every frame before it can
+//! be. The comparison ends at a gap, and the report says so.
 //!
-//! A log joined by other tools may hold several flights; each has its own report. A flight without comparisons is never
-//! identical, and a flight whose record ends before the flight did is reported as cut.
+//! A log joined by other tools may hold several flights; each has its own report. A flight without
+//! comparisons is never identical, and a flight whose record ends before the flight did is reported
+//! as cut.
 //!
-//! If a whole file diverges, the report also says whether the landing would end differently: only for this, the flight is
-//! simulated from the first frame that differs.
+//! If a whole file diverges, the report also says whether the landing would end differently: only
+//! for this, the flight is simulated from the first frame that differs.
 
 mod again;
 mod baseline;
@@ -56,7 +58,8 @@ const VERIFIED: [&str; 3] = [TOPIC_COMPUTER_START, TOPIC_COMPUTER_FRAME, TOPIC_V
 /// Verifies a log file: one report on each of its flights, or one report if it has none.
 ///
 /// # Errors
-/// The file is not a flight log or cannot be read. A log that cannot be replayed is a report, not an error.
+/// The file is not a flight log or cannot be read. A log that cannot be replayed is a report, not
+/// an error.
 pub fn verify(path: &Path) -> Result<Vec<VerifyReport>, LogError> {
     verify_as(path, false)
 }
@@ -87,8 +90,8 @@ fn verify_as(path: &Path, strict: bool) -> Result<Vec<VerifyReport>, LogError> {
     Ok(reports)
 }
 
-/// Verifies a log that is being read, strictly or not. `whole_head` is called for the log's whole head if its first frame comes before
-/// its profile.
+/// Verifies a log that is being read, strictly or not. `whole_head` is called for the log's whole
+/// head if its first frame comes before its profile.
 ///
 /// # Errors
 /// As [`verify`].
@@ -129,7 +132,8 @@ pub fn verify_log<R: Read>(
 pub enum Verification {
     /// The flight is whole, has frames, and all that was compared is identical.
     Identical,
-    /// The log is damaged, ends before its flight did or lacks a part, and what could be compared is identical.
+    /// The log is damaged, ends before its flight did or lacks a part, and what could be compared
+    /// is identical.
     IdenticalReadablePart,
     /// Something differs.
     Diverged,
@@ -209,7 +213,8 @@ pub struct VerifyReport {
     pub from_power_up: bool,
     /// What was compared, and what was not.
     pub parts: Vec<Part>,
-    /// The log says how many records it has. Otherwise nothing shows that the last ones are missing.
+    /// The log says how many records it has. Otherwise nothing shows that the last ones are
+    /// missing.
     pub counted: bool,
     /// Frames that could be read.
     pub frames_recorded: u64,
@@ -249,7 +254,8 @@ impl VerifyReport {
         self.parts.iter().find(|part| part.name == name)
     }
 
-    /// Compares what only a strict verification does. `world`: that of the flight, drawn again; `recorded`: its verdict.
+    /// Compares what only a strict verification does. `world`: that of the flight, drawn again;
+    /// `recorded`: its verdict.
     fn compare_strictly(
         &mut self,
         world: Option<Result<WorldAgain, String>>,
@@ -454,11 +460,13 @@ pub(crate) struct Args {
     /// Answer in JSON: a report, or a list of reports for several logs.
     #[arg(long)]
     json: bool,
-    /// Exit code 3 unless all that can be compared was: damaged logs fail, logs that end before their flight did, and
-    /// logs that lack a part. A simulated flight is flown again, and its verdict compared.
+    /// Exit code 3 unless all that can be compared was: damaged logs fail, logs that end before
+    /// their flight did, and logs that lack a part. A simulated flight is flown again, and its
+    /// verdict compared.
     #[arg(long)]
     strict: bool,
-    /// Solve the plan of this frame of the only log again, and judge it; or of `all` frames, which takes a minute.
+    /// Solve the plan of this frame of the only log again, and judge it; or of `all` frames, which
+    /// takes a minute.
     #[arg(long, value_name = "FRAME|all", conflicts_with = "strict")]
     explain: Option<String>,
     #[command(flatten)]

@@ -1,4 +1,5 @@
-//! Tests logs that this build would not produce: every command says so, so that nobody blames the settings for it.
+//! Tests logs that this build would not produce: every command says so, so that nobody blames the
+//! settings for it.
 
 use replay::cli::Answer as _;
 use replay::evaluate::evaluate;

@@ -127,7 +127,8 @@ fn a_flight_that_cannot_be_flown_again_is_refused_with_the_reason() {
     }
 }
 
-/// A log that this build's world would not produce: the forged frame is named, and the flight is still flown on.
+/// A log that this build's world would not produce: the forged frame is named, and the flight is
+/// still flown on.
 #[test]
 fn a_difference_before_the_start_is_reported() {
     let mut recording = recording();

@@ -130,8 +130,8 @@ fn a_log_that_diverges_or_breaks_fails_and_is_not_accepted() {
     assert_eq!(std::fs::read(logs.baseline()).unwrap(), accepted);
 }
 
-/// A ground station's log has no flight; a pipe would be waited for without end; a link to its own directory would count
-/// every flight again.
+/// A ground station's log has no flight; a pipe would be waited for without end; a link to its own
+/// directory would count every flight again.
 #[test]
 fn only_flights_count_and_each_once() {
     let logs = Logs::new();

@@ -99,7 +99,8 @@ fn an_edited_and_a_forged_book_are_not_proven() {
     let found = audited(&[&log]);
     assert!(!found.is_proven());
     assert!(found.books[0].broken.as_ref().unwrap().contains("from 2 to 2 was changed"), "{found:?}");
-    // Signed anew with another key: its first entry is another one, and the vehicle's book is missing.
+    // Signed anew with another key: its first entry is another one, and the vehicle's book is
+    // missing.
     let log = ground_log(&folder.path().join("forged.mcap"), &day("Eve", 2));
     let found = audited(&[&log, &vehicle]);
     assert!(!found.is_proven() && found.missing.len() == 1, "{found:?}");

@@ -1,4 +1,5 @@
-//! Tests the clocks of a log: one time base in the file, and times that are asked for by the name of their clock.
+//! Tests the clocks of a log: one time base in the file, and times that are asked for by the name
+//! of their clock.
 
 use std::collections::BTreeMap;
 
@@ -10,12 +11,14 @@ use crate::command_line::{data, replay, run};
 use crate::from_apogee::LANDED;
 use crate::simulated::MK2;
 
-/// In Foxglove's terms: at any `log_time` the frames, the truth and the transform describe the same moment.
+/// In Foxglove's terms: at any `log_time` the frames, the truth and the transform describe the same
+/// moment.
 #[test]
 fn frames_truth_and_transforms_have_one_time_base() {
     for log in [&MK2.log, &LANDED.log] {
         let mut entries = FlightLog::open(log).unwrap();
-        // By log time: the record's own time of frames and of truth, and the height in truth and transform.
+        // By log time: the record's own time of frames and of truth, and the height in truth and
+        // transform.
         let mut frames: BTreeMap<u64, f64> = BTreeMap::new();
         let mut truth: BTreeMap<u64, (f64, f64)> = BTreeMap::new();
         let mut transforms: BTreeMap<u64, f64> = BTreeMap::new();

@@ -50,8 +50,8 @@ pub(crate) fn refusal(command: &mut Command) -> String {
     stderr
 }
 
-/// The C library picks its mathematical functions by processor; the controller's results must not depend on that. (Our
-/// solver asks the processor itself: this test does not change its answer.)
+/// The C library picks its mathematical functions by processor; the controller's results must not
+/// depend on that. (Our solver asks the processor itself: this test does not change its answer.)
 #[test]
 fn a_log_is_identical_also_with_other_functions_of_the_c_library() {
     let files = Files::new();

@@ -129,8 +129,8 @@ fn has_converged(frame: &ComputerFrame) -> bool {
         && frame.output.level == u32::from(ControlLevel::Converged.index())
 }
 
-/// The judge shares no function with the solver that flies. It finds the plan that flew, if its solve converged, or one that costs
-/// at most a per cent less.
+/// The judge shares no function with the solver that flies. It finds the plan that flew, if its
+/// solve converged, or one that costs at most a per cent less.
 #[test]
 fn val_judge_finds_no_better_plan_than_the_one_that_flew() {
     let recording = MK2.recording();

@@ -1,4 +1,5 @@
-//! Tests cut and broken logs: no panic, everything before the damage is used, and no damage goes unnoticed.
+//! Tests cut and broken logs: no panic, everything before the damage is used, and no damage goes
+//! unnoticed.
 
 use proptest::prelude::*;
 use protocol::log::computer_v1::ComputerFrame;
@@ -44,8 +45,8 @@ fn a_record_too_short_for_its_type_ends_the_reading() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 512, ..ProptestConfig::default() })]
 
-    /// Whichever bit of the data is flipped: either the file is refused, or the log is known to be damaged and every
-    /// frame that is read is an original frame.
+    /// Whichever bit of the data is flipped: either the file is refused, or the log is known to be
+    /// damaged and every frame that is read is an original frame.
     #[test]
     fn no_flipped_bit_goes_unnoticed(place in 0..data_end(), bit in 0_u32..8) {
         let mut bytes = WHOLE.bytes.clone();

@@ -94,7 +94,8 @@ fn a_log_brings_its_mission_and_its_answer_ends_in_a_word() {
     );
 }
 
-/// Eleven crashes speak against any rate that a club wants, whatever is simulated; and one log is one flight.
+/// Eleven crashes speak against any rate that a club wants, whatever is simulated; and one log is
+/// one flight.
 #[test]
 fn flights_that_did_not_land_are_no_go_and_one_log_counts_once() {
     let directory = tempfile::tempdir().unwrap();

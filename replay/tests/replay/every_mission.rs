@@ -1,4 +1,5 @@
-//! Asks every command about a log of every mission from each of its starts, and which settings of a mission act in a flight.
+//! Asks every command about a log of every mission from each of its starts, and which settings of a
+//! mission act in a flight.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -24,7 +25,8 @@ use crate::station::station_log;
 /// An exit code, and what the answer says; what begins with `!` is what it does not say.
 type Answer = (i32, &'static [&'static str]);
 
-/// A command, and how it answers about a landing, about an abort before the burn, and about a start that was refused.
+/// A command, and how it answers about a landing, about an abort before the burn, and about a start
+/// that was refused.
 struct Row {
     command: &'static str,
     landed: Answer,
@@ -166,7 +168,8 @@ struct Case {
     flown: Simulated,
     /// Of the log.
     frames: u64,
-    /// A frame that plans, in the middle of the burn; without a burn the frame in the middle of the flight.
+    /// A frame that plans, in the middle of the burn; without a burn the frame in the middle of the
+    /// flight.
     planned: u64,
 }
 
@@ -242,8 +245,8 @@ impl Case {
     }
 }
 
-/// A mission's flights from each of its starts. Those that are let go by a drone refuse to be dropped from where their
-/// apogee would be: it is too low for a plan.
+/// A mission's flights from each of its starts. Those that are let go by a drone refuse to be
+/// dropped from where their apogee would be: it is too low for a plan.
 fn flights(mission: &'static str) -> Vec<Case> {
     let recipe = Recipe::built_in(mission, "field").unwrap();
     let own = recipe.mission.start.at;
@@ -283,7 +286,8 @@ fn every_command_answers_about_every_mission() {
     assert!(wrong.is_empty(), "{} answers are wrong:\n{}", wrong.len(), wrong.join("\n\n"));
 }
 
-/// Limits that the flight keeps away from: changed by half they change no command. With this value each of them acts.
+/// Limits that the flight keeps away from: changed by half they change no command. With this value
+/// each of them acts.
 const DO_NOT_ACT: [(&str, f64, &str); 12] = [
     ("ignition.late_s", 0.0, "the band of heights has room for igniters that are late by half as much again"),
     (
@@ -307,7 +311,8 @@ const DO_NOT_ACT: [(&str, f64, &str); 12] = [
     ("ignition.arm_before_s", 1.0, "it is armed when the fall is predicted, which is later"),
 ];
 
-/// The numbers of a section times a factor. Of the scales in a list it is their distance from 1 that is multiplied.
+/// The numbers of a section times a factor. Of the scales in a list it is their distance from 1
+/// that is multiplied.
 fn changed(prefix: &str, value: &toml::Value, factor: f64) -> Vec<Setting> {
     let scaled = |number: f64| number * factor;
     let value = match value {

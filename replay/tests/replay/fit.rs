@@ -61,8 +61,9 @@ fn val_simulation_a_field_flight_is_known_within_the_bars() {
     assert!(fit.not_found.iter().any(|lack| lack.name == "mass"), "{:?}", fit.not_found);
 }
 
-/// What is wrong is told as that, with the reason, and the rest is found: a motor that was fired and gives no thrust; a servo
-/// that stays at 3.7 degrees, whatever is commanded; a motor that goes out after two seconds.
+/// What is wrong is told as that, with the reason, and the rest is found: a motor that was fired
+/// and gives no thrust; a servo that stays at 3.7 degrees, whatever is commanded; a motor that goes
+/// out after two seconds.
 #[test]
 fn what_is_broken_is_told_with_its_reason_and_the_rest_is_found() {
     let (dark, not_its_model, not_its_curve) = (
@@ -103,7 +104,8 @@ fn intervals_say_on_how_many_flights_they_were_calibrated() {
     assert!(calibration.own && calibration.vehicles == ["mk2"] && calibration.flights >= 100, "{own:?}");
     assert!(own.sentences()[1].starts_with("95 % intervals, calibrated on "), "{own:?}");
     assert!(own.get("thrust_scale").unwrap().systematic.is_some());
-    // The same flight of a vehicle that nobody has flown: the widest of the others', and it says so.
+    // The same flight of a vehicle that nobody has flown: the widest of the others', and it says
+    // so.
     let mission = flight::vehicle::mission::Mission { name: "ours".to_owned(), ..TRACE.mission.clone() };
     let ours = fit(&Trace { mission, ..TRACE.clone() });
     assert!(!ours.calibration.as_ref().unwrap().own);

@@ -1,4 +1,5 @@
-//! The first frames of a simulated flight, and logs of them: short, so that they can be cut and broken everywhere.
+//! The first frames of a simulated flight, and logs of them: short, so that they can be cut and
+//! broken everywhere.
 
 use std::fs::File;
 use std::io::Read as _;

@@ -1,4 +1,5 @@
-//! Tests files that are not flight logs: the message says what was found and what would be accepted.
+//! Tests files that are not flight logs: the message says what was found and what would be
+//! accepted.
 
 use std::collections::BTreeMap;
 use std::io::Cursor;

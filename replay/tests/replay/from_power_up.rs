@@ -1,4 +1,5 @@
-//! Tests that the whole flight computer is run again from power-up on: pin, arming, countdown, hold, abort, restart.
+//! Tests that the whole flight computer is run again from power-up on: pin, arming, countdown,
+//! hold, abort, restart.
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -74,7 +75,8 @@ pub(crate) fn armed_and_started(at: u64) -> Vec<Reached> {
     vec![asked(0, Asked::Hold), asked(at, Asked::Arm), asked(at + 1, Asked::Start)]
 }
 
-/// A vehicle, and the header of its log. Of those on a rail the one whose crew places the rail upwind.
+/// A vehicle, and the header of its log. Of those on a rail the one whose crew places the rail
+/// upwind.
 fn vehicle(start: StartPoint, faults: &[&str]) -> (Vehicle, LogHeader) {
     let faults = faults.iter().map(|fault| fault.parse().unwrap()).collect();
     let name = if start == StartPoint::Pad { "mk3" } else { "mk2" };
@@ -241,8 +243,8 @@ fn what_two_people_do_verifies() {
     assert!(changed.from_power_up && changed.frames_different > 0);
 }
 
-/// The whole flight from the pad, with an abort, with a dead computer under the ascent motor, and with a booster that
-/// stays; and from below a drone.
+/// The whole flight from the pad, with an abort, with a dead computer under the ascent motor, and
+/// with a booster that stays; and from below a drone.
 #[test]
 fn flights_from_the_pad_and_from_a_drone_verify() {
     let started = armed_and_started(2_600);

@@ -1,4 +1,5 @@
-//! Tests the log of a ground station, which has what was heard and nothing that the vehicle recorded.
+//! Tests the log of a ground station, which has what was heard and nothing that the vehicle
+//! recorded.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;

@@ -1,4 +1,5 @@
-//! The help of the commands that answer questions about the vehicle, as snapshots. `INSTA_UPDATE=always` records new ones.
+//! The help of the commands that answer questions about the vehicle, as snapshots.
+//! `INSTA_UPDATE=always` records new ones.
 
 use std::process::Command;
 

@@ -11,8 +11,8 @@ use crate::from_apogee::LANDED;
 use crate::simulated::{MK2, WITH_FRAMES};
 use crate::tampered::{Held, Kept};
 
-/// The orders that other programs write: one topic after the other, from either end; a later part first; and equal times from the
-/// last topic to the first.
+/// The orders that other programs write: one topic after the other, from either end; a later part
+/// first; and equal times from the last topic to the first.
 fn in_other_orders(held: &Held) -> [Held; 4] {
     let [mut by_topic, mut from_z, mut second_half_first, mut equal_times] = [(); 4].map(|()| held.clone());
     by_topic.messages.sort_by(|a, b| a.topic.cmp(&b.topic));
@@ -55,7 +55,8 @@ fn a_log_in_another_order_is_refused() {
     }
 }
 
-/// The flight computer's own records are written by one thread: a frame that is late by little is out of order as well.
+/// The flight computer's own records are written by one thread: a frame that is late by little is
+/// out of order as well.
 #[test]
 fn a_frame_that_is_a_little_late_is_out_of_order() {
     let directory = tempfile::tempdir().unwrap();

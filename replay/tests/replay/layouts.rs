@@ -1,7 +1,8 @@
-//! Tests the layouts for Foxglove and PlotJuggler: every path in them exists in the schemas of a recorded log.
+//! Tests the layouts for Foxglove and PlotJuggler: every path in them exists in the schemas of a
+//! recorded log.
 //!
-//! Neither application is run here, and PlotJuggler could not be: it is neither in Debian nor on PyPI. Its file is read as
-//! XML, and its series are named as its parser of protobuf names them:
+//! Neither application is run here, and PlotJuggler could not be: it is neither in Debian nor on
+//! PyPI. Its file is read as XML, and its series are named as its parser of protobuf names them:
 //! topic and fields with slashes, elements of a list with brackets.
 
 use std::collections::BTreeMap;

@@ -1,4 +1,5 @@
-//! Tests logs that are too long, sparse, or full of impossible numbers: an answer or a reason, in bounded memory.
+//! Tests logs that are too long, sparse, or full of impossible numbers: an answer or a reason, in
+//! bounded memory.
 
 use std::path::Path;
 use std::process::Command;
@@ -110,7 +111,8 @@ fn data_and_ending() -> (Vec<u8>, Vec<u8>) {
     (WHOLE.bytes[..at].to_vec(), protocol::log::writer::ending())
 }
 
-/// An attachment of a gigabyte that is nearly all a hole is passed over, and so is a chunk; what follows is read.
+/// An attachment of a gigabyte that is nearly all a hole is passed over, and so is a chunk; what
+/// follows is read.
 #[test]
 fn what_is_too_large_is_passed_over_by_its_length() {
     const LENGTH: u64 = 1 << 30;
@@ -308,7 +310,8 @@ fn spoil(frame: &mut ComputerFrame, field: usize, bits: u64) {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
 
-    /// A log with correct checksums and nonsense numbers: every command gives an answer or a reason.
+    /// A log with correct checksums and nonsense numbers: every command gives an answer or a
+    /// reason.
     #[test]
     fn nonsense_gets_an_answer_or_a_reason(spoilt in prop::collection::vec((0_usize..30, 0_usize..15, any::<u64>()), 1..12)) {
         let mut frames = FLIGHT.frames[..30].to_vec();

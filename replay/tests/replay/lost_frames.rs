@@ -1,4 +1,5 @@
-//! Tests frames that a damaged log has lost: no command takes them for a restart of the flight computer.
+//! Tests frames that a damaged log has lost: no command takes them for a restart of the flight
+//! computer.
 
 use std::path::PathBuf;
 use std::sync::LazyLock;

@@ -10,8 +10,8 @@ use crate::from_apogee::LANDED;
 use crate::simulated::MK2;
 use crate::tampered::Held;
 
-/// The log with half of its frames and two thirds of the truth left out: every other frame, first the even and then the odd ones
-/// of 40, because a fix comes every 40 frames.
+/// The log with half of its frames and two thirds of the truth left out: every other frame, first
+/// the even and then the odd ones of 40, because a fix comes every 40 frames.
 fn thinned(log: &Path, directory: &tempfile::TempDir) -> PathBuf {
     let mut held = Held::read(log);
     let (mut frames, mut truths, mut all_frames) = (0, 0, 0);
@@ -71,7 +71,8 @@ fn a_lost_topic_does_not_pass() {
     }
 }
 
-/// Two logs with the same damage agree in everything that could be read, but that is not the whole flight.
+/// Two logs with the same damage agree in everything that could be read, but that is not the whole
+/// flight.
 #[test]
 fn a_damaged_log_does_not_pass() {
     let directory = tempfile::tempdir().unwrap();

@@ -1,4 +1,5 @@
-//! Tests with logs of a landing, whole, changed, cut and broken, through the library and through the command.
+//! Tests with logs of a landing, whole, changed, cut and broken, through the library and through
+//! the command.
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
 mod aborted;

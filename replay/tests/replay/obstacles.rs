@@ -1,4 +1,5 @@
-//! Tests logs whose frames cannot all be re-executed: the reason is named, and the other frames are compared.
+//! Tests logs whose frames cannot all be re-executed: the reason is named, and the other frames are
+//! compared.
 
 use std::io::Cursor;
 use std::path::PathBuf;

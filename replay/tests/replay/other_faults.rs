@@ -1,4 +1,5 @@
-//! Tests counterfactuals: a flight flown again with other faults is the flight that had those faults.
+//! Tests counterfactuals: a flight flown again with other faults is the flight that had those
+//! faults.
 
 use replay::info::info;
 use replay::log::{Moment, Recording};
@@ -18,7 +19,8 @@ fn changed(with: &[&str], without: &[&str]) -> ReflyOptions {
     }
 }
 
-/// Adding a fault to the healthy flight, and leaving it out of the broken one, give each other's verdict bit for bit.
+/// Adding a fault to the healthy flight, and leaving it out of the broken one, give each other's
+/// verdict bit for bit.
 #[test]
 fn the_same_flight_with_and_without_a_fault() {
     const FAULTS: [&str; 2] = ["weak-motor:0.8@ignition", "gnss-out@5"];
@@ -67,7 +69,8 @@ fn a_fault_that_cannot_be_is_refused_with_what_could() {
     assert_eq!(report["verdict_changed"], true);
 }
 
-/// What broke is the first finding, in the description as text and as JSON; a landing with nothing broken has none.
+/// What broke is the first finding, in the description as text and as JSON; a landing with nothing
+/// broken has none.
 #[test]
 fn a_description_says_what_went_wrong_first_in_time() {
     for (fault, words) in [
@@ -130,7 +133,8 @@ fn findings_begin_on_the_pad() {
     assert!(found.last().unwrap().since_s > 0.0, "{found:?}");
 }
 
-/// A log whose decisions this build does not make has no findings, because they would be about other commands.
+/// A log whose decisions this build does not make has no findings, because they would be about
+/// other commands.
 #[test]
 fn findings_are_not_looked_for_where_the_decisions_are_not_made_again() {
     let path = LANDED.beside("otherwise.mcap");

@@ -1,4 +1,5 @@
-//! Tests that no command overwrites an existing file, and that none leaves an incomplete file under its final name.
+//! Tests that no command overwrites an existing file, and that none leaves an incomplete file under
+//! its final name.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -47,7 +47,8 @@ fn says_in_order(page: &str, words: &[&str]) {
     assert!(places.is_sorted(), "{places:?}");
 }
 
-/// Every time that a picture's lines are read at, and the rows of the vehicle, for the page's script.
+/// Every time that a picture's lines are read at, and the rows of the vehicle, for the page's
+/// script.
 fn script_data(page: &str) -> serde_json::Value {
     let data = page.split_once("type=\"application/json\">").unwrap().1;
     serde_json::from_str(data.split_once("</script>").unwrap().0).unwrap()
@@ -84,7 +85,8 @@ fn the_report_says_the_verdict_first_and_then_why() {
         assert!(whole.contains("class=\"place\""), "{whole}");
         // Paper and pages without scripts have the events, too.
         assert!(!page.contains("<details") && section(&page, ">Events").contains("<td>"));
-        // The script finds a scale in every picture, as many values as lines, and the vehicle at every time.
+        // The script finds a scale in every picture, as many values as lines, and the vehicle at
+        // every time.
         for figure in page.split("<figure id=").skip(1) {
             let figure = figure.split("</figure>").next().unwrap();
             let over_time = figure.contains("data-axes=\"time\"");
@@ -119,7 +121,8 @@ fn the_first_screen_says_when_and_where_and_names_every_phase() {
     }
 }
 
-/// Logs with frames only, a cut log, a log without a flight, one of a ground station, and names that contain markup.
+/// Logs with frames only, a cut log, a log without a flight, one of a ground station, and names
+/// that contain markup.
 #[test]
 fn a_poor_log_has_a_page_that_says_what_is_missing() {
     let directory = tempfile::tempdir().unwrap();
@@ -159,7 +162,8 @@ fn the_report_of_a_motor_that_never_lit_says_nothing_of_thrust() {
     }
 }
 
-/// From the pad, by the mission's own words: the moments of the ascent, and each stage in the pictures of the place.
+/// From the pad, by the mission's own words: the moments of the ascent, and each stage in the
+/// pictures of the place.
 #[test]
 fn the_report_of_a_flight_from_the_pad_shows_the_ascent() {
     let mut recipe = Flown::built_in("mk2", "field").unwrap();
@@ -190,7 +194,8 @@ fn errors_of_the_estimate_are_drawn_in_every_direction_and_only_in_the_air() {
     assert!(until_s <= contact_s && until_s > contact_s - 0.1, "{until_s}, {contact_s}");
 }
 
-/// The first screen names the cause with its number, links to where more of it stands, and says what the flight is without it.
+/// The first screen names the cause with its number, links to where more of it stands, and says
+/// what the flight is without it.
 #[test]
 fn the_report_of_a_broken_flight_names_its_cause_first() {
     let page = page_of(&fly(&["gimbal-jams:4@powered"]).log);

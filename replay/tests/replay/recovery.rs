@@ -68,7 +68,8 @@ fn whole_and_its_chunks_end() -> (Messages, usize) {
     (original.messages.clone(), original.chunks.last().unwrap().end)
 }
 
-/// A log with everything that a summary can hold, and little of it: four chunks, two topics, metadata and an attachment.
+/// A log with everything that a summary can hold, and little of it: four chunks, two topics,
+/// metadata and an attachment.
 fn small_log() -> Vec<u8> {
     let options = mcap::WriteOptions::new().chunk_size(None);
     let mut writer = options.create(std::io::Cursor::new(Vec::new())).unwrap();
@@ -92,8 +93,8 @@ fn small_log() -> Vec<u8> {
     writer.into_inner().into_inner()
 }
 
-/// A disk that is full, a limit of the file's size, a recorder that is killed while it closes: what is left of the list of
-/// chunks is not taken for the whole list.
+/// A disk that is full, a limit of the file's size, a recorder that is killed while it closes: what
+/// is left of the list of chunks is not taken for the whole list.
 #[test]
 fn a_log_cut_at_any_byte_behind_its_chunks_keeps_every_message() {
     let directory = tempfile::tempdir().unwrap();
@@ -103,7 +104,8 @@ fn a_log_cut_at_any_byte_behind_its_chunks_keeps_every_message() {
     let small_end =
         small_end.iter().map(|index| index.chunk_start_offset + index.chunk_length).max().unwrap();
     let (_, whole_end) = whole_and_its_chunks_end();
-    // Every byte of the small one; of the other, whose schemas are long, some of every kind of record.
+    // Every byte of the small one; of the other, whose schemas are long, some of every kind of
+    // record.
     for (bytes, chunks_end, step) in
         [(&small, usize::try_from(small_end).unwrap(), 1), (&WHOLE.bytes, whole_end, 97)]
     {
@@ -309,8 +311,8 @@ fn assert_nothing_is_laundered(original: &Original, bytes: &[u8], is_spliced: bo
     };
     let untold = original.messages.difference(&kept).find(|(_, at_ns, ..)| !in_a_span(*at_ns));
     let untold = untold.map(|(topic, at_ns, ..)| (topic, (*at_ns as f64 - first_ns as f64) / 1e9));
-    // Without an end mark the rest is unknown; without its channel's record a message has no topic; and a chunk that is
-    // not there leaves only the count of messages.
+    // Without an end mark the rest is unknown; without its channel's record a message has no topic;
+    // and a chunk that is not there leaves only the count of messages.
     let is_counted = recovery.messages_counted.is_some_and(|counted| counted != recovery.messages);
     let open_end = !recovery.ended || recovery.undecodable > 0 || is_counted;
     assert!(untold.is_none() || open_end, "{what}: {untold:?} is lost and not told: {recovery:?}");
@@ -353,7 +355,8 @@ fn harm_in_ways(cases: u32) {
     ended.unwrap();
 }
 
-/// Chunks of three logs are cut, dropped, swapped, repeated, spliced, flipped, renamed and inflated.
+/// Chunks of three logs are cut, dropped, swapped, repeated, spliced, flipped, renamed and
+/// inflated.
 #[test]
 fn whatever_happens_to_a_log_no_recovery_calls_it_whole() {
     harm_in_ways(100);

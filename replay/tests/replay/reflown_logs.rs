@@ -1,4 +1,5 @@
-//! Tests that the log of a re-flown flight from apogee is one flight from its first frame to its last.
+//! Tests that the log of a re-flown flight from apogee is one flight from its first frame to its
+//! last.
 
 use flight::rules::phase::Phase;
 use replay::log::{Moment, Recording};
@@ -26,7 +27,8 @@ fn assert_whole(again: &Recording) {
     assert!(again.frames.iter().map(|frame| frame.input.frame).eq(1..=again.frames.len() as u64));
 }
 
-/// If another build flew differently before the start, its frames are not put before those of this build.
+/// If another build flew differently before the start, its frames are not put before those of this
+/// build.
 #[test]
 fn a_reflown_log_holds_only_frames_of_this_build() {
     let whole = Recording::open(&LANDED.log).unwrap();

@@ -1,4 +1,5 @@
-//! Tests the solve times of a flown rocket: they are recorded beside the frames from which they follow, and are not compared.
+//! Tests the solve times of a flown rocket: they are recorded beside the frames from which they
+//! follow, and are not compared.
 
 use onboard_sim::statistics::quantile;
 use replay::info::info;

@@ -9,8 +9,8 @@ use protocol::log::writer::{LogHeader, LogWriter};
 use protocol::told::Told;
 use replay::log::{Entry, FlightLog};
 
-/// The station was started this long before the first frame, records the vehicle's state so often, and its crew notes something in
-/// the burn, ns.
+/// The station was started this long before the first frame, records the vehicle's state so often,
+/// and its crew notes something in the burn, ns.
 pub(crate) const EARLIER_NS: u64 = 3_000_000_000;
 const PERIOD_NS: u64 = 100_000_000;
 const NOTED_NS: u64 = 25_000_000_000;

@@ -1,5 +1,6 @@
-//! Tests that a strict verification passes the whole log of a flight and nothing else: whatever is changed, cut, left out,
-//! exchanged, repeated or taken from another flight, although every checksum is right.
+//! Tests that a strict verification passes the whole log of a flight and nothing else: whatever is
+//! changed, cut, left out, exchanged, repeated or taken from another flight, although every
+//! checksum is right.
 
 use std::path::Path;
 use std::sync::LazyLock;
@@ -128,7 +129,8 @@ fn another_version_of_the_contents_is_no_excuse() {
     }
 }
 
-/// Its frames begin at the release, so what the computer remembers of its pad is unknown, and nothing differs.
+/// Its frames begin at the release, so what the computer remembers of its pad is unknown, and
+/// nothing differs.
 #[test]
 fn a_flight_without_its_pad_is_no_divergence_and_is_not_whole() {
     let mut held = pad();
@@ -378,8 +380,8 @@ fn messages_in(held: &Held) -> Vec<(&str, u64, &[u8])> {
     messages
 }
 
-/// Every checksum of these logs is right, so that only what they hold tells that they are not whole: strictly none passes, and a
-/// recovery keeps what is there and nothing else.
+/// Every checksum of these logs is right, so that only what they hold tells that they are not
+/// whole: strictly none passes, and a recovery keeps what is there and nothing else.
 fn tamper_in_ways(cases: u32) {
     let mut runner = TestRunner::new(ProptestConfig { cases, ..ProptestConfig::default() });
     let harms = vec![

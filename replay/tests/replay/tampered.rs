@@ -1,4 +1,5 @@
-//! Rewrites logs with messages left out, changed or taken from another log: whole files with correct checksums.
+//! Rewrites logs with messages left out, changed or taken from another log: whole files with
+//! correct checksums.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;

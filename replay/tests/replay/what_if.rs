@@ -21,7 +21,8 @@ fn the_margin_is_the_fraction_left_of_the_nearest_limit() {
     assert!(margin(&verdict).is_infinite() && margin(&verdict) < 0.0);
 }
 
-/// A vehicle that fell over is as far from standing as its contact says: the harder contact has less margin.
+/// A vehicle that fell over is as far from standing as its contact says: the harder contact has
+/// less margin.
 #[test]
 fn failed_flights_have_an_order() {
     let recording = MK2.recording();

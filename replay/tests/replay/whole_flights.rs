@@ -1,5 +1,6 @@
-//! Tests the verification of logs that only look whole, or hold several flights: a log without comparisons is never
-//! "identical", every flight gets its own verdict, and a flight without its end is reported as cut.
+//! Tests the verification of logs that only look whole, or hold several flights: a log without
+//! comparisons is never "identical", every flight gets its own verdict, and a flight without its
+//! end is reported as cut.
 
 use std::path::{Path, PathBuf};
 
@@ -34,7 +35,8 @@ fn tamper(message: &mut Kept) {
     message.data = frame.encode_to_vec();
 }
 
-/// The number of frames of each flight of a log, and how many of them are identical, with the outcome of each.
+/// The number of frames of each flight of a log, and how many of them are identical, with the
+/// outcome of each.
 fn flights(path: &Path) -> Vec<(Verification, u64, u64)> {
     let of = |report: VerifyReport| (report.outcome, report.frames_recorded, report.frames_identical);
     verify(path).unwrap().into_iter().map(of).collect()

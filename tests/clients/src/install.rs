@@ -8,9 +8,9 @@ use std::sync::OnceLock;
 
 use crate::run::{found, outside};
 
-/// The settings of pip and npm in the environment that determine how packages are downloaded and where downloads are
-/// cached. They stay as the user has set them. All other settings are removed, because they could change where packages
-/// are installed.
+/// The settings of pip and npm in the environment that determine how packages are downloaded and
+/// where downloads are cached. They stay as the user has set them. All other settings are removed,
+/// because they could change where packages are installed.
 const WAYS: [&str; 17] = [
     "index_url",
     "extra_index_url",
@@ -57,7 +57,8 @@ impl PythonPackages {
         outside(self.installed().join("bin/python"))
     }
 
-    /// A program that a package contains. It is a Python script whose first line may name another folder.
+    /// A program that a package contains. It is a Python script whose first line may name another
+    /// folder.
     pub fn program(&self, name: &str) -> Command {
         let mut command = self.python();
         command.arg(self.installed().join("bin").join(name));
@@ -69,7 +70,8 @@ impl PythonPackages {
         self.folder.get_or_init(|| self.install_below(&clients()))
     }
 
-    /// Installs it into a folder of its name below this one, unless it is installed there; returns its folder.
+    /// Installs it into a folder of its name below this one, unless it is installed there; returns
+    /// its folder.
     pub fn install_below(&self, below: &Path) -> PathBuf {
         let folder = below.join(self.name);
         let version = done(self.name, installer(found(&["python3"], "python3")).arg("--version"));
@@ -108,7 +110,8 @@ impl NodePackages {
         command
     }
 
-    /// Installs them into a folder of their name below this one, unless they are installed there; returns their folder.
+    /// Installs them into a folder of their name below this one, unless they are installed there;
+    /// returns their folder.
     pub fn install_below(&self, below: &Path) -> PathBuf {
         let folder = below.join(self.name);
         let what = format!("{} {}", self.packages.join(" "), folder.display());
@@ -126,8 +129,8 @@ impl NodePackages {
     }
 }
 
-/// The path of Node itself: the first `node` on the path may be a script that chooses a version by the user's
-/// settings.
+/// The path of Node itself: the first `node` on the path may be a script that chooses a version by
+/// the user's settings.
 fn node() -> PathBuf {
     let mut ask = installer(found(&["node", "nodejs"], "nodejs"));
     PathBuf::from(done("node", ask.args(["-p", "process.execPath"])).trim())
@@ -140,7 +143,8 @@ pub(crate) fn clients() -> PathBuf {
     test.ancestors().nth(3).expect("the target folder").join("clients")
 }
 
-/// Runs `install` unless `what` is installed in this folder already. Two programs that need it wait for each other.
+/// Runs `install` unless `what` is installed in this folder already. Two programs that need it wait
+/// for each other.
 fn once(folder: &Path, what: &str, install: impl FnOnce()) {
     std::fs::create_dir_all(folder.parent().expect("a folder in another")).expect("a folder");
     let lock = File::create(folder.with_extension("lock")).expect("a file");
@@ -154,7 +158,8 @@ fn once(folder: &Path, what: &str, install: impl FnOnce()) {
     std::fs::write(note, what).expect("a file");
 }
 
-/// A program that installs packages. It has the user's environment except for settings that choose where packages go.
+/// A program that installs packages. It has the user's environment except for settings that choose
+/// where packages go.
 fn installer(program: impl AsRef<OsStr>) -> Command {
     let mut command = Command::new(program);
     for (name, _) in std::env::vars_os() {

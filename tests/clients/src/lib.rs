@@ -1,12 +1,12 @@
-//! Runs other people's programs: MAVLink ground stations and libraries, Wireshark, readers of MCAP and of tables, a
-//! browser.
+//! Runs other people's programs: MAVLink ground stations and libraries, Wireshark, readers of MCAP
+//! and of tables, a browser.
 //!
-//! Python and Node packages are installed with pinned versions into `target/clients` and nowhere else. Other programs
-//! must be on the machine. If one is missing, its test fails and says what to install, so that a test that did not
-//! run never counts as passed.
+//! Python and Node packages are installed with pinned versions into `target/clients` and nowhere
+//! else. Other programs must be on the machine. If one is missing, its test fails and says what to
+//! install, so that a test that did not run never counts as passed.
 //!
-//! Each program runs with settings of its own ([`outside`]), independent of the user's plugins, paths and
-//! preferences.
+//! Each program runs with settings of its own ([`outside`]), independent of the user's plugins,
+//! paths and preferences.
 #![expect(clippy::missing_panics_doc, reason = "a function that panics fails its test, which is its purpose")]
 
 mod install;
@@ -17,8 +17,8 @@ pub use run::{found, outside, tshark, tshark_folder};
 
 use std::path::{Path, PathBuf};
 
-/// Without dependencies, because MAVProxy depends on plotting and vision packages that its command line does not
-/// need.
+/// Without dependencies, because MAVProxy depends on plotting and vision packages that its command
+/// line does not need.
 pub static PYMAVLINK: PythonPackages = PythonPackages::without_dependencies(
     "pymavlink",
     &[

@@ -9,7 +9,8 @@ use crate::install::clients;
 /// The user id of `nobody`, which is the same on every Linux.
 const NOBODY: u32 = 65_534;
 
-/// Finds the first of these programs on the path. If there is none, the test fails with the Debian package to install.
+/// Finds the first of these programs on the path. If there is none, the test fails with the Debian
+/// package to install.
 pub fn found(names: &[&str], package: &str) -> PathBuf {
     let path = std::env::var_os("PATH").unwrap_or_default();
     let folders: Vec<PathBuf> = std::env::split_paths(&path).collect();
@@ -19,8 +20,9 @@ pub fn found(names: &[&str], package: &str) -> PathBuf {
     })
 }
 
-/// A program that sees none of the user's settings: it has a bare environment and a home folder of ours below the
-/// target folder. The home must exist, because these programs create it if root runs them.
+/// A program that sees none of the user's settings: it has a bare environment and a home folder of
+/// ours below the target folder. The home must exist, because these programs create it if root runs
+/// them.
 pub fn outside(program: impl AsRef<OsStr>) -> Command {
     let mut command = Command::new(program);
     command.env_clear();
@@ -37,8 +39,8 @@ pub fn outside(program: impl AsRef<OsStr>) -> Command {
     command
 }
 
-/// Wireshark without a window, in a folder made with [`tshark_folder`]. It runs no scripts as root, so root runs it
-/// as `nobody`.
+/// Wireshark without a window, in a folder made with [`tshark_folder`]. It runs no scripts as root,
+/// so root runs it as `nobody`.
 pub fn tshark(folder: &Path) -> Command {
     let mut command = outside(found(&["tshark"], "tshark"));
     // `-n` turns name resolution off.
@@ -52,7 +54,8 @@ pub fn tshark(folder: &Path) -> Command {
     command
 }
 
-/// Makes a folder readable for `nobody`; the usual folder for temporary files may be readable by root only.
+/// Makes a folder readable for `nobody`; the usual folder for temporary files may be readable by
+/// root only.
 ///
 /// # Errors
 /// As [`std::fs::set_permissions`].

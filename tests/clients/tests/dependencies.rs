@@ -1,7 +1,7 @@
 //! What the dependencies of every program may be: their licences, and where they come from.
 //!
-//! Here and not with the other tests, because `cargo metadata` wants every package of the lock file, also those that are
-//! only for other systems, and may have to download them.
+//! Here and not with the other tests, because `cargo metadata` wants every package of the lock
+//! file, also those that are only for other systems, and may have to download them.
 
 use std::path::Path;
 use std::process::Command;
@@ -9,8 +9,9 @@ use std::process::Command;
 use serde_json::Value;
 use spdx::{Expression, ParseMode};
 
-/// Licences that ask for no more than their text beside a program. MPL-2.0 asks for the source of its own files, which are
-/// used unchanged; CDLA-Permissive-2.0 is that of a list of certificates, which comes with the export to Rerun.
+/// Licences that ask for no more than their text beside a program. MPL-2.0 asks for the source of
+/// its own files, which are used unchanged; CDLA-Permissive-2.0 is that of a list of certificates,
+/// which comes with the export to Rerun.
 const ACCEPTED: [&str; 11] = [
     "MIT",
     "Apache-2.0",

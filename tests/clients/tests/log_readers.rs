@@ -1,5 +1,5 @@
-//! Other people's programs read the files that replay writes: `mcap`, `pymcap-cli`, Foxglove's `@mcap/core` and
-//! application, Rerun, pandas, polars, pyarrow, pymavlink.
+//! Other people's programs read the files that replay writes: `mcap`, `pymcap-cli`, Foxglove's
+//! `@mcap/core` and application, Rerun, pandas, polars, pyarrow, pymavlink.
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
 #[path = "../../../replay/tests/replay/from_apogee.rs"]
@@ -53,7 +53,8 @@ static LOGS: LazyLock<Vec<PathBuf>> = LazyLock::new(|| {
     flown.into_iter().chain([again, recovered, LANDED.log.clone()]).collect()
 });
 
-/// The topic of the flight computer's frames, their number, and the last gimbal command that is not 0, rad.
+/// The topic of the flight computer's frames, their number, and the last gimbal command that is not
+/// 0, rad.
 fn commands(log: &Path) -> (&'static str, usize, f64) {
     let mut log = FlightLog::open(log).unwrap();
     let (mut frames, mut last_rad) = (0, 0.0);
@@ -83,7 +84,8 @@ fn logs_are_read_by_mcap_and_pass_pymcap_doctor() {
     }
 }
 
-/// Foxglove's library decodes every message by the schema in the log, and the values to plot are numbers.
+/// Foxglove's library decodes every message by the schema in the log, and the values to plot are
+/// numbers.
 #[test]
 fn logs_are_read_by_foxgloves_library() {
     for log in LOGS.iter() {

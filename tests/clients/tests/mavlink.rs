@@ -18,7 +18,8 @@ fn vehicle(folder: &Path, arguments: &[&str]) -> Running {
     )
 }
 
-/// Generates our dialect beside pymavlink's, in every run, because the definitions may have changed.
+/// Generates our dialect beside pymavlink's, in every run, because the definitions may have
+/// changed.
 static DIALECT: LazyLock<()> = LazyLock::new(|| {
     let place = Running::to_end(
         PYMAVLINK.python().args(["-c", "import pymavlink.dialects.v20 as d; print(d.__path__[0])"]),
@@ -113,7 +114,8 @@ fn val_node_mavlink_reads_arms_and_terminates() {
     run_client_that_listens(NODE_MAVLINK.node().arg(file("node_client.mjs")));
 }
 
-/// The vehicle accepts what pymavlink signs and rejects what is unsigned or wrongly signed, also after a restart.
+/// The vehicle accepts what pymavlink signs and rejects what is unsigned or wrongly signed, also
+/// after a restart.
 #[test]
 fn val_pymavlink_signatures_are_required_and_checked() {
     let folder = tempfile::tempdir().unwrap();
@@ -169,7 +171,8 @@ fn val_mavproxy_shows_arms_and_terminates() {
     let shown = proxy.wait_for_line("NMPC_W_THETA");
     assert!(shown.contains("200"), "{shown}");
     types(&mut operator, "param set RATE_FINS 1");
-    // MAVProxy sets parameters in the background, so the test asks until the vehicle's answer has arrived.
+    // MAVProxy sets parameters in the background, so the test asks until the vehicle's answer has
+    // arrived.
     let is_set = (0..1_000).any(|_| {
         types(&mut operator, "param show RATE_FINS");
         proxy.wait_for_line("RATE_FINS").contains("1.0")

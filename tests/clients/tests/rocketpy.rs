@@ -7,7 +7,8 @@ use flight::vehicle::site::Site;
 use serde_json::Value;
 use sim::world::{Actuators, AscentTruth, Truth, World};
 
-/// Height and time of our apogee since the thrust began, m and s, from a rail with this lean, degrees.
+/// Height and time of our apogee since the thrust began, m and s, from a rail with this lean,
+/// degrees.
 fn ours(tilt_deg: f64) -> (f64, f64) {
     let mission = flight::vehicles::mission::builtin("mk2").unwrap().unwrap();
     let mut launch = mission.launch.unwrap();

@@ -1,5 +1,5 @@
-//! Tests that the user's settings for Python, pip, Node and npm change neither where packages are installed nor what
-//! a program sees.
+//! Tests that the user's settings for Python, pip, Node and npm change neither where packages are
+//! installed nor what a program sees.
 #![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
 use std::path::{Path, PathBuf};

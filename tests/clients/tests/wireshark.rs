@@ -11,8 +11,8 @@ use protocol::dialect::{MavMessage, TD_PAD_CHECK_DATA};
 use protocol::frame::Encoder;
 use protocol::identity::VEHICLE;
 
-/// A dissector that pymavlink's generator made of our XML reads every frame of a whole flight. It has every message of
-/// ours but those of a crew.
+/// A dissector that pymavlink's generator made of our XML reads every frame of a whole flight. It
+/// has every message of ours but those of a crew.
 #[test]
 fn val_wireshark_finds_no_malformed_frame() {
     // The usual folder for temporary files may be readable by root only.
@@ -23,20 +23,22 @@ fn val_wireshark_finds_no_malformed_frame() {
     let generated = Running::to_end(generator.current_dir(folder.path()));
     assert_eq!(generated.code, Some(0), "{}", generated.output);
 
-    // pymavlink writes `le_double` for a double, which Wireshark does not have: its `le_float` reads eight bytes as well.
+    // pymavlink writes `le_double` for a double, which Wireshark does not have: its `le_float`
+    // reads eight bytes as well.
     let dissector = folder.path().join("touchdown.lua");
     let text = std::fs::read_to_string(&dissector).unwrap();
     std::fs::write(&dissector, text.replace(":le_double()", ":le_float()")).unwrap();
 
-    // HEARTBEAT, SYS_STATUS, ATTITUDE_QUATERNION, LOCAL_POSITION_NED, VFR_HUD, EXTENDED_SYS_STATE, STATUSTEXT, ESTIMATOR_STATUS, TD_DESCENT.
+    // HEARTBEAT, SYS_STATUS, ATTITUDE_QUATERNION, LOCAL_POSITION_NED, VFR_HUD, EXTENDED_SYS_STATE,
+    // STATUSTEXT, ESTIMATOR_STATUS, TD_DESCENT.
     let flown = dissected(folder.path(), "mk2");
     for id in [0, 1, 31, 32, 74, 245, 253, 230, 54_008] {
         assert!(flown.contains(&id), "message {id} is not among {flown:?}");
     }
     let text = std::fs::read_to_string(dialect()).unwrap();
     let ours = text.split("<message id=\"").skip(1).filter_map(|rest| rest.split('"').next()?.parse().ok());
-    // TD_CREW and TD_OPERATOR are sent by a vehicle with operators only, and that one does not start by itself;
-    // TD_BOOK_HEAD is sent by a station, and TD_BOOK_KEPT answers it.
+    // TD_CREW and TD_OPERATOR are sent by a vehicle with operators only, and that one does not
+    // start by itself; TD_BOOK_HEAD is sent by a station, and TD_BOOK_KEPT answers it.
     let ours: BTreeSet<u32> = ours.filter(|id| ![54_010, 54_011, 54_013, 54_014].contains(id)).collect();
     let check = Encoder::new(VEHICLE).encode(&value_of_a_pad_check()).as_bytes().to_vec();
     let checked = read_by_wireshark(folder.path(), "check", &[check]);
@@ -95,7 +97,8 @@ fn read_by_wireshark(folder: &Path, name: &str, frames: &[Vec<u8>]) -> BTreeSet<
 
 /// A libpcap file with one UDP datagram to port 14550 for each frame.
 fn capture_of(frames: &[Vec<u8>]) -> Vec<u8> {
-    // Magic, version 2.4, zone, accuracy, longest packet, link type 228: IPv4 without anything below it.
+    // Magic, version 2.4, zone, accuracy, longest packet, link type 228: IPv4 without anything
+    // below it.
     let mut capture = Vec::new();
     for word in [0xa1b2_c3d4_u32, 0x0004_0002, 0, 0, 65_535, 228] {
         capture.extend_from_slice(&word.to_le_bytes());
@@ -117,8 +120,8 @@ fn capture_of(frames: &[Vec<u8>]) -> Vec<u8> {
     capture
 }
 
-/// Runs the same test for a user with Wireshark plugins, preferences and paths, among them another project's
-/// dissector with our dissector's name, which is broken.
+/// Runs the same test for a user with Wireshark plugins, preferences and paths, among them another
+/// project's dissector with our dissector's name, which is broken.
 #[test]
 fn a_users_wireshark_settings_have_no_effect() {
     let home = tempfile::tempdir_in("/tmp").unwrap();
@@ -132,7 +135,8 @@ fn a_users_wireshark_settings_have_no_effect() {
     std::fs::write(settings.join("init.lua"), OTHER_DISSECTOR).unwrap();
     std::fs::write(settings.join("disabled_protos"), "udp\n").unwrap();
     std::fs::write(settings.join("preferences"), "gui.column.format: \"No.\", \"%m\"\n").unwrap();
-    // The programs are built and installed with the user's real settings; Cargo keeps its own below the home folder.
+    // The programs are built and installed with the user's real settings; Cargo keeps its own below
+    // the home folder.
     program(Program::OnboardSim);
     PYMAVLINK.installed();
     let cargo = std::env::home_dir().unwrap().join(".cargo");

@@ -1,5 +1,5 @@
-//! The page of the checks on the pad (every value with its limits, the radio range test, battery and storage), and the
-//! page that helps to find the vehicle.
+//! The page of the checks on the pad (every value with its limits, the radio range test, battery
+//! and storage), and the page that helps to find the vehicle.
 
 use std::time::Duration;
 
@@ -108,7 +108,8 @@ fn role_of(verdict: TdPadCheckVerdict) -> (&'static str, TextRole) {
     }
 }
 
-/// One surface: range, error and lag, each with its limit; of one that tells nothing, what people see.
+/// One surface: range, error and lag, each with its limit; of one that tells nothing, what people
+/// see.
 fn surface(check: Option<&PadCheck>, (name, first, seen): (&str, u32, &str), theme: Theme) -> Line<'static> {
     let values: Vec<Option<&TD_PAD_CHECK_DATA>> = (first..first + 3)
         .map(|item| check.and_then(|check| check.values().find(|value| value.item as u32 == item)))
@@ -161,7 +162,8 @@ fn cell(value: &TD_PAD_CHECK_DATA, theme: Theme) -> Vec<Span<'static>> {
     ]
 }
 
-/// The radio range test in one line, because the smallest whole screen has no more: what was found with its limits.
+/// The radio range test in one line, because the smallest whole screen has no more: what was found
+/// with its limits.
 fn radio(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     let Some(test) = model.range_test.as_ref() else {
         let begins = format!("  {} begins one: 30 s, antennas as in flight", Act::RangeTest.key_name());
@@ -191,7 +193,8 @@ fn radio(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     Line::from(spans)
 }
 
-// The page that helps to find the vehicle: where it was last heard, where it is predicted, and the way there.
+// The page that helps to find the vehicle: where it was last heard, where it is predicted, and the
+// way there.
 
 /// Columns of the arrow at 80 columns, and of the words.
 const ARROW_COLUMNS: u16 = 14;
@@ -199,7 +202,8 @@ const WORD_COLUMNS: u16 = 33;
 /// Rows of the words above the arrow.
 const WORD_ROWS: u16 = 15;
 
-/// Draws an arrow that points to where it is, what is known of the place, the way over the ground, and the code for a phone.
+/// Draws an arrow that points to where it is, what is known of the place, the way over the ground,
+/// and the code for a phone.
 pub fn draw_find(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let (walk, middle, right) = if Room::of(frame.area()) == Room::Small {
         columns(area, [Length(ARROW_COLUMNS), Length(WORD_COLUMNS), Fill(1)]).into()

@@ -1,5 +1,5 @@
-//! The pages of ascent, descent and burn: the band, height over time with what is to come, the place from above, the vehicle from two
-//! sides; on a larger screen values, fins and events below.
+//! The pages of ascent, descent and burn: the band, height over time with what is to come, the
+//! place from above, the vehicle from two sides; on a larger screen values, fins and events below.
 
 use std::time::Duration;
 
@@ -122,10 +122,12 @@ pub fn vehicle(model: &Model, sides: &[Side], theme: Theme, now: Duration, frame
 static VALUES: [&str; 7] =
     ["tilt", "horizontal speed", "distance", "touchdown north", "touchdown east", "wind", "drag"];
 
-/// A fin follows if it is nearer to its command than this, degrees: the 0.1 rad of the vehicle's own gate.
+/// A fin follows if it is nearer to its command than this, degrees: the 0.1 rad of the vehicle's
+/// own gate.
 const FOLLOWS_DEG: f64 = 5.7;
 
-/// What the vehicle tells of the gate of its ignition with the limits that it tells, and how many of them hold. It checks more itself.
+/// What the vehicle tells of the gate of its ignition with the limits that it tells, and how many
+/// of them hold. It checks more itself.
 fn gate(model: &Model, theme: Theme, now: Duration) -> Option<(Line<'static>, Vec<Line<'static>>)> {
     let vehicle = &model.vehicle;
     let descent = vehicle.descent()?;
@@ -230,7 +232,8 @@ fn band_word(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     theme.line(format!("{mark}{words}{commit}"), role)
 }
 
-/// Whether the parachute is out, or an abort would still throw it out. Then the vehicle is not committed to a burn.
+/// Whether the parachute is out, or an abort would still throw it out. Then the vehicle is not
+/// committed to a burn.
 fn parachute_may_fly(model: &Model, chute: TdChute) -> bool {
     let out = matches!(chute, TdChute::TD_CHUTE_FIRED | TdChute::TD_CHUTE_OPEN);
     let ordered = model.vehicle.phase_now() == Some(TdPhase::TD_PHASE_CHUTE);

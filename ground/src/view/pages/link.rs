@@ -12,13 +12,15 @@ use crate::view::status_lines::{loss_role, percent};
 use crate::view::{STALE_MARK, TextRole, Theme, fixed, seconds};
 
 const NAME_WIDTH: usize = 26;
-/// The width of a message name with its age and rate: two beside each other on the smallest whole screen.
+/// The width of a message name with its age and rate: two beside each other on the smallest whole
+/// screen.
 const MESSAGE_CELL_WIDTH: usize = 39;
 /// The messages that the vehicle sends regularly.
 const REGULAR: &str = "HEARTBEAT SYS_STATUS EXTENDED_SYS_STATE TD_FLIGHT_STATUS ATTITUDE_QUATERNION \
     LOCAL_POSITION_NED VFR_HUD TD_FINS TD_GIMBAL TD_DESCENT TD_CONTROLLER TD_TOUCHDOWN_PREDICTION TD_PREDICTED_PATH";
 
-/// What was rejected and by whom; the rates of all links together, of each link and of each component; age and rate of every message.
+/// What was rejected and by whom; the rates of all links together, of each link and of each
+/// component; age and rate of every message.
 pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize, rows: usize) -> Vec<Line<'static>> {
     let mut lines = rejected(model, theme, now);
     let heading = cells(["over 10 s", "rx B/s", "tx", "frames/s", "loss", "copies", "age"]);
@@ -39,7 +41,8 @@ fn cells([name, rx, tx, frames, loss, copies, age]: [&str; 7]) -> String {
     format!(" {name:<NAME_WIDTH$.NAME_WIDTH$}{rx:>11}{tx:>6}{frames:>9}{loss:>8}{copies:>8}{age:>9}")
 }
 
-/// Counts of rejected frames by reason, what the vehicle refuses, and what a radio reports about itself.
+/// Counts of rejected frames by reason, what the vehicle refuses, and what a radio reports about
+/// itself.
 fn rejected(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let (link, framing) = (&model.link, &model.link.framing);
     let unreadable = format!(

@@ -69,7 +69,8 @@ pub fn messages_lines(model: &Model, theme: Theme, columns: usize, rows: usize) 
 
 // The log page: whether the flight is recorded, and where.
 
-/// The end of the book: how many entries, the head, whether it is signed, and what the vehicle has of it.
+/// The end of the book: how many entries, the head, whether it is signed, and what the vehicle has
+/// of it.
 fn book(model: &Model) -> String {
     let Some(signed) = model.book.head else { return "none".to_owned() };
     let (entries, hash) = (signed.head.entries, protocol::book::shown(&signed.head.hash[..6]));
@@ -141,7 +142,8 @@ pub fn help_lines(model: &Model, theme: Theme, now: Duration, columns: usize) ->
         lines.extend(REPLAY.map(|(key, words)| line(key.to_owned(), words)));
     }
     let works = DEFINITIONS.iter().filter(|definition| definition.act.works(model, now));
-    // The smallest screen has no room for every key. The palette lists these, too, and the page of the checks its own.
+    // The smallest screen has no room for every key. The palette lists these, too, and the page of
+    // the checks its own.
     let elsewhere =
         |act: Act| matches!(act, Act::Show(_) | Act::Redraw | Act::Check | Act::CheckStill | Act::RangeTest);
     for definition in works.filter(|definition| !elsewhere(definition.act)) {

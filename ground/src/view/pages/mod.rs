@@ -23,7 +23,8 @@ use super::pictures::attitude::Side;
 use super::{TextRole, Theme, bars, draw_lines};
 use crate::model::{Model, Page};
 
-/// Draws the present page between the top lines and the alarm line. Returns where the pictures of a flight are.
+/// Draws the present page between the top lines and the alarm line. Returns where the pictures of a
+/// flight are.
 pub fn draw(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) -> Option<Rect> {
     let page = model.page();
     match page {
@@ -46,7 +47,8 @@ const BARS_ROWS: u16 = 8;
 /// Rows of the newest events under a list, with their borders, at least.
 const EVENTS_ROWS: u16 = 5;
 
-/// A page of lines, with the newest events under a short one. A larger screen has pictures beside it; returns where.
+/// A page of lines, with the newest events under a short one. A larger screen has pictures beside
+/// it; returns where.
 fn draw_list(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) -> Option<Rect> {
     let page = model.page();
     let has_pictures = Room::of(frame.area()) != Room::Small;
@@ -82,7 +84,8 @@ fn draw_list(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area
     has_pictures.then_some(right)
 }
 
-/// A page of lines, which also a small terminal shows; instead of a page of panels the newest events.
+/// A page of lines, which also a small terminal shows; instead of a page of panels the newest
+/// events.
 pub fn lines(model: &Model, theme: Theme, now: Duration, area: Rect) -> Vec<Line<'static>> {
     let (columns, rows) = (usize::from(area.width), usize::from(area.height));
     match model.page() {
@@ -107,7 +110,8 @@ fn rows<const N: usize>(area: Rect, rows: [Constraint; N]) -> [Rect; N] {
     area.layout(&Layout::vertical(rows).spacing(Spacing::Overlap(1)))
 }
 
-/// Draws the border of a panel with its title, and what stands at the right end of it. Returns its inside.
+/// Draws the border of a panel with its title, and what stands at the right end of it. Returns its
+/// inside.
 pub fn framed(title: &str, right: Line<'static>, theme: Theme, frame: &mut Frame, area: Rect) -> Rect {
     let title = theme.line(format!(" {title} "), TextRole::Title);
     let block = Block::bordered().border_style(theme.border()).merge_borders(MergeStrategy::Exact);

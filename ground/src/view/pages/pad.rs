@@ -1,4 +1,5 @@
-//! The pad page: every arming check with its value, and the arming ladder (the steps from link to countdown).
+//! The pad page: every arming check with its value, and the arming ladder (the steps from link to
+//! countdown).
 
 use std::time::Duration;
 
@@ -25,8 +26,8 @@ const STEP_COLUMNS: [u16; 2] = [30, 38];
 /// Rows of the panels under the pictures.
 const BELOW_ROWS: u16 = 12;
 
-/// Draws GO or what fails, the next step, the steps; and the vehicle with what is around the pad, or the checks while
-/// something is amiss.
+/// Draws GO or what fails, the next step, the steps; and the vehicle with what is around the pad,
+/// or the checks while something is amiss.
 pub fn draw_pad(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let area =
         if headline::banner(model, now).is_some() { area } else { draw_go(model, theme, now, frame, area) };
@@ -113,7 +114,8 @@ fn draw_checklist(model: &Model, theme: Theme, now: Duration, frame: &mut Frame,
     draw_lines(frame, inside, &lists::checklist_rows(model, theme, now, size));
 }
 
-/// Each failing check in the words of the vehicle, or with the value found and why it fails; how many pass; the measured values of those.
+/// Each failing check in the words of the vehicle, or with the value found and why it fails; how
+/// many pass; the measured values of those.
 pub fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     // Off the pad the vehicle does not check for arming and reports no failing check.
     let off_pad = model.vehicle.phase().is_some_and(|phase| !is_on_pad(phase.value));
@@ -164,7 +166,8 @@ pub fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> 
     lines
 }
 
-/// Whether burns of its lot confirm the landing motor, once the vehicle has said which mission it flies.
+/// Whether burns of its lot confirm the landing motor, once the vehicle has said which mission it
+/// flies.
 fn motor(model: &Model, theme: Theme) -> Option<Line<'static>> {
     let burns = model.vehicle.mission()?.motor_burns;
     let (word, found) = match burns {
@@ -220,7 +223,8 @@ fn station_log(model: &Model, theme: Theme, now: Duration) -> (bool, Line<'stati
     (word == " NO ", of_the_station(word, " station log ", found, theme))
 }
 
-/// The value that telemetry shows for a check, empty if there is none; and why the check fails, if it does.
+/// The value that telemetry shows for a check, empty if there is none; and why the check fails, if
+/// it does.
 fn about(vehicle: &Vehicle, check: TdCheck) -> (String, &'static str) {
     let locks = vehicle.interlocks();
     let yes_no = |bit: TdInterlock, yes: &'static str, no: &'static str| {

@@ -25,7 +25,8 @@ const TICK_ROWS: u16 = 3;
 const CALM_SPAN: Duration = Duration::from_mins(2);
 const BEFORE_FLIGHT: Duration = Duration::from_secs(5);
 
-/// Draws the list of quantities, and the chosen one over time: its name and unit, its least and its greatest value in the title.
+/// Draws the list of quantities, and the chosen one over time: its name and unit, its least and its
+/// greatest value in the title.
 pub fn draw_plot_page(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let [list, area] = columns(area, [Length(LIST_COLUMNS), Fill(1)]);
     let inside = framed("Up Down choose", Line::default(), theme, frame, list);

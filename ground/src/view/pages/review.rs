@@ -18,7 +18,8 @@ const FINDING_TIME_COLUMNS: usize = 10;
 
 const FINDINGS_TITLE: &str = "what went wrong";
 
-/// Draws the verdict in large letters with its sentence, the limits as bars, the whole flight and the place.
+/// Draws the verdict in large letters with its sentence, the limits as bars, the whole flight and
+/// the place.
 pub fn draw_review(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let ended = panels::ending_role(model, now).map(|(ending, role)| (ending.sentence(&model.vehicle), role));
     let (words, role) = ended.unwrap_or(("no verdict received yet".to_owned(), TextRole::Caution));
@@ -36,7 +37,8 @@ pub fn draw_review(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
         let [left, mut right] = columns(area, [Fill(6), Fill(5)]);
         let found = findings(model, theme, usize::from(right.width.saturating_sub(2)));
         if model.vehicle.findings.count.is_some_and(|count| count > 0) {
-            // What went wrong first: half of the panel's height at most, or all of it where the map has no room.
+            // What went wrong first: half of the panel's height at most, or all of it where the map
+            // has no room.
             let wanted = u16::try_from(found.len()).unwrap_or(u16::MAX).saturating_add(2);
             let most = if area.height < 14 { area.height } else { area.height / 2 };
             let [above, below] = rows(right, [Length(wanted.min(most)), Fill(1)]);

@@ -1,4 +1,5 @@
-//! The vehicle from a side, as it stands in the air: body, legs, fins, flame along the gimbal, velocity and wind.
+//! The vehicle from a side, as it stands in the air: body, legs, fins, flame along the gimbal,
+//! velocity and wind.
 
 use std::time::Duration;
 
@@ -52,15 +53,17 @@ const LEG: [f64; 3] = [-0.28, -0.62, 0.24];
 const HINGE: f64 = 0.22;
 const FIN: f64 = 0.3;
 const FLAME: f64 = 0.28;
-/// The canopy over the nose: how far out and how high its hem and its top are, while it fills and when it is open.
+/// The canopy over the nose: how far out and how high its hem and its top are, while it fills and
+/// when it is open.
 const CANOPY: [[f64; 3]; 2] = [[0.07, 0.66, 0.8], [0.34, 0.64, 0.8]];
 /// The arc with the limit of the tilt, over the nose, and how far it reaches to either side, rad.
 const ARC: f64 = 0.72;
 const ARC_REACH: f64 = 0.7;
-/// How far the picture reaches from the middle of the body, to either side and up. A body that lies on its side may be cut.
+/// How far the picture reaches from the middle of the body, to either side and up. A body that lies
+/// on its side may be cut.
 const REACH: [f64; 2] = [0.56, 0.84];
-/// Headings of the fins 1 to 4 at zero roll: each is 30 degrees off the east-west line (landing paper, Eq. 16 and 17:
-/// the moments contain sin 30 and cos 30 degrees).
+/// Headings of the fins 1 to 4 at zero roll: each is 30 degrees off the east-west line (landing
+/// paper, Eq. 16 and 17: the moments contain sin 30 and cos 30 degrees).
 const FIN_HEADING_DEG: [f64; 4] = [300.0, 240.0, 120.0, 60.0];
 /// Steps of the direction cosines of an axis, and of the opening of a fin, rad.
 const STEPS: f64 = 16.0;
@@ -144,7 +147,8 @@ pub fn draw_attitude(model: &Model, side: Side, theme: Theme, now: Duration, fra
         }
         // Of two colours in a cell the last counts.
         body(context, &seen, per_dot, theme);
-        // The flame goes against the thrust, which a positive angle turns towards y, and away from z.
+        // The flame goes against the thrust, which a positive angle turns towards y, and away from
+        // z.
         let (pitch, yaw) = (libm::sin(gimbal.pitch.measured_rad), libm::sin(gimbal.yaw.measured_rad));
         for (shift, share) in [(-per_dot, 0.7), (0.0, 1.0), (per_dot, 0.7)].into_iter().filter(|_| burning) {
             let length = share * FLAME;
@@ -263,8 +267,8 @@ mod tests {
         }
     }
 
-    /// The positions follow from the moments of Eq. 16 and 17: opening fin 1 pitches up and yaws right, so it is in
-    /// the north-west.
+    /// The positions follow from the moments of Eq. 16 and 17: opening fin 1 pitches up and yaws
+    /// right, so it is in the north-west.
     #[test]
     fn val_landing_paper_eq_16_17_fin_positions_match_their_moments() {
         let pitch_signs = [1.0, -1.0, -1.0, 1.0];

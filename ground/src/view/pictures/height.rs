@@ -25,8 +25,8 @@ fn flown(model: &Model, from: Duration, now: Duration) -> Vec<(f64, f64)> {
     values.map(|(at, height_m)| (seconds_since(at, from), height_m)).collect()
 }
 
-/// Draws height over time: flown, predicted to the touchdown, where lighting lands, where it will be lit, and the height below which
-/// no parachute opens.
+/// Draws height over time: flown, predicted to the touchdown, where lighting lands, where it will
+/// be lit, and the height below which no parachute opens.
 pub fn draw_height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     if area.width < 16 || area.height < 4 {
         return;

@@ -1,4 +1,5 @@
-//! The place from above, north up, fitted to what matters: the fence, where it will come down, the pad, the track, the wind.
+//! The place from above, north up, fitted to what matters: the fence, where it will come down, the
+//! pad, the track, the wind.
 
 use std::time::Duration;
 
@@ -16,7 +17,8 @@ use crate::view::{fixed, shortest, widgets};
 /// The least that the picture shows to every side, m; in the burn the scale of the last 30 m.
 const REACH_MIN_M: f64 = 10.0;
 const BURN_REACH_M: f64 = 15.0;
-/// The steps of its reach, each 1.4 times the one before, up to 3,000 km; and of its middle, in reaches.
+/// The steps of its reach, each 1.4 times the one before, up to 3,000 km; and of its middle, in
+/// reaches.
 const REACH_STEPS: usize = 36;
 const MIDDLE_STEP: f64 = 0.5;
 /// How much farther the picture reaches than what it shows, so that nothing stands on its edge.
@@ -30,7 +32,8 @@ const RAIL_LEANS_DEG: f64 = 0.5;
 /// How far back predictions of the touchdown count for its uncertainty.
 const SCATTER_OVER: Duration = Duration::from_secs(5);
 
-/// The predicted touchdown in flight, and how far it has moved within five seconds; `None` while it is unknown or stale.
+/// The predicted touchdown in flight, and how far it has moved within five seconds; `None` while it
+/// is unknown or stale.
 pub fn comes_down(model: &Model, now: Duration) -> Option<Spot> {
     if !model.vehicle.in_flight() {
         return None;
@@ -50,8 +53,8 @@ pub fn comes_down(model: &Model, now: Duration) -> Option<Spot> {
     Some(Spot { north_m, east_m, error_m })
 }
 
-/// The middle of the picture and how far it reaches, m: both in steps, so that the ground stands still while the vehicle moves
-/// over it.
+/// The middle of the picture and how far it reaches, m: both in steps, so that the ground stands
+/// still while the vehicle moves over it.
 fn box_around(points: &[(f64, f64)], least_m: f64) -> ((f64, f64), f64) {
     let of = |pick: fn(&(f64, f64)) -> f64| {
         let low = points.iter().map(pick).fold(f64::INFINITY, f64::min);
@@ -102,7 +105,8 @@ pub fn draw_map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
         points.push((0.0, 0.0));
     }
     let (mut middle, mut reach_m) = box_around(&points, if burns { BURN_REACH_M } else { REACH_MIN_M });
-    // The whole fence, unless it would make everything small; on the ground only the way to the vehicle matters.
+    // The whole fence, unless it would make everything small; on the ground only the way to the
+    // vehicle matters.
     let is_small = |fence_m: f64| fence_m < FENCE_COST_MAX * reach_m.max(30.0) && stands.is_none() && !burns;
     let holds = |fence_m: f64| points.iter().all(|(x, y)| libm::hypot(*x, *y) < 1.2 * fence_m);
     if let Some(fence_m) = fence_m.filter(|fence_m| is_small(*fence_m) && holds(*fence_m)) {

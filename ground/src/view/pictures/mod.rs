@@ -1,7 +1,8 @@
 //! The pictures: the vehicle from two sides, height over time, the place from above.
 //!
-//! What was measured is a thick line, what is predicted are dots, limits are thin, everywhere. A picture is drawn in braille
-//! dots over its scales; its words are written into cells afterwards, so that no dot hides a letter.
+//! What was measured is a thick line, what is predicted are dots, limits are thin, everywhere. A
+//! picture is drawn in braille dots over its scales; its words are written into cells afterwards,
+//! so that no dot hides a letter.
 
 pub mod attitude;
 pub mod height;
@@ -21,7 +22,8 @@ use super::{Ink, TextRole, Theme, shortest, widgets};
 /// Braille dots per cell.
 const DOTS_ACROSS: f64 = 2.0;
 const DOTS_UP: f64 = 4.0;
-/// Of so many dots of a dotted line every second pair is drawn: single ones vanish where a line is steep.
+/// Of so many dots of a dotted line every second pair is drawn: single ones vanish where a line is
+/// steep.
 const DOT_PERIOD: f64 = 4.0;
 
 /// An area whose cells have places in a plane.
@@ -65,7 +67,8 @@ impl Plane {
         frame.buffer_mut().set_string(column, row, words, style);
     }
 
-    /// Writes the first of some words that has room beside a place, on its row or one near it, where nothing else stands.
+    /// Writes the first of some words that has room beside a place, on its row or one near it,
+    /// where nothing else stands.
     fn beside(&self, frame: &mut Frame, (x, y): (f64, f64), words: &[String], style: Style) {
         let Some((column, row)) = self.cell(x, y) else { return };
         let buffer = frame.buffer_mut();
@@ -102,8 +105,8 @@ impl Plane {
         }
     }
 
-    /// What is predicted: dots along a path. Their places do not depend on where it begins, so that they stand still while time
-    /// passes, which a slow line can carry.
+    /// What is predicted: dots along a path. Their places do not depend on where it begins, so that
+    /// they stand still while time passes, which a slow line can carry.
     fn predicted(&self, context: &mut Context, path: &[(f64, f64)], color: Color) {
         let mut dots = Vec::new();
         let (dot_x, dot_y) = (self.dot() / self.dot_ratio(), self.dot());
@@ -148,8 +151,8 @@ pub fn ticks([low, high]: [f64; 2], parts_max: u16) -> Vec<f64> {
     widgets::ticks(low, high, step).collect()
 }
 
-/// Draws the scales of a picture of one number over another: ticks with their numbers, and thin lines. Returns the plane inside.
-/// `across` are the numbers under it, `up` those at its left.
+/// Draws the scales of a picture of one number over another: ticks with their numbers, and thin
+/// lines. Returns the plane inside. `across` are the numbers under it, `up` those at its left.
 pub fn scales(
     (x, y): ([f64; 2], [f64; 2]),
     (across, up): (&[f64], &[f64]),

@@ -1,4 +1,5 @@
-//! The QR code of a place (ISO/IEC 18004): a phone's camera reads it from the terminal, and the phone shows the way.
+//! The QR code of a place (ISO/IEC 18004): a phone's camera reads it from the terminal, and the
+//! phone shows the way.
 
 use qrcode::render::{Renderer, unicode::Dense1x2};
 use qrcode::{EcLevel, QrCode};
@@ -7,14 +8,14 @@ use ratatui::text::Line;
 
 use crate::model::Degrees;
 
-/// Rows of the code with a margin of two light modules, and with one. The standard asks for 4; a phone's camera needs fewer, and a
-/// terminal is small.
+/// Rows of the code with a margin of two light modules, and with one. The standard asks for 4; a
+/// phone's camera needs fewer, and a terminal is small.
 const ROWS: [u16; 2] = [15, 14];
 /// Its columns with the wider margin.
 pub const COLUMNS: u16 = 29;
 
-/// The code of a place as a `geo:` address (RFC 5870), two modules of height in a row; empty without so many rows. Black on white
-/// whatever the theme is, because a camera expects that.
+/// The code of a place as a `geo:` address (RFC 5870), two modules of height in a row; empty
+/// without so many rows. Black on white whatever the theme is, because a camera expects that.
 pub fn code(place: Degrees, rows: u16) -> Vec<Line<'static>> {
     let margin = match ROWS.iter().position(|needs| *needs <= rows) {
         Some(narrower) => 2 - narrower as u32,

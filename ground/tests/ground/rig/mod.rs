@@ -133,8 +133,8 @@ impl Rig {
         self.run(0.2);
     }
 
-    /// A key that is held on a terminal that does not report repeats: a press, a repeat after the keyboard's delay,
-    /// then further repeats. A tick every 10 ms.
+    /// A key that is held on a terminal that does not report repeats: a press, a repeat after the
+    /// keyboard's delay, then further repeats. A tick every 10 ms.
     pub(crate) fn hold(&mut self, key: Key, delay_ms: u64, period_ms: u64, seconds: u64) {
         for elapsed_ms in (0..seconds * 1_000).step_by(1) {
             let repeats = elapsed_ms >= delay_ms && (elapsed_ms - delay_ms).is_multiple_of(period_ms);
@@ -331,8 +331,8 @@ impl Rig {
         terminal.backend().to_string()
     }
 
-    /// The styles of the same screen in the dark theme, one letter per cell, with a legend. Plain cells at the end of a line are left
-    /// out.
+    /// The styles of the same screen in the dark theme, one letter per cell, with a legend. Plain
+    /// cells at the end of a line are left out.
     pub(crate) fn styles(&self, columns: u16, rows: u16) -> String {
         let terminal = self.draw(columns, rows, Theme { palette: Palette::Dark, ascii: false });
         let rows = terminal.backend().buffer().content.chunks(usize::from(columns));

@@ -85,7 +85,8 @@ impl Pen {
         format!("c{}", self.classes.entry(colour).or_insert(next))
     }
 
-    /// A row of the screen: backgrounds and blocks as shapes, so that they join whatever the font, then the letters.
+    /// A row of the screen: backgrounds and blocks as shapes, so that they join whatever the font,
+    /// then the letters.
     fn row(&mut self, cells: &[Cell]) -> String {
         let (mut backs, mut blocks, mut texts) = (String::new(), String::new(), String::new());
         let mut at = 0;
@@ -190,8 +191,8 @@ pub(crate) fn picture(buffer: &Buffer) -> String {
     pen.file(buffer.area, "", &drawn)
 }
 
-/// Screens one after the other, each for its time in s, again and again. A row that several show is stored once. Who asks for
-/// less motion, and a program that knows no motion, shows the last.
+/// Screens one after the other, each for its time in s, again and again. A row that several show is
+/// stored once. Who asks for less motion, and a program that knows no motion, shows the last.
 pub(crate) fn moving_picture(screens: &[(Buffer, f64)]) -> String {
     let (last, _) = screens.last().expect("a screen");
     let mut pen = Pen::new(colours(&last.content[0]).1);

@@ -25,7 +25,8 @@ impl Rig {
         velocity: [f32; 3],
         (heading_deg, lean_deg): (f64, f64),
     ) {
-        // Upright is a quarter turn about east; the lean is a rotation about the horizontal axis across the heading.
+        // Upright is a quarter turn about east; the lean is a rotation about the horizontal axis
+        // across the heading.
         let (sin_lean, cos_lean) = libm::sincos(lean_deg.to_radians() / 2.0);
         let (across_north, across_east) = {
             let (sin, cos) = libm::sincos(heading_deg.to_radians());
@@ -186,7 +187,8 @@ impl Rig {
         }));
     }
 
-    /// TD_DESCENT on the way up, with the apogee that is expected: its height, m, and the time until then, s.
+    /// TD_DESCENT on the way up, with the apogee that is expected: its height, m, and the time
+    /// until then, s.
     pub(crate) fn ascent(&mut self, booster: TdBooster, apogee_m: f32, time_to_apogee_s: f32) {
         self.hear(&MavMessage::TD_DESCENT(TD_DESCENT_DATA {
             boot_number: self.boot_number,

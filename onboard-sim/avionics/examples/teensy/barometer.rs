@@ -1,4 +1,5 @@
-//! MS5611 over I2C (TE Connectivity, MS5611-01BA03): one conversion after the other, and no waiting for any.
+//! MS5611 over I2C (TE Connectivity, MS5611-01BA03): one conversion after the other, and no waiting
+//! for any.
 
 use embedded_hal::delay::DelayNs;
 use embedded_hal::i2c::I2c;
@@ -43,7 +44,8 @@ impl Barometer {
         Ok(Self { prom, converts: None, frames: 0, temperature_raw: 0 })
     }
 
-    /// Called once a frame. The pressure, Pa, in the frame in which one is ready. A bus that has failed gives none, and is asked anew.
+    /// Called once a frame. The pressure, Pa, in the frame in which one is ready. A bus that has
+    /// failed gives none, and is asked anew.
     pub(crate) fn poll(&mut self, bus: &mut impl I2c) -> Option<f64> {
         self.frames += 1;
         if self.converts.is_some() && self.frames < CONVERSION_FRAMES {
@@ -66,7 +68,8 @@ impl Barometer {
     }
 }
 
-/// Temperature, 0.01 degrees Celsius, and pressure, Pa, with compensation of the second order, as on pages 8 and 9 of the data sheet.
+/// Temperature, 0.01 degrees Celsius, and pressure, Pa, with compensation of the second order, as
+/// on pages 8 and 9 of the data sheet.
 pub(crate) fn compensated(prom: &[u16; 8], pressure_raw: u32, temperature_raw: u32) -> (i64, f64) {
     let [_, c1, c2, c3, c4, c5, c6, _] = prom.map(i64::from);
     let difference = i64::from(temperature_raw) - (c5 << 8);
@@ -84,7 +87,8 @@ pub(crate) fn compensated(prom: &[u16; 8], pressure_raw: u32, temperature_raw: u
     (temperature, pressure as f64 / f64::from(1 << 15))
 }
 
-/// The checksum of the coefficients (AN520); the last four bits, where it is kept, count as zero with their byte.
+/// The checksum of the coefficients (AN520); the last four bits, where it is kept, count as zero
+/// with their byte.
 pub(crate) fn crc4(prom: &[u16; 8]) -> u8 {
     let mut remainder: u16 = 0;
     for place in 0..16 {

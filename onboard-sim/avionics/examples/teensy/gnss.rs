@@ -1,4 +1,5 @@
-//! u-blox over a UART: the message UBX-NAV-PVT (u-blox M10, interface description UBX-21035062), and nothing else.
+//! u-blox over a UART: the message UBX-NAV-PVT (u-blox M10, interface description UBX-21035062),
+//! and nothing else.
 
 use flight::estimation::estimator::FixQuality;
 

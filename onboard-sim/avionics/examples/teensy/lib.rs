@@ -1,8 +1,10 @@
-//! An example: the flight computer's board as a student club would wire it, around a Teensy 4.1. Nobody has flown it.
+//! An example: the flight computer's board as a student club would wire it, around a Teensy 4.1.
+//! Nobody has flown it.
 //!
-//! Everything here is written for the traits of `embedded-hal` and `embedded-io`, so that it runs on a desk, too: `tests.rs` puts
-//! simulated devices in the place of the real ones. What a program for the chip adds is a [`Wiring`], a [`Chip`], an entry and a heap
-//! (`../../src/m7.rs`), and a timer that calls [`tick`] every 5 ms. `README.md` has pins and parts.
+//! Everything here is written for the traits of `embedded-hal` and `embedded-io`, so that it runs
+//! on a desk, too: `tests.rs` puts simulated devices in the place of the real ones. What a program
+//! for the chip adds is a [`Wiring`], a [`Chip`], an entry and a heap (`../../src/m7.rs`), and a
+//! timer that calls [`tick`] every 5 ms. `README.md` has pins and parts.
 #![cfg_attr(not(test), no_std)]
 
 extern crate alloc;
@@ -67,7 +69,8 @@ pub trait Chip {
     /// What the main context has solved, once.
     fn solved(&mut self) -> Option<Box<Planner>>;
 
-    /// What the radio has heard since the last frame: an endpoint's answer, as in `avionics::board::radio`.
+    /// What the radio has heard since the last frame: an endpoint's answer, as in
+    /// `avionics::board::radio`.
     fn heard(&mut self) -> UplinkState;
 
     /// Tells the crew.
@@ -88,7 +91,8 @@ pub trait Chip {
     /// Writes a record to one of two places (0 and 1) in a memory that outlasts a reset.
     fn save(&mut self, slot: usize, record: &[u8]);
 
-    /// Reads such a place, which has room for [`MOST_BYTES`]; returns how many bytes were written to it.
+    /// Reads such a place, which has room for [`MOST_BYTES`]; returns how many bytes were written
+    /// to it.
     fn load(&mut self, slot: usize, into: &mut [u8]) -> usize;
 }
 
@@ -113,7 +117,8 @@ pub struct Parts<W: Wiring> {
     pub chip: W::Chip,
 }
 
-/// What each output switches: both igniters of the landing motor, that of the ascent motor, separation and parachute.
+/// What each output switches: both igniters of the landing motor, that of the ascent motor,
+/// separation and parachute.
 pub const LINES: [PyroOutput; 5] = [
     PyroOutput::LandingIgniter,
     PyroOutput::LandingIgniter,
@@ -122,7 +127,8 @@ pub const LINES: [PyroOutput; 5] = [
     PyroOutput::Parachute,
 ];
 
-/// Axes from other ones: for each, which of the others it lies on, and whether along it (1) or against it (-1).
+/// Axes from other ones: for each, which of the others it lies on, and whether along it (1) or
+/// against it (-1).
 pub type Axes = [(usize, f64); 3];
 
 /// World axes (north, west, up) from those of a satellite receiver (north, east, down).
@@ -158,7 +164,8 @@ const ZERO_FIXES: u32 = 10;
 
 /// The board.
 pub struct TeensyBoard<W: Wiring> {
-    /// What did not start is silent: the flight computer arms nothing without it, and behind a reset in the air it does what is left.
+    /// What did not start is silent: the flight computer arms nothing without it, and behind a
+    /// reset in the air it does what is left.
     pub imu: Result<(), Trouble>,
     pub barometer: Result<Barometer, Trouble>,
     parts: Parts<W>,
@@ -263,7 +270,8 @@ impl<W: Wiring> TeensyBoard<W> {
         Measurements { imu, pressure_altitude_m, gnss, lidar_range_m }
     }
 
-    /// A fix on the flight computer's clock, relative to the pad: the vehicle stands where its mission says.
+    /// A fix on the flight computer's clock, relative to the pad: the vehicle stands where its
+    /// mission says.
     fn located(&mut self, fix: &gnss::Fix) -> Option<GnssFix> {
         let (north_m, east_m) =
             self.pad.to(Degrees { latitude: fix.latitude_deg, longitude: fix.longitude_deg });
@@ -278,7 +286,8 @@ impl<W: Wiring> TeensyBoard<W> {
 }
 
 impl<W: Wiring> Board for TeensyBoard<W> {
-    /// A sensor that has failed is silent, which the flight computer knows how to fly with; ending the frames would help nobody.
+    /// A sensor that has failed is silent, which the flight computer knows how to fly with; ending
+    /// the frames would help nobody.
     type Error = Infallible;
 
     fn sense(&mut self) -> Result<Option<LoggedInput>, Infallible> {

@@ -1,4 +1,5 @@
-//! What outlasts a reset: the flight computer's record, and where this board's sensors have their zero.
+//! What outlasts a reset: the flight computer's record, and where this board's sensors have their
+//! zero.
 //!
 //! Without the zeros a barometer that starts again in the air would say that the ground is there.
 
@@ -25,7 +26,8 @@ impl Zero {
     }
 }
 
-/// Longest record with its checksum, bytes; the numbers beside the flight computer's record have 66.
+/// Longest record with its checksum, bytes; the numbers beside the flight computer's record
+/// have 66.
 pub const MOST_BYTES: usize = 4 + 66 + Saved::MOST_BYTES;
 
 /// A record.

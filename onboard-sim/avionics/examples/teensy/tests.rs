@@ -1,5 +1,5 @@
-//! The drivers against their data sheets, and the whole board flown: simulated devices with the real ones' registers, frames and
-//! pulses stand between it and a simulated world.
+//! The drivers against their data sheets, and the whole board flown: simulated devices with the
+//! real ones' registers, frames and pulses stand between it and a simulated world.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -37,7 +37,8 @@ fn val_datasheet_ms5611_worked_example() {
     assert_eq!((temperature, pressure_pa.floor()), (2007, 100_009.0));
 }
 
-/// The same coefficients and -10.00 degrees before the second order, put into the formulas of page 9.
+/// The same coefficients and -10.00 degrees before the second order, put into the formulas of
+/// page 9.
 #[test]
 fn val_hand_ms5611_in_the_cold() {
     let [_, c1, c2, c3, c4, c5, c6, _] = PROM.map(f64::from);
@@ -562,7 +563,8 @@ const CREW: [Asked; 5] = [Asked::Check, Asked::Seen, Asked::Seen, Asked::Arm, As
 const CREW_WAITS: u64 = 20;
 const CREW_COMES: u64 = 1_000;
 
-/// Flies from power-up until the vehicle is at rest. The board loses its power for 0.1 s half a second after the beginning of a phase.
+/// Flies from power-up until the vehicle is at rest. The board loses its power for 0.1 s half a
+/// second after the beginning of a phase.
 fn fly(resets_in: Option<Phase>) -> (Bench, ComputerStart) {
     let (bench, computer) = Bench::standing(&mission());
     let (bench, begun) = (Rc::new(RefCell::new(bench)), start_to_log(&computer));
@@ -595,8 +597,8 @@ fn fly(resets_in: Option<Phase>) -> (Bench, ComputerStart) {
     (Rc::into_inner(bench).unwrap().into_inner(), begun)
 }
 
-/// The log is that of the flight computer: another one that gets its inputs, and hears what the crew has asked, decides and
-/// remembers the same. Returns the plans.
+/// The log is that of the flight computer: another one that gets its inputs, and hears what the
+/// crew has asked, decides and remembers the same. Returns the plans.
 fn verified(bench: &Bench, begun: &ComputerStart) -> usize {
     let (mut log, mut again, mut plans) =
         (bench.log.as_slice(), RecordedComputer::started(&mission(), begun), 0);

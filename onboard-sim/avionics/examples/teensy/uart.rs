@@ -27,7 +27,8 @@ impl<const N: usize> Framer<N> {
         (self.have == 0).then_some(&self.frame)
     }
 
-    /// Takes what has arrived, and does not wait; returns what the last frame says that says anything.
+    /// Takes what has arrived, and does not wait; returns what the last frame says that says
+    /// anything.
     pub(crate) fn newest<T>(
         &mut self,
         uart: &mut (impl Read + ReadReady),

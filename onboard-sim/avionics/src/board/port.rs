@@ -1,8 +1,9 @@
 //! What a board must offer to fly the flight computer, and the frames that fly it.
 //!
-//! A board has two contexts. A timer calls [`Frames::fly`] every 5 ms, which never waits. The main context computes what a frame has
-//! [posed](Board::pose), which takes up to 20 frames, and is interrupted by them: it receives a [`Planner`], calls
-//! [`Planner::solve`], and sends it back. The planner is a box that moves through the board's own channels, such as two queues of
+//! A board has two contexts. A timer calls [`Frames::fly`] every 5 ms, which never waits. The main
+//! context computes what a frame has [posed](Board::pose), which takes up to 20 frames, and is
+//! interrupted by them: it receives a [`Planner`], calls [`Planner::solve`], and sends it back. The
+//! planner is a box that moves through the board's own channels, such as two queues of
 //! `heapless::spsc`: nothing is shared.
 
 use alloc::boxed::Box;
@@ -17,23 +18,26 @@ use protocol::records::computer_v1::ComputerFrame;
 pub trait Board {
     type Error;
 
-    /// Reads everything at the end of a frame, 5 ms after the last one, and does not wait: gyro and accelerometer in every frame,
-    /// barometer, satellites and lidar if they have something new; gimbal and fins, which are not read if the airframe says
-    /// that their servos do not tell where they are. [`Input`] says what each value is; its number, its time, the rehearsal
-    /// and whether a plan is ready are set by [`Frames`]. `None`: the flight is over.
+    /// Reads everything at the end of a frame, 5 ms after the last one, and does not wait: gyro and
+    /// accelerometer in every frame, barometer, satellites and lidar if they have something new;
+    /// gimbal and fins, which are not read if the airframe says that their servos do not tell where
+    /// they are. [`Input`] says what each value is; its number, its time, the rehearsal and whether
+    /// a plan is ready are set by [`Frames`]. `None`: the flight is over.
     ///
     /// # Errors
     /// A device without which nothing can be decided has failed.
     fn sense(&mut self) -> Result<Option<LoggedInput>, Self::Error>;
 
-    /// Moves servos and switches currents: gimbal, fins, both igniters, separation, parachute. It acts on every command
-    /// of the last frame at once, and keeps a current only as long as it is commanded.
+    /// Moves servos and switches currents: gimbal, fins, both igniters, separation, parachute. It
+    /// acts on every command of the last frame at once, and keeps a current only as long as it is
+    /// commanded.
     ///
     /// # Errors
     /// As [`sense`](Self::sense).
     fn act(&mut self, commands: &Commands) -> Result<(), Self::Error>;
 
-    /// Sends to the main context what it has to compute. It does not wait: there is never more than one.
+    /// Sends to the main context what it has to compute. It does not wait: there is never more than
+    /// one.
     fn pose(&mut self, posed: Box<Planner>);
 
     /// Receives what the main context has computed, once.
@@ -42,7 +46,8 @@ pub trait Board {
     /// Tells the crew.
     fn tell(&mut self, news: &[CrewMessage]);
 
-    /// Appends a frame to the log. It must not wait: a log that cannot follow says so in the next frame's `log`.
+    /// Appends a frame to the log. It must not wait: a log that cannot follow says so in the next
+    /// frame's `log`.
     fn keep(&mut self, frame: &ComputerFrame);
 }
 
@@ -56,8 +61,9 @@ pub struct Frames {
 }
 
 impl Frames {
-    /// Behind this frame: 0 at power-up, and for a computer that was [resumed](Computer::resume) the one that a clock gives which
-    /// ran through the reset. A computer that was not released rehearses its landing now, which takes some seconds.
+    /// Behind this frame: 0 at power-up, and for a computer that was [resumed](Computer::resume)
+    /// the one that a clock gives which ran through the reset. A computer that was not released
+    /// rehearses its landing now, which takes some seconds.
     pub fn new(mut computer: Computer, frame: u64) -> Self {
         let rehearsed = computer.rehearse();
         Self { computer, frame, rehearsed }

@@ -33,7 +33,8 @@ impl Radio for () {
     fn write(&mut self, _: &[u8]) {}
 }
 
-/// Frames without a byte after which a frame that has begun will not go on: 0.1 s. The longest frame takes half of that at 57,600 baud.
+/// Frames without a byte after which a frame that has begun will not go on: 0.1 s. The longest
+/// frame takes half of that at 57,600 baud.
 const SILENT_FRAMES: u32 = 20;
 
 /// A board's end of the link.
@@ -49,7 +50,8 @@ pub(crate) struct Crewed {
 }
 
 impl Crewed {
-    /// The vehicle at power-up, a rocket in space. `mission` is the mission as flown, and `toml` its text.
+    /// The vehicle at power-up, a rocket in space. `mission` is the mission as flown, and `toml`
+    /// its text.
     pub(crate) fn new(kind: VehicleKind, on_the_air: &OnTheAir, mission: &Mission, toml: &str) -> Self {
         let system_id = u8::try_from(on_the_air.system_id).unwrap_or(u8::MAX);
         let endpoint = VehicleEndpoint::new(kind)
@@ -75,8 +77,9 @@ impl Crewed {
         LoggedInput { kept: KeptInput { uplink, commander, ..input.kept }, requests, ..input }
     }
 
-    /// Speaks with the ground after a frame; returns what the next one is told and asked. Never inline: what it keeps on the stack
-    /// would lie below the flight computer's, whose own is the largest.
+    /// Speaks with the ground after a frame; returns what the next one is told and asked. Never
+    /// inline: what it keeps on the stack would lie below the flight computer's, whose own is the
+    /// largest.
     #[inline(never)]
     pub(crate) fn flown(
         &mut self,

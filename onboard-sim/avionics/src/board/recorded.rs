@@ -14,8 +14,8 @@ pub use crate::link::vehicle::VehicleKind;
 use crate::board::radio::{Crewed, Radio};
 use crate::board::stream::{Answer, Begin, Frame, Reader, put};
 
-/// What looks at the computer while it flies, without changing anything. A machine that counts its instructions counts
-/// between `begins` and `ended`.
+/// What looks at the computer while it flies, without changing anything. A machine that counts its
+/// instructions counts between `begins` and `ended`.
 pub trait Watch {
     /// The computer is built: from here on it flies.
     fn is_set_up(&mut self) {}
@@ -29,8 +29,8 @@ pub trait Watch {
     }
     /// Saves what is kept through a reset, after each frame.
     fn save(&mut self, _saved: &Saved) {}
-    /// The computer was dead in the frames before this one: the machine is reset. Where this returns, the computer is
-    /// restarted in place.
+    /// The computer was dead in the frames before this one: the machine is reset. Where this
+    /// returns, the computer is restarted in place.
     fn reset(&mut self, _before: u64) {}
 }
 
@@ -84,8 +84,9 @@ impl Board {
         &self.reader
     }
 
-    /// Takes bytes that have arrived, flies the frames in them, and gives each answer to `answer` before the next frame, which
-    /// may reset the machine. If the flight's first frame says who the board is on the air, the crew is heard over the radio.
+    /// Takes bytes that have arrived, flies the frames in them, and gives each answer to `answer`
+    /// before the next frame, which may reset the machine. If the flight's first frame says who the
+    /// board is on the air, the crew is heard over the radio.
     ///
     /// # Errors
     /// See [`FlyError`]; every frame before the error was answered.
@@ -158,7 +159,8 @@ impl Flying {
         put(&decided, &mut bytes);
         answer(&bytes);
         self.answered = Some((number, bytes));
-        // A frame on its own timer would go on meanwhile. The frame that takes it over is said by the world.
+        // A frame on its own timer would go on meanwhile. The frame that takes it over is said by
+        // the world.
         watch.begins();
         if self.computer.computer_mut().solve_posed().is_some() {
             watch.ended(number, true);

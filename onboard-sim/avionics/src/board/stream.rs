@@ -1,12 +1,14 @@
 //! A flight as bytes for a board, and the board's answers.
 //!
-//! Either way it is a sequence of records: a protocol buffer and its CRC-32 (the lowest byte first), in Consistent Overhead
-//! Byte Stuffing, ended by a zero byte. So whoever joins in, or has lost a byte, is in step again behind the next zero, and
-//! a record that has changed on its way is known. To the board: one [`Frame`] for each frame; the first one says what to
-//! fly. From the board: one [`Answer`] for each frame. Who asks again gets the same answer again.
+//! Either way it is a sequence of records: a protocol buffer and its CRC-32 (the lowest byte
+//! first), in Consistent Overhead Byte Stuffing, ended by a zero byte. So whoever joins in, or has
+//! lost a byte, is in step again behind the next zero, and a record that has changed on its way is
+//! known. To the board: one [`Frame`] for each frame; the first one says what to fly. From the
+//! board: one [`Answer`] for each frame. Who asks again gets the same answer again.
 //!
-//! A board with a radio (`on_the_air`) hears its crew itself: it does not look at uplink, commander and requests in a frame, and
-//! its answer has them for the next one, so that a world that flies the same computer beside it can compare.
+//! A board with a radio (`on_the_air`) hears its crew itself: it does not look at uplink, commander
+//! and requests in a frame, and its answer has them for the next one, so that a world that flies
+//! the same computer beside it can compare.
 //!
 //! Inputs and answers are the records of the flight log, byte for byte.
 
@@ -18,7 +20,8 @@ use protocol::records::computer_v1::{
     Commander, ComputerInput, ComputerOutput, ComputerStart, Request, Uplink,
 };
 
-/// Longest accepted record, bytes: several times a mission with its motors' files (20 KB), the longest there is.
+/// Longest accepted record, bytes: several times a mission with its motors' files (20 KB), the
+/// longest there is.
 pub const LONGEST_BYTES: usize = 128 * 1024;
 
 /// What a computer is built from.
@@ -30,7 +33,8 @@ pub struct Begin {
     /// The start in the log: at power-up, or at the release.
     #[prost(message, required, tag = "2")]
     pub start: ComputerStart,
-    /// Who the board is on its own radio. Without it nobody is heard, and the crew's requests are in the frames.
+    /// Who the board is on its own radio. Without it nobody is heard, and the crew's requests are
+    /// in the frames.
     #[prost(message, optional, tag = "3")]
     pub on_the_air: Option<OnTheAir>,
     /// Another one for each flight: a board that flies this one already does not begin it again.
@@ -99,7 +103,8 @@ pub struct Answer {
 }
 
 impl Answer {
-    /// Whether both have decided the same in every bit. Compared as bytes: a NaN never equals itself, and 0.0 equals -0.0.
+    /// Whether both have decided the same in every bit. Compared as bytes: a NaN never equals
+    /// itself, and 0.0 equals -0.0.
     pub fn is_same_as(&self, other: &Self) -> bool {
         let decided = |answer: &Self| Self { heard: None, ..answer.clone() }.encode_to_vec();
         decided(self) == decided(other)

@@ -1,8 +1,9 @@
 //! Translates MAVLink commands to requests for the vehicle.
 //!
-//! Semantics: <https://mavlink.io/en/messages/common.html#mav_commands>. Numbers are taken exactly: an arm that is
-//! neither 0 nor 1 is refused rather than guessed, and no force code opens an interlock. A forced *disarm* is what
-//! other ground stations call an emergency stop: it always stops what can still be stopped.
+//! Semantics: <https://mavlink.io/en/messages/common.html#mav_commands>. Numbers are taken exactly:
+//! an arm that is neither 0 nor 1 is refused rather than guessed, and no force code opens an
+//! interlock. A forced *disarm* is what other ground stations call an emergency stop: it always
+//! stops what can still be stopped.
 
 use alloc::borrow::ToOwned as _;
 use alloc::format;
@@ -101,7 +102,8 @@ pub fn parse(request: &CommandRequest) -> Result<Command, Unfit> {
     } else if let Some((_, message_id)) =
         LEGACY_REQUESTS.iter().find(|(command, _)| *command == request.command)
     {
-        // Parameter 1 says whether it is wanted; old clients leave it at 0 or 1 and want it either way.
+        // Parameter 1 says whether it is wanted; old clients leave it at 0 or 1 and want it either
+        // way.
         Ok(Command::SendMessage { message_id: *message_id, of: 0 })
     } else if request.command == GET_MESSAGE_INTERVAL {
         Ok(Command::SendMessage { message_id: MESSAGE_INTERVAL_DATA::ID, of: message_id(param1)? })
@@ -110,8 +112,8 @@ pub fn parse(request: &CommandRequest) -> Result<Command, Unfit> {
     }
 }
 
-/// The number of the ask that an arm or a start confirms, in parameter 3. Other ground stations leave it at 0 or NaN:
-/// their command is an ask.
+/// The number of the ask that an arm or a start confirms, in parameter 3. Other ground stations
+/// leave it at 0 or NaN: their command is an ask.
 pub fn confirmed_ask(request: &CommandRequest) -> Option<u16> {
     let param3 = request.params[2];
     let confirms =
@@ -119,13 +121,14 @@ pub fn confirmed_ask(request: &CommandRequest) -> Option<u16> {
     confirms.then_some(param3 as u16)
 }
 
-/// Parameter 2 of a forced arm or disarm, as other ground stations send it: PX4's (QGroundControl, MAVSDK) and
-/// ArduPilot's (Mission Planner, MAVProxy).
+/// Parameter 2 of a forced arm or disarm, as other ground stations send it: PX4's (QGroundControl,
+/// MAVSDK) and ArduPilot's (Mission Planner, MAVProxy).
 const FORCE_CODES: [f32; 2] = [21196.0, 2989.0];
 /// MAV_CMD_GET_MESSAGE_INTERVAL, the predecessor of a request for MESSAGE_INTERVAL.
 const GET_MESSAGE_INTERVAL: u16 = 510;
-/// Requests for one message each, from before MAV_CMD_REQUEST_MESSAGE; clients in use still send them:
-/// MAV_CMD_GET_HOME_POSITION, MAV_CMD_REQUEST_PROTOCOL_VERSION and MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES.
+/// Requests for one message each, from before MAV_CMD_REQUEST_MESSAGE; clients in use still send
+/// them: MAV_CMD_GET_HOME_POSITION, MAV_CMD_REQUEST_PROTOCOL_VERSION and
+/// MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES.
 const LEGACY_REQUESTS: [(u16, u32); 3] =
     [(410, HOME_POSITION_DATA::ID), (519, 300), (520, AUTOPILOT_VERSION_DATA::ID)];
 

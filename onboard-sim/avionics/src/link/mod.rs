@@ -1,4 +1,5 @@
-//! The vehicle's end of MAVLink: what it says, how often, and how it takes what a ground station asks for.
+//! The vehicle's end of MAVLink: what it says, how often, and how it takes what a ground station
+//! asks for.
 //!
 //! It is pure: frames, times and the vehicle are arguments. A simulated vehicle and
 //! a board's program use the same code.

@@ -1,9 +1,10 @@
-//! The vehicle's parameters: values that a ground station may read by name, and the few that it may set.
+//! The vehicle's parameters: values that a ground station may read by name, and the few that it may
+//! set.
 //!
 //! The station in command may set the rate of each message, in hertz, at any time, as with
-//! MAV_CMD_SET_MESSAGE_INTERVAL: on the link that asked, within its budget. The weights of the landing cost are
-//! read-only: they come from the mission, which the log holds, so that a replay uses the same ones. Safety limits are
-//! not parameters. The list of names never changes.
+//! MAV_CMD_SET_MESSAGE_INTERVAL: on the link that asked, within its budget. The weights of the
+//! landing cost are read-only: they come from the mission, which the log holds, so that a replay
+//! uses the same ones. Safety limits are not parameters. The list of names never changes.
 
 use alloc::format;
 use alloc::string::String;
@@ -65,8 +66,9 @@ pub fn value(place: u16, streams: &Streams, weights: &PlanWeights) -> MavMessage
     value_message(name(place), found as f32, place, COUNT)
 }
 
-/// Sets a parameter; `forbidden` says why this station may set none now. Returns the index of the parameter, whose
-/// value is to be sent in any case, and the refusal if it was not changed as requested.
+/// Sets a parameter; `forbidden` says why this station may set none now. Returns the index of the
+/// parameter, whose value is to be sent in any case, and the refusal if it was not changed as
+/// requested.
 ///
 /// # Errors
 /// No parameter of that name.

@@ -1,5 +1,5 @@
-//! The messages that are sent periodically, and their rates; and the values of a check on the pad and what went wrong in the
-//! flight, one after the other.
+//! The messages that are sent periodically, and their rates; and the values of a check on the pad
+//! and what went wrong in the flight, one after the other.
 
 use alloc::format;
 use alloc::string::String;
@@ -24,20 +24,22 @@ use protocol::identity::RADIO_BUDGET_BYTES_S;
 use crate::link::telemetry;
 use crate::link::vehicle::VehicleState;
 
-/// The span that the budget holds for, s: a second, and the 20 ms by which a busy machine may send a frame late, so
-/// that no second on the wire carries more.
+/// The span that the budget holds for, s: a second, and the 20 ms by which a busy machine may send
+/// a frame late, so that no second on the wire carries more.
 pub(crate) const WINDOW_S: f64 = 1.02;
 
 /// Bytes around a payload: header and checksum.
 const FRAME_OVERHEAD: usize = 12;
 /// Time, mask and six of the 32 outputs; the others are zero and therefore truncated.
 const ACTUATOR_PAYLOAD_LEN: usize = 12 + 6 * 4;
-/// Highest default rates, Hz; the first one that fits the link is used. Signed frames need it on a radio, because a signature
-/// is as long as a short message, and what a client asks for. Vital messages are not slowed down.
+/// Highest default rates, Hz; the first one that fits the link is used. Signed frames need it on a
+/// radio, because a signature is as long as a short message, and what a client asks for. Vital
+/// messages are not slowed down.
 const RATES_MAX_HZ: [f64; 12] = [f64::INFINITY, 9.0, 8.0, 7.0, 6.0, 5.5, 5.0, 4.5, 4.0, 3.5, 3.25, 3.0];
 /// A line slower than a radio: a frame that takes longer than this is not sent, s.
 const LINE_HOLDS_S: f64 = 0.3;
-/// On such a line: the share of vital messages, and of all periodic ones. The rest is for answers, texts and requests.
+/// On such a line: the share of vital messages, and of all periodic ones. The rest is for answers,
+/// texts and requests.
 const VITAL_SHARE: f64 = 0.3;
 const PERIODIC_SHARE: f64 = 0.85;
 /// What is stretched to fit such a line still comes this often, Hz, if it came as often before.
@@ -53,27 +55,28 @@ const ACK_PAYLOAD_LEN: usize = 10;
 const UPLINK_HZ: f64 = 2.0;
 /// The same over a line slower than a radio.
 pub(crate) const SLOW_UPLINK_HZ: f64 = 1.0;
-/// While a client reads a file over the link, a message is sent at most this often, s: vital ones, and others. The
-/// vehicle is disarmed on the ground then.
+/// While a client reads a file over the link, a message is sent at most this often, s: vital ones,
+/// and others. The vehicle is disarmed on the ground then.
 const SPARED_VITAL_S: f64 = 1.0;
 const SPARED_S: f64 = 10.0;
 /// Shortest interval of a message that is sent early, s.
 const HURRIED_S: f64 = 0.1;
 
-/// Bytes kept free for vital messages: a heartbeat, a flight status and the answer to an abort, all in one instant.
-/// They never wait for telemetry.
+/// Bytes kept free for vital messages: a heartbeat, a flight status and the answer to an abort, all
+/// in one instant. They never wait for telemetry.
 pub(crate) fn kept_free_bytes(signature_len: usize) -> usize {
     let payload = HEARTBEAT_DATA::ENCODED_LEN + TD_FLIGHT_STATUS_DATA::ENCODED_LEN + ACK_PAYLOAD_LEN;
     payload + 3 * (FRAME_OVERHEAD + signature_len)
 }
 
-/// A link's share for answers, and the same for texts, bytes per second. The rest is always for telemetry. A line of any
-/// speed carries one text a second.
+/// A link's share for answers, and the same for texts, bytes per second. The rest is always for
+/// telemetry. A line of any speed carries one text a second.
 pub(crate) fn share_bytes_s(capacity_bytes_s: u32) -> usize {
     (capacity_bytes_s as usize / 5).max(TEXT_FRAME_LEN)
 }
 
-/// Whether a budget is that of a line slower than a radio: four fifths of what its baud rate carries.
+/// Whether a budget is that of a line slower than a radio: four fifths of what its baud rate
+/// carries.
 pub(crate) fn is_slow(capacity_bytes_s: u32) -> bool {
     capacity_bytes_s < RADIO_BUDGET_BYTES_S
 }
@@ -134,7 +137,8 @@ pub const STANDARD: &[Standard] = &[
     // Without its optional offset quaternion.
     standard::<ATTITUDE_QUATERNION_DATA>("RATE_ATTITUDE", 8.0).cut_to(32),
     standard::<LOCAL_POSITION_NED_DATA>("RATE_POSITION", 8.0),
-    // Without its extensions, which are zero from apogee on. On the way up there is no plan to be sent.
+    // Without its extensions, which are zero from apogee on. On the way up there is no plan to be
+    // sent.
     standard::<TD_DESCENT_DATA>("RATE_DESCENT", 4.0).cut_to(61),
     standard::<TD_GIMBAL_DATA>("RATE_GIMBAL", 3.0),
     standard::<TD_CONTROLLER_DATA>("RATE_CONTROLLER", 3.0),
@@ -144,12 +148,13 @@ pub const STANDARD: &[Standard] = &[
     standard::<SYS_STATUS_DATA>("RATE_SYS_STATUS", 1.0),
     standard::<EXTENDED_SYS_STATE_DATA>("RATE_EXT_STATE", 1.0),
     standard::<ESTIMATOR_STATUS_DATA>("RATE_ESTIMATOR", 0.5),
-    // The vehicle's place and the pad's on the Earth: where people look for it, over any link. At 20 m/s its place is known to 40 m
-    // when the link falls silent.
+    // The vehicle's place and the pad's on the Earth: where people look for it, over any link. At
+    // 20 m/s its place is known to 40 m when the link falls silent.
     standard::<GLOBAL_POSITION_INT_DATA>("RATE_GLOBAL", 0.5).on_network(4.0),
     standard::<HOME_POSITION_DATA>("RATE_HOME", 0.1).on_network(1.0),
     standard::<TD_TOUCHDOWN_LIMITS_DATA>("RATE_LIMITS", 0.2),
-    // For other clients. A radio has no room for all of them: the messages above already have this data.
+    // For other clients. A radio has no room for all of them: the messages above already have this
+    // data.
     standard::<HIGHRES_IMU_DATA>("RATE_IMU", 0.0),
     standard::<BATTERY_STATUS_DATA>("RATE_BATTERY", 0.0).on_network(1.0),
     standard::<ACTUATOR_OUTPUT_STATUS_DATA>("RATE_ACTUATORS", 0.0)
@@ -211,7 +216,8 @@ impl Streams {
         Self::over_a_radio(0, false)
     }
 
-    /// The same for signed frames: the fastest messages are slowed down, so that the radio's budget holds.
+    /// The same for signed frames: the fastest messages are slowed down, so that the radio's budget
+    /// holds.
     pub fn signed() -> Self {
         Self::over_a_radio(SIGNATURE_LEN, false)
     }
@@ -263,7 +269,8 @@ impl Streams {
         STANDARD.iter().map(rate).collect()
     }
 
-    /// The rates for a line slower than a radio: less often in the same proportion, vital messages less so.
+    /// The rates for a line slower than a radio: less often in the same proportion, vital messages
+    /// less so.
     fn stretched_rates_hz(&self) -> Vec<f64> {
         let capacity_bytes_s = f64::from(self.capacity_bytes_s);
         let longest = LINE_HOLDS_S * capacity_bytes_s / SHARE;
@@ -306,7 +313,8 @@ impl Streams {
         self.capacity_bytes_s
     }
 
-    /// Gives the link another budget. The intervals that nobody has asked for are those of this budget from now on.
+    /// Gives the link another budget. The intervals that nobody has asked for are those of this
+    /// budget from now on.
     pub fn set_capacity(&mut self, capacity_bytes_s: u32) {
         if capacity_bytes_s == self.capacity_bytes_s {
             return;
@@ -331,8 +339,9 @@ impl Streams {
         self.bytes_s() <= self.for_telemetry_bytes_s()
     }
 
-    /// The part of the link's budget for telemetry, bytes per second: without the reserve for vital messages and the
-    /// uplink reports. A slow line has its reserve in what its budget leaves of its baud rate.
+    /// The part of the link's budget for telemetry, bytes per second: without the reserve for vital
+    /// messages and the uplink reports. A slow line has its reserve in what its budget leaves of
+    /// its baud rate.
     fn for_telemetry_bytes_s(&self) -> f64 {
         let uplink_len = (TD_UPLINK_DATA::ENCODED_LEN + FRAME_OVERHEAD + self.signature_len) as f64;
         let capacity_bytes_s = f64::from(self.capacity_bytes_s);
@@ -342,7 +351,8 @@ impl Streams {
         (capacity_bytes_s - kept_free_bytes(self.signature_len) as f64) / WINDOW_S - UPLINK_HZ * uplink_len
     }
 
-    /// The messages whose time has come, most important first; fewer if the link is spared for files.
+    /// The messages whose time has come, most important first; fewer if the link is spared for
+    /// files.
     pub(crate) fn due(&self, now_s: f64, spared: bool) -> Vec<Due> {
         let due = |stream: &&Stream| {
             let least_s = if is_vital(stream.message_id) { SPARED_VITAL_S } else { SPARED_S };
@@ -362,8 +372,8 @@ impl Streams {
         for stream in self.each.iter_mut().filter(|stream| stream.message_id == message_id) {
             stream.sent_s = now_s;
             let Some(interval_s) = stream.interval_s else { continue };
-            // Count from the due time, not from now; otherwise the frame grid would lower the rate. A message that was
-            // sent early or held back is not sent twice.
+            // Count from the due time, not from now; otherwise the frame grid would lower the rate.
+            // A message that was sent early or held back is not sent twice.
             let next_s = stream.due_s + interval_s;
             stream.due_s = if next_s > now_s { next_s } else { now_s + interval_s };
         }
@@ -374,7 +384,8 @@ impl Streams {
         self.at_least_every(message_id, HURRIED_S);
     }
 
-    /// Sends a message at most this long after the last one; on a slow line as often as it takes half of it.
+    /// Sends a message at most this long after the last one; on a slow line as often as it takes
+    /// half of it.
     pub(crate) fn at_least_every(&mut self, message_id: u32, interval_s: f64) {
         let half_bytes_s = 0.5 * f64::from(self.capacity_bytes_s);
         let slow = is_slow(self.capacity_bytes_s);
@@ -400,7 +411,8 @@ impl Streams {
         self.each.iter().map(|stream| stream.interval_s).collect()
     }
 
-    /// MAV_CMD_SET_MESSAGE_INTERVAL: -1 off, 0 default, else microseconds; the result and, if refused, why.
+    /// MAV_CMD_SET_MESSAGE_INTERVAL: -1 off, 0 default, else microseconds; the result and, if
+    /// refused, why.
     pub fn set_interval(
         &mut self,
         message_id: u32,
@@ -475,14 +487,14 @@ fn is_vital(message_id: u32) -> bool {
     matches!(message_id, HEARTBEAT_DATA::ID | TD_FLIGHT_STATUS_DATA::ID)
 }
 
-// Tells the stations what the check on the pad finds, and what went wrong in the flight: one value after the other, again and
-// again.
+// Tells the stations what the check on the pad finds, and what went wrong in the flight: one value
+// after the other, again and again.
 //
-// The values are requested messages, after all telemetry: there is room for them on the pad within a radio's budget, and in
-// flight they wait.
+// The values are requested messages, after all telemetry: there is room for them on the pad within
+// a radio's budget, and in flight they wait.
 
-/// While a check runs, and until every value has been told twice after it, a value is told each so many seconds: 250 B/s
-/// when signed.
+/// While a check runs, and until every value has been told twice after it, a value is told each so
+/// many seconds: 250 B/s when signed.
 const OFTEN_S: f64 = 0.2;
 /// Later, and for what went wrong: for a station that comes late.
 const SELDOM_S: f64 = 1.0;

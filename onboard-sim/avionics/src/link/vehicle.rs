@@ -1,4 +1,5 @@
-//! A vehicle as its links see it: its flight computer with the input that it keeps, and what stands beside them.
+//! A vehicle as its links see it: its flight computer with the input that it keeps, and what stands
+//! beside them.
 
 use alloc::string::String;
 
@@ -20,8 +21,9 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector2, Vector3};
 use protocol::mission::MissionHash;
 use protocol::motion::Degrees;
 
-/// Under a parachute that carries the fall is slower than this, m/s (canopies are sized for 6, an open fall is 20 to 40),
-/// and more than this share of the weight is felt: right after apogee the fall is slow, too, but free.
+/// Under a parachute that carries the fall is slower than this, m/s (canopies are sized for 6, an
+/// open fall is 20 to 40), and more than this share of the weight is felt: right after apogee the
+/// fall is slow, too, but free.
 const CARRIED_M_S: f64 = 10.0;
 const CARRIED_WEIGHTS: f64 = 0.5;
 
@@ -159,8 +161,9 @@ impl<'a> VehicleState<'a> {
         airframe.above_feet_m(MassModel::new(&airframe.mass, propellant_kg).at(burnt_kg).cg_station_m)
     }
 
-    /// Time since T+0, s; stands still after touchdown. As in the log: since the release, which lights the ascent motor on
-    /// a pad and lets the vehicle fall elsewhere (see [`flight::computer::flight_time_s`]).
+    /// Time since T+0, s; stands still after touchdown. As in the log: since the release, which
+    /// lights the ascent motor on a pad and lets the vehicle fall elsewhere (see
+    /// [`flight::computer::flight_time_s`]).
     pub fn since_zero_s(&self) -> Option<f64> {
         let air = self.airborne()?;
         Some(self.judged.map_or(air.flown.time_s, |judged| judged.time_s - air.released_at_s))
@@ -210,8 +213,8 @@ impl<'a> VehicleState<'a> {
         Some(Planned { plan, time_to_go_s: plan.left_s(air.flown.time_s) })
     }
 
-    /// Where the present velocity leads to on the ground, in the world's axes, m; NaN where a parachute will take it there.
-    /// Where that leads is known once it drifts with the wind.
+    /// Where the present velocity leads to on the ground, in the world's axes, m; NaN where a
+    /// parachute will take it there. Where that leads is known once it drifts with the wind.
     pub fn touchdown_m(&self, air: &Airborne<'_>) -> Vector2<f64> {
         let (place, velocity) = (&air.estimate.state.position_m, &air.estimate.state.velocity_m_s);
         if self.phase().before_apogee() {
@@ -264,15 +267,16 @@ pub struct Planned<'a> {
 }
 
 impl Planned<'_> {
-    /// Its end. A plan that misses its end by no more than `landing_miss` counts as a landing: it ends on the ground.
+    /// Its end. A plan that misses its end by no more than `landing_miss` counts as a landing: it
+    /// ends on the ground.
     pub fn end(&self, landing_miss: f64) -> Touchdown {
         let end = self.plan.touchdown();
         let on_ground = end.height_m.abs() <= landing_miss;
         Touchdown { height_m: if on_ground { 0.0 } else { end.height_m }, ..end }
     }
 
-    /// Up to `N` points of its path, evenly spread, both ends kept, and how many: north and up, m, as it looks from the east,
-    /// where the path that is flown is seen from too.
+    /// Up to `N` points of its path, evenly spread, both ends kept, and how many: north and up, m,
+    /// as it looks from the east, where the path that is flown is seen from too.
     pub fn path_from_the_east<const N: usize>(&self) -> ([(f64, f64); N], usize) {
         let states = self.plan.states();
         let count = states.len().min(N);

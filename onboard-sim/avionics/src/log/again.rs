@@ -1,4 +1,5 @@
-//! The flight computer of a log, run again on its recorded frames. A replay and a board use the same code.
+//! The flight computer of a log, run again on its recorded frames. A replay and a board use the
+//! same code.
 
 use flight::computer::saved::{LONGEST_RESET_S, Saved};
 use flight::computer::{Computer, Output, flight_time_s};
@@ -33,8 +34,8 @@ pub enum FrameError {
     },
 }
 
-/// A flight computer that is run on the frames of a log, from its start record on. Frames must come in order. Missing frames
-/// mean that the computer was restarted: it is restarted here, too.
+/// A flight computer that is run on the frames of a log, from its start record on. Frames must come
+/// in order. Missing frames mean that the computer was restarted: it is restarted here, too.
 #[derive(Debug, Clone)]
 pub struct RecordedComputer {
     computer: Computer,
@@ -43,7 +44,8 @@ pub struct RecordedComputer {
     rehearsed: bool,
 }
 
-/// The mission as it was flown, with the values that its start record adds, but for the keys that are `decided` otherwise.
+/// The mission as it was flown, with the values that its start record adds, but for the keys that
+/// are `decided` otherwise.
 pub fn mission_flown(mut mission: Mission, start: &ComputerStart, decided: impl Fn(&str) -> bool) -> Mission {
     if let (Some(launch), Some(foot_m)) = (&mut mission.launch, &start.rail_m) {
         for (key, value, found) in [
@@ -101,7 +103,8 @@ impl RecordedComputer {
                 return Err(FrameError::Order { frame: number, after: next - 1 });
             }
             if number > next {
-                // It was dead in the missing frames and restarted at the end of the frame before this one.
+                // It was dead in the missing frames and restarted at the end of the frame before
+                // this one.
                 self.computer.restart(flight_time_s(number - 1));
                 self.rehearsed = self.computer.rehearsed().is_some();
             }
@@ -118,7 +121,8 @@ impl RecordedComputer {
         frame
     }
 
-    /// This computer at power-up, after a reset behind which frame `number` is next: it goes on from what was saved.
+    /// This computer at power-up, after a reset behind which frame `number` is next: it goes on
+    /// from what was saved.
     pub fn resume(&mut self, saved: &Saved, number: u64) {
         self.computer.resume(saved, flight_time_s(number.saturating_sub(1)));
         (self.next, self.rehearsed) = (Some(number), false);

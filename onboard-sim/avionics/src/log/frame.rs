@@ -48,8 +48,8 @@ pub fn start_to_log(computer: &Computer) -> v1::ComputerStart {
     }
 }
 
-/// A whole frame as a record; `computer` has just flown it. The result of the rehearsal is recorded in one frame only:
-/// `rehearsed_before` says that an earlier frame has it.
+/// A whole frame as a record; `computer` has just flown it. The result of the rehearsal is recorded
+/// in one frame only: `rehearsed_before` says that an earlier frame has it.
 pub fn frame_to_log(
     input: &Input<'_>,
     output: &Output,

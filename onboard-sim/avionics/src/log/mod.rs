@@ -1,7 +1,7 @@
 //! Converts flights into log records and back, bit for bit.
 //!
-//! The flight code does not know the log, and the log does not know the flight code. Programs that write or replay a
-//! log use this.
+//! The flight code does not know the log, and the log does not know the flight code. Programs that
+//! write or replay a log use this.
 //!
 //! * [`frame`]: the flight computer's frames.
 //! * [`again`]: the flight computer of a log, run again on these frames.

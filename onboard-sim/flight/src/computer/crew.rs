@@ -45,15 +45,16 @@ pub enum Asked {
 }
 }
 
-/// How many people an arming and a start take. Without one of these there are no operators, and whoever is heard
-/// commands.
+/// How many people an arming and a start take. Without one of these there are no operators, and
+/// whoever is heard commands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum People {
     /// Every operator alone.
     One,
     /// Two of different roles.
     Two {
-        /// Number of the first ask since power-up, another one at each boot: a confirmation from before it names none.
+        /// Number of the first ask since power-up, another one at each boot: a confirmation from
+        /// before it names none.
         first_ask: u16,
     },
 }
@@ -61,7 +62,8 @@ pub enum People {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Request {
     pub asked: Asked,
-    /// How well the requesting station is heard. [`Uplink::NotNeeded`] for the vehicle's own programme.
+    /// How well the requesting station is heard. [`Uplink::NotNeeded`] for the vehicle's own
+    /// programme.
     pub uplink: Uplink,
     /// `None` for the vehicle's own programme.
     pub station: Option<Station>,
@@ -104,8 +106,8 @@ impl Answer {
     pub(super) const ACCEPTED: Self = Self { ending: Ending::Accepted, reason: None };
 }
 
-/// Whether the vehicle is already in the requested state. A repeated request is accepted: a refusal would alarm the
-/// crew.
+/// Whether the vehicle is already in the requested state. A repeated request is accepted: a refusal
+/// would alarm the crew.
 pub(super) fn is_so_already(mode: &Mode, asked: Asked) -> bool {
     let locks = mode.interlocks;
     match asked {
@@ -120,8 +122,9 @@ pub(super) fn is_so_already(mode: &Mode, asked: Asked) -> bool {
     }
 }
 
-/// The event for a request; `None` for one that is no matter of the phase table. A countdown is of this length, before a
-/// flight that starts there, and `abort` is the event that an abort would be now; `lifted_off`: the vehicle has left its rail.
+/// The event for a request; `None` for one that is no matter of the phase table. A countdown is of
+/// this length, before a flight that starts there, and `abort` is the event that an abort would be
+/// now; `lifted_off`: the vehicle has left its rail.
 pub(super) fn event_of(
     asked: Asked,
     checks: &[Check],
@@ -146,8 +149,8 @@ pub(super) fn event_of(
 
 /// The answer to a request whose event the table has refused; the crew is told the reason.
 pub(super) fn refused(table: &mut PhaseTable, asked: Asked, refusal: Refusal, checks: &[Check]) -> Answer {
-    // The first answer may have been lost: a latched abort is accepted again, also under the parachute and on the
-    // ground.
+    // The first answer may have been lost: a latched abort is accepted again, also under the
+    // parachute and on the ground.
     let latched = asked == Asked::Abort && table.mode().interlocks.abort_latched;
     if latched || refusal == Refusal::AlreadyAborted {
         return Answer::ACCEPTED;
@@ -165,7 +168,8 @@ pub(super) fn refused(table: &mut PhaseTable, asked: Asked, refusal: Refusal, ch
     Answer { ending, reason: Some(reason) }
 }
 
-// Decides the crew's requests, and holds the countdown when the commanding station falls silent or a tap is overdue.
+// Decides the crew's requests, and holds the countdown when the commanding station falls silent or
+// a tap is overdue.
 
 /// What the computer remembers of its crew.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
@@ -254,7 +258,8 @@ impl Computer {
             let shared = act_of(asked).is_some() && people != People::One;
             return shared.then(|| "two people arm and start, not the vehicle by itself".into());
         }
-        // Whoever holds any key of this crew may stop the launch: the links let nobody else through.
+        // Whoever holds any key of this crew may stop the launch: the links let nobody else
+        // through.
         if matches!(asked, Asked::Abort | Asked::Hold) {
             return None;
         }
@@ -265,8 +270,9 @@ impl Computer {
         }
     }
 
-    /// Why nobody starts from there now. Who starts is who armed: the station whose silence holds the countdown. Of two people
-    /// one taps, too, and they may start from any two of their stations.
+    /// Why nobody starts from there now. Who starts is who armed: the station whose silence holds
+    /// the countdown. Of two people one taps, too, and they may start from any two of their
+    /// stations.
     fn why_not_start(&self, request: &Request) -> Option<String> {
         let station = request.station.filter(|_| !matches!(self.input.people, Some(People::Two { .. })));
         let armed_by = self.input.commander.filter(|_| self.table.mode().interlocks.armed);
@@ -279,7 +285,8 @@ impl Computer {
         None
     }
 
-    /// Asks or confirms, if this takes two people; the answer to an ask, and to a wrong confirmation, is an error.
+    /// Asks or confirms, if this takes two people; the answer to an ask, and to a wrong
+    /// confirmation, is an error.
     fn agree(&mut self, request: &Request) -> Result<Option<Agreed>, Answer> {
         let Request { asked, station, by, confirms, .. } = *request;
         let (first_ask, act) = match (self.input.people, act_of(asked)) {
@@ -313,7 +320,8 @@ impl Computer {
         let two_person = &mut self.crew.two_person;
         match (asked, agreed) {
             (Asked::Arm, Some((ask, _))) => two_person.armed(ask),
-            // Whose station commands is watched by its silence already: the other one of the two taps.
+            // Whose station commands is watched by its silence already: the other one of the two
+            // taps.
             (Asked::Start, Some((ask, confirmed_by))) if commands(confirmed_by) => {
                 two_person.begin_taps(ask.by, time_s);
             }
@@ -388,7 +396,8 @@ impl Computer {
         Answer::ACCEPTED
     }
 
-    /// Holds the countdown if the station that armed the vehicle has fallen silent, or hears nothing of the vehicle.
+    /// Holds the countdown if the station that armed the vehicle has fallen silent, or hears
+    /// nothing of the vehicle.
     pub(super) fn watch_the_commander(&mut self, input: &KeptInput) {
         let Some(Commander { station, age_s, by, deaf }) = input.commander else { return };
         // An age that is not a number is no sign of life.
@@ -414,7 +423,8 @@ impl Computer {
         self.table.happen(Event::Hold { cause, start }).is_ok()
     }
 
-    /// Holds the countdown if the tap of whoever confirmed the start is overdue. After the release taps mean nothing.
+    /// Holds the countdown if the tap of whoever confirmed the start is overdue. After the release
+    /// taps mean nothing.
     pub(super) fn watch_the_taps(&mut self) {
         if self.table.mode().countdown_end_s.is_none() {
             self.crew.two_person.end_taps();

@@ -1,8 +1,9 @@
 //! One number for everything that the flight computer remembers.
 //!
-//! What is hashed is what `serde` writes of [`Computer`]. A field that cannot decide the future (a constant of the mission,
-//! workspace that is written before it is read, the last input) has `#[serde(skip)]` and its reason where it is declared,
-//! so a new field counts unless somebody says otherwise.
+//! What is hashed is what `serde` writes of [`Computer`]. A field that cannot decide the future (a
+//! constant of the mission, workspace that is written before it is read, the last input) has
+//! `#[serde(skip)]` and its reason where it is declared, so a new field counts unless somebody says
+//! otherwise.
 
 use core::hash::Hasher as _;
 
@@ -12,7 +13,8 @@ use twox_hash::XxHash64;
 
 use super::Computer;
 
-/// Bytes that are given to the hash at once. Word by word, the hash took a third of the time of `replay verify`.
+/// Bytes that are given to the hash at once. Word by word, the hash took a third of the time of
+/// `replay verify`.
 const BLOCK: usize = 1024;
 
 /// The hash being computed, XXH64, as a place that postcard writes to.
@@ -26,7 +28,8 @@ struct Digest {
 impl Digest {
     fn of(remembered: &impl Serialize) -> u64 {
         let empty = Self { hash: XxHash64::with_seed(0), block: [0; BLOCK], waiting: 0 };
-        // It cannot fail: nothing here refuses a byte, and every list of the computer knows its length.
+        // It cannot fail: nothing here refuses a byte, and every list of the computer knows its
+        // length.
         postcard::serialize_with_flavor(remembered, empty).unwrap_or_default()
     }
 
@@ -73,7 +76,8 @@ pub(super) fn checksum(bytes: &[u8]) -> u64 {
 }
 
 impl Computer {
-    /// A number that changes with anything that the computer remembers, to compare a replay with a log.
+    /// A number that changes with anything that the computer remembers, to compare a replay with a
+    /// log.
     pub fn digest(&self) -> u64 {
         Digest::of(self)
     }
@@ -115,7 +119,8 @@ mod tests {
         }
     }
 
-    /// The digest does not depend on how the bytes are divided into blocks, and it is never the number of a failure.
+    /// The digest does not depend on how the bytes are divided into blocks, and it is never the
+    /// number of a failure.
     #[test]
     fn the_digest_is_the_hash_of_all_that_postcard_writes() {
         let long = "x".repeat(3 * BLOCK);

@@ -1,7 +1,9 @@
-//! What went wrong in a flight, from what its computer knows: first in time, each with the numbers that it rests on.
+//! What went wrong in a flight, from what its computer knows: first in time, each with the numbers
+//! that it rests on.
 //!
-//! [`Findings::note`] looks at the computer after each of its frames. Nothing on board depends on it: the vehicle sends what
-//! was found, and a report begins with it. The truth of a simulation is not used, because a real flight has none.
+//! [`Findings::note`] looks at the computer after each of its frames. Nothing on board depends on
+//! it: the vehicle sends what was found, and a report begins with it. The truth of a simulation is
+//! not used, because a real flight has none.
 //!
 //! Each [`Sign`] has one rule, in [`Watcher::seen`] and [`RULES`].
 
@@ -60,7 +62,8 @@ pub enum Sign {
     Latched,
 }
 
-/// Every sign, and how long it must last to be a finding, s. A moment of it is noise, a dropped sample or a gust.
+/// Every sign, and how long it must last to be a finding, s. A moment of it is noise, a dropped
+/// sample or a gust.
 const RULES: [(Sign, f64); 25] = [
     (Sign::Restart, 0.0),
     (Sign::Gnss, 0.0),
@@ -228,19 +231,22 @@ impl Findings {
     }
 }
 
-/// The same where its last fix came before the boost was over, s: none of three receivers keeps its fix in a boost.
+/// The same where its last fix came before the boost was over, s: none of three receivers keeps its
+/// fix in a boost.
 const GNSS_LOST_IN_BOOST_S: f64 = 6.0;
-/// Where the lidar must see the ground: from this slant range, m, down to the dust, and while its beam leans less than this
-/// (40 deg).
+/// Where the lidar must see the ground: from this slant range, m, down to the dust, and while its
+/// beam leans less than this (40 deg).
 const LIDAR_SEES_M: [f64; 2] = [3.0, 7.0];
 const LIDAR_COS_TILT: f64 = 0.766;
 /// Beyond this tilt (60 deg) the nose is astray: no plan leans so far.
 const ASTRAY_COS_TILT: f64 = 0.5;
-/// A gimbal and a fin this far from where their servo's data take them do not follow, rad. Feedback, play and an unknown
-/// half frame of delay make 1 deg of it for a gimbal; the fins' feedback is coarser.
+/// A gimbal and a fin this far from where their servo's data take them do not follow, rad.
+/// Feedback, play and an unknown half frame of delay make 1 deg of it for a gimbal; the fins'
+/// feedback is coarser.
 const AWAY_RAD: [f64; 2] = [0.035, 0.14];
-/// A gimbal that never turned by this share of its servo's rate, in so many frames that asked for more, is slow. One that is as its
-/// data say turns by 0.6 of it at least (388 flights of mk2 and mk3 in `real`).
+/// A gimbal that never turned by this share of its servo's rate, in so many frames that asked for
+/// more, is slow. One that is as its data say turns by 0.6 of it at least (388 flights of mk2 and
+/// mk3 in `real`).
 const SLOW: f64 = 0.55;
 const SLOW_FRAMES: u32 = 40;
 /// Common regulators of 5 V give up here, V.
@@ -258,7 +264,8 @@ const SHOCK_S: f64 = 0.1;
 const IMPULSE_SIGMAS: f64 = 3.0;
 /// A tail-off is not known better, s.
 const EARLY_S: f64 = 0.3;
-/// The barometer and the other heights differ by less, m: 3 m of the pressure of the own exhaust, and a slow offset.
+/// The barometer and the other heights differ by less, m: 3 m of the pressure of the own exhaust,
+/// and a slow offset.
 const HEIGHTS_APART_M: f64 = 6.0;
 /// Below this height a plan ends, m.
 const PLANS_ABOVE_M: f64 = 2.0;
@@ -276,7 +283,8 @@ struct Watcher {
     surfaces: [ServoModel; SURFACES],
     /// Where the gimbal was in the frame before, rad.
     gimbal_rad: [f64; 2],
-    /// In the burn: the frames in which each axis had to turn fast, and how far it turned in one at most, rad.
+    /// In the burn: the frames in which each axis had to turn fast, and how far it turned in one at
+    /// most, rad.
     turns: [(u32, f64); 2],
     /// Specific force along the nose over the boost, m/s.
     boost_m_s: f64,
@@ -285,7 +293,8 @@ struct Watcher {
     parted_s: Option<f64>,
     /// Since when the lidar must see the ground, s.
     must_see_s: Option<f64>,
-    /// The nose was astray in the burn: what is felt along it tells little of the motor from then on.
+    /// The nose was astray in the burn: what is felt along it tells little of the motor from then
+    /// on.
     astray: bool,
     /// A foot has touched the ground: nothing after it was the flight's.
     down: bool,

@@ -1,10 +1,12 @@
 //! The flight computer: everything that decides on board, from power-up to safed.
 //!
-//! [`Computer::step`] is the only way to advance it: one [`Input`] a frame, one [`Output`] back, and the same inputs
-//! give the same outputs, bit for bit. Self-test, pin, arming, countdown, release, descent, landing, abort and safing
-//! are all decided here, through one [phase table](crate::rules::phase).
+//! [`Computer::step`] is the only way to advance it: one [`Input`] a frame, one [`Output`] back,
+//! and the same inputs give the same outputs, bit for bit. Self-test, pin, arming, countdown,
+//! release, descent, landing, abort and safing are all decided here, through one [phase
+//! table](crate::rules::phase).
 //!
-//! * [`table`]: the phase table as the computer uses it: each event goes through it once; what an abort would do now.
+//! * [`table`]: the phase table as the computer uses it: each event goes through it once; what an
+//!   abort would do now.
 //! * [`crew`]: the crew's requests, and the decision about each.
 //! * [`findings`]: what went wrong in a flight.
 //! * [`news`]: the computer's messages to the crew.
@@ -62,7 +64,8 @@ pub const FRAME_S: f64 = FRAME_MS as f64 * 1e-3;
 /// Time on the ground after which the flight is over, s.
 const AT_REST_S: f64 = 1.0;
 
-/// From this sine of its opening on a fin is out of the way of what leaves the hatch: mk3's end then stands 8 cm off the skin.
+/// From this sine of its opening on a fin is out of the way of what leaves the hatch: mk3's end
+/// then stands 8 cm off the skin.
 const HATCH_FREE_SINE: f64 = 0.7;
 
 /// When the vehicle was released.
@@ -102,7 +105,8 @@ pub struct Computer {
     motor_watch: MotorWatch,
     crew: CrewMemory,
     fins_answering: [bool; 4],
-    /// What the fins' feedback said of the closed fins before the self-test moved them, less the angle of closed fins, rad.
+    /// What the fins' feedback said of the closed fins before the self-test moved them, less the
+    /// angle of closed fins, rad.
     fins_zero_rad: [f64; 4],
     pad_check: PadCheck,
     /// The servos of a vehicle that tell nothing, from the first frame on.
@@ -112,8 +116,9 @@ pub struct Computer {
 }
 
 impl Computer {
-    /// One frame. In the air: take over a plan that is ready, estimate, answer the crew, decide, pose the next plan, point. On
-    /// the pad: answer the crew, and wait. At the end, and nowhere else, the outputs follow from the mode that the frame ends in.
+    /// One frame. In the air: take over a plan that is ready, estimate, answer the crew, decide,
+    /// pose the next plan, point. On the pad: answer the crew, and wait. At the end, and nowhere
+    /// else, the outputs follow from the mode that the frame ends in.
     pub fn step(&mut self, input: &Input<'_>) -> Output {
         let mut input = self.with_silent_servos(input);
         let measured = &mut input.kept.measured;
@@ -188,8 +193,8 @@ impl Computer {
         Input { kept, ..*input }
     }
 
-    /// Whether no fin is over the parachute's hatch: they stand open, or have had the time of their servos since they were told
-    /// to. One that is stuck keeps no parachute in.
+    /// Whether no fin is over the parachute's hatch: they stand open, or have had the time of their
+    /// servos since they were told to. One that is stuck keeps no parachute in.
     fn hatch_is_free(&self, input: &KeptInput) -> bool {
         let airframe = &self.pilot.mission().airframe;
         let fins = &airframe.fins;
@@ -212,7 +217,8 @@ impl Computer {
         }
     }
 
-    /// Commands fins and gimbal as the pilot points them, and reports a shut gate and another control level.
+    /// Commands fins and gimbal as the pilot points them, and reports a shut gate and another
+    /// control level.
     fn take_over(&mut self, pointed: Pointed) {
         let Pointed { gimbal_rad, fins_rad, level } = pointed;
         let phase = self.table.mode().phase;
@@ -222,7 +228,8 @@ impl Computer {
         }
         self.gate_told = refusal;
         self.commands = Commands { gimbal_rad, fins_rad, ..self.commands };
-        // A new plan, converged or nearly, is what is expected: it is told after one that was missed.
+        // A new plan, converged or nearly, is what is expected: it is told after one that was
+        // missed.
         let misses = |level| matches!(level, ControlLevel::ShiftedPlan | ControlLevel::Stabiliser);
         if phase.in_landing_burn() && level != self.level && (misses(level) || misses(self.level)) {
             self.table.say(Severity::Notice, format!("controller level {}", level.name()));
@@ -230,7 +237,8 @@ impl Computer {
         self.level = level;
     }
 
-    /// Changes that come with time alone, in every frame: a hold ends, a motor cools, the vehicle is SAFED.
+    /// Changes that come with time alone, in every frame: a hold ends, a motor cools, the vehicle
+    /// is SAFED.
     fn keep_time(&mut self) {
         let (mode, time_s) = (*self.table.mode(), self.table.time_s());
         if mode.held(time_s).is_some_and(|(_, left_s)| left_s <= 0.0) {
@@ -276,13 +284,14 @@ impl Computer {
         self.table.latch()
     }
 
-    /// Time before the release from which on nothing holds the countdown, s; `None` if a hold comes in time until then.
+    /// Time before the release from which on nothing holds the countdown, s; `None` if a hold comes
+    /// in time until then.
     pub fn last_hold_s(&self) -> Option<f64> {
         self.start_point().last_hold_s()
     }
 
-    /// Whether the flight is over: the vehicle lies on the ground, or was aborted on the pad. SAFED depends on the
-    /// motor: it may come much later, or never.
+    /// Whether the flight is over: the vehicle lies on the ground, or was aborted on the pad. SAFED
+    /// depends on the motor: it may come much later, or never.
     pub fn is_over(&self) -> bool {
         let mode = self.table.mode();
         let in_phase_s = self.table.time_s() - mode.entered_at_s;
@@ -338,8 +347,9 @@ impl Computer {
     }
 }
 
-/// Time since its release at the end of a frame, s: what crews and logs call T+. A flight from a pad is released when its
-/// ascent motor is lit; a flight from apogee or below a drone, when it begins to fall.
+/// Time since its release at the end of a frame, s: what crews and logs call T+. A flight from a
+/// pad is released when its ascent motor is lit; a flight from apogee or below a drone, when it
+/// begins to fall.
 pub fn flight_time_s(frame: u64) -> f64 {
     // Saturating, because a recorded frame may have any number.
     frame.saturating_mul(u64::from(FRAME_MS)) as f64 * 1e-3
@@ -360,7 +370,8 @@ impl LogState {
     pub const NONE: Self = Self { running: false, space_bytes: 0 };
 }
 
-/// Result of a rehearsal of the landing: of a [planned](Computer::rehearse) one, or of one in a simulated world.
+/// Result of a rehearsal of the landing: of a [planned](Computer::rehearse) one, or of one in a
+/// simulated world.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Rehearsed {
     /// It found plans, and landed on its legs.
@@ -484,7 +495,8 @@ pub struct Commands {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Output {
     pub commands: Commands,
-    /// The countdown has ended in this frame: the simulation releases the vehicle where its flight begins.
+    /// The countdown has ended in this frame: the simulation releases the vehicle where its flight
+    /// begins.
     pub released: bool,
     /// An answer to each request, in order.
     pub answers: Vec<Answer>,

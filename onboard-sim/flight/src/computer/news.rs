@@ -72,8 +72,8 @@ pub(super) fn words_of_landing_here(before: Interlocks, mode: &Mode) -> Option<(
     (after.lands_in_place && !before.lands_in_place).then_some((Severity::Critical, words))
 }
 
-/// A check that fails for so long is told, and holds the countdown, s: a contact that bounces, or one lost sample, is shorter,
-/// and a sensor that dies has shown how by then.
+/// A check that fails for so long is told, and holds the countdown, s: a contact that bounces, or
+/// one lost sample, is shorter, and a sensor that dies has shown how by then.
 const FAILS_FOR_S: f64 = 0.1;
 
 /// The failing arming check that the crew on the pad was last told of, and since when one fails, s.
@@ -84,9 +84,9 @@ pub(super) struct Readiness {
 }
 
 impl Readiness {
-    /// Why the vehicle may not be armed or started, and whether the crew is still to be told: the first check that fails, once
-    /// one has failed for [`FAILS_FOR_S`]. The uplink is left out: it comes and goes with every lost heartbeat, and each station
-    /// is told of its own uplink anyway.
+    /// Why the vehicle may not be armed or started, and whether the crew is still to be told: the
+    /// first check that fails, once one has failed for [`FAILS_FOR_S`]. The uplink is left out: it
+    /// comes and goes with every lost heartbeat, and each station is told of its own uplink anyway.
     pub(super) fn failing(&mut self, checks: &[Check], time_s: f64) -> Option<(String, bool)> {
         let Some(check) = checks.iter().find(|check| !check.passed && check.name != UPLINK_CHECK) else {
             *self = Self::default();
@@ -100,8 +100,8 @@ impl Readiness {
     }
 }
 
-// Tells the crew each change of the landing motor's state: the safety of anyone who approaches the vehicle depends on
-// it.
+// Tells the crew each change of the landing motor's state: the safety of anyone who approaches the
+// vehicle depends on it.
 
 /// The state that the crew was last told of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

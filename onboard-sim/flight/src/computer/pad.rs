@@ -1,5 +1,6 @@
-//! Finds from the sensors whether the vehicle stands still on its pad, or how it hangs below its drone, and in which
-//! attitude; the self-test, the arming checks, and all that happens from power-up to the release.
+//! Finds from the sensors whether the vehicle stands still on its pad, or how it hangs below its
+//! drone, and in which attitude; the self-test, the arming checks, and all that happens from
+//! power-up to the release.
 
 use alloc::format;
 use alloc::vec::Vec;
@@ -20,8 +21,8 @@ use crate::vehicle::rigid::{RigidState, upright};
 /// The stance is evaluated every so many frames: once a second.
 const WINDOW_FRAMES: u32 = 200;
 
-/// A hanging vehicle that feels less than this, m/s^2, for [`FALLING_FRAMES`] has been let go. A swing of 30 degrees takes
-/// at most a quarter of its weight away.
+/// A hanging vehicle that feels less than this, m/s^2, for [`FALLING_FRAMES`] has been let go. A
+/// swing of 30 degrees takes at most a quarter of its weight away.
 const FALLING_M_S2: f64 = 3.0;
 /// 0.1 s, in which it falls by 5 cm.
 const FALLING_FRAMES: u32 = 20;
@@ -52,9 +53,11 @@ impl Stance {
 /// Result of one second on the pad.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 struct PadSecond {
-    /// Attitude with the heading of the pad, and the gyro's bias, rad/s; `None` if the vehicle was not at rest.
+    /// Attitude with the heading of the pad, and the gyro's bias, rad/s; `None` if the vehicle was
+    /// not at rest.
     at_rest: Option<PadStart>,
-    /// Mean angle between the axis and what is felt, rad: the tilt of a vehicle that hangs still in the mean.
+    /// Mean angle between the axis and what is felt, rad: the tilt of a vehicle that hangs still in
+    /// the mean.
     lean_rad: f64,
     /// Mean pressure altitude, m; NaN without a sample.
     pressure_altitude_m: f64,
@@ -103,8 +106,8 @@ impl PadWatch {
             at_rest: self.record.take(&over.alignment, 0.0).ok(),
             lean_rad: libm::atan2(across_m_s2, over.force_sum_m_s2.x),
             pressure_altitude_m: over.altitude_sum_m / f64::from(over.pressures),
-            // A second without a fix tells no speed; that there is none is a check of its own. Before the first fix this is zero by
-            // zero: NaN, which passes no check.
+            // A second without a fix tells no speed; that there is none is a check of its own.
+            // Before the first fix this is zero by zero: NaN, which passes no check.
             velocity_m_s: match over.found.filter(|_| over.fixes == 0) {
                 Some(before) => before.velocity_m_s,
                 None => over.velocity_sum_m_s / f64::from(over.fixes),
@@ -112,7 +115,8 @@ impl PadWatch {
         });
     }
 
-    /// Attitude and motion on the pad, or below a drone, of a vehicle whose gyro shows a rate, body, rad/s.
+    /// Attitude and motion on the pad, or below a drone, of a vehicle whose gyro shows a rate,
+    /// body, rad/s.
     pub(super) fn stance(&self, hangs: bool, measured_rad_s: Vector3<f64>) -> Stance {
         let Some(found) = &self.found else { return Stance::UNKNOWN };
         let bias_rad_s =
@@ -161,11 +165,11 @@ impl PadWatch {
 
 /// Fins and gimbal are moved by this much, rad.
 const MOVED_RAD: f64 = 0.05;
-/// An actuator farther than this from its command counts as not answering, rad; one that has moved by this much answers. It is
-/// more than the play of a linkage.
+/// An actuator farther than this from its command counts as not answering, rad; one that has moved
+/// by this much answers. It is more than the play of a linkage.
 pub(super) const ANSWERING_RAD: f64 = 0.02;
-/// The feedback of a closed fin may be off by this much, rad: fins are set by eye, their potentiometers glued. One tooth of a servo's
-/// spline is 0.25 rad (25 teeth).
+/// The feedback of a closed fin may be off by this much, rad: fins are set by eye, their
+/// potentiometers glued. One tooth of a servo's spline is 0.25 rad (25 teeth).
 const ZERO_MAX_RAD: f64 = 0.06;
 /// Servos have reached their rest so long after power-up, s.
 const REST_S: f64 = 0.5;
@@ -195,7 +199,8 @@ pub(super) enum TestStep {
 }
 
 impl SelfTest {
-    /// Called until the test has passed, with the time since power-up. `answering`: every actuator has reached its commanded angle.
+    /// Called until the test has passed, with the time since power-up. `answering`: every actuator
+    /// has reached its commanded angle.
     pub(super) fn step(&mut self, answering: bool, since_s: f64) -> TestStep {
         match self {
             Self::NotBegun if since_s >= REST_S => {
@@ -281,8 +286,8 @@ impl Computer {
         arming_checks(&self.arming, &input)
     }
 
-    /// Asks every arming check again: while the vehicle waits the crew is told, and a check that fails in the countdown holds
-    /// it, until the igniter has its current.
+    /// Asks every arming check again: while the vehicle waits the crew is told, and a check that
+    /// fails in the countdown holds it, until the igniter has its current.
     pub(super) fn ask_the_checks_again(&mut self) {
         let checks = self.arming_checks();
         let armed = match self.table.mode().phase {
@@ -348,7 +353,8 @@ impl Computer {
         self.pilot.mission().start.at
     }
 
-    /// Moves every actuator and brings it back. The test is not passed before the sensors were felt for a second.
+    /// Moves every actuator and brings it back. The test is not passed before the sensors were felt
+    /// for a second.
     fn test_itself(&mut self, input: &KeptInput) {
         let gimbal = self.commands.gimbal_rad.iter().zip(&input.gimbal_rad);
         let answering = gimbal.clone().all(|(told, found)| (told - found).abs() <= ANSWERING_RAD)
@@ -359,7 +365,8 @@ impl Computer {
             TestStep::Command(angle_rad) => {
                 let closed_rad = self.closed_rad();
                 if self.self_test == SelfTest::Moved {
-                    // An actuator answers if it moves as it is told: its feedback may have a zero of its own.
+                    // An actuator answers if it moves as it is told: its feedback may have a zero
+                    // of its own.
                     let off_rad = input.fins_rad.map(|fin_rad| fin_rad - closed_rad);
                     self.fins_zero_rad =
                         off_rad.map(|off_rad| if off_rad.abs() <= ZERO_MAX_RAD { off_rad } else { 0.0 });

@@ -1,14 +1,16 @@
-//! How a computer starts; what it saves in every frame, in a memory that keeps it through a reset, and how it goes on from
-//! that.
+//! How a computer starts; what it saves in every frame, in a memory that keeps it through a reset,
+//! and how it goes on from that.
 //!
 //! A reset (a watchdog, a dip of the voltage) takes everything else. A computer that comes back
 //!
-//! * on the pad, not released, is as after power-up, and says so: not armed, no countdown. Only an abort stays latched;
-//! * in the air flies on: phase, latches, motor and the last commands are as they were, the last estimate is carried over the lost
-//!   time, and estimator, plan and gimbal loop start afresh. So under power it holds the nose upright until its next plan.
+//! * on the pad, not released, is as after power-up, and says so: not armed, no countdown. Only an
+//!   abort stays latched;
+//! * in the air flies on: phase, latches, motor and the last commands are as they were, the last
+//!   estimate is carried over the lost time, and estimator, plan and gimbal loop start afresh. So
+//!   under power it holds the nose upright until its next plan.
 //!
-//! [`Saved::read`] refuses bytes that are not whole, so a board keeps two records and writes them in turn: a reset while
-//! one is written leaves the other.
+//! [`Saved::read`] refuses bytes that are not whole, so a board keeps two records and writes them
+//! in turn: a reset while one is written leaves the other.
 
 use alloc::boxed::Box;
 use serde::{Deserialize, Serialize};
@@ -30,8 +32,8 @@ use crate::rules::phase::{Event, Interlocks, Latch, Mode};
 use crate::vehicle::mission::{ArmingLimits, Mission, StartPoint};
 use crate::vehicle::rigid::RigidState;
 
-/// After a longer time without power, s, nothing is taken up: whoever switches a computer off and on again later has a
-/// computer at power-up. No fall that is lost for so long can be saved.
+/// After a longer time without power, s, nothing is taken up: whoever switches a computer off and
+/// on again later has a computer at power-up. No fall that is lost for so long can be saved.
 pub const LONGEST_RESET_S: f64 = 10.0;
 
 /// Bytes of the checksum before the record.
@@ -45,7 +47,8 @@ pub struct Saved {
     time_s: f64,
     mode: Mode,
     latch: Option<Latch>,
-    /// From its release on; it may still stand on its rail under the first current of its ascent motor.
+    /// From its release on; it may still stand on its rail under the first current of its ascent
+    /// motor.
     in_the_air: Option<InTheAir>,
 }
 
@@ -126,8 +129,9 @@ impl Computer {
         Saved { frame: self.input.frame, time_s: self.table.time_s(), mode, latch, in_the_air }
     }
 
-    /// A computer that was just powered up, after a reset: it goes on from what was saved. `time_s` is the vehicle time at
-    /// which it comes back, so a board needs a clock that runs through the reset.
+    /// A computer that was just powered up, after a reset: it goes on from what was saved. `time_s`
+    /// is the vehicle time at which it comes back, so a board needs a clock that runs through the
+    /// reset.
     pub fn resume(&mut self, saved: &Saved, time_s: f64) {
         let lost_s = time_s - saved.time_s;
         if !(0.0..=LONGEST_RESET_S).contains(&lost_s) {
@@ -151,8 +155,8 @@ impl Computer {
         }
     }
 
-    /// Not armed, and without a countdown. The wait after an abort begins again: whoever walks to the pad must not be told
-    /// less.
+    /// Not armed, and without a countdown. The wait after an abort begins again: whoever walks to
+    /// the pad must not be told less.
     fn wake_on_the_pad(&mut self, saved: &Saved, time_s: f64) {
         let Interlocks { armed, abort_latched, landing_motor_inhibited, .. } = saved.mode.interlocks;
         let mut mode = Mode::power_up(time_s);
@@ -178,8 +182,8 @@ impl Computer {
 // Starts of a flight computer: at power-up and at its release; and changes of its settings.
 
 impl Computer {
-    /// The computer at power-up. `believed` is its estimate of the state at the start of the flight; one that
-    /// stands on its rail finds its attitude there by itself.
+    /// The computer at power-up. `believed` is its estimate of the state at the start of the
+    /// flight; one that stands on its rail finds its attitude there by itself.
     pub fn at_power_up(mission: &Mission, believed: &RigidState) -> Self {
         let arming = match (mission.start.at, &mission.drop) {
             (StartPoint::Drone, Some(drop)) => ArmingLimits {
@@ -221,7 +225,8 @@ impl Computer {
         }
     }
 
-    /// The same computer if the vehicle was aborted on its pad in an earlier power-up, at this vehicle time, s: before zero.
+    /// The same computer if the vehicle was aborted on its pad in an earlier power-up, at this
+    /// vehicle time, s: before zero.
     #[must_use]
     pub fn aborted_before(mut self, at_s: f64) -> Self {
         let mode = Mode { aborted_before_s: Some(at_s), ..*self.table.mode() };
@@ -229,15 +234,16 @@ impl Computer {
         self
     }
 
-    /// The same computer after it has found its state and the calibration of its inertial unit on its rail.
+    /// The same computer after it has found its state and the calibration of its inertial unit on
+    /// its rail.
     #[must_use]
     pub fn standing(mut self, believed: &RigidState, calibration: &ImuCalibration) -> Self {
         self.pilot.stand(believed, calibration);
         self
     }
 
-    /// The same computer, released in a frame: for flights that begin without a pad, and for a replay that begins at the
-    /// release.
+    /// The same computer, released in a frame: for flights that begin without a pad, and for a
+    /// replay that begins at the release.
     #[must_use]
     pub fn released(mut self, frame: u64) -> Self {
         self.input.frame = frame;
@@ -351,7 +357,8 @@ mod tests {
         assert_ne!(resumed(&saved, 0.2 + LONGEST_RESET_S).digest(), powered_up().digest());
     }
 
-    /// In every phase: on the pad nothing but an abort is taken up, in the air everything of the mode.
+    /// In every phase: on the pad nothing but an abort is taken up, in the air everything of the
+    /// mode.
     #[test]
     fn every_phase_comes_back_as_stated() {
         for phase in Phase::ALL {

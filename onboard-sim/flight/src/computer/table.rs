@@ -1,5 +1,5 @@
-//! The phase table as the flight computer uses it: every event of a vehicle goes through here once. Also what
-//! an abort would do now.
+//! The phase table as the flight computer uses it: every event of a vehicle goes through here once.
+//! Also what an abort would do now.
 
 use alloc::borrow::ToOwned as _;
 use alloc::string::String;
@@ -71,7 +71,8 @@ impl PhaseTable {
         let countdown_s =
             if let Event::StartRequested { countdown_s, .. } = event { countdown_s } else { 0.0 };
         for effect in next.effects.iter() {
-            // At touchdown, the motor may have been inhibited long before: it is not reported again.
+            // At touchdown, the motor may have been inhibited long before: it is not reported
+            // again.
             let known = effect == Effect::InhibitLandingMotor && before.interlocks.landing_motor_inhibited;
             if let Some((severity, words)) = words_of(effect, countdown_s).filter(|_| !known) {
                 self.say(severity, words);
@@ -110,9 +111,11 @@ pub enum AbortEffect {
     ChuteAtApogee,
     /// Inhibit the landing motor, parachute now.
     ChuteNow,
-    /// Too low for a parachute, and the gate is open: light the landing motor at its height and land on the ground below.
+    /// Too low for a parachute, and the gate is open: light the landing motor at its height and
+    /// land on the ground below.
     Burn,
-    /// Too low for a parachute, and the gate is shut or the motor has not lit: inhibit the landing motor.
+    /// Too low for a parachute, and the gate is shut or the motor has not lit: inhibit the landing
+    /// motor.
     Impact {
         /// Speed at the ground, rounded up, m/s.
         m_s: u8,
@@ -149,13 +152,14 @@ impl Computer {
         self.pilot.abort_event(self.table.mode(), self.flown().as_ref(), &self.sensors)
     }
 
-    /// What an abort would do now. The phase table itself is asked, so the text beside the abort key cannot differ from
-    /// it.
+    /// What an abort would do now. The phase table itself is asked, so the text beside the abort
+    /// key cannot differ from it.
     pub fn abort_effect(&self) -> AbortEffect {
         let mode = self.table.mode();
         let next = transition(mode, self.abort_event(), self.table.time_s());
         let does = |effect| next.effects.contains(effect);
-        // Rounded up to be on the safe side; 254 is the largest value reported, 255 would mean "unknown".
+        // Rounded up to be on the safe side; 254 is the largest value reported, 255 would mean
+        // "unknown".
         let fallen_m_s = self.pilot.impact_m_s().unwrap_or(0.0);
         let impact = || AbortEffect::Impact { m_s: libm::ceil(fallen_m_s).clamp(0.0, 254.0) as u8 };
         // The motor was commanded to light and has not.

@@ -1,15 +1,18 @@
 //! The wanted direction of the nose, and the loop that turns the nose there with the gimbal.
 //!
-//! The landing planner runs every tenth of a second; this loop runs at every frame. It is a second-order law on the
-//! angle between the nose and its aim, in body axes, so roll does not matter. A real nozzle needs three additions:
+//! The landing planner runs every tenth of a second; this loop runs at every frame. It is a
+//! second-order law on the angle between the nose and its aim, in body axes, so roll does not
+//! matter. A real nozzle needs three additions:
 //!
-//! * The effect of commands that have not moved the vehicle yet is predicted (O. J. M. Smith, "Closer control of loops with
-//!   dead time", Chemical Engineering Progress 53, 1957; with the latency of
-//!   servo and linkage in frames). Without it the loop would have to be several times softer.
-//! * The acceleration that the model does not explain (air, a crooked nozzle, a shifted centre of gravity) is
-//!   estimated and compensated (a disturbance observer: W.-H. Chen et al., IEEE Trans. Industrial Electronics 63, 2016).
-//! * The linkage has play. At each reversal the horn must cross it before the nozzle moves, so the command crosses it
-//!   at once (G. Tao and P. V. Kokotovic, Automatica 29, 1993).
+//! * The effect of commands that have not moved the vehicle yet is predicted (O. J. M. Smith,
+//!   "Closer control of loops with dead time", Chemical Engineering Progress 53, 1957; with the
+//!   latency of servo and linkage in frames). Without it the loop would have to be several times
+//!   softer.
+//! * The acceleration that the model does not explain (air, a crooked nozzle, a shifted centre of
+//!   gravity) is estimated and compensated (a disturbance observer: W.-H. Chen et al., IEEE Trans.
+//!   Industrial Electronics 63, 2016).
+//! * The linkage has play. At each reversal the horn must cross it before the nozzle moves, so the
+//!   command crosses it at once (G. Tao and P. V. Kokotovic, Automatica 29, 1993).
 
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
@@ -38,7 +41,8 @@ impl Aim {
         Self::at(Vector3::z())
     }
 
-    /// At rest in a direction, or in the nearest one that leans from the vertical by no more than an angle, rad.
+    /// At rest in a direction, or in the nearest one that leans from the vertical by no more than
+    /// an angle, rad.
     pub fn leaning_at_most(direction: &Vector3<f64>, lean_rad: f64) -> Self {
         let level = libm::hypot(direction.x, direction.y);
         let (sin, cos) = libm::sincos(lean_rad);
@@ -102,11 +106,12 @@ pub struct AimLoop {
     frame_s: f64,
     #[serde(skip)]
     latency_frames: usize,
-    /// Angular accelerations that were commanded but have not acted yet, about body y and z, oldest first, rad/s^2.
+    /// Angular accelerations that were commanded but have not acted yet, about body y and z, oldest
+    /// first, rad/s^2.
     under_way_rad_s2: [[f64; 2]; MAX_LATENCY_FRAMES],
     rate_before_rad_s: Option<[f64; 2]>,
-    /// The angular acceleration about body y and z that the model does not explain, rad/s^2: the sum of the effects of
-    /// a crooked nozzle, a centre of gravity off the axis and the air.
+    /// The angular acceleration about body y and z that the model does not explain, rad/s^2: the
+    /// sum of the effects of a crooked nozzle, a centre of gravity off the axis and the air.
     disturbance_rad_s2: [f64; 2],
     /// The wanted nozzle angle, and the side of the play on which the horn is.
     nozzle_rad: [f64; 2],
@@ -145,8 +150,8 @@ impl AimLoop {
 
     /// Gimbal angles (pitch, yaw), rad, for one frame.
     ///
-    /// `turning_rad_s2` is the rotational acceleration of a unit sine of the gimbal angle, `T (X_CG - X_THR) / I`;
-    /// without thrust the nozzle is centred.
+    /// `turning_rad_s2` is the rotational acceleration of a unit sine of the gimbal angle, `T
+    /// (X_CG - X_THR) / I`; without thrust the nozzle is centred.
     pub fn command_rad(
         &mut self,
         world_from_body: &UnitQuaternion<f64>,

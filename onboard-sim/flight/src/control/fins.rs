@@ -1,10 +1,11 @@
 //! Finds the four opening angles for wanted moments and drag.
 //!
-//! The sines of the openings are written as a mean and one amplitude for each of the patterns pitch, yaw and roll,
-//! which are orthogonal. The effect of the patterns follows Eq. 13-17, with one effect that the paper leaves out: the
-//! lifts cause more than roll. With unequal openings the four alternating lifts leave a side force, which acts at the
-//! fins' station, a distance `a` ahead of the centre of gravity. With `h` the angle from y to an open fin, `g = r(s) s`,
-//! `s = sin kappa`, divided by dynamic pressure and area:
+//! The sines of the openings are written as a mean and one amplitude for each of the patterns
+//! pitch, yaw and roll, which are orthogonal. The effect of the patterns follows Eq. 13-17, with
+//! one effect that the paper leaves out: the lifts cause more than roll. With unequal openings the
+//! four alternating lifts leave a side force, which acts at the fins' station, a distance `a` ahead
+//! of the centre of gravity. With `h` the angle from y to an open fin, `g = r(s) s`, `s = sin
+//! kappa`, divided by dynamic pressure and area:
 //!
 //! ```text
 //! roll  = sum ROLL[i]  C_l g(s_i)
@@ -12,20 +13,21 @@
 //! yaw   = sum YAW[i]   (C_d cos h g(s_i) + a C_l sin h s_i)
 //! ```
 //!
-//! If a command does not fit between the stops, first drag is given up, then roll, then pitch and yaw together, so that
-//! a wanted tilt keeps its direction.
+//! If a command does not fit between the stops, first drag is given up, then roll, then pitch and
+//! yaw together, so that a wanted tilt keeps its direction.
 
 use crate::vehicle::fins::{FinModel, Moments, PITCH, ROLL, YAW};
 
-/// Rounds that correct the amplitudes. The gains are quadratic in the openings; each round leaves about a tenth of the
-/// error.
+/// Rounds that correct the amplitudes. The gains are quadratic in the openings; each round leaves
+/// about a tenth of the error.
 const ROUNDS: usize = 8;
-/// Smallest slope that a correction divides by, as a fraction of the slope of half-open fins: almost closed fins have a
-/// weak effect, and their lift can cancel the moment of their drag.
+/// Smallest slope that a correction divides by, as a fraction of the slope of half-open fins:
+/// almost closed fins have a weak effect, and their lift can cancel the moment of their drag.
 const SLOPE_FLOOR: f64 = 0.2;
 
-/// The share of the room between the stops that pitch and yaw may fill. The rest is kept for the roll: with all of it a tilt that
-/// saturates let mk2 below its drone roll at 1.3 rad/s, which the ignition gate forbids.
+/// The share of the room between the stops that pitch and yaw may fill. The rest is kept for the
+/// roll: with all of it a tilt that saturates let mk2 below its drone roll at 1.3 rad/s, which the
+/// ignition gate forbids.
 const FOR_TILT: f64 = 0.85;
 
 /// Less dynamic pressure counts as no air, Pa, because the results would overflow.
@@ -77,7 +79,8 @@ impl Patterns {
     /// Reduces the amplitudes until the openings fit between the stops.
     fn fit(mut self, lowest: f64, highest: f64) -> Self {
         let room = highest - lowest;
-        // The two patterns have every combination of signs, so together they spread by twice the sum.
+        // The two patterns have every combination of signs, so together they spread by twice the
+        // sum.
         let spread = 2.0 * (self.pitch.abs() + self.yaw.abs());
         if spread > FOR_TILT * room {
             self.pitch *= FOR_TILT * room / spread;
@@ -94,8 +97,8 @@ impl Patterns {
     }
 }
 
-/// The largest roll amplitude of this sign that keeps a pattern within `room`, the width of the range: each pair of
-/// fins with opposite roll signs may move apart until it fills the range.
+/// The largest roll amplitude of this sign that keeps a pattern within `room`, the width of the
+/// range: each pair of fins with opposite roll signs may move apart until it fills the range.
 fn largest_roll(tilt: &[f64; 4], sign: f64, room: f64) -> f64 {
     let mut largest = room / 2.0;
     for up in 0..4 {
@@ -180,8 +183,8 @@ impl Allocation {
         }
     }
 
-    /// The four opening angles for a command, rad, always inside the range. Without air, or with a command that is not
-    /// finite, the fins open fully, as in the passive descent.
+    /// The four opening angles for a command, rad, always inside the range. Without air, or with a
+    /// command that is not finite, the fins open fully, as in the passive descent.
     pub fn openings_rad(&self, command: &FinCommand, dynamic_pressure_pa: f64) -> [f64; 4] {
         let OpeningRange { min_rad, max_rad } = self.range;
         let (lowest, highest) = (libm::sin(min_rad), libm::sin(max_rad));

@@ -1,8 +1,9 @@
 //! Where a servo should be by its airframe's data: a delay, then a rate.
 //!
-//! A command is not a position: a flight computer that takes one for the other brakes with fins that are not open yet, and
-//! meets the ground at 1.9 m/s in the rehearsal of mk2, whose legs bear 1.0 m/s. So servos that report nothing are where
-//! this model has them, and those that report are watched by it.
+//! A command is not a position: a flight computer that takes one for the other brakes with fins
+//! that are not open yet, and meets the ground at 1.9 m/s in the rehearsal of mk2, whose legs bear
+//! 1.0 m/s. So servos that report nothing are where this model has them, and those that report are
+//! watched by it.
 
 use serde::Serialize;
 
@@ -51,8 +52,9 @@ impl ServoModel {
         self.next = (self.next + 1) % LINE_FRAMES;
     }
 
-    /// Moves for a frame under the commands so far: towards the command of a delay ago, by at most the rate. A data sheet states the
-    /// rate alone, as the time for 60 degrees; the delay is measured.
+    /// Moves for a frame under the commands so far: towards the command of a delay ago, by at most
+    /// the rate. A data sheet states the rate alone, as the time for 60 degrees; the delay is
+    /// measured.
     pub(crate) fn advance(&mut self) {
         let delayed = (self.next + LINE_FRAMES - 1 - self.delay_frames) % LINE_FRAMES;
         self.at_rad += (self.line_rad[delayed] - self.at_rad).clamp(-self.step_rad, self.step_rad);

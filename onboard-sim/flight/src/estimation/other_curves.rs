@@ -1,8 +1,9 @@
 //! Which thrust curve a burning motor has, of those that are known of it.
 //!
-//! Two motors can bear one name, and the certified curves of one motor can differ by more than its scatter. The scales of a
-//! wrong curve fit the thrust of the moment, and promise what the motor does not have. So one filter for each other curve of
-//! the mission follows the same samples, and [`CHOSEN_AFTER_S`] after the ignition the likeliest goes on.
+//! Two motors can bear one name, and the certified curves of one motor can differ by more than its
+//! scatter. The scales of a wrong curve fit the thrust of the moment, and promise what the motor
+//! does not have. So one filter for each other curve of the mission follows the same samples, and
+//! [`CHOSEN_AFTER_S`] after the ignition the likeliest goes on.
 
 use alloc::vec::Vec;
 
@@ -12,10 +13,12 @@ use super::motor_estimate::{MotorEstimate, MotorPrior, MotorSample, MotorStage};
 use crate::vehicle::mission::Mission;
 use crate::vehicle::thrust_curve::ThrustCurve;
 
-/// When the curve is chosen, s since the thrust began: the landing then has to waste, or to save, all that the curves differ by.
+/// When the curve is chosen, s since the thrust began: the landing then has to waste, or to save,
+/// all that the curves differ by.
 const CHOSEN_AFTER_S: f64 = 0.5;
-/// Another curve is chosen only if its misfit is smaller by this: over the 88 frames that are compared it is then 80 times as likely
-/// as the expected one, so a motor of the expected curve is hardly ever mistaken.
+/// Another curve is chosen only if its misfit is smaller by this: over the 88 frames that are
+/// compared it is then 80 times as likely as the expected one, so a motor of the expected curve is
+/// hardly ever mistaken.
 const CLEARLY: f64 = 0.1;
 
 /// The filters of the other curves until one is chosen, and the chosen one.
@@ -47,7 +50,8 @@ impl OtherCurves {
         other.unwrap_or(&mission.motor_curve)
     }
 
-    /// Takes the sample that `motor` has just taken under the expected curve, and replaces `motor` if it has another one.
+    /// Takes the sample that `motor` has just taken under the expected curve, and replaces `motor`
+    /// if it has another one.
     pub fn update(&mut self, motor: &mut MotorEstimate, curves: &[ThrustCurve], sample: &MotorSample) {
         if self.filters.is_empty() {
             return;
@@ -81,7 +85,8 @@ mod tests {
 
     const LIT_S: f64 = 2.0;
 
-    /// What a motor of this curve and these scales, in a vehicle of 3.3 kg, is taken for, and the estimate after a second.
+    /// What a motor of this curve and these scales, in a vehicle of 3.3 kg, is taken for, and the
+    /// estimate after a second.
     fn taken_for(curve: &ThrustCurve, impulse_scale: f64, time_scale: f64) -> (Option<usize>, MotorEstimate) {
         let mission = builtin("mk3").unwrap().unwrap();
         let mut motor = MotorEstimate::new(&mission.motor);

@@ -1,5 +1,5 @@
-//! Which sensors speak, and what each says that cannot be true: one set of rules, asked before an arming, until the igniter
-//! has its current, in flight, and of a log.
+//! Which sensors speak, and what each says that cannot be true: one set of rules, asked before an
+//! arming, until the igniter has its current, in flight, and of a log.
 
 use alloc::format;
 use alloc::string::String;
@@ -14,34 +14,36 @@ pub const SENSORS: [&str; 5] = ["accelerometer", "gyro", "barometer", "GNSS", "l
 
 /// So many equal inertial samples in a row do not happen to noise.
 pub(super) const FROZEN_IMU: u32 = 4;
-/// The same of a barometer, half a second, and of a lidar, a second: both round more coarsely. A receiver at rest
-/// may repeat one fix (static hold).
+/// The same of a barometer, half a second, and of a lidar, a second: both round more coarsely. A
+/// receiver at rest may repeat one fix (static hold).
 const FROZEN_BAROMETER: u32 = 25;
 const FROZEN_RANGES: u32 = 100;
 /// Below this range a lidar need not see the ground, m (TF-Luna, Benewake).
 pub const LIDAR_BLIND_M: f64 = 0.2;
-/// Difference of a range from the one where the vehicle stands, m: noise, grass and slope are smaller.
+/// Difference of a range from the one where the vehicle stands, m: noise, grass and slope are
+/// smaller.
 const LIDAR_OFF_M: f64 = 0.35;
 /// Ranges in a row that have to be off, 0.2 s: outliers are single.
 const RANGES: usize = 20;
 
 /// The barometer speaks 50 times a second.
 pub const BAROMETER_LOST_S: f64 = 0.25;
-/// A satellite receiver that has had no fix for this long has lost it, s: it speaks five times a second and drops one sample
-/// in 50.
+/// A satellite receiver that has had no fix for this long has lost it, s: it speaks five times a
+/// second and drops one sample in 50.
 pub const GNSS_LOST_S: f64 = 1.5;
 /// A lidar that says nothing for this long where it must see the ground, s.
 pub const LIDAR_LOST_S: f64 = 0.25;
 /// An inertial unit speaks in every frame; its samples are bridged for as long, s.
 const IMU_LOST_S: f64 = 0.05;
 
-/// Time over which a resting vehicle's inertial samples are averaged, s: a shudder of the rail in a gust is shorter, and
-/// the noise of one sample (0.5 deg/s, 0.1 m/s^2) goes down to a seventh.
+/// Time over which a resting vehicle's inertial samples are averaged, s: a shudder of the rail in a
+/// gust is shorter, and the noise of one sample (0.5 deg/s, 0.1 m/s^2) goes down to a seventh.
 const RESTS_OVER_S: f64 = 0.25;
-/// A barometer that was zeroed at power-up and stands farther from its pad than this is wrong, m: in a day the weather moves
-/// it by 15 m.
+/// A barometer that was zeroed at power-up and stands farther from its pad than this is wrong, m:
+/// in a day the weather moves it by 15 m.
 const BAROMETER_OFF_M: f64 = 20.0;
-/// Fixes of a vehicle on its pad lie within this of it, m: four times the wander of a single-frequency receiver.
+/// Fixes of a vehicle on its pad lie within this of it, m: four times the wander of a
+/// single-frequency receiver.
 const GNSS_OFF_M: f64 = 20.0;
 /// Weight of the newest fix in the place that fixes show: an outlier of 50 m moves it by 10.
 const NEWEST_FIX: f64 = 0.2;
@@ -123,7 +125,8 @@ pub struct SensorWatch {
 /// Where a vehicle stands while its sensors are asked.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Rests {
-    /// On its rail or its legs, with its centre of gravity there, m, and its lidar this far from the ground, m.
+    /// On its rail or its legs, with its centre of gravity there, m, and its lidar this far from
+    /// the ground, m.
     Standing { at_m: Vector3<f64>, range_m: f64 },
     /// Below a drone, which moves.
     Hanging,
@@ -193,7 +196,8 @@ impl SensorWatch {
         self.accelerometer_frozen_s().is_some() || self.accelerometer.silent_s(self.time_s) > 0.0
     }
 
-    /// For how long nothing was felt, s: accelerometer or gyro repeat one sample, or say nothing that can be.
+    /// For how long nothing was felt, s: accelerometer or gyro repeat one sample, or say nothing
+    /// that can be.
     pub fn feels_nothing_for_s(&self) -> f64 {
         let gyro_s = self.gyro.repeats_for_s(FROZEN_IMU, self.time_s).unwrap_or(0.0);
         self.accelerometer_lost_s().max(gyro_s).max(self.gyro.silent_s(self.time_s))

@@ -1,12 +1,13 @@
 //! Phase 1: falling tail-first on four fins, steered back to the pad.
 //!
-//! The fins' drag acts along the wind and gives no lift, but the body gives lift: when its nose leans away from the
-//! wind by an angle of attack, the air on its side pushes it the other way, by `1/2 rho V^2 S_n sin^2` (H. J. Allen and E. W.
-//! Perkins, NACA Report 1048, 1951). The law computes the horizontal acceleration that brings the vehicle to rest over the pad
-//! at ignition (the least-effort law `a = -(6 p / t^2 + 4 v / t)`; C. N. D'Souza, "An optimal guidance law for planetary
-//! landing", AIAA 97-3709). It turns the acceleration into a lean and the lean into a moment, and the
-//! [allocation](crate::control::fins) finds four openings. The lean is limited, because the body's own moment grows with it
-//! and the fins' moment does not.
+//! The fins' drag acts along the wind and gives no lift, but the body gives lift: when its nose
+//! leans away from the wind by an angle of attack, the air on its side pushes it the other way, by
+//! `1/2 rho V^2 S_n sin^2` (H. J. Allen and E. W. Perkins, NACA Report 1048, 1951). The law
+//! computes the horizontal acceleration that brings the vehicle to rest over the pad at ignition
+//! (the least-effort law `a = -(6 p / t^2 + 4 v / t)`; C. N. D'Souza, "An optimal guidance law for
+//! planetary landing", AIAA 97-3709). It turns the acceleration into a lean and the lean into a
+//! moment, and the [allocation](crate::control::fins) finds four openings. The lean is limited,
+//! because the body's own moment grows with it and the fins' moment does not.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -16,7 +17,8 @@ use crate::vehicle::rigid::RigidState;
 
 /// Below this airspeed the fins are too weak for steering, m/s.
 pub const LEAST_AIRSPEED_M_S: f64 = 12.0;
-/// A fall to less than this speed is short, m/s: fins brake little in it, and the wind is as fast as half of it.
+/// A fall to less than this speed is short, m/s: fins brake little in it, and the wind is as fast
+/// as half of it.
 pub const SHORT_FALL_M_S: f64 = 18.0;
 /// Below this airspeed they are too weak even to control the roll, m/s.
 const LEAST_ROLLING_AIRSPEED_M_S: f64 = 2.0;
@@ -27,19 +29,22 @@ const LEAST_ROLLING_AIRSPEED_M_S: f64 = 2.0;
 pub struct DescentGains {
     /// Largest commanded angle of attack, degrees.
     pub lean_max_deg: f64,
-    /// Largest commanded angle of attack at ignition, because the gate needs the vehicle nearly upright, degrees.
+    /// Largest commanded angle of attack at ignition, because the gate needs the vehicle nearly
+    /// upright, degrees.
     pub lean_at_ignition_deg: f64,
     /// Time before the ignition from which the lean is reduced, s.
     #[serde(default)]
     pub lean_fades_s: f64,
     /// Least natural frequency of the attitude loop, rad/s.
     pub natural_frequency_rad_s: f64,
-    /// Stiffness of the attitude loop over the dynamic pressure, m^3. It decides where it makes the loop stiffer than the least
-    /// natural frequency. An error in the air's moment grows with the dynamic pressure, and so does what the fins can do.
+    /// Stiffness of the attitude loop over the dynamic pressure, m^3. It decides where it makes the
+    /// loop stiffer than the least natural frequency. An error in the air's moment grows with the
+    /// dynamic pressure, and so does what the fins can do.
     #[serde(default)]
     pub stiffness_m3: f64,
     pub damping: f64,
-    /// Whether the fins open in the fall. In a short one they brake little, and turn the vehicle into the wind.
+    /// Whether the fins open in the fall. In a short one they brake little, and turn the vehicle
+    /// into the wind.
     #[serde(default)]
     pub opens_fins: bool,
     /// Decay rate of the roll rate, 1/s.
@@ -62,8 +67,8 @@ pub struct DescentSituation {
     pub crossflow_area_m2: f64,
     /// [`Airframe::restoring_m3`](crate::vehicle::airframe::Airframe::restoring_m3).
     pub restoring_m3: f64,
-    /// Distance of the body's middle behind the centre of gravity, m. The crossflow acts there and turns the nose away
-    /// from the wind.
+    /// Distance of the body's middle behind the centre of gravity, m. The crossflow acts there and
+    /// turns the nose away from the wind.
     pub body_behind_cg_m: f64,
     /// Time until the vehicle should be at rest over the pad, s; `None` while it is not known.
     pub time_to_go_s: Option<f64>,
@@ -113,8 +118,8 @@ impl DescentGains {
         let nose_in_world = (upstream - lean).normalize();
 
         let error = turn_to_aim_rad(&state.world_from_body, &nose_in_world);
-        // The moment that holds the wanted lean against the air: the attitude loop alone is much softer than the
-        // weathercock effect.
+        // The moment that holds the wanted lean against the air: the attitude loop alone is much
+        // softer than the weathercock effect.
         let wanted_lean = error - turn_to_aim_rad(&state.world_from_body, &upstream);
         let held_n_m = dynamic_pressure_pa
             * (situation.restoring_m3
@@ -134,7 +139,8 @@ impl DescentGains {
         libm::sqrt((least * least).max(self.stiffness_m3 * dynamic_pressure_pa / inertia_kg_m2))
     }
 
-    /// The lean of the nose out of the wind: the tangent of the angle of attack, along the wanted push.
+    /// The lean of the nose out of the wind: the tangent of the angle of attack, along the wanted
+    /// push.
     fn lean(
         &self,
         state: &RigidState,
@@ -150,7 +156,8 @@ impl DescentGains {
         let across = wanted_m_s2 - upstream * wanted_m_s2.dot(upstream);
         let (sine, cosine) = libm::sincos(self.lean_max_deg.to_radians());
         let most = sine / cosine;
-        // Linear in the lean and exact at its limit: the square root would have an infinite slope at zero.
+        // Linear in the lean and exact at its limit: the square root would have an infinite slope
+        // at zero.
         let per_lean_m_s2 = per_mass * situation.crossflow_area_m2 * sine * sine / most;
         let lean = across / per_lean_m_s2.max(1e-6);
         let most = libm::tan(self.lean_allowed_rad(situation.time_to_go_s));
@@ -158,7 +165,8 @@ impl DescentGains {
         if length > most { lean * (most / length) } else { lean }
     }
 
-    /// The largest lean at a time before the ignition, rad; the full lean while that time is unknown.
+    /// The largest lean at a time before the ignition, rad; the full lean while that time is
+    /// unknown.
     fn lean_allowed_rad(&self, time_to_go_s: Option<f64>) -> f64 {
         let share = time_to_go_s.map_or(1.0, |time_s| (time_s / self.lean_fades_s - 0.5).clamp(0.0, 1.0));
         (self.lean_at_ignition_deg + share * (self.lean_max_deg - self.lean_at_ignition_deg)).to_radians()
@@ -206,8 +214,9 @@ mod tests {
         state
     }
 
-    /// Least phase margin, degrees, and gain margins upwards and downwards, dB, of the attitude loop in a plant whose air turns
-    /// the vehicle back by this more than the data say, 1/s^2, with a delay, s.
+    /// Least phase margin, degrees, and gain margins upwards and downwards, dB, of the attitude
+    /// loop in a plant whose air turns the vehicle back by this more than the data say, 1/s^2, with
+    /// a delay, s.
     fn margins(natural: f64, damping: f64, stiffness_per_s2: f64, delay_s: f64) -> [f64; 3] {
         use nalgebra::Complex;
         let open_loop = |rad_s: f64| {
@@ -237,8 +246,8 @@ mod tests {
         [phase_deg, upwards_db, downwards_db]
     }
 
-    /// Legs of 0.010 m2 that the data do not have, or that they have and that are not there: 45 degrees and 6 dB at 36 m/s, and
-    /// as much where the air is slower and weaker in proportion.
+    /// Legs of 0.010 m2 that the data do not have, or that they have and that are not there: 45
+    /// degrees and 6 dB at 36 m/s, and as much where the air is slower and weaker in proportion.
     #[test]
     fn the_attitude_loop_has_margins_for_legs_that_nobody_measured() {
         for name in ["mk2", "mk3"] {

@@ -1,9 +1,10 @@
 //! When to light the landing motor.
 //!
-//! The motor lights only once, and its strength is known only afterwards. Every tick computes the heights from which a
-//! landing exists ([`crate::guidance::vertical`]) for the certified motor, a weak motor and a strong motor. The chosen
-//! height lies at a set place in the band that all three have in common, so the landing exists for any of them. The
-//! command is sent early by the delay of the igniter.
+//! The motor lights only once, and its strength is known only afterwards. Every tick computes the
+//! heights from which a landing exists ([`crate::guidance::vertical`]) for the certified motor, a
+//! weak motor and a strong motor. The chosen height lies at a set place in the band that all three
+//! have in common, so the landing exists for any of them. The command is sent early by the delay of
+//! the igniter.
 
 use serde::{Deserialize, Serialize};
 
@@ -15,16 +16,18 @@ use crate::vehicle::thrust_curve::ThrustCurve;
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct IgnitionSettings {
-    /// Impulse of the weakest and the strongest motor to be landed, divided by the certified impulse.
+    /// Impulse of the weakest and the strongest motor to be landed, divided by the certified
+    /// impulse.
     #[serde(default)]
     pub impulse_scales: [f64; 2],
-    /// Burn times of the shortest and the longest burn to be landed, divided by the certified burn time.
+    /// Burn times of the shortest and the longest burn to be landed, divided by the certified burn
+    /// time.
     #[serde(default)]
     pub burn_time_scales: [f64; 2],
     /// Chosen place in the common band: 0 at its low end, 1 at its high end.
     pub place: f64,
-    /// How much later than expected an igniter may light, s. None lights much earlier, so the height is chosen for the middle
-    /// of the two.
+    /// How much later than expected an igniter may light, s. None lights much earlier, so the
+    /// height is chosen for the middle of the two.
     #[serde(default)]
     pub late_s: f64,
     /// Expected time from command to thrust, s.
@@ -38,11 +41,13 @@ pub struct IgnitionSettings {
 /// What a tick computes for the choice of the ignition.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct IgnitionPrediction {
-    /// Heights from which the certified motor lands if its thrust begins there at the expected speed, m.
+    /// Heights from which the certified motor lands if its thrust begins there at the expected
+    /// speed, m.
     pub band: Option<Band>,
     /// Heights from which all considered motors land, m.
     pub common: Option<Band>,
-    /// From the highest of their low ends to the lowest of their high ends, m; the latter may lie below the former.
+    /// From the highest of their low ends to the lowest of their high ends, m; the latter may lie
+    /// below the former.
     pub nearest: Option<Band>,
     /// The chosen height at which thrust should begin, m.
     pub chosen_m: Option<f64>,
@@ -55,26 +60,29 @@ pub struct IgnitionPrediction {
 }
 
 impl IgnitionPrediction {
-    /// How long the ignition has been due, s, at an even speed; `None` before. It is due when thrust commanded at the next frame would begin
-    /// below the chosen height; `onset_m` is where it would begin.
+    /// How long the ignition has been due, s, at an even speed; `None` before. It is due when
+    /// thrust commanded at the next frame would begin below the chosen height; `onset_m` is where
+    /// it would begin.
     pub fn overdue_s(&self, onset_m: f64) -> Option<f64> {
         let below_m = self.chosen_m? - onset_m;
         (below_m >= 0.0).then(|| below_m / (-self.onset_vertical_m_s).max(1.0))
     }
 }
 
-/// Below the height from which the strongest motor lands a fall has at least this long, s: a late igniter is not prepared for at the
-/// cost of one that is in time. mk2-h53 has 0.1 s; higher by 2 m, 128 of 150 stand instead of 142 (`field`, seed 7001).
+/// Below the height from which the strongest motor lands a fall has at least this long, s: a late
+/// igniter is not prepared for at the cost of one that is in time. mk2-h53 has 0.1 s; higher by 2
+/// m, 128 of 150 stand instead of 142 (`field`, seed 7001).
 const HIGH_ROOM_S: f64 = 0.13;
 
-/// Step and number of steps of the look along a fall that still gains speed: 4 s, after which an open vehicle has reached
-/// 0.8 of its terminal speed.
+/// Step and number of steps of the look along a fall that still gains speed: 4 s, after which an
+/// open vehicle has reached 0.8 of its terminal speed.
 const AHEAD_S: f64 = 0.25;
 const AHEAD_STEPS: u32 = 16;
 
 impl IgnitionSettings {
-    /// Whether the certified motor lands from some point of the fall that begins at this height and vertical velocity. A
-    /// motor that is too strong for the present speed may suit the speed that is still to come.
+    /// Whether the certified motor lands from some point of the fall that begins at this height and
+    /// vertical velocity. A motor that is too strong for the present speed may suit the speed that
+    /// is still to come.
     pub fn lands_ahead(
         &self,
         column: &Column,
@@ -91,8 +99,9 @@ impl IgnitionSettings {
         })
     }
 
-    /// The prediction from a height and a vertical velocity (up positive), with the fins open at `fin_drag_area_m2`. Each end of a
-    /// band moves one way with impulse and with burn time, so the motors at the ends of their ranges bound what suits all between.
+    /// The prediction from a height and a vertical velocity (up positive), with the fins open at
+    /// `fin_drag_area_m2`. Each end of a band moves one way with impulse and with burn time, so the
+    /// motors at the ends of their ranges bound what suits all between.
     pub fn prediction(
         &self,
         column: &Column,
@@ -113,8 +122,8 @@ impl IgnitionSettings {
         let bands = extremes.map(|(impulse, time)| band(impulse, time));
         let common = certified
             .and_then(|certified| bands.iter().try_fold(certified, |common, band| common.and(&(*band)?)));
-        // If no height suits all motors, the middle between the highest low end and the lowest high end is closest to
-        // all of them.
+        // If no height suits all motors, the middle between the highest low end and the lowest high
+        // end is closest to all of them.
         let nearest = certified.map(|certified| {
             bands.iter().flatten().fold(certified, |nearest, band| Band {
                 low_m: nearest.low_m.max(band.low_m),

@@ -1,18 +1,19 @@
 //! The landing burn in one dimension: the heights from which a landing can begin.
 //!
-//! The vehicle has no throttle, but its tilt reduces the vertical thrust and its fins add drag. Both are bounded, so at
-//! every instant the deceleration lies between a soft and a hard one. A landing must end with both height and sinking
-//! speed near zero. It must not end before the thrust falls through the weight, or the vehicle would lift off again.
-//! For a bounded double integrator the extremes are bang-bang (A. E. Bryson and Y.-C. Ho, Applied Optimal Control, 1975, chapter 3):
-//! the highest start brakes softly first and hard later;
-//! the lowest start brakes hard first and softly later, but the vehicle never rises. Constant braking lies in between.
-//! The heights from which these landings begin span the band of feasible heights ([`Column::band`]). The vehicle's
-//! place in the band says how hard to brake ([`Band::place`]). The last moments are flown upright, so that the vehicle
-//! arrives settled.
+//! The vehicle has no throttle, but its tilt reduces the vertical thrust and its fins add drag.
+//! Both are bounded, so at every instant the deceleration lies between a soft and a hard one. A
+//! landing must end with both height and sinking speed near zero. It must not end before the thrust
+//! falls through the weight, or the vehicle would lift off again. For a bounded double integrator
+//! the extremes are bang-bang (A. E. Bryson and Y.-C. Ho, Applied Optimal Control, 1975, chapter
+//! 3): the highest start brakes softly first and hard later; the lowest start brakes hard first and
+//! softly later, but the vehicle never rises. Constant braking lies in between. The heights from
+//! which these landings begin span the band of feasible heights ([`Column::band`]). The vehicle's
+//! place in the band says how hard to brake ([`Band::place`]). The last moments are flown upright,
+//! so that the vehicle arrives settled.
 //!
-//! Tilt at high speed does not reduce the deceleration: the body lies across the air, and its own drag compensates the
-//! lost thrust. The model contains that drag, `1/2 rho V^2 S_n sin^3`, so the fins act as the throttle early in the
-//! burn and the tilt late in it.
+//! Tilt at high speed does not reduce the deceleration: the body lies across the air, and its own
+//! drag compensates the lost thrust. The model contains that drag, `1/2 rho V^2 S_n sin^3`, so the
+//! fins act as the throttle early in the burn and the tilt late in it.
 #![expect(clippy::inline_always, reason = "what is to be compiled for wide vectors must be inlined there")]
 
 use core::array::from_fn;
@@ -92,14 +93,15 @@ impl Band {
 }
 
 impl Column {
-    /// Heights from which a landing exists for a motor that has burnt for `burning_s` (0 for an ignition now) and a
-    /// vertical velocity of `vertical_m_s` (up positive); `None` if there is no landing.
+    /// Heights from which a landing exists for a motor that has burnt for `burning_s` (0 for an
+    /// ignition now) and a vertical velocity of `vertical_m_s` (up positive); `None` if there is no
+    /// landing.
     pub fn band(&self, burn: &Burn<'_>, burning_s: f64, vertical_m_s: f64) -> Option<Band> {
         self.landings(burn, burning_s)?.band(vertical_m_s)
     }
 
-    /// The landings on a motor that has burnt for `burning_s`, at any velocity; `None` if the thrust never carries the
-    /// vehicle.
+    /// The landings on a motor that has burnt for `burning_s`, at any velocity; `None` if the
+    /// thrust never carries the vehicle.
     pub fn landings(&self, burn: &Burn<'_>, burning_s: f64) -> Option<Landings> {
         let carried_until_s = burn.falls_through_weight_s(self.mass_at_ignition_kg)?;
         let soonest_s = carried_until_s.max(burning_s + 0.02);
@@ -126,10 +128,11 @@ impl Column {
         (height_m, vertical_m_s)
     }
 
-    /// Fin opening, 0 to 1, that holds the vehicle at a place between the lowest height that suits the weaker of two
-    /// motors and the highest height that suits the stronger.
+    /// Fin opening, 0 to 1, that holds the vehicle at a place between the lowest height that suits
+    /// the weaker of two motors and the highest height that suits the stronger.
     ///
-    /// Without a band the vehicle is too fast or too slow for any landing, and the result is an end of the range.
+    /// Without a band the vehicle is too fast or too slow for any landing, and the result is an end
+    /// of the range.
     pub fn fin_share(
         &self,
         burns: [&Burn<'_>; 2],
@@ -138,8 +141,9 @@ impl Column {
         height_m: f64,
         place: f64,
     ) -> f64 {
-        /// Smallest width that is assumed for a band, as time at the present speed, s. Above a narrow band there is
-        /// hardly a landing, but closed fins would only make the vehicle faster.
+        /// Smallest width that is assumed for a band, as time at the present speed, s. Above a
+        /// narrow band there is hardly a landing, but closed fins would only make the vehicle
+        /// faster.
         const NARROW_S: f64 = 0.25;
         let [weak, strong] = burns.map(|burn| self.band(burn, burning_s, vertical_m_s));
         let Some(weak) = weak else {
@@ -151,8 +155,8 @@ impl Column {
         (0.5 + FIN_GAIN * (place - (height_m - low_m) / width_m)).clamp(0.0, 1.0)
     }
 
-    /// Whether a vehicle without a band falls more slowly than a landing needs: even the softest braking stops it before
-    /// the thrust falls through the weight.
+    /// Whether a vehicle without a band falls more slowly than a landing needs: even the softest
+    /// braking stops it before the thrust falls through the weight.
     pub fn falls_too_slowly(&self, burn: &Burn<'_>, burning_s: f64, vertical_m_s: f64) -> bool {
         if vertical_m_s > -1.0 {
             return true;
@@ -174,9 +178,10 @@ impl Column {
     }
 }
 
-/// Speed at the ground, m/s, positive downwards, after a fall from a height with a vertical velocity (up positive)
-/// towards a terminal speed `V_t`: the difference of `v^2` from `V_t^2` falls by a factor of e in each `V_t^2 / (2 g)`
-/// of height. A vehicle that rises is assumed to fall from its present height.
+/// Speed at the ground, m/s, positive downwards, after a fall from a height with a vertical
+/// velocity (up positive) towards a terminal speed `V_t`: the difference of `v^2` from `V_t^2`
+/// falls by a factor of e in each `V_t^2 / (2 g)` of height. A vehicle that rises is assumed to
+/// fall from its present height.
 pub fn fall_ends_m_s(height_m: f64, vertical_m_s: f64, terminal_m_s: f64) -> f64 {
     let [begins, terminal] = [(-vertical_m_s).max(0.0), terminal_m_s].map(|speed_m_s| speed_m_s * speed_m_s);
     let left = libm::exp(-2.0 * STANDARD_GRAVITY_M_S2 * height_m.max(0.0) / terminal);
@@ -186,8 +191,8 @@ pub fn fall_ends_m_s(height_m: f64, vertical_m_s: f64, terminal_m_s: f64) -> f64
 // The vertical motion of a mission's vehicle as its data say.
 
 impl Column {
-    /// The column of a mission's vehicle before ignition, with all drag along the axis multiplied by `air_scale` (1 as
-    /// certified), and with a largest tilt, degrees.
+    /// The column of a mission's vehicle before ignition, with all drag along the axis multiplied
+    /// by `air_scale` (1 as certified), and with a largest tilt, degrees.
     pub fn of_mission(
         mission: &Mission,
         mass_at_ignition_kg: f64,
@@ -217,7 +222,8 @@ impl Column {
     }
 }
 
-/// The landing that holds one tilt from ignition to touchdown, with half-open fins, on the expected motor.
+/// The landing that holds one tilt from ignition to touchdown, with half-open fins, on the expected
+/// motor.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct EvenLanding {
     /// How long the thrust exceeds the weight, s; of a motor that never does, how long it burns.
@@ -277,8 +283,8 @@ impl EvenLanding {
         Self { carried_s, speed_m_s, height_m, tilt_rad: tilt_rad(speed_m_s) }
     }
 
-    /// From this tilt on, rad, a vehicle that throws away thrust all the way down has nothing left for a motor that is stronger: 62
-    /// degrees.
+    /// From this tilt on, rad, a vehicle that throws away thrust all the way down has nothing left
+    /// for a motor that is stronger: 62 degrees.
     pub const MOST_TILT_RAD: f64 = 1.082;
 
     /// Why no height lands the vehicle, in a builder's words; `None` if some may.
@@ -301,10 +307,12 @@ const INTERVALS: usize = 40;
 const MET_M_S: f64 = 1e-4;
 /// Largest number of falls tried for a way of braking; about six are usual.
 const MOST_FALLS: usize = 24;
-/// How many ways of braking and holding are tried: the last two differ by a four thousandth of the burn. With seven a landing was
-/// often missed, because the speed at which the thrust falls must be met to a quarter of a metre per second.
+/// How many ways of braking and holding are tried: the last two differ by a four thousandth of the
+/// burn. With seven a landing was often missed, because the speed at which the thrust falls must be
+/// met to a quarter of a metre per second.
 const HOLDS_TRIED: usize = 12;
-/// A vehicle that is held ends this near to the touchdown speed, m/s: the last moments, upright, change it a little.
+/// A vehicle that is held ends this near to the touchdown speed, m/s: the last moments, upright,
+/// change it a little.
 const HELD_M_S: f64 = 0.3;
 /// A vehicle that moves upwards faster than this rises, m/s.
 const RISING_M_S: f64 = 0.05;
@@ -342,8 +350,8 @@ const WAYS: [Way; 3] = [Way::SoftFirst, Way::HardFirst, Way::Even];
 const HARD_FIRST: usize = 1;
 
 impl Way {
-    /// The fraction of soft braking in interval `k`, before it is limited to 0 to 1: the first number times the parameter,
-    /// plus the second times `k`, plus the third.
+    /// The fraction of soft braking in interval `k`, before it is limited to 0 to 1: the first
+    /// number times the parameter, plus the second times `k`, plus the third.
     #[inline(always)]
     fn softly(self) -> (f64, f64, f64) {
         const ALL: f64 = INTERVALS as f64;
@@ -359,7 +367,8 @@ impl Way {
 pub struct Landings(Falls<END_TIMES>);
 
 impl Landings {
-    /// Heights from which a landing exists at a vertical velocity (up positive); `None` if there is no landing.
+    /// Heights from which a landing exists at a vertical velocity (up positive); `None` if there is
+    /// no landing.
     pub fn band(&self, vertical_m_s: f64) -> Option<Band> {
         let heights_m = self.0.heights_m(vertical_m_s);
         heights_m.iter().flatten().flatten().fold(None, |band: Option<Band>, &height_m| {
@@ -371,8 +380,9 @@ impl Landings {
     }
 }
 
-/// The rest of the burn until `N` given ends, each in equal intervals. A step of a fall waits for the one before it, so the
-/// falls to all ends are computed side by side, in vectors, and those of all ways in turn.
+/// The rest of the burn until `N` given ends, each in equal intervals. A step of a fall waits for
+/// the one before it, so the falls to all ends are computed side by side, in vectors, and those of
+/// all ways in turn.
 struct Falls<const N: usize> {
     step_s: [f64; N],
     touchdown_m_s: f64,
@@ -381,13 +391,15 @@ struct Falls<const N: usize> {
 
 /// An interval of each fall.
 struct Ahead<const N: usize> {
-    /// Acceleration without drag of the hardest and the softest braking, m/s^2, and their drag over the mass and the square of the
-    /// speed, 1/m; upright in the share of the interval that is for settling.
+    /// Acceleration without drag of the hardest and the softest braking, m/s^2, and their drag over
+    /// the mass and the square of the speed, 1/m; upright in the share of the interval that is for
+    /// settling.
     pushed_m_s2: [[f64; N]; 2],
     drag_per_m: [[f64; N]; 2],
 }
 
-/// Falls of one way, each to its end: how far, the vertical velocity, up positive, and the highest so far.
+/// Falls of one way, each to its end: how far, the vertical velocity, up positive, and the highest
+/// so far.
 #[derive(Clone, Copy)]
 struct Falling<const N: usize> {
     fallen_m: [f64; N],
@@ -428,14 +440,15 @@ impl<const N: usize> Falls<N> {
         Self { step_s, touchdown_m_s: column.touchdown_m_s, ahead }
     }
 
-    /// The heights from which landings to each end begin, one for each way of braking that reaches the touchdown speed
-    /// without rising before.
+    /// The heights from which landings to each end begin, one for each way of braking that reaches
+    /// the touchdown speed without rising before.
     fn heights_m(&self, vertical_m_s: f64) -> [[Option<f64>; N]; WAYS.len()] {
         Arch::new().dispatch(Heights { falls: self, vertical_m_s })
     }
 
-    /// Finds for each end and way the parameter that gives the touchdown speed, by false position. The value of an end that
-    /// stays twice is halved (the Illinois rule; Dowell and Jarratt, BIT 11, 1971).
+    /// Finds for each end and way the parameter that gives the touchdown speed, by false position.
+    /// The value of an end that stays twice is halved (the Illinois rule; Dowell and Jarratt, BIT
+    /// 11, 1971).
     #[inline(always)]
     fn sought_m(&self, vertical_m_s: f64) -> [[Option<f64>; N]; WAYS.len()] {
         let missed_m_s = |fall: &Falling<N>, i: usize| fall.speeds_m_s[i] - self.touchdown_m_s;
@@ -481,8 +494,8 @@ impl<const N: usize> Falls<N> {
         }
         let risen = &risen[HARD_FIRST];
         if risen.contains(&true) {
-            // It would rise. It may instead be held by its tilt once it sinks as at touchdown: braked hard before that for as long
-            // as the softest braking can still hold it.
+            // It would rise. It may instead be held by its tilt once it sinks as at touchdown:
+            // braked hard before that for as long as the softest braking can still hold it.
             let after = |softly: f64, rises: bool, by: f64| (softly + if rises { by } else { -by }).max(0.0);
             let mut softly = [0.0; N];
             let mut softer_by = 0.5;
@@ -511,8 +524,8 @@ impl<const N: usize> Falls<N> {
         heights_m
     }
 
-    /// The falls from a vertical velocity, each with its parameter of each way; if it `HOLDS`, no faster upwards than at
-    /// touchdown as far as the softest braking allows.
+    /// The falls from a vertical velocity, each with its parameter of each way; if it `HOLDS`, no
+    /// faster upwards than at touchdown as far as the softest braking allows.
     #[inline(always)]
     fn along<const HOLDS: bool, const W: usize>(
         &self,
@@ -540,8 +553,8 @@ impl<const N: usize> Falls<N> {
         falling
     }
 
-    /// One interval of the falls of one way, with these shares of soft braking: the midpoint rule. Every line is one operation on
-    /// all falls, which the compiler makes one on vectors.
+    /// One interval of the falls of one way, with these shares of soft braking: the midpoint rule.
+    /// Every line is one operation on all falls, which the compiler makes one on vectors.
     #[inline(always)]
     fn step<const HOLDS: bool>(&self, ahead: &Ahead<N>, softly: &[f64; N], falling: &mut Falling<N>) {
         let Ahead { pushed_m_s2: [hard_m_s2, soft_m_s2], drag_per_m: [hard_per_m, soft_per_m] } = ahead;

@@ -65,7 +65,8 @@ pub struct ArmingInput {
     pub estimator_converged: bool,
     /// Number of fins that reached their commanded angle.
     pub fins_answering: [bool; 4],
-    /// How many people have seen the surfaces of a vehicle move whose servos tell nothing; `None`: they tell.
+    /// How many people have seen the surfaces of a vehicle move whose servos tell nothing; `None`:
+    /// they tell.
     pub seers: Option<usize>,
     /// The landing motor's igniter has continuity.
     pub igniter_continuity: bool,
@@ -165,7 +166,8 @@ fn uplink(uplink: Uplink) -> Check {
     }
 }
 
-/// A servo that tells nothing is where it was commanded, whatever it does: then people have to have seen it.
+/// A servo that tells nothing is where it was commanded, whatever it does: then people have to have
+/// seen it.
 fn fins_answering(input: &ArmingInput) -> Check {
     let answering = input.fins_answering.iter().filter(|answers| **answers).count();
     let (passed, found, required) = match input.seers {

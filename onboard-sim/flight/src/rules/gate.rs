@@ -1,11 +1,11 @@
 //! The checks before the landing motor is lit.
 //!
-//! They use measured and predicted values of this moment. The latches (armed, not inhibited, no abort) are in the
-//! [phase table](crate::rules::phase). Loss of the radio link neither fires nor blocks the motor, so it is not checked
-//! here.
+//! They use measured and predicted values of this moment. The latches (armed, not inhibited, no
+//! abort) are in the [phase table](crate::rules::phase). Loss of the radio link neither fires nor
+//! blocks the motor, so it is not checked here.
 //!
-//! One list serves all: what keeps the gate shut now, what gives the landing up because it will not go away, and what the crew is
-//! told of both.
+//! One list serves all: what keeps the gate shut now, what gives the landing up because it will not
+//! go away, and what the crew is told of both.
 
 use alloc::format;
 use alloc::string::String;
@@ -57,8 +57,8 @@ pub struct GateCheck {
     pub lasts: bool,
 }
 
-/// Tilt, pitch rate, speed and heights often come back inside the gate's limits, but not from beyond this multiple of
-/// them: such a vehicle tumbles, or does not know where it is.
+/// Tilt, pitch rate, speed and heights often come back inside the gate's limits, but not from
+/// beyond this multiple of them: such a vehicle tumbles, or does not know where it is.
 const FAR_BEYOND: f64 = 2.0;
 
 /// How many checks the gate has.
@@ -66,8 +66,8 @@ pub const GATE_CHECKS: usize = 14;
 
 /// The checks of the gate, in the order in which they are told.
 ///
-/// The fence needs no margin beside the prediction's: steering does not bring the vehicle back. From the commit height to ignition it
-/// has a second.
+/// The fence needs no margin beside the prediction's: steering does not bring the vehicle back.
+/// From the commit height to ignition it has a second.
 pub fn checks(limits: &GateLimits, input: &GateInput) -> [GateCheck; GATE_CHECKS] {
     let value = |name, found: f64, limit: f64, unit, beyond: f64| GateCheck {
         name,
@@ -220,7 +220,8 @@ mod tests {
         }
     }
 
-    /// What is a little beyond its limit comes back; what is far beyond it, or out of the fence, does not.
+    /// What is a little beyond its limit comes back; what is far beyond it, or out of the fence,
+    /// does not.
     #[test]
     fn what_lasts_is_far_beyond_its_limit_and_is_told_with_values() {
         for (tilt_deg, lasts) in [(25.0_f64, false), (41.0, true)] {

@@ -1,4 +1,5 @@
-//! The people who may command: their names and their roles. Which key belongs to whom is not known here.
+//! The people who may command: their names and their roles. Which key belongs to whom is not known
+//! here.
 
 use core::fmt;
 use serde::Serialize;

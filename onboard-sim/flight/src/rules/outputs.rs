@@ -1,9 +1,10 @@
 //! What lights, parts and ejects: both igniters, the separation charge and the parachute.
 //!
-//! [`Outputs::decided`] is the only function that switches one of them on. The flight computer calls it once, at the end of
-//! a frame, when the crew has been answered and the phase is settled. An output has current unless
-//! [something speaks against it](why_not), so each names every reason for which it is off. The reasons repeat latches that
-//! the [phase table](crate::rules::phase) has checked already: a mistake there lights nothing by itself.
+//! [`Outputs::decided`] is the only function that switches one of them on. The flight computer
+//! calls it once, at the end of a frame, when the crew has been answered and the phase is settled.
+//! An output has current unless [something speaks against it](why_not), so each names every reason
+//! for which it is off. The reasons repeat latches that the [phase table](crate::rules::phase) has
+//! checked already: a mistake there lights nothing by itself.
 
 use serde::{Deserialize, Serialize};
 
@@ -33,7 +34,8 @@ pub struct FlightProgress {
     pub lifted_off: bool,
     /// Apogee is near, or was: the booster goes.
     pub separation_due: bool,
-    /// The fins, which close over the parachute's hatch, are out of its way, or had the time for it.
+    /// The fins, which close over the parachute's hatch, are out of its way, or had the time for
+    /// it.
     pub hatch_free: bool,
 }
 
@@ -58,7 +60,8 @@ pub fn why_not(
             locks.landing_motor_inhibited.then_some("the landing motor is inhibited"),
             (!locks.armed).then_some("not armed"),
             (!locks.pin_out).then_some("the pin is in"),
-            // An abort too low for the parachute lands on the motor, and so does one after the command to light.
+            // An abort too low for the parachute lands on the motor, and so does one after the
+            // command to light.
             (locks.abort_latched && !locks.lands_in_place).then_some("an abort is latched"),
             None,
         ],
@@ -82,7 +85,8 @@ pub fn why_not(
     reasons.into_iter().flatten()
 }
 
-/// Which outputs have current. Nothing else in the flight computer can set one: the field is private.
+/// Which outputs have current. Nothing else in the flight computer can set one: the field is
+/// private.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Outputs([bool; 4]);
 
@@ -201,9 +205,10 @@ mod tests {
         }
     }
 
-    /// The bar: in a million random sequences no igniter has current after an abort, a disarm or a hold was accepted, but for
-    /// the landing motor of a vehicle that was aborted too low for its parachute or after the command to light. A motor is
-    /// lit armed and with its pin out, at most once, and never with the parachute.
+    /// The bar: in a million random sequences no igniter has current after an abort, a disarm or a
+    /// hold was accepted, but for the landing motor of a vehicle that was aborted too low for its
+    /// parachute or after the command to light. A motor is lit armed and with its pin out, at most
+    /// once, and never with the parachute.
     #[test]
     fn in_a_million_random_sequences_no_igniter_is_on_after_an_abort_a_disarm_or_a_hold() {
         let mut random = ChaCha8Rng::seed_from_u64(48);

@@ -1,19 +1,22 @@
 //! Arming and start by two people of different roles: one asks, another confirms.
 //!
-//! A state machine of its own: it takes who asks for what and when, and answers. Nothing is armed or started here; the
-//! phase table still decides what an agreed request does.
+//! A state machine of its own: it takes who asks for what and when, and answers. Nothing is armed
+//! or started here; the phase table still decides what an agreed request does.
 //!
-//! An ask has a number, and a confirmation names it: two people who ask at the same moment have not confirmed each
-//! other, and a confirmation that was meant for an earlier ask, or is sent again later, confirms nothing. From the
-//! agreed start to the release the one who confirmed it taps a key (or the one who asked, if the other is in command: it
-//! takes two in the countdown, too); without a tap for [`TAP_WITHIN_S`] the countdown is held. A terminal reports no release of
-//! a key, so the taps stand for the hand on a dead-man's switch, which amateur launch sites ask of a second person.
+//! An ask has a number, and a confirmation names it: two people who ask at the same moment have not
+//! confirmed each other, and a confirmation that was meant for an earlier ask, or is sent again
+//! later, confirms nothing. From the agreed start to the release the one who confirmed it taps a
+//! key (or the one who asked, if the other is in command: it takes two in the countdown, too);
+//! without a tap for [`TAP_WITHIN_S`] the countdown is held. A terminal reports no release of a
+//! key, so the taps stand for the hand on a dead-man's switch, which amateur launch sites ask of a
+//! second person.
 //!
-//! The way of an ask: a station sends the command, signed with its operator's own key. `protocol::signing` checks the frame with
-//! the key that its link id names, and the vehicle's endpoint takes the operator from there; it refuses what names another boot,
-//! what is for everybody, and what comes from ids under which two stations are heard. `computer::crew` asks here; the number
-//! goes back in the answer and in TD_CREW, and the other operator's command names it. How many people it takes is in every
-//! frame's input, so a replay decides the same.
+//! The way of an ask: a station sends the command, signed with its operator's own key.
+//! `protocol::signing` checks the frame with the key that its link id names, and the vehicle's
+//! endpoint takes the operator from there; it refuses what names another boot, what is for
+//! everybody, and what comes from ids under which two stations are heard. `computer::crew` asks
+//! here; the number goes back in the answer and in TD_CREW, and the other operator's command names
+//! it. How many people it takes is in every frame's input, so a replay decides the same.
 
 use core::fmt;
 use serde::Serialize;
@@ -24,11 +27,13 @@ use super::phase::UPLINK_SILENT_S;
 /// How long an ask waits for its confirmation, s.
 pub const CONFIRM_WITHIN_S: f64 = 10.0;
 
-/// The longest time between two taps, s. As long as the silence of a station that holds the countdown, so that one sum holds
-/// for all that can be lost. Whoever taps twice a second may have one tap lost.
+/// The longest time between two taps, s. As long as the silence of a station that holds the
+/// countdown, so that one sum holds for all that can be lost. Whoever taps twice a second may have
+/// one tap lost.
 pub const TAP_WITHIN_S: f64 = UPLINK_SILENT_S;
 
-/// The first tap may come so much later, s: whoever has just confirmed the start has to see the countdown first.
+/// The first tap may come so much later, s: whoever has just confirmed the start has to see the
+/// countdown first.
 const FIRST_TAP_LATER_S: f64 = 1.0;
 
 /// The number of the n-th ask from 0, never 0: a command without a number confirms nothing.
@@ -149,7 +154,8 @@ pub struct TwoPerson {
 }
 
 impl TwoPerson {
-    /// Asks for an act, or confirms the ask of this number. `first` is where the numbers of the asks begin.
+    /// Asks for an act, or confirms the ask of this number. `first` is where the numbers of the
+    /// asks begin.
     pub fn request(
         &mut self,
         act: Act,
@@ -336,14 +342,16 @@ mod tests {
         assert_eq!(two.lapsed(100.0), None);
     }
 
-    /// What an outsider remembers of all requests: every one with its time, to look up afterwards who had really asked.
+    /// What an outsider remembers of all requests: every one with its time, to look up afterwards
+    /// who had really asked.
     struct Account {
         asked: Vec<(Act, u16, Operator, f64)>,
         used: Vec<u16>,
     }
 
     impl Account {
-        /// Whether the log of requests holds an unused ask of this number by another role in the last ten seconds.
+        /// Whether the log of requests holds an unused ask of this number by another role in the
+        /// last ten seconds.
         fn backs(&self, act: Act, number: u16, by: Operator, time_s: f64) -> bool {
             !self.used.contains(&number)
                 && self.asked.iter().any(|(asked, of, asker, at_s)| {
@@ -357,8 +365,9 @@ mod tests {
         }
     }
 
-    /// The bar: a million random sequences of asks, confirmations (right, wrong, replayed), withdrawals and pauses agree to
-    /// nothing that two different roles had not asked and confirmed. Sequences with one person only never agree.
+    /// The bar: a million random sequences of asks, confirmations (right, wrong, replayed),
+    /// withdrawals and pauses agree to nothing that two different roles had not asked and
+    /// confirmed. Sequences with one person only never agree.
     #[test]
     fn a_million_random_sequences_arm_nothing_without_two_keys() {
         let mut random = ChaCha8Rng::seed_from_u64(2);
@@ -368,7 +377,8 @@ mod tests {
             let mut two = TwoPerson::default();
             let first = random.next_u32() as u16;
             let mut account = Account { asked: Vec::new(), used: Vec::new() };
-            // Every fourth sequence has a single key: one person, with every message of theirs also replayed.
+            // Every fourth sequence has a single key: one person, with every message of theirs also
+            // replayed.
             let alone = (sequence % 4 == 0).then(|| people[(random.next_u32() % 5) as usize]);
             let mut time_s = 0.0;
             for _ in 0..8 {

@@ -1,4 +1,5 @@
-//! How a landing ended, in four words that every program says alike, and the limits that two of them are judged by.
+//! How a landing ended, in four words that every program says alike, and the limits that two of
+//! them are judged by.
 
 use alloc::borrow::ToOwned as _;
 use alloc::string::{String, ToString as _};
@@ -17,13 +18,16 @@ pub struct Touchdown {
     pub distance_m: f64,
     /// Height of the feet above the ground, m.
     pub height_m: f64,
-    /// Velocity of the centre of gravity, up, m/s; [`along_axis`](Self::along_axis): towards the nose.
+    /// Velocity of the centre of gravity, up, m/s; [`along_axis`](Self::along_axis): towards the
+    /// nose.
     pub vertical_m_s: f64,
-    /// Speed of the centre of gravity over the ground, m/s; [`along_axis`](Self::along_axis): across the axis.
+    /// Speed of the centre of gravity over the ground, m/s; [`along_axis`](Self::along_axis):
+    /// across the axis.
     pub lateral_m_s: f64,
     /// Angle between nose and vertical, rad.
     pub tilt_rad: f64,
-    /// Size of the rotation rate, roll included, rad/s; [`along_axis`](Self::along_axis): without roll.
+    /// Size of the rotation rate, roll included, rad/s; [`along_axis`](Self::along_axis): without
+    /// roll.
     pub rate_rad_s: f64,
 }
 
@@ -70,7 +74,8 @@ pub struct Limits {
     pub rate_rad_s: f64,
 }
 
-/// Table 2 of the landing paper, for a [`Touchdown::along_axis`]: x, altitude, u, w, pitch error, pitch rate.
+/// Table 2 of the landing paper, for a [`Touchdown::along_axis`]: x, altitude, u, w, pitch error,
+/// pitch rate.
 pub const TABLE_2: Limits = Limits {
     distance_m: 20.0,
     height_m: 0.2,
@@ -114,8 +119,8 @@ pub struct LimitResult {
     pub passed: bool,
 }
 
-/// A value over the limit on its side of 0: above 1 it is outside. A limit of 0 has no shares: outside of it the value counts over
-/// the width of the range.
+/// A value over the limit on its side of 0: above 1 it is outside. A limit of 0 has no shares:
+/// outside of it the value counts over the width of the range.
 pub fn share_of_limit(value: f64, lowest: f64, highest: f64) -> f64 {
     let end = if value < 0.0 { lowest } else { highest };
     if end == 0.0 && value != 0.0 {
@@ -165,8 +170,8 @@ impl LandingVerdict {
         }
     }
 
-    /// Judges the end of a plan, which has to be on the ground. A plan meets it only within its solver's tolerance, so an end that is
-    /// within a millimetre below counts as on it.
+    /// Judges the end of a plan, which has to be on the ground. A plan meets it only within its
+    /// solver's tolerance, so an end that is within a millimetre below counts as on it.
     pub fn judge_plan(limits: &Limits, end: &Touchdown) -> Self {
         let limits = Limits { height_m: limits.height_m.min(TABLE_2.height_m), ..*limits };
         let on_ground = (-PLAN_HEIGHT_TOLERANCE_M..0.0).contains(&end.height_m);
@@ -200,8 +205,8 @@ impl LandingVerdict {
 /// How a landing ended. No word implies another, but what stands undamaged is upright.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Landing {
-    /// It came to rest upright on its legs, and nothing broke. Legs that crush tell it by what they bore; others have kept their
-    /// limits at contact.
+    /// It came to rest upright on its legs, and nothing broke. Legs that crush tell it by what they
+    /// bore; others have kept their limits at contact.
     pub stands: bool,
     /// It came to rest upright, whatever it touched down with.
     pub upright: bool,

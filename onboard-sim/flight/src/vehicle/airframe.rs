@@ -1,7 +1,8 @@
 //! The vehicle as data: masses, shape, fins, gimbal, legs and parachute.
 //!
-//! Stations are heights above the nozzle exit of the upright vehicle, positive towards the nose. The thrust goes through
-//! the gimbal's pivot. The controller's model and the simulated truth use the same data.
+//! Stations are heights above the nozzle exit of the upright vehicle, positive towards the nose.
+//! The thrust goes through the gimbal's pivot. The controller's model and the simulated truth use
+//! the same data.
 
 use alloc::string::String;
 use serde::{Deserialize, Serialize};
@@ -19,7 +20,8 @@ pub struct Airframe {
     /// How many independent igniters light the landing motor, 1 to 3.
     #[serde(default = "one")]
     pub igniters: u32,
-    /// The servos report where they are. If not, people must have seen them move before the vehicle is armed.
+    /// The servos report where they are. If not, people must have seen them move before the vehicle
+    /// is armed.
     pub servos_tell: bool,
     /// Masses and their positions.
     pub mass: Mass,
@@ -69,8 +71,8 @@ impl Airframe {
         self.unfinned_drag_area_m2(0.0) + self.fin_drag_area_m2(&[opening_rad; 4])
     }
 
-    /// Drag area of body and legs in a tail-first fall, m^2, of which an exhaust takes a share of the body's: the legs stand
-    /// outside of it.
+    /// Drag area of body and legs in a tail-first fall, m^2, of which an exhaust takes a share of
+    /// the body's: the legs stand outside of it.
     pub fn unfinned_drag_area_m2(&self, body_loss: f64) -> f64 {
         let body = &self.body;
         body.reference_area_m2 * body.axial_drag_coefficient * (1.0 - body_loss) + self.legs.drag_area_m2
@@ -82,9 +84,10 @@ impl Airframe {
         each_m2 * openings_rad.iter().map(|opening| libm::sin(*opening)).sum::<f64>()
     }
 
-    /// Drag area of the fins, m^2, times their distance ahead of a centre of gravity, m, less that of the legs times their distance
-    /// behind it: this turns the nose back into the wind in a tail-first fall, m^3. A drag `q A` along the wind has a moment of
-    /// `q A x sin(lean)` about a point `x` away on the axis.
+    /// Drag area of the fins, m^2, times their distance ahead of a centre of gravity, m, less that
+    /// of the legs times their distance behind it: this turns the nose back into the wind in a
+    /// tail-first fall, m^3. A drag `q A` along the wind has a moment of `q A x sin(lean)` about a
+    /// point `x` away on the axis.
     pub fn restoring_m3(&self, fin_drag_area_m2: f64, cg_station_m: f64) -> f64 {
         fin_drag_area_m2 * (self.fins.station_m - cg_station_m)
             - self.legs.drag_area_m2 * (cg_station_m - self.legs.drag_station_m)
@@ -95,23 +98,25 @@ impl Airframe {
         self.fin_drag_area_m2(&[self.fins.open_rad(); 4])
     }
 
-    /// Arm of the thrust about a centre of gravity at a station, m: the motor swings about its pivot.
+    /// Arm of the thrust about a centre of gravity at a station, m: the motor swings about its
+    /// pivot.
     pub fn thrust_arm_m(&self, cg_station_m: f64) -> f64 {
         cg_station_m - self.gimbal.pivot_station_m
     }
 
-    /// Angular momentum that a swinging motor of this mass, kg, has for each rad/s of the gimbal, kg m^2: `m (k^2 + l a)`, with its
-    /// radius of gyration `k` and the distances `l` from its middle up to the pivot and `a` up to the centre of gravity of all: its own,
-    /// and that of its mass moving at `l` about a point `a` away (Koenig's theorem; H. Goldstein, Classical Mechanics, section 1.2). The
-    /// body turns back by as much.
+    /// Angular momentum that a swinging motor of this mass, kg, has for each rad/s of the gimbal,
+    /// kg m^2: `m (k^2 + l a)`, with its radius of gyration `k` and the distances `l` from its
+    /// middle up to the pivot and `a` up to the centre of gravity of all: its own, and that of its
+    /// mass moving at `l` about a point `a` away (Koenig's theorem; H. Goldstein, Classical
+    /// Mechanics, section 1.2). The body turns back by as much.
     pub fn swinging_kg_m2(&self, motor: &ThrustCurve, motor_kg: f64, cg_station_m: f64) -> f64 {
         let middle_m = self.mass.propellant_station_m;
         motor_kg
             * (motor.gyration_m2() + (self.gimbal.pivot_station_m - middle_m) * (cg_station_m - middle_m))
     }
 
-    /// Angle at which the swinging motor touches the inside of the tube, rad: one of its rims, the one farther from the
-    /// pivot, has `max(p, L - p) sin a + r cos a` to the side.
+    /// Angle at which the swinging motor touches the inside of the tube, rad: one of its rims, the
+    /// one farther from the pivot, has `max(p, L - p) sin a + r cos a` to the side.
     pub fn gimbal_clearance_rad(&self, motor: &ThrustCurve) -> f64 {
         let above_m = motor.length_m() - self.gimbal.pivot_station_m;
         let (along_m, across_m) = (self.gimbal.pivot_station_m.max(above_m), 0.5 * motor.diameter_m());
@@ -119,8 +124,9 @@ impl Airframe {
         libm::asin((0.5 * self.gimbal.inside_diameter_m / reach_m).min(1.0)) - libm::atan2(across_m, along_m)
     }
 
-    /// Standard deviation of the earliest of the igniters' delays over that of one, if they are normal: sqrt(1 - 1 / pi) of two
-    /// (H. A. David and H. N. Nagaraja, Order Statistics, 3rd edition, table 4.9.1 has the rest).
+    /// Standard deviation of the earliest of the igniters' delays over that of one, if they are
+    /// normal: sqrt(1 - 1 / pi) of two (H. A. David and H. N. Nagaraja, Order Statistics, 3rd
+    /// edition, table 4.9.1 has the rest).
     pub fn igniter_scatter(&self) -> f64 {
         match self.igniters {
             0 | 1 => 1.0,
@@ -163,8 +169,8 @@ pub struct MassModel {
 }
 
 impl MassModel {
-    /// Removes the propellant, a point mass on the axis, from the loaded vehicle (parallel axes: H. Goldstein, C. Poole and J. Safko,
-    /// Classical Mechanics, 3rd edition, chapter 5).
+    /// Removes the propellant, a point mass on the axis, from the loaded vehicle (parallel axes: H.
+    /// Goldstein, C. Poole and J. Safko, Classical Mechanics, 3rd edition, chapter 5).
     pub fn new(mass: &Mass, propellant_mass_kg: f64) -> Self {
         let dry_mass_kg = mass.loaded_kg - propellant_mass_kg;
         let moment_kg_m = mass.loaded_kg * mass.loaded_cg_station_m;
@@ -272,9 +278,11 @@ pub struct FinData {
     /// Width of a fin along the body's skin, m.
     #[serde(default)]
     pub width_m: f64,
-    /// Angle from the y axis to the middle of a closed fin, degrees: 45 is a quarter of the skin for each.
+    /// Angle from the y axis to the middle of a closed fin, degrees: 45 is a quarter of the skin
+    /// for each.
     pub from_y_deg: f64,
-    /// Angle from a fin's middle to its hinge, towards the y axis, degrees: where an open fin stands, and why it has a lift.
+    /// Angle from a fin's middle to its hinge, towards the y axis, degrees: where an open fin
+    /// stands, and why it has a lift.
     pub hinge_off_deg: f64,
     /// Drag coefficient of an open fin on the body's reference area (Eq. 2).
     #[serde(default)]
@@ -355,7 +363,8 @@ impl Servo {
     }
 }
 
-/// Four legs, 90 degrees apart. Each has a spring and a damper along the vertical, and a foot with friction.
+/// Four legs, 90 degrees apart. Each has a spring and a damper along the vertical, and a foot with
+/// friction.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Legs {
@@ -379,9 +388,10 @@ pub struct Legs {
     pub crush: Option<Crush>,
 }
 
-/// A block above each foot that crushes at a nearly constant force, as foam does, and does not come back. The foot slides along
-/// the body's axis in a guide, which a force across jams a little: the foot gives way when the force along the axis exceeds
-/// `force_n` and `guide_share` times the force across.
+/// A block above each foot that crushes at a nearly constant force, as foam does, and does not come
+/// back. The foot slides along the body's axis in a guide, which a force across jams a little: the
+/// foot gives way when the force along the axis exceeds `force_n` and `guide_share` times the force
+/// across.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Crush {
@@ -547,7 +557,8 @@ mod tests {
         assert_eq!(error, "gimbal.limit_deg is -3; above 0 and below 90 is accepted");
     }
 
-    /// Quarters of the skin of a body of 74 mm are 58.1 mm wide. Turned by 15 degrees, neighbours are 38.7 mm apart on one side.
+    /// Quarters of the skin of a body of 74 mm are 58.1 mm wide. Turned by 15 degrees, neighbours
+    /// are 38.7 mm apart on one side.
     #[test]
     fn val_hand_closed_fins_must_not_overlap() {
         let mk3 = crate::vehicles::mission::builtin_airframe("mk3").unwrap();
@@ -571,7 +582,8 @@ mod tests {
         }
     }
 
-    /// It crushes under half the weight, jams, lets the nozzle touch the ground, or its leg breaks first.
+    /// It crushes under half the weight, jams, lets the nozzle touch the ground, or its leg breaks
+    /// first.
     #[test]
     fn a_foot_that_cannot_give_way_is_named_in_the_error() {
         let mut airframe = crate::vehicles::mission::builtin_airframe("mk3").unwrap();
@@ -589,8 +601,8 @@ mod tests {
         }
     }
 
-    /// The earlier of two independent delays of unit deviation: deviation sqrt(1 - 1 / pi). Of three: variance
-    /// 1 + sqrt(3) / (2 pi) - 9 / (4 pi).
+    /// The earlier of two independent delays of unit deviation: deviation sqrt(1 - 1 / pi). Of
+    /// three: variance 1 + sqrt(3) / (2 pi) - 9 / (4 pi).
     #[test]
     fn val_order_statistics_the_earliest_of_several_igniters() {
         use core::f64::consts::PI;

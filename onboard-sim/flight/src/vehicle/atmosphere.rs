@@ -1,8 +1,9 @@
 //! The air by height: U.S. Standard Atmosphere, 1976 (NOAA-S/T 76-1562), to 20 km.
 //!
-//! It has the standard's first two layers: temperature falls by 6.5 K per kilometre of geopotential height up to 11 km
-//! and is 216.65 K above. Heights are above mean sea level. The standard's lowest layer is used down to -5 km, and a
-//! height outside -5 to 20 km gets the air of the nearest end.
+//! It has the standard's first two layers: temperature falls by 6.5 K per kilometre of geopotential
+//! height up to 11 km and is 216.65 K above. Heights are above mean sea level. The standard's
+//! lowest layer is used down to -5 km, and a height outside -5 to 20 km gets the air of the nearest
+//! end.
 //!
 //! A warmer day has the standard's pressure at each height, as density altitude is computed in
 //! aviation. [`Site`](super::site::Site) has the air of a flight.
@@ -39,7 +40,8 @@ impl Air {
         Self::warmer_at_geopotential_m(height_m, 0.0)
     }
 
-    /// The air at a geopotential height, m, on a day that is warmer than the standard by this much, K.
+    /// The air at a geopotential height, m, on a day that is warmer than the standard by this much,
+    /// K.
     pub fn warmer_at_geopotential_m(height_m: f64, warmer_k: f64) -> Self {
         let height_m = height_m.clamp(LOWEST_M, HIGHEST_M);
         let standard_k = SEA_LEVEL_TEMPERATURE_K - LAPSE_K_M * height_m.min(TROPOPAUSE_M);
@@ -67,8 +69,8 @@ pub fn geopotential_m(height_m: f64) -> f64 {
     EARTH_RADIUS_M * height_m / (EARTH_RADIUS_M + height_m)
 }
 
-/// The geopotential height at which the standard has a pressure, m, which is a barometer's height. The result is
-/// limited to -5 to 20 km; a pressure that is not a positive number gives the top.
+/// The geopotential height at which the standard has a pressure, m, which is a barometer's height.
+/// The result is limited to -5 to 20 km; a pressure that is not a positive number gives the top.
 pub fn pressure_altitude_m(pressure_pa: f64) -> f64 {
     let ratio = pressure_pa / SEA_LEVEL_PRESSURE_PA;
     if ratio.is_nan() || ratio <= 0.0 {

@@ -3,8 +3,9 @@
 use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use crate::vehicle::thrust_curve::ThrustCurve;
 
-/// A certified thrust curve with the scales of this motor: `T(t) = s/b T0(t/b)`, so that `s` scales the impulse and `b`
-/// the time: with `t = b u` the integral of `T dt` is `s` times that of `T0 du`.
+/// A certified thrust curve with the scales of this motor: `T(t) = s/b T0(t/b)`, so that `s` scales
+/// the impulse and `b` the time: with `t = b u` the integral of `T dt` is `s` times that of `T0
+/// du`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Burn<'a> {
     /// The certified curve.
@@ -17,8 +18,8 @@ pub struct Burn<'a> {
     pub deviation: Deviation,
 }
 
-/// A deviation of the thrust from the certified shape: a fraction of the thrust that fades exponentially from an instant
-/// on.
+/// A deviation of the thrust from the certified shape: a fraction of the thrust that fades
+/// exponentially from an instant on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Deviation {
     /// At that instant.
@@ -33,7 +34,8 @@ impl Deviation {
     /// The certified shape.
     pub const NONE: Self = Self { share: 0.0, at_s: 0.0, lasts_s: 1.0 };
 
-    /// Mean over a span that begins at `from_s` since the thrust began, s: of `exp(-t)` over a time `d` it is `(1 - exp(-d)) / d`.
+    /// Mean over a span that begins at `from_s` since the thrust began, s: of `exp(-t)` over a time
+    /// `d` it is `(1 - exp(-d)) / d`.
     fn mean(&self, from_s: f64, duration_s: f64) -> f64 {
         if self.share == 0.0 {
             return 0.0;
@@ -69,13 +71,14 @@ impl<'a> Burn<'a> {
         self.impulse_scale * self.curve.impulse_to_n_s(burning_s / self.time_scale)
     }
 
-    /// Factor of the deviation on the mean thrust of a span that begins at `from_s` since it began, s. It changes little over
-    /// the spans of a plan, so its mean may multiply the thrust's.
+    /// Factor of the deviation on the mean thrust of a span that begins at `from_s` since it began,
+    /// s. It changes little over the spans of a plan, so its mean may multiply the thrust's.
     pub(crate) fn deviates(&self, from_s: f64, duration_s: f64) -> f64 {
         1.0 + self.deviation.mean(from_s, duration_s)
     }
 
-    /// Derivative of the impulse from `from_s` to `until_s` since the thrust began by the deviation at `from_s`, N s.
+    /// Derivative of the impulse from `from_s` to `until_s` since the thrust began by the deviation
+    /// at `from_s`, N s.
     pub fn fading_n_s(&self, from_s: f64, until_s: f64) -> f64 {
         let fading = Deviation { share: 1.0, at_s: from_s, ..self.deviation };
         let duration_s = until_s - from_s;
@@ -87,14 +90,14 @@ impl<'a> Burn<'a> {
         self.curve.propellant_burnt_kg(burning_s / self.time_scale)
     }
 
-    /// When the thrust falls through the weight for the last time, s since it began; `None` if it never exceeds the
-    /// weight.
+    /// When the thrust falls through the weight for the last time, s since it began; `None` if it
+    /// never exceeds the weight.
     ///
     /// `mass_at_ignition_kg` is the mass before the burn.
     pub fn falls_through_weight_s(&self, mass_at_ignition_kg: f64) -> Option<f64> {
         let mut time_s = self.time_scale * self.curve.burn_time_s();
-        // The burnt propellant changes the weight by one or two per cent, so the fixed-point iteration needs few
-        // rounds.
+        // The burnt propellant changes the weight by one or two per cent, so the fixed-point
+        // iteration needs few rounds.
         for _ in 0..4 {
             let weight_n = (mass_at_ignition_kg - self.burnt_kg(time_s)) * STANDARD_GRAVITY_M_S2;
             let curve_n =

@@ -1,30 +1,37 @@
-//! The four fins of the landing paper: drag, lift and moments as functions of the opening angle (section 2, Eq. 1-17).
+//! The four fins of the landing paper: drag, lift and moments as functions of the opening angle
+//! (section 2, Eq. 1-17).
 //!
-//! Each fin is a quarter of the fuselage's skin, with its hinge near the nose; `kappa` is its opening angle, 0 closed
-//! against the body and pi/2 fully open. (Eq. 1 prints `pi - X_b . Y_f`, which is no angle.) Body axes are those of
+//! Each fin is a quarter of the fuselage's skin, with its hinge near the nose; `kappa` is its
+//! opening angle, 0 closed against the body and pi/2 fully open. (Eq. 1 prints `pi - X_b . Y_f`,
+//! which is no angle.) Body axes are those of
 //! [`crate::vehicle::rigid`]: x to the nose, moments about x roll, y pitch, z yaw. The middles of the closed fins are
-//! 45 degrees from the y axis, so that the four quarters close into a cylinder. The hinge is 15 degrees off the fin's
-//! middle, towards the y axis ("the fins' links are rotated at an angle of 15 degrees", section 2.1): an open fin
-//! stands at its hinge, 30 degrees from y, and its skin reaches further to one side of it. From that comes its lift: a
-//! fin hinged at its middle has none. Seen along the body, an open fin `i` is at
+//! 45 degrees from the y axis, so that the four quarters close into a cylinder. The hinge is 15
+//! degrees off the fin's middle, towards the y axis ("the fins' links are rotated at an angle of 15
+//! degrees", section 2.1): an open fin stands at its hinge, 30 degrees from y, and its skin reaches
+//! further to one side of it. From that comes its lift: a fin hinged at its middle has none. Seen
+//! along the body, an open fin `i` is at
 //!
 //! ```text
 //! (y, z) = r (-YAW[i] cos h, PITCH[i] sin h),   r = (D + L_f sin kappa) / 2,   h = 30 deg
 //! ```
 //!
-//! At this place a drag towards the nose has the moments of Eq. 16 and 17. `h` is the angle of Eq. 9-12, too, and
-//! another airframe may have another. As in the paper the force acts at the hinge's angle: that the middle of an open
-//! fin is `D/2 sin 15 deg`, 10 mm, beside it, is left out.
+//! At this place a drag towards the nose has the moments of Eq. 16 and 17. `h` is the angle of Eq.
+//! 9-12, too, and another airframe may have another. As in the paper the force acts at the hinge's
+//! angle: that the middle of an open fin is `D/2 sin 15 deg`, 10 mm, beside it, is left out.
 //!
 //! Errors of the printed equations, and their corrections:
-//! * Eq. 3 and Eq. 13-14 each have a sine of kappa; it is one and the same, and the force goes as `sin kappa`.
-//! * Eq. 16 and 17 multiply the bracket by one force, but each fin has its own force, so the sum is taken fin by fin.
-//! * Eq. 15 sums four lift moments of one sign: four equal openings would spin the vehicle. The text's "chosen
-//!   symmetries" need neighbours that mirror each other, so the signs alternate ([`ROLL`]). The patterns of roll,
-//!   pitch, yaw and drag are then orthogonal, which is the decoupling that section 2.1 claims.
+//! * Eq. 3 and Eq. 13-14 each have a sine of kappa; it is one and the same, and the force goes as
+//!   `sin kappa`.
+//! * Eq. 16 and 17 multiply the bracket by one force, but each fin has its own force, so the sum is
+//!   taken fin by fin.
+//! * Eq. 15 sums four lift moments of one sign: four equal openings would spin the vehicle. The
+//!   text's "chosen symmetries" need neighbours that mirror each other, so the signs alternate
+//!   ([`ROLL`]). The patterns of roll, pitch, yaw and drag are then orthogonal, which is the
+//!   decoupling that section 2.1 claims.
 
-/// Signs of the fins' roll moments. The hinges are on the side where the side force of the lift acts with the drag in
-/// yaw, and against it, but more strongly, in pitch. With hinges on the other side the two would almost cancel in yaw.
+/// Signs of the fins' roll moments. The hinges are on the side where the side force of the lift
+/// acts with the drag in yaw, and against it, but more strongly, in pitch. With hinges on the other
+/// side the two would almost cancel in yaw.
 pub const ROLL: [f64; 4] = [-1.0, 1.0, -1.0, 1.0];
 /// Signs of the fins' pitch moments (Eq. 16).
 pub const PITCH: [f64; 4] = [1.0, -1.0, -1.0, 1.0];
@@ -59,7 +66,8 @@ pub struct Moments {
     pub yaw_n_m: f64,
 }
 
-/// Sine and cosine of an angle in degrees; those of the paper's 30 degrees exactly, of which no `f64` in radians has the sine.
+/// Sine and cosine of an angle in degrees; those of the paper's 30 degrees exactly, of which no
+/// `f64` in radians has the sine.
 pub fn sin_cos_deg(angle_deg: f64) -> (f64, f64) {
     const COS_30: f64 = 0.866_025_403_784_438_6;
     if (angle_deg - 30.0).abs() < 1e-9 { (0.5, COS_30) } else { libm::sincos(angle_deg.to_radians()) }
@@ -133,7 +141,8 @@ mod tests {
             })
         }
 
-        /// Moments of the drags and lifts about the axis: Eq. 15 with alternating signs, Eq. 16 and 17 fin by fin.
+        /// Moments of the drags and lifts about the axis: Eq. 15 with alternating signs, Eq. 16 and
+        /// 17 fin by fin.
         fn moments(&self, flow: &Flow, kappa_rad: [f64; 4]) -> Moments {
             let (drag_n, lift_n) = (self.drag_n(flow, kappa_rad), self.lift_n(flow, kappa_rad));
             let mut moments = Moments::default();
@@ -175,7 +184,8 @@ mod tests {
         );
     }
 
-    /// Eq. 9-12 for alpha 0.2, beta 0.1, worked by hand: 0.2 cos 30 = 0.1732051, 0.1 sin 30 = 0.05, and so on.
+    /// Eq. 9-12 for alpha 0.2, beta 0.1, worked by hand: 0.2 cos 30 = 0.1732051, 0.1 sin 30 = 0.05,
+    /// and so on.
     #[test]
     fn val_hand_fin_incidence() {
         let expected = [
@@ -192,7 +202,8 @@ mod tests {
         }
     }
 
-    /// At 1,000 Pa an open fin has 0.0043 x 1.55 x 1000 = 6.665 N of drag and 5.504 N of lift; half of each at 30 degrees.
+    /// At 1,000 Pa an open fin has 0.0043 x 1.55 x 1000 = 6.665 N of drag and 5.504 N of lift; half
+    /// of each at 30 degrees.
     #[test]
     fn val_hand_drag_and_lift() {
         let flow = along_the_axis(1000.0);
@@ -205,15 +216,16 @@ mod tests {
         {
             close(found, expected, "lift");
         }
-        // cos(60 deg) of incidence on fin 1 halves it: alpha cos 30 - beta sin 30 = pi/3, and the other is zero.
+        // cos(60 deg) of incidence on fin 1 halves it: alpha cos 30 - beta sin 30 = pi/3, and the
+        // other is zero.
         let alpha_rad = core::f64::consts::FRAC_PI_3 * PLACE.1;
         let beta_rad = -core::f64::consts::FRAC_PI_3 * PLACE.0;
         let oblique = Flow { alpha_rad, beta_rad, dynamic_pressure_pa: 1000.0 };
         close(model().drag_n(&oblique, kappa_rad)[0], 3.3325, "oblique drag");
     }
 
-    /// One open fin at 1,000 Pa, radius (0.074 + 0.1)/2 = 0.087 m: roll 0.087 x 5.504, pitch 0.087 x 0.5 x 6.665, yaw
-    /// 0.087 x 0.8660254 x 6.665.
+    /// One open fin at 1,000 Pa, radius (0.074 + 0.1)/2 = 0.087 m: roll 0.087 x 5.504, pitch 0.087
+    /// x 0.5 x 6.665, yaw 0.087 x 0.8660254 x 6.665.
     #[test]
     fn val_hand_moments_of_one_fin() {
         let flow = along_the_axis(1000.0);
@@ -227,7 +239,8 @@ mod tests {
         }
     }
 
-    /// The paper's decoupling: equal openings give no moment, and each pattern gives a moment about its own axis.
+    /// The paper's decoupling: equal openings give no moment, and each pattern gives a moment about
+    /// its own axis.
     #[test]
     fn patterns_are_decoupled() {
         let flow = along_the_axis(800.0);
@@ -248,7 +261,8 @@ mod tests {
         }
     }
 
-    /// Without an arm the side forces give no moment, and the allocation's moments are those of Eq. 15-17.
+    /// Without an arm the side forces give no moment, and the allocation's moments are those of Eq.
+    /// 15-17.
     #[test]
     fn without_an_arm_the_allocation_matches_the_paper() {
         let flow = along_the_axis(800.0);
@@ -260,8 +274,8 @@ mod tests {
         close(found.yaw_n_m, printed.yaw_n_m, "yaw");
     }
 
-    /// Wherever the fins stand: drag along the axis and lift across it and the fin's direction, at their places, turn the vehicle
-    /// by what the allocation counts on.
+    /// Wherever the fins stand: drag along the axis and lift across it and the fin's direction, at
+    /// their places, turn the vehicle by what the allocation counts on.
     #[test]
     fn at_any_place_the_allocation_has_the_moments_of_the_forces() {
         for open_deg in [20.0, 30.0, 45.0, 60.0] {
@@ -351,7 +365,8 @@ mod tests {
             }
         }
 
-        /// A command that fits between the stops is met exactly: the allocation is the inverse of the model.
+        /// A command that fits between the stops is met exactly: the allocation is the inverse of
+        /// the model.
         #[test]
         fn what_fits_is_given(
             mean in 0.6..0.8_f64,

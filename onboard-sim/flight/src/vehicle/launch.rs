@@ -1,7 +1,7 @@
 //! The ascent as data: the rail on the pad, and the booster stage that carries the vehicle up.
 //!
-//! Stations are heights above the landing vehicle's nozzle exit, towards the nose positive. The booster sits below it, so
-//! its stations are negative.
+//! Stations are heights above the landing vehicle's nozzle exit, towards the nose positive. The
+//! booster sits below it, so its stations are negative.
 
 use alloc::string::String;
 
@@ -17,8 +17,8 @@ use super::thrust_curve::ThrustCurve;
 #[serde(deny_unknown_fields)]
 pub struct Launch {
     pub rail: Rail,
-    /// Time before the expected apogee at which the booster is separated, s. A stack that is still fast points along its
-    /// path; close to apogee it would follow the path over the top.
+    /// Time before the expected apogee at which the booster is separated, s. A stack that is still
+    /// fast points along its path; close to apogee it would follow the path over the top.
     pub separate_before_apogee_s: f64,
     pub booster: Booster,
 }
@@ -39,8 +39,9 @@ pub struct Rail {
     /// To the west, m.
     #[serde(default)]
     pub y_m: f64,
-    /// The crew places it upwind of the landing pad by this time times the mean wind at 10 m that it measures, s, and writes
-    /// where it stands into `x_m` and `y_m`. A simulated crew does so where both are zero.
+    /// The crew places it upwind of the landing pad by this time times the mean wind at 10 m that
+    /// it measures, s, and writes where it stands into `x_m` and `y_m`. A simulated crew does so
+    /// where both are zero.
     #[serde(default)]
     pub upwind_s: f64,
 }
@@ -52,7 +53,8 @@ impl Rail {
     }
 }
 
-/// The booster stage, and the air on the whole stack. Coefficients are on the reference area of the vehicle's body.
+/// The booster stage, and the air on the whole stack. Coefficients are on the reference area of the
+/// vehicle's body.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Booster {
@@ -82,7 +84,8 @@ pub struct Booster {
     /// Of the booster's fins. The reader of the mission computes it.
     #[serde(skip)]
     pub fin_force: NormalForce,
-    /// Distance from the axis at which the force on a fin acts, m. The reader of the mission computes it.
+    /// Distance from the axis at which the force on a fin acts, m. The reader of the mission
+    /// computes it.
     #[serde(skip)]
     pub fin_radius_m: f64,
     /// Momentum that the separation charge gives the vehicle, N s.
@@ -115,8 +118,9 @@ pub struct BoosterFins {
 }
 
 impl BoosterFins {
-    /// Force across the axis on a body of this diameter, m, whose lower end is at a station, m (J. S. and J. A. Barrowman, The
-    /// Theoretical Prediction of the Center of Pressure, 1966; with its interference of fins and body).
+    /// Force across the axis on a body of this diameter, m, whose lower end is at a station, m (J.
+    /// S. and J. A. Barrowman, The Theoretical Prediction of the Center of Pressure, 1966; with its
+    /// interference of fins and body).
     pub fn force(&self, diameter_m: f64, end_station_m: f64) -> NormalForce {
         let Self { root_chord_m: root_m, tip_chord_m: tip_m, span_m, sweep_m, above_end_m } = *self;
         let both_m = root_m + tip_m;

@@ -1,8 +1,10 @@
-//! What a club knows of the lot that its landing motor is of, and what a mission expects of the motor because of it.
+//! What a club knows of the lot that its landing motor is of, and what a mission expects of the
+//! motor because of it.
 //!
-//! A certified curve was measured on motors of another lot. A club that has burnt some of its own on a stand says so in the
-//! section `[lot]` of its mission: how they differed, at which temperature, and what motor and vehicle weigh on the day.
-//! [`Lot::expectation`] is the one place where that becomes a mean and a width.
+//! A certified curve was measured on motors of another lot. A club that has burnt some of its own
+//! on a stand says so in the section `[lot]` of its mission: how they differed, at which
+//! temperature, and what motor and vehicle weigh on the day. [`Lot::expectation`] is the one place
+//! where that becomes a mean and a width.
 
 use alloc::string::String;
 
@@ -19,8 +21,8 @@ pub struct Lot {
     pub name: String,
     /// Motors of the lot that were burnt and measured. With 0 nothing confirms the curve.
     pub burns: u32,
-    /// A measured curve, flown instead of the certified one: a built-in motor's name, or the text of a motor file. The scales
-    /// are then over this curve.
+    /// A measured curve, flown instead of the certified one: a built-in motor's name, or the text
+    /// of a motor file. The scales are then over this curve.
     pub curve: Option<String>,
     /// Impulses of the burns over the curve's.
     #[serde(default)]
@@ -42,7 +44,8 @@ with_defaults! {
         /// Sample standard deviation; 0 of a single burn.
         #[serde(default)]
         pub scatter: f64 = 0.0,
-        /// Standard deviation of what every burn may be wrong by in the same direction, such as the load cell's calibration.
+        /// Standard deviation of what every burn may be wrong by in the same direction, such as the
+        /// load cell's calibration.
         #[serde(default)]
         pub common: f64 = 0.0,
     }
@@ -68,26 +71,29 @@ pub struct Weighed {
     pub vehicle_kg: Option<f64>,
 }
 
-/// The prior counts as this many burns for the mean: a lot's mean differs from the certified value as much as motors within
-/// the lot differ from each other. (The certified curves of one motor, which are of different lots, differ by 3.75 % of
-/// impulse; the set `field` has 2.5 % for the two together.)
+/// The prior counts as this many burns for the mean: a lot's mean differs from the certified value
+/// as much as motors within the lot differ from each other. (The certified curves of one motor,
+/// which are of different lots, differ by 3.75 % of impulse; the set `field` has 2.5 % for the two
+/// together.)
 const PRIOR_BURNS: f64 = 1.0;
-/// Half the degrees of freedom of the prior's scatter: the fewest with which the next value has a variance, so that the
-/// lot's own burns count soon.
+/// Half the degrees of freedom of the prior's scatter: the fewest with which the next value has a
+/// variance, so that the lot's own burns count soon.
 const PRIOR_ALPHA: u32 = 2;
-/// Standard deviation of the mass of a vehicle that was not weighed on the day: the 1 % that [`MotorPrior`] has in its impulse.
+/// Standard deviation of the mass of a vehicle that was not weighed on the day: the 1 % that
+/// [`MotorPrior`] has in its impulse.
 const UNWEIGHED_SHARE: f64 = 0.01;
 /// A weighing is right to this, kg.
 const WEIGHED_KG: f64 = 0.005;
-/// Change of the chamber pressure by the propellant's temperature, 1/K: the middle of 0.067 to 0.278 % (Sutton and Biblarz,
-/// Rocket Propulsion Elements, 9th edition, chapter 12, temperature sensitivity at constant area ratio). The thrust changes as
-/// the pressure, the burn time inversely: the impulse stays.
+/// Change of the chamber pressure by the propellant's temperature, 1/K: the middle of 0.067 to
+/// 0.278 % (Sutton and Biblarz, Rocket Propulsion Elements, 9th edition, chapter 12, temperature
+/// sensitivity at constant area ratio). The thrust changes as the pressure, the burn time
+/// inversely: the impulse stays.
 const PRESSURE_PER_K: f64 = 0.001_725;
 /// Its standard deviation, that of an even distribution between these two, 1/K.
 const PRESSURE_PER_K_SIGMA: f64 = 0.000_609;
 
-/// What is known of a normal distribution: the conjugate normal-inverse-gamma (A. Gelman et al., Bayesian Data Analysis, 3rd
-/// edition, section 3.3), and what all values have in common.
+/// What is known of a normal distribution: the conjugate normal-inverse-gamma (A. Gelman et al.,
+/// Bayesian Data Analysis, 3rd edition, section 3.3), and what all values have in common.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Posterior {
     /// Expected mean.
@@ -161,15 +167,17 @@ pub struct Expectation {
 }
 
 impl Expectation {
-    /// Standard deviation of the impulse per mass, as a fraction: an accelerometer cannot tell the two apart.
+    /// Standard deviation of the impulse per mass, as a fraction: an accelerometer cannot tell the
+    /// two apart.
     pub fn impulse_per_mass_share(&self) -> f64 {
         libm::hypot(self.impulse.share, self.mass_share)
     }
 }
 
 impl Lot {
-    /// What this lot lets expect, where nothing was known but `prior`; the vehicle has this mass. Mean and scatter are those of
-    /// [`Posterior`]; the variances of causes that know nothing of each other add up.
+    /// What this lot lets expect, where nothing was known but `prior`; the vehicle has this mass.
+    /// Mean and scatter are those of [`Posterior`]; the variances of causes that know nothing of
+    /// each other add up.
     pub fn expectation(&self, prior: &MotorPrior, loaded_kg: f64) -> Expectation {
         let impulse_sigma = libm::sqrt(
             (prior.impulse_sigma * prior.impulse_sigma - UNWEIGHED_SHARE * UNWEIGHED_SHARE).max(0.0),
@@ -190,7 +198,8 @@ impl Lot {
         }
     }
 
-    /// Checks the weights against what motor and vehicle are by their data, kg: another one was weighed, or in grams.
+    /// Checks the weights against what motor and vehicle are by their data, kg: another one was
+    /// weighed, or in grams.
     ///
     /// # Errors
     /// [`BadValue`] names the key.
@@ -217,8 +226,9 @@ mod tests {
         Lot { name, burns, curve: None, impulse, burn_time, temperature: None, weighed: Weighed::default() }
     }
 
-    /// A prior of 1 with 0.02, worth one value, 4 degrees: squares 0.0004. Values 1.02 and 0.99: the mean is (1 + 1.02 +
-    /// 0.99) / 3; the squares grow by 0.02^2 / 2 and by 0.02^2 2/3, value by value.
+    /// A prior of 1 with 0.02, worth one value, 4 degrees: squares 0.0004. Values 1.02 and 0.99:
+    /// the mean is (1 + 1.02 + 0.99) / 3; the squares grow by 0.02^2 / 2 and by 0.02^2 2/3, value
+    /// by value.
     #[test]
     fn val_hand_two_burns() {
         let prior = Posterior::prior(1.0, 0.02);

@@ -70,8 +70,8 @@ pub struct Start {
     pub tilt_deg: f64,
 }
 
-/// Places of the sensors in the vehicle: stations above the nozzle exit, and distances from the axis
-/// along body y and z, m. A sensor without a station is taken to be at the centre of gravity.
+/// Places of the sensors in the vehicle: stations above the nozzle exit, and distances from the
+/// axis along body y and z, m. A sensor without a station is taken to be at the centre of gravity.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SensorPlaces {
@@ -183,9 +183,11 @@ with_defaults! {
         pub speed_max_m_s: f64 = 0.2,
         /// Smallest free log space, bytes.
         pub log_space_min_bytes: u64 = 64 << 20,
-        /// Lowest voltage of the battery, V. The default is for two lithium-polymer cells: 3.7 V a cell at light load is
-        /// about a seventh of the charge, a quarter of an hour of the simulated vehicle (1 Ah, 0.5 A), and 0.8 V above the 6.6 V
-        /// at which common 5 V regulators give up; six moving servos and an igniter take 0.65 V of that (9.2 A through 70 mohm).
+        /// Lowest voltage of the battery, V. The default is for two lithium-polymer cells: 3.7 V a
+        /// cell at light load is about a seventh of the charge, a quarter of an hour of the
+        /// simulated vehicle (1 Ah, 0.5 A), and 0.8 V above the 6.6 V at which common 5 V
+        /// regulators give up; six moving servos and an igniter take 0.65 V of that (9.2 A through
+        /// 70 mohm).
         pub battery_min_v: f64 = 7.4,
     }
 }
@@ -207,8 +209,8 @@ pub struct GateLimits {
     pub fence_radius_m: f64,
 }
 
-/// Everything that defines a flight, except random differences. A club's file has what it measures or decides; the reader of the
-/// mission adds the controller.
+/// Everything that defines a flight, except random differences. A club's file has what it measures
+/// or decides; the reader of the mission adds the controller.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Mission {
@@ -216,23 +218,27 @@ pub struct Mission {
     pub name: String,
     /// Description in one line.
     pub summary: String,
-    /// The keys of the file that are the controller's: with one of them the mission is not flown by the standard controller.
+    /// The keys of the file that are the controller's: with one of them the mission is not flown by
+    /// the standard controller.
     #[serde(skip)]
     pub changed: Vec<String>,
     /// The vehicle.
     pub airframe: Airframe,
-    /// The expected thrust curve of the landing motor: the certified one of the motor that the airframe names, or what the lot
-    /// tells instead. It is not in the mission's file; the reader of the mission looks the motor up.
+    /// The expected thrust curve of the landing motor: the certified one of the motor that the
+    /// airframe names, or what the lot tells instead. It is not in the mission's file; the reader
+    /// of the mission looks the motor up.
     #[serde(skip)]
     pub motor_curve: ThrustCurve,
-    /// Other curves that the landing motor may turn out to have: names of built-in motors, or texts of motor files.
+    /// Other curves that the landing motor may turn out to have: names of built-in motors, or texts
+    /// of motor files.
     #[serde(default)]
     pub other_motors: Vec<String>,
-    /// These curves, and before each the one half way to it. The reader of the mission looks them up.
+    /// These curves, and before each the one half way to it. The reader of the mission looks them
+    /// up.
     #[serde(skip)]
     pub other_curves: Vec<ThrustCurve>,
-    /// What burns of the motor's lot tell. The reader of the mission puts it into the motor's curve and prior, the ignition
-    /// and the mass.
+    /// What burns of the motor's lot tell. The reader of the mission puts it into the motor's curve
+    /// and prior, the ignition and the mass.
     pub lot: Option<Box<Lot>>,
     /// What comes of the lot; `None` without one.
     #[serde(skip)]
@@ -245,15 +251,17 @@ pub struct Mission {
     /// The prior of the motor before ignition.
     #[serde(default)]
     pub motor: MotorPrior,
-    /// A plan assumes a motor that is weaker than the estimate by this many standard deviations of the remaining
-    /// impulse.
+    /// A plan assumes a motor that is weaker than the estimate by this many standard deviations of
+    /// the remaining impulse.
     pub caution_sigmas: f64,
     /// This caution fades over this time before the thrust falls through the weight, s.
     pub caution_fades_s: f64,
-    /// Largest tilt that the landing may use throughout, in the band of feasible heights before the ignition, degrees.
+    /// Largest tilt that the landing may use throughout, in the band of feasible heights before the
+    /// ignition, degrees.
     #[serde(default)]
     pub soft_tilt_deg: f64,
-    /// The same for the fins' band after the ignition, degrees; the rest of the tilt is reserved for the planner.
+    /// The same for the fins' band after the ignition, degrees; the rest of the tilt is reserved
+    /// for the planner.
     #[serde(default)]
     pub fin_soft_tilt_deg: f64,
     /// How long before touchdown the vehicle is upright in that band, s.
@@ -273,7 +281,8 @@ pub struct Mission {
     pub powered: PoweredSettings,
     /// The gimbal loop.
     pub aim: AimGains,
-    /// Whether the gimbal holds a vehicle upright that has touched down while the thrust still carries it.
+    /// Whether the gimbal holds a vehicle upright that has touched down while the thrust still
+    /// carries it.
     #[serde(default)]
     pub upright_after_contact: bool,
     /// Limits of the pad checks before arming.
@@ -281,14 +290,15 @@ pub struct Mission {
     pub arming: ArmingLimits,
     /// Limits of the checks before ignition.
     pub gate: GateLimits,
-    /// What the legs were designed for, all at once. Whether a landing counts is decided by what they bear.
+    /// What the legs were designed for, all at once. Whether a landing counts is decided by what
+    /// they bear.
     #[serde(default)]
     pub leg_limits: LegLimits,
 }
 
 impl Mission {
-    /// How many burns of the motor's lot have confirmed the curve that this mission expects; of a certified curve alone none
-    /// has.
+    /// How many burns of the motor's lot have confirmed the curve that this mission expects; of a
+    /// certified curve alone none has.
     pub fn motor_burns(&self) -> u32 {
         self.lot.as_ref().map_or(0, |lot| lot.burns)
     }
@@ -298,19 +308,22 @@ impl Mission {
         self.launch.as_ref().filter(|_| self.start.at == StartPoint::Pad)
     }
 
-    /// Height of the centre of gravity above the pad at which its flight begins, m: at apogee, or where a drone releases it.
+    /// Height of the centre of gravity above the pad at which its flight begins, m: at apogee, or
+    /// where a drone releases it.
     pub fn start_height_m(&self) -> f64 {
         let dropped = self.drop.filter(|_| self.start.at == StartPoint::Drone);
         dropped.map_or(self.start.height_m, |drop| drop.height_m)
     }
 
-    /// The prior of a motor with another curve than the expected one: nobody has burnt any of its lot.
+    /// The prior of a motor with another curve than the expected one: nobody has burnt any of its
+    /// lot.
     pub(crate) fn unknown_motor(&self) -> MotorPrior {
         let MotorPrior { impulse_sigma, burn_time_sigma, .. } = MotorPrior::default();
         MotorPrior { impulse_sigma, burn_time_sigma, ..self.motor }
     }
 
-    /// Puts in what the lot tells, where `curve` is the one that the lot's scales are over; without a lot, that curve.
+    /// Puts in what the lot tells, where `curve` is the one that the lot's scales are over; without
+    /// a lot, that curve.
     pub(crate) fn expect(&mut self, curve: ThrustCurve) {
         let Some(lot) = &self.lot else {
             self.motor_curve = curve;

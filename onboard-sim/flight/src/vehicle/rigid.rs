@@ -1,14 +1,15 @@
 //! The state of a rigid rocket in space, and its frames.
 //!
-//! World: `x` and `y` horizontal, `z` up, right-handed, origin at the pad on the ground. Body: `x` along the axis of
-//! symmetry towards the nose, `z` along world `x` when upright and not rolled, `y` to complete a right-handed set
-//! (world `-y` when upright), origin at the centre of gravity.
+//! World: `x` and `y` horizontal, `z` up, right-handed, origin at the pad on the ground. Body: `x`
+//! along the axis of symmetry towards the nose, `z` along world `x` when upright and not rolled,
+//! `y` to complete a right-handed set (world `-y` when upright), origin at the centre of gravity.
 //!
-//! The nozzle points along body `-x`. Gimbal angles `(pitch, yaw)` turn the thrust to
-//! `T (cos p cos y, sin y, -sin p cos y)` in body axes: a positive angle pitches the nose down, or yaws it, by
+//! The nozzle points along body `-x`. Gimbal angles `(pitch, yaw)` turn the thrust to `T (cos p cos
+//! y, sin y, -sin p cos y)` in body axes: a positive angle pitches the nose down, or yaws it, by
 //! `q' = -T sin p (X_CG - X_THR) / I` and `r' = -T sin y (X_CG - X_THR) / I`.
 //!
-//! Rotations are unit quaternions (B. L. Stevens and F. L. Lewis, Aircraft Control and Simulation, chapter 1).
+//! Rotations are unit quaternions (B. L. Stevens and F. L. Lewis, Aircraft Control and Simulation,
+//! chapter 1).
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};

@@ -1,8 +1,8 @@
 //! A solid motor's thrust over time.
 //!
-//! Thrust is linear between the points and zero outside them, so impulse and mean thrust are exact. Propellant burns in
-//! proportion to the delivered impulse (a constant exhaust velocity: G. P. Sutton and O. Biblarz, Rocket Propulsion Elements,
-//! 9th edition, chapter 2).
+//! Thrust is linear between the points and zero outside them, so impulse and mean thrust are exact.
+//! Propellant burns in proportion to the delivered impulse (a constant exhaust velocity: G. P.
+//! Sutton and O. Biblarz, Rocket Propulsion Elements, 9th edition, chapter 2).
 
 use alloc::format;
 use alloc::string::String;
@@ -74,7 +74,8 @@ impl ThrustCurve {
         }
     }
 
-    /// The motor whose thrust and masses lie this share of the way from this one's to another's, named after both.
+    /// The motor whose thrust and masses lie this share of the way from this one's to another's,
+    /// named after both.
     #[must_use]
     pub fn towards(&self, other: &Self, share: f64) -> Self {
         let between = |here: f64, there: f64| here + share * (there - here);
@@ -132,7 +133,8 @@ impl ThrustCurve {
         self.data.total_mass_kg
     }
 
-    /// The square of the casing's radius of gyration across its axis, m^2, taken as a full cylinder.
+    /// The square of the casing's radius of gyration across its axis, m^2, taken as a full
+    /// cylinder.
     pub fn gyration_m2(&self) -> f64 {
         self.data.length_m * self.data.length_m / 12.0 + self.data.diameter_m * self.data.diameter_m / 16.0
     }
@@ -157,7 +159,8 @@ impl ThrustCurve {
         self.data.points.iter().fold(0.0, |peak: f64, point| peak.max(point.thrust_n))
     }
 
-    /// The segment that contains a time: its ends and the impulse before it. `None` outside the burn.
+    /// The segment that contains a time: its ends and the impulse before it. `None` outside the
+    /// burn.
     fn segment(&self, time_s: f64) -> Option<(ThrustPoint, ThrustPoint, f64)> {
         let after = self.data.points.partition_point(|point| point.time_s <= time_s);
         let from = *self.data.points.get(after.checked_sub(1)?)?;
@@ -181,7 +184,8 @@ impl ThrustCurve {
         }
     }
 
-    /// Mean thrust over `[from_s, from_s + duration_s]`, N; the thrust itself for a duration that is not positive.
+    /// Mean thrust over `[from_s, from_s + duration_s]`, N; the thrust itself for a duration that
+    /// is not positive.
     pub fn mean_thrust_n(&self, from_s: f64, duration_s: f64) -> f64 {
         if duration_s > 0.0 {
             (self.impulse_to_n_s(from_s + duration_s) - self.impulse_to_n_s(from_s)) / duration_s
@@ -195,7 +199,8 @@ impl ThrustCurve {
         self.data.propellant_mass_kg * self.impulse_to_n_s(time_s) / self.total_impulse_n_s()
     }
 
-    /// When the thrust falls through a value for the last time, s; `None` if it never exceeds the value.
+    /// When the thrust falls through a value for the last time, s; `None` if it never exceeds the
+    /// value.
     pub fn falls_through_s(&self, thrust_n: f64) -> Option<f64> {
         let last_above = self.data.points.iter().rposition(|point| point.thrust_n > thrust_n)?;
         let from = self.data.points.get(last_above)?;

@@ -50,7 +50,8 @@ pub fn names() -> impl Iterator<Item = &'static str> {
     BUILTIN.iter().map(|(name, _)| *name)
 }
 
-/// Whether a built-in motor is produced, and the day on which that was so (YYYY-MM-DD): its file says it.
+/// Whether a built-in motor is produced, and the day on which that was so (YYYY-MM-DD): its file
+/// says it.
 pub fn status(name: &str) -> Option<(bool, &'static str)> {
     let (_, text) = BUILTIN.iter().find(|(known, _)| *known == name)?;
     let line = text.lines().find_map(|line| line.strip_prefix("; status: "))?;
@@ -71,8 +72,9 @@ pub fn builtin(name: &str) -> Result<ThrustCurve, MotorError> {
     thrust_curve::from_rasp(text).map_err(|source| MotorError::Unusable { name, source })
 }
 
-/// The motor of an airframe: the name of a built-in motor, or the text of a RASP (`.eng`) or RockSim (`.rse`) file.
-/// With the text inside, a mission and the log of its flight need no other file.
+/// The motor of an airframe: the name of a built-in motor, or the text of a RASP (`.eng`) or
+/// RockSim (`.rse`) file. With the text inside, a mission and the log of its flight need no other
+/// file.
 ///
 /// # Errors
 ///

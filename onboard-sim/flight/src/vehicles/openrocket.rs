@@ -54,8 +54,9 @@ pub fn read(text: &str) -> Result<Simulated, TableError> {
 mod tests {
     use super::*;
 
-    /// The head and first row of github.com/psas/Launch-10, sim/launch-output_sim.csv (OpenRocket 13.05), without columns that
-    /// are not read. Its README has mass and centre of gravity: 34.069 kg, 241 cm from the nose, 14.0 cm of diameter.
+    /// The head and first row of github.com/psas/Launch-10, sim/launch-output_sim.csv (OpenRocket
+    /// 13.05), without columns that are not read. Its README has mass and centre of gravity: 34.069
+    /// kg, 241 cm from the nose, 14.0 cm of diameter.
     const LAUNCH_10: &str = "# Brothers Summer 2013 (Up to date)\n\
         # 1098 data points written for 54 variables.\n\
         # Simulation warnings:\n\

@@ -1,7 +1,8 @@
 //! Tables of numbers whose columns say their units, as programs export and test stands record them.
 //!
-//! The first line that names the wanted columns is the header, also behind a comment sign: `# Time (s),Mass (g)`,
-//! `time_ms;thrust_lbf`. Its separator is a semicolon, a tab or a comma. Other columns, blank lines and comments are ignored.
+//! The first line that names the wanted columns is the header, also behind a comment sign: `# Time
+//! (s),Mass (g)`, `time_ms;thrust_lbf`. Its separator is a semicolon, a tab or a comma. Other
+//! columns, blank lines and comments are ignored.
 
 use alloc::borrow::ToOwned as _;
 use alloc::format;
@@ -37,7 +38,8 @@ impl TableError {
     }
 }
 
-/// By how much a number in a unit is multiplied to be in that unit of the SI: "kg m2" from "lb·ft²". Anything has no unit.
+/// By how much a number in a unit is multiplied to be in that unit of the SI: "kg m2" from
+/// "lb·ft²". Anything has no unit.
 ///
 /// # Errors
 /// The units that are accepted.
@@ -60,8 +62,9 @@ pub fn factor(si: &str, unit: &str) -> Result<f64, String> {
 /// A line, and the numbers in it.
 pub type Row<const N: usize> = (usize, [Option<f64>; N]);
 
-/// The rows of a table, each with its line: of every wanted column (its name in small letters, its unit of the SI) the number in
-/// that unit, if there is one. The first `needed` columns must be there.
+/// The rows of a table, each with its line: of every wanted column (its name in small letters, its
+/// unit of the SI) the number in that unit, if there is one. The first `needed` columns must be
+/// there.
 ///
 /// # Errors
 /// A needed column is missing, or a unit is not known; a row's: a needed number is missing.

@@ -193,8 +193,9 @@ fn what_a_missing_section_should_have_is_told_with_the_name_of_the_section() {
     );
 }
 
-/// Barrowman's equations of three fins: a middle line of 49.74 mm, 12 (43 / 74)^2 / (1 + sqrt(1 + (2 x 49.74 / 150)^2)) = 1.842,
-/// times 1 + 37 / 80; 22.22 + 19.44 mm behind the root's front, which stands 110 mm above the end.
+/// Barrowman's equations of three fins: a middle line of 49.74 mm, 12 (43 / 74)^2 / (1 + sqrt(1 +
+/// (2 x 49.74 / 150)^2)) = 1.842, times 1 + 37 / 80; 22.22 + 19.44 mm behind the root's front,
+/// which stands 110 mm above the end.
 #[test]
 fn val_barrowman_the_fins_of_a_booster() {
     let booster = read("mk2").launch.unwrap().booster;

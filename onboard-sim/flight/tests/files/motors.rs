@@ -1,7 +1,7 @@
 use flight::vehicles::motors::{BUILTIN, builtin, named, names, status};
 
-/// Impulse (N s) of each motor as its maker or certifier states it, and the accepted relative error of the file's
-/// curve.
+/// Impulse (N s) of each motor as its maker or certifier states it, and the accepted relative error
+/// of the file's curve.
 #[test]
 fn val_catalogue_impulse_of_the_builtin_motors() {
     for (name, impulse_n_s, share) in [

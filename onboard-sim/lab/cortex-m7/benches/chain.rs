@@ -1,8 +1,9 @@
-//! The whole chain with an emulated Cortex-M7, flown from the ordinary screen: armed, started, landed; and aborted in
-//! its descent.
+//! The whole chain with an emulated Cortex-M7, flown from the ordinary screen: armed, started,
+//! landed; and aborted in its descent.
 //!
-//! It types into `onboard-sim/lab/cortex-m7/emulate chain`, the command that a person uses. It is no test of `cargo test`: it
-//! takes QEMU, the programs of `emulate build` and some minutes of real time. Without them it says NOT RUN and why.
+//! It types into `onboard-sim/lab/cortex-m7/emulate chain`, the command that a person uses. It is
+//! no test of `cargo test`: it takes QEMU, the programs of `emulate build` and some minutes of real
+//! time. Without them it says NOT RUN and why.
 //!
 //! `cargo bench -p board --bench chain`, or `onboard-sim/lab/cortex-m7/emulate test`.
 
@@ -17,8 +18,8 @@ use ground::exit::Exit;
 type Failure = Box<dyn std::error::Error + Send + Sync>;
 
 const SIZE: (u16, u16) = (100, 40);
-/// A flight of mk2 takes a minute and a half, after up to half a minute on the pad, and its motor is hot for another one. A
-/// machine without a free processor core takes several times as long.
+/// A flight of mk2 takes a minute and a half, after up to half a minute on the pad, and its motor
+/// is hot for another one. A machine without a free processor core takes several times as long.
 const FLIGHT_LIMIT: Duration = Duration::from_mins(10);
 /// A key is answered within this time.
 const ASKS_WITHIN: Duration = Duration::from_secs(5);
@@ -99,8 +100,8 @@ fn missing(terminal: &Terminal, what: &str) -> String {
     format!("no {what} on:\n{}", terminal.window().rows().join("\n"))
 }
 
-/// Ends the screen, and with it the chain; what the script says then. A station does not end at one key before it has heard
-/// that its vehicle is disarmed.
+/// Ends the screen, and with it the chain; what the script says then. A station does not end at one
+/// key before it has heard that its vehicle is disarmed.
 fn end(terminal: &mut Terminal, expected: Exit) -> Result<String, Failure> {
     wait(terminal, "disarmed")?;
     let before = terminal.window().bytes().len();

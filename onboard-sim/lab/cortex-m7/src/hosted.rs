@@ -34,8 +34,8 @@ enum Command {
     },
     /// Compare what machines answered in recorded flights with what was recorded, frame by frame
     ///
-    /// Each folder is a flight: the file `recorded`, and a file for each machine, with its name. Exit codes: 0 all
-    /// frames identical, 1 error, 2 usage, 3 a frame differs.
+    /// Each folder is a flight: the file `recorded`, and a file for each machine, with its name.
+    /// Exit codes: 0 all frames identical, 1 error, 2 usage, 3 a frame differs.
     #[command(after_help = "Example: board compare --machine x86-64 --machine aarch64 flights/0 flights/1")]
     Compare {
         /// A machine; may be repeated
@@ -119,7 +119,8 @@ fn fly_standard_input(radio: Option<&Path>) -> Result<()> {
             None => board.take(&arrived[..read], &mut (), &mut (), &mut answer),
             Some(radio) => board.take(&arrived[..read], radio, &mut (), &mut answer),
         };
-        // A world waits for it. One that has ended its flight may have gone before an answer that it asked for again.
+        // A world waits for it. One that has ended its flight may have gone before an answer that
+        // it asked for again.
         match to_world.write_all(&answers).and_then(|()| to_world.flush()) {
             Err(error) if error.kind() == io::ErrorKind::BrokenPipe => break,
             written => written?,

@@ -1,7 +1,8 @@
-//! The only program of a Cortex-M7. Its link is semihosting: the files `frames`, `answers` and `costs` in the folder of
-//! the emulator or debugger. Its radio is the serial device `radio` there, if a flight has a crew. The files `saved-0` and
-//! `saved-1` are its memory that outlasts a reset: where a recorded flight's computer was dead, this program resets its processor
-//! and goes on from them.
+//! The only program of a Cortex-M7. Its link is semihosting: the files `frames`, `answers` and
+//! `costs` in the folder of the emulator or debugger. Its radio is the serial device `radio` there,
+//! if a flight has a crew. The files `saved-0` and `saved-1` are its memory that outlasts a reset:
+//! where a recorded flight's computer was dead, this program resets its processor and goes on from
+//! them.
 
 use core::ffi::CStr;
 use core::fmt::Write as _;
@@ -31,8 +32,9 @@ static WRAPS: AtomicU32 = AtomicU32::new(0);
 /// Values of the counter: it has 24 bits.
 const COUNTS: u32 = 1 << 24;
 
-/// Instructions for one count: `qemu -icount shift=0` takes an instruction for 1 ns, and the counter of its board counts
-/// with 25 MHz. On hardware the numbers are clock cycles of that counter, and mean nothing else.
+/// Instructions for one count: `qemu -icount shift=0` takes an instruction for 1 ns, and the
+/// counter of its board counts with 25 MHz. On hardware the numbers are clock cycles of that
+/// counter, and mean nothing else.
 const INSTRUCTIONS_PER_COUNT: u64 = 40;
 
 #[exception]
@@ -127,7 +129,8 @@ fn fly(
     }
 }
 
-/// The serial device `radio`: a pseudo-terminal that is set to return what it has, and not to wait (`stty min 0 time 0`).
+/// The serial device `radio`: a pseudo-terminal that is set to return what it has, and not to wait
+/// (`stty min 0 time 0`).
 #[derive(Default)]
 struct Serial {
     /// Opened with the first byte that it is asked for; `Some(None)` if there is none.
@@ -154,8 +157,8 @@ impl Radio for Serial {
     }
 }
 
-/// Writes a line for each frame and for each plan: the frame's number, 1 for a plan that it has posed, the instructions, and the bytes
-/// on the heap after it.
+/// Writes a line for each frame and for each plan: the frame's number, 1 for a plan that it has
+/// posed, the instructions, and the bytes on the heap after it.
 struct Costs {
     file: File,
     begun: u64,

@@ -1,5 +1,6 @@
-//! JSBSim as the world: its equations of motion, integrator, Earth, atmosphere, motor, servos and ground instead of ours,
-//! and our flight computer as a process of its own. Each flight is also flown in our own world with the same draw.
+//! JSBSim as the world: its equations of motion, integrator, Earth, atmosphere, motor, servos and
+//! ground instead of ours, and our flight computer as a process of its own. Each flight is also
+//! flown in our own world with the same draw.
 #![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 #![expect(clippy::print_stdout, reason = "the touchdowns side by side, for the page of hardware in the loop")]
 
@@ -136,7 +137,8 @@ fn medians(outcomes: &[Outcome]) -> [f64; 6] {
     })
 }
 
-/// The same flights in JSBSim, in our world, and in our world with the noise of the sensors drawn anew.
+/// The same flights in JSBSim, in our world, and in our world with the noise of the sensors drawn
+/// anew.
 struct Flown {
     theirs: Vec<Outcome>,
     ours: Vec<Outcome>,
@@ -181,7 +183,8 @@ fn differences(some: &[Outcome], others: &[Outcome]) -> [(f64, f64); 6] {
     })
 }
 
-/// Landings inside the design envelope of the legs, in JSBSim and in our world, and both worlds' outcomes.
+/// Landings inside the design envelope of the legs, in JSBSim and in our world, and both worlds'
+/// outcomes.
 fn compare(mission: &str, wind_m_s: f64, flights: u64) -> ([usize; 2], Flown) {
     let mission = flight::vehicles::mission::builtin(mission).unwrap().unwrap();
     let flown = fly(&mission, wind_m_s, flights);
@@ -234,7 +237,8 @@ fn val_jsbsim_in_wind_it_lands_in_a_world_that_nobody_here_wrote() {
     lands_as_often(4.0, 17);
 }
 
-/// A plan in space may end half a second later after another gust of noise, so the times are only printed.
+/// A plan in space may end half a second later after another gust of noise, so the times are only
+/// printed.
 #[test]
 #[ignore = "200 flights of the vehicle that a club should build: six minutes"]
 fn val_jsbsim_lands_mk3_as_often_as_our_world_within_a_point() {

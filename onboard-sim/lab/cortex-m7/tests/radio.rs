@@ -1,6 +1,6 @@
-//! The program of a board, as a process: it speaks MAVLink itself, over a serial radio, with the ordinary ground station, and
-//! decides every frame of a simulated world, which is another process. `benches/chain.rs` does the same with the image of a
-//! Cortex-M7.
+//! The program of a board, as a process: it speaks MAVLink itself, over a serial radio, with the
+//! ordinary ground station, and decides every frame of a simulated world, which is another process.
+//! `benches/chain.rs` does the same with the image of a Cortex-M7.
 #![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
 use std::fs::File;
@@ -72,7 +72,8 @@ fn an_abort_from_the_screen_opens_the_parachute_of_a_board() {
     ground.env("XDG_RUNTIME_DIR", folder.path()).env("XDG_CONFIG_HOME", folder.path());
     let mut screen = Terminal::start(&ground, (100, 40), false);
     screen.wait_for("every arming check passes");
-    // A busy machine may leave the radio silent for a second, which holds the countdown: then the crew starts anew.
+    // A busy machine may leave the radio silent for a second, which holds the countdown: then the
+    // crew starts anew.
     let falls = |screen: &Terminal| {
         screen.wait_within(Duration::from_secs(30), |window| window.shows("Falling").then_some(())).is_some()
     };
@@ -94,8 +95,8 @@ fn an_abort_from_the_screen_opens_the_parachute_of_a_board() {
     expect_identical_replay(folder.path(), "vehicle.mcap");
 }
 
-/// What a recorded flight is written as goes into the folder that is given, beside what is there: `emulate` has the flight's words in
-/// it. A board answers as was recorded.
+/// What a recorded flight is written as goes into the folder that is given, beside what is there:
+/// `emulate` has the flight's words in it. A board answers as was recorded.
 #[test]
 fn a_recorded_flight_is_written_beside_what_is_there_and_flown_again() {
     let folder = tempfile::tempdir().unwrap();

@@ -11,15 +11,17 @@ use onboard_sim::files::{new_folder, write_folder};
 use crate::study::fall::{CG_STATION_M, HEAVY_TAIL_STATION_M, Stability};
 use crate::study::figures::{figures, stability_figures};
 
-/// Repeat the landing paper's experiments: its Tables 3 to 6 beside ours, and its equations as printed.
+/// Repeat the landing paper's experiments: its Tables 3 to 6 beside ours, and its equations as
+/// printed.
 #[derive(Parser)]
 #[command(name = "paper", after_help = "Example: paper --out figures")]
 struct Arguments {
-    /// Instead of the tables, map from which tilts the paper's vehicle settles in a passive fall, over the opening of its
-    /// fins, with the static margin that explains it.
+    /// Instead of the tables, map from which tilts the paper's vehicle settles in a passive fall,
+    /// over the opening of its fins, with the static margin that explains it.
     #[arg(long)]
     stability: bool,
-    /// Write the figures of what is printed as SVG into this folder, a new one: Figures 5 to 9, or the map.
+    /// Write the figures of what is printed as SVG into this folder, a new one: Figures 5 to 9, or
+    /// the map.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }

@@ -24,7 +24,8 @@ fn in_space(planar: &PlanarState) -> RigidState {
     }
 }
 
-/// A motor of constant thrust with almost no propellant, an ideal gimbal, no crossflow, fins closed, near sea level.
+/// A motor of constant thrust with almost no propellant, an ideal gimbal, no crossflow, fins
+/// closed, near sea level.
 #[test]
 fn the_planar_equations_are_the_motion_in_the_x_z_plane() {
     let mut airframe = mission::builtin_airframe("mk2").unwrap();

@@ -1,4 +1,5 @@
-//! Compares our solutions with those of an independent solver, `CasADi` with IPOPT, on the landing paper's own problem.
+//! Compares our solutions with those of an independent solver, `CasADi` with IPOPT, on the landing
+//! paper's own problem.
 #![expect(clippy::unwrap_used, reason = "a table that cannot be read is a failed test")]
 
 use paper::plane::dynamics::PlanarState;
@@ -52,7 +53,8 @@ fn val_casadi_ipopt_costs_and_final_states() {
     for row in rows {
         let solution = solve(&problem(row.start, HORIZON), None);
         assert!(solution.converged(), "{:?}", row.start);
-        // Both stop at residuals of 1e-6 or below. Costs agree to the square of that, states to its order.
+        // Both stop at residuals of 1e-6 or below. Costs agree to the square of that, states to its
+        // order.
         let (cost, end) = (solution.outcome.cost, solution.end());
         assert!((cost - row.cost).abs() < 1e-5, "{:?}: {cost} and {}", row.start, row.cost);
         // A start that is its own mirror image has two landings with the same cost.

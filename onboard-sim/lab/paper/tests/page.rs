@@ -15,7 +15,8 @@ fn named() -> Vec<String> {
     page.split('`').skip(1).step_by(2).map(str::to_owned).collect()
 }
 
-/// With `--help` at its end a command is read to its end, but not run. The pages' own tests read those of `onboard-sim`.
+/// With `--help` at its end a command is read to its end, but not run. The pages' own tests read
+/// those of `onboard-sim`.
 #[test]
 fn every_command_of_the_page_is_understood() {
     let is_ours = |text: &str| text.split(' ').next() == Some("paper") && !text.contains('…');

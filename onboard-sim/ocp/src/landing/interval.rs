@@ -1,9 +1,10 @@
 //! One interval with its derivatives, and the air's force in it.
 //!
-//! The lean moves as under a constant rotational acceleration. The velocity changes by the acceleration at the mean lean
-//! of the interval, `p + h p'/2 + h^2 p''/6`, and the products of rates are those of the mean rates, `p' + h p''/2`, both
-//! with the gimbal's part of `p''`. The drag sees the velocity that an upright thrust would give in the middle; the gain
-//! sideways, left out there, makes 0.2 m/s in a landing of 3.8 s, which the next plan sees.
+//! The lean moves as under a constant rotational acceleration. The velocity changes by the
+//! acceleration at the mean lean of the interval, `p + h p'/2 + h^2 p''/6`, and the products of
+//! rates are those of the mean rates, `p' + h p''/2`, both with the gimbal's part of `p''`. The
+//! drag sees the velocity that an upright thrust would give in the middle; the gain sideways, left
+//! out there, makes 0.2 m/s in a landing of 3.8 s, which the next plan sees.
 
 use crate::add_multiple;
 
@@ -232,7 +233,8 @@ impl<'a> Middle<'a> {
         mirrored(&c)
     }
 
-    /// The same by (p, r, rates, gimbal): the mean leans depend on the rates and the gimbal, the mean rates on the gimbal.
+    /// The same by (p, r, rates, gimbal): the mean leans depend on the rates and the gimbal, the
+    /// mean rates on the gimbal.
     fn outwards(&self, mut c: [[f64; 6]; 6]) -> [[f64; 6]; 6] {
         for row in &mut c {
             for lean in 0..2 {

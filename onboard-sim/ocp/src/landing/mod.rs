@@ -1,16 +1,20 @@
-//! The landing as an optimal-control problem in space, and its solver: the nose may lean in any direction.
+//! The landing as an optimal-control problem in space, and its solver: the nose may lean in any
+//! direction.
 //!
-//! [`solve`] takes a [`Problem`] and, if there is one, a [`Start`]; its [`Outcome`] says how the solve ended, and the
-//! [`Workspace`] has the path. The crate's page has the solver's formulation and its references. Exact
-//! second derivatives are needed: the multiplier of the end height is large, so the curvature of the dynamics counts.
+//! [`solve`] takes a [`Problem`] and, if there is one, a [`Start`]; its [`Outcome`] says how the
+//! solve ended, and the [`Workspace`] has the path. The crate's page has the solver's formulation
+//! and its references. Exact second derivatives are needed: the multiplier of the end height is
+//! large, so the curvature of the dynamics counts.
 //!
-//! A surplus of impulse is best wasted with a lean of constant size whose direction turns once around: the vehicle then
-//! never passes through upright on the way, as it must in a plane, and comes to rest sideways by itself.
+//! A surplus of impulse is best wasted with a lean of constant size whose direction turns once
+//! around: the vehicle then never passes through upright on the way, as it must in a plane, and
+//! comes to rest sideways by itself.
 //!
-//! Ground frame: `x`, `y` level, `z` up. The nose is `n = (sin p, cos p sin r, cos p cos r)`, so `p` is the lean towards
-//! `x` and `r` the lean towards `y`, both zero upright. States are the position of the feet, the velocity, `p`, `r` and
-//! their rates. Inputs are the gimbal angles that turn the nose towards growing `p` and `r`, and the share of the fins'
-//! drag area that stands in the air.
+//! Ground frame: `x`, `y` level, `z` up. The nose is `n = (sin p, cos p sin r, cos p cos r)`, so
+//! `p` is the lean towards `x` and `r` the lean towards `y`, both zero upright. States are the
+//! position of the feet, the velocity, `p`, `r` and their rates. Inputs are the gimbal angles that
+//! turn the nose towards growing `p` and `r`, and the share of the fins' drag area that stands in
+//! the air.
 //!
 //! ```text
 //! v'  = (T/m) (n - dp e_p - dr e_r) - g e_z + drag
@@ -18,8 +22,8 @@
 //! r'' = ((T l / I) dr + 2 p' r' sin p) / cos p
 //! ```
 //!
-//! with `e_p = dn/dp`, `e_r = dn/dr / cos p`: a slender axisymmetric body that does not roll. The gimbal's angles are
-//! small; their second order in the thrust is left out (0.3 % at 4.5 degrees).
+//! with `e_p = dn/dp`, `e_r = dn/dr / cos p`: a slender axisymmetric body that does not roll. The
+//! gimbal's angles are small; their second order in the thrust is left out (0.3 % at 4.5 degrees).
 
 mod interval;
 mod stage;
@@ -44,8 +48,8 @@ pub type State = [f64; STATES];
 /// Largest miss of a condition by a path that lands, m, m/s, rad or rad/s.
 pub const LANDING_MISS: f64 = 1e-3;
 
-/// Barrier of a cold solve's first iteration. A cold solve takes 62 iterations (geometric mean of 200 starts) with 1000 and 51
-/// with 30: of 175 landings eight are then cheaper and two dearer.
+/// Barrier of a cold solve's first iteration. A cold solve takes 62 iterations (geometric mean of
+/// 200 starts) with 1000 and 51 with 30: of 175 landings eight are then cheaper and two dearer.
 const FIRST_BARRIER: f64 = 30.0;
 
 /// When a solve ends, and what a broken condition costs.
@@ -63,7 +67,8 @@ pub struct SolverLimits {
 /// The buffers of a solve, and its result.
 pub type Workspace = crate::Workspace<Problem, STATES, INPUTS>;
 
-/// [`crate::Workspace::solve`], compiled here with the solver's settings: a program may compile what calls it for size.
+/// [`crate::Workspace::solve`], compiled here with the solver's settings: a program may compile
+/// what calls it for size.
 pub fn solve(
     workspace: &mut Workspace,
     problem: &Problem,
@@ -145,7 +150,8 @@ pub struct Problem {
     pub end: End,
     /// Smallest height of the feet per second before the end, m/s.
     pub floor_rise_m_s: f64,
-    /// Size of the lean of the cold guesses, rad, and its first direction from `x` towards `y`, rad.
+    /// Size of the lean of the cold guesses, rad, and its first direction from `x` towards `y`,
+    /// rad.
     pub guess_lean_rad: f64,
     pub guess_towards_rad: f64,
     pub solver: SolverLimits,
@@ -205,12 +211,13 @@ const BOX: usize = 12;
 const END: usize = 2;
 const LEAN: usize = 4;
 
-/// Turns of the cold guesses' lean: once around, once the other way. Upright is only tried if neither lands.
+/// Turns of the cold guesses' lean: once around, once the other way. Upright is only tried if
+/// neither lands.
 const TURNS: [f64; 3] = [1.0, -1.0, 0.0];
 const TURNING: usize = 2;
 
-/// Writes the conditions' multipliers of the last `kept` of a solution's `intervals`; see `append_conditions` for their
-/// order.
+/// Writes the conditions' multipliers of the last `kept` of a solution's `intervals`; see
+/// `append_conditions` for their order.
 pub fn last_multipliers(
     all: &[f64],
     settled_nodes: usize,
@@ -312,7 +319,8 @@ impl Model<STATES, INPUTS> for Problem {
         }
     }
 
-    /// Positions and velocities on the straight line to rest at the target, and a lean of one size that turns around.
+    /// Positions and velocities on the straight line to rest at the target, and a lean of one size
+    /// that turns around.
     fn guess(&self, index: usize, states: &mut [State], inputs: &mut [[f64; INPUTS]]) {
         let last = self.pushes.len() as f64;
         let [x_m, y_m] = self.target_m;

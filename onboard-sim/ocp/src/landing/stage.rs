@@ -1,8 +1,9 @@
 //! One interval as the sweeps read it.
 //!
-//! The five accelerations of an interval, of the place and of the leans, carry everything that is not linear. With the shift
-//! `E` (places and leans grow by velocity and rates), the gain `G` of an acceleration held over the interval, and the
-//! accelerations' derivative `D` by the ten [`DIRECTIONS`],
+//! The five accelerations of an interval, of the place and of the leans, carry everything that is
+//! not linear. With the shift `E` (places and leans grow by velocity and rates), the gain `G` of an
+//! acceleration held over the interval, and the accelerations' derivative `D` by the ten
+//! [`DIRECTIONS`],
 //!
 //! ```text
 //! (A, B) = E + G D
@@ -21,7 +22,8 @@ use super::{INPUTS, STATES, State};
 /// Places: nothing depends on them.
 const PLACES: usize = 3;
 
-/// What the accelerations depend on: velocity, leans and rates, in the states' order, and the inputs.
+/// What the accelerations depend on: velocity, leans and rates, in the states' order, and the
+/// inputs.
 pub(super) const DIRECTIONS: usize = MOVING + INPUTS;
 const MOVING: usize = STATES - PLACES;
 

@@ -5,12 +5,13 @@
 //! subject to  dx_{k+1} = A_k dx_k + B_k du_k + r_k,   dx_0 = 0
 //! ```
 //!
-//! The value function of the stages from `k` on is `dx' P dx / 2 + p' dx`. It contains the conditions with the
-//! stiffness of their barrier. So `P` loses digits across the conditions, but only the curvature along them is needed.
-//! The costates come from their own recursion, which does not use `P`.
+//! The value function of the stages from `k` on is `dx' P dx / 2 + p' dx`. It contains the
+//! conditions with the stiffness of their barrier. So `P` loses digits across the conditions, but
+//! only the curvature along them is needed. The costates come from their own recursion, which does
+//! not use `P`.
 //!
-//! The system has the right inertia exactly if `B' P B` plus the inputs' own curvature is positive definite at every
-//! stage ([`Factor`](crate::Factor)).
+//! The system has the right inertia exactly if `B' P B` plus the inputs' own curvature is positive
+//! definite at every stage ([`Factor`](crate::Factor)).
 #![expect(clippy::inline_always, reason = "what is to be compiled for wide vectors must be inlined there")]
 
 use alloc::vec::Vec;
@@ -96,7 +97,8 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Sweep<M, NX, NU> {
         }
     }
 
-    /// The backward sweep with a fraction of the dynamics' curvature; returns whether the inertia is right.
+    /// The backward sweep with a fraction of the dynamics' curvature; returns whether the inertia
+    /// is right.
     pub(crate) fn backward(&mut self, iterate: &Iterate<M, NX, NU>, share: f64) -> bool {
         self.share = share;
         Arch::new().dispatch(Wide::<_, _, _, BACKWARD> { sweep: self, iterate })
@@ -153,8 +155,8 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Sweep<M, NX, NU> {
             let mut g = slope;
             add_times(&self.values[k + 1], &residual, &mut g);
             let (pulled_x, pulled_u) = interval.pull(&g);
-            // The correction for the dynamics' change since then, because their first derivatives are the old ones,
-            // too.
+            // The correction for the dynamics' change since then, because their first derivatives
+            // are the old ones, too.
             let costate = &iterate.costates[k + 1];
             let (now_x, now_u) = iterate.intervals.pulled(k, costate);
             let (old_x, old_u) = interval.pull(costate);

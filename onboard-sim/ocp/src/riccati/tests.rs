@@ -8,8 +8,8 @@ use crate::iterate::Iterate;
 use crate::model::Model;
 
 impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Sweep<M, NX, NU> {
-    /// The optimality residuals of the inputs of interval `k` after the step: only rounding, unless the sweeps are
-    /// wrong.
+    /// The optimality residuals of the inputs of interval `k` after the step: only rounding, unless
+    /// the sweeps are wrong.
     pub(crate) fn input_residual(&self, iterate: &Iterate<M, NX, NU>, k: usize) -> [f64; NU] {
         let interval = iterate.intervals.interval(k);
         let (_, turned) = interval.curve(self.share, &self.states[k], &self.inputs[k]);

@@ -30,8 +30,8 @@ pub(super) fn problem(limit: f64) -> Polynomial<2, 1> {
     }
 }
 
-/// The forces fall along a straight line. With `sum of u = 0` and `h^2 sum of (N/2 - 1/2 - k) u_k = 1` its slope is
-/// `12 / (h^2 N (N^2 - 1))`.
+/// The forces fall along a straight line. With `sum of u = 0` and `h^2 sum of (N/2 - 1/2 - k) u_k =
+/// 1` its slope is `12 / (h^2 N (N^2 - 1))`.
 #[test]
 fn val_closed_form_of_the_least_effort() {
     let (workspace, outcome) = solved(&problem(10.0));
@@ -82,7 +82,8 @@ fn a_target_out_of_reach_costs_its_penalty() {
 
 // A bound on the work of several solves together.
 
-/// With one pass a cold solve evaluates its guess and ends there; with many it finds what it finds without a bound, bit for bit.
+/// With one pass a cold solve evaluates its guess and ends there; with many it finds what it finds
+/// without a bound, bit for bit.
 #[test]
 fn a_solve_ends_when_its_passes_are_spent() {
     let model = problem(0.27);

@@ -11,7 +11,8 @@ use crate::{Model, Status};
 
 const INTERVALS: usize = 12;
 
-/// Least curvature of the cost, by which an error of the optimality conditions bounds the distance from the optimum.
+/// Least curvature of the cost, by which an error of the optimality conditions bounds the distance
+/// from the optimum.
 const LEAST_WEIGHT: f64 = 0.2;
 
 /// Numbers from -1 to 1.
@@ -59,7 +60,8 @@ fn problem<const NX: usize, const NU: usize>(seed: u64, limit: f64) -> Polynomia
     }
 }
 
-/// Inputs, states and multipliers by one dense linear system: the conditions are equations, the limits are left out.
+/// Inputs, states and multipliers by one dense linear system: the conditions are equations, the
+/// limits are left out.
 fn dense<const NX: usize, const NU: usize>(model: &Polynomial<NX, NU>) -> Vec<[f64; NU]> {
     let (n, m) = (INTERVALS * (NX + NU), INTERVALS * NX + model.conditions.len());
     let (mut matrix, mut right) = (DMatrix::zeros(n + m, n + m), DVector::zeros(n + m));
@@ -136,9 +138,10 @@ fn limited<const NX: usize, const NU: usize>(seed: u64) -> usize {
     assert_eq!(outcome.status, Status::Converged, "{outcome:?}");
     let warm_errors = Optimality::of(&model, &workspace);
     warm_errors.assert_within(1e-5);
-    // Strong convexity with curvature w: for two points z whose gradients are off by at most r in each of n components
-    // and whose slacks times multipliers sum up to g, w |dz|^2 <= g + r sqrt(n) |dz|. A limit whose multiplier is almost
-    // zero makes use of it: there an interior point is off by the root of the barrier, here by up to 1e-4.
+    // Strong convexity with curvature w: for two points z whose gradients are off by at most r in
+    // each of n components and whose slacks times multipliers sum up to g, w |dz|^2 <= g + r
+    // sqrt(n) |dz|. A limit whose multiplier is almost zero makes use of it: there an interior
+    // point is off by the root of the barrier, here by up to 1e-4.
     let components = (INTERVALS * (NX + NU)) as f64;
     let gradient = cold_errors.gradient + warm_errors.gradient;
     let bound = ((cold_errors.gap + warm_errors.gap) / LEAST_WEIGHT).sqrt()
@@ -167,7 +170,8 @@ proptest! {
     }
 }
 
-/// A limit whose multiplier is almost zero: the cold solve's inputs are 1.06e-4 from the warm one's.
+/// A limit whose multiplier is almost zero: the cold solve's inputs are 1.06e-4 from the warm
+/// one's.
 #[test]
 fn limits_that_are_hardly_active() {
     limited::<5, 3>(17_605_430_316_556_728_362);

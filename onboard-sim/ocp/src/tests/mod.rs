@@ -1,5 +1,5 @@
-//! The solver on problems of several sizes: 2 states and 1 input, 4 and 2, 5 and 3, 13 and 3; and the
-//! optimality conditions, evaluated without the solver's own code.
+//! The solver on problems of several sizes: 2 states and 1 input, 4 and 2, 5 and 3, 13 and 3; and
+//! the optimality conditions, evaluated without the solver's own code.
 
 mod double_integrator;
 mod linear_quadratic;

@@ -1,4 +1,5 @@
-//! Test problems: dynamics that are polynomials of second degree, integrated by Euler steps, and quadratic costs.
+//! Test problems: dynamics that are polynomials of second degree, integrated by Euler steps, and
+//! quadratic costs.
 
 use core::array::from_fn;
 

@@ -1,11 +1,12 @@
-//! A rigid body under a constant thrust along its own axis, turned by three torques: 13 states, 3 inputs. Also the
-//! sweeps alone.
+//! A rigid body under a constant thrust along its own axis, turned by three torques: 13 states, 3
+//! inputs. Also the sweeps alone.
 
 use super::polynomial::{Polynomial, Term, diagonal, equals, within};
 use super::{Kept, Optimality, solved};
 use crate::{Status, Workspace};
 
-/// Positions, velocities, the quaternion (scalar first) from body to ground, and the rates of the body.
+/// Positions, velocities, the quaternion (scalar first) from body to ground, and the rates of the
+/// body.
 const R: usize = 0;
 const V: usize = 3;
 const Q: usize = 6;
@@ -128,8 +129,8 @@ fn numbers_that_are_not_finite_give_a_status_and_not_a_panic() {
 
 // The sweeps alone.
 
-/// States and costates satisfy their equations by construction of the sweeps. If the inputs satisfy theirs, too, the
-/// step solves the whole Newton system.
+/// States and costates satisfy their equations by construction of the sweeps. If the inputs satisfy
+/// theirs, too, the step solves the whole Newton system.
 #[test]
 fn the_sweeps_solve_the_newton_system() {
     let mut model = problem(0.2);

@@ -2,7 +2,8 @@
 //!
 //! * [`fly`]: the run loop with clock, links and log.
 //! * [`vehicle`]: the simulated vehicle as run loop, radio and log see it. Pure.
-//! * [`endpoint`]: a frame of the simulated vehicle and of its end of MAVLink (`avionics::link`, which a board has, too).
+//! * [`endpoint`]: a frame of the simulated vehicle and of its end of MAVLink (`avionics::link`,
+//!   which a board has, too).
 //! * [`record`]: a flight as log records, with the truth.
 //! * [`solve_times`]: statistics of the controller's solve times.
 

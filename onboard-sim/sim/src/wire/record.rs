@@ -1,5 +1,5 @@
-//! A simulated flight as log records: the flight computer's frames, what it thought, and the truth. A replay runs the
-//! flight computer again from the frames.
+//! A simulated flight as log records: the flight computer's frames, what it thought, and the truth.
+//! A replay runs the flight computer again from the frames.
 
 use std::collections::BTreeMap;
 
@@ -107,13 +107,14 @@ fn truth(flight: &Sortie) -> TruthSample {
     }
 }
 
-/// The header for a flight of a campaign. It has no date: its log begins at the epoch, so that the same flight always
-/// gives the same log.
+/// The header for a flight of a campaign. It has no date: its log begins at the epoch, so that the
+/// same flight always gives the same log.
 pub fn campaign_header(recipe: &Recipe, number: u64) -> LogHeader {
     header("onboard-sim campaign", recipe, number, 0)
 }
 
-/// The dispersions of a log: from the text of its scenario, or else the built-in set that its run facts name.
+/// The dispersions of a log: from the text of its scenario, or else the built-in set that its run
+/// facts name.
 ///
 /// # Errors
 /// The text is not a set of dispersions, or no built-in set has the name.

@@ -1,10 +1,13 @@
-//! The force of the air on body, fins and parachute, each computed from the relative wind where it acts.
+//! The force of the air on body, fins and parachute, each computed from the relative wind where it
+//! acts.
 //!
-//! Rotation changes the wind at those places, so the model contains damping. It contains static stability, too: in a
-//! tail-first fall the fins drag behind the centre of gravity. The fins follow Eq. 2, 3, 13 and 14 of the landing paper
-//! (coefficients, areas, radius), with the force turned into the local wind. The body follows the paper's Eq. 8 along
-//! the axis and the crossflow of a cylinder across it (strip by strip, S. F. Hoerner, Fluid-Dynamic Drag, chapter 3). The legs
-//! drag along the wind where each of them is, ahead of the centre of gravity in the flow: they turn the tail away from it.
+//! Rotation changes the wind at those places, so the model contains damping. It contains static
+//! stability, too: in a tail-first fall the fins drag behind the centre of gravity. The fins follow
+//! Eq. 2, 3, 13 and 14 of the landing paper (coefficients, areas, radius), with the force turned
+//! into the local wind. The body follows the paper's Eq. 8 along the axis and the crossflow of a
+//! cylinder across it (strip by strip, S. F. Hoerner, Fluid-Dynamic Drag, chapter 3). The legs drag
+//! along the wind where each of them is, ahead of the centre of gravity in the flow: they turn the
+//! tail away from it.
 #![expect(clippy::inline_always, reason = "what is to be compiled for wide vectors must be inlined there")]
 
 use core::array::from_fn;
@@ -51,9 +54,10 @@ pub(crate) struct Plume {
 }
 
 impl Plume {
-    /// The jet points upstream and pushes the air aside: wholly when its thrust exceeds the dynamic pressure on the base,
-    /// and in proportion below that. The ratio is the usual one for jets against the wind; that the effect is full at 1
-    /// is an assumption (this vehicle burns at about 15 until the tail-off).
+    /// The jet points upstream and pushes the air aside: wholly when its thrust exceeds the dynamic
+    /// pressure on the base, and in proportion below that. The ratio is the usual one for jets
+    /// against the wind; that the effect is full at 1 is an assumption (this vehicle burns at about
+    /// 15 until the tail-off).
     pub(crate) fn new(truth: &Truth, thrust_n: f64, on_base_n: f64) -> Self {
         if thrust_n <= 0.0 {
             return Self { body: 1.0, fins: 1.0 };
@@ -84,7 +88,8 @@ pub(crate) struct Configuration {
     /// Parachute's drag area, m^2.
     pub(crate) parachute_area_m2: f64,
     pub(crate) plume: Plume,
-    /// Centre of gravity: x is its station (above the nozzle), y and z its distance from the axis, m.
+    /// Centre of gravity: x is its station (above the nozzle), y and z its distance from the axis,
+    /// m.
     pub(crate) cg_m: Vector3<f64>,
 }
 
@@ -147,7 +152,8 @@ impl Shape {
         }
     }
 
-    /// The total force and moment of the air, in the widest vectors that the machine has; the bits are the same.
+    /// The total force and moment of the air, in the widest vectors that the machine has; the bits
+    /// are the same.
     pub(crate) fn load(&self, flow: &Flow, configuration: &Configuration) -> Load {
         Arch::new().dispatch(Blown { shape: self, flow, configuration })
     }
@@ -168,8 +174,9 @@ impl Shape {
         load
     }
 
-    /// The drag along the axis, and across it strip by strip. The strips are on the axis: with `a` from the centre of gravity
-    /// to the axis and `x` up to the strip, the wind there is `v + rate x (x, a)`.
+    /// The drag along the axis, and across it strip by strip. The strips are on the axis: with `a`
+    /// from the centre of gravity to the axis and `x` up to the strip, the wind there is `v + rate
+    /// x (x, a)`.
     #[inline(always)]
     fn add_body(
         &self,
@@ -201,15 +208,17 @@ impl Shape {
         load.moment_n_m += Vector3::new(roll_n_m, turning_n_m[0], turning_n_m[1]);
     }
 
-    /// Legs and fins, each in the wind where it is. The drag is along it: legs are tubes and struts in every direction. The lift
-    /// of a fin is across both the wind and the fin's own direction from the axis.
+    /// Legs and fins, each in the wind where it is. The drag is along it: legs are tubes and struts
+    /// in every direction. The lift of a fin is across both the wind and the fin's own direction
+    /// from the axis.
     #[inline(always)]
     fn add_points(&self, load: &mut Load, flow: &Flow, half_density: f64, configuration: &Configuration) {
         let Configuration { fin_sines, legs_out, plume, cg_m, .. } = configuration;
         let leg = if *legs_out { -half_density * 0.25 * self.leg_drag_m2 } else { 0.0 };
         let fin = half_density * self.fin_scale * plume.fins * self.fins.reference_area_m2;
         let [drag, lift] = [self.fins.drag_coefficient, self.fins.lift_coefficient].map(|per| -fin * per);
-        // Legs, then fins; every line is one operation on all, which the compiler makes one on vectors.
+        // Legs, then fins; every line is one operation on all, which the compiler makes one on
+        // vectors.
         let outward: [Vector3<f64>; POINTS] = from_fn(|i| self.fin_directions[i % 4]);
         let (y_out, z_out): (Each, Each) = (from_fn(|i| outward[i].y), from_fn(|i| outward[i].z));
         let out_m: Each = from_fn(|i| if i < 4 { 0.0 } else { self.fins.radius_m(fin_sines[i - 4]) });
@@ -249,8 +258,8 @@ fn length(vector: &Vector3<f64>) -> f64 {
     vector.norm_squared().sqrt()
 }
 
-// The parachute: it is ejected by command, its lines are taut after a delay, and then it fills with the distance
-// fallen through the air.
+// The parachute: it is ejected by command, its lines are taut after a delay, and then it fills with
+// the distance fallen through the air.
 
 #[derive(Debug, Clone)]
 pub(crate) struct Parachute {
@@ -288,8 +297,8 @@ impl Parachute {
         }
     }
 
-    /// Fraction of the canopy that is open, 0 to 1. The area grows with the square of the distance, because the
-    /// diameter of the canopy grows linearly with it.
+    /// Fraction of the canopy that is open, 0 to 1. The area grows with the square of the distance,
+    /// because the diameter of the canopy grows linearly with it.
     pub(crate) fn open_share(&self) -> f64 {
         let filled = (self.travelled_m / self.data.inflation_distance_m).min(1.0);
         filled * filled
@@ -328,7 +337,8 @@ mod tests {
         let velocity_m_s = Vector3::new(-30.0 * cos, 0.0, 30.0 * sin);
         let (force_n, moment_n_m) =
             added(&Flow { density_kg_m3: 1.2, velocity_m_s, rate_rad_s: Vector3::zeros() });
-        // 540 Pa times 0.01 m2 against the velocity; its part across the axis is 0.35 m behind the centre of gravity.
+        // 540 Pa times 0.01 m2 against the velocity; its part across the axis is 0.35 m behind the
+        // centre of gravity.
         assert!((force_n + velocity_m_s * (5.4 / 30.0)).norm() < 1e-12, "{force_n}");
         assert!((moment_n_m - Vector3::new(0.0, -0.35 * 5.4 * sin, 0.0)).norm() < 1e-12, "{moment_n_m}");
         // Rolling at 10 rad/s moves the middle of a leg across at 10 times its radius.

@@ -1,10 +1,12 @@
 //! The balance of a tail-first fall: where the air's force across the axis acts.
 //!
-//! With the centre of pressure above the centre of gravity (the fins trail) the air turns the tail into the wind: the
-//! fall is stable. Below it, the air turns the nose down. The fins' force across the axis grows with the sine of the
-//! angle to the wind, that of the bare body with its square, so the centre of pressure comes down as the angle grows.
+//! With the centre of pressure above the centre of gravity (the fins trail) the air turns the tail
+//! into the wind: the fall is stable. Below it, the air turns the nose down. The fins' force across
+//! the axis grows with the sine of the angle to the wind, that of the bare body with its square, so
+//! the centre of pressure comes down as the angle grows.
 //!
-//! Forces across a slender body at large angles: H. J. Allen and E. W. Perkins, NACA Report 1048, 1951.
+//! Forces across a slender body at large angles: H. J. Allen and E. W. Perkins, NACA Report
+//! 1048, 1951.
 
 use flight::vehicle::airframe::Airframe;
 use nalgebra::Vector3;
@@ -21,7 +23,8 @@ pub struct Balance {
 /// The force of the air across the axis at one angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AcrossForce {
-    /// Force over dynamic pressure, m^2; positive if it pushes the vehicle away from the wind, as it always does.
+    /// Force over dynamic pressure, m^2; positive if it pushes the vehicle away from the wind, as
+    /// it always does.
     pub area_m2: f64,
     /// The station at which this force alone has the whole moment of the air, m above the nozzle.
     pub centre_of_pressure_m: f64,
@@ -33,8 +36,9 @@ impl Balance {
         Self { shape: Shape::new(airframe, &Truth::default()) }
     }
 
-    /// The force with the wind from the tail at an angle to the axis, rad, above 0 and below pi. `roll_rad` turns the
-    /// plane of that angle about the axis, from body z towards body y. `None` where there is no force across the axis.
+    /// The force with the wind from the tail at an angle to the axis, rad, above 0 and below pi.
+    /// `roll_rad` turns the plane of that angle about the axis, from body z towards body y. `None`
+    /// where there is no force across the axis.
     pub fn across(&self, opening_rad: f64, angle_rad: f64, roll_rad: f64) -> Option<AcrossForce> {
         /// The force is divided by it again.
         const SPEED_M_S: f64 = 1.0;
@@ -56,7 +60,8 @@ impl Balance {
         };
         let load = self.shape.load(&flow, &configuration);
         let area_m2 = -load.force_n.dot(&sideways) / (0.5 * DENSITY_KG_M3 * SPEED_M_S * SPEED_M_S);
-        // A force of -1 along `sideways` at the station 1 has the moment of `sideways` crossed with x.
+        // A force of -1 along `sideways` at the station 1 has the moment of `sideways` crossed with
+        // x.
         let moment_n_m = load.moment_n_m.dot(&sideways.cross(&Vector3::x()));
         (area_m2 > 0.0).then(|| AcrossForce { area_m2, centre_of_pressure_m: moment_n_m / area_m2 })
     }
@@ -74,8 +79,8 @@ mod tests {
         (airframe, balance)
     }
 
-    /// Closed fins have no force, and the crossflow of a cylinder acts at half its length and grows with the square of
-    /// the sine.
+    /// Closed fins have no force, and the crossflow of a cylinder acts at half its length and grows
+    /// with the square of the sine.
     #[test]
     fn val_hoerner_the_bare_body_is_held_at_its_middle() {
         let (airframe, balance) = balance();
@@ -91,8 +96,9 @@ mod tests {
         assert_eq!(balance.across(0.0, 0.0, 0.0), None);
     }
 
-    /// By hand: the fins' drag along the wind at their station, the crossflow at the middle, and the couple of the four
-    /// fins' lifts, whose axial parts push on opposite sides: 4 times lift times radius times sin 30 deg times cos 30 deg.
+    /// By hand: the fins' drag along the wind at their station, the crossflow at the middle, and
+    /// the couple of the four fins' lifts, whose axial parts push on opposite sides: 4 times lift
+    /// times radius times sin 30 deg times cos 30 deg.
     #[test]
     fn val_hand_open_fins_drag_behind_and_their_lifts_are_a_couple() {
         let (airframe, balance) = balance();

@@ -2,15 +2,18 @@
 //!
 //! Two lithium-polymer cells of 1 Ah. Nothing of it was measured on this vehicle.
 //!
-//! An open-circuit voltage behind a resistance (G. L. Plett, Battery Management Systems, volume 1, 2015, chapter 2).
+//! An open-circuit voltage behind a resistance (G. L. Plett, Battery Management Systems, volume 1,
+//! 2015, chapter 2).
 
 /// Cells in series.
 const CELLS: f64 = 2.0;
 /// Charge of the full battery, A s: 1 Ah.
 const FULL_A_S: f64 = 3600.0;
-/// Resistance of the battery and its wires, ohm: about 30 mohm a cell, as such cells have, and the plug.
+/// Resistance of the battery and its wires, ohm: about 30 mohm a cell, as such cells have, and the
+/// plug.
 const RESISTANCE_OHM: f64 = 0.07;
-/// Voltage of a cell at rest over its charge, typical of the tables that makers and users of such cells publish.
+/// Voltage of a cell at rest over its charge, typical of the tables that makers and users of such
+/// cells publish.
 const AT_REST_V: [(f64, f64); 9] = [
     (0.0, 3.0),
     (0.05, 3.45),

@@ -1,7 +1,8 @@
 //! The rigid body: its equations of motion and their integrator.
 //!
-//! Newton's and Euler's equations with a quaternion (B. L. Stevens and F. L. Lewis, Aircraft Control and Simulation, chapter 1), in
-//! classical Runge-Kutta steps (E. Hairer, S. P. Norsett and G. Wanner, Solving Ordinary Differential Equations I, section II.1).
+//! Newton's and Euler's equations with a quaternion (B. L. Stevens and F. L. Lewis, Aircraft
+//! Control and Simulation, chapter 1), in classical Runge-Kutta steps (E. Hairer, S. P. Norsett and
+//! G. Wanner, Solving Ordinary Differential Equations I, section II.1).
 
 use flight::vehicle::rigid::RigidState;
 use nalgebra::{Quaternion, Rotation3, UnitQuaternion, Vector3};
@@ -35,8 +36,9 @@ struct Rates {
     specific_force: Vector3<f64>,
 }
 
-/// One classical Runge-Kutta step of a length, s, under gravity, m/s^2. Returns the state after the step and the mean
-/// specific force over it in body axes, m/s^2, which is what an ideal accelerometer at the centre of gravity measures.
+/// One classical Runge-Kutta step of a length, s, under gravity, m/s^2. Returns the state after the
+/// step and the mean specific force over it in body axes, m/s^2, which is what an ideal
+/// accelerometer at the centre of gravity measures.
 pub(crate) fn rk4_step(
     state: &RigidState,
     inertia: &Inertia,
@@ -117,7 +119,8 @@ mod tests {
         }
     }
 
-    /// A torque-free symmetric top: the spin about its axis is constant, and the cross rates rotate at (1 - I_x/I) p.
+    /// A torque-free symmetric top: the spin about its axis is constant, and the cross rates rotate
+    /// at (1 - I_x/I) p.
     #[test]
     fn val_euler_torque_free_precession() {
         let inertia =
@@ -162,7 +165,8 @@ mod tests {
         assert!((state.rate_rad_s.x - 6.0).abs() > 1e-3, "{}", state.rate_rad_s);
     }
 
-    /// A body with three inertias that spins about the middle one turns over and back, and keeps momentum and energy.
+    /// A body with three inertias that spins about the middle one turns over and back, and keeps
+    /// momentum and energy.
     #[test]
     fn val_euler_three_inertias_keep_momentum_and_energy() {
         let inertia =

@@ -1,14 +1,16 @@
-//! The ground: a plane through the pad, level or with a slope. The four legs are springs with dampers, and their feet have friction. The
-//! vehicle is broken if any other part touches the ground.
+//! The ground: a plane through the pad, level or with a slope. The four legs are springs with
+//! dampers, and their feet have friction. The vehicle is broken if any other part touches the
+//! ground.
 //!
-//! A leg may have a block that crushes in series with its spring and damper. Its foot then slides in a guide along the body's
-//! axis and stays where it was pushed. The block gives way when the force along the axis exceeds its own and what the guide adds:
-//! a share of the force across, which friction on the ground and a tilt bring about. A foot has no mass of its own: the body
-//! carries it, and the block stops a little more than it has to. Its friction on the ground is that of a foot which moves with the
-//! body, also while it slides in its guide. Legs do not bend across.
+//! A leg may have a block that crushes in series with its spring and damper. Its foot then slides
+//! in a guide along the body's axis and stays where it was pushed. The block gives way when the
+//! force along the axis exceeds its own and what the guide adds: a share of the force across, which
+//! friction on the ground and a tilt bring about. A foot has no mass of its own: the body carries
+//! it, and the block stops a little more than it has to. Its friction on the ground is that of a
+//! foot which moves with the body, also while it slides in its guide. Legs do not bend across.
 //!
-//! Contact by springs, dampers and Coulomb's friction: G. Gilardi and I. Sharf, "Literature survey of contact dynamics modelling",
-//! Mechanism and Machine Theory 37, 2002.
+//! Contact by springs, dampers and Coulomb's friction: G. Gilardi and I. Sharf, "Literature survey
+//! of contact dynamics modelling", Mechanism and Machine Theory 37, 2002.
 
 use flight::rules::verdict::Touchdown;
 use flight::vehicle::airframe::{Airframe, Crush};
@@ -17,15 +19,19 @@ use nalgebra::{Rotation3, Vector3};
 
 use crate::world::aero::Load;
 
-/// Sliding speed below which friction fades out, m/s: the friction of a foot at rest has no direction.
+/// Sliding speed below which friction fades out, m/s: the friction of a foot at rest has no
+/// direction.
 const SLIDING_M_S: f64 = 0.05;
-/// A part of a step may last so many time constants of the feet's friction; Runge-Kutta's fourth order is stable to 2.78.
+/// A part of a step may last so many time constants of the feet's friction; Runge-Kutta's fourth
+/// order is stable to 2.78.
 const STIFFEST: f64 = 1.5;
-/// Most parts of a step. Legs that crush press mk3's feet with 470 N, and turn its slim body 34,000 times per second.
+/// Most parts of a step. Legs that crush press mk3's feet with 470 N, and turn its slim body 34,000
+/// times per second.
 const MOST_PARTS: usize = 16;
 /// Beyond this tilt, 45 degrees, the vehicle falls over, rad.
 const TIPPED_RAD: f64 = core::f64::consts::FRAC_PI_4;
-/// A vehicle with three feet on the ground that is slower than this, m/s and rad/s, for this time, s, is at rest.
+/// A vehicle with three feet on the ground that is slower than this, m/s and rad/s, for this time,
+/// s, is at rest.
 const STILL_M_S: f64 = 0.03;
 const STILL_RAD_S: f64 = 0.05;
 const STILL_S: f64 = 0.3;
@@ -87,7 +93,8 @@ pub(crate) struct Ground {
     damping_n_s_m: f64,
     friction: f64,
     crush: Option<Crush>,
-    /// Positions of the feet relative to the nozzle exit, m; a leg that has given way has a higher foot.
+    /// Positions of the feet relative to the nozzle exit, m; a leg that has given way has a higher
+    /// foot.
     feet_m: [Vector3<f64>; 4],
     /// How far each leg has given way, m.
     pub(crate) given_m: [f64; 4],
@@ -175,8 +182,8 @@ impl Ground {
         }
     }
 
-    /// How far the ground has pushed a foot in, m, the force on it in the world, N, and along the normal the force at which its leg
-    /// gives way, N; `None` in the air.
+    /// How far the ground has pushed a foot in, m, the force on it in the world, N, and along the
+    /// normal the force at which its leg gives way, N; `None` in the air.
     fn on_foot(
         &self,
         foot: usize,
@@ -208,8 +215,8 @@ impl Ground {
         Some((depth_m, sliding * (-self.friction * normal_n / fading) + normal * normal_n, yields_n))
     }
 
-    /// Notes how hard the feet press. Legs that are pushed in further than their springs reach at the force that crushes them
-    /// give way.
+    /// Notes how hard the feet press. Legs that are pushed in further than their springs reach at
+    /// the force that crushes them give way.
     pub(crate) fn give_way(&mut self, state: &RigidState, cg_m: &Vector3<f64>) {
         let world_from_body = state.world_from_body.to_rotation_matrix();
         self.pressed_n = 0.0;
@@ -243,8 +250,9 @@ impl Ground {
         self.strain.tilt_rad = self.strain.tilt_rad.max(state.tilt_rad());
     }
 
-    /// Into how many parts a step, s, is to be divided, because the friction of the pressed feet is stiff: at low speed it damps a
-    /// roll by the force times friction, the square of their radius and `1 / SLIDING_M_S`, over the moment of inertia.
+    /// Into how many parts a step, s, is to be divided, because the friction of the pressed feet is
+    /// stiff: at low speed it damps a roll by the force times friction, the square of their radius
+    /// and `1 / SLIDING_M_S`, over the moment of inertia.
     pub(crate) fn parts(&self, state: &RigidState, roll_inertia_kg_m2: f64, step_s: f64) -> usize {
         let feet = self.feet_m.len() as f64;
         let more_n_s_m = feet * (self.damping_n_s_m + self.stiffness_n_m * step_s);
@@ -259,8 +267,8 @@ impl Ground {
         self.strain.clearance_m.is_finite().then_some(self.strain)
     }
 
-    /// Takes a further time on the ground, s, and returns how the vehicle came to rest, if it has. It is not at rest
-    /// while the thrust still carries half the weight.
+    /// Takes a further time on the ground, s, and returns how the vehicle came to rest, if it has.
+    /// It is not at rest while the thrust still carries half the weight.
     pub(crate) fn outcome(
         &mut self,
         state: &RigidState,
@@ -299,7 +307,8 @@ mod tests {
         Vector3::x() * airframe.mass.loaded_cg_station_m
     }
 
-    /// An upright mk3 with all feet 3 cm or more in the ground slides up a slope: the force along the normal at each foot, N.
+    /// An upright mk3 with all feet 3 cm or more in the ground slides up a slope: the force along
+    /// the normal at each foot, N.
     fn crushing_n(slope_deg: f64, uphill_m_s: f64) -> f64 {
         let airframe = mk3();
         let (sin, cos) = libm::sincos(slope_deg.to_radians());
@@ -312,8 +321,9 @@ mod tests {
         0.25 * (world_from_body * load.force_n).dot(&ground.normal)
     }
 
-    /// A block of 90 N, a friction of 0.6, a guide that adds 0.4 of the force across. By hand, per newton along the normal of a
-    /// slope of 10 degrees: sin 0.17365, cos 0.98481; uphill friction is 0.6 (cos, sin).
+    /// A block of 90 N, a friction of 0.6, a guide that adds 0.4 of the force across. By hand, per
+    /// newton along the normal of a slope of 10 degrees: sin 0.17365, cos 0.98481; uphill friction
+    /// is 0.6 (cos, sin).
     #[test]
     fn val_hand_a_foot_gives_way_at_the_blocks_force_and_what_the_guide_adds() {
         for (slope_deg, uphill_m_s, yields_n) in [

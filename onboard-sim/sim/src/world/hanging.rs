@@ -1,8 +1,9 @@
-//! A vehicle that hangs tail-down below a drone: a stiff pendulum on a hook that wanders about its place.
+//! A vehicle that hangs tail-down below a drone: a stiff pendulum on a hook that wanders about its
+//! place.
 //!
-//! Rope and vehicle are one line. The swing is that of a mathematical pendulum with small angles (L. D. Landau and E. M.
-//! Lifshitz, Mechanics, 3rd edition, section 21), and nothing damps it:
-//! the vehicle moves as told here until the drone lets it go.
+//! Rope and vehicle are one line. The swing is that of a mathematical pendulum with small angles
+//! (L. D. Landau and E. M. Lifshitz, Mechanics, 3rd edition, section 21), and nothing damps it: the
+//! vehicle moves as told here until the drone lets it go.
 
 use core::f64::consts::TAU;
 
@@ -31,7 +32,8 @@ pub struct Hanging {
 }
 
 impl Hanging {
-    /// The state at a time, s, and the specific force in body axes, m/s^2. At time zero the drone drifts fastest.
+    /// The state at a time, s, and the specific force in body axes, m/s^2. At time zero the drone
+    /// drifts fastest.
     pub fn at(&self, time_s: f64) -> (RigidState, Vector3<f64>) {
         let (sin, cos) = libm::sincos(self.towards_rad);
         let (across, axis) = (Vector3::new(cos, sin, 0.0), Vector3::new(-sin, cos, 0.0));
@@ -88,8 +90,8 @@ mod tests {
             assert!((acceleration - felt).norm() < 1e-6);
             let turned = (before.0.world_from_body.inverse() * after.0.world_from_body).scaled_axis();
             assert!((turned / (2.0 * step_s) - now.0.rate_rad_s).norm() < 1e-6);
-            // Of the weight the rope carries only the part along itself, and what the swing adds: nothing pulls sideways
-            // but the drone's own acceleration.
+            // Of the weight the rope carries only the part along itself, and what the swing adds:
+            // nothing pulls sideways but the drone's own acceleration.
             let sideways = now.1 - Vector3::x() * now.1.x;
             assert!(sideways.norm() < 0.36, "{}", now.1);
         }

@@ -1,18 +1,20 @@
 //! Simulates the physical truth: a rigid rocket in wind, its actuators, its sensors and the ground.
 //!
-//! It is pure, like `flight`: time is a count of steps, random numbers come from a seed, and the same arguments
-//! give the same bits on any machine. The flight code sees only what `sensors` measures. Frames are those of
-//! [`flight::vehicle::rigid`].
+//! It is pure, like `flight`: time is a count of steps, random numbers come from a seed, and the
+//! same arguments give the same bits on any machine. The flight code sees only what `sensors`
+//! measures. Frames are those of [`flight::vehicle::rigid`].
 //!
 //! * [`whole`]: all parts together, one millisecond at a time.
-//! * `body`, `aero`, `motor`, `servo`, [`ground`]: the parts, one model each; the parachute is in `aero`.
+//! * `body`, `aero`, `motor`, `servo`, [`ground`]: the parts, one model each; the parachute is in
+//!   `aero`.
 //! * `battery`: its voltage under what the vehicle draws.
 //! * [`hanging`]: the vehicle below a drone; on its booster it is a part of [`whole`].
 //! * [`wind`]: the mean wind over height, and gusts.
 //! * [`sensors`]: the measurements that the flight computer gets.
 //! * [`balance`]: the centre of pressure of a tail-first fall, which decides whether it is stable.
 //! * `normal`: the random numbers of sensors and gusts.
-//! * [`truth`]: how the true vehicle and the weather of one flight differ from the nominal data, and what can break.
+//! * [`truth`]: how the true vehicle and the weather of one flight differ from the nominal data,
+//!   and what can break.
 
 mod aero;
 pub mod balance;

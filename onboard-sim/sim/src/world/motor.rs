@@ -1,9 +1,9 @@
-//! The true landing motor: `T(t) = s/b T0(t/b) (1 + sum of a_k cos(k pi i))` for impulse scale s, burn-time scale b and
-//! the fraction i of the impulse that `T0` has given by then. The cosines have no mean over the impulse, so a shape keeps
-//! it.
+//! The true landing motor: `T(t) = s/b T0(t/b) (1 + sum of a_k cos(k pi i))` for impulse scale s,
+//! burn-time scale b and the fraction i of the impulse that `T0` has given by then. The cosines
+//! have no mean over the impulse, so a shape keeps it.
 //!
-//! Burn rate and pressure change thrust and time against each other at the same impulse (G. P. Sutton and O. Biblarz, Rocket Propulsion
-//! Elements, 9th edition, chapter 12).
+//! Burn rate and pressure change thrust and time against each other at the same impulse (G. P.
+//! Sutton and O. Biblarz, Rocket Propulsion Elements, 9th edition, chapter 12).
 
 use core::f64::consts::PI;
 
@@ -64,8 +64,8 @@ impl TrueBurn {
         self.curve.propellant_mass_kg() / (self.curve.total_impulse_n_s() * self.impulse_scale)
     }
 
-    /// Factor of the shape on the thrust at a time on the file's curve, and the fraction of the impulse by which the
-    /// shape has changed what was given until then.
+    /// Factor of the shape on the thrust at a time on the file's curve, and the fraction of the
+    /// impulse by which the shape has changed what was given until then.
     fn shape_at(&self, curve_s: f64) -> (f64, f64) {
         if self.shape.iter().all(|amplitude| *amplitude == 0.0) {
             return (1.0, 0.0);
@@ -114,8 +114,8 @@ impl Motor {
         }
     }
 
-    /// This motor with the curve and scales of `after`; `before` is the truth that it was built from. Faults stay, with
-    /// the same factor and delay.
+    /// This motor with the curve and scales of `after`; `before` is the truth that it was built
+    /// from. Faults stay, with the same factor and delay.
     pub(crate) fn changed(&self, after: &Self, before: &Truth) -> Self {
         // Unchanged values keep their bits.
         let (own_scale, new_scale) = (self.burn.impulse_scale, after.burn.impulse_scale);
@@ -134,8 +134,8 @@ impl Motor {
         }
     }
 
-    /// Whether current flows through the igniter from this time on, s. It fires when the current has flowed for its delay
-    /// without a break, and then nothing stops it.
+    /// Whether current flows through the igniter from this time on, s. It fires when the current
+    /// has flowed for its delay without a break, and then nothing stops it.
     pub(crate) fn current(&mut self, flows: bool, time_s: f64) {
         let fired = self.current_since_s.is_some_and(|since_s| time_s >= since_s + self.ignition_delay_s);
         if flows {
@@ -145,8 +145,8 @@ impl Motor {
         }
     }
 
-    /// When the thrust begins, s, if the current stays on until the igniter has fired; `None` without current, and for a
-    /// motor that does not light.
+    /// When the thrust begins, s, if the current stays on until the igniter has fired; `None`
+    /// without current, and for a motor that does not light.
     pub(crate) fn thrust_begins_s(&self) -> Option<f64> {
         let delay_s = self.ignition_delay_s + self.hang_fire_s;
         self.current_since_s.filter(|_| !self.no_light).map(|since_s| since_s + delay_s)
@@ -167,8 +167,8 @@ impl Motor {
         rate * self.burn.thrust_n(curve_s)
     }
 
-    /// A chuff and a slow rise burn the propellant later, and none is lost: how far the burn has come along its curve, s,
-    /// and how fast it goes along it.
+    /// A chuff and a slow rise burn the propellant later, and none is lost: how far the burn has
+    /// come along its curve, s, and how fast it goes along it.
     fn on_the_curve(&self, burning_s: f64) -> (f64, f64) {
         let [burns_s, out_s] = self.chuff_s;
         if (burns_s..burns_s + out_s).contains(&burning_s) {
@@ -274,8 +274,8 @@ mod tests {
         let truth =
             Truth { thrust_shape: [0.1, -0.05, 0.0, 0.02, 0.0], ignition_delay_s: 0.0, ..Truth::default() };
         let motor = motor(&truth);
-        // The curve gives 20 N s up to 1 s, 80 N s to 3 s, 20 N s to 4 s. At 2 s half of the impulse is given: the
-        // cosines are 0, -1, 0, 1.
+        // The curve gives 20 N s up to 1 s, 80 N s to 3 s, 20 N s to 4 s. At 2 s half of the
+        // impulse is given: the cosines are 0, -1, 0, 1.
         assert!((motor.thrust_n(12.0) - 40.0 * (1.0 + 0.05 + 0.02)).abs() < 1e-9);
         let thrusts_n = (0..40_000).map(|i| motor.thrust_n(10.0 + 1e-4 * (f64::from(i) + 0.5)));
         let impulse_n_s: f64 = thrusts_n.map(|thrust_n| thrust_n * 1e-4).sum();

@@ -4,7 +4,8 @@ use nalgebra::Vector3;
 use rand::{Rng, SeedableRng as _};
 use rand_chacha::ChaCha12Rng;
 
-/// Normal numbers by Box and Muller (Annals of Mathematical Statistics 29, 1958), on `libm` so that they are the same on every machine.
+/// Normal numbers by Box and Muller (Annals of Mathematical Statistics 29, 1958), on `libm` so that
+/// they are the same on every machine.
 #[derive(Debug, Clone)]
 pub(crate) struct Normal<R = ChaCha12Rng> {
     random: R,
@@ -14,7 +15,8 @@ pub(crate) struct Normal<R = ChaCha12Rng> {
 }
 
 impl Normal {
-    /// The streams of a seed are independent, so a fault in one sensor does not change the noise of another.
+    /// The streams of a seed are independent, so a fault in one sensor does not change the noise of
+    /// another.
     pub(crate) fn new(seed: u64, stream: u64, sigma: f64) -> Self {
         let mut random = ChaCha12Rng::seed_from_u64(seed);
         random.set_stream(stream);

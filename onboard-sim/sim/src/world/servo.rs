@@ -1,7 +1,8 @@
-//! A servo: a pure delay, a rate limit, stops, and play between horn and load. A linkage is what lies between it and
-//! the surface that it moves.
+//! A servo: a pure delay, a rate limit, stops, and play between horn and load. A linkage is what
+//! lies between it and the surface that it moves.
 //!
-//! Play: G. Tao and P. V. Kokotovic, "Adaptive control of systems with backlash", Automatica 29, 1993.
+//! Play: G. Tao and P. V. Kokotovic, "Adaptive control of systems with backlash", Automatica
+//! 29, 1993.
 
 use flight::vehicle::airframe::Servo as ServoData;
 
@@ -45,8 +46,8 @@ impl Servo {
         }
     }
 
-    /// This servo with the delay, rate, play and stops of `after`; `before` is the data that it was built from. A stuck
-    /// servo stays stuck, and a slow one stays slow by the same factor.
+    /// This servo with the delay, rate, play and stops of `after`; `before` is the data that it was
+    /// built from. A stuck servo stays stuck, and a slow one stays slow by the same factor.
     pub(crate) fn changed(&self, before: &ServoData, after: &Self) -> Self {
         let was_rad = before.rate_rad_s() * STEP_S;
         // Unchanged values keep their bits.
@@ -102,8 +103,8 @@ impl Servo {
     }
 }
 
-// What lies between a servo and what it moves: a gain, a misalignment, and play that the servo's data do not know. The
-// servo's feedback sees none of it.
+// What lies between a servo and what it moves: a gain, a misalignment, and play that the servo's
+// data do not know. The servo's feedback sees none of it.
 
 /// One linkage. Angles in rad.
 #[derive(Debug, Clone)]
@@ -116,7 +117,8 @@ pub(crate) struct Linkage {
 }
 
 impl Linkage {
-    /// A linkage at rest with its servo at an angle, rad. Play and misalignment move nothing past the stops.
+    /// A linkage at rest with its servo at an angle, rad. Play and misalignment move nothing past
+    /// the stops.
     pub(crate) fn new(
         gain: f64,
         offset_rad: f64,

@@ -1,5 +1,5 @@
-//! How the true vehicle and the weather of one flight differ from the nominal data, and what can break. A campaign
-//! draws these values for each flight.
+//! How the true vehicle and the weather of one flight differ from the nominal data, and what can
+//! break. A campaign draws these values for each flight.
 
 use std::borrow::Cow;
 
@@ -19,11 +19,13 @@ flight::with_defaults! {
         pub impulse_scale: f64 = 1.0,
         /// True burn time over the motor file's.
         pub burn_time_scale: f64 = 1.0,
-        /// The motor's curve lies this share of the way from the mission's to the last of its other curves.
+        /// The motor's curve lies this share of the way from the mission's to the last of its other
+        /// curves.
         pub other_curve: f64 = 0.0,
         /// Time from the ignition command to the first thrust, s.
         pub ignition_delay_s: f64 = 0.15,
-        /// The motor chuffs: it burns for the first time, goes out for the second, and then burns on, s.
+        /// The motor chuffs: it burns for the first time, goes out for the second, and then burns
+        /// on, s.
         pub chuff_s: [f64; 2] = [0.0; 2],
         /// Time in which the thrust rises to the curve's, s.
         pub thrust_rise_s: f64 = 0.0,
@@ -35,7 +37,8 @@ flight::with_defaults! {
         pub mass_scale: f64 = 1.0,
         /// True aerodynamic force over the model's.
         pub drag_scale: f64 = 1.0,
-        /// Offset of the true from the nominal centre of gravity, in body axes (x towards the nose), m.
+        /// Offset of the true from the nominal centre of gravity, in body axes (x towards the
+        /// nose), m.
         pub cg_offset_m: [f64; 3] = [0.0; 3],
         /// Mean wind 10 m above the ground, m/s.
         pub wind_m_s: f64 = 0.0,
@@ -47,14 +50,16 @@ flight::with_defaults! {
         pub wind_exponent: f64 = crate::world::wind::EXPONENT,
         /// Turn of the mean wind's direction with height, from world x towards world y, rad/m.
         pub wind_veer_rad_m: f64 = 0.0,
-        /// Shape of the thrust curve: the file's thrust is multiplied by `1 + sum over k of a_k cos(k pi s)`, k from 1,
-        /// where `s` is the fraction of the impulse already given. The impulse stays the same: over a whole burn each term's
-        /// integral is zero.
+        /// Shape of the thrust curve: the file's thrust is multiplied by `1 + sum over k of a_k
+        /// cos(k pi s)`, k from 1, where `s` is the fraction of the impulse already given. The
+        /// impulse stays the same: over a whole burn each term's integral is zero.
         pub thrust_shape: [f64; SHAPE_TERMS] = [0.0; SHAPE_TERMS],
-        /// Fractions of drag that the exhaust takes away while the motor burns: of the body along its axis, and of the fins.
+        /// Fractions of drag that the exhaust takes away while the motor burns: of the body along
+        /// its axis, and of the fins.
         pub plume_body_loss: f64 = 0.0,
         pub plume_fin_loss: f64 = 0.0,
-        /// Factors on the drag along the body, on the fins and on the drag across the body, each beside `drag_scale`.
+        /// Factors on the drag along the body, on the fins and on the drag across the body, each
+        /// beside `drag_scale`.
         pub body_drag_scale: f64 = 1.0,
         pub fin_drag_scale: f64 = 1.0,
         pub crossflow_scale: f64 = 1.0,
@@ -74,7 +79,8 @@ flight::with_defaults! {
         pub fin_offset_rad: [f64; 4] = [0.0; 4],
         /// Play between the fins' servos and the fins that the data do not know, rad.
         pub fin_slop_rad: f64 = 0.0,
-        /// Rise of the ground, metre per metre along world x and y; its height at their origin, where the vehicle is to land, is 0.
+        /// Rise of the ground, metre per metre along world x and y; its height at their origin,
+        /// where the vehicle is to land, is 0.
         pub ground_rise: [f64; 2] = [0.0; 2],
     }
 }
@@ -110,7 +116,8 @@ impl Truth {
     /// The curve that the scales are over.
     ///
     /// # Errors
-    /// [`WorldError::Truth`] if the share is not 0 to 1, or not 0 and the mission has no other curve.
+    /// [`WorldError::Truth`] if the share is not 0 to 1, or not 0 and the mission has no other
+    /// curve.
     pub fn curve<'a>(&self, mission: &'a Mission) -> Result<Cow<'a, ThrustCurve>, WorldError> {
         let share = self.other_curve;
         let refuse = |required: &str| {
@@ -139,7 +146,8 @@ impl Truth {
     }
 }
 
-// The faults that can occur in flight. A fault acts from the step after its injection and never ends.
+// The faults that can occur in flight. A fault acts from the step after its injection and never
+// ends.
 
 /// A fault of motor or actuators.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]

@@ -1,5 +1,6 @@
-//! A prescribed flight: from apogee down in wind, with ignition in time, through an S-turn to the ground. Its attitude
-//! is a function of time and its thrust a function of height and speed, so it needs no controller and no estimator.
+//! A prescribed flight: from apogee down in wind, with ignition in time, through an S-turn to the
+//! ground. Its attitude is a function of time and its thrust a function of height and speed, so it
+//! needs no controller and no estimator.
 
 use core::f64::consts::TAU;
 

@@ -1,5 +1,5 @@
-//! Tests the estimator with the modelled sensors: it is consistent, accurate enough for landing, and works when sensors
-//! fail.
+//! Tests the estimator with the modelled sensors: it is consistent, accurate enough for landing,
+//! and works when sensors fail.
 #![expect(clippy::expect_used, reason = "a test says what it expected")]
 
 mod flight;
@@ -52,9 +52,9 @@ fn height_rms_m(at: &[&Frame]) -> f64 {
 fn val_chi_square_the_error_matches_the_filters_covariance() {
     let flights = &*HEALTHY;
     let shortest = flights.iter().map(Vec::len).min().expect("at least one flight");
-    // Nine degrees of freedom, averaged over the flights: chi-square of 1,800 has a standard deviation of 60, and
-    // 99.9 % of it lies within 3.29 of them (Bar-Shalom, Li and Kirubarajan, "Estimation with Applications to Tracking
-    // and Navigation", section 5.4).
+    // Nine degrees of freedom, averaged over the flights: chi-square of 1,800 has a standard
+    // deviation of 60, and 99.9 % of it lies within 3.29 of them (Bar-Shalom, Li and Kirubarajan,
+    // "Estimation with Applications to Tracking and Navigation", section 5.4).
     let freedom = 9.0 * FLIGHTS as f64;
     let half_width = 3.29 * (2.0 * freedom).sqrt() / FLIGHTS as f64;
     for frame in (0..shortest).step_by(50) {

@@ -1,5 +1,5 @@
-//! Tests the estimators with the simulated truth: a vehicle falls in wind and gusts with moving fins. A simple law that
-//! knows the truth lights the motor and holds the vehicle upright.
+//! Tests the estimators with the simulated truth: a vehicle falls in wind and gusts with moving
+//! fins. A simple law that knows the truth lights the motor and holds the vehicle upright.
 
 use std::sync::LazyLock;
 
@@ -176,7 +176,8 @@ fn rms(
 
 #[test]
 fn val_chi_square_of_the_error_in_the_simulated_truth() {
-    // 99.9 % of chi-square with 900 degrees of freedom, over the flights, as for the flights of `main`.
+    // 99.9 % of chi-square with 900 degrees of freedom, over the flights, as for the flights of
+    // `main`.
     let half_width = 3.29 * (18.0 / FLIGHTS as f64).sqrt();
     let of_fall = |frame: usize| FLOWN.iter().map(|(_, frames)| frames[frame].nees).sum::<f64>();
     let of_burn = |since_s: f64| burning_for(since_s).iter().map(|(_, frame)| frame.nees).sum::<f64>();
@@ -210,7 +211,8 @@ fn wind_and_air_are_known_at_ignition() {
 fn the_motor_is_known_half_a_second_into_its_burn() {
     for (since_s, thrust_n) in [(0.5, 1.0), (1.0, 1.0), (1.5, 1.0)] {
         let burning = burning_for(since_s);
-        // The accelerometer measures thrust over mass, so an error of the mass goes into the estimated thrust.
+        // The accelerometer measures thrust over mass, so an error of the mass goes into the
+        // estimated thrust.
         let ahead_n = rms(&burning, |truth, frame| frame.ahead_n.0 - frame.ahead_n.1 / truth.mass_scale);
         println!("after {since_s} s: thrust a second ahead {ahead_n:.2} N");
         assert!(ahead_n < thrust_n, "{ahead_n}");

@@ -1,7 +1,7 @@
 //! A file of recorded sensors, resampled to the frames of the flight computer.
 //!
-//! CSV with a header, 50 to 2,000 inertial samples a second. An empty cell or `nan` is no new sample of that sensor;
-//! other columns are not read.
+//! CSV with a header, 50 to 2,000 inertial samples a second. An empty cell or `nan` is no new
+//! sample of that sensor; other columns are not read.
 //!
 //! | column | unit and frame |
 //! |---|---|
@@ -30,10 +30,11 @@ use super::axes::Axes;
 
 /// Accepted rates of inertial samples, 1/s.
 const RATES_HZ: RangeInclusive<f64> = 50.0..=2_000.0;
-/// Longest time between two inertial samples, s. A logger that writes to its card pauses for tens of milliseconds; over
-/// a longer pause no interpolated motion is the vehicle's.
+/// Longest time between two inertial samples, s. A logger that writes to its card pauses for tens
+/// of milliseconds; over a longer pause no interpolated motion is the vehicle's.
 const LONGEST_PAUSE_S: f64 = 0.1;
-/// A sample this share of a frame after the frame's end still belongs to it: 5 us, the rounding of time stamps.
+/// A sample this share of a frame after the frame's end still belongs to it: 5 us, the rounding of
+/// time stamps.
 const LATE_SHARE: f64 = 1e-3;
 /// The columns that are read; of the first seven all but the time are required.
 #[rustfmt::skip]
@@ -67,7 +68,8 @@ pub enum SensorFileError {
 /// The samples of a file, resampled.
 #[derive(Debug, Clone, Default)]
 pub struct RecordedSensors {
-    /// The measurements of each frame; the first ends 5 ms after the first inertial sample, and fixes are on that clock.
+    /// The measurements of each frame; the first ends 5 ms after the first inertial sample, and
+    /// fixes are on that clock.
     pub frames: Vec<Measurements>,
     /// Mean rate of the inertial samples, 1/s.
     pub rate_hz: f64,
@@ -75,11 +77,13 @@ pub struct RecordedSensors {
     pub longest_pause_s: f64,
 }
 
-/// Reads a file, whose rows have a rate, 1/s, if it has no time stamps, and resamples it: the inertial samples that arrive in
-/// a frame are averaged, a frame without one is interpolated. Every other sample belongs to the frame in which it arrives.
+/// Reads a file, whose rows have a rate, 1/s, if it has no time stamps, and resamples it: the
+/// inertial samples that arrive in a frame are averaged, a frame without one is interpolated. Every
+/// other sample belongs to the frame in which it arrives.
 ///
 /// # Errors
-/// A cell cannot be read, times do not increase, or the rate is not accepted; the message names the line.
+/// A cell cannot be read, times do not increase, or the rate is not accepted; the message names the
+/// line.
 pub fn read(
     file: impl Read,
     row_rate_hz: Option<f64>,
@@ -137,7 +141,8 @@ pub fn read(
             vertical_m: reported(vertical_m),
             speed_m_s: reported(speed_m_s),
         };
-        // A fix without a velocity has one that is not a number, which passes no check and corrects nothing.
+        // A fix without a velocity has one that is not a number, which passes no check and corrects
+        // nothing.
         let fix = vector(&cells[9..12]).map(|position_m| GnssFix {
             position_m,
             velocity_m_s: vector(&cells[12..15]).unwrap_or(Vector3::repeat(f64::NAN)),

@@ -24,7 +24,8 @@ fn refused(text: &str) -> String {
     read_text(text).map(|read| read.rate_hz).unwrap_err().to_string()
 }
 
-/// A rate that grows steadily is the mean over each frame, or its end, whatever the rate of the rows.
+/// A rate that grows steadily is the mean over each frame, or its end, whatever the rate of the
+/// rows.
 #[test]
 fn val_hand_a_ramp_is_resampled_from_every_accepted_rate() {
     for rate_hz in [50.0, 100.0, 187.0, 200.0, 400.0, 819.0, 1_000.0, 2_000.0] {

@@ -1,8 +1,8 @@
 //! The side of MAVLink FTP that has the files, for reading only.
 //!
-//! Requests go in with [`Server::take`]; answers come out of [`Server::next_answer`], and the pieces of files out of
-//! [`Server::next_piece`], one at a time, whenever the link has room for one. So the caller sets the pace: nothing is
-//! sent that the link cannot carry.
+//! Requests go in with [`Server::take`]; answers come out of [`Server::next_answer`], and the
+//! pieces of files out of [`Server::next_piece`], one at a time, whenever the link has room for
+//! one. So the caller sets the pace: nothing is sent that the link cannot carry.
 
 use alloc::borrow::ToOwned as _;
 use alloc::collections::VecDeque;
@@ -16,7 +16,8 @@ use super::{LOG_DIRECTORY, crc};
 use crate::dialect::MavMessage;
 use crate::identity::Address;
 
-/// Most open files; of one client at most [`MAX_SESSIONS_OF_ONE`], so that nobody keeps the others out.
+/// Most open files; of one client at most [`MAX_SESSIONS_OF_ONE`], so that nobody keeps the others
+/// out.
 const MAX_SESSIONS: usize = 8;
 const MAX_SESSIONS_OF_ONE: usize = 4;
 /// A file that nobody has read for this long is closed.
@@ -45,7 +46,8 @@ pub trait Files {
     /// Every file, the oldest first.
     fn entries(&self) -> &[FileEntry];
 
-    /// Reads from a file (its place in the list) and returns how many bytes there were; `None` if it cannot be read.
+    /// Reads from a file (its place in the list) and returns how many bytes there were; `None` if
+    /// it cannot be read.
     fn read(&mut self, place: usize, offset: u32, into: &mut [u8]) -> Option<usize>;
 }
 
@@ -316,7 +318,8 @@ impl Server {
         self.remembered.push_back(Remembered { client, request: request.clone(), answer: answer.clone() });
     }
 
-    /// Whether an answer that is remembered does not hold any more: its session is closed, or there are files now.
+    /// Whether an answer that is remembered does not hold any more: its session is closed, or there
+    /// are files now.
     fn is_void(&self, client: Address, answer: &Packet) -> bool {
         match answer.asked {
             Opcode::OPEN_FILE_RO => {
@@ -335,7 +338,8 @@ impl Server {
         }
     }
 
-    /// Opens a file. A client that opens it again has been restarted: its old session would go on with its burst.
+    /// Opens a file. A client that opens it again has been restarted: its old session would go on
+    /// with its burst.
     fn open(
         &mut self,
         request: &Packet,
@@ -357,8 +361,8 @@ impl Server {
         if self.sessions.len() >= MAX_SESSIONS {
             return request.nak(Refusal::NoSessionsAvailable);
         }
-        // Some clients expect the number that they have named. A number that was just closed may have packets on
-        // their way.
+        // Some clients expect the number that they have named. A number that was just closed may
+        // have packets on their way.
         let is_free = |number: &u8| {
             !closed.contains(number) && !self.sessions.iter().any(|session| session.number == *number)
         };
@@ -386,7 +390,8 @@ fn parts(path: &str) -> Vec<&str> {
     path.split('/').filter(|part| !part.is_empty()).collect()
 }
 
-/// Whether a part of a path names the directory of the log. `@MAV_LOG` is the name that clients know for it.
+/// Whether a part of a path names the directory of the log. `@MAV_LOG` is the name that clients
+/// know for it.
 fn names_log(part: &str) -> bool {
     part == "@MAV_LOG" || parts(LOG_DIRECTORY) == [part]
 }
@@ -400,8 +405,8 @@ fn place_of(path: &str, files: &dyn Files) -> Option<usize> {
     }
 }
 
-/// A part of a directory, from the entry with the number in `offset` on: each with its kind, its name, and the length
-/// of a file behind a tab.
+/// A part of a directory, from the entry with the number in `offset` on: each with its kind, its
+/// name, and the length of a file behind a tab.
 fn list(request: &Packet, files: &dyn Files) -> Packet {
     let entries: Vec<String> = match parts(request.path())[..] {
         [] => vec![format!("D{}", LOG_DIRECTORY.trim_start_matches('/'))],
@@ -467,8 +472,9 @@ impl Session {
     /// Takes a request to read inside the file.
     fn ask(&mut self, request: &Packet) {
         if request.opcode == Opcode::BURST_READ_FILE {
-            // A request that comes again does not begin again what is under way, and one for pieces farther ahead in
-            // it prolongs it. So a client need not wait for the end of a burst, nor for its last packet if that is lost.
+            // A request that comes again does not begin again what is under way, and one for pieces
+            // farther ahead in it prolongs it. So a client need not wait for the end of a burst,
+            // nor for its last packet if that is lost.
             if let Some(burst) = &mut self.burst
                 && burst.request.size == request.size
                 && (burst.request == *request || burst.is_ahead(request.offset))

@@ -181,7 +181,8 @@ fn sessions_are_bounded_and_end_when_nobody_reads() {
 }
 
 proptest! {
-    /// Whatever arrives, the server answers with what a packet can hold, keeps its bounds and never panics.
+    /// Whatever arrives, the server answers with what a packet can hold, keeps its bounds and never
+    /// panics.
     #[test]
     fn hostile_requests_are_answered_within_bounds(
         requests in proptest::collection::vec((any::<u8>(), any::<u8>(), any::<u16>(), any::<u32>(), "[a-z/@_A-Z.0]{0,30}", any::<u8>()), 0..200),

@@ -1,4 +1,5 @@
-//! UDP links: `udpin` answers every sender of which a frame was accepted; `udpout` sends first, and only to one peer.
+//! UDP links: `udpin` answers every sender of which a frame was accepted; `udpout` sends first, and
+//! only to one peer.
 
 mod peers;
 
@@ -17,8 +18,8 @@ use super::Outgoing;
 use crate::hub::{Origin, Received};
 
 const MAX_DATAGRAM: usize = 2048;
-/// This many datagrams may lie in the owner's queue, where senders no longer take turns. At fifty polls a second, as
-/// the vehicle makes, that is enough for 12,800 datagrams a second.
+/// This many datagrams may lie in the owner's queue, where senders no longer take turns. At fifty
+/// polls a second, as the vehicle makes, that is enough for 12,800 datagrams a second.
 pub(super) const INBOX_LEN: usize = 256;
 /// The link keeps this many unread reports about itself.
 const MAX_REPORTS: usize = 8;
@@ -33,7 +34,8 @@ pub(super) struct Queues {
     pub(super) believed: Receiver<Origin>,
 }
 
-/// Binds and listens. Returns the bound address, which names the port that the system chose if `address` has port 0.
+/// Binds and listens. Returns the bound address, which names the port that the system chose if
+/// `address` has port 0.
 pub(super) async fn listen(address: &str, queues: Queues) -> io::Result<SocketAddr> {
     let socket = UdpSocket::bind(address).await?;
     let bound = socket.local_addr()?;
@@ -46,8 +48,8 @@ pub(super) async fn connect(address: &str, queues: Queues) -> io::Result<()> {
         io::Error::new(io::ErrorKind::NotFound, format!("`{address}` resolves to no address"))
     })?;
     let any: SocketAddr = if peer.is_ipv4() { ([0, 0, 0, 0], 0).into() } else { ([0u16; 8], 0).into() };
-    // The socket stays unconnected: otherwise an ICMP "port unreachable", from a ground that starts later, would end
-    // the link.
+    // The socket stays unconnected: otherwise an ICMP "port unreachable", from a ground that starts
+    // later, would end the link.
     let socket = UdpSocket::bind(any).await?;
     if queues.inbox.send(Received::Up(peer.to_string())).await.is_ok() {
         tokio::spawn(run(socket, Peers::only(peer), queues));
@@ -72,7 +74,8 @@ async fn run(socket: UdpSocket, mut peers: Peers, queues: Queues) {
                         queue.push(from, standing, &buffer[..count]);
                     }
                 }
-                // The error is about an earlier datagram of ours. If it persists, it must not use a whole core.
+                // The error is about an earlier datagram of ours. If it persists, it must not use a
+                // whole core.
                 Err(_) => tokio::time::sleep(PAUSE).await,
             },
             place = inbox.reserve(), if !reports.is_empty() || !queue.is_empty() => {
@@ -85,7 +88,8 @@ async fn run(socket: UdpSocket, mut peers: Peers, queues: Queues) {
             outgoing = outbox.recv() => {
                 let Some((bytes, to)) = outgoing else { return };
                 for peer in peers.answered().filter(|peer| to.is_none_or(|to| to == Origin::Datagram(*peer))) {
-                    // A datagram that cannot be sent counts as lost; the link's statistics and heartbeats show it.
+                    // A datagram that cannot be sent counts as lost; the link's statistics and
+                    // heartbeats show it.
                     let _ = socket.send_to(&bytes, peer).await;
                 }
             }
@@ -106,11 +110,11 @@ async fn run(socket: UdpSocket, mut peers: Peers, queues: Queues) {
     }
 }
 
-// Queues datagrams fairly: each sender has its own queue and the senders take turns, so that a flood loses only its
-// own datagrams.
+// Queues datagrams fairly: each sender has its own queue and the senders take turns, so that a
+// flood loses only its own datagrams.
 
-/// This many datagrams of proven senders may wait; the senders share the places equally. It holds a fifth of a second
-/// of the fastest simulated telemetry, 5,000 datagrams a second.
+/// This many datagrams of proven senders may wait; the senders share the places equally. It holds a
+/// fifth of a second of the fastest simulated telemetry, 5,000 datagrams a second.
 const PROVEN_PLACES: usize = 1024;
 /// This many datagrams of all other senders together may wait.
 const UNPROVEN_PLACES: usize = 256;
@@ -139,8 +143,8 @@ impl FairQueue {
     fn push(&mut self, from: SocketAddr, bytes: &[u8]) -> bool {
         let senders = self.queues.len();
         match self.queues.entry(from) {
-            // A sender that queued when there were fewer senders may hold more than its share; it gets no more places
-            // until it holds less.
+            // A sender that queued when there were fewer senders may hold more than its share; it
+            // gets no more places until it holds less.
             Entry::Occupied(queue) if queue.get().len() >= (self.most / senders).max(1) => return false,
             Entry::Occupied(mut queue) => queue.get_mut().push_back(bytes.to_vec()),
             Entry::Vacant(_) if senders >= self.most => return false,
@@ -182,7 +186,8 @@ impl DatagramQueue {
         }
     }
 
-    /// Queues a datagram and returns true, or drops it because its sender has too many waiting already.
+    /// Queues a datagram and returns true, or drops it because its sender has too many waiting
+    /// already.
     fn push(&mut self, from: SocketAddr, standing: Standing, bytes: &[u8]) -> bool {
         match standing {
             Standing::Proven => self.proven.push(from, bytes),

@@ -1,7 +1,7 @@
 //! Decides which senders a UDP link answers, and reports all others.
 //!
-//! A datagram proves nothing about its sender. A sender is answered once a frame of it was accepted. Time is an
-//! argument, counted from the opening of the link.
+//! A datagram proves nothing about its sender. A sender is answered once a frame of it was
+//! accepted. Time is an argument, counted from the opening of the link.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::net::SocketAddr;
@@ -9,21 +9,24 @@ use std::time::Duration;
 
 use super::Standing;
 
-/// This many proven senders are answered at the same time; each one costs the vehicle's whole telemetry, 2,000 bytes
-/// a second. Without a key anybody's frame is valid, so there must be more places than strangers usually take.
+/// This many proven senders are answered at the same time; each one costs the vehicle's whole
+/// telemetry, 2,000 bytes a second. Without a key anybody's frame is valid, so there must be more
+/// places than strangers usually take.
 const MAX_PROVEN: usize = 64;
-/// When all places are taken, a newcomer displaces a proven sender that has been silent for this long. A sender that
-/// still sends is never displaced.
+/// When all places are taken, a newcomer displaces a proven sender that has been silent for this
+/// long. A sender that still sends is never displaced.
 const SILENT_AFTER: Duration = Duration::from_secs(10);
-/// While no sender is proven, one stranger (the guest) is answered, so that a ground with the wrong key can see why
-/// it is refused. It keeps that place until it has been silent for this long.
+/// While no sender is proven, one stranger (the guest) is answered, so that a ground with the wrong
+/// key can see why it is refused. It keeps that place until it has been silent for this long.
 const GUEST_SILENT_AFTER: Duration = Duration::from_secs(5);
 
 /// Unknown senders are reported at most this often.
 const REPORT_INTERVAL: Duration = Duration::from_secs(10);
-/// The first report waits this long, so that a newcomer whose first frame is still being checked is not reported.
+/// The first report waits this long, so that a newcomer whose first frame is still being checked is
+/// not reported.
 const FIRST_REPORT_DELAY: Duration = Duration::from_secs(1);
-/// This many new peers are named in [`REPORT_INTERVAL`]; of further ones only the number is reported.
+/// This many new peers are named in [`REPORT_INTERVAL`]; of further ones only the number is
+/// reported.
 const MAX_NAMED: usize = 4;
 /// This many strangers are counted by sender; of further ones only the datagrams are counted.
 const MAX_COUNTED_SENDERS: usize = 1024;
@@ -103,8 +106,8 @@ impl Peers {
         Some(Standing::Unproven)
     }
 
-    /// Notes that a frame of this sender was accepted. Returns a value if the sender is answered from now on and was
-    /// not before; the value says whether it is to be named.
+    /// Notes that a frame of this sender was accepted. Returns a value if the sender is answered
+    /// from now on and was not before; the value says whether it is to be named.
     pub(super) fn on_believed(&mut self, from: SocketAddr, now: Duration) -> Option<Newcomer> {
         if self.fixed.is_some() {
             return None;

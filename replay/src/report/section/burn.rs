@@ -71,7 +71,8 @@ pub(super) fn words(flight: &Flight) -> String {
     paragraph(&format!("{source} {}", thrust(flight))) + &paths(flight)
 }
 
-/// A motor that is further off than this was another one than the mission expected: one of twenty of its own lot is.
+/// A motor that is further off than this was another one than the mission expected: one of twenty
+/// of its own lot is.
 const ANOTHER_SIGMAS: f64 = 2.0;
 
 fn thrust(flight: &Flight) -> String {

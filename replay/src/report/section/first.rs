@@ -1,4 +1,5 @@
-//! The first screen: how the flight ended, what went wrong, the whole flight, its limits and its place.
+//! The first screen: how the flight ended, what went wrong, the whole flight, its limits and its
+//! place.
 
 use flight::rules::verdict::Landing;
 use protocol::log::v1::LimitResult;
@@ -86,7 +87,8 @@ fn findings(flight: &Flight, info: &Info, drawn: &[Drawn]) -> String {
         html.extend([format!("<ol class=\"findings\">\n{items}</ol>\n")]);
     }
     html += &without_its_faults(flight);
-    // The picture of the first; the whole flight stands beside it. Of nothing wrong how it came down.
+    // The picture of the first; the whole flight stands beside it. Of nothing wrong how it came
+    // down.
     let shown = findings.iter().map(|finding| finding.picture).chain(["vertical-speed"]);
     let first = shown.filter_map(of).find(|(section, ..)| *section != "first");
     html + &first.map_or_else(String::new, |(.., svg)| svg.replacen("<figure id=", "<figure data-of=", 1))
@@ -152,7 +154,8 @@ fn measured(limit: &LimitResult) -> String {
     format!("{:.2} {unit}", value.abs()).trim_end().to_owned()
 }
 
-/// A value's share of its limit: even up to the limit, and from there a third of the rest for each factor of ten.
+/// A value's share of its limit: even up to the limit, and from there a third of the rest for each
+/// factor of ten.
 fn bar(share: f64, passed: bool) -> String {
     const LIMIT: f64 = 70.0;
     const TEN: f64 = 25.0;
@@ -169,7 +172,8 @@ fn bar(share: f64, passed: bool) -> String {
 mod tests {
     use super::*;
 
-    /// Far beyond the limit is longer than beyond it, which is longer than at it; a share without end fills the bar.
+    /// Far beyond the limit is longer than beyond it, which is longer than at it; a share without
+    /// end fills the bar.
     #[test]
     fn bars_of_different_shares_differ() {
         let long = |share: f64| {

@@ -1,4 +1,5 @@
-//! The vehicle over time, for the page's script: where it was, how it pointed, and what its actuators did.
+//! The vehicle over time, for the page's script: where it was, how it pointed, and what its
+//! actuators did.
 
 use flight::vehicle::airframe::MassModel;
 use serde_json::{Value, json};
@@ -9,9 +10,10 @@ use crate::report::track::{Flight, Part, Series};
 /// Time between two rows in the landing burn and elsewhere, s.
 const EACH_S: [f64; 2] = [0.04, 0.1];
 
-/// The shape of the vehicle, the phases, and rows of: time on the report's axis, s; north, east and height of the feet, m;
-/// attitude from body to world (w, x, y, z); gimbal pitch and yaw, and the fins, deg; thrust, N; whether it is on its booster; how
-/// far the parachute is open. As JSON; what is unknown is null.
+/// The shape of the vehicle, the phases, and rows of: time on the report's axis, s; north, east and
+/// height of the feet, m; attitude from body to world (w, x, y, z); gimbal pitch and yaw, and the
+/// fins, deg; thrust, N; whether it is on its booster; how far the parachute is open. As JSON; what
+/// is unknown is null.
 pub(in crate::report) fn json(flight: &Flight) -> String {
     let on_booster = flight.framed(|frame| Some(f64::from(u8::from(frame.input.booster_attached))));
     let thrust_n = match flight.recording.world.as_slice() {

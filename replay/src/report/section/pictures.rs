@@ -30,7 +30,8 @@ pub(super) struct Picture<'a> {
 }
 
 impl<'a> Picture<'a> {
-    /// A picture over a part of the flight, with its phases, what happened and what went wrong in it.
+    /// A picture over a part of the flight, with its phases, what happened and what went wrong in
+    /// it.
     fn new(flight: &'a Flight, section: &'static str, part: Part, title: &str) -> Self {
         let mark = |at_s: Option<f64>, name: &str| Some((flight.axis_s(at_s?), name.to_owned()));
         let marks = [mark(flight.ignition_s, "ignition"), mark(flight.touchdown_s, "touchdown")];
@@ -214,8 +215,8 @@ fn of_the_rest(flight: &Flight) -> Vec<Picture<'_>> {
     pictures
 }
 
-/// Actual and commanded angle of gimbal pitch and yaw, and of the fins, deg. Without a simulated truth actual is what the servos
-/// report.
+/// Actual and commanded angle of gimbal pitch and yaw, and of the fins, deg. Without a simulated
+/// truth actual is what the servos report.
 pub(super) fn surface_deg(flight: &Flight, surface: usize) -> [Series; 2] {
     let deg = |gimbal_rad: &[f64], fins_rad: &[f64]| {
         let of_fins = || fins_rad.get(surface.checked_sub(2)?);

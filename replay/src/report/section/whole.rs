@@ -33,7 +33,8 @@ pub(super) fn events(flight: &Flight) -> Option<String> {
     Some(table(&[heading, "from", "event"], rows) + &rest)
 }
 
-/// What of the flown mission differs from the built-in one of its name, and whether its controller is the standard one.
+/// What of the flown mission differs from the built-in one of its name, and whether its controller
+/// is the standard one.
 pub(super) fn mission(flight: &Flight, info: &Info) -> Option<String> {
     let flown = flight.recording.profile_toml().ok()?;
     let profile = info.profile.as_ref();

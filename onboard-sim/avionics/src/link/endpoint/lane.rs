@@ -1,7 +1,9 @@
-//! A lane: links that carry the same frames, their budget, and the queue of what waits for room on them.
+//! A lane: links that carry the same frames, their budget, and the queue of what waits for room on
+//! them.
 //!
-//! All links begin in one lane, so that a ground station that hears several of them can recognise copies by their
-//! sequence numbers. A link with different message intervals gets its own lane with its own sequence numbers.
+//! All links begin in one lane, so that a ground station that hears several of them can recognise
+//! copies by their sequence numbers. A link with different message intervals gets its own lane with
+//! its own sequence numbers.
 
 use alloc::boxed::Box;
 use alloc::collections::VecDeque;
@@ -21,7 +23,8 @@ use crate::link::streams::{Due, SLOW_UPLINK_HZ, Streams, WINDOW_S, is_slow, kept
 use crate::link::vehicle::VehicleState;
 use crate::link::{parameters, telemetry};
 
-/// Most answers that may wait, and most texts. More are dropped; a station that needs an answer asks again.
+/// Most answers that may wait, and most texts. More are dropped; a station that needs an answer
+/// asks again.
 const MAX_WAITING: usize = 32;
 /// The longest frame with a piece of a file, without its signature.
 const PIECE_FRAME_LEN: usize = protocol::ftp::packet::PAYLOAD_LEN + 12;
@@ -29,8 +32,9 @@ const PIECE_FRAME_LEN: usize = protocol::ftp::packet::PAYLOAD_LEN + 12;
 const ABORT_ANSWERED_S: f64 = 0.09;
 /// The same on a line slower than a radio, s.
 const SLOW_ABORT_ANSWERED_S: f64 = 0.3;
-/// Bytes per second of files over a link that carries at least a network's telemetry: 15 % of the slowest Wi-Fi (802.11b,
-/// 11 Mbit/s). A smaller budget may be that of a radio somewhere on the way; files then use what telemetry leaves of it.
+/// Bytes per second of files over a link that carries at least a network's telemetry: 15 % of the
+/// slowest Wi-Fi (802.11b, 11 Mbit/s). A smaller budget may be that of a radio somewhere on the
+/// way; files then use what telemetry leaves of it.
 const NETWORK_FILES_BYTES_S: f64 = 200_000.0;
 /// A piece of a file that would hold a line for longer than this is not sent, s.
 const LINE_HOLDS_S: f64 = 0.3;
@@ -79,8 +83,8 @@ pub(super) struct Lane {
     /// The budget that the lane was given, bytes per second; a radio may leave less of it.
     granted_bytes_s: u32,
     radio: RadioShare,
-    /// When a line slower than a radio has sent what it was given. What is not vital waits for that, so that nothing queues
-    /// behind it.
+    /// When a line slower than a radio has sent what it was given. What is not vital waits for
+    /// that, so that nothing queues behind it.
     line_free_at_s: f64,
     /// When the next uplink reports go over such a line.
     uplinks_at_s: f64,
@@ -173,8 +177,8 @@ impl Lane {
         }
     }
 
-    /// Queues requested messages; returns whether there was room in the queue. Otherwise they are dropped, and the
-    /// station has to ask again.
+    /// Queues requested messages; returns whether there was room in the queue. Otherwise they are
+    /// dropped, and the station has to ask again.
     pub(super) fn request(&mut self, messages: Vec<MavMessage>) -> bool {
         let fits = self.requested.len() + messages.len() <= MAX_REQUESTED;
         if fits {
@@ -183,8 +187,9 @@ impl Lane {
         fits
     }
 
-    /// The frames to send now: vital messages first, then answers, then texts (in the fall after telemetry), then telemetry by
-    /// importance, then requested messages, then pieces of files. The budget holds in every second.
+    /// The frames to send now: vital messages first, then answers, then texts (in the fall after
+    /// telemetry), then telemetry by importance, then requested messages, then pieces of files. The
+    /// budget holds in every second.
     pub(super) fn poll(
         &mut self,
         context: &Context,
@@ -244,8 +249,8 @@ impl Lane {
             self.send_texts(now_s, &mut frames);
         }
         for due in due.iter().filter(|due| !due.vital) {
-            // The check uses the longest form of the message, so that no frame is built for nothing. Less important
-            // messages do not overtake it.
+            // The check uses the longest form of the message, so that no frame is built for
+            // nothing. Less important messages do not overtake it.
             if due.frame_len > self.room_for_telemetry() || !self.is_line_free(now_s) {
                 break;
             }
@@ -314,7 +319,8 @@ impl Lane {
         }
     }
 
-    /// Room for messages that are not vital. Some of the budget is kept free so that vital messages never wait.
+    /// Room for messages that are not vital. Some of the budget is kept free so that vital messages
+    /// never wait.
     fn room(&self) -> usize {
         self.sent.room().saturating_sub(kept_free_bytes(self.signature_len))
     }
@@ -330,7 +336,8 @@ impl Lane {
     fn send(&mut self, due: &Due, context: &Context, vehicle: &VehicleState<'_>, frames: &mut Vec<Frame>) {
         if let Some(message) = telemetry::message(due.message_id, vehicle, context.identity) {
             let frame = self.encoder.encode(&message);
-            // Vital messages do not count as recent telemetry: a change of phase must not delay a position.
+            // Vital messages do not count as recent telemetry: a change of phase must not delay a
+            // position.
             if !due.vital {
                 self.telemetry_briefly.take(self.len_of(&frame), context.now_s);
             }
@@ -388,8 +395,9 @@ impl Lane {
 
 // Tracks how much a link has carried recently and how much room it has left.
 
-/// In any fifth of a second telemetry may take 22 % of the budget of one second, and answers and texts a sixth of it.
-/// Otherwise a burst could spend the whole budget, and even vital messages would wait.
+/// In any fifth of a second telemetry may take 22 % of the budget of one second, and answers and
+/// texts a sixth of it. Otherwise a burst could spend the whole budget, and even vital messages
+/// would wait.
 pub(super) const BRIEFLY_S: f64 = 0.2;
 
 /// A radio that has not reported for this long has no say any more, s.

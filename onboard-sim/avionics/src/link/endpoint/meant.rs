@@ -1,5 +1,6 @@
-//! Whether a command that can move something is meant for this vehicle, this boot of it and its mission, and comes from a
-//! station that can be told from others. What stops the launch (abort, hold, disarm, the end of a check) is always taken.
+//! Whether a command that can move something is meant for this vehicle, this boot of it and its
+//! mission, and comes from a station that can be told from others. What stops the launch (abort,
+//! hold, disarm, the end of a check) is always taken.
 
 use alloc::borrow::ToOwned as _;
 use alloc::format;
@@ -16,7 +17,8 @@ use crate::link::commands::{Command, Unfit};
 use crate::link::stations::SAME_IDS_FOR_S;
 use crate::link::vehicle::VehicleState;
 
-/// So long after a frame of another vehicle under our ids, s, a command must name the boot that it is meant for.
+/// So long after a frame of another vehicle under our ids, s, a command must name the boot that it
+/// is meant for.
 const TWIN_FOR_S: f64 = 10.0;
 
 impl VehicleEndpoint {
@@ -37,7 +39,8 @@ impl VehicleEndpoint {
         self.twin_heard_at_s.is_some_and(|at_s| time_s - at_s <= TWIN_FOR_S)
     }
 
-    /// Why a command is not carried out, whatever the vehicle would decide; `None` if nothing speaks against it.
+    /// Why a command is not carried out, whatever the vehicle would decide; `None` if nothing
+    /// speaks against it.
     pub(super) fn why_not_meant(
         &self,
         request: &CommandRequest,

@@ -1,7 +1,8 @@
 //! The vehicle's end of MAVLink, without sockets: frames in, frames out.
 //!
-//! In every second each link carries at most its budget, whatever is requested. Vital messages go first, then answers
-//! and texts within their own shares, then telemetry, then requested messages. In the fall texts follow telemetry.
+//! In every second each link carries at most its budget, whatever is requested. Vital messages go
+//! first, then answers and texts within their own shares, then telemetry, then requested messages.
+//! In the fall texts follow telemetry.
 
 mod lane;
 pub mod meant;
@@ -49,8 +50,8 @@ use crate::link::{commands, telemetry};
 const MAX_REQUESTED: usize = 32;
 /// Most sources that are remembered, so that a flood of forged ids cannot grow memory.
 const MAX_KNOWN: usize = 16;
-/// After an abort: interval of heartbeats, s, and for how long, s. The crew soon sees the latched abort, even over a
-/// bad link.
+/// After an abort: interval of heartbeats, s, and for how long, s. The crew soon sees the latched
+/// abort, even over a bad link.
 const ABORTED_BEAT_S: f64 = 0.2;
 const ABORTED_BEATS_FOR_S: f64 = 3.0;
 /// In a countdown: the longest interval of flight statuses, s; on a slow line they take half of it.
@@ -118,7 +119,8 @@ impl From<&Mode> for LastReported {
 }
 
 impl VehicleEndpoint {
-    /// An endpoint with the standard messages at their default rates, over one link with a radio's budget.
+    /// An endpoint with the standard messages at their default rates, over one link with a radio's
+    /// budget.
     pub fn new(kind: VehicleKind) -> Self {
         Self::over(kind, Streams::new(), 0)
     }
@@ -128,8 +130,9 @@ impl VehicleEndpoint {
         Self::over(kind, Streams::signed(), SIGNATURE_LEN)
     }
 
-    /// The same for a vehicle with operators. A frame's signature must have been checked with the key that its link id
-    /// names ([`protocol::signing::Signing::with_operators`]): here it only says whose it is.
+    /// The same for a vehicle with operators. A frame's signature must have been checked with the
+    /// key that its link id names ([`protocol::signing::Signing::with_operators`]): here it only
+    /// says whose it is.
     pub fn sending_to_crew(kind: VehicleKind) -> Self {
         let endpoint = Self::over(kind, Streams::with_crew(), SIGNATURE_LEN);
         Self { stations: Stations::of_a_crew(), ..endpoint }
@@ -172,8 +175,8 @@ impl VehicleEndpoint {
         Self { identity: Identity { uid, ..self.identity }, ..self }
     }
 
-    /// Sets the links by their budgets in bytes per second. All carry the same frames, limited by the slowest link,
-    /// until a station asks one link for something else.
+    /// Sets the links by their budgets in bytes per second. All carry the same frames, limited by
+    /// the slowest link, until a station asks one link for something else.
     #[must_use]
     pub fn over_links(mut self, capacities_bytes_s: &[u32]) -> Self {
         self.capacities_bytes_s = capacities_bytes_s.to_vec();
@@ -196,8 +199,9 @@ impl VehicleEndpoint {
         Self { us, lanes, ..self }
     }
 
-    /// Takes a frame that came in this way. The vehicle decides requests in its next frame ([`VehicleEndpoint::heard`],
-    /// [`VehicleEndpoint::on_answers`]); answers come out of [`VehicleEndpoint::poll`].
+    /// Takes a frame that came in this way. The vehicle decides requests in its next frame
+    /// ([`VehicleEndpoint::heard`], [`VehicleEndpoint::on_answers`]); answers come out of
+    /// [`VehicleEndpoint::poll`].
     pub fn on_frame(&mut self, path: impl Into<Path>, frame: &Frame, vehicle: &VehicleState<'_>) {
         if frame.source() == self.us {
             self.note_twin(vehicle.time_s);
@@ -274,8 +278,8 @@ impl VehicleEndpoint {
         self.stations.copied(frame, &sender_of(frame, path.into(), vehicle));
     }
 
-    /// Warns the crew about a command without a valid signature. It is not acknowledged: otherwise a forger could cause
-    /// an answer that the real ground station takes for its own.
+    /// Warns the crew about a command without a valid signature. It is not acknowledged: otherwise
+    /// a forger could cause an answer that the real ground station takes for its own.
     pub fn on_rejected(&mut self, frame: &Frame, why: Rejection) {
         self.stations.refused(frame.source(), why, self.now_s);
         let Some(request) = CommandRequest::from_frame(frame).filter(|asked| self.us.accepts(asked.target))
@@ -330,14 +334,15 @@ impl VehicleEndpoint {
             self.hurry(HEARTBEAT_DATA::ID);
             self.hurry(TD_FLIGHT_STATUS_DATA::ID);
         }
-        // A phase of the flight may be over within a tenth of a second, and no command can bring it back.
+        // A phase of the flight may be over within a tenth of a second, and no command can bring it
+        // back.
         if !now.phase.on_pad() && before.is_some_and(|before| before.phase != now.phase) {
             for lane in &mut self.lanes {
                 lane.streams.at_least_every(TD_FLIGHT_STATUS_DATA::ID, 0.0);
             }
         }
-        // A station that hears nothing of the countdown for 1 s says so, and holds it: also over the slowest line it hears
-        // several of these in that time.
+        // A station that hears nothing of the countdown for 1 s says so, and holds it: also over
+        // the slowest line it hears several of these in that time.
         if mode.countdown_end_s.is_some() {
             for lane in &mut self.lanes {
                 lane.streams.at_least_every(TD_FLIGHT_STATUS_DATA::ID, COUNTDOWN_TOLD_S);
@@ -416,8 +421,8 @@ impl VehicleEndpoint {
         }
     }
 
-    /// Takes back a command that is being carried out: only a check takes a while. Any other is done or refused at once, and the
-    /// answer says that it cannot be cancelled.
+    /// Takes back a command that is being carried out: only a check takes a while. Any other is
+    /// done or refused at once, and the answer says that it cannot be cancelled.
     fn on_cancel(
         &mut self,
         path: Path,
@@ -455,8 +460,8 @@ impl VehicleEndpoint {
         }
     }
 
-    /// Why this station may not set rates now, if so. While the vehicle is armed, only the station that armed it may
-    /// set them; if the vehicle armed itself, every station may.
+    /// Why this station may not set rates now, if so. While the vehicle is armed, only the station
+    /// that armed it may set them; if the vehicle armed itself, every station may.
     fn rates_forbidden(
         &self,
         station: Station,
@@ -471,8 +476,8 @@ impl VehicleEndpoint {
         Some(format!("while armed, only {armed_by}, which armed, sets rates"))
     }
 
-    /// Changes the rates of one link: an interval applies to the link that asked. A link that shared a lane with others
-    /// gets its own lane if anything changes.
+    /// Changes the rates of one link: an interval applies to the link that asked. A link that
+    /// shared a lane with others gets its own lane if anything changes.
     fn with_rates_of<T>(&mut self, link: usize, change: impl FnOnce(&mut Streams) -> T) -> T {
         let capacity_bytes_s = self.capacities_bytes_s.get(link).copied().unwrap_or(RADIO_BUDGET_BYTES_S);
         let lane = self.lane(link);
@@ -585,12 +590,14 @@ fn sender_of(frame: &Frame, path: Path, vehicle: &VehicleState<'_>) -> Sender {
     Sender { address: frame.source(), key, path }
 }
 
-/// Whether a forced disarm is an abort, as in the air. Other ground stations call it an emergency stop or a kill.
+/// Whether a forced disarm is an abort, as in the air. Other ground stations call it an emergency
+/// stop or a kill.
 fn means_abort(vehicle: &VehicleState<'_>) -> bool {
     !(vehicle.phase().on_pad() || matches!(vehicle.phase(), Phase::Touchdown | Phase::Safed))
 }
 
-/// The answer to a PING that asks for one. PING is deprecated, but older ground stations still measure with it.
+/// The answer to a PING that asks for one. PING is deprecated, but older ground stations still
+/// measure with it.
 #[expect(deprecated, reason = "the standard has replaced PING by TIMESYNC; older ground stations have not")]
 fn pong(message: &MavMessage, asker: Address) -> Option<MavMessage> {
     let MavMessage::PING(ping) = message else {

@@ -1,4 +1,5 @@
-//! Answers messages that are not commands: questions about parameters, files and lists, and requests for the log.
+//! Answers messages that are not commands: questions about parameters, files and lists, and
+//! requests for the log.
 
 use alloc::borrow::ToOwned as _;
 use alloc::boxed::Box;
@@ -83,12 +84,14 @@ impl VehicleEndpoint {
     }
 }
 
-// Answers for lists that this vehicle does not keep: missions, fences, rally points, logs on board, extended parameters.
+// Answers for lists that this vehicle does not keep: missions, fences, rally points, logs on board,
+// extended parameters.
 //
-// Other ground stations ask for them whatever the capabilities say, and report a failure to their user if there is no
-// answer. So every question is answered: the lists are empty, and nothing can be put into them. Protocols:
-// <https://mavlink.io/en/services/mission.html> and LOG_REQUEST_LIST of common.xml. Questions are parsed from raw
-// bytes, because a mission type that the dialect does not know must be answered, too.
+// Other ground stations ask for them whatever the capabilities say, and report a failure to their
+// user if there is no answer. So every question is answered: the lists are empty, and nothing can
+// be put into them. Protocols: <https://mavlink.io/en/services/mission.html> and LOG_REQUEST_LIST
+// of common.xml. Questions are parsed from raw bytes, because a mission type that the dialect does
+// not know must be answered, too.
 
 /// A question about a list, with its answer.
 pub(super) struct ListQuestion {
@@ -139,7 +142,8 @@ impl ListQuestion {
     }
 }
 
-/// There are no extended parameters. The standard has no answer for that to a question; this is the one of the parameters.
+/// There are no extended parameters. The standard has no answer for that to a question; this is the
+/// one of the parameters.
 fn no_parameter(id: [u8; 16], index: i16, asker: Address) -> MavMessage {
     MavMessage::PARAM_ERROR(PARAM_ERROR_DATA {
         param_index: index,
@@ -192,7 +196,8 @@ fn acknowledged(asker: Address, kind: u8, result: MavMissionResult) -> MavMessag
     })
 }
 
-// Gives out the vehicle's log (MAVLink FTP), while nobody can be harmed by a thinner telemetry: on the ground, disarmed.
+// Gives out the vehicle's log (MAVLink FTP), while nobody can be harmed by a thinner telemetry: on
+// the ground, disarmed.
 
 flight::with_defaults! {
     /// The log's files, and what clients have asked for.
@@ -232,8 +237,8 @@ impl VehicleEndpoint {
         self.files = FileService { server: Server::default(), files };
     }
 
-    /// Takes a request for a file. A link that reads gets a lane of its own: its files and its thinner telemetry
-    /// concern no other link.
+    /// Takes a request for a file. A link that reads gets a lane of its own: its files and its
+    /// thinner telemetry concern no other link.
     pub(super) fn on_file_request(
         &mut self,
         link: usize,
@@ -253,7 +258,8 @@ impl VehicleEndpoint {
         }
     }
 
-    /// Continues with what takes long, and closes every file when the vehicle must not give them out any more.
+    /// Continues with what takes long, and closes every file when the vehicle must not give them
+    /// out any more.
     pub(super) fn serve_files(&mut self, vehicle: &VehicleState<'_>) {
         let FileService { server, files } = &mut self.files;
         if gives_out_its_log(vehicle) {

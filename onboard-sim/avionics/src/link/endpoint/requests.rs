@@ -1,5 +1,5 @@
-//! Keeps the stations' requests until the vehicle has decided. A command is acknowledged by the frame that carried it
-//! out. Refusals are explained, but not without end.
+//! Keeps the stations' requests until the vehicle has decided. A command is acknowledged by the
+//! frame that carried it out. Refusals are explained, but not without end.
 
 use alloc::borrow::ToOwned as _;
 use alloc::collections::BTreeMap;
@@ -22,8 +22,8 @@ use super::meant::can_move;
 use crate::link::commands;
 use crate::link::vehicle::VehicleState;
 
-/// Most commands that may wait for one frame (some milliseconds); more are refused for now. So many aborts of no operator may
-/// wait beside them; one would do.
+/// Most commands that may wait for one frame (some milliseconds); more are refused for now. So many
+/// aborts of no operator may wait beside them; one would do.
 const MAX_WAITING: usize = 64;
 /// How many answers are remembered, in case their commands are repeated.
 const MAX_ANSWERED: usize = 16;
@@ -67,8 +67,8 @@ fn is_repeated(
 }
 
 impl VehicleEndpoint {
-    /// Configures a vehicle that starts by itself: no station has to be heard, and the silence of a station does not
-    /// hold it.
+    /// Configures a vehicle that starts by itself: no station has to be heard, and the silence of a
+    /// station does not hold it.
     #[must_use]
     pub fn starting_by_itself(self) -> Self {
         Self { starts_by_itself: true, ..self }
@@ -114,8 +114,8 @@ impl VehicleEndpoint {
         };
         let confirms = commands::confirmed_ask(command);
         let request = Request { asked, uplink, station: Some(station), by, confirms };
-        // A station that repeats an abort before the decision is answered once. Nobody else's abort makes it a
-        // repetition: an observer may name the same address.
+        // A station that repeats an abort before the decision is answered once. Nobody else's abort
+        // makes it a repetition: an observer may name the same address.
         let repeats =
             |waiting: &Waiting| waiting.command.source == command.source && waiting.request.by == by;
         if asked == Asked::Abort
@@ -133,8 +133,8 @@ impl VehicleEndpoint {
         UplinkState { uplink, commander, requests }
     }
 
-    /// Takes the vehicle's answers to the requests that it has [heard](Self::heard); `vehicle` has just decided. A dead
-    /// flight computer gives no answers, and its requests are dropped.
+    /// Takes the vehicle's answers to the requests that it has [heard](Self::heard); `vehicle` has
+    /// just decided. A dead flight computer gives no answers, and its requests are dropped.
     pub fn on_answers(&mut self, answers: &[Answer], vehicle: &VehicleState<'_>) {
         let waiting = core::mem::take(&mut self.waiting);
         for (Waiting { link, command, request }, answer) in waiting.into_iter().zip(answers) {
@@ -160,8 +160,8 @@ impl VehicleEndpoint {
         }
     }
 
-    /// The first station that armed it is in command: of two people the one who asked. A station that takes over is
-    /// next.
+    /// The first station that armed it is in command: of two people the one who asked. A station
+    /// that takes over is next.
     fn note_commander(&mut self, request: &Request, answer: &Answer, vehicle: &VehicleState<'_>) {
         let Some(station) = request.station.filter(|_| answer.ending == Ending::Accepted) else { return };
         let here = (station, request.by);
@@ -195,15 +195,17 @@ impl VehicleEndpoint {
     }
 }
 
-// Limits how often refusals are explained: the reason is sent once and then counted, so that a flood of refused
-// requests fills neither the radio nor the crew's screen.
+// Limits how often refusals are explained: the reason is sent once and then counted, so that a
+// flood of refused requests fills neither the radio nor the crew's screen.
 
-/// Number of refused commands of one station that are answered at once. No known client sends more before it waits.
+/// Number of refused commands of one station that are answered at once. No known client sends more
+/// before it waits.
 const AT_ONCE: f64 = 8.0;
 /// After those, answers per second to one station's refused commands: each repetition waits 0.5 s.
 const PER_S: f64 = 2.0;
-/// A command that the vehicle does not know costs this much of an answer: clients try out many in a row, and wait for each.
-/// It has no text. Twenty at ten a second are all answered, and five a second for as long as they like.
+/// A command that the vehicle does not know costs this much of an answer: clients try out many in a
+/// row, and wait for each. It has no text. Twenty at ten a second are all answered, and five a
+/// second for as long as they like.
 const COST_OF_UNSUPPORTED: f64 = 0.4;
 /// Number of stations tracked separately. A flood of forged addresses shares the last entry.
 const MAX_STATIONS: usize = 16;
@@ -238,7 +240,8 @@ impl Refusals {
     }
 }
 
-/// Shortest time before the same warning is sent again, s, with the number of times it was held back.
+/// Shortest time before the same warning is sent again, s, with the number of times it was held
+/// back.
 const SAID_FOR_S: f64 = 5.0;
 /// Most different warnings in that time; only the number of further ones is sent.
 const MAX_DIFFERENT: usize = 8;
@@ -259,8 +262,8 @@ struct Said {
 }
 
 impl Warnings {
-    /// Whether to send a warning now. Texts that differ only in their digits are the same warning, because a newly
-    /// measured value is no news.
+    /// Whether to send a warning now. Texts that differ only in their digits are the same warning,
+    /// because a newly measured value is no news.
     pub(super) fn is_news(&mut self, words: &str, now_s: f64) -> bool {
         if let Some(said) = self.said.iter_mut().find(|said| same_but_for_figures(&said.words, words)) {
             said.more += 1;

@@ -1,13 +1,15 @@
-//! Tracks how well the vehicle hears each ground station: whose frames were accepted, how long ago, and whose were
-//! refused.
+//! Tracks how well the vehicle hears each ground station: whose frames were accepted, how long ago,
+//! and whose were refused.
 //!
-//! A working downlink does not prove a working uplink. So the vehicle tells every station the age of the last frame it
-//! accepted from that station, and why the last frame from anybody was refused. Pure: times are vehicle times, s.
+//! A working downlink does not prove a working uplink. So the vehicle tells every station the age
+//! of the last frame it accepted from that station, and why the last frame from anybody was
+//! refused. Pure: times are vehicle times, s.
 //!
-//! Two programs may speak under the same ids: both have the default ones, or one was started again. They are told apart by
-//! the key that signs, by the session in their heartbeats (drawn at a program's start), and without a session, as other
-//! people's clients have none, by the [path](Path) that their frames take. A frame that is no heartbeat belongs to the
-//! station whose heartbeats take its path.
+//! Two programs may speak under the same ids: both have the default ones, or one was started again.
+//! They are told apart by the key that signs, by the session in their heartbeats (drawn at a
+//! program's start), and without a session, as other people's clients have none, by the
+//! [path](Path) that their frames take. A frame that is no heartbeat belongs to the station whose
+//! heartbeats take its path.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -23,7 +25,8 @@ use protocol::hub::Origin;
 use protocol::identity::Address;
 use protocol::signing::Rejection;
 
-/// Most stations remembered: the crew's, a spare one and an observer's. Each costs a message twice a second.
+/// Most stations remembered: the crew's, a spare one and an observer's. Each costs a message twice
+/// a second.
 pub const MAX_STATIONS: usize = 3;
 /// The same with operators. No more than [`MAX_STATIONS`] are told at once: of more, each in turn.
 const MAX_STATIONS_OF_A_CREW: usize = 6;
@@ -31,11 +34,12 @@ const MAX_STATIONS_OF_A_CREW: usize = 6;
 /// Interval of the uplink report to every known station, s.
 const TELL_EVERY_S: f64 = 0.5;
 
-/// A station keeps its entry for this long after its last heartbeat, s; frames of others do not push it out.
+/// A station keeps its entry for this long after its last heartbeat, s; frames of others do not
+/// push it out.
 const PROVEN_FOR_S: f64 = 60.0;
 
-/// Two stations with the same ids are there as long as a heartbeat of each is no older than this, s. A station sends one a
-/// second at least, and half of them may be lost.
+/// Two stations with the same ids are there as long as a heartbeat of each is no older than this,
+/// s. A station sends one a second at least, and half of them may be lost.
 pub const SAME_IDS_FOR_S: f64 = 5.0;
 
 /// Most paths remembered of a station, and most of its last heartbeats.
@@ -45,7 +49,8 @@ const MAX_BEATS: usize = 4;
 /// Addressee while no frame was ever accepted: everybody.
 const EVERYBODY: Address = Address { system_id: 0, component_id: 0 };
 
-/// How a frame came in: the number of its link, and who sent it, as that link tells its senders apart (`None`: it does not).
+/// How a frame came in: the number of its link, and who sent it, as that link tells its senders
+/// apart (`None`: it does not).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Path {
     pub link: usize,
@@ -58,8 +63,8 @@ impl From<usize> for Path {
     }
 }
 
-/// Who has sent a frame: its ids, the number of the operator's key that has signed it (0: the shared key, or none), and its
-/// path.
+/// Who has sent a frame: its ids, the number of the operator's key that has signed it (0: the
+/// shared key, or none), and its path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Sender {
     pub address: Address,
@@ -77,7 +82,8 @@ struct Peer {
     number: u32,
     /// The paths of its frames, the latest first.
     paths: Vec<Path>,
-    /// Sequence numbers and checksums of its last heartbeats, the latest first, by which a copy is recognised.
+    /// Sequence numbers and checksums of its last heartbeats, the latest first, by which a copy is
+    /// recognised.
     beats: Vec<(u8, u16)>,
     accepted_at_s: f64,
     heartbeat_at_s: Option<f64>,
@@ -211,7 +217,8 @@ impl Stations {
         self.known.remove(goes);
     }
 
-    /// The station that a heartbeat belongs to. One that spoke before its first heartbeat has it now.
+    /// The station that a heartbeat belongs to. One that spoke before its first heartbeat has it
+    /// now.
     fn place_of_session(&self, sender: &Sender, session: u32) -> Option<usize> {
         let of = |same: &dyn Fn(&Peer) -> bool| {
             self.known.iter().position(|known| known.is_of(sender) && same(known))
@@ -256,8 +263,8 @@ impl Stations {
         Some(self.known.len() - 1)
     }
 
-    /// The entry of a station that never proved itself or has been gone for a long time; under the same ids for a short one,
-    /// as when a station was started again.
+    /// The entry of a station that never proved itself or has been gone for a long time; under the
+    /// same ids for a short one, as when a station was started again.
     fn replaceable(&self, address: Address, time_s: f64) -> Option<usize> {
         let proven = |known: &Peer| {
             let for_s = if known.address == address { SAME_IDS_FOR_S } else { PROVEN_FOR_S };
@@ -273,7 +280,8 @@ impl Stations {
         self.refused_count = self.refused_count.saturating_add(1);
     }
 
-    /// The station that a frame belongs to, other than a heartbeat; with number 0 if it is not known.
+    /// The station that a frame belongs to, other than a heartbeat; with number 0 if it is not
+    /// known.
     pub fn of(&self, sender: &Sender) -> Station {
         let number = self.place_of(sender).map_or(0, |place| self.known[place].number);
         station_of(sender.address, number)
@@ -283,7 +291,8 @@ impl Stations {
         self.known.iter().find(|known| known.station() == station)
     }
 
-    /// How many other stations are there under the same ids; those that found no place count as one.
+    /// How many other stations are there under the same ids; those that found no place count as
+    /// one.
     pub fn same_ids(&self, station: Station, time_s: f64) -> usize {
         let same = |known: &&Peer| {
             (known.address.system_id, known.address.component_id) == (station.system, station.component)
@@ -294,8 +303,8 @@ impl Stations {
         others.count() + usize::from(station.number != 0 && same.iter().any(crowded))
     }
 
-    /// Age of the last sign of life of a station, s; `None` if there is none. One that tells its session lives as long as its
-    /// heartbeats do: its other frames might be another one's.
+    /// Age of the last sign of life of a station, s; `None` if there is none. One that tells its
+    /// session lives as long as its heartbeats do: its other frames might be another one's.
     pub fn age_s(&self, station: Station, time_s: f64) -> Option<f64> {
         let known = self.known(station)?;
         let at_s = if known.session == 0 { Some(known.accepted_at_s) } else { known.heartbeat_at_s };
@@ -334,8 +343,8 @@ impl Stations {
         self.commander.map(|(station, _)| station)
     }
 
-    /// The uplink reports that are due: one for each known station, but at most [`MAX_STATIONS`], or one for everybody
-    /// while there is none.
+    /// The uplink reports that are due: one for each known station, but at most [`MAX_STATIONS`],
+    /// or one for everybody while there is none.
     pub fn due(&mut self, boot_number: u32, time_s: f64) -> Vec<MavMessage> {
         if time_s < self.tell_at_s {
             return Vec::new();
@@ -378,7 +387,8 @@ impl Stations {
     }
 }
 
-/// The session that a ground station's heartbeat tells; 0 if it tells none. In anybody else's the field is a mode.
+/// The session that a ground station's heartbeat tells; 0 if it tells none. In anybody else's the
+/// field is a mode.
 fn session_of(frame: &Frame) -> u32 {
     match frame.decode() {
         Ok(MavMessage::HEARTBEAT(beat)) if beat.mavtype == MavType::MAV_TYPE_GCS => beat.custom_mode,

@@ -68,7 +68,8 @@ fn any_accepted_frame_counts_for_the_age_and_a_heartbeat_alone_proves_the_uplink
     assert_eq!(stations.best_uplink(4.0), Uplink::Heard { age_s: 2.0 });
 }
 
-/// It is accepted unsigned, so it must not count: otherwise anybody without the key could keep a dead uplink alive.
+/// It is accepted unsigned, so it must not count: otherwise anybody without the key could keep a
+/// dead uplink alive.
 #[test]
 fn a_radio_s_report_proves_nothing_whatever_address_it_names() {
     let mut stations = Stations::default();
@@ -151,7 +152,8 @@ fn a_flood_of_strangers_pushes_out_no_station_that_has_proved_itself() {
     assert_eq!((age_s(&stations, GROUND, 61.0), age_s(&stations, station(10), 61.0)), (None, Some(0.0)));
 }
 
-/// The probability of a run of lost frames of this length, among frames lost independently with a given probability.
+/// The probability of a run of lost frames of this length, among frames lost independently with a
+/// given probability.
 fn chance_of_a_run(frames: usize, run: usize, lost: f64) -> f64 {
     // Probability of each number of trailing lost frames, while no run is complete.
     let mut lost_last = vec![0.0; run];
@@ -180,8 +182,8 @@ fn the_probability_of_a_run_equals_that_of_enumerating_all_outcomes() {
     }
 }
 
-/// A ground station sends ten heartbeats a second while a vehicle is armed. On a link that loses every fourth frame, a
-/// countdown is then held by chance less than once in a thousand.
+/// A ground station sends ten heartbeats a second while a vehicle is armed. On a link that loses
+/// every fourth frame, a countdown is then held by chance less than once in a thousand.
 #[test]
 fn with_a_quarter_of_the_frames_lost_a_countdown_is_held_less_than_once_in_a_thousand() {
     const LOST: f64 = 0.25;
@@ -226,8 +228,8 @@ impl Program {
     }
 }
 
-/// A new session is a program that was started again, another key another person, and without a session another socket is
-/// another program.
+/// A new session is a program that was started again, another key another person, and without a
+/// session another socket is another program.
 #[test]
 fn programs_with_the_same_ids_are_told_apart_and_told_of_each_other() {
     for (mut one, mut other) in [
@@ -319,7 +321,8 @@ fn a_program_over_two_links_is_one_station() {
     assert_eq!(stations.same_ids(stations.of(&over(0)), 0.2), 0);
 }
 
-/// Over a radio both take the same path: whose frame it was cannot be known, so only heartbeats keep a station alive.
+/// Over a radio both take the same path: whose frame it was cannot be known, so only heartbeats
+/// keep a station alive.
 #[test]
 fn a_station_with_a_session_lives_by_its_heartbeats_alone() {
     let mut stations = Stations::default();
@@ -335,7 +338,8 @@ fn a_station_with_a_session_lives_by_its_heartbeats_alone() {
     assert_eq!(age_s(&stations, GROUND, 2.0), Some(0.5));
 }
 
-/// A command that comes before the first heartbeat, over a path that no heartbeat takes: nobody is heard there.
+/// A command that comes before the first heartbeat, over a path that no heartbeat takes: nobody is
+/// heard there.
 #[test]
 fn a_command_over_an_unknown_path_is_nobody_s_whose_heartbeat_is_heard() {
     let mut stations = Stations::default();

@@ -1,7 +1,7 @@
 //! A vehicle's state as MAVLink messages.
 //!
-//! Frames: north-east-down, as in [`Motion`]; an upright rocket has 90 degrees of pitch. Values are narrowed to the
-//! fields' types here and only here; what does not fit saturates.
+//! Frames: north-east-down, as in [`Motion`]; an upright rocket has 90 degrees of pitch. Values are
+//! narrowed to the fields' types here and only here; what does not fit saturates.
 //!
 //! What is not modelled is sent as MAVLink's "unknown" and never invented.
 //!
@@ -39,7 +39,8 @@ use crate::link::vehicle::{BatteryFacts, Identity, VehicleKind, VehicleState};
 /// PROTOCOL_VERSION: deprecated late in 2025, but some clients still request it first.
 const PROTOCOL_VERSION_ID: u32 = 300;
 
-/// The message of this id in the current state, or `None` if the vehicle has no such message or no data for it.
+/// The message of this id in the current state, or `None` if the vehicle has no such message or no
+/// data for it.
 pub fn message(message_id: u32, state: &VehicleState<'_>, identity: Identity) -> Option<MavMessage> {
     let boot = identity.boot_number;
     match message_id {
@@ -202,7 +203,8 @@ fn vfr_hud(state: &VehicleState<'_>) -> MavMessage {
     MavMessage::VFR_HUD(VFR_HUD_DATA {
         airspeed: motion.airspeed_m_s as f32,
         groundspeed: libm::hypot(north_m_s, east_m_s) as f32,
-        // Above mean sea level, as the standard has it; LOCAL_POSITION_NED has the height above the pad.
+        // Above mean sea level, as the standard has it; LOCAL_POSITION_NED has the height above the
+        // pad.
         alt: (state.mission().site.altitude_m - motion.position_m[2]) as f32,
         climb: -down_m_s as f32,
         heading: libm::round(motion::heading_deg(&motion.ned_from_body)) as i16 % 360,
@@ -235,7 +237,8 @@ fn autopilot_version(uid: u16) -> MavMessage {
     })
 }
 
-/// The first 8 bytes of the commit, as the standard has it; in a development build, which names none, a hash of its version.
+/// The first 8 bytes of the commit, as the standard has it; in a development build, which names
+/// none, a hash of its version.
 fn version_hash() -> [u8; 8] {
     let byte = |place: usize| u8::from_str_radix(GIT_COMMIT.get(2 * place..2 * place + 2)?, 16).ok();
     let bytes: Option<Vec<u8>> = (0..8).map(byte).collect();
@@ -255,7 +258,8 @@ fn protocol_version() -> MavMessage {
     })
 }
 
-/// Outputs 1 to 4 the fins (0 closed, 1 fully deployed), 5 and 6 the gimbal (-1 to 1, stop to stop).
+/// Outputs 1 to 4 the fins (0 closed, 1 fully deployed), 5 and 6 the gimbal (-1 to 1, stop to
+/// stop).
 fn actuators(state: &VehicleState<'_>) -> MavMessage {
     let mut actuator = [0.0; 32];
     for (output, angle_rad) in actuator.iter_mut().zip(state.input().fins_rad) {
@@ -335,7 +339,8 @@ fn battery(state: &VehicleState<'_>) -> MavMessage {
     })
 }
 
-/// `None` if the operator chose to fly without a log. How large the storage is, and how fast, is not known: 0.
+/// `None` if the operator chose to fly without a log. How large the storage is, and how fast, is
+/// not known: 0.
 fn storage(state: &VehicleState<'_>) -> Option<MavMessage> {
     let log = state.input().log;
     let has_storage = log.space_bytes != u64::MAX;

@@ -1,5 +1,6 @@
-//! Where the vehicle is and how it moves: attitude as angles and the position on the globe, for the maps and
-//! instruments of other clients, and descent, estimator and sensors of the rocket in space.
+//! Where the vehicle is and how it moves: attitude as angles and the position on the globe, for the
+//! maps and instruments of other clients, and descent, estimator and sensors of the rocket in
+//! space.
 
 use flight::computer::pilot::ApogeeAhead;
 use flight::estimation::estimator::{Doubt, Health};
@@ -15,12 +16,12 @@ use protocol::dialect::{
 use super::boot_ms;
 use crate::link::vehicle::{Airborne, VehicleState};
 
-/// Sine of pitch above which roll and heading are the same rotation: above 0.99999 (0.26 degrees from upright) single
-/// precision cannot separate them.
+/// Sine of pitch above which roll and heading are the same rotation: above 0.99999 (0.26 degrees
+/// from upright) single precision cannot separate them.
 const UPRIGHT_SINE: f64 = 0.999_99;
 
-/// Roll, pitch and yaw, rad, of a rotation from the body to north-east-down. Upright, roll and yaw are the same
-/// rotation, and all of it counts as yaw.
+/// Roll, pitch and yaw, rad, of a rotation from the body to north-east-down. Upright, roll and yaw
+/// are the same rotation, and all of it counts as yaw.
 fn roll_pitch_yaw_rad([w, x, y, z]: &[f64; 4]) -> [f64; 3] {
     let sine = 2.0 * (w * y - x * z);
     if sine.abs() > UPRIGHT_SINE {
@@ -36,8 +37,9 @@ fn roll_pitch_yaw_rad([w, x, y, z]: &[f64; 4]) -> [f64; 3] {
     ]
 }
 
-/// The compass heading of the vehicle, degrees from north over east, 0 to 360. If the nose is steeper than 45 degrees,
-/// the heading is that of the belly, as for an aircraft that has pitched up from that heading.
+/// The compass heading of the vehicle, degrees from north over east, 0 to 360. If the nose is
+/// steeper than 45 degrees, the heading is that of the belly, as for an aircraft that has pitched
+/// up from that heading.
 pub(super) fn heading_deg([w, x, y, z]: &[f64; 4]) -> f64 {
     let nose = [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z)];
     let belly = [2.0 * (x * z + w * y), 2.0 * (y * z - w * x)];
@@ -117,8 +119,8 @@ pub(super) fn home(state: &VehicleState<'_>) -> MavMessage {
     })
 }
 
-/// GPS_RAW_INT: whether the satellite receiver reports. Its position is the estimated one, because single fixes are not
-/// kept.
+/// GPS_RAW_INT: whether the satellite receiver reports. Its position is the estimated one, because
+/// single fixes are not kept.
 pub(super) fn gps(state: &VehicleState<'_>) -> MavMessage {
     let motion = state.motion();
     let [north_m, east_m, down_m] = motion.position_m;
@@ -160,8 +162,8 @@ pub(super) fn system_time(state: &VehicleState<'_>) -> MavMessage {
 
 // Messages of the rocket in space only: descent, estimator, sensors.
 
-/// The sensors that exist, and those that are silent. The lidar works only close to the ground, so its silence means
-/// nothing.
+/// The sensors that exist, and those that are silent. The lidar works only close to the ground, so
+/// its silence means nothing.
 pub(super) fn sensors(state: &VehicleState<'_>) -> (MavSysStatusSensor, MavSysStatusSensor) {
     use MavSysStatusSensor as S;
     let mut silent = S::empty();
@@ -234,7 +236,8 @@ fn booster(state: &VehicleState<'_>, air: &Airborne<'_>) -> TdBooster {
     }
 }
 
-/// The outputs that are valid, by the estimator's own doubts, and by how much of its gate each sensor's last measurement was off.
+/// The outputs that are valid, by the estimator's own doubts, and by how much of its gate each
+/// sensor's last measurement was off.
 pub(super) fn estimator(state: &VehicleState<'_>) -> Option<MavMessage> {
     use EstimatorStatusFlags as F;
     let estimate = state.airborne()?.estimate;

@@ -1,5 +1,5 @@
-//! The messages of our dialect that every vehicle sends: flight status, controller, verdict, crew, check on the pad,
-//! and what went wrong.
+//! The messages of our dialect that every vehicle sends: flight status, controller, verdict, crew,
+//! check on the pad, and what went wrong.
 
 use flight::computer::AbortEffect;
 use flight::computer::crew::People;

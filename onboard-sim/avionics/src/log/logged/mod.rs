@@ -1,4 +1,5 @@
-//! The flight computer's types and their records in the log: each field is named once, for both directions.
+//! The flight computer's types and their records in the log: each field is named once, for both
+//! directions.
 
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -54,7 +55,8 @@ impl At {
     }
 }
 
-/// A type of the flight computer that has a record in the log. No bit is lost on the way there and back.
+/// A type of the flight computer that has a record in the log. No bit is lost on the way there and
+/// back.
 pub trait Logged: Sized {
     /// What the log holds of it.
     type Record;
@@ -66,7 +68,8 @@ pub trait Logged: Sized {
     fn from_log(record: &Self::Record, at: At) -> Result<Self, RecordError>;
 }
 
-/// A structure whose record has the same fields. After `;` come fields of the record alone, which begin empty.
+/// A structure whose record has the same fields. After `;` come fields of the record alone, which
+/// begin empty.
 macro_rules! record {
     ($logged:ident as $record:path { $($field:ident),+ $(; $($beside:ident),+)? }) => {
         impl Logged for $logged {

@@ -1,11 +1,11 @@
-//! The check that a crew asks for on the pad: every surface goes through its range, the sensors stand still, and what
-//! they find is compared with limits.
+//! The check that a crew asks for on the pad: every surface goes through its range, the sensors
+//! stand still, and what they find is compared with limits.
 //!
-//! It moves actuators only while the vehicle is disarmed and unreleased: [`PadCheck::step`] is called nowhere else, and
-//! whatever else the crew asks for ends it first.
+//! It moves actuators only while the vehicle is disarmed and unreleased: [`PadCheck::step`] is
+//! called nowhere else, and whatever else the crew asks for ends it first.
 //!
-//! The gyro is not calibrated here: [the watch on the pad](super::pad) finds its bias in every second at rest, and the
-//! flight begins with the last one. The check shows that bias.
+//! The gyro is not calibrated here: [the watch on the pad](super::pad) finds its bias in every
+//! second at rest, and the flight begins with the last one. The check shows that bias.
 
 mod sweep;
 #[cfg(test)]
@@ -42,8 +42,8 @@ pub enum CheckState {
     Stopped = 4,
 }
 
-/// After an early end the surfaces return to rest: frames in which the vehicle is not ready to be armed, 1 s. A servo at
-/// a third of mk2's rate returns in that time from anywhere.
+/// After an early end the surfaces return to rest: frames in which the vehicle is not ready to be
+/// armed, 1 s. A servo at a third of mk2's rate returns in that time from anywhere.
 const RETURN_FRAMES: u64 = 200;
 
 /// What is being done.
@@ -130,8 +130,8 @@ impl PadCheck {
         None
     }
 
-    /// Somebody has seen every surface move as the crew's page says; `two`: people are told apart. An error says why it does
-    /// not count.
+    /// Somebody has seen every surface move as the crew's page says; `two`: people are told apart.
+    /// An error says why it does not count.
     fn see(&mut self, by: Option<Operator>, two: bool) -> Result<(), &'static str> {
         if self.state != CheckState::Passed || self.swept_frames == 0 {
             return Err("no check with motion has passed");
@@ -231,7 +231,8 @@ pub enum Item {
     GnssSpeed,
     /// The last range; on a pad it may be too near to be measured.
     LidarRange,
-    /// On a rail: angle between the vertical as the inertial unit feels it and as the mission's rail has it.
+    /// On a rail: angle between the vertical as the inertial unit feels it and as the mission's
+    /// rail has it.
     RailLean,
     IgniterContinuity,
     BoosterWire,
@@ -242,7 +243,8 @@ pub enum Item {
 }
 
 impl Item {
-    /// Its number on the wire, as in the dialect's TD_PAD_CHECK_ITEM: three for each surface, then the others.
+    /// Its number on the wire, as in the dialect's TD_PAD_CHECK_ITEM: three for each surface, then
+    /// the others.
     pub fn number(self) -> u8 {
         self.row().0
     }
@@ -342,7 +344,8 @@ fn findings_of_switches(
     [
         Some(closed(Item::IgniterContinuity, input.igniter_continuity)),
         on_a_rail.then(|| closed(Item::BoosterWire, input.booster_attached)),
-        // In while people work at the vehicle, out before it is armed: both are right in their time.
+        // In while people work at the vehicle, out before it is armed: both are right in their
+        // time.
         Some(CheckedValue::only_shown(Item::PinOut, f64::from(u8::from(input.pin_out)))),
         input
             .battery_v
@@ -434,7 +437,8 @@ impl Computer {
         (self.commands.gimbal_rad, self.commands.fins_rad) = ([0.0; 2], [self.closed_rad(); 4]);
     }
 
-    /// One frame of a running check. It ends here at the latest, whatever has happened in this frame.
+    /// One frame of a running check. It ends here at the latest, whatever has happened in this
+    /// frame.
     pub(super) fn check_itself(&mut self, input: &KeptInput) {
         if !self.pad_check.is_running() {
             return;

@@ -1,5 +1,5 @@
-//! One surface after the other is told to go to both ends of its range, and its feedback is watched.
-//! Then the sensors are read while the vehicle stands still.
+//! One surface after the other is told to go to both ends of its range, and its feedback is
+//! watched. Then the sensors are read while the vehicle stands still.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -14,15 +14,15 @@ use crate::estimation::estimator::alignment::{BIAS_MAX_RAD_S, FELT_AT_REST_M_S2}
 use crate::vehicle::airframe::{Airframe, Servo};
 use crate::vehicle::mission::{ArmingLimits, Mission};
 
-/// A surface stays at an end for this long after it should have arrived, s: a servo at half its rate arrives late, and
-/// yet is seen to arrive. mk2's longest way takes 0.3 s.
+/// A surface stays at an end for this long after it should have arrived, s: a servo at half its
+/// rate arrives late, and yet is seen to arrive. mk2's longest way takes 0.3 s.
 const STAYS_S: f64 = 0.4;
 /// The feedback counts as that of a surface at its end in the last part of the stay, s.
 const SETTLED_S: f64 = 0.1;
 /// A surface that tells nothing stays at an end for people to see it, s.
 const SEEN_S: f64 = 2.0;
-/// A surface may arrive this much later than its airframe says, s: one more of the delays of 20 ms that the missions
-/// were flown with, in simulation.
+/// A surface may arrive this much later than its airframe says, s: one more of the delays of 20 ms
+/// that the missions were flown with, in simulation.
 const LATER_S: f64 = 0.020;
 /// A command leaves at the end of its frame, and the feedback is from the end of another one.
 const FRAMES_LATER: f64 = 2.0;
@@ -210,10 +210,11 @@ fn way_rad(reach: &Reach, targets_rad: &[f64], place: usize) -> f64 {
 pub(super) const STILL_FRAMES: u32 = 1000;
 /// The surfaces have come to rest after this many frames.
 const SKIPPED: u32 = 100;
-/// A spread may be this many times what the filter assumes of the sensor. At twice the spread the filter trusts a sample
-/// four times as much as it should.
+/// A spread may be this many times what the filter assumes of the sensor. At twice the spread the
+/// filter trusts a sample four times as much as it should.
 const SPREAD_MOST: f64 = 2.0;
-/// One fix a second: without one in its second the pad's watch knows no speed, and arming is refused.
+/// One fix a second: without one in its second the pad's watch knows no speed, and arming is
+/// refused.
 const FIXES_LEAST: f64 = STILL_FRAMES as f64 * FRAME_S;
 
 /// A rail is levelled with a bubble, degrees, about each axis.
@@ -337,8 +338,8 @@ impl Still {
         })
     }
 
-    /// What the rail's level and the inertial unit's mount lean together, on a rail. The filter doubts its attitude by the
-    /// mount's stated misalignment, and no sensor shows it in flight.
+    /// What the rail's level and the inertial unit's mount lean together, on a rail. The filter
+    /// doubts its attitude by the mount's stated misalignment, and no sensor shows it in flight.
     pub(super) fn lean_from_the_rail(&self, mission: &Mission) -> Option<CheckedValue> {
         let launch = mission.launched()?;
         let rail = launch.standing(mission.airframe.mass.loaded_cg_station_m).world_from_body;

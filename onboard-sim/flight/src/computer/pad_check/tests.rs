@@ -189,7 +189,8 @@ fn each_sensor_and_switch_is_judged() {
     assert_eq!(still(f64::NAN, SOUND).len(), 7, "no number passes");
 }
 
-/// A mount that is 4 degrees askew looks like a rail that leans by 4 degrees: the crew looks at both.
+/// A mount that is 4 degrees askew looks like a rail that leans by 4 degrees: the crew looks at
+/// both.
 #[test]
 fn a_mount_that_leans_further_than_stated_fails() {
     let lean = |deg: f64, mounting_deg: f64, at: StartPoint| {

@@ -1,5 +1,5 @@
-//! Detects lift-off, burn-out, the moment to separate the booster, and apogee, from what the sensors show; and a fin that
-//! does not move.
+//! Detects lift-off, burn-out, the moment to separate the booster, and apogee, from what the
+//! sensors show; and a fin that does not move.
 
 use alloc::format;
 use alloc::string::String;
@@ -12,37 +12,41 @@ use crate::estimation::estimator::Estimate;
 use crate::rules::phase::{Event, Phase};
 use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 
-/// Specific force along the axis above which the vehicle is being pushed, m/s^2. At rest it is 9.8; the slowest lift-off
-/// that the rail guides well has 5 times the weight.
+/// Specific force along the axis above which the vehicle is being pushed, m/s^2. At rest it is 9.8;
+/// the slowest lift-off that the rail guides well has 5 times the weight.
 const PUSHED_M_S2: f64 = 1.5 * STANDARD_GRAVITY_M_S2;
-/// Speed gained without a break that counts as lift-off, m/s. A knock of 20 g that lasts 10 ms gives 2 m/s.
+/// Speed gained without a break that counts as lift-off, m/s. A knock of 20 g that lasts 10 ms
+/// gives 2 m/s.
 const LIFTED_OFF_M_S: f64 = 3.0;
 /// Longest time from the ignition command to lift-off, s. Igniters of ascent motors need up to 2 s.
 const LIFT_OFF_WITHIN_S: f64 = 3.0;
-/// How long the vehicle must brake before the motor counts as burnt out, s. Drag alone brakes at once; a dip of the thrust
-/// below the drag is shorter.
+/// How long the vehicle must brake before the motor counts as burnt out, s. Drag alone brakes at
+/// once; a dip of the thrust below the drag is shorter.
 const BRAKING_S: f64 = 0.1;
-/// A burn-out counts from this share of the motor's burn time on, and comes by itself at that one: burn times scatter by 4 %,
-/// and an accelerometer that lies ends no boost.
+/// A burn-out counts from this share of the motor's burn time on, and comes by itself at that one:
+/// burn times scatter by 4 %, and an accelerometer that lies ends no boost.
 const BURNS_FOR: [f64; 2] = [0.6, 1.5];
 /// Frames with a falling vehicle that make an apogee: 15 ms, in which the vehicle falls by 1 mm.
 const FALLING_FRAMES: u32 = 3;
-/// A vehicle this far below its highest pressure altitude, m, for [`SUNK_S`] has passed apogee, if nothing else says that it
-/// rises. It is six times the noise of a barometer in its own exhaust or wake.
+/// A vehicle this far below its highest pressure altitude, m, for [`SUNK_S`] has passed apogee, if
+/// nothing else says that it rises. It is six times the noise of a barometer in its own exhaust or
+/// wake.
 const SUNK_M: f64 = 6.0;
 const SUNK_S: f64 = 0.2;
-/// A vehicle this far above its first pressure altitude, m, for [`RISEN_S`] has lifted off, whatever it feels. Gusts over the
-/// static ports show a metre or two.
+/// A vehicle this far above its first pressure altitude, m, for [`RISEN_S`] has lifted off,
+/// whatever it feels. Gusts over the static ports show a metre or two.
 const RISEN_M: f64 = 15.0;
 const RISEN_S: f64 = 0.1;
 /// A barometer that shows this much, m/s, climbs, and has not sunk.
 const CLIMBS_M_S: f64 = 10.0;
-/// After the separation charge the pressure in the vehicle is not that of the air, s: three times its time of 0.3 s.
+/// After the separation charge the pressure in the vehicle is not that of the air, s: three times
+/// its time of 0.3 s.
 const CHARGE_LASTS_S: f64 = 1.0;
-/// What was felt as a lift-off is looked at for so long, s: the weakest motor that leaves the rail rises by 10 m in it.
+/// What was felt as a lift-off is looked at for so long, s: the weakest motor that leaves the rail
+/// rises by 10 m in it.
 const DOUBTED_S: f64 = 2.0;
-/// Within this of its first pressure altitude, m, a vehicle stands, and a fix that shows less than that speed, m/s, is one of a
-/// vehicle that stands.
+/// Within this of its first pressure altitude, m, a vehicle stands, and a fix that shows less than
+/// that speed, m/s, is one of a vehicle that stands.
 const STANDS_M: f64 = 5.0;
 const STANDS_M_S: f64 = 3.0;
 /// What the watch sees of a frame.
@@ -143,8 +147,8 @@ impl AscentWatch {
             self.lifted_off_at_s = seen.time_s;
             return Some(Event::LiftOff);
         }
-        // The second opinion counts while a lift-off is expected, also after an abort of the ignition: in a day on the pad
-        // the weather moves by 15 m.
+        // The second opinion counts while a lift-off is expected, also after an abort of the
+        // ignition: in a day on the pad the weather moves by 15 m.
         let expected = seen.phase == Phase::Boost || seen.time_s < LIFT_OFF_WITHIN_S;
         if expected && self.risen_s >= RISEN_S {
             (self.lifted_off, self.lifted_off_at_s) = (true, seen.time_s);
@@ -153,8 +157,9 @@ impl AscentWatch {
         (seen.phase == Phase::Boost && seen.time_s >= LIFT_OFF_WITHIN_S).then_some(Event::NoLiftOff)
     }
 
-    /// A push alone is no lift-off. Whoever says that the vehicle moves confirms it; if barometer or satellites say that it
-    /// stands, there was none. In doubt it flies: a barometer that has failed does not stand still on its pad.
+    /// A push alone is no lift-off. Whoever says that the vehicle moves confirms it; if barometer
+    /// or satellites say that it stands, there was none. In doubt it flies: a barometer that has
+    /// failed does not stand still on its pad.
     fn doubt_the_lift_off(&mut self, seen: &AscentReadings) -> Option<Event> {
         let (time_s, speeds) = (seen.time_s, &seen.speeds);
         let fix_m_s = speeds.gnss_m_s(time_s);
@@ -198,8 +203,9 @@ impl AscentWatch {
 
     fn has_passed_apogee(&mut self, seen: &AscentReadings) -> bool {
         self.falling_frames = if self.rises_m_s(seen) < 0.0 { self.falling_frames + 1 } else { 0 };
-        // The pressure shows a fall, and satellites do; without them the pressure is believed when the estimate rises slowly,
-        // or after the time in which a vehicle as fast as the estimate has fallen, too.
+        // The pressure shows a fall, and satellites do; without them the pressure is believed when
+        // the estimate rises slowly, or after the time in which a vehicle as fast as the estimate
+        // has fallen, too.
         let sunk = match seen.speeds.gnss_m_s(seen.time_s) {
             Some(gnss_m_s) => gnss_m_s < 0.0 && self.sunk_s >= SUNK_S,
             None if seen.vertical_m_s <= APART_OF_TWO_M_S => self.sunk_s >= SUNK_S,
@@ -243,8 +249,8 @@ impl AscentWatch {
     }
 }
 
-/// For how long something has been so, s, after one more frame. Samples come in some frames only; between them the last one
-/// counts.
+/// For how long something has been so, s, after one more frame. Samples come in some frames only;
+/// between them the last one counts.
 fn lasts_s(before_s: f64, is_now: Option<bool>, frame_s: f64) -> f64 {
     if is_now.unwrap_or(before_s > 0.0) { before_s + frame_s } else { 0.0 }
 }
@@ -278,13 +284,15 @@ pub(super) fn words_of_ascent(event: Event, estimate: &Estimate) -> Option<(Seve
 
 // Finds a fin that does not move when commanded.
 //
-// A command that sweeps to and fro passes a stuck fin again and again, so a fin at its commanded angle may still be
-// stuck. A fin is stuck if its command has been far away for longer than a servo needs and the fin has not moved.
+// A command that sweeps to and fro passes a stuck fin again and again, so a fin at its commanded
+// angle may still be stuck. A fin is stuck if its command has been far away for longer than a servo
+// needs and the fin has not moved.
 
-/// A working fin moves at once if its command is farther away than this, rad: the tolerance of the ignition gate.
+/// A working fin moves at once if its command is farther away than this, rad: the tolerance of the
+/// ignition gate.
 const FAR_RAD: f64 = super::gate::FIN_THERE_RAD;
-/// A fin is stuck if its command has been far away for this long in total and it has not moved, s: more than ten times the
-/// delay of a servo.
+/// A fin is stuck if its command has been far away for this long in total and it has not moved, s:
+/// more than ten times the delay of a servo.
 const STUCK_AFTER_S: f64 = 0.25;
 
 /// State of the watch over one fin.
@@ -343,7 +351,8 @@ mod tests {
         }
     }
 
-    /// The same with what the three speeds make of it, of a vehicle that feels such an acceleration, m/s^2, and gets such a fix.
+    /// The same with what the three speeds make of it, of a vehicle that feels such an
+    /// acceleration, m/s^2, and gets such a fix.
     fn heard(
         speeds: &mut VerticalSpeeds,
         seen: AscentReadings,
@@ -414,8 +423,8 @@ mod tests {
         assert_eq!(events, [Event::Apogee { booster_attached: true }]);
     }
 
-    /// An accelerometer that reads nothing, so that the estimate falls from the first frame on: the barometer alone sees the
-    /// lift-off, and no apogee is believed while it climbs.
+    /// An accelerometer that reads nothing, so that the estimate falls from the first frame on: the
+    /// barometer alone sees the lift-off, and no apogee is believed while it climbs.
     #[test]
     fn with_a_dead_accelerometer_the_barometer_sees_lift_off_and_apogee() {
         let (mut watch, mut speeds) = (AscentWatch::default(), VerticalSpeeds::default());
@@ -443,7 +452,8 @@ mod tests {
         assert_eq!(events[0].1, Event::LiftOff);
         // 15 m at 0.26 s, and the 0.1 s for which it has to stay so.
         assert!((0.3..0.5).contains(&events[0].0), "{events:?}");
-        // Nothing brakes: the motor's time is over, and the booster goes two seconds before the apogee of the pressure.
+        // Nothing brakes: the motor's time is over, and the booster goes two seconds before the
+        // apogee of the pressure.
         assert_eq!((events[1].1, events[2].1), (Event::Burnout, Event::SeparationDue));
         assert!((1.2..1.8).contains(&events[1].0) && (4.0..4.5).contains(&events[2].0), "{events:?}");
         assert_eq!(events[3].1, Event::Apogee { booster_attached: true });
@@ -465,8 +475,8 @@ mod tests {
         }
     }
 
-    /// A step of the pressure in the boost, and a ramp that shows a fall: without a fix, with one, and with one that agrees
-    /// with the pressure.
+    /// A step of the pressure in the boost, and a ramp that shows a fall: without a fix, with one,
+    /// and with one that agrees with the pressure.
     #[test]
     fn a_barometer_alone_ends_no_ascent() {
         for (fix_m_s, ends) in [(None, false), (Some(50.0), false), (Some(-5.0), true)] {
@@ -489,7 +499,8 @@ mod tests {
         }
     }
 
-    /// An accelerometer that pushes while barometer and satellites stand is denied; one whose others are silent is believed.
+    /// An accelerometer that pushes while barometer and satellites stand is denied; one whose
+    /// others are silent is believed.
     #[test]
     fn a_push_that_only_the_accelerometer_feels_is_no_lift_off() {
         for (pressure, fix, denied) in
@@ -534,7 +545,8 @@ mod tests {
         assert_eq!(events.first(), Some(&(39, Event::Apogee { booster_attached: false })));
     }
 
-    /// When the watch reports a fin that sticks from `stuck_from_s` on, in a sweep with a period of 1 s.
+    /// When the watch reports a fin that sticks from `stuck_from_s` on, in a sweep with a period of
+    /// 1 s.
     fn found_after_s(stuck_from_s: f64, rate_rad_s: f64) -> Option<f64> {
         let mut watch = FinWatch::default();
         let mut fin_rad: f64 = 0.0;

@@ -1,5 +1,5 @@
-//! Moves through the phases of the descent and the landing: the ignition behind its gate, and the parachute while there is height for
-//! it, if the gate will not open.
+//! Moves through the phases of the descent and the landing: the ignition behind its gate, and the
+//! parachute while there is height for it, if the gate will not open.
 
 use alloc::format;
 use alloc::string::String;
@@ -21,10 +21,12 @@ pub(super) const FIN_THERE_RAD: f64 = 0.1;
 const NEAR_GROUND_M: f64 = 15.0;
 /// A reason that has kept the gate shut for this long, s, will not go away before ignition.
 const LASTS_S: f64 = 0.5;
-/// The decision is taken this long before the room for the parachute ends, s. As long may a due ignition be refused: a fin
-/// that is still moving has kept the gate shut for up to 45 ms in 1500 simulated flights.
+/// The decision is taken this long before the room for the parachute ends, s. As long may a due
+/// ignition be refused: a fin that is still moving has kept the gate shut for up to 45 ms in 1500
+/// simulated flights.
 const BEFORE_S: f64 = 0.1;
-/// A pressure altitude that is lower than the estimate by more, m, is not only its ram error and a slow offset.
+/// A pressure altitude that is lower than the estimate by more, m, is not only its ram error and a
+/// slow offset.
 const HEIGHTS_APART_M: f64 = 8.0;
 /// The fence holds for a place that is farther out by so many of its standard deviations.
 const PLACE_SIGMAS: f64 = 2.0;
@@ -156,8 +158,8 @@ impl Pilot {
     ) -> [GateCheck; GATE_CHECKS] {
         let state = &estimate.state;
         let onset_m = self.onset_m(estimate);
-        // With no room for the parachute, a landing by what is not known well ends better than a fall, while the vehicle knows which
-        // way is up.
+        // With no room for the parachute, a landing by what is not known well ends better than a
+        // fall, while the vehicle knows which way is up.
         let low = self.feet_height_m(estimate) < self.prediction.filling_height_m();
         let unknown = matches!(estimate.health, Health::Doubtful(Doubt::Restarted | Doubt::Imu))
             || estimate.sigmas.attitude_rad.xy().max()
@@ -168,8 +170,8 @@ impl Pilot {
             pitch_rate_rad_s: libm::hypot(state.rate_rad_s.y, state.rate_rad_s.z),
             speed_m_s: state.velocity_m_s.norm(),
             predicted_speed_m_s: self.prediction.predicted_speed_m_s,
-            // With one source left there is no disagreement; the estimator's health says whether that source is
-            // reliable.
+            // With one source left there is no disagreement; the estimator's health says whether
+            // that source is reliable.
             height_disagreement_m: estimate.heights.contradiction_m().unwrap_or(0.0),
             landing_feasible: self.prediction.ignition.band.is_some_and(|band| band.contains(onset_m)),
             predicted_touchdown_x_m: self.prediction.touchdown_distance_m
@@ -185,8 +187,8 @@ impl Pilot {
         gate::checks(&self.model.mission.gate, &found)
     }
 
-    /// The fins have left their closed stop and stand where they are commanded to. In the frame that enters DEPLOY they still
-    /// stand where the ascent had them, and that says nothing.
+    /// The fins have left their closed stop and stand where they are commanded to. In the frame
+    /// that enters DEPLOY they still stand where the ascent had them, and that says nothing.
     fn fins_are_out(&self, fins_rad: &[f64; 4]) -> bool {
         let least_rad = self.model.airframe().fins.control_min_rad() - FIN_THERE_RAD;
         fins_rad.iter().all(|fin_rad| *fin_rad >= least_rad) && self.fins_there(fins_rad)
@@ -220,9 +222,10 @@ impl Pilot {
 
     /// The event that the gate will not open any more, as soon as waiting gains nothing, and why.
     ///
-    /// Above the commit height: the gate has been shut for a lasting reason, and this is the last chance for the parachute
-    /// with its margin. Below: ignition is due and refused, or no landing is possible from here any more. The motor must
-    /// never be lit outside the gate, so only the parachute is left, without the margin.
+    /// Above the commit height: the gate has been shut for a lasting reason, and this is the last
+    /// chance for the parachute with its margin. Below: ignition is due and refused, or no landing
+    /// is possible from here any more. The motor must never be lit outside the gate, so only the
+    /// parachute is left, without the margin.
     fn gate_will_not_open(&mut self, mode: &Mode, seen: Seen<'_>) -> Option<(Event, String)> {
         let checks = self.gate_checks(mode, seen);
         let Seen { input, estimate, sensors } = seen;
@@ -270,7 +273,8 @@ impl Pilot {
         let ejected =
             feet_m.max(estimated_m) > filling_m - self.model.airframe().parachute.inflation_distance_m;
         if self.is_astray(sensors) {
-            // Nobody knows the attitude, and the pressure alone knows the height: nothing is gained by waiting.
+            // Nobody knows the attitude, and the pressure alone knows the height: nothing is gained
+            // by waiting.
             let parachute_fills = pressure_m.is_none_or(|pressure_m| pressure_m > filling_m);
             return Some((
                 Event::GateShutForGood { parachute_fills },
@@ -283,12 +287,14 @@ impl Pilot {
         })
     }
 
-    /// Without what is felt, or with an estimate that two of three speeds contradict, no landing is tried.
+    /// Without what is felt, or with an estimate that two of three speeds contradict, no landing is
+    /// tried.
     fn is_astray(&self, sensors: &SensorWatch) -> bool {
         sensors.feels_nothing_for_s() >= LASTS_S || self.speeds.contradict_the_estimate()
     }
 
-    /// All that decided, with values, and for how long: what lasts, or else what keeps the gate shut now.
+    /// All that decided, with values, and for how long: what lasts, or else what keeps the gate
+    /// shut now.
     fn why_given_up(&self, checks: &[GateCheck; GATE_CHECKS], time_s: f64) -> String {
         let for_s = |since_s: &Option<f64>| since_s.map_or(0.0, |since_s| time_s - since_s);
         // A fin on its way fails for a moment and decides nothing beside what has lasted.
@@ -377,8 +383,8 @@ mod tests {
         Unbraked,
     }
 
-    /// A fall at 38 m/s: the commit height is at 87 m, the ignition at about 70 m, and the parachute fills in 58 m. The crew
-    /// aborts below a height.
+    /// A fall at 38 m/s: the commit height is at 87 m, the ignition at about 70 m, and the
+    /// parachute fills in 58 m. The crew aborts below a height.
     fn fall(wrong: Wrong, abort_below_m: f64) -> Ended {
         let mission = crate::vehicles::mission::builtin("mk2").expect("built in").expect("sound");
         let start = RigidState::upright(250.0);
@@ -477,7 +483,8 @@ mod tests {
         assert_parachute(turning, filling_m);
     }
 
-    /// A fin on its way keeps the gate shut for up to 45 ms, a gust that turns the vehicle for somewhat longer.
+    /// A fin on its way keeps the gate shut for up to 45 ms, a gust that turns the vehicle for
+    /// somewhat longer.
     #[test]
     fn a_gate_shut_for_a_moment_delays_the_ignition_only() {
         let Ended::Ignition(due_m) = fall(NOTHING, NO_ABORT_M) else { panic!("no ignition") };

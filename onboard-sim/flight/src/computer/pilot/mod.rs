@@ -1,8 +1,9 @@
-//! The pilot flies a rocket in space from its release to touchdown: one frame in, one set of commands out.
+//! The pilot flies a rocket in space from its release to touchdown: one frame in, one set of
+//! commands out.
 //!
-//! It is a part of the [flight computer](crate::computer) and deterministic like it. A frame is 5 ms: estimate, watch
-//! the motor, move through the phases, point fins and gimbal. Every tenth frame poses the prediction, or a plan of the
-//! landing, to the [`planner`].
+//! It is a part of the [flight computer](crate::computer) and deterministic like it. A frame is 5
+//! ms: estimate, watch the motor, move through the phases, point fins and gimbal. Every tenth frame
+//! poses the prediction, or a plan of the landing, to the [`planner`].
 
 mod ascent;
 mod gate;
@@ -42,7 +43,8 @@ use crate::vehicle::thrust_curve::ThrustCurve;
 /// Frames between plans, if none takes longer.
 pub const FRAMES_PER_PLAN: u64 = 10;
 
-/// Where a frame points the vehicle. What lights and ejects is decided [at the end of the frame](crate::rules::outputs).
+/// Where a frame points the vehicle. What lights and ejects is decided [at the end of the
+/// frame](crate::rules::outputs).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Pointed {
     /// Gimbal angles (pitch, yaw), rad.
@@ -67,7 +69,8 @@ pub struct Pilot {
     ignited_at_s: Option<f64>,
     prediction: Prediction,
     powered: PoweredGuidance,
-    /// What it was posed was remembered in the frame in which it was posed. `None` while it computes in another context.
+    /// What it was posed was remembered in the frame in which it was posed. `None` while it
+    /// computes in another context.
     #[serde(skip)]
     planner: Option<Box<Planner>>,
     /// When something was posed that was not taken over yet, s.
@@ -90,7 +93,8 @@ pub struct Pilot {
 }
 
 impl Pilot {
-    /// A pilot at the start of its flight, with its estimate of its state and the uncertainty of that estimate.
+    /// A pilot at the start of its flight, with its estimate of its state and the uncertainty of
+    /// that estimate.
     pub fn starting(
         mission: &Mission,
         time_s: f64,
@@ -179,7 +183,8 @@ impl Pilot {
         &self.prediction
     }
 
-    /// The landing motor's curve: the expected one, or another that its burn has turned out to have.
+    /// The landing motor's curve: the expected one, or another that its burn has turned out to
+    /// have.
     pub fn curve(&self) -> &ThrustCurve {
         self.model.curve()
     }
@@ -227,8 +232,8 @@ impl Pilot {
 // For replay: reads the pilot's state and changes its settings from outside the flight.
 
 impl Pilot {
-    /// The same memory with another mission: other vehicle data, gains, limits and settings. The frame length, the
-    /// estimator's configuration and the start stay as they were.
+    /// The same memory with another mission: other vehicle data, gains, limits and settings. The
+    /// frame length, the estimator's configuration and the start stay as they were.
     #[must_use]
     pub fn reconfigured(&self, mission: &Mission) -> Self {
         let mass = MassModel::new(&mission.airframe.mass, mission.motor_curve.propellant_mass_kg());
@@ -248,8 +253,9 @@ impl Pilot {
 
 // What a pilot saves for a restart in the air, and how it goes on.
 
-/// What a pilot keeps through a reset: the knowledge of motor and drag, the last commands, the last estimate, and what it has
-/// seen of its ascent, its fins and its gimbal. Covariances of the estimator, prediction, plan and gimbal loop are not kept.
+/// What a pilot keeps through a reset: the knowledge of motor and drag, the last commands, the last
+/// estimate, and what it has seen of its ascent, its fins and its gimbal. Covariances of the
+/// estimator, prediction, plan and gimbal loop are not kept.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SavedPilot {
     motor: MotorEstimate,
@@ -286,9 +292,9 @@ impl Pilot {
         }
     }
 
-    /// This pilot, which was just powered up, from what was saved before a reset that ended at `time_s`. The saved estimate
-    /// is extrapolated over the lost time with the last measured rates and forces, and gets the same uncertainty as
-    /// at apogee.
+    /// This pilot, which was just powered up, from what was saved before a reset that ended at
+    /// `time_s`. The saved estimate is extrapolated over the lost time with the last measured rates
+    /// and forces, and gets the same uncertainty as at apogee.
     #[must_use]
     pub(super) fn resumed(&self, saved: &SavedPilot, time_s: f64) -> Self {
         let mission = &self.model.mission;
@@ -298,7 +304,8 @@ impl Pilot {
             |estimate| {
                 let lost_s = (time_s - estimate.time_s).max(0.0);
                 let mut believed = estimate.state;
-                // It keeps its last rotation rate; the force has the direction at half of the lost time.
+                // It keeps its last rotation rate; the force has the direction at half of the lost
+                // time.
                 let half = nalgebra::UnitQuaternion::from_scaled_axis(believed.rate_rad_s * (0.5 * lost_s));
                 believed.world_from_body *= half;
                 let force = believed.world_from_body * estimate.specific_force_m_s2;
@@ -370,7 +377,8 @@ mod tests {
         assert!(found.angle_to(&expected) < 1e-6, "{}", found.angle_to(&expected));
     }
 
-    /// A restart in the burn keeps the curve that the motor was found to have; one in the fall leaves the choice open.
+    /// A restart in the burn keeps the curve that the motor was found to have; one in the fall
+    /// leaves the choice open.
     #[test]
     fn a_restart_keeps_the_choice_of_the_curve() {
         let mission = crate::vehicles::mission::builtin("mk3").unwrap().unwrap();

@@ -1,8 +1,9 @@
 //! What takes longer than a frame: the landing under thrust, and the prediction in the fall.
 //!
-//! A frame poses one of them, and goes on; a later frame, whose input says that it is ready, takes it over. What is posed is a
-//! copy of all that it depends on, so that whoever computes it, at whatever time, finds the same. A board computes it in its main
-//! context, while a timer flies the frames; a simulator or a replay computes it at once and holds it back.
+//! A frame poses one of them, and goes on; a later frame, whose input says that it is ready, takes
+//! it over. What is posed is a copy of all that it depends on, so that whoever computes it, at
+//! whatever time, finds the same. A board computes it in its main context, while a timer flies the
+//! frames; a simulator or a replay computes it at once and holds it back.
 
 use alloc::boxed::Box;
 
@@ -17,19 +18,22 @@ use crate::guidance::powered::{LandingSolved, Plan, Search};
 use crate::rules::verdict::Touchdown;
 use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 
-/// Within this time after it was posed a plan is ready, s: a board that needs longer is too slow. Twice the period of plans; the bound
-/// on a plan's work (`powered.max_passes`) is made for it.
+/// Within this time after it was posed a plan is ready, s: a board that needs longer is too slow.
+/// Twice the period of plans; the bound on a plan's work (`powered.max_passes`) is made for it.
 pub const PLAN_WITHIN_S: f64 = 0.1;
 
-/// A plan is expected to be ready after this time, s, and is made for the vehicle as it will be then: the median of mk2's plans. Of 300
-/// `real` flights of mk2 (seed 7001) 268 land, 242 if plans are made for the present, and 261 with 40 ms and 60 ms for the first; chosen on that
-/// seed, before their instructions were measured.
+/// A plan is expected to be ready after this time, s, and is made for the vehicle as it will be
+/// then: the median of mk2's plans. Of 300 `real` flights of mk2 (seed 7001) 268 land, 242 if plans
+/// are made for the present, and 261 with 40 ms and 60 ms for the first; chosen on that seed,
+/// before their instructions were measured.
 const EXPECTED_S: f64 = 0.025;
 
-/// Instructions that a Cortex-M7 executes in a frame: 600 MHz, and 0.67 instructions a cycle, which is assumed.
+/// Instructions that a Cortex-M7 executes in a frame: 600 MHz, and 0.67 instructions a cycle, which
+/// is assumed.
 const INSTRUCTIONS_PER_FRAME: u64 = 400_000 * FRAME_MS as u64;
-/// Instructions on an emulated Cortex-M7 (onboard-sim/lab/cortex-m7/README.md): of 3,347 predictions the dearest, and of a landing the line in
-/// the passes of its search above which 39 of 3,994 plans lie.
+/// Instructions on an emulated Cortex-M7 (onboard-sim/lab/cortex-m7/README.md): of 3,347
+/// predictions the dearest, and of a landing the line in the passes of its search above which 39 of
+/// 3,994 plans lie.
 const PREDICTION: u64 = 13_600_000;
 const LANDING: u64 = 5_170_000;
 const PASS: u64 = 12_050;
@@ -48,8 +52,9 @@ pub(super) enum Posed {
 /// What was found.
 #[derive(Debug, Clone)]
 enum Solved {
-    /// The search's outcome (none if the thrust never carries the vehicle), unless the flown plan is flown to its end; whether the
-    /// vehicle was high; and the share of the fins' drag area if no plan says it.
+    /// The search's outcome (none if the thrust never carries the vehicle), unless the flown plan
+    /// is flown to its end; whether the vehicle was high; and the share of the fins' drag area if
+    /// no plan says it.
     Landing {
         searched: Option<(Option<Outcome>, bool)>,
         fin_share: Option<f64>,
@@ -98,8 +103,9 @@ impl Planner {
         self.found = None;
     }
 
-    /// The next landing starts from the plan that was found, or goes on with the last one. Returns whether the search converged on a
-    /// landing; `None` if there was none, because the last plan is flown to its end or the thrust never carries the vehicle.
+    /// The next landing starts from the plan that was found, or goes on with the last one. Returns
+    /// whether the search converged on a landing; `None` if there was none, because the last plan
+    /// is flown to its end or the thrust never carries the vehicle.
     pub(super) fn fly_on(&mut self) -> Option<bool> {
         let Some(Solved::Landing { searched: Some((Some(outcome), _)), .. }) = &self.found else {
             return None;
@@ -137,8 +143,8 @@ impl Planner {
 }
 
 impl VehicleModel {
-    /// The vehicle when its plan is expected to be ready: until then it moves as the flown plan does, or without one keeps its
-    /// force and its rates.
+    /// The vehicle when its plan is expected to be ready: until then it moves as the flown plan
+    /// does, or without one keeps its force and its rates.
     fn later(&self, flown: &Plan, estimate: &Estimate, burning: &Burning) -> (Estimate, Burning) {
         let time_s = estimate.time_s;
         let later_s = time_s + EXPECTED_S;
@@ -174,7 +180,8 @@ impl Pilot {
         Box::new(Planner { model: model.without_filters(), posed: None, search, found: None })
     }
 
-    /// Poses a prediction or a landing. Returns whether it could: nothing is posed before the last has been taken over.
+    /// Poses a prediction or a landing. Returns whether it could: nothing is posed before the last
+    /// has been taken over.
     pub(super) fn pose(&mut self, time_s: f64, estimate: &Estimate, asked: Posed) -> bool {
         let Some(planner) = self.planner.as_mut().filter(|_| self.posed_at_s.is_none()) else { return false };
         self.posed_at_s = Some(time_s);
@@ -184,7 +191,8 @@ impl Pilot {
         true
     }
 
-    /// Takes over what was posed; computes it now, if nobody has. Returns whether it is a plan of a landing.
+    /// Takes over what was posed; computes it now, if nobody has. Returns whether it is a plan of a
+    /// landing.
     pub(crate) fn take_over(&mut self, time_s: f64) -> bool {
         let Some((posed_at_s, planner)) = self.posed_at_s.zip(self.planner.as_mut()) else { return false };
         self.posed_at_s = None;
@@ -212,7 +220,8 @@ impl Pilot {
         self.planner.as_mut().filter(|planner| planner.found.is_none())
     }
 
-    /// The landing that was taken over last, and its problem; none before the first, and once the next one is posed.
+    /// The landing that was taken over last, and its problem; none before the first, and once the
+    /// next one is posed.
     pub fn landing_solved(&self) -> Option<LandingSolved> {
         let planner = self.planner.as_ref()?;
         let (estimate, Posed::Landing(burning)) = planner.posed.as_ref()? else { return None };
@@ -227,27 +236,31 @@ impl Pilot {
 }
 
 impl Computer {
-    /// Computes what the pilot has posed, in this context, if it was not done yet; returns in how many frames a Cortex-M7 does.
+    /// Computes what the pilot has posed, in this context, if it was not done yet; returns in how
+    /// many frames a Cortex-M7 does.
     pub fn solve_posed(&mut self) -> Option<u64> {
         let planner = self.pilot.posed()?;
         planner.solve();
         Some(planner.frames_on_a_board())
     }
 
-    /// What the pilot has posed, to be computed in another context; once. It has to be [given back](Self::give_back).
+    /// What the pilot has posed, to be computed in another context; once. It has to be [given
+    /// back](Self::give_back).
     pub fn take_posed(&mut self) -> Option<Box<Planner>> {
         self.pilot.posed()?;
         self.pilot.planner.take()
     }
 
-    /// Gives back what was [computed](Planner::solve) in another context. The frame that is told so takes it over.
+    /// Gives back what was [computed](Planner::solve) in another context. The frame that is told so
+    /// takes it over.
     pub fn give_back(&mut self, planner: Box<Planner>) {
         // One of a computer that has restarted meanwhile has its own.
         self.pilot.planner.get_or_insert(planner);
     }
 
-    /// Rehearses the landing at power-up, without a simulated world: what a board puts into its inputs. `None` once it is released,
-    /// and while something is posed. It takes some seconds on a board, and leaves no memory.
+    /// Rehearses the landing at power-up, without a simulated world: what a board puts into its
+    /// inputs. `None` once it is released, and while something is posed. It takes some seconds on a
+    /// board, and leaves no memory.
     pub fn rehearse(&mut self) -> Option<Rehearsed> {
         let pilot = &mut *self.pilot;
         let planner =

@@ -13,15 +13,17 @@ use crate::rules::phase::Phase;
 use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use crate::vehicle::rigid::RigidState;
 
-/// The commit height is the height that the parachute needs, times this: half as much again, because ejection and filling
-/// scatter.
+/// The commit height is the height that the parachute needs, times this: half as much again,
+/// because ejection and filling scatter.
 const COMMIT_MARGIN: f64 = 1.5;
 
-/// Share of the burn's reach towards the pad that it is sure of: with it, of 33 `harsh` flights (seed 7001) a second before their
-/// ignition, 30 touched down nearer than predicted or within 2 m, and the others by up to 14 m farther.
+/// Share of the burn's reach towards the pad that it is sure of: with it, of 33 `harsh` flights
+/// (seed 7001) a second before their ignition, 30 touched down nearer than predicted or within 2 m,
+/// and the others by up to 14 m farther.
 const SURE_REACH: f64 = 0.5;
 
-/// A fall is taken to be at least this fast, m/s, so that the time to the ground is finite at apogee.
+/// A fall is taken to be at least this fast, m/s, so that the time to the ground is finite at
+/// apogee.
 const FALL_MIN_M_S: f64 = 5.0;
 
 /// The forecast before ignition, renewed five or twenty times a second.
@@ -36,8 +38,8 @@ pub struct Prediction {
     pub predicted_speed_m_s: f64,
     /// The certified motor lands from here or from farther down.
     pub lands_ahead: bool,
-    /// Distance from the pad at which the vehicle would touch down under the motor, or without a height for its ignition by
-    /// falling on, m.
+    /// Distance from the pad at which the vehicle would touch down under the motor, or without a
+    /// height for its ignition by falling on, m.
     pub touchdown_distance_m: f64,
 }
 
@@ -48,21 +50,22 @@ impl Prediction {
     }
 }
 
-/// Height that a parachute needs at a speed, with a margin: the fall until it is ejected, plus the distance over which
-/// it inflates (T. W. Knacke, Parachute Recovery Systems Design Manual, NWC TP 6575, 1991, chapter 5).
+/// Height that a parachute needs at a speed, with a margin: the fall until it is ejected, plus the
+/// distance over which it inflates (T. W. Knacke, Parachute Recovery Systems Design Manual, NWC TP
+/// 6575, 1991, chapter 5).
 pub(super) fn commit_height_m(speed_m_s: f64, ejection_delay_s: f64, inflation_distance_m: f64) -> f64 {
     COMMIT_MARGIN * (speed_m_s * ejection_delay_s + inflation_distance_m)
 }
 
-/// Where a vehicle would touch down without further steering, m, in the world's horizontal axes: from a place, m, with
-/// a velocity, m/s, and its feet at a height, m.
+/// Where a vehicle would touch down without further steering, m, in the world's horizontal axes:
+/// from a place, m, with a velocity, m/s, and its feet at a height, m.
 pub fn touchdown_m(place_m: &Vector3<f64>, velocity_m_s: &Vector3<f64>, height_m: f64) -> Vector2<f64> {
     let to_ground_s = height_m.max(0.0) / (-velocity_m_s.z).max(FALL_MIN_M_S);
     (place_m + velocity_m_s * to_ground_s).xy()
 }
 
-/// Time in which a vehicle on its open fins takes on the wind's speed, s: a terminal speed of 40 m/s over g, and half as
-/// much again while it is slower.
+/// Time in which a vehicle on its open fins takes on the wind's speed, s: a terminal speed of 40
+/// m/s over g, and half as much again while it is slower.
 const TAKES_THE_WIND_S: f64 = 6.0;
 
 /// The apogee ahead of a coasting vehicle.
@@ -74,8 +77,9 @@ pub struct ApogeeAhead {
     pub in_s: f64,
 }
 
-/// The apogee of a vehicle that coasts up from a height, m, at a vertical speed, m/s, while the air brakes it by so much,
-/// m/s^2: the drag falls with the square of the speed, so in the mean over the height half of it acts.
+/// The apogee of a vehicle that coasts up from a height, m, at a vertical speed, m/s, while the air
+/// brakes it by so much, m/s^2: the drag falls with the square of the speed, so in the mean over
+/// the height half of it acts.
 fn apogee_ahead(height_m: f64, vertical_m_s: f64, braking_m_s2: f64) -> ApogeeAhead {
     let slowing_m_s2 = STANDARD_GRAVITY_M_S2 + 0.5 * braking_m_s2.max(0.0);
     let rising_m_s = vertical_m_s.max(0.0);
@@ -85,15 +89,16 @@ fn apogee_ahead(height_m: f64, vertical_m_s: f64, braking_m_s2: f64) -> ApogeeAh
     }
 }
 
-/// Where a rising vehicle would touch down in still air without steering, m: it drifts to its apogee and until the air
-/// has stopped it.
+/// Where a rising vehicle would touch down in still air without steering, m: it drifts to its
+/// apogee and until the air has stopped it.
 pub fn touchdown_from_below_m(place_m: &Vector3<f64>, velocity_m_s: &Vector3<f64>) -> Vector2<f64> {
     let in_s = apogee_ahead(place_m.z, velocity_m_s.z, 0.0).in_s;
     (place_m + velocity_m_s * (in_s + TAKES_THE_WIND_S)).xy()
 }
 
 impl VehicleModel {
-    /// The prediction without the ignition, for a moment: with the fins at these openings, rad, after a fall from this height, m.
+    /// The prediction without the ignition, for a moment: with the fins at these openings, rad,
+    /// after a fall from this height, m.
     pub(super) fn fall(&self, estimate: &Estimate, fins_rad: &[f64; 4], apogee_m: f64) -> Prediction {
         let column = self.column(self.density_kg_m3(estimate), self.mission.soft_tilt_deg);
         let state = &estimate.state;
@@ -135,8 +140,8 @@ impl VehicleModel {
         Prediction { ignition, lands_ahead, touchdown_distance_m, ..fall }
     }
 
-    /// Where the motor lets the vehicle down, m, in the world's horizontal axes: it falls to its ignition, brakes evenly, and diverts
-    /// towards the pad.
+    /// Where the motor lets the vehicle down, m, in the world's horizontal axes: it falls to its
+    /// ignition, brakes evenly, and diverts towards the pad.
     fn landing_m(&self, estimate: &Estimate, ignition: &IgnitionPrediction) -> Option<Vector2<f64>> {
         let settings = &self.mission.powered.homing;
         let homing = Homing { reach_m_s2: SURE_REACH * settings.reach_m_s2, ..*settings };
@@ -161,8 +166,8 @@ impl Pilot {
         Some(apogee_ahead(estimate.state.position_m.z, estimate.state.velocity_m_s.z, braking_m_s2))
     }
 
-    /// Speed at the ground after a fall from here with the fins fully open and without thrust, m/s, positive downwards;
-    /// `None` before the first frame.
+    /// Speed at the ground after a fall from here with the fins fully open and without thrust, m/s,
+    /// positive downwards; `None` before the first frame.
     pub fn impact_m_s(&self) -> Option<f64> {
         let estimate = self.estimate.as_ref()?;
         let (known, state) = (&self.model, &estimate.state);

@@ -1,7 +1,8 @@
-//! The rehearsal of the landing at power-up, on a board: no world is simulated there, so the vehicle falls as its model does, and
-//! then moves as it plans.
+//! The rehearsal of the landing at power-up, on a board: no world is simulated there, so the
+//! vehicle falls as its model does, and then moves as it plans.
 //!
-//! It shows whether the planner works on this machine, and whether a landing is possible with this vehicle, motor and mission.
+//! It shows whether the planner works on this machine, and whether a landing is possible with this
+//! vehicle, motor and mission.
 
 use alloc::format;
 
@@ -49,8 +50,8 @@ impl Planner {
 }
 
 impl VehicleModel {
-    /// The vehicle as its motor takes thrust, at time zero, after a fall with open fins in still air; `None` if no height suits the
-    /// motor.
+    /// The vehicle as its motor takes thrust, at time zero, after a fall with open fins in still
+    /// air; `None` if no height suits the motor.
     fn lit(&self) -> Option<(Estimate, Burning)> {
         let (mission, mass, fins_m2) =
             (&self.mission, self.mass.at(0.0), self.airframe().open_fin_drag_area_m2());

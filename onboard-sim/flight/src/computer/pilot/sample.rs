@@ -27,7 +27,8 @@ pub(crate) fn alone(kept: &KeptInput) -> Input<'static> {
     Input { kept: *kept, requests: &[], rehearsed: None, plan_ready: false }
 }
 
-/// The input of a frame with almost no specific force, turning at a rate, of a computer that was released at once.
+/// The input of a frame with almost no specific force, turning at a rate, of a computer that was
+/// released at once.
 pub(crate) fn input(frame: u64, gyro_rad_s: f64) -> KeptInput {
     let imu = ImuSample {
         gyro_rad_s: Vector3::new(0.0, gyro_rad_s, 0.0),

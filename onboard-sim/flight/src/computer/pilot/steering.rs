@@ -18,8 +18,8 @@ use crate::vehicle::fins::Moments;
 /// Below this thrust the gimbal cannot turn the vehicle, N.
 const STEERING_THRUST_N: f64 = 3.0;
 
-/// Beyond this angle between nose and airflow, rad, the moment of the body is larger than the moment that partly closed
-/// fins can set against it: all fins are opened then.
+/// Beyond this angle between nose and airflow, rad, the moment of the body is larger than the
+/// moment that partly closed fins can set against it: all fins are opened then.
 const ACROSS_THE_AIR_RAD: f64 = 0.65;
 
 /// Whether the air comes so far from the side that only fully open fins turn the vehicle back.
@@ -38,8 +38,8 @@ impl Pilot {
             let estimate = &estimate;
             let thrusting = self.burning(mode, input.time_s);
             let burning = thrusting.as_ref().filter(|_| flying);
-            // The thrust still carries a vehicle that stands: the legs then carry little, and the wind tips it over. So the gimbal
-            // holds it upright until the thrust ends.
+            // The thrust still carries a vehicle that stands: the legs then carry little, and the
+            // wind tips it over. So the gimbal holds it upright until the thrust ends.
             let balances = self.model.mission.upright_after_contact && mode.phase == Phase::Touchdown;
             let (gimbal_rad, added_rad_s) = match (burning, thrusting.as_ref().filter(|_| balances)) {
                 (Some(burning), _) => {
@@ -61,8 +61,8 @@ impl Pilot {
         Pointed { gimbal_rad: self.gimbal_rad, fins_rad: self.fins_rad, level }
     }
 
-    /// Swings the gimbal of a vehicle that does not burn while the motor may still be lit: its command, rad, and what that has
-    /// added to the cross rates, rad/s.
+    /// Swings the gimbal of a vehicle that does not burn while the motor may still be lit: its
+    /// command, rad, and what that has added to the cross rates, rad/s.
     fn swing(&mut self, mode: &Mode, input: &KeptInput) -> ([f64; 2], [f64; 2]) {
         let may_light = matches!(mode.phase, Phase::AeroDescent | Phase::LandArmed)
             && !mode.interlocks.landing_motor_inhibited;
@@ -144,7 +144,8 @@ impl Pilot {
         };
         let demand = self.model.mission.descent.demand(&estimate.state, &situation);
         let (moments, drag_area_m2, min_rad) = if burning {
-            // During the burn the gimbal turns the vehicle; the fins brake and stop it from rolling.
+            // During the burn the gimbal turns the vehicle; the fins brake and stop it from
+            // rolling.
             (Vector3::new(demand.moment_n_m.x, 0.0, 0.0), self.fin_share * largest_m2, fins.closed_rad())
         } else if !self.model.mission.descent.opens_fins {
             return [fins.control_min_rad(); 4];

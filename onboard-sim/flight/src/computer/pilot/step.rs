@@ -22,13 +22,14 @@ const FRAMES_PER_FAR_LOOK: u64 = 4 * FRAMES_PER_PLAN;
 /// An estimate outlives a pause of the accelerometer of this length, s.
 const ACCELEROMETER_LOST_S: f64 = 0.5;
 
-/// What a frame adds to the doubt about the velocity when the force is not felt but expected, m/s: it is off by some 0.3 m/s^2
-/// for half a second.
+/// What a frame adds to the doubt about the velocity when the force is not felt but expected, m/s:
+/// it is off by some 0.3 m/s^2 for half a second.
 const EXPECTED_FORCE_M_S: f64 = 0.02;
 
-/// What the estimator may use before apogee. The booster's drag and masses are not those of the vehicle, so the air
-/// shows no wind. The barometer's ram error belongs to a flow from the nose, not from the tail, and its static ports lie
-/// in the booster's wake and in the charge's gas; the lidar looks into the booster.
+/// What the estimator may use before apogee. The booster's drag and masses are not those of the
+/// vehicle, so the air shows no wind. The barometer's ram error belongs to a flow from the nose,
+/// not from the tail, and its static ports lie in the booster's wake and in the charge's gas; the
+/// lidar looks into the booster.
 fn on_the_way_up(
     measurements: &Measurements,
     vehicle: &VehicleNow,
@@ -53,18 +54,21 @@ impl Pilot {
         }
     }
 
-    /// Follows the ascent, predicts ignition and abort, and watches the fins. Every event goes through the `table`.
+    /// Follows the ascent, predicts ignition and abort, and watches the fins. Every event goes
+    /// through the `table`.
     pub(crate) fn predict(&mut self, table: &mut PhaseTable, input: &KeptInput) {
         let Some(estimate) = self.estimate else { return };
         self.watch_the_speeds(input, &estimate);
-        // Before the prediction: at apogee an abort has to know at once whether the parachute has room.
+        // Before the prediction: at apogee an abort has to know at once whether the parachute has
+        // room.
         self.watch_the_ascent(table, input, &estimate);
         // A drop lasts 2 to 3 s, so it is predicted in every planning frame.
         let dropped = self.model.mission.start.at == StartPoint::Drone;
         let far = table.mode().phase == Phase::AeroDescent && !dropped;
         let due = input.frame.is_multiple_of(if far { FRAMES_PER_FAR_LOOK } else { FRAMES_PER_PLAN });
         if table.mode().phase.in_descent() {
-            // Right after apogee and after a restart an abort would not know whether the parachute has room.
+            // Right after apogee and after a restart an abort would not know whether the parachute
+            // has room.
             let unknown = self.prediction == Prediction::default();
             if unknown {
                 self.prediction = self.model.fall(&estimate, &self.fins_rad, self.apogee_m);
@@ -77,8 +81,9 @@ impl Pilot {
         self.fin_watch.update(&input.fins_rad, &self.fins_rad, self.model.mission.estimator.frame_s);
     }
 
-    /// Poses a landing in the first frame of the burn, and again ten frames after the last, or later if that one takes longer: not in
-    /// the frame that took it over, so that it can be looked at behind it.
+    /// Poses a landing in the first frame of the burn, and again ten frames after the last, or
+    /// later if that one takes longer: not in the frame that took it over, so that it can be looked
+    /// at behind it.
     pub(crate) fn plan(&mut self, mode: &Mode, input: &KeptInput, took_over: bool) {
         let due = !took_over && input.frame >= self.plan_due && mode.phase.in_landing_burn();
         let burning = self.burning(mode, input.time_s).filter(|_| due);
@@ -131,8 +136,8 @@ impl Pilot {
             measurements.pressure_altitude_m.filter(|altitude_m| !self.speeds.repeats(*altitude_m));
     }
 
-    /// Estimates motor and drag from the specific force along the axis; not on the way up, on the ground or under the
-    /// parachute.
+    /// Estimates motor and drag from the specific force along the axis; not on the way up, on the
+    /// ground or under the parachute.
     pub(super) fn update_models(&mut self, phase: Phase, input: &KeptInput, estimate: &Estimate) {
         if input.contact || phase == Phase::Chute || phase.before_apogee() {
             return;
@@ -172,7 +177,8 @@ impl Pilot {
 
     fn watch_the_speeds(&mut self, input: &KeptInput, estimate: &Estimate) {
         let Measurements { imu, pressure_altitude_m, gnss, .. } = input.measured;
-        // No fix follows the motion that a wrong inertial unit measures: the pressure confirms it instead.
+        // No fix follows the motion that a wrong inertial unit measures: the pressure confirms it
+        // instead.
         let confirmed_m_s = gnss
             .map(|fix| fix.velocity_m_s.z)
             .filter(|m_s| self.speeds.pressure_confirms(*m_s, input.time_s, self.ascent.through_gas_s()));

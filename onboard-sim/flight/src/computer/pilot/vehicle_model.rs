@@ -1,5 +1,5 @@
-//! The pilot's knowledge of its vehicle: the mission's data, and what it has learnt about motor and drag.
-//! From that, the motor that a plan assumes.
+//! The pilot's knowledge of its vehicle: the mission's data, and what it has learnt about motor and
+//! drag. From that, the motor that a plan assumes.
 
 use alloc::sync::Arc;
 
@@ -55,7 +55,8 @@ impl VehicleModel {
         self.mission.site.air_at_m(estimate.state.position_m.z).density_kg_m3
     }
 
-    /// The vehicle as the estimator takes it, at this mass, air density and fin openings, rad, and with its motor burning or not.
+    /// The vehicle as the estimator takes it, at this mass, air density and fin openings, rad, and
+    /// with its motor burning or not.
     pub(super) fn now(
         &self,
         mass: &MassProperties,
@@ -87,7 +88,8 @@ impl VehicleModel {
         self.motor.ignition_s().map(|ignition_s| (time_s - ignition_s).max(0.0))
     }
 
-    /// Whether the whole burn time has passed. A motor that went out early is not called burnt out before that either.
+    /// Whether the whole burn time has passed. A motor that went out early is not called burnt out
+    /// before that either.
     pub(super) fn burn_is_over(&self, time_s: f64) -> bool {
         let whole_s = self.motor.burn_time_stretch() * self.curve().burn_time_s();
         self.burning_s(time_s).is_some_and(|burning_s| burning_s >= whole_s)
@@ -101,9 +103,9 @@ impl VehicleModel {
         self.motor.burn(self.curve())
     }
 
-    /// The motor with `sigmas` standard deviations less (below zero) or more impulse than expected from now until its
-    /// thrust falls below the weight. Measurements show the thrust, not how long it lasts; as long as that holds, the
-    /// weaker motor burns out sooner.
+    /// The motor with `sigmas` standard deviations less (below zero) or more impulse than expected
+    /// from now until its thrust falls below the weight. Measurements show the thrust, not how long
+    /// it lasts; as long as that holds, the weaker motor burns out sooner.
     pub(super) fn doubted_burn(&self, burning_s: f64, sigmas: f64) -> Burn<'_> {
         let burn = self.burn();
         let carried_until_s = burn.falls_through_weight_s(self.mass.at(0.0).mass_kg);
@@ -126,7 +128,8 @@ impl VehicleModel {
         self.airframe().above_feet_m(mass.cg_station_m)
     }
 
-    /// The guidance of the landing burn before its first plan, and the search of its plans, with room for every plan.
+    /// The guidance of the landing burn before its first plan, and the search of its plans, with
+    /// room for every plan.
     pub(super) fn guidance(&self) -> (PoweredGuidance, Search) {
         let state = RigidState::upright(self.mission.start.height_m);
         let estimate = Estimate::exact(0.0, state, Vector3::zeros(), Vector2::zeros());
@@ -138,7 +141,8 @@ impl VehicleModel {
         PoweredGuidance::with_room(self.mission.powered, &state, &situation)
     }
 
-    /// The burning vehicle, not high, with this motor, and with this drag area of the fins as certified.
+    /// The burning vehicle, not high, with this motor, and with this drag area of the fins as
+    /// certified.
     pub(super) fn powered_situation<'a>(
         &'a self,
         estimate: &Estimate,
@@ -168,22 +172,22 @@ impl VehicleModel {
     }
 }
 
-/// Without a plan the fins leave room for a motor that is weaker or stronger by one deviation, and keep the vehicle in the
-/// middle of that band.
+/// Without a plan the fins leave room for a motor that is weaker or stronger by one deviation, and
+/// keep the vehicle in the middle of that band.
 const FIN_SIGMAS: f64 = 1.0;
 const FIN_PLACE: f64 = 0.5;
 
 // The motor that a plan assumes.
 //
-// Surplus thrust can be wasted late in the burn, missing thrust cannot be made up. A plan is therefore made for a
-// motor that is weaker than estimated, by the number of standard deviations that the mission sets as its caution. The
-// motor must not be so weak that no landing is possible: such a plan would turn the vehicle across the air to brake,
-// and spoil the landing for every stronger motor. So the plan takes the weakest of these motors that can still land
-// from here.
+// Surplus thrust can be wasted late in the burn, missing thrust cannot be made up. A plan is
+// therefore made for a motor that is weaker than estimated, by the number of standard deviations
+// that the mission sets as its caution. The motor must not be so weak that no landing is possible:
+// such a plan would turn the vehicle across the air to brake, and spoil the landing for every
+// stronger motor. So the plan takes the weakest of these motors that can still land from here.
 //
-// High in the band of feasible heights, a hard landing in a plan has another cause: the plan has not found a way to sink
-// faster. There the guidance flies a hard plan rather than braking upright, which helps a vehicle that is too low and
-// makes this vehicle hover.
+// High in the band of feasible heights, a hard landing in a plan has another cause: the plan has
+// not found a way to sink faster. There the guidance flies a hard plan rather than braking upright,
+// which helps a vehicle that is too low and makes this vehicle hover.
 
 /// Number of steps from full caution to none.
 const CAUTION_STEPS: u32 = 3;
@@ -221,8 +225,9 @@ impl VehicleModel {
         }
     }
 
-    /// By how many standard deviations a plan takes the motor to be weaker than estimated: the mission's full caution
-    /// early, none in the last moments, when no thrust can be wasted any more.
+    /// By how many standard deviations a plan takes the motor to be weaker than estimated: the
+    /// mission's full caution early, none in the last moments, when no thrust can be wasted any
+    /// more.
     fn caution_sigmas(&self, burning_s: f64) -> f64 {
         let carried_until_s = self.burn().falls_through_weight_s(self.mass.at(0.0).mass_kg);
         let left_s = carried_until_s.unwrap_or(0.0) - burning_s;

@@ -1,18 +1,20 @@
-//! How fast the vehicle rises or falls, by three that know nothing of each other: what was felt since the start, the pressure,
-//! and the satellites. One of them alone decides nothing.
+//! How fast the vehicle rises or falls, by three that know nothing of each other: what was felt
+//! since the start, the pressure, and the satellites. One of them alone decides nothing.
 
 use serde::{Deserialize, Serialize};
 
 use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 
-/// The pressure altitude gives a speed once in this time, s: with the noise of a barometer to 0.6 m/s.
+/// The pressure altitude gives a speed once in this time, s: with the noise of a barometer to 0.6
+/// m/s.
 pub(super) const RATE_OVER_S: f64 = 0.2;
 /// A fix this old still tells the speed, s: three fixes are missing.
 const FIX_KEEPS_S: f64 = 0.6;
 /// A barometer that says the same for so many samples, a tenth of a second, says nothing.
 const FROZEN_SAMPLES: u32 = 5;
-/// Speeds that differ by more, m/s, cannot both be right: a late fix and the pressure of the last window make 3 of it while
-/// the vehicle coasts, 15 under the ascent motor, where there are no fixes.
+/// Speeds that differ by more, m/s, cannot both be right: a late fix and the pressure of the last
+/// window make 3 of it while the vehicle coasts, 15 under the ascent motor, where there are no
+/// fixes.
 const APART_OF_THREE_M_S: f64 = 8.0;
 pub(super) const APART_OF_TWO_M_S: f64 = 15.0;
 /// For how long the middle one of three contradicts an estimate that is given up, s.
@@ -116,8 +118,9 @@ impl VerticalSpeeds {
         })
     }
 
-    /// Whether the pressure has shown about the speed of the fixes, m/s, while that changed: a spike, or the flow at Mach 1, agrees
-    /// by chance with a receiver that keeps reporting its last speed.
+    /// Whether the pressure has shown about the speed of the fixes, m/s, while that changed: a
+    /// spike, or the flow at Mach 1, agrees by chance with a receiver that keeps reporting its last
+    /// speed.
     pub(super) fn pressure_confirms(
         &mut self,
         gnss_m_s: f64,
@@ -136,8 +139,8 @@ impl VerticalSpeeds {
             .then_some(self.altitude_m)
     }
 
-    /// What the pressure shows. `through_gas_s`: for so long after the last window the vehicle coasts, and the pressure is that of
-    /// a charge's gas.
+    /// What the pressure shows. `through_gas_s`: for so long after the last window the vehicle
+    /// coasts, and the pressure is that of a charge's gas.
     pub(super) fn pressure_m_s(&self, time_s: f64, through_gas_s: Option<f64>) -> Option<f64> {
         let age_s = time_s - self.pressure_at_s;
         if self.altitude_m(time_s).is_some() {
@@ -162,8 +165,9 @@ impl VerticalSpeeds {
         Some(three_m_s[1])
     }
 
-    /// How fast the vehicle rises: as estimated, unless the three say otherwise. Of two that contradict each other the one that
-    /// rises faster counts: nothing is parted or opened on the way up.
+    /// How fast the vehicle rises: as estimated, unless the three say otherwise. Of two that
+    /// contradict each other the one that rises faster counts: nothing is parted or opened on the
+    /// way up.
     pub(super) fn rises_m_s(&self, estimated_m_s: f64, time_s: f64, through_gas_s: Option<f64>) -> f64 {
         let others = [self.pressure_m_s(time_s, through_gas_s), self.gnss_m_s(time_s)];
         if let Some(fastest_m_s) =

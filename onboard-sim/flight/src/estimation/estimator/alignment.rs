@@ -1,4 +1,5 @@
-//! Finds the initial attitude on the pad: at rest the accelerometer shows the vertical and the gyro shows its own bias.
+//! Finds the initial attitude on the pad: at rest the accelerometer shows the vertical and the gyro
+//! shows its own bias.
 //!
 //! This is the levelling of a strapdown unit (Groves 2013, section 5.6).
 
@@ -13,8 +14,8 @@ use crate::vehicle::rigid::upright;
 const FEWEST: u32 = 200;
 /// Largest turn-on bias of a gyro that is calibrated, rad/s: 10 deg/s. Hobby gyros show up to 7.2.
 pub(crate) const BIAS_MAX_RAD_S: f64 = 0.175;
-/// Length of the specific force of a vehicle at rest, m/s^2: gravity, with 7 % for scale and bias. Hobby
-/// accelerometers show 9.7 to 10.44.
+/// Length of the specific force of a vehicle at rest, m/s^2: gravity, with 7 % for scale and bias.
+/// Hobby accelerometers show 9.7 to 10.44.
 pub(crate) const FELT_AT_REST_M_S2: core::ops::RangeInclusive<f64> = 9.12..=10.5;
 /// Largest difference between the two halves of the record of a vehicle at rest: of the gyro, rad/s
 /// (0.3 deg/s, five standard deviations of two seconds' noise), and of the specific force, m/s^2.
@@ -31,19 +32,21 @@ pub struct PadAlignment {
 
 /// Newest seconds, which show a drift.
 const RECORD: usize = 8;
-/// Weight of all seconds before them, s: together the white noise of a gyro (0.05 deg/s/sqrt(Hz)) is down to
-/// 0.009 deg/s, as much as its bias walks in 20 s.
+/// Weight of all seconds before them, s: together the white noise of a gyro (0.05 deg/s/sqrt(Hz))
+/// is down to 0.009 deg/s, as much as its bias walks in 20 s.
 const OLDER_S: u32 = 24;
 /// Largest difference of the older seconds' gyro from the newest ones', rad/s: 0.08 deg/s.
 const OLDER_OFF_RAD_S: f64 = 0.0014;
 
-/// The means of the last seconds at rest: a longer mean, and a motion that one second does not show.
+/// The means of the last seconds at rest: a longer mean, and a motion that one second does not
+/// show.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct PadRecord {
     seconds: [PadAlignment; RECORD],
     filled: usize,
     older: PadAlignment,
-    /// The first second is over. It is not recorded: at power-up the vehicle may still sway on its legs.
+    /// The first second is over. It is not recorded: at power-up the vehicle may still sway on its
+    /// legs.
     begun: bool,
 }
 
@@ -95,12 +98,13 @@ pub struct ImuCalibration {
     pub accelerometer_scale: f64,
 }
 
-/// Largest deviation of the scale from 1 that is taken for a bias: 25 mg, half of what data sheets allow. One position
-/// cannot tell them apart, but in a boost they differ.
+/// Largest deviation of the scale from 1 that is taken for a bias: 25 mg, half of what data sheets
+/// allow. One position cannot tell them apart, but in a boost they differ.
 const BIAS_MAX_SHARE: f64 = 0.025;
 
 impl ImuCalibration {
-    /// The divisor of the measured specific force, and the standard deviation of the bias that is left, m/s^2.
+    /// The divisor of the measured specific force, and the standard deviation of the bias that is
+    /// left, m/s^2.
     pub(super) fn scale_and_bias(&self) -> (f64, f64) {
         let off = (self.accelerometer_scale - 1.0).abs();
         if off > BIAS_MAX_SHARE {
@@ -193,7 +197,8 @@ impl PadAlignment {
         }
         let headed = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), heading_rad) * upright();
         let up_in_world = headed * self.specific_force_m_s2;
-        // The shortest rotation from the measured direction to the vertical does not change the heading.
+        // The shortest rotation from the measured direction to the vertical does not change the
+        // heading.
         let lean = UnitQuaternion::rotation_between(&up_in_world, &Vector3::z())
             .unwrap_or_else(UnitQuaternion::identity);
         let calibration = ImuCalibration {

@@ -1,7 +1,8 @@
-//! The barometer: height by the static pressure, with its own offset and the errors of the flow around it.
+//! The barometer: height by the static pressure, with its own offset and the errors of the flow
+//! around it.
 //!
-//! The error of a static port is in proportion to the dynamic pressure (W. Gracey, Measurement of Aircraft Speed and Altitude, NASA
-//! Reference Publication 1046, 1980).
+//! The error of a static port is in proportion to the dynamic pressure (W. Gracey, Measurement of
+//! Aircraft Speed and Altitude, NASA Reference Publication 1046, 1980).
 
 use super::correction::{DOUBT_POSITION_M, shown_by_height, without_last_if};
 use super::covariance::{
@@ -10,16 +11,17 @@ use super::covariance::{
 };
 use super::{Estimator, HeightSources};
 
-/// After this many rejections in a row, half a second, the filter assumes that the barometer has a new offset.
+/// After this many rejections in a row, half a second, the filter assumes that the barometer has a
+/// new offset.
 const BAROMETER_REJECTIONS: u32 = 25;
 
-/// After so many, three tenths of a second, what was felt and the fixes that came meanwhile outvote it: before heights that
-/// disagree end the landing.
+/// After so many, three tenths of a second, what was felt and the fixes that came meanwhile outvote
+/// it: before heights that disagree end the landing.
 const OUTVOTED_REJECTIONS: u32 = 15;
 
 impl Estimator {
-    /// The barometer measures the height of its ports by its scale, plus its own offset, plus the ram error `-k V^2 / 2 g`, plus the suction `c v^2 / 2 g` of
-    /// the flow across the axis.
+    /// The barometer measures the height of its ports by its scale, plus its own offset, plus the
+    /// ram error `-k V^2 / 2 g`, plus the suction `c v^2 / 2 g` of the flow across the axis.
     pub(super) fn take_barometer(&mut self, altitude_m: f64, lever_m: &nalgebra::Vector3<f64>) {
         // Zeroed on the pad, where the vehicle stands upright.
         let altitude_m = altitude_m - (self.nominal.world_from_body * lever_m).z + lever_m.x;

@@ -1,5 +1,5 @@
-//! The assumed sensor errors, as data. The defaults are those of hobby-grade sensors: a consumer inertial unit, a
-//! barometer, a single-frequency satellite receiver and a 12 m lidar.
+//! The assumed sensor errors, as data. The defaults are those of hobby-grade sensors: a consumer
+//! inertial unit, a barometer, a single-frequency satellite receiver and a 12 m lidar.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -10,8 +10,8 @@ use crate::vehicle::mission::StartPoint;
 pub const GRAVITY_M_S2: f64 = crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 
 with_defaults! {
-    /// Noise of the sensors and other assumptions of the filter. Each value is a standard deviation unless its name says
-    /// otherwise.
+    /// Noise of the sensors and other assumptions of the filter. Each value is a standard deviation
+    /// unless its name says otherwise.
     #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
     #[serde(deny_unknown_fields, default)]
     pub struct EstimatorConfig {
@@ -26,11 +26,13 @@ with_defaults! {
         pub accelerometer_noise_mg_sqrt_hz: f64 = 0.65,
         /// Noise density that the motor's vibration adds to the gyro, deg/s/sqrt(Hz).
         pub burning_gyro_deg_s_sqrt_hz: f64 = 0.0,
-        /// How far the motor's vibration may shift the gyro's bias when it lights, each axis, deg/s.
+        /// How far the motor's vibration may shift the gyro's bias when it lights, each axis,
+        /// deg/s.
         pub burning_gyro_bias_deg_s: f64 = 0.0,
         /// Noise density that the motor's vibration adds to the accelerometer, mg/sqrt(Hz).
         pub burning_accelerometer_mg_sqrt_hz: f64 = 0.0,
-        /// Wander of the accelerometer bias, mg in one second. It covers the scale error while the thrust changes.
+        /// Wander of the accelerometer bias, mg in one second. It covers the scale error while the
+        /// thrust changes.
         pub accelerometer_bias_walk_mg_sqrt_s: f64 = 0.4,
         /// Barometer noise of one sample, m.
         pub barometer_m: f64 = 0.08,
@@ -40,10 +42,12 @@ with_defaults! {
         pub barometer_offset_walk_m_sqrt_s: f64 = 0.03,
         /// Wander of the ram coefficient, in one second.
         pub barometer_ram_walk_sqrt_s: f64 = 0.001,
-        /// Suction of the flow across the axis, divided by its dynamic pressure; 0 rules it out. A port on a cylinder feels
-        /// +1 to -1.1 of it, by its place; the mean over a ring of ports is about -0.5 (Hoerner, "Fluid-Dynamic Drag", 1965).
+        /// Suction of the flow across the axis, divided by its dynamic pressure; 0 rules it out. A
+        /// port on a cylinder feels +1 to -1.1 of it, by its place; the mean over a ring of ports
+        /// is about -0.5 (Hoerner, "Fluid-Dynamic Drag", 1965).
         pub barometer_suction: f64 = 0.0,
-        /// Scale error of the barometric height: a day 15 K from the standard atmosphere's temperature.
+        /// Scale error of the barometric height: a day 15 K from the standard atmosphere's
+        /// temperature.
         pub barometer_scale: f64 = 0.05,
         /// White noise of a satellite position, horizontal, m.
         pub gnss_horizontal_m: f64 = 0.2,
@@ -51,10 +55,11 @@ with_defaults! {
         pub gnss_vertical_m: f64 = 0.3,
         /// Noise of a satellite velocity, m/s.
         pub gnss_velocity_m_s: f64 = 0.05,
-        /// Error of the satellite fixes' time tags, the same for all of a flight, s; 0 trusts the tags.
+        /// Error of the satellite fixes' time tags, the same for all of a flight, s; 0 trusts the
+        /// tags.
         pub gnss_time_tag_s: f64 = 0.0,
-        /// Error of each time tag beside that, s; 0 rules it out. This is what the filter believes before the flight: from then
-        /// on the fixes show it.
+        /// Error of each time tag beside that, s; 0 rules it out. This is what the filter believes
+        /// before the flight: from then on the fixes show it.
         pub gnss_age_jitter_s: f64 = 0.0,
         /// Wander of the satellite position's offset, horizontal, m in one second.
         pub gnss_horizontal_walk_m_sqrt_s: f64 = 0.15,
@@ -66,19 +71,22 @@ with_defaults! {
         pub lidar_late_s: f64 = 0.0,
         /// Slope of the ground about the pad, degrees; 0 takes it as level.
         pub ground_slope_deg: f64 = 0.0,
-        /// Misalignment of the inertial unit in the vehicle, about each axis, degrees. No sensor shows it: it is added to the
-        /// uncertainty of the attitude.
+        /// Misalignment of the inertial unit in the vehicle, about each axis, degrees. No sensor
+        /// shows it: it is added to the uncertainty of the attitude.
         pub mounting_deg: f64 = 0.0,
-        /// Wander of the wind at the vehicle, m/s in one second, from gusts and from the layers that it falls through.
+        /// Wander of the wind at the vehicle, m/s in one second, from gusts and from the layers
+        /// that it falls through.
         pub wind_walk_m_s_sqrt_s: f64 = 0.5,
         /// Exponent of the wind's power law over height; the estimated wind decreases with it.
         pub wind_shear_exponent: f64 = 1.0 / 7.0,
         /// Uncertainty of the sideways aerodynamic force, as a fraction of it.
         pub sideways_force_share: f64 = 0.1,
-        /// How often the sideways force is linearised for one correction of the wind. Once is enough where the fins feel most of
-        /// the wind; a body without large fins, which feels the square of it, needs about five.
+        /// How often the sideways force is linearised for one correction of the wind. Once is
+        /// enough where the fins feel most of the wind; a body without large fins, which feels the
+        /// square of it, needs about five.
         pub wind_passes: u32 = 1,
-        /// A measurement that differs from its prediction by more than this many standard deviations is rejected.
+        /// A measurement that differs from its prediction by more than this many standard
+        /// deviations is rejected.
         pub gate_sigmas: f64 = 5.0,
         /// Beyond these limits the estimate is unhealthy.
         pub health: HealthLimits = HealthLimits::default(),
@@ -148,7 +156,8 @@ impl StartUncertainty {
         }
     }
 
-    /// Where a flight begins. A vehicle below a drone has been carried up, with its estimator running.
+    /// Where a flight begins. A vehicle below a drone has been carried up, with its estimator
+    /// running.
     pub fn at_start(start: StartPoint) -> Self {
         match start {
             StartPoint::Pad => Self::on_pad(),

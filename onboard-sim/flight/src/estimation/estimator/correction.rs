@@ -1,17 +1,18 @@
 //! A correction by one scalar, and the status record of everything that corrects.
 //!
-//! The gate is that of the normalised innovation (Y. Bar-Shalom, X. R. Li and T. Kirubarajan, Estimation with Applications to Tracking
-//! and Navigation, 2001, section 5.4).
+//! The gate is that of the normalised innovation (Y. Bar-Shalom, X. R. Li and T. Kirubarajan,
+//! Estimation with Applications to Tracking and Navigation, 2001, section 5.4).
 
 use serde::Serialize;
 
 use super::Estimator;
 use super::covariance::{ACCELEROMETER_BIAS, ATTITUDE, POSITION, VELOCITY};
 
-/// After this many rejected ranges or numbers of satellite positions (three for each fix) in a row the filter assumes that the
-/// estimated position is wrong.
+/// After this many rejected ranges or numbers of satellite positions (three for each fix) in a row
+/// the filter assumes that the estimated position is wrong.
 pub(super) const POSITION_REJECTIONS: u32 = 10;
-/// Standard deviation that the filter adds to a position or an offset that it assumes to be wrong, m.
+/// Standard deviation that the filter adds to a position or an offset that it assumes to be wrong,
+/// m.
 pub(super) const DOUBT_POSITION_M: f64 = 3.0;
 
 /// The result of a scalar correction.
@@ -28,13 +29,15 @@ pub(super) struct Correction {
     pub(super) accepted: bool,
 }
 
-/// The status of one aid, the same for every one. A measurement that does not fit is refused and counted. If an aid is refused
-/// many times in a row, the filter is wrong.
+/// The status of one aid, the same for every one. A measurement that does not fit is refused and
+/// counted. If an aid is refused many times in a row, the filter is wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct AidStatus {
-    /// The last measurement less its prediction, in the aid's unit; of a fix, that of its worst number. 0 if it was no number.
+    /// The last measurement less its prediction, in the aid's unit; of a fix, that of its worst
+    /// number. 0 if it was no number.
     pub innovation: f64,
-    /// Its size over the largest that is used: above 1 it was refused. Infinite if it was no number.
+    /// Its size over the largest that is used: above 1 it was refused. Infinite if it was no
+    /// number.
     pub test_ratio: f64,
     /// Measurements used.
     pub used: u32,
@@ -117,8 +120,9 @@ impl AidStatus {
     }
 }
 
-/// Whether a height shows an error: not the attitude, nor the motion along the ground. They depend on each other by the
-/// force of a leaning vehicle, but the flow around static ports and a field that is not level err for seconds.
+/// Whether a height shows an error: not the attitude, nor the motion along the ground. They depend
+/// on each other by the force of a leaning vehicle, but the flow around static ports and a field
+/// that is not level err for seconds.
 pub(super) fn shown_by_height(index: usize) -> bool {
     ![POSITION, POSITION + 1, VELOCITY, VELOCITY + 1].contains(&index)
         && !(ATTITUDE..ACCELEROMETER_BIAS).contains(&index)
@@ -130,8 +134,8 @@ pub(super) fn without_last_if(ruled_out: bool, sensitivity: &[(usize, f64)]) -> 
 }
 
 impl Estimator {
-    /// Corrects by one scalar with its sensitivity to each error. Errors that are not `moved` count in the variance but
-    /// are not changed.
+    /// Corrects by one scalar with its sensitivity to each error. Errors that are not `moved` count
+    /// in the variance but are not changed.
     pub(super) fn correct(
         &mut self,
         sensitivity: &[(usize, f64)],

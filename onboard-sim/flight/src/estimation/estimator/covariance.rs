@@ -1,12 +1,13 @@
-//! The covariance of the error state: its propagation in blocks, and its update by scalar measurements.
+//! The covariance of the error state: its propagation in blocks, and its update by scalar
+//! measurements.
 //!
-//! Error state, all small: position (0..3, world, m), velocity (3..6, world, m/s), attitude (6..9, rotation vector in
-//! the world, rad, `R = exp(dphi) R_est`), gyro bias (9..12, body, rad/s), accelerometer bias (12..15, body, m/s^2),
-//! wind (15..17, world x and y, m/s), barometer offset (17, m), ram coefficient (18), offset of the satellite position
-//! (19..22, world, m), error of the satellite fixes' time tags (22, s),
-//! age of a barometer sample (23, s), age of a lidar sample (24, s),
-//! slope of the ground (25..27, rise along world x and y), suction coefficient of the flow across the axis at the barometer
-//! (27), scale of the barometric height (28).
+//! Error state, all small: position (0..3, world, m), velocity (3..6, world, m/s), attitude (6..9,
+//! rotation vector in the world, rad, `R = exp(dphi) R_est`), gyro bias (9..12, body, rad/s),
+//! accelerometer bias (12..15, body, m/s^2), wind (15..17, world x and y, m/s), barometer offset
+//! (17, m), ram coefficient (18), offset of the satellite position (19..22, world, m), error of the
+//! satellite fixes' time tags (22, s), age of a barometer sample (23, s), age of a lidar sample
+//! (24, s), slope of the ground (25..27, rise along world x and y), suction coefficient of the flow
+//! across the axis at the barometer (27), scale of the barometric height (28).
 
 use nalgebra::{Matrix3, Vector3};
 use serde::ser::SerializeTuple as _;
@@ -60,7 +61,8 @@ pub(super) struct Transition {
     pub(super) interval_s: f64,
     /// Velocity gained from the specific force, world, m/s: `dv -= [felt]x dphi`.
     pub(super) felt_m_s: Vector3<f64>,
-    /// Integral of the body-to-world rotation over the interval, s: `dphi -= it dbg`, `dv -= it dba`.
+    /// Integral of the body-to-world rotation over the interval, s: `dphi -= it dbg`, `dv -= it
+    /// dba`.
     pub(super) world_from_body_s: Matrix3<f64>,
     /// Factor on the wind's error.
     pub(super) wind_factor: f64,
@@ -99,8 +101,8 @@ impl Covariance {
         self.rows.iter().flatten().all(|value| value.is_finite())
     }
 
-    /// Correlates the lean with the accelerometer's bias, of this variance, (m/s^2)^2, which was taken for a part of
-    /// the gravity, m/s^2, as the vehicle was levelled.
+    /// Correlates the lean with the accelerometer's bias, of this variance, (m/s^2)^2, which was
+    /// taken for a part of the gravity, m/s^2, as the vehicle was levelled.
     pub(super) fn level(&mut self, world_from_body: &Matrix3<f64>, bias_m2_s4: f64, gravity_m_s2: f64) {
         for axis in 0..3 {
             let column = ACCELEROMETER_BIAS + axis;
@@ -116,8 +118,8 @@ impl Covariance {
         self.rows[index][index] += variance;
     }
 
-    /// `P <- F P F' + Q`. Only position, velocity and attitude have rows in `F` beyond the unit matrix's, so only
-    /// their rows change; the rest is their mirror image.
+    /// `P <- F P F' + Q`. Only position, velocity and attitude have rows in `F` beyond the unit
+    /// matrix's, so only their rows change; the rest is their mirror image.
     pub(super) fn propagate(&mut self, step: &Transition) {
         let (dt, felt, turn) = (step.interval_s, step.felt_m_s, step.world_from_body_s);
         // -[felt]x
@@ -172,7 +174,8 @@ impl Covariance {
         }
     }
 
-    /// Variance of a measurement's prediction, and the covariance of each error with it: `(h P h', P h')`.
+    /// Variance of a measurement's prediction, and the covariance of each error with it: `(h P h',
+    /// P h')`.
     pub(super) fn project(&self, sensitivity: &[(usize, f64)]) -> (f64, Row) {
         let mut with = [0.0; N];
         for (index, share) in sensitivity {
@@ -182,9 +185,9 @@ impl Covariance {
         (variance, with)
     }
 
-    /// Joseph's form (R. S. Bucy and P. D. Joseph, Filtering for Stochastic Processes with Applications to Guidance, 1968) for one
-    /// scalar and any gain, `(I - K h) P (I - K h)' + K r K'`, multiplied out:
-    /// `P - K (P h')' - (P h') K' + s K K'` with `s = h P h' + r`.
+    /// Joseph's form (R. S. Bucy and P. D. Joseph, Filtering for Stochastic Processes with
+    /// Applications to Guidance, 1968) for one scalar and any gain, `(I - K h) P (I - K h)' + K r
+    /// K'`, multiplied out: `P - K (P h')' - (P h') K' + s K K'` with `s = h P h' + r`.
     pub(super) fn update(&mut self, gain: &Row, with: &Row, innovation_variance: f64) {
         for (index, row) in self.rows.iter_mut().enumerate() {
             let by_with = -gain[index];
@@ -285,8 +288,8 @@ mod tests {
         let (seen, with) = covariance.project(&sensitivity);
         assert!((seen - h.dot(&(before * h))).abs() < 1e-12);
         let variance = seen + noise;
-        // Half the optimal gain, and some errors held: a filter that considers errors without estimating them does
-        // this.
+        // Half the optimal gain, and some errors held: a filter that considers errors without
+        // estimating them does this.
         let mut gain = with.map(|value| 0.5 * value / variance);
         gain[4] = 0.0;
         gain[20] = 0.0;

@@ -12,11 +12,11 @@ use super::gnss_gate::REPORTED_M;
 use super::strapdown::Since;
 use super::{Estimator, EstimatorConfig, GnssFix, health};
 
-/// Standard deviations that the filter adds when satellite velocities do not fit on average: of the velocity. All four make
-/// room for what a fault of the inertial unit has done.
+/// Standard deviations that the filter adds when satellite velocities do not fit on average: of the
+/// velocity. All four make room for what a fault of the inertial unit has done.
 const DOUBT_VELOCITY_M_S: f64 = 0.5;
-/// A velocity that surprises while it is off by less, m/s, has crept away: a gyro that is off by 2 deg/s has moved it by 0.3 when
-/// that is noticed, one by 20 deg/s by more than 0.45.
+/// A velocity that surprises while it is off by less, m/s, has crept away: a gyro that is off by 2
+/// deg/s has moved it by 0.3 when that is noticed, one by 20 deg/s by more than 0.45.
 const CREEPS_M_S: f64 = 0.4;
 /// Of the attitude.
 const DOUBT_ATTITUDE_RAD: f64 = 0.04;
@@ -24,12 +24,14 @@ const DOUBT_ATTITUDE_RAD: f64 = 0.04;
 const DOUBT_GYRO_BIAS_RAD_S: f64 = 0.05;
 /// Of the accelerometer's bias.
 const DOUBT_ACCELEROMETER_BIAS_M_S2: f64 = 0.5;
-/// Beyond this lean, rad, an antenna along the nose loses satellites, and a fix is believed to be off by so many times what it is
-/// upright. With 1, 1.5 and 2 a receiver with threefold noise there, which loses half of its fixes, lands mk3 in 31, 55 and 59 of
-/// 60 flights; a gyro that jumps by 2 deg/s 3 s into the fall in 24, 24 and 19 of 24.
+/// Beyond this lean, rad, an antenna along the nose loses satellites, and a fix is believed to be
+/// off by so many times what it is upright. With 1, 1.5 and 2 a receiver with threefold noise
+/// there, which loses half of its fixes, lands mk3 in 31, 55 and 59 of 60 flights; a gyro that
+/// jumps by 2 deg/s 3 s into the fall in 24, 24 and 19 of 24.
 const LEANS_RAD: f64 = 0.35;
 const LEANING_NOISE: f64 = 1.5;
-/// Below this speed along an axis its satellite position does not show how old the fix is, m/s: 10 ms are 0.15 m.
+/// Below this speed along an axis its satellite position does not show how old the fix is, m/s: 10
+/// ms are 0.15 m.
 const SHOWS_AGE_M_S: f64 = 15.0;
 /// The filter's belief before the flight counts as much as this many fixes.
 const BELIEVED_FIXES: f64 = 10.0;
@@ -37,11 +39,13 @@ const BELIEVED_FIXES: f64 = 10.0;
 const REMEMBERED_FIXES: f64 = 40.0;
 /// One fix counts as at most this many standard deviations: an outlier says nothing of the age.
 const AGE_SIGMAS: f64 = 3.0;
-/// Numbers of positions, of ten fixes in two seconds, that must fit after a surprise before the fixes outvote the barometer.
+/// Numbers of positions, of ten fixes in two seconds, that must fit after a surprise before the
+/// fixes outvote the barometer.
 const FITS_AGAIN: u32 = 30;
 
-/// How much the ages of the fixes vary, from how far their positions are off along the motion: innovation-based adaptive
-/// estimation (Mehra, "Approaches to adaptive filtering", IEEE Trans. Automatic Control 17, 1972), of this one number.
+/// How much the ages of the fixes vary, from how far their positions are off along the motion:
+/// innovation-based adaptive estimation (Mehra, "Approaches to adaptive filtering", IEEE Trans.
+/// Automatic Control 17, 1972), of this one number.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(super) struct FixAge {
     variance_s2: f64,
@@ -56,7 +60,8 @@ impl FixAge {
         Self { variance_s2, fixes: BELIEVED_FIXES, smallest_s2: 0.1 * variance_s2 }
     }
 
-    /// Takes how far a position was off, m, the variance that is expected of a fix of exact age, m^2, and the speed, m/s.
+    /// Takes how far a position was off, m, the variance that is expected of a fix of exact age,
+    /// m^2, and the speed, m/s.
     fn take(&mut self, innovation_m: f64, exact_m2: f64, speed_m_s: f64) {
         if self.smallest_s2 <= 0.0 || speed_m_s.abs() < SHOWS_AGE_M_S || !innovation_m.is_finite() {
             return;
@@ -91,8 +96,8 @@ impl Estimator {
                 self.aids.gnss_velocity.refuse();
                 continue;
             };
-            // The past velocity is the present one minus the gain since. The gain depends on the attitude and the
-            // accelerometer bias, which have errors of their own.
+            // The past velocity is the present one minus the gain since. The gain depends on the
+            // attitude and the accelerometer bias, which have errors of their own.
             let felt = since.gained_m_s - lever_m_s
                 + nalgebra::Vector3::z() * (self.config.gravity_m_s2 * since.age_s);
             let by_attitude = felt.cross_matrix();
@@ -164,8 +169,8 @@ impl Estimator {
         self.history.since(fix.valid_at_s - self.nominal.gnss_time_tag_s, &antenna_m_s)
     }
 
-    /// Increases the uncertainty of motion and inertial biases: satellite velocities do not fit on average, so an error
-    /// of the inertial unit must have changed. `creeping`: by little so far.
+    /// Increases the uncertainty of motion and inertial biases: satellite velocities do not fit on
+    /// average, so an error of the inertial unit must have changed. `creeping`: by little so far.
     fn doubt_motion(&mut self, creeping: bool) {
         self.doubted_until_s = self.time_s()
             + if creeping { health::DOUBT_AFTER_SURPRISE_S } else { health::DOUBT_AFTER_RESTART_S };
@@ -192,7 +197,8 @@ mod tests {
         FixAge::new(&EstimatorConfig { gnss_age_jitter_s: 0.01, ..EstimatorConfig::default() })
     }
 
-    /// Innovations of both signs with exactly the variance of this jitter, s, at 40 m/s, beside 0.4 m of everything else.
+    /// Innovations of both signs with exactly the variance of this jitter, s, at 40 m/s, beside 0.4
+    /// m of everything else.
     fn shown(jitter_s: f64, fixes: u32) -> f64 {
         let mut age = age();
         let off_m = libm::sqrt(0.16 + 1600.0 * jitter_s * jitter_s);

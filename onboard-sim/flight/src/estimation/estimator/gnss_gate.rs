@@ -26,14 +26,14 @@ const AGE_ERROR_S: f64 = 0.02;
 /// Difference between the change of position and the two velocities, m, and as a share of it.
 const UNEXPLAINED_M: f64 = 4.0;
 const MOVED_SHARE: f64 = 0.2;
-/// A receiver in doubt has to follow the motion, and to come this close to the estimate: its velocity, m/s, and its
-/// position, m, and in standard deviations of the estimate. After an outage of the whole ascent the estimated
-/// velocity is off by 0.3 m/s.
+/// A receiver in doubt has to follow the motion, and to come this close to the estimate: its
+/// velocity, m/s, and its position, m, and in standard deviations of the estimate. After an outage
+/// of the whole ascent the estimated velocity is off by 0.3 m/s.
 const NEAR_M_S: f64 = 2.0;
 const NEAR_M: f64 = 30.0;
 const NEAR_SIGMAS: f64 = 5.0;
-/// A receiver in doubt after an outage of this length, s, that is this far from the estimate, m/s, has to follow this change
-/// of velocity instead, m/s: one that stands still cannot.
+/// A receiver in doubt after an outage of this length, s, that is this far from the estimate, m/s,
+/// has to follow this change of velocity instead, m/s: one that stands still cannot.
 const OUTAGE_S: f64 = 1.0;
 const FAR_M_S: f64 = 5.0;
 const FOLLOWED_M_S: f64 = 4.0;
@@ -110,8 +110,8 @@ impl GnssGate {
         self.in_doubt = false;
     }
 
-    /// Begins a frame with the velocity gained by the specific force, m/s, whether it was measured, and whether it repeats
-    /// the sample before.
+    /// Begins a frame with the velocity gained by the specific force, m/s, whether it was measured,
+    /// and whether it repeats the sample before.
     pub(super) fn begin_frame(&mut self, force_m_s: f64, measured: bool, repeated: bool) {
         self.admitted_m_s = None;
         self.force_m_s += force_m_s;
@@ -180,7 +180,8 @@ impl Estimator {
         let off_m_s = (fix.velocity_m_s - velocity_m_s + since.gained_m_s).norm();
         let off_m = (fix.position_m - self.nominal.position_m - lever_m + since.moved_m).norm();
         let near_m = NEAR_M + NEAR_SIGMAS * self.covariance.sigmas(POSITION).norm();
-        // After an outage the estimate may be far off, but hardly ever a receiver that follows the motion.
+        // After an outage the estimate may be far off, but hardly ever a receiver that follows the
+        // motion.
         let returns = gate.doubted_after_outage && gate.followed_m_s >= FOLLOWED_M_S && off_m_s > FAR_M_S;
         if gate.followed_m_s > 0.0 && (off_m_s <= NEAR_M_S || returns) && off_m <= near_m {
             gate.in_doubt = false;

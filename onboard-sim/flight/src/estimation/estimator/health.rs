@@ -1,4 +1,5 @@
-//! Whether the estimate is good enough to light a motor, and if not, why; with the two heights that show it.
+//! Whether the estimate is good enough to light a motor, and if not, why; with the two heights that
+//! show it.
 
 use core::fmt;
 use serde::{Deserialize, Serialize};
@@ -9,8 +10,8 @@ use super::{Aids, EstimatorConfig, Sigmas};
 pub(super) const BRIDGED_FRAMES: u32 = 4;
 /// Shortest time that the estimate stays unhealthy after a restart, s.
 pub(super) const DOUBT_AFTER_RESTART_S: f64 = 1.0;
-/// The same after a surprise by velocities that are off by little, s: two fixes, from where on the standard deviations tell. No longer,
-/// as half a second of doubt ends a landing.
+/// The same after a surprise by velocities that are off by little, s: two fixes, from where on the
+/// standard deviations tell. No longer, as half a second of doubt ends a landing.
 pub(super) const DOUBT_AFTER_SURPRISE_S: f64 = 0.45;
 
 /// The estimator's own verdict.
@@ -30,8 +31,8 @@ pub enum Doubt {
     Restarted = "estimate diverged and started afresh",
     /// The inertial unit has sent nothing usable for several frames.
     Imu = "no usable inertial samples",
-    /// The filter had to increase its uncertainty, because satellite velocities differed too much from their
-    /// predictions on average.
+    /// The filter had to increase its uncertainty, because satellite velocities differed too much
+    /// from their predictions on average.
     Surprised = "satellite velocities kept disagreeing",
     /// The velocity's standard deviation is too large.
     Velocity = "velocity uncertain",
@@ -84,24 +85,26 @@ pub(super) fn judge(
 }
 
 with_defaults! {
-    /// Whether satellite velocities still fit on average. Each of them may pass its gate although together they differ too
-    /// much from their predictions: the test of the normalised innovation squared over time (Y. Bar-Shalom, X. R. Li and
-    /// T. Kirubarajan, Estimation with Applications to Tracking and Navigation, 2001, section 5.4), with a memory that fades.
+    /// Whether satellite velocities still fit on average. Each of them may pass its gate although
+    /// together they differ too much from their predictions: the test of the normalised innovation
+    /// squared over time (Y. Bar-Shalom, X. R. Li and T. Kirubarajan, Estimation with Applications
+    /// to Tracking and Navigation, 2001, section 5.4), with a memory that fades.
     #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
     pub(super) struct Surprise {
         mean: f64 = 1.0,
     }
 }
 
-/// Weight of the newest value in the running mean of the normalised innovation squared: the mean remembers three
-/// fixes of three numbers.
+/// Weight of the newest value in the running mean of the normalised innovation squared: the mean
+/// remembers three fixes of three numbers.
 const NEWEST: f64 = 0.1;
-/// In a consistent filter a mean this large has a probability below 1e-6 per fix (the expected mean is 1).
+/// In a consistent filter a mean this large has a probability below 1e-6 per fix (the expected mean
+/// is 1).
 const TOO_MUCH: f64 = 5.0;
 
 impl Surprise {
-    /// Takes one normalised innovation squared. Returns true when the filter must increase its uncertainty; the mean
-    /// then starts again.
+    /// Takes one normalised innovation squared. Returns true when the filter must increase its
+    /// uncertainty; the mean then starts again.
     pub(super) fn take(&mut self, normalised_squared: f64) -> bool {
         self.mean += NEWEST * (normalised_squared.min(100.0) - self.mean);
         let too_much = self.mean > TOO_MUCH;
@@ -114,15 +117,18 @@ impl Surprise {
 
 // Two independent heights. A check before ignition compares them.
 //
-// The first uses no barometer, only the estimated vertical velocity (inertial and satellite), satellite heights with
-// their slow offset, and the lidar. The second is the barometer's last sample without its estimated errors.
+// The first uses no barometer, only the estimated vertical velocity (inertial and satellite),
+// satellite heights with their slow offset, and the lidar. The second is the barometer's last
+// sample without its estimated errors.
 
 /// An older barometer sample is not used, s: a dozen samples are missing.
 const BAROMETER_KEEPS_S: f64 = 0.25;
-/// Correlation time of the vertical velocity's errors, s: satellite velocities correct them in about that time.
+/// Correlation time of the vertical velocity's errors, s: satellite velocities correct them in
+/// about that time.
 const VELOCITY_ERROR_LASTS_S: f64 = 1.0;
 
-/// Growth of the height's variance with each measurement that does not fit; below 1 the variance would shrink.
+/// Growth of the height's variance with each measurement that does not fit; below 1 the variance
+/// would shrink.
 const DOUBT_FACTOR: f64 = 1.1;
 
 /// A difference of fewer standard deviations is no contradiction.
@@ -145,7 +151,8 @@ impl HeightSources {
         self.barometric_m.map(|height_m| (height_m - self.inertial_m).abs())
     }
 
-    /// The same, if the inertial height is known well enough to contradict, m; without fixes it is not for long.
+    /// The same, if the inertial height is known well enough to contradict, m; without fixes it is
+    /// not for long.
     pub fn contradiction_m(&self) -> Option<f64> {
         self.disagreement_m()
             .filter(|off_m| off_m.is_nan() || *off_m > CONTRADICTS_SIGMAS * self.inertial_sigma_m)
@@ -206,8 +213,8 @@ impl HeightChannel {
         self.barometer_age_s = f64::INFINITY;
     }
 
-    /// Takes a satellite height, the distance that the vehicle has climbed since the fix was valid, and the variance
-    /// that its unknown age adds, m^2.
+    /// Takes a satellite height, the distance that the vehicle has climbed since the fix was valid,
+    /// and the variance that its unknown age adds, m^2.
     pub(super) fn take_gnss(
         &mut self,
         config: &EstimatorConfig,
@@ -221,7 +228,8 @@ impl HeightChannel {
         self.update(config, innovation_m, [1.0, 1.0], noise);
     }
 
-    /// Takes a height from the lidar's range and the tilt; the noise grows with the tilt of the beam.
+    /// Takes a height from the lidar's range and the tilt; the noise grows with the tilt of the
+    /// beam.
     pub(super) fn take_lidar(&mut self, config: &EstimatorConfig, height_m: f64, cos_tilt: f64) {
         let sigma = config.lidar_m * cos_tilt;
         self.update(config, height_m - self.height_m, [1.0, 0.0], sigma * sigma);
@@ -239,8 +247,8 @@ impl HeightChannel {
         let variance = height * with_height + offset * with_offset + noise;
         let gate = config.gate_sigmas * config.gate_sigmas * variance;
         if innovation_m.is_nan() || innovation_m * innovation_m > gate {
-            // Each rejected measurement increases the variance a little, so that the channel cannot reject a sensor
-            // forever.
+            // Each rejected measurement increases the variance a little, so that the channel cannot
+            // reject a sensor forever.
             self.height_m2 *= DOUBT_FACTOR;
             return;
         }

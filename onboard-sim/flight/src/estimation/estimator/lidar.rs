@@ -5,29 +5,32 @@ use super::covariance::{ATTITUDE, LIDAR_LATE, POSITION, SLOPE};
 use super::{Estimator, HeightSources};
 use crate::estimation::sensor_watch::LIDAR_BLIND_M;
 
-/// A beam that leans wrongly is wrong in the same way in as many samples as come while the vehicle leans the same way:
-/// 20 in 0.2 s.
+/// A beam that leans wrongly is wrong in the same way in as many samples as come while the vehicle
+/// leans the same way: 20 in 0.2 s.
 const ASKEW_SAMPLES: f64 = 20.0;
-/// Ranges that do not fit the estimate must agree with each other by this before they are believed instead of it, m: two
-/// hundredths of a second apart the estimate's error changes by centimetres, and an outlier by metres.
+/// Ranges that do not fit the estimate must agree with each other by this before they are believed
+/// instead of it, m: two hundredths of a second apart the estimate's error changes by centimetres,
+/// and an outlier by metres.
 const AGREES_M: f64 = 0.5;
-/// A height that is farther from that of the barometer, m, is not believed instead of the estimate, whatever agrees: the own
-/// exhaust is worth 3 m of pressure, a slow offset some more.
+/// A height that is farther from that of the barometer, m, is not believed instead of the estimate,
+/// whatever agrees: the own exhaust is worth 3 m of pressure, a slow offset some more.
 const ASTRAY_M: f64 = 8.0;
-/// Cosine of the tilt (49 degrees) beyond which a lidar range is not used for the height: the beam meets the
-/// ground too far away.
+/// Cosine of the tilt (49 degrees) beyond which a lidar range is not used for the height: the beam
+/// meets the ground too far away.
 const LIDAR_COS_TILT: f64 = 0.65;
 
 /// At this vertical speed no range repeats the one before it to the centimetre, m/s.
 const MOVES_M_S: f64 = 1.0;
-/// A height by the lidar that is off by more, m, and standard deviations, loses to two others that agree.
+/// A height by the lidar that is off by more, m, and standard deviations, loses to two others that
+/// agree.
 const CONTRADICTS_M: f64 = 1.0;
 const CONTRADICTS_SIGMAS: f64 = 2.0;
 /// They agree if they are apart by less than this share of the farther one's distance from it.
 const AGREE_SHARE: f64 = 0.7;
 
 impl Estimator {
-    /// Whether barometer and inertial height, which know nothing of the lidar, agree against its height, m.
+    /// Whether barometer and inertial height, which know nothing of the lidar, agree against its
+    /// height, m.
     fn others_contradict_m(&self, height_m: f64) -> bool {
         let HeightSources { inertial_m, inertial_sigma_m, barometric_m } =
             self.heights_without_lidar.sources();
@@ -38,9 +41,10 @@ impl Estimator {
             && (barometric_m - inertial_m).abs() < AGREE_SHARE * inertial_off_m.max(barometric_off_m)
     }
 
-    /// The lidar looks along body `-x` from its place behind the centre of gravity. Its range plus that distance is the
-    /// height divided by the cosine of the tilt: `s = h / n`, `n` the nose's vertical part. A small turn `d` about the world's axes
-    /// adds `d_x n_y - d_y n_x` to `n`, so it adds `-s / n (d_x n_y - d_y n_x)` to `s`.
+    /// The lidar looks along body `-x` from its place behind the centre of gravity. Its range plus
+    /// that distance is the height divided by the cosine of the tilt: `s = h / n`, `n` the nose's
+    /// vertical part. A small turn `d` about the world's axes adds `d_x n_y - d_y n_x` to `n`, so
+    /// it adds `-s / n (d_x n_y - d_y n_x)` to `s`.
     pub(super) fn take_lidar(&mut self, range_m: f64, lever_m: &nalgebra::Vector3<f64>) {
         let nose = self.nominal.world_from_body * nalgebra::Vector3::x();
         if nose.z < LIDAR_COS_TILT {
@@ -69,7 +73,8 @@ impl Estimator {
         }
         let aside_m = self.nominal.world_from_body * nalgebra::Vector3::new(0.0, lever_m.y, lever_m.z);
         let measured_m = range_m - lever_m.x - aside_m.z / nose.z;
-        // The beam leans as the airframe does, not as the inertial unit does: the same error in many samples.
+        // The beam leans as the airframe does, not as the inertial unit does: the same error in
+        // many samples.
         let askew_m = slant_m * nose.xy().norm() / nose.z * self.config.mounting_deg.to_radians();
         let noise = self.config.lidar_m * self.config.lidar_m + askew_m * askew_m * ASKEW_SAMPLES;
         let take = |estimator: &mut Self| {
@@ -90,7 +95,8 @@ impl Estimator {
         if agrees && !astray && self.aids.lidar.refused_in_a_row >= POSITION_REJECTIONS {
             self.aids.lidar.refused_in_a_row = 0;
             self.covariance.widen(POSITION + 2, DOUBT_POSITION_M * DOUBT_POSITION_M);
-            // At once: the barometer's next sample would end the doubt at the height that no range fits.
+            // At once: the barometer's next sample would end the doubt at the height that no range
+            // fits.
             take(self);
         }
         if measured_m.is_finite() {

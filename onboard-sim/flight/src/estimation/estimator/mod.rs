@@ -1,18 +1,21 @@
 //! Estimates position, motion, attitude and wind from the sensors.
 //!
-//! An error-state Kalman filter with a multiplicative quaternion (Solà, "Quaternion kinematics for the error-state
-//! Kalman filter", 2017; here the attitude error is in world axes). The inertial unit propagates the whole state in
-//! every frame. The error of the state, 29 numbers, is corrected by scalar measurements: barometer with offset, age and ram
-//! error, late satellite fixes with a slowly wandering offset and an error of their time tags, lidar, and the sideways force that shows the wind.
+//! An error-state Kalman filter with a multiplicative quaternion (Solà, "Quaternion kinematics for
+//! the error-state Kalman filter", 2017; here the attitude error is in world axes). The inertial
+//! unit propagates the whole state in every frame. The error of the state, 29 numbers, is corrected
+//! by scalar measurements: barometer with offset, age and ram error, late satellite fixes with a
+//! slowly wandering offset and an error of their time tags, lidar, and the sideways force that
+//! shows the wind.
 //!
-//! * [`Measurements`] and [`VehicleNow`] are the only inputs of a frame: with a log of them the estimator gives the
-//!   same bits again.
-//! * [`EstimatorConfig`] and [`StartUncertainty`] are the assumed errors of the sensors and of the initial state.
+//! * [`Measurements`] and [`VehicleNow`] are the only inputs of a frame: with a log of them the
+//!   estimator gives the same bits again.
+//! * [`EstimatorConfig`] and [`StartUncertainty`] are the assumed errors of the sensors and of the
+//!   initial state.
 //! * [`Estimate`] is the output: state, wind, standard deviations, two heights, health.
 //! * [`alignment`] finds the initial attitude on the pad.
 //!
-//! A measurement that does not fit is rejected and counted ([`Aids`]). If the state is not a number, the filter
-//! restarts from the last good state with a larger uncertainty.
+//! A measurement that does not fit is rejected and counted ([`Aids`]). If the state is not a
+//! number, the filter restarts from the last good state with a larger uncertainty.
 
 pub mod alignment;
 mod barometer;
@@ -234,7 +237,8 @@ impl Estimator {
         self.start_s + self.frames as f64 * self.config.frame_s
     }
 
-    /// Runs one frame: propagates the state with the inertial sample, then corrects it with the other measurements.
+    /// Runs one frame: propagates the state with the inertial sample, then corrects it with the
+    /// other measurements.
     pub fn step(&mut self, measurements: &Measurements, vehicle: &VehicleNow) -> Estimate {
         self.frames += 1;
         self.aids.begin_frame();
@@ -269,8 +273,8 @@ impl Estimator {
         }
     }
 
-    /// Takes a shock along the nose that no inertial unit measures: it changes the velocity by about so much, m/s, and a fix from
-    /// before it does not show the velocity after it.
+    /// Takes a shock along the nose that no inertial unit measures: it changes the velocity by
+    /// about so much, m/s, and a fix from before it does not show the velocity after it.
     pub(crate) fn take_shock(&mut self, gained_m_s: f64) {
         self.doubt_velocity(&(self.nominal.world_from_body * Vector3::x() * gained_m_s));
         self.history.restart();
@@ -325,9 +329,9 @@ impl Estimator {
         self.restarts
     }
 
-    /// Normalised estimation error squared (Bar-Shalom, Li and Kirubarajan 2001, section 5.4) of position, velocity and attitude
-    /// against the truth. In a consistent filter
-    /// it is chi-square with 9 degrees of freedom. `None` if the covariance has lost rank.
+    /// Normalised estimation error squared (Bar-Shalom, Li and Kirubarajan 2001, section 5.4) of
+    /// position, velocity and attitude against the truth. In a consistent filter it is chi-square
+    /// with 9 degrees of freedom. `None` if the covariance has lost rank.
     pub fn nees_of_motion(&self, truth: &RigidState) -> Option<f64> {
         let turn = (truth.world_from_body * self.nominal.world_from_body.inverse()).scaled_axis();
         let position = truth.position_m - self.over_ground_m();
@@ -450,7 +454,8 @@ impl ImuSample {
     }
 }
 
-/// One fix of the satellite receiver, of the antenna. It arrives late: it holds for the time `valid_at_s`.
+/// One fix of the satellite receiver, of the antenna. It arrives late: it holds for the time
+/// `valid_at_s`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GnssFix {
     /// Position of the antenna in the world, relative to the pad, m.

@@ -1,4 +1,5 @@
-//! Recovery of a lost estimate: barometer and satellite receiver agree with each other, and not with it.
+//! Recovery of a lost estimate: barometer and satellite receiver agree with each other, and not
+//! with it.
 //!
 //! After an inertial failure every good measurement is rejected, because the filter is sure of its
 //! state. Two sensors that fail in the same way for a second are less likely than one filter.
@@ -35,7 +36,8 @@ with_defaults! {
 }
 
 impl Estimator {
-    /// Takes a frame's measurements, and gives the estimate up when both have contradicted it for long enough.
+    /// Takes a frame's measurements, and gives the estimate up when both have contradicted it for
+    /// long enough.
     pub(super) fn recover_if_lost(&mut self, measurements: &Measurements) {
         let seen = &mut self.contradiction;
         seen.fix_age_s += self.config.frame_s;

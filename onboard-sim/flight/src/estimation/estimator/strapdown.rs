@@ -1,7 +1,8 @@
-//! Propagates the state and its error with the inertial unit, and keeps the recent motion for late measurements.
+//! Propagates the state and its error with the inertial unit, and keeps the recent motion for late
+//! measurements.
 //!
-//! The motion follows the navigation equations of a world at rest (Groves 2013, chapter 5); its error grows as in Solà 2017, here in
-//! world axes.
+//! The motion follows the navigation equations of a world at rest (Groves 2013, chapter 5); its
+//! error grows as in Solà 2017, here in world axes.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector2, Vector3};
 use serde::Serialize;
@@ -99,7 +100,8 @@ impl Nominal {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Noise {
     pub(super) accelerometer_m_s2_sqrt_hz: f64,
-    /// Variance that each error gains in a second: in the fall, and while the motor shakes the inertial unit.
+    /// Variance that each error gains in a second: in the fall, and while the motor shakes the
+    /// inertial unit.
     per_second: Row,
     burning_per_second: Row,
 }
@@ -147,8 +149,8 @@ with_defaults! {
 }
 
 impl Estimator {
-    /// Integrates one frame: the attitude by the mean rate, the velocity by the mean specific force turned by the
-    /// attitude in the middle of the frame.
+    /// Integrates one frame: the attitude by the mean rate, the velocity by the mean specific force
+    /// turned by the attitude in the middle of the frame.
     pub(super) fn carry_forward(&mut self, imu: &ImuSample, burning: bool, levers: &LeverArms) {
         let interval_s = self.config.frame_s;
         let measured = self.aids.imu.count(imu.is_plausible());
@@ -160,7 +162,8 @@ impl Estimator {
         let state = &mut self.nominal;
         let before_rad_s = self.rate_rad_s;
         self.rate_rad_s = self.last_imu.gyro_rad_s - state.gyro_bias_rad_s;
-        // At the centre of gravity (Groves 2013, section 5.5): the rate in the middle of two samples.
+        // At the centre of gravity (Groves 2013, section 5.5): the rate in the middle of two
+        // samples.
         let angular_m_s2 = (self.rate_rad_s - before_rad_s) / interval_s;
         let middle_rad_s = (self.rate_rad_s + before_rad_s) * 0.5;
         self.specific_force_m_s2 = self.last_imu.specific_force_m_s2 / scale
@@ -228,10 +231,11 @@ impl Estimator {
 
 // The antenna's recent motion, for fixes that arrive late.
 //
-// The history holds the velocity gained and its integral, not past estimates. The past state is the present estimate
-// run backwards, so it contains every correction made since. (This is the recalculation of Larsen and others,
-// "Incorporation of time delayed measurements in a discrete-time Kalman filter", CDC 1998, for a system whose motion
-// in between is known better than the measurement.)
+// The history holds the velocity gained and its integral, not past estimates. The past state is the
+// present estimate run backwards, so it contains every correction made since. (This is the
+// recalculation of Larsen and others, "Incorporation of time delayed measurements in a
+// discrete-time Kalman filter", CDC 1998, for a system whose motion in between is known better than
+// the measurement.)
 
 /// Frames kept: 320 ms at 200 Hz.
 const LENGTH: usize = 64;
@@ -279,7 +283,8 @@ impl History {
         self.filled = 1;
     }
 
-    /// Adds one frame: the velocity gained by the centre of gravity, m/s, and the antenna's lever arm, m, with its velocity, m/s.
+    /// Adds one frame: the velocity gained by the centre of gravity, m/s, and the antenna's lever
+    /// arm, m, with its velocity, m/s.
     pub(super) fn push(
         &mut self,
         time_s: f64,
@@ -311,8 +316,8 @@ impl History {
         self.ring[self.newest].velocity_m_s
     }
 
-    /// The motion since a time, for an antenna that now has this velocity. `None` for a time in the future or too long
-    /// ago.
+    /// The motion since a time, for an antenna that now has this velocity. `None` for a time in the
+    /// future or too long ago.
     pub(super) fn since(&self, valid_at_s: f64, velocity_m_s: &Vector3<f64>) -> Option<Since> {
         let now = self.ring[self.newest];
         let age_s = now.time_s - valid_at_s;
@@ -356,7 +361,8 @@ mod tests {
         for frame in 1..=200 {
             history.push(f64::from(frame) * dt, dt, &(g * dt), [Vector3::zeros(); 2]);
         }
-        // The time is 1 s. The velocity at the start, which the history does not contain, was (3, 0, -5).
+        // The time is 1 s. The velocity at the start, which the history does not contain, was (3,
+        // 0, -5).
         let start = Vector3::new(3.0, 0.0, -5.0);
         let now = start + g;
         for age in [0.0, 0.005, 0.12, 0.2] {
@@ -365,7 +371,8 @@ mod tests {
             assert!((since.moved_m - moved).norm() < 1e-12, "{age}: {} {moved}", since.moved_m);
             assert!((since.gained_m_s - g * age).norm() < 1e-12);
         }
-        // Between frames the velocity is exact; the error of the position is below its curvature over a frame.
+        // Between frames the velocity is exact; the error of the position is below its curvature
+        // over a frame.
         let since = history.since(1.0 - 0.1234, &now).unwrap();
         assert!((since.gained_m_s - g * 0.1234).norm() < 1e-12);
         assert!(history.since(1.1, &now).is_none(), "to come");

@@ -32,7 +32,8 @@ fn at(height_m: f64) -> Estimator {
     Estimator::new(&EstimatorConfig::default(), &StartUncertainty::at_apogee(), 0.0, &state)
 }
 
-/// The measurements of every sensor in an upright hover. No fix repeats the one before it: such a fix is stale.
+/// The measurements of every sensor in an upright hover. No fix repeats the one before it: such a
+/// fix is stale.
 fn hovering(frame: u64) -> Measurements {
     let unrepeated_m = if frame.is_multiple_of(80) { 1e-9 } else { 0.0 };
     Measurements {
@@ -169,8 +170,9 @@ fn a_state_that_is_not_a_number_restarts_from_the_last_good_one() {
     assert!((estimator.estimate().state.position_m.z - 5.0).abs() < 0.1);
 }
 
-/// Flies level over ground that rises by 2 % along x, at 8 m/s and 8 m above the pad's level, with exact sensors. Returns
-/// the estimated height over the ground less the true one, and the standard deviation that the filter has for it.
+/// Flies level over ground that rises by 2 % along x, at 8 m/s and 8 m above the pad's level, with
+/// exact sensors. Returns the estimated height over the ground less the true one, and the standard
+/// deviation that the filter has for it.
 fn height_error_over_a_slope(ground_slope_deg: f64) -> (f64, f64) {
     const RISE: f64 = 0.02;
     const SPEED_M_S: f64 = 8.0;
@@ -208,8 +210,9 @@ fn a_filter_that_expects_a_slope_is_not_deceived_by_it() {
     assert!(level_m.abs() > 2.0 * level_sigma_m, "the slope must matter: {level_m} m with {level_sigma_m} m");
 }
 
-/// Brakes from 20 m/s to 8 m/s with a lidar that is 10 ms late, and otherwise only an exact inertial unit. Returns the
-/// error of the estimated height and the standard deviation that the filter has for it.
+/// Brakes from 20 m/s to 8 m/s with a lidar that is 10 ms late, and otherwise only an exact
+/// inertial unit. Returns the error of the estimated height and the standard deviation that the
+/// filter has for it.
 fn height_error_with_a_late_lidar(lidar_late_s: f64) -> (f64, f64) {
     const LATE_S: f64 = 0.01;
     const BRAKING_M_S2: f64 = 10.0;
@@ -240,8 +243,9 @@ fn a_filter_that_expects_a_late_lidar_doubts_its_ranges() {
     assert!(expecting_m.abs() < trusting_m.abs(), "{expecting_m} m, trusting {trusting_m} m");
 }
 
-/// Hovers 5 m over the ground where the satellites, and the barometer if there is one, show 8 m. From `first` on measures the
-/// ranges to the ground, the tenth of which is `tenth_m`. Returns the estimated heights after each frame from then on.
+/// Hovers 5 m over the ground where the satellites, and the barometer if there is one, show 8 m.
+/// From `first` on measures the ranges to the ground, the tenth of which is `tenth_m`. Returns the
+/// estimated heights after each frame from then on.
 fn heights_with_ranges_from(first: u64, tenth_m: f64, has_barometer: bool) -> Vec<f64> {
     let mut estimator = at(8.0);
     (1..first + 40)
@@ -282,7 +286,8 @@ fn two_other_heights_outvote_ranges_that_agree() {
     assert!(heights_m.iter().all(|height_m| (height_m - 8.0).abs() < 0.1), "{heights_m:?}");
 }
 
-/// Hovers for 10 s at 5 m, out of the lidar's sight, and from the fifth second on the barometer and the fixes are higher by these, m.
+/// Hovers for 10 s at 5 m, out of the lidar's sight, and from the fifth second on the barometer and
+/// the fixes are higher by these, m.
 fn hover_with_heights_off(barometer_m: f64, fixes_m: f64) -> Estimate {
     let mut estimator = at(5.0);
     for frame in 1..=2000 {
@@ -316,7 +321,8 @@ fn two_heights_outvote_the_third() {
     }
 }
 
-/// A charge changes the velocity by what no inertial unit feels. The fixes show it, and nothing else is doubted.
+/// A charge changes the velocity by what no inertial unit feels. The fixes show it, and nothing
+/// else is doubted.
 #[test]
 fn an_expected_shock_does_not_spoil_the_attitude() {
     let doubts = [true, false].map(|expected| {

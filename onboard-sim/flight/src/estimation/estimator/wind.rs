@@ -1,8 +1,9 @@
 //! The horizontal wind, from the sideways specific force while the vehicle falls.
 //!
-//! In free fall only the air exerts a force: the sideways specific force is the fins' drag along the relative wind plus
-//! the body's cross-flow drag (Hoerner, "Fluid-Dynamic Drag", 1965, cross-flow principle). It corrects only the
-//! estimated wind, because a wrong drag coefficient must not tilt the attitude.
+//! In free fall only the air exerts a force: the sideways specific force is the fins' drag along
+//! the relative wind plus the body's cross-flow drag (Hoerner, "Fluid-Dynamic Drag", 1965,
+//! cross-flow principle). It corrects only the estimated wind, because a wrong drag coefficient
+//! must not tilt the attitude.
 
 use nalgebra::{Matrix2, Matrix2x3, Rotation3, Vector2, Vector3};
 use serde::Serialize;
@@ -15,9 +16,11 @@ use crate::vehicle::mission::{Exhaust, LeverArms};
 
 /// Frames whose sideways force is averaged for one update: 20 ms, in which a gust hardly changes.
 const FRAMES: u32 = 4;
-/// Below this dynamic pressure the force is not used, Pa: at 6 m/s it is small beside the accelerometer's errors.
+/// Below this dynamic pressure the force is not used, Pa: at 6 m/s it is small beside the
+/// accelerometer's errors.
 const SMALLEST_DYNAMIC_PRESSURE_PA: f64 = 20.0;
-/// An error of the drag coefficients does not average out. It counts as noise with this correlation time, s.
+/// An error of the drag coefficients does not average out. It counts as noise with this correlation
+/// time, s.
 const COEFFICIENT_ERROR_LASTS_S: f64 = 2.0;
 
 /// The running mean of the sideways specific force, body y and z.
@@ -44,7 +47,8 @@ impl Sideways {
     }
 }
 
-/// Sideways specific force of the air, body y and z, m/s^2, and its derivative by the sideways relative wind, 1/s.
+/// Sideways specific force of the air, body y and z, m/s^2, and its derivative by the sideways
+/// relative wind, 1/s.
 fn felt_sideways(
     vehicle: &VehicleNow,
     through_air_m_s: &Vector3<f64>,
@@ -110,10 +114,12 @@ impl Estimator {
         white + share * share * COEFFICIENT_ERROR_LASTS_S / mean_over_s
     }
 
-    /// The wind at which the sideways force is linearised: the estimated wind, or with more passes the most likely wind by
-    /// the steps of Gauss and Newton (the iterated filter; Bell and Cathey, IEEE Trans. Automatic Control 38, 1993). The
-    /// body's cross-flow force grows with the square of the wind and has no slope in still air. Linearised there, all of
-    /// a first force counts as the fins', and the wind comes out as much as three times too strong, or the force is rejected.
+    /// The wind at which the sideways force is linearised: the estimated wind, or with more passes
+    /// the most likely wind by the steps of Gauss and Newton (the iterated filter; Bell and Cathey,
+    /// IEEE Trans. Automatic Control 38, 1993). The body's cross-flow force grows with the square
+    /// of the wind and has no slope in still air. Linearised there, all of a first force counts as
+    /// the fins', and the wind comes out as much as three times too strong, or the force is
+    /// rejected.
     fn linearised_at_m_s(
         &mut self,
         vehicle: &VehicleNow,
@@ -153,29 +159,31 @@ pub struct VehicleNow {
     pub air_density_kg_m3: f64,
     /// Axial drag coefficient of the body times its area, m^2.
     pub body_drag_area_m2: f64,
-    /// Drag area of the legs, m^2. Their drag is along the relative wind, too; what turning adds to it is left out.
+    /// Drag area of the legs, m^2. Their drag is along the relative wind, too; what turning adds to
+    /// it is left out.
     pub leg_drag_area_m2: f64,
-    /// Sum over the fins of drag coefficient times area at their present openings, m^2. Their drag is along the
-    /// relative wind, so this counts sideways as well.
+    /// Sum over the fins of drag coefficient times area at their present openings, m^2. Their drag
+    /// is along the relative wind, so this counts sideways as well.
     pub fin_drag_area_m2: f64,
-    /// Sum over the fins of lift coefficient times area times the direction from the axis to the fin, body y and z,
-    /// m^2, each with the sign of its roll moment: zero while the openings are equal.
+    /// Sum over the fins of lift coefficient times area times the direction from the axis to the
+    /// fin, body y and z, m^2, each with the sign of its roll moment: zero while the openings are
+    /// equal.
     pub fin_lift_area_m2: Vector2<f64>,
     /// Distance of the fins ahead of the centre of gravity, m.
     pub fin_ahead_of_cg_m: f64,
-    /// Cross-flow drag coefficient of the body times its side area, m^2: the force sideways is that times the
-    /// dynamic pressure of the sideways wind alone.
+    /// Cross-flow drag coefficient of the body times its side area, m^2: the force sideways is that
+    /// times the dynamic pressure of the sideways wind alone.
     pub crossflow_area_m2: f64,
-    /// The igniter has been fired, so the landing motor may burn. The wind is then not estimated from the sideways
-    /// force, because the motor's own sideways force is not known well enough.
+    /// The igniter has been fired, so the landing motor may burn. The wind is then not estimated
+    /// from the sideways force, because the motor's own sideways force is not known well enough.
     pub motor_burning: bool,
     /// Lever arms of the sensors.
     pub levers: LeverArms,
 }
 
 impl VehicleNow {
-    /// The data from an airframe, its masses, the air density, kg/m^3, the present fin openings, rad, and
-    /// the sensors' lever arms.
+    /// The data from an airframe, its masses, the air density, kg/m^3, the present fin openings,
+    /// rad, and the sensors' lever arms.
     pub fn of(
         airframe: &Airframe,
         mass: &MassProperties,
@@ -219,8 +227,9 @@ impl VehicleNow {
         }
     }
 
-    /// Force of the air in body axes, N, for a velocity through the air in body axes, m/s, and a rotation rate, rad/s:
-    /// drag of the body along its axis (Eq. 8 of the landing paper) and across it, drag and lift of the fins.
+    /// Force of the air in body axes, N, for a velocity through the air in body axes, m/s, and a
+    /// rotation rate, rad/s: drag of the body along its axis (Eq. 8 of the landing paper) and
+    /// across it, drag and lift of the fins.
     pub fn air_force_n(&self, through_air_m_s: &Vector3<f64>, rate_rad_s: &Vector3<f64>) -> Vector3<f64> {
         let velocity = through_air_m_s;
         let at_fins = velocity + rate_rad_s.cross(&Vector3::new(self.fin_ahead_of_cg_m, 0.0, 0.0));
@@ -243,7 +252,8 @@ mod tests {
     use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
     use crate::vehicle::rigid::RigidState;
 
-    /// The wind that a body with small fins feels after a fifth of a second of a fall through a wind of 8 m/s.
+    /// The wind that a body with small fins feels after a fifth of a second of a fall through a
+    /// wind of 8 m/s.
     fn felt_of_8_m_s(wind_passes: u32) -> Vector2<f64> {
         const FRAME_S: f64 = 0.005;
         let vehicle = VehicleNow { mass_kg: 1.2, fin_drag_area_m2: 0.003, ..VEHICLE };
@@ -286,7 +296,8 @@ mod tests {
             let quotient = (felt_sideways(&VEHICLE, &ahead, &rate).0
                 - felt_sideways(&VEHICLE, &behind, &rate).0)
                 / (2.0 * step);
-            // The change of the speed is neglected: it is of the order of (sideways wind / speed) squared.
+            // The change of the speed is neglected: it is of the order of (sideways wind / speed)
+            // squared.
             assert!((quotient - slope.column(axis)).norm() < 0.005 * slope.norm(), "{quotient} {slope}");
         }
     }
@@ -294,8 +305,9 @@ mod tests {
     #[test]
     fn val_hand_air_force() {
         let vehicle = VehicleNow { fin_lift_area_m2: Vector2::new(0.0, 0.002), ..VEHICLE };
-        // 40 m/s down the axis and 3 m/s sideways: V = 40.112342. Body: 0.0043 V 40 along, 0.09 * 9 sideways.
-        // Fins: 0.031 V (40, 3); lift: v x G with G = (0, 0, 0.002) is (3 * 0.002, 40 * 0.002, 0), times V.
+        // 40 m/s down the axis and 3 m/s sideways: V = 40.112342. Body: 0.0043 V 40 along, 0.09 * 9
+        // sideways. Fins: 0.031 V (40, 3); lift: v x G with G = (0, 0, 0.002) is (3 * 0.002, 40 *
+        // 0.002, 0), times V.
         let force = vehicle.air_force_n(&Vector3::new(-40.0, 3.0, 0.0), &Vector3::zeros());
         // -0.6 (-6.899323 - 49.739304 + 0.240674, 0.81 + 3.730448 + 3.208987, 0)
         assert!((force - Vector3::new(33.838_772, -4.649_661, 0.0)).norm() < 1e-5, "{force}");

@@ -1,15 +1,18 @@
-//! Estimates the impulse, the burn time and the instant of ignition of the motor from the specific force along the
-//! nose.
+//! Estimates the impulse, the burn time and the instant of ignition of the motor from the specific
+//! force along the nose.
 //!
-//! A solid motor's impulse differs from its data sheet by about 2.5 %, its burn time by about 4 %. With the nominal
-//! curve `T0(t)`, the impulse scale `s`, the burn-time stretch `b` and the instant of ignition `t0`, the thrust is
-//! `T(t) = (1 + n) s / b T0((t - t0) / b)`. The deviation `n` from the certified shape wanders: it is a first-order
-//! Gauss-Markov process with mean zero. Without it a shape error would pass for an error of impulse and burn time that
-//! the filter is ever surer of. The specific force along the nose contains the thrust and the air force:
-//! `m f_x = T cos p cos y + d A`, with the gimbal angles `p` and `y`, the modelled air force `A` and its scale `d`. An
-//! extended Kalman filter over `(s, b, t0, d, n)` finds all five; it finds `d` before ignition, while the vehicle falls.
+//! A solid motor's impulse differs from its data sheet by about 2.5 %, its burn time by about 4
+//! %. With the nominal curve `T0(t)`, the impulse scale `s`, the burn-time stretch `b` and the
+//! instant of ignition `t0`, the thrust is `T(t) = (1 + n) s / b T0((t - t0) / b)`. The
+//! deviation `n` from the certified shape wanders: it is a first-order Gauss-Markov process
+//! with mean zero. Without it a shape error would pass for an error of impulse and burn time
+//! that the filter is ever surer of. The specific force along the nose contains the thrust and
+//! the air force: `m f_x = T cos p cos y + d A`, with the gimbal angles `p` and `y`, the
+//! modelled air force `A` and its scale `d`. An extended Kalman filter over `(s, b, t0, d, n)`
+//! finds all five; it finds `d` before ignition, while the vehicle falls.
 //!
-//! The process and the filter are those of A. Gelb (editor), Applied Optimal Estimation, 1974, chapters 3 and 6.
+//! The process and the filter are those of A. Gelb (editor), Applied Optimal Estimation, 1974,
+//! chapters 3 and 6.
 
 #[cfg(test)]
 mod tests;
@@ -37,14 +40,15 @@ pub struct MotorSample {
 }
 
 with_defaults! {
-    /// The prior of the motor before ignition, and the noise, as standard deviations. The defaults are the scatter of certified
-    /// motors, 1 % of mass, and a hobby accelerometer at 200 Hz.
+    /// The prior of the motor before ignition, and the noise, as standard deviations. The defaults
+    /// are the scatter of certified motors, 1 % of mass, and a hobby accelerometer at 200 Hz.
     #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
     #[serde(deny_unknown_fields, default)]
     pub struct MotorPrior {
         /// Length of a frame, s.
         pub frame_s: f64 = 0.005,
-        /// Impulse scale. It includes the mass error, because the accelerometer cannot tell the two apart.
+        /// Impulse scale. It includes the mass error, because the accelerometer cannot tell the two
+        /// apart.
         pub impulse_sigma: f64 = 0.027,
         /// Burn-time stretch.
         pub burn_time_sigma: f64 = 0.04,
@@ -54,11 +58,13 @@ with_defaults! {
         pub accelerometer_m_s2: f64 = 0.09,
         /// Roughness of the burn around its curve, as a fraction of the thrust.
         pub roughness_share: f64 = 0.02,
-        /// Deviation of the thrust from the certified shape, as a fraction of the thrust; 0 trusts the shape.
+        /// Deviation of the thrust from the certified shape, as a fraction of the thrust; 0 trusts
+        /// the shape.
         pub shape_sigma: f64 = 0.0,
         /// Correlation time of that deviation, s.
         pub shape_lasts_s: f64 = 1.0,
-        /// What the exhaust may change of the air force beyond what is assumed, as a fraction of the air force.
+        /// What the exhaust may change of the air force beyond what is assumed, as a fraction of
+        /// the air force.
         pub exhaust_sigma: f64 = 0.0,
     }
 }
@@ -110,8 +116,8 @@ const IGNITION: usize = 2;
 const AIR: usize = 3;
 const SHAPE: usize = 4;
 
-/// The igniter and the first pressure peak are not in the curve, so samples within this time after ignition are not
-/// used, s.
+/// The igniter and the first pressure peak are not in the curve, so samples within this time after
+/// ignition are not used, s.
 const SPIKE_S: f64 = 0.06;
 /// Correlation time of roughness and shape errors, s: samples within it are not independent.
 const ROUGHNESS_LASTS_S: f64 = 0.1;
@@ -125,14 +131,16 @@ const AIR_WALK_SQRT_S: f64 = 0.01;
 const SMALLEST_AIR_N: f64 = 2.0;
 /// Below this fraction of the peak, in the tail-off, samples are not used.
 const TAIL_SHARE: f64 = 0.08;
-/// A sample that differs from its prediction by more than this many standard deviations is rejected.
+/// A sample that differs from its prediction by more than this many standard deviations is
+/// rejected.
 const GATE_SIGMAS: f64 = 5.0;
-/// Below this fraction of the predicted thrust, for [`STARVED_FRAMES`] in a row, the motor has burnt out: no motor is so weak.
+/// Below this fraction of the predicted thrust, for [`STARVED_FRAMES`] in a row, the motor has
+/// burnt out: no motor is so weak.
 const STARVED_SHARE: f64 = 0.3;
 /// 80 ms: a dip of the thrust is shorter.
 const STARVED_FRAMES: u32 = 16;
-/// A motor that goes out within this time of its first thrust has chuffed, and lights again, s: its propellant did not burn
-/// yet where the igniter did not reach.
+/// A motor that goes out within this time of its first thrust has chuffed, and lights again, s: its
+/// propellant did not burn yet where the igniter did not reach.
 const CHUFF_S: f64 = 0.4;
 /// Half the span over which the curve's slope is taken, s.
 const SLOPE_SPAN_S: f64 = 0.02;
@@ -164,8 +172,8 @@ impl MotorEstimate {
         }
     }
 
-    /// How badly the burn's frames fit the curve: minus twice the logarithm of their likelihood, but for a constant, as the mean
-    /// of a frame. Infinite before the first.
+    /// How badly the burn's frames fit the curve: minus twice the logarithm of their likelihood,
+    /// but for a constant, as the mean of a frame. Infinite before the first.
     pub fn misfit(&self) -> f64 {
         if self.compared == 0 { f64::INFINITY } else { self.misfit / f64::from(self.compared) }
     }
@@ -222,9 +230,9 @@ impl MotorEstimate {
         Deviation { share, at_s: self.felt_at_s - self.mean[IGNITION], lasts_s: self.prior.shape_lasts_s }
     }
 
-    /// The worst burn at this many standard deviations: the one that changes a quantity most, given the quantity's
-    /// derivatives by impulse scale, burn-time stretch and deviation from the shape. A positive number of deviations
-    /// raises the quantity.
+    /// The worst burn at this many standard deviations: the one that changes a quantity most, given
+    /// the quantity's derivatives by impulse scale, burn-time stretch and deviation from the shape.
+    /// A positive number of deviations raises the quantity.
     pub fn doubted<'a>(&self, curve: &'a ThrustCurve, derivatives: [f64; 3], sigmas: f64) -> Burn<'a> {
         let [by_impulse, by_stretch, by_shape] = derivatives;
         let by_scales = Vector2::new(by_impulse, by_stretch);
@@ -280,7 +288,8 @@ impl MotorEstimate {
         }
     }
 
-    /// Thrust at a time on the sample's clock. Before ignition the motor is assumed to light at `lights_at_s`.
+    /// Thrust at a time on the sample's clock. Before ignition the motor is assumed to light at
+    /// `lights_at_s`.
     pub fn predict(&self, curve: &ThrustCurve, time_s: f64, lights_at_s: f64) -> PredictedThrust {
         let ignition_s = match self.stage {
             MotorStage::Waiting => lights_at_s,
@@ -304,8 +313,9 @@ impl MotorEstimate {
         PredictedThrust { thrust_n, sigma_n: libm::sqrt(variance.max(0.0)) }
     }
 
-    /// Normalised estimation error squared of impulse scale and burn-time stretch against the truth. In a consistent
-    /// filter it is chi-square with 2 degrees of freedom. `None` if the covariance has lost rank.
+    /// Normalised estimation error squared of impulse scale and burn-time stretch against the
+    /// truth. In a consistent filter it is chi-square with 2 degrees of freedom. `None` if the
+    /// covariance has lost rank.
     pub fn nees_of_scales(&self, impulse_scale: f64, burn_time_stretch: f64) -> Option<f64> {
         let error = Vector2::new(impulse_scale, burn_time_stretch) - self.mean.fixed_rows::<2>(0);
         let covariance = self.covariance.fixed_view::<2, 2>(0, 0).into_owned();
@@ -417,8 +427,9 @@ impl MotorEstimate {
     }
 }
 
-/// The scalar product. The first four terms are added as in a product of four, so that a filter that trusts the shape
-/// gives the same bits as one without a fifth state: logs of that filter still verify.
+/// The scalar product. The first four terms are added as in a product of four, so that a filter
+/// that trusts the shape gives the same bits as one without a fifth state: logs of that filter
+/// still verify.
 fn product(one: &Vector5<f64>, other: &Vector5<f64>) -> f64 {
     one.fixed_rows::<4>(0).dot(&other.fixed_rows::<4>(0)) + one[SHAPE] * other[SHAPE]
 }
@@ -429,7 +440,8 @@ fn product(one: &Vector5<f64>, other: &Vector5<f64>) -> f64 {
 const CAUGHT_SHARE: f64 = 0.1;
 /// Standard deviation of the instant, s: about a frame.
 const IGNITION_SIGMA_S: f64 = 0.004;
-/// The curve's own rise to that fraction is searched up to this time, and in steps of this length, s.
+/// The curve's own rise to that fraction is searched up to this time, and in steps of this length,
+/// s.
 const RISE_S: f64 = 0.3;
 const RISE_STEP_S: f64 = 0.0005;
 
@@ -442,7 +454,8 @@ struct Detector {
 }
 
 impl Detector {
-    /// Takes a frame's mean thrust. Returns when the thrust rose through the threshold, s, if this is the second frame above it.
+    /// Takes a frame's mean thrust. Returns when the thrust rose through the threshold, s, if this
+    /// is the second frame above it.
     fn take(&mut self, mark_n: f64, middle_s: f64, thrust_n: f64) -> Option<f64> {
         let before = self.last.replace((middle_s, thrust_n));
         if thrust_n <= mark_n {

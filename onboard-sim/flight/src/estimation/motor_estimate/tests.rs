@@ -9,7 +9,8 @@ use serde::Serialize;
 const POINTS: [(f64, f64); 7] =
     [(0.0, 0.0), (0.14, 62.0), (1.3, 69.0), (2.5, 61.0), (4.1, 34.0), (5.5, 14.0), (7.2, 0.0)];
 
-/// A regressive motor like a slow-burning H: it rises in 0.14 s, is flat for a while, then falls for a long time.
+/// A regressive motor like a slow-burning H: it rises in 0.14 s, is flat for a while, then falls
+/// for a long time.
 static CURVE: LazyLock<ThrustCurve> = LazyLock::new(|| {
     let points = POINTS.map(|(time_s, thrust_n)| ThrustPoint { time_s, thrust_n }).to_vec();
     ThrustCurve::new(MotorData { points, ..MotorData::default() }).expect("it has thrust")
@@ -156,15 +157,15 @@ fn future_thrust_is_predicted_within_its_stated_uncertainty() {
             (informed / f64::from(n)).sqrt(),
             (ignorant / f64::from(n)).sqrt()
         );
-        // These motors do not have the roughness that the filter allows for, so the filter may state too large an
-        // uncertainty, but not too small a one.
+        // These motors do not have the roughness that the filter allows for, so the filter may
+        // state too large an uncertainty, but not too small a one.
         assert!(mean < 1.0 + 4.0 * (2.0 / f64::from(n)).sqrt(), "after {end_s} s: {mean}");
         assert!(informed < before_share * before_share * ignorant, "after {end_s} s");
     }
 }
 
-/// Thrust that waves by 2 % around the curve. A filter that trusts the shape is far too sure of impulse and burn time;
-/// one that does not knows how little it knows.
+/// Thrust that waves by 2 % around the curve. A filter that trusts the shape is far too sure of
+/// impulse and burn time; one that does not knows how little it knows.
 #[test]
 fn a_wrong_shape_is_no_surprise_to_a_filter_that_expects_one() {
     let trusting = MotorPrior { roughness_share: 0.003, ..MotorPrior::default() };

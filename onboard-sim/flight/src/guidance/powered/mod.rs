@@ -1,11 +1,12 @@
 //! Phase 2: from ignition to touchdown on a motor that cannot be throttled.
 //!
-//! A tick poses a landing for the [NMPC](ocp::landing): gimbal, fins and final time at once, from the plan that is flown. It is
-//! [searched](Search) apart from the frames, and flown from the frame on in which it is ready.
-//! The nose may lean in any direction. The plan contains the thrust curve as estimated by
-//! [`Burn`](crate::vehicle::burn::Burn), the burning mass, the drag of body and fins, a floor above the ground, and a free
-//! final time that is not before the thrust falls through the weight. In each frame the plan says where the nose points
-//! and how far the fins are open.
+//! A tick poses a landing for the [NMPC](ocp::landing): gimbal, fins and final time at once, from
+//! the plan that is flown. It is [searched](Search) apart from the frames, and flown from the frame
+//! on in which it is ready. The nose may lean in any direction. The plan contains the thrust curve
+//! as estimated by [`Burn`](crate::vehicle::burn::Burn), the burning mass, the drag of body and
+//! fins, a floor above the ground, and a free final time that is not before the thrust falls
+//! through the weight. In each frame the plan says where the nose points and how far the fins are
+//! open.
 //!
 //! Without a plan the guidance degrades in reported steps, the [`ControlLevel`]s.
 
@@ -31,10 +32,12 @@ use crate::vehicle::rigid::RigidState;
 /// well within what the legs take.
 const END_LEAN_MAX_RAD: f64 = 0.05;
 
-/// Largest lean with which a vehicle is brought to rest before contact, rad: 5 degrees, half of what the legs take.
+/// Largest lean with which a vehicle is brought to rest before contact, rad: 5 degrees, half of
+/// what the legs take.
 const CONTACT_LEAN_RAD: f64 = 0.0873;
 
-/// A plan that touches down faster than this is not flown unless the vehicle is high, m/s: the upright law brakes just as well.
+/// A plan that touches down faster than this is not flown unless the vehicle is high, m/s: the
+/// upright law brakes just as well.
 const HARD_M_S: f64 = -1.2;
 
 /// The guidance and its memory.
@@ -48,16 +51,19 @@ pub struct PoweredGuidance {
 }
 
 impl PoweredGuidance {
-    /// Guidance without a plan, and a search with room for every plan, however long the motor burns.
+    /// Guidance without a plan, and a search with room for every plan, however long the motor
+    /// burns.
     ///
-    /// It plans a landing with the most intervals and forgets the plans, so that every buffer has its size.
+    /// It plans a landing with the most intervals and forgets the plans, so that every buffer has
+    /// its size.
     pub fn with_room(
         settings: PoweredSettings,
         state: &RigidState,
         situation: &PoweredSituation<'_>,
     ) -> (Self, Search) {
         let solver = SolverLimits { max_iterations: 1, ..settings.solver };
-        // As many intervals as there can be, and no longer than in flight: of longer ones fewer would be settled.
+        // As many intervals as there can be, and no longer than in flight: of longer ones fewer
+        // would be settled.
         let carried_s = situation.ends_s(0.0, 0.0).map_or(0.0, |(earliest_s, _)| earliest_s);
         let latest_after_s = MOST_INTERVALS as f64 * settings.interval_s - carried_s;
         let mut planned = Self::new(PoweredSettings { solver, max_solves: 1, latest_after_s, ..settings });
@@ -110,8 +116,9 @@ impl PoweredGuidance {
         search.begin(&self.flown);
     }
 
-    /// Takes over what was searched, if it is finite; there is no outcome if the thrust never carries the vehicle. `high`: as in
-    /// its situation; `posed_and_now_s`: when it was posed, and the time now.
+    /// Takes over what was searched, if it is finite; there is no outcome if the thrust never
+    /// carries the vehicle. `high`: as in its situation; `posed_and_now_s`: when it was posed, and
+    /// the time now.
     pub(crate) fn take_over(
         &mut self,
         search: &mut Search,
@@ -127,10 +134,12 @@ impl PoweredGuidance {
         };
         let found = &mut search.found;
         let usable = found.is_finite();
-        // Too low for any landing: upright brakes just as well. High above the ground it would stop the vehicle there.
+        // Too low for any landing: upright brakes just as well. High above the ground it would stop
+        // the vehicle there.
         let too_low = !high && found.end_m_s() < HARD_M_S;
         let lands = outcome.status == Status::Converged && outcome.miss <= self.settings.landing_miss;
-        // Processors give the NaN of a broken plan different signs, and the report is in the digest.
+        // Processors give the NaN of a broken plan different signs, and the report is in the
+        // digest.
         let one_nan = |value: f64| if value.is_nan() { f64::NAN } else { value };
         self.report = PoweredReport {
             level: ControlLevel::of_plan(usable, self.left_s(time_s), too_low, lands),
@@ -161,8 +170,8 @@ impl PoweredGuidance {
 
     /// The wanted direction of the nose at a time.
     ///
-    /// A vehicle whose foot is about to touch is only brought to rest, because it may touch before its plan ends: a lean of 10
-    /// degrees lowers a foot of mk2 by 7 cm, which it sinks in 0.15 s.
+    /// A vehicle whose foot is about to touch is only brought to rest, because it may touch before
+    /// its plan ends: a lean of 10 degrees lowers a foot of mk2 by 7 cm, which it sinks in 0.15 s.
     pub fn aim(&self, time_s: f64, state: &RigidState, situation: &PoweredSituation<'_>) -> Aim {
         let quiet_s = self.settings.contact_quiet_s;
         if quiet_s > 0.0 && situation.touches_within(quiet_s, state) {
@@ -189,8 +198,8 @@ impl PoweredGuidance {
         Aim::at(nose / nose.norm())
     }
 
-    /// The direction that a plan wants at a time; `None` after its end. `push` makes a lean, as a tangent, from a velocity to
-    /// be lost.
+    /// The direction that a plan wants at a time; `None` after its end. `push` makes a lean, as a
+    /// tangent, from a velocity to be lost.
     fn planned_aim(
         &self,
         plan: &Plan,
@@ -219,8 +228,8 @@ impl PoweredGuidance {
 
 // Chooses the landing point of a plan, in each level direction alone.
 
-/// Limits of the homing to the pad: a plan lands only as near as necessary, and diverts no farther than a moderate lean
-/// reaches.
+/// Limits of the homing to the pad: a plan lands only as near as necessary, and diverts no farther
+/// than a moderate lean reaches.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Homing {
@@ -232,7 +241,8 @@ pub struct Homing {
 }
 
 impl Homing {
-    /// The landing point in one direction, m from the pad, at a velocity of `along_m_s` with `left_s` to go.
+    /// The landing point in one direction, m from the pad, at a velocity of `along_m_s` with
+    /// `left_s` to go.
     pub(crate) fn target_m(&self, x_m: f64, along_m_s: f64, left_s: f64) -> f64 {
         let free_m = here_m(x_m, along_m_s, left_s);
         let reach_m = self.reach_m_s2 * left_s * left_s;
@@ -240,8 +250,8 @@ impl Homing {
     }
 }
 
-/// The landing point without homing, m from the pad: the end of a constant deceleration from `along_m_s` in `left_s`.
-/// It needs the smallest lean.
+/// The landing point without homing, m from the pad: the end of a constant deceleration from
+/// `along_m_s` in `left_s`. It needs the smallest lean.
 pub(crate) fn here_m(x_m: f64, along_m_s: f64, left_s: f64) -> f64 {
     x_m + 0.5 * along_m_s * left_s
 }
@@ -256,8 +266,8 @@ mod tests {
 
     // What the guidance flies when no plan is good.
 
-    /// A vehicle in the middle of its burn, 7 m above the ground at 5 m/s and moving sideways at 3 m/s: it has to turn away more
-    /// thrust than it can without hovering.
+    /// A vehicle in the middle of its burn, 7 m above the ground at 5 m/s and moving sideways at 3
+    /// m/s: it has to turn away more thrust than it can without hovering.
     fn too_high(mission: &str, high: bool) -> PoweredGuidance {
         let mission = builtin(mission).unwrap().unwrap();
         let feet_below_cg_m = 0.44;

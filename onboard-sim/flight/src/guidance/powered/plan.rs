@@ -46,7 +46,8 @@ impl Plan {
         &self.states
     }
 
-    /// The inputs held in its intervals: gimbal towards growing `p` and `r`, rad, and the fins' share.
+    /// The inputs held in its intervals: gimbal towards growing `p` and `r`, rad, and the fins'
+    /// share.
     pub fn inputs(&self) -> &[[f64; INPUTS]] {
         &self.inputs
     }
@@ -122,7 +123,8 @@ impl Plan {
         (self.begins_s, self.step_s, self.settled_nodes) = (from.begins_s, from.step_s, from.settled_nodes);
     }
 
-    /// The last `intervals` intervals of an earlier plan. The conditions' multipliers are kept if their order is known.
+    /// The last `intervals` intervals of an earlier plan. The conditions' multipliers are kept if
+    /// their order is known.
     pub(super) fn take_last(&mut self, from: &Self, intervals: usize, settled_nodes: usize) -> bool {
         let Some(gone) = from.inputs.len().checked_sub(intervals) else { return false };
         let refill = |into: &mut Vec<State>, all: &[State]| {
@@ -169,7 +171,8 @@ impl Plan {
         self.settled_nodes = problem.end.settled_nodes;
     }
 
-    /// Planned velocity over the ground, m/s, and the direction of the nose at a time; `None` after the end.
+    /// Planned velocity over the ground, m/s, and the direction of the nose at a time; `None` after
+    /// the end.
     pub(crate) fn at(&self, time_s: f64) -> Option<(Vector3<f64>, Aim)> {
         let since = (time_s - self.begins_s).max(0.0) / self.step_s;
         let k = since as usize;

@@ -1,4 +1,5 @@
-//! What the landing burn is set to and what it reports: its settings in a mission, and the report of a tick.
+//! What the landing burn is set to and what it reports: its settings in a mission, and the report
+//! of a tick.
 
 use ocp::Status;
 use ocp::landing::SolverLimits;
@@ -28,8 +29,9 @@ pub enum ControlLevel {
 }
 
 impl ControlLevel {
-    /// The level after a plan was tried. `usable`: it is finite and flyable; `left_s`: time that an earlier plan still has, s;
-    /// `too_low`: no landing is left to plan; `lands`: the plan converged on its end.
+    /// The level after a plan was tried. `usable`: it is finite and flyable; `left_s`: time that an
+    /// earlier plan still has, s; `too_low`: no landing is left to plan; `lands`: the plan
+    /// converged on its end.
     pub(super) fn of_plan(usable: bool, left_s: Option<f64>, too_low: bool, lands: bool) -> Self {
         if !usable {
             if left_s.is_some_and(|left_s| left_s > 0.0) { Self::ShiftedPlan } else { Self::Stabiliser }
@@ -52,11 +54,13 @@ pub struct PoweredReport {
     pub status: Status,
     /// Iterations over all final times tried.
     pub iterations: usize,
-    /// Work of the tick: the solver's passes over an interval, as in [`PoweredSettings::max_passes`].
+    /// Work of the tick: the solver's passes over an interval, as in
+    /// [`PoweredSettings::max_passes`].
     pub passes: usize,
     /// When the landing was posed, s since the release.
     pub posed_at_s: f64,
-    /// From then until the plan was taken over, s. The next one waits for that, if it is longer than a period.
+    /// From then until the plan was taken over, s. The next one waits for that, if it is longer
+    /// than a period.
     pub took_s: f64,
     /// Residuals of the optimality conditions.
     pub kkt_stationarity: f64,
@@ -88,7 +92,8 @@ pub struct PoweredSettings {
     /// Largest lean of a plan in north and in west, degrees.
     #[serde(default)]
     pub tilt_max_deg: f64,
-    /// Largest planned gimbal angle on either side, degrees; the attitude loop has the rest of the travel.
+    /// Largest planned gimbal angle on either side, degrees; the attitude loop has the rest of the
+    /// travel.
     #[serde(default)]
     pub gimbal_deg: f64,
     /// Choice of the landing point.
@@ -108,18 +113,20 @@ pub struct PoweredSettings {
     pub flown_out_s: f64,
     /// During this time before the plan's end the nose is not turned any more, only held, s.
     pub quiet_s: f64,
-    /// The same during this time before the lowest foot is expected to touch, whatever the plan says, s.
+    /// The same during this time before the lowest foot is expected to touch, whatever the plan
+    /// says, s.
     #[serde(default)]
     pub contact_quiet_s: f64,
     /// Largest number of final times tried in a tick.
     pub max_solves: u32,
-    /// Largest number of passes of the solver over an interval in a tick, over all its guesses and final times
-    /// (`ocp::Workspace::allow`): the best plan until then stands, and the next tick goes on from it. Without it there is
-    /// no bound.
+    /// Largest number of passes of the solver over an interval in a tick, over all its guesses and
+    /// final times (`ocp::Workspace::allow`): the best plan until then stands, and the next tick
+    /// goes on from it. Without it there is no bound.
     pub max_passes: Option<usize>,
     /// Largest miss of a plan's end (m, rad, m/s or rad/s) that still counts as a landing.
     pub landing_miss: f64,
-    /// Without a plan, and at the end of one, the vehicle leans against a velocity that is to be lost: decay rate, 1/s.
+    /// Without a plan, and at the end of one, the vehicle leans against a velocity that is to be
+    /// lost: decay rate, 1/s.
     pub upright_decay_per_s: f64,
     /// Largest such lean, degrees.
     pub upright_lean_max_deg: f64,

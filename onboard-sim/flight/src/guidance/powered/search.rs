@@ -15,7 +15,8 @@ pub(super) const MOST_INTERVALS: usize = 60;
 /// Shortest horizon, intervals: with fewer a plan cannot lean and come upright again.
 const LEAST_INTERVALS: usize = 6;
 
-/// First change of the final time that is tried, s, the factor after one that was no better, and the smallest change.
+/// First change of the final time that is tried, s, the factor after one that was no better, and
+/// the smallest change.
 const FIRST_STEP_S: f64 = 0.1;
 const SHORTER: f64 = 0.3;
 const LEAST_STEP_S: f64 = 0.01;
@@ -34,7 +35,8 @@ pub struct Search {
     problem: Option<Problem>,
     trial: Plan,
     warm: Plan,
-    /// Intervals that all of these have room for. A landing that needs more gets longer ones, so that no flight allocates.
+    /// Intervals that all of these have room for. A landing that needs more gets longer ones, so
+    /// that no flight allocates.
     room: Option<usize>,
 }
 
@@ -87,10 +89,11 @@ impl Search {
         self.workspace.passes()
     }
 
-    /// Searches the path and the final time of a landing into `found`. The outcome has the iterations of all solves; there is none if the
-    /// thrust never carries the vehicle.
+    /// Searches the path and the final time of a landing into `found`. The outcome has the
+    /// iterations of all solves; there is none if the thrust never carries the vehicle.
     ///
-    /// By the envelope theorem the derivative of the Lagrangian by the final time says on which side a better one lies.
+    /// By the envelope theorem the derivative of the Lagrangian by the final time says on which
+    /// side a better one lies.
     pub(crate) fn search(
         &mut self,
         settings: &PoweredSettings,
@@ -149,7 +152,8 @@ impl Search {
         Some(Outcome { iterations, ..best })
     }
 
-    /// The landing that was searched at a time from this situation; if it was usable, `flown` is its plan.
+    /// The landing that was searched at a time from this situation; if it was usable, `flown` is
+    /// its plan.
     pub(crate) fn solved(
         &self,
         settings: &PoweredSettings,
@@ -231,8 +235,8 @@ fn posed(situation: &PoweredSituation<'_>, settings: &PoweredSettings, state: &R
     }
 }
 
-/// Fills in what follows from the final time, s from now, and the number of intervals. It allocates only if there never
-/// were as many.
+/// Fills in what follows from the final time, s from now, and the number of intervals. It allocates
+/// only if there never were as many.
 fn stretch(
     problem: &mut Problem,
     situation: &PoweredSituation<'_>,

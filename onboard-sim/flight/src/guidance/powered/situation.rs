@@ -28,13 +28,15 @@ pub struct PoweredSituation<'a> {
     pub body_drag_area_m2: f64,
     /// Drag area of the body across its axis, m^2.
     pub crossflow_area_m2: f64,
-    /// Drag area of the fins: all open for a plan, which opens them itself; at their present opening for an aim, m^2.
+    /// Drag area of the fins: all open for a plan, which opens them itself; at their present
+    /// opening for an aim, m^2.
     pub fin_drag_area_m2: f64,
     /// Largest gimbal angle, rad.
     pub gimbal_limit_rad: f64,
     /// After an abort: the vehicle lands on the ground below, not on the pad.
     pub lands_in_place: bool,
-    /// High in the band of feasible heights or above it: more thrust has to be turned away than is easy.
+    /// High in the band of feasible heights or above it: more thrust has to be turned away than is
+    /// easy.
     pub high: bool,
 }
 
@@ -43,8 +45,8 @@ impl PoweredSituation<'_> {
         self.mass_at_ignition_kg - self.burn.burnt_kg(self.burning_s)
     }
 
-    /// The earliest and the latest end of a plan from a height of the feet, m; times from now, s. `None` if the thrust never
-    /// carries the vehicle.
+    /// The earliest and the latest end of a plan from a height of the feet, m; times from now, s.
+    /// `None` if the thrust never carries the vehicle.
     pub(super) fn ends_s(&self, latest_after_s: f64, height_m: f64) -> Option<(f64, f64)> {
         let carried_until_s = self.burn.falls_through_weight_s(self.mass_at_ignition_kg)?;
         let earliest_s = (carried_until_s - self.burning_s).max(0.05);
@@ -55,7 +57,8 @@ impl PoweredSituation<'_> {
         Some((earliest_s, latest_s))
     }
 
-    /// Whether the lowest foot of a vehicle that sinks on as it does touches the ground within a time, s.
+    /// Whether the lowest foot of a vehicle that sinks on as it does touches the ground within a
+    /// time, s.
     pub(super) fn touches_within(&self, within_s: f64, state: &RigidState) -> bool {
         let nose = state.nose_in_world();
         let lowest_m = state.position_m.z
@@ -117,7 +120,8 @@ mod tests {
         let upright = RigidState { velocity_m_s: -0.5 * Vector3::z(), ..RigidState::upright(0.54) };
         assert!(!situation.touches_within(0.19, &upright));
         assert!(situation.touches_within(0.21, &upright));
-        // With 10 degrees of lean a foot is 0.4 sin 10 = 69.5 mm lower, and the body's end 0.44 (1 - cos 10) = 6.7 mm higher.
+        // With 10 degrees of lean a foot is 0.4 sin 10 = 69.5 mm lower, and the body's end 0.44
+        // (1 - cos 10) = 6.7 mm higher.
         let lean = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), 10.0_f64.to_radians());
         let leaning = RigidState { world_from_body: lean * upright.world_from_body, ..upright };
         assert!(!situation.touches_within(0.073, &leaning));

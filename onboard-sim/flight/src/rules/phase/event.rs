@@ -10,7 +10,8 @@ pub enum Event {
     PinPulled,
     /// The physical pin was put back.
     PinInserted,
-    /// Radio command: arm. `checks_passed` is the result of the [arming checks](crate::rules::arming).
+    /// Radio command: arm. `checks_passed` is the result of the [arming
+    /// checks](crate::rules::arming).
     ArmRequested {
         /// Every arming check passed.
         checks_passed: bool,
@@ -27,7 +28,8 @@ pub enum Event {
         /// Length of the countdown, s.
         countdown_s: f64,
     },
-    /// Hold the countdown: the station that armed the vehicle is silent, or a station asks for a hold.
+    /// Hold the countdown: the station that armed the vehicle is silent, or a station asks for a
+    /// hold.
     Hold {
         cause: HoldCause,
         /// Where the flight starts, which decides until when a hold comes in time.
@@ -35,10 +37,11 @@ pub enum Event {
     },
     /// A hold has lasted for [`HOLD_LIMIT_S`](super::HOLD_LIMIT_S).
     HoldElapsed,
-    /// The countdown of a pad start ended: light the ascent motor. A simulation that starts in the air sends
-    /// [`Event::ReleasedAt`] instead.
+    /// The countdown of a pad start ended: light the ascent motor. A simulation that starts in the
+    /// air sends [`Event::ReleasedAt`] instead.
     CountdownElapsed,
-    /// The countdown is over, and the vehicle falls: a simulation that starts in the air let it go, or a drone did.
+    /// The countdown is over, and the vehicle falls: a simulation that starts in the air let it go,
+    /// or a drone did.
     ReleasedAt(StartPoint),
     /// The vehicle left the pad.
     LiftOff,
@@ -69,7 +72,8 @@ pub enum Event {
     },
     /// The accelerometer shows landing-motor thrust.
     ThrustConfirmed,
-    /// No thrust within [`NO_THRUST_TIMEOUT_S`](super::NO_THRUST_TIMEOUT_S) of the ignition command.
+    /// No thrust within [`NO_THRUST_TIMEOUT_S`](super::NO_THRUST_TIMEOUT_S) of the ignition
+    /// command.
     NoThrustTimeout,
     /// The vehicle itself finds, in its descent, that its ignition gate will not open any more.
     GateShutForGood {
@@ -80,7 +84,8 @@ pub enum Event {
     AbortRequested {
         /// The vehicle has left its rail.
         lifted_off: bool,
-        /// The height is still sufficient for the parachute: with a margin if the gate is open, else without.
+        /// The height is still sufficient for the parachute: with a margin if the gate is open,
+        /// else without.
         above_commit_height: bool,
         /// The ignition gate is open at this moment.
         gate_open: bool,
@@ -90,8 +95,8 @@ pub enum Event {
         /// Thrust is below the weight, so the vehicle will stay down.
         thrust_below_weight: bool,
     },
-    /// On the ground, every actuator and igniter line is shut down. The event is accepted only if the motor is safe,
-    /// too.
+    /// On the ground, every actuator and igniter line is shut down. The event is accepted only if
+    /// the motor is safe, too.
     SafingDone,
 }
 

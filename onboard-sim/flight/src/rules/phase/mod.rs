@@ -1,9 +1,9 @@
 //! The flight phases, the events that change them, and the one table of all transitions.
 //!
-//! [`transition()`] is a pure function: it takes a mode and an event, and returns a mode and effects, or a [`Refusal`] in
-//! words. The vehicle lights a motor on the way down, which staging electronics forbid for good reason. So the table is
-//! explicit and conservative: only one line of it lights the landing motor, once, and only if every interlock allows
-//! it.
+//! [`transition()`] is a pure function: it takes a mode and an event, and returns a mode and
+//! effects, or a [`Refusal`] in words. The vehicle lights a motor on the way down, which staging
+//! electronics forbid for good reason. So the table is explicit and conservative: only one line of
+//! it lights the landing motor, once, and only if every interlock allows it.
 
 mod event;
 #[cfg(test)]
@@ -48,8 +48,8 @@ pub enum Phase {
     Powered = "POWERED",
     /// On the ground, thrust below weight.
     Touchdown = "TOUCHDOWN",
-    /// On the ground, everything inhibited, and the vehicle safe to approach: the motor burnt out and cooled, or its
-    /// pin in.
+    /// On the ground, everything inhibited, and the vehicle safe to approach: the motor burnt out
+    /// and cooled, or its pin in.
     Safed = "SAFED",
     /// Under the parachute.
     Chute = "CHUTE",
@@ -96,7 +96,8 @@ pub struct Interlocks {
     pub abort_latched: bool,
     /// The landing motor was commanded and gave no thrust in time.
     pub no_light_latched: bool,
-    /// Aborted too low for the parachute, or with the landing motor lit, which has no cut-off: the vehicle lands on the ground below.
+    /// Aborted too low for the parachute, or with the landing motor lit, which has no cut-off: the
+    /// vehicle lands on the ground below.
     pub lands_in_place: bool,
 }
 
@@ -115,8 +116,9 @@ pub struct Mode {
     pub hold: Option<Hold>,
     /// The state of the landing motor.
     pub motor: Motor,
-    /// When an abort on the pad of an earlier power-up was, vehicle time, s: before zero. Nobody approaches and nothing arms before
-    /// its wait is over, and the pin is due until it was put in and is pulled again.
+    /// When an abort on the pad of an earlier power-up was, vehicle time, s: before zero. Nobody
+    /// approaches and nothing arms before its wait is over, and the pin is due until it was put in
+    /// and is pulled again.
     pub aborted_before_s: Option<f64>,
 }
 
@@ -139,7 +141,8 @@ impl Mode {
         self.countdown_end_s.map(|end_s| (end_s - time_s).max(0.0))
     }
 
-    /// Time until the pad may be approached after an abort there, s; `None` unless that wait is running.
+    /// Time until the pad may be approached after an abort there, s; `None` unless that wait is
+    /// running.
     pub fn pad_wait_remaining_s(&self, time_s: f64) -> Option<f64> {
         let remaining_s = self.aborted_on_the_pad_s()? + PAD_ABORT_WAIT_S - time_s;
         (remaining_s > 0.0).then_some(remaining_s)
@@ -151,7 +154,8 @@ impl Mode {
         now_s.or(self.aborted_before_s)
     }
 
-    /// The abort that a power cycle must not wipe out: until its wait is over and the pin is in. When it was, vehicle time, s.
+    /// The abort that a power cycle must not wipe out: until its wait is over and the pin is in.
+    /// When it was, vehicle time, s.
     pub fn abort_to_keep_s(&self, time_s: f64) -> Option<f64> {
         let is_over = self.pad_wait_remaining_s(time_s).is_none() && !self.interlocks.pin_out;
         self.aborted_on_the_pad_s().filter(|_| !is_over)
@@ -160,20 +164,23 @@ impl Mode {
 
 // The hold of a countdown.
 
-/// A station that arms, or commands an armed vehicle, was heard in this time, s: two of its heartbeats outside a countdown.
+/// A station that arms, or commands an armed vehicle, was heard in this time, s: two of its
+/// heartbeats outside a countdown.
 pub const UPLINK_PROVEN_S: f64 = 2.0;
 
-/// In a countdown the station that armed the vehicle counts as silent when no frame of it was accepted for this long, s. With
-/// ten heartbeats a second nine in a row have to be lost by chance. What is lost is noticed so much later, so with
-/// [`LAST_HOLD_S`] it is the time before the release until which every loss holds.
+/// In a countdown the station that armed the vehicle counts as silent when no frame of it was
+/// accepted for this long, s. With ten heartbeats a second nine in a row have to be lost by chance.
+/// What is lost is noticed so much later, so with [`LAST_HOLD_S`] it is the time before the release
+/// until which every loss holds.
 pub const UPLINK_SILENT_S: f64 = 1.0;
 
 /// A held vehicle disarms after this long without a new start, s.
 pub const HOLD_LIMIT_S: f64 = 60.0;
 
-/// So long before the release, s, and later no key and no silence holds the countdown any more: a hold that comes as late as the
-/// release itself must not leave the crew in doubt whether the motor lights. An abort and a disarm still end it, and so does an
-/// arming check that fails: it is the vehicle that finds it, and nothing has current before the release.
+/// So long before the release, s, and later no key and no silence holds the countdown any more: a
+/// hold that comes as late as the release itself must not leave the crew in doubt whether the motor
+/// lights. An abort and a disarm still end it, and so does an arming check that fails: it is the
+/// vehicle that finds it, and nothing has current before the release.
 pub const LAST_HOLD_S: f64 = 2.0;
 
 /// Why a countdown was held.
@@ -192,7 +199,8 @@ pub enum HoldCause {
     CheckFailed = 5,
 }
 
-/// A hold: the countdown is cancelled, but the vehicle is still armed. Only a new start continues the launch.
+/// A hold: the countdown is cancelled, but the vehicle is still armed. Only a new start continues
+/// the launch.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Hold {
     pub cause: HoldCause,
@@ -201,8 +209,8 @@ pub struct Hold {
 }
 
 impl StartPoint {
-    /// From when on nothing holds, s before the release. `None` below a drone: its pilot lets go at no set time after the
-    /// countdown, so a hold comes in time until then.
+    /// From when on nothing holds, s before the release. `None` below a drone: its pilot lets go at
+    /// no set time after the countdown, so a hold comes in time until then.
     pub fn last_hold_s(self) -> Option<f64> {
         (self != Self::Drone).then_some(LAST_HOLD_S)
     }
@@ -216,7 +224,8 @@ impl Mode {
         self.countdown_end_s.is_some_and(in_time)
     }
 
-    /// Why the last countdown was held, and the time left until the vehicle disarms, s; `None` unless it is held.
+    /// Why the last countdown was held, and the time left until the vehicle disarms, s; `None`
+    /// unless it is held.
     pub fn held(&self, time_s: f64) -> Option<(HoldCause, f64)> {
         let hold = self.hold.filter(|_| self.phase == Phase::PadArmed)?;
         Some((hold.cause, (hold.at_s + HOLD_LIMIT_S - time_s).max(0.0)))
@@ -266,16 +275,17 @@ impl Latch {
 
 // The state of the landing motor, for a person who approaches the vehicle.
 //
-// A motor that was not lit stays dangerous on the ground: only software keeps it from lighting, and after an ignition
-// command it may light late. A burnt motor is hot. The vehicle is not SAFED in either case.
+// A motor that was not lit stays dangerous on the ground: only software keeps it from lighting, and
+// after an ignition command it may light late. A burnt motor is hot. The vehicle is not SAFED in
+// either case.
 
-/// How long nobody may approach a motor that was not lit or did not light on command, s. The safety codes of the
-/// National Association of Rocketry ask for 60 s after the last launch attempt. Here the time counts from the
-/// touchdown, because that was the last shock to the igniter line.
+/// How long nobody may approach a motor that was not lit or did not light on command, s. The safety
+/// codes of the National Association of Rocketry ask for 60 s after the last launch attempt. Here
+/// the time counts from the touchdown, because that was the last shock to the igniter line.
 pub const MISFIRE_WAIT_S: f64 = 60.0;
 
-/// How long a burnt motor counts as hot, s. The value was chosen, not measured. It equals the misfire wait, so that a
-/// crew has to remember only one number.
+/// How long a burnt motor counts as hot, s. The value was chosen, not measured. It equals the
+/// misfire wait, so that a crew has to remember only one number.
 pub const MOTOR_HOT_S: f64 = 60.0;
 
 /// The state of the landing motor.
@@ -310,8 +320,8 @@ pub enum MotorStatus {
 impl Mode {
     /// The motor's status at a vehicle time.
     pub fn motor_status(&self, time_s: f64) -> MotorStatus {
-        // After "no light", and on the ground, the command no longer means that the motor burns; it may still light
-        // late.
+        // After "no light", and on the ground, the command no longer means that the motor burns; it
+        // may still light late.
         let expected = self.phase == Phase::Ignition && !self.interlocks.no_light_latched;
         match self.motor {
             Motor::Burning => MotorStatus::Burning,
@@ -323,8 +333,8 @@ impl Mode {
         }
     }
 
-    /// Time until the vehicle may be approached, s, 0 if it may be now; `None` while this is unknown: armed, in the
-    /// air, or with a burning motor.
+    /// Time until the vehicle may be approached, s, 0 if it may be now; `None` while this is
+    /// unknown: armed, in the air, or with a burning motor.
     pub fn approach_wait_s(&self, time_s: f64) -> Option<f64> {
         // Never longer than the wait itself, as a sum of times could be by rounding.
         let left = |since_s: f64, wait_s: f64| Some((wait_s - (time_s - since_s)).max(0.0));

@@ -1,8 +1,10 @@
-//! The one controller: what depends on the vehicle, as formulas. What is the same for every vehicle is in `controller.toml`.
+//! The one controller: what depends on the vehicle, as formulas. What is the same for every vehicle
+//! is in `controller.toml`.
 //!
-//! Three numbers of a vehicle decide ([`EvenLanding`]): how long its thrust carries it, how fast it falls into the ignition,
-//! and how far it must lean to throw away what is too much. The factors are mk3's values where the formula only scales them.
-//! They were chosen on seeds from 7001 on seven vehicles, and each says what it is for.
+//! Three numbers of a vehicle decide ([`EvenLanding`]): how long its thrust carries it, how fast it
+//! falls into the ignition, and how far it must lean to throw away what is too much. The factors
+//! are mk3's values where the formula only scales them. They were chosen on seeds from 7001 on
+//! seven vehicles, and each says what it is for.
 
 use alloc::borrow::ToOwned as _;
 use alloc::string::String;
@@ -16,7 +18,8 @@ use crate::vehicle::launch::Launch;
 use crate::vehicle::mission::{LegLimits, Mission, StartPoint};
 use crate::vehicle::thrust_curve::ThrustCurve;
 
-/// The formulas of one mission: which keys its file states, and which of these are the controller's.
+/// The formulas of one mission: which keys its file states, and which of these are the
+/// controller's.
 pub(super) struct Formulas<'a> {
     pub(super) stated: &'a [String],
     pub(super) changed: Vec<String>,
@@ -45,7 +48,8 @@ impl Formulas<'_> {
 
     /// Shape and balance as they follow from what a builder measures.
     pub(super) fn airframe(&self, airframe: &mut Airframe, motor: &ThrustCurve) {
-        /// Coefficients of a fin on its own area: the paper's 1.55 and 1.28 on a body of 0.0043 m2, for a fin of 58 by 100 mm.
+        /// Coefficients of a fin on its own area: the paper's 1.55 and 1.28 on a body of 0.0043 m2,
+        /// for a fin of 58 by 100 mm.
         const FIN_DRAG: f64 = 1.149;
         const FIN_LIFT: f64 = 0.949;
         /// A saw's cut between two fins, m.
@@ -102,32 +106,35 @@ impl Formulas<'_> {
         of("soft_tilt_deg", &mut mission.soft_tilt_deg, soft_deg);
         of("fin_soft_tilt_deg", &mut mission.fin_soft_tilt_deg, soft_deg);
         let powered = &mut mission.powered;
-        // The more thrust there is, the faster an error of its time becomes one of height: a strong motor ends its plan higher.
+        // The more thrust there is, the faster an error of its time becomes one of height: a strong
+        // motor ends its plan higher.
         let floor_m_s = (0.47 + 0.045 * (even_deg - 27.0)).clamp(0.47, 1.2);
         of("powered.floor_rise_m_s", &mut powered.floor_rise_m_s, floor_m_s);
-        // It sinks no faster than the floor at its end, less a tenth of a metre per second for the last interval.
+        // It sinks no faster than the floor at its end, less a tenth of a metre per second for the
+        // last interval.
         let end = &mut powered.final_box;
         of("powered.final.u_min_m_s", &mut end.u_min_m_s, 0.11 - floor_m_s);
         of("powered.final.u_max_m_s", &mut end.u_max_m_s, -0.05 - 0.35 * (floor_m_s - 0.47));
         // The planner's room beyond the soft tilt.
         of("powered.tilt_max_deg", &mut powered.tilt_max_deg, (soft_deg + 10.0).max(45.0));
-        // A lean moves a vehicle by g t^2. With four times as much one far from the pad hurries there, and 1 flight in 200 more
-        // does not stop in time.
+        // A lean moves a vehicle by g t^2. With four times as much one far from the pad hurries
+        // there, and 1 flight in 200 more does not stop in time.
         of("powered.weights.x", &mut powered.weights.x, 0.5 * libm::pow(4.32 / carried_s, 4.0));
         // Half of the height at most.
         let reach_m_s2 = 0.53 * height_m / (carried_s * carried_s);
         of("powered.homing.reach_m_s2", &mut powered.homing.reach_m_s2, reach_m_s2);
         let interval_s = (carried_s / 29.0).clamp(0.15, 0.2);
         of("powered.interval_s", &mut powered.interval_s, interval_s);
-        // A foot of a vehicle that leans touches early, and a short burn has no time to be upright early. With 0.2 s mk3 met the ground
-        // inside its legs' design in 469 of 500 `real` flights, with 0.3, 0.4, 0.5 and 0.6 in 476, 484, 482 and 479; in `wild` more
-        // than 0.3 costs landings.
+        // A foot of a vehicle that leans touches early, and a short burn has no time to be upright
+        // early. With 0.2 s mk3 met the ground inside its legs' design in 469 of 500 `real`
+        // flights, with 0.3, 0.4, 0.5 and 0.6 in 476, 484, 482 and 479; in `wild` more than 0.3
+        // costs landings.
         of("powered.settled_s", &mut powered.settled_s, 0.06 * carried_s);
         // The rest is the attitude loop's.
         of("powered.gimbal_deg", &mut powered.gimbal_deg, 0.72 * airframe.gimbal.limit_deg);
 
-        // A slow fall meets the wind at a larger angle and turns back slowly; and where the parachute is decided before the
-        // ignition, the vehicle must be upright by then.
+        // A slow fall meets the wind at a larger angle and turns back slowly; and where the
+        // parachute is decided before the ignition, the vehicle must be upright by then.
         let fills_m = speed_m_s * parachute.ejection_delay_s + parachute.inflation_distance_m;
         let fades_s = libm::pow(33.7 / speed_m_s, 2.0) + 4.0 * (fills_m - height_m).max(0.0) / speed_m_s;
         let descent = &mut mission.descent;
@@ -135,7 +142,8 @@ impl Formulas<'_> {
         let arm_m = fins.station_m - airframe.mass.loaded_cg_station_m;
         let fins_m2 = airframe.open_fin_drag_area_m2();
         let steers = arm_m >= 0.1 * airframe.body.length_m;
-        // Legs that drag by 0.010 m2 more or less than the airframe's leave mk3 50 degrees and 6 dB of margin.
+        // Legs that drag by 0.010 m2 more or less than the airframe's leave mk3 50 degrees and 6 dB
+        // of margin.
         let stiffness_m3 = if steers { 0.69 * fins_m2 * arm_m } else { 0.0 };
         of("descent.stiffness_m3", &mut descent.stiffness_m3, stiffness_m3);
         if !steers {
@@ -153,11 +161,13 @@ impl Formulas<'_> {
         of("aim.latency_s", &mut aim.latency_s, servo.delay_s + mission.estimator.frame_s);
         // A hobby linkage wears.
         of("aim.play_deg", &mut aim.play_deg, servo.slop_deg + 0.4);
-        // A drop in wind turns the vehicle: with 20 degrees some flights end under a parachute that has no room.
+        // A drop in wind turns the vehicle: with 20 degrees some flights end under a parachute that
+        // has no room.
         let tilt_max_deg = if mission.start.at == StartPoint::Drone { 35.0 } else { 20.0 };
         of("gate.tilt_max_deg", &mut mission.gate.tilt_max_deg, tilt_max_deg);
 
-        // In a short fall fins ahead of the centre of gravity brake little, and turn the vehicle into a wind that is as fast.
+        // In a short fall fins ahead of the centre of gravity brake little, and turn the vehicle
+        // into a wind that is as fast.
         let opens_fins = speed_m_s > SHORT_FALL_M_S || arm_m < 0.03 * airframe.body.length_m;
         self.of_controller("descent.opens_fins", &mut mission.descent.opens_fins, opens_fins);
         // Motors within so many deviations of what is expected of them.
@@ -168,9 +178,10 @@ impl Formulas<'_> {
         let scales = around(2.0, motor.burn_time_sigma);
         self.of_controller("ignition.burn_time_scales", &mut ignition.burn_time_scales, scales);
         let intervals = libm::ceil((carried_s + powered.latest_after_s) / powered.interval_s).min(60.0);
-        // A plan then takes at most 22 million instructions of a Cortex-M7 (onboard-sim/lab/cortex-m7/README.md): the last iteration,
-        // which is finished, is about five passes over every interval. With twice the passes no more flights land, because the plan comes
-        // later (`cargo bench --bench work`).
+        // A plan then takes at most 22 million instructions of a Cortex-M7
+        // (onboard-sim/lab/cortex-m7/README.md): the last iteration, which is finished, is about
+        // five passes over every interval. With twice the passes no more flights land, because the
+        // plan comes later (`cargo bench --bench work`).
         let passes = (1_230.0 - 5.0 * intervals) as usize;
         self.of_controller("powered.max_passes", &mut powered.max_passes, Some(passes));
 
@@ -181,7 +192,8 @@ impl Formulas<'_> {
         };
         self.of_vehicle("leg_limits.vertical_m_s", &mut mission.leg_limits, designed);
         if let Some(launch) = &mut mission.launch {
-            // Half the way that the fall drifts in 1 m/s of wind: the stack that turns into the wind gives the rest back.
+            // Half the way that the fall drifts in 1 m/s of wind: the stack that turns into the
+            // wind gives the rest back.
             let falls_s = mission.start.height_m / speed_m_s;
             self.of_vehicle("launch.rail.upwind_s", &mut launch.rail.upwind_s, libm::round(falls_s));
         }

@@ -1,7 +1,8 @@
 //! Missions, from TOML. Unknown keys are errors.
 //!
-//! A file says what a club measures or decides. `controller.toml` has what is the same for every vehicle, [`controller`] what
-//! follows from it, and `defaults.toml` what a file may leave out. A file may state any of it.
+//! A file says what a club measures or decides. `controller.toml` has what is the same for every
+//! vehicle, [`controller`] what follows from it, and `defaults.toml` what a file may leave out. A
+//! file may state any of it.
 
 mod controller;
 mod validate;
@@ -35,7 +36,8 @@ pub const BUILTIN: &[(&str, &str)] = &[
     ("vlr-f16", include_str!("../../../vehicles/missions/vlr-f16.toml")),
 ];
 
-/// The built-in mission that is flown if no other is asked for: the vehicle that a club should build.
+/// The built-in mission that is flown if no other is asked for: the vehicle that a club should
+/// build.
 pub const DEFAULT: &str = "mk3";
 
 /// Why a mission cannot be flown.
@@ -62,7 +64,8 @@ const CONTROLLER: &str = include_str!("../../../vehicles/controller.toml");
 /// What a mission may leave out.
 const DEFAULTS: &str = include_str!("../../../vehicles/defaults.toml");
 
-/// Reads a mission and its motors, and gives its vehicle the controller; `origin` names the text in error messages.
+/// Reads a mission and its motors, and gives its vehicle the controller; `origin` names the text in
+/// error messages.
 ///
 /// # Errors
 /// [`MissionError`] names the key and what would be accepted.
@@ -128,7 +131,8 @@ fn leaves(prefix: &str, table: &DeTable<'_>, found: &mut dyn FnMut(String)) {
 /// Where in a text a section is that the text does not have.
 const NOWHERE: Range<usize> = usize::MAX..usize::MAX;
 
-/// Puts what a table does not have into it. How a vehicle is launched or dropped is only filled in if it is.
+/// Puts what a table does not have into it. How a vehicle is launched or dropped is only filled in
+/// if it is.
 fn fill<'a>(table: &mut DeTable<'a>, defaults: DeTable<'a>) {
     for (key, default) in defaults {
         if matches!(key.get_ref().as_ref(), "launch" | "drop") && !table.contains_key(&key) {

@@ -29,8 +29,8 @@ impl From<BadAirframe> for BadValue {
 
 type Check = Result<(), BadValue>;
 
-/// A range in words, its ends, and the keys that lie in it; a key of a section stands for all numbers of it that no row before
-/// names.
+/// A range in words, its ends, and the keys that lie in it; a key of a section stands for all
+/// numbers of it that no row before names.
 type Range = (&'static str, f64, f64, &'static [&'static str]);
 
 /// Above 0.

@@ -1,4 +1,5 @@
-//! Motor files in the two formats that hobbyists use, RASP (`.eng`) and `RockSim` (`.rse`), and tables of a test stand.
+//! Motor files in the two formats that hobbyists use, RASP (`.eng`) and `RockSim` (`.rse`), and
+//! tables of a test stand.
 
 mod plausible;
 mod rasp;

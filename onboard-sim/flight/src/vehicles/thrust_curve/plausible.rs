@@ -1,4 +1,5 @@
-//! Finds masses, sizes and times in the wrong unit or place: a motor with grams in the place of kilograms parses, but cannot exist.
+//! Finds masses, sizes and times in the wrong unit or place: a motor with grams in the place of
+//! kilograms parses, but cannot exist.
 
 use alloc::format;
 use core::f64::consts::PI;
@@ -7,12 +8,15 @@ use crate::vehicle::thrust_curve::ThrustCurve;
 
 use super::{ThrustCurveError, bad};
 
-/// Impulse over mass of the propellant, m/s. Black powder has 300 to 800, composite 1500 to 2200; for a hybrid some files
-/// count only the solid fuel, and have up to 35,000 (thrustcurve.org, 2019). A wrong unit is a factor of 1000.
+/// Impulse over mass of the propellant, m/s. Black powder has 300 to 800, composite 1500 to 2200;
+/// for a hybrid some files count only the solid fuel, and have up to 35,000 (thrustcurve.org,
+/// 2019). A wrong unit is a factor of 1000.
 const EXHAUST_M_S: core::ops::RangeInclusive<f64> = 100.0..=50_000.0;
-/// Highest mass over volume of the casing, kg/m^3: that of steel is 7,900, the highest in thrustcurve.org 4,900.
+/// Highest mass over volume of the casing, kg/m^3: that of steel is 7,900, the highest in
+/// thrustcurve.org 4,900.
 const DENSEST_KG_M3: f64 = 10_000.0;
-/// Diameters of motors, m: 6 to 161 mm (thrustcurve.org). Many have one of 24 to 54 mm, which are 0.9 to 2.1 inches.
+/// Diameters of motors, m: 6 to 161 mm (thrustcurve.org). Many have one of 24 to 54 mm, which are
+/// 0.9 to 2.1 inches.
 const DIAMETERS_M: core::ops::RangeInclusive<f64> = 0.005..=0.5;
 /// The latest first thrust, s: up to 0.36 in thrustcurve.org.
 const BEGINS_S: f64 = 1.0;

@@ -52,8 +52,8 @@ pub(super) fn parse(text: &str) -> Result<(MotorData, usize), ThrustCurveError> 
     Ok((data, header_line))
 }
 
-/// The text of a RASP file of a motor. It has no delays. White space in the motor's name becomes `_`, because the format
-/// separates its fields by white space.
+/// The text of a RASP file of a motor. It has no delays. White space in the motor's name becomes
+/// `_`, because the format separates its fields by white space.
 pub fn to_rasp(curve: &ThrustCurve) -> String {
     let name = curve.name().split_whitespace().collect::<Vec<_>>().join("_");
     let name = if name.is_empty() { "unnamed" } else { &name };

@@ -1,5 +1,5 @@
-//! `RockSim` motor files: XML with one `engine` element. Its attributes hold the data (mm, g), its `eng-data` elements
-//! the points (s, N).
+//! `RockSim` motor files: XML with one `engine` element. Its attributes hold the data (mm, g), its
+//! `eng-data` elements the points (s, N).
 
 use alloc::borrow::ToOwned as _;
 use alloc::string::ToString as _;

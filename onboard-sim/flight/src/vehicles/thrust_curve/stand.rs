@@ -30,8 +30,9 @@ pub fn read_stand(text: &str) -> Result<Vec<(f64, f64)>, TableError> {
     Ok(rows)
 }
 
-/// The motor that burnt on a stand. The head is that of a RASP file: name, diameter in mm, length in mm, delays, propellant in
-/// kg, total mass in kg, maker. The rows before the burn tell the zero of the load cell.
+/// The motor that burnt on a stand. The head is that of a RASP file: name, diameter in mm, length
+/// in mm, delays, propellant in kg, total mass in kg, maker. The rows before the burn tell the zero
+/// of the load cell.
 ///
 /// # Errors
 /// [`ThrustCurveError`] names the line, the field and what would be accepted.
@@ -78,8 +79,9 @@ mod tests {
 
     const HEAD: &str = "ours 38 200 P 0.12 0.3 the club";
 
-    /// A trapezium of 120 N s: 1 s up to 40 N, 2 s level, 1 s down, from 0.7 s on, by a load cell with a zero of 0.5 N: it is above
-    /// 5 % of 40.5 N from 0.038 s to 3.962 s, which leaves out 0.06 N s.
+    /// A trapezium of 120 N s: 1 s up to 40 N, 2 s level, 1 s down, from 0.7 s on, by a load cell
+    /// with a zero of 0.5 N: it is above 5 % of 40.5 N from 0.038 s to 3.962 s, which leaves out
+    /// 0.06 N s.
     #[test]
     fn val_hand_a_burn_becomes_a_motor() {
         let thrust_n = |time_s: f64| 0.5 + (40.0 * time_s).min(40.0 * (4.0 - time_s)).clamp(0.0, 40.0);

@@ -1,25 +1,32 @@
-//! Whether a flight could have been landed with perfect information: the measure for the landing rate of a controller.
+//! Whether a flight could have been landed with perfect information: the measure for the landing
+//! rate of a controller.
 //!
-//! The vehicle falls with open fins from the drawn apogee and gets its ignition command at one height that is the same for
-//! all flights of the campaign. From the first thrust on the true motor, mass and drag are known, and at every instant
-//! fins are chosen between closed and fully open and the tilt between upright and the planner's limit
-//! (`powered.tilt_max_deg`). It lands if its feet reach the ground within the vertical speed limit of the legs and after
-//! the thrust has fallen through the weight for the last time, because before that the vehicle would lift off again.
+//! The vehicle falls with open fins from the drawn apogee and gets its ignition command at one
+//! height that is the same for all flights of the campaign. From the first thrust on the true
+//! motor, mass and drag are known, and at every instant fins are chosen between closed and fully
+//! open and the tilt between upright and the planner's limit (`powered.tilt_max_deg`). It lands if
+//! its feet reach the ground within the vertical speed limit of the legs and after the thrust has
+//! fallen through the weight for the last time, because before that the vehicle would lift off
+//! again.
 //!
-//! It is a bound, so it errs on the generous side. Motion is vertical: wind, gusts, place, attitude dynamics and the
-//! slope of the ground are left out. Tilt and fins change at once, so the vehicle may lean until touchdown: upright last
-//! moments would cost only what the servos and the inertia cost. Injected faults do not happen.
+//! It is a bound, so it errs on the generous side. Motion is vertical: wind, gusts, place, attitude
+//! dynamics and the slope of the ground are left out. Tilt and fins change at once, so the vehicle
+//! may lean until touchdown: upright last moments would cost only what the servos and the inertia
+//! cost. Injected faults do not happen.
 //!
-//! [`window::window`] is the interval of command heights from which a flight lands, [`window::best_height_m`] the height inside most of
-//! them. A landing from a height exists if the height lies between two bang-bang landings.
+//! [`window::window`] is the interval of command heights from which a flight lands,
+//! [`window::best_height_m`] the height inside most of them. A landing from a height exists if the
+//! height lies between two bang-bang landings.
 //!
-//! At every instant the acceleration lies between a soft and a hard one: the extremes over tilt and fins at that speed.
-//! (At high speed a lean brakes harder than an upright vehicle: the body across the air gives more drag than the thrust
-//! loses.) So the velocity over time lies between bang-bang paths. The least fall brakes hard from the first thrust on; a
-//! vehicle that stops before the thrust has fallen through the weight hovers there, just above the ground, or climbs if
-//! even the softest braking is more than its weight. The greatest fall brakes softly first and hard later, and touches
-//! down at the limit of the legs, some time after the thrust has fallen through the weight: a later touchdown falls
-//! farther at the end, but has to be slower before. In between any fall is possible.
+//! At every instant the acceleration lies between a soft and a hard one: the extremes over tilt and
+//! fins at that speed. (At high speed a lean brakes harder than an upright vehicle: the body across
+//! the air gives more drag than the thrust loses.) So the velocity over time lies between bang-bang
+//! paths. The least fall brakes hard from the first thrust on; a vehicle that stops before the
+//! thrust has fallen through the weight hovers there, just above the ground, or climbs if even the
+//! softest braking is more than its weight. The greatest fall brakes softly first and hard later,
+//! and touches down at the limit of the legs, some time after the thrust has fallen through the
+//! weight: a later touchdown falls farther at the end, but has to be slower before. In between any
+//! fall is possible.
 //!
 //! ```text
 //! cargo run --release -p paper --example attainable -- --mission mk2 --dispersion real --seed 2002 --flights 100

@@ -20,7 +20,8 @@ const CELL: (f64, f64) = (0.2, 0.1);
 const CELLS: (usize, usize) = (800, 620);
 /// States that climb faster are not followed, m/s: a landing needs none of them.
 const CLIMBS_M_S: f64 = 1.0;
-/// What the search may miss near the ends of a window, m: the cells, the held controls and the few tilts cost it that.
+/// What the search may miss near the ends of a window, m: the cells, the held controls and the few
+/// tilts cost it that.
 const NEAR_M: f64 = 0.8;
 /// What it cannot find outside, m: both sides integrate within a centimetre.
 const BEYOND_M: f64 = 0.05;
@@ -187,7 +188,8 @@ struct Compared {
     only_window: Vec<(u64, f64, Option<Window>)>,
 }
 
-/// Asks both about heights inside and outside of each window, and about many heights if there is no window.
+/// Asks both about heights inside and outside of each window, and about many heights if there is no
+/// window.
 fn compared(mission: &str, dispersion: &str, seed: u64, numbers: impl Iterator<Item = u64>) -> Compared {
     let recipe = Recipe::built_in(mission, dispersion).unwrap();
     let mut all = Compared::default();
@@ -221,8 +223,9 @@ fn compared(mission: &str, dispersion: &str, seed: u64, numbers: impl Iterator<I
     all
 }
 
-/// The search may miss a tenth of the landings in windows: near an end the controls must switch at the right moment, and it holds them
-/// for 0.1 s and forgets states that share a cell. Over 190 flights it found no landing outside a window.
+/// The search may miss a tenth of the landings in windows: near an end the controls must switch at
+/// the right moment, and it holds them for 0.1 s and forgets states that share a cell. Over 190
+/// flights it found no landing outside a window.
 #[test]
 fn val_brute_force_finds_no_landing_outside_the_windows_of_a_few_flights() {
     let compared = compared("mk2", "harsh", 11, 0..2);

@@ -1,5 +1,6 @@
-//! The true vehicle in a vertical fall through still air: the same thrust, masses and drag as in [`sim::world::World`], without
-//! attitude dynamics. Tilt and fin opening are given, so the forces are those of a vehicle that turns at once.
+//! The true vehicle in a vertical fall through still air: the same thrust, masses and drag as in
+//! [`sim::world::World`], without attitude dynamics. Tilt and fin opening are given, so the forces
+//! are those of a vehicle that turns at once.
 
 use flight::vehicle::airframe::{Airframe, MassModel};
 use flight::vehicle::site::Site;
@@ -13,7 +14,8 @@ pub(crate) struct Vertical {
     burn: TrueBurn,
     mass_model: MassModel,
     truth: Truth,
-    /// Drag areas along the body, of the fins fully closed and fully open, and across the body, m^2.
+    /// Drag areas along the body, of the fins fully closed and fully open, and across the body,
+    /// m^2.
     body_m2: f64,
     fins_m2: [f64; 2],
     across_m2: f64,
@@ -34,9 +36,10 @@ pub(crate) struct Drag {
 }
 
 impl Drag {
-    /// Vertical force with the nose at an angle from the vertical, given by its sine and cosine, and with the fins open to
-    /// a share between closed (0) and fully open (1), N. The air meets the body along its axis with the cosine of the
-    /// speed and across it with the sine; the fins' drag follows the wind.
+    /// Vertical force with the nose at an angle from the vertical, given by its sine and cosine,
+    /// and with the fins open to a share between closed (0) and fully open (1), N. The air meets
+    /// the body along its axis with the cosine of the speed and across it with the sine; the fins'
+    /// drag follows the wind.
     pub(crate) fn at_n(&self, [sin, cos]: [f64; 2], fin_share: f64) -> f64 {
         let [closed_n, open_n] = self.fins_n;
         self.body_n * cos * cos + self.across_n * sin * sin * sin + closed_n + fin_share * (open_n - closed_n)
@@ -44,8 +47,8 @@ impl Drag {
 }
 
 impl Vertical {
-    /// The vehicle of an airframe and a motor file as the truth changes them. Fins hang exactly at their commanded angle,
-    /// without misalignment or play.
+    /// The vehicle of an airframe and a motor file as the truth changes them. Fins hang exactly at
+    /// their commanded angle, without misalignment or play.
     pub(crate) fn new(site: &Site, airframe: &Airframe, motor: &ThrustCurve, truth: &Truth) -> Self {
         let (body, fins) = (&airframe.body, airframe.fin_model());
         let legs_m2 = airframe.legs.drag_area_m2 + truth.leg_drag_m2;
@@ -88,7 +91,8 @@ impl Vertical {
     /// The drag at a speed in air of a density under a thrust.
     pub(crate) fn drag(&self, density_kg_m3: f64, speed_m_s: f64, thrust_n: f64) -> Drag {
         let pressure_pa = 0.5 * density_kg_m3 * speed_m_s * speed_m_s;
-        // The exhaust takes its share when its thrust exceeds the pressure on the base, and in proportion below that.
+        // The exhaust takes its share when its thrust exceeds the pressure on the base, and in
+        // proportion below that.
         let on_base_n = pressure_pa * self.base_m2;
         let strength = if thrust_n > on_base_n { 1.0 } else { (thrust_n / on_base_n).max(0.0) };
         let [body, fins] =
@@ -111,7 +115,8 @@ mod tests {
     use super::*;
     use sim::world::{Actuators, World};
 
-    /// The whole world with a vehicle that is upright in still air: its vertical acceleration is this room's.
+    /// The whole world with a vehicle that is upright in still air: its vertical acceleration is
+    /// this room's.
     #[test]
     fn val_world_the_forces_are_those_of_an_upright_vehicle() {
         let airframe = flight::vehicles::mission::builtin_airframe("mk2").unwrap();

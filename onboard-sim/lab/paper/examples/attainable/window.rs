@@ -21,8 +21,9 @@ impl Window {
     }
 }
 
-/// Command heights tried if none of the usual kind lands, between the lowest one and apogee. Only vehicles that are still
-/// gaining speed have such landings, and for them the window is metres wide.
+/// Command heights tried if none of the usual kind lands, between the lowest one and apogee. Only
+/// vehicles that are still gaining speed have such landings, and for them the window is metres
+/// wide.
 const TRIED: usize = 24;
 
 /// The window of a flight whose fall begins in this state; `None` if it lands from no height.
@@ -56,7 +57,8 @@ pub(crate) fn window(mission: &Mission, drawn: &Draw, fall: &RigidState) -> Opti
     Some(Window { low_m: edge_m(first, first - 1), high_m })
 }
 
-/// Heights are found this closely, m: far below what decides a landing (a metre of height is 0.2 m/s at the ground).
+/// Heights are found this closely, m: far below what decides a landing (a metre of height is 0.2
+/// m/s at the ground).
 const ROUNDING_M: f64 = 1e-3;
 
 struct Search {
@@ -65,8 +67,8 @@ struct Search {
 }
 
 impl Search {
-    /// Height at the first thrust above the lowest from which the vehicle stops before the ground, m. It grows with the
-    /// command height: a higher command comes at a lower speed.
+    /// Height at the first thrust above the lowest from which the vehicle stops before the ground,
+    /// m. It grows with the command height: a higher command comes at a lower speed.
     fn above_lowest_m(&self, command_m: f64) -> f64 {
         let (height_m, vertical_m_s) = self.fall.onset(command_m);
         height_m - self.braking.least_fall(height_m, vertical_m_s).fallen_m
@@ -90,8 +92,8 @@ impl Search {
     }
 }
 
-/// The command height inside most windows, m, and the number of windows around it; `None` without windows. Among equally
-/// good heights it is the middle of the lowest stretch.
+/// The command height inside most windows, m, and the number of windows around it; `None` without
+/// windows. Among equally good heights it is the middle of the lowest stretch.
 pub(crate) fn best_height_m(windows: &[Window]) -> Option<(f64, u64)> {
     // Where windows begin (first at equal heights) and end, in order.
     let mut edges: Vec<(f64, bool)> =
@@ -112,20 +114,22 @@ pub(crate) fn best_height_m(windows: &[Window]) -> Option<(f64, u64)> {
     best
 }
 
-/// Length of a step, s. The midpoint rule is then right to a millimetre over the fall, and to a centimetre over a burn.
+/// Length of a step, s. The midpoint rule is then right to a millimetre over the fall, and to a
+/// centimetre over a burn.
 const STEP_S: f64 = 0.02;
 /// A fall that takes longer is given up, s. From 300 m it takes 11 s.
 const LONGEST_S: f64 = 120.0;
 
-/// Height of the feet, m, and vertical velocity, m/s, at equal times since apogee, past the ground by the igniter's delay.
+/// Height of the feet, m, and vertical velocity, m/s, at equal times since apogee, past the ground
+/// by the igniter's delay.
 struct Fall {
     states: Vec<(f64, f64)>,
     delay_s: f64,
 }
 
 impl Fall {
-    /// The fall from a height of the feet, m, and a vertical velocity that is not upwards, m/s. `None` if it does not reach
-    /// the ground.
+    /// The fall from a height of the feet, m, and a vertical velocity that is not upwards, m/s.
+    /// `None` if it does not reach the ground.
     fn new(vertical: &Vertical, height_m: f64, vertical_m_s: f64, delay_s: f64) -> Option<Self> {
         let mass_kg = vertical.mass_kg(-1.0);
         let acceleration_m_s2 = |height_m: f64, vertical_m_s: f64| {
@@ -151,8 +155,8 @@ impl Fall {
         Some(Self { states, delay_s })
     }
 
-    /// Height of the feet, m, and vertical velocity, m/s, at the first thrust after a command at a height of the feet, m,
-    /// between the ground and apogee.
+    /// Height of the feet, m, and vertical velocity, m/s, at the first thrust after a command at a
+    /// height of the feet, m, between the ground and apogee.
     fn onset(&self, command_m: f64) -> (f64, f64) {
         let after = self.states.partition_point(|(height_m, _)| *height_m > command_m);
         let from = after.saturating_sub(1);
@@ -179,9 +183,11 @@ impl Fall {
     }
 }
 
-/// Time after the burn that is looked at, s. A vehicle at rest then falls to the legs' limit (1 m/s) in a tenth of that.
+/// Time after the burn that is looked at, s. A vehicle at rest then falls to the legs' limit (1
+/// m/s) in a tenth of that.
 const AFTER_S: f64 = 1.0;
-/// Tilts tried for the hardest and softest braking. Between them a parabola is laid through three: with 17, heights differ by at most 0.3 mm.
+/// Tilts tried for the hardest and softest braking. Between them a parabola is laid through three:
+/// with 17, heights differ by at most 0.3 mm.
 const TILTS: usize = 9;
 /// Times of touchdown tried for the greatest fall, between which a parabola is laid, too.
 const ENDS: usize = 16;
@@ -220,13 +226,14 @@ struct Braking {
     carried_until_s: f64,
     ground_density_kg_m3: f64,
     density_gradient_kg_m4: f64,
-    /// Paths that brake hard until they touch down at the limit of the legs: time of touchdown, s, and the state at each
-    /// step before it.
+    /// Paths that brake hard until they touch down at the limit of the legs: time of touchdown, s,
+    /// and the state at each step before it.
     endings: Vec<(f64, Vec<State>)>,
 }
 
 impl Braking {
-    /// From the largest tilt, rad, and the legs' limit, m/s. `None` if the thrust never exceeds the weight.
+    /// From the largest tilt, rad, and the legs' limit, m/s. `None` if the thrust never exceeds the
+    /// weight.
     fn new(vertical: Vertical, (tilt_max_rad, leg_m_s): (f64, f64)) -> Option<Self> {
         let burn = vertical.burn();
         let count = libm::ceil((burn.lasts_s() + AFTER_S) / STEP_S) as usize;
@@ -298,7 +305,8 @@ impl Braking {
         (height_m + time_s * midway.1, vertical_m_s + time_s * midway_m_s2)
     }
 
-    /// The state at the end of each step, on the way from a time on; the first is at the end of the step of that time.
+    /// The state at the end of each step, on the way from a time on; the first is at the end of the
+    /// step of that time.
     fn onwards(
         &self,
         from_s: f64,
@@ -314,8 +322,8 @@ impl Braking {
         })
     }
 
-    /// The states at the steps' beginnings on the way to a state at a time, as far back as the speed is sensible; the first
-    /// of them is the earliest.
+    /// The states at the steps' beginnings on the way to a state at a time, as far back as the
+    /// speed is sensible; the first of them is the earliest.
     fn back_from(&self, end_s: f64, end: State, brake: Brake) -> Vec<State> {
         let last = (libm::ceil(end_s / STEP_S) as usize).clamp(1, self.steps.len()) - 1;
         let too_fast = (0.0, -f64::INFINITY);
@@ -335,7 +343,8 @@ impl Braking {
         path
     }
 
-    /// Until when hard braking keeps a vehicle within the limit of the legs, s, from a time and a velocity on.
+    /// Until when hard braking keeps a vehicle within the limit of the legs, s, from a time and a
+    /// velocity on.
     fn slow_until_s(&self, from_s: f64, vertical_m_s: f64) -> f64 {
         let mut before_m_s = vertical_m_s;
         for (step, passed_s, (_, after_m_s)) in self.onwards(from_s, (0.0, vertical_m_s), Brake::Hard) {
@@ -382,8 +391,9 @@ impl Braking {
         Least { fallen_m: from_m - before.0, lands: false }
     }
 
-    /// The least fall of a vehicle that stops at a time at the earliest, after falling that far from a state: until there
-    /// if it can land from there, otherwise until the earliest stop from which it can.
+    /// The least fall of a vehicle that stops at a time at the earliest, after falling that far
+    /// from a state: until there if it can land from there, otherwise until the earliest stop from
+    /// which it can.
     fn stopped(&self, fallen_m: f64, from: State, stops_s: f64) -> Least {
         let comes_down =
             |stops_s: f64| self.most_fall_m(stops_s, 0.0, 0.0).is_some_and(|fall_m| fall_m >= 0.0);
@@ -403,7 +413,8 @@ impl Braking {
         }
     }
 
-    /// The greatest fall to a landing from a state at a time, m; `None` if it cannot become slow enough.
+    /// The greatest fall to a landing from a state at a time, m; `None` if it cannot become slow
+    /// enough.
     fn most_fall_m(&self, from_s: f64, height_m: f64, vertical_m_s: f64) -> Option<f64> {
         let from = (height_m, vertical_m_s);
         let soft: Vec<(usize, f64, State)> = self.onwards(from_s, from, Brake::Soft).collect();
@@ -412,7 +423,8 @@ impl Braking {
             .iter()
             .map(|(_, ending)| joined_m(from_s, from, soft.iter().copied(), ending))
             .collect();
-        // A strong motor: not even soft braking all the way reaches the limit of the legs before it.
+        // A strong motor: not even soft braking all the way reaches the limit of the legs before
+        // it.
         let slow_m = soft
             .iter()
             .position(|(step, _, state)| {
@@ -427,7 +439,8 @@ impl Braking {
     }
 }
 
-/// The fall along a path until its velocity meets an ending's, and then along the ending, m; `None` if they do not meet.
+/// The fall along a path until its velocity meets an ending's, and then along the ending, m; `None`
+/// if they do not meet.
 fn joined_m(
     from_s: f64,
     from: State,
@@ -456,7 +469,8 @@ fn joined_m(
     None
 }
 
-/// The largest of values at equal distances, of which some are missing, with a parabola through it and its neighbours.
+/// The largest of values at equal distances, of which some are missing, with a parabola through it
+/// and its neighbours.
 fn peak(values: &[Option<f64>]) -> Option<f64> {
     let found = values.iter().enumerate().filter_map(|(place, value)| Some((place, (*value)?)));
     let (place, most) = found.reduce(|best, next| if next.1 > best.1 { next } else { best })?;
@@ -473,9 +487,9 @@ const CLOSE: f64 = 1e-4;
 /// Largest number of values asked for; about eight are usual.
 const MOST_VALUES: usize = 60;
 
-/// Where a function that rises from below zero at `low` passes zero, by false position; the value of an end that stays
-/// twice is halved (the Illinois rule; Dowell and Jarratt, BIT 11, 1971). `None` if it is below zero at `high`; `low` if it
-/// is above zero there.
+/// Where a function that rises from below zero at `low` passes zero, by false position; the value
+/// of an end that stays twice is halved (the Illinois rule; Dowell and Jarratt, BIT 11, 1971).
+/// `None` if it is below zero at `high`; `low` if it is above zero there.
 fn root(value_at: impl Fn(f64) -> f64, low: f64, high: f64) -> Option<f64> {
     let (mut below, mut above) = ((low, value_at(low)), (high, value_at(high)));
     if below.1 >= 0.0 {

@@ -1,7 +1,9 @@
-//! The landing controller's solver behind a pipe, to compare it with other solvers problem by problem.
+//! The landing controller's solver behind a pipe, to compare it with other solvers problem by
+//! problem.
 //!
-//! Each line on standard input is a command and gets one line as its answer. A state is `x z theta u w q`, in m, rad,
-//! m/s and rad/s. The problem is the landing paper's own (only distance and height are limited at the end), N = 50.
+//! Each line on standard input is a command and gets one line as its answer. A state is `x z theta
+//! u w q`, in m, rad, m/s and rad/s. The problem is the landing paper's own (only distance and
+//! height are limited at the end), N = 50.
 //!
 //! ```text
 //! penalty PENALTY              what a metre of missed end height costs from now on; a high penalty makes it a hard condition
@@ -18,12 +20,13 @@
 //! peak                     time the arithmetic of this machine
 //! ```
 //!
-//! A solve runs twice, and the second run is timed in the thread's own processor time, so interruptions do not count.
-//! Its answer is `STATUS NANOSECONDS ITERATIONS COST STATIONARITY FEASIBILITY MISS` and the inputs in rad. The answer
-//! to `sweep` is the nanoseconds of evaluating all intervals, of a Newton step, and of a warm solve that ends after one
-//! iteration. The answer to `quadratic` is the nanoseconds of a Newton step, the problem's numbers, and the answer of a
-//! solve; that to `peak` is Gflop/s and the latencies of addition, multiplication, division and root in ns. What is proved
-//! not landable is not solved.
+//! A solve runs twice, and the second run is timed in the thread's own processor time, so
+//! interruptions do not count. Its answer is `STATUS NANOSECONDS ITERATIONS COST STATIONARITY
+//! FEASIBILITY MISS` and the inputs in rad. The answer to `sweep` is the nanoseconds of evaluating
+//! all intervals, of a Newton step, and of a warm solve that ends after one iteration. The answer
+//! to `quadratic` is the nanoseconds of a Newton step, the problem's numbers, and the answer of a
+//! solve; that to `peak` is Gflop/s and the latencies of addition, multiplication, division and
+//! root in ns. What is proved not landable is not solved.
 #![expect(clippy::print_stdout, reason = "the answers")]
 
 mod clock;
@@ -178,7 +181,8 @@ impl Peer {
     }
 }
 
-/// Solves twice, the second time with the buffers of the first; the second outcome, and the answer that tells it.
+/// Solves twice, the second time with the buffers of the first; the second outcome, and the answer
+/// that tells it.
 fn timed<M: Model<NX, NU>, const NX: usize, const NU: usize>(
     model: &M,
     workspace: &mut ocp::Workspace<M, NX, NU>,

@@ -1,5 +1,6 @@
-//! The quadratic problem of one Gauss-Newton step: the landing with its dynamics linearised at a plan. (With the exact Hessian it
-//! need not be convex, which public solvers of such problems ask for.)
+//! The quadratic problem of one Gauss-Newton step: the landing with its dynamics linearised at a
+//! plan. (With the exact Hessian it need not be convex, which public solvers of such problems ask
+//! for.)
 #![expect(clippy::inline_always, reason = "inlined into the sweeps, to be compiled for their vectors")]
 
 use core::array::from_fn;
@@ -31,8 +32,8 @@ struct Linear {
     ends: Vec<[f64; 6]>,
 }
 
-/// The nanoseconds of a Newton step; of every interval the columns of `A`, that of `B`, and its end from zeros; and the
-/// answer of a solve.
+/// The nanoseconds of a Newton step; of every interval the columns of `A`, that of `B`, and its end
+/// from zeros; and the answer of a solve.
 pub(crate) fn answer(problem: &Problem, plan: &Solution) -> Result<String> {
     ensure!(plan.inputs_rad.len() == problem.intervals, "the plan must be of the whole horizon");
     let mut posed = Quadratic { problem, plan, linear: Linear::default() };

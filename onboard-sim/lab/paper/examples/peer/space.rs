@@ -1,6 +1,8 @@
-//! A landing in space for the comparison: gimbal in two directions, fins, a box at the end, a given final time.
+//! A landing in space for the comparison: gimbal in two directions, fins, a box at the end, a given
+//! final time.
 //!
-//! The vehicle is the one of the solver's own tests: 1.2 kg, a thrust that falls to the weight in 3.8 s, a light wind.
+//! The vehicle is the one of the solver's own tests: 1.2 kg, a thrust that falls to the weight in
+//! 3.8 s, a light wind.
 
 use anyhow::{Result, ensure};
 use ocp::Start;

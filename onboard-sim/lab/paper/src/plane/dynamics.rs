@@ -1,8 +1,10 @@
-//! The planar (longitudinal) equations of motion of the landing burn, their integrator and their derivatives.
+//! The planar (longitudinal) equations of motion of the landing burn, their integrator and their
+//! derivatives.
 //!
-//! Frames: `x` horizontal, `z` altitude, up. Pitch `theta` from the horizontal, pi/2 upright. Body axes
-//! `e_x = (cos theta, sin theta)`, towards the nose, and `e_z = (sin theta, -cos theta)`; `(u, w)` is the
-//! velocity along them and `q = d(theta)/dt`. The gimbal angle `delta` is positive for a pitch-down manoeuvre.
+//! Frames: `x` horizontal, `z` altitude, up. Pitch `theta` from the horizontal, pi/2 upright. Body
+//! axes `e_x = (cos theta, sin theta)`, towards the nose, and `e_z = (sin theta, -cos theta)`; `(u,
+//! w)` is the velocity along them and `q = d(theta)/dt`. The gimbal angle `delta` is positive for a
+//! pitch-down manoeuvre.
 //!
 //! ```text
 //! x'     = u cos(theta) + w sin(theta)
@@ -13,16 +15,16 @@
 //! q'     = -T sin(delta) (X_CG - X_THR) / I_y
 //! ```
 //!
-//! This is the landing paper (`EuroGNC`), Eq. 18-22, put into one frame and with forces divided by mass; see
-//! [`ModelKind`] for the printed set.
+//! This is the landing paper (`EuroGNC`), Eq. 18-22, put into one frame and with forces divided by
+//! mass; see [`ModelKind`] for the printed set.
 
 /// The set of planar equations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ModelKind {
     /// One frame throughout: energy is conserved without thrust and drag.
     Consistent,
-    /// Eq. 18-22 of the landing paper with forces divided by mass and no other correction: the rotation and the gravity
-    /// terms belong to different frames. For replication only.
+    /// Eq. 18-22 of the landing paper with forces divided by mass and no other correction: the
+    /// rotation and the gravity terms belong to different frames. For replication only.
     AsPrinted,
 }
 
@@ -110,7 +112,8 @@ impl PlanarModel {
     }
 }
 
-/// The motion at a state, for its rates and their derivatives by pitch, `u`, `w`, pitch rate and gimbal angle.
+/// The motion at a state, for its rates and their derivatives by pitch, `u`, `w`, pitch rate and
+/// gimbal angle.
 pub(super) struct Motion {
     state: [f64; 6],
     /// Sine and cosine of the pitch.
@@ -118,14 +121,14 @@ pub(super) struct Motion {
     gravity_m_s2: f64,
     /// 1, or -1 where the printed rotation (Eq. 22) turns `w` the other way.
     lateral: f64,
-    /// Accelerations by the thrust: along the axis, across it (its derivative by the gimbal angle), and of the pitch, with its
-    /// derivative by that angle.
+    /// Accelerations by the thrust: along the axis, across it (its derivative by the gimbal angle),
+    /// and of the pitch, with its derivative by that angle.
     push: f64,
     side: f64,
     turn: f64,
     turn_by_gimbal: f64,
-    /// The drag's acceleration along the axis, its derivatives by `u` and `w`, and those of second order: by `u` twice, by both,
-    /// by `w` twice.
+    /// The drag's acceleration along the axis, its derivatives by `u` and `w`, and those of second
+    /// order: by `u` twice, by both, by `w` twice.
     drag: f64,
     drag_by: [f64; 2],
     drag_bent: [f64; 3],
@@ -237,7 +240,8 @@ mod tests {
         PlanarModel { kind, ..problem::model() }
     }
 
-    /// Energy gained over one second of coasting without drag, J/kg, from 30 deg off the vertical with sideways speed.
+    /// Energy gained over one second of coasting without drag, J/kg, from 30 deg off the vertical
+    /// with sideways speed.
     fn coasting_energy_gain_j_kg(kind: ModelKind) -> f64 {
         let mut model = model(kind);
         model.drag_per_m = 0.0;
@@ -255,8 +259,8 @@ mod tests {
         assert!(coasting_energy_gain_j_kg(ModelKind::Consistent).abs() < 1e-10);
     }
 
-    /// The printed rotation and the printed gravity belong to different frames: with 147 J/kg of height, 12.5 J/kg appear
-    /// without a source within a second.
+    /// The printed rotation and the printed gravity belong to different frames: with 147 J/kg of
+    /// height, 12.5 J/kg appear without a source within a second.
     #[test]
     fn val_energy_conservation_printed_model_breaks_it() {
         let gain = coasting_energy_gain_j_kg(ModelKind::AsPrinted);
@@ -278,7 +282,8 @@ mod tests {
         }
     }
 
-    /// Upright flight without drag has the closed form z = z0 + v t + (T/m - g) t^2 / 2, which the integrator must give.
+    /// Upright flight without drag has the closed form z = z0 + v t + (T/m - g) t^2 / 2, which the
+    /// integrator must give.
     #[test]
     fn val_closed_form_upright_burn() {
         let mut model = model(ModelKind::Consistent);

@@ -1,6 +1,7 @@
 //! The planar dynamics in every interval, with exact first and second derivatives.
 //!
-//! Only five directions matter: pitch, velocity, pitch rate and the gimbal angle. Nothing depends on the position.
+//! Only five directions matter: pitch, velocity, pitch rate and the gimbal angle. Nothing depends
+//! on the position.
 
 use core::array::from_fn;
 
@@ -32,7 +33,8 @@ pub(super) fn evaluate(
         interval.end = end(state, &stages, h);
         let jacobians = stages.each_ref().map(Motion::by_directions);
 
-        // Backwards: what a change of each stage's rates is worth, and of each direction of its state.
+        // Backwards: what a change of each stage's rates is worth, and of each direction of its
+        // state.
         let mut worth = [[0.0; 6]; 4];
         let (mut later, mut pulled) = ([0.0; DIRECTIONS], [0.0; DIRECTIONS]);
         for stage in (0..4).rev() {

@@ -1,16 +1,16 @@
 //! Solves the landing paper's optimal-control problem, which lies in a vertical plane.
 //!
-//! [`solve`] takes a [`Problem`] and, if there is one, a [`Start`]. It always returns a [`Solution`], whose [`Status`] says
-//! how the solve ended.
+//! [`solve`] takes a [`Problem`] and, if there is one, a [`Start`]. It always returns a
+//! [`Solution`], whose [`Status`] says how the solve ended.
 //!
-//! * [`problem`]: the problem and its conditions, as data and as the solver reads it, and a lower bound of the touchdown
-//!   speed, which shows starts that cannot be landed.
+//! * [`problem`]: the problem and its conditions, as data and as the solver reads it, and a lower
+//!   bound of the touchdown speed, which shows starts that cannot be landed.
 //! * [`dynamics`]: the planar equations of motion and their integrator.
 //! * `intervals`: the dynamics of all intervals with exact first and second derivatives.
 //!
-//! The solver is the crate [`ocp`], whose page has the formulation, the steps and the references. Gauss-Newton Hessians
-//! do not work here: the multiplier of the end height is large, so the curvature of the dynamics counts, and full
-//! Gauss-Newton steps diverge from tilted starts.
+//! The solver is the crate [`ocp`], whose page has the formulation, the steps and the references.
+//! Gauss-Newton Hessians do not work here: the multiplier of the end height is large, so the
+//! curvature of the dynamics counts, and full Gauss-Newton steps diverge from tilted starts.
 
 pub mod dynamics;
 mod intervals;
@@ -88,8 +88,9 @@ impl Solution {
 
 /// Solves the landing problem.
 ///
-/// The solve starts from an earlier solution if its length fits. Otherwise it starts from two bent guesses and keeps the
-/// better result: the problem has mirrored and multi-swing local minima, and the straight path between them is a saddle.
+/// The solve starts from an earlier solution if its length fits. Otherwise it starts from two bent
+/// guesses and keeps the better result: the problem has mirrored and multi-swing local minima, and
+/// the straight path between them is a saddle.
 pub fn solve(problem: &Problem, start: Option<&Start<'_, 6, 1>>) -> Solution {
     let mut workspace = Workspace::default();
     let outcome = workspace.solve(problem, start);

@@ -1,4 +1,5 @@
-//! The landing problem, as data and as the solver reads it, and a lower bound of its touchdown speed.
+//! The landing problem, as data and as the solver reads it, and a lower bound of its touchdown
+//! speed.
 
 use core::array::from_fn;
 use core::f64::consts::{FRAC_PI_2, PI};
@@ -12,8 +13,9 @@ use crate::plane::intervals;
 /// The box in which a planned trajectory ends, in addition to height and distance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FinalBox {
-    /// Number of nodes at the end, one per sample, at which pitch, lateral speed and pitch rate are inside the box.
-    /// With one node the vehicle may fly through the box at the last instant; with more it arrives settled.
+    /// Number of nodes at the end, one per sample, at which pitch, lateral speed and pitch rate are
+    /// inside the box. With one node the vehicle may fly through the box at the last instant; with
+    /// more it arrives settled.
     pub settled_nodes: usize,
     /// Largest pitch error from upright, degrees.
     pub pitch_error_deg: f64,
@@ -39,10 +41,11 @@ pub struct SolverLimits {
 
 /// One landing problem: from a state now, through intervals of held gimbal angle, to the ground.
 ///
-/// Minimise the running cost (Eq. 28 of the landing paper) subject to the planar dynamics, the gimbal limit,
-/// `z = 0` and `|x| <= x_final_m` at the end, and perhaps a box around the other states there (the paper's Table 2).
-/// The conditions on states are exact penalties, so the problem always has a solution. Cost and conditions are relative
-/// to an upright vehicle at rest at the origin.
+/// Minimise the running cost (Eq. 28 of the landing paper) subject to the planar dynamics, the
+/// gimbal limit, `z = 0` and `|x| <= x_final_m` at the end, and perhaps a box around the other
+/// states there (the paper's Table 2). The conditions on states are exact penalties, so the problem
+/// always has a solution. Cost and conditions are relative to an upright vehicle at rest at the
+/// origin.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Problem {
     pub model: PlanarModel,
@@ -101,7 +104,8 @@ impl Problem {
 /// Barrier of a cold solve's first iteration.
 const FIRST_BARRIER: f64 = 1e3;
 
-/// Bends of the cold guesses' pitch, rad. Those after the first two are only tried if the first two do not land.
+/// Bends of the cold guesses' pitch, rad. Those after the first two are only tried if the first two
+/// do not land.
 const BENDS_RAD: [f64; 4] = [0.3, -0.3, 3.3 * 0.3, -3.3 * 0.3];
 const NARROW_BENDS: usize = 2;
 
@@ -138,7 +142,8 @@ impl Model<6, 1> for Problem {
             let tilt = limits.pitch_error_deg.to_radians();
             let rate = limits.pitch_rate_deg_s.to_radians();
             between(end, U, limits.u_min_m_s, limits.u_max_m_s);
-            // From the end backwards, so that a horizon that is too short for all nodes keeps the order of the others.
+            // From the end backwards, so that a horizon that is too short for all nodes keeps the
+            // order of the others.
             for node in (1..=end).rev().take(limits.settled_nodes) {
                 between(node, THETA, FRAC_PI_2 - tilt, FRAC_PI_2 + tilt);
                 between(node, W, -limits.w_m_s, limits.w_m_s);
@@ -160,9 +165,9 @@ impl Model<6, 1> for Problem {
         }
     }
 
-    /// States on the straight line from the start to the target, the pitch bent by one full wave. The vehicle tilts one
-    /// way and then the other, which wastes surplus thrust and ends upright. The path need not be flyable. Inputs are
-    /// zero.
+    /// States on the straight line from the start to the target, the pitch bent by one full wave.
+    /// The vehicle tilts one way and then the other, which wastes surplus thrust and ends upright.
+    /// The path need not be flyable. Inputs are zero.
     fn guess(&self, index: usize, states: &mut [[f64; 6]], inputs_rad: &mut [[f64; 1]]) {
         let from = self.initial.to_array();
         for (k, state) in states.iter_mut().enumerate() {
@@ -225,13 +230,14 @@ impl Model<6, 1> for Problem {
 /// Steps in an interval.
 const SUB_STEPS: usize = 20;
 
-/// The slowest vertical touchdown that any gimbal commands can reach from the problem's start, m/s; 0 if the vehicle
-/// can stop sinking before it reaches the ground.
+/// The slowest vertical touchdown that any gimbal commands can reach from the problem's start, m/s;
+/// 0 if the vehicle can stop sinking before it reaches the ground.
 ///
-/// The vertical acceleration is largest upright with the nozzle centred, when all the thrust acts against the weight.
-/// So a path that is upright from now on sinks slowest at every instant and reaches the ground last, and no other path
-/// touches down slower. The bound neglects the drag of sideways flight, which is below one thousandth of gravity at the
-/// landing paper's speeds, and the time to turn upright.
+/// The vertical acceleration is largest upright with the nozzle centred, when all the thrust acts
+/// against the weight. So a path that is upright from now on sinks slowest at every instant and
+/// reaches the ground last, and no other path touches down slower. The bound neglects the drag of
+/// sideways flight, which is below one thousandth of gravity at the landing paper's speeds, and the
+/// time to turn upright.
 pub fn best_touchdown_speed_m_s(problem: &Problem) -> f64 {
     let Problem { model, initial, thrust_n, .. } = problem;
     let (_, vertical_m_s) = initial.ground_velocity_m_s();

@@ -1,4 +1,5 @@
-//! The paper's experiments, the numbers it prints for them (its Tables 3 to 6), and what counts as a landing (Table 2).
+//! The paper's experiments, the numbers it prints for them (its Tables 3 to 6), and what counts as
+//! a landing (Table 2).
 
 use core::f64::consts::FRAC_PI_2;
 
@@ -178,7 +179,8 @@ pub(super) fn broken(state: &PlanarState) -> Vec<String> {
 mod tests {
     use super::*;
 
-    /// Tables 3 to 6 of the landing paper under its own Table 2: 3 of the 7 distinct start states land.
+    /// Tables 3 to 6 of the landing paper under its own Table 2: 3 of the 7 distinct start states
+    /// land.
     #[test]
     fn val_landing_paper_tables_4_to_6_judged_by_table_2() {
         // (x m, theta deg, u m/s, w m/s, q deg/s), z is zero in all.

@@ -1,8 +1,10 @@
-//! The paper's vehicle falling with its fins held still, in space (its section 2, Fig. 5); and whether it settles, over the
-//! tilt at the start and the opening of the fins, with the static margin that explains it.
+//! The paper's vehicle falling with its fins held still, in space (its section 2, Fig. 5); and
+//! whether it settles, over the tilt at the start and the opening of the fins, with the static
+//! margin that explains it.
 //!
-//! A cell of that map is one fall from rest for each of [`ROLLS_DEG`]: the lifts of the fins are a couple that helps in one
-//! plane and harms in the other, so the direction of the tilt counts. The tilt repeats after half a turn.
+//! A cell of that map is one fall from rest for each of [`ROLLS_DEG`]: the lifts of the fins are a
+//! couple that helps in one plane and harms in the other, so the direction of the tilt counts. The
+//! tilt repeats after half a turn.
 
 use core::f64::consts::FRAC_PI_2;
 
@@ -21,8 +23,9 @@ use super::PaperError;
 pub(crate) const HEIGHT_M: f64 = 300.0;
 /// Centre of gravity above the nozzle (Table 1: `X_CG - X_THR`), m.
 pub(crate) const CG_STATION_M: f64 = 0.52;
-/// The same by the other reading of "25 % of the rocket's length, as the engine represents the large majority of the total
-/// mass": a quarter of the length from the nozzle, m. Table 1 has it a quarter from the nose.
+/// The same by the other reading of "25 % of the rocket's length, as the engine represents the
+/// large majority of the total mass": a quarter of the length from the nozzle, m. Table 1 has it a
+/// quarter from the nose.
 pub(crate) const HEAVY_TAIL_STATION_M: f64 = 0.175;
 /// Steps between two samples.
 const SAMPLE_STEPS: u64 = 20;
@@ -42,15 +45,16 @@ pub(crate) struct Moment {
     /// Centre of gravity, height above the ground under the feet's contact, m.
     pub(crate) position_m: Vector3<f64>,
     pub(crate) velocity_m_s: Vector3<f64>,
-    /// Angle between the tail and the velocity: 0 in a straight tail-first fall, pi nose first, rad.
+    /// Angle between the tail and the velocity: 0 in a straight tail-first fall, pi nose first,
+    /// rad.
     pub(crate) angle_to_wind_rad: f64,
     /// Angle between the nose and the vertical, rad.
     pub(crate) tilt_rad: f64,
 }
 
 impl Vehicle {
-    /// The vehicle with our own airframe's parts that the paper leaves out (legs, servos, parachute), which do not act
-    /// in a passive fall.
+    /// The vehicle with our own airframe's parts that the paper leaves out (legs, servos,
+    /// parachute), which do not act in a passive fall.
     ///
     /// # Errors
     /// A built-in file is missing: a defect of the build.
@@ -79,8 +83,9 @@ impl Vehicle {
         &self.airframe
     }
 
-    /// The fall from rest in still air, from [`HEIGHT_M`] to the ground, with the nose turned away from the vertical:
-    /// pitch and yaw about body y and z, rad. It ends early when `over` says so of a sample.
+    /// The fall from rest in still air, from [`HEIGHT_M`] to the ground, with the nose turned away
+    /// from the vertical: pitch and yaw about body y and z, rad. It ends early when `over` says so
+    /// of a sample.
     ///
     /// # Errors
     /// The world cannot be built: a defect of the build.
@@ -178,8 +183,8 @@ pub(crate) struct Stability {
     pub(crate) cg_station_m: f64,
     /// Row by row: a row for each of [`OPENINGS_DEG`], a column for each of [`TILTS_DEG`].
     pub(crate) fates: Vec<Fate>,
-    /// Centre of pressure above the centre of gravity, m, positive is stable: for each of [`OPENINGS_DEG`] and
-    /// [`ANGLES_DEG`], the least and the most over the direction of the angle.
+    /// Centre of pressure above the centre of gravity, m, positive is stable: for each of
+    /// [`OPENINGS_DEG`] and [`ANGLES_DEG`], the least and the most over the direction of the angle.
     pub(crate) margins_m: Vec<[[f64; 2]; ANGLES_DEG.len()]>,
 }
 
@@ -230,8 +235,8 @@ fn fate(vehicle: &Vehicle, opening_deg: f64, tilt_deg: f64) -> Result<Fate, Pape
     })
 }
 
-/// Least and most over the direction, m. The couple of the lifts goes as the cosine of twice the direction, so its
-/// extremes are in the two planes of symmetry.
+/// Least and most over the direction, m. The couple of the lifts goes as the cosine of twice the
+/// direction, so its extremes are in the two planes of symmetry.
 fn margin_m(balance: &Balance, opening_deg: f64, angle_deg: f64, cg_station_m: f64) -> [f64; 2] {
     let of = |roll_deg: f64| {
         let across = balance.across(opening_deg.to_radians(), angle_deg.to_radians(), roll_deg.to_radians());
@@ -251,7 +256,8 @@ mod tests {
         libm::sqrt(2.0 * vehicle.airframe.mass.loaded_kg * 9.806_65 / (1.225 * area_m2))
     }
 
-    /// The paper's Fig. 5: fins fully open, 2 degrees of pitch and 1 degree of yaw: passively stable, and slow.
+    /// The paper's Fig. 5: fins fully open, 2 degrees of pitch and 1 degree of yaw: passively
+    /// stable, and slow.
     #[test]
     fn val_paper_fig_5_the_fall_settles_and_approaches_the_terminal_speed() {
         let vehicle = Vehicle::new().unwrap();
@@ -279,9 +285,10 @@ mod tests {
         values.iter().position(|known| (known - value).abs() < 1e-9).unwrap()
     }
 
-    /// By hand: the moment about the centre of gravity of the open fins, `4 S C_x (0.63 - 0.52) sin a` with the couple
-    /// of their lifts `4 S C_z r sin 30 cos 30 sin a` for or against it, over that of the body,
-    /// `C_c D L (0.52 - 0.35) sin^2 a`, changes its sign at 11.5 degrees in one plane and at 20.9 in the other.
+    /// By hand: the moment about the centre of gravity of the open fins, `4 S C_x (0.63 - 0.52) sin
+    /// a` with the couple of their lifts `4 S C_z r sin 30 cos 30 sin a` for or against it, over
+    /// that of the body, `C_c D L (0.52 - 0.35) sin^2 a`, changes its sign at 11.5 degrees in one
+    /// plane and at 20.9 in the other.
     #[test]
     fn val_hand_the_static_margin_explains_where_the_paper_s_vehicle_flips() {
         let stability = Stability::new(CG_STATION_M).unwrap();
@@ -303,7 +310,8 @@ mod tests {
         }
     }
 
-    /// By hand: the middle of the body, where the air pushes at least, is 0.175 m above this centre of gravity.
+    /// By hand: the middle of the body, where the air pushes at least, is 0.175 m above this centre
+    /// of gravity.
     #[test]
     fn val_hand_with_a_heavy_tail_every_fall_settles() {
         let stability = Stability::new(HEAVY_TAIL_STATION_M).unwrap();

@@ -1,5 +1,6 @@
-//! Figures as SVG, drawn with `plotters`: the best maintained plotting crate that writes SVG without fonts, images or a browser
-//! (three small crates, 6 s of a build); ticks, axes and escaping are its own.
+//! Figures as SVG, drawn with `plotters`: the best maintained plotting crate that writes SVG
+//! without fonts, images or a browser (three small crates, 6 s of a build); ticks, axes and
+//! escaping are its own.
 
 use std::collections::BTreeSet;
 
@@ -128,13 +129,15 @@ pub(crate) struct Panel {
     pub(crate) x_label: String,
     pub(crate) y_label: String,
     pub(crate) lines: Vec<Line>,
-    /// Places of several kinds, each kind with its name. All panels of a figure have the same kinds.
+    /// Places of several kinds, each kind with its name. All panels of a figure have the same
+    /// kinds.
     pub(crate) kinds: Vec<(String, Vec<(f64, f64)>)>,
     /// Crosses, each with the colour of a curve.
     pub(crate) crosses: Vec<(f64, f64, usize)>,
 }
 
-/// Panels in rows of `columns`, smaller ones if there are several, below a title. `cross_name` says what the crosses are.
+/// Panels in rows of `columns`, smaller ones if there are several, below a title. `cross_name` says
+/// what the crosses are.
 ///
 /// # Errors
 /// A panel has no finite point, or is too small.

@@ -1,7 +1,7 @@
 //! Figures 5 to 9 of the paper from our own runs, in its axes.
 //!
-//! Solid: the plan from the start, the paper's "optimal descent". Dashed: the closed loop. The crosses are the final
-//! positions that the paper prints.
+//! Solid: the plan from the start, the paper's "optimal descent". Dashed: the closed loop. The
+//! crosses are the final positions that the paper prints.
 
 use core::f64::consts::FRAC_PI_2;
 

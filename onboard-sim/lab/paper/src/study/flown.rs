@@ -1,5 +1,5 @@
-//! The paper's vehicle in motion: its closed loop, and what the numbers and equations exactly as printed predict and what
-//! really happens.
+//! The paper's vehicle in motion: its closed loop, and what the numbers and equations exactly as
+//! printed predict and what really happens.
 
 use paper::plane::dynamics::{ModelKind, PlanarModel, PlanarState};
 use paper::plane::{LANDING_MISS, Problem, Solution, best_touchdown_speed_m_s, solve};
@@ -13,10 +13,11 @@ const STEP_S: f64 = 0.001;
 /// Changes a state before a sample.
 type Disturbance = fn(usize, &mut PlanarState);
 
-/// The paper's closed loop from the start of a problem to the end of its burn: the rest of the landing is solved once a
-/// sample from the state predicted one sample ahead, and the first input acts there, one sample late. As in the paper
-/// there is no ground in between: its final state is the state at the end of its 5 s, and its optimum dips some
-/// millimetres below the ground just before.
+/// The paper's closed loop from the start of a problem to the end of its burn: the rest of the
+/// landing is solved once a sample from the state predicted one sample ahead, and the first input
+/// acts there, one sample late. As in the paper there is no ground in between: its final state is
+/// the state at the end of its 5 s, and its optimum dips some millimetres below the ground just
+/// before.
 pub(super) fn closed_loop(problem: &Problem) -> Finish {
     disturbed(problem, |_, _| (), |_, _| ())
 }
@@ -54,8 +55,8 @@ fn disturbed(problem: &Problem, kick: Disturbance, deceive: Disturbance) -> Fini
     Finish::judged(path, cost, plans.iter().all(|(_, converged)| *converged))
 }
 
-/// Time and state at the contact of a vehicle that burns with these gimbal angles, one a sample, and then coasts; `None` if it
-/// does not come down within 5 s after the burn.
+/// Time and state at the contact of a vehicle that burns with these gimbal angles, one a sample,
+/// and then coasts; `None` if it does not come down within 5 s after the burn.
 pub(super) fn contact(
     model: PlanarModel,
     start: PlanarState,
@@ -70,7 +71,8 @@ pub(super) fn contact(
         let after = |time_s| model.rk4_step(&state, gimbal_rad, thrust_n, time_s);
         let next = after(STEP_S);
         if next.z_m <= 0.0 {
-            // Bisect for the instant of contact: 40 halvings of 1 ms are below a double's resolution of time.
+            // Bisect for the instant of contact: 40 halvings of 1 ms are below a double's
+            // resolution of time.
             let (mut above_s, mut below_s) = (0.0, STEP_S);
             for _ in 0..40 {
                 let middle_s = 0.5 * (above_s + below_s);
@@ -83,7 +85,8 @@ pub(super) fn contact(
     None
 }
 
-/// Iterations that the printed equations need; they are harder for the solver than the corrected ones.
+/// Iterations that the printed equations need; they are harder for the solver than the corrected
+/// ones.
 const MAX_ITERATIONS: usize = 1000;
 
 /// Results of the printed numbers and equations.
@@ -95,8 +98,8 @@ pub(crate) struct AsPrinted {
     pub(crate) best_touchdown_speed_m_s: f64,
     /// The slowest touchdown that counts as a landing, m/s.
     pub(crate) limit_m_s: f64,
-    /// Energy gained or lost in one second of coasting from a tilted attitude without thrust or drag, J/kg: by the
-    /// printed equations, and by the corrected ones.
+    /// Energy gained or lost in one second of coasting from a tilted attitude without thrust or
+    /// drag, J/kg: by the printed equations, and by the corrected ones.
     pub(crate) energy_error_j_kg: [f64; 2],
     /// The landing that a solver with the printed equations and the printed thrust predicts.
     pub(crate) promised: PlanarState,
@@ -106,7 +109,8 @@ pub(crate) struct AsPrinted {
     pub(crate) promised_lowest_m: f64,
     /// Whether that solve converged.
     pub(crate) promise_converged: bool,
-    /// The contact that the true vehicle makes when it flies that plan; `None` if it does not come down in time.
+    /// The contact that the true vehicle makes when it flies that plan; `None` if it does not come
+    /// down in time.
     pub(crate) happens: Option<PlanarState>,
 }
 
@@ -153,8 +157,8 @@ mod tests {
     use super::super::cases::broken;
     use super::*;
 
-    /// Touches the ground inside Table 2, and as the burn ends: a contact while thrust still exceeds weight would not end the
-    /// flight.
+    /// Touches the ground inside Table 2, and as the burn ends: a contact while thrust still
+    /// exceeds weight would not end the flight.
     fn assert_lands(name: &str, problem: &Problem, flown: &Finish) {
         let above = flown.path.iter().take_while(|sample| sample.state.z_m > 0.0).count();
         let last = &flown.path[above - 1];
@@ -173,7 +177,8 @@ mod tests {
         }
     }
 
-    /// The starts of the paper's section 3.3.2, and starts of one and two sigma of 0.2 m/s, 3 deg and 2 deg/s.
+    /// The starts of the paper's section 3.3.2, and starts of one and two sigma of 0.2 m/s, 3 deg
+    /// and 2 deg/s.
     #[test]
     fn every_start_lands_on_the_settled_plan() {
         let papers = [
@@ -238,8 +243,8 @@ mod tests {
         }
     }
 
-    /// A nearly normal random number of sigma one that depends only on the key: the sum of twelve uniform numbers from a
-    /// `SplitMix64` stream.
+    /// A nearly normal random number of sigma one that depends only on the key: the sum of twelve
+    /// uniform numbers from a `SplitMix64` stream.
     fn gaussian(key: u64) -> f64 {
         let uniform = |draw: u64| {
             let mut bits = (key.wrapping_mul(12) + draw).wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
@@ -263,7 +268,8 @@ mod tests {
         assert!(contact.z_m >= 0.0 && contact.z_m < 1e-9);
     }
 
-    /// 30 N on 3 kg, upright all the way: on the ground at 3.2 s at -4.3 m/s (hand integration of the paper's case).
+    /// 30 N on 3 kg, upright all the way: on the ground at 3.2 s at -4.3 m/s (hand integration of
+    /// the paper's case).
     #[test]
     fn val_hand_integration_thirty_newton_cannot_stop_the_vehicle() {
         let (time_s, contact) = contact(model(), start(), PRINTED_THRUST_N, &[[0.0]; HORIZON]).unwrap();
@@ -285,8 +291,8 @@ mod tests {
         assert!(mended.abs() < 1e-9, "{mended}");
     }
 
-    /// By the printed equations the motor brings the vehicle back up to the ground from below; in truth it cannot even
-    /// stop it.
+    /// By the printed equations the motor brings the vehicle back up to the ground from below; in
+    /// truth it cannot even stop it.
     #[test]
     fn the_landing_predicted_by_the_printed_equations_does_not_happen() {
         let printed = as_printed();

@@ -1,10 +1,10 @@
 //! The landing paper's own experiments, its numbers beside ours.
 //!
-//! Tables 3 to 6 of *Definition of a Landing Strategy for a Model-Scale Reusable Rocket* (EuroGNC) give the optimal
-//! landing for several input weights and from several starts. Here each is solved open loop (the whole plan at once)
-//! and flown closed loop (the horizon shrinks to touchdown; the first action comes one sample late, as in the paper),
-//! and each final state is judged by the paper's Table 2. A second part shows what the paper's equations predict
-//! exactly as printed.
+//! Tables 3 to 6 of *Definition of a Landing Strategy for a Model-Scale Reusable Rocket* (EuroGNC)
+//! give the optimal landing for several input weights and from several starts. Here each is solved
+//! open loop (the whole plan at once) and flown closed loop (the horizon shrinks to touchdown; the
+//! first action comes one sample late, as in the paper), and each final state is judged by the
+//! paper's Table 2. A second part shows what the paper's equations predict exactly as printed.
 //!
 //! * [`Objective`]: Table 3's J under every definition that the paper leaves open.
 //! * [`figures`]: Figures 5 to 9 from these runs; `figure` draws.
@@ -50,7 +50,8 @@ pub(crate) struct Finish {
     pub(crate) broken: Vec<String>,
     /// Cost: of the plan, or of the first plan of a closed loop.
     pub(crate) cost: f64,
-    /// Whether the plan, or every plan of a closed loop, met the optimality conditions to the tolerance.
+    /// Whether the plan, or every plan of a closed loop, met the optimality conditions to the
+    /// tolerance.
     pub(crate) converged: bool,
     /// The way there, from ignition on, once a sample.
     pub(crate) path: Vec<Sample>,
@@ -129,8 +130,8 @@ fn experiment(case: Case) -> Row {
 mod tests {
     use super::*;
 
-    /// Optimal costs that six independent solvers agree on (CasADi with IPOPT and fatrop, acados and others) for
-    /// these starts and P = 1.
+    /// Optimal costs that six independent solvers agree on (CasADi with IPOPT and fatrop, acados
+    /// and others) for these starts and P = 1.
     #[test]
     fn val_six_solvers_optimal_costs() {
         let cost = |case: &Case| match (case.pitch_deg, case.w_m_s, case.pitch_rate_deg_s) {

@@ -1,8 +1,10 @@
-//! The paper's J (Table 3: 1.54, 2.18 and 4.57) under every definition of a cost that its Eq. 23 and 28 leave open.
+//! The paper's J (Table 3: 1.54, 2.18 and 4.57) under every definition of a cost that its Eq. 23
+//! and 28 leave open.
 //!
-//! Each definition is evaluated on our optimal landings. None gives the paper's numbers, and two laws say that none can:
-//! for any `J = A + P B` with `A` and `B` not negative (any states, units, scales, norms of time and references), the
-//! least `J` over all landings is concave in P, and does not grow faster than P.
+//! Each definition is evaluated on our optimal landings. None gives the paper's numbers, and two
+//! laws say that none can: for any `J = A + P B` with `A` and `B` not negative (any states, units,
+//! scales, norms of time and references), the least `J` over all landings is concave in P, and does
+//! not grow faster than P.
 
 use paper::plane::Problem;
 
@@ -168,8 +170,8 @@ mod tests {
         experiments().objective
     }
 
-    /// The landing of P = 1 costs at most twice as much with P = 2, and J is concave in P. The printed 4.57 is above
-    /// both; it would fit with the P = 5 of the paper's Fig. 6.
+    /// The landing of P = 1 costs at most twice as much with P = 2, and J is concave in P. The
+    /// printed 4.57 is above both; it would fit with the P = 5 of the paper's Fig. 6.
     #[test]
     fn val_paper_table_3_its_j_is_no_optimum_under_any_definition() {
         let [half, one, two] = [1.54, 2.18, 4.57];

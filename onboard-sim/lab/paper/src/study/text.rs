@@ -151,8 +151,8 @@ fn write_printed(out: &mut impl Write, printed: &AsPrinted) -> io::Result<()> {
     }
 }
 
-/// Writes the map, the highest opening first, and the static margins; and what becomes of the same vehicle with a heavy
-/// tail.
+/// Writes the map, the highest opening first, and the static margins; and what becomes of the same
+/// vehicle with a heavy tail.
 ///
 /// # Errors
 /// The output cannot be written.

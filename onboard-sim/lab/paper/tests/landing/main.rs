@@ -1,4 +1,5 @@
-//! The guarantees of the solver, on the landing paper's problem and on the same with an end that can be flown.
+//! The guarantees of the solver, on the landing paper's problem and on the same with an end that
+//! can be flown.
 
 mod robust;
 
@@ -26,8 +27,9 @@ type Pose = fn(PlanarState, usize) -> Problem;
 /// A start's name, its state and its best known cost.
 type Case = (&'static str, fn() -> PlanarState, f64);
 
-/// The seven start states of the landing paper, section 3.3.2, and the best known cost from each: six solvers
-/// (IPOPT through `CasADi` and do-mpc, fatrop, acados with HPIPM and with DAQP, Clarabel) agree on them.
+/// The seven start states of the landing paper, section 3.3.2, and the best known cost from each:
+/// six solvers (IPOPT through `CasADi` and do-mpc, fatrop, acados with HPIPM and with DAQP,
+/// Clarabel) agree on them.
 const BEST_COSTS: [Case; 7] = [
     ("nominal", nominal_start, 8465.15),
     ("theta0 = 60 deg", || pitched(60.0), 8483.94),
@@ -50,7 +52,8 @@ fn val_solver_study_best_costs_of_the_seven_starts() {
         assert_eq!(outcome.status, Status::Converged, "{name}");
         assert!((outcome.cost - best_cost).abs() < 0.006, "{name}: {}", outcome.cost);
         assert!(outcome.stationarity <= 1e-6 && outcome.feasibility <= 1e-6, "{name}");
-        // The study's ends: |w| < 0.002 m/s, upright within 0.05 deg, u = 0.137 to 0.157 m/s, |x| <= 1.2 m.
+        // The study's ends: |w| < 0.002 m/s, upright within 0.05 deg, u = 0.137 to 0.157 m/s, |x|
+        // <= 1.2 m.
         assert!(end.w_m_s.abs() < 0.002 && (0.1365..0.1570).contains(&end.u_m_s), "{name}: {end:?}");
         assert!((end.theta_rad.to_degrees() - 90.0).abs() < 0.05 && end.x_m.abs() <= 1.2, "{name}: {end:?}");
     }
@@ -96,8 +99,8 @@ fn a_disturbed_warm_start_converges_in_a_few_iterations() {
     }
 }
 
-/// A solve that has time for a few iterations uses them all: over some kicks, the first inputs are nearer to those of the
-/// optima than the plan's are.
+/// A solve that has time for a few iterations uses them all: over some kicks, the first inputs are
+/// nearer to those of the optima than the plan's are.
 #[test]
 fn warm_solves_of_few_iterations_come_nearer_to_the_optimum() {
     let plan = solve(&problem(nominal_start(), HORIZON), None);
@@ -129,8 +132,9 @@ fn warm_solves_of_few_iterations_come_nearer_to_the_optimum() {
     assert!(once < planned && four < 0.3 * planned, "{planned} rad, {once} after one, {four} after four");
 }
 
-/// With 30 N of thrust on 3 kg, even an upright vehicle hits the ground at 4.3 m/s, by the closed form without drag
-/// (v^2 = 25 - 2 (10 - 9.81) 15). The bound, which includes a little drag, agrees.
+/// With 30 N of thrust on 3 kg, even an upright vehicle hits the ground at 4.3 m/s, by the closed
+/// form without drag (v^2 = 25 - 2 (10 - 9.81) 15). The bound, which includes a little drag,
+/// agrees.
 #[test]
 fn val_closed_form_the_printed_thrust_cannot_land() {
     let without_drag = libm::sqrt(25.0 - 2.0 * (10.0 - 9.81) * 15.0);
@@ -148,7 +152,8 @@ fn the_bound_does_not_refuse_a_problem_with_a_landing() {
     }
 }
 
-/// Without the box at the end the optimum goes below the ground and comes back up, as its comment says.
+/// Without the box at the end the optimum goes below the ground and comes back up, as its comment
+/// says.
 #[test]
 fn the_paper_optimum_goes_below_the_ground_and_the_flown_plan_does_not() {
     let lowest = |problem: Pose| {
@@ -159,7 +164,8 @@ fn the_paper_optimum_goes_below_the_ground_and_the_flown_plan_does_not() {
     assert!(lowest(settled) > -1e-6);
 }
 
-/// An unreachable condition is missed at its penalty: its multiplier equals the penalty, and the solve still converges.
+/// An unreachable condition is missed at its penalty: its multiplier equals the penalty, and the
+/// solve still converges.
 #[test]
 fn an_unreachable_end_is_missed_by_as_little_as_its_price_allows() {
     let start = PlanarState { z_m: 0.5, u_m_s: -0.5, ..nominal_start() };
@@ -171,7 +177,8 @@ fn an_unreachable_end_is_missed_by_as_little_as_its_price_allows() {
     assert!((solution.condition_multipliers[0].abs() - penalty).abs() < 1e-9);
 }
 
-/// The printed equations can be solved, too, in hundreds of iterations, because their gravity curves the wrong way.
+/// The printed equations can be solved, too, in hundreds of iterations, because their gravity
+/// curves the wrong way.
 #[test]
 fn the_printed_model_can_be_solved_for_replication() {
     let mut problem = problem(nominal_start(), HORIZON);

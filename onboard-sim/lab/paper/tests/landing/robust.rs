@@ -39,7 +39,8 @@ fn cold_starts_from_the_box_around_the_nominal_converge() {
     assert_eq!(converged + refused, STARTS);
 }
 
-/// Of the first 10,000 starts of the test above, the three whose best descent ends at its cap, beside a saddle.
+/// Of the first 10,000 starts of the test above, the three whose best descent ends at its cap,
+/// beside a saddle.
 #[test]
 fn cold_starts_beside_a_saddle_converge() {
     for [z_m, theta_rad, u_m_s, w_m_s, q_rad_s] in [
@@ -81,8 +82,8 @@ fn draws(seed: u64) -> impl FnMut() -> f64 {
     }
 }
 
-/// Whole landings along the shrinking horizon, with a disturbance of 2 mm/s and 0.05 deg/s (one sigma) per sample. In
-/// the last steps the end is out of reach and is missed at its penalty.
+/// Whole landings along the shrinking horizon, with a disturbance of 2 mm/s and 0.05 deg/s (one
+/// sigma) per sample. In the last steps the end is out of reach and is missed at its penalty.
 #[test]
 fn no_solve_fails_in_the_disturbed_closed_loop() {
     let model = model();

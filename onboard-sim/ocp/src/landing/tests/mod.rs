@@ -34,8 +34,8 @@ fn a_surplus_of_thrust_is_wasted_with_a_lean_that_turns_around() {
     }
 }
 
-/// The inputs of a plan, flown in small steps with the equations of a slender body written with vectors instead of leans.
-/// The intervals come nearer with shorter steps.
+/// The inputs of a plan, flown in small steps with the equations of a slender body written with
+/// vectors instead of leans. The intervals come nearer with shorter steps.
 #[test]
 fn intervals_lead_where_the_equations_of_motion_do() {
     let model = problem(1.6);
@@ -90,7 +90,8 @@ fn flown(model: &Problem, inputs: &[[f64; INPUTS]]) -> [f64; 8] {
                 velocity[i] += step_s * (push.thrust_m_s2 * (nose[i] - sideways[i]) + push.per_kg * air_n);
             }
             velocity[2] -= step_s * model.gravity_m_s2;
-            // The angular momentum over the moment of inertia; a slender body has none about its axis.
+            // The angular momentum over the moment of inertia; a slender body has none about its
+            // axis.
             let torque = cross(&nose, &sideways).map(|value| value * push.turning_rad_s2);
             for i in 0..3 {
                 turning[i] += step_s * torque[i];

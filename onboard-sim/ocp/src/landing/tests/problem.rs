@@ -4,7 +4,8 @@ use super::{Drag, End, Problem, Push, SolverLimits, Weights};
 
 pub(super) const GRAVITY_M_S2: f64 = 9.806_65;
 
-/// A stage of 1.2 kg that falls at 12.5 m/s in a light wind. Its thrust falls to its weight in 3.8 s.
+/// A stage of 1.2 kg that falls at 12.5 m/s in a light wind. Its thrust falls to its weight in 3.8
+/// s.
 pub(super) fn problem(thrust_over_weight: f64) -> Problem {
     const INTERVALS: usize = 38;
     let pushes = (0..INTERVALS).map(|k| {

@@ -6,8 +6,9 @@ use flight::computer::crew::{Answer, Request};
 
 use crate::wire::vehicle::{Vehicle, VehicleEvent, VehicleStep};
 
-/// Steps the vehicle by one frame with the requests from the links and from its own programme. Returns the events and
-/// the answers to its own programme. Answers to the links come out of [`VehicleEndpoint::poll`].
+/// Steps the vehicle by one frame with the requests from the links and from its own programme.
+/// Returns the events and the answers to its own programme. Answers to the links come out of
+/// [`VehicleEndpoint::poll`].
 pub fn step(
     endpoint: &mut VehicleEndpoint,
     vehicle: &mut Vehicle,
@@ -25,8 +26,8 @@ pub fn step(
     (events, to_itself)
 }
 
-/// Tells the stations what the vehicle reports. A new phase is seen by [`VehicleEndpoint::poll`], like every other change of
-/// the vehicle's mode.
+/// Tells the stations what the vehicle reports. A new phase is seen by [`VehicleEndpoint::poll`],
+/// like every other change of the vehicle's mode.
 fn tell(endpoint: &mut VehicleEndpoint, event: &VehicleEvent) {
     match event {
         VehicleEvent::Text { severity, text } => endpoint.say(*severity, text),

@@ -1,14 +1,16 @@
-//! A flight computer on a board that decides every frame of a flight beside the one in this process, and hears the crew on a
-//! radio of its own.
+//! A flight computer on a board that decides every frame of a flight beside the one in this
+//! process, and hears the crew on a radio of its own.
 //!
-//! What the crew asks for comes from the board with its answer to the frame before. The vehicle's frame is over when the board has
-//! answered it with the same output and the same digest of its memory, bit for bit; otherwise the flight ends with an error. So
-//! what moves the vehicle is what the board has decided, from what the board has heard.
+//! What the crew asks for comes from the board with its answer to the frame before. The vehicle's
+//! frame is over when the board has answered it with the same output and the same digest of its
+//! memory, bit for bit; otherwise the flight ends with an error. So what moves the vehicle is what
+//! the board has decided, from what the board has heard.
 //!
-//! The board is at the other end of two pipes in a folder, `frames` and `answers`, and reads a flight as
-//! [`avionics::board::stream`] describes it; what is behind the pipes (a process, an emulator, `socat` and a cable) may lose bytes. A
-//! frame that is not answered is sent again, with the flight's beginning. A board that was dead in some frames finds that
-//! out from the number of the next one, and resets itself; so behind missing frames that frame is sent twice.
+//! The board is at the other end of two pipes in a folder, `frames` and `answers`, and reads a
+//! flight as [`avionics::board::stream`] describes it; what is behind the pipes (a process, an
+//! emulator, `socat` and a cable) may lose bytes. A frame that is not answered is sent again, with
+//! the flight's beginning. A board that was dead in some frames finds that out from the number of
+//! the next one, and resets itself; so behind missing frames that frame is sent twice.
 
 use std::fs::{File, OpenOptions};
 use std::hash::{BuildHasher as _, Hasher as _, RandomState};
@@ -32,10 +34,12 @@ use protocol::transport::LinkAddress;
 use crate::wire::endpoint::UplinkState;
 use crate::wire::vehicle::{Vehicle, VehicleEvent};
 
-/// A board that is silent for longer has stopped. An emulated one plans a landing in a second or two.
+/// A board that is silent for longer has stopped. An emulated one plans a landing in a second or
+/// two.
 const PATIENCE: Duration = Duration::from_secs(30);
 
-/// A frame without an answer is sent again after this time. An emulated board that still plans answers it twice.
+/// A frame without an answer is sent again after this time. An emulated board that still plans
+/// answers it twice.
 const SENT_AGAIN_AFTER: Duration = Duration::from_millis(500);
 
 /// Why a flight with a board has ended early.
@@ -62,7 +66,8 @@ pub(super) struct OnBoard {
     begin: Begin,
     /// The number of the last frame.
     last: Option<u64>,
-    /// For the next frame; `None` of a board that has not answered the last one: it has heard nobody yet.
+    /// For the next frame; `None` of a board that has not answered the last one: it has heard
+    /// nobody yet.
     heard: Option<stream::Heard>,
 }
 
@@ -206,12 +211,14 @@ pub struct OnTheWire {
     pub uid: NonZeroU16,
     /// Budget of each network link, bytes per second.
     pub network_bytes_s: u32,
-    /// Budget of each serial link, bytes per second, as far as four fifths of its baud rate go: what a radio behind it carries.
+    /// Budget of each serial link, bytes per second, as far as four fifths of its baud rate go:
+    /// what a radio behind it carries.
     pub serial_bytes_s: u32,
 }
 
 impl OnTheWire {
-    /// A random boot number and unique id, a network's budget on network links and a radio's on serial ones.
+    /// A random boot number and unique id, a network's budget on network links and a radio's on
+    /// serial ones.
     pub fn drawn() -> Self {
         // The standard library's random hash keys differ in every process.
         let drawn = || RandomState::new().build_hasher().finish();

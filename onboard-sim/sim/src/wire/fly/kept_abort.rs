@@ -1,4 +1,5 @@
-//! An abort on the pad outlives the vehicle's power switch, in a small file: when it was, by the wall clock.
+//! An abort on the pad outlives the vehicle's power switch, in a small file: when it was, by the
+//! wall clock.
 
 use std::fs;
 use std::path::PathBuf;
@@ -13,14 +14,16 @@ pub(super) struct KeptAbort {
 }
 
 impl KeptAbort {
-    /// Opens the file, and says how long ago the abort was, s. One that cannot be read was just now: nobody is told less.
+    /// Opens the file, and says how long ago the abort was, s. One that cannot be read was just
+    /// now: nobody is told less.
     pub(super) fn open(file: Option<PathBuf>) -> (Self, Option<f64>) {
         let kept = file.as_ref().filter(|file| file.exists());
         let ago_s = kept.map(|file| ago_s(&fs::read_to_string(file).unwrap_or_default(), unix_s()));
         (Self { kept: ago_s.is_some(), file }, ago_s)
     }
 
-    /// Writes the abort of this vehicle, or forgets it when people may have approached. Says if that fails.
+    /// Writes the abort of this vehicle, or forgets it when people may have approached. Says if
+    /// that fails.
     pub(super) fn keep(&mut self, vehicle: &Vehicle) -> Option<String> {
         let abort_s = vehicle.mode().abort_to_keep_s(vehicle.time_s());
         let file = self.file.as_ref().filter(|_| abort_s.is_some() != self.kept)?;

@@ -1,5 +1,5 @@
-//! The open links: removes copies, checks and adds signatures if a key is set, and records the frames. Here are the
-//! people who may command over them, too, and a radio that is broken.
+//! The open links: removes copies, checks and adds signatures if a key is set, and records the
+//! frames. Here are the people who may command over them, too, and a radio that is broken.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -137,7 +137,8 @@ impl Links {
                 }
             }
         }
-        // Save the timestamp before acting on the frame, so that it cannot be replayed after a restart.
+        // Save the timestamp before acting on the frame, so that it cannot be replayed after a
+        // restart.
         if self.open.saves_timestamps_at(now.stamp) || believed {
             self.save_timestamps(time_s);
         }
@@ -172,7 +173,8 @@ impl Links {
         self.open.dropped()
     }
 
-    /// Writes the final statistics into the log: traffic of each link, and frames refused for their signature.
+    /// Writes the final statistics into the log: traffic of each link, and frames refused for their
+    /// signature.
     pub(super) fn close(&mut self, time_s: f64) {
         let now = Duration::from_secs_f64(time_s);
         for (name, link) in self.open.each() {
@@ -209,8 +211,8 @@ impl Links {
     }
 }
 
-/// The time for signatures: the time of day at the start, and from then on the time since. A clock that is set while the
-/// vehicle runs does not move it.
+/// The time for signatures: the time of day at the start, and from then on the time since. A clock
+/// that is set while the vehicle runs does not move it.
 struct Stamps {
     started: std::time::Instant,
     anchor: Anchor,
@@ -248,7 +250,8 @@ pub(super) fn operators_of(crew: &CrewFile) -> Vec<Operator> {
     crew.members.iter().filter_map(operator).collect()
 }
 
-/// How many people an arming and a start take. The numbers of the asks begin elsewhere at each boot.
+/// How many people an arming and a start take. The numbers of the asks begin elsewhere at each
+/// boot.
 pub(super) fn people_of(crew: &CrewFile, boot_number: u32) -> People {
     match crew.mode {
         Mode::OnePerson => People::One,

@@ -1,4 +1,5 @@
-//! Loads a mission, by name or from a file, makes a flight of it, and starts it where there is no crew.
+//! Loads a mission, by name or from a file, makes a flight of it, and starts it where there is no
+//! crew.
 
 use std::path::Path;
 
@@ -17,7 +18,8 @@ use crate::wire::vehicle::{RocketFlight, Vehicle};
 const DISPERSION: &str = "field";
 
 impl RocketFlight {
-    /// The same flight from another start; `None` leaves a mission with a launch on its pad, and anything else as it is.
+    /// The same flight from another start; `None` leaves a mission with a launch on its pad, and
+    /// anything else as it is.
     ///
     /// # Errors
     /// It has no such start.
@@ -67,7 +69,8 @@ pub fn load_flight(name_or_path: &str) -> Result<RocketFlight, FlyError> {
 
 // Arms and starts a flight without a crew.
 
-/// The arming checks pass within this time, s, if they ever do: the rehearsal of a long flight takes some seconds.
+/// The arming checks pass within this time, s, if they ever do: the rehearsal of a long flight
+/// takes some seconds.
 const READY_WITHIN_S: f64 = 10.0;
 
 /// Arms and starts once the checks pass.

@@ -44,8 +44,8 @@ use crate::wire::vehicle::{Judged, RocketFlight, Vehicle, VehicleEvent};
 pub enum Speed {
     /// This many times real time.
     Factor(f64),
-    /// As fast as the machine can. On its pad with a crew a vehicle is never faster than real time, because it judges
-    /// its uplink by the age of the last heartbeat.
+    /// As fast as the machine can. On its pad with a crew a vehicle is never faster than real time,
+    /// because it judges its uplink by the age of the last heartbeat.
     Max,
 }
 
@@ -83,11 +83,12 @@ pub struct FlyOptions {
     pub speed: Speed,
     /// Arm and start without waiting for a ground station.
     pub auto_start: bool,
-    /// End once the flight is over, SAFED or not; otherwise keep serving the links until told to stop. After an abort
-    /// on the pad the links are always served: the crew has to see the countdown of the waiting time.
+    /// End once the flight is over, SAFED or not; otherwise keep serving the links until told to
+    /// stop. After an abort on the pad the links are always served: the crew has to see the
+    /// countdown of the waiting time.
     pub exit_when_safed: bool,
-    /// Folder with the pipes of a board whose flight computer decides every frame, too, and that hears the crew on its own
-    /// radio; then there are no links and no start by itself.
+    /// Folder with the pipes of a board whose flight computer decides every frame, too, and that
+    /// hears the crew on its own radio; then there are no links and no start by itself.
     pub board: Option<PathBuf>,
     /// Where the pin is, each time that somebody moves it; it is out at first.
     pub pin_out: Option<watch::Receiver<bool>>,
@@ -145,7 +146,8 @@ pub enum FlyError {
     /// The crew cannot be used.
     #[error(transparent)]
     Crew(#[from] CrewFileError),
-    /// Operators' frames are checked by their keys, and the vehicle signs with the key that all share.
+    /// Operators' frames are checked by their keys, and the vehicle signs with the key that all
+    /// share.
     #[error("a crew needs --key, the key that vehicle and stations share")]
     CrewWithoutKey,
     /// Two people cannot be replaced by a program.
@@ -180,7 +182,8 @@ pub struct FlightSummary {
     pub outcome: FlightEnd,
     /// Contact and its verdict, if there was one.
     pub judged: Option<Judged>,
-    /// The verdict as it is in the log: every limit, and how the flight ended. Its time counts from the release.
+    /// The verdict as it is in the log: every limit, and how the flight ended. Its time counts from
+    /// the release.
     pub verdict: Option<LandingVerdict>,
     /// Last phase.
     pub phase: Phase,
@@ -275,7 +278,8 @@ fn on_board(folder: &Path, options: &FlyOptions) -> Result<OnBoard, FlyError> {
 /// How a flight has ended.
 fn outcome_of(vehicle: &Vehicle, refused: Option<String>, stopped: bool) -> FlightEnd {
     match (vehicle.judged().map(|judged| judged.landing.stands), refused) {
-        // An abort stays an abort, however the vehicle came down; the verdict is reported separately.
+        // An abort stays an abort, however the vehicle came down; the verdict is reported
+        // separately.
         _ if vehicle.aborted() => FlightEnd::Aborted,
         (Some(true), _) => FlightEnd::Landed,
         (None, Some(reason)) => FlightEnd::Refused(reason),
@@ -287,8 +291,8 @@ fn outcome_of(vehicle: &Vehicle, refused: Option<String>, stopped: bool) -> Flig
 
 /// Flies; `observe` is called with the simulated time and each thing the vehicle reports.
 ///
-/// The outcome depends only on the flight, an abort before it, and what arrives on the links and at the pin, not on the speed,
-/// the machine or the clock.
+/// The outcome depends only on the flight, an abort before it, and what arrives on the links and at
+/// the pin, not on the speed, the machine or the clock.
 ///
 /// # Errors
 /// The flight cannot be simulated, or a link cannot be opened.

@@ -46,8 +46,8 @@ impl Lateness {
         self.worst = self.worst.max(late);
     }
 
-    /// The median, the 99th percentile (both rounded up to a tenth of a millisecond) and the worst; `None` if no
-    /// frame was paced.
+    /// The median, the 99th percentile (both rounded up to a tenth of a millisecond) and the worst;
+    /// `None` if no frame was paced.
     pub fn quantiles(&self) -> Option<[Duration; 3]> {
         let total: u64 = self.frames.iter().sum();
         let quantile = |percent: u64| {

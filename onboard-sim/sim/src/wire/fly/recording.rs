@@ -1,4 +1,5 @@
-//! Chooses what is recorded in the log of a flight, and gives out that log once the vehicle is down.
+//! Chooses what is recorded in the log of a flight, and gives out that log once the vehicle is
+//! down.
 
 use std::fs::File;
 use std::os::unix::fs::FileExt as _;
@@ -82,8 +83,8 @@ pub(super) fn log_state(recorder: Option<&Recorder>) -> LogState {
     LogState { running: recorder.is_whole() && recorder.dropped() == 0, space_bytes }
 }
 
-// The vehicle's own log as a file that it gives out once it is down: the part up to a mark, which does not change any
-// more while recording goes on, with the end of a log behind it.
+// The vehicle's own log as a file that it gives out once it is down: the part up to a mark, which
+// does not change any more while recording goes on, with the end of a log behind it.
 
 /// How far the log is on its way to being offered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -187,7 +188,8 @@ mod tests {
         (messages, reader.damage().is_none())
     }
 
-    /// Recording goes on behind the mark; what is offered is a whole log, the same in pieces of any length.
+    /// Recording goes on behind the mark; what is offered is a whole log, the same in pieces of any
+    /// length.
     #[test]
     fn a_log_up_to_its_mark_is_whole_and_does_not_change() {
         let folder = tempfile::tempdir().unwrap();
@@ -218,7 +220,8 @@ mod tests {
         assert_eq!(read(&std::fs::read(path).unwrap()), (2000, true));
     }
 
-    /// A storage that loses power keeps a part of the log: all whole chunks before the cut are read, wherever it is.
+    /// A storage that loses power keeps a part of the log: all whole chunks before the cut are
+    /// read, wherever it is.
     #[test]
     fn a_log_that_is_cut_at_any_byte_is_read_up_to_its_last_whole_chunk() {
         let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,5 @@
-//! Contact with the ground, the verdict on it, and the end of the flight: what only the simulation knows.
+//! Contact with the ground, the verdict on it, and the end of the flight: what only the simulation
+//! knows.
 
 use crate::outcome::Outcome;
 use crate::sortie::Sortie;
@@ -8,7 +9,8 @@ use flight::rules::phase::Phase;
 
 use super::{Judged, VehicleEvent};
 
-/// A flight computer that does not notice within this time that it lies on the ground is waited for no longer, s.
+/// A flight computer that does not notice within this time that it lies on the ground is waited for
+/// no longer, s.
 const UNNOTICED_S: f64 = 15.0;
 
 /// What has become of the flight.

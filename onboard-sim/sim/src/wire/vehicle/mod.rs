@@ -1,6 +1,8 @@
-//! The simulated vehicle as the crew sees it: a flight that is stepped frame by frame, and the events it reports.
+//! The simulated vehicle as the crew sees it: a flight that is stepped frame by frame, and the
+//! events it reports.
 //!
-//! This module has the interface that the run loop uses; the radio takes a [`VehicleState`], and the log takes records.
+//! This module has the interface that the run loop uses; the radio takes a [`VehicleState`], and
+//! the log takes records.
 //!
 //! It is pure: time is simulated.
 
@@ -150,7 +152,8 @@ impl Vehicle {
         Some(VehicleEvent::Planned { frame, time_s, took_s, deadline_s: PLAN_WITHIN_S })
     }
 
-    /// Events that only the simulation knows: the start of the flight, contact with the ground, the verdict.
+    /// Events that only the simulation knows: the start of the flight, contact with the ground, the
+    /// verdict.
     fn events_of_the_simulation(&mut self, released: bool) -> Vec<VehicleEvent> {
         if !released {
             return self.ground.watch(&self.sortie);
@@ -207,7 +210,8 @@ impl Vehicle {
         self.mode().interlocks.abort_latched
     }
 
-    /// Whether the flight is over: the vehicle lies on the ground and is judged, or was aborted on the pad.
+    /// Whether the flight is over: the vehicle lies on the ground and is judged, or was aborted on
+    /// the pad.
     pub fn is_over(&self) -> bool {
         self.ground.is_over(self.computer())
     }
@@ -270,8 +274,9 @@ impl From<CrewMessage> for VehicleEvent {
 // What of a flight goes into its log beside its events.
 
 impl Vehicle {
-    /// The last frame of the flight computer, and what it starts from: before its first frame and behind its release. They
-    /// come before all others, so that a flight begins with the power-up of its computer.
+    /// The last frame of the flight computer, and what it starts from: before its first frame and
+    /// behind its release. They come before all others, so that a flight begins with the power-up
+    /// of its computer.
     pub fn computer_records(&self) -> Vec<Record> {
         let Some(frame) = &self.computer_frame else { return Vec::new() };
         let started = || Record::ComputerStart(Box::new(crate::wire::record::start(self.computer())));
@@ -285,7 +290,8 @@ impl Vehicle {
         if self.flown { crate::wire::record::thought_and_truth(&self.sortie) } else { Vec::new() }
     }
 
-    /// The landing as a log's record, once it is judged. Its time counts from the release, as that of the frames.
+    /// The landing as a log's record, once it is judged. Its time counts from the release, as that
+    /// of the frames.
     pub fn verdict_record(&self) -> Option<v1::LandingVerdict> {
         self.judged()?;
         crate::wire::record::verdict(&self.sortie)

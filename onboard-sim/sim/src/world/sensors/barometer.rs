@@ -1,4 +1,5 @@
-//! The barometer: the errors of its ports go with the dynamic pressure (W. Gracey, NASA Reference Publication 1046, 1980).
+//! The barometer: the errors of its ports go with the dynamic pressure (W. Gracey, NASA Reference
+//! Publication 1046, 1980).
 
 use flight::estimation::estimator::GRAVITY_M_S2;
 use serde::{Deserialize, Serialize};
@@ -22,13 +23,16 @@ flight::with_defaults! {
         pub offset_walk_m_sqrt_s: f64 = 0.03,
         /// Ram coefficient: the pressure error divided by the dynamic pressure.
         pub ram_coefficient: f64 = 0.05,
-        /// Suction of the flow across the axis, divided by its dynamic pressure: lowest and highest.
+        /// Suction of the flow across the axis, divided by its dynamic pressure: lowest and
+        /// highest.
         pub crossflow: [f64; 2] = [0.0; 2],
-        /// Age of a sample beyond what the flight computer assumes, the same for all of a flight, s.
+        /// Age of a sample beyond what the flight computer assumes, the same for all of a flight,
+        /// s.
         pub late_s: f64 = 0.0,
         /// Offset while the motor burns, m: the exhaust changes the pressure around the vehicle.
         pub plume_m: f64 = 0.0,
-        /// Height error when the parachute is ejected, m, from the charge's pressure; it leaks out through the vents.
+        /// Height error when the parachute is ejected, m, from the charge's pressure; it leaks out
+        /// through the vents.
         pub ejection_m: f64 = 0.0,
     }
 }
@@ -41,7 +45,8 @@ impl Sensors {
         }
         let walk = barometer.offset_walk_m_sqrt_s * libm::sqrt(f64::from(barometer.period_ms) * MS_S);
         self.errors.barometer_offset_m += walk * self.barometer_noise.next();
-        // A pressure that is too high by k rho V^2 / 2 gives a height that is too low by k V^2 / 2 g.
+        // A pressure that is too high by k rho V^2 / 2 gives a height that is too low by k V^2 / 2
+        // g.
         let speed_height_m = truth.airspeed_m_s * truth.airspeed_m_s / (2.0 * GRAVITY_M_S2);
         let then_m = truth.state.position_m.z - truth.state.velocity_m_s.z * self.flaws.barometer_late_s;
         let plume_m = if truth.burning { self.flaws.barometer_plume_m } else { 0.0 };

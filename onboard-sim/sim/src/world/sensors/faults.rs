@@ -124,7 +124,8 @@ impl Broken {
         });
     }
 
-    /// What it says, and how that changes a second, in the place of what was measured; the defect's values are in this unit.
+    /// What it says, and how that changes a second, in the place of what was measured; the defect's
+    /// values are in this unit.
     fn says(
         &mut self,
         measured: (Vector3<f64>, Vector3<f64>),

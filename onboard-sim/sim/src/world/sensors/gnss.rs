@@ -1,4 +1,5 @@
-//! The satellite receiver, whose fixes come late: white and wandering errors (Groves 2013, chapter 9).
+//! The satellite receiver, whose fixes come late: white and wandering errors (Groves 2013, chapter
+//! 9).
 
 use flight::estimation::estimator::{FixQuality, GRAVITY_M_S2, GnssFix};
 use flight::vehicle::rigid::RigidState;
@@ -9,7 +10,8 @@ use super::noise::{Fate, Flaws, fate};
 use super::{MS_S, SensorParams, SensorTruth, Sensors};
 
 flight::with_defaults! {
-    /// Satellite receiver. Its position is zeroed on the pad before the flight and wanders from then on.
+    /// Satellite receiver. Its position is zeroed on the pad before the flight and wanders from
+    /// then on.
     #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
     #[serde(deny_unknown_fields, default)]
     pub struct GnssParams {
@@ -40,11 +42,12 @@ flight::with_defaults! {
         pub velocity_wander_correlation_s: f64 = 60.0,
         /// Probability that a fix is lost.
         pub dropout_share: f64 = 0.0,
-        /// Probability that a fix is an outlier, and how far an outlier's position is off, each axis, m.
+        /// Probability that a fix is an outlier, and how far an outlier's position is off, each
+        /// axis, m.
         pub outlier_share: f64 = 0.0,
         pub outlier_m: f64 = 0.0,
-        /// How much of the sky a lean takes from an antenna that looks along the nose: at 1 beyond 20 degrees of tilt the noise is
-        /// threefold, and beyond 30 half of the fixes are lost.
+        /// How much of the sky a lean takes from an antenna that looks along the nose: at 1 beyond
+        /// 20 degrees of tilt the noise is threefold, and beyond 30 half of the fixes are lost.
         pub shadow_share: f64 = 0.0,
         /// Time for which the receiver keeps reporting the motion at lift-off, as valid fixes, s.
         pub stale_s: f64 = 0.0,
@@ -116,8 +119,8 @@ impl Sensors {
 }
 
 impl Flaws {
-    /// What is wrong with one more fix: how much older it is than its time tag says, s, and its wandering velocity error,
-    /// m/s.
+    /// What is wrong with one more fix: how much older it is than its time tag says, s, and its
+    /// wandering velocity error, m/s.
     fn of_satellites(&mut self, params: &SensorParams) -> (f64, Vector3<f64>) {
         let gnss = &params.gnss;
         for axis in &mut self.velocity_wander {

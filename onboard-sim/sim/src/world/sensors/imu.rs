@@ -1,4 +1,5 @@
-//! The inertial unit: white noise by its density, a bias that walks, scale, axes and range (Groves 2013, chapter 4).
+//! The inertial unit: white noise by its density, a bias that walks, scale, axes and range (Groves
+//! 2013, chapter 4).
 
 use core::f64::consts::FRAC_1_SQRT_2;
 
@@ -17,7 +18,8 @@ flight::with_defaults! {
     pub struct ImuParams {
         /// Gyro noise density, deg/s/sqrt(Hz).
         pub gyro_noise_deg_s_sqrt_hz: f64 = 0.05,
-        /// Gyro bias that remains after the calibration on the pad, each axis, deg/s. (At turn-on it is ten times larger.)
+        /// Gyro bias that remains after the calibration on the pad, each axis, deg/s. (At turn-on
+        /// it is ten times larger.)
         pub gyro_bias_deg_s: f64 = 0.02,
         /// Wander of the gyro bias, deg/s in one second.
         pub gyro_bias_walk_deg_s_sqrt_s: f64 = 0.002,
@@ -37,7 +39,8 @@ flight::with_defaults! {
         pub vibration_g: f64 = 0.0,
         /// Vibration while the motor burns, rms of one frame's sample, each axis, deg/s.
         pub vibration_deg_s: f64 = 0.0,
-        /// Accelerometer bias while the motor burns, each axis, mg: vibration that the sensor rectifies.
+        /// Accelerometer bias while the motor burns, each axis, mg: vibration that the sensor
+        /// rectifies.
         pub vibration_bias_mg: f64 = 0.0,
         /// Gyro bias while the motor burns, each axis, deg/s: vibration that the sensor rectifies.
         pub vibration_bias_deg_s: f64 = 0.0,
@@ -49,8 +52,8 @@ flight::with_defaults! {
 }
 
 impl Sensors {
-    /// Specific force where the inertial unit sits: that of the centre of gravity, and what turning adds (Stevens
-    /// and Lewis, chapter 1).
+    /// Specific force where the inertial unit sits: that of the centre of gravity, and what turning
+    /// adds (Stevens and Lewis, chapter 1).
     pub(super) fn force_at_unit_m_s2(&self, truth: &SensorTruth) -> Vector3<f64> {
         let (lever_m, rate) =
             (self.places.lever_arms(&truth.cg_m).imu_m + self.flaws.unit_m, &truth.state.rate_rad_s);
@@ -100,8 +103,9 @@ impl Sensors {
 }
 
 impl Flaws {
-    /// Vibration of one frame's sample: rotation rate, rad/s, and specific force, m/s^2. The mean rate over a frame is the
-    /// difference of two angles, which a vibration does not let grow; the mean force is one of two velocities.
+    /// Vibration of one frame's sample: rotation rate, rad/s, and specific force, m/s^2. The mean
+    /// rate over a frame is the difference of two angles, which a vibration does not let grow; the
+    /// mean force is one of two velocities.
     fn vibration(&mut self, params: &SensorParams) -> (Vector3<f64>, Vector3<f64>) {
         let imu = &params.imu;
         let now = [self.vibration.next3(), self.vibration.next3()];

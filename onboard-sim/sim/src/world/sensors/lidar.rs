@@ -25,7 +25,8 @@ flight::with_defaults! {
         pub blind_below_m: f64 = 0.0,
         /// Lean of the beam against the axis, each way, degrees.
         pub beam_deg: f64 = 0.0,
-        /// Height of the grass whose tops the beam meets, lowest and highest, m; the feet stand on the ground.
+        /// Height of the grass whose tops the beam meets, lowest and highest, m; the feet stand on
+        /// the ground.
         pub grass_m: [f64; 2] = [0.0; 2],
         /// Age of a range beyond what the flight computer assumes, the same for all of a flight, s.
         pub late_s: f64 = 0.0,
@@ -55,8 +56,8 @@ impl Sensors {
             - self.flaws.grass_m
             - truth.state.velocity_m_s.z * self.flaws.lidar_late_s;
         let range_m = then_m / libm::cos(tilt_rad) + noise_m;
-        // Rough ground reflects light in all directions, and less at an angle (Lambert's cosine law). The echo weakens
-        // with the square of the range.
+        // Rough ground reflects light in all directions, and less at an angle (Lambert's cosine
+        // law). The echo weakens with the square of the range.
         let farthest_m = lidar.range_max_m * libm::cos(tilt_rad).sqrt();
         let blind = truth.burning
             && truth.state.position_m.z - truth.ground_m - truth.cg_over_feet_m < lidar.blind_below_m;

@@ -1,8 +1,10 @@
-//! The flight computer's sensors: an inertial unit, a barometer, a satellite receiver with late fixes, and a lidar.
+//! The flight computer's sensors: an inertial unit, a barometer, a satellite receiver with late
+//! fixes, and a lidar.
 //!
-//! [`Sensors::observe`] is called after every millisecond of truth. After every fifth it returns the measurements of
-//! one frame of the flight computer. Each sensor has its own stream of random numbers and keeps drawing while it is
-//! out, so a fault in one sensor does not change the noise of another.
+//! [`Sensors::observe`] is called after every millisecond of truth. After every fifth it returns
+//! the measurements of one frame of the flight computer. Each sensor has its own stream of random
+//! numbers and keeps drawing while it is out, so a fault in one sensor does not change the noise of
+//! another.
 
 mod barometer;
 mod faults;
@@ -32,11 +34,11 @@ use crate::world::normal::Normal;
 use crate::world::whole::World;
 
 const MS_S: f64 = 1e-3;
-/// Errors of sensors for a flight whose state is known, as a multiple of real ones. They are not zero, because a sensor that repeats
-/// one value counts as broken.
+/// Errors of sensors for a flight whose state is known, as a multiple of real ones. They are not
+/// zero, because a sensor that repeats one value counts as broken.
 pub const NEARLY_EXACT: f64 = 1e-3;
-/// A hobby receiver loses its satellites under the acceleration of the ascent motor (its tracking loops follow 4 g) and
-/// finds them again this long after it, ms: a hot start takes 1 to 2 s.
+/// A hobby receiver loses its satellites under the acceleration of the ascent motor (its tracking
+/// loops follow 4 g) and finds them again this long after it, ms: a hot start takes 1 to 2 s.
 const REACQUIRED_MS: u32 = 1500;
 
 /// The truth that the sensors measure, after a millisecond.
@@ -60,15 +62,17 @@ pub struct SensorTruth {
     pub ground_m: f64,
     /// The motor burns.
     pub burning: bool,
-    /// Time since the last charge was fired inside the vehicle, s: that of the parachute, or that of the booster.
+    /// Time since the last charge was fired inside the vehicle, s: that of the parachute, or that
+    /// of the booster.
     pub ejected_for_s: Option<f64>,
     /// The ascent motor burns.
     pub boosted: bool,
 }
 
 impl SensorTruth {
-    /// The truth over level ground, without rotation's acceleration, flow across the axis, exhaust or parachute: state, specific force, m/s^2,
-    /// airspeed, m/s, and the centre of gravity's height over the feet, m.
+    /// The truth over level ground, without rotation's acceleration, flow across the axis, exhaust
+    /// or parachute: state, specific force, m/s^2, airspeed, m/s, and the centre of gravity's
+    /// height over the feet, m.
     pub fn of_motion(
         state: &RigidState,
         specific_force_m_s2: &Vector3<f64>,
@@ -160,7 +164,8 @@ impl Sensors {
         self.start_s -= time_s;
     }
 
-    /// Draws one flight's sensors. Their errors are this share of what the parameters say: 1, or [`NEARLY_EXACT`].
+    /// Draws one flight's sensors. Their errors are this share of what the parameters say: 1, or
+    /// [`NEARLY_EXACT`].
     ///
     /// # Errors
     /// A parameter is out of range.
@@ -218,7 +223,8 @@ impl Sensors {
         &self.errors
     }
 
-    /// Measures the truth after one more millisecond; returns a frame's measurements after every fifth.
+    /// Measures the truth after one more millisecond; returns a frame's measurements after every
+    /// fifth.
     pub fn observe(&mut self, truth: &SensorTruth) -> Option<Measurements> {
         self.elapsed_ms += 1;
         self.rate_sum_rad_s += truth.state.rate_rad_s;

@@ -1,5 +1,5 @@
-//! What is random about the sensors of one flight: white noise and slow wander, flaws, and the state in which the
-//! estimator begins. All from a seed.
+//! What is random about the sensors of one flight: white noise and slow wander, flaws, and the
+//! state in which the estimator begins. All from a seed.
 
 use flight::estimation::estimator::{GRAVITY_M_S2, StartUncertainty};
 use flight::vehicle::rigid::RigidState;
@@ -8,8 +8,8 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use super::{SensorParams, Sensors};
 use crate::world::normal::Normal;
 
-/// A stationary first-order Gauss-Markov process: its correlation decays exponentially (J. A. Farrell, Aided Navigation, 2008,
-/// chapter 4).
+/// A stationary first-order Gauss-Markov process: its correlation decays exponentially (J. A.
+/// Farrell, Aided Navigation, 2008, chapter 4).
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Wander {
     pub(super) value: f64,
@@ -23,16 +23,17 @@ impl Wander {
         Self { value: sigma * normal.next(), sigma, correlation_s }
     }
 
-    /// Advances over an interval of any length, exactly: what is kept of the variance, `k^2`, and what is new, `1 - k^2`, are one.
+    /// Advances over an interval of any length, exactly: what is kept of the variance, `k^2`, and
+    /// what is new, `1 - k^2`, are one.
     pub(super) fn advance(&mut self, interval_s: f64, normal: &mut Normal) {
         let kept = libm::exp(-interval_s / self.correlation_s);
         self.value = self.value * kept + self.sigma * libm::sqrt(1.0 - kept * kept) * normal.next();
     }
 }
 
-// What is wrong with one flight's sensors beyond noise and bias: mounting, vibration, time errors, dropouts, outliers,
-// and feedback that is off. The numbers come from random streams of their own, so the noise of a flight stays the same
-// whether there are flaws or not.
+// What is wrong with one flight's sensors beyond noise and bias: mounting, vibration, time errors,
+// dropouts, outliers, and feedback that is off. The numbers come from random streams of their own,
+// so the noise of a flight stays the same whether there are flaws or not.
 
 /// The random streams after those of the sensors and of the start.
 const DRAWN_STREAM: u64 = 5;
@@ -145,8 +146,8 @@ pub(super) fn fate(chance: f64, lost: f64, outlier: f64) -> Fate {
 /// The random stream after those of the sensors.
 const STREAM: u64 = 4;
 
-/// The true state with errors drawn from the stated uncertainty. The rotation rate has no error, because the gyro
-/// replaces it in the first frame.
+/// The true state with errors drawn from the stated uncertainty. The rotation rate has no error,
+/// because the gyro replaces it in the first frame.
 pub fn believed_start(truth: &RigidState, uncertainty: &StartUncertainty, seed: u64) -> RigidState {
     let mut normal = Normal::new(seed, STREAM, 1.0);
     let position_m = Vector3::new(uncertainty.horizontal_m, uncertainty.horizontal_m, uncertainty.height_m);
@@ -162,8 +163,9 @@ pub fn believed_start(truth: &RigidState, uncertainty: &StartUncertainty, seed: 
 }
 
 impl Sensors {
-    /// The estimate of a vehicle that has levelled itself on its pad: the attitude is that of the inertial unit, off by
-    /// what its accelerometer errs at rest, and has the heading of `believed`.
+    /// The estimate of a vehicle that has levelled itself on its pad: the attitude is that of the
+    /// inertial unit, off by what its accelerometer errs at rest, and has the heading of
+    /// `believed`.
     pub(crate) fn levelled(&self, truth: &RigidState, believed: &RigidState) -> RigidState {
         let unit_from_body = UnitQuaternion::from_rotation_matrix(&self.flaws.unit_from_body);
         let world_from_unit = truth.world_from_body * unit_from_body.inverse();

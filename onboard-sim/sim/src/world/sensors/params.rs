@@ -1,4 +1,5 @@
-//! The errors of the sensors, as data. The defaults are those of sensors that a student club can buy.
+//! The errors of the sensors, as data. The defaults are those of sensors that a student club can
+//! buy.
 
 use flight::computer::FRAME_MS;
 use serde::{Deserialize, Serialize};
@@ -10,7 +11,8 @@ use super::lidar::LidarParams;
 use super::switches::SwitchParams;
 use crate::world::numbers;
 
-/// The parameters of every sensor. Each value is a standard deviation unless its name says otherwise.
+/// The parameters of every sensor. Each value is a standard deviation unless its name says
+/// otherwise.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SensorParams {

@@ -4,7 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use super::Sensors;
 
-/// Switches and feedback: what tells the flight computer of contact, of the igniter and of the fins.
+/// Switches and feedback: what tells the flight computer of contact, of the igniter and of the
+/// fins.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SwitchParams {

@@ -69,8 +69,8 @@ fn the_lidar_is_silent_high_up_and_on_its_side() {
     let lean = |deg: f64| nalgebra::UnitQuaternion::from_axis_angle(&Vector3::x_axis(), deg.to_radians());
     leaning.state.world_from_body = lean(46.0) * flight::vehicle::rigid::upright();
     assert!(lidar_of(&leaning).is_empty());
-    // 11 m straight down are in range. The slant range of 10.7 m from 8 m is beyond 12 m times the root of the cosine
-    // of 44 deg.
+    // 11 m straight down are in range. The slant range of 10.7 m from 8 m is beyond 12 m times the
+    // root of the cosine of 44 deg.
     assert!(!lidar_of(&falling(5.0, 11.0)).is_empty());
     let mut far = falling(5.0, 8.0);
     far.state.world_from_body = lean(44.0) * flight::vehicle::rigid::upright();
@@ -101,7 +101,8 @@ fn a_fault_silences_its_sensor_and_does_not_change_the_noise_of_others() {
     assert!(silent.iter().all(|m| m.pressure_altitude_m.is_none() && m.lidar_range_m.is_none()));
 }
 
-/// By the definition of each defect, on a barometer that is 10 m up and speaks in every fourth frame.
+/// By the definition of each defect, on a barometer that is 10 m up and speaks in every fourth
+/// frame.
 #[test]
 fn each_defect_says_what_it_is() {
     let said = |defect| {
@@ -139,7 +140,8 @@ fn noise_has_the_stated_size_and_a_seed_repeats_it() {
         let squares = values.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>();
         (squares / values.len() as f64).sqrt()
     };
-    // Densities over the square root of a frame's 5 ms; four standard errors of 4,000 samples are 4.5 %.
+    // Densities over the square root of a frame's 5 ms; four standard errors of 4,000 samples are
+    // 4.5 %.
     let gyro = spread(seen.iter().map(|m| m.imu.gyro_rad_s.x).collect());
     assert!((gyro.to_degrees() / (0.05 / 0.005_f64.sqrt()) - 1.0).abs() < 0.045, "{gyro}");
     let force = spread(seen.iter().map(|m| m.imu.specific_force_m_s2.y).collect());
@@ -269,7 +271,8 @@ fn late_samples_wrong_tags_dust_dropouts_and_switches() {
     sensors.flaws.barometer_ejection_m = 8.0;
     sensors.flaws.gnss_tag_s = 0.03;
     let frames: Vec<Measurements> = (0..800).map(|_| one_frame(&mut sensors, &truth)).collect();
-    // 20 ms ago the vehicle was 0.2 m higher; for the lidar 10 ms and 0.1 m, and 0.45 m from the lidar to the centre.
+    // 20 ms ago the vehicle was 0.2 m higher; for the lidar 10 ms and 0.1 m, and 0.45 m from the
+    // lidar to the centre.
     assert!(frames.iter().filter_map(|m| m.pressure_altitude_m).all(|m| (m - 5.2).abs() < 1e-9));
     let ranges: Vec<f64> = frames.iter().filter_map(|m| m.lidar_range_m).collect();
     assert!(ranges.iter().all(|range_m| (range_m - (5.1 - 0.45)).abs() < 1e-9));
@@ -293,7 +296,8 @@ fn late_samples_wrong_tags_dust_dropouts_and_switches() {
     assert!(sensors.contact(true), "after 15 ms");
 }
 
-/// The last measurement of each sensor after 0.4 s: with the same noise for the same seed, whatever the parameters.
+/// The last measurement of each sensor after 0.4 s: with the same noise for the same seed, whatever
+/// the parameters.
 fn last_of_each(params: &SensorParams, truth: &SensorTruth) -> Measurements {
     let mut sensors = Sensors::new(params, &PLACES, 5, 1.0).unwrap();
     let frames = (0..400).filter_map(|_| sensors.observe(truth));
@@ -318,8 +322,8 @@ fn val_hand_a_flow_across_the_axis_raises_the_barometers_height() {
     assert!((raised_m - 2.804_219).abs() < 1e-6, "{raised_m}");
 }
 
-/// A fix that is older than its tag says is off by the motion since: in the fall by 40 m/s, and its velocity by gravity less
-/// drag.
+/// A fix that is older than its tag says is off by the motion since: in the fall by 40 m/s, and its
+/// velocity by gravity less drag.
 #[test]
 fn a_fix_of_unknown_age_is_off_along_the_motion() {
     let truth = falling(40.0, 100.0);
@@ -344,7 +348,8 @@ fn a_beam_meets_the_grass_and_leans_as_its_holder_does() {
         |lidar: LidarParams| last_of_each(&SensorParams { lidar, ..quiet }, &truth).lidar_range_m.unwrap();
     let good_m = range(quiet.lidar);
     assert!((good_m - range(LidarParams { grass_m: [0.15; 2], ..quiet.lidar }) - 0.15).abs() < 1e-12);
-    // A beam that leans meets level ground further away; with 10 degrees each way it leans by less than 45.
+    // A beam that leans meets level ground further away; with 10 degrees each way it leans by less
+    // than 45.
     let leaning_m = range(LidarParams { beam_deg: 10.0, ..quiet.lidar });
     assert!(leaning_m > good_m + 1e-3 && leaning_m < good_m + 5.0, "{leaning_m}");
 }

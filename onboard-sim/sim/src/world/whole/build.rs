@@ -1,5 +1,5 @@
-//! Builds a world from data, refuses data that make no sense, and changes the vehicle or the weather in the middle of
-//! a flight.
+//! Builds a world from data, refuses data that make no sense, and changes the vehicle or the
+//! weather in the middle of a flight.
 
 use core::f64::consts::FRAC_PI_2;
 
@@ -53,7 +53,8 @@ pub enum WorldError {
 }
 
 impl World {
-    /// A world at the start of a flight: fins closed, gimbal centred, motor full, parachute stowed, gusts from a seed.
+    /// A world at the start of a flight: fins closed, gimbal centred, motor full, parachute stowed,
+    /// gusts from a seed.
     ///
     /// # Errors
     ///
@@ -118,7 +119,8 @@ impl World {
         Ok(world)
     }
 
-    /// The same world with the vehicle on its booster, at rest on the rail, whose foot stands on the ground.
+    /// The same world with the vehicle on its booster, at rest on the rail, whose foot stands on
+    /// the ground.
     #[must_use]
     pub fn on_rail(mut self, launch: &Launch, truth: &AscentTruth) -> Self {
         let [about_x, about_y] = truth.rail_lean_rad;
@@ -206,9 +208,9 @@ fn check(truth: &Truth) -> Result<(), WorldError> {
 impl World {
     /// The same moment of the same flight, with another airframe, motor or truth from now on.
     ///
-    /// State, time, servo angles, past commands and faults stay. The gusts continue with the new strength, and a
-    /// burning motor continues on the new curve at the same time. If nothing changes, the flight continues with the
-    /// same bits.
+    /// State, time, servo angles, past commands and faults stay. The gusts continue with the new
+    /// strength, and a burning motor continues on the new curve at the same time. If nothing
+    /// changes, the flight continues with the same bits.
     ///
     /// # Errors
     /// As [`World::new`].

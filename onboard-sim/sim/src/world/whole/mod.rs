@@ -1,9 +1,10 @@
 //! All parts together, one millisecond at a time.
 //!
-//! In the air a step is one Runge-Kutta step; near the ground it is several. Within a step wind, servo angles and
-//! masses are constant (masses at mid-step), while thrust and air density follow time and height. The centre of gravity
-//! moves through the body while propellant burns; that relative motion (some mm/s) is neglected in the velocities. The
-//! exhaust takes angular momentum with it (jet damping: W. T. Thomson, Introduction to Space Dynamics, section 7.7).
+//! In the air a step is one Runge-Kutta step; near the ground it is several. Within a step wind,
+//! servo angles and masses are constant (masses at mid-step), while thrust and air density follow
+//! time and height. The centre of gravity moves through the body while propellant burns; that
+//! relative motion (some mm/s) is neglected in the velocities. The exhaust takes angular momentum
+//! with it (jet damping: W. T. Thomson, Introduction to Space Dynamics, section 7.7).
 
 mod build;
 mod riding;
@@ -31,7 +32,8 @@ use crate::world::{STEP_S, body};
 
 /// Below this clearance steps are divided, m. It is more than one step of fall at 40 m/s.
 const NEAR_M: f64 = 0.1;
-/// The wind is held for so many steps, in which a vehicle comes 0.2 m further; the shortest gusts are 3 m long.
+/// The wind is held for so many steps, in which a vehicle comes 0.2 m further; the shortest gusts
+/// are 3 m long.
 const WIND_STEPS: u64 = 5;
 /// The density is taken as linear within this distance, m: it is wrong by a part in 10^9.
 const AIR_M: f64 = 0.5;
@@ -92,7 +94,8 @@ pub struct World {
     ground: Ground,
     steps: u64,
     state: RigidState,
-    /// Landing propellant burnt up to the middle of the last step, kg, and what the vehicle weighs with the rest.
+    /// Landing propellant burnt up to the middle of the last step, kg, and what the vehicle weighs
+    /// with the rest.
     burnt_kg: f64,
     mass: MassProperties,
     specific_force_m_s2: Vector3<f64>,
@@ -245,7 +248,8 @@ impl World {
         }
     }
 
-    /// What arrives at the servos, over wires that may be wrong: gimbal (pitch, yaw), fins 1 to 4, rad.
+    /// What arrives at the servos, over wires that may be wrong: gimbal (pitch, yaw), fins 1 to 4,
+    /// rad.
     fn wired_rad(&self, actuators: &Actuators) -> [f64; 6] {
         let told_rad = surfaces_rad(actuators.gimbal_rad, actuators.fins_rad);
         let both_stops_rad = self.airframe.fins.closed_rad() + self.airframe.fins.open_rad();
@@ -277,7 +281,8 @@ impl World {
         }
     }
 
-    /// Centre of gravity: x its station, y and z its distance from the axis, m. A swinging motor takes it to the side.
+    /// Centre of gravity: x its station, y and z its distance from the axis, m. A swinging motor
+    /// takes it to the side.
     pub fn cg_m(&self) -> Vector3<f64> {
         let below_pivot_m = self.airframe.gimbal.pivot_station_m - self.airframe.mass.propellant_station_m;
         let aside_m = below_pivot_m * self.motor_kg() / self.mass.mass_kg;
@@ -291,7 +296,8 @@ impl World {
         self.certified.total_mass_kg() - self.burnt_kg
     }
 
-    /// The body turns back when the motor begins to swing and when it stops: their common angular momentum is kept.
+    /// The body turns back when the motor begins to swing and when it stops: their common angular
+    /// momentum is kept.
     fn turn_back(&mut self) {
         let [before_rad_s, now_rad_s] = self.gimbal_rates_rad_s;
         let swinging_kg_m2 =
@@ -438,8 +444,8 @@ impl World {
         self.airframe.above_feet_m(self.cg_m().x)
     }
 
-    /// Mean specific force over the last step in body axes, m/s^2, which is what an ideal accelerometer at the centre
-    /// of gravity measures.
+    /// Mean specific force over the last step in body axes, m/s^2, which is what an ideal
+    /// accelerometer at the centre of gravity measures.
     pub fn specific_force_m_s2(&self) -> &Vector3<f64> {
         &self.specific_force_m_s2
     }
@@ -464,7 +470,8 @@ impl World {
         self.motor.thrust_n(self.time_s())
     }
 
-    /// When the thrust begins or began, s; `None` without current before it has lit, and for a motor that does not light.
+    /// When the thrust begins or began, s; `None` without current before it has lit, and for a
+    /// motor that does not light.
     pub fn thrust_begins_s(&self) -> Option<f64> {
         self.motor.thrust_begins_s()
     }
@@ -544,7 +551,8 @@ impl World {
         self.parachute.ejected_s()
     }
 
-    /// Height of the ground where a beam backwards along the axis meets it, m; the slope is taken as small.
+    /// Height of the ground where a beam backwards along the axis meets it, m; the slope is taken
+    /// as small.
     pub fn ground_under_beam_m(&self) -> f64 {
         let (place_m, nose) = (&self.state.position_m, self.state.nose_in_world());
         let per_m = place_m.z / nose.z.max(0.1);

@@ -1,8 +1,8 @@
 //! The way up: on the rail, under the ascent motor, and coasting until the booster is separated.
 //!
-//! The state of the world is always the vehicle's own. In each step the motion of the stack's centre of gravity follows
-//! from it, and it from that motion. The centre moves through the body while propellant burns; that relative motion (some
-//! cm/s) is neglected.
+//! The state of the world is always the vehicle's own. In each step the motion of the stack's
+//! centre of gravity follows from it, and it from that motion. The centre moves through the body
+//! while propellant burns; that relative motion (some cm/s) is neglected.
 
 use flight::vehicle::airframe::MassProperties;
 use flight::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
@@ -109,9 +109,10 @@ impl World {
 
 // The vehicle on its booster: masses, thrust and the air on the whole stack.
 //
-// Forces across the axis in proportion to the angle of attack act at the nose and at the booster's fins (J. S. Barrowman
-// and J. A. Barrowman, "The Theoretical Prediction of the Center of Pressure", 1966), each from the wind where it acts,
-// so that turning is damped. The crossflow of the vehicle's body is that of `aero`.
+// Forces across the axis in proportion to the angle of attack act at the nose and at the booster's
+// fins (J. S. Barrowman and J. A. Barrowman, "The Theoretical Prediction of the Center of
+// Pressure", 1966), each from the wind where it acts, so that turning is damped. The crossflow of
+// the vehicle's body is that of `aero`.
 
 /// Time from the current through the separation charge to the separation, s.
 const CHARGE_DELAY_S: f64 = 0.02;
@@ -190,7 +191,8 @@ impl Stack {
         self.charge_fired_s
     }
 
-    /// Speed that the charge gives a vehicle of a mass along its axis, m/s, and the rotation rate across it, rad/s.
+    /// Speed that the charge gives a vehicle of a mass along its axis, m/s, and the rotation rate
+    /// across it, rad/s.
     pub(crate) fn parting(&self, mass_kg: f64) -> (f64, [f64; 2]) {
         (self.booster.separation_impulse_n_s / mass_kg, self.truth.tip_off_rad_s)
     }
@@ -204,8 +206,9 @@ impl Stack {
         self.motor.thrust_n(time_s)
     }
 
-    /// Damping of the cross rates per newton of thrust, m s/rad: the gas leaves with the angular momentum that it has at
-    /// the nozzle, and it had that of its place in the motor (W. T. Thomson, Introduction to Space Dynamics, section 7.7).
+    /// Damping of the cross rates per newton of thrust, m s/rad: the gas leaves with the angular
+    /// momentum that it has at the nozzle, and it had that of its place in the motor (W. T.
+    /// Thomson, Introduction to Space Dynamics, section 7.7).
     pub(crate) fn jet_damping_m_s(&self, cg_station_m: f64) -> f64 {
         let [nozzle_m, propellant_m] =
             [self.nozzle_m().x, self.booster.propellant_station_m].map(|station_m| station_m - cg_station_m);
@@ -222,7 +225,8 @@ impl Stack {
         self.truth.drag_scale * self.booster.stack_drag_coefficient / vehicle_coefficient
     }
 
-    /// The masses at a time, with a vehicle of these masses and centre of gravity on top (parallel axes).
+    /// The masses at a time, with a vehicle of these masses and centre of gravity on top (parallel
+    /// axes).
     pub(crate) fn mass(
         &self,
         vehicle: &MassProperties,
@@ -260,8 +264,8 @@ impl Stack {
             let across = Vector3::new(0.0, local.y, local.z);
             load.add_at(&place_m, &(across * (-0.5 * flow.density_kg_m3 * speed * area_m2 * slope_per_rad)));
         }
-        // All fins turned the same way by the cant roll the stack, and rolling turns the wind at them back. Of n fins n/2
-        // lift in one plane, but all n roll.
+        // All fins turned the same way by the cant roll the stack, and rolling turns the wind at
+        // them back. Of n fins n/2 lift in one plane, but all n roll.
         let axial_m_s = flow.velocity_m_s.x;
         let angle_speed = self.truth.fin_cant_rad * axial_m_s - flow.rate_rad_s.x * fin_radius_m;
         load.moment_n_m.x +=
@@ -273,8 +277,8 @@ impl Stack {
         self.rail.is_some()
     }
 
-    /// A step, s, along the rail with an acceleration along it, m/s^2: the speed afterwards, m/s. Nothing holds the stack
-    /// down, and the rail's foot holds it up.
+    /// A step, s, along the rail with an acceleration along it, m/s^2: the speed afterwards, m/s.
+    /// Nothing holds the stack down, and the rail's foot holds it up.
     pub(crate) fn slide(&mut self, speed_m_s: f64, acceleration_m_s2: f64, step_s: f64) -> f64 {
         let Some(rail) = &mut self.rail else { return speed_m_s };
         let next_m_s = (speed_m_s + acceleration_m_s2 * step_s).max(0.0);

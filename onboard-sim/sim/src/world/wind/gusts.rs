@@ -1,15 +1,17 @@
-//! Dryden gusts at low altitude, MIL-F-8785C section 3.7.3.4: intensities and lengths depend on height, and filtered
-//! noise on the path through the air.
+//! Dryden gusts at low altitude, MIL-F-8785C section 3.7.3.4: intensities and lengths depend on
+//! height, and filtered noise on the path through the air.
 //!
-//! With the height h in feet, `L_w = h`, `L_u = L_v = h / (0.177 + 0.000823 h)^1.2`, `sigma_w = 0.1 W20` and
-//! `sigma_u = sigma_v = sigma_w / (0.177 + 0.000823 h)^0.4`, held at their values at 10 ft below and at 1,000 ft above.
-//! The gust field is frozen in the air: the filters run over the path flown through it. Along the mean wind the
-//! spectrum is the longitudinal one, across it and upwards the transverse one. (The standard is written for aircraft in
-//! level flight. For a falling vehicle the choice of the longitudinal component is free.)
+//! With the height h in feet, `L_w = h`, `L_u = L_v = h / (0.177 + 0.000823 h)^1.2`, `sigma_w = 0.1
+//! W20` and `sigma_u = sigma_v = sigma_w / (0.177 + 0.000823 h)^0.4`, held at their values at 10 ft
+//! below and at 1,000 ft above. The gust field is frozen in the air: the filters run over the path
+//! flown through it. Along the mean wind the spectrum is the longitudinal one, across it and
+//! upwards the transverse one. (The standard is written for aircraft in level flight. For a falling
+//! vehicle the choice of the longitudinal component is free.)
 //!
-//! Both filters are discretised exactly: state transition and noise covariance of the continuous filter over the step,
-//! for any length of step, from a stationary start. The states have unit variance and are scaled by sigma at the
-//! output, so that a change of height does not disturb the variance.
+//! Both filters are discretised exactly: state transition and noise covariance of the continuous
+//! filter over the step, for any length of step, from a stationary start. The states have unit
+//! variance and are scaled by sigma at the output, so that a change of height does not disturb the
+//! variance.
 
 use nalgebra::Vector3;
 use rand_chacha::ChaCha8Rng;
@@ -61,8 +63,8 @@ impl GustScales {
     }
 }
 
-/// The transverse filter `(1 + sqrt(3) L s) / (1 + L s)^2` over the path s: two equal lags in a row, the output a mix
-/// of their states.
+/// The transverse filter `(1 + sqrt(3) L s) / (1 + L s)^2` over the path s: two equal lags in a
+/// row, the output a mix of their states.
 #[derive(Debug, Clone, Copy)]
 struct Transverse {
     first: f64,
@@ -128,8 +130,8 @@ impl Gusts {
         self.wind_at_20_ft_m_s > 0.0
     }
 
-    /// Advances by a length of air, m, at a height above ground, m. Returns the gust along the mean wind, across it and
-    /// upwards, m/s.
+    /// Advances by a length of air, m, at a height above ground, m. Returns the gust along the mean
+    /// wind, across it and upwards, m/s.
     pub fn step(&mut self, height_m: f64, path_m: f64) -> Vector3<f64> {
         let scales = GustScales::at(height_m, self.wind_at_20_ft_m_s);
         let share = path_m / scales.horizontal_m;
@@ -149,8 +151,8 @@ impl Gusts {
 mod tests {
     use super::*;
 
-    /// MIL-F-8785C at 200 ft in 15 m/s of wind at 20 ft, worked by hand: 0.177 + 0.1646 = 0.3416; ^0.4 = 0.650739,
-    /// ^1.2 = 0.275565; lengths 200 / 0.275565 = 725.78 ft and 200 ft.
+    /// MIL-F-8785C at 200 ft in 15 m/s of wind at 20 ft, worked by hand: 0.177 + 0.1646 = 0.3416;
+    /// ^0.4 = 0.650739, ^1.2 = 0.275565; lengths 200 / 0.275565 = 725.78 ft and 200 ft.
     #[test]
     fn val_mil_f_8785c_scales_at_200_ft() {
         let scales = GustScales::at(60.96, 15.0);
@@ -166,8 +168,8 @@ mod tests {
         assert_eq!(GustScales::at(900.0, 15.0), GustScales::at(304.8, 15.0));
     }
 
-    /// Variances, and the correlation a quarter and a whole length apart, over many samples. The step is longer than in a
-    /// simulation, which exact discretisation allows.
+    /// Variances, and the correlation a quarter and a whole length apart, over many samples. The
+    /// step is longer than in a simulation, which exact discretisation allows.
     #[test]
     fn val_mil_f_8785c_variance_and_correlation() {
         let height_m = 60.0;

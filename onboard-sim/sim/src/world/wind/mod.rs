@@ -1,8 +1,8 @@
 //! The wind: a mean that grows with height, and gusts.
 //!
-//! The mean follows the power law over flat open country with the exponent 1/7 (J. F. Manwell, J. G. McGowan and A. L. Rogers, Wind
-//! Energy Explained, 2nd edition, chapter 2), from its value 10 m above the
-//! ground. Gusts are those of [`gusts`].
+//! The mean follows the power law over flat open country with the exponent 1/7 (J. F. Manwell, J.
+//! G. McGowan and A. L. Rogers, Wind Energy Explained, 2nd edition, chapter 2), from its value 10 m
+//! above the ground. Gusts are those of [`gusts`].
 
 pub mod gusts;
 
@@ -14,7 +14,8 @@ use gusts::Gusts;
 pub const REFERENCE_HEIGHT_M: f64 = 10.0;
 /// Exponent of the power law.
 pub const EXPONENT: f64 = 1.0 / 7.0;
-/// Below this height the mean wind is constant, m: the power law does not hold so close to the ground.
+/// Below this height the mean wind is constant, m: the power law does not hold so close to the
+/// ground.
 const LOWEST_M: f64 = 0.5;
 /// Reference height of the wind in the gust standard: 20 ft, m.
 const GUST_REFERENCE_HEIGHT_M: f64 = 6.096;
@@ -32,8 +33,9 @@ pub struct Wind {
 }
 
 impl Wind {
-    /// A wind from its mean at the reference height, m/s, the direction it blows to (from world x towards world y,
-    /// rad), the gust intensity as a multiple of the standard's, and the seed of the gusts.
+    /// A wind from its mean at the reference height, m/s, the direction it blows to (from world x
+    /// towards world y, rad), the gust intensity as a multiple of the standard's, and the seed of
+    /// the gusts.
     pub fn new(reference_m_s: f64, towards_rad: f64, gust_scale: f64, seed: u64) -> Self {
         let (sin, cos) = libm::sincos(towards_rad);
         let gust_wind_m_s = mean_m_s(reference_m_s, EXPONENT, GUST_REFERENCE_HEIGHT_M);
@@ -48,14 +50,15 @@ impl Wind {
         }
     }
 
-    /// This wind with another exponent of the power law, and a direction that turns with the height over the reference
-    /// height, rad/m.
+    /// This wind with another exponent of the power law, and a direction that turns with the height
+    /// over the reference height, rad/m.
     #[must_use]
     pub fn over_height(self, exponent: f64, veer_rad_m: f64) -> Self {
         Self { exponent, veer_rad_m, ..self }
     }
 
-    /// This wind with the mean and the gust intensity of another wind; the gusts themselves continue.
+    /// This wind with the mean and the gust intensity of another wind; the gusts themselves
+    /// continue.
     pub(crate) fn changed(&self, other: &Self) -> Self {
         Self { gusts: self.gusts.as_strong_as(&other.gusts), now_m_s: self.now_m_s, ..other.clone() }
     }

@@ -1,12 +1,13 @@
 //! Finds, in the fall, a gimbal that does not move, before the motor is lit.
 //!
 //! The landing motor has some per cent of the body's inertia. When it swings, the body turns back
-//! ([`Airframe::swinging_kg_m2`]), and the gyro feels that, whatever a servo tells. So the gimbal swings to and fro from fins out to
-//! ignition, pitch and yaw in turn, and the gyro is compared with what should be felt.
+//! ([`Airframe::swinging_kg_m2`]), and the gyro feels that, whatever a servo tells. So the gimbal
+//! swings to and fro from fins out to ignition, pitch and yaw in turn, and the gyro is compared
+//! with what should be felt.
 //!
-//! Air and fins turn the body more, but more slowly. The swing's rate has the signs of a Thue-Morse sequence, and the sum of
-//! any parabola over it with these signs is zero (E. Prouhet, 1851; J.-P. Allouche and J. Shallit, "The ubiquitous
-//! Prouhet-Thue-Morse sequence", 1999).
+//! Air and fins turn the body more, but more slowly. The swing's rate has the signs of a Thue-Morse
+//! sequence, and the sum of any parabola over it with these signs is zero (E. Prouhet, 1851; J.-P.
+//! Allouche and J. Shallit, "The ubiquitous Prouhet-Thue-Morse sequence", 1999).
 
 use serde::{Deserialize, Serialize};
 
@@ -14,17 +15,21 @@ use crate::computer::FRAME_S;
 use crate::vehicle::airframe::MassProperties;
 use crate::vehicle::mission::Mission;
 
-/// The signs of the gimbal's rate in the legs of a swing: it is at the centre again after every second one.
+/// The signs of the gimbal's rate in the legs of a swing: it is at the centre again after every
+/// second one.
 const SIGNS: [f64; 8] = [1.0, -1.0, -1.0, 1.0, -1.0, 1.0, 1.0, -1.0];
-/// A swing must show this multiple of the gyro's noise, by as many repetitions as it needs, at most so many.
+/// A swing must show this multiple of the gyro's noise, by as many repetitions as it needs, at most
+/// so many.
 const SIGMAS: f64 = 10.0;
 const REPEATS_MAX: f64 = 4.0;
-/// A swing that shows less than this share of what is expected speaks against the gimbal. One that is stuck shows nothing, with a
-/// scatter of 0.05; one at 0.3 of its rate with 1.5 degrees of play, which lands, shows 0.17, and a sound one 0.5 at least (4,800
-/// swings of mk3 in `real`, `wild` and `harsh`). Longer legs would show more of a slow one, and more of the fins.
+/// A swing that shows less than this share of what is expected speaks against the gimbal. One that
+/// is stuck shows nothing, with a scatter of 0.05; one at 0.3 of its rate with 1.5 degrees of play,
+/// which lands, shows 0.17, and a sound one 0.5 at least (4,800 swings of mk3 in `real`, `wild` and
+/// `harsh`). Longer legs would show more of a slow one, and more of the fins.
 const MOVES: f64 = 0.09;
-/// What is missing to that adds up, swing by swing, and more takes it away again (E. S. Page, "Continuous inspection schemes",
-/// Biometrika 41, 1954). At this the gimbal is stuck: three or four swings of a stuck one, one of a reversed one.
+/// What is missing to that adds up, swing by swing, and more takes it away again (E. S. Page,
+/// "Continuous inspection schemes", Biometrika 41, 1954). At this the gimbal is stuck: three or
+/// four swings of a stuck one, one of a reversed one.
 const STUCK: f64 = 0.25;
 
 /// What a swing is, and what it should show.
@@ -84,8 +89,8 @@ impl SwingWatch {
         self.missing >= STUCK
     }
 
-    /// Takes a frame's cross rates, rad/s. Gives the gimbal's command (pitch, yaw), rad, and what the swing should have added
-    /// to the rates, rad/s.
+    /// Takes a frame's cross rates, rad/s. Gives the gimbal's command (pitch, yaw), rad, and what
+    /// the swing should have added to the rates, rad/s.
     pub(super) fn update(&mut self, swing: &Swing, rates_rad_s: [f64; 2]) -> ([f64; 2], [f64; 2]) {
         let (mut command_rad, mut added_rad_s) = ([0.0; 2], [0.0; 2]);
         if self.found_stuck() {
@@ -134,8 +139,9 @@ mod tests {
         (mission, swing)
     }
 
-    /// When the gimbal of mk3, whose axes turn by shares of their commands, is found stuck, s; within 20 s. The vehicle sways by 40
-    /// degrees/s, 0.8 times a second, and the gyro has the mission's noise.
+    /// When the gimbal of mk3, whose axes turn by shares of their commands, is found stuck, s;
+    /// within 20 s. The vehicle sways by 40 degrees/s, 0.8 times a second, and the gyro has the
+    /// mission's noise.
     fn found_s(shares: [f64; 2], seed: u64) -> Option<f64> {
         let (mission, swing) = swing_of("mk3");
         let swing = swing.unwrap();
@@ -157,8 +163,8 @@ mod tests {
         })
     }
 
-    /// mk3's motor has 0.365 (0.203^2 / 12 + 0.038^2 / 16) = 0.001 286 kg m^2, and the body 0.137: 9 degrees of swing turn it
-    /// by 0.0845 degrees.
+    /// mk3's motor has 0.365 (0.203^2 / 12 + 0.038^2 / 16) = 0.001 286 kg m^2, and the body 0.137:
+    /// 9 degrees of swing turn it by 0.0845 degrees.
     #[test]
     fn val_hand_a_leg_turns_mk3_by_a_twelfth_of_a_degree() {
         let swing = swing_of("mk3").1.unwrap();

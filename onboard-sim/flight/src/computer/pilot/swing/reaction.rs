@@ -18,7 +18,8 @@ impl Reaction {
         Self { swing, servos, shares: [1.0; 2] }
     }
 
-    /// The cross rates that the gyro feels in a frame, rad/s, after the commands of the last one, rad.
+    /// The cross rates that the gyro feels in a frame, rad/s, after the commands of the last one,
+    /// rad.
     pub(in crate::computer::pilot) fn felt_rad_s(&mut self, told_rad: [f64; 2]) -> [f64; 2] {
         [0, 1].map(|axis: usize| {
             let servo = &mut self.servos[axis];

@@ -248,7 +248,8 @@ fn no_event_leaves_an_armed_vehicle_with_both_a_hold_and_a_countdown() {
             let context = format!("{mode:?} + {event:?}");
             assert!(next.hold.is_none() || next.countdown_end_s.is_none(), "{context}");
             assert!(next.hold.is_none() || next.phase == Phase::PadArmed, "{context}");
-            // During a hold nothing is released or lit, except for a vehicle that already rises or falls.
+            // During a hold nothing is released or lit, except for a vehicle that already rises or
+            // falls.
             if mode.hold.is_some() {
                 let lit = [Effect::IgniteAscentMotor, Effect::IgniteLandingMotor];
                 assert!(!lit.into_iter().any(|effect| answer.effects.contains(effect)), "{context}");

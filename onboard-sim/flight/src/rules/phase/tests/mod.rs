@@ -68,7 +68,8 @@ const LATER_S: f64 = 10.0;
     clippy::match_same_arms,
     reason = "rows of different phases stay apart even where they say the same"
 )]
-/// The next phase and the effects of an event for a vehicle with everything in order; `None` is a refusal.
+/// The next phase and the effects of an event for a vehicle with everything in order; `None` is a
+/// refusal.
 fn expected(phase: Phase, event: Event) -> Option<(Phase, &'static [Effect])> {
     use Effect::{
         DeployChute, Disarm, FinsOpen, IgniteLandingMotor, InhibitLandingMotor, RecordLoss, SeparateBooster,

@@ -1,5 +1,5 @@
-//! Tests that the downlink stays within its budget in any one second, whatever is requested, and that every link has
-//! its own.
+//! Tests that the downlink stays within its budget in any one second, whatever is requested, and
+//! that every link has its own.
 
 use protocol::dialect::{LOCAL_POSITION_NED_DATA, MavModeFlag, MavState, STATUSTEXT_DATA};
 

@@ -1,4 +1,5 @@
-//! Two people at a vehicle's endpoint, with frames that are really signed: who may arm and start, and who may not.
+//! Two people at a vehicle's endpoint, with frames that are really signed: who may arm and start,
+//! and who may not.
 
 use flight::computer::crew::People;
 use protocol::dialect::{TD_CREW_DATA, TdAct, TdHold};
@@ -241,7 +242,8 @@ fn of_the_two_who_start_the_one_who_does_not_command_taps() {
     assert_eq!(launch.says(RANGE, TAP, 0.0, 0.0).0, ACCEPTED);
     let crew = launch.crew.clone().unwrap();
     assert_eq!((crew.commanded_by, crew.tapped_by), (2, 1));
-    // Nor does she take command while she taps: in the last moment nothing holds, and he may be silent.
+    // Nor does she take command while she taps: in the last moment nothing holds, and he may be
+    // silent.
     while launch.vehicle.mode().countdown_remaining_s(launch.vehicle.time_s()).unwrap() > 3.0 {
         launch.says(RANGE, TAP, 0.0, 0.0);
     }
@@ -383,9 +385,9 @@ fn the_command_passes_only_from_a_silent_station_to_the_same_role_or_range_safet
     assert!(!launch.counts_down());
 }
 
-/// Random frames of everybody, with replays, wrong keys, forged numbers and races, at a vehicle that is disarmed again
-/// whenever it was armed. It is armed only in a frame in which the confirmation of another role arrived, of an ask that
-/// had been made in the ten seconds before.
+/// Random frames of everybody, with replays, wrong keys, forged numbers and races, at a vehicle
+/// that is disarmed again whenever it was armed. It is armed only in a frame in which the
+/// confirmation of another role arrived, of an ask that had been made in the ten seconds before.
 #[test]
 fn random_signed_frames_arm_nothing_without_two_keys() {
     let mut random = ChaCha8Rng::seed_from_u64(7);

@@ -1,4 +1,5 @@
-//! Tests what other ground stations ask every vehicle, what they get without asking, and what stations tell the vehicle.
+//! Tests what other ground stations ask every vehicle, what they get without asking, and what
+//! stations tell the vehicle.
 
 use protocol::dialect::{
     ATTITUDE_DATA, AUTOPILOT_VERSION_DATA, BATTERY_STATUS_DATA, CURRENT_MODE_DATA, GLOBAL_POSITION_INT_DATA,
@@ -338,7 +339,8 @@ fn the_rates_of_every_kind_of_link_fit_it() {
     }
 }
 
-// What stations tell the vehicle about themselves: the end of their book, and the mission that they expect.
+// What stations tell the vehicle about themselves: the end of their book, and the mission that they
+// expect.
 
 fn tell(wire: &mut Wire, head: TD_BOOK_HEAD_DATA) -> Vec<TD_BOOK_KEPT_DATA> {
     wire.tell(&MavMessage::TD_BOOK_HEAD(head));

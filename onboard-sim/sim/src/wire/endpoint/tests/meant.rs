@@ -1,5 +1,5 @@
-//! Who commands which vehicle: the boot that a command names, programs that share their ids, and a million random requests
-//! of a crew of two people.
+//! Who commands which vehicle: the boot that a command names, programs that share their ids, and a
+//! million random requests of a crew of two people.
 #![expect(clippy::verbose_bit_mask, reason = "bits of a random number are its dice")]
 #![expect(clippy::float_cmp, reason = "times of the same frame are the same number")]
 
@@ -199,7 +199,8 @@ fn a_command_for_every_vehicle_stops_and_moves_nothing() {
     assert!(range.vehicle.aborted());
 }
 
-/// Two stations each of Ann and Bob, one each of Cat and Dan, one with the shared key, and two that share ids with another.
+/// Two stations each of Ann and Bob, one each of Cat and Dan, one with the shared key, and two that
+/// share ids with another.
 fn crowd() -> Vec<Program> {
     let people = operators();
     let by = |number: usize| Some(people[number - 1]);
@@ -215,7 +216,8 @@ fn crowd() -> Vec<Program> {
     ]
 }
 
-/// What an onlooker writes down: who asked for what and was heard, alone under their ids, for this vehicle.
+/// What an onlooker writes down: who asked for what and was heard, alone under their ids, for this
+/// vehicle.
 struct Heard {
     program: usize,
     command: u16,
@@ -223,9 +225,10 @@ struct Heard {
     at_s: f64,
 }
 
-/// The rule, told a second time and checked in every frame: a vehicle is armed, and a countdown begins, only by an ask and the
-/// confirmation of another person in another role, both from stations that are heard, alone under their ids, for this boot
-/// of this vehicle. In the countdown one person commands and another one taps; without the heartbeats of the one or the taps of the
+/// The rule, told a second time and checked in every frame: a vehicle is armed, and a countdown
+/// begins, only by an ask and the confirmation of another person in another role, both from
+/// stations that are heard, alone under their ids, for this boot of this vehicle. In the countdown
+/// one person commands and another one taps; without the heartbeats of the one or the taps of the
 /// other it is held, but for its last moment.
 #[test]
 #[expect(clippy::too_many_lines, reason = "one loop: what is drawn, what is sent, and the rule that is held")]
@@ -294,7 +297,8 @@ fn a_million_random_requests_move_nothing_but_by_the_rule() {
         let now_s = range.vehicle.time_s();
         let mode = *range.vehicle.mode();
         let crew_after = range.vehicle.computer().crew().two_person;
-        // Two people of two roles have agreed in this frame: the confirmation came now, the ask some time before.
+        // Two people of two roles have agreed in this frame: the confirmation came now, the ask
+        // some time before.
         let agreed = |command: u16| {
             heard.iter().filter(|one| one.command == command && one.at_s == time_s && one.confirms != 0).any(
                 |confirmation| {

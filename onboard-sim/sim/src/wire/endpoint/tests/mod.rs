@@ -298,7 +298,8 @@ fn time_is_told_to_those_who_ask_this_vehicle() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Whatever frames arrive, the vehicle keeps running, and only the two proper commands arm and start it.
+    /// Whatever frames arrive, the vehicle keeps running, and only the two proper commands arm and
+    /// start it.
     #[test]
     fn hostile_payloads_never_stop_the_vehicle(
         messages in prop::collection::vec((prop::sample::select(vec![0u32, 4, 75, 76, 77, 111, 253, 54_000]), prop::collection::vec(any::<u8>(), 1..64)), 1..40)
@@ -318,8 +319,8 @@ proptest! {
     }
 }
 
-/// The bits of `checks_failed` have the order of the vehicle's checks: the name of each bit is the start of its
-/// check's name.
+/// The bits of `checks_failed` have the order of the vehicle's checks: the name of each bit is the
+/// start of its check's name.
 #[test]
 fn the_dialect_names_the_arming_checks_in_their_order() {
     let checks = rocket().arming_checks();

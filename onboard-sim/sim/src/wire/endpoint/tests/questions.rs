@@ -1,4 +1,5 @@
-//! Tests questions about parameters, files and versions, as other clients ask them, and the vehicle's log over FTP.
+//! Tests questions about parameters, files and versions, as other clients ask them, and the
+//! vehicle's log over FTP.
 
 use avionics::link::parameters;
 use flight::computer::FRAME_S;
@@ -142,7 +143,8 @@ fn while_armed_only_the_station_that_armed_sets_rates_in_flight_too() {
     let mut wire = Wire::new();
     assert_eq!(set_rates(&mut wire, other).0, 0, "before arming every station may");
     assert_eq!(wire.ask(400, 1.0, 0.0).0, 0);
-    // A second arm is accepted, because the vehicle is armed, but it does not transfer the right to set rates.
+    // A second arm is accepted, because the vehicle is armed, but it does not transfer the right to
+    // set rates.
     let again = CommandRequest {
         source: other,
         target: VEHICLE,
@@ -182,7 +184,8 @@ fn questions_for_another_system_are_left_alone() {
     assert!(values(&sent).is_empty() && count(&sent, FILE_TRANSFER_PROTOCOL_DATA::ID) == 0);
 }
 
-// Tests the vehicle's log over MAVLink FTP: within the link's budget, beside telemetry, and refused while armed.
+// Tests the vehicle's log over MAVLink FTP: within the link's budget, beside telemetry, and refused
+// while armed.
 
 /// A log of this length, as the recorder would offer it.
 pub(super) fn log(len: usize) -> InMemory {

@@ -121,8 +121,8 @@ fn its_whole_flight_stays_within_the_radio_s_budget_in_every_second_and_refusals
     let span_s = at_s[at_s.len() - 1] - at_s[0];
     assert!(span_s > flown_s - 0.3, "{span_s} of {flown_s} s");
     let hz = (at_s.len() - 1) as f64 / span_s;
-    // Eight a second are due. Predictions in the burn and the texts of the touchdown take the room of some: 7.5 of them over this
-    // flight.
+    // Eight a second are due. Predictions in the burn and the texts of the touchdown take the room
+    // of some: 7.5 of them over this flight.
     assert!((7.3..8.2).contains(&hz), "{hz} positions a second in {flown_s} s");
 }
 
@@ -221,7 +221,8 @@ fn the_storage_is_told_while_there_is_one() {
     assert_eq!(count(&sent, STORAGE_INFORMATION_DATA::ID), 0, "the operator flies without a log");
 }
 
-/// Every value of a check arrives over a radio, within its budget, and again for a station that comes late.
+/// Every value of a check arrives over a radio, within its budget, and again for a station that
+/// comes late.
 #[test]
 fn a_check_is_told_value_by_value() {
     let mut airborne = Airborne::on_the_pad("field");
@@ -271,7 +272,8 @@ fn a_link_that_is_lost_changes_nothing_about_the_flight() {
     assert!(lost.rocket.judged().unwrap().landing.stands);
 }
 
-/// Outcome: the request is carried out later by the delay; its answer comes later by twice the delay.
+/// Outcome: the request is carried out later by the delay; its answer comes later by twice the
+/// delay.
 #[test]
 fn over_a_slow_link_an_abort_is_late_but_still_works() {
     let mut late = Airborne::let_go_with_faults("field", &["link-delay:1.5@descent"]);

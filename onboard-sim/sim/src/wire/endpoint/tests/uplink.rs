@@ -297,7 +297,8 @@ fn an_abort_in_the_air_is_acknowledged_when_its_latch_is_seen() {
     pad.run(pad.vehicle.computer().countdown_s() + 1.0);
     assert!(pad.vehicle.phase().in_descent());
     pad.tell(CREW, ABORT, 1.0);
-    // The flight computer takes it at its next frame: until then nothing is latched and nothing acknowledged.
+    // The flight computer takes it at its next frame: until then nothing is latched and nothing
+    // acknowledged.
     let before = frames(pad.endpoint.poll(&pad.vehicle.state()));
     assert!(!pad.vehicle.aborted());
     assert!(before.iter().all(|frame| CommandAnswer::from_frame(frame).is_none()));

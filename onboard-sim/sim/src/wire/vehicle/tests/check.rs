@@ -1,4 +1,5 @@
-//! The check that the crew asks for on the pad: what it finds, when it is refused, and what ends it.
+//! The check that the crew asks for on the pad: what it finds, when it is refused, and what ends
+//! it.
 
 use crate::sortie::Sortie;
 use crate::world::Fault;
@@ -61,7 +62,8 @@ fn wrong_wirings() -> Vec<Fault> {
     reversed.chain(swapped).collect()
 }
 
-/// Servos that report where their surfaces are: a surface that moves otherwise than it is told is found and named.
+/// Servos that report where their surfaces are: a surface that moves otherwise than it is told is
+/// found and named.
 #[test]
 fn every_wrong_wiring_is_found_where_servos_tell() {
     for wrong in wrong_wirings() {
@@ -80,15 +82,17 @@ fn every_wrong_wiring_is_found_where_servos_tell() {
     }
 }
 
-/// What two people see in a check: how each surface stands whenever one is told to go somewhere. A fin is open (1) or closed
-/// (0); the nozzle swings towards the fins of one side (y, z), or hangs straight.
+/// What two people see in a check: how each surface stands whenever one is told to go somewhere. A
+/// fin is open (1) or closed (0); the nozzle swings towards the fins of one side (y, z), or hangs
+/// straight.
 fn seen_motions(rocket: &mut Told) -> Vec<([f64; 2], [f64; 4])> {
     let mut seen: Vec<([f64; 2], [f64; 4])> = Vec::new();
     rocket.request(Asked::Check);
     rocket.run_until(|rocket| {
         let ([pitch_rad, yaw_rad], fins_rad) =
             (rocket.sortie.world().gimbal_rad(), rocket.sortie.world().fins_rad());
-        // The thrust is turned to (sin yaw, -sin pitch) in (y, z), and the nozzle's end goes the other way.
+        // The thrust is turned to (sin yaw, -sin pitch) in (y, z), and the nozzle's end goes the
+        // other way.
         let side = |angle_rad: f64| if angle_rad.abs() < 0.1 { 0.0 } else { angle_rad.signum() };
         let stands =
             ([-side(yaw_rad), side(pitch_rad)], fins_rad.map(|fin_rad| f64::from(u8::from(fin_rad > 1.5))));
@@ -100,7 +104,8 @@ fn seen_motions(rocket: &mut Told) -> Vec<([f64; 2], [f64; 4])> {
     seen
 }
 
-/// The words of the crew's page as motions: the nozzle towards fins 1 and 4, 2 and 3, 1 and 2, 3 and 4; then each fin.
+/// The words of the crew's page as motions: the nozzle towards fins 1 and 4, 2 and 3, 1 and 2, 3
+/// and 4; then each fin.
 fn motions_of_the_page() -> Vec<([f64; 2], [f64; 4])> {
     let fins = flight::vehicles::mission::builtin_airframe("mk3").unwrap().fin_model();
     let towards = |one: usize, other: usize| {
@@ -133,8 +138,9 @@ fn without_feedback() -> Told {
     rocket
 }
 
-/// Servos that tell nothing: the positions are the commands, and pass whatever moves. Without the word of two people the vehicle
-/// is not armed, and what they see is not what the page says if any wire is wrong.
+/// Servos that tell nothing: the positions are the commands, and pass whatever moves. Without the
+/// word of two people the vehicle is not armed, and what they see is not what the page says if any
+/// wire is wrong.
 #[test]
 fn without_feedback_two_people_see_every_wrong_wiring_and_nobody_arms_before() {
     let mut rocket = without_feedback();
@@ -190,7 +196,8 @@ fn a_feedback_with_a_zero_of_its_own_passes_the_self_test_and_a_slipped_spline_d
     }
 }
 
-/// The world begins anew with the release, and what is broken stays broken; without a pad it is broken from the beginning on.
+/// The world begins anew with the release, and what is broken stays broken; without a pad it is
+/// broken from the beginning on.
 #[test]
 fn a_fin_that_sticks_on_the_pad_sticks_in_flight() {
     let flight = flight_of("none", &["fin-stuck:1@pad"]);
@@ -211,7 +218,8 @@ fn without_motion_everything_but_the_surfaces_is_checked() {
         state(rocket) != CheckState::Running
     });
     assert_eq!(state(&rocket), CheckState::Passed);
-    // Eight of the sensors, five of switches, battery and log: mk2 starts at apogee, without a booster's wire.
+    // Eight of the sensors, five of switches, battery and log: mk2 starts at apogee, without a
+    // booster's wire.
     assert_eq!(rocket.computer().pad_check().findings().len(), 13);
 }
 
@@ -340,8 +348,8 @@ fn requests() -> impl Strategy<Value = Vec<(Asked, u16)>> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
 
-    /// Whatever the crew asks for, and whenever: no check moves anything while the vehicle is armed, counts down, is
-    /// aborted or flies.
+    /// Whatever the crew asks for, and whenever: no check moves anything while the vehicle is
+    /// armed, counts down, is aborted or flies.
     #[test]
     fn no_check_moves_a_surface_of_an_armed_or_a_flying_vehicle(requests in requests()) {
         let mut rocket = on_the_pad("none", &[]);

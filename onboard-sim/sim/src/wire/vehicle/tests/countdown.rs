@@ -14,7 +14,8 @@ fn armed(mission: &str) -> Told {
     Told::of(Vehicle::on_the_pad(&flight).unwrap()).run_to(Phase::PadArmed)
 }
 
-/// Something that fails on the pad: the words that the crew reads, and how long it takes to be seen, s.
+/// Something that fails on the pad: the words that the crew reads, and how long it takes to be
+/// seen, s.
 struct Failure {
     happens: fn(&mut Told),
     words: &'static str,
@@ -33,7 +34,8 @@ macro_rules! sensor {
     };
 }
 
-/// A fix is missed after 1.5 s; a tilt is known once a second, and a second that saw both is no second at rest.
+/// A fix is missed after 1.5 s; a tilt is known once a second, and a second that saw both is no
+/// second at rest.
 const FAILURES: &[Failure] = &[
     sensor!("accelerometer-dead", "accelerometer repeats one value", 0.2),
     sensor!("accelerometer-bias:300", "m/s2 at rest, not 9.8", 0.4),
@@ -71,8 +73,8 @@ fn seconds(rocket: &mut Told, seconds: f64) -> Vec<VehicleEvent> {
     (0..(seconds / FRAME_S) as u32).flat_map(|_| rocket.advance()).collect()
 }
 
-/// Each failure at each second of the countdown, and in its last moments: held until what the vehicle needs to see it, and
-/// never lit.
+/// Each failure at each second of the countdown, and in its last moments: held until what the
+/// vehicle needs to see it, and never lit.
 #[test]
 fn whatever_fails_in_the_countdown_holds_it_with_its_name_until_the_igniter_has_its_current() {
     for mission in ["mk2", "mk3"] {

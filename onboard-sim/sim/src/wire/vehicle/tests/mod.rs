@@ -1,4 +1,5 @@
-//! The vehicles as their crew meets them: arming, countdown, landing, and an abort in every phase they pass.
+//! The vehicles as their crew meets them: arming, countdown, landing, and an abort in every phase
+//! they pass.
 
 mod check;
 mod countdown;

@@ -102,7 +102,8 @@ fn an_abort_on_the_way_up_ends_under_the_parachute_at_apogee() {
     }
 }
 
-/// The igniter has had current, and the motor has not lit: it does not light, and nobody goes near it for a minute.
+/// The igniter has had current, and the motor has not lit: it does not light, and nobody goes near
+/// it for a minute.
 #[test]
 fn an_abort_or_a_disarm_before_the_lift_off_switches_the_igniter_off_and_says_that_it_may_still_light() {
     for asked in [Asked::Abort, Asked::Disarm] {
@@ -127,7 +128,8 @@ fn an_abort_or_a_disarm_before_the_lift_off_switches_the_igniter_off_and_says_th
     }
 }
 
-/// The motor has lit, and no lift-off is felt yet: it rises, and comes down as after any abort on the way up.
+/// The motor has lit, and no lift-off is felt yet: it rises, and comes down as after any abort on
+/// the way up.
 #[test]
 fn an_abort_between_the_light_and_the_lift_off_ends_under_the_parachute() {
     let mut rocket = from(StartPoint::Pad, "field", &[]).run_to(Phase::Boost);
@@ -163,7 +165,8 @@ fn asked_in(flight: &Sortie, asked: Asked, frames: usize) -> bool {
     accepted
 }
 
-/// The bar: an abort, a disarm and a hold in every frame from ten seconds before the release to three after it.
+/// The bar: an abort, a disarm and a hold in every frame from ten seconds before the release to
+/// three after it.
 #[test]
 fn after_an_abort_a_disarm_or_a_hold_at_any_moment_no_igniter_is_on_but_for_a_burn_too_low_for_the_parachute()
 {
@@ -230,7 +233,8 @@ fn a_booster_that_does_not_separate_inhibits_the_motor_and_opens_the_parachute()
     assert_eq!(world.rest().unwrap().outcome, RestOutcome::BodyStrike);
 }
 
-/// Early and late detections: what the sensors do wrong on the way up must not light the motor early, nor lose the apogee.
+/// Early and late detections: what the sensors do wrong on the way up must not light the motor
+/// early, nor lose the apogee.
 #[test]
 fn faults_of_the_ascent_end_in_a_landing_or_under_the_parachute() {
     for fault in [
@@ -258,8 +262,8 @@ fn faults_of_the_ascent_end_in_a_landing_or_under_the_parachute() {
     }
 }
 
-/// Lift-off is late, seen by the barometer alone. Pressure and satellites part the booster and show the apogee; without an
-/// accelerometer no landing is tried.
+/// Lift-off is late, seen by the barometer alone. Pressure and satellites part the booster and show
+/// the apogee; without an accelerometer no landing is tried.
 #[test]
 fn a_dead_accelerometer_neither_lights_the_motor_nor_loses_the_parachute() {
     let mut hard = 0;
@@ -282,8 +286,8 @@ fn a_dead_accelerometer_neither_lights_the_motor_nor_loses_the_parachute() {
     assert!(hard <= 1, "{hard}");
 }
 
-/// A motor that nobody lit, in every state of the pad: if the vehicle was armed it flies its mission, else it comes down
-/// under its parachute without the landing motor.
+/// A motor that nobody lit, in every state of the pad: if the vehicle was armed it flies its
+/// mission, else it comes down under its parachute without the landing motor.
 #[test]
 fn an_ascent_motor_that_lights_itself_is_flown() {
     let ways: [(Phase, &[Asked], Phase); 4] = [
@@ -360,7 +364,8 @@ fn an_abort_while_it_hangs_inhibits_the_motor_and_stays_on_the_drone() {
     assert!(rocket.sortie.world().hangs() && rocket.mode().interlocks.landing_motor_inhibited);
 }
 
-/// A reset of 0.1 s on the pad disarms, ends the countdown and is said; the crew may arm and start again.
+/// A reset of 0.1 s on the pad disarms, ends the countdown and is said; the crew may arm and start
+/// again.
 #[test]
 fn a_reset_on_the_pad_disarms_and_the_vehicle_flies_when_it_is_armed_again() {
     let mut rocket = from(StartPoint::Pad, "field", &["reboot:0.1@pad-armed+1"]).run_to(Phase::PadArmed);
@@ -378,8 +383,9 @@ fn a_reset_on_the_pad_disarms_and_the_vehicle_flies_when_it_is_armed_again() {
     assert!(rocket.judged().is_some_and(|judged| judged.landing.stands));
 }
 
-/// In the air it flies on. Under power it holds the nose upright until its next plan. Of 100 flights of seed 7001 that are reset at
-/// the ignition or a second later 98 stand; all of this one do.
+/// In the air it flies on. Under power it holds the nose upright until its next plan. Of 100
+/// flights of seed 7001 that are reset at the ignition or a second later 98 stand; all of this one
+/// do.
 #[test]
 fn a_reset_in_every_phase_of_the_flight_is_flown_through() {
     for phase in ["boost+0.3", "coast+2", "descent+2", "armed", "ignition", "powered+1", "touchdown+0.2"] {

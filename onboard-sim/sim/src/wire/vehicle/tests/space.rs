@@ -1,4 +1,5 @@
-//! The rocket: pad, arming, the flight from apogee, what is said of the motor behind it, and an abort in every phase.
+//! The rocket: pad, arming, the flight from apogee, what is said of the motor behind it, and an
+//! abort in every phase.
 
 use crate::dispersion::Dispersion;
 use flight::computer::AbortEffect;
@@ -29,8 +30,9 @@ pub(super) fn in_phase(flight: &RocketFlight, phase: Phase) -> Told {
     rocket_of(flight).run_to(phase)
 }
 
-/// Steered with fins nearly shut, mk3 is aborted: its charge has no current before all of them stand 45 degrees open. A fin that is
-/// stuck, and servos that tell nothing, keep it waiting for as long as a servo takes, and no longer.
+/// Steered with fins nearly shut, mk3 is aborted: its charge has no current before all of them
+/// stand 45 degrees open. A fin that is stuck, and servos that tell nothing, keep it waiting for as
+/// long as a servo takes, and no longer.
 #[test]
 fn the_charge_waits_for_the_fins_over_the_hatch_and_for_no_stuck_one() {
     for (stuck, tells) in [(false, true), (true, true), (false, false)] {
@@ -155,7 +157,8 @@ fn telemetry_is_the_estimate_in_north_east_down() {
     close(motion.position_m[0], estimated.position_m.x);
     close(motion.position_m[1], -estimated.position_m.y);
     close(motion.velocity_m_s[2], -estimated.velocity_m_s.z);
-    // The mass burnt is believed, not known: the centre of gravity is some tenths of a millimetre off.
+    // The mass burnt is believed, not known: the centre of gravity is some tenths of a millimetre
+    // off.
     let off_m = -motion.position_m[2] - world.height_m() - (estimated.position_m.z - truth.position_m.z);
     assert!(off_m.abs() < 2e-3, "{}", motion.position_m[2]);
     // The nose, turned by the quaternion of the wire.
@@ -178,8 +181,8 @@ fn telemetry_is_the_estimate_in_north_east_down() {
 
 #[test]
 fn the_countdown_to_ignition_runs_down_to_it() {
-    // In still air with everything known: what a gust or a better estimate changes in the last second is no error of
-    // the countdown.
+    // In still air with everything known: what a gust or a better estimate changes in the last
+    // second is no error of the countdown.
     let mut rocket = in_phase(&flight_of("none", &[]), Phase::LandArmed);
     let announced = rocket.descent();
     let chosen_m = announced.chosen_height_m;
@@ -221,7 +224,8 @@ fn the_crew_sees_where_the_servos_say_that_they_are() {
     assert!(apart > 100, "{apart} frames");
 }
 
-/// A plan is taken over as many frames after it was posed as a board needs, and the radio says how long that was.
+/// A plan is taken over as many frames after it was posed as a board needs, and the radio says how
+/// long that was.
 #[test]
 fn plans_are_late_by_what_they_cost_on_a_board() {
     let mut rocket = in_phase(&flight_of("none", &[]), Phase::Powered);
@@ -333,7 +337,8 @@ fn an_abort_with_room_left_opens_the_parachute_and_lights_nothing() {
     }
 }
 
-/// Below the commit height: with the gate shut the parachute still fills in time, with the gate open it burns and lands.
+/// Below the commit height: with the gate shut the parachute still fills in time, with the gate
+/// open it burns and lands.
 #[test]
 fn an_abort_below_the_commit_height_does_what_is_said_beside_the_key() {
     let flight = flight_of("none", &[]);

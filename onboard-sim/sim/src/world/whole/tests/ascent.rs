@@ -12,13 +12,15 @@ fn on_rail(tilt_deg: f64, truth: &Truth, ascent: &AscentTruth) -> World {
     let mission = flight::vehicles::mission::builtin("mk2").unwrap().unwrap();
     let mut launch: Launch = mission.launch.unwrap();
     launch.rail.tilt_deg = tilt_deg;
-    // With which RocketPy gave the numbers below: the parts have 2 % more inertia than a mission estimates.
+    // With which RocketPy gave the numbers below: the parts have 2 % more inertia than a mission
+    // estimates.
     (launch.rail.length_m, launch.booster.roll_inertia_kg_m2) = (2.5, 0.000_984);
     let truth = Truth { gust_scale: 0.0, ..*truth };
     world("mk2", &truth, &RigidState::upright(1.0)).on_rail(&launch, ascent)
 }
 
-/// Time since the thrust began, s, height above the rail, distance, m, and tilt, degrees, at apogee.
+/// Time since the thrust began, s, height above the rail, distance, m, and tilt, degrees, at
+/// apogee.
 fn apogee(world: &mut World) -> [f64; 4] {
     let from_m = world.state().position_m;
     while world.time_s() < 1.0 || world.state().velocity_m_s.z > 0.0 {
@@ -29,8 +31,8 @@ fn apogee(world: &mut World) -> [f64; 4] {
     [world.time_s() - 0.15, travel_m.z, libm::hypot(travel_m.x, travel_m.y), state.tilt_rad().to_degrees()]
 }
 
-/// RocketPy 1.13.0 with the same stack (`tests/clients/rocketpy`): six degrees of freedom from the rail to apogee. It has no
-/// drag across the body, so ours is switched off.
+/// RocketPy 1.13.0 with the same stack (`tests/clients/rocketpy`): six degrees of freedom from the
+/// rail to apogee. It has no drag across the body, so ours is switched off.
 #[test]
 fn val_rocketpy_apogee_of_the_stack() {
     let alike = Truth { crossflow_scale: 0.0, ..Truth::default() };
@@ -86,8 +88,9 @@ fn val_rocketpy_rail_exit_and_burn_out() {
     assert!((travelled_m(&world) - 76.987).abs() < 0.4, "{}", travelled_m(&world));
 }
 
-/// As it leaves the rail at 17.6 m/s, 5 m/s against the lean come from 15.7 degrees. By then 24 % of the propellant
-/// is burnt: the forces of nose and fins act 0.1996 m behind the centre of gravity, and the moment of inertia is 0.632 kg m^2.
+/// As it leaves the rail at 17.6 m/s, 5 m/s against the lean come from 15.7 degrees. By then 24 %
+/// of the propellant is burnt: the forces of nose and fins act 0.1996 m behind the centre of
+/// gravity, and the moment of inertia is 0.632 kg m^2.
 #[test]
 fn val_hand_the_stack_turns_into_the_wind() {
     let windy = Truth {

@@ -30,8 +30,9 @@ fn windy() -> Truth {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
 
-    /// For any commands, in the air, under thrust, under the parachute and on the ground: the numbers are finite, the
-    /// attitude is a unit quaternion, and the actuators are between their stops.
+    /// For any commands, in the air, under thrust, under the parachute and on the ground: the
+    /// numbers are finite, the attitude is a unit quaternion, and the actuators are between their
+    /// stops.
     #[test]
     fn any_commands_give_finite_numbers(
         commands in proptest::collection::vec(actuators(), 1..40),
@@ -55,7 +56,8 @@ proptest! {
         }
     }
 
-    /// A vehicle rolled by half a turn, with its commands rolled as well, flies the same path in the world.
+    /// A vehicle rolled by half a turn, with its commands rolled as well, flies the same path in
+    /// the world.
     #[test]
     fn half_a_roll_mirrors(
         gimbal_rad in proptest::array::uniform2(-0.1..0.1_f64),

@@ -3,7 +3,8 @@
 use super::*;
 use crate::world::ground::RestOutcome;
 
-/// A world with the feet at a height, m, a velocity (x, z), m/s, a lean, rad, and a rate about body y, rad/s.
+/// A world with the feet at a height, m, a velocity (x, z), m/s, a lean, rad, and a rate about body
+/// y, rad/s.
 fn approaching(height_m: f64, [x_m_s, z_m_s]: [f64; 2], lean_rad: f64, rate_rad_s: f64) -> World {
     let airframe = on_springs("mk2");
     let above_feet_m = airframe.above_feet_m(airframe.mass.loaded_cg_station_m);
@@ -38,7 +39,8 @@ fn a_standing_vehicle_rests_on_its_legs_and_its_accelerometer_measures_gravity()
     assert!((touchdown.over_ground.vertical_m_s + fallen_m_s).abs() < 0.01, "{touchdown:?}");
 }
 
-/// Landings at each limit of the legs' verdict, one at a time, and at the vertical and lateral limits together.
+/// Landings at each limit of the legs' verdict, one at a time, and at the vertical and lateral
+/// limits together.
 #[test]
 fn landings_at_the_limits_of_the_verdict_stay_upright() {
     for (velocity_m_s, lean_deg, rate_deg_s) in [
@@ -72,7 +74,8 @@ fn after_a_fall_from_height_the_body_hits_the_ground() {
     assert!(world.touchdown().unwrap().over_ground.vertical_m_s < -25.0);
 }
 
-/// Legs without damping return the energy: the vehicle bounces to the height it fell from. Damping takes the energy.
+/// Legs without damping return the energy: the vehicle bounces to the height it fell from. Damping
+/// takes the energy.
 #[test]
 fn legs_bounce_without_damping() {
     let peak_m = |damping_n_s_m: f64| {
@@ -103,7 +106,8 @@ fn legs_bounce_without_damping() {
     assert!(peak_m(45.0) < 0.015, "{}", peak_m(45.0));
 }
 
-/// Ejected at full falling speed, the parachute is open after its delay and distance, and the vehicle sinks at 6 m/s.
+/// Ejected at full falling speed, the parachute is open after its delay and distance, and the
+/// vehicle sinks at 6 m/s.
 #[test]
 fn the_parachute_brings_the_vehicle_down_slowly() {
     for (name, slowest, fastest) in

@@ -1,4 +1,5 @@
-//! Legs that give way: the stroke of a drop, the limits of tipping over, and landings at the design's corners.
+//! Legs that give way: the stroke of a drop, the limits of tipping over, and landings at the
+//! design's corners.
 
 use flight::vehicle::airframe::Crush;
 
@@ -34,8 +35,9 @@ fn until_rest(world: &mut World) -> (RestOutcome, Strain) {
     panic!("no rest after 20 s: {:?}", world.state());
 }
 
-/// All four legs at once: the weight falls by the height and by what the legs give way and bend; the blocks take the crush force
-/// times what they give way, and the springs half of that force times what they bend.
+/// All four legs at once: the weight falls by the height and by what the legs give way and bend;
+/// the blocks take the crush force times what they give way, and the springs half of that force
+/// times what they bend.
 #[test]
 fn val_hand_a_level_drop_uses_energy_over_force_of_the_stroke() {
     for height_m in [0.05, 0.1, 0.2] {
@@ -59,7 +61,8 @@ fn val_hand_a_level_drop_uses_energy_over_force_of_the_stroke() {
     }
 }
 
-/// From 0.4 m the blocks cannot take the energy: they become solid, and the springs bear what is left.
+/// From 0.4 m the blocks cannot take the energy: they become solid, and the springs bear what is
+/// left.
 #[test]
 fn a_drop_beyond_the_stroke_uses_it_up_and_overloads_the_legs() {
     let airframe = on_blocks(CRUSH);
@@ -83,8 +86,8 @@ fn on_slope(airframe: &Airframe, slope_rad: f64, towards_rad: f64) -> World {
     placed(airframe, &truth, &state)
 }
 
-/// It stands while its centre of gravity is above the square of its feet: towards a foot by the feet's distance from the axis,
-/// between two feet by that over the root of two.
+/// It stands while its centre of gravity is above the square of its feet: towards a foot by the
+/// feet's distance from the axis, between two feet by that over the root of two.
 #[test]
 fn val_hand_a_slope_tips_it_over_when_the_centre_of_gravity_leaves_the_feet() {
     let mut airframe = on_blocks(Crush { force_n: 400.0, strength_n: 1000.0, ..CRUSH });
@@ -106,7 +109,8 @@ fn val_hand_a_slope_tips_it_over_when_the_centre_of_gravity_leaves_the_feet() {
     }
 }
 
-/// A vehicle that turns about its two downhill feet tips over if its energy lifts the centre of gravity to above them.
+/// A vehicle that turns about its two downhill feet tips over if its energy lifts the centre of
+/// gravity to above them.
 #[test]
 fn val_hand_a_turn_about_two_feet_tips_it_over_when_its_energy_lifts_it_above_them() {
     let mut airframe = on_blocks(Crush { force_n: 400.0, strength_n: 1000.0, ..CRUSH });
@@ -137,13 +141,15 @@ fn val_hand_a_turn_about_two_feet_tips_it_over_when_its_energy_lifts_it_above_th
     }
 }
 
-/// An angle of its own for each number and each of four directions, spread evenly (Kronecker's sequence with roots of primes).
+/// An angle of its own for each number and each of four directions, spread evenly (Kronecker's
+/// sequence with roots of primes).
 fn azimuth_rad(number: usize, direction: usize) -> f64 {
     let root = libm::sqrt([2.0, 3.0, 5.0, 7.0][direction]);
     core::f64::consts::TAU * libm::modf(root * number as f64).0
 }
 
-/// A contact: speeds down and across, m/s, tilt and slope, degrees, rotation rate across the axis, deg/s.
+/// A contact: speeds down and across, m/s, tilt and slope, degrees, rotation rate across the axis,
+/// deg/s.
 struct Contact {
     down_m_s: f64,
     across_m_s: f64,
@@ -156,7 +162,8 @@ fn contact(down_m_s: f64, across_m_s: f64, tilt_deg: f64, rate_deg_s: f64, slope
     Contact { down_m_s, across_m_s, tilt_deg, rate_deg_s, slope_deg }
 }
 
-/// The world at a contact whose slope, tilt, speed across and rotation point in directions of their own.
+/// The world at a contact whose slope, tilt, speed across and rotation point in directions of their
+/// own.
 fn at_contact(airframe: &Airframe, contact: &Contact, number: usize) -> World {
     let towards = |direction: usize| {
         let (sin, cos) = libm::sincos(azimuth_rad(number, direction));
@@ -176,7 +183,8 @@ fn at_contact(airframe: &Airframe, contact: &Contact, number: usize) -> World {
     placed(airframe, &truth, &state)
 }
 
-/// mk3 with blocks of a force, N, and guides that add a share of the force across, on ground of a friction.
+/// mk3 with blocks of a force, N, and guides that add a share of the force across, on ground of a
+/// friction.
 fn mk3_on((force_n, guide_share): (f64, f64), friction: f64) -> Airframe {
     let mut mk3 = flight::vehicles::mission::builtin_airframe("mk3").unwrap();
     mk3.legs.friction_coefficient = friction;
@@ -184,10 +192,12 @@ fn mk3_on((force_n, guide_share): (f64, f64), friction: f64) -> Airframe {
     mk3
 }
 
-/// The softest block in the smoothest guide that a scale lets pass, N and share, and the hardest in the roughest: MK3.md.
+/// The softest block in the smoothest guide that a scale lets pass, N and share, and the hardest in
+/// the roughest: MK3.md.
 const FEET: [(f64, f64); 2] = [(80.0, 0.2), (100.0, 0.45)];
 
-/// mk3's legs were designed for all of these at once, to slopes of 5 degrees, and for 2 m/s nearly upright, never mind which way each of them points.
+/// mk3's legs were designed for all of these at once, to slopes of 5 degrees, and for 2 m/s nearly
+/// upright, never mind which way each of them points.
 fn corners() -> Vec<Contact> {
     let mut corners = vec![contact(2.0, 0.0, 0.0, 0.0, 0.0), contact(2.0, 0.3, 4.0, 20.0, 1.0)];
     for corner in 0..32 {
@@ -217,8 +227,8 @@ fn regress_mk3s_legs_stand_undamaged_at_every_corner_of_their_design() {
     }
 }
 
-/// Ground that grips more than it was designed for: no block is used up, and a vehicle that slides fast, leans and turns at
-/// once may trip.
+/// Ground that grips more than it was designed for: no block is used up, and a vehicle that slides
+/// fast, leans and turns at once may trip.
 #[test]
 fn regress_mk3s_legs_on_ground_that_grips() {
     let mk3 = mk3_on((90.0, 0.4), 0.9);
@@ -237,7 +247,8 @@ fn regress_mk3s_legs_on_ground_that_grips() {
     assert!(tripped + overloaded <= 13, "{tripped} and {overloaded} of 272");
 }
 
-/// A drop of a dummy: how far its lowest and its highest foot have risen, and how far it bounced, mm.
+/// A drop of a dummy: how far its lowest and its highest foot have risen, and how far it bounced,
+/// mm.
 fn dropped(airframe: &Airframe, height_m: f64, lean_rad: f64) -> [f64; 3] {
     let mut state = RigidState::upright(1.0);
     state.world_from_body = UnitQuaternion::from_scaled_axis(Vector3::y() * lean_rad) * state.world_from_body;
@@ -255,8 +266,9 @@ fn dropped(airframe: &Airframe, height_m: f64, lean_rad: f64) -> [f64; 3] {
     [fold(f64::max), fold(f64::min), bounce_m].map(|length_m| 1e3 * length_m)
 }
 
-/// The bounds of the drop test on the page are those of the world, on floors that grip by 0.2 to 0.9, with every block and guide
-/// that a scale lets pass. Blocks of half and twice the force do not pass.
+/// The bounds of the drop test on the page are those of the world, on floors that grip by 0.2 to
+/// 0.9, with every block and guide that a scale lets pass. Blocks of half and twice the force do
+/// not pass.
 #[test]
 fn the_drop_test_on_the_page_has_the_worlds_bounds() {
     let page = include_str!("../../../../../../MK3.md");

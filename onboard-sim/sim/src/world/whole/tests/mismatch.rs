@@ -6,7 +6,8 @@ use crate::world::wind::Wind;
 const LIT: Actuators =
     Actuators { gimbal_rad: [0.0; 2], fins_rad: [FRAC_PI_2; 4], ignite: true, ..Actuators::NONE };
 
-/// Air force along the nose, N, at 30 m/s down with the fins open, without and with a burning motor.
+/// Air force along the nose, N, at 30 m/s down with the fins open, without and with a burning
+/// motor.
 fn air_n(truth: &Truth, lit: bool) -> f64 {
     let truth = Truth { gust_scale: 0.0, ignition_delay_s: 0.0, ..*truth };
     let mut state = RigidState::upright(100.0);
@@ -38,7 +39,8 @@ fn val_hand_scales_and_exhaust_change_body_and_fin_drag() {
     let fins_m2 = all_m2 - body_m2;
     let scaled = Truth { body_drag_scale: 0.5, fin_drag_scale: 1.2, ..nominal };
     expect(&scaled, false, 0.5 * body_m2 + 1.2 * fins_m2);
-    // The thrust is far above the dynamic pressure on the base, so the exhaust has its whole effect.
+    // The thrust is far above the dynamic pressure on the base, so the exhaust has its whole
+    // effect.
     let plume = Truth { plume_body_loss: 0.7, plume_fin_loss: 0.1, ..nominal };
     expect(&plume, false, all_m2);
     expect(&plume, true, 0.3 * body_m2 + 0.9 * fins_m2);

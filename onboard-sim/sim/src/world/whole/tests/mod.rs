@@ -27,8 +27,8 @@ fn world(name: &str, truth: &Truth, initial: &RigidState) -> World {
     World::new(&Site::default(), &airframe, &motor, truth, initial, 1).unwrap()
 }
 
-/// Falls from rest, tail first, with the centre of gravity 300 m above the ground. Returns time and speed when the
-/// centre of gravity would reach the ground.
+/// Falls from rest, tail first, with the centre of gravity 300 m above the ground. Returns time and
+/// speed when the centre of gravity would reach the ground.
 fn drop(airframe: &Airframe, opening_rad: f64) -> (f64, f64) {
     let motor = motors::builtin(&airframe.motor).unwrap();
     let mut world =
@@ -89,8 +89,8 @@ fn leaning(height_m: f64, pitch_rad: f64, yaw_rad: f64) -> RigidState {
     state
 }
 
-/// Fig. 5 of the landing paper: fins open, 2 degrees of pitch and 1 degree of yaw. The attitude settles, and the speed
-/// at sea level is 39.4 m/s.
+/// Fig. 5 of the landing paper: fins open, 2 degrees of pitch and 1 degree of yaw. The attitude
+/// settles, and the speed at sea level is 39.4 m/s.
 #[test]
 fn val_landing_paper_fig_5() {
     let (pitch_rad, yaw_rad) = (2.0_f64.to_radians(), 1.0_f64.to_radians());
@@ -107,8 +107,8 @@ fn val_landing_paper_fig_5() {
     }
     assert!(worst_deg.is_sorted_by(|lower, upper| lower < upper), "{worst_deg:?}");
     assert!(worst_deg[4] < 2.25 && worst_deg[0] < 0.25 * worst_deg[4], "{worst_deg:?}");
-    // The air gets denser on the way down, so the speed lags a little behind the terminal speed, at which the drag
-    // equals the weight.
+    // The air gets denser on the way down, so the speed lags a little behind the terminal speed, at
+    // which the drag equals the weight.
     let felt_m_s2 = felt_before_contact.norm();
     let speed_m_s = -world.touchdown().unwrap().over_ground.vertical_m_s;
     let terminal_m_s = speed_m_s * (STANDARD_GRAVITY_M_S2 / felt_m_s2).sqrt();
@@ -164,7 +164,8 @@ fn energy_is_conserved_without_air() {
     assert!(world.specific_force_m_s2().norm() < 1e-12, "an accelerometer in free fall measures nothing");
 }
 
-/// A burn in vacuum, straight up, against the rocket equation with the file's own impulse and propellant.
+/// A burn in vacuum, straight up, against the rocket equation with the file's own impulse and
+/// propellant.
 #[test]
 fn val_tsiolkovsky_vertical_burn() {
     let truth = Truth { drag_scale: 0.0, ignition_delay_s: 0.0, ..Truth::default() };
@@ -181,7 +182,8 @@ fn val_tsiolkovsky_vertical_burn() {
     assert!(world.state().tilt_rad() < 1e-12);
 }
 
-/// A gimbal angle turns the vehicle as [`flight::vehicle::rigid`] says: `q' = -T sin p (X_CG - X_THR) / I`.
+/// A gimbal angle turns the vehicle as [`flight::vehicle::rigid`] says: `q' = -T sin p (X_CG -
+/// X_THR) / I`.
 #[test]
 fn val_gimbal_signs_and_arm() {
     for axis in 0..2 {
@@ -203,9 +205,10 @@ fn val_gimbal_signs_and_arm() {
     }
 }
 
-/// Free of forces, a motor that swings turns the body back: `w = -m (L^2/12 + r^2/4 + l a) / I` of the gimbal's rate, with
-/// mk2's full motor (0.294784 kg, 194 x 38 mm), a ring 0.05 m above its middle, and 0.303 m from there to the centre of gravity.
-/// The centre of gravity goes `m l / M` of the angle to the side.
+/// Free of forces, a motor that swings turns the body back: `w = -m (L^2/12 + r^2/4 + l a) / I` of
+/// the gimbal's rate, with mk2's full motor (0.294784 kg, 194 x 38 mm), a ring 0.05 m above its
+/// middle, and 0.303 m from there to the centre of gravity. The centre of gravity goes `m l / M` of
+/// the angle to the side.
 #[test]
 fn val_hand_a_swinging_motor_turns_the_body_back() {
     let mut airframe = flight::vehicles::mission::builtin_airframe("mk2").unwrap();
