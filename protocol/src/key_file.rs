@@ -1,9 +1,14 @@
 //! Stores a signing key in a file, and the timestamps to remember beside it.
+//!
+//! A thread writes the timestamps, because a disk may stall for seconds and an abort must not wait
+//! for it.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read as _, Write as _};
 use std::os::unix::fs::{OpenOptionsExt as _, PermissionsExt as _};
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use crate::signing::{Key, Memory, MemoryError, Signing};
 
@@ -11,6 +16,11 @@ use crate::signing::{Key, Memory, MemoryError, Signing};
 const OWNER_ONLY: u32 = 0o600;
 /// After this many appended bytes the timestamp file is written anew.
 const APPEND_LIMIT_BYTES: usize = 64 << 10;
+/// How long a caller waits for the disk: a working one takes some 0.05 ms, and an abort may be late
+/// by 100 ms.
+const STORED_WITHIN: Duration = Duration::from_millis(5);
+/// How long the last timestamps may take at the end of the program.
+const ENDS_WITHIN: Duration = Duration::from_secs(10);
 /// The permission bits of group and others.
 const GROUP_AND_OTHERS: u32 = 0o077;
 
@@ -35,10 +45,72 @@ pub enum KeyFileError {
     /// The timestamps beside it cannot be parsed. Starting afresh would make a replay possible.
     #[error("timestamp file {path}: {why}; delete it only if nobody can have recorded earlier runs")]
     Memory { path: PathBuf, why: MemoryError },
+    /// The disk stalls; the timestamps are written once it continues.
+    #[error("timestamp file {path}: the disk stalls")]
+    Late { path: PathBuf },
 }
 
+/// The timestamps beside a key.
 #[derive(Debug)]
 pub struct KeyFile {
+    /// The file, until a thread writes it.
+    idle: Option<StampFile>,
+    stamps_path: PathBuf,
+    shared: Arc<Shared>,
+}
+
+/// What the writing thread shares.
+#[derive(Debug, Default)]
+struct Shared {
+    state: Mutex<State>,
+    changed: Condvar,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    /// The newest timestamps, not begun to be written.
+    newest: Option<Memory>,
+    writes: bool,
+    failure: Option<KeyFileError>,
+    ends: bool,
+}
+
+impl State {
+    fn is_busy(&mut self) -> bool {
+        self.newest.is_some() || self.writes
+    }
+}
+
+impl Shared {
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Waits until everything is written, or for so long.
+    fn wait(&self, state: MutexGuard<'_, State>, longest: Duration) -> MutexGuard<'_, State> {
+        let waited = self.changed.wait_timeout_while(state, longest, |state| state.is_busy());
+        waited.unwrap_or_else(PoisonError::into_inner).0
+    }
+
+    /// Writes the newest timestamps until the end.
+    fn write(&self, mut file: StampFile) {
+        loop {
+            let wait = self.changed.wait_while(self.state(), |state| state.newest.is_none() && !state.ends);
+            let mut state = wait.unwrap_or_else(PoisonError::into_inner);
+            let Some(memory) = state.newest.take() else { return };
+            state.writes = true;
+            drop(state);
+            let failure = file.remember(&memory).err();
+            let mut state = self.state();
+            (state.writes, state.failure) = (false, failure);
+            self.changed.notify_all();
+        }
+    }
+}
+
+/// The timestamp file as the writing thread sees it.
+#[derive(Debug)]
+struct StampFile {
     stamps_path: PathBuf,
     /// What the timestamp file contains up to its last complete line.
     written: Memory,
@@ -90,8 +162,9 @@ impl KeyFile {
             Err(error) if error.kind() == io::ErrorKind::NotFound => Memory::default(),
             Err(source) => return Err(KeyFileError::Io { path: stamps_path, source }),
         };
-        let file = Self { stamps_path, written: memory.clone(), appending: None };
-        Ok((file, Signing::new(key, memory)))
+        let path = stamps_path.clone();
+        let idle = Some(StampFile { stamps_path, written: memory.clone(), appending: None });
+        Ok((Self { idle, stamps_path: path, shared: Arc::default() }, Signing::new(key, memory)))
     }
 
     /// Reads a key without timestamps.
@@ -116,11 +189,44 @@ impl KeyFile {
 
     /// Stores timestamps, so that they survive this process however it ends. It is cheap enough to
     /// be called before every accepted frame is acted on: it writes a line of some thirty bytes for
-    /// each stream.
+    /// each stream. It waits 5 ms for the disk at most, and not at all while the disk still writes
+    /// what came before.
     ///
     /// # Errors
-    /// The file cannot be written.
+    /// The file cannot be written, or the disk stalls.
     pub fn remember(&mut self, memory: &Memory) -> Result<(), KeyFileError> {
+        if let Some(file) = self.idle.take() {
+            let shared = Arc::clone(&self.shared);
+            let thread = std::thread::Builder::new().name("timestamps".to_owned());
+            let spawned = thread.spawn(move || shared.write(file));
+            spawned.map_err(|source| KeyFileError::Io { path: self.stamps_path.clone(), source })?;
+        }
+        let mut state = self.shared.state();
+        let is_late = state.is_busy();
+        state.newest = Some(memory.clone());
+        self.shared.changed.notify_all();
+        if is_late {
+            return Err(KeyFileError::Late { path: self.stamps_path.clone() });
+        }
+        state = self.shared.wait(state, STORED_WITHIN);
+        state.failure.take().map_or(Ok(()), Err)
+    }
+}
+
+impl Drop for KeyFile {
+    /// Waits for the last timestamps.
+    fn drop(&mut self) {
+        let mut state = self.shared.state();
+        if self.idle.is_none() {
+            state = self.shared.wait(state, ENDS_WITHIN);
+        }
+        state.ends = true;
+        self.shared.changed.notify_all();
+    }
+}
+
+impl StampFile {
+    fn remember(&mut self, memory: &Memory) -> Result<(), KeyFileError> {
         let lines = memory.lines_since(&self.written);
         if lines.is_empty() {
             return Ok(());
@@ -149,6 +255,8 @@ impl KeyFile {
             let mut file =
                 OpenOptions::new().write(true).create(true).truncate(true).mode(OWNER_ONLY).open(&beside)?;
             file.write_all(memory.to_text().as_bytes())?;
+            // A power cut after the rename must not leave an empty file.
+            file.sync_data()?;
             fs::rename(&beside, &self.stamps_path)?;
             Ok(file)
         };
@@ -257,6 +365,32 @@ mod tests {
             }
         }
         assert!(longest < 2 * APPEND_LIMIT_BYTES as u64, "{longest} bytes");
+    }
+
+    /// The new file is a pipe: opening it takes until somebody reads. A caller that waited each time
+    /// would take five seconds.
+    #[test]
+    fn a_stalling_disk_is_reported_and_not_waited_for() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("flight.key");
+        KeyFile::create(&path).unwrap();
+        let pipe = folder.path().join("flight.key.ground.stamps.new");
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        let (mut file, mut signing) = KeyFile::open(&path, "ground").unwrap();
+        let beat = Encoder::new(GROUND).encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
+        signing.sign(&beat, 0, 1_000);
+        file.remember(&signing.memory()).unwrap();
+        for _ in 0..1_000 {
+            let late = file.remember(&signing.memory()).unwrap_err();
+            assert!(matches!(late, KeyFileError::Late { .. }), "{late}");
+        }
+        // It continues; the pipe cannot be synced, and then a file takes its place.
+        let mut disk = File::open(&pipe).unwrap();
+        fs::remove_file(&pipe).unwrap();
+        disk.read_to_end(&mut Vec::new()).unwrap();
+        drop(file);
+        let stored = fs::read_to_string(folder.path().join("flight.key.ground.stamps")).unwrap();
+        assert_eq!(stored, signing.memory().to_text());
     }
 
     #[test]

@@ -63,81 +63,114 @@ pub(super) fn other_name(choice: Option<&LogChoice>, log: Option<&Path>) -> Opti
     recorder::other_name(asked, log)
 }
 
-/// How often the space is looked at; the rate is a mean over this time.
-const LOOKS_EVERY: Duration = Duration::from_secs(5);
+/// How often the space is measured; the rate is a mean over this time.
+const MEASURED_EVERY: Duration = Duration::from_secs(5);
 
-/// Watches the space that is left for the log, and how fast it grows.
+/// What the disk reports of the log's files.
+pub(super) struct LogFiles {
+    of: OpenFiles,
+    bytes: u64,
+    /// Free space beside them; `None` where the system does not report it.
+    free_bytes: Option<u64>,
+    /// The names no longer belong to these files.
+    removed: bool,
+}
+
+/// Tracks the space that is left for the log, how fast the log grows, and whether it still exists.
 #[derive(Debug, Default)]
-pub struct SpaceWatch {
+pub(super) struct LogWatch {
+    /// The disk has been asked and has not answered.
+    pending: bool,
     due: Duration,
     /// When the files had how many bytes.
     last: Option<(Duration, u64)>,
-    space: Option<LogSpace>,
+    pub(super) space: Option<LogSpace>,
+    pub(super) removed: bool,
 }
 
-impl SpaceWatch {
-    /// The length of the log's files when they were last looked at.
+impl LogWatch {
+    /// Length of the log's files at the last measurement.
     pub(super) fn bytes(&self) -> u64 {
         self.last.map_or(0, |(_, bytes)| bytes)
     }
 
-    /// The space as it was last looked at; `None` where the system does not tell it.
-    pub fn look(&mut self, recorder: &Recorder, now: Duration) -> Option<LogSpace> {
-        if now < self.due {
-            return self.space;
+    /// Returns whether to ask the disk now: it has answered the last time.
+    pub(super) fn begins(&mut self) -> bool {
+        !std::mem::replace(&mut self.pending, true)
+    }
+
+    /// Takes the answer of the disk about the files of the present log.
+    pub(super) fn take(&mut self, found: &LogFiles, present: &OpenFiles, now: Duration) {
+        self.pending = false;
+        if !Arc::ptr_eq(&found.of.0, &present.0) {
+            return;
         }
-        self.due = now + LOOKS_EVERY;
-        let folder = recorder.path().parent().filter(|folder| !folder.as_os_str().is_empty());
-        let size = |path: &Path| std::fs::metadata(path).map_or(0, |facts| facts.len());
-        let bytes = size(recorder.path()) + recorder.tlog_path().map_or(0, size);
-        let last = self.last.replace((now, bytes));
+        self.removed = found.removed;
+        if now < self.due {
+            return;
+        }
+        self.due = now + MEASURED_EVERY;
+        let last = self.last.replace((now, found.bytes));
         let grows_bytes_s = last.map_or(0.0, |(at, before)| {
-            bytes.saturating_sub(before) as f64 / now.saturating_sub(at).as_secs_f64().max(1.0)
+            found.bytes.saturating_sub(before) as f64 / now.saturating_sub(at).as_secs_f64().max(1.0)
         });
-        let free = fs4::available_space(folder.unwrap_or(Path::new("."))).ok();
-        self.space = free.map(|free_bytes| LogSpace { free_bytes, grows_bytes_s: grows_bytes_s as u32 });
-        self.space
+        self.space =
+            found.free_bytes.map(|free_bytes| LogSpace { free_bytes, grows_bytes_s: grows_bytes_s as u32 });
     }
 }
 
-/// A log and its open files: what is in them can be read although somebody has removed them.
+/// A log and its open files: their content can be read even after somebody has removed them.
 pub(super) struct Log {
     pub(super) recorder: Recorder,
-    files: Vec<(PathBuf, File)>,
+    pub(super) files: OpenFiles,
+}
+
+/// The open files of a log, by their paths.
+#[derive(Clone)]
+pub(super) struct OpenFiles(Arc<[(PathBuf, File)]>);
+
+impl OpenFiles {
+    fn removed(&self) -> impl Iterator<Item = &(PathBuf, File)> {
+        let is_there = |path: &Path, file: &File| {
+            let [there, ours] = [fs::metadata(path).ok()?, file.metadata().ok()?];
+            Some((there.dev(), there.ino()) == (ours.dev(), ours.ino()))
+        };
+        self.0.iter().filter(move |(path, file)| is_there(path, file) != Some(true))
+    }
+
+    /// Asks the disk about the files.
+    pub(super) fn look(&self) -> LogFiles {
+        let size = |file: &File| file.metadata().map_or(0, |facts| facts.len());
+        let folder = self.0.first().and_then(|(path, _)| path.parent());
+        let folder = folder.filter(|folder| !folder.as_os_str().is_empty());
+        LogFiles {
+            of: self.clone(),
+            bytes: self.0.iter().map(|(_, file)| size(file)).sum(),
+            free_bytes: fs4::available_space(folder.unwrap_or(Path::new("."))).ok(),
+            removed: self.removed().next().is_some(),
+        }
+    }
+
+    /// Reserves the names again, for the content of the removed files.
+    pub(super) fn take_names(&self) {
+        for (path, _) in self.removed() {
+            // If the name is in use by now, or the folder no longer exists, the end reports it.
+            let _ = File::create_new(path);
+        }
+    }
 }
 
 impl Log {
     pub(super) fn of(recorder: Recorder) -> Self {
         let paths = [Some(recorder.path()), recorder.tlog_path()].into_iter().flatten();
         let files = paths.filter_map(|path| Some((path.to_owned(), File::open(path).ok()?))).collect();
-        Self { recorder, files }
-    }
-
-    fn removed(&self) -> impl Iterator<Item = &(PathBuf, File)> {
-        let is_there = |path: &Path, file: &File| {
-            let [there, ours] = [fs::metadata(path).ok()?, file.metadata().ok()?];
-            Some((there.dev(), there.ino()) == (ours.dev(), ours.ino()))
-        };
-        self.files.iter().filter(move |(path, file)| is_there(path, file) != Some(true))
-    }
-
-    pub(super) fn is_removed(&self) -> bool {
-        self.removed().next().is_some()
-    }
-
-    /// Takes the names again, for what is in the removed files.
-    pub(super) fn take_names(&self) {
-        for (path, _) in self.removed() {
-            // Somebody else may have the name by now, or the folder is gone: then it is said at the
-            // end.
-            let _ = File::create_new(path);
-        }
+        Self { recorder, files: OpenFiles(files) }
     }
 
     /// Finishes the log, and writes removed files anew under their names.
     pub(super) fn finish(&self) -> Result<PathBuf, RecorderError> {
         let path = self.recorder.finish()?;
-        for (path, file) in self.removed() {
+        for (path, file) in self.files.removed() {
             write_anew(path, file).map_err(|source| RecorderError::Create { path: path.clone(), source })?;
         }
         Ok(path)

@@ -3,6 +3,8 @@
 
 mod answers;
 pub mod attached;
+mod background;
+mod backlog;
 pub mod clock;
 pub mod download;
 pub mod files;
@@ -20,6 +22,7 @@ pub mod wire;
 
 use std::hash::{BuildHasher as _, Hasher as _, RandomState};
 use std::io::IsTerminal as _;
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use anyhow::Context as _;
@@ -45,8 +48,9 @@ use crate::model::{KeyOwner, Model, Role, Seat, Settings, words::printable};
 use crate::update::update;
 use crate::view::theme::Palette;
 use attached::Viewer;
+use background::Background;
 use clock::{Clock, LogTime};
-use files::{LogGuard, SpaceWatch, newest_place, open_checklist, open_log, other_name, read_unfinished};
+use files::{LogGuard, LogWatch, newest_place, open_checklist, open_log, other_name, read_unfinished};
 use next_log::NextLog;
 use output::{Lines, Output, print};
 use server::{Server, hello};
@@ -177,7 +181,7 @@ async fn session(args: &StationArgs, config: &Config, duty: Duty) -> anyhow::Res
     if let Some(msg) = wire.save_timestamps() {
         update(&mut model, msg, clock.now());
     }
-    station.close(&model).await;
+    station.close(&mut model).await;
     let log_path = log_guard.finish();
     ran?;
     let exit = exit::decide(&model.outcome, duty.interactive);
@@ -268,7 +272,7 @@ async fn start(
         for text in told {
             model.warn(clock.now(), text);
         }
-        file
+        Arc::new(Mutex::new(file))
     });
     go_on_with_what_is_kept(&mut model, recorder.as_ref(), clock.now());
     let server = serve(args, &mut model, duty, &clock).await?;
@@ -278,7 +282,8 @@ async fn start(
         clock,
         log_time,
         recorder,
-        log_space: SpaceWatch::default(),
+        background: Background::start().context("starting the thread of the files")?,
+        log_watch: LogWatch::default(),
         demo,
         output,
         socket: args.flags.socket.socket.clone(),
@@ -289,7 +294,9 @@ async fn start(
         signatures,
         book: None,
         report: None,
-        place_failed: false,
+        alarm_failure: None,
+        not_saved: false,
+        signed: 0,
         report_at: Duration::ZERO,
         next_log,
     };

@@ -14,7 +14,8 @@ use protocol::book::BookKey;
 use protocol::log::recorder::{Recorder, RecorderError};
 use protocol::log::writer::LogHeader;
 
-use super::files::{GuardedLog, Log, SpaceWatch, open_log};
+use super::background::{Outcome, Target};
+use super::files::{GuardedLog, Log, LogWatch, OpenFiles, open_log};
 use super::output::absolute;
 use super::programs::in_a_thread;
 use super::server::hello;
@@ -39,6 +40,8 @@ pub(super) struct NextLog {
     guarded: GuardedLog,
     /// The next one could not be created; when to try again.
     not_before: Duration,
+    /// The next one is being created.
+    begins: bool,
     /// The log before, while its end is written.
     pub(super) ending: Option<Receiver<Result<(), RecorderError>>>,
 }
@@ -46,7 +49,15 @@ pub(super) struct NextLog {
 impl NextLog {
     pub(super) fn new(args: &StationArgs, header: LogHeader, guarded: GuardedLog) -> Self {
         let names = (args.flags.log.clone(), args.flags.tlog.clone());
-        Self { names, header, book_key: None, guarded, not_before: Duration::ZERO, ending: None }
+        Self {
+            names,
+            header,
+            book_key: None,
+            guarded,
+            not_before: Duration::ZERO,
+            begins: false,
+            ending: None,
+        }
     }
 
     /// The log that is written; `None` if none is wanted.
@@ -54,9 +65,9 @@ impl NextLog {
         self.guarded().as_ref().map(|log| log.recorder.clone())
     }
 
-    /// Whether somebody has removed its files.
-    pub(super) fn is_removed(&self) -> bool {
-        self.guarded().as_ref().is_some_and(Log::is_removed)
+    /// The files of the log that is written.
+    pub(super) fn files(&self) -> Option<OpenFiles> {
+        self.guarded().as_ref().map(|log| log.files.clone())
     }
 
     fn guarded(&self) -> MutexGuard<'_, Option<Log>> {
@@ -86,30 +97,41 @@ impl Station {
                 model.warn(now, format!("the log before is not complete: {why}"));
             }
         }
-        let is_long = self.log_space.bytes() >= LONG_BYTES;
+        let is_long = self.log_watch.bytes() >= LONG_BYTES;
         let waits = now < self.next_log.not_before || matches!(ended, Some(Err(TryRecvError::Empty)));
-        // A demonstration has one log, in which its vehicle writes, too: that is written anew at
-        // the end.
-        let is_removed = model.log.removed && self.next_log.is_removed();
-        if is_removed && !waits && !model.settings.demonstration {
-            if let Some(log) = &*self.next_log.guarded() {
-                log.take_names();
-            }
-            self.change_log(model, wire);
-        } else if is_long && !waits && model.may_change_log(now) {
-            self.change_log(model, wire);
+        // A demonstration has one log, which its vehicle writes, too: that is written again at the
+        // end.
+        let is_removed = self.log_watch.removed && !model.settings.demonstration;
+        if !waits && (is_removed || is_long && model.may_change_log(now)) {
+            self.begin_next_log();
         }
     }
 
-    fn change_log(&mut self, model: &mut Model, wire: &mut Wire) {
-        let now = self.clock.now();
-        // What has failed is told to the crew, and not hidden by a new log.
+    /// Has the next log created.
+    fn begin_next_log(&mut self) {
+        // The crew sees a log that has failed; a new one would hide it.
         let Some(before) = self.recorder.as_ref().filter(|log| log.is_whole()) else { return };
-        let before_name = file_name(before.path());
+        let Some(files) = self.next_log.files().filter(|_| !self.next_log.begins) else { return };
         let NextLog { names: (log, tlog), header, .. } = &self.next_log;
-        let mut header = header.clone();
-        header.run.insert("after".to_owned(), before_name.clone());
-        let next = match open_log(log.as_ref(), tlog.as_ref(), &header) {
+        let (log, tlog, mut header) = (log.clone(), tlog.clone(), header.clone());
+        header.run.insert("after".to_owned(), file_name(before.path()));
+        self.next_log.begins = self.background.queue(Target::NextLog, move || {
+            files.take_names();
+            let next = open_log(log.as_ref(), tlog.as_ref(), &header);
+            Outcome::NextLog(next.map(|next| next.map(Log::of)))
+        });
+    }
+
+    /// Continues in the next log, once it is created.
+    pub(super) fn change_log(
+        &mut self,
+        next: anyhow::Result<Option<Log>>,
+        model: &mut Model,
+        wire: &mut Wire,
+    ) {
+        let now = self.clock.now();
+        self.next_log.begins = false;
+        let next_log = match next {
             Ok(Some(next)) => next,
             Ok(None) => return,
             Err(why) => {
@@ -117,11 +139,14 @@ impl Station {
                 return model.warn(now, format!("the log stays the same: {why:#}"));
             }
         };
+        let next = next_log.recorder.clone();
+        let Some(before) = &self.recorder else { return };
+        let before_name = file_name(before.path());
         self.close_book(&format!("the log goes on in {}", file_name(next.path())), model, wire);
         let end_of_book = model.book.short().map_or_else(String::new, |end| format!(" with book {end}"));
-        let before = self.next_log.guarded().replace(Log::of(next.clone()));
+        let before = self.next_log.guarded().replace(next_log);
         wire.recorder = Some(next.clone());
-        (self.recorder, self.log_space) = (Some(next.clone()), SpaceWatch::default());
+        (self.recorder, self.log_watch) = (Some(next.clone()), LogWatch::default());
         self.next_log.ending = before.and_then(end);
         self.open_book(model, &format!(", after {before_name}{end_of_book}"));
         let path = |path: &Path| absolute(&path.display().to_string());
@@ -172,6 +197,16 @@ mod tests {
         (frames, entries, audited)
     }
 
+    /// Changes the log and waits for the disk.
+    fn change_log(station: &mut Station, model: &mut Model, wire: &mut Wire) {
+        let before = model.settings.log_path.clone();
+        station.begin_next_log();
+        while model.settings.log_path == before {
+            std::thread::yield_now();
+            station.take_outcomes(model, wire);
+        }
+    }
+
     #[test]
     fn no_frame_is_lost_between_two_logs_and_both_books_are_whole() {
         let folder = tempfile::tempdir().unwrap();
@@ -200,13 +235,13 @@ mod tests {
             say(&mut wire);
             station.keep_logs_short(&mut model, &mut wire);
             assert_eq!(model.settings.log_path.as_deref(), Some(&*log), "a short log goes on");
-            station.change_log(&mut model, &mut wire);
+            change_log(&mut station, &mut model, &mut wire);
             say(&mut wire);
             assert_eq!(super::super::stations::of(&model, &[]).log, Some(path("flight-2.mcap")));
-            station.change_log(&mut model, &mut wire);
+            change_log(&mut station, &mut model, &mut wire);
             say(&mut wire);
             station.close_book("the station ends", &mut model, &mut wire);
-            station.close(&model).await;
+            station.close(&mut model).await;
             assert_eq!(guard.finish().unwrap(), Some(PathBuf::from(path("flight-3.mcap"))));
         });
         let logs = ["flight.mcap", "flight-2.mcap", "flight-3.mcap"].map(|name| read(Path::new(&path(name))));

@@ -3,6 +3,8 @@
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
 use std::time::Duration;
 
 use anyhow::Context as _;
@@ -141,17 +143,19 @@ impl Output {
 pub struct Lines {
     seen: u64,
     closed: bool,
+    /// Started with the first line.
+    printer: Option<Printer>,
 }
 
 impl Lines {
     /// Prints only new events; the earlier ones were shown on a screen.
     pub fn new_events_only(model: &Model) -> Self {
-        Self { seen: model.events.total(), closed: false }
+        Self { seen: model.events.total(), ..Self::default() }
     }
 
     /// Prints nothing: nobody reads the output.
     pub fn closed() -> Self {
-        Self { seen: 0, closed: true }
+        Self { closed: true, ..Self::default() }
     }
 
     /// Prints the new events. If nobody reads the output any more, printing stops and the flight
@@ -168,7 +172,63 @@ impl Lines {
             let _ = writeln!(text, "{time_s:9.3}  {speaker:<7}  {mark}{}", event.text);
         }
         self.seen = model.events.total();
-        self.closed = print(text.as_bytes()).is_err();
+        if self.printer.is_none() {
+            self.printer = Printer::start().ok();
+        }
+        self.closed = !self.printer.as_mut().is_some_and(|printer| printer.print(text));
+    }
+}
+
+/// Maximum number of texts that wait for whoever reads the output.
+const TEXTS_MAX: usize = 256;
+/// How long the last lines may take at the end.
+const PRINTED_WITHIN: Duration = Duration::from_secs(1);
+/// Set once the output takes no more: printing to it would wait for ever.
+static STUCK: AtomicBool = AtomicBool::new(false);
+
+/// Prints in a thread: a pipe that nobody empties must delay neither the link nor the screen.
+#[derive(Debug)]
+struct Printer {
+    texts: Option<SyncSender<String>>,
+    ended: Receiver<()>,
+    /// Texts that found no room since the last one that did.
+    lost: u64,
+}
+
+impl Printer {
+    fn start() -> std::io::Result<Self> {
+        let (texts, waiting) = sync_channel::<String>(TEXTS_MAX);
+        let (end, ended) = sync_channel(1);
+        let run = move || {
+            // Without a reader there is nothing left to do.
+            let _ = waiting.iter().try_for_each(|text| print(text.as_bytes()));
+            let _ = end.send(());
+        };
+        std::thread::Builder::new().name("lines".to_owned()).spawn(run)?;
+        Ok(Self { texts: Some(texts), ended, lost: 0 })
+    }
+
+    /// Returns whether anybody may still read.
+    fn print(&mut self, text: String) -> bool {
+        let text = match self.lost {
+            0 => text,
+            lost => format!("{lost} messages were not printed, because nobody read them\n{text}"),
+        };
+        match self.texts.as_ref().map(|texts| texts.try_send(text)) {
+            Some(Ok(())) => self.lost = 0,
+            Some(Err(TrySendError::Full(_))) => self.lost += 1,
+            Some(Err(TrySendError::Disconnected(_))) | None => return false,
+        }
+        true
+    }
+}
+
+impl Drop for Printer {
+    fn drop(&mut self) {
+        self.texts = None;
+        if self.ended.recv_timeout(PRINTED_WITHIN) == Err(RecvTimeoutError::Timeout) {
+            STUCK.store(true, Ordering::Release);
+        }
     }
 }
 
@@ -261,6 +321,7 @@ fn verdict_table(model: &Model, verdict: &Verdict, now: Duration) -> String {
 /// # Errors
 /// It cannot be written.
 pub(super) fn print(bytes: &[u8]) -> anyhow::Result<()> {
+    anyhow::ensure!(!STUCK.load(Ordering::Acquire), "standard output takes no more");
     let mut out = std::io::stdout().lock();
     out.write_all(bytes).and_then(|()| out.flush()).context("writing to standard output")
 }

@@ -76,21 +76,23 @@ fn speak(mut child: Child, lines: &Receiver<String>) {
 
 // Runs the command that reports an alarm to people who are not at the screen.
 
-/// Runs the command with `sh -c` and the text of the alarm in `TOUCHDOWN_ALARM`, without waiting
-/// for it.
+/// Runs the command with `sh -c` and the text of the alarm in `TOUCHDOWN_ALARM`, in a thread: the
+/// disk may be slow to start it. The result arrives if it cannot be started.
 ///
 /// # Errors
-/// The command, or the thread that waits for it, cannot be started.
-pub fn run_alarm_command(command: &str, alarm: &str) -> std::io::Result<()> {
-    let mut child = Command::new("sh")
-        .args(["-c", command])
-        .env("TOUCHDOWN_ALARM", alarm)
-        .stdin(Stdio::null())
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()?;
-    // Waiting only prevents a zombie process; the result is ignored.
-    in_a_thread("alarm command", move || child.wait()).map(drop)
+/// No thread can be started.
+pub(super) fn run_alarm_command(command: &str, alarm: &str) -> io::Result<Receiver<io::Error>> {
+    let mut shell = Command::new("sh");
+    shell.args(["-c", command]).env("TOUCHDOWN_ALARM", alarm);
+    shell.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    let (failed, failure) = sync_channel(1);
+    let run = move || match shell.spawn() {
+        // Waiting only prevents a zombie process; the result is ignored.
+        Ok(mut child) => _ = child.wait(),
+        // The station may have ended.
+        Err(error) => _ = failed.send(error),
+    };
+    std::thread::Builder::new().name("alarm command".to_owned()).spawn(run).map(|_| failure)
 }
 
 // Writes the report of the flight: runs `replay report` on the station's log.

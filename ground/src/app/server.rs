@@ -1,7 +1,6 @@
 //! The station's side of its socket: sends history and news to attached screens, and receives their
 //! requests.
 
-use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex};
@@ -15,18 +14,13 @@ use tokio::net::unix::{OwnedReadHalf, OwnedWriteHalf};
 use tokio::sync::{broadcast, mpsc, oneshot};
 use tokio_util::codec::{FramedRead, LengthDelimitedCodec};
 
+use super::backlog::{Backlog, Bytes};
 use super::output::absolute;
 use crate::attach::codec::{decode_to_station, encode_to_screen, messages};
 use crate::attach::{Hello, ToScreen, ToStation, socket};
 use crate::model::{Model, Seat, Settings};
 use crate::update::Msg;
 
-/// The size of the kept history: an hour of telemetry in flight, half a minute of the worst flood.
-/// It is most of what a station ever needs.
-const HISTORY_BYTES_MAX: usize = 16 * 1024 * 1024;
-/// Messages are kept together in blocks of this size: one by one, each would take as much again for
-/// its place.
-const BLOCK_BYTES: usize = 64 * 1024;
 /// A screen that is this many messages behind is disconnected; it attaches again.
 const BEHIND_MAX: usize = 4_096;
 /// How many requests may wait.
@@ -34,7 +28,6 @@ const REQUESTS_MAX: usize = 64;
 /// How long a new connection may take to send its first message.
 const SPEAKS_WITHIN: Duration = Duration::from_secs(5);
 
-type Bytes = Arc<[u8]>;
 /// What a screen says.
 type Asked = FramedRead<OwnedReadHalf, LengthDelimitedCodec>;
 
@@ -58,34 +51,9 @@ pub enum ServerEvent {
 #[derive(Default)]
 struct History {
     hello: Hello,
-    /// The latest checklist, which is sent also if the history no longer reaches back to it.
+    /// The latest checklist, which is sent also if the backlog no longer reaches back to it.
     checklist: Option<Bytes>,
-    /// Whole messages, each with its length before it.
-    blocks: VecDeque<Bytes>,
-    /// The block that is being filled.
-    last: Vec<u8>,
-    /// The size of all of them.
-    bytes: usize,
-}
-
-impl History {
-    fn keep(&mut self, message: &[u8]) {
-        if self.last.len() + message.len() > BLOCK_BYTES && !self.last.is_empty() {
-            self.blocks.push_back(Bytes::from(&self.last[..]));
-            self.last.clear();
-        }
-        self.last.extend_from_slice(message);
-        self.bytes += message.len();
-        while self.bytes > HISTORY_BYTES_MAX {
-            let Some(oldest) = self.blocks.pop_front() else { break };
-            self.bytes -= oldest.len();
-        }
-    }
-
-    /// All of it, in order.
-    fn kept(&self) -> impl Iterator<Item = Bytes> {
-        self.blocks.iter().cloned().chain([Bytes::from(&self.last[..])])
-    }
+    backlog: Backlog,
 }
 
 /// Serves screens until it goes out of scope.
@@ -143,7 +111,7 @@ impl Server {
         if matches!(msg, Msg::Checklist(_)) {
             history.checklist = Some(Arc::clone(&bytes));
         }
-        history.keep(&bytes);
+        history.backlog.push(&bytes);
         // Fails only if no screen is attached.
         let _ = self.shared.news.send(bytes);
     }
@@ -186,7 +154,7 @@ impl Shared {
         let Ok(history) = self.history.lock() else { return (Vec::new(), self.news.subscribe()) };
         let hello = ToScreen::Hello(Box::new(Hello { screen, ..history.hello.clone() }));
         let hello = encode_to_screen(&hello, Duration::ZERO).map(Bytes::from);
-        let past = hello.iter().chain(&history.checklist).cloned().chain(history.kept()).collect();
+        let past = hello.iter().chain(&history.checklist).cloned().chain(history.backlog.all()).collect();
         (past, self.news.subscribe())
     }
 }
@@ -275,40 +243,5 @@ async fn listen_to(mut read: Asked, seat: Seat, watch: bool, ask: mpsc::Sender<S
             }
             Err(_) => return,
         }
-    }
-}
-
-#[cfg(test)]
-mod server_tests {
-    use super::*;
-
-    fn message(number: u32) -> Vec<u8> {
-        let content = [&number.to_le_bytes()[..], &vec![7; 16 + number as usize % 300]].concat();
-        [&(content.len() as u32).to_le_bytes()[..], &content].concat()
-    }
-
-    fn numbers(mut bytes: &[u8]) -> Vec<u32> {
-        let mut numbers = Vec::new();
-        while let Some((prefix, rest)) = bytes.split_first_chunk() {
-            let length = u32::from_le_bytes(*prefix) as usize;
-            numbers.push(u32::from_le_bytes(*rest.first_chunk().unwrap()));
-            bytes = &rest[length..];
-        }
-        numbers
-    }
-
-    #[test]
-    fn the_history_keeps_the_latest_messages_whole_and_is_bounded() {
-        let mut history = History::default();
-        for number in 0..200_000 {
-            history.keep(&message(number));
-            assert!(history.bytes <= HISTORY_BYTES_MAX);
-        }
-        let kept: Vec<u8> = history.kept().flat_map(|block| block.to_vec()).collect();
-        assert_eq!(kept.len(), history.bytes);
-        let numbers = numbers(&kept);
-        assert!(numbers.windows(2).all(|pair| pair[1] == pair[0] + 1) && numbers.last() == Some(&199_999));
-        assert!(kept.len() > HISTORY_BYTES_MAX - 2 * BLOCK_BYTES, "no more than a block is given up at once");
-        assert!(history.blocks.len() <= HISTORY_BYTES_MAX / (BLOCK_BYTES - 400) + 1);
     }
 }

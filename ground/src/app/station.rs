@@ -2,6 +2,8 @@
 //! model.
 
 use std::path::{Path, PathBuf};
+use std::sync::mpsc::Receiver;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use futures_util::future::OptionFuture;
@@ -12,8 +14,9 @@ use protocol::log::recorder::Recorder;
 use protocol::log::v1::OperatorAction;
 use tokio::time::{MissedTickBehavior, interval};
 
+use super::background::{Background, Outcome, Target};
 use super::clock::{Clock, LogTime, Signals};
-use super::files::{SignatureFile, SpaceWatch, StationBook};
+use super::files::{LogWatch, SignatureFile, StationBook};
 use super::next_log::NextLog;
 use super::output::{Lines, Output};
 use super::server::{Server, ServerEvent, hello};
@@ -35,7 +38,8 @@ pub(super) struct Station {
     pub(super) clock: Clock,
     pub(super) log_time: LogTime,
     pub(super) recorder: Option<Recorder>,
-    pub(super) log_space: SpaceWatch,
+    pub(super) background: Background,
+    pub(super) log_watch: LogWatch,
     pub(super) demo: Option<Demo>,
     pub(super) output: Output,
     /// The socket path that was given, if any.
@@ -46,14 +50,18 @@ pub(super) struct Station {
     /// Whether the station's own screen answers.
     pub(super) own: Answers,
     pub(super) alarm_command: Option<String>,
-    /// The files of the last place could not be written.
-    pub(super) place_failed: bool,
+    /// Why the newest alarm command could not be started, if so.
+    pub(super) alarm_failure: Option<Receiver<std::io::Error>>,
+    /// A file for the next run could not be written, which was reported.
+    pub(super) not_saved: bool,
     /// The report that is being written.
     pub(super) report: Option<programs::Writing>,
     /// Who did what; `None` without a log.
     pub(super) book: Option<StationBook>,
-    /// Where the signatures of the checklist are kept; `None` without a checklist.
-    pub(super) signatures: Option<SignatureFile>,
+    /// The file of the checklist's signatures; `None` without a checklist.
+    pub(super) signatures: Option<Arc<Mutex<SignatureFile>>>,
+    /// Number of signatures of this run.
+    pub(super) signed: u64,
     /// When the links are reported next.
     pub(super) report_at: Duration,
     pub(super) next_log: NextLog,
@@ -132,6 +140,7 @@ impl Station {
                     self.output.pass(model, now, now);
                     self.count_silence(now);
                     self.tell_crew(model, wire);
+                    self.take_outcomes(model, wire);
                     self.tick_msgs(model)
                 }
                 () = self.clock.sleep_until(redraw_at) => Vec::new(),
@@ -273,12 +282,52 @@ impl Station {
 
     fn tell_alarm(&mut self, words: &str) {
         let Some(command) = &self.alarm_command else { return };
-        if let Err(error) = programs::run_alarm_command(command, words) {
-            // Reported once, because it would fail again.
-            let text = format!("the alarm command cannot be started: {error}");
-            self.alarm_command = None;
-            let event = Event { level: EventLevel::Warning, name: "ground".to_owned(), message: text };
-            self.record(Record::Event(event));
+        match programs::run_alarm_command(command, words) {
+            Ok(failure) => self.alarm_failure = Some(failure),
+            Err(error) => self.give_up_alarm_command(&error),
+        }
+    }
+
+    /// Reports the failure once, because it would happen again.
+    fn give_up_alarm_command(&mut self, error: &std::io::Error) {
+        self.alarm_command = None;
+        let message = format!("the alarm command cannot be started: {error}");
+        self.record(Record::Event(Event { level: EventLevel::Warning, name: "ground".to_owned(), message }));
+    }
+
+    /// Takes the outcomes of what runs beside the loop.
+    pub(super) fn take_outcomes(&mut self, model: &mut Model, wire: &mut Wire) {
+        if let Some(error) = self.alarm_failure.as_ref().and_then(|failure| failure.try_recv().ok()) {
+            self.give_up_alarm_command(&error);
+        }
+        while let Some(outcome) = self.background.outcome() {
+            self.take_outcome(outcome, model, wire);
+        }
+        if let Some(files) = self.next_log.files().filter(|_| self.log_watch.begins()) {
+            self.background.queue(Target::LogFiles, move || Outcome::LogFiles(files.look()));
+        }
+    }
+
+    fn take_outcome(&mut self, outcome: Outcome, model: &mut Model, wire: &mut Wire) {
+        let now = self.clock.now();
+        match outcome {
+            Outcome::Written => {}
+            Outcome::NotWritten(target, error) => self.report_not_written(target, &error, model),
+            Outcome::LogFiles(found) => {
+                if let Some(present) = self.next_log.files() {
+                    self.log_watch.take(&found, &present, now);
+                }
+            }
+            Outcome::NextLog(next) => self.change_log(next, model, wire),
+        }
+    }
+
+    fn report_not_written(&mut self, target: Target, error: &anyhow::Error, model: &mut Model) {
+        let now = self.clock.now();
+        if let Target::Signature(_) = target {
+            model.warn(now, format!("the checklist is not kept over a restart: {error:#}"));
+        } else if !std::mem::replace(&mut self.not_saved, true) {
+            model.warn(now, format!("a restart will not know this: {error:#}"));
         }
     }
 
@@ -286,8 +335,8 @@ impl Station {
         let health = self.recorder.as_ref().map_or_else(LogHealth::default, |recorder| LogHealth {
             dropped: recorder.dropped(),
             failed: !recorder.is_whole(),
-            removed: self.next_log.is_removed(),
-            space: self.log_space.look(recorder, self.clock.now()),
+            removed: self.log_watch.removed,
+            space: self.log_watch.space,
         });
         let health = (health != model.log).then_some(Msg::Log(health));
         let book = self.sign_book(false);
@@ -319,10 +368,12 @@ impl Station {
                     self.record(record);
                 }
                 Action::KeepPlace(place) => {
-                    self.keep(model, now, |folder, _| files::write_place(folder, &place));
+                    let target = Target::Position(place.boot);
+                    self.save(target, model, move |folder, _| files::write_place(folder, &place));
                 }
                 Action::KeepUnfinished(kept) => {
-                    self.keep(model, now, |folder, unix_s| files::write_unfinished(folder, &kept, unix_s));
+                    let write = move |folder: &Path, unix_s| files::write_unfinished(folder, &kept, unix_s);
+                    self.save(Target::Unfinished, model, write);
                 }
                 Action::Enter(line) => self.enter(&line),
                 Action::KeepChecklist(entry) => self.keep_checklist(model, &entry, now),
@@ -363,20 +414,33 @@ impl Station {
         }
     }
 
-    /// Writes a file beside the log. A failure is reported once.
-    fn keep(
+    /// Has a file written beside the log, given the folder and the Unix time, s.
+    fn save(
         &mut self,
+        target: Target,
         model: &mut Model,
-        now: Duration,
-        write: impl FnOnce(&Path, u64) -> anyhow::Result<()>,
+        write: impl FnOnce(&Path, u64) -> anyhow::Result<()> + Send + 'static,
     ) {
         let Some(folder) = self.recorder.as_ref().and_then(|recorder| recorder.path().parent()) else {
             return;
         };
-        if let Err(error) = write(folder, self.clock.unix_ns() / 1_000_000_000)
-            && !std::mem::replace(&mut self.place_failed, true)
-        {
-            model.warn(now, format!("a restart will not know this: {error:#}"));
+        let (folder, unix_s) = (folder.to_owned(), self.clock.unix_ns() / 1_000_000_000);
+        self.queue(target, model, move || write(&folder, unix_s));
+    }
+
+    /// Queues a file for the disk.
+    fn queue(
+        &mut self,
+        target: Target,
+        model: &mut Model,
+        write: impl FnOnce() -> anyhow::Result<()> + Send + 'static,
+    ) {
+        let write = move || match write() {
+            Ok(()) => Outcome::Written,
+            Err(error) => Outcome::NotWritten(target, error),
+        };
+        if !self.background.queue(target, write) {
+            self.report_not_written(target, &anyhow::anyhow!("the disk is too slow"), model);
         }
     }
 
@@ -469,8 +533,12 @@ impl Station {
 
     /// Keeps a change of the checklist, and shows it on every screen.
     fn keep_checklist(&mut self, model: &mut Model, entry: &ChecklistEntry, now: Duration) {
-        if let Some(Err(error)) = self.signatures.as_mut().map(|file| file.add(entry)) {
-            model.warn(now, format!("the checklist is not kept over a restart: {error:#}"));
+        if let Some(file) = self.signatures.clone() {
+            let entry = entry.clone();
+            self.signed += 1;
+            self.queue(Target::Signature(self.signed), model, move || {
+                file.lock().unwrap_or_else(PoisonError::into_inner).add(&entry)
+            });
         }
         self.publish_checklist(model, now);
     }
@@ -483,17 +551,29 @@ impl Station {
     }
 
     /// Restores the terminal first, because the rest may take a while.
-    pub(super) async fn close(mut self, model: &Model) {
+    pub(super) async fn close(self, model: &mut Model) {
+        let Self { background, demo, next_log, mut output, clock, .. } = self;
         // Lets the socket send its last answers.
         tokio::task::yield_now().await;
-        if self.output.screen.take().is_none() {
-            self.output.lines.show(model);
+        let had_screen = output.screen.take().is_some();
+        for outcome in background.finish() {
+            match outcome {
+                Outcome::NotWritten(_, error) => {
+                    model.warn(clock.now(), format!("the next run will not know this: {error:#}"));
+                }
+                // Its files are empty.
+                Outcome::NextLog(Ok(Some(log))) => _ = log.recorder.discard(),
+                Outcome::Written | Outcome::LogFiles(_) | Outcome::NextLog(_) => {}
+            }
         }
-        if let Some(demo) = self.demo {
+        if !had_screen {
+            output.lines.show(model);
+        }
+        if let Some(demo) = demo {
             demo.stop().await;
         }
         // The end of the log before is written, too.
-        let _ = self.next_log.ending.map(|ending| ending.recv());
+        let _ = next_log.ending.map(|ending| ending.recv());
     }
 }
 

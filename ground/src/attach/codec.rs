@@ -77,6 +77,16 @@ pub fn messages<R: AsyncRead>(read: R) -> FramedRead<R, LengthDelimitedCodec> {
     LengthDelimitedCodec::builder().little_endian().max_frame_length(LENGTH_MAX).new_read(read)
 }
 
+/// The messages of a block, each without its length.
+pub(crate) fn split(mut block: &[u8]) -> impl Iterator<Item = &[u8]> {
+    std::iter::from_fn(move || {
+        let (prefix, rest) = block.split_first_chunk()?;
+        let (message, after) = rest.split_at_checked(u32::from_le_bytes(*prefix) as usize)?;
+        block = after;
+        Some(message)
+    })
+}
+
 fn message(payload: &impl Serialize) -> Option<Vec<u8>> {
     let head = [[0; PREFIX_LEN], VERSION.to_le_bytes()].concat();
     let mut bytes = postcard::to_extend(payload, head).ok()?;

@@ -152,7 +152,10 @@ impl Line for Port {
     }
 
     async fn open(&self) -> Result<SerialStream, String> {
-        tokio_serial::new(&self.path, self.baud).open_native_async().map_err(|error| error.to_string())
+        // In a thread: a file system that stalls delays opening the device, too.
+        let port = tokio_serial::new(&self.path, self.baud);
+        let opened = tokio::task::spawn_blocking(move || port.open_native_async()).await;
+        opened.map_err(|error| error.to_string())?.map_err(|error| error.to_string())
     }
 }
 
