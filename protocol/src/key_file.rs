@@ -87,7 +87,7 @@ impl Shared {
     }
 
     /// Waits until everything is written, or for so long.
-    fn wait(&self, state: MutexGuard<'_, State>, longest: Duration) -> MutexGuard<'_, State> {
+    fn wait<'a>(&'a self, state: MutexGuard<'a, State>, longest: Duration) -> MutexGuard<'a, State> {
         let waited = self.changed.wait_timeout_while(state, longest, |state| state.is_busy());
         waited.unwrap_or_else(PoisonError::into_inner).0
     }
@@ -378,7 +378,7 @@ mod tests {
         assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
         let (mut file, mut signing) = KeyFile::open(&path, "ground").unwrap();
         let beat = Encoder::new(GROUND).encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
-        signing.sign(&beat, 0, 1_000);
+        let _ = signing.sign(&beat, 0, 1_000);
         file.remember(&signing.memory()).unwrap();
         for _ in 0..1_000 {
             let late = file.remember(&signing.memory()).unwrap_err();

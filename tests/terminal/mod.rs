@@ -14,5 +14,6 @@ mod reboot;
 mod removed_logs;
 mod resize;
 mod rig;
+mod stalled_disk;
 mod standstill;
 mod stations;

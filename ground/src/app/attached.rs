@@ -14,6 +14,7 @@ use tokio_util::codec::{FramedRead, LengthDelimitedCodec};
 use super::clock::{Clock, Signals};
 use super::files::{read_unfinished, write_unfinished};
 use super::output::{Lines, Output, print};
+use super::programs::in_a_thread;
 use super::stations;
 use crate::attach::codec::{CodecError, decode_to_screen, encode_to_station, messages};
 use crate::attach::{Hello, ToScreen, ToStation, socket};
@@ -159,7 +160,7 @@ async fn take_history(
     viewer: &Viewer,
 ) -> anyhow::Result<()> {
     // What another screen of this folder has kept for it.
-    let kept = read_unfinished(Some(Path::new("")), clock.unix_ns() / 1_000_000_000);
+    let kept = read_unfinished(Some(Path::new(""))).ok().flatten();
     let asked = kept.and_then(|kept| kept.abort).map(|at| format!("; ABORT asked at {at} NOT CONFIRMED"));
     let silent = format!("the station does not answer: it hangs or is stopped{}", asked.unwrap_or_default());
     loop {
@@ -232,8 +233,11 @@ fn keep_unsent(is_kept: &mut bool, model: &mut Model, unix_s: u64, now: Duration
     }
     let folder = model.settings.log_path.as_deref().and_then(|log| Path::new(log).parent());
     let kept = Unfinished { abort, ..model.unfinished(now) };
-    if let Some(Err(error)) = folder.map(|folder| write_unfinished(folder, &kept, unix_s)) {
-        model.warn(now, format!("the next station will not know of this abort: {error:#}"));
+    let Some(folder) = folder.map(Path::to_owned) else { return };
+    // In a thread: an abort that waits for a station must not wait for the disk.
+    let written = in_a_thread("unsent abort", move || write_unfinished(&folder, &kept));
+    if let Err(error) = written {
+        model.warn(now, format!("the next station will not know of this abort: {error}"));
     }
 }
 

@@ -8,7 +8,9 @@ use std::sync::mpsc::{Receiver, sync_channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 
-use super::files::{Log, LogFiles};
+use protocol::log::recorder::Recorder;
+
+use super::files::LogFiles;
 
 /// Maximum number of jobs that wait for the disk. Only signatures and the positions of several
 /// vehicles accumulate; a crew signs some ten steps a minute.
@@ -35,7 +37,7 @@ pub(super) enum Outcome {
     NotWritten(Target, anyhow::Error),
     LogFiles(LogFiles),
     /// The next log; `None` if no log is wanted.
-    NextLog(anyhow::Result<Option<Log>>),
+    NextLog(anyhow::Result<Option<Recorder>>),
 }
 
 type Job = Box<dyn FnOnce() -> Outcome + Send>;
@@ -121,10 +123,12 @@ impl Background {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::mpsc::SyncSender;
+
     use super::*;
 
     /// A disk that stalls until the returned end is dropped.
-    fn stall(background: &Background) -> impl Drop {
+    fn stall(background: &Background) -> SyncSender<()> {
         let (stalled, stalls) = sync_channel::<()>(0);
         let (begun, begins) = sync_channel(1);
         background.queue(Target::LogFiles, move || {

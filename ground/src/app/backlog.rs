@@ -157,7 +157,8 @@ mod tests {
         }
 
         fn receive(&mut self, message: &MavMessage) {
-            self.take(Msg::Frame(self.vehicle.encode(message)));
+            let frame = self.vehicle.encode(message);
+            self.take(Msg::Frame(frame));
         }
 
         fn status(&mut self, status: TD_FLIGHT_STATUS_DATA) {

@@ -3,8 +3,7 @@
 
 use std::fs;
 use std::fs::File;
-use std::io::{ErrorKind, Read as _, Seek as _, Write as _};
-use std::os::unix::fs::MetadataExt as _;
+use std::io::{ErrorKind, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -68,12 +67,24 @@ const MEASURED_EVERY: Duration = Duration::from_secs(5);
 
 /// What the disk reports of the log's files.
 pub(super) struct LogFiles {
-    of: OpenFiles,
+    path: PathBuf,
     bytes: u64,
     /// Free space beside them; `None` where the system does not report it.
     free_bytes: Option<u64>,
-    /// The names no longer belong to these files.
     removed: bool,
+}
+
+impl LogFiles {
+    /// Asks the disk.
+    pub(super) fn of(recorder: &Recorder) -> Self {
+        let folder = recorder.path().parent().filter(|folder| !folder.as_os_str().is_empty());
+        Self {
+            path: recorder.path().to_owned(),
+            bytes: recorder.len_bytes(),
+            free_bytes: fs4::available_space(folder.unwrap_or(Path::new("."))).ok(),
+            removed: recorder.is_removed(),
+        }
+    }
 }
 
 /// Tracks the space that is left for the log, how fast the log grows, and whether it still exists.
@@ -100,9 +111,9 @@ impl LogWatch {
     }
 
     /// Takes the answer of the disk about the files of the present log.
-    pub(super) fn take(&mut self, found: &LogFiles, present: &OpenFiles, now: Duration) {
+    pub(super) fn take(&mut self, found: &LogFiles, present: &Recorder, now: Duration) {
         self.pending = false;
-        if !Arc::ptr_eq(&found.of.0, &present.0) {
+        if found.path != present.path() {
             return;
         }
         self.removed = found.removed;
@@ -119,76 +130,8 @@ impl LogWatch {
     }
 }
 
-/// A log and its open files: their content can be read even after somebody has removed them.
-pub(super) struct Log {
-    pub(super) recorder: Recorder,
-    pub(super) files: OpenFiles,
-}
-
-/// The open files of a log, by their paths.
-#[derive(Clone)]
-pub(super) struct OpenFiles(Arc<[(PathBuf, File)]>);
-
-impl OpenFiles {
-    fn removed(&self) -> impl Iterator<Item = &(PathBuf, File)> {
-        let is_there = |path: &Path, file: &File| {
-            let [there, ours] = [fs::metadata(path).ok()?, file.metadata().ok()?];
-            Some((there.dev(), there.ino()) == (ours.dev(), ours.ino()))
-        };
-        self.0.iter().filter(move |(path, file)| is_there(path, file) != Some(true))
-    }
-
-    /// Asks the disk about the files.
-    pub(super) fn look(&self) -> LogFiles {
-        let size = |file: &File| file.metadata().map_or(0, |facts| facts.len());
-        let folder = self.0.first().and_then(|(path, _)| path.parent());
-        let folder = folder.filter(|folder| !folder.as_os_str().is_empty());
-        LogFiles {
-            of: self.clone(),
-            bytes: self.0.iter().map(|(_, file)| size(file)).sum(),
-            free_bytes: fs4::available_space(folder.unwrap_or(Path::new("."))).ok(),
-            removed: self.removed().next().is_some(),
-        }
-    }
-
-    /// Reserves the names again, for the content of the removed files.
-    pub(super) fn take_names(&self) {
-        for (path, _) in self.removed() {
-            // If the name is in use by now, or the folder no longer exists, the end reports it.
-            let _ = File::create_new(path);
-        }
-    }
-}
-
-impl Log {
-    pub(super) fn of(recorder: Recorder) -> Self {
-        let paths = [Some(recorder.path()), recorder.tlog_path()].into_iter().flatten();
-        let files = paths.filter_map(|path| Some((path.to_owned(), File::open(path).ok()?))).collect();
-        Self { recorder, files: OpenFiles(files) }
-    }
-
-    /// Finishes the log, and writes removed files anew under their names.
-    pub(super) fn finish(&self) -> Result<PathBuf, RecorderError> {
-        let path = self.recorder.finish()?;
-        for (path, file) in self.files.removed() {
-            write_anew(path, file).map_err(|source| RecorderError::Create { path: path.clone(), source })?;
-        }
-        Ok(path)
-    }
-}
-
-fn write_anew(path: &Path, mut file: &File) -> std::io::Result<()> {
-    let mut anew = File::options().append(true).create(true).open(path)?;
-    if anew.metadata()?.len() > 0 {
-        return Err(ErrorKind::AlreadyExists.into());
-    }
-    file.rewind()?;
-    std::io::copy(&mut file, &mut anew)?;
-    anew.sync_data()
-}
-
 /// The log that a guard finishes; a station that begins another log puts it here.
-pub(super) type GuardedLog = Arc<Mutex<Option<Log>>>;
+pub(super) type GuardedLog = Arc<Mutex<Option<Recorder>>>;
 
 /// Finishes the log when it goes out of scope, also while a panic unwinds.
 pub struct LogGuard(GuardedLog);
@@ -196,14 +139,14 @@ pub struct LogGuard(GuardedLog);
 impl LogGuard {
     /// Guards a log, if there is one.
     pub fn new(recorder: Option<Recorder>) -> Self {
-        Self(Arc::new(Mutex::new(recorder.map(Log::of))))
+        Self(Arc::new(Mutex::new(recorder)))
     }
 
     pub(super) fn log(&self) -> GuardedLog {
         Arc::clone(&self.0)
     }
 
-    fn take(&self) -> Option<Log> {
+    fn take(&self) -> Option<Recorder> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 
@@ -211,7 +154,7 @@ impl LogGuard {
     pub fn discard(self) {
         if let Some(log) = self.take() {
             // Why the run has failed is being reported.
-            let _ = log.recorder.discard();
+            let _ = log.discard();
         }
     }
 
@@ -424,14 +367,16 @@ fn write_one(folder: &Path, name: &str, text: &str) -> anyhow::Result<()> {
     fs::rename(&part, &whole).with_context(failed)
 }
 
+/// The files of places in a folder.
+fn place_files(folder: &Path) -> impl Iterator<Item = fs::DirEntry> {
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let files = fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok);
+    files.filter(|file| file.file_name().to_string_lossy().starts_with(PLACE_NAME))
+}
+
 /// The newest place that was kept in the folder of the log in the last day.
 pub(super) fn newest_place(folder: Option<&Path>, now_unix_s: u64) -> Option<LastPlace> {
-    let folder = match folder? {
-        here if here.as_os_str().is_empty() => Path::new("."),
-        folder => folder,
-    };
-    let files = fs::read_dir(folder).ok()?.filter_map(Result::ok);
-    let ours = files.filter(|file| file.file_name().to_string_lossy().starts_with(PLACE_NAME));
+    let ours = place_files(folder?);
     // What is no place, as a KML is none, is passed over.
     let places = ours.filter_map(|file| {
         let place: LastPlace =
@@ -446,29 +391,27 @@ pub(super) fn newest_place(folder: Option<&Path>, now_unix_s: u64) -> Option<Las
 // The file beside the log with what must not be forgotten when the station ends.
 
 const UNFINISHED_NAME: &str = "touchdown-unfinished.json";
-/// Older ones are of another day.
-const UNFINISHED_FOR_S: u64 = 12 * 3_600;
 
-/// Writes what is unfinished now, or removes the file when nothing is.
+/// Stores what is unfinished now.
 ///
 /// # Errors
 /// The folder cannot be written.
-pub(super) fn write_unfinished(folder: &Path, kept: &Unfinished, now_unix_s: u64) -> anyhow::Result<()> {
-    if *kept != Unfinished::default() {
-        return write_one(folder, UNFINISHED_NAME, &serde_json::to_string(&(now_unix_s, kept))?);
-    }
-    match fs::remove_file(folder.join(UNFINISHED_NAME)) {
-        Err(error) if error.kind() != ErrorKind::NotFound => Err(error).context(UNFINISHED_NAME),
-        _ => Ok(()),
-    }
+pub(super) fn write_unfinished(folder: &Path, kept: &Unfinished) -> anyhow::Result<()> {
+    write_one(folder, UNFINISHED_NAME, &serde_json::to_string(kept)?)
 }
 
-/// What an earlier run has left unfinished in this folder, as it is now.
-pub(super) fn read_unfinished(folder: Option<&Path>, now_unix_s: u64) -> Option<Unfinished> {
-    let text = fs::read_to_string(folder?.join(UNFINISHED_NAME)).ok()?;
-    let (at_unix_s, kept): (u64, Unfinished) = serde_json::from_str(&text).ok()?;
-    let passed_s = now_unix_s.saturating_sub(at_unix_s);
-    (passed_s <= UNFINISHED_FOR_S).then(|| kept.after(passed_s))
+/// What an earlier run has left unfinished in this folder; `None` if no vehicle has flown from here.
+///
+/// # Errors
+/// The file is damaged, or it is missing beside the position of a vehicle, with which it is written.
+pub(super) fn read_unfinished(folder: Option<&Path>) -> anyhow::Result<Option<Unfinished>> {
+    let Some(folder) = folder else { return Ok(None) };
+    let path = folder.join(UNFINISHED_NAME);
+    match fs::read_to_string(&path) {
+        Ok(text) => serde_json::from_str(&text).map(Some).with_context(|| path.display().to_string()),
+        Err(error) if error.kind() == ErrorKind::NotFound && place_files(folder).next().is_none() => Ok(None),
+        Err(error) => Err(error).with_context(|| path.display().to_string()),
+    }
 }
 
 #[cfg(test)]

@@ -31,6 +31,7 @@ use protocol::book::BookKey;
 use protocol::crew_file::CrewFile;
 use protocol::dialect::TdRole;
 use protocol::key_file::KeyFile;
+use protocol::log::record::EventLevel;
 use protocol::log::recorder::Recorder;
 use protocol::log::writer::LogHeader;
 use protocol::mission::MissionHash;
@@ -44,7 +45,7 @@ use crate::config::{Config, EXAMPLE, usual_path};
 use crate::demo::{Demo, DemoOptions, LogClock};
 use crate::exit;
 use crate::exit::Exit;
-use crate::model::{KeyOwner, Model, Role, Seat, Settings, words::printable};
+use crate::model::{Danger, KeyOwner, Model, Role, Seat, Settings, Speaker, Unfinished, words::printable};
 use crate::update::update;
 use crate::view::theme::Palette;
 use attached::Viewer;
@@ -322,8 +323,15 @@ fn announce(model: &mut Model, auto: bool, renamed: Option<String>, now: Duratio
 fn go_on_with_what_is_kept(model: &mut Model, log: Option<&Recorder>, now: Duration) {
     let (folder, unix_s) = (log.and_then(|log| log.path().parent()), model.settings.start_unix_s);
     model.place = newest_place(folder, unix_s);
-    if let Some(kept) = read_unfinished(folder, unix_s).filter(|_| !model.settings.demonstration) {
-        model.take_unfinished(kept, now);
+    if !model.settings.demonstration {
+        let kept = read_unfinished(folder).unwrap_or_else(|why| {
+            let text = format!("what the last run left unfinished is not known, so people wait: {why:#}");
+            model.say(now, Speaker::Ground, EventLevel::Error, text);
+            Some(Unfinished { abort: None, danger: Some(Danger::NotReported) })
+        });
+        if let Some(kept) = kept {
+            model.take_unfinished(kept, now);
+        }
     }
     if model.place.is_some() {
         model.info(now, "the last place of a vehicle is kept from before: page Find");

@@ -15,7 +15,7 @@ use protocol::log::recorder::{Recorder, RecorderError};
 use protocol::log::writer::LogHeader;
 
 use super::background::{Outcome, Target};
-use super::files::{GuardedLog, Log, LogWatch, OpenFiles, open_log};
+use super::files::{GuardedLog, LogWatch, open_log};
 use super::output::absolute;
 use super::programs::in_a_thread;
 use super::server::hello;
@@ -62,21 +62,16 @@ impl NextLog {
 
     /// The log that is written; `None` if none is wanted.
     pub(super) fn present(&self) -> Option<Recorder> {
-        self.guarded().as_ref().map(|log| log.recorder.clone())
+        self.guarded().clone()
     }
 
-    /// The files of the log that is written.
-    pub(super) fn files(&self) -> Option<OpenFiles> {
-        self.guarded().as_ref().map(|log| log.files.clone())
-    }
-
-    fn guarded(&self) -> MutexGuard<'_, Option<Log>> {
+    fn guarded(&self) -> MutexGuard<'_, Option<Recorder>> {
         self.guarded.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 /// Writes the end of a log in a thread of its own, because the disk may be slow.
-fn end(log: Log) -> Option<Receiver<Result<(), RecorderError>>> {
+fn end(log: Recorder) -> Option<Receiver<Result<(), RecorderError>>> {
     // Without the thread the last handle is gone, and the recorder ends the log by itself.
     in_a_thread("log end", move || log.finish().map(drop)).ok()
 }
@@ -88,7 +83,7 @@ fn file_name(path: &Path) -> String {
 impl Station {
     /// Begins the next log if the present one is long and nobody flies, or at once if it was
     /// removed.
-    pub(super) fn keep_logs_short(&mut self, model: &mut Model, wire: &mut Wire) {
+    pub(super) fn keep_logs_short(&mut self, model: &mut Model) {
         let now = self.clock.now();
         let ended = self.next_log.ending.as_ref().map(Receiver::try_recv);
         if let Some(Ok(ended)) = &ended {
@@ -101,7 +96,7 @@ impl Station {
         let waits = now < self.next_log.not_before || matches!(ended, Some(Err(TryRecvError::Empty)));
         // A demonstration has one log, which its vehicle writes, too: that is written again at the
         // end.
-        let is_removed = self.log_watch.removed && !model.settings.demonstration;
+        let is_removed = model.log.removed && self.log_watch.removed && !model.settings.demonstration;
         if !waits && (is_removed || is_long && model.may_change_log(now)) {
             self.begin_next_log();
         }
@@ -110,28 +105,27 @@ impl Station {
     /// Has the next log created.
     fn begin_next_log(&mut self) {
         // The crew sees a log that has failed; a new one would hide it.
-        let Some(before) = self.recorder.as_ref().filter(|log| log.is_whole()) else { return };
-        let Some(files) = self.next_log.files().filter(|_| !self.next_log.begins) else { return };
+        let before = self.recorder.clone().filter(|log| log.is_whole() && !self.next_log.begins);
+        let Some(before) = before else { return };
         let NextLog { names: (log, tlog), header, .. } = &self.next_log;
         let (log, tlog, mut header) = (log.clone(), tlog.clone(), header.clone());
         header.run.insert("after".to_owned(), file_name(before.path()));
         self.next_log.begins = self.background.queue(Target::NextLog, move || {
-            files.take_names();
-            let next = open_log(log.as_ref(), tlog.as_ref(), &header);
-            Outcome::NextLog(next.map(|next| next.map(Log::of)))
+            before.take_names();
+            Outcome::NextLog(open_log(log.as_ref(), tlog.as_ref(), &header))
         });
     }
 
     /// Continues in the next log, once it is created.
     pub(super) fn change_log(
         &mut self,
-        next: anyhow::Result<Option<Log>>,
+        next: anyhow::Result<Option<Recorder>>,
         model: &mut Model,
         wire: &mut Wire,
     ) {
         let now = self.clock.now();
         self.next_log.begins = false;
-        let next_log = match next {
+        let next = match next {
             Ok(Some(next)) => next,
             Ok(None) => return,
             Err(why) => {
@@ -139,12 +133,11 @@ impl Station {
                 return model.warn(now, format!("the log stays the same: {why:#}"));
             }
         };
-        let next = next_log.recorder.clone();
         let Some(before) = &self.recorder else { return };
         let before_name = file_name(before.path());
         self.close_book(&format!("the log goes on in {}", file_name(next.path())), model, wire);
         let end_of_book = model.book.short().map_or_else(String::new, |end| format!(" with book {end}"));
-        let before = self.next_log.guarded().replace(next_log);
+        let before = self.next_log.guarded().replace(next.clone());
         wire.recorder = Some(next.clone());
         (self.recorder, self.log_watch) = (Some(next.clone()), LogWatch::default());
         self.next_log.ending = before.and_then(end);
@@ -233,7 +226,7 @@ mod tests {
                 }
             };
             say(&mut wire);
-            station.keep_logs_short(&mut model, &mut wire);
+            station.keep_logs_short(&mut model);
             assert_eq!(model.settings.log_path.as_deref(), Some(&*log), "a short log goes on");
             change_log(&mut station, &mut model, &mut wire);
             say(&mut wire);

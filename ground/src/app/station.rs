@@ -16,7 +16,7 @@ use tokio::time::{MissedTickBehavior, interval};
 
 use super::background::{Background, Outcome, Target};
 use super::clock::{Clock, LogTime, Signals};
-use super::files::{LogWatch, SignatureFile, StationBook};
+use super::files::{LogFiles, LogWatch, SignatureFile, StationBook};
 use super::next_log::NextLog;
 use super::output::{Lines, Output};
 use super::server::{Server, ServerEvent, hello};
@@ -173,7 +173,7 @@ impl Station {
                 next = next.max(self.step(model, wire, Msg::ScreenGone));
             }
             self.tell_crew(model, wire);
-            self.keep_logs_short(model, wire);
+            self.keep_logs_short(model);
             if next == Next::Quit {
                 return Ok(());
             }
@@ -303,8 +303,8 @@ impl Station {
         while let Some(outcome) = self.background.outcome() {
             self.take_outcome(outcome, model, wire);
         }
-        if let Some(files) = self.next_log.files().filter(|_| self.log_watch.begins()) {
-            self.background.queue(Target::LogFiles, move || Outcome::LogFiles(files.look()));
+        if let Some(log) = self.recorder.clone().filter(|_| self.log_watch.begins()) {
+            self.background.queue(Target::LogFiles, move || Outcome::LogFiles(LogFiles::of(&log)));
         }
     }
 
@@ -314,8 +314,8 @@ impl Station {
             Outcome::Written => {}
             Outcome::NotWritten(target, error) => self.report_not_written(target, &error, model),
             Outcome::LogFiles(found) => {
-                if let Some(present) = self.next_log.files() {
-                    self.log_watch.take(&found, &present, now);
+                if let Some(present) = &self.recorder {
+                    self.log_watch.take(&found, present, now);
                 }
             }
             Outcome::NextLog(next) => self.change_log(next, model, wire),
@@ -369,10 +369,10 @@ impl Station {
                 }
                 Action::KeepPlace(place) => {
                     let target = Target::Position(place.boot);
-                    self.save(target, model, move |folder, _| files::write_place(folder, &place));
+                    self.save(target, model, move |folder| files::write_place(folder, &place));
                 }
                 Action::KeepUnfinished(kept) => {
-                    let write = move |folder: &Path, unix_s| files::write_unfinished(folder, &kept, unix_s);
+                    let write = move |folder: &Path| files::write_unfinished(folder, &kept);
                     self.save(Target::Unfinished, model, write);
                 }
                 Action::Enter(line) => self.enter(&line),
@@ -414,18 +414,18 @@ impl Station {
         }
     }
 
-    /// Has a file written beside the log, given the folder and the Unix time, s.
+    /// Has a file written into the folder of the log.
     fn save(
         &mut self,
         target: Target,
         model: &mut Model,
-        write: impl FnOnce(&Path, u64) -> anyhow::Result<()> + Send + 'static,
+        write: impl FnOnce(&Path) -> anyhow::Result<()> + Send + 'static,
     ) {
         let Some(folder) = self.recorder.as_ref().and_then(|recorder| recorder.path().parent()) else {
             return;
         };
-        let (folder, unix_s) = (folder.to_owned(), self.clock.unix_ns() / 1_000_000_000);
-        self.queue(target, model, move || write(&folder, unix_s));
+        let folder = folder.to_owned();
+        self.queue(target, model, move || write(&folder));
     }
 
     /// Queues a file for the disk.
@@ -447,7 +447,7 @@ impl Station {
     /// Tells every screen what is kept from before this run: the checklist, the last place, what is
     /// unfinished.
     pub(super) fn publish_kept(&mut self, model: &Model, now: Duration) {
-        if let Some((kept, _)) = &model.kept {
+        if let Some(kept) = &model.kept {
             self.publish(&Msg::Unfinished(Box::new(kept.clone())), now);
         }
         self.publish_checklist(model, now);
@@ -562,7 +562,7 @@ impl Station {
                     model.warn(clock.now(), format!("the next run will not know this: {error:#}"));
                 }
                 // Its files are empty.
-                Outcome::NextLog(Ok(Some(log))) => _ = log.recorder.discard(),
+                Outcome::NextLog(Ok(Some(log))) => _ = log.discard(),
                 Outcome::Written | Outcome::LogFiles(_) | Outcome::NextLog(_) => {}
             }
         }

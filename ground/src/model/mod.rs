@@ -222,8 +222,8 @@ pub struct Model {
     /// An abort of an earlier run of this station, or of its screen, that was asked for and not
     /// confirmed.
     pub(crate) abort_before: Option<String>,
-    /// What is kept of it beside the log, and since when.
-    pub(crate) kept: Option<(Unfinished, Duration)>,
+    /// What is stored of it beside the log.
+    pub(crate) kept: Option<Unfinished>,
     /// When it is looked at next.
     pub(crate) place_due: Option<Duration>,
     /// The radio range test, once one has begun.

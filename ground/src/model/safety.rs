@@ -143,18 +143,9 @@ impl Vehicle {
 pub struct Unfinished {
     /// An abort that was asked for and not confirmed: when, and by whom.
     pub abort: Option<String>,
-    /// Why people must keep away.
-    pub away: Option<KeepAway>,
-}
-
-impl Unfinished {
-    /// The same this much later.
-    #[must_use]
-    pub fn after(self, passed_s: u64) -> Self {
-        let passed_s = u16::try_from(passed_s).unwrap_or(u16::MAX);
-        let left_s = |away: &KeepAway| away.wait_s.unwrap_or(UNTOLD_WAIT_S).saturating_sub(passed_s);
-        Self { away: self.away.map(|away| KeepAway { wait_s: Some(left_s(&away)), ..away }), ..self }
-    }
+    /// Why people must keep away. For how long is not stored: no clock shows how long the station
+    /// was off, so the wait runs again in full.
+    pub danger: Option<Danger>,
 }
 
 impl Model {
@@ -172,18 +163,22 @@ impl Model {
             }
             None => self.abort_before.clone(),
         };
-        Unfinished { abort, away: KeepAway::of(&self.vehicle, now) }
+        Unfinished { abort, danger: KeepAway::of(&self.vehicle, now).map(|away| away.danger) }
     }
 
     /// Goes on with what an earlier run has left unfinished.
     pub fn take_unfinished(&mut self, kept: Unfinished, now: Duration) {
-        self.kept = Some((kept.clone(), now));
+        self.kept = Some(kept.clone());
         if let Some(asked) = &kept.abort {
             let text = format!("an ABORT was asked for at {asked} and not confirmed");
             self.say(now, Speaker::Ground, EventLevel::Error, text);
         }
         self.abort_before = kept.abort;
-        self.vehicle.before = kept.away.map(|away| Sample::new(away, now));
+        let full = |danger| match danger {
+            Danger::LiveWaited => KeepAway { danger: Danger::Live, wait_s: Some(UNTOLD_WAIT_S) },
+            danger => KeepAway { danger, wait_s: Some(UNTOLD_WAIT_S) },
+        };
+        self.vehicle.before = kept.danger.map(|danger| Sample::new(full(danger), now));
     }
 }
 

@@ -63,8 +63,6 @@ impl Announced {
 pub const RESTARTED: &str = "the flight computer has restarted";
 /// News of one reset come within this time.
 const ONE_RESET: Duration = Duration::from_secs(5);
-/// A waiting time is kept anew if it differs by more than this from what is kept, s.
-const KEPT_WITHIN_S: u16 = 2;
 
 /// Shows another boot if one takes the screen.
 pub(super) fn settle(model: &mut Model, now: Duration) {
@@ -96,13 +94,10 @@ pub(super) fn keep_unfinished(model: &mut Model, now: Duration) {
         return;
     }
     let present = model.unfinished(now);
-    let (kept, at) = model.kept.clone().unwrap_or_default();
-    let wait_s = |unfinished: &Unfinished| unfinished.away.and_then(|away| away.wait_s).unwrap_or(0);
-    let about = |unfinished: &Unfinished| (unfinished.abort.clone(), unfinished.away.map(|away| away.danger));
-    let differs = about(&present) != about(&kept);
-    let expected = kept.after(now.saturating_sub(at).as_secs());
-    if differs || wait_s(&present).abs_diff(wait_s(&expected)) > KEPT_WITHIN_S {
-        model.kept = Some((present.clone(), now));
+    // Once a position is stored, nothing is stored explicitly, too: then a missing file shows.
+    let is_missing = model.kept.is_none() && model.place.is_some();
+    if is_missing || present != model.kept.clone().unwrap_or_default() {
+        model.kept = Some(present.clone());
         model.outbox.push(Action::KeepUnfinished(present));
     }
 }

@@ -4,9 +4,7 @@
 use std::time::Duration;
 
 use ground::key::Key;
-use ground::model::{
-    Action, AlarmKind, CommandKind, Danger, KeepAway, Prompt, Role, Seat, Settings, Unfinished,
-};
+use ground::model::{Action, AlarmKind, CommandKind, Danger, Prompt, Role, Seat, Settings, Unfinished};
 use ground::update::{Msg, Request};
 use protocol::dialect::{MavCmd, TdInterlock, TdMotor, TdPhase};
 
@@ -33,10 +31,6 @@ fn latched(rig: &mut Rig) {
     rig.run(1.0);
 }
 
-fn live(wait_s: u16) -> KeepAway {
-    KeepAway { danger: Danger::Live, wait_s: Some(wait_s) }
-}
-
 #[test]
 fn an_abort_and_its_wait_are_kept_until_it_is_confirmed_and_people_may_approach() {
     let mut rig = counting();
@@ -47,17 +41,16 @@ fn an_abort_and_its_wait_are_kept_until_it_is_confirmed_and_people_may_approach(
     assert!(asked.contains("UTC"), "{asked}");
     rig.answer(ABORT, 0);
     latched(&mut rig);
-    assert_eq!(kept(&rig), Some(Unfinished { abort: None, away: Some(live(58)) }));
+    assert_eq!(kept(&rig), Some(Unfinished { abort: None, danger: Some(Danger::Live) }));
     rig.actions.clear();
     for _ in 0..10 {
         rig.approach_wait_s -= 1;
         rig.run(1.0);
     }
-    assert_eq!(kept(&rig).map(|kept| kept.away), None, "a time that passes is not kept anew");
+    assert_eq!(kept(&rig), None, "a time that passes is not stored");
     rig.approach_wait_s = 0;
     rig.run(0.2);
-    let waited = KeepAway { danger: Danger::LiveWaited, wait_s: Some(0) };
-    assert_eq!(kept(&rig).and_then(|kept| kept.away), Some(waited));
+    assert_eq!(kept(&rig).and_then(|kept| kept.danger), Some(Danger::LiveWaited));
     rig.motor = TdMotor::TD_MOTOR_PIN_IN;
     rig.run(0.2);
     assert_eq!(kept(&rig), Some(Unfinished::default()));
@@ -88,23 +81,28 @@ fn a_demonstration_and_an_attached_screen_keep_nothing() {
     }
 }
 
-/// The station was quit during the wait, and vehicle and station were switched on again.
+/// The station was quit during the wait, or after it, and vehicle and station were switched on
+/// again.
 #[test]
-fn a_station_that_is_started_again_goes_on_with_the_wait_and_then_asks_for_the_pin() {
+fn a_restarted_station_waits_again_in_full_and_then_asks_for_the_pin() {
+    for danger in [Danger::Live, Danger::LiveWaited, Danger::NotReported] {
+        let mut rig = Rig::new(settings(false, true));
+        rig.msg(Msg::Unfinished(Box::new(Unfinished { abort: None, danger: Some(danger) })));
+        let shown = reason(&rig).unwrap();
+        assert!(shown.starts_with(" do not approach for 60 s: "), "not received: {shown}");
+    }
     let mut rig = Rig::new(settings(false, true));
-    let before = Unfinished { abort: None, away: Some(live(57)) }.after(5);
-    rig.msg(Msg::Unfinished(Box::new(before)));
-    assert_eq!(reason(&rig).as_deref(), Some(" do not approach for 52 s: LIVE MOTOR"), "unheard");
+    rig.msg(Msg::Unfinished(Box::new(Unfinished { abort: None, danger: Some(Danger::Live) })));
     rig.run(2.0);
-    assert_eq!(reason(&rig).as_deref(), Some(" do not approach for 50 s: LIVE MOTOR"));
+    assert_eq!(reason(&rig).as_deref(), Some(" do not approach for 58 s: LIVE MOTOR"));
     rig.keys(&ladder());
     assert_eq!(rig.take_commands(), []);
     rig.expect_event("cannot arm: do not approach for 5");
-    rig.run(52.0);
+    rig.run(60.0);
     let live = " one person: pin in: the motor is LIVE, and the waiting time is over";
     assert_eq!(reason(&rig).as_deref(), Some(live));
     // It is kept for the next start, too.
-    assert_eq!(kept(&rig).and_then(|kept| kept.away).map(|away| away.danger), Some(Danger::LiveWaited));
+    assert_eq!(kept(&rig).and_then(|kept| kept.danger), Some(Danger::LiveWaited));
     rig.motor = TdMotor::TD_MOTOR_PIN_IN;
     rig.run(1.0);
     rig.motor = TdMotor::TD_MOTOR_LIVE;
@@ -117,11 +115,10 @@ fn a_station_that_is_started_again_goes_on_with_the_wait_and_then_asks_for_the_p
 #[test]
 fn after_the_wait_for_a_hot_motor_nobody_is_asked_to_put_a_pin_in() {
     let mut rig = Rig::new(settings(false, true));
-    let hot = KeepAway { danger: Danger::Hot, wait_s: Some(20) };
-    rig.msg(Msg::Unfinished(Box::new(Unfinished { abort: None, away: Some(hot) })));
+    rig.msg(Msg::Unfinished(Box::new(Unfinished { abort: None, danger: Some(Danger::Hot) })));
     rig.run(2.0);
-    rig.expect_screen("do not approach for 18 s: MOTOR HOT");
-    rig.run(20.0);
+    rig.expect_screen("do not approach for 58 s: MOTOR HOT");
+    rig.run(60.0);
     assert_eq!(reason(&rig), None);
 }
 
@@ -129,7 +126,7 @@ fn after_the_wait_for_a_hot_motor_nobody_is_asked_to_put_a_pin_in() {
 fn a_new_station_says_what_was_asked_for_and_not_confirmed() {
     let mut rig = Rig::new(settings(false, true));
     let asked = Some("12:03:05 UTC (screen 2, Ann)".to_owned());
-    rig.msg(Msg::Unfinished(Box::new(Unfinished { abort: asked.clone(), away: None })));
+    rig.msg(Msg::Unfinished(Box::new(Unfinished { abort: asked.clone(), danger: None })));
     rig.run(1.0);
     let words = "ABORT asked at 12:03:05 UTC (screen 2, Ann) NOT CONFIRMED";
     assert!(rig.screen(120, 36).contains(words), "{}", rig.screen(120, 36));
@@ -142,7 +139,7 @@ fn a_new_station_says_what_was_asked_for_and_not_confirmed() {
         |rig: &Rig| rig.model.alarms.list().iter().any(|alarm| alarm.what.kind == AlarmKind::AbortBefore);
     assert!(!is_open(&rig));
     assert_eq!(kept(&rig), Some(Unfinished::default()));
-    rig.msg(Msg::Unfinished(Box::new(Unfinished { abort: asked, away: None })));
+    rig.msg(Msg::Unfinished(Box::new(Unfinished { abort: asked, danger: None })));
     rig.run(0.1);
     assert!(is_open(&rig));
     rig.abort();

@@ -13,6 +13,7 @@
 
 use std::fs::File;
 use std::io::{self, BufWriter, Seek, Write};
+use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
@@ -25,7 +26,8 @@ use super::tlog::TlogWriter;
 use super::writer::{LogHeader, LogWriteError, LogWriter};
 use crate::text::printable;
 
-const QUEUE_RECORDS: usize = 8192;
+/// A disk may stall for 16 s at the 2,000 records a second of a flight.
+const QUEUE_RECORDS: usize = 32_768;
 const FLUSH_INTERVAL: Duration = Duration::from_millis(200);
 /// What asks to be synced soon is synced at most this often: each time ends a chunk, of which the
 /// writer keeps an entry for the index at the end.
@@ -86,6 +88,8 @@ pub struct Recorder {
 struct Shared {
     path: PathBuf,
     tlog_path: Option<PathBuf>,
+    /// The open files: their content can be read even after somebody has removed them.
+    files: Vec<(PathBuf, File)>,
     dropped: AtomicU64,
     failed: AtomicBool,
     /// Length of the log up to the mark, bytes; 0 without one.
@@ -185,16 +189,19 @@ impl Recorder {
         });
         let (path, (file, tlog)) = created.map_err(|source| RecorderError::Create { path: tried, source })?;
         let create_error = |source| RecorderError::Create { path: path.clone(), source };
+        let paths = [Some(&path), tlog.as_ref().map(|(tlog, _)| tlog)];
+        let opened = paths.into_iter().flatten().map(|path| Ok((path.clone(), File::open(path)?)));
+        let files = opened.collect::<io::Result<_>>().map_err(create_error)?;
         let disk = file.try_clone().map_err(create_error)?;
         let writer = LogWriter::new(BufWriter::new(file), header)
             .map_err(|source| RecorderError::Write { path: path.clone(), source })?;
         let (tlog_path, tlog) = tlog.unzip();
-        Self::start((path.clone(), tlog_path), (writer, tlog), disk).map_err(create_error)
+        Self::start((path.clone(), tlog_path, files), (writer, tlog), disk).map_err(create_error)
     }
 
     /// Starts the two threads.
     fn start<W: Write + Seek + Send + 'static>(
-        (path, tlog_path): (PathBuf, Option<PathBuf>),
+        (path, tlog_path, files): (PathBuf, Option<PathBuf>, Vec<(PathBuf, File)>),
         (writer, tlog): (LogWriter<W>, Option<TlogWriter<BufWriter<File>>>),
         disk: impl Disk,
     ) -> io::Result<Self> {
@@ -202,6 +209,7 @@ impl Recorder {
         let shared = Arc::new(Shared {
             path,
             tlog_path,
+            files,
             dropped: AtomicU64::new(0),
             failed: AtomicBool::new(false),
             marked_bytes: AtomicU64::new(0),
@@ -296,12 +304,39 @@ impl Recorder {
         Some(self.shared.marked_bytes.load(Ordering::Acquire)).filter(|bytes| *bytes > 0)
     }
 
+    /// Files whose names no longer lead to them: somebody has removed or replaced them.
+    fn removed(&self) -> impl Iterator<Item = &(PathBuf, File)> {
+        let is_there = |path: &Path, file: &File| {
+            let [there, ours] = [std::fs::metadata(path).ok()?, file.metadata().ok()?];
+            Some((there.dev(), there.ino()) == (ours.dev(), ours.ino()))
+        };
+        self.shared.files.iter().filter(move |(path, file)| is_there(path, file) != Some(true))
+    }
+
+    /// Returns whether somebody has removed a file. [`Self::finish`] writes it again.
+    pub fn is_removed(&self) -> bool {
+        self.removed().next().is_some()
+    }
+
+    /// Reserves the names of removed files for [`Self::finish`].
+    pub fn take_names(&self) {
+        for (path, _) in self.removed() {
+            // If the name is in use by now, or the folder no longer exists, the end reports it.
+            let _ = File::create_new(path);
+        }
+    }
+
+    /// Length of the files, bytes.
+    pub fn len_bytes(&self) -> u64 {
+        self.shared.files.iter().map(|(_, file)| file.len_bytes().unwrap_or(0)).sum()
+    }
+
     /// Ends the log with its summary and waits until it is written. Records that other handles send
-    /// later count as dropped.
+    /// later count as dropped. Removed files are written again under their names.
     ///
     /// # Errors
     /// A record could not be written or, at any time, not synced; everything synced before it can
-    /// still be read.
+    /// still be read. Or a removed file cannot be written again.
     pub fn finish(&self) -> Result<PathBuf, RecorderError> {
         let path = self.shared.path.clone();
         let thread = self.shared.thread.lock().ok().and_then(|mut slot| slot.take());
@@ -311,10 +346,14 @@ impl Recorder {
         // If the thread has ended already, joining it returns its error.
         let _ = self.orders.send(Order::Finish);
         match thread.join() {
-            Ok(Ok(())) => Ok(path),
-            Ok(Err(source)) => Err(RecorderError::Write { path, source }),
-            Err(_panic) => Err(RecorderError::Gone { path }),
+            Ok(Ok(())) => {}
+            Ok(Err(source)) => return Err(RecorderError::Write { path, source }),
+            Err(_panic) => return Err(RecorderError::Gone { path }),
         }
+        for (path, file) in self.removed() {
+            restore(path, file).map_err(|source| RecorderError::Create { path: path.clone(), source })?;
+        }
+        Ok(path)
     }
 
     /// Ends the log and removes its files, because the run has failed before it began: their names
@@ -327,6 +366,16 @@ impl Recorder {
         let files = [Some(self.path()), self.tlog_path()];
         files.into_iter().flatten().try_for_each(std::fs::remove_file)
     }
+}
+
+fn restore(path: &Path, mut file: &File) -> io::Result<()> {
+    let mut again = File::options().append(true).create(true).open(path)?;
+    if again.metadata()?.len() > 0 {
+        return Err(io::ErrorKind::AlreadyExists.into());
+    }
+    file.rewind()?;
+    io::copy(&mut file, &mut again)?;
+    again.sync_data()
 }
 
 #[expect(clippy::disallowed_methods, reason = "the flush timer is about the disk, not about the flight")]
@@ -458,7 +507,7 @@ mod tests {
 
     fn started<W: Write + Seek + Send + 'static>(output: W, disk: impl Disk) -> Recorder {
         let writer = LogWriter::new(output, &LogHeader::default()).unwrap();
-        Recorder::start((PathBuf::from("of a test"), None), (writer, None), disk).unwrap()
+        Recorder::start((PathBuf::from("of a test"), None, Vec::new()), (writer, None), disk).unwrap()
     }
 
     #[test]

@@ -1,66 +1,75 @@
-//! An abort on the pad outlives the vehicle's power switch, in a small file: when it was, by the
-//! wall clock.
+//! An abort on the pad outlives the vehicle's power switch: a small file exists as long as people
+//! must wait.
+//!
+//! The file has no time. No clock of the vehicle runs while it is off, and the wall clock may be
+//! set, so the wait runs again in full.
 
-use std::fs;
-use std::path::PathBuf;
-use std::time::{SystemTime, UNIX_EPOCH};
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
 use crate::wire::vehicle::Vehicle;
 
+/// Changes that wait for the disk: an abort, and its end a minute later.
+const WAITING_MAX: usize = 4;
+
 pub(super) struct KeptAbort {
     file: Option<PathBuf>,
-    /// Whether the file is there.
+    /// Whether the file exists, or will once the disk continues.
     kept: bool,
+    /// The thread that writes: a disk that stalls must not stop the vehicle.
+    changes: Option<(SyncSender<bool>, Receiver<String>)>,
 }
 
 impl KeptAbort {
-    /// Opens the file, and says how long ago the abort was, s. One that cannot be read was just
-    /// now: nobody is told less.
-    pub(super) fn open(file: Option<PathBuf>) -> (Self, Option<f64>) {
-        let kept = file.as_ref().filter(|file| file.exists());
-        let ago_s = kept.map(|file| ago_s(&fs::read_to_string(file).unwrap_or_default(), unix_s()));
-        (Self { kept: ago_s.is_some(), file }, ago_s)
+    /// Opens the file, and returns whether people still had to wait when the vehicle was switched
+    /// off.
+    pub(super) fn open(file: Option<PathBuf>) -> (Self, bool) {
+        let kept = file.as_ref().is_some_and(|file| file.exists());
+        (Self { file, kept, changes: None }, kept)
     }
 
-    /// Writes the abort of this vehicle, or forgets it when people may have approached. Says if
-    /// that fails.
+    /// Has the abort of this vehicle stored, or removed when people may have approached. Returns
+    /// why an earlier change failed.
     pub(super) fn keep(&mut self, vehicle: &Vehicle) -> Option<String> {
-        let abort_s = vehicle.mode().abort_to_keep_s(vehicle.time_s());
-        let file = self.file.as_ref().filter(|_| abort_s.is_some() != self.kept)?;
-        self.kept = abort_s.is_some();
-        // Complete or absent.
-        let beside = file.with_added_extension("new");
-        let written = match abort_s.map(|abort_s| unix_s() - (vehicle.time_s() - abort_s)) {
-            Some(at_s) => fs::write(&beside, format!("{at_s:.1}\n")).and_then(|()| fs::rename(&beside, file)),
-            None => fs::remove_file(file),
-        };
-        written.err().map(|why| format!("the wait after an abort is not kept: {}: {why}", file.display()))
+        let keeps = vehicle.mode().abort_to_keep_s(vehicle.time_s()).is_some();
+        let file = self.file.as_ref()?;
+        if keeps != self.kept {
+            let (changes, _) = self.changes.get_or_insert_with(|| write_in_a_thread(file));
+            // If there is no room, the next frame tries again.
+            self.kept = if changes.try_send(keeps).is_ok() { keeps } else { self.kept };
+        }
+        let failed = |why| format!("the wait after an abort is not kept: {}: {why}", file.display());
+        self.changes.as_ref()?.1.try_recv().ok().map(failed)
     }
 }
 
-fn ago_s(text: &str, now_s: f64) -> f64 {
-    let at_s = text.trim().parse().ok().filter(|at_s: &f64| at_s.is_finite());
-    // A clock that was set back ends no wait.
-    at_s.map_or(0.0, |at_s| (now_s - at_s).max(0.0))
-}
-
-#[expect(
-    clippy::disallowed_methods,
-    reason = "only the wall clock goes on while the vehicle is off; no flight reads it"
-)]
-fn unix_s() -> f64 {
-    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |since| since.as_secs_f64())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_abort_is_as_old_as_the_clock_says_and_was_just_now_if_the_file_or_the_clock_is_wrong() {
-        let cases = [("980.0\n", 20), ("", 0), ("nonsense", 0), ("NaN", 0), ("inf", 0), ("1000.1", 0)];
-        for (text, expected) in cases {
-            assert_eq!(ago_s(text, 1_000.0) as u32, expected, "{text}");
+impl Drop for KeptAbort {
+    /// Waits for the last change.
+    fn drop(&mut self) {
+        if let Some((changes, failures)) = self.changes.take() {
+            drop(changes);
+            failures.iter().for_each(drop);
         }
     }
+}
+
+fn write_in_a_thread(file: &Path) -> (SyncSender<bool>, Receiver<String>) {
+    let (change, changes) = sync_channel(WAITING_MAX);
+    let (failed, failures) = sync_channel(WAITING_MAX);
+    let file = file.to_owned();
+    let write = move || {
+        for keeps in changes {
+            let written = if keeps { create(&file) } else { fs::remove_file(&file) };
+            // Nobody may be listening any more.
+            let _ = written.map_err(|why| failed.try_send(why.to_string()));
+        }
+    };
+    // Without the thread both channels are closed: nothing can be stored.
+    let _ = std::thread::Builder::new().name("kept abort".to_owned()).spawn(write);
+    (change, failures)
+}
+
+fn create(file: &Path) -> std::io::Result<()> {
+    File::create(file)?.sync_all()
 }

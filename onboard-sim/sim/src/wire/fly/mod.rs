@@ -223,10 +223,10 @@ fn endpoint_of(options: &FlyOptions) -> VehicleEndpoint {
 }
 
 /// The vehicle, powered up, with its crew and with its pin out.
-fn vehicle_of(options: &FlyOptions, aborted_s_ago: Option<f64>) -> Result<Vehicle, FlyError> {
+fn vehicle_of(options: &FlyOptions, was_aborted: bool) -> Result<Vehicle, FlyError> {
     let mut vehicle = options.flight.vehicle()?;
-    if let Some(ago_s) = aborted_s_ago {
-        vehicle = vehicle.aborted_before(-ago_s);
+    if was_aborted {
+        vehicle = vehicle.aborted_before(0.0);
     }
     if let Some(crew) = &options.crew {
         if options.key_file.is_none() {
@@ -301,8 +301,8 @@ pub async fn fly_observed(
     mut stop: watch::Receiver<bool>,
     mut observe: impl FnMut(f64, &VehicleEvent) + Send,
 ) -> Result<FlightSummary, FlyError> {
-    let (mut kept_abort, aborted_s_ago) = KeptAbort::open(options.abort_file.take());
-    let mut vehicle = vehicle_of(&options, aborted_s_ago)?;
+    let (mut kept_abort, was_aborted) = KeptAbort::open(options.abort_file.take());
+    let mut vehicle = vehicle_of(&options, was_aborted)?;
     let mut links = Links::open(
         &options.links,
         options.key_file.as_deref(),

@@ -80,7 +80,8 @@ pub(super) fn log_state(recorder: Option<&Recorder>) -> LogState {
     };
     let directory = recorder.path().parent().filter(|path| !path.as_os_str().is_empty());
     let space_bytes = fs4::available_space(directory.unwrap_or(Path::new("."))).unwrap_or(0);
-    LogState { running: recorder.is_whole() && recorder.dropped() == 0, space_bytes }
+    let running = recorder.is_whole() && recorder.dropped() == 0 && !recorder.is_removed();
+    LogState { running, space_bytes }
 }
 
 // The vehicle's own log as a file that it gives out once it is down: the part up to a mark, which
