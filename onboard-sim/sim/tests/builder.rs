@@ -1,6 +1,6 @@
-//! What MK3.md tells a builder to measure, and when to stop, follows from the airframe, its motor,
-//! the limits of the pad check, and what `real` scatters: two deviations to either side, because a
-//! part outside of them is wrong rather than unlucky.
+//! The tolerances of docs/build-mk3.md follow from the airframe, its motor, the limits of the pad
+//! check, and the scatter of `real`: two standard deviations to either side, because a part outside
+//! of them is wrong rather than unlucky.
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::f64::consts::TAU;
@@ -9,7 +9,7 @@ use flight::vehicles::{mission, motors};
 use sim::dispersion::Dispersion;
 use sim::world::truth::Truth;
 
-const PAGE: &str = include_str!("../../../MK3.md");
+const PAGE: &str = include_str!("../../../docs/build-mk3.md");
 const SIGMAS: f64 = 2.0;
 const G_M_S2: f64 = 9.80665;
 
