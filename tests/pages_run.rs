@@ -11,8 +11,9 @@ use e2e::{Program, Running, program};
 use crate::pages::page;
 
 /// The pages, from the root of the workspace.
-const PAGES: [&str; 9] = [
+const PAGES: [&str; 10] = [
     "README.md",
+    "docs/safety.md",
     "docs/engineer.md",
     "docs/build-mk3.md",
     "CONTRIBUTING.md",
@@ -71,7 +72,8 @@ const ELSEWHERE: [(&str, &str, &str); 27] = [
 ];
 
 /// What the pages say that a line answers: how the line begins, and words of its answer.
-const SAID: [(&str, &str); 21] = [
+const SAID: [(&str, &str); 22] = [
+    ("onboard-sim fly --start pad --fault abort@descent", "ABORTED, then DOWN UNDER THE PARACHUTE"),
     ("onboard-sim fly --start pad --fault separation-fails@0", "DOWN UNDER THE PARACHUTE"),
     ("onboard-sim campaign --only 17", "touchdown_vertical_m_s"),
     (
