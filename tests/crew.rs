@@ -1,5 +1,5 @@
-//! CREW.md as it stands: every command of ours on it. Addresses and devices of the page are those
-//! of this test.
+//! Runs every command of docs/crew.md as printed. The page's addresses and devices are replaced by
+//! those of this test.
 
 use std::fs;
 use std::net::SocketAddr;
@@ -40,7 +40,7 @@ impl Places {
 
     /// The command of a line of the page that begins like this, in a folder.
     fn command(&self, folder: &Path, begins: &str) -> Command {
-        let lines = lines_of_code(&page("CREW.md"));
+        let lines = lines_of_code(&page("docs/crew.md"));
         let line = lines.iter().find(|line| line.starts_with(begins));
         let line = line.unwrap_or_else(|| panic!("no line `{begins}` on the page"));
         let (which, words) = commands_of(line).pop().expect("a command of ours");
@@ -94,7 +94,7 @@ const LINES: [&str; 20] = [
 /// A line that is new on the page needs a test.
 #[test]
 fn every_command_of_the_crews_page_is_run_here() {
-    let lines = lines_of_code(&page("CREW.md"));
+    let lines = lines_of_code(&page("docs/crew.md"));
     let ours: Vec<&String> = lines.iter().filter(|line| !commands_of(line).is_empty()).collect();
     let starts = |line: &str| LINES.iter().any(|begin| format!("{line} ").starts_with(begin));
     let new: Vec<_> = ours.iter().filter(|line| !starts(line)).collect();
@@ -165,7 +165,7 @@ fn the_log_is_fetched_as_the_crews_page_says() {
 
 /// The crew file is the block of the page.
 fn crew_file() -> String {
-    let page = page("CREW.md");
+    let page = page("docs/crew.md");
     let block = page.lines().skip_while(|line| *line != "```toml").skip(1).take_while(|line| *line != "```");
     block.collect::<Vec<_>>().join("\n")
 }

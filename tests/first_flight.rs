@@ -1,5 +1,5 @@
-//! FIRST_FLIGHT.md as it stands: every command of ours on it, in its order, with a simulated pair
-//! of radios.
+//! Runs every command of docs/first-flight.md as printed and in its order, over a simulated pair of
+//! radios.
 
 use std::path::Path;
 use std::process::Command;
@@ -14,7 +14,7 @@ const SIZE: (u16, u16) = (80, 24);
 
 /// The commands of the page, each at its end of the radio.
 fn commands(folder: &Path, radio: &SerialLine) -> Vec<Command> {
-    let of_the_page = lines_of_code(&page("FIRST_FLIGHT.md"));
+    let of_the_page = lines_of_code(&page("docs/first-flight.md"));
     let commands = of_the_page.iter().flat_map(|line| commands_of(line));
     let as_a_process = |(which, words): (Program, Vec<String>)| {
         let end = if which == Program::Ground { radio.far_link() } else { radio.near_link() };

@@ -206,7 +206,7 @@ fn cells(page: &str, first: &str) -> Vec<String> {
 /// Each mission has its row on one page: the README has three, the engineer's page the others.
 #[test]
 fn the_landing_rates_on_the_pages_are_the_measured_ones() {
-    let (missions, mk3) = (page("README.md") + &page("ENGINEER.md"), page("MK3.md"));
+    let (missions, mk3) = (page("README.md") + &page("docs/engineer.md"), page("docs/build-mk3.md"));
     for rate in rates().iter().filter(|rate| matches!(rate.dispersion.as_str(), "field" | "real")) {
         let of = if rate.flights == 1_000 { "1,000".to_owned() } else { rate.flights.to_string() };
         let row = cells(&missions, &format!("`{}` |", rate.mission));
@@ -220,25 +220,28 @@ fn the_landing_rates_on_the_pages_are_the_measured_ones() {
             let Rate { flights, stands, envelope, .. } = rate(mission, dispersion);
             let told = [stands, envelope]
                 .map(|count| format!("{} ({})", percent(count, flights), interval(count, flights)));
-            assert_eq!(row[1..], told, "MK3.md {dispersion}, {mission}");
+            assert_eq!(row[1..], told, "docs/build-mk3.md {dispersion}, {mission}");
         }
     }
     let Rate { flights, stands, .. } = rate("mk3", "wild");
     let wild = format!("{stands} of {flights} stand");
-    assert!(prose("MK3.md").replace(',', "").contains(&wild), "MK3.md does not say: {wild}");
+    assert!(
+        prose("docs/build-mk3.md").replace(',', "").contains(&wild),
+        "docs/build-mk3.md does not say: {wild}"
+    );
 }
 
 /// Every figure of a sentence about rates on the page for the range safety officer.
 #[test]
 fn what_the_safety_page_says_of_landing_rates_agrees_with_the_measured_ones() {
     let [field, real] = ["field", "real"].map(|dispersion| rate("mk2", dispersion));
-    let safety = prose("SAFETY.md");
+    let safety = prose("docs/safety.md");
     let said: Vec<&str> =
         safety.split(". ").filter(|sentence| sentence.contains("landing rate of")).collect();
-    assert!(!said.is_empty(), "SAFETY.md gives no landing rate");
+    assert!(!said.is_empty(), "docs/safety.md gives no landing rate");
     for sentence in said {
         for figure in [percent(field.stands, field.flights), percent(real.stands, real.flights)] {
-            assert!(sentence.contains(&figure), "SAFETY.md: {figure} is missing in: {sentence}");
+            assert!(sentence.contains(&figure), "docs/safety.md: {figure} is missing in: {sentence}");
         }
         assert_eq!(sentence.matches(" %").count(), 2, "another figure in: {sentence}");
     }
@@ -261,7 +264,7 @@ fn sources_below(folder: &Path, found: &mut String) {
 #[test]
 fn every_test_that_the_safety_page_names_exists() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let page = fs::read_to_string(root.join("SAFETY.md")).expect("the page");
+    let page = fs::read_to_string(root.join("docs/safety.md")).expect("the page");
     let mut sources = String::new();
     sources_below(&root, &mut sources);
     let is_name = |word: &&str| word.matches('_').count() > 2 && !word.contains([' ', '.', '/']);

@@ -22,7 +22,7 @@ const JUST_ENDED: Duration = Duration::from_secs(3);
 
 /// The surfaces in the order in which a check moves them, the number of the first item of each, and
 /// what people see. Fins have their numbers painted on: seen from the nose they count
-/// counter-clockwise (MK3.md, Axes and signs).
+/// counter-clockwise (docs/build-mk3.md, Axes and signs).
 pub const SURFACES: [(&str, u32, &str); 6] = [
     ("gimbal pitch", 0, "nozzle swings towards fins 1 and 4, then towards 2 and 3"),
     ("gimbal yaw", 3, "nozzle swings towards fins 1 and 2, then towards 3 and 4"),

@@ -151,7 +151,7 @@ fn toml_block(page: &str, begins: &str) -> String {
 /// Whoever copies the examples of the page can arm.
 #[test]
 fn the_example_crew_can_finish_both_example_checklists() {
-    let page = include_str!("../../../CREW.md");
+    let page = include_str!("../../../docs/crew.md");
     let crew = toml_block(page, "# crew.toml");
     let crew = CrewFile::from_toml(&crew, Path::new("crew.toml")).expect("an example that is read");
     for list in [include_str!("../../checklist-example.toml"), &toml_block(page, "name = ")] {

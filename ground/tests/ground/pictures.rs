@@ -2,7 +2,7 @@
 //! says nothing alone.
 //!
 //! The pictures are written to `target/tmp/pictures`. `UPDATE_PICTURES=1 cargo test -p ground
-//! --test ground pictures` also writes those that README.md and CREW.md show, the moving one
+//! --test ground pictures` also writes those that README.md and docs/crew.md show, the moving one
 //! included, to `ground/pictures`, from the flight that is recorded there: `onboard-sim fly --start
 //! pad --dispersion real --seed 2001 --mavlink udpin:127.0.0.1:14550` and `ground --auto --connect
 //! udpout:127.0.0.1:14550 --log flight.mcap --tlog flight.tlog`.
@@ -441,7 +441,7 @@ fn is_ready(moment: &Moment) -> bool {
     phase && moment.status.checks_failed.is_empty() && moment.rig.model.link.uplink.is_proven(moment.rig.now)
 }
 
-/// The pictures of README.md and CREW.md: on the pad, in the descent, and after the landing.
+/// The pictures of README.md and docs/crew.md: on the pad, in the descent, and after the landing.
 fn moments() -> [(&'static str, Palette, Moment); 3] {
     let falls = |moment: &Moment| moment.phase == TdPhase::TD_PHASE_AERO_DESCENT && moment.height_m < 220.0;
     [

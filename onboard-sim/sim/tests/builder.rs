@@ -1,6 +1,6 @@
-//! What MK3.md tells a builder to measure, and when to stop, follows from the airframe, its motor,
-//! the limits of the pad check, and what `real` scatters: two deviations to either side, because a
-//! part outside of them is wrong rather than unlucky.
+//! The tolerances of docs/build-mk3.md follow from the airframe, its motor, the limits of the pad
+//! check, and the scatter of `real`: two standard deviations to either side, because a part outside
+//! of them is wrong rather than unlucky.
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::f64::consts::TAU;
@@ -9,7 +9,7 @@ use flight::vehicles::{mission, motors};
 use sim::dispersion::Dispersion;
 use sim::world::truth::Truth;
 
-const PAGE: &str = include_str!("../../../MK3.md");
+const PAGE: &str = include_str!("../../../docs/build-mk3.md");
 const SIGMAS: f64 = 2.0;
 const G_M_S2: f64 = 9.80665;
 
@@ -58,7 +58,7 @@ fn the_bounds_for_a_builder_follow_from_the_data() {
     let (rod_mm, limit_deg) = (500.0, mk3.gimbal.limit_deg);
     let tip_mm = |deg: f64| rod_mm * libm::tan(deg.to_radians());
     says("thrust line, direction", [0.0, 0.0, tip_mm(SIGMAS * real.thrust_misalignment_deg)], 1);
-    says("thrust line, place", [0.0, 0.0, 1e3 * SIGMAS * wrong.thrust_offset_m], 1);
+    says("thrust line, position", [0.0, 0.0, 1e3 * SIGMAS * wrong.thrust_offset_m], 1);
     let gain = SIGMAS * wrong.gimbal_gain_share;
     says("gimbal, each end", [1.0, 1.0 - gain, 1.0 + gain].map(|gain| tip_mm(gain * limit_deg)), 0);
     says("gimbal, play", [mk3.gimbal.servo.slop_deg, 0.0, wrong.gimbal_slop_deg[1]].map(tip_mm), 1);

@@ -45,7 +45,7 @@ pub(crate) struct FlyArguments {
     /// Sign every frame with this key, and ignore frames that are not signed with it. See keygen.
     #[arg(long, value_name = "FILE")]
     key: Option<PathBuf>,
-    /// People who may command, each with a key of their own (TOML; see the README): arming and
+    /// People who may command, each with a key of their own (TOML; see docs/crew.md): arming and
     /// start by one or by two of them. Needs --key, which all share.
     #[arg(long, value_name = "FILE", requires = "key")]
     crew: Option<PathBuf>,

@@ -393,8 +393,8 @@ mod tests {
         }
     }
 
-    /// MK3.md, "What a builder measures": ten swings of mk3 on wires of 1 m, 0.4 m apart, take 19.3
-    /// s.
+    /// docs/build-mk3.md, "What a builder measures": ten swings of mk3 on wires of 1 m, 0.4 m
+    /// apart, take 19.3 s.
     #[test]
     fn val_hand_answers_are_scaled_converted_and_swung() {
         let answers = "HP-H45W\n4100 g\n80 m\n0,8\n\nhalf\n40\n0.4\n20.1 1 0.4\n1 kg m2\n\n130 mm\n\n8\n1500 ft\n95\n35\nabove\nDrone\n140\n\n\n\n\n\n";

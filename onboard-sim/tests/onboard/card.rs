@@ -158,7 +158,7 @@ fn val_hand_the_wind_to_fly_in_keeps_nine_tenths_of_the_landings() {
 /// The words of the card are those of the page for the range safety officer.
 #[test]
 fn val_safety_md_the_abort_table_is_the_same() {
-    let page = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../SAFETY.md")).unwrap();
+    let page = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/safety.md")).unwrap();
     let table = page.split("| when | what happens |\n|---|---|\n").nth(1).unwrap();
     let rows: Vec<Vec<&str>> = table
         .lines()

@@ -88,7 +88,7 @@ fn what_broke_is_named_first() {
 }
 
 #[test]
-#[ignore = "1,080 flights; prints the table of ENGINEER.md"]
+#[ignore = "1,080 flights; prints the table of docs/engineer.md"]
 fn what_broke_is_named_first_in_95_of_100_and_a_landing_is_silent_in_98() {
     for mission in ["mk2", "mk3"] {
         let (named, alarms, table) = named(mission, 20, 200, 2001);

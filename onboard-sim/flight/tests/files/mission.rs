@@ -262,7 +262,7 @@ fn other_motors_and_the_curves_half_way_to_them_are_looked_up() {
 
 #[test]
 fn the_lot_on_the_engineers_page_is_one() {
-    let page = include_str!("../../../../ENGINEER.md");
+    let page = include_str!("../../../../docs/engineer.md");
     let (_, lot) = page.split_once("```toml\n[lot]\n").unwrap();
     assert_eq!(mk3_with(lot.split_once("```").unwrap().0).motor_burns(), 4);
 }

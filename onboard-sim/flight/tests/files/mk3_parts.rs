@@ -1,4 +1,5 @@
-//! The parts list of MK3.md adds up to the airframe's mass, centre of gravity and inertias.
+//! The parts list of docs/build-mk3.md adds up to the airframe's mass, centre of gravity and
+//! inertias.
 
 use flight::vehicles::mission::builtin_airframe as builtin;
 
@@ -11,9 +12,9 @@ struct Part {
     radius_m: f64,
 }
 
-/// The rows of the table "Parts" in MK3.md.
+/// The rows of the table "Parts" in docs/build-mk3.md.
 fn parts() -> Vec<Part> {
-    let page = include_str!("../../../../MK3.md");
+    let page = include_str!("../../../../docs/build-mk3.md");
     let table = page.split("## Parts").nth(1).unwrap().split("\n## ").next().unwrap();
     let rows = table.lines().filter(|line| line.starts_with("| ") && !line.starts_with("| part"));
     rows.map(|row| {

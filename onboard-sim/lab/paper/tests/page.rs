@@ -1,4 +1,4 @@
-//! What PAPER.md names exists: the commands of `paper`, tests and paths.
+//! What docs/paper.md names exists: the commands of `paper`, tests and paths.
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
 
 use std::fs;
@@ -11,7 +11,7 @@ fn root() -> PathBuf {
 
 /// What the page has in backticks.
 fn named() -> Vec<String> {
-    let page = fs::read_to_string(root().join("PAPER.md")).unwrap();
+    let page = fs::read_to_string(root().join("docs/paper.md")).unwrap();
     page.split('`').skip(1).step_by(2).map(str::to_owned).collect()
 }
 

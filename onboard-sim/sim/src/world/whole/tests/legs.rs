@@ -193,7 +193,7 @@ fn mk3_on((force_n, guide_share): (f64, f64), friction: f64) -> Airframe {
 }
 
 /// The softest block in the smoothest guide that a scale lets pass, N and share, and the hardest in
-/// the roughest: MK3.md.
+/// the roughest: docs/build-mk3.md.
 const FEET: [(f64, f64); 2] = [(80.0, 0.2), (100.0, 0.45)];
 
 /// mk3's legs were designed for all of these at once, to slopes of 5 degrees, and for 2 m/s nearly
@@ -271,7 +271,7 @@ fn dropped(airframe: &Airframe, height_m: f64, lean_rad: f64) -> [f64; 3] {
 /// not pass.
 #[test]
 fn the_drop_test_on_the_page_has_the_worlds_bounds() {
-    let page = include_str!("../../../../../../MK3.md");
+    let page = include_str!("../../../../../../docs/build-mk3.md");
     let words = page.split_whitespace().collect::<Vec<_>>().join(" ");
     let [soft, hard] = FEET;
     assert!(words.contains(&format!("between {} and {} N", soft.0, hard.0)), "of the scale");
