@@ -131,11 +131,11 @@ fn prefixed(msg: &Msg, at: Duration) -> Bytes {
 
 #[cfg(test)]
 mod tests {
-    use protocol::dialect::{
-        COMMAND_ACK_DATA, HEARTBEAT_DATA, MavCmd, MavModeFlag, MavResult, STATUSTEXT_DATA,
-    };
+    use std::collections::BTreeSet;
+
+    use protocol::dialect::{HEARTBEAT_DATA, STATUSTEXT_DATA};
     use protocol::frame::Encoder;
-    use protocol::identity::{GROUND, VEHICLE};
+    use protocol::identity::VEHICLE;
 
     use super::*;
     use crate::attach::codec::split;
@@ -162,16 +162,12 @@ mod tests {
         }
 
         fn status(&mut self, status: TD_FLIGHT_STATUS_DATA) {
-            self.receive(&MavMessage::HEARTBEAT(HEARTBEAT_DATA {
-                base_mode: MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED,
-                ..HEARTBEAT_DATA::default()
-            }));
             self.receive(&MavMessage::TD_FLIGHT_STATUS(status));
             self.take(Msg::Tick);
         }
     }
 
-    fn shown(model: &Model) -> Vec<String> {
+    fn shown(model: &Model) -> BTreeSet<String> {
         model
             .alarms
             .list()
@@ -198,35 +194,30 @@ mod tests {
         let model = Model::new(Settings { vehicle: VEHICLE, ..Settings::on_screen("udpin:1") });
         let vehicle = Encoder::new(VEHICLE);
         let mut station = Station { model, backlog: Backlog::default(), vehicle, now: Duration::ZERO };
-        let armed = TD_FLIGHT_STATUS_DATA {
-            phase: TdPhase::TD_PHASE_PAD_ARMED,
+        // Aborted on its pad with a live motor; another abort is never acknowledged.
+        let mut aborted = TD_FLIGHT_STATUS_DATA {
+            phase: TdPhase::TD_PHASE_PAD_IDLE,
+            interlocks: TdInterlock::TD_INTERLOCK_ABORT_LATCHED | TdInterlock::TD_INTERLOCK_MOTOR_INHIBITED,
             motor: TdMotor::TD_MOTOR_LIVE,
             boot_number: 7,
             ..TD_FLIGHT_STATUS_DATA::default()
         };
-        station.status(armed.clone());
-        // The abort is acknowledged, and the vehicle never shows it.
+        station.status(aborted.clone());
         station.take(Msg::command(CommandKind::Abort, Seat::default()));
-        station.receive(&MavMessage::COMMAND_ACK(COMMAND_ACK_DATA {
-            command: MavCmd::MAV_CMD_DO_FLIGHTTERMINATION,
-            result: MavResult::MAV_RESULT_ACCEPTED,
-            target_system: GROUND.system_id,
-            target_component: GROUND.component_id,
-            ..COMMAND_ACK_DATA::default()
-        }));
         station.receive(&MavMessage::STATUSTEXT(STATUSTEXT_DATA::default()));
-        for frame in 0..700_000_u64 {
-            station.now = Duration::from_millis(5 * frame);
+        for frame in 0..700_000_u32 {
+            station.now = Duration::from_millis(5 * u64::from(frame));
             if frame % 20 == 0 {
-                station.status(armed.clone());
+                aborted.time_boot_ms = 5 * frame;
+                station.status(aborted.clone());
             } else {
                 station.receive(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
             }
         }
         assert!(!station.backlog.older.events.is_empty() && station.backlog.older.events.len() < 10);
         let alarms = shown(&station.model);
-        assert!(alarms.iter().any(|text| text.starts_with("DO NOT APPROACH")), "{alarms:?}");
-        assert!(alarms.iter().any(|text| text.contains("ABORT")), "{alarms:?}");
+        assert!(alarms.iter().any(|text| text.starts_with("ONE PERSON: PIN IN")), "{alarms:?}");
+        assert!(alarms.iter().any(|text| text.starts_with("ABORT NOT ACKNOWLEDGED")), "{alarms:?}");
         assert_eq!(shown(&attached(&station.backlog)), alarms);
     }
 

@@ -147,7 +147,8 @@ fn typed(player: &mut Player, msg: &Msg) -> Vec<Action> {
             actions.extend(player.on_key(*key));
         }
     }
-    actions.retain(|action| matches!(action, Action::Redraw | Action::NextTheme | Action::Quit));
+    actions
+        .retain(|action| matches!(action, Action::Bell | Action::Redraw | Action::NextTheme | Action::Quit));
     actions
 }
 

@@ -16,6 +16,8 @@ pub const RING_EVERY: Duration = Duration::from_secs(4);
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum AlarmKind {
     LinkLost,
+    /// A screen that commands nothing was given a command.
+    NothingSent,
     /// The vehicle does not hear this station.
     UplinkLost,
     /// Frames are refused for their signature, and the vehicle is not heard.

@@ -70,16 +70,16 @@ impl CommandKind {
             MAV_CMD_DO_PAUSE_CONTINUE as PAUSE, MAV_CMD_MISSION_START as START,
             MAV_CMD_TD_PAD_CHECK as CHECK, MAV_CMD_TD_TAKE_COMMAND as TAKE, MAV_CMD_TD_TAP as TAP,
         };
-        use Resend::{Never, Times, UntilWithdrawn};
+        use Resend::{Never, Times, UntilAnswered, UntilWithdrawn};
         let row = |name, mav, moves, resend, seen| CommandRow { name, mav, moves, resend, seen };
         match self {
             Self::Arm => row("ARM", (ARM, 1.0), true, Times(4), Some("HEARTBEAT says armed")),
-            Self::Disarm => row("DISARM", (ARM, 0.0), false, Times(3), Some("HEARTBEAT says disarmed")),
+            Self::Disarm => row("DISARM", (ARM, 0.0), false, UntilAnswered, Some("HEARTBEAT says disarmed")),
             Self::Start => row("START", (START, 0.0), true, Times(4), Some("countdown runs")),
             Self::Abort => row("ABORT", (TERMINATE, 1.0), false, UntilWithdrawn, Some("abort latched")),
             Self::ConfirmArm => row("CONFIRM ARM", (ARM, 1.0), true, Times(4), Some("HEARTBEAT says armed")),
             Self::ConfirmStart => row("CONFIRM START", (START, 0.0), true, Times(4), Some("countdown runs")),
-            Self::Hold => row("HOLD", (PAUSE, 0.0), false, Times(3), Some("no countdown")),
+            Self::Hold => row("HOLD", (PAUSE, 0.0), false, UntilAnswered, Some("no countdown")),
             Self::Tap => row("TAP", (TAP, 0.0), true, Never, None),
             Self::TakeCommand => row("TAKE COMMAND", (TAKE, 0.0), true, Times(3), None),
             Self::Check => row("CHECK", (CHECK, 1.0), true, Never, None),

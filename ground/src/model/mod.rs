@@ -222,6 +222,8 @@ pub struct Model {
     /// An abort of an earlier run of this station, or of its screen, that was asked for and not
     /// confirmed.
     pub(crate) abort_before: Option<String>,
+    /// When a screen that commands nothing was last given a command.
+    pub(crate) nothing_sent_at: Option<Duration>,
     /// What is stored of it beside the log.
     pub(crate) kept: Option<Unfinished>,
     /// When it is looked at next.

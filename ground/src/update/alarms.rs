@@ -20,6 +20,8 @@ const FIRST_PLAN_WITHIN: Duration = Duration::from_millis(300);
 /// Six minutes of the simulated vehicle, and where the voltage of lithium-polymer cells begins to
 /// fall steeply.
 const BATTERY_LOW_PERCENT: u8 = 10;
+/// How long a command that nothing was sent for holds as an alarm condition.
+const NOTHING_SENT_SHOWN: Duration = Duration::from_secs(10);
 /// How long a reboot holds as an alarm condition.
 const REBOOT_SHOWN: Duration = Duration::from_secs(10);
 
@@ -48,7 +50,11 @@ const fn of_boot(kind: AlarmKind, urgency: u8, holds: fn(&Model, Duration) -> Op
 }
 
 /// The alarms of the station, its link and its log. A silent station says nothing about the link.
-const OF_STATION: [AlarmRow; 12] = [
+const OF_STATION: [AlarmRow; 13] = [
+    of_run(AlarmKind::NothingSent, ABORT, |model, now| {
+        model.nothing_sent_at.filter(|at| now.saturating_sub(*at) < NOTHING_SENT_SHOWN)?;
+        Some(format!("NOTHING WAS SENT: {}", model.settings.role.why_not_command()?))
+    }),
     of_run(AlarmKind::StationSilent, WHO, |model, now| {
         let gone = "STATION GONE: this screen shows the past and commands nothing";
         let silent = "STATION SILENT: it does not answer this screen, which shows the past";
@@ -196,16 +202,25 @@ fn is_unheard(model: &Model, now: Duration) -> bool {
 fn command_conditions(model: &Model, now: Duration, found: &mut Vec<Condition>) {
     for track in &model.commands.tracks {
         let name = track.kind.name();
-        let urgency = if track.kind == CommandKind::Abort { ABORT } else { OTHER };
+        let persists = track.kind.row().resend.is_persistent();
+        let urgency = match track.kind {
+            CommandKind::Abort => ABORT,
+            _ if persists => VEHICLE,
+            _ => OTHER,
+        };
         let mut hold = |kind, text| found.push(Condition { kind, urgency, ends_with_boot: true, text });
         if track.disagrees(now) {
             hold(AlarmKind::Disagreement(track.kind), format!("{name} acknowledged, NOT OBSERVED"));
         }
-        let waits = matches!(track.acknowledged, Acknowledgement::Waiting | Acknowledgement::GivenUp);
+        let gave_up = track.acknowledged == Acknowledgement::GivenUp;
+        let waits = match track.kind {
+            CommandKind::Abort => gave_up || track.acknowledged == Acknowledgement::Waiting,
+            _ => track.acknowledged == Acknowledgement::Waiting && track.observed_at.is_none(),
+        };
         let waited = now.saturating_sub(track.commanded_at);
-        if track.kind == CommandKind::Abort && waits && waited >= UNANSWERED_FOR {
+        if persists && waits && waited >= UNANSWERED_FOR {
             hold(AlarmKind::Unanswered(track.kind), format!("{name} NOT ACKNOWLEDGED yet; repeated"));
-        } else if track.acknowledged == Acknowledgement::GivenUp && !track.not_observed_reported {
+        } else if gave_up && !track.not_observed_reported {
             hold(AlarmKind::Unanswered(track.kind), format!("{name} was never acknowledged"));
         }
         if matches!(track.acknowledged, Acknowledgement::Answered(_)) && !track.accepted() {

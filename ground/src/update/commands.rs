@@ -3,16 +3,16 @@
 
 use std::time::Duration;
 
-use protocol::command::{CommandAnswer, CommandEvent, Ticket, result_words};
+use protocol::command::{CommandAnswer, CommandEvent, Resend, Ticket, result_words};
 use protocol::dialect::{COMMAND_LONG_DATA, MavMessage, MavResult, TdAct, TdHold, TdPhase};
 use protocol::log::record::EventLevel;
 use protocol::mission::MissionHash;
 
 use super::Action;
 use crate::model::{
-    Acknowledgement, AutoStep, CommandKind, LogFault, LogStanding, Model, Seat, Speaker, TrackedCommand,
-    why_not_arm, why_not_check, why_not_confirm, why_not_seat, why_not_seen, why_not_start, why_not_take,
-    why_nothing_moves, why_untested,
+    Acknowledgement, AutoStep, CommandKind, Commands, LogFault, LogStanding, Model, Seat, Speaker,
+    TrackedCommand, why_not_arm, why_not_check, why_not_confirm, why_not_seat, why_not_seen, why_not_start,
+    why_not_take, why_nothing_moves, why_untested,
 };
 
 /// Of the many attempts of an abort, only the first and every n-th become an event.
@@ -202,9 +202,8 @@ fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
         CommandEvent::Sent { .. } => {
             track.attempts += 1;
             let attempt = track.attempts;
-            if kind == CommandKind::Abort && attempt > 1 {
-                // An abort is repeated whether answered or not; an event for each attempt would
-                // hide everything else.
+            if kind.row().resend.is_persistent() && attempt > 1 {
+                // An event for each attempt would hide everything else.
                 if attempt % ABORT_REPORTED_EVERY != 0 {
                     return;
                 }
@@ -308,8 +307,22 @@ pub(super) fn restart_after_reboot(model: &mut Model, now: Duration) -> Vec<&'st
 /// Compares the vehicle's own state with the commands.
 pub(super) fn observe(model: &mut Model, now: Duration) {
     let mut told = Vec::new();
-    for track in &mut model.commands.tracks {
+    let flies = model.vehicle.in_flight();
+    let Commands { sender, tracks } = &mut model.commands;
+    for track in tracks {
         let (name, seen) = (track.kind.name(), track.kind.row().seen);
+        // What is repeated until its answer ends when it shows, or when it can no longer help.
+        let repeats = track.kind.row().resend == Resend::UntilAnswered
+            && track.acknowledged == Acknowledgement::Waiting;
+        if repeats && (flies || track.observed_at.is_some()) {
+            sender.withdraw_one(track.ticket, now);
+            if flies && track.observed_at.is_none() {
+                track.acknowledged = Acknowledgement::GivenUp;
+                let text = format!("{name} TOO LATE: the vehicle flies, and has not acknowledged it");
+                told.push((EventLevel::Error, track.by.clone(), text));
+                continue;
+            }
+        }
         let answered = seen.is_none() && track.accepted();
         let shown = answered || track.kind.is_observed(&model.vehicle, track.commanded_at);
         let (level, text) = if let Some(since) = track.observed_at {

@@ -119,7 +119,7 @@ pub(super) fn drop_run(model: &mut Model, now: Duration) {
 fn on_abort_key(model: &mut Model, key: Key, now: Duration) -> bool {
     if key == Key::CtrlX {
         if let Some(why) = model.settings.role.why_not_command() {
-            model.info(now, why);
+            refuse_command(model, why, now);
             return true;
         }
         // An Enter that comes too late for the abort must not confirm a dialog that was open
@@ -255,6 +255,13 @@ pub(super) fn pass(model: &mut Model, now: Duration) {
     }
 }
 
+/// A screen that commands nothing was given a command: that is an alarm, because the crew may take
+/// a replay for the flight.
+fn refuse_command(model: &mut Model, why: &str, now: Duration) {
+    model.nothing_sent_at = Some(now);
+    model.warn(now, format!("NOTHING WAS SENT: {why}"));
+}
+
 /// A letter that no key and no word has.
 fn layout(letter: char) -> String {
     format!("KEYBOARD LAYOUT: {letter} is no key here; change to Latin letters")
@@ -299,7 +306,7 @@ fn on_free_key(model: &mut Model, key: Key, touch: KeyOrigin, now: Duration) {
 /// dialog.
 pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
     if let Some(why) = model.settings.role.why_not_command().filter(|_| act.opens_confirmation()) {
-        model.info(now, why);
+        refuse_command(model, why, now);
         return swallow_word(model, act, why.to_owned(), now);
     }
     let shown = model.page();

@@ -10,8 +10,8 @@ use protocol::log::record::EventLevel;
 use super::{Action, commands, pad};
 use crate::model::{
     Approach, CommandKind, Danger, Ending, FlightSoFar, FlownMission, FlownPath, History, KeepAway, Model,
-    RestOfWord, Role, Sample, Seat, Speaker, Unfinished, Uplink, Vehicle, Verdict, hold_words, is_aborted,
-    is_flight, is_on_pad, latch_words, words,
+    RestOfWord, Role, Sample, Seat, Speaker, Uplink, Vehicle, Verdict, hold_words, is_aborted, is_flight,
+    is_on_pad, latch_words, words,
 };
 
 /// The part of the vehicle's state whose changes are reported.

@@ -15,6 +15,9 @@ pub enum Resend {
     Never,
     /// Sent this many further times, under one number: the vehicle does it once.
     Times(u8),
+    /// Sent under one number until it is answered or withdrawn: twenty times, fifty milliseconds
+    /// apart, then five times a second. For what makes a vehicle safer.
+    UntilAnswered,
     /// Sent until it is withdrawn, whatever the answer is: twenty times a second until it is
     /// accepted, then five times a second. For aborting: if half of the frames are lost, all twenty
     /// of a second are lost once in a million times, and after an outage one of them arrives within
@@ -22,6 +25,15 @@ pub enum Resend {
     UntilWithdrawn,
 }
 
+impl Resend {
+    /// Returns whether it is sent however long the answer takes.
+    pub fn is_persistent(self) -> bool {
+        matches!(self, Self::UntilAnswered | Self::UntilWithdrawn)
+    }
+}
+
+/// Sendings before an unanswered command that is repeated until its answer becomes less frequent.
+const URGENT_SENDINGS: u32 = 20;
 /// Interval between the sendings of an abort that is not accepted yet.
 const URGENT_INTERVAL: Duration = Duration::from_millis(50);
 /// After a silence this long an outage may be over when something is heard.
@@ -104,9 +116,12 @@ impl Pending {
     fn due_after(&self, now: Duration) -> Duration {
         match self.resend {
             Resend::UntilWithdrawn if self.is_accepted() => now + STEADY_INTERVAL,
+            Resend::UntilAnswered if self.attempts >= URGENT_SENDINGS => now + STEADY_INTERVAL,
             // Counted from the time at which it was due, so that a poll that comes late now and
             // then does not lower the rate.
-            Resend::UntilWithdrawn => (self.due_at + URGENT_INTERVAL).max(now + URGENT_INTERVAL / 2),
+            Resend::UntilAnswered | Resend::UntilWithdrawn => {
+                (self.due_at + URGENT_INTERVAL).max(now + URGENT_INTERVAL / 2)
+            }
             Resend::Never | Resend::Times(_) => now + ANSWER_TIMEOUT,
         }
     }
@@ -218,7 +233,7 @@ impl CommandSender {
         let mut due = false;
         if heard_at.is_none_or(|at| now.saturating_sub(at) >= SILENCE) {
             for pending in &mut self.pending {
-                let urgent = pending.resend == Resend::UntilWithdrawn && !pending.is_accepted();
+                let urgent = pending.resend.is_persistent() && !pending.is_accepted();
                 if urgent && pending.attempts > 0 {
                     pending.due_at = pending.due_at.min(now.max(pending.sent_at + URGENT_INTERVAL / 2));
                     due |= pending.due_at <= now;
@@ -253,12 +268,12 @@ impl CommandSender {
             if now < pending.due_at {
                 return false;
             }
-            let waits = pending.in_progress && pending.resend != Resend::UntilWithdrawn;
+            let waits = pending.in_progress && !pending.resend.is_persistent();
             let may_send = !waits
                 && match pending.resend {
                     Resend::Never => pending.attempts == 0,
                     Resend::Times(times) => pending.attempts <= u32::from(times),
-                    Resend::UntilWithdrawn => true,
+                    Resend::UntilAnswered | Resend::UntilWithdrawn => true,
                 };
             let command = pending.message.command as u16;
             if !may_send {
