@@ -1,4 +1,4 @@
-//! Detects a frame that arrives over several links, so that it is handled once.
+//! Detects a frame that arrives more than once, so that it is handled once.
 
 use alloc::collections::BTreeMap;
 use alloc::vec;
@@ -12,6 +12,9 @@ use crate::identity::Address;
 /// 0.3 s; an overloaded link, or all of them after the computer slept, by seconds. If a copy were
 /// not detected, its command would be executed again.
 const MAX_DELAY: Duration = Duration::from_secs(10);
+/// A source that has sent fewer frames since cannot have used all its sequence numbers again, unless
+/// half of its frames are lost.
+const HALF_OF_THE_NUMBERS: u64 = 128;
 /// So many frames with the same number are remembered: 4,096 of a source, more than it sends in
 /// that time.
 const MAX_OF_A_NUMBER: usize = 16;
@@ -24,21 +27,42 @@ struct Heard {
     at: Duration,
     /// The links over which it has arrived, a bit each.
     links: u64,
+    /// Number of new frames of its source until then.
+    nth: u64,
     operator: u8,
     message_id: u32,
     crc: u16,
 }
 
+/// How a frame has arrived.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Arrival {
+    New,
+    /// It has arrived before, over other links only.
+    OverAnotherLink,
+    /// It has arrived before over this link.
+    Again,
+}
+
 /// Tells copies apart from new frames.
 ///
 /// A component numbers its frames once for all links, so a copy has the sequence number and the
-/// checksum of a frame that arrived over other links shortly before, and not over this one. A frame
-/// that arrives twice over the same link is no copy: its sender sent it twice, has used all its
-/// numbers since, or does not number its frames.
+/// checksum of a frame that arrived shortly before. Over the same link it is a copy only if the
+/// numbers have gone back: otherwise its sender sent it twice, has used all its numbers since, or
+/// does not number its frames.
 #[derive(Debug, Default)]
 pub struct Duplicates {
-    /// Of each source the frames that may still have copies, by sequence number, oldest first.
-    sources: BTreeMap<Address, Vec<Vec<Heard>>>,
+    sources: BTreeMap<Address, Source>,
+}
+
+#[derive(Debug)]
+struct Source {
+    /// The frames that may still have copies, by sequence number, oldest first.
+    by_number: Vec<Vec<Heard>>,
+    /// Number of new frames.
+    frames: u64,
+    /// Sequence number of the newest frame.
+    newest: u8,
 }
 
 impl Duplicates {
@@ -46,34 +70,40 @@ impl Duplicates {
         Self::default()
     }
 
-    /// Notes a frame that this operator has signed (0: the shared key, or none) and returns whether
-    /// it is a copy. Nobody can turn another one's frame into a copy. Over a link from the 65th on
+    /// Notes a frame that this operator has signed (0: the shared key, or none) and returns how it
+    /// has arrived. Nobody can turn another one's frame into a copy. Over a link from the 65th on
     /// nothing is a copy.
-    pub fn is_copy(&mut self, frame: &Frame, operator: u8, link: usize, now: Duration) -> bool {
+    pub fn arrival(&mut self, frame: &Frame, operator: u8, link: usize, now: Duration) -> Arrival {
         let source = frame.source();
         if !self.sources.contains_key(&source) && self.sources.len() >= MAX_SOURCES {
-            return false;
+            return Arrival::New;
         }
-        let of = self.sources.entry(source).or_insert_with(|| vec![Vec::new(); 256]);
-        let heard = &mut of[usize::from(frame.sequence())];
+        let new = || Source { by_number: vec![Vec::new(); 256], frames: 0, newest: 0 };
+        let Source { by_number, frames, newest } = self.sources.entry(source).or_insert_with(new);
+        let heard = &mut by_number[usize::from(frame.sequence())];
         heard.retain(|earlier| now.saturating_sub(earlier.at) <= MAX_DELAY);
         let over = u32::try_from(link).ok().and_then(|link| 1_u64.checked_shl(link)).unwrap_or(0);
         let content = (operator, frame.message_id(), frame.crc());
+        let went_back = *newest != frame.sequence();
         let first = heard.iter_mut().find(|earlier| {
-            earlier.links & over == 0 && (earlier.operator, earlier.message_id, earlier.crc) == content
+            let may_repeat = went_back && *frames - earlier.nth < HALF_OF_THE_NUMBERS;
+            (earlier.operator, earlier.message_id, earlier.crc) == content
+                && (earlier.links & over == 0 || may_repeat)
         });
         match first {
-            Some(first) if over != 0 => {
+            Some(first) if over != 0 && first.links & over == 0 => {
                 first.links |= over;
-                true
+                Arrival::OverAnotherLink
             }
+            Some(_) if over != 0 => Arrival::Again,
             _ => {
                 if heard.len() >= MAX_OF_A_NUMBER {
                     heard.remove(0);
                 }
                 let (operator, message_id, crc) = content;
-                heard.push(Heard { at: now, links: over, operator, message_id, crc });
-                false
+                (*frames, *newest) = (*frames + 1, frame.sequence());
+                heard.push(Heard { at: now, links: over, nth: *frames, operator, message_id, crc });
+                Arrival::New
             }
         }
     }
@@ -86,6 +116,10 @@ mod tests {
     use crate::frame::Encoder;
     use crate::identity::VEHICLE;
 
+    fn is_copy(of: &mut Duplicates, frame: &Frame, operator: u8, link: usize, now: Duration) -> bool {
+        of.arrival(frame, operator, link, now) != Arrival::New
+    }
+
     #[test]
     fn a_copy_arrives_soon_and_over_another_link() {
         let mut encoder = Encoder::new(VEHICLE);
@@ -93,14 +127,18 @@ mod tests {
         let (first, second) = (beat(), beat());
         let mut duplicates = Duplicates::new();
         let at = |ms| Duration::from_millis(ms);
-        assert!(!duplicates.is_copy(&first, 0, 0, at(0)));
-        assert!(!duplicates.is_copy(&second, 0, 1, at(10)), "it is another frame");
-        assert!(duplicates.is_copy(&first, 0, 1, at(300)));
-        assert!(duplicates.is_copy(&first, 0, 2, at(400)), "it arrives over a third link");
-        assert!(!duplicates.is_copy(&first, 0, 0, at(500)), "it arrives again over its own link");
-        assert!(duplicates.is_copy(&first, 0, 1, at(9_000)), "it arrives over a link that lags far behind");
+        assert!(!is_copy(&mut duplicates, &first, 0, 0, at(0)));
+        assert!(!is_copy(&mut duplicates, &second, 0, 1, at(10)), "it is another frame");
+        assert!(is_copy(&mut duplicates, &first, 0, 1, at(300)));
+        assert!(is_copy(&mut duplicates, &first, 0, 2, at(400)), "it arrives over a third link");
+        assert!(is_copy(&mut duplicates, &first, 0, 0, at(500)), "it arrives late, again over its own link");
+        assert!(!is_copy(&mut duplicates, &second, 0, 1, at(600)), "its sender does not number its frames");
         assert!(
-            !duplicates.is_copy(&first, 0, 1, at(11_000)),
+            is_copy(&mut duplicates, &first, 0, 1, at(9_000)),
+            "it arrives over a link that lags far behind"
+        );
+        assert!(
+            !is_copy(&mut duplicates, &first, 0, 1, at(11_000)),
             "the sequence number may have been used again"
         );
     }
@@ -111,7 +149,10 @@ mod tests {
         let mut duplicates = Duplicates::new();
         for frame in 0..1_000 {
             let beat = encoder.encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
-            assert!(!duplicates.is_copy(&beat, 0, frame % 2, Duration::from_millis(frame as u64)), "{frame}");
+            assert!(
+                !is_copy(&mut duplicates, &beat, 0, frame % 2, Duration::from_millis(frame as u64)),
+                "{frame}"
+            );
         }
     }
 
@@ -130,7 +171,11 @@ mod tests {
         for link in 0..3 {
             for (nth, frame) in frames.iter().enumerate() {
                 let now = Duration::from_secs(link as u64);
-                assert_eq!(duplicates.is_copy(frame, 0, link, now), link > 0, "frame {nth} over link {link}");
+                assert_eq!(
+                    is_copy(&mut duplicates, frame, 0, link, now),
+                    link > 0,
+                    "frame {nth} over link {link}"
+                );
             }
         }
     }
@@ -141,7 +186,7 @@ mod tests {
         for system_id in 1..=255 {
             let source = Address { system_id, component_id: 1 };
             let frame = Encoder::new(source).encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
-            duplicates.is_copy(&frame, 0, 0, Duration::ZERO);
+            is_copy(&mut duplicates, &frame, 0, 0, Duration::ZERO);
         }
         assert_eq!(duplicates.sources.len(), MAX_SOURCES);
     }

@@ -14,7 +14,7 @@ use core::net::SocketAddr;
 use core::time::Duration;
 
 use self::line::Line;
-use crate::duplicate::Duplicates;
+use crate::duplicate::{Arrival, Duplicates};
 use crate::frame::{Frame, Framer, FramerCounters, SIGNATURE_LEN};
 use crate::identity::RADIO;
 use crate::link_stats::LinkStats;
@@ -220,11 +220,15 @@ impl Hub {
         {
             line.on_radio(frame.padded_payload()[TXBUF_AT], now);
         }
-        // A rejected frame is no sign of life either, so it does not count in the statistics.
-        self.links[link].stats.on_frame(&frame, now);
         // The signature is checked first: a forged frame must not turn the true one into a copy.
         let operator = self.signing.as_ref().map_or(0, |signing| signing.operator_of(&frame));
-        if self.duplicates.is_copy(&frame, operator, link, now) {
+        let arrival = self.duplicates.arrival(&frame, operator, link, now);
+        // A rejected frame is no sign of life either, so it does not count in the statistics. One
+        // that arrives again would count as 255 lost ones.
+        if arrival != Arrival::Again {
+            self.links[link].stats.on_frame(&frame, now);
+        }
+        if arrival != Arrival::New {
             self.links[link].copies += 1;
             return LinkEvent::Copy(frame);
         }
