@@ -20,7 +20,7 @@ const MAX_SOURCES: usize = 16;
 
 /// A frame at its first arrival.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Heard {
+struct FirstArrival {
     at: Duration,
     /// The links over which it has arrived, a bit each.
     links: u64,
@@ -29,7 +29,7 @@ struct Heard {
     crc: u16,
 }
 
-/// Tells copies apart from new frames.
+/// Distinguishes copies from new frames.
 ///
 /// A component numbers its frames once for all links, so a copy has the sequence number and the
 /// checksum of a frame that arrived over other links shortly before, and not over this one. A frame
@@ -38,7 +38,7 @@ struct Heard {
 #[derive(Debug, Default)]
 pub struct Duplicates {
     /// Of each source the frames that may still have copies, by sequence number, oldest first.
-    sources: BTreeMap<Address, Vec<Vec<Heard>>>,
+    sources: BTreeMap<Address, Vec<Vec<FirstArrival>>>,
 }
 
 impl Duplicates {
@@ -47,7 +47,7 @@ impl Duplicates {
     }
 
     /// Notes a frame that this operator has signed (0: the shared key, or none) and returns whether
-    /// it is a copy. Nobody can turn another one's frame into a copy. Over a link from the 65th on
+    /// it is a copy. A frame cannot be marked as a copy by another key. Over a link from the 65th on
     /// nothing is a copy.
     pub fn is_copy(&mut self, frame: &Frame, operator: u8, link: usize, now: Duration) -> bool {
         let source = frame.source();
@@ -55,11 +55,11 @@ impl Duplicates {
             return false;
         }
         let of = self.sources.entry(source).or_insert_with(|| vec![Vec::new(); 256]);
-        let heard = &mut of[usize::from(frame.sequence())];
-        heard.retain(|earlier| now.saturating_sub(earlier.at) <= MAX_DELAY);
+        let arrivals = &mut of[usize::from(frame.sequence())];
+        arrivals.retain(|earlier| now.saturating_sub(earlier.at) <= MAX_DELAY);
         let over = u32::try_from(link).ok().and_then(|link| 1_u64.checked_shl(link)).unwrap_or(0);
         let content = (operator, frame.message_id(), frame.crc());
-        let first = heard.iter_mut().find(|earlier| {
+        let first = arrivals.iter_mut().find(|earlier| {
             earlier.links & over == 0 && (earlier.operator, earlier.message_id, earlier.crc) == content
         });
         match first {
@@ -68,11 +68,11 @@ impl Duplicates {
                 true
             }
             _ => {
-                if heard.len() >= MAX_OF_A_NUMBER {
-                    heard.remove(0);
+                if arrivals.len() >= MAX_OF_A_NUMBER {
+                    arrivals.remove(0);
                 }
                 let (operator, message_id, crc) = content;
-                heard.push(Heard { at: now, links: over, operator, message_id, crc });
+                arrivals.push(FirstArrival { at: now, links: over, operator, message_id, crc });
                 false
             }
         }
@@ -115,7 +115,7 @@ mod tests {
         }
     }
 
-    /// A computer that slept hears some seconds of each link at once: more frames than there are
+    /// A computer that slept reads some seconds of each link at once: more frames than there are
     /// numbers.
     #[test]
     fn a_link_that_is_read_long_after_another_one_has_copies_alone() {
