@@ -6,7 +6,7 @@ use std::path::Path;
 use protocol::frame::Framer;
 use protocol::identity::VEHICLE;
 use protocol::log::tlog::TlogReader;
-use protocol::told::Told;
+use protocol::reported::ReportedState;
 
 use e2e::{Ended, Program, Running, auto_ground, expect_landing, program, vehicle};
 
@@ -92,7 +92,7 @@ const STATE: [&str; 8] =
 /// The vehicle's state after each frame in a `.tlog` that tells of it, and once before the first.
 fn told_by_each_frame(tlog: &Path) -> Vec<[Option<f64>; 8]> {
     let mut frames = TlogReader::new(std::fs::File::open(tlog).expect("the station has written it"));
-    let mut told = Told::default();
+    let mut told = ReportedState::default();
     let mut states = Vec::new();
     loop {
         let told_now = told.record(0.0);
@@ -113,7 +113,7 @@ fn told_by_each_frame(tlog: &Path) -> Vec<[Option<f64>; 8]> {
                 framer.next_frame()
             });
         if !heard.any(|frame| {
-            frame.source() == VEHICLE && told.hear(&frame.decode().expect("the vehicle is of this release"))
+            frame.source() == VEHICLE && told.update(&frame.decode().expect("the vehicle is of this release"))
         }) {
             return states;
         }

@@ -4,7 +4,7 @@
 //! `cargo run -p onboard-sim --example landing_rates -- DIR...`
 //!
 //! Each DIR is the `--out` of an `onboard-sim campaign`. A row with the same mission and dispersion
-//! is replaced where it stands; others stay.
+//! is replaced in place; others stay.
 
 use anyhow::{Context as _, Result};
 use flight::rules::verdict::Landing;

@@ -1,11 +1,11 @@
-//! What it is worth to tell a mission of its motor's lot: how often the same vehicles land, told
-//! and not told.
+//! Value of stating the motor's lot in a mission: landing rates of the same vehicles with and
+//! without it.
 //!
 //! `cargo run --release -p onboard-sim --example lot -- MISSION SET FLIGHTS SEED ROWS`
 //!
-//! The motors of a row are those of a lot, drawn with what is known of it. Each flight is flown by
-//! a mission that knows this lot, and by one that was told less (ROWS is part of the names of rows;
-//! default: all): motor, vehicle, day and chance are the same.
+//! The motors of a row are those of a lot, drawn with its measured scatter. Each flight is flown by
+//! a mission with this lot, and by one with less information (ROWS is part of the names of rows;
+//! default: all): motor, vehicle, weather and seed are the same.
 
 use std::io::Write as _;
 
@@ -19,9 +19,9 @@ use sim::sortie::Sortie;
 use sim::world::truth::Truth;
 
 /// So many burns that their scatter is the lot's.
-const KNOWN: &str =
+const FORTY: &str =
     "burns = 40\nimpulse = { mean = 1.0, scatter = 0.01 }\nburn_time = { mean = 1.0, scatter = 0.015 }";
-/// What a club has.
+/// A club's lot.
 const FOUR: &str =
     "burns = 4\nimpulse = { mean = 1.0, scatter = 0.01 }\nburn_time = { mean = 1.0, scatter = 0.015 }";
 const WEAK: &str =
@@ -44,15 +44,15 @@ fn main() -> anyhow::Result<()> {
         let lot = if lot.is_empty() { String::new() } else { format!("\n[lot]\nname = \"lot\"\n{lot}\n") };
         Ok(flight::vehicles::mission::from_toml(&format!("{text}{lot}"), &name)?)
     };
-    let (cold, warm) = (format!("{KNOWN}{COLD}"), format!("{KNOWN}{WARM}"));
+    let (cold, warm) = (format!("{FORTY}{COLD}"), format!("{FORTY}{WARM}"));
     let mut stdout = std::io::stdout().lock();
     for (row, lot, less) in [
-        ("lot known to 1 and 1.5 %; certified", KNOWN, ""),
+        ("lot known to 1 and 1.5 %; certified", FORTY, ""),
         ("lot of four burns with this scatter; certified", FOUR, ""),
         ("lot of 0.97 and 1.04; certified", WEAK, ""),
         ("lot of 1.03 and 0.96; certified", STRONG, ""),
-        ("15 K colder; not told", &cold, KNOWN),
-        ("15 K warmer; not told", &warm, KNOWN),
+        ("15 K colder; not told", &cold, FORTY),
+        ("15 K warmer; not told", &warm, FORTY),
     ] {
         if !row.contains(&rows) {
             continue;

@@ -1,5 +1,5 @@
-//! Whether the vehicle of a mission will land, and what to change if not, before anything is built:
-//! one page of rows, each with what the mission's data come to beside what is asked of it.
+//! Predicts before construction whether the vehicle of a mission will land, and what to change if
+//! not: one page of rows, each with a value of the mission's data beside its requirement.
 //!
 //! All but the last row are formulas on the expected motor in still air or in a steady wind. The
 //! last one flies.
@@ -36,7 +36,7 @@ pub enum Verdict {
 }
 }
 
-/// What a value must be at least: below the first number the answer is no, below the second tight.
+/// Thresholds of a value: below the first number the answer is no, below the second tight.
 #[derive(Clone, Copy)]
 struct Least(f64, f64);
 
@@ -56,21 +56,21 @@ const AT_FIRST: Least = Least(0.5, 1.0);
 /// Mean thrust over weight while the thrust exceeds the weight.
 const CARRIED: Least = Least(1.1, 1.3);
 /// Thrust over weight [`ENDS_S`] before the thrust falls through the weight, as a limit from above:
-/// what ends at once leaves no time to correct. `mk3` has 1.2, `vlr-f15` 1.3, and of drawn vehicles
+/// an abrupt end leaves no time to correct. `mk3` has 1.2, `vlr-f15` 1.3, and of drawn vehicles
 /// with 2.3 a third stood.
 const AT_LAST: Least = Least(-2.15, -1.35);
 const ENDS_S: f64 = 0.3;
 /// Lean that lands the expected motor, degrees: with less a weak motor does not stop it.
 /// [`EvenLanding::MOST_TILT_RAD`] is the most.
 const LEAN_DEG: Least = Least(0.0, 15.0);
-/// Width of the heights that suit every motor, over what two deviations of the igniter to either
-/// side cover. Below zero no height suits all.
+/// Width of the heights that suit every motor, over the range covered by two deviations of the
+/// igniter to either side. Below zero no height suits all.
 const BAND: Least = Least(-0.3, 1.0);
-/// Angular acceleration at the gimbal's stop over what is asked at once. With 0.6 nine of ten drawn
-/// vehicles still stood.
+/// Angular acceleration at the gimbal's stop over the immediately required one. With 0.6 nine of
+/// ten drawn vehicles still stood.
 const GIMBAL: Least = Least(0.3, 1.5);
-/// The same over what the motor's direction alone asks: eight tenths of a degree, of which five
-/// degrees are six times as much.
+/// The same over the requirement of the motor's direction alone: eight tenths of a degree, of which
+/// five degrees are six times as much.
 const STEERED: Least = Least(1.0, 6.4);
 /// Angular acceleration by a side wind of a vehicle whose fins do not steer, degrees/s2, as a limit
 /// from above. With 80 to 200 half of the drawn vehicles ended under the parachute, with 13 or less
@@ -87,10 +87,10 @@ const EXPECTED_M_S: f64 = 1.5;
 const FEET_DEG: Least = Least(15.0, 25.0);
 /// Speed under the canopy, m/s, as a limit from above.
 const CANOPY_M_S: Least = Least(-12.0, -8.0);
-/// How long before the ignition the parachute must be decided, s, as a limit from above: what then
-/// goes wrong has none.
+/// Time before the ignition at which the parachute must be decided, s, as a limit from above: a
+/// later fault has no parachute.
 const DECIDED_S: Least = Least(f64::NEG_INFINITY, -0.5);
-/// Radius of the fence over the farthest that it may come down.
+/// Radius of the fence over the farthest possible touchdown.
 const FENCE: Least = Least(0.25, 1.0);
 /// Share of the flights that stand undamaged.
 const FLIGHTS: Least = Least(0.5, 0.9);
@@ -112,12 +112,12 @@ const PROPOSED: usize = 2;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
     pub what: &'static str,
-    /// What the data come to.
+    /// Value of the data.
     pub found: String,
-    /// What is asked of it.
+    /// Requirement.
     pub beside: String,
     pub verdict: Verdict,
-    /// What would make it better, if it is not ok.
+    /// Change that would improve it, if it is not ok.
     pub change: Option<String>,
 }
 
@@ -126,7 +126,7 @@ impl Row {
         Self { what, found, beside, verdict, change: None }
     }
 
-    /// What to change if it is not ok.
+    /// Adds the change to make if it is not ok.
     fn or(self, change: impl FnOnce() -> String) -> Self {
         let change = (self.verdict > Verdict::Ok).then(change);
         Self { change, ..self }
@@ -166,15 +166,15 @@ fn worst(rows: &[Row]) -> Verdict {
 /// A motor to propose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
-    /// What a mission's `airframe.motor` says: the name of a built-in motor, or the text of its
+    /// Value of a mission's `airframe.motor`: the name of a built-in motor, or the text of its
     /// file.
     pub motor: String,
     pub curve: ThrustCurve,
-    /// Its maker still makes it, as far as is known.
+    /// Still in production, according to its file.
     pub in_production: bool,
 }
 
-/// The motors that come with the program.
+/// The built-in motors.
 pub fn built_in() -> Vec<Candidate> {
     let found = motors::names().filter_map(|name| {
         let in_production = motors::status(name).is_none_or(|(in_production, _)| in_production);
@@ -243,7 +243,7 @@ fn proposal(recipe: &Recipe, motors: &[Candidate], than: Verdict) -> Result<Stri
     let Mission { airframe, motor_curve, .. } = &recipe.mission;
     let frame = Frame::of(&recipe.mission)?;
     let with = |motor: &str, curve, ballast_kg: f64| {
-        // What the reader refuses is no vehicle.
+        // A vehicle that the reader refuses is skipped.
         let other = changed(recipe, motor, &frame.with(curve, ballast_kg)).ok()?;
         Some(worst(&Vehicle::of(&other.mission).lands())).filter(|verdict| *verdict < than)
     };
@@ -281,7 +281,7 @@ fn flown(recipe: &Recipe, rows: &[Flown]) -> Row {
     })
 }
 
-/// A mission's vehicle with what the rows are computed from.
+/// A mission's vehicle with the inputs of the rows.
 struct Vehicle<'a> {
     mission: &'a Mission,
     landing: EvenLanding,
@@ -541,7 +541,7 @@ impl<'a> Vehicle<'a> {
         (!is_such).then(|| row.or(|| "measure it again, in kg m2".to_owned()))
     }
 
-    /// Speed under the canopy, m/s, with the motor not lit.
+    /// Speed under the canopy, m/s, with an unignited motor.
     fn canopy_m_s(&self, area_m2: f64) -> f64 {
         let lift_kg_m =
             0.5 * self.column.air_density_kg_m3 * self.mission.airframe.parachute.drag_coefficient * area_m2;
@@ -631,9 +631,9 @@ mod tests {
         );
     }
 
-    /// What is proposed is what the legs are asked for.
+    /// The proposed change meets the requirement of the legs.
     #[test]
-    fn legs_that_do_not_bear_it_are_told_with_the_stroke_that_would() {
+    fn legs_that_fail_are_reported_with_the_stroke_that_would_do() {
         let legs = |force_n: f64, stroke_m: f64| {
             let change = |mission: &mut Mission| {
                 let crush = mission.airframe.legs.crush.as_mut().unwrap();

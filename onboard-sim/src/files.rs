@@ -1,5 +1,5 @@
-//! Texts that are built in or files; and files that are written whole: each is complete or absent.
-//! What exists is kept: a new file or folder gets the next free name.
+//! Texts that are built in or files; and files written atomically: each is complete or absent.
+//! Existing files are preserved: a new file or folder gets the next free name.
 
 use std::fs::{File, TryLockError};
 use std::io::{self, Seek, SeekFrom, Write};
@@ -11,25 +11,25 @@ use tempfile::{NamedTempFile, TempPath};
 
 /// Neither a built-in text nor a file.
 #[derive(Debug, thiserror::Error)]
-#[error("'{name}' is neither a built-in {what} ({known}) nor a readable file")]
+#[error("'{name}' is neither a built-in {what} ({available}) nor a readable file")]
 pub struct UnknownText {
     name: String,
     what: &'static str,
-    known: String,
+    available: String,
     source: io::Error,
 }
 
-/// The text of what is built in under a name, or of a file.
+/// Returns a built-in text by name, or the text of a file.
 ///
 /// # Errors
 /// It is neither.
 pub fn text_of(name: &str, builtin: &[(&str, &str)], what: &'static str) -> Result<String, UnknownText> {
-    if let Some((_, text)) = builtin.iter().find(|(known, _)| *known == name) {
+    if let Some((_, text)) = builtin.iter().find(|(key, _)| *key == name) {
         return Ok((*text).to_owned());
     }
     std::fs::read_to_string(name).map_err(|source| {
-        let known = builtin.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
-        UnknownText { name: name.to_owned(), what, known, source }
+        let available = builtin.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
+        UnknownText { name: name.to_owned(), what, available, source }
     })
 }
 
@@ -49,21 +49,20 @@ impl WriteError {
     }
 }
 
-/// Says that something gets another name than the one that was asked for. If nobody reads it, it is
-/// written anyway.
-pub fn say_other(asked: &Path, free: &Path) {
-    if let Some(words) = other_name(asked, free) {
+/// Reports that a file gets another name than the requested one. Failure to print is ignored.
+pub fn report_other_name(requested: &Path, free: &Path) {
+    if let Some(words) = other_name(requested, free) {
         let _ = writeln!(io::stderr(), "{words}");
     }
 }
 
-/// Makes a folder under the next free name, and says it if it is another one. An empty folder is
-/// taken as it is. No other process takes it before the returned file is dropped; then something
-/// should be in it.
+/// Creates a folder under the next free name, and reports a changed name. An empty folder is used
+/// as it is. No other process takes it before the returned file is dropped; by then it should have
+/// content.
 ///
 /// # Errors
 /// It cannot be made, or no name is free.
-pub fn new_folder(asked: &Path) -> Result<(PathBuf, File), WriteError> {
+pub fn new_folder(requested: &Path) -> Result<(PathBuf, File), WriteError> {
     let make = |name: &Path| {
         std::fs::create_dir(name).or_else(|taken| if name.is_dir() { Ok(()) } else { Err(taken) })?;
         let folder = File::open(name)?;
@@ -71,9 +70,9 @@ pub fn new_folder(asked: &Path) -> Result<(PathBuf, File), WriteError> {
         let is_ours = !held && std::fs::read_dir(name)?.next().is_none();
         is_ours.then_some(folder).ok_or(io::ErrorKind::AlreadyExists.into())
     };
-    let parents = std::fs::create_dir_all(asked.parent().unwrap_or(asked));
-    let made = parents.and_then(|()| under_free_name(asked, make)).map_err(WriteError::at(asked))?;
-    say_other(asked, &made.0);
+    let parents = std::fs::create_dir_all(requested.parent().unwrap_or(requested));
+    let made = parents.and_then(|()| under_free_name(requested, make)).map_err(WriteError::at(requested))?;
+    report_other_name(requested, &made.0);
     Ok(made)
 }
 
@@ -98,7 +97,7 @@ pub fn write_folder(folder: &Path, files: &[(&str, impl AsRef<[u8]>)]) -> Result
 /// dropped, it is removed.
 #[derive(Debug)]
 pub struct NewFile {
-    /// The name that was asked for.
+    /// The requested name.
     path: PathBuf,
     replaces: bool,
     file: File,
@@ -107,13 +106,13 @@ pub struct NewFile {
 }
 
 impl NewFile {
-    /// Creates a file. If there is one of this name when it is complete, it gets the next free
-    /// name, and says it.
+    /// Creates a file. If one of this name exists when it is complete, it gets the next free name,
+    /// which is reported.
     ///
     /// # Errors
     /// It cannot be created in its directory.
-    pub fn create(asked: &Path) -> Result<Self, WriteError> {
-        Self::begin(asked, false)
+    pub fn create(requested: &Path) -> Result<Self, WriteError> {
+        Self::begin(requested, false)
     }
 
     /// Begins the new content of a file.
@@ -126,7 +125,7 @@ impl NewFile {
 
     fn begin(path: &Path, replaces: bool) -> Result<Self, WriteError> {
         let begun = if path == Path::new("/dev/stdout") {
-            // If it is a file, what is printed afterwards follows in it.
+            // If it is a file, later output is appended to it.
             io::stdout().as_fd().try_clone_to_owned().map(|stdout| (stdout.into(), None))
         } else if is_device(path) {
             File::options().write(true).open(path).map(|file| (file, None))
@@ -161,7 +160,7 @@ impl NewFile {
             Err(refused.error)
         };
         let (named, ()) = under_free_name(&path, name).map_err(WriteError::at(&path))?;
-        say_other(&path, &named);
+        report_other_name(&path, &named);
         Ok(named)
     }
 }
@@ -182,7 +181,7 @@ impl Seek for NewFile {
     }
 }
 
-/// A file beside another, which disappears unless it is kept.
+/// A file beside another, removed unless it is persisted.
 fn unfinished(beside: &Path) -> io::Result<NamedTempFile> {
     let mut unfinished = tempfile::Builder::new();
     unfinished.prefix(".unfinished-");
@@ -202,7 +201,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_exists_is_kept_and_a_file_is_there_whole_or_not_at_all() {
+    fn an_existing_file_is_preserved_and_a_new_one_is_complete_or_absent() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("file.txt");
         let write = |text: &str| {
@@ -220,7 +219,7 @@ mod tests {
 
     /// Another program creates the file while this one is being written.
     #[test]
-    fn a_file_that_appears_meanwhile_is_kept() {
+    fn a_file_that_appears_meanwhile_is_preserved() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("file");
         let file = NewFile::create(&path).unwrap();
@@ -229,7 +228,7 @@ mod tests {
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "theirs");
     }
 
-    /// A folder is nobody else's from the moment on when it is made, and what is in it is kept.
+    /// A folder belongs to one process from its creation on, and its content is preserved.
     #[test]
     fn a_new_folder_is_one_process_s() {
         let directory = tempfile::tempdir().unwrap();

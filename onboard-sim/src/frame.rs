@@ -28,7 +28,7 @@ pub enum FrameError {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frame {
     loaded: Mass,
-    own_motor: ThrustCurve,
+    flown_motor: ThrustCurve,
     mass_kg: f64,
     cg_station_m: f64,
     pitch_inertia_kg_m2: f64,
@@ -59,18 +59,18 @@ impl Frame {
             let motors = libm::round(1e5 * motors) / 1e5;
             return refused("loaded_pitch_inertia_kg_m2", mass.loaded_pitch_inertia_kg_m2, motors);
         }
-        let (loaded, own_motor) = (*mass, motor.clone());
-        Ok(Self { loaded, own_motor, mass_kg, cg_station_m, pitch_inertia_kg_m2: left_kg_m2 })
+        let (loaded, flown_motor) = (*mass, motor.clone());
+        Ok(Self { loaded, flown_motor, mass_kg, cg_station_m, pitch_inertia_kg_m2: left_kg_m2 })
     }
 
     /// Masses with a motor and so much ballast, kg; below zero it is taken out.
     pub fn with(&self, motor: &ThrustCurve, ballast_kg: f64) -> Mass {
-        let is_own = *motor == self.own_motor;
-        if is_own && ballast_kg == 0.0 {
+        let is_same = *motor == self.flown_motor;
+        if is_same && ballast_kg == 0.0 {
             // To the bit.
             return self.loaded;
         }
-        let motor_cg_m = if is_own { self.loaded.propellant_station_m } else { 0.5 * motor.length_m() };
+        let motor_cg_m = if is_same { self.loaded.propellant_station_m } else { 0.5 * motor.length_m() };
         let parts = [
             (self.mass_kg + ballast_kg, self.cg_station_m, self.pitch_inertia_kg_m2),
             (motor.total_mass_kg(), motor_cg_m, rod_inertia_kg_m2(motor)),
@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn its_own_motor_gives_the_airframe_back_to_the_bit() {
+    fn the_flown_motor_restores_the_airframe_to_the_bit() {
         for (name, _) in flight::vehicles::mission::BUILTIN {
             let mission = flight::vehicles::mission::builtin(name).unwrap().unwrap();
             let frame = Frame::of(&mission).unwrap();
@@ -225,19 +225,19 @@ mod tests {
         }
     }
 
-    /// With its own motor a mission keeps what is known of the lot, but not the weight of another
-    /// ballast; with another one nothing of it.
+    /// With the flown motor a mission retains the lot's measurements, but not the weight of another
+    /// ballast; with another motor neither.
     #[test]
     fn a_lot_and_the_other_motors_of_its_name_stay_with_a_motor() {
         let lot = "name = \"2609\"\nburns = 3\nimpulse = { mean = 1.02 }\nweighed = { vehicle_kg = 3.65 }";
         let recipe = recipe("mk3", &format!("\n[lot]\n{lot}\n"));
         let mass = Mass { loaded_kg: 3.75, ..recipe.mission.airframe.mass };
         let read = |motor: &str| changed(&recipe, motor, &mass).unwrap().mission;
-        let kept = read(&recipe.mission.airframe.motor);
-        assert_eq!((&kept.motor_curve, kept.airframe.mass), (&recipe.mission.motor_curve, mass));
+        let same = read(&recipe.mission.airframe.motor);
+        assert_eq!((&same.motor_curve, same.airframe.mass), (&recipe.mission.motor_curve, mass));
         let other = read("G33");
         assert!(other.lot.is_none() && other.motor_burns() == 0);
-        assert!(kept.other_motors == ["H45W"] && other.other_curves.is_empty());
+        assert!(same.other_motors == ["H45W"] && other.other_curves.is_empty());
         assert_eq!(other.motor_curve, flight::vehicles::motors::named("G33").unwrap());
     }
 

@@ -1,9 +1,9 @@
-//! Where a vehicle comes down, in each way that a flight can end: what says how near people may
-//! stand.
+//! Impact areas of a vehicle for each case of a flight, which determine the safe distance of
+//! people.
 //!
-//! Each flight is flown as it is drawn. On its way copies of it are aborted, each at a moment drawn
-//! evenly from one part of that very flight. The ways with a fault are flights of their own with
-//! the same draws.
+//! Each flight is flown as drawn. Copies of it are aborted under way, each at a moment drawn evenly
+//! from one part of that flight. The cases with a fault are separate flights with the same
+//! draws.
 
 use core::fmt;
 
@@ -29,21 +29,21 @@ use statrs::distribution::{Binomial, DiscreteCDF as _};
 use crate::run::{RunError, in_parallel};
 use crate::statistics::Landings;
 
-/// The share of the flights that a radius has to hold.
+/// The share of the flights that a radius must contain.
 const HELD: f64 = 0.99;
 /// Each end of a 95 % interval.
 const TAIL: f64 = 0.025;
 /// A flight that is still in the air after this is given up, s; it counts as infinitely far.
 const LONGEST_S: f64 = 900.0;
-/// What still moves this long after the first contact stays where it is, s.
+/// Time after the first contact at which sliding ends, s.
 const SLIDES_S: f64 = 5.0;
 /// Any number that no other draw uses.
 const OF_HAZARD: u64 = 0x4a2a_0000_0000_0005;
 
 flight::numbered_enum! {
-/// A way in which a flight can end.
+/// A case in which a flight can end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Way {
+pub enum Case {
     AsPlanned = "as planned",
     /// Aborted in the boost or in the coast: the parachute opens at apogee, the longest way under
     /// it.
@@ -60,17 +60,16 @@ pub enum Way {
     NoSeparation = "booster stays on",
     /// A disarmed vehicle lifts off.
     Uncommanded = "uncommanded lift-off",
-    /// The booster parts. No fin opens, no parachute, and no motor lights.
+    /// The booster separates. No fin opens, no parachute, and no motor ignites.
     Ballistic = "ballistic",
     /// Nothing happens any more after the lift-off, as with a dead flight computer.
     BallisticWithBooster = "ballistic, with booster",
-    /// The booster without its own parachute: along its axis or tumbling across it, whichever
-    /// carries it farther.
+    /// The booster without its parachute: along its axis or tumbling, whichever carries it farther.
     Booster = "spent booster, ballistic",
 }
 }
 
-impl Way {
+impl Case {
     /// The one start from which it happens; `None`: it happens from all.
     const fn start(self) -> Option<StartPoint> {
         match self {
@@ -84,7 +83,7 @@ impl Way {
         }
     }
 
-    /// The faults that make a flight end so; none for what happens to the flight as planned.
+    /// The faults of the case; none for the nominal flight.
     const fn faults(self) -> &'static [&'static str] {
         match self {
             Self::NoLight => &["no-light@0"],
@@ -102,13 +101,13 @@ impl Way {
         }
     }
 
-    /// The ways that a mission's flights can end.
+    /// The cases of a mission's flights.
     pub fn of(mission: &Mission) -> Vec<Self> {
-        let happens = |way: &Self| way.start().is_none_or(|start| start == mission.start.at);
+        let happens = |case: &Self| case.start().is_none_or(|start| start == mission.start.at);
         Self::ALL.into_iter().filter(happens).collect()
     }
 
-    /// It is a flight of its own, and no part of the one as planned.
+    /// Whether it is a separate flight, and not a part of the nominal one.
     fn is_alone(self) -> bool {
         self == Self::Uncommanded || !self.faults().is_empty()
     }
@@ -132,10 +131,10 @@ impl Way {
     }
 }
 
-/// Where a flight came down.
+/// Impact of a flight.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Impact {
-    pub way: Way,
+    pub case: Case,
     /// Number of the flight.
     pub number: u64,
     /// Place from the pad, m along world x and y; `None` if it was still in the air after a quarter
@@ -147,21 +146,21 @@ pub struct Impact {
     pub course: Course,
 }
 
-/// What else a flight tells that people on the ground ask for.
+/// Further values of a flight for people on the ground.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Course {
     /// Greatest height of the centre of gravity above the pad, m.
     pub highest_m: f64,
-    /// Speed at the end of the rail, m/s; of a flight that is looked at from its rail on.
+    /// Speed at the end of the rail, m/s; for a flight observed from its rail on.
     pub rail_m_s: Option<f64>,
     /// Lowest height of the feet in the fall from which an abort would still have opened the
     /// parachute, m.
     pub chute_down_to_m: Option<f64>,
     /// Height of the feet when the landing motor got its current, m.
-    pub lit_at_m: Option<f64>,
+    pub ignition_m: Option<f64>,
     /// From the ejection of the parachute to the ground, s.
     pub canopy_s: Option<f64>,
-    /// It does not stand at the end: it tipped over, or its body struck the ground.
+    /// It is not upright at the end: it tipped over, or its body struck the ground.
     pub lies: bool,
     /// Where the stack stood, m, and its speed a frame ago, m/s, while it is on its rail.
     on_rail: Option<(Vector3<f64>, f64)>,
@@ -177,7 +176,7 @@ impl Course {
         let down_s = world.touchdown().map(|touchdown| touchdown.time_s);
         self.canopy_s = down_s.zip(ejected_s).map(|(down_s, ejected_s)| down_s - ejected_s);
         if world.thrust_begins_s().is_some() {
-            self.lit_at_m.get_or_insert(world.height_m());
+            self.ignition_m.get_or_insert(world.height_m());
         }
         if !phase.before_apogee() && computer.abort_effect() == AbortEffect::ChuteNow {
             self.chute_down_to_m = Some(world.height_m());
@@ -223,9 +222,9 @@ pub struct Radius {
 }
 
 impl Radius {
-    /// The radius of distances, m; `None` without any. The ends are order statistics: how many of n
-    /// flights come down inside the true radius is binomial (W. J. Conover, Practical Nonparametric
-    /// Statistics, section 3.2), for any distribution of the distances.
+    /// The radius of distances, m; `None` without any. The ends are order statistics: the number of
+    /// n flights that come down inside the true radius is binomial (W. J. Conover, Practical
+    /// Nonparametric Statistics, section 3.2), for any distribution of the distances.
     pub fn of(mut distances_m: Vec<f64>) -> Option<Self> {
         distances_m.sort_by(f64::total_cmp);
         let (flights, farthest_m) = (distances_m.len(), *distances_m.last()?);
@@ -245,13 +244,12 @@ impl Radius {
         })
     }
 
-    /// The radius of one way, of many ways' impacts.
-    pub fn of_way(impacts: &[Impact], way: Way) -> Option<Self> {
-        Self::of(impacts.iter().filter(|impact| impact.way == way).map(Impact::distance_m).collect())
+    /// The radius of one case, from the impacts of many.
+    pub fn of_case(impacts: &[Impact], case: Case) -> Option<Self> {
+        Self::of(impacts.iter().filter(|impact| impact.case == case).map(Impact::distance_m).collect())
     }
 
-    /// The radius outside of which people may stand as far as these flights tell: the upper end, or
-    /// the farthest.
+    /// The safe radius according to these flights: the upper end, or the farthest.
     pub fn outside_m(&self) -> f64 {
         self.high_m.map_or(self.farthest_m, |high_m| high_m.max(self.holds_m))
     }
@@ -260,14 +258,14 @@ impl Radius {
 /// How many flights are flown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Flights {
-    /// Of every way.
+    /// Flights of every case.
     pub survey: u64,
-    /// Of the ways that reached nearly as far as the farthest.
+    /// Flights of the cases that reached nearly as far as the farthest.
     pub of_widest: u64,
 }
 
-/// A way of which the farthest flight of the survey comes down at this share of the farthest of all
-/// is one of the widest.
+/// Share of the farthest distance from which a case counts among the widest, by its farthest
+/// flight in the survey.
 const NEARLY: f64 = 0.9;
 
 /// [`study`] of each recipe. `done` gets how many flights of all are flown, of about how many.
@@ -289,8 +287,9 @@ pub fn studies(
     of_each.collect()
 }
 
-/// Flies every way of a recipe's mission, and the widest ones as often as is asked. `done` gets how
-/// many flights are flown, of how many: before the widest ways are known, of one of them.
+/// Flies every case of a recipe's mission, and the widest ones as often as requested. `done`
+/// gets the number of flights flown, and of all: before the widest cases are determined, of one
+/// of them.
 ///
 /// # Errors
 /// A flight cannot be set up.
@@ -300,12 +299,12 @@ pub fn study(
     done: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Vec<Impact>, RunError> {
     let Flights { survey, of_widest } = Flights { survey: flights.survey.min(flights.of_widest), ..flights };
-    let ways = Way::of(&recipe.mission);
-    let (surveyed, more) = (survey as usize * ways.len(), (of_widest - survey) as usize);
-    let fly_some = |ways: &[Way], numbers: core::ops::Range<u64>, told: &(dyn Fn(usize) + Sync)| {
+    let cases = Case::of(&recipe.mission);
+    let (surveyed, more) = (survey as usize * cases.len(), (of_widest - survey) as usize);
+    let fly_some = |cases: &[Case], numbers: core::ops::Range<u64>, show: &(dyn Fn(usize) + Sync)| {
         let numbers: Vec<u64> = numbers.collect();
         let flown =
-            in_parallel(&numbers, |number| fly(recipe, ways, *number), &|flown| told(flown * ways.len()));
+            in_parallel(&numbers, |number| fly(recipe, cases, *number), &|flown| show(flown * cases.len()));
         let flown = numbers
             .iter()
             .zip(flown)
@@ -313,20 +312,20 @@ pub fn study(
         Ok::<_, RunError>(flown.collect::<Result<Vec<_>, _>>()?.concat())
     };
     done(0, surveyed + more);
-    let mut impacts = fly_some(&ways, 0..survey, &|flown| done(flown, surveyed + more))?;
-    let farthest_m = |way: Way| Radius::of_way(&impacts, way).map_or(0.0, |radius| radius.farthest_m);
-    let widest_m = ways.iter().map(|way| farthest_m(*way)).fold(0.0, f64::max);
-    let widest: Vec<Way> = ways.into_iter().filter(|way| farthest_m(*way) >= NEARLY * widest_m).collect();
+    let mut impacts = fly_some(&cases, 0..survey, &|flown| done(flown, surveyed + more))?;
+    let farthest_m = |case: Case| Radius::of_case(&impacts, case).map_or(0.0, |radius| radius.farthest_m);
+    let widest_m = cases.iter().map(|case| farthest_m(*case)).fold(0.0, f64::max);
+    let widest: Vec<Case> = cases.into_iter().filter(|case| farthest_m(*case) >= NEARLY * widest_m).collect();
     let of = surveyed + more * widest.len();
     impacts.extend(fly_some(&widest, survey..of_widest, &|flown| done(surveyed + flown, of))?);
     Ok(impacts)
 }
 
-/// The radius outside of which people may stand as far as flights tell: the widest of all ways,
-/// with its way; `None` without flights.
-pub fn widest(impacts: &[Impact]) -> Option<(Way, Radius)> {
-    let radii = Way::ALL.into_iter().filter_map(|way| Some((way, Radius::of_way(impacts, way)?)));
-    // Of ways that reach alike far the one with an upper end.
+/// The safe radius according to the flights: the widest of all cases, with its case; `None`
+/// without flights.
+pub fn widest(impacts: &[Impact]) -> Option<(Case, Radius)> {
+    let radii = Case::ALL.into_iter().filter_map(|case| Some((case, Radius::of_case(impacts, case)?)));
+    // Of cases with equal reach the one with an upper end.
     let key = |radius: &Radius| (radius.outside_m(), radius.high_m.is_some());
     radii.max_by(|one, two| {
         let ((one_m, one_ends), (two_m, two_ends)) = (key(&one.1), key(&two.1));
@@ -334,35 +333,35 @@ pub fn widest(impacts: &[Impact]) -> Option<(Way, Radius)> {
     })
 }
 
-/// Nobody stands within this, m: the larger one of flights and rule, rounded up to ten metres.
+/// Keep-out distance, m: the larger one of flights and rule, rounded up to ten metres.
 pub fn keep_out_m(radius: &Radius, rule: &Rule) -> f64 {
     10.0 * libm::ceil(radius.outside_m().max(rule.distance_m()) / 10.0)
 }
 
-/// Flies flight `number` of a recipe in some ways.
+/// Flies flight `number` of a recipe in some cases.
 ///
 /// # Errors
 /// The flight cannot be set up.
-pub fn fly(recipe: &Recipe, ways: &[Way], number: u64) -> Result<Vec<Impact>, SetUpError> {
-    let mut impacts = Vec::with_capacity(ways.len());
+pub fn fly(recipe: &Recipe, cases: &[Case], number: u64) -> Result<Vec<Impact>, SetUpError> {
+    let mut impacts = Vec::with_capacity(cases.len());
     let drawn = draw(&recipe.mission, &recipe.dispersion, recipe.seed, number);
     let downwind_rad = drawn.truth.wind_towards_rad;
-    let mut add = |way: Way, (place_m, course), landing| {
-        impacts.push(Impact { way, number, place_m, downwind_rad, landing, course });
+    let mut add = |case: Case, (place_m, course), landing| {
+        impacts.push(Impact { case, number, place_m, downwind_rad, landing, course });
     };
-    let (alone, beside): (Vec<Way>, Vec<Way>) = ways.iter().partition(|way| way.is_alone());
+    let (alone, beside): (Vec<Case>, Vec<Case>) = cases.iter().partition(|case| case.is_alone());
     if !beside.is_empty() {
-        let mut branches: Vec<Branch> = beside.iter().map(|way| Branch::new(*way)).collect();
+        let mut branches: Vec<Branch> = beside.iter().map(|case| Branch::new(*case)).collect();
         let mut chance = Chance::of(recipe.seed ^ OF_HAZARD, number);
         let mut flight = Sortie::new(recipe, number)?;
         let (mut attached, mut booster) = (flight.world().booster_attached(), None);
         let to_the_ground = beside
             .iter()
-            .any(|way| !matches!(way, Way::AbortInAscent | Way::ParachuteFromApogee | Way::Booster));
+            .any(|case| !matches!(case, Case::AbortInAscent | Case::ParachuteFromApogee | Case::Booster));
         let planned = come_down(&mut flight, |flight| {
             let computer = flight.computer();
             let (phase, effect) = (computer.mode().phase, computer.abort_effect());
-            for branch in branches.iter_mut().filter(|branch| branch.way.aborts(phase, effect)) {
+            for branch in branches.iter_mut().filter(|branch| branch.case.aborts(phase, effect)) {
                 branch.take(flight, &mut chance);
             }
             if attached && !flight.world().booster_attached() {
@@ -372,71 +371,71 @@ pub fn fly(recipe: &Recipe, ways: &[Way], number: u64) -> Result<Vec<Impact>, Se
             to_the_ground || phase.before_apogee() || phase == Phase::Deploy
         });
         for branch in branches {
-            match (branch.way, branch.aborted) {
-                (Way::AsPlanned, _) => add(Way::AsPlanned, planned, flight.outcome().landing),
-                (Way::Booster, _) => {
+            match (branch.case, branch.aborted) {
+                (Case::AsPlanned, _) => add(Case::AsPlanned, planned, flight.outcome().landing),
+                (Case::Booster, _) => {
                     if let Some(place_m) = booster {
-                        add(Way::Booster, (Some(place_m), Course::default()), Landing::default());
+                        add(Case::Booster, (Some(place_m), Course::default()), Landing::default());
                     }
                 }
-                (way, Some(mut aborted)) => {
+                (case, Some(mut aborted)) => {
                     aborted.abort();
                     let down = come_down(&mut aborted, |_| true);
-                    add(way, down, aborted.outcome().landing);
+                    add(case, down, aborted.outcome().landing);
                 }
                 // This flight had no such part.
                 (_, None) => {}
             }
         }
     }
-    for way in alone {
-        let mut flight = if way == Way::Uncommanded {
+    for case in alone {
+        let mut flight = if case == Case::Uncommanded {
             uncommanded(recipe, number)?
         } else {
             let faults: Vec<TimedFault> =
-                way.faults().iter().filter_map(|fault| fault.parse().ok()).collect();
+                case.faults().iter().filter_map(|fault| fault.parse().ok()).collect();
             Sortie::new(&Recipe { faults, ..recipe.clone() }, number)?
         };
         let down = come_down(&mut flight, |_| true);
-        add(way, down, flight.outcome().landing);
+        add(case, down, flight.outcome().landing);
     }
-    let place_of = |way: Way| ways.iter().position(|known| *known == way);
-    impacts.sort_by_key(|impact| place_of(impact.way));
+    let place_of = |case: Case| cases.iter().position(|one| *one == case);
+    impacts.sort_by_key(|impact| place_of(impact.case));
     Ok(impacts)
 }
 
 /// How the flights as planned landed.
 pub fn landed_as_planned(impacts: &[Impact]) -> Landings {
-    let planned = impacts.iter().filter(|impact| impact.way == Way::AsPlanned);
+    let planned = impacts.iter().filter(|impact| impact.case == Case::AsPlanned);
     Landings::of(planned.map(|impact| impact.landing))
 }
 
 /// A copy of a flight, to be aborted.
 struct Branch {
-    way: Way,
+    case: Case,
     aborted: Option<Box<Sortie>>,
     frames: u64,
 }
 
 impl Branch {
-    fn new(way: Way) -> Self {
-        Self { way, aborted: None, frames: 0 }
+    fn new(case: Case) -> Self {
+        Self { case, aborted: None, frames: 0 }
     }
 
-    /// Keeps this frame or the one that is kept, so that each is as likely (J. S. Vitter, Random
-    /// Sampling with a Reservoir, 1985). At apogee the first one stays.
+    /// Retains this frame or the stored one, with equal probability for all (J. S. Vitter, Random
+    /// Sampling with a Reservoir, 1985). At apogee the first one is retained.
     fn take(&mut self, flight: &Sortie, chance: &mut Chance) {
         self.frames += 1;
-        let first = self.way == Way::ParachuteFromApogee;
-        let kept = if first { self.frames == 1 } else { chance.unit() * (self.frames as f64) < 1.0 };
-        if kept {
+        let first = self.case == Case::ParachuteFromApogee;
+        let selected = if first { self.frames == 1 } else { chance.unit() * (self.frames as f64) < 1.0 };
+        if selected {
             self.aborted = Some(Box::new(flight.clone()));
         }
     }
 }
 
-/// Flies until the vehicle lies still, and looks at every frame before it is flown, which says
-/// whether to go on. Where it lies, m, and how it came there.
+/// Flies until the vehicle is at rest; `look` examines every frame before it is flown, and decides
+/// whether to go on. Returns the impact position, m, and the course.
 fn come_down(flight: &mut Sortie, mut look: impl FnMut(&Sortie) -> bool) -> (Option<[f64; 2]>, Course) {
     let mut course = Course::default();
     let goes_on = |flight: &Sortie| {
@@ -468,7 +467,7 @@ fn come_down(flight: &mut Sortie, mut look: impl FnMut(&Sortie) -> bool) -> (Opt
     (down.then_some([place_m.x, place_m.y]), course)
 }
 
-/// A vehicle that stands on its pad, disarmed, when its ascent motor lights.
+/// A vehicle on its pad, disarmed, when its ascent motor ignites.
 fn uncommanded(recipe: &Recipe, number: u64) -> Result<Sortie, SetUpError> {
     /// The self-test is over by then, s.
     const READY_S: f64 = 60.0;
@@ -480,8 +479,8 @@ fn uncommanded(recipe: &Recipe, number: u64) -> Result<Sortie, SetUpError> {
     Ok(flight)
 }
 
-/// Where the booster of a flight comes down that has just been separated, m; without a parachute,
-/// as a point mass in the mean wind. `None` without a booster.
+/// Impact position of a booster just separated, m; without a parachute, as a point mass in the mean
+/// wind. `None` without a booster.
 fn spent_booster_m(flight: &Sortie) -> Option<[f64; 2]> {
     let (mission, world) = (flight.mission(), flight.world());
     let booster = &mission.launch.as_ref()?.booster;
@@ -501,7 +500,7 @@ fn spent_booster_m(flight: &Sortie) -> Option<[f64; 2]> {
     fallen.into_iter().max_by(|one, two| libm::hypot(one[0], one[1]).total_cmp(&libm::hypot(two[0], two[1])))
 }
 
-/// Where a point mass with a drag area for each kilogram, m^2/kg, comes down, m.
+/// Impact position of a point mass with a drag area for each kilogram, m^2/kg, m.
 fn fallen_m(
     mut place_m: Vector3<f64>,
     mut velocity_m_s: Vector3<f64>,
@@ -522,7 +521,7 @@ fn fallen_m(
     [place_m.x, place_m.y]
 }
 
-/// What a national association asks for, for any result of the flights.
+/// Requirement of a national association, independent of the flights.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rule {
     /// Least distance of people from the pad, feet.
@@ -536,7 +535,7 @@ pub struct Rule {
 }
 
 impl Rule {
-    /// Where the distances stand.
+    /// Source of the distances.
     pub const SOURCE: &str = "NAR High Power Rocket Safety Code (August 2012), minimum distance table; NAR Model Rocket Safety \
         Code, rule 5; both as tabled on lunar.org/wp/?p=98";
 
@@ -623,7 +622,7 @@ mod tests {
         assert_eq!((radius.flights, radius.holds_m, radius.farthest_m), (400, 396.0, 400.0));
         assert_eq!((radius.low_m, radius.high_m), (392.0, Some(400.0)));
         assert_eq!(Radius::of(vec![]), None);
-        // A flight that never came down is inside no radius.
+        // A flight that never landed is inside no radius.
         assert!(Radius::of(vec![1.0, f64::INFINITY]).unwrap().outside_m().is_infinite());
     }
 

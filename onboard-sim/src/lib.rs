@@ -4,10 +4,10 @@
 //! * [`tally`]: flies one flight of a campaign and collects the values of its [`row`].
 //! * [`run`]: the same work on many things, on several threads; flies the missing flights.
 //! * [`progress`]: how far something long is.
-//! * [`files`]: texts that are built in or files, and files that are written whole.
+//! * [`files`]: texts that are built in or files, and files written atomically.
 //! * [`statistics`], [`summary`]: percentiles and texts from the rows.
-//! * [`hazard`]: where a flight comes down in each way that it can end.
-//! * [`check`]: whether a vehicle that is not built yet will land, and what to change.
+//! * [`hazard`]: impact areas for each case of a flight.
+//! * [`check`]: prediction for an unbuilt vehicle whether it will land, and what to change.
 //! * [`frame`]: another motor in an airframe.
 //! * [`card`]: the landing card.
 //! * [`playback`]: recorded sensors played to the flight computer.

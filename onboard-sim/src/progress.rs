@@ -17,7 +17,7 @@ const BAR: &str = "{wide_bar} {pos} of {len} {msg}; {eta} to go";
 #[derive(Debug)]
 pub struct Progress {
     bar: ProgressBar,
-    /// When it began, and when it said something last.
+    /// Start time, and time of the last output.
     times: Mutex<(Instant, Instant)>,
 }
 
@@ -31,7 +31,7 @@ impl Progress {
         (now() - self.times.lock().unwrap_or_else(PoisonError::into_inner).0).as_secs_f64()
     }
 
-    /// Shows how many of some things are done. With none done it starts anew.
+    /// Shows the number of completed items. With none done it restarts.
     pub fn show(&self, done: usize, of: usize, what: impl Display) {
         let mut times = self.times.lock().unwrap_or_else(PoisonError::into_inner);
         if done == 0 {

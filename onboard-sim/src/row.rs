@@ -1,8 +1,8 @@
 //! One row per flight: its random draws, its outcome and the work of its solver.
 //!
-//! The columns and their units are named only here. The cell of a quantity that a flight does not
-//! have (such as the height of an ignition that never came) is empty. A number in CSV has enough
-//! digits to read the same bits back.
+//! The columns and their units are named only here. The cell of a missing quantity (such as the
+//! height of an ignition that never took place) is empty. A number in CSV has enough digits to
+//! restore the same bits.
 
 use flight::rules::verdict::Landing;
 use serde::{Deserialize, Serialize};
@@ -103,7 +103,7 @@ row! {
     leg_use: Option<f64>,
     /// It stands undamaged ([`Landing`]).
     stands: bool,
-    /// It stands, whatever it touched down with.
+    /// It is upright, whatever its touchdown.
     upright: bool,
     /// Inside the design envelope of its legs at contact.
     envelope: bool,
@@ -111,15 +111,16 @@ row! {
     table_2: bool,
     /// Why it does not stand undamaged; empty if it does.
     failure: String,
-    /// How the vehicle came to rest; empty if it did not.
+    /// Rest state of the vehicle; empty if it did not come to rest.
     rest: String,
-    /// Largest share of a leg's stroke that was used, if legs can give way.
+    /// Largest used share of a leg's stroke, if legs are crushable.
     stroke_used: Option<f64>,
-    /// Largest force at a foot over the leg's strength, if legs can give way.
+    /// Largest force at a foot over the leg's strength, if legs are crushable.
     strength_used: Option<f64>,
-    /// Smallest distance of nozzle and body from the ground since contact, if legs can give way, m.
+    /// Smallest distance of nozzle and body from the ground since contact, if legs are crushable,
+    /// m.
     clearance_m: Option<f64>,
-    /// Largest tilt since contact, if legs can give way, degrees.
+    /// Largest tilt since contact, if legs are crushable, degrees.
     leaned_deg: Option<f64>,
     /// Last phase.
     phase: String,

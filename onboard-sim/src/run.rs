@@ -1,7 +1,7 @@
 //! The same work on many things, on several threads.
 //!
-//! What a thread does depends only on its thing (of a flight on the recipe and its number), so no
-//! result depends on the number of threads.
+//! The work of a thread depends only on its item (for a flight, on the recipe and its number), so
+//! no result depends on the number of threads.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -43,17 +43,17 @@ pub fn in_parallel<'a, T: Sync, R: Send>(
     items.par_iter().with_max_len(1).map(one).collect()
 }
 
-/// What a run has flown.
+/// Counters of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Counts {
     pub flown: u64,
-    /// Flights that this run has to fly.
+    /// Number of flights of this run.
     pub of: u64,
     /// Flights that stand undamaged.
     pub stands: u64,
     /// Flights that touched down inside the design envelope of their legs.
     pub envelope: u64,
-    /// Simulated time of the flights, whole milliseconds.
+    /// Simulated time of the flights, full milliseconds.
     pub flight_time_ms: u64,
 }
 
@@ -102,8 +102,8 @@ pub fn run(recipe: &Recipe, store: &Store, progress: &(dyn Fn(&Counts) + Sync)) 
     Ok(total.into_inner().unwrap_or_else(PoisonError::into_inner))
 }
 
-/// Flies flights 0 to `flights` of a recipe, those of a campaign with it, and keeps their rows.
-/// `done` gets how many are flown.
+/// Flies flights 0 to `flights` of a recipe, and those of a campaign with it, and returns their
+/// rows. `done` gets the number of flights flown.
 ///
 /// # Errors
 /// The first flight that cannot be set up or panics.

@@ -47,7 +47,7 @@ impl fmt::Display for Share {
     }
 }
 
-/// How many of some flights ended as each word of a [`Landing`] says.
+/// Numbers of flights by the words of a [`Landing`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Landings {
     pub stands: Share,
@@ -74,7 +74,7 @@ impl Landings {
 }
 
 impl fmt::Display for Landings {
-    /// What stands undamaged, never without what was inside the design envelope of its legs.
+    /// Vehicles that stand undamaged, always with those inside the design envelope of their legs.
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(out, "{}, {} inside the envelope", self.stands, self.envelope.count)
     }

@@ -1,8 +1,8 @@
-//! A campaign's directory: what its results depend on, and a row for each flight that is flown.
+//! A campaign's directory: the inputs of its results, and a row for each flown flight.
 //!
 //! Rows are appended as the flights end, and sorted when all are flown. A stopped campaign
-//! continues with the flights that have no whole line. A directory belongs to one campaign; another
-//! one is refused.
+//! continues with the flights that have no complete line. A directory belongs to one campaign;
+//! another one is refused.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -22,7 +22,7 @@ const MANIFEST: &str = "manifest.json";
 const MISSION: &str = "mission.toml";
 const DISPERSION: &str = "dispersion.toml";
 const FLIGHTS: &str = "flights.csv";
-/// After so many rows the disk has them, also if the power fails.
+/// Number of rows after which they are synced to the disk.
 const SYNCED_ROWS: usize = 10;
 
 /// Everything that the results in a directory depend on.
@@ -37,7 +37,7 @@ pub struct Manifest {
     /// Digest of their text.
     pub dispersion_sha256: String,
     pub seed: u64,
-    /// Flights of the whole campaign; they are numbered from 0.
+    /// Flights of the complete campaign; they are numbered from 0.
     pub flights: u64,
     /// Faults, as written on a command line.
     pub faults: Vec<String>,
@@ -46,7 +46,7 @@ pub struct Manifest {
 }
 
 impl Manifest {
-    /// Of so many flights of a recipe; `build` names the program.
+    /// For this many flights of a recipe; `build` names the program.
     pub fn of(recipe: &Recipe, flights: u64, build: &str) -> Self {
         Self {
             mission: recipe.mission.name.clone(),
@@ -163,7 +163,7 @@ impl Store {
         (0..self.manifest.flights).filter(|number| !rows.contains_key(number)).collect()
     }
 
-    /// Writes the row of a flight, whole or not at all.
+    /// Writes the row of a flight, complete or not at all.
     ///
     /// # Errors
     /// It cannot be written.
@@ -175,7 +175,8 @@ impl Store {
         let synced =
             |file: &File| if (rows.len() + 1) % SYNCED_ROWS == 0 { file.sync_data() } else { Ok(()) };
         file.write_all(&line).and_then(|()| synced(file)).map_err(|error| {
-            // What cannot be taken back is cut off when the campaign goes on: it has no line's end.
+            // If it fails, the incomplete line is removed when the campaign continues: it has no
+            // line end.
             let _ = file.set_len(before);
             StoreError::content(&path, &error)
         })?;
@@ -236,7 +237,7 @@ fn read_rows(directory: &Path, manifest: &Manifest) -> Result<BTreeMap<u64, Row>
     rows.collect()
 }
 
-/// With a header if it is wanted and there is a row.
+/// With a header if requested and if there is a row.
 fn to_csv<'a>(rows: impl IntoIterator<Item = &'a Row>, has_header: bool) -> Result<Vec<u8>, StoreError> {
     let mut writer = csv::WriterBuilder::new().has_headers(has_header).from_writer(Vec::new());
     let written = rows.into_iter().try_for_each(|row| writer.serialize(row));

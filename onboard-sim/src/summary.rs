@@ -15,7 +15,7 @@ use crate::statistics::{Landings, Share, quantile, sorted};
 use crate::store::Manifest;
 
 /// Columns whose percentiles are in the summary.
-const TOLD: [&str; 14] = [
+const SUMMARISED: [&str; 14] = [
     "touchdown_vertical_m_s",
     "touchdown_lateral_m_s",
     "touchdown_tilt_deg",
@@ -145,7 +145,7 @@ impl Summary {
                 solver_iterations: sum(|row| row.solver_iterations),
                 solver_failures: sum(|row| row.solver_failures),
             },
-            distributions: TOLD.iter().filter_map(|name| distribution(rows, name)).collect(),
+            distributions: SUMMARISED.iter().filter_map(|name| distribution(rows, name)).collect(),
             sensitivity: sensitivity(rows),
         }
     }
@@ -241,7 +241,7 @@ fn what(manifest: &Manifest) -> String {
     what
 }
 
-/// What fits into 80 columns; the summary has the other percentiles.
+/// As much as fits into 80 columns; the summary has the other percentiles.
 fn write_distributions(summary: &Summary, out: &mut String) -> fmt::Result {
     let heading = ["least", "5 %", "50 %", "95 %", "greatest"];
     writeln!(out, "{:<30}{}", "", heading.map(|name| format!("{name:>10}")).concat())?;
@@ -251,11 +251,11 @@ fn write_distributions(summary: &Summary, out: &mut String) -> fmt::Result {
     })
 }
 
-/// The quantities whose cost the number of flights can tell from nothing.
+/// The quantities whose cost is significant with this number of flights.
 fn write_sensitivities(summary: &Summary, out: &mut String) -> fmt::Result {
     let Summary { sensitivity, landings, .. } = summary;
-    let told = || sensitivity.iter().filter(|found| found.cost_interval()[0] > 0.0);
-    if told().next().is_none() {
+    let costly = || sensitivity.iter().filter(|found| found.cost_interval()[0] > 0.0);
+    if costly().next().is_none() {
         return writeln!(out, "\nwhat costs landings: {} flights do not tell", landings.stands.of);
     }
     writeln!(
@@ -266,7 +266,7 @@ fn write_sensitivities(summary: &Summary, out: &mut String) -> fmt::Result {
     )?;
     let heading = ["deviation", "inner %", "outer %", "cost %", "from %", "to %"];
     writeln!(out, "{:<30}{}", "", heading.map(|name| format!("{name:>8}")).concat())?;
-    told().try_for_each(|found| {
+    costly().try_for_each(|found| {
         let [low, high] = found.cost_interval();
         let percents = [found.inner.share, found.outer.share, found.cost(), low, high];
         let percents = percents.map(|share| format!("{:>8.1}", 100.0 * share)).concat();

@@ -14,13 +14,14 @@ use crate::row::Row;
 
 /// Fraction of the gimbal's travel from which a command counts as at its stop.
 const AT_STOP_SHARE: f64 = 0.999;
-/// By then the filter has seen most of the burn, and the plan can still use what it knows, s.
-const MOTOR_KNOWN_S: f64 = 3.0;
+/// Time since thrust onset at which the filter has processed most of the burn, and the plan can
+/// still use its estimate, s.
+const MOTOR_ESTIMATED_S: f64 = 3.0;
 
 /// A running flight, and the values collected for its row.
 pub struct Tally {
     flight: Sortie,
-    /// What is known before the end.
+    /// Values available before the end.
     so_far: Row,
     /// Sum over frames, and their number.
     nees_of_motion: (f64, u32),
@@ -85,7 +86,7 @@ impl Tally {
             if let Some(nees) = flight.nees_of_motion() {
                 self.nees_of_motion = (self.nees_of_motion.0 + nees, self.nees_of_motion.1 + 1);
             }
-            if burning_s >= MOTOR_KNOWN_S && row.nees_of_motor.is_none() {
+            if burning_s >= MOTOR_ESTIMATED_S && row.nees_of_motor.is_none() {
                 row.nees_of_motor = flight.nees_of_motor();
             }
         }

@@ -1,13 +1,15 @@
-//! The book of a station: who did what when, with a hash over all of it that is signed.
+//! The book of a station: a record of crew actions with operator and time, and a signed hash over
+//! all entries.
 //!
-//! Whoever changes an entry gets another hash, which they cannot sign. The vehicle keeps the signed
-//! hashes that it was sent, so a book that was cut is shorter than what the vehicle has of it.
+//! A changed entry gives another hash, which cannot be signed without the key. The vehicle stores
+//! the signed hashes that it receives, so a truncated book is shorter than the vehicle's record of
+//! it.
 //!
-//! The way of an entry: the ground's `update` enters a line for a key, a command, an answer, a
-//! signature of the checklist or a word of the vehicle. Its `app` adds the time of day; here it is
-//! numbered and hashed, and it goes to `/book` of the station's log. At most every 2 s, and at the
-//! close, the hash of all entries is signed, recorded (`/book/head`) and sent to the vehicle until
-//! the vehicle confirms it. The frame is in the vehicle's log before the confirmation leaves.
+//! Path of an entry: the ground's `update` enters a line for a key, a command, an answer, a
+//! signature of the checklist or a message of the vehicle. Its `app` adds the time of day; here it
+//! is numbered and hashed, and written to `/book` of the station's log. At most every 2 s, and at
+//! the close, the hash of all entries is signed, recorded (`/book/head`) and sent to the vehicle
+//! until the vehicle confirms it. The frame is in the vehicle's log before the confirmation leaves.
 //! `replay verify --book` compares all of them ([`audit`]).
 
 use std::fmt;
@@ -27,7 +29,7 @@ pub const OPENED: &str = "opened";
 /// The kind of the last entry of a book that was ended properly.
 pub const CLOSED: &str = "closed";
 
-/// What is entered.
+/// An entry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Line<'a> {
     /// Nanoseconds since 1970, UTC, by the station's clock.
@@ -112,7 +114,7 @@ pub fn shown(hash: &[u8]) -> String {
 }
 
 impl SignedHead {
-    /// The message that tells the vehicle.
+    /// The message that sends the head to the vehicle.
     pub fn message(&self, vehicle: Address) -> TD_BOOK_HEAD_DATA {
         TD_BOOK_HEAD_DATA {
             book: self.head.book,
@@ -220,7 +222,7 @@ fn signed_bytes(head: &Head) -> Vec<u8> {
     [HEAD_DOMAIN, &head.book.to_le_bytes(), &head.entries.to_le_bytes(), &head.hash].concat()
 }
 
-// Checks a book against the signed heads in its own log and in the vehicle's.
+// Checks a book against the signed heads in its log and in the vehicle's.
 
 /// A signed head that was found in a log.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -231,7 +233,7 @@ pub struct RecordedHead {
     pub signed: SignedHead,
 }
 
-/// Why a book is not what was written.
+/// Why a book is not authentic.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Broken {
     #[error("the book does not begin with its first entry")]
@@ -254,14 +256,14 @@ pub struct Audit {
     pub head: Option<Head>,
     /// The key in the text of the first entry.
     pub key: Option<PublicKey>,
-    /// The first that is wrong; `None` if the book is whole.
+    /// The first fault; `None` if the book is intact.
     pub broken: Option<Broken>,
     /// The entries under a signature in the station's log: only the owner of the key can have
     /// written them.
     pub signed: u32,
     /// The entries whose hash a vehicle has: they cannot have been changed or cut since.
     pub witnessed: u32,
-    /// Whether the last entry says that the book was closed.
+    /// Whether the last entry closes the book.
     pub closed: bool,
 }
 

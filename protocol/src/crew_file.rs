@@ -1,8 +1,8 @@
 //! Reads the file that names the people who may command: who they are, their roles, and where their
 //! keys are.
 //!
-//! The vehicle reads everybody's key. A station reads its own operator's only, so the others' need
-//! not be there.
+//! The vehicle reads all keys. A station reads its operator's only, so the others need not be
+//! present.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -163,7 +163,7 @@ impl CrewFile {
     /// The member of this name.
     ///
     /// # Errors
-    /// Nobody has it; the message names everybody.
+    /// Unknown name; the message lists all names.
     pub fn member(&self, name: &str) -> Result<&Member, CrewFileError> {
         self.members.iter().find(|member| member.name == name).ok_or_else(|| {
             let names: Vec<&str> = self.members.iter().map(|member| member.name.as_str()).collect();

@@ -23,7 +23,7 @@ const MAX_SOURCES: usize = 16;
 
 /// A frame at its first arrival.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Heard {
+struct FirstArrival {
     at: Duration,
     /// The links over which it has arrived, a bit each.
     links: u64,
@@ -44,7 +44,7 @@ pub enum Arrival {
     Again,
 }
 
-/// Tells copies apart from new frames.
+/// Distinguishes copies from new frames.
 ///
 /// A component numbers its frames once for all links, so a copy has the sequence number and the
 /// checksum of a frame that arrived shortly before. Over the same link it is a copy only if the
@@ -58,7 +58,7 @@ pub struct Duplicates {
 #[derive(Debug)]
 struct Source {
     /// The frames that may still have copies, by sequence number, oldest first.
-    by_number: Vec<Vec<Heard>>,
+    by_number: Vec<Vec<FirstArrival>>,
     /// Number of new frames.
     frames: u64,
     /// Sequence number of the newest frame.
@@ -80,12 +80,12 @@ impl Duplicates {
         }
         let new = || Source { by_number: vec![Vec::new(); 256], frames: 0, newest: 0 };
         let Source { by_number, frames, newest } = self.sources.entry(source).or_insert_with(new);
-        let heard = &mut by_number[usize::from(frame.sequence())];
-        heard.retain(|earlier| now.saturating_sub(earlier.at) <= MAX_DELAY);
+        let arrivals = &mut by_number[usize::from(frame.sequence())];
+        arrivals.retain(|earlier| now.saturating_sub(earlier.at) <= MAX_DELAY);
         let over = u32::try_from(link).ok().and_then(|link| 1_u64.checked_shl(link)).unwrap_or(0);
         let content = (operator, frame.message_id(), frame.crc());
         let went_back = *newest != frame.sequence();
-        let first = heard.iter_mut().find(|earlier| {
+        let first = arrivals.iter_mut().find(|earlier| {
             let may_repeat = went_back && *frames - earlier.nth < HALF_OF_THE_NUMBERS;
             (earlier.operator, earlier.message_id, earlier.crc) == content
                 && (earlier.links & over == 0 || may_repeat)
@@ -97,12 +97,12 @@ impl Duplicates {
             }
             Some(_) if over != 0 => Arrival::Again,
             _ => {
-                if heard.len() >= MAX_OF_A_NUMBER {
-                    heard.remove(0);
+                if arrivals.len() >= MAX_OF_A_NUMBER {
+                    arrivals.remove(0);
                 }
                 let (operator, message_id, crc) = content;
                 (*frames, *newest) = (*frames + 1, frame.sequence());
-                heard.push(Heard { at: now, links: over, nth: *frames, operator, message_id, crc });
+                arrivals.push(FirstArrival { at: now, links: over, nth: *frames, operator, message_id, crc });
                 Arrival::New
             }
         }
@@ -156,7 +156,7 @@ mod tests {
         }
     }
 
-    /// A computer that slept hears some seconds of each link at once: more frames than there are
+    /// A computer that slept reads some seconds of each link at once: more frames than there are
     /// numbers.
     #[test]
     fn a_link_that_is_read_long_after_another_one_has_copies_alone() {

@@ -1,7 +1,7 @@
 //! Converts bytes into checked MAVLink frames and messages into frames, without I/O.
 //!
-//! [`Framer`] keeps what the crate `mavlink` would drop: the exact bytes of a frame (for the log),
-//! counters of what was rejected and why, and frames whose fields hold values outside the dialect
+//! [`Framer`] retains data that the crate `mavlink` would drop: the exact bytes of a frame (for the
+//! log), counters of rejections by cause, and frames whose fields hold values outside the dialect
 //! (so that an unknown command can still be answered). It accepts MAVLink 2 only: MAVLink 1 has a
 //! one-byte marker and unchecked ids, so its framer would wait on noise for bytes that never come.
 //! Wire format: <https://mavlink.io/en/guide/serialization.html>.
@@ -24,7 +24,7 @@ pub(crate) const INCOMPAT_SIGNED: u8 = 0x01;
 /// The message SETUP_SIGNING, which contains a key in the clear.
 const SETUP_SIGNING_ID: u32 = 256;
 
-/// One whole frame with a correct CRC.
+/// A complete frame with a correct CRC.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Frame {
     bytes: Vec<u8>,
@@ -83,9 +83,8 @@ impl Frame {
         Some(stamp.iter().rev().fold(0, |stamp, byte| stamp << 8 | u64::from(*byte)))
     }
 
-    /// Returns the number of the key that its signature names; 0 for the shared key, and without a
-    /// signature. It says nothing until [`crate::signing::Signing`] has checked the frame against
-    /// that key.
+    /// Returns the key number in the signature; 0 for the shared key, and without a signature. It
+    /// is meaningless until [`crate::signing::Signing`] has checked the frame against that key.
     pub fn key_number(&self) -> u8 {
         self.signature().map_or(0, |signature| crate::signing::key_number(signature[0]))
     }
@@ -246,7 +245,7 @@ impl Encoder {
 
 // Finds frames with a correct checksum in bytes, however the bytes are split into pieces.
 
-/// What a [`Framer`] has accepted and rejected.
+/// Counters of accepted and rejected frames.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "transport", derive(serde::Serialize, serde::Deserialize))]
 pub struct FramerCounters {
@@ -258,7 +257,7 @@ pub struct FramerCounters {
     pub unknown_ids: u64,
     /// Candidates that ended before their stated length.
     pub cut_short: u64,
-    /// Candidates with incompatibility flags that this implementation does not know.
+    /// Candidates with unknown incompatibility flags.
     pub unknown_flags: u64,
     /// Bytes that belonged to no frame.
     pub garbage_bytes: u64,
@@ -280,7 +279,7 @@ impl core::ops::AddAssign for FramerCounters {
 /// After a rejected candidate the search continues at its second byte, so that a start marker
 /// inside garbage never hides the frame behind it. A candidate that waits for bytes is rejected
 /// once no more bytes will come: at the end of a datagram, and when a serial line falls silent. The
-/// framer keeps at most one partial frame between calls.
+/// framer stores at most one partial frame between calls.
 #[derive(Debug, Default)]
 pub struct Framer {
     buffer: Vec<u8>,
@@ -312,7 +311,7 @@ impl Framer {
 
     /// Notes that the stream has paused for longer than a frame may, so that an incomplete frame
     /// will stay incomplete. Call [`Framer::next_frame`] until it returns `None` afterwards: a
-    /// whole frame may follow the incomplete one.
+    /// complete frame may follow the incomplete one.
     pub fn on_silence(&mut self) {
         self.ended = true;
     }
@@ -321,7 +320,7 @@ impl Framer {
         self.counters
     }
 
-    /// Returns the next whole frame, or `None` until more bytes arrive.
+    /// Returns the next complete frame, or `None` until more bytes arrive.
     pub fn next_frame(&mut self) -> Option<Frame> {
         self.next_view().map(|view| Frame { bytes: view.bytes.to_vec() })
     }
@@ -333,7 +332,7 @@ impl Framer {
         Some(FrameView { bytes: &self.buffer[found] })
     }
 
-    /// Returns where the next whole frame lies in the buffer, and counts it as taken.
+    /// Returns the position of the next complete frame in the buffer, and counts it as taken.
     #[inline]
     fn find(&mut self) -> Option<Range<usize>> {
         loop {

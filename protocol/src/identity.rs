@@ -26,12 +26,12 @@ pub const RADIO: Address = Address { system_id: 51, component_id: 68 };
 pub const RADIO_BUDGET_BYTES_S: u32 = 2_000;
 
 /// Bytes per second that telemetry may use over UDP and TCP: ten radios, and 1.5 % of the slowest
-/// Wi-Fi (802.11b, 11 Mbit/s). The default rates use an eighth of it; the rest is for what clients
-/// ask for.
+/// Wi-Fi (802.11b, 11 Mbit/s). The default rates use an eighth of it; the rest is for clients'
+/// requests.
 pub const NETWORK_BUDGET_BYTES_S: u32 = 20_000;
 
-/// Boot numbers are 1 to here: a command names the boot that it is meant for in a parameter, and a
-/// float holds every whole number up to 2^24 exactly.
+/// Largest boot number; the smallest is 1. A command carries the boot that it is addressed to in a
+/// parameter, and a float represents every integer up to 2^24 exactly.
 pub const LARGEST_BOOT_NUMBER: u32 = 0x00FF_FFFF;
 
 /// The phase has the lowest bits of a vehicle's `custom_mode` (HEARTBEAT), and its boot number the
@@ -49,8 +49,8 @@ impl Address {
         Self { system_id, ..self }
     }
 
-    /// Returns whether a message to `target` is meant for this component: the ids match or are the
-    /// broadcast id 0.
+    /// Returns whether a message to `target` is addressed to this component: the ids match or are
+    /// the broadcast id 0.
     pub fn accepts(self, target: Address) -> bool {
         (target.system_id == 0 || target.system_id == self.system_id)
             && (target.component_id == 0 || target.component_id == self.component_id)

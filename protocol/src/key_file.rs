@@ -14,7 +14,7 @@ use crate::signing::{Key, Memory, MemoryError, Signing};
 
 /// Only the owner may read and write.
 const OWNER_ONLY: u32 = 0o600;
-/// After this many appended bytes the timestamp file is written anew.
+/// Number of appended bytes after which the timestamp file is rewritten.
 const APPEND_LIMIT_BYTES: usize = 64 << 10;
 /// How long a caller waits for the disk: a working one takes some 0.05 ms, and an abort may be late
 /// by 100 ms.
@@ -42,7 +42,8 @@ pub enum KeyFileError {
     /// It does not contain a key.
     #[error("key file {path}: must be 64 hexadecimal digits; `onboard-sim keygen` makes a key")]
     NoKey { path: PathBuf },
-    /// The timestamps beside it cannot be parsed. Starting afresh would make a replay possible.
+    /// The timestamps beside it cannot be parsed. Starting without them would make a replay
+    /// possible.
     #[error("timestamp file {path}: {why}; delete it only if nobody can have recorded earlier runs")]
     Memory { path: PathBuf, why: MemoryError },
     /// The disk stalls; the timestamps are written once it continues.
@@ -112,7 +113,7 @@ impl Shared {
 #[derive(Debug)]
 struct StampFile {
     stamps_path: PathBuf,
-    /// What the timestamp file contains up to its last complete line.
+    /// Content of the timestamp file up to its last complete line.
     written: Memory,
     /// The timestamp file, once this run has written it, and how many bytes were appended since.
     appending: Option<(File, usize)>,
@@ -146,7 +147,7 @@ impl KeyFile {
     }
 
     /// Reads a key and the timestamps of `user` beside it (`FILE.USER.stamps`). Vehicle and ground
-    /// may use one key file on the same machine, but each has its own timestamps.
+    /// may use one key file on the same machine, with separate timestamps.
     ///
     /// # Errors
     /// The file cannot be read, other users can read it, or it contains no key; or the timestamps
@@ -349,7 +350,7 @@ mod tests {
         let mut encoder = Encoder::new(GROUND);
         let mut beat = || encoder.encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
         let (mut file, mut ground) = KeyFile::open(&path, "ground").unwrap();
-        // There are more frames than are appended before the file is written anew.
+        // There are more frames than are appended before a rewrite.
         let mut longest = 0;
         for number in 0..5_000 {
             let signed = vehicle.sign(&beat(), 0, 1_000 + 300 * number);

@@ -19,19 +19,20 @@
 //! * `links` (the same feature): the open links of a program, together;
 //! * `key_file` and `crew_file` (the same feature): the file of a signing key, and of the people
 //!   who have keys;
-//! * [`mission`]: which mission is meant;
-//! * [`motion`]: where a vehicle is and how it turns, from its messages; `told`: all of it as a
+//! * [`mission`]: identification of a mission by its hash;
+//! * [`motion`]: position and attitude of a vehicle, from its messages; `reported`: all of it as a
 //!   record of the log;
-//! * [`book`]: who did what, with a signed hash over all of it;
+//! * [`book`]: the record of crew actions, with a signed hash over all entries;
 //! * [`records`]: the records of the flight log, generated;
 //! * [`log`]: the flight log;
 //! * `program` (a feature): exit codes, completions and manual pages of the programs.
 //!
 //! # On a flight computer
 //!
-//! Bytes from a UART, a socket or a test go into a [`hub::Hub`]; valid frames that were not heard
-//! before come out. A message is sent through a [`frame::Encoder`], one for each component, and
-//! then through the hub, which signs it for each link. Nothing here waits or reads a clock:
+//! Bytes from a UART, a socket or a test go into a [`hub::Hub`]; valid frames that were not
+//! received before come out. A message is sent through a [`frame::Encoder`], one for each
+//! component, and then through the hub, which signs it for each link. Nothing here waits or reads a
+//! clock:
 //!
 //! ```
 //! use std::time::Duration;
@@ -46,10 +47,10 @@
 //! let mut encoder = Encoder::new(VEHICLE);
 //! let mut uart_out = Vec::new();
 //!
-//! # let asked = MavMessage::COMMAND_LONG(COMMAND_LONG_DATA {
+//! # let request = MavMessage::COMMAND_LONG(COMMAND_LONG_DATA {
 //! #     command: MavCmd::MAV_CMD_NAV_TAKEOFF, target_system: 1, ..COMMAND_LONG_DATA::default()
 //! # });
-//! # let uart_in = Encoder::new(GROUND).encode(&asked).as_bytes().to_vec();
+//! # let uart_in = Encoder::new(GROUND).encode(&request).as_bytes().to_vec();
 //! let since_boot = Duration::from_millis(20);
 //! for news in hub.take(0, Received::Stream(0, uart_in), since_boot, 0) {
 //!     let LinkEvent::Frame(frame) = news else { continue };
@@ -64,11 +65,11 @@
 //! assert_eq!(uart_out[7], 77, "a COMMAND_ACK");
 //! ```
 //!
-//! With a key, the caller must pass the time of day, as far as it is known, and must store
+//! With a key, the caller must pass the time of day, as far as it is available, and must store
 //! [`hub::Hub::signing_memory`] so that it survives a power cycle.
 //!
-//! Without the feature `std` the crate needs a heap and no operating system; then it has no log, no
-//! book and no files, and its dialect has the messages that a vehicle says and hears.
+//! Without the feature `std` the crate needs a heap and no operating system. It then has no log, no
+//! book and no files, and its dialect has the messages that a vehicle sends and receives.
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 
 extern crate alloc;
@@ -99,9 +100,9 @@ pub mod parameter;
 #[cfg(feature = "program")]
 pub mod program;
 pub mod records;
+#[cfg(feature = "std")]
+pub mod reported;
 pub mod signing;
 pub mod text;
-#[cfg(feature = "std")]
-pub mod told;
 #[cfg(feature = "transport")]
 pub mod transport;

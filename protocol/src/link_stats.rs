@@ -93,7 +93,7 @@ struct MessageStats {
     buckets: Buckets,
 }
 
-/// How many frames of a component arrived, and how many were lost, since it was first heard.
+/// Number of frames of a component received and lost since its first one.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct FrameCounts {
     pub arrived: u64,
@@ -119,7 +119,7 @@ pub struct LinkFigures {
     pub loss: f64,
 }
 
-/// When a message of a component came last, and how often it comes.
+/// Time of the last message of a component, and its rate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MessageFigures {
     pub source: Address,
@@ -192,17 +192,17 @@ impl LinkStats {
         self.buckets.on_frame(lost, late, now);
     }
 
-    /// Returns how many frames of this component arrived and were lost since it was first heard.
+    /// Returns how many frames of this component were received and lost since its first one.
     pub fn counts(&self, source: Address) -> FrameCounts {
         self.sources.get(&source).map_or_else(FrameCounts::default, |source| source.counts)
     }
 
-    /// Returns the time since the last frame of this component; `None` if it was never heard.
+    /// Returns the time since the last frame of this component; `None` if none was received.
     pub fn age(&self, source: Address, now: Duration) -> Option<Duration> {
         self.sources.get(&source).map(|source| now.saturating_sub(source.last_seen))
     }
 
-    /// Returns the age and the rate of every message that was heard.
+    /// Returns the age and the rate of every received message.
     pub fn messages(&self, now: Duration) -> impl Iterator<Item = MessageFigures> {
         self.messages.iter().map(move |((source, message_id), message)| MessageFigures {
             source: *source,
@@ -212,7 +212,7 @@ impl LinkStats {
         })
     }
 
-    /// Returns the rate and the loss of every component that was heard.
+    /// Returns the rate and the loss of every received component.
     pub fn sources(&self, now: Duration) -> Vec<SourceFigures> {
         let figures = |(address, source): (&Address, &SourceStats)| {
             let sum = source.buckets.sum(now);
@@ -246,15 +246,14 @@ impl LinkStats {
 
 /// How old the newest content of a vehicle is, with the time that it has spent in queues.
 ///
-/// The vehicle's messages carry its own clock. When one arrives, the clocks differ by at most
-/// `arrival - clock`, because nothing arrives before it was sent. The answer to a TIMESYNC was
-/// given after the question left, so they differ by at least `question - clock`. The latter
-/// decides, if there is one: then the age is rather given too great, by the time that the question
-/// took.
+/// The vehicle's messages carry its clock. When one arrives, the clocks differ by at most `arrival
+/// - clock`, because nothing arrives before it was sent. The answer to a TIMESYNC was given after
+/// the query left, so they differ by at least `query - clock`. The latter is used if available: the
+/// age is then overestimated at most by the travel time of the query.
 #[derive(Debug, Clone, Default)]
 pub struct ContentAge {
-    /// The newest time on the vehicle's clock, us, and the first one that was heard.
-    heard_us: Option<(i64, i64)>,
+    /// The newest time on the vehicle's clock, us, and the first one received.
+    received_us: Option<(i64, i64)>,
     /// The least upper bound of the difference in each of the last minutes, us, with the minute.
     upper: VecDeque<(u64, i64)>,
     /// The greatest lower bound in the same way.
@@ -263,18 +262,17 @@ pub struct ContentAge {
 
 /// So many minutes are remembered. In ten minutes two quartz clocks drift apart by some 60 ms.
 const CLOCK_MINUTES: usize = 10;
-/// A vehicle's clock that goes back by more than this has begun anew, us. Messages may overtake
-/// each other.
+/// Backward step of a vehicle's clock that means a restart, us. Messages may overtake each other.
 const ANEW_US: i64 = 1_000_000;
 
 fn us(time: Duration) -> i64 {
     i64::try_from(time.as_micros()).unwrap_or(i64::MAX)
 }
 
-fn keep(bounds: &mut VecDeque<(u64, i64)>, bound_us: i64, better: fn(i64, i64) -> i64, now: Duration) {
+fn tighten(bounds: &mut VecDeque<(u64, i64)>, bound_us: i64, better: fn(i64, i64) -> i64, now: Duration) {
     let minute = now.as_secs() / 60;
     match bounds.back_mut() {
-        Some((of, known)) if *of == minute => *known = better(*known, bound_us),
+        Some((of, bound)) if *of == minute => *bound = better(*bound, bound_us),
         _ => bounds.push_back((minute, bound_us)),
     }
     while bounds.len() > CLOCK_MINUTES {
@@ -284,29 +282,29 @@ fn keep(bounds: &mut VecDeque<(u64, i64)>, bound_us: i64, better: fn(i64, i64) -
 
 impl ContentAge {
     /// Takes the time on the vehicle's clock that a message carries.
-    pub fn hear(&mut self, clock: Duration, now: Duration) {
+    pub fn received(&mut self, clock: Duration, now: Duration) {
         let (clock_us, offset_us) = (us(clock), us(now) - us(clock));
-        if self.heard_us.is_some_and(|(newest_us, _)| clock_us + ANEW_US < newest_us) {
+        if self.received_us.is_some_and(|(newest_us, _)| clock_us + ANEW_US < newest_us) {
             *self = Self::default();
         }
-        let (newest_us, first_us) = self.heard_us.unwrap_or((clock_us, clock_us));
-        self.heard_us = Some((newest_us.max(clock_us), first_us));
-        // It arrived before it could have been sent: the vehicle's clock runs faster than was
-        // thought.
+        let (newest_us, first_us) = self.received_us.unwrap_or((clock_us, clock_us));
+        self.received_us = Some((newest_us.max(clock_us), first_us));
+        // It arrived before it could have been sent: the vehicle's clock runs faster than
+        // estimated.
         if self.at_least_us().is_some_and(|least_us| offset_us < least_us) {
             self.lower.clear();
         }
-        keep(&mut self.upper, offset_us, i64::min, now);
+        tighten(&mut self.upper, offset_us, i64::min, now);
     }
 
     /// Takes the answer to a TIMESYNC: the time on the vehicle's clock, and when the question left.
-    pub fn answered(&mut self, clock: Duration, asked_at: Duration, now: Duration) {
-        let least_us = us(asked_at) - us(clock);
+    pub fn answered(&mut self, clock: Duration, queried_at: Duration, now: Duration) {
+        let least_us = us(queried_at) - us(clock);
         // The vehicle's clock has lost time.
         if self.at_most_us().is_some_and(|most_us| most_us < least_us) {
             self.upper.clear();
         }
-        keep(&mut self.lower, least_us, i64::max, now);
+        tighten(&mut self.lower, least_us, i64::max, now);
     }
 
     fn at_most_us(&self) -> Option<i64> {
@@ -319,7 +317,7 @@ impl ContentAge {
 
     /// Returns the age of the newest content; `None` while no clock of the vehicle is seen to run.
     pub fn age(&self, now: Duration) -> Option<Duration> {
-        let (newest_us, _) = self.heard_us.filter(|(newest_us, first_us)| newest_us > first_us)?;
+        let (newest_us, _) = self.received_us.filter(|(newest_us, first_us)| newest_us > first_us)?;
         let offset_us = self.at_least_us().or(self.at_most_us())?;
         Some(Duration::from_micros(u64::try_from(us(now) - newest_us - offset_us).unwrap_or(0)))
     }
@@ -342,29 +340,29 @@ mod tests {
     /// Messages every 100 ms that take `delay` of their time of sending to arrive; a question every
     /// 5 s, which takes 30 ms, and its answer as long as everything else. Returns the worst error
     /// of the age, ms, from a time on.
-    fn worst_error_ms(delay: impl Fn(u64) -> u64, asks: bool, from_ms: u64) -> u64 {
+    fn worst_error_ms(delay: impl Fn(u64) -> u64, queries: bool, from_ms: u64) -> u64 {
         // The vehicle has run for 1,000 s when the station starts.
         let clock = |now: u64| ms(1_000_000 + now);
         let mut content = ContentAge::default();
         let mut arrivals: Vec<(u64, u64, Option<u64>)> = Vec::new();
         for sent in (0..60_000).step_by(100) {
             arrivals.push((sent + delay(sent), sent, None));
-            if asks && sent % 5_000 == 0 {
+            if queries && sent % 5_000 == 0 {
                 arrivals.push((sent + 30 + delay(sent + 30), sent + 30, Some(sent)));
             }
         }
         arrivals.sort_unstable();
         let (mut worst, mut newest) = (0, 0);
-        for (at, sent, asked) in arrivals.into_iter().filter(|(at, ..)| *at < 60_000) {
-            if let Some(asked) = asked {
-                content.answered(clock(sent), ms(asked), ms(at));
+        for (at, sent, queried) in arrivals.into_iter().filter(|(at, ..)| *at < 60_000) {
+            if let Some(queried) = queried {
+                content.answered(clock(sent), ms(queried), ms(at));
             } else {
                 newest = sent;
-                content.hear(clock(sent), ms(at));
+                content.received(clock(sent), ms(at));
             }
             if at >= from_ms {
-                let told = content.age(ms(at)).unwrap().as_millis() as u64;
-                worst = worst.max(told.abs_diff(at - newest));
+                let age_ms = content.age(ms(at)).unwrap().as_millis() as u64;
+                worst = worst.max(age_ms.abs_diff(at - newest));
             }
         }
         worst
@@ -383,27 +381,27 @@ mod tests {
     fn a_station_that_joins_an_overloaded_line_learns_the_age_from_the_first_answer() {
         let stands = |_| 7_000;
         assert!(worst_error_ms(stands, true, 8_000) <= 50);
-        assert!(worst_error_ms(stands, false, 8_000) >= 6_000, "without an answer nothing tells");
+        assert!(worst_error_ms(stands, false, 8_000) >= 6_000, "without an answer it is undetected");
     }
 
     #[test]
     fn a_clock_that_begins_anew_stands_still_or_loses_time_is_not_old_for_long() {
         let mut content = ContentAge::default();
-        content.hear(ms(0), ms(5_000));
-        content.hear(ms(0), ms(9_000));
+        content.received(ms(0), ms(5_000));
+        content.received(ms(0), ms(9_000));
         assert_eq!(content.age(ms(9_000)), None, "it does not run");
-        content.hear(ms(50_000), ms(10_000));
-        content.hear(ms(50_100), ms(10_100));
+        content.received(ms(50_000), ms(10_000));
+        content.received(ms(50_100), ms(10_100));
         assert_eq!(content.age(ms(10_350)), Some(ms(250)));
         // A reboot.
-        content.hear(ms(10), ms(20_000));
-        content.hear(ms(110), ms(20_100));
+        content.received(ms(10), ms(20_000));
+        content.received(ms(110), ms(20_100));
         assert_eq!(content.age(ms(20_100)), Some(ms(0)));
         // A simulation that stood still for 4 s.
-        content.hear(ms(210), ms(24_200));
+        content.received(ms(210), ms(24_200));
         assert_eq!(content.age(ms(24_200)), Some(ms(4_000)));
         content.answered(ms(300), ms(24_290), ms(24_300));
-        content.hear(ms(310), ms(24_310));
+        content.received(ms(310), ms(24_310));
         assert_eq!(content.age(ms(24_310)), Some(ms(10)));
     }
 }

@@ -111,23 +111,23 @@ impl Links {
         .await
     }
 
-    /// What waits on a link.
+    /// Returns data that waits on a link.
     pub fn try_receive(&mut self, number: usize) -> Option<Received> {
         self.open[number].transport.try_receive()
     }
 
-    /// What received data mean. Senders that are believed are known to the link from then on.
+    /// Interprets received data. Accepted senders are reported to the link.
     pub fn take(&mut self, number: usize, received: Received, now: Now) -> Vec<LinkEvent> {
         let events = self.hub.take(number, received, now.time, now.stamp);
         for event in &events {
-            if let LinkEvent::Believed(origin) = event {
-                self.open[number].sender.believe(*origin);
+            if let LinkEvent::Accepted(origin) = event {
+                self.open[number].sender.accept(*origin);
             }
         }
         events
     }
 
-    /// Sends a frame over one link, to everybody there or `to` one of them. For a slow line it may
+    /// Sends a frame over one link, to all its peers or `to` one of them. For a slow line it may
     /// wait until [`Self::send_what_waits`].
     pub fn send(&mut self, number: usize, frame: &Frame, to: Option<Origin>, now: Now, on_sent: OnSent<'_>) {
         if let Some(bytes) = self.hub.send(number, frame, now.stamp) {
@@ -135,7 +135,7 @@ impl Links {
         }
     }
 
-    /// Gives each slow line what it can carry by now.
+    /// Sends over each slow line as much as it can carry by now.
     pub fn send_what_waits(&mut self, now: Now, on_sent: OnSent<'_>) {
         for number in 0..self.open.len() {
             while let Some((frame, bytes)) = self.hub.leaving(number, now.time, now.stamp) {

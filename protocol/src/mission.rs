@@ -1,13 +1,13 @@
-//! Which mission is meant: a short name for its text, for vehicle and ground to compare.
+//! Identification of a mission: a short hash of its text, compared by vehicle and ground.
 
 use core::fmt;
 
 use sha2::{Digest as _, Sha256};
 
 /// The first eight bytes of the SHA-256 of a mission's text, as in TD_MISSION. Any edit changes it,
-/// also of a comment, but for the line that says where a flight begins (`at` in `[start]`): that is
-/// chosen anew for each flight (`--start`). 64 bits tell missions apart; they are no protection
-/// against somebody who searches for a text with the same hash.
+/// including comments, except the line with the start of the flight (`at` in `[start]`): that is
+/// chosen for each flight (`--start`). 64 bits distinguish missions; they do not protect against a
+/// deliberate search for a text with the same hash.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "transport", derive(serde::Serialize, serde::Deserialize))]
 pub struct MissionHash(pub [u8; 8]);
@@ -30,11 +30,11 @@ impl MissionHash {
     }
 }
 
-/// A float holds every whole number up to 2^24, so 22 bits plus one in any case.
+/// A float represents every integer up to 2^24, so 22 bits plus one in any case.
 const BITS_A_PARAM: u32 = 22;
 const MASK: u64 = (1 << BITS_A_PARAM) - 1;
 
-/// What an arm says about the mission that the station is prepared for.
+/// The mission in an arming command: the one that the station is prepared for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Expected {
     /// Nothing, as from other ground stations: any mission is armed.

@@ -40,7 +40,7 @@ impl Degrees {
         self.latitude.abs() <= LATITUDE_MAX_DEG && self.longitude.abs() <= 180.0
     }
 
-    /// A place in ten millionths of a degree, as messages have it; 0, 0 stands for none.
+    /// A position in ten millionths of a degree, as in messages; 0, 0 stands for none.
     pub fn of_e7(latitude: i32, longitude: i32) -> Option<Self> {
         let [latitude, longitude] = [latitude, longitude].map(|e7| f64::from(e7) * 1e-7);
         let is_told = latitude != 0.0 || longitude != 0.0;
@@ -132,9 +132,9 @@ pub struct BodySpeed {
 /// Commanded and measured angle.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Deflection {
-    /// What the controller commanded.
+    /// Commanded angle.
     pub commanded_rad: f64,
-    /// What the sensor measured.
+    /// Measured angle.
     pub measured_rad: f64,
 }
 
@@ -200,7 +200,7 @@ impl Motion {
         Self::vertical(f64::from(data.relative_alt) / 1e3, -f64::from(data.vz) / 1e2)
     }
 
-    /// A motion of which only altitude and climb rate are known.
+    /// A motion with only altitude and climb rate.
     pub fn vertical(altitude_m: f64, climb_m_s: f64) -> Self {
         let unknown = f64::NAN;
         Self { x_m: unknown, y_m: unknown, altitude_m, vx_m_s: unknown, vy_m_s: unknown, climb_m_s }
@@ -289,9 +289,9 @@ mod tests {
     }
 
     proptest! {
-        /// A rotation keeps the length: the components along the body axes make up the whole speed.
+        /// A rotation preserves the length: the components along the body axes add up to the speed.
         #[test]
-        fn the_components_along_the_body_axes_make_up_the_whole_speed(
+        fn the_components_along_the_body_axes_add_up_to_the_speed(
             q in prop::array::uniform4(-1.0..1.0_f64),
             v in prop::array::uniform3(-50.0..50.0_f64),
         ) {

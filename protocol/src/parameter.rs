@@ -1,7 +1,7 @@
 //! Parses the requests of the parameter protocol and builds the answers.
 //!
 //! Protocol: <https://mavlink.io/en/services/parameter.html>. Requests are parsed from their bytes,
-//! because a PARAM_SET with a type that the dialect does not know must be answered, too. Values are
+//! because a PARAM_SET with a type outside the dialect must be answered, too. Values are
 //! MAV_PARAM_TYPE_REAL32.
 
 use alloc::string::String;
@@ -111,7 +111,7 @@ pub fn is_real32(value_type: u8) -> bool {
 }
 
 /// Builds a PARAM_VALUE for the parameter at `index` of `count`. It is broadcast, so that every
-/// ground station learns of a change.
+/// ground station receives a change.
 pub fn value_message(name: &str, value: f32, index: u16, count: u16) -> MavMessage {
     MavMessage::PARAM_VALUE(PARAM_VALUE_DATA {
         param_value: value,

@@ -1,4 +1,4 @@
-//! What the three programs have in common: how they end, and their command lines in other forms.
+//! Common parts of the three programs: exit codes, and alternative forms of their command lines.
 
 use std::io::{self, Write as _};
 use std::process::ExitCode;
@@ -12,8 +12,8 @@ use clap_complete::Shell;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Exit {
-    /// It stands undamaged, it is the same, it is done; or the crew closed the screen before a
-    /// flight began.
+    /// It stands undamaged, is identical, or is done; or the crew closed the screen before a flight
+    /// began.
     Yes = 0,
     /// Something failed: a file, a socket, the simulator.
     Error = 1,
@@ -23,7 +23,7 @@ pub enum Exit {
     No = 3,
     /// Arming or start was refused, or the flight was aborted.
     RefusedOrAborted = 4,
-    /// The end of the flight was not seen, or not all that was asked could be answered.
+    /// The end of the flight was not received, or not every request could be answered.
     NotSeen = 5,
 }
 
@@ -123,7 +123,7 @@ pub enum Manual {
     },
     /// Print the manual page (roff) of the program, or of a command.
     Man {
-        /// The command, and its own if it has some.
+        /// The command, with its subcommand if it has one.
         command: Vec<String>,
     },
 }

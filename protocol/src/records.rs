@@ -3,7 +3,7 @@
 //!
 //! * [`v1`]: the verdict, telemetry, operators.
 //! * [`flight_v1`]: the pilot, and the simulated truth.
-//! * [`computer_v1`]: the whole flight computer, from power-up on.
+//! * [`computer_v1`]: the complete flight computer, from power-up on.
 
 macro_rules! generated {
     ($($(#[$about:meta])* $module:ident = $file:literal,)*) => {$(
@@ -29,7 +29,7 @@ generated! {
     computer_v1 = "/touchdown.computer.v1.rs",
 }
 
-/// Serialised `google.protobuf.FileDescriptorSet` of [`computer_v1`] and what it imports.
+/// Serialised `google.protobuf.FileDescriptorSet` of [`computer_v1`] and its imports.
 pub const DESCRIPTORS_COMPUTER_V1: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/computer_v1.fds"));
 
 /// Serialised `google.protobuf.FileDescriptorSet` of [`flight_v1`].

@@ -19,11 +19,11 @@ use sha2::{Digest as _, Sha256};
 use crate::frame::{Frame, INCOMPAT_SIGNED, SIGNATURE_LEN};
 use crate::identity::Address;
 
-/// A new stream may begin at most this far behind our own time: one minute.
+/// Maximum age of a new stream's first timestamp: one minute.
 const NEW_STREAM_LAG: u64 = 60 * STAMPS_PER_S;
-/// A frame may be at most this far ahead of a clock that is known to be set: one day. A clock set
-/// to another time zone is off by less, and must not separate vehicle and ground at the pad. A
-/// station with a wrong year must not lock out all others for ever.
+/// Maximum lead of a frame over a clock that is set: one day. A clock in another time zone is off
+/// by less, and must not separate vehicle and ground at the pad. A station with a wrong year must
+/// not lock out all others permanently.
 const MAX_AHEAD: u64 = 24 * 3600 * STAMPS_PER_S;
 /// 2026-01-01 00:00 UTC, 4,018 days after 2015-01-01. This program is newer, so a clock that shows
 /// an earlier time was never set.
@@ -104,7 +104,7 @@ pub enum Rejection {
     /// It begins a stream with a timestamp that is more than a minute behind.
     #[error("too old")]
     TooOld,
-    /// Its timestamp is more than a day ahead of our clock, and our clock is known to be set.
+    /// Its timestamp is more than a day ahead of our clock, and our clock is set.
     #[error("too new")]
     TooNew,
 }
@@ -119,7 +119,7 @@ pub struct SigningCounters {
     pub unsigned: u64,
     /// Frames signed with another key.
     pub wrong: u64,
-    /// Frames that were heard before.
+    /// Frames received before.
     pub replayed: u64,
     /// Frames that began a stream with a timestamp too far behind.
     pub too_old: u64,
@@ -157,13 +157,12 @@ pub(crate) fn key_number(link_id: u8) -> u8 {
 
 /// Signs frames that are sent and checks frames that arrive.
 ///
-/// Without operators everybody has one key. With operators each of them has a key of their own, and
-/// the link id of a signature selects the key to check against; the vehicle itself and whoever only
-/// looks on use the shared one.
+/// Without operators there is one shared key. With operators each has a key, and the link id of a
+/// signature selects the key to check against; the vehicle itself and observers use the shared one.
 #[derive(Debug, Clone)]
 pub struct Signing {
     /// The key that signs, and its number.
-    own: (u8, Key),
+    signing_key: (u8, Key),
     /// The key of frames whose link id names no operator.
     shared: Key,
     /// The operators' keys, by number.
@@ -179,7 +178,7 @@ impl Signing {
     pub fn new(key: Key, memory: Memory) -> Self {
         let clock_before = memory.clock;
         Self {
-            own: (0, key.clone()),
+            signing_key: (0, key.clone()),
             shared: key,
             operators: BTreeMap::new(),
             memory,
@@ -188,11 +187,11 @@ impl Signing {
         }
     }
 
-    /// Signs as the operator of this number from now on; what the vehicle sends is checked with the
-    /// key that all share.
+    /// Signs as the operator of this number from now on; frames of the vehicle are checked with the
+    /// shared key.
     #[must_use]
     pub fn as_operator(self, number: u8, shared: Key) -> Self {
-        Self { own: (key_number(number), self.own.1), shared, ..self }
+        Self { signing_key: (key_number(number), self.signing_key.1), shared, ..self }
     }
 
     /// Checks frames that name an operator with that operator's key. A frame that names an unknown
@@ -205,7 +204,7 @@ impl Signing {
     /// The link id of frames over a link: its number, and the number of the key. Links beyond the
     /// 16th share an id, which costs nothing but exact statistics.
     pub fn link_id(&self, link: usize) -> u8 {
-        (link as u8) << KEY_BITS | self.own.0
+        (link as u8) << KEY_BITS | self.signing_key.0
     }
 
     /// The number of the operator whose key checks this frame; 0 for the shared key.
@@ -222,8 +221,8 @@ impl Signing {
     }
 
     /// Signs an unsigned frame for one link. `clock` is the time of the system's clock, which may
-    /// stand still or be wrong. A frame that is sent again must be signed again, which gives it a
-    /// newer timestamp.
+    /// stand still or be wrong. A repeated frame must be signed again, which gives it a newer
+    /// timestamp.
     #[must_use]
     pub fn sign(&mut self, frame: &Frame, link_id: u8, clock: u64) -> Frame {
         self.memory.ours = clock.max(self.memory.ours + 1).min(MAX_STAMP);
@@ -233,7 +232,7 @@ impl Signing {
         let mut signature = [0; SIGNATURE_LEN];
         signature[0] = link_id;
         signature[1..7].copy_from_slice(&self.memory.ours.to_le_bytes()[..6]);
-        let hash = self.own.1.hash(&[signed.as_bytes(), &signature[..7]].concat());
+        let hash = self.signing_key.1.hash(&[signed.as_bytes(), &signature[..7]].concat());
         signature[7..].copy_from_slice(&hash);
         signed.push_signature(&signature);
         signed
@@ -242,7 +241,7 @@ impl Signing {
     /// Checks a frame and counts the result.
     ///
     /// # Errors
-    /// The frame must not be acted on; the error says why.
+    /// The frame must be ignored; the error gives the reason.
     pub fn check(&mut self, frame: &Frame, clock: u64) -> Result<(), Rejection> {
         let outcome = self.judge(frame, clock);
         self.counters.count(outcome);
@@ -260,8 +259,8 @@ impl Signing {
         let stamp = frame.stamp().ok_or(Rejection::Unsigned)?;
         let stream = (frame.source(), signature[0]);
         self.memory.clock = self.memory.clock.max(clock);
-        // A clock that is known to be set shows the right time. Otherwise the latest timestamp that
-        // was heard is taken for the time.
+        // A clock that is set shows the right time. Otherwise the latest received timestamp is used
+        // as the time.
         let is_set = self.is_set(clock);
         if is_set && stamp > clock + MAX_AHEAD {
             return Err(Rejection::TooNew);
@@ -275,7 +274,7 @@ impl Signing {
             _ => {}
         }
         self.memory.streams.insert(stream, stamp);
-        // What we sign must be newer than everything we have heard.
+        // Our signatures must be newer than all received ones.
         self.memory.ours = self.memory.ours.max(stamp);
         Ok(())
     }
@@ -288,9 +287,9 @@ impl Signing {
         self.memory.streams.keys().filter(|(_, link_id)| key_number(*link_id) == operator).count()
     }
 
-    /// Returns whether our clock is known to be set: it shows a time after this program was
-    /// written, and it has not gone back since earlier runs. A board whose clock stops without
-    /// power fails one of the two.
+    /// Returns whether our clock is set: it shows a time after this program was written, and it has
+    /// not gone back since earlier runs. A board whose clock stops without power fails one of the
+    /// two.
     fn is_set(&self, clock: u64) -> bool {
         clock >= PROGRAM_WRITTEN.max(self.clock_before)
     }
@@ -301,7 +300,7 @@ impl Signing {
     }
 
     /// Returns the timestamps to be stored. Store them before acting on an accepted frame, so that
-    /// it is not accepted twice, and at least once a second, so that no own timestamp is used
+    /// it is not accepted twice, and at least once a second, so that no timestamp of ours is used
     /// twice.
     pub fn memory(&self) -> Memory {
         let ours = (self.memory.ours + LEAD).min(MAX_STAMP);
@@ -362,35 +361,35 @@ pub enum MemoryError {
     NoOwnStamp,
 }
 
-/// The timestamps that must survive a restart: our own, our clock's, and those of each stream that
-/// was heard.
+/// The timestamps that must survive a restart: ours, our clock's, and those of each received
+/// stream.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Memory {
     /// The last timestamp that was used for signing, plus a margin: see [`Signing::memory`].
     ours: u64,
-    /// The latest time that our own clock has shown.
+    /// The latest time that our clock has shown.
     clock: u64,
     streams: BTreeMap<(Address, u8), u64>,
 }
 
 impl Memory {
     pub fn to_text(&self) -> String {
-        [self.own_lines()].into_iter().chain(self.streams.iter().map(heard)).collect()
+        [self.our_lines()].into_iter().chain(self.streams.iter().map(stream_line)).collect()
     }
 
-    /// Returns the lines that update `other`, an older memory, to this one. While the margin of the
-    /// own timestamps is at least half left, they are not written again.
+    /// Returns the lines that update `other`, an older memory, to this one. While at least half of
+    /// our timestamp margin is left, our lines are not rewritten.
     pub fn lines_since(&self, other: &Self) -> String {
-        let news = self.streams.iter().filter(|(stream, stamp)| other.streams.get(stream) != Some(stamp));
-        let own = (self.ours > other.ours + LEAD / 2).then(|| self.own_lines());
-        news.map(heard).chain(own).collect()
+        let changed = self.streams.iter().filter(|(stream, stamp)| other.streams.get(stream) != Some(stamp));
+        let ours = (self.ours > other.ours + LEAD / 2).then(|| self.our_lines());
+        changed.map(stream_line).chain(ours).collect()
     }
 
-    fn own_lines(&self) -> String {
+    fn our_lines(&self) -> String {
         format!("ours {}\nclock {}\n", self.ours, self.clock)
     }
 
-    /// Notes that what [`Memory::lines_since`] returned was written, so that it is not written
+    /// Notes that the result of [`Memory::lines_since`] was written, so that it is not written
     /// again.
     pub fn catch_up(&mut self, with: &Self) {
         if with.ours > self.ours + LEAD / 2 {
@@ -403,7 +402,7 @@ impl Memory {
     /// line was cut off while it was written. Its frame was not acted on, so the line is ignored.
     ///
     /// # Errors
-    /// A line cannot be parsed, or the own timestamp is missing.
+    /// A line cannot be parsed, or our timestamp is missing.
     pub fn from_text(text: &str) -> Result<Self, MemoryError> {
         let mut memory = Self::default();
         let mut has_ours = false;
@@ -441,25 +440,25 @@ impl Memory {
     }
 }
 
-fn heard((stream, stamp): (&(Address, u8), &u64)) -> String {
+fn stream_line((stream, stamp): (&(Address, u8), &u64)) -> String {
     let (Address { system_id, component_id }, link_id) = stream;
     format!("heard {system_id} {component_id} {link_id} {stamp}\n")
 }
 
-// Notices that every frame of a sender is refused for its time stamp although its key is right, and
-// says what to do.
+// Detects a sender whose frames are all rejected for their timestamps although the key is right,
+// and advises the crew.
 
 /// A sender is locked out when for this long only such frames arrived.
 const AFTER: Duration = Duration::from_secs(2);
-/// It is said again after this time.
+/// Interval of repeated reports.
 const AGAIN_AFTER: Duration = Duration::from_secs(30);
-/// At most this many senders are watched. Only holders of the key come here.
+/// Maximum number of monitored senders. Only holders of the key get this far.
 const MAX_SENDERS: usize = 16;
 
 #[derive(Debug, Clone, Copy)]
 struct Refused {
     since: Duration,
-    said_at: Option<Duration>,
+    reported_at: Option<Duration>,
 }
 
 /// The senders of which nothing but refused time stamps has arrived for a while.
@@ -485,13 +484,13 @@ impl Lockouts {
         if self.0.len() >= MAX_SENDERS && !self.0.contains_key(&source) {
             return None;
         }
-        let refused = self.0.entry(source).or_insert(Refused { since: now, said_at: None });
+        let refused = self.0.entry(source).or_insert(Refused { since: now, reported_at: None });
         let due = now.saturating_sub(refused.since) >= AFTER
-            && refused.said_at.is_none_or(|at| now.saturating_sub(at) >= AGAIN_AFTER);
+            && refused.reported_at.is_none_or(|at| now.saturating_sub(at) >= AGAIN_AFTER);
         if !due {
             return None;
         }
-        refused.said_at = Some(now);
+        refused.reported_at = Some(now);
         let Address { system_id, component_id } = source;
         let off = in_words(stamp.abs_diff(clock));
         let side = if stamp > clock { "ahead of" } else { "behind" };

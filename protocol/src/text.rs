@@ -64,7 +64,7 @@ struct Partial {
     first_seen: Duration,
 }
 
-/// Reassembles chunked texts. At most [`Reassembler::MAX_PARTIAL`] incomplete texts are kept.
+/// Reassembles chunked texts. At most [`Reassembler::MAX_PARTIAL`] incomplete texts are stored.
 #[derive(Debug, Default)]
 pub struct Reassembler {
     partial: BTreeMap<(Address, u16), Partial>,
@@ -110,7 +110,7 @@ impl Reassembler {
         if end.is_some() || sequence == MAX_CHUNKS - 1 {
             partial.ended_at = Some(sequence);
         }
-        if partial.is_whole()
+        if partial.is_complete()
             && let Some(partial) = self.partial.remove(&(source, chunk.id))
         {
             ready.push(partial.into_text(source));
@@ -137,7 +137,7 @@ impl Reassembler {
 }
 
 impl Partial {
-    fn is_whole(&self) -> bool {
+    fn is_complete(&self) -> bool {
         self.ended_at.is_some_and(|end| self.chunks[..=end].iter().all(Option::is_some))
     }
 

@@ -14,7 +14,7 @@ fn key(byte: u8) -> BookKey {
 struct Written {
     entries: Vec<BookEntry>,
     /// After every third entry; in the log, and in that of the vehicle.
-    own: Vec<RecordedHead>,
+    station: Vec<RecordedHead>,
     vehicle: Vec<RecordedHead>,
 }
 
@@ -23,12 +23,12 @@ fn book(texts: &[String], key: &BookKey) -> Written {
     let opened = format!("station 255/190, public key {}", key.public());
     let lines = texts.iter().map(|text| ("commanded", "Ann", text.as_str()));
     let lines = [(OPENED, "", opened.as_str())].into_iter().chain(lines).chain([(CLOSED, "", "ended")]);
-    let mut written = Written { entries: Vec::new(), own: Vec::new(), vehicle: Vec::new() };
+    let mut written = Written { entries: Vec::new(), station: Vec::new(), vehicle: Vec::new() };
     for (place, (kind, who, text)) in lines.enumerate() {
         written.entries.push(book.enter(&Line { unix_ns: 1_000 + place as u64, kind, who, text }));
         let signed = key.sign(book.head().expect("an entry"));
         if place % 3 == 0 || kind == CLOSED {
-            written.own.push(RecordedHead { from: "the log".to_owned(), by_vehicle: false, signed });
+            written.station.push(RecordedHead { from: "the log".to_owned(), by_vehicle: false, signed });
             written.vehicle.push(RecordedHead { from: "the vehicle".to_owned(), by_vehicle: true, signed });
         }
     }
@@ -36,7 +36,7 @@ fn book(texts: &[String], key: &BookKey) -> Written {
 }
 
 fn check(written: &Written, trusted: Option<PublicKey>) -> Audit {
-    audit(&written.entries, &[&written.own[..], &written.vehicle].concat(), trusted)
+    audit(&written.entries, &[&written.station[..], &written.vehicle].concat(), trusted)
 }
 
 fn texts() -> impl Strategy<Value = Vec<String>> {
@@ -89,7 +89,7 @@ proptest! {
         prop_assert_eq!(check(&written, None).broken, Some(expected));
     }
 
-    /// Somebody changes an entry and computes every hash anew.
+    /// Somebody changes an entry and computes every hash again.
     #[test]
     fn another_book_fits_no_hash_that_was_signed(texts in texts(), at in any::<prop::sample::Index>()) {
         let written = book(&texts, &key(1));
@@ -109,12 +109,12 @@ proptest! {
     }
 
     #[test]
-    fn a_cut_book_is_found_by_what_the_vehicle_knows(texts in texts(), left in any::<prop::sample::Index>()) {
+    fn a_cut_book_is_detected_from_the_heads_in_the_vehicle_log(texts in texts(), left in any::<prop::sample::Index>()) {
         let mut written = book(&texts, &key(1));
         let whole = written.entries.len() as u32;
         let left = 1 + left.index(written.entries.len() - 1) as u32;
         written.entries.truncate(left as usize);
-        written.own.retain(|head| head.signed.head.entries <= left);
+        written.station.retain(|head| head.signed.head.entries <= left);
         let expected = Broken::Cut { entries: left, from: "the vehicle".to_owned(), signed: found_after(left, whole) };
         prop_assert_eq!(check(&written, None).broken, Some(expected));
         // Without the vehicle it only shows that the book was not closed.

@@ -93,7 +93,7 @@ fn the_answer_to_an_unknown_command_is_decoded_again() {
 }
 
 #[test]
-fn an_address_accepts_its_own_ids_and_the_broadcast() {
+fn an_address_accepts_its_ids_and_the_broadcast() {
     let of = |system_id, component_id| Address { system_id, component_id };
     for target in [of(0, 0), of(1, 0), of(0, 1), of(1, 1)] {
         assert!(VEHICLE.accepts(target), "{target:?}");
@@ -154,7 +154,7 @@ fn loss_and_rate_are_those_of_the_last_ten_seconds() {
 }
 
 #[test]
-fn each_component_has_its_own_loss_and_each_message_its_age_and_rate() {
+fn each_component_has_a_loss_and_each_message_an_age_and_a_rate() {
     let mut stats = LinkStats::new();
     let (vehicle, ground) =
         (heartbeats(&mut Encoder::new(VEHICLE), 100), heartbeats(&mut Encoder::new(GROUND), 100));

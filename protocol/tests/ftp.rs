@@ -171,7 +171,7 @@ impl World {
         }
     }
 
-    fn is_whole(&self) -> bool {
+    fn is_complete(&self) -> bool {
         self.written == (crc::continued(0, &self.file), self.file.clone())
     }
 
@@ -190,7 +190,7 @@ const RADIO: LineSettings =
 /// Ten megabytes over 57,600 baud with 30 % loss both ways; the ground's process is killed five
 /// times, and begins again with what is on disk.
 #[test]
-fn ten_megabytes_arrive_whole_over_a_bad_line_although_the_ground_is_killed_five_times() {
+fn ten_megabytes_arrive_intact_over_a_bad_line_with_the_ground_killed_five_times() {
     const LEN: usize = 10_000_000;
     let mut world = World::new(LEN, RADIO, 1);
     for life in 0_u16..=5 {
@@ -204,7 +204,7 @@ fn ten_megabytes_arrive_whole_over_a_bad_line_although_the_ground_is_killed_five
             world.step(None);
         }
     }
-    assert!(world.is_whole(), "the file is another");
+    assert!(world.is_complete(), "the file is another");
     assert_eq!(world.begun_fresh, 1, "it began at zero more than once");
     // What the line can carry of files: whole frames, of which 30 % are lost.
     let carried_bytes =
@@ -228,7 +228,7 @@ fn a_slow_line_and_a_quick_one_are_filled_as_well() {
             let mut world = World::new(len, settings, 7);
             let mut download = Download::new(None, 0);
             assert_eq!(world.run(&mut download, 10_000.0), Some(Ok(())));
-            assert!(world.is_whole());
+            assert!(world.is_complete());
             let share = len as f64 / (world.now_s * bytes_s * (1.0 - loss)) * 266.0 / 239.0;
             println!("{bytes_s} B/s, latency {latency_s} s, loss {loss}: {:.1} %", 100.0 * share);
             assert!(share >= 0.8, "{bytes_s} B/s, latency {latency_s} s, loss {loss}: {share}");
@@ -237,7 +237,7 @@ fn a_slow_line_and_a_quick_one_are_filled_as_well() {
 }
 
 #[test]
-fn a_line_that_is_dead_is_given_up_and_a_refusal_is_told() {
+fn a_dead_line_times_out_and_a_refusal_is_reported() {
     let mut world = World::new(1000, LineSettings { loss: 1.0, ..RADIO }, 3);
     let mut download = Download::new(None, 0);
     assert_eq!(world.run(&mut download, 100.0), Some(Err(Failure::NoAnswer)));
@@ -261,13 +261,13 @@ fn a_vehicle_that_arms_during_the_download_ends_it() {
 }
 
 #[test]
-fn what_was_kept_of_another_file_is_thrown_away() {
+fn the_stored_part_of_another_file_is_discarded() {
     let settings = LineSettings { loss: 0.0, ..RADIO };
     let mut world = World::new(50_000, settings, 5);
     world.written = (1, vec![0; 10_000]);
     let mut download = Download::new(None, 0);
     assert_eq!(world.run(&mut download, 100.0), Some(Ok(())));
-    assert!(world.is_whole());
+    assert!(world.is_complete());
     assert_eq!(world.begun_fresh, 1);
 }
 
@@ -278,12 +278,12 @@ fn a_session_that_the_vehicle_has_closed_is_opened_again() {
     world.run(&mut download, 20.0);
     world.server.close_all();
     assert_eq!(world.run(&mut download, 1000.0), Some(Ok(())));
-    assert!(world.is_whole());
+    assert!(world.is_complete());
     assert_eq!(world.begun_fresh, 1);
 }
 
 #[test]
-fn a_log_keeps_no_content_of_a_file_and_every_frame() {
+fn a_log_stores_every_frame_without_file_content() {
     let request = Packet { size: 239, ..Packet::request(1, 2, protocol::ftp::Opcode::READ_FILE, 239, "") };
     let frame = Encoder::new(VEHICLE).encode(&request.ack(&[0xAB; 239]).message(GROUND));
     let mut framer = Framer::new();
@@ -317,6 +317,6 @@ proptest! {
         }
         let mut download = Download::new(None, seed as u16);
         prop_assert_eq!(world.run(&mut download, 2000.0), Some(Ok(())));
-        prop_assert!(world.is_whole());
+        prop_assert!(world.is_complete());
     }
 }

@@ -70,7 +70,7 @@ fn read(bytes: &[u8]) -> Contents {
 }
 
 #[test]
-fn a_whole_log_is_read_as_written() {
+fn a_complete_log_is_read_as_written() {
     let frame = RawFrame {
         direction: Direction::Rx,
         endpoint: "ground",

@@ -91,7 +91,7 @@ fn every_flipped_bit_is_detected() {
 }
 
 #[test]
-fn a_restart_forgets_neither_what_was_heard_nor_what_was_sent() {
+fn a_restart_remembers_received_and_sent_timestamps() {
     let mut ground = side(7);
     let heard = ground.sign(&beat(), 0, NOW);
     let mut vehicle = side(7);
@@ -121,7 +121,7 @@ fn an_unreadable_memory_names_its_line() {
 }
 
 #[test]
-fn a_timestamp_far_ahead_is_refused_if_our_own_clock_is_known_to_be_set() {
+fn a_timestamp_far_ahead_is_refused_if_our_clock_is_set() {
     const DAY: u64 = 24 * 3600 * SECOND;
     let far = side(7).sign(&beat(), 0, NOW + 10 * 365 * DAY);
     let mut vehicle = side(7);
@@ -311,7 +311,7 @@ fn an_observer_locks_no_operator_out() {
 
 /// The vehicle signs with the shared key, and every station checks with it.
 #[test]
-fn every_station_believes_the_vehicle() {
+fn every_station_accepts_the_vehicle() {
     let (mut vehicle, stations) = crew();
     let beat = Encoder::new(VEHICLE).encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
     for (link, mut station) in stations.into_iter().enumerate() {

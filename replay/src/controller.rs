@@ -195,6 +195,6 @@ impl LoggedComputer {
 /// The plan that a flight computer took over in the frame it has just run; `None` if it flies an
 /// earlier plan or none.
 pub fn new_plan<'a>(pilot: &'a Pilot, output: &ComputerOutput) -> Option<&'a Plan> {
-    let posed_at_s = pilot.report().posed_at_s;
-    pilot.powered().planned().filter(|plan| output.planned && plan.begins_s() >= posed_at_s)
+    let requested_at_s = pilot.report().requested_at_s;
+    pilot.powered().planned().filter(|plan| output.planned && plan.begins_s() >= requested_at_s)
 }

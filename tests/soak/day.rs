@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use e2e::resident_bytes;
 use flight::computer::LogState;
-use flight::computer::crew::{Asked, Request};
+use flight::computer::crew::{CrewCommand, Request};
 use flight::rules::phase::Phase;
 use ground::model::{Model, Settings};
 use ground::update::{Msg, update};
@@ -65,13 +65,13 @@ fn fly(hour: u32, model: &mut Model, station: &mut Encoder) -> Result<bool, Fail
             let beat = station.encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
             endpoint.on_frame(0, &beat, &vehicle.state());
         }
-        let asked: &[Asked] = if at >= ON_THE_PAD && !armed && vehicle.phase() == Phase::PadIdle {
+        let commands: &[CrewCommand] = if at >= ON_THE_PAD && !armed && vehicle.phase() == Phase::PadIdle {
             armed = true;
-            &[Asked::Arm, Asked::Start]
+            &[CrewCommand::Arm, CrewCommand::Start]
         } else {
             &[]
         };
-        let own: Vec<Request> = asked.iter().copied().map(Request::of_the_programme).collect();
+        let own: Vec<Request> = commands.iter().copied().map(Request::of_the_programme).collect();
         drop(step(&mut endpoint, &mut vehicle, &own));
         for outgoing in endpoint.poll(&vehicle.state()) {
             drop(update(model, Msg::Frame(outgoing.frame), now));

@@ -105,7 +105,7 @@ impl Station {
     /// Has the next log created.
     fn begin_next_log(&mut self) {
         // The crew sees a log that has failed; a new one would hide it.
-        let before = self.recorder.clone().filter(|log| log.is_whole() && !self.next_log.begins);
+        let before = self.recorder.clone().filter(|log| log.is_intact() && !self.next_log.begins);
         let Some(before) = before else { return };
         let NextLog { names: (log, tlog), header, .. } = &self.next_log;
         let (log, tlog, mut header) = (log.clone(), tlog.clone(), header.clone());

@@ -334,7 +334,7 @@ impl Station {
     fn tick_msgs(&mut self, model: &Model) -> Vec<Msg> {
         let health = self.recorder.as_ref().map_or_else(LogHealth::default, |recorder| LogHealth {
             dropped: recorder.dropped(),
-            failed: !recorder.is_whole(),
+            failed: !recorder.is_intact(),
             removed: self.log_watch.removed,
             space: self.log_watch.space,
         });

@@ -230,7 +230,7 @@ impl Wire {
                     self.record(Direction::Rx, &name, &frame);
                     self.note_boot(number, &frame, from);
                 }
-                LinkEvent::Believed(_) => taken.believed = true,
+                LinkEvent::Accepted(_) => taken.believed = true,
                 LinkEvent::UnknownSenders(words) => msgs.push(Msg::LinkSays(self.named(&name, words))),
                 // Counted and shown in the report of the link; a sender that is locked out is
                 // reported.

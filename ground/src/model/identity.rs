@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use protocol::dialect::{HEARTBEAT_DATA, MavAutopilot, MavMessage, MavModeFlag, MavType, TdVehicleFlag};
 use protocol::identity::LARGEST_BOOT_NUMBER;
-pub use protocol::told::may_be_ours;
+pub use protocol::reported::may_be_ours;
 
 use super::{Model, words};
 

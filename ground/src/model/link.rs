@@ -149,7 +149,7 @@ impl Link {
     pub(crate) fn date(&mut self, message: &MavMessage, now: Duration) {
         let clock_ms = time_boot_ms(message).filter(|_| !matches!(message, MavMessage::TIMESYNC(_)));
         if let Some(clock_ms) = clock_ms {
-            self.content.hear(Duration::from_millis(clock_ms.into()), now);
+            self.content.received(Duration::from_millis(clock_ms.into()), now);
         }
     }
 

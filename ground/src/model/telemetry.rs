@@ -10,7 +10,7 @@ use protocol::dialect::{
 };
 use protocol::mission::MissionHash;
 use protocol::motion::Degrees;
-pub use protocol::told::{phase_from_number, phase_of};
+pub use protocol::reported::{phase_from_number, phase_of};
 
 use super::{
     Attitude, Battery, Deflection, FlownMission, Foreign, Gimbal, Heartbeat, Motion, PadCheck, Prediction,
@@ -23,7 +23,7 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) {
         return;
     }
     vehicle.boot.hear(message);
-    vehicle.told.hear(message);
+    vehicle.told.update(message);
     vehicle.keep(message, now);
     match message {
         MavMessage::HEARTBEAT(data) => {

@@ -10,7 +10,7 @@ use protocol::dialect::{
 };
 use protocol::mission::MissionHash;
 use protocol::motion::Degrees;
-use protocol::told::Told;
+use protocol::reported::ReportedState;
 
 use super::{
     Attitude, BodySpeed, Boot, Deflection, FlownPath, Foreign, KeepAway, Motion, PadCheck, ToldChecks,
@@ -121,7 +121,7 @@ pub struct Vehicle {
     pub attitude: Option<Sample<Attitude>>,
     pub motion: Option<Sample<Motion>>,
     /// What goes into the log's record of it.
-    pub told: Told,
+    pub told: ReportedState,
     /// `GLOBAL_POSITION_INT`: height above the pad and climb, for a vehicle that sends no local
     /// position.
     pub hud: Option<Sample<Motion>>,

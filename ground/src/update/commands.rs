@@ -170,7 +170,7 @@ pub(super) fn on_answer(model: &mut Model, answer: CommandAnswer, now: Duration)
     if !awaited && given_up {
         // The answer to a command that was given up is still recorded.
         let CommandAnswer { command, result, .. } = answer;
-        on_event(model, CommandEvent::Answered { command, result, asks: answer.asks() }, now);
+        on_event(model, CommandEvent::Answered { command, result, open: answer.is_open() }, now);
         return;
     }
     poll(model, now);
@@ -216,12 +216,12 @@ fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
             track.acknowledged = Acknowledgement::InProgress;
             ("acknowledged", EventLevel::Info, format!("{name} acknowledged: in progress"))
         }
-        CommandEvent::Answered { result, asks, .. } | CommandEvent::AnsweredLate { result, asks, .. } => {
-            let asked = asks && result == MavResult::MAV_RESULT_TEMPORARILY_REJECTED as u8;
+        CommandEvent::Answered { result, open, .. } | CommandEvent::AnsweredLate { result, open, .. } => {
+            let asked = open && result == MavResult::MAV_RESULT_TEMPORARILY_REJECTED as u8;
             track.acknowledged =
                 if asked { Acknowledgement::Asked } else { Acknowledgement::Answered(result) };
             track.acknowledged_at = Some(now);
-            answered = (!asks).then_some(result);
+            answered = (!open).then_some(result);
             let words = result_words(result);
             let late = if matches!(event, CommandEvent::AnsweredLate { .. }) { " (late)" } else { "" };
             if asked {

@@ -7,8 +7,8 @@ use protocol::dialect::{MavMessage, TD_FLIGHT_STATUS_DATA, TD_UPLINK_DATA, TIMES
 use protocol::frame::Frame;
 use protocol::identity::{Address, RADIO};
 use protocol::log::record::EventLevel;
+use protocol::reported::boot_of;
 use protocol::text::Text;
-use protocol::told::boot_of;
 
 use super::{Action, commands, pad, vehicle_changes};
 use crate::model::{
@@ -41,7 +41,7 @@ pub(super) fn on_frame(model: &mut Model, frame: &Frame, now: Duration) {
     } else if frame.source() == model.settings.vehicle {
         on_vehicle_frame(model, frame, now);
         // After what the frame says: it may show that the abort is latched.
-        if model.commands.sender.on_heard(now) {
+        if model.commands.sender.on_received(now) {
             commands::poll(model, now);
         }
     } else if frame.message_id() == HEARTBEAT_ID {

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use flight::computer::LogState;
-use flight::computer::crew::{Asked, Request};
+use flight::computer::crew::{CrewCommand, Request};
 use ground::model::{
     Model,
     dead_reckoning::{Basis, PredictedPosition, predict_position},
@@ -27,7 +27,7 @@ fn frames_of(number: u64) -> Vec<(Duration, Frame)> {
 }
 
 /// The same, with what the crew asks of the vehicle in flight.
-fn mk2(number: u64, asks: impl Fn(&Vehicle) -> Option<Asked>) -> Vec<(Duration, Frame)> {
+fn mk2(number: u64, asks: impl Fn(&Vehicle) -> Option<CrewCommand>) -> Vec<(Duration, Frame)> {
     let mut flight = load_flight("mk2").expect("a profile of its own");
     flight.number = number;
     let mut rocket = Vehicle::on_the_pad(&flight).expect("its motor is known");
@@ -38,7 +38,11 @@ fn mk2(number: u64, asks: impl Fn(&Vehicle) -> Option<Asked>) -> Vec<(Duration, 
     let mut stands_s = 0.0;
     while rocket.time_s() < LONGEST_S && stands_s < 2.0 {
         let ready = rocket.phase().on_pad() && rocket.state().checks_failed() == 0;
-        let own = if ready { vec![Asked::Arm, Asked::Start] } else { asks(&rocket).into_iter().collect() };
+        let own = if ready {
+            vec![CrewCommand::Arm, CrewCommand::Start]
+        } else {
+            asks(&rocket).into_iter().collect()
+        };
         let own: Vec<Request> = own.into_iter().map(Request::of_the_programme).collect();
         step(&mut endpoint, &mut rocket, &own);
         if rocket.is_over() {
@@ -110,7 +114,7 @@ fn the_time_that_is_told_under_the_parachute_is_the_time_that_is_flown() {
         let flight = mk2(number, |rocket| {
             let falls = rocket.phase().in_descent();
             let height_m = rocket.state().airborne().map_or(0.0, |air| air.height_m());
-            (falls && height_m < below_m).then_some(Asked::Abort)
+            (falls && height_m < below_m).then_some(CrewCommand::Abort)
         });
         let down = down_at(&flight);
         let mut carried_since = None;

@@ -1,9 +1,9 @@
-//! The outside of the flight computer, simulated or real: what it says and hears, what is recorded
-//! of it, and the loop that steps it on a board.
+//! Interfaces of the flight computer, simulated or real: its links, its log, and the loop that
+//! steps it on a board.
 //!
 //! * [`link`]: the vehicle's end of MAVLink.
 //! * [`log`]: flights as log records, and back, bit for bit.
-//! * [`board`]: what a board must offer, and the loop that flies it.
+//! * [`board`]: the interface that a board implements, and the loop that flies it.
 //!
 //! It is pure, and needs no operating system.
 #![cfg_attr(not(test), no_std)]

@@ -1,5 +1,5 @@
-//! A simulated flight as a stream: the answers are what was recorded, and what is wrong with a
-//! stream is said.
+//! A simulated flight as a stream: the answers match the record, and faults of a stream are
+//! reported.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::cell::Cell;
@@ -12,8 +12,8 @@ use avionics::board::recorded::{Board, FlyError, VehicleKind, Watch};
 use avionics::board::stream::{Answer, Begin, Frame, LONGEST_BYTES, OnTheAir, Reader, put};
 use avionics::log::again::RecordedComputer;
 use avionics::log::frame::{LoggedInput, input_from_log};
-use flight::computer::crew::{Asked, Request};
-use flight::computer::news::CrewMessage;
+use flight::computer::crew::{CrewCommand, Request};
+use flight::computer::messages::CrewMessage;
 use flight::computer::pilot::planner::Planner;
 use flight::computer::{Commands, Computer};
 use flight::rules::outputs::PyroOutput;
@@ -25,11 +25,11 @@ use sim::recipe::Recipe;
 use sim::sortie::Sortie;
 use sim::wire::record::LastFrame;
 
-/// More than the messages of a frame need, bytes, with the parts that they are put together from:
-/// 1,073 at ignition, when the gate says every number that it has looked at.
-const NEWS_BYTES_MAX: u64 = 2048;
+/// More than the messages of a frame need, bytes, with their parts: 1,073 at ignition, when the
+/// gate reports all its values.
+const MESSAGE_BYTES_MAX: u64 = 2048;
 
-/// What a board answers to bytes that arrive a few at a time, as a serial line gives them.
+/// Answers of a board to bytes that arrive a few at a time, as from a serial line.
 fn fly(bytes: &[u8]) -> (Board, Vec<Answer>, Result<(), FlyError>) {
     let (mut board, mut out, mut flown) = (Board::new(VehicleKind::Simulated), Vec::new(), Ok(()));
     for arrived in bytes.chunks(61) {
@@ -72,11 +72,11 @@ fn answer_to(frame: &ComputerFrame) -> Answer {
         frame: frame.input.frame,
         output: frame.output.clone(),
         state_digest: frame.state_digest,
-        heard: None,
+        radio: None,
     }
 }
 
-fn asked(frame: &ComputerFrame, begin: Option<Begin>) -> Frame {
+fn request(frame: &ComputerFrame, begin: Option<Begin>) -> Frame {
     Frame { input: frame.input.clone(), begin }
 }
 
@@ -93,7 +93,7 @@ fn a_flight_through_a_stream_is_answered_as_it_was_flown_bit_for_bit() {
     let mut sortie = Sortie::new(&recipe(), 0).unwrap();
     let mut begin = Some(begin(&sortie));
     let frames = flown(&mut sortie);
-    let bytes = bytes_of(frames.iter().map(|frame| asked(frame, begin.take())));
+    let bytes = bytes_of(frames.iter().map(|frame| request(frame, begin.take())));
     let (board, answers, flown) = fly(&bytes);
     flown.unwrap();
     assert_eq!((board.frames(), board.reader().broken()), (frames.len() as u64, 0));
@@ -103,7 +103,7 @@ fn a_flight_through_a_stream_is_answered_as_it_was_flown_bit_for_bit() {
     }
 }
 
-/// Every frame is asked twice, with the flight's beginning, and comes through noise and with broken
+/// Every frame is requested twice, with the flight's beginning, through noise and with broken
 /// copies.
 #[test]
 fn a_bad_wire_changes_no_answer() {
@@ -113,7 +113,7 @@ fn a_bad_wire_changes_no_answer() {
     let mut bytes = b"noise before the first frame".to_vec();
     bytes.push(0);
     for frame in &frames {
-        let whole = bytes_of([asked(frame, Some(begin.clone()))]);
+        let whole = bytes_of([request(frame, Some(begin.clone()))]);
         for place in [3, whole.len() / 2] {
             let mut flipped = whole.clone();
             flipped[place] ^= if flipped[place] == 0x10 { 0x20 } else { 0x10 };
@@ -144,7 +144,7 @@ impl Watch for Resets<'_> {
     }
 }
 
-/// A reset loses what has not left the machine.
+/// A reset loses the bytes that have not left the machine.
 #[test]
 fn every_frame_before_a_reset_is_answered_before_it() {
     let mut sortie = Sortie::new(&recipe(), 0).unwrap();
@@ -152,7 +152,7 @@ fn every_frame_before_a_reset_is_answered_before_it() {
     let mut frames = flown(&mut sortie);
     frames.truncate(200);
     frames.drain(100..120);
-    let bytes = bytes_of(frames.iter().map(|frame| asked(frame, begin.take())));
+    let bytes = bytes_of(frames.iter().map(|frame| request(frame, begin.take())));
     let answered = Cell::new(0);
     let mut resets = Resets { answered: &answered, found: Vec::new() };
     Board::new(VehicleKind::Simulated)
@@ -161,7 +161,7 @@ fn every_frame_before_a_reset_is_answered_before_it() {
     assert_eq!(resets.found, [(frames[100].input.frame, 100)]);
 }
 
-/// A board whose main context is a thread. It senses what was recorded, has a plan in the frame in
+/// A board whose main context is a thread. It senses the recorded input, has a plan in the frame in
 /// which the recorded computer had it, and notes its commands.
 struct Recorded<'f> {
     frames: std::slice::Iter<'f, ComputerFrame>,
@@ -169,15 +169,15 @@ struct Recorded<'f> {
     to_main: SyncSender<Box<Planner>>,
     from_main: Receiver<Box<Planner>>,
     commanded: Vec<Commands>,
-    kept: u64,
+    logged: u64,
 }
 
 impl<'f> Recorded<'f> {
     fn sensing(frames: &'f [ComputerFrame]) -> Self {
         // There is never more than one.
-        let ((to_main, posed), (solve, from_main)) = (sync_channel::<Box<Planner>>(1), sync_channel(1));
+        let ((to_main, requests), (solve, from_main)) = (sync_channel::<Box<Planner>>(1), sync_channel(1));
         let solves = move || {
-            for mut planner in posed {
+            for mut planner in requests {
                 planner.solve();
                 if solve.send(planner).is_err() {
                     return;
@@ -185,7 +185,7 @@ impl<'f> Recorded<'f> {
             }
         };
         thread::Builder::new().name("main context".into()).spawn(solves).unwrap();
-        Self { frames: frames.iter(), ready: false, to_main, from_main, commanded: Vec::new(), kept: 0 }
+        Self { frames: frames.iter(), ready: false, to_main, from_main, commanded: Vec::new(), logged: 0 }
     }
 }
 
@@ -203,19 +203,19 @@ impl port::Board for Recorded<'_> {
         Ok(())
     }
 
-    fn pose(&mut self, posed: Box<Planner>) {
-        self.to_main.send(posed).unwrap();
+    fn submit(&mut self, planner: Box<Planner>) {
+        self.to_main.send(planner).unwrap();
     }
 
     fn solved(&mut self) -> Option<Box<Planner>> {
         self.ready.then(|| self.from_main.recv().unwrap())
     }
 
-    fn tell(&mut self, _: &[CrewMessage]) {}
+    fn send(&mut self, _: &[CrewMessage]) {}
 
-    fn keep(&mut self, frame: &ComputerFrame) {
-        self.kept += 1;
-        assert_eq!(frame.input.frame, self.kept);
+    fn log(&mut self, frame: &ComputerFrame) {
+        self.logged += 1;
+        assert_eq!(frame.input.frame, self.logged);
     }
 }
 
@@ -227,7 +227,11 @@ fn started(recipe: &Recipe, sortie: &Sortie) -> RecordedComputer {
 fn commands_the_same(computer: Computer, frames: &[ComputerFrame]) -> Frames {
     let (mut flight, mut board) = (Frames::new(computer, 0), Recorded::sensing(frames));
     while flight.fly(&mut board).unwrap() {}
-    assert_eq!((board.kept, board.commanded.len()), (frames.len() as u64, frames.len()), "no frame is lost");
+    assert_eq!(
+        (board.logged, board.commanded.len()),
+        (frames.len() as u64, frames.len()),
+        "no frame is lost"
+    );
     for (frame, commands) in frames.iter().zip(&board.commanded) {
         let (recorded, number) = (&frame.output, frame.input.frame);
         let bits = |angles: &[f64]| angles.iter().map(|angle| angle.to_bits()).collect::<Vec<_>>();
@@ -246,8 +250,8 @@ fn commands_the_same(computer: Computer, frames: &[ComputerFrame]) -> Frames {
     flight
 }
 
-/// However late the plans are, a board whose main context plans decides what the simulator has
-/// decided with plans as late.
+/// However late the plans, a board whose main context plans decides as the simulator has decided
+/// with plans as late.
 #[test]
 fn a_board_that_senses_the_same_commands_the_same() {
     for slower in [1, 4] {
@@ -268,8 +272,8 @@ fn a_board_rehearses_arms_and_lands() {
     let mut sortie = Sortie::on_the_pad(&recipe(), 0).unwrap();
     let computer = started(&recipe(), &sortie).computer().clone();
     let (mut frames, mut last, mut armed) = (Vec::new(), LastFrame::default(), false);
-    let asks = |asked| [Request::of_the_programme(asked)];
-    let (arm, start) = (asks(Asked::Arm), asks(Asked::Start));
+    let requests = |command| [Request::of_the_programme(command)];
+    let (arm, start) = (requests(CrewCommand::Arm), requests(CrewCommand::Start));
     // The simulated rehearsal is over after some seconds.
     while sortie.goes_on() || sortie.computer().released_at_s().is_none() {
         let requests: &[Request] = match sortie.frame() {
@@ -292,24 +296,24 @@ fn a_board_rehearses_arms_and_lands() {
     assert_eq!(flight.computer().mode().phase, sortie.computer().mode().phase);
 }
 
-/// On a board the heap is for set-up. In flight there are only the lists of a frame's news, which
-/// go with the frame. vlr wants more intervals in flight than on the ground.
+/// On a board the heap is for set-up. In flight there are only the lists of a frame's messages,
+/// which end with the frame. vlr needs more intervals in flight than on the ground.
 #[test]
-fn in_flight_only_news_allocate() {
+fn only_messages_allocate_in_flight() {
     for mission in ["mk2", "mk3", "vlr"] {
         let recipe = Recipe::built_in(mission, "field").unwrap();
         let mut sortie = Sortie::new(&recipe, 0).unwrap();
         let mut computer = started(&recipe, &sortie);
         let mut frames_with_news = 0;
         for recorded in &flown(&mut sortie) {
-            let (mut news, frame) = (0, recorded.input.frame);
+            let (mut messages, frame) = (0, recorded.input.frame);
             let read = computer.read(&recorded.input).unwrap();
-            let allocated = allocation_counter::measure(|| news = computer.step(&read).news.len());
-            if news == 0 {
+            let allocated = allocation_counter::measure(|| messages = computer.step(&read).messages.len());
+            if messages == 0 {
                 assert_eq!(allocated.count_total, 0, "{mission}, frame {frame}: {allocated:?}");
             } else {
                 frames_with_news += 1;
-                assert!(allocated.bytes_max < NEWS_BYTES_MAX, "{mission}, frame {frame}: {allocated:?}");
+                assert!(allocated.bytes_max < MESSAGE_BYTES_MAX, "{mission}, frame {frame}: {allocated:?}");
             }
             assert_eq!(allocated.bytes_current, 0, "{mission}, frame {frame}: {allocated:?}");
         }
@@ -318,7 +322,7 @@ fn in_flight_only_news_allocate() {
 }
 
 #[test]
-fn what_is_wrong_with_a_stream_is_said() {
+fn a_fault_in_a_stream_is_reported() {
     let sortie = Sortie::new(&recipe(), 0).unwrap();
     let begin = begin(&sortie);
     let said = |frame: Frame| fly(&bytes_of([frame])).2.unwrap_err().to_string();
@@ -338,7 +342,7 @@ fn what_is_wrong_with_a_stream_is_said() {
     assert!(board.reader().broken() > 0);
 }
 
-/// Keeps what is sent.
+/// Stores the sent messages.
 #[derive(Default)]
 struct Sent(Vec<u8>);
 
@@ -352,9 +356,9 @@ impl Radio for Sent {
     }
 }
 
-/// A station acts by itself only on a vehicle that says in both places that it is simulated.
+/// A station acts by itself only on a vehicle that reports itself as simulated in both places.
 #[test]
-fn a_board_tells_its_crew_whether_it_is_real() {
+fn a_board_reports_to_its_crew_whether_it_is_real() {
     let mut sortie = Sortie::new(&recipe(), 0).unwrap();
     let on_the_air =
         OnTheAir { mission: "mk2".to_owned(), system_id: 1, boot_number: 7, ..OnTheAir::default() };
@@ -362,7 +366,7 @@ fn a_board_tells_its_crew_whether_it_is_real() {
     let mut begin = Some(Begin { on_the_air: Some(on_the_air), ..begin(&sortie) });
     let mut frames = flown(&mut sortie);
     frames.truncate(400);
-    let bytes = bytes_of(frames.iter().map(|frame| asked(frame, begin.take())));
+    let bytes = bytes_of(frames.iter().map(|frame| request(frame, begin.take())));
     for (kind, marked) in [(VehicleKind::Real, false), (VehicleKind::Simulated, true)] {
         let mut radio = Sent::default();
         Board::new(kind).take(&bytes, &mut radio, &mut (), &mut |_: &[u8]| ()).unwrap();

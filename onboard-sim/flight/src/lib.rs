@@ -9,8 +9,8 @@
 //! * [`vehicle`] describes the rocket, its motor, the air and a mission, as data.
 //! * [`estimation`] estimates from the sensors where the rocket is and how strong its motor is.
 //! * [`guidance`] decides where to steer, when to light the motor, and how to land.
-//! * [`control`] turns a wanted direction into commands for gimbal and fins.
-//! * [`rules`] decides what the vehicle may do: phases, checks and limits.
+//! * [`control`] turns a commanded direction into commands for gimbal and fins.
+//! * [`rules`] decides the permitted actions: phases, checks and limits.
 //! * [`computer`] is the flight computer: one frame, from sensor samples to commands.
 //!
 //! With the feature `files`, `vehicles` reads the files that describe a vehicle. The crate [`ocp`]
@@ -78,8 +78,8 @@ pub mod vehicle {
     //! * [`mission`] holds a flight from apogee: the vehicle, the start, the settings and the
     //!   limits.
     //! * [`airframe`] holds masses, shape and actuators.
-    //! * [`thrust_curve`] is the certified motor, [`lot`] what burns of its lot tell, and [`burn`]
-    //!   the expected burn of this motor.
+    //! * [`thrust_curve`] is the certified motor, [`lot`] the measured burns of its lot, and
+    //!   [`burn`] the expected burn of this motor.
     //! * [`atmosphere`] and [`fins`] give the air and its forces on the fins.
     //! * [`rigid`] is the state in space.
     //! * [`site`] is the launch site: position, air and ground.
@@ -104,9 +104,9 @@ pub mod estimation {
     //!
     //! * [`estimator`] finds state and wind from the sensors.
     //! * [`motor_estimate`] finds impulse, burn time and ignition of the motor.
-    //! * [`other_curves`] finds out which of the known thrust curves the motor has.
+    //! * [`other_curves`] identifies which of the certified thrust curves the motor has.
     //! * `spikes` removes single wrong pressures.
-    //! * [`sensor_watch`] says which sensors speak, and what they say that cannot be true.
+    //! * [`sensor_watch`] detects silent sensors and implausible samples.
 
     pub mod estimator;
     pub mod motor_estimate;
@@ -130,10 +130,10 @@ pub mod guidance {
 }
 
 pub mod control {
-    //! Turns wanted directions into commands for gimbal and fins.
+    //! Turns commanded directions into commands for gimbal and fins.
     //!
     //! * [`aim`] points the rocket by its gimbal.
-    //! * [`fins`] finds the four openings for wanted moments and drag.
+    //! * [`fins`] finds the four openings for commanded moments and drag.
 
     pub mod aim;
     pub mod fins;
@@ -141,14 +141,14 @@ pub mod control {
 }
 
 pub mod rules {
-    //! The rules for what the vehicle may do.
+    //! The rules for permitted actions.
     //!
     //! * [`phase`] has the flight phases and the one table that moves between them.
     //! * [`arming`] has the checks before arming, [`gate`] the checks before ignition.
-    //! * [`outputs`] says which igniter, charge or parachute has current.
+    //! * [`outputs`] decides which igniter, charge or parachute is energised.
     //! * [`operator`] has the people who may command; [`two_person`] lets two of them arm and start
     //!   together.
-    //! * [`verdict`] has the touchdown limits, and whether a landing kept them.
+    //! * [`verdict`] has the touchdown limits, and the verdict on a landing.
 
     pub mod arming;
     pub mod gate;

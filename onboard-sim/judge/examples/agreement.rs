@@ -2,9 +2,9 @@
 //!
 //! `cargo run --release -p judge --example agreement -- FLIGHTS EVERY MISSION/SET...`
 //!
-//! Flies so many flights of each mission and set of dispersions, and judges every so manyth plan of
-//! the landing burns. The judge begins from its own guesses, and from the plan that flew. Prints a
-//! table in Markdown.
+//! Flies this many flights of each mission and set of dispersions, and judges every n-th plan of
+//! the landing burns. The judge begins from its guesses, and from the flown plan. Prints a table in
+//! Markdown.
 
 use std::io::Write as _;
 

@@ -124,7 +124,7 @@ pub(crate) fn cost_at(problem: &Problem, k: usize) -> (Node, Node) {
     (weight * *step_s, Node::from(free))
 }
 
-/// A range that a component of a node has to keep.
+/// Permitted range of a component of a node.
 pub(crate) struct Range {
     pub(crate) what: &'static str,
     pub(crate) node: usize,

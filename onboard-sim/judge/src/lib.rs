@@ -20,8 +20,8 @@ use ocp::landing::{INPUTS, Problem, STATES, State};
 use self::landing::{Node, Range, after, cost_at, ranges};
 use self::sqp::Search;
 
-/// A plan by the judge's own dynamics and conditions. NaN throughout if the plan has another number
-/// of intervals, or does not fly on finite numbers.
+/// A plan by the judge's dynamics and conditions. NaN throughout if the plan has another number of
+/// intervals, or flies on values that are not finite.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Score {
     /// The running cost.
@@ -37,7 +37,7 @@ pub struct Score {
     pub defect: f64,
 }
 
-/// The judge's own plan.
+/// The judge's plan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Judgement {
     /// Whether nothing better lies near it; if not, it is only the best that was found.
@@ -51,11 +51,11 @@ pub struct Judgement {
     pub inputs: Vec<[f64; INPUTS]>,
 }
 
-/// The judge's own guesses: turns of the lean, and how far from the problem's direction it begins,
-/// rad.
+/// The judge's guesses: turns of the lean, and the offset of its initial direction from the
+/// problem's, rad.
 const GUESSES: [(f64, f64); 5] = [(1.0, 0.0), (-1.0, 0.0), (1.0, PI), (-1.0, PI), (0.0, 0.0)];
 
-/// Solves a landing from the judge's own guesses, and from a plan if there is one; the best is the
+/// Solves a landing from the judge's guesses, and from a plan if there is one; the best is the
 /// answer. A plan with another number of intervals is not used. The final time is that of the
 /// problem. The score is NaN if the problem has no intervals, or numbers that are not finite.
 pub fn solve(problem: &Problem, start: Option<(&[State], &[[f64; INPUTS]])>) -> Judgement {

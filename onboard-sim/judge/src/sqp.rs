@@ -7,9 +7,9 @@
 //!    quadratic programs arising in direct optimal control", SIAM J. Optim. 27, 2017).
 //! 2. Clarabel solves the subproblem: nodes and misses are its variables, intervals and conditions
 //!    its rows.
-//! 3. The step is flown: the inputs follow it, and correct with the recursion's gains what the
-//!    tangents did not see. So every iterate is flyable, and its merit is the one of its
-//!    [`score`](crate::score). The step is halved until the merit falls.
+//! 3. The step is flown: the inputs follow it, and correct the errors of linearisation with the
+//!   recursion's gains. So every iterate is flyable, and its merit is the one of its
+//!   [`score`](crate::score). The step is halved until the merit falls.
 
 use std::f64::consts::TAU;
 
@@ -27,18 +27,17 @@ const ITERATIONS: usize = 60;
 /// A plan has converged when the subproblem promises less than this share of its merit.
 const TOLERANCE: f64 = 1e-7;
 
-/// Share of the promised decrease of the merit that a step has to keep, and how many shares are
-/// tried.
-const KEPT: f64 = 1e-4;
+/// Required share of the predicted decrease of the merit, and the number of step shares tried.
+const ARMIJO: f64 = 1e-4;
 const SHARES: usize = 10;
 
-/// The merit must be less than the largest of so many before: a full step along a curved condition
-/// raises it for a moment.
+/// Number of earlier merits whose largest the merit must undercut: a full step along a curved
+/// condition raises it for a moment.
 const MEMORY: usize = 8;
 
-/// So many iterations first go without the dynamics' curvature. With it from the second on, the
-/// best of three guesses ends beside the best known landing in 3 of 12 landings like those of the
-/// tests; after these in none.
+/// Iterations without the dynamics' curvature at the start. With it from the second on, the best of
+/// three guesses ends beside the best landing found in 3 of 12 landings like those of the tests;
+/// after these in none.
 const ROUGH: usize = 10;
 
 /// Smallest curvature of a stage, and the smallest of the inputs relative to their largest.
@@ -140,7 +139,7 @@ impl<'a> Search<'a> {
             let taken = shares.find_map(|share| {
                 let flown = self.flown(&nodes, &stages, &step, share);
                 let merit = scored(self.problem, &self.ranges, &flown).merit;
-                (merit < reference - KEPT * share * step.promised.max(0.0)).then_some((flown, merit, share))
+                (merit < reference - ARMIJO * share * step.promised.max(0.0)).then_some((flown, merit, share))
             });
             match taken {
                 Some((flown, merit, share)) => {
@@ -149,12 +148,12 @@ impl<'a> Search<'a> {
                     if merit < best.0 {
                         best = (merit, nodes.clone());
                     }
-                    for (kept, new) in multipliers.iter_mut().zip(step.multipliers) {
-                        *kept += share * (new - *kept);
+                    for (multiplier, new) in multipliers.iter_mut().zip(step.multipliers) {
+                        *multiplier += share * (new - *multiplier);
                     }
                     curved = iterations >= ROUGH;
                 }
-                // The tangents' own curvature is always positive.
+                // The curvature of the linearisation is always positive.
                 None if curved => curved = false,
                 None => break,
             }

@@ -10,13 +10,13 @@ use problem::{GRAVITY_M_S2, problem};
 /// The landing of 2.0 has two optima whose merits differ by 0.2 %: there each solver finds another
 /// one.
 #[test]
-fn val_flying_solver_agrees_with_the_judges_own_guesses() {
+fn val_flying_solver_agrees_with_the_guesses_of_the_judge() {
     for (thrust_over_weight, sideways_m_s, optima) in
         [(1.4, 0.0, 1), (1.6, 1.0, 1), (1.8, -1.0, 1), (2.0, 0.0, 2)]
     {
         let mut model = problem(thrust_over_weight);
         model.initial[4] += sideways_m_s;
-        // What is compared is nearer to the optimum than a flown plan must be.
+        // The comparison is nearer to the optimum than a flown plan must be.
         model.solver.kkt_tolerance = 1e-8;
         let mut workspace = Workspace::default();
         ocp::landing::solve(&mut workspace, &model, None);
@@ -107,7 +107,7 @@ fn a_score_names_the_worst_miss_and_finds_defects() {
 }
 
 #[test]
-fn what_cannot_be_judged_is_told() {
+fn an_unsolvable_problem_is_reported() {
     let mut model = braking();
     model.wind_m_s[0] = f64::NAN;
     let Judgement { converged, score, .. } = solve(&model, None);

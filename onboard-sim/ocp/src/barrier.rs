@@ -68,8 +68,8 @@ impl Limits {
 
 /// Slacks and multiplier of a condition.
 ///
-/// The multiplier is kept as its distances `a = y + l` and `b = M - y`, so that it stays exact when
-/// it is next to an end of its range.
+/// The multiplier is stored as its distances `a = y + l` and `b = M - y`, so that it stays exact
+/// next to an end of its range.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Elastic {
     a: f64,
@@ -109,9 +109,9 @@ impl Elastic {
     pub(crate) fn warm(c: f64, multiplier: f64, equality: bool, penalty: f64, barrier: f64) -> Self {
         /// Smallest distance of a multiplier from the ends of its range, as a fraction of its value
         /// on the central path.
-        const KEPT: f64 = 0.1;
+        const MARGIN: f64 = 0.1;
         let least = if equality { penalty } else { 0.0 };
-        let nearest = KEPT * barrier / c.abs().max(SLACK);
+        let nearest = MARGIN * barrier / c.abs().max(SLACK);
         let a = (multiplier + least).max(nearest);
         let b = (penalty - multiplier).max(nearest);
         Self { a, b, above: barrier / a, below: barrier / b, least, penalty }.fitted(c)
@@ -134,7 +134,7 @@ impl Elastic {
         settled.fitted(c)
     }
 
-    /// With `s - e` equal to the condition's value `c`: the smaller of the two is kept.
+    /// With `s - e` equal to the condition's value `c`: the smaller of the two is retained.
     #[inline]
     pub(crate) fn fitted(mut self, c: f64) -> Self {
         if c >= 0.0 {

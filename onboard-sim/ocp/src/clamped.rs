@@ -74,7 +74,7 @@ const LARGEST_STEP: f64 = 3.0;
 impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
     /// Iterates from `current`, a complete warm start, to the optimum.
     ///
-    /// With few iterations it may end at their limit, with `current` after so many steps.
+    /// With few iterations it may end at their limit, with `current` after that many steps.
     ///
     /// # Errors
     /// The numbers of steps and sweeps, if the optimum is not close; `current` must then not be
@@ -170,8 +170,8 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
         Err((most, sweeps))
     }
 
-    /// The Newton step that belongs to the sides; whether it has the whole curvature of the
-    /// dynamics, `None` without the right inertia.
+    /// The Newton step of the present sides; whether it has the full curvature of the dynamics,
+    /// `None` without the right inertia.
     fn step_for_sides(&mut self, model: &M, stiffness: f64, sweeps: &mut u32) -> Option<bool> {
         self.assemble_sides(model, stiffness);
         let share = CURVATURE_SHARES.into_iter().position(|share| {

@@ -1,4 +1,4 @@
-//! Intervals as whole matrices, for models without a structure that is worth its own code; and the
+//! Intervals as full matrices, for models without a structure that merits separate code; and the
 //! factors of a symmetric matrix.
 #![expect(clippy::inline_always, reason = "inlined into the sweeps, to be compiled for their vectors")]
 
@@ -8,7 +8,7 @@ use core::array::from_fn;
 use crate::intervals::{Curvature, Feedback, Hessian, Interval, Intervals, Stage, add_times};
 
 /// One interval. [`Model::evaluate`](crate::Model::evaluate) fills in `end`, `pulled_x` and
-/// `pulled_u`, and the other fields if derivatives are asked for.
+/// `pulled_u`, and the other fields if derivatives are requested.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Dense<const NX: usize, const NU: usize> {
     /// `F`.
@@ -253,7 +253,7 @@ mod tests {
         }
 
         #[test]
-        fn val_nalgebra_eigenvalues_tell_which_matrices_are_refused(root in matrix()) {
+        fn val_nalgebra_eigenvalues_decide_which_matrices_are_rejected(root in matrix()) {
             let symmetric = root + root.transpose();
             let least = symmetric.symmetric_eigenvalues().min();
             prop_assume!(least.abs() > 1e-9);

@@ -1,7 +1,6 @@
-//! The dynamics at a point, as the solver reads them. [`DenseIntervals`](crate::DenseIntervals) has
-//! whole matrices; a model whose matrices have a known structure can have its own. Also what the
-//! backward sweep makes of them: its stages, the value function, and second derivatives of the
-//! cost.
+//! The dynamics at a point, as read by the solver. [`DenseIntervals`](crate::DenseIntervals) has
+//! full matrices; a model whose matrices have a structure can have a custom type. Also the results
+//! of the backward sweep: its stages, the value function, and second derivatives of the cost.
 #![expect(clippy::inline_always, reason = "a fixed-size kernel of a few dozen instructions")]
 
 use core::array::from_fn;
@@ -75,13 +74,13 @@ pub struct Hessian<const NX: usize, const NU: usize> {
     pub uu: [[f64; NU]; NU],
 }
 
-// One stage of the backward sweep: what it is given, and what it finds.
+// One stage of the backward sweep: its inputs and results.
 
-/// Smallest curvature by an input that counts as positive, relative to the input's own terms.
+/// Smallest curvature by an input that counts as positive, relative to the input's terms.
 const LEAST_CURVATURE: f64 = 1e-11;
 
-/// An interval to be eliminated, apart from its own derivatives: the objective at the node before
-/// it and by its inputs.
+/// An interval to be eliminated, without its derivatives: the objective at the node before it and
+/// by its inputs.
 #[derive(Debug, Clone, Copy)]
 pub struct Stage<'a, C, R, const NX: usize, const NU: usize> {
     /// Difference between the end of the interval and the next node.
@@ -90,14 +89,14 @@ pub struct Stage<'a, C, R, const NX: usize, const NU: usize> {
     pub share: f64,
     /// Second and first derivative of the objective by the state.
     pub state_terms: (&'a C, &'a [f64; NX]),
-    /// Second and first derivative of the objective by the inputs, apart from what comes through
-    /// the states.
+    /// Second and first derivative of the objective by the inputs, without the part through the
+    /// states.
     pub input_terms: (&'a R, &'a [f64; NU]),
 }
 
 impl<C: Curvature<NX>, R: Curvature<NU>, const NX: usize, const NU: usize> Stage<'_, C, R, NX, NU> {
-    /// Adds the inputs' own curvature to the one that comes through the states, and factorises the
-    /// sum if it is positive definite.
+    /// Adds the inputs' curvature to the part through the states, and factorises the sum if it is
+    /// positive definite.
     #[inline(always)]
     pub fn factor(&self, mut by_inputs: [[f64; NU]; NU]) -> Option<Factor<NU>> {
         let (own, _) = self.input_terms;
@@ -174,10 +173,10 @@ pub(crate) fn add_times<const NX: usize>(matrix: &[[f64; NX]; NX], vector: &[f64
     }
 }
 
-// Second derivatives of the cost: only the diagonal, or the whole matrix.
+// Second derivatives of the cost: only the diagonal, or the full matrix.
 
 /// The second derivative of a cost by `N` variables. `[f64; N]` is a diagonal, `[[f64; N]; N]` a
-/// whole symmetric matrix.
+/// full symmetric matrix.
 pub trait Curvature<const N: usize>: Copy + Debug {
     const ZERO: Self;
 
@@ -253,7 +252,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_diagonal_acts_like_the_whole_matrix_with_it() {
+    fn a_diagonal_acts_like_the_full_matrix() {
         let (mut diagonal, mut whole) = ([2.0, -3.0], [[2.0, 0.0], [0.0, -3.0]]);
         diagonal.add_to_diagonal(1, 0.5);
         whole.add_to_diagonal(1, 0.5);

@@ -11,7 +11,7 @@ use crate::model::{Condition, Model};
 /// A point of the primal-dual space.
 #[derive(Debug, Clone)]
 pub(crate) struct Iterate<M: Model<NX, NU>, const NX: usize, const NU: usize> {
-    /// States at the nodes, one more than inputs; the first is the model's own.
+    /// States at the nodes, one more than inputs; the first is that of the model.
     pub(crate) states: Vec<[f64; NX]>,
     /// Inputs of each interval.
     pub(crate) inputs: Vec<[f64; NU]>,
@@ -47,7 +47,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Iterate<M, NX, NU> {
         self.elastics.copy_from_slice(&point.elastics);
     }
 
-    /// Evaluates every interval at the iterate, with derivatives if asked for.
+    /// Evaluates every interval at the iterate, with derivatives if requested.
     pub(crate) fn evaluate(&mut self, model: &M, derivatives: bool) {
         model.evaluate(&self.states, &self.inputs, &self.costates, derivatives, &mut self.intervals);
     }

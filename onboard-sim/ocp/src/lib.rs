@@ -1,6 +1,6 @@
 //! Solves optimal-control problems over a horizon of stages with a primal-dual interior-point
-//! method with exact Hessians. A [`Model`] says what the problem is. The numbers of states and
-//! inputs are constants of the compiler.
+//! method with exact Hessians. A [`Model`] defines the problem. The numbers of states and inputs
+//! are compile-time constants.
 //!
 //! # Formulation
 //!
@@ -18,12 +18,13 @@
 //! exactly, so a high penalty makes it a hard one.
 //!
 //! There is no cost of products of states and inputs, no condition on several components at once,
-//! and input limits are the same in all intervals. A further state can stand for what is missing.
+//! and input limits are the same in all intervals. An additional state can replace a missing
+//! feature.
 //!
 //! [`Dense`] intervals are enough for a new model; the tests' `polynomial` is one. [`landing`] has
 //! one whose matrices have a structure.
 //!
-//! The tolerances inside suit states, and inputs in their own [`unit`](InputRange::unit), whose
+//! The built-in tolerances suit states, and inputs in their [`unit`](InputRange::unit), whose
 //! changes are of the order of one.
 //!
 //! # Steps of an iteration
@@ -71,7 +72,7 @@
 
 extern crate alloc;
 
-/// Buffers without room, for any model: a derived default would ask the model for one, too.
+/// Empty buffers, for any model: a derived default would require one of the model, too.
 macro_rules! empty {
     ($name:ident { $($field:ident),+ }) => {
         impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Default for $name<M, NX, NU> {

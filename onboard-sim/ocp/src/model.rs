@@ -1,4 +1,4 @@
-//! What the solver asks of a problem, and the conditions on its states.
+//! Interface of a problem to the solver, and the conditions on its states.
 
 use alloc::vec::Vec;
 
@@ -31,10 +31,10 @@ pub trait Model<const NX: usize, const NU: usize> {
 
     fn settings(&self) -> Settings;
 
-    /// Writes the states and inputs from which the cold solve `index` starts, 0 to `guesses +
+    /// Writes the initial states and inputs of the cold solve `index`, 0 to `guesses +
     /// spare_guesses - 1` of the settings. The first state is the initial one, the inputs are
-    /// inside their limits, and the path may have defects. Newton's method keeps a symmetry, so a
-    /// guess should not have one that the best path breaks.
+    /// inside their limits, and the path may have defects. Newton's method preserves a symmetry, so
+    /// a guess should not have one that the best path breaks.
     fn guess(&self, index: usize, states: &mut [[f64; NX]], inputs: &mut [[f64; NU]]);
 
     /// Evaluates every interval `k` from node `k`, with the costate of node `k + 1`. Without
@@ -125,7 +125,7 @@ pub struct Settings {
     /// Barrier of a cold solve's first iteration, of the order of the penalty, so that nothing is
     /// active yet.
     pub first_barrier: f64,
-    /// Number of guesses of a cold solve; the cheapest result is kept.
+    /// Number of guesses of a cold solve; the result with the lowest cost is used.
     pub guesses: usize,
     /// Number of further guesses, tried if the cheapest result has not converged or misses a
     /// condition.

@@ -17,7 +17,7 @@ pub(crate) struct Newton<M: Model<NX, NU>, const NX: usize, const NU: usize> {
     elastics: Vec<ElasticStep>,
 }
 
-/// The longest fractions of a step that keep slacks and multipliers positive.
+/// The longest fractions of a step that leave slacks and multipliers positive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Fractions {
     pub(crate) primal: f64,
@@ -207,7 +207,7 @@ const SUFFICIENT_DECREASE: f64 = 1e-8;
 /// Relative rounding error of the objective that a comparison allows.
 const ROUNDING: f64 = 1e-13;
 
-/// Largest number of points kept; the oldest are dropped.
+/// Largest number of stored points; the oldest are dropped.
 const CAPACITY: usize = 32;
 
 /// Defects and objective of a point.
@@ -262,7 +262,7 @@ impl Filter {
 
     /// Whether a trial point at `fraction` of a step is progress over `now`. If the point is
     /// accepted but the step was not a descent of the objective, `now` enters the filter. `slope`
-    /// is the objective's slope along the whole step.
+    /// is the objective's slope along the full step.
     pub(crate) fn accepts(&mut self, now: Measures, trial: Measures, slope: f64, fraction: f64) -> bool {
         if !trial.is_finite() {
             return false;

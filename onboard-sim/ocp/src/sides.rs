@@ -179,7 +179,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
         }
     }
 
-    /// Takes the whole step; returns whether a limit or condition changed sides.
+    /// Takes the full step; returns whether a limit or condition changed sides.
     pub(crate) fn step_sides(&mut self, model: &M, stiffness: f64) -> bool {
         let ranges = model.input_ranges();
         let penalty = model.settings().penalty;

@@ -29,10 +29,10 @@ const LONGER: usize = 10;
 /// limits.
 const STEP_FRACTION_MIN: f64 = 0.1;
 
-/// After so many whole steps in a row with less than the dynamics' curvature the descent creeps
-/// along a saddle, and the barrier is raised. Fewer, and the steps beside some saddles are too few
-/// to leave them: with six, two of 30,000 cold starts of the landing paper's problem end at their
-/// cap, with eight none.
+/// Consecutive full steps with less than the dynamics' curvature after which the descent creeps
+/// along a saddle, and the barrier is raised. With fewer, the steps beside some saddles do not
+/// leave them: with six, two of 30,000 cold starts of the landing paper's problem end at their cap,
+/// with eight none.
 const CREEPS: u32 = 8;
 
 /// If the line search shortens a step to less than this fraction, the Hessian is nearly singular,
@@ -48,14 +48,13 @@ const BARRIER_EXPONENT: f64 = 1.8;
 
 /// Bounds of the fraction of a slack or multiplier that a step must leave; between them it equals
 /// the barrier.
-const KEPT_LEAST: f64 = 1e-4;
-const KEPT_MOST: f64 = 1e-2;
+const MIN_REMAINING: f64 = 1e-4;
+const MAX_REMAINING: f64 = 1e-2;
 
-/// Fractions of the dynamics' curvature that are tried until the inertia is right, beginning with
-/// the one before the last that was right; after one that was wrong, with that which was right.
-/// Without the curvature the Hessian is that of Gauss and Newton, whose inertia is always right.
-/// The second is nearly the whole: with half of it at once, landings in space creep, and take a
-/// fifth more iterations.
+/// Fractions of the dynamics' curvature tried until the inertia is right, beginning with the one
+/// before the last right one, or after a wrong one with the right one. Without the curvature the
+/// Hessian is that of Gauss and Newton, whose inertia is always right. The second is nearly full:
+/// with half of it at once, landings in space creep, and take a fifth more iterations.
 pub(crate) const CURVATURE_SHARES: [f64; 4] = [1.0, 0.9, 0.5, 0.0];
 
 /// Shortest fraction that is tried of the step that the slacks allow.
@@ -65,8 +64,8 @@ const SHORTEST_STEP: f64 = 1.0 / 1024.0;
 /// rounding error is larger than its possible decrease.
 const TINY_STEP: f64 = 1e-7;
 
-/// Buffers of a solve, kept so that the next solve does not allocate. The result does not depend on
-/// them, except on what is left of the [allowance](Self::allow).
+/// Buffers of a solve, reused so that the next solve does not allocate. The result does not depend
+/// on them, except on the remaining [allowance](Self::allow).
 #[derive(Debug, Clone)]
 pub struct Workspace<M: Model<NX, NU>, const NX: usize, const NU: usize> {
     pub(crate) conditions: Vec<Condition>,
@@ -144,8 +143,8 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
             && best.miss <= settings.acceptable_miss
             && !self.allowance.is_spent()
         {
-            // It creeps along a saddle. From where it ended, with the slacks opened again, it gets
-            // time to find the way down.
+            // It creeps along a saddle. From its end, with the slacks opened again, it gets time to
+            // find the descent.
             self.current.move_to(&self.best);
             start::raise(model, &self.conditions, RAISED_BARRIER, &mut self.current);
             let mut again = self.descend(model, RAISED_BARRIER, LONGER * cap);
@@ -200,8 +199,8 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
             first = if right > first { right } else { right.saturating_sub(1) };
             self.newton.solve(model, &self.conditions, &self.current, barrier);
 
-            let kept = barrier.clamp(KEPT_LEAST, KEPT_MOST);
-            let fractions = self.newton.fractions(model, &self.current, kept);
+            let remaining = barrier.clamp(MIN_REMAINING, MAX_REMAINING);
+            let fractions = self.newton.fractions(model, &self.current, remaining);
             let jammed = raises == 0
                 && barrier < RAISED_BARRIER
                 && fractions.primal.min(fractions.dual) < STEP_FRACTION_MIN;
@@ -293,7 +292,7 @@ impl Allowance {
 }
 
 impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
-    /// Allows the coming solves so many passes together, or any number; a pass is one interval
+    /// Allows the next solves this many passes together, or any number; a pass is one interval
     /// evaluated with its derivatives, or eliminated by a backward sweep. An iteration that has
     /// begun is finished. A solve without passes ends with [`Status::WorkLimit`]: cold with its
     /// first guess, warm with the start's inputs.
@@ -306,7 +305,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
         self.allowance.made
     }
 
-    /// Whether nothing is left of what was allowed.
+    /// Whether the allowance is used up.
     pub fn is_spent(&self) -> bool {
         self.allowance.is_spent()
     }

@@ -119,7 +119,7 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Iterate<M, NX, NU> {
     }
 }
 
-// How a solve ended, and what it found.
+// Outcome of a solve, with its result.
 
 /// How a solve ended, with its number on the wire (TD_SOLVER_STATUS).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
@@ -131,7 +131,7 @@ pub enum Status {
     Converged = 1,
     /// The iteration cap ended the solve; the best iterate is returned.
     IterationLimit = 2,
-    /// What was allowed ([`Workspace::allow`]) ended the solve; the best iterate is returned.
+    /// The allowance ([`Workspace::allow`]) ended the solve; the best iterate is returned.
     WorkLimit = 6,
     /// No step improved the best iterate any more before the tolerance was reached.
     Stalled = 3,

@@ -8,7 +8,7 @@ use serde::Deserialize;
 #[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Dispersion {
-    /// The sensors err; otherwise they are nearly exact, and the state at the start is known.
+    /// The sensors have errors; otherwise they are nearly exact, and the initial state is exact.
     pub sensors: bool,
     /// Errors of the sensors.
     pub sensor_params: SensorParams,
@@ -54,8 +54,7 @@ pub struct Dispersion {
     pub fin_cant_deg: f64,
     /// Height of a drop, m.
     pub drop_height_m: f64,
-    /// Differences between the vehicle and its data that the flight computer's own models do not
-    /// have.
+    /// Deviations of the vehicle from its data that the flight computer's models do not contain.
     pub mismatch: Mismatch,
 }
 
@@ -68,9 +67,9 @@ pub struct Mismatch {
     /// Shape of the thrust curve: rms over the burn, as a fraction of the thrust. Slow deviations
     /// are larger than fast ones; the impulse stays.
     pub thrust_shape_share: f64,
-    /// How far the curve lies on the way from the mission's to the last of its other ones, 0 to 1.
+    /// Position of the curve between the mission's and the last of its other ones, 0 to 1.
     pub other_curve: [f64; 2],
-    /// Probability that the motor chuffs: it burns for 0.1 s, goes out for 0.2 s, and burns on.
+    /// Probability that the motor chuffs: it burns for 0.1 s, goes out for 0.2 s, and reignites.
     pub chuff_share: f64,
     /// Time in which the thrust rises to its curve's, s.
     pub thrust_rise_s: [f64; 2],
@@ -129,8 +128,7 @@ pub const BUILTIN: &[(&str, &str)] = &[
     ("wild", include_str!("dispersions/wild.toml")),
 ];
 
-/// The set behind every number that a person acts on, if no other is asked for: the one with an
-/// error in everything.
+/// The default set behind every number that a person acts on: the one with an error in everything.
 pub const DEFAULT: &str = "real";
 
 /// Whether a number from this set may be kinder than one from [`DEFAULT`]: every set but this one,
@@ -151,12 +149,12 @@ pub enum DispersionError {
         message: String,
     },
     /// No built-in set has this name.
-    #[error("no dispersion is named '{name}'; these are built in: {known}")]
+    #[error("no dispersion is named '{name}'; these are built in: {available}")]
     Unknown {
-        /// The name asked for.
+        /// The requested name.
         name: String,
         /// The names there are.
-        known: String,
+        available: String,
     },
 }
 
@@ -183,10 +181,10 @@ impl Dispersion {
     /// # Errors
     /// [`DispersionError::Unknown`] lists the names there are.
     pub fn builtin_toml(name: &str) -> Result<&'static str, DispersionError> {
-        let found = BUILTIN.iter().find(|(known, _)| *known == name).map(|(_, text)| *text);
+        let found = BUILTIN.iter().find(|(key, _)| *key == name).map(|(_, text)| *text);
         found.ok_or_else(|| {
-            let known = BUILTIN.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
-            DispersionError::Unknown { name: name.to_owned(), known }
+            let available = BUILTIN.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
+            DispersionError::Unknown { name: name.to_owned(), available }
         })
     }
 }

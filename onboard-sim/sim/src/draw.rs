@@ -14,13 +14,13 @@ use rand_chacha::ChaCha12Rng;
 
 use crate::dispersion::{Dispersion, Mismatch};
 
-/// What chance decided about one flight.
+/// The random differences of one flight.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Draw {
     /// The vehicle and the day.
     pub truth: Truth,
-    /// The state in which the fall begins: at apogee, or when it is felt after a drone let go. A
-    /// flight from the pad rises to an apogee of its own.
+    /// The state in which the fall begins: at apogee, or when it is sensed after a drone's release.
+    /// A flight from the pad rises to its own apogee.
     pub apogee: RigidState,
     /// The ascent of a flight from the pad.
     pub ascent: AscentTruth,
@@ -36,7 +36,7 @@ pub struct Draw {
 /// does not change the other draws, and two sets of dispersions can be compared flight by flight.
 pub fn draw(mission: &Mission, dispersion: &Dispersion, seed: u64, number: u64) -> Draw {
     let mut chance = Chance::of(seed, number);
-    let sigma = &known(mission, dispersion);
+    let sigma = &narrowed_by_lot(mission, dispersion);
     let mut truth = Truth { gust_scale: sigma.gust_scale, ..Truth::default() };
     truth.impulse_scale =
         (1.0 + sigma.impulse_share * chance.normal() + sigma.impulse_even_share * chance.even()).max(0.1);
@@ -86,10 +86,9 @@ pub fn draw(mission: &Mission, dispersion: &Dispersion, seed: u64, number: u64) 
     Draw { truth, apogee, ascent, hanging, flight_seed }
 }
 
-/// The set, which scatters landing motors as certified curves differ, with the scatter that the
-/// mission knows of its lot, and a vehicle that was weighed. What the set does not scatter stays as
-/// it is.
-fn known(mission: &Mission, set: &Dispersion) -> Dispersion {
+/// The set, which scatters landing motors as certified curves differ, with the scatter of the
+/// mission's lot, and a weighed vehicle. A value without scatter in the set is unchanged.
+fn narrowed_by_lot(mission: &Mission, set: &Dispersion) -> Dispersion {
     let (Some(lot), Some(expected)) = (&mission.lot, &mission.expected) else { return *set };
     let weighed = lot.weighed.vehicle_kg.map_or(set.mass_share, |_| set.mass_share.min(expected.mass_share));
     let set = Dispersion { mass_share: weighed, ..*set };
@@ -107,7 +106,7 @@ fn known(mission: &Mission, set: &Dispersion) -> Dispersion {
     }
 }
 
-/// The ascent of flight `number`, from a generator of its own.
+/// The ascent of flight `number`, from a separate generator.
 fn ascended(mission: &Mission, sigma: &Dispersion, seed: u64, number: u64) -> AscentTruth {
     /// Any number that no other draw uses.
     const OF_ASCENT: u64 = 0x5ce7_0000_0000_0003;
@@ -132,9 +131,9 @@ fn ascended(mission: &Mission, sigma: &Dispersion, seed: u64, number: u64) -> As
     }
 }
 
-/// Where the crew of flight `number` places a rail that should stand upwind of the pad by a time,
-/// s, times the wind: by the wind that it measures, x and y, m. It measures from a generator of its
-/// own.
+/// Position of a rail that should be upwind of the pad by a time, s, times the wind: placed by the
+/// crew of flight `number` from its wind measurement, x and y, m. The measurement is drawn from a
+/// separate generator.
 pub(crate) fn rail_upwind_m(
     upwind_s: f64,
     sigma: &Dispersion,
@@ -151,7 +150,8 @@ pub(crate) fn rail_upwind_m(
     [cos, sin].map(|downwind| -downwind * measured_m_s * upwind_s)
 }
 
-/// How the vehicle of flight `number` hangs, from a generator of its own; `None` without a drone.
+/// Attitude and swing of the vehicle of flight `number` below its drone, from a separate generator;
+/// `None` without a drone.
 fn hung(mission: &Mission, sigma: &Dispersion, seed: u64, number: u64) -> Option<Hanging> {
     /// Any number that no other draw uses.
     const OF_HANGING: u64 = 0xd120_0000_0000_0004;
@@ -173,8 +173,8 @@ fn hung(mission: &Mission, sigma: &Dispersion, seed: u64, number: u64) -> Option
 /// How long a chuffing motor burns, and how long it is out before it burns on, s.
 const CHUFF_S: [f64; 2] = [0.1, 0.2];
 
-/// Draws the differences of flight `number` that the flight computer's models do not have. They
-/// come from a generator of their own: a set without them draws what it always drew.
+/// Draws the deviations of flight `number` that the flight computer's models do not contain. They
+/// come from a separate generator: a set without them draws the same values as before.
 fn mismatch(truth: &mut Truth, mission: &Mission, sigma: &Mismatch, seed: u64, number: u64) {
     /// Any number that no other draw uses.
     const OF_MISMATCH: u64 = 0x3d15_0000_0000_0002;
@@ -218,7 +218,7 @@ fn mismatch(truth: &mut Truth, mission: &Mission, sigma: &Mismatch, seed: u64, n
 }
 
 /// Fractions of a delay, uniform in [0, 1), for the faults of flight `number`. They come from a
-/// generator of their own, so that a fault changes no other draw of the flight.
+/// separate generator, so that a fault changes no other draw of the flight.
 pub(crate) fn fault_shares(seed: u64, number: u64, faults: usize) -> Vec<f64> {
     /// Any number that no other draw uses.
     const OF_FAULTS: u64 = 0xfa17_0000_0000_0001;
@@ -280,7 +280,7 @@ mod tests {
             let (certified, known) = (truth("", set), truth(lot, set));
             let off = [certified.impulse_scale, certified.burn_time_scale].map(|scale| scale - 1.0);
             let now = [known.impulse_scale, known.burn_time_scale].map(|scale| scale - 1.0);
-            // 400 burns know the scatter to a fortieth of it and less.
+            // 400 burns determine the scatter to a fortieth of it and less.
             for (place, scatter) in [0.01, 0.015].into_iter().enumerate() {
                 let expected = off[place] * scatter / shares[place];
                 assert!((now[place] / expected - 1.0).abs() < 0.025, "{set}: {} {expected}", now[place]);

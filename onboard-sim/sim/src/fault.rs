@@ -1,4 +1,4 @@
-//! What breaks in a flight, and when; and its injection at that time.
+//! Faults of a flight with their times, and their injection.
 //!
 //! On a command line a fault is written `NAME[:VALUE]@WHEN`, for example `gnss-out@5`,
 //! `fin-stuck:2@apogee`, `gimbal-slow:0.3@ignition+0.3`. `WHEN` is a time since the start of the
@@ -14,7 +14,7 @@ use flight::rules::phase::Phase;
 
 use crate::draw::fault_shares;
 
-/// What can break.
+/// The faulty part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Breakage {
     /// Motor, gimbal or fins.
@@ -27,7 +27,7 @@ pub enum Breakage {
     LinkDelay(f64),
     /// The flight computer is dead for this long, s, and then starts again with its stored memory.
     Reboot(f64),
-    /// The operator asks for an abort.
+    /// The operator requests an abort.
     Abort,
 }
 
@@ -47,7 +47,7 @@ pub enum When {
 pub struct TimedFault {
     /// Name and value, without its time.
     what: String,
-    /// What breaks.
+    /// The faulty part.
     pub breakage: Breakage,
     pub when: When,
 }
@@ -60,7 +60,7 @@ pub struct FaultError {
     problem: String,
 }
 
-/// What a fault takes.
+/// Argument of a fault.
 enum Takes {
     Nothing(Breakage),
     /// A value, with its meaning; `None` of one that is not accepted.
@@ -165,12 +165,12 @@ const PHASES: &[(&str, Phase)] = &[
 pub fn how_to_write() -> String {
     format!(
         "NAME[:VALUE]@WHEN, as in gnss-out@5 or fin-stuck:2@apogee. NAME: {}. WHEN: seconds, or with +SECONDS or +FROM..TO one of {}",
-        known(),
+        fault_forms(),
         phases()
     )
 }
 
-fn known() -> String {
+fn fault_forms() -> String {
     let with_value = |(name, takes): &(&str, Takes)| match takes {
         Takes::Nothing(_) => (*name).to_owned(),
         Takes::Value(meaning, _) => format!("{name}:VALUE ({meaning})"),
@@ -306,7 +306,7 @@ impl Injector {
         self.happened
     }
 
-    /// What breaks at a time, s since the start, in a phase. Call it before every frame.
+    /// Faults due at a time, s since the start, in a phase. Call it before every frame.
     pub fn due(&mut self, time_s: f64, phase: Phase) -> Vec<Breakage> {
         self.entered_s[usize::from(phase.index())].get_or_insert(time_s);
         let entered_s = self.entered_s;
@@ -323,7 +323,7 @@ impl Injector {
             // The delay was drawn together with the flight.
             When::PhaseBetween(since, [delay_s, _]) | When::Phase(since, delay_s) => {
                 let entered_s = entered_s[usize::from(since.index())];
-                // The time begins anew with the release.
+                // The time restarts at the release.
                 since.on_pad() == phase.on_pad()
                     && entered_s.is_some_and(|entered_s| time_s >= entered_s + delay_s)
             }

@@ -7,7 +7,7 @@
 //! * [`recipe`]: everything that a flight is made from.
 //! * [`dispersion`]: which values of a flight are uncertain and by how much, as data.
 //! * [`draw`]: the random values of one flight, from a seed and the flight's number.
-//! * [`fault`]: what breaks in a flight, and when.
+//! * [`fault`]: faults of a flight with their times.
 //! * [`sortie`]: the flight itself.
 //! * `surroundings`: everything of it but its flight computer.
 //! * [`outside`]: the input from the crew and the ground in one frame.

@@ -16,19 +16,19 @@ pub enum Failure {
     NoLight,
     /// The vehicle came down under the parachute.
     Parachute,
-    /// Of the limits of legs that cannot give way, the contact broke this one by the largest share.
+    /// The limit exceeded by the largest share at contact, for legs that cannot crush.
     Limit(&'static str),
     /// The vehicle was within the limits at contact but fell over.
     TippedOver,
-    /// Nozzle or body struck the ground, of a vehicle whose legs can give way.
+    /// Nozzle or body struck the ground, for a vehicle with crushable legs.
     Struck,
-    /// A leg gave way by all of its stroke.
+    /// A leg has used all of its stroke.
     StrokeUsedUp,
     /// A foot bore more than its leg's strength.
     Overload,
     /// The vehicle had not come to rest when the time limit of a flight ended.
     TimeOut,
-    /// The state was not a number.
+    /// The state is NaN.
     NotANumber,
 }
 
@@ -49,7 +49,7 @@ impl Failure {
         }
     }
 
-    /// A limit of the legs tells it: at contact, or of what they bear.
+    /// Whether the failure is of a limit of the legs, at contact or by their loads.
     pub const fn is_of_a_limit(self) -> bool {
         matches!(self, Self::Limit(_) | Self::StrokeUsedUp | Self::Overload)
     }
@@ -88,7 +88,7 @@ pub struct Ending {
     /// The motor was commanded to light.
     pub ignited: bool,
     /// The motor did light.
-    pub lit: bool,
+    pub motor_started: bool,
     /// The parachute was deployed.
     pub parachute: bool,
     /// Every state was finite.
@@ -104,7 +104,7 @@ pub fn judge(mission: &Mission, ending: &Ending) -> Outcome {
         (None, _) => Some(Failure::TimeOut),
         _ if ending.parachute => Some(Failure::Parachute),
         _ if !ending.ignited => Some(Failure::NoIgnition),
-        _ if !ending.lit => Some(Failure::NoLight),
+        _ if !ending.motor_started => Some(Failure::NoLight),
         (_, Some(Rest { outcome, strain: Some(strain), .. })) => damage(outcome, &strain),
         (Some(envelope), _) => {
             let broken = envelope.worst().map(|limit| Failure::Limit(limit.name));
@@ -130,7 +130,7 @@ pub fn by_table_2(contact: &FirstContact) -> LandingVerdict {
     LandingVerdict::judge(&TABLE_2, &Touchdown::along_axis(&contact.state, 0.0))
 }
 
-/// What is broken of a vehicle whose legs can give way.
+/// The damage of a vehicle with crushable legs.
 fn damage(rest: RestOutcome, strain: &Strain) -> Option<Failure> {
     match rest {
         RestOutcome::TippedOver => Some(Failure::TippedOver),

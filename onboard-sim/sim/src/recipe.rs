@@ -9,7 +9,7 @@ use flight::vehicles::thrust_curve::to_rasp;
 use crate::dispersion::{Dispersion, DispersionError};
 use crate::fault::TimedFault;
 
-/// Everything that a flight is made from. A log keeps the texts that the data were read from.
+/// All inputs of a flight. A log stores the texts that the data were read from.
 #[derive(Debug, Clone)]
 pub struct Recipe {
     pub mission: Mission,
@@ -19,7 +19,7 @@ pub struct Recipe {
     pub dispersion_toml: String,
     /// Seed of everything random, for all flights of this recipe.
     pub seed: u64,
-    /// What breaks in every flight.
+    /// The faults of every flight.
     pub faults: Vec<TimedFault>,
 }
 
@@ -60,7 +60,7 @@ impl Recipe {
     /// This recipe with another start of its flights.
     ///
     /// # Errors
-    /// The mission has not what that start needs.
+    /// The mission lacks the data of that start.
     pub fn starting_at(self, start: StartPoint) -> Result<Self, RecipeError> {
         let mission_toml = toml_starting_at(&self.mission_toml, &self.mission.name, start)?;
         let mission = flight::vehicles::mission::from_toml(&mission_toml, &self.mission.name)?;

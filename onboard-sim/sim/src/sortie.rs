@@ -4,12 +4,12 @@
 //! A frame is 5 ms: the world moves under the last commands, the sensors measure it, and the flight
 //! computer decides. On the pad the same flight is rehearsed with nominal data.
 
+use crate::world::plant::WorldError;
 use crate::world::sensors::SensorParamError;
-use crate::world::whole::WorldError;
 use crate::world::{Battery, World};
-use flight::computer::crew::{Asked, Request};
+use flight::computer::crew::{CrewCommand, Request};
 use flight::computer::pilot::Pilot;
-use flight::computer::{Commands, Computer, FRAME_S, Input, KeptInput, Output, Rehearsed, flight_time_s};
+use flight::computer::{Commands, Computer, FRAME_S, Input, Output, Rehearsed, SensedInput, flight_time_s};
 use flight::estimation::estimator::Measurements;
 use flight::estimation::estimator::alignment::ImuCalibration;
 use flight::guidance::powered::{ControlLevel, PoweredReport};
@@ -66,7 +66,7 @@ pub struct Sortie {
     /// Frames until the dead flight computer starts again.
     frames_down: u64,
     dead: bool,
-    /// The frame in which a board has computed what was posed last.
+    /// The frame in which a board has computed the last request.
     plan_ready_at: Option<u64>,
     /// How many times as long as a Cortex-M7 it takes for that.
     slower: u64,
@@ -78,7 +78,7 @@ pub struct Sortie {
     followed: Option<Decision>,
 }
 
-/// What a flight computer has decided that its world asks for.
+/// The flight computer's decisions that its world needs.
 #[derive(Debug, Clone, Copy)]
 struct Decision {
     mode: Mode,
@@ -141,13 +141,13 @@ impl Sortie {
         })
     }
 
-    /// The same flight without the rehearsal on the pad, for a vehicle that nobody will arm.
+    /// The same flight without the rehearsal on the pad, for a vehicle that will not be armed.
     #[must_use]
     pub fn without_rehearsal(self) -> Self {
         Self { rehearsal: None, ..self }
     }
 
-    /// The same flight with a board on which plans take so many times as long as on a Cortex-M7.
+    /// The same flight on a board that takes this many times as long for plans as a Cortex-M7.
     #[must_use]
     pub fn planning_slower(self, times: u64) -> Self {
         Self { slower: times, ..self }
@@ -189,9 +189,9 @@ impl Sortie {
         Self { computer: self.computer.released(0), ..self }
     }
 
-    /// Begins the flight: on its rail, or in the air, where nobody simulates how it got there.
+    /// Begins the flight: on its rail, or in the air, where the way there is not simulated.
     fn begin(&mut self) {
-        // A motor that lit itself is on its way already: only the clock begins anew.
+        // A self-ignited motor is under way already: only the clock restarts.
         if self.surroundings.world.booster_thrust_n() > 0.0 {
             return self.surroundings.count_from(flight_time_s(self.frame));
         }
@@ -209,8 +209,8 @@ impl Sortie {
         if let Some(rehearsal) = self.rehearsal.as_mut().filter(|_| waits) {
             rehearsal.step();
         }
-        let felt = self.feel()?;
-        let abort = [Request::of_the_programme(Asked::Abort)];
+        let from_sensors = self.sense()?;
+        let abort = [Request::of_the_programme(CrewCommand::Abort)];
         let aborting;
         let requests = if core::mem::take(&mut self.abort) {
             aborting = [outside.requests, abort.as_slice()].concat();
@@ -218,22 +218,22 @@ impl Sortie {
         } else {
             outside.requests
         };
-        let kept = KeptInput {
+        let sensed = SensedInput {
             pin_out: outside.pin_out,
             log: outside.log,
             uplink: outside.uplink,
             commander: outside.commander,
             people: outside.people,
-            ..felt
+            ..from_sensors
         };
         let input = Input {
-            kept,
+            sensed,
             requests,
             rehearsed: self.rehearsal.as_ref().and_then(Rehearsal::over).map(|(rehearsed, _)| rehearsed),
             plan_ready: self.plan_ready_at.take_if(|at| self.frame >= *at).is_some(),
         };
         let mut output = self.computer.step(&input);
-        if let Some(frames) = self.computer.solve_posed() {
+        if let Some(frames) = self.computer.solve_requested() {
             self.plan_ready_at = Some(self.frame + self.slower * frames);
         }
         watch.decided(&input, &output, &self.computer);
@@ -246,19 +246,19 @@ impl Sortie {
         Some(output)
     }
 
-    /// Flies the frame of this number since the release, that another computer has just flown: its
-    /// commands move the world. What it felt before it decided; `None` if the computer of this
-    /// flight would have been dead, or would have lived in a frame that the other has missed.
-    pub fn follow(&mut self, frame: u64, computer: &Computer) -> Option<KeptInput> {
+    /// Flies the frame of this number since the release, which another computer has just flown: its
+    /// commands move the world. Returns the sensed input, or `None` where one computer was down and
+    /// the other was not.
+    pub fn follow(&mut self, frame: u64, computer: &Computer) -> Option<SensedInput> {
         while self.frame + 1 < frame {
-            if self.feel().is_some() {
+            if self.sense().is_some() {
                 return None;
             }
         }
-        let felt = self.feel()?;
+        let from_sensors = self.sense()?;
         self.followed = Some(Decision::of(computer));
         self.surroundings.command(computer.commands());
-        Some(felt)
+        Some(from_sensors)
     }
 
     /// The computer's decisions, or those that this flight follows.
@@ -266,10 +266,10 @@ impl Sortie {
         self.followed.unwrap_or_else(|| Decision::of(&self.computer))
     }
 
-    /// The world moves for one frame. What the computer feels in it, apart from its crew; `None` if
-    /// it is dead, or if there is no sample: then there is no frame, and what was commanded goes
-    /// on.
-    fn feel(&mut self) -> Option<KeptInput> {
+    /// Advances the world by one frame. Returns the computer's sensor input without its crew's;
+    /// `None` if the computer is down, or if there is no sample: then there is no frame, and the
+    /// last commands persist.
+    fn sense(&mut self) -> Option<SensedInput> {
         let Decision { mode, released, .. } = self.decision();
         for breakage in self.injector.due(self.surroundings.world.time_s(), mode.phase) {
             self.break_down(&breakage);
@@ -287,7 +287,7 @@ impl Sortie {
             return None;
         }
         let measured = measured?;
-        Some(KeptInput {
+        Some(SensedInput {
             frame: self.frame,
             time_s: flight_time_s(self.frame),
             measured,
@@ -343,7 +343,7 @@ impl Sortie {
         self.abort = true;
     }
 
-    /// Stops the flight computer, which starts again after a time, s. The servos keep their last
+    /// Stops the flight computer, which restarts after a time, s. The servos hold their last
     /// command meanwhile.
     pub fn reboot(&mut self, down_s: f64) {
         self.frames_down = libm::ceil(down_s / FRAME_S).max(1.0) as u64;
@@ -371,7 +371,7 @@ impl Sortie {
         self.decision().mode
     }
 
-    /// The flight computer is dead: it neither hears nor speaks.
+    /// Whether the flight computer is down: it neither receives nor sends.
     pub fn computer_is_dead(&self) -> bool {
         self.dead
     }
@@ -517,8 +517,8 @@ impl Sortie {
         self.pilot().estimator().nees_of_motion(&self.over_the_ground())
     }
 
-    /// The true state with its height above the ground below it, which is what a landing needs and
-    /// what the lidar shows.
+    /// The true state with its height above the ground below it, as needed for a landing and
+    /// measured by the lidar.
     fn over_the_ground(&self) -> RigidState {
         let mut state = *self.world().state();
         state.position_m.z = self.world().truth().over_ground_m(&state.position_m);
@@ -526,9 +526,9 @@ impl Sortie {
     }
 
     /// Normalised estimation error squared of the motor's impulse scale and burn time
-    /// ([`MotorEstimate::nees_of_scales`]); `None` before the motor has lit, and where its scales
-    /// are over another curve than the truth's. The accelerometer cannot tell more impulse from
-    /// less mass.
+    /// ([`MotorEstimate::nees_of_scales`]); `None` before the motor has ignited, and where its
+    /// scales refer to another curve than the truth's. The accelerometer cannot distinguish more
+    /// impulse from less mass.
     ///
     /// [`MotorEstimate::nees_of_scales`]: flight::estimation::motor_estimate::MotorEstimate::nees_of_scales
     pub fn nees_of_motor(&self) -> Option<f64> {
@@ -559,10 +559,10 @@ impl Sortie {
 // The rehearsal on the pad: one flight of the mission with its nominal data, faster than real time.
 //
 // It shows whether the flight computer's solver works, and whether a landing is possible with this
-// vehicle, motor and mission. It knows neither the wind of the day nor the scatter of the real
+// vehicle, motor and mission. It includes neither the wind on the day nor the scatter of the real
 // motor.
 
-/// Frames rehearsed in each frame on the pad: the whole flight takes a second or two.
+/// Frames rehearsed in each frame on the pad: the complete flight takes a second or two.
 const FRAMES_AT_ONCE: u32 = 20;
 
 /// A rehearsal, running or finished.

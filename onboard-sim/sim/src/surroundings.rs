@@ -1,11 +1,11 @@
-//! Everything of a flight but its flight computer: the world and how it begins, the sensors that
-//! look at it, and the actuators that move it.
+//! Everything of a flight except its flight computer: the world with its initial state, the sensors
+//! that measure it, and the actuators that move it.
 
 use crate::world::sensors::{
-    Defect, NEARLY_EXACT, Sensor, SensorFaults, SensorParamError, SensorTruth, Sensors, believed_start,
+    Defect, NEARLY_EXACT, Sensor, SensorFaults, SensorParamError, SensorTruth, Sensors, start_with_errors,
 };
 use crate::world::{Actuators, Battery, Fault, World};
-use flight::computer::{Commands, FRAME_MS, FRAME_S, KeptInput, pad_check};
+use flight::computer::{Commands, FRAME_MS, FRAME_S, SensedInput, pad_check};
 use flight::estimation::estimator::{Measurements, StartUncertainty};
 use flight::rules::outputs::PyroOutput;
 use flight::rules::phase::Phase;
@@ -17,13 +17,13 @@ use crate::draw::Draw;
 use crate::outcome::{Ending, Outcome, judge};
 use crate::sortie::{LONGEST_S, SetUpError};
 
-/// The world of one flight, and what is between it and its flight computer.
+/// The world of one flight, and its interface to the flight computer.
 #[derive(Debug, Clone)]
 pub(crate) struct Surroundings {
     pub(crate) world: World,
     sensors: Sensors,
     pub(crate) faults: SensorFaults,
-    /// What of the vehicle is broken.
+    /// Faults of the vehicle.
     broken: Vec<Fault>,
     actuators: Actuators,
     pub(crate) battery: Battery,
@@ -43,7 +43,7 @@ impl Surroundings {
         let world = world(mission, drawn)?;
         let sensors = sensors(mission, dispersion, drawn)?;
         let uncertainty = StartUncertainty::at_start(mission.start.at);
-        let believed = || believed_start(world.state(), &uncertainty, drawn.flight_seed);
+        let believed = || start_with_errors(world.state(), &uncertainty, drawn.flight_seed);
         let believed = match mission.start.at {
             _ if !dispersion.sensors => *world.state(),
             StartPoint::Pad => sensors.levelled(world.state(), &believed()),
@@ -69,7 +69,7 @@ impl Surroundings {
         self.actuators = at_rest(mission);
     }
 
-    /// Something of the vehicle breaks. What broke on the pad is broken in flight.
+    /// Breaks a part of the vehicle. A fault on the pad persists in flight.
     pub(crate) fn break_down(&mut self, fault: Fault) {
         self.world.inject(&fault);
         self.broken.push(fault);
@@ -89,8 +89,7 @@ impl Surroundings {
         self.sensors.count_from(release_s);
     }
 
-    /// The world moves for one frame, and the sensors measure it. `None` if they have given no
-    /// sample: what is true is then known to nobody.
+    /// Advances the world by one frame and samples the sensors; `None` if they gave no sample.
     pub(crate) fn sample_sensors(&mut self) -> Option<Measurements> {
         let mut measured = None;
         for _ in 0..FRAME_MS {
@@ -100,26 +99,25 @@ impl Surroundings {
         let lit =
             [self.actuators.ignite, self.actuators.ignite_booster].into_iter().filter(|lit| *lit).count();
         self.battery.step(surfaces_rad(&self.world), lit, FRAME_S);
-        self.measured = measured.map(|measured| self.faults.heard(&measured));
+        self.measured = measured.map(|measured| self.faults.distort(&measured));
         self.measured
     }
 
-    /// What feedback and switches say after the frame, and nothing else; `released`: contact
-    /// counts.
-    pub(crate) fn feedback(&mut self, released: bool) -> KeptInput {
+    /// Feedback and switches after the frame, without other inputs; `released`: contact counts.
+    pub(crate) fn feedback(&mut self, released: bool) -> SensedInput {
         let (gimbal_rad, fins_rad) = if self.world.airframe().servos_tell {
             (self.world.gimbal_feedback_rad(), self.sensors.fins_rad(&self.world.fins_feedback_rad()))
         } else {
             (self.actuators.gimbal_rad, self.actuators.fins_rad)
         };
-        KeptInput {
+        SensedInput {
             gimbal_rad,
             fins_rad,
             contact: self.sensors.contact(released && self.world.touchdown().is_some()),
             igniter_continuity: self.sensors.igniter_continuity(),
             booster_attached: self.world.booster_attached(),
             battery_v: Some(self.battery.volts()),
-            ..KeptInput::NONE
+            ..SensedInput::NONE
         }
     }
 
@@ -151,7 +149,7 @@ impl Surroundings {
             rest: self.world.rest().copied(),
             phase,
             ignited,
-            lit: self.world.thrust_begins_s().is_some(),
+            motor_started: self.world.thrust_begins_s().is_some(),
             parachute: self.world.parachute_ejected(),
             finite: self.finite,
         };
@@ -176,7 +174,7 @@ pub(crate) fn surfaces_rad(world: &World) -> [f64; 6] {
 
 // The world in which a flight begins.
 
-/// Frames that a hanging vehicle falls until its computer knows.
+/// Frames that a hanging vehicle falls until its computer detects it.
 const UNNOTICED_FRAMES: usize = 20;
 
 /// The world at the start of the flight.

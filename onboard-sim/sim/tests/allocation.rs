@@ -22,7 +22,7 @@ impl Watch for Shadow {
         let allocated = allocation_counter::measure(|| again = Some(self.computer.step(input)));
         assert_eq!(again.as_ref(), Some(output));
         self.plans += u64::from(computer.mode().phase == Phase::Powered && output.planned);
-        if output.news.is_empty() && output.answers.is_empty() {
+        if output.messages.is_empty() && output.answers.is_empty() {
             self.silent_frames += 1;
             if allocated.count_total > 0 {
                 self.allocating.push((input.frame, self.plans, allocated.count_total));

@@ -29,7 +29,7 @@ fn row(section: &str, name: &str) -> Vec<f64> {
 }
 
 /// What a row says: expected, stop below, stop above.
-fn says(name: &str, expected: [f64; 3], decimals: usize) {
+fn row_is(name: &str, expected: [f64; 3], decimals: usize) {
     let found = row("What a builder measures", name);
     let rounded = expected.map(|value| format!("{value:.decimals$}").parse::<f64>().unwrap());
     assert_eq!(found, rounded, "{name}");
@@ -44,28 +44,28 @@ fn about(value: f64, deviation: f64) -> [f64; 3] {
 fn the_bounds_for_a_builder_follow_from_the_data() {
     let (mk3, real) = (mission::builtin_airframe("mk3").unwrap(), Dispersion::builtin("real").unwrap());
     let (mass, wrong) = (&mk3.mass, &real.mismatch);
-    says("mass,", about(mass.loaded_kg, real.mass_share * mass.loaded_kg), 2);
-    says("centre of gravity,", about(1e3 * mass.loaded_cg_station_m, 1e3 * wrong.cg_along_m), 0);
-    says("centre of gravity beside", [0.0, 0.0, 1e3 * SIGMAS * real.cg_off_axis_m], 1);
+    row_is("mass,", about(mass.loaded_kg, real.mass_share * mass.loaded_kg), 2);
+    row_is("centre of gravity,", about(1e3 * mass.loaded_cg_station_m, 1e3 * wrong.cg_along_m), 0);
+    row_is("centre of gravity beside", [0.0, 0.0, 1e3 * SIGMAS * real.cg_off_axis_m], 1);
     // Two strings of 1 m, 0.4 m apart: T = 2 pi sqrt(I L / (m g b^2)), b = 0.2 m.
     let ten_s = |share: f64| {
         let inertia = mass.loaded_pitch_inertia_kg_m2 * (1.0 + share);
         10.0 * TAU * (inertia / (mass.loaded_kg * G_M_S2 * 0.2 * 0.2)).sqrt()
     };
     let share = SIGMAS * wrong.inertia_share;
-    says("pitch inertia", [ten_s(0.0), ten_s(-share), ten_s(share)], 1);
+    row_is("pitch inertia", [ten_s(0.0), ten_s(-share), ten_s(share)], 1);
     // A rod of 0.5 m in the motor's place.
     let (rod_mm, limit_deg) = (500.0, mk3.gimbal.limit_deg);
     let tip_mm = |deg: f64| rod_mm * libm::tan(deg.to_radians());
-    says("thrust line, direction", [0.0, 0.0, tip_mm(SIGMAS * real.thrust_misalignment_deg)], 1);
-    says("thrust line, position", [0.0, 0.0, 1e3 * SIGMAS * wrong.thrust_offset_m], 1);
+    row_is("thrust line, direction", [0.0, 0.0, tip_mm(SIGMAS * real.thrust_misalignment_deg)], 1);
+    row_is("thrust line, position", [0.0, 0.0, 1e3 * SIGMAS * wrong.thrust_offset_m], 1);
     let gain = SIGMAS * wrong.gimbal_gain_share;
-    says("gimbal, each end", [1.0, 1.0 - gain, 1.0 + gain].map(|gain| tip_mm(gain * limit_deg)), 0);
-    says("gimbal, play", [mk3.gimbal.servo.slop_deg, 0.0, wrong.gimbal_slop_deg[1]].map(tip_mm), 1);
+    row_is("gimbal, each end", [1.0, 1.0 - gain, 1.0 + gain].map(|gain| tip_mm(gain * limit_deg)), 0);
+    row_is("gimbal, play", [mk3.gimbal.servo.slop_deg, 0.0, wrong.gimbal_slop_deg[1]].map(tip_mm), 1);
     // An end of a fin moves on an arc of its length.
     let end_mm = |deg: f64| 1e3 * mk3.fins.length_m * deg.to_radians();
-    says("fins, play", [wrong.fin_slop_deg[0], 0.0, wrong.fin_slop_deg[1]].map(end_mm), 1);
-    says("fins, open", about(mk3.fins.open_deg, wrong.fin_offset_deg), 0);
+    row_is("fins, play", [wrong.fin_slop_deg[0], 0.0, wrong.fin_slop_deg[1]].map(end_mm), 1);
+    row_is("fins, open", about(mk3.fins.open_deg, wrong.fin_offset_deg), 0);
     for (name, servo, way_deg) in [
         ("gimbal servo", &mk3.gimbal.servo, 2.0 * limit_deg),
         ("fin servo", &mk3.fins.servo, mk3.fins.open_deg - mk3.fins.closed_deg),
@@ -73,19 +73,19 @@ fn the_bounds_for_a_builder_follow_from_the_data() {
         // The pad check allows 20 ms more. A servo that is faster than 1.5 times its data makes the
         // loop another one.
         let whole_ms = |rate: f64| 1e3 * (servo.delay_s + way_deg / (rate * servo.rate_deg_s));
-        says(name, [whole_ms(1.0), whole_ms(1.5), whole_ms(1.0) + 20.0], 0);
+        row_is(name, [whole_ms(1.0), whole_ms(1.5), whole_ms(1.0) + 20.0], 0);
     }
-    says(
+    row_is(
         "igniters",
         about(1e3 * Truth::default().ignition_delay_s, 1e3 * real.ignition_delay_s * mk3.igniter_scatter()),
         0,
     );
     let motor = motors::builtin(&mk3.motor).unwrap();
     let impulse_n_s = motor.total_impulse_n_s();
-    says("motor, impulse", about(impulse_n_s, real.impulse_share * impulse_n_s), 0);
+    row_is("motor, impulse", about(impulse_n_s, real.impulse_share * impulse_n_s), 0);
     let burn_s = motor.burn_time_s();
-    says("motor, burn time", about(burn_s, real.burn_time_share * burn_s), 2);
-    says("IMU, square", [0.0, 0.0, SIGMAS * real.sensor_params.imu.mounting_deg], 1);
+    row_is("motor, burn time", about(burn_s, real.burn_time_share * burn_s), 2);
+    row_is("IMU, square", [0.0, 0.0, SIGMAS * real.sensor_params.imu.mounting_deg], 1);
 }
 
 /// Drag of an open fin at 36 m/s at sea level, at half the fin's length; a servo that keeps half
@@ -96,13 +96,13 @@ fn val_hand_the_servo_of_a_fin() {
     let fins = &mk3.fins;
     let drag_n = 0.5 * 1.225 * 36.0 * 36.0 * mk3.body.reference_area_m2 * fins.drag_coefficient;
     let hinge_n_m = drag_n * 0.5 * fins.length_m;
-    let says = |name: &str| row("Fins", name);
-    assert!((says("hinge torque of an open fin at 36 m/s")[0] - hinge_n_m).abs() < 0.005, "{hinge_n_m}");
+    let fin_row = |name: &str| row("Fins", name);
+    assert!((fin_row("hinge torque of an open fin at 36 m/s")[0] - hinge_n_m).abs() < 0.005, "{hinge_n_m}");
     let section = PAGE.split("\n## Fins\n").nth(1).unwrap();
     assert!(section.contains(&format!("at least {:.2} N m", 2.0 * hinge_n_m)), "{hinge_n_m}");
-    assert!(says("servo's class")[0] >= 2.0 * hinge_n_m);
+    assert!(fin_row("servo's class")[0] >= 2.0 * hinge_n_m);
     // The page has tenths of a millimetre.
-    assert!((says("width along the skin")[0] - 1e3 * fins.width_m).abs() < 0.05);
+    assert!((fin_row("width along the skin")[0] - 1e3 * fins.width_m).abs() < 0.05);
     let opens_s = fins.servo.delay_s + (fins.open_deg - fins.closed_deg) / fins.servo.rate_deg_s;
     assert!(section.contains(&format!("the {opens_s:.2} s that their servos take")), "{opens_s}");
 }

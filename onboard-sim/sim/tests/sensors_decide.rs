@@ -1,6 +1,6 @@
 //! What the flight computer detects on the way up, it detects from sensors.
 
-use flight::computer::{Computer, Input, KeptInput, Output};
+use flight::computer::{Computer, Input, Output, SensedInput};
 use flight::estimation::estimator::Measurements;
 use flight::rules::phase::Phase;
 use flight::vehicle::mission::StartPoint;
@@ -9,20 +9,20 @@ use sim::recipe::Recipe;
 use sim::sortie::Sortie;
 
 /// The frames of a flight without requests.
-struct Frames(Vec<(KeptInput, bool)>);
+struct Frames(Vec<(SensedInput, bool)>);
 
 impl Watch for Frames {
     fn decided(&mut self, input: &Input<'_>, _: &Output, _: &Computer) {
         assert!(input.requests.is_empty() && input.rehearsed.is_none());
-        self.0.push((input.kept, input.plan_ready));
+        self.0.push((input.sensed, input.plan_ready));
     }
 }
 
 /// The phases that a computer passes through.
-fn phases(mut computer: Computer, frames: impl Iterator<Item = (KeptInput, bool)>) -> Vec<Phase> {
+fn phases(mut computer: Computer, frames: impl Iterator<Item = (SensedInput, bool)>) -> Vec<Phase> {
     let mut phases = Vec::new();
-    for (kept, plan_ready) in frames {
-        computer.step(&Input { kept, requests: &[], rehearsed: None, plan_ready });
+    for (sensed, plan_ready) in frames {
+        computer.step(&Input { sensed, requests: &[], rehearsed: None, plan_ready });
         let phase = computer.mode().phase;
         if phases.last() != Some(&phase) {
             phases.push(phase);
@@ -46,7 +46,7 @@ fn a_flight_whose_sensors_stand_on_the_rail_is_never_detected() {
     let flown = phases(computer.clone(), frames.iter().copied());
     assert!(flown.starts_with(&[Phase::Boost, Phase::Coast, Phase::Deploy]), "{flown:?}");
     let measured = Measurements { gnss: None, ..frames[0].0.measured };
-    let stood = frames.iter().map(|&(kept, ready)| (KeptInput { measured, ..kept }, ready));
+    let stood = frames.iter().map(|&(sensed, ready)| (SensedInput { measured, ..sensed }, ready));
     let told = phases(computer, stood);
     assert!(!told.contains(&Phase::Coast) && !told.contains(&Phase::Deploy), "{told:?}");
 }

@@ -1,8 +1,8 @@
 //! The landing card: what a team takes to the field for one mission, as it is loaded; one side of
 //! it is for the [`range_safety`] officer.
 //!
-//! It is computed, not looked up: the mission is flown in several winds in every way in which a
-//! flight can end, and at other masses.
+//! It is computed, not looked up: the mission is flown in several winds, in every case of a
+//! flight, and at other masses.
 
 pub mod range_safety;
 mod sheet;
@@ -50,38 +50,38 @@ pub enum CardError {
     NoWind,
     #[error(transparent)]
     Fly(#[from] RunError),
-    /// The mission has not what its start needs.
+    /// The mission lacks the data of its start.
     #[error(transparent)]
     Recipe(#[from] RecipeError),
 }
 
 impl Card {
     /// Computes the card of a recipe from its flights in each mean wind, m/s, rising.
-    /// `wind_from_deg` is where the wind of the day comes from, degrees clockwise from north, if it
-    /// is known.
+    /// `wind_from_deg` is the direction of the wind on the day, degrees clockwise from north, if
+    /// available.
     ///
     /// # Errors
-    /// The vehicle does not land, or what was asked for cannot be had.
+    /// The vehicle does not land, or the request cannot be met.
     pub fn new(
         recipe: &Recipe,
         winds: Vec<(f64, Recipe)>,
         flights: Flights,
         wind_from_deg: Option<f64>,
-        told: &(dyn Fn(usize, usize) + Sync),
+        show: &(dyn Fn(usize, usize) + Sync),
     ) -> Result<Self, CardError> {
         let from_the_pad = recipe.mission.launch.is_some() && recipe.mission.start.at == StartPoint::Apogee;
         let (winds_m_s, days): (Vec<f64>, Vec<Recipe>) = winds.into_iter().unzip();
         let begin = |day: Recipe| if from_the_pad { day.starting_at(StartPoint::Pad) } else { Ok(day) };
         let days = days.into_iter().map(begin).collect::<Result<Vec<_>, _>>()?;
         let calmest = days.first().ok_or(CardError::NoWind)?;
-        refuse_without_a_landing(calmest, told)?;
-        let impacts = hazard::studies(&days, flights, told)?;
-        let own = landed_as_planned(impacts.first().map_or(&[], Vec::as_slice));
+        refuse_without_a_landing(calmest, show)?;
+        let impacts = hazard::studies(&days, flights, show)?;
+        let nominal = landed_as_planned(impacts.first().map_or(&[], Vec::as_slice));
         Ok(Self {
             recipe: recipe.clone(),
             start: calmest.mission.start.at,
             flown: winds_m_s.into_iter().zip(impacts).collect(),
-            masses: masses(calmest, own, flights.survey, told)?,
+            masses: masses(calmest, nominal, flights.survey, show)?,
             flights,
             rule: Rule::of(&calmest.mission),
             wind_from_deg,
@@ -95,10 +95,10 @@ impl Card {
 }
 
 /// Some flights, before many are flown.
-fn refuse_without_a_landing(recipe: &Recipe, told: &(dyn Fn(usize, usize) + Sync)) -> Result<(), CardError> {
+fn refuse_without_a_landing(recipe: &Recipe, show: &(dyn Fn(usize, usize) + Sync)) -> Result<(), CardError> {
     const FIRST: u64 = 12;
-    told(0, FIRST as usize);
-    let rows = fly(recipe, FIRST, &|done| told(done, FIRST as usize))?;
+    show(0, FIRST as usize);
+    let rows = fly(recipe, FIRST, &|done| show(done, FIRST as usize))?;
     if rows.iter().any(|row| row.stands) {
         return Ok(());
     }
@@ -106,29 +106,29 @@ fn refuse_without_a_landing(recipe: &Recipe, told: &(dyn Fn(usize, usize) + Sync
     Err(CardError::NoneLanded { flights: FIRST, set: recipe.dispersion_name.clone(), reason })
 }
 
-/// How many land at the mission's own mass and at others, on each side up to the first at which
-/// fewer than nine of ten do. Ballast is at the centre of gravity.
+/// Landing rates at the mission's mass and at others, on each side up to the first at which fewer
+/// than nine of ten land. Ballast is at the centre of gravity.
 fn masses(
     recipe: &Recipe,
-    own: Landings,
+    nominal: Landings,
     flights: u64,
-    told: &(dyn Fn(usize, usize) + Sync),
+    show: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Vec<(f64, Landings)>, CardError> {
-    /// Between neighbours, of the own mass, and most of them on each side.
+    /// Between neighbours, as a share of the nominal mass, and most of them on each side.
     const STEP: f64 = 0.02;
     const STEPS: i32 = 10;
     let airframe = &recipe.mission.airframe;
-    let (frame, own_kg) = (Frame::of(&recipe.mission)?, airframe.mass.loaded_kg);
-    let mut found = vec![(own_kg, own)];
+    let (frame, nominal_kg) = (Frame::of(&recipe.mission)?, airframe.mass.loaded_kg);
+    let mut found = vec![(nominal_kg, nominal)];
     for side in [-1, 1] {
-        let mut share = own.stands.share;
+        let mut share = nominal.stands.share;
         for step in 1..=STEPS {
-            let mass = frame.with(&recipe.mission.motor_curve, f64::from(side * step) * STEP * own_kg);
+            let mass = frame.with(&recipe.mission.motor_curve, f64::from(side * step) * STEP * nominal_kg);
             let Ok(other) = changed(recipe, &airframe.motor, &mass) else { break };
             if share < NINE_OF_TEN {
                 break;
             }
-            let rows = fly(&other, flights, &|done| told(done, flights as usize))?;
+            let rows = fly(&other, flights, &|done| show(done, flights as usize))?;
             let landings = Landings::of(rows.iter().map(Row::landing));
             share = landings.stands.share;
             found.push((mass.loaded_kg, landings));
@@ -138,5 +138,5 @@ fn masses(
     Ok(found)
 }
 
-/// A mass at which so many land is one to fly with.
+/// Landing rate from which a mass is suitable.
 const NINE_OF_TEN: f64 = 0.9;

@@ -1,5 +1,5 @@
-//! The side of a card for the range safety officer: who stands where in which wind, and what an
-//! abort does.
+//! The side of a card for the range safety officer: safe distances by wind, and the effects of an
+//! abort.
 
 use core::fmt::Write as _;
 
@@ -8,15 +8,15 @@ use flight::vehicle::launch::Launch;
 use flight::vehicle::mission::{Mission, StartPoint};
 
 use super::sheet::words_of;
-use crate::hazard::{Impact, Radius, Rule, Way, keep_out_m, landed_as_planned, lift_off_kg, widest};
+use crate::hazard::{Case, Impact, Radius, Rule, keep_out_m, landed_as_planned, lift_off_kg, widest};
 use crate::statistics::Landings;
 
-/// A rate or a radius that rests on fewer flights is not told.
+/// Fewest flights behind a stated rate or radius.
 pub const FEWEST: u64 = 100;
-/// The launch crew stands so far outside of the circle, m.
+/// Distance of the launch crew outside of the circle, m.
 const BESIDE_M: f64 = 10.0;
 
-/// What the flights in one wind tell.
+/// Results of the flights in one wind.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InWind {
     /// Mean wind 10 m above the ground.
@@ -26,35 +26,35 @@ pub struct InWind {
     pub circle: Option<Circle>,
 }
 
-/// Nobody stands in it.
+/// A keep-out circle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Circle {
-    /// Radius about the landing pad: what flights and rule ask for in this wind and in less.
+    /// Radius about the landing pad required by flights and rule, in this wind and in less.
     pub keep_out_m: f64,
-    /// The way of ending that reaches farthest, with its flights.
-    pub way: Way,
+    /// The case with the farthest impacts, with its flights.
+    pub case: Case,
     pub radius: Radius,
-    /// The farthest that any flight came down downwind, across the wind and upwind, m.
+    /// The farthest impacts of all flights downwind, across the wind and upwind, m.
     pub farthest_m: [f64; 3],
 }
 
 impl Circle {
-    /// Where the launch crew stands, upwind of the pad, m.
+    /// Distance of the launch crew, upwind of the pad, m.
     pub fn crew_m(&self) -> f64 {
         self.keep_out_m + BESIDE_M
     }
 }
 
-/// What flights tell of each wind, in rising order.
+/// Results in each wind, in rising order.
 pub fn in_winds(flown: &[(f64, Vec<Impact>)], rule: &Rule) -> Vec<InWind> {
     let mut least_m: f64 = 0.0;
     let in_wind = |(wind_m_s, impacts): &(f64, Vec<Impact>)| {
         let landed = landed_as_planned(impacts);
         let enough = landed.stands.of >= FEWEST;
         let widest = widest(impacts).filter(|(_, radius)| enough && radius.flights as u64 >= FEWEST);
-        let circle = widest.map(|(way, radius)| {
+        let circle = widest.map(|(case, radius)| {
             least_m = least_m.max(keep_out_m(&radius, rule));
-            Circle { keep_out_m: least_m, way, radius, farthest_m: farthest_m(impacts) }
+            Circle { keep_out_m: least_m, case, radius, farthest_m: farthest_m(impacts) }
         });
         InWind { wind_m_s: *wind_m_s, landed: enough.then_some(landed), circle }
     };
@@ -68,15 +68,15 @@ fn farthest_m(impacts: &[Impact]) -> [f64; 3] {
 }
 
 /// The strongest of these winds up to which at least nine tenths as many flights land as in the
-/// calmest one; `None` if too few flights tell of it.
+/// calmest one; `None` with too few flights.
 pub fn limit_m_s(winds: &[InWind]) -> Option<f64> {
-    const KEPT: f64 = 0.9;
+    const SHARE: f64 = 0.9;
     let calmest = winds.first()?.landed?;
-    // Nobody can stand outside of a radius without an upper end.
+    // A radius without an upper end has no safe outside.
     let ends = |circle: Circle| circle.keep_out_m.is_finite() && circle.radius.high_m.is_some();
     let may_fly = |wind: &&InWind| {
         wind.circle.is_some_and(ends)
-            && wind.landed.is_some_and(|landed| landed.stands.share >= KEPT * calmest.stands.share)
+            && wind.landed.is_some_and(|landed| landed.stands.share >= SHARE * calmest.stands.share)
     };
     winds.iter().take_while(may_fly).last().map(|wind| wind.wind_m_s)
 }
@@ -107,7 +107,7 @@ pub fn calibres(mission: &Mission, launch: &Launch) -> f64 {
     (gravity_m - pressure_m) / body.diameter_m
 }
 
-/// What an abort does, when and what, of flights that begin so, or of all; with the height of the
+/// Effects of an abort, by time, for flights with this start, or for all; with the height of the
 /// feet from which a parachute opens.
 pub fn aborts(start: Option<StartPoint>, height: &str) -> Vec<Vec<String>> {
     let only = |of: &[StartPoint]| start.is_none_or(|start| of.contains(&start)).then(String::new);
@@ -122,16 +122,16 @@ pub fn aborts(start: Option<StartPoint>, height: &str) -> Vec<Vec<String>> {
     )
 }
 
-/// Half the width and half the height of the plan, how far the farthest crew stands in it, and the
-/// length of its line, in its own units.
+/// Half the width and half the height of the plan, the distance of the farthest crew in it, and the
+/// length of its line, in the plan's units.
 const HALF: [f64; 2] = [140.0, 98.0];
 const WIDEST: f64 = 72.0;
 const LINE: f64 = 84.0;
 /// Room of a circle's name across the wind.
 const NAME: f64 = 28.0;
 
-/// The circles of the winds to fly in from above, to scale, with the line downwind. `wind_from_deg`
-/// is where the wind comes from, clockwise from north, which is up then; without it up is downwind.
+/// The circles of the permitted winds from above, to scale, with the line downwind. `wind_from_deg`
+/// is the direction of the wind, clockwise from north, which is up then; without it up is downwind.
 /// `None` without a circle.
 pub fn plan(winds: &[InWind], wind_from_deg: Option<f64>) -> Option<String> {
     let limit_m_s = limit_m_s(winds)?;
@@ -152,7 +152,7 @@ pub fn plan(winds: &[InWind], wind_from_deg: Option<f64>) -> Option<String> {
         format!("<line class=\"{class}\" x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\"/>")
     };
     let (mut lines, mut names) = (String::new(), String::new());
-    // Names stand on both sides in turn, and not where one stands already.
+    // Names alternate between the sides, and are left out where one is already.
     let mut named = [0.0; 2];
     for (place, (wind_m_s, circle)) in circles.iter().enumerate() {
         let radius = scale * circle.keep_out_m;

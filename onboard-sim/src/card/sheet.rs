@@ -1,5 +1,5 @@
-//! What stands on a card, as text and as HTML. Both show the same sheet of two sides: the front for
-//! the range safety officer, the back for whoever prepares the vehicle.
+//! Content of a card, as text and as HTML. Both show the same sheet of two sides: the front for the
+//! range safety officer, the back for the person who prepares the vehicle.
 
 use flight::rules::phase::{HOLD_LIMIT_S, MISFIRE_WAIT_S, MOTOR_HOT_S, PAD_ABORT_WAIT_S};
 use flight::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
@@ -12,7 +12,7 @@ use super::range_safety::{
     Circle, FEWEST, InWind, aborts, calibres, in_winds, limit_m_s, plan, thrust_to_weight,
 };
 use super::{Card, NINE_OF_TEN};
-use crate::hazard::{Impact, Rule, Way, lift_off_kg};
+use crate::hazard::{Case, Impact, Rule, lift_off_kg};
 
 /// One side of a sheet.
 struct Side {
@@ -32,7 +32,7 @@ enum Content {
     Table(&'static [&'static str], Vec<Vec<String>>),
     /// To be ticked off, in order.
     Checks(Vec<String>),
-    /// A plan, if there is one, as SVG, and what it says in words.
+    /// A plan, if there is one, as SVG, and its text.
     Plan(Option<String>, Vec<String>),
     /// To be filled in behind these words, row by row.
     Blanks(Vec<Vec<String>>),
@@ -57,13 +57,13 @@ fn rows(title: &'static str, rows: Vec<Vec<String>>) -> Section {
     Section { title, content: Content::Table(&[], rows) }
 }
 
-/// A value that people ask for, and whether it is its usual least.
+/// A required value, and whether it reaches its usual minimum.
 fn judged(value: f64, least: f64) -> String {
     format!("{value:.1}: {}", if value < least { "TOO LOW" } else { "good" })
 }
 
-/// Least and greatest of what flights tell.
-fn told<'a>(
+/// Smallest and largest value of the flights.
+fn extremes<'a>(
     flights: impl Iterator<Item = &'a Impact>,
     of: impl Fn(&Impact) -> Option<f64>,
 ) -> Option<[f64; 2]> {
@@ -123,7 +123,7 @@ impl Card {
         }
     }
 
-    /// The mission and what tells it from others.
+    /// The mission with its identification.
     fn named(&self) -> String {
         format!("{}, mission {}", self.recipe.mission.name, self.hash())
     }
@@ -135,14 +135,14 @@ impl Card {
     }
 
     fn as_planned(&self, winds: &[InWind], of: impl Fn(&Impact) -> Option<f64>) -> Option<[f64; 2]> {
-        told(self.flights(winds).filter(|impact| impact.way == Way::AsPlanned), of)
+        extremes(self.flights(winds).filter(|impact| impact.case == Case::AsPlanned), of)
     }
 
     fn launch(&self) -> Option<&Launch> {
         self.recipe.mission.launch.as_ref().filter(|_| self.start == StartPoint::Pad)
     }
 
-    /// What the words of the card are filled with.
+    /// Values for the placeholders of the card's text.
     fn values(&self, winds: &[InWind]) -> Vec<(&'static str, Option<String>)> {
         let (mission, launch) = (&self.recipe.mission, self.launch());
         let (airframe, mass, chute) =
@@ -181,14 +181,14 @@ impl Card {
                 self.as_planned(winds, |impact| impact.course.rail_m_s).map(|[least, _]| judged(least, 15.0)),
             ),
             ("calibres", launch.map(|launch| judged(calibres(mission, launch), 1.0))),
-            ("highest_m", told(self.flights(winds), highest_m).map(|[_, most]| whole(most))),
-            ("apogee", told(calm.filter(|impact| impact.way == Way::AsPlanned), highest_m).map(span)),
+            ("highest_m", extremes(self.flights(winds), highest_m).map(|[_, most]| whole(most))),
+            ("apogee", extremes(calm.filter(|impact| impact.case == Case::AsPlanned), highest_m).map(span)),
             (
                 "canopy_s",
-                told(self.flights(winds), |impact| impact.course.canopy_s).map(|[_, most]| whole(most)),
+                extremes(self.flights(winds), |impact| impact.course.canopy_s).map(|[_, most]| whole(most)),
             ),
             ("lying", Some(self.lying(winds))),
-            ("lit", self.as_planned(winds, |impact| impact.course.lit_at_m).map(span)),
+            ("lit", self.as_planned(winds, |impact| impact.course.ignition_m).map(span)),
             ("hold_s", Some(whole(HOLD_LIMIT_S))),
             ("pad_s", Some(whole(PAD_ABORT_WAIT_S))),
             ("misfire_s", Some(whole(MISFIRE_WAIT_S))),
@@ -206,9 +206,9 @@ impl Card {
         ]
     }
 
-    /// How vehicles lie that came down under the parachute without having lit the landing motor.
+    /// Attitudes of vehicles under the parachute with an unignited landing motor, on the ground.
     fn lying(&self, winds: &[InWind]) -> String {
-        let hung = |impact: &&Impact| impact.course.canopy_s.is_some() && impact.course.lit_at_m.is_none();
+        let hung = |impact: &&Impact| impact.course.canopy_s.is_some() && impact.course.ignition_m.is_none();
         let (of, lie) = self
             .flights(winds)
             .filter(hung)
@@ -252,7 +252,7 @@ impl Card {
         Section { title: "Who stands where", content: Content::Plan(plan, words.concat()) }
     }
 
-    /// What the numbers of the front rest on.
+    /// Sources of the numbers of the front.
     fn sources(&self, winds: &[InWind]) -> String {
         let winds: Vec<String> = winds.iter().map(|wind| wind.wind_m_s.to_string()).collect();
         let values = [
@@ -274,7 +274,7 @@ impl Card {
         Side {
             title: format!("Landing card: {}", self.named()),
             subtitle: format!(
-                "For whoever prepares the vehicle, and for what nobody wants. From {}.",
+                "For the person who prepares the vehicle, and for emergencies. From {}.",
                 self.begins()
             ),
             sections: vec![
@@ -332,9 +332,9 @@ fn wind_table(winds: &[InWind]) -> Section {
     }
 }
 
-/// What flights in one wind tell, as a row.
+/// Results of the flights in one wind, as a row.
 fn wind_row(wind: &InWind, may_fly: bool) -> Vec<String> {
-    let told = |text: Option<String>| text.unwrap_or_else(|| "too few flights".to_owned());
+    let or_too_few = |text: Option<String>| text.unwrap_or_else(|| "too few flights".to_owned());
     let people = |circle: Circle| {
         if !may_fly {
             return ["DO NOT FLY".to_owned(), "-".to_owned()];
@@ -347,18 +347,18 @@ fn wind_row(wind: &InWind, may_fly: bool) -> Vec<String> {
         format!("{} m/s", wind.wind_m_s),
         people,
         crew,
-        told(wind.circle.map(|circle| circle.farthest_m.map(|m| format!("{m:.0}")).join(", ") + " m")),
-        told(wind.circle.map(|Circle { way, radius, .. }| {
+        or_too_few(wind.circle.map(|circle| circle.farthest_m.map(|m| format!("{m:.0}")).join(", ") + " m")),
+        or_too_few(wind.circle.map(|Circle { case, radius, .. }| {
             let high = radius.high_m.map_or_else(|| "?".to_owned(), |high_m| format!("{high_m:.0}"));
             format!(
                 "{:.0} m ({:.0} to {high}) of {}: {}",
                 radius.holds_m,
                 radius.low_m,
                 radius.flights,
-                way.name()
+                case.name()
             )
         })),
-        told(wind.landed.as_ref().map(ToString::to_string)),
+        or_too_few(wind.landed.as_ref().map(ToString::to_string)),
     ]
 }
 

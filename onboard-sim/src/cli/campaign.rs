@@ -16,12 +16,12 @@ use protocol::program::Exit;
 use serde::Serialize;
 use sim::fault::{TimedFault, how_to_write};
 
-use super::{Asked, Progress, on_threads, single};
+use super::{Progress, Selection, on_threads, single};
 
 #[derive(Args)]
 pub(crate) struct CampaignArguments {
     #[command(flatten)]
-    asked: Asked,
+    selection: Selection,
     /// Where the flights begin: pad, apogee or drone, if the mission has that start [default: the
     /// mission's].
     #[arg(long, value_name = "START")]
@@ -44,7 +44,7 @@ pub(crate) struct CampaignArguments {
 
 pub(crate) fn run(arguments: &CampaignArguments) -> anyhow::Result<Exit> {
     let mut stdout = std::io::stdout().lock();
-    let mut recipe = arguments.asked.recipe(arguments.start)?;
+    let mut recipe = arguments.selection.recipe(arguments.start)?;
     recipe.faults.clone_from(&arguments.faults);
     if let Some(number) = arguments.only {
         return single::fly(&recipe, number, arguments.out.as_deref());
@@ -53,7 +53,7 @@ pub(crate) fn run(arguments: &CampaignArguments) -> anyhow::Result<Exit> {
     let manifest = Manifest::of(&recipe, arguments.flights, &program()?);
     let store = Store::open(out, &recipe, manifest)?;
     let progress = Progress::start();
-    let cost = on_threads(arguments.asked.jobs, || {
+    let cost = on_threads(arguments.selection.jobs, || {
         let flown = run::run(&recipe, &store, &|flown| show(&progress, flown))?;
         Ok(Cost::of(&flown, progress.elapsed_s()))
     })?;

@@ -9,7 +9,7 @@ use onboard_sim::files::{new_folder, write_folder};
 use onboard_sim::hazard::Flights;
 use protocol::program::Exit;
 
-use super::{Asked, in_wind, on_threads, show_flights};
+use super::{Selection, in_wind, on_threads, show_flights};
 
 /// Most flights of a card.
 const CARD_FLIGHTS_MAX: u64 = 10_000;
@@ -17,7 +17,7 @@ const CARD_FLIGHTS_MAX: u64 = 10_000;
 #[derive(Args)]
 pub(crate) struct CardArguments {
     #[command(flatten)]
-    asked: Asked,
+    selection: Selection,
     /// Mean winds 10 m above the ground, m/s, each with a radius and a rate of its own.
     #[arg(long = "wind", value_delimiter = ',', default_value = "0,3,6,10", value_name = "M/S,...")]
     winds: Vec<f64>,
@@ -39,7 +39,7 @@ pub(crate) struct CardArguments {
 }
 
 pub(crate) fn run(arguments: &CardArguments) -> anyhow::Result<Exit> {
-    let recipe = arguments.asked.recipe(None)?;
+    let recipe = arguments.selection.recipe(None)?;
     let mut winds_m_s = arguments.winds.clone();
     winds_m_s.sort_by(f64::total_cmp);
     winds_m_s.dedup();
@@ -47,7 +47,7 @@ pub(crate) fn run(arguments: &CardArguments) -> anyhow::Result<Exit> {
     let winds = winds.collect::<anyhow::Result<Vec<_>>>()?;
     let (survey, of_widest) = (arguments.flights, arguments.hazard_flights.max(arguments.flights));
     let flights = Flights { survey, of_widest };
-    let card = on_threads(arguments.asked.jobs, || {
+    let card = on_threads(arguments.selection.jobs, || {
         Ok(Card::new(&recipe, winds, flights, arguments.wind_from, &show_flights())?)
     })?;
     let page = card.text();

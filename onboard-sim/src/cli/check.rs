@@ -1,5 +1,4 @@
-//! `onboard-sim check`: whether a vehicle that is not built yet will land, and what to change if
-//! not.
+//! `onboard-sim check`: predicts whether an unbuilt vehicle will land, and what to change if not.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -11,7 +10,7 @@ use onboard_sim::check::{Candidate, Verdict, built_in, check};
 use protocol::program::Exit;
 use serde::Deserialize;
 
-use super::{on_threads, read, recipe, say, show_flights};
+use super::{notify, on_threads, read, recipe, show_flights};
 
 #[derive(Args)]
 pub(crate) struct CheckArguments {
@@ -42,14 +41,14 @@ pub(crate) fn run(arguments: &CheckArguments) -> anyhow::Result<Exit> {
     let mut motors = if arguments.from.is_empty() { built_in() } else { Vec::new() };
     arguments.from.iter().try_for_each(|path| read_motors(path, &mut motors))?;
     let (flights, show) = (arguments.flights, show_flights());
-    let told = |done| show(done, flights as usize);
-    let page = on_threads(arguments.jobs, || Ok(check(&recipe, &motors, flights, &told)?))?;
+    let progress = |done| show(done, flights as usize);
+    let page = on_threads(arguments.jobs, || Ok(check(&recipe, &motors, flights, &progress)?))?;
     write!(std::io::stdout().lock(), "{page}")?;
     Ok(Exit::of(page.verdict() != Verdict::No))
 }
 
-/// Reads a motor file, the files of a folder in the order of their names, or a list. It says which
-/// motor cannot be used, and why.
+/// Reads a motor file, the files of a folder in the order of their names, or a list. Reports
+/// unusable motors with the reason.
 fn read_motors(path: &Path, motors: &mut Vec<Candidate>) -> anyhow::Result<()> {
     const ENDINGS: [&str; 3] = ["eng", "rse", "json"];
     let origin = path.display();
@@ -69,7 +68,7 @@ fn read_motors(path: &Path, motors: &mut Vec<Candidate>) -> anyhow::Result<()> {
     let text = read(path)?;
     let mut take = |name: &str, motor: anyhow::Result<Candidate>| match motor {
         Ok(motor) => motors.push(motor),
-        Err(reason) => say(&format!("{name} cannot be used: {origin}: {reason:#}")),
+        Err(reason) => notify(&format!("{name} cannot be used: {origin}: {reason:#}")),
     };
     if is(path, "json") {
         let list: Vec<serde_json::Value> = serde_json::from_str(&text).with_context(|| {
@@ -92,7 +91,8 @@ fn read_motors(path: &Path, motors: &mut Vec<Candidate>) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// What is read of an entry of the list: grams and millimetres, and samples in seconds and newtons.
+/// The parsed fields of an entry of the list: grams and millimetres, and samples in seconds and
+/// newtons.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct Entry {
@@ -107,7 +107,7 @@ struct Entry {
     availability: Option<String>,
 }
 
-/// A motor by the RASP file that an entry of the list comes to.
+/// A motor from the RASP file of an entry of the list.
 fn of_entry(entry: serde_json::Value) -> anyhow::Result<Candidate> {
     let entry: Entry = serde_json::from_value(entry)?;
     let name = entry.designation.replace(char::is_whitespace, "_");
@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn an_entry_that_is_not_whole_is_refused_with_the_value() {
+    fn a_fractional_entry_is_refused_with_the_value() {
         for (from, to, reason) in [
             ("\"totalWeightG\": 44, ", "", "missing field `totalWeightG`"),
             (

@@ -134,14 +134,14 @@ async fn fly(arguments: FlyArguments) -> anyhow::Result<Exit> {
     let log = arguments.log.as_ref().filter(|path| *path != Path::new("none"));
     let recorder = log.map(|path| logging(path, &flight.log_header("onboard-sim", unix_ns()))).transpose()?;
     let drawn = OnTheWire::drawn();
-    let uid = arguments.uid_file.as_deref().map(|file| kept_uid(file, drawn.uid)).transpose()?;
+    let uid = arguments.uid_file.as_deref().map(|file| stored_uid(file, drawn.uid)).transpose()?;
     let on_the_wire = OnTheWire {
         boot_number: arguments.boot_number.unwrap_or(drawn.boot_number),
         uid: uid.unwrap_or(drawn.uid),
         network_bytes_s: arguments.network_budget,
         serial_bytes_s: arguments.serial_budget,
     };
-    // People stand at it: a flight by itself keeps nobody away.
+    // People may be at it: an automatic flight gives no warning.
     let crewed = !arguments.auto && !arguments.mavlink.is_empty();
     // Beside the first of these that the vehicle has: they make it the same vehicle when it is
     // switched on again.
@@ -214,7 +214,7 @@ fn boot_number(text: &str) -> Result<NonZeroU32, String> {
 }
 
 /// The unique id in the file; a new file gets the drawn one.
-fn kept_uid(file: &Path, drawn: NonZeroU16) -> anyhow::Result<NonZeroU16> {
+fn stored_uid(file: &Path, drawn: NonZeroU16) -> anyhow::Result<NonZeroU16> {
     let name = file.display();
     match std::fs::read_to_string(file) {
         Ok(text) => text.trim().parse().ok().with_context(|| {
@@ -230,7 +230,7 @@ fn kept_uid(file: &Path, drawn: NonZeroU16) -> anyhow::Result<NonZeroU16> {
     }
 }
 
-/// Receives where the pin is, as somebody types it at this program.
+/// Receives the position of the pin, typed at this program.
 fn pin_as_typed() -> std::io::Result<watch::Receiver<bool>> {
     let (pin, moved) = watch::channel(true);
     std::thread::Builder::new().name("pin".to_owned()).spawn(move || read_pin(&pin))?;
@@ -264,7 +264,7 @@ fn read_pin(pin: &watch::Sender<bool>) {
                 _ => _ = writeln!(std::io::stderr(), "type `pin in` or `pin out`, and Enter"),
             }
         }
-        // No line is so long.
+        // Commands are shorter.
         typed.truncate(100);
     }
 }

@@ -1,4 +1,4 @@
-//! `onboard-sim hazard`: how near people may stand.
+//! `onboard-sim hazard`: safe distances of people.
 
 use std::io::Write as _;
 use std::path::PathBuf;
@@ -7,18 +7,18 @@ use clap::Args;
 use flight::rules::verdict::Landing;
 use flight::vehicle::mission::{Mission, StartPoint};
 use onboard_sim::files::NewFile;
-use onboard_sim::hazard::{self, Flights, Impact, Radius, Rule, Way, keep_out_m, landed_as_planned, widest};
+use onboard_sim::hazard::{self, Case, Flights, Impact, Radius, Rule, keep_out_m, landed_as_planned, widest};
 use onboard_sim::statistics::Landings;
 use protocol::program::Exit;
 use sim::dispersion::may_be_kinder;
 use sim::recipe::Recipe;
 
-use super::{Asked, in_wind, on_threads, show_flights};
+use super::{Selection, in_wind, on_threads, show_flights};
 
 #[derive(Args)]
 pub(crate) struct HazardArguments {
     #[command(flatten)]
-    asked: Asked,
+    selection: Selection,
     /// Where the flights begin: pad, apogee or drone [default: pad if the mission has a booster,
     /// else the mission's].
     #[arg(long, value_name = "START")]
@@ -41,12 +41,12 @@ pub(crate) struct HazardArguments {
 pub(crate) fn run(arguments: &HazardArguments) -> anyhow::Result<Exit> {
     let recipes = recipes(arguments)?;
     let mission = &recipes[0].mission;
-    let ways = Way::of(mission);
+    let cases = Case::of(mission);
     let flights = Flights { survey: arguments.flights, of_widest: arguments.hazard_flights };
     let impacts =
-        on_threads(arguments.asked.jobs, || Ok(hazard::studies(&recipes, flights, &show_flights())?))?;
+        on_threads(arguments.selection.jobs, || Ok(hazard::studies(&recipes, flights, &show_flights())?))?;
     let rule = Rule::of(mission);
-    let study = Study { arguments, mission, ways: &ways, impacts: &impacts };
+    let study = Study { arguments, mission, cases: &cases, impacts: &impacts };
     study.write_text(&rule, &mut std::io::stdout().lock())?;
     if let Some(path) = &arguments.csv {
         let csv = study.csv()?;
@@ -57,25 +57,25 @@ pub(crate) fn run(arguments: &HazardArguments) -> anyhow::Result<Exit> {
 
 /// The mission in each wind.
 fn recipes(arguments: &HazardArguments) -> anyhow::Result<Vec<Recipe>> {
-    let mut recipe = arguments.asked.recipe(arguments.start)?;
+    let mut recipe = arguments.selection.recipe(arguments.start)?;
     if arguments.start.is_none() && recipe.mission.launch.is_some() {
         recipe = recipe.starting_at(StartPoint::Pad)?;
     }
     arguments.winds.iter().map(|wind_m_s| in_wind(&recipe, *wind_m_s)).collect()
 }
 
-/// The flights with what was asked.
+/// The flights with their arguments.
 struct Study<'a> {
     arguments: &'a HazardArguments,
     mission: &'a Mission,
-    ways: &'a [Way],
+    cases: &'a [Case],
     /// In each wind.
     impacts: &'a [Vec<Impact>],
 }
 
 impl Study<'_> {
     fn write_text(&self, rule: &Rule, out: &mut impl std::io::Write) -> std::io::Result<()> {
-        let HazardArguments { asked: Asked { dispersion, seed, .. }, winds, .. } = self.arguments;
+        let HazardArguments { selection: Selection { dispersion, seed, .. }, winds, .. } = self.arguments;
         let Mission { name, site, gate, .. } = self.mission;
         let start = match self.mission.start.at {
             StartPoint::Apogee => "apogee; how it got there is not in it",
@@ -96,9 +96,9 @@ impl Study<'_> {
         };
         let heads = winds.iter().map(|wind_m_s| format!("{:<29}", format!("{wind_m_s} m/s")));
         writeln!(out, "{:<26}{}", "", heads.collect::<Vec<_>>().concat())?;
-        for way in self.ways {
-            let cells = of_each(&|impacts| cell(Radius::of_way(impacts, *way).as_ref()));
-            writeln!(out, "{:<26}{cells}", way.name())?;
+        for case in self.cases {
+            let cells = of_each(&|impacts| cell(Radius::of_case(impacts, *case).as_ref()));
+            writeln!(out, "{:<26}{cells}", case.name())?;
         }
         let landed = |impacts: &Vec<Impact>| {
             let Landings { stands, envelope, .. } = landed_as_planned(impacts);
@@ -112,11 +112,11 @@ impl Study<'_> {
             gate.fence_radius_m
         )?;
         for (wind_m_s, impacts) in winds.iter().zip(self.impacts) {
-            if let Some((way, radius)) = widest(impacts) {
+            if let Some((case, radius)) = widest(impacts) {
                 let apart = keep_out_m(&radius, rule);
-                let open =
+                let end =
                     if radius.high_m.is_none() { " at least: too few flights for an upper end;" } else { "" };
-                writeln!(out, "{wind_m_s:>4} m/s: nobody within {apart:.0} m;{open} widest: {}", way.name())?;
+                writeln!(out, "{wind_m_s:>4} m/s: nobody within {apart:.0} m;{end} widest: {}", case.name())?;
             }
         }
         if self.mission.start.at == StartPoint::Pad {
@@ -135,12 +135,12 @@ impl Study<'_> {
         table.write_record(told.iter().chain(&Landing::COLUMNS))?;
         for (wind_m_s, impacts) in self.arguments.winds.iter().zip(self.impacts) {
             for impact in impacts {
-                let Impact { way, number, place_m, landing, .. } = impact;
+                let Impact { case, number, place_m, landing, .. } = impact;
                 let two =
                     |m: Option<[f64; 2]>| m.map_or_else(Default::default, |m| m.map(|m| format!("{m:.2}")));
                 let ([x, y], in_wind) = (two(*place_m), two(impact.in_wind_m()));
                 let wind = wind_m_s.to_string();
-                table.serialize((wind, way.name(), number, x, y, in_wind, landing.flags()))?;
+                table.serialize((wind, case.name(), number, x, y, in_wind, landing.flags()))?;
             }
         }
         Ok(table.into_inner()?)

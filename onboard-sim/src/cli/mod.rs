@@ -1,4 +1,4 @@
-//! The subcommands of the program, and what they have in common: the texts that they read, and the
+//! The subcommands of the program, and their common parts: the texts that they read, and the
 //! threads that they use.
 
 pub(crate) mod campaign;
@@ -17,7 +17,7 @@ use anyhow::Context as _;
 use clap::Args;
 use flight::vehicle::mission::StartPoint;
 use flight::vehicles::mission;
-use onboard_sim::files::{say_other, text_of};
+use onboard_sim::files::{report_other_name, text_of};
 use onboard_sim::progress::Progress;
 use onboard_sim::run::threads;
 use protocol::log::recorder::Recorder;
@@ -29,7 +29,7 @@ use toml_edit::{Array, DocumentMut};
 
 /// What flies, under what chance.
 #[derive(Args)]
-pub(crate) struct Asked {
+pub(crate) struct Selection {
     /// Built-in mission or TOML file.
     #[arg(long, alias = "profile", default_value = mission::DEFAULT, value_name = "NAME|FILE")]
     mission: String,
@@ -45,13 +45,13 @@ pub(crate) struct Asked {
     jobs: Option<usize>,
 }
 
-impl Asked {
+impl Selection {
     fn recipe(&self, start: Option<StartPoint>) -> anyhow::Result<Recipe> {
         recipe(&self.mission, start, &self.dispersion, self.seed)
     }
 }
 
-/// Does work on so many threads, or on as many as there are processors; the results do not depend
+/// Runs work on this many threads, or on as many as there are processors; the results do not depend
 /// on it.
 fn on_threads<T: Send>(
     jobs: Option<usize>,
@@ -63,19 +63,18 @@ fn on_threads<T: Send>(
 /// Begins a log, under the next free name.
 fn logging(path: &Path, header: &LogHeader) -> anyhow::Result<Recorder> {
     let recorder = Recorder::create(path, None, header)?;
-    say_other(path, recorder.path());
+    report_other_name(path, recorder.path());
     Ok(recorder)
 }
 
-/// Says on standard error what is no error, unless --quiet is given. If nobody reads it, nothing is
-/// lost.
-fn say(text: &str) {
+/// Prints a notice on standard error, unless --quiet is given. Failure to print is ignored.
+fn notify(text: &str) {
     if !is_quiet() {
         let _ = writeln!(std::io::stderr(), "{text}");
     }
 }
 
-/// A file's text; what is not UTF-8 is read as Latin-1, in which some programs export.
+/// A file's text; text other than UTF-8 is read as Latin-1, in which some programs export.
 fn read(path: &Path) -> anyhow::Result<String> {
     let bytes = std::fs::read(path).with_context(|| format!("{}: cannot be read", path.display()))?;
     Ok(String::from_utf8(bytes)
@@ -94,7 +93,7 @@ fn recipe(mission_name: &str, start: Option<StartPoint>, set: &str, seed: u64) -
     })
 }
 
-/// The same flights in another mean wind, m/s. The log keeps the text of the set, and a replay
+/// The same flights in another mean wind, m/s. The log stores the text of the set, and a replay
 /// draws from it again.
 fn in_wind(recipe: &Recipe, wind_m_s: f64) -> anyhow::Result<Recipe> {
     const MOST_M_S: f64 = 30.0;

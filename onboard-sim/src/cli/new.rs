@@ -1,5 +1,5 @@
-//! A mission file for a rocket of one's own: what a club measures, each with its unit and how it is
-//! measured. What is not told is another mission's, scaled.
+//! A mission file for a custom rocket: a club's measurements, each with its unit and method.
+//! Missing values are another mission's, scaled.
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
@@ -16,7 +16,7 @@ use onboard_sim::files::{NewFile, text_of};
 use protocol::program::Exit;
 use toml::Value;
 
-use super::{read, say};
+use super::{notify, read};
 
 const MASS: &str = "airframe.mass.loaded_kg";
 const LENGTH: &str = "airframe.body.length_m";
@@ -28,7 +28,7 @@ const START: &str = "start.at";
 pub(crate) struct NewArguments {
     /// The vehicle's name: NAME.toml is written.
     name: String,
-    /// Mission that has what is not told, scaled by mass, length and diameter: built-in or TOML
+    /// Mission that supplies missing values, scaled by mass, length and diameter: built-in or TOML
     /// file [default: mk3].
     #[arg(long, value_name = "NAME|FILE")]
     like: Option<String>,
@@ -52,33 +52,33 @@ pub(crate) struct NewArguments {
     out: Option<PathBuf>,
 }
 
-/// Shows a question, and gives what is typed.
-type Ask<'a> = &'a mut dyn FnMut(&str) -> anyhow::Result<String>;
+/// Shows a question, and returns the typed answer.
+type Prompt<'a> = &'a mut dyn FnMut(&str) -> anyhow::Result<String>;
 
 pub(crate) fn run(arguments: &NewArguments) -> anyhow::Result<Exit> {
     let path = arguments.out.clone().unwrap_or_else(|| format!("{}.toml", arguments.name).into());
     let mut stdin = std::io::stdin().lock();
     let terminal = stdin.is_terminal();
-    let mut ask = |question: &str| {
+    let mut prompt = |question: &str| {
         ensure!(terminal, "there is no terminal on which to ask for it");
         write!(std::io::stderr(), "{question}: ")?;
         let mut line = String::new();
         ensure!(stdin.read_line(&mut line)? > 0, "the answers end at: {question}");
         Ok(line.trim().to_owned())
     };
-    let asks = arguments.like.is_none();
-    if asks && !terminal {
-        say(&format!("no terminal on which to ask: what is not told is {}'s", mission::DEFAULT));
+    let prompts = arguments.like.is_none();
+    if prompts && !terminal {
+        notify(&format!("no terminal for questions: missing values are {}'s", mission::DEFAULT));
     }
-    let text = made(arguments, asks && terminal, &mut ask, &path.display().to_string())?;
+    let text = made(arguments, prompts && terminal, &mut prompt, &path.display().to_string())?;
     let path = NewFile::create(&path)?.fill(|file| file.write_all(text.as_bytes()))?;
-    say(&format!("{0} is written; `onboard-sim check {0}` says whether it will land", path.display()));
+    notify(&format!("{0} is written; `onboard-sim check {0}` says whether it will land", path.display()));
     Ok(Exit::Yes)
 }
 
-/// The text of the mission, which can be loaded; asks for everything if `asks`, else only for what
-/// must be told.
-fn made(arguments: &NewArguments, asks: bool, ask: Ask<'_>, path: &str) -> anyhow::Result<String> {
+/// The text of the mission, which can be loaded; asks for everything if `prompts`, else only
+/// for required values.
+fn made(arguments: &NewArguments, prompts: bool, prompt: Prompt<'_>, path: &str) -> anyhow::Result<String> {
     let NewArguments { name, like, from, length, motor, motor_data, .. } = arguments;
     let mut draft = Draft::like(like.as_deref().unwrap_or(mission::DEFAULT))?;
     draft.put("name", Value::String(name.clone()), "chosen");
@@ -87,18 +87,18 @@ fn made(arguments: &NewArguments, asks: bool, ask: Ask<'_>, path: &str) -> anyho
         draft.put(LENGTH, Value::Float(*length_m), "--length");
     }
     if let Some(file) = from {
-        draft.simulated(file, ask)?;
+        draft.simulated(file, prompt)?;
     }
     if let Some(motor) = motor {
-        draft.motor(motor, motor_data.as_ref(), ask)?;
+        draft.motor(motor, motor_data.as_ref(), prompt)?;
     }
-    let mut questions: Vec<Key> = keys().filter(|key| asks && key.place.is_some()).collect();
+    let mut questions: Vec<Key> = keys().filter(|key| prompts && key.place.is_some()).collect();
     questions.sort_by_key(|key| key.place);
     for key in questions {
-        let drone = draft.told.get(START).is_some_and(|(at, _)| at.as_str() == Some("drone"));
+        let drone = draft.given.get(START).is_some_and(|(at, _)| at.as_str() == Some("drone"));
         let idle = if drone { "start.height_m" } else { "drop.height_m" };
-        if key.path != idle && !draft.told.contains_key(key.path) {
-            draft.ask(&key, ask)?;
+        if key.path != idle && !draft.given.contains_key(key.path) {
+            draft.query(&key, prompt)?;
         }
     }
     let text = draft.text()?;
@@ -110,7 +110,7 @@ fn made(arguments: &NewArguments, asks: bool, ask: Ask<'_>, path: &str) -> anyho
 struct Key {
     path: &'static str,
     unit: &'static str,
-    /// What it is, and how it is measured.
+    /// Its description and method of measurement.
     how: &'static str,
     /// Powers of mass, length and diameter by which it is scaled.
     powers: Vec<f64>,
@@ -135,11 +135,11 @@ fn keys() -> impl Iterator<Item = Key> {
 /// A mission in the making.
 struct Draft {
     like: Mission,
-    /// What the other mission states.
+    /// Values stated in the other mission.
     stated: toml::Table,
     motor: ThrustCurve,
-    /// What is told, and by what.
-    told: BTreeMap<&'static str, (Value, String)>,
+    /// Given values, with their sources.
+    given: BTreeMap<&'static str, (Value, String)>,
 }
 
 impl Draft {
@@ -147,17 +147,17 @@ impl Draft {
         let text = text_of(name, mission::BUILTIN, "mission")?;
         let like = mission::from_toml(&text, name)?;
         let motor = like.motor_curve.clone();
-        Ok(Self { like, stated: text.parse()?, motor, told: BTreeMap::new() })
+        Ok(Self { like, stated: text.parse()?, motor, given: BTreeMap::new() })
     }
 
     fn put(&mut self, path: &'static str, value: Value, by: &str) {
-        self.told.insert(path, (value, by.to_owned()));
+        self.given.insert(path, (value, by.to_owned()));
     }
 
-    /// What stands at a key, and where it comes from.
+    /// Value of a key, and its source.
     fn value(&self, key: &Key) -> Option<(Value, String)> {
-        if let Some(told) = self.told.get(key.path) {
-            return Some(told.clone());
+        if let Some(given) = self.given.get(key.path) {
+            return Some(given.clone());
         }
         let (section, leaf) = key.path.rsplit_once('.').unwrap_or(("", key.path));
         let mut sections = section.split('.').filter(|name| !name.is_empty());
@@ -179,7 +179,7 @@ impl Draft {
     fn scales(&self) -> [f64; 3] {
         let (mass, body) = (&self.like.airframe.mass, &self.like.airframe.body);
         [(MASS, mass.loaded_kg), (LENGTH, body.length_m), (DIAMETER, body.diameter_m)].map(|(path, like)| {
-            self.told.get(path).and_then(|(value, _)| value.as_float()).map_or(1.0, |number| number / like)
+            self.given.get(path).and_then(|(value, _)| value.as_float()).map_or(1.0, |number| number / like)
         })
     }
 
@@ -191,12 +191,12 @@ impl Draft {
         libm::floor(10.0 * airframe.gimbal_clearance_rad(&self.motor).to_degrees()) / 10.0
     }
 
-    /// Takes what OpenRocket says of the vehicle.
-    fn simulated(&mut self, file: &Path, ask: Ask<'_>) -> anyhow::Result<()> {
+    /// Applies OpenRocket's data of the vehicle.
+    fn simulated(&mut self, file: &Path, prompt: Prompt<'_>) -> anyhow::Result<()> {
         let name = file.display().to_string();
         let found = openrocket::read(&read(file)?).with_context(|| name.clone())?;
-        if let Some(length) = keys().find(|key| key.path == LENGTH && !self.told.contains_key(LENGTH)) {
-            self.ask(&length, ask).context("--length is missing: OpenRocket counts from the nose")?;
+        if let Some(length) = keys().find(|key| key.path == LENGTH && !self.given.contains_key(LENGTH)) {
+            self.query(&length, prompt).context("--length is missing: OpenRocket counts from the nose")?;
         }
         let length_m = self.scales()[1] * self.like.airframe.body.length_m;
         for (path, number) in [
@@ -213,8 +213,8 @@ impl Draft {
         Ok(())
     }
 
-    /// Takes a motor: a name, or a file's, whose text goes into the mission.
-    fn motor(&mut self, motor: &str, data: Option<&Vec<String>>, ask: Ask<'_>) -> anyhow::Result<()> {
+    /// Applies a motor: a name, or a file's, whose text becomes part of the mission.
+    fn motor(&mut self, motor: &str, data: Option<&Vec<String>>, prompt: Prompt<'_>) -> anyhow::Result<()> {
         const DATA: [&str; 5] =
             ["name", "diameter, mm", "length, mm", "mass of its propellant, kg", "mass with propellant, kg"];
         let (text, curve) = match motors::builtin(motor) {
@@ -224,7 +224,7 @@ impl Draft {
                 let ending = motor.rsplit('.').next().unwrap_or_default();
                 let curve = if ["csv", "tsv", "txt"].iter().any(|table| ending.eq_ignore_ascii_case(table)) {
                     let asked =
-                        || DATA.map(|what| ask(&format!("Motor on the stand, {what}"))).into_iter().collect();
+                        || DATA.map(|of| prompt(&format!("Motor on the stand, {of}"))).into_iter().collect();
                     let data = data.cloned().map_or_else(asked, Ok).context("--motor-data is missing")?;
                     let mut head: Vec<_> =
                         data.iter().map(|word| word.replace(char::is_whitespace, "_")).collect();
@@ -240,16 +240,16 @@ impl Draft {
         };
         self.motor = curve;
         self.put(MOTOR, Value::String(text), motor);
-        // Nobody has said what else this motor may turn out to be.
+        // Alternative curves of this motor are not available.
         self.stated.remove("other_motors");
         Ok(())
     }
 
-    /// Asks for a value, until there is one that can be taken; one that is far from what was
-    /// expected is asked for twice.
-    fn ask(&mut self, key: &Key, ask: Ask<'_>) -> anyhow::Result<()> {
+    /// Asks for a value until an answer is valid; a value far from the expected one must be
+    /// repeated.
+    fn query(&mut self, key: &Key, prompt: Prompt<'_>) -> anyhow::Result<()> {
         let number_of = |draft: &Self| draft.value(key)?.0.as_float();
-        let (expected, mut doubt) = (number_of(self), String::new());
+        let (expected, mut remark) = (number_of(self), String::new());
         let unit = match key.unit {
             _ if key.path == MOTOR => {
                 "; built in: ".to_owned() + &motors::names().collect::<Vec<_>>().join(", ")
@@ -262,33 +262,33 @@ impl Draft {
             let missing = if key.path == START { self.like.start.at.name() } else { "standard" };
             let default = self.value(key).map_or(missing.into(), |(value, _)| value);
             let shown = default.as_str().map_or(default.to_string(), |text| text.lines().take(1).collect());
-            let answer = ask(&format!("{doubt}{}{unit} [{shown}]", key.how))?;
-            let before = self.told.clone();
+            let answer = prompt(&format!("{remark}{}{unit} [{shown}]", key.how))?;
+            let before = self.given.clone();
             let taken = match key.path {
                 _ if answer.is_empty() => return Ok(()),
-                MOTOR => self.motor(&answer, None, ask),
+                MOTOR => self.motor(&answer, None, prompt),
                 START => Ok(Value::String(answer.to_lowercase())).map(|at| self.put(START, at, "told")),
                 path => number(&answer, key.unit, self.scales()[0] * self.like.airframe.mass.loaded_kg)
                     .map(|number| self.put(path, number, "told")),
             };
-            doubt = match (taken.and_then(|()| self.refused(key)), expected.zip(number_of(self))) {
+            remark = match (taken.and_then(|()| self.refused(key)), expected.zip(number_of(self))) {
                 (Err(error), _) => {
-                    self.told = before;
+                    self.given = before;
                     format!("{error:#}\n")
                 }
-                (Ok(()), Some((expected, told)))
+                (Ok(()), Some((expected, given)))
                     if !key.path.starts_with("site.")
-                        && !(0.25..=4.0).contains(&(told / expected))
-                        && default.as_float() != Some(told) =>
+                        && !(0.25..=4.0).contains(&(given / expected))
+                        && default.as_float() != Some(given) =>
                 {
-                    format!("{told} is far from the {expected} of a vehicle like this; Enter takes it\n")
+                    format!("{given} is far from the {expected} of a vehicle like this; Enter takes it\n")
                 }
                 _ => return Ok(()),
             };
         }
     }
 
-    /// An error if a mission cannot hold what stands at this key.
+    /// An error if the value of this key is invalid in a mission.
     fn refused(&self, key: &Key) -> anyhow::Result<()> {
         let leaf = key.path.rsplit('.').next().unwrap_or_default();
         let error = mission::from_toml(&self.text()?, "not taken").err().map(|error| error.to_string());
@@ -320,8 +320,8 @@ fn rounded(number: f64) -> Value {
     Value::Float(format!("{number:.3e}").parse().unwrap_or(number))
 }
 
-/// A number in a unit: of an answer that has the number alone, or another unit behind it, or for an
-/// inertia what was measured of a vehicle of this mass that swings on two wires.
+/// A number in a unit, from an answer that has the number alone, or with another unit, or for an
+/// inertia the measurements of a vehicle of this mass swinging on two wires.
 fn number(answer: &str, unit: &str, mass_kg: f64) -> anyhow::Result<Value> {
     let float = |text: &str| {
         text.replace(',', ".").parse::<f64>().ok().with_context(|| format!("'{text}' is no number"))
@@ -351,18 +351,18 @@ mod tests {
         <Only as clap::Parser>::parse_from([&["new"], words].concat()).new
     }
 
-    /// The text, and what was asked.
-    fn asked(words: &[&str], answers: &str) -> (anyhow::Result<String>, String) {
+    /// The text, and the dialogue.
+    fn dialogue(words: &[&str], answers: &str) -> (anyhow::Result<String>, String) {
         let (mut shown, mut lines) = (String::new(), answers.lines());
-        let mut ask = |question: &str| {
+        let mut prompt = |question: &str| {
             shown += question;
             lines.next().map(str::to_owned).context("no more answers")
         };
-        let made = made(&arguments(words), true, &mut ask, "ours.toml");
+        let made = made(&arguments(words), true, &mut prompt, "ours.toml");
         (made, shown)
     }
 
-    fn told(words: &[&str]) -> anyhow::Result<String> {
+    fn text_of_new(words: &[&str]) -> anyhow::Result<String> {
         made(&arguments(words), false, &mut |_| bail!("no terminal"), "ours.toml")
     }
 
@@ -383,7 +383,7 @@ mod tests {
             for key in &stated {
                 assert!(keys().any(|row| row.path == key), "{like}: {key} is not in the table");
             }
-            let made = mission::from_toml(&told(&["ours", "--like", like]).unwrap(), "ours").unwrap();
+            let made = mission::from_toml(&text_of_new(&["ours", "--like", like]).unwrap(), "ours").unwrap();
             assert!(made.changed.is_empty(), "{:?}", made.changed);
             let built_in = mission::from_toml(text, like).unwrap();
             assert_eq!(
@@ -398,7 +398,7 @@ mod tests {
     #[test]
     fn val_hand_answers_are_scaled_converted_and_swung() {
         let answers = "HP-H45W\n4100 g\n80 m\n0,8\n\nhalf\n40\n0.4\n20.1 1 0.4\n1 kg m2\n\n130 mm\n\n8\n1500 ft\n95\n35\nabove\nDrone\n140\n\n\n\n\n\n";
-        let (text, shown) = asked(&["ours"], answers);
+        let (text, shown) = dialogue(&["ours"], answers);
         let text = text.unwrap();
         let ours = mission::from_toml(&text, "ours").unwrap();
         let Mission { airframe, drop, site, start, changed, .. } = &ours;
@@ -435,7 +435,7 @@ mod tests {
         }
         assert!(text.contains("kitchen scale (kg; told)\nloaded_kg = 4.1\n"), "{text}");
         assert!(text.contains("(m; mk3's, scaled)\nstation_m = 0.72\n"), "{text}");
-        assert_eq!(asked(&["ours"], "3.7\n").0.unwrap_err().to_string(), "no more answers");
+        assert_eq!(dialogue(&["ours"], "3.7\n").0.unwrap_err().to_string(), "no more answers");
     }
 
     #[test]
@@ -456,11 +456,11 @@ mod tests {
         std::fs::write(&stand, burn).unwrap();
         let (sim, stand) = (sim.to_str().unwrap(), stand.to_str().unwrap());
         let burnt = ["ours", "--from", sim, "--motor", stand];
-        let error = |more: &[&str]| told(&[&burnt, more].concat()).unwrap_err().to_string();
+        let error = |more: &[&str]| text_of_new(&[&burnt, more].concat()).unwrap_err().to_string();
         assert!(error(&[]).starts_with("--length is missing"));
         assert!(error(&["--length", "0.72"]).contains("--motor-data is missing"));
         let data = ["--length", "0.72", "--motor-data", "club 38", "38", "210", "0.19", "0.37"];
-        let text = told(&[burnt.as_slice(), &data].concat()).unwrap();
+        let text = text_of_new(&[burnt.as_slice(), &data].concat()).unwrap();
         let ours = mission::from_toml(&text, "ours").unwrap();
         let mass = &ours.airframe.mass;
         assert!(
@@ -474,10 +474,10 @@ mod tests {
         assert!(text.contains(&format!("(kg; {sim})\nloaded_kg = 3.5\n")), "{text}");
         // A motor that is too long for mk3's gimbal swings less.
         let long = ["--length", "0.72", "--motor-data", "club", "38", "260", "0.19", "0.37"];
-        let text = told(&[burnt.as_slice(), &long].concat()).unwrap();
+        let text = text_of_new(&[burnt.as_slice(), &long].concat()).unwrap();
         assert!(text.contains("as far as the motor can swing in its tube)\nlimit_deg = 7."), "{text}");
-        // What cannot be flown is not written.
-        let bad = told(&["ours", "--like", "mk3", "--length", "0"]).unwrap_err().to_string();
+        // A mission that cannot be flown is not written.
+        let bad = text_of_new(&["ours", "--like", "mk3", "--length", "0"]).unwrap_err().to_string();
         assert!(bad.starts_with("ours.toml: airframe."), "{bad}");
     }
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use clap::Args;
-use flight::computer::news::Severity;
+use flight::computer::messages::Severity;
 use flight::estimation::estimator::AidStatus;
 use flight::vehicle::mission::StartPoint;
 use flight::vehicles::mission;
@@ -158,8 +158,8 @@ fn print_moments(out: &mut impl Write, played: &Played) -> std::io::Result<()> {
 fn print_sensors(out: &mut impl Write, played: &Played) -> std::io::Result<()> {
     writeln!(out, "\nin flight         received      used  rejected not offered")?;
     let (aids, [barometer, fixes, lidar]) = (&played.aids, played.received);
-    // A fix has three numbers of each kind. What the computer withholds from its estimator was
-    // never offered.
+    // A fix has three numbers of each kind. Measurements withheld from the estimator were never
+    // offered.
     for (name, received, AidStatus { used, refused, .. }) in [
         ("barometer", barometer, &aids.barometer),
         ("GNSS velocity", 3 * fixes, &aids.gnss_velocity),

@@ -1,4 +1,4 @@
-//! Plays recorded sensors to the flight computer: what it would have decided aboard a rocket that
+//! Plays recorded sensors to the flight computer, to determine its decisions aboard a rocket that
 //! flew without it.
 //!
 //! The computer is stepped as on a board that is powered up with the first row: it is not armed,
@@ -9,8 +9,8 @@
 mod axes;
 pub mod sensor_file;
 
-use flight::computer::news::CrewMessage;
-use flight::computer::{Computer, FRAME_S, Input, KeptInput, LogState, Output, flight_time_s};
+use flight::computer::messages::CrewMessage;
+use flight::computer::{Computer, FRAME_S, Input, LogState, Output, SensedInput, flight_time_s};
 use flight::estimation::estimator::{Aids, Measurements};
 use flight::estimation::sensor_watch::SENSORS;
 use flight::rules::arming::{Check, Uplink};
@@ -30,10 +30,9 @@ const RECORDED_CHECKS: [&str; 4] = ["rotation", "tilt from vertical", "speed", "
 /// count.
 const CHECK_FRAMES: u64 = 200;
 const CHECKED_S: usize = 10;
-/// The lift-off begins up to so many frames before it is detected.
+/// Largest number of frames between the start of a lift-off and its detection.
 const LIFTING_OFF_FRAMES: u64 = 100;
-/// A climb from the barometer compares its means over so many frames before and after, half a
-/// second.
+/// Frames averaged before and after for a climb rate from the barometer, half a second each.
 const CLIMB_FRAMES: usize = 100;
 /// A faster climb tears a parachute or a stack that separates, m/s.
 pub const CLIMB_MAX_M_S: f64 = 30.0;
@@ -56,7 +55,7 @@ pub struct Moment {
     pub too_fast: bool,
 }
 
-/// What the computer made of a recorded flight.
+/// Decisions of the computer in a recorded flight.
 #[derive(Debug, Clone, Default)]
 pub struct Played {
     /// For each arming check its refusals in the last seconds on the pad, the newest first.
@@ -64,8 +63,8 @@ pub struct Played {
     /// How many seconds these are.
     pub checked_s: usize,
     pub moments: Vec<Moment>,
-    /// What the estimator used and rejected from the lift-off on, and its restarts, each because a
-    /// state was not a number.
+    /// Measurements used and rejected by the estimator from lift-off on, and its restarts after NaN
+    /// states.
     pub aids: Aids,
     pub restarts: u32,
     /// Samples from the lift-off on: barometer, fixes, lidar.
@@ -99,12 +98,12 @@ pub fn play(sensors: &[Measurements], mission: &Mission, mut log: impl FnMut(Rec
     for frame in 1..=sensors.len() as u64 {
         let (before, flies) = (player.computer.mode().phase, player.computer.released_at_s().is_some());
         let output = player.step(frame, &mut last);
-        let news = output.news.iter().map(|message| match message {
-            CrewMessage::Said { severity, words } => record::text_event(*severity, words),
+        let messages = output.messages.iter().map(|message| match message {
+            CrewMessage::Text { severity, text } => record::text_event(*severity, text),
             CrewMessage::PhaseChanged { from, to } => record::phase_event(*from, *to),
         });
         let records = last.take().map(Record::ComputerFrame).into_iter();
-        let records = records.chain(output.released.then(|| start(&player.computer))).chain(news);
+        let records = records.chain(output.released.then(|| start(&player.computer))).chain(messages);
         let estimate = flies.then(|| record::estimate(player.computer.pilot())).flatten();
         records.chain(estimate).for_each(|record| log(record, (1e9 * flight_time_s(frame)).round() as u64));
         player.note(frame, before, &output);
@@ -128,7 +127,7 @@ impl Player<'_> {
         if let (Some(fix), Some(released_s)) = (&mut measured.gnss, self.computer.released_at_s()) {
             fix.valid_at_s -= released_s;
         }
-        let kept = KeptInput {
+        let sensed = SensedInput {
             frame,
             time_s: flight_time_s(frame),
             measured,
@@ -139,19 +138,19 @@ impl Player<'_> {
             pin_out: true,
             log: LogState { running: true, space_bytes: u64::MAX },
             uplink: Uplink::NotNeeded,
-            ..KeptInput::NONE
+            ..SensedInput::NONE
         };
         let plan_ready = self.plan_ready_at.take_if(|at| frame >= *at).is_some();
-        let input = Input { kept, requests: &[], rehearsed: None, plan_ready };
+        let input = Input { sensed, requests: &[], rehearsed: None, plan_ready };
         let output = self.computer.step(&input);
-        if let Some(frames) = self.computer.solve_posed() {
+        if let Some(frames) = self.computer.solve_requested() {
             self.plan_ready_at = Some(frame + frames);
         }
         last.decided(&input, &output, &self.computer);
         output
     }
 
-    /// Notes what a frame has decided, from the phase before it.
+    /// Notes the decisions of a frame, from the phase before it.
     fn note(&mut self, frame: u64, before: Phase, output: &Output) {
         let now = self.computer.mode().phase;
         if output.released {
@@ -212,7 +211,7 @@ impl Player<'_> {
         });
     }
 
-    /// Height, m, and climb, m/s, after so many frames.
+    /// Height, m, and climb, m/s, after this many frames.
     fn barometer(&self, frames: usize) -> Option<(f64, f64)> {
         let mean_m = |from: usize| {
             let near = self.sensors.iter().skip(from).take(CLIMB_FRAMES);

@@ -7,7 +7,7 @@ use onboard_sim::card::Card;
 use onboard_sim::card::range_safety::{
     FEWEST, InWind, aborts, calibres, in_winds, limit_m_s, plan, thrust_to_weight,
 };
-use onboard_sim::hazard::{Course, Flights, Impact, Rule, Way, fly, lift_off_kg, studies};
+use onboard_sim::hazard::{Case, Course, Flights, Impact, Rule, fly, lift_off_kg, studies};
 use proptest::prelude::*;
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
@@ -16,21 +16,21 @@ fn rule() -> Rule {
     Rule { feet: 200.0, impulse_n_s: 673.0, complex: true, model: false }
 }
 
-fn impact(way: Way, number: usize, along_m: f64, across_m: f64, landed: bool) -> Impact {
+fn impact(case: Case, number: usize, along_m: f64, across_m: f64, landed: bool) -> Impact {
     let (place_m, course) = (Some([along_m, across_m]), Course::default());
     let landing = Landing { stands: landed, ..Landing::default() };
-    Impact { way, number: number as u64, place_m, downwind_rad: 0.0, landing, course }
+    Impact { case, number: number as u64, place_m, downwind_rad: 0.0, landing, course }
 }
 
-/// Flights in winds from 0 m/s on, each with its places in two ways.
+/// Flights in winds from 0 m/s on, each with its places in two cases.
 fn flown(of: impl Into<proptest::collection::SizeRange>) -> impl Strategy<Value = Vec<(f64, Vec<Impact>)>> {
     let one = (-900.0..900.0, -300.0..300.0, any::<bool>());
     let in_wind = prop::collection::vec(one, of).prop_map(|flights| {
         let numbered = flights.into_iter().enumerate();
         let each = numbered.flat_map(|(number, (along_m, across_m, landed))| {
             [
-                impact(Way::AsPlanned, number, 0.1 * along_m, 0.1 * across_m, landed),
-                impact(Way::Uncommanded, number, along_m, across_m, false),
+                impact(Case::AsPlanned, number, 0.1 * along_m, 0.1 * across_m, landed),
+                impact(Case::Uncommanded, number, along_m, across_m, false),
             ]
         });
         each.collect::<Vec<_>>()
@@ -50,11 +50,11 @@ proptest! {
         for ((wind_m_s, impacts), wind) in flown.iter().zip(&winds) {
             prop_assert_eq!(wind.wind_m_s.to_bits(), wind_m_s.to_bits());
             let circle = wind.circle.unwrap();
-            for way in [Way::AsPlanned, Way::Uncommanded] {
-                let of_way = || impacts.iter().filter(|impact| impact.way == way);
-                let inside = |radius_m: f64| of_way().filter(|impact| impact.distance_m() <= radius_m).count();
-                prop_assert!(100 * inside(circle.keep_out_m) >= 99 * of_way().count());
-                prop_assert!(way != circle.way || 100 * inside(circle.radius.holds_m) >= 99 * of_way().count());
+            for case in [Case::AsPlanned, Case::Uncommanded] {
+                let of_case = || impacts.iter().filter(|impact| impact.case == case);
+                let inside = |radius_m: f64| of_case().filter(|impact| impact.distance_m() <= radius_m).count();
+                prop_assert!(100 * inside(circle.keep_out_m) >= 99 * of_case().count());
+                prop_assert!(case != circle.case || 100 * inside(circle.radius.holds_m) >= 99 * of_case().count());
             }
             // Never less than in less wind, nor than the rule.
             prop_assert!(circle.keep_out_m >= least_m && circle.keep_out_m >= rule().distance_m());
@@ -67,7 +67,7 @@ proptest! {
     fn a_rate_is_the_share_of_the_flights_as_planned_and_nothing_else(flown in flown(FEWEST as usize..200)) {
         for ((_, impacts), wind) in flown.iter().zip(in_winds(&flown, &rule())) {
             let landed = wind.landed.unwrap().stands;
-            let planned = impacts.iter().filter(|impact| impact.way == Way::AsPlanned);
+            let planned = impacts.iter().filter(|impact| impact.case == Case::AsPlanned);
             prop_assert_eq!(landed.of, planned.clone().count() as u64);
             prop_assert_eq!(landed.count, planned.filter(|impact| impact.landing.stands).count() as u64);
             prop_assert!(landed.low <= landed.share && landed.share <= landed.high);
@@ -75,7 +75,7 @@ proptest! {
     }
 
     #[test]
-    fn fewer_than_a_hundred_flights_tell_no_rate_no_radius_and_no_wind_to_fly_in(flown in flown(0..FEWEST as usize)) {
+    fn fewer_than_a_hundred_flights_give_no_rate_no_radius_and_no_wind_limit(flown in flown(0..FEWEST as usize)) {
         let winds = in_winds(&flown, &rule());
         prop_assert!(winds.iter().all(|wind| wind.landed.is_none() && wind.circle.is_none()));
         prop_assert_eq!(limit_m_s(&winds), None);
@@ -110,7 +110,7 @@ proptest! {
 
 fn circle(wind_m_s: f64, keep_out_m: f64) -> InWind {
     let impacts: Vec<Impact> =
-        (0..400).map(|number| impact(Way::AsPlanned, number, keep_out_m - 5.0, 0.0, true)).collect();
+        (0..400).map(|number| impact(Case::AsPlanned, number, keep_out_m - 5.0, 0.0, true)).collect();
     in_winds(&[(wind_m_s, impacts)], &rule()).remove(0)
 }
 
@@ -135,9 +135,9 @@ fn val_compass_the_line_of_a_west_wind_points_east() {
 /// 360 of 400 in calm air: 324 is nine tenths of it, 323 is less. 100 flights give a radius without
 /// an upper end, and nobody can stand outside of that.
 #[test]
-fn val_hand_the_wind_to_fly_in_keeps_nine_tenths_of_the_landings() {
+fn val_hand_the_wind_limit_leaves_nine_tenths_of_the_landings() {
     let of = |flights: usize, landed: usize| -> Vec<Impact> {
-        (0..flights).map(|number| impact(Way::AsPlanned, number, 50.0, 0.0, number < landed)).collect()
+        (0..flights).map(|number| impact(Case::AsPlanned, number, 50.0, 0.0, number < landed)).collect()
     };
     let limit = |flights: usize, landed: [usize; 3]| {
         let flown: Vec<(f64, Vec<Impact>)> =
@@ -177,7 +177,7 @@ fn val_safety_md_the_abort_table_is_the_same() {
 /// The mission of mk3 says 2.4 calibres; the rest by hand: 3.70 + 1.1195 + 0.2121 kg, and I243's
 /// first half second.
 #[test]
-fn val_hand_what_a_range_officer_asks_of_mk3() {
+fn val_hand_the_range_officer_values_of_mk3() {
     let mission = flight::vehicles::mission::builtin("mk3").unwrap().unwrap();
     let launch = mission.launch.as_ref().unwrap();
     assert!((calibres(&mission, launch) - 2.4).abs() < 0.05, "{}", calibres(&mission, launch));
@@ -211,7 +211,7 @@ fn a_card_is_of_the_mission_that_was_given_byte_for_byte() {
 }
 
 #[test]
-fn a_card_says_which_keys_are_not_those_of_the_standard_controller() {
+fn a_card_lists_the_keys_that_differ_from_the_standard_controller() {
     let mut recipe = Recipe::built_in("mini-f10", "none").unwrap();
     recipe.mission.changed = ["powered.weights.theta", "soft_tilt_deg"].map(str::to_owned).to_vec();
     let sheet = card_of(&recipe, Flights { survey: 1, of_widest: 1 }).text();
@@ -222,7 +222,7 @@ fn a_card_says_which_keys_are_not_those_of_the_standard_controller() {
 
 /// `hazard` on the mission that is written flies the flights of the card, from the pad.
 #[test]
-fn what_a_card_says_is_flown_again_from_its_mission() {
+fn a_card_is_reproduced_from_its_mission() {
     let recipe = Recipe { seed: 5, ..Recipe::built_in("mk3", "real").unwrap() };
     let flights = Flights { survey: 1, of_widest: 2 };
     let card = card_of(&recipe, flights);
@@ -231,7 +231,7 @@ fn what_a_card_says_is_flown_again_from_its_mission() {
     let flown = windy.starting_at(StartPoint::Pad).unwrap();
     assert_eq!(card.flown[0].1, studies(core::slice::from_ref(&flown), flights, &|_, _| {}).unwrap()[0]);
     let text = card.text();
-    let planned = card.flown[0].1.iter().find(|impact| impact.way == Way::AsPlanned).unwrap().course;
+    let planned = card.flown[0].1.iter().find(|impact| impact.case == Case::AsPlanned).unwrap().course;
     // The same flight, looked at by its world.
     let (mut flight, mut highest_m, mut rail_m_s) = (Sortie::new(&flown, 0).unwrap(), 0.0_f64, 0.0);
     let stood_m = flight.world().state().position_m;
@@ -246,7 +246,7 @@ fn what_a_card_says_is_flown_again_from_its_mission() {
     }
     assert!((planned.highest_m - highest_m).abs() < 1e-9, "{planned:?} {highest_m}");
     assert!((planned.rail_m_s.unwrap() - rail_m_s).abs() < 1e-9 && rail_m_s > 15.0, "{planned:?} {rail_m_s}");
-    let [lit_m, chute_m] = [planned.lit_at_m, planned.chute_down_to_m].map(Option::unwrap);
+    let [lit_m, chute_m] = [planned.ignition_m, planned.chute_down_to_m].map(Option::unwrap);
     assert!(15.0 < lit_m && lit_m < chute_m && chute_m < 150.0, "{planned:?}");
     for words in [
         "Fewer than 100 flights were flown in each wind, or one did not come down: no radius, no rate",
@@ -272,16 +272,19 @@ fn what_a_card_says_is_flown_again_from_its_mission() {
 #[test]
 fn a_parachute_ends_with_a_live_motor_and_often_on_its_side() {
     let recipe = Recipe::built_in("mk3", "real").unwrap().starting_at(StartPoint::Pad).unwrap();
-    let down = |number| fly(&recipe, &[Way::AbortInAscent, Way::Uncommanded], number).unwrap();
+    let down = |number| fly(&recipe, &[Case::AbortInAscent, Case::Uncommanded], number).unwrap();
     let courses: Vec<Course> = (0..4).flat_map(down).map(|impact| impact.course).collect();
     for course in &courses {
-        assert!(course.lit_at_m.is_none() && (20.0..90.0).contains(&course.canopy_s.unwrap()), "{course:?}");
+        assert!(
+            course.ignition_m.is_none() && (20.0..90.0).contains(&course.canopy_s.unwrap()),
+            "{course:?}"
+        );
     }
     assert!(courses.iter().any(|course| course.lies), "{courses:?}");
 }
 
 #[test]
-fn a_card_says_at_which_masses_nine_of_ten_land() {
+fn a_card_states_at_which_masses_nine_of_ten_land() {
     let recipe = Recipe::built_in("mini-f10", "none").unwrap();
     let flights = Flights { survey: 4, of_widest: 4 };
     let masses = card_of(&recipe, flights).masses;

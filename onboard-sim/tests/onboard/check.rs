@@ -53,7 +53,7 @@ fn too_heavy_and_too_light_are_refused_with_the_mass_that_is_not() {
 }
 
 #[test]
-fn flights_are_a_row_of_their_own() {
+fn flights_are_a_separate_row() {
     let page = check(&recipe("vlr", None), &[], 2, &|_| {}).unwrap();
     let row = page.rows.last().unwrap();
     assert!(row.what == "flights" && row.found.ends_with(" of 2 flights stand"), "{page}");

@@ -11,7 +11,7 @@ fn campaign(directory: &Path, arguments: &[&str]) -> Output {
 }
 
 #[test]
-fn a_file_that_has_the_name_of_the_lock_keeps_its_content() {
+fn a_file_with_the_name_of_the_lock_is_unchanged() {
     let directory = tempfile::tempdir().unwrap();
     let lock = directory.path().join("lock");
     fs::write(&lock, "notes").unwrap();

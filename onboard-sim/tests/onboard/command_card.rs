@@ -82,7 +82,7 @@ fn a_folder_without_motors_and_a_wrong_value_are_named() {
 }
 
 #[test]
-fn a_card_is_written_whole_shows_what_is_left_and_names_no_rate_of_two_flights() {
+fn a_card_is_complete_shows_the_time_left_and_gives_no_rate_of_two_flights() {
     let directory = tempfile::tempdir().unwrap();
     let few = ["--flights", "2", "--hazard-flights", "3"];
     let arguments = [&["card", "--mission", "mk2", "--wind", "6,0", "--wind-from", "225"], &few[..]].concat();
@@ -122,7 +122,7 @@ fn a_card_is_written_whole_shows_what_is_left_and_names_no_rate_of_two_flights()
 
 /// `--quiet` leaves what the program was asked for, and where it is.
 #[test]
-fn a_new_mission_is_quiet_if_asked() {
+fn a_new_mission_is_quiet_on_request() {
     let directory = tempfile::tempdir().unwrap();
     for (quiet, lines) in [(&[][..], 1), (&["-q"], 0), (&["-q"], 1)] {
         let made = run(directory.path(), &[&["new", "ours", "--like", "mk3"], quiet].concat());
@@ -150,7 +150,7 @@ fn a_command_that_there_is_not_is_wrong_usage_and_the_commands_are_listed() {
 
 /// What a person acts on says its set, and a set that may be kinder than `real` says that.
 #[test]
-fn where_a_vehicle_comes_down_is_told_with_set_flights_interval_and_rule() {
+fn the_impact_area_is_reported_with_set_flights_interval_and_rule() {
     let directory = tempfile::tempdir().unwrap();
     let few = ["hazard", "--mission", "vlr", "--wind", "0,4", "--flights", "1", "--hazard-flights", "2"];
     let hazard = |more: &[&str]| run(directory.path(), &[&few, more].concat());

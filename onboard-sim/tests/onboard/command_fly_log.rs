@@ -31,7 +31,7 @@ fn fly_with_the_log_none_writes_no_file() {
 
 /// The same command again after a crash.
 #[test]
-fn fly_keeps_a_log_that_exists_and_says_the_free_name() {
+fn fly_preserves_an_existing_log_and_reports_the_free_name() {
     let directory = tempfile::tempdir().unwrap();
     fs::write(directory.path().join("flight.mcap"), "a flight").unwrap();
     let said = fly(directory.path(), "flight.mcap");

@@ -3,7 +3,7 @@
 
 use flight::rules::verdict::Landing;
 use flight::vehicle::mission::StartPoint;
-use onboard_sim::hazard::{Course, Flights, Impact, Radius, Way, fly, study, widest};
+use onboard_sim::hazard::{Case, Course, Flights, Impact, Radius, fly, study, widest};
 use onboard_sim::run::threads;
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
@@ -16,27 +16,27 @@ fn recipe(mission: &str, start: StartPoint) -> Recipe {
 #[test]
 fn a_flight_from_the_pad_that_ends_otherwise_comes_down_beyond_the_fence() {
     let recipe = recipe("mk2", StartPoint::Pad);
-    let ways = Way::of(&recipe.mission);
-    let flights: Vec<Vec<Impact>> = (0..3).map(|number| fly(&recipe, &ways, number).unwrap()).collect();
+    let cases = Case::of(&recipe.mission);
+    let flights: Vec<Vec<Impact>> = (0..3).map(|number| fly(&recipe, &cases, number).unwrap()).collect();
     for impacts in &flights {
         assert_eq!(
-            impacts.iter().map(|impact| impact.way).collect::<Vec<_>>(),
-            ways,
+            impacts.iter().map(|impact| impact.case).collect::<Vec<_>>(),
+            cases,
             "every way, in its order"
         );
         assert!(impacts.iter().all(|impact| impact.place_m.is_some()), "{impacts:?}");
         let landed = impacts.iter().filter(|impact| impact.landing.stands);
-        let may_land = [Way::AsPlanned, Way::AbortTooLow, Way::AbortUnderThrust];
-        assert!(landed.clone().all(|impact| may_land.contains(&impact.way)), "{impacts:?}");
+        let may_land = [Case::AsPlanned, Case::AbortTooLow, Case::AbortUnderThrust];
+        assert!(landed.clone().all(|impact| may_land.contains(&impact.case)), "{impacts:?}");
     }
-    let farthest_m = |way: Way| {
-        let of_way = flights.iter().flatten().filter(|impact| impact.way == way);
-        of_way.map(Impact::distance_m).fold(0.0, f64::max)
+    let farthest_m = |case: Case| {
+        let of_case = flights.iter().flatten().filter(|impact| impact.case == case);
+        of_case.map(Impact::distance_m).fold(0.0, f64::max)
     };
-    for way in [Way::AbortInAscent, Way::NoSeparation, Way::Uncommanded] {
-        assert!(farthest_m(way) > 120.0, "{way:?} {} m", farthest_m(way));
+    for case in [Case::AbortInAscent, Case::NoSeparation, Case::Uncommanded] {
+        assert!(farthest_m(case) > 120.0, "{case:?} {} m", farthest_m(case));
     }
-    assert!(farthest_m(Way::AsPlanned) < 120.0);
+    assert!(farthest_m(Case::AsPlanned) < 120.0);
 }
 
 /// The study holds the fins and moves the world alone once the parachute is out. A flight with its
@@ -54,7 +54,7 @@ fn under_the_parachute_the_computer_changes_nothing() {
         let place_m = flight.world().state().position_m;
         Some([place_m.x, place_m.y])
     };
-    let found = fly(&recipe, &[Way::AbortInAscent, Way::NoSeparation], 1).unwrap();
+    let found = fly(&recipe, &[Case::AbortInAscent, Case::NoSeparation], 1).unwrap();
     let [aborted, stays_on] = [0, 1].map(|place: usize| found[place].place_m);
     assert_eq!([aborted, aborted], [flown("abort@boost+0.5"), flown("abort@coast+2")]);
     assert_eq!(stays_on, flown("separation-fails@0"));
@@ -68,11 +68,11 @@ fn the_widest_way_is_flown_more_often_and_on_any_number_of_threads_alike() {
     let alone = flown(1);
     assert_eq!(alone, flown(2));
     // A parachute drifts with the wind; what falls without one does not.
-    let (way, radius) = widest(&alone).unwrap();
+    let (case, radius) = widest(&alone).unwrap();
     // From the apogee or a moment after it: which of the two reaches further is decided by metres.
-    assert!(matches!(way, Way::ParachuteFromApogee | Way::AbortInDescent), "{way:?}");
+    assert!(matches!(case, Case::ParachuteFromApogee | Case::AbortInDescent), "{case:?}");
     assert_eq!(radius.flights, 3);
-    let falls = Radius::of_way(&alone, Way::Ballistic).unwrap();
+    let falls = Radius::of_case(&alone, Case::Ballistic).unwrap();
     assert!(falls.flights == 1 && falls.farthest_m < radius.farthest_m, "{falls:?}");
 }
 
@@ -83,7 +83,7 @@ fn a_parachute_drifts_downwind_whatever_the_direction_of_the_wind() {
     recipe.dispersion.wind_m_s = [8.0; 2];
     let mut quarters = [false; 4];
     for number in 0..8 {
-        let impact = fly(&recipe, &[Way::Uncommanded], number).unwrap()[0];
+        let impact = fly(&recipe, &[Case::Uncommanded], number).unwrap()[0];
         let [along_m, left_m] = impact.in_wind_m().unwrap();
         assert!(along_m > 150.0 && left_m.abs() < 0.6 * along_m, "{number}: {along_m} {left_m}");
         quarters[(impact.downwind_rad / core::f64::consts::FRAC_PI_2) as usize % 4] = true;
@@ -95,7 +95,7 @@ fn a_parachute_drifts_downwind_whatever_the_direction_of_the_wind() {
 #[test]
 fn val_hand_a_place_downwind_and_left_of_it() {
     let impact = Impact {
-        way: Way::AsPlanned,
+        case: Case::AsPlanned,
         number: 0,
         place_m: Some([-3.0, 10.0]),
         downwind_rad: core::f64::consts::FRAC_PI_2,
@@ -108,9 +108,9 @@ fn val_hand_a_place_downwind_and_left_of_it() {
 }
 
 #[test]
-fn without_a_booster_nothing_of_one_is_asked() {
-    let apogee = Way::of(&recipe("mk2", StartPoint::Apogee).mission);
-    assert!(!apogee.contains(&Way::AbortInAscent) && apogee.contains(&Way::ParachuteFromApogee));
-    let drone = Way::of(&recipe("vlr", StartPoint::Drone).mission);
-    assert!(!drone.contains(&Way::ParachuteFromApogee) && drone.contains(&Way::Ballistic));
+fn without_a_booster_no_scenario_needs_one() {
+    let apogee = Case::of(&recipe("mk2", StartPoint::Apogee).mission);
+    assert!(!apogee.contains(&Case::AbortInAscent) && apogee.contains(&Case::ParachuteFromApogee));
+    let drone = Case::of(&recipe("vlr", StartPoint::Drone).mission);
+    assert!(!drone.contains(&Case::ParachuteFromApogee) && drone.contains(&Case::Ballistic));
 }

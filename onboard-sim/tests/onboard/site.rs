@@ -4,7 +4,7 @@
 use flight::vehicle::mission::StartPoint;
 use onboard_sim::card::Card;
 use onboard_sim::check::check;
-use onboard_sim::hazard::{Flights, Way, fly};
+use onboard_sim::hazard::{Case, Flights, fly};
 use sim::recipe::Recipe;
 
 /// mk3 from its pad at an altitude, m, and a temperature, degrees Celsius.
@@ -23,7 +23,7 @@ fn thinner_air_changes_apogee_hazard_radius_card_check_and_campaign() {
     let sites = [(0.0, None), (1_500.0, None), (1_500.0, Some(35.0))];
     let found = sites.map(|(altitude_m, temperature_c)| {
         let recipe = recipe(altitude_m, temperature_c);
-        let impacts = fly(&recipe, &[Way::AsPlanned, Way::BallisticWithBooster, Way::Booster], 3).unwrap();
+        let impacts = fly(&recipe, &[Case::AsPlanned, Case::BallisticWithBooster, Case::Booster], 3).unwrap();
         let row = onboard_sim::run::fly(&recipe, 1, &|_| {}).unwrap().remove(0);
         let page = check(&recipe, &[], 0, &|_| {}).unwrap().to_string();
         let flights = Flights { survey: 1, of_widest: 1 };

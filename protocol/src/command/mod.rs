@@ -1,8 +1,8 @@
 //! Parses MAVLink commands, builds their answers, and sends commands with retries.
 //!
 //! Protocol: <https://mavlink.io/en/services/command.html>. Requests and answers hold numbers
-//! instead of the dialect's enums, because a command that the dialect does not know must still be
-//! answered UNSUPPORTED.
+//! instead of the dialect's enums, because a command outside the dialect must still be answered
+//! UNSUPPORTED.
 
 mod sender;
 
@@ -84,16 +84,16 @@ impl CommandRequest {
 
     /// Reads parameter 7 of a command that can move something. Other ground stations leave it at 0
     /// or NaN.
-    pub fn meant_boot(&self) -> MeantBoot {
+    pub fn addressed_boot(&self) -> AddressedBoot {
         let param7 = self.params[6];
         if param7.is_nan() || param7.abs() < 0.5 {
-            MeantBoot::Any
+            AddressedBoot::Any
         } else if (1.0..=LARGEST_BOOT_NUMBER as f32).contains(&param7)
             && libm::truncf(param7).to_bits() == param7.to_bits()
         {
-            MeantBoot::Boot(param7 as u32)
+            AddressedBoot::Boot(param7 as u32)
         } else {
-            MeantBoot::Unreadable
+            AddressedBoot::Unreadable
         }
     }
 
@@ -103,9 +103,10 @@ impl CommandRequest {
     }
 }
 
-/// Numbers of commands begin here, above every force code and every number of an ask.
+/// Smallest command number, above every force code and every proposal number.
 pub const FIRST_NUMBER: u32 = 65_536;
-/// A parameter is a float, which holds whole numbers below this one exactly.
+/// End of the command numbers: a parameter is a float, which represents integers below this one
+/// exactly.
 const NUMBERS_END: u32 = 1 << 24;
 
 fn number_in(param2: f32) -> Option<u32> {
@@ -114,9 +115,9 @@ fn number_in(param2: f32) -> Option<u32> {
     (whole && fits).then_some(param2 as u32)
 }
 
-/// The boot of a vehicle that a command is meant for.
+/// The boot of a vehicle that a command is addressed to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum MeantBoot {
+pub enum AddressedBoot {
     /// It names none.
     Any,
     Boot(u32),
@@ -133,9 +134,8 @@ pub struct CommandAnswer {
     pub result: u8,
     /// Percent done while the result is MAV_RESULT_IN_PROGRESS; 255 means unknown.
     pub progress: u8,
-    /// RESULT_PARAM2: the number of the command, negative if a second person has to confirm it. Of
-    /// a command without a number it is the number of the ask that has to be confirmed; 0 if there
-    /// is none.
+    /// RESULT_PARAM2: the number of the command, negative if a second person must confirm it. For a
+    /// command without a number it is the number of the proposal to confirm; 0 if there is none.
     pub detail: i32,
     /// The component that the answer is for.
     pub target: Address,
@@ -152,10 +152,10 @@ impl CommandAnswer {
         }
     }
 
-    /// The same, for a command that a second person has to confirm by the number of this ask.
+    /// The same, for a command that a second person must confirm by this proposal number.
     #[must_use]
-    pub fn asking(self, ask: u16) -> Self {
-        let detail = if self.detail == 0 { ask.into() } else { -self.detail };
+    pub fn for_confirmation(self, proposal: u16) -> Self {
+        let detail = if self.detail == 0 { proposal.into() } else { -self.detail };
         Self { detail, ..self }
     }
 
@@ -164,8 +164,8 @@ impl CommandAnswer {
         Some(self.detail.unsigned_abs()).filter(|number| *number >= FIRST_NUMBER)
     }
 
-    /// Whether a second person has to confirm the command.
-    pub fn asks(&self) -> bool {
+    /// Whether a second person must confirm the command.
+    pub fn is_open(&self) -> bool {
         self.detail < 0 || (self.detail > 0 && self.number().is_none())
     }
 

@@ -11,7 +11,7 @@ use crate::identity::Address;
 /// How often an unanswered command is sent again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Resend {
-    /// Sent once: what is meant for one moment.
+    /// Sent once, for a command that is valid for one moment.
     Never,
     /// Sent this many further times, under one number: the vehicle does it once.
     Times(u8),
@@ -36,13 +36,13 @@ impl Resend {
 const URGENT_SENDINGS: u32 = 20;
 /// Interval between the sendings of an abort that is not accepted yet.
 const URGENT_INTERVAL: Duration = Duration::from_millis(50);
-/// After a silence this long an outage may be over when something is heard.
+/// Silence after which a received frame may mark the end of an outage.
 const SILENCE: Duration = Duration::from_millis(100);
 /// Interval between the sendings of an accepted abort.
 const STEADY_INTERVAL: Duration = Duration::from_millis(200);
 
-/// What happened to a command. Acknowledged is not observed: only the vehicle's state shows that a
-/// command was done.
+/// Progress of a command. Acknowledged is not observed: only the vehicle's state proves that a
+/// command was executed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CommandEvent {
     Sent {
@@ -50,7 +50,7 @@ pub enum CommandEvent {
         /// Number of the attempt, from 1.
         attempt: u32,
     },
-    /// The answer says that it is being done.
+    /// Acknowledged as in progress.
     InProgress {
         command: u16,
         /// Percent done; 255 means unknown.
@@ -60,15 +60,15 @@ pub enum CommandEvent {
     Answered {
         command: u16,
         result: u8,
-        /// A second person has to confirm.
-        asks: bool,
+        /// A second person must confirm.
+        open: bool,
     },
     /// The final answer to a command that is no longer waited for, because it was given up or
     /// replaced by another command with its number.
     AnsweredLate {
         command: u16,
         result: u8,
-        asks: bool,
+        open: bool,
         /// The ticket that [`CommandSender::submit`] returned.
         ticket: Ticket,
     },
@@ -80,14 +80,14 @@ pub enum CommandEvent {
 const ANSWER_TIMEOUT: Duration = Duration::from_millis(500);
 /// After the answer "in progress" a command waits this long for the final answer.
 const PROGRESS_TIMEOUT: Duration = Duration::from_secs(3);
-/// The answer to a command that nobody waits for any more may arrive up to this much later.
+/// Time limit of the answer to a command that is no longer pending.
 const LATE_ANSWER_WITHIN: Duration = Duration::from_secs(10);
 
 /// Identifies one submitted command among others with the same number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Ticket(u64);
 
-/// A command that nobody waits for any more, but that may still be answered.
+/// A command that is no longer pending, but may still be answered.
 #[derive(Debug)]
 struct Late {
     command: MavCmd,
@@ -134,7 +134,7 @@ impl Pending {
         number_in(self.message.param2)
     }
 
-    /// The answer that may still come when this command is no longer waited for.
+    /// The late answer still possible when this command is no longer pending.
     fn into_late(self, now: Duration) -> Option<Late> {
         let late = Late {
             command: self.message.command,
@@ -147,8 +147,8 @@ impl Pending {
     }
 }
 
-/// The sender's side of the command protocol, without I/O: [`CommandSender::poll`] returns what to
-/// send.
+/// The sender's side of the command protocol, without I/O: [`CommandSender::poll`] returns the
+/// frames to send.
 ///
 /// A command that is sent until it is withdrawn may be answered many times; each answer that
 /// differs from the one before is reported.
@@ -164,7 +164,7 @@ pub struct CommandSender {
     late: Vec<Late>,
     events: Vec<CommandEvent>,
     submitted: u64,
-    heard_at: Option<Duration>,
+    received_at: Option<Duration>,
     /// Where the numbers begin: another station with the same address should begin elsewhere.
     begin: u32,
 }
@@ -225,13 +225,12 @@ impl CommandSender {
         self.withdraw(now, |pending| pending.ticket == ticket);
     }
 
-    /// Notes that something was heard from the target. After a silence an abort that is not
-    /// accepted yet is due at once: an outage may be over, and the next one may begin soon. Returns
-    /// whether that is so.
-    pub fn on_heard(&mut self, now: Duration) -> bool {
-        let heard_at = self.heard_at.replace(now);
+    /// Notes that a frame was received from the target. After a silence an unaccepted abort is due
+    /// at once: an outage may be over, and the next one may begin soon. Returns whether that is so.
+    pub fn on_received(&mut self, now: Duration) -> bool {
+        let received_at = self.received_at.replace(now);
         let mut due = false;
-        if heard_at.is_none_or(|at| now.saturating_sub(at) >= SILENCE) {
+        if received_at.is_none_or(|at| now.saturating_sub(at) >= SILENCE) {
             for pending in &mut self.pending {
                 let urgent = pending.resend.is_persistent() && !pending.is_accepted();
                 if urgent && pending.attempts > 0 {
@@ -249,7 +248,7 @@ impl CommandSender {
         self.pending.iter().map(|pending| pending.due_at).min()
     }
 
-    /// Stops sending all commands. Answers to what was sent may still come.
+    /// Stops sending all commands. Answers to sent commands may still arrive.
     pub fn withdraw_all(&mut self, now: Duration) {
         self.withdraw(now, |_| true);
     }
@@ -305,9 +304,9 @@ impl CommandSender {
             && let Some(late) = self.late.iter_mut().find(late)
         {
             if final_answer && !core::mem::replace(&mut late.is_answered, true) {
-                let (asks, ticket) = (answer.asks(), late.ticket);
+                let (open, ticket) = (answer.is_open(), late.ticket);
                 let CommandAnswer { command, result, .. } = *answer;
-                self.events.push(CommandEvent::AnsweredLate { command, result, asks, ticket });
+                self.events.push(CommandEvent::AnsweredLate { command, result, open, ticket });
             }
             return true;
         }
@@ -320,7 +319,7 @@ impl CommandSender {
         } else if final_answer {
             self.pending.remove(index);
             let CommandAnswer { command, result, .. } = *answer;
-            self.events.push(CommandEvent::Answered { command, result, asks: answer.asks() });
+            self.events.push(CommandEvent::Answered { command, result, open: answer.is_open() });
         } else {
             self.pending[index].in_progress = true;
             self.pending[index].due_at = now + PROGRESS_TIMEOUT;
@@ -340,7 +339,7 @@ impl CommandSender {
         *known = Some(answer.result);
         let CommandAnswer { command, result, progress, .. } = answer;
         self.events.push(if final_answer {
-            CommandEvent::Answered { command, result, asks: answer.asks() }
+            CommandEvent::Answered { command, result, open: answer.is_open() }
         } else {
             CommandEvent::InProgress { command, progress }
         });
@@ -429,25 +428,21 @@ mod tests {
     }
 
     #[test]
-    fn what_is_heard_after_a_silence_lets_an_abort_leave_at_once() {
+    fn abort_is_sent_immediately_when_the_link_returns() {
         let abort = MavCmd::MAV_CMD_DO_FLIGHTTERMINATION;
         let mut sender = CommandSender::new(0);
         sender.submit(VEHICLE, abort, [1.0; 7], Resend::UntilWithdrawn, ms(0));
         let mut sent = Vec::new();
-        // The vehicle is heard every 10 ms, except between 500 and 1,230 ms.
+        // Frames arrive every 10 ms, except between 500 and 1,230 ms.
         for now in (0..2_000).step_by(10) {
-            let heard = !(500..1_230).contains(&now);
-            if now % 50 == 0 || (heard && sender.on_heard(ms(now))) {
+            let receives = !(500..1_230).contains(&now);
+            if now % 50 == 0 || (receives && sender.on_received(ms(now))) {
                 sent.extend(sender.poll(ms(now)).iter().map(|_| now));
             }
         }
         assert!(sent.contains(&1_230), "{sent:?}");
         assert!(sent.windows(2).all(|pair| pair[1] - pair[0] >= 25), "{sent:?}");
-        assert!(
-            sent.len() <= 42,
-            "what is heard all the time does not make it more frequent: {}",
-            sent.len()
-        );
+        assert!(sent.len() <= 42, "continuous reception does not make it more frequent: {}", sent.len());
     }
 
     /// Dead air in bursts, both ways, for 30 % of the time.
@@ -480,10 +475,10 @@ mod tests {
             sender.submit(VEHICLE, abort, [1.0; 7], Resend::UntilWithdrawn, ms(0));
             let arrived = (0..10_000).find(|now| {
                 let up = alive(*now) == Some(true);
-                // The vehicle is heard thirty times a second, and the station looks when it hears
-                // it or something is due.
+                // Frames arrive thirty times a second, and the station polls on reception or when
+                // something is due.
                 let due = sender.due_at().is_some_and(|at| at <= ms(*now));
-                (due || (up && now % 33 == 0 && sender.on_heard(ms(*now))))
+                (due || (up && now % 33 == 0 && sender.on_received(ms(*now))))
                     && !sender.poll(ms(*now)).is_empty()
                     && up
             });
@@ -499,14 +494,14 @@ mod tests {
             aborts_ms(&[(100, accepted), (150, accepted), (160, MavResult::MAV_RESULT_FAILED)], 500);
         assert_eq!(sent, [0, 50, 100, 150, 350], "less often once it is accepted");
         let command = MavCmd::MAV_CMD_DO_FLIGHTTERMINATION as u16;
-        assert_eq!(events, [CommandEvent::Answered { command, result: 0, asks: false }]);
+        assert_eq!(events, [CommandEvent::Answered { command, result: 0, open: false }]);
     }
 
     #[test]
     fn each_answer_belongs_to_the_command_whose_number_it_has() {
         let (command, result) = (ARM as u16, 0);
-        let late = CommandEvent::AnsweredLate { command, result, asks: false, ticket: Ticket(1) };
-        let answered = CommandEvent::Answered { command, result, asks: false };
+        let late = CommandEvent::AnsweredLate { command, result, open: false, ticket: Ticket(1) };
+        let answered = CommandEvent::Answered { command, result, open: false };
         for disarmed_ms in [200, 3_000] {
             let [first, second, third] = [100, 200, 700].map(|after| disarmed_ms + after);
             // A repeated arming is answered twice.

@@ -1,9 +1,8 @@
 //! The side of MAVLink FTP that fetches a file.
 //!
 //! Packets go in with [`Download::take`], packets to send come out of [`Download::poll`], and the
-//! file comes out in order as [`DownloadEvent`]s. The caller writes it, says with
-//! [`Download::resume`] how much of it is there from before, and compares the checksum of the whole
-//! file in the end.
+//! file comes out in order as [`DownloadEvent`]s. The caller writes it, passes the length of an
+//! earlier part to [`Download::resume`], and compares the checksum of the complete file at the end.
 
 use alloc::collections::{BTreeMap, VecDeque};
 use alloc::format;
@@ -16,15 +15,15 @@ use super::packet::{DATA_LEN, Opcode, Packet, Refusal};
 
 /// A request that is not answered for this long is sent again; all requests to read, when none was
 /// answered.
-const ASK_AGAIN: Duration = Duration::from_millis(900);
-/// A vehicle that has said nothing about files for this long is given up.
+const RETRY_AFTER: Duration = Duration::from_millis(900);
+/// Time without an answer about files after which the download fails.
 const GIVE_UP: Duration = Duration::from_secs(30);
 /// Requests to close the file before it is left to the vehicle to close it.
 const CLOSE_TRIES: u32 = 3;
-/// Most pieces that are asked for at once. A line of 57,600 baud carries them in 1.5 s, so it has
-/// something to carry while a lost request is noticed.
+/// Most pieces requested at once. A line of 57,600 baud carries them in 1.5 s, so it stays busy
+/// while a lost request is detected.
 const MAX_WAITING: usize = 32;
-/// Pieces this far behind the first one that is missing are not asked for, bytes: they wait in
+/// Distance from the first missing piece beyond which pieces are not requested, bytes: they wait in
 /// memory.
 const AHEAD: u32 = 1024 * DATA_LEN as u32;
 /// The rate is a mean over this many seconds.
@@ -50,10 +49,10 @@ pub enum Failure {
     Refused(Refusal),
 }
 
-/// What a packet has brought.
+/// Result of a packet.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum DownloadEvent {
-    /// The file is open: the caller resumes with what it has of the file with this checksum.
+    /// The file is open: the caller resumes with its part of the file with this checksum.
     Opened { crc: u32 },
     /// The next bytes of the file.
     Data(Vec<u8>),
@@ -73,7 +72,7 @@ pub struct Progress {
 enum Phase {
     Listing,
     Opening,
-    /// Asks for the checksum of the whole file.
+    /// Requests the checksum of the complete file.
     Summing,
     Reading,
     Closing,
@@ -82,13 +81,13 @@ enum Phase {
 
 /// A request that is waiting for its answer.
 #[derive(Debug, Clone)]
-struct Asked {
+struct PendingRequest {
     packet: Packet,
     sent_at: Option<Duration>,
     tries: u32,
 }
 
-/// One file on its way.
+/// One file download.
 #[derive(Debug, Clone)]
 pub struct Download {
     phase: Phase,
@@ -96,7 +95,7 @@ pub struct Download {
     /// The files that were listed, the newest last.
     listed: Vec<String>,
     path: Option<String>,
-    asked: Option<Asked>,
+    pending: Option<PendingRequest>,
     session: u8,
     len: u32,
     crc: Option<u32>,
@@ -107,8 +106,8 @@ pub struct Download {
     /// Requests to read, in the order in which they were sent.
     waiting: VecDeque<Packet>,
     repeated_at: Duration,
-    heard_at: Option<Duration>,
-    /// Bytes at the last whole seconds.
+    answered_at: Option<Duration>,
+    /// Bytes at the last full seconds.
     rate: VecDeque<(Duration, u32)>,
 }
 
@@ -121,7 +120,7 @@ impl Download {
             sequence: first_sequence,
             listed: Vec::new(),
             path: name.map(|name| format!("{LOG_DIRECTORY}/{name}")),
-            asked: None,
+            pending: None,
             session: 0,
             len: 0,
             crc: None,
@@ -129,12 +128,12 @@ impl Download {
             ahead: BTreeMap::new(),
             waiting: VecDeque::new(),
             repeated_at: Duration::ZERO,
-            heard_at: None,
+            answered_at: None,
             rate: VecDeque::new(),
         }
     }
 
-    /// The name of the file, once it is known.
+    /// The name of the file, once available.
     pub fn name(&self) -> Option<&str> {
         self.path.as_deref().and_then(|path| path.rsplit('/').next())
     }
@@ -143,7 +142,7 @@ impl Download {
     pub fn resume(&mut self, bytes: u32) {
         if self.phase == Phase::Reading && bytes <= self.len {
             self.bytes = bytes;
-            self.close_if_whole();
+            self.close_if_complete();
         }
     }
 
@@ -175,15 +174,15 @@ impl Download {
         if self.ended().is_some() {
             return None;
         }
-        if packet.asked == Opcode::READ_FILE {
+        if packet.request == Opcode::READ_FILE {
             return self.take_piece(packet, now);
         }
-        let expected = self.asked.as_ref().is_some_and(|asked| asked.packet.is_answered_by(packet));
+        let expected = self.pending.as_ref().is_some_and(|pending| pending.packet.is_answered_by(packet));
         if !expected {
             return None;
         }
-        self.heard_at = Some(now);
-        self.asked = None;
+        self.answered_at = Some(now);
+        self.pending = None;
         match (self.phase, packet.refusal()) {
             (Phase::Listing, None) => {
                 let files = packet.data.split(|byte| *byte == 0).filter(|entry| !entry.is_empty());
@@ -220,25 +219,25 @@ impl Download {
         None
     }
 
-    /// What to send now; to be called often, also when nothing has arrived.
+    /// Returns the packets to send now; to be called often, also when nothing has arrived.
     pub fn poll(&mut self, now: Duration) -> Vec<Packet> {
-        let heard_at = *self.heard_at.get_or_insert(now);
-        if self.ended().is_none() && now.saturating_sub(heard_at) >= GIVE_UP {
+        let answered_at = *self.answered_at.get_or_insert(now);
+        if self.ended().is_none() && now.saturating_sub(answered_at) >= GIVE_UP {
             // Nothing is missing of a file that only waits to be closed.
             self.phase = Phase::Over((self.phase != Phase::Closing).then_some(Failure::NoAnswer));
         }
         self.measure(now);
         match self.phase {
             Phase::Over(_) => Vec::new(),
-            Phase::Reading => self.read(now.saturating_sub(heard_at), now),
+            Phase::Reading => self.read(now.saturating_sub(answered_at), now),
             Phase::Listing | Phase::Opening | Phase::Summing | Phase::Closing => {
-                self.ask(now).into_iter().collect()
+                self.next_request(now).into_iter().collect()
             }
         }
     }
 
-    fn ask(&mut self, now: Duration) -> Option<Packet> {
-        if self.asked.is_none() {
+    fn next_request(&mut self, now: Duration) -> Option<Packet> {
+        if self.pending.is_none() {
             let path = self.path.as_deref().unwrap_or_default();
             let (opcode, session, offset, path) = match self.phase {
                 Phase::Listing => (Opcode::LIST_DIRECTORY, 0, self.listed.len() as u32, LOG_DIRECTORY),
@@ -248,26 +247,26 @@ impl Download {
             };
             let packet = Packet::request(self.sequence, session, opcode, offset, path);
             self.sequence = self.sequence.wrapping_add(1);
-            self.asked = Some(Asked { packet, sent_at: None, tries: 0 });
+            self.pending = Some(PendingRequest { packet, sent_at: None, tries: 0 });
         }
         let closing = self.phase == Phase::Closing;
-        let asked = self.asked.as_mut()?;
-        if asked.sent_at.is_some_and(|sent_at| now.saturating_sub(sent_at) < ASK_AGAIN) {
+        let pending = self.pending.as_mut()?;
+        if pending.sent_at.is_some_and(|sent_at| now.saturating_sub(sent_at) < RETRY_AFTER) {
             return None;
         }
-        if closing && asked.tries >= CLOSE_TRIES {
+        if closing && pending.tries >= CLOSE_TRIES {
             self.phase = Phase::Over(None);
             return None;
         }
-        asked.sent_at = Some(now);
-        asked.tries += 1;
-        Some(asked.packet.clone())
+        pending.sent_at = Some(now);
+        pending.tries += 1;
+        Some(pending.packet.clone())
     }
 
     /// Asks for the first pieces that are missing.
     fn read(&mut self, silent: Duration, now: Duration) -> Vec<Packet> {
         let mut packets = Vec::new();
-        if silent >= ASK_AGAIN && now.saturating_sub(self.repeated_at) >= ASK_AGAIN {
+        if silent >= RETRY_AFTER && now.saturating_sub(self.repeated_at) >= RETRY_AFTER {
             self.repeated_at = now;
             // The same requests: the vehicle answers one that waits there once.
             packets.extend(self.waiting.iter().cloned());
@@ -276,8 +275,8 @@ impl Download {
         let mut offset = self.bytes;
         while offset < end && self.waiting.len() < MAX_WAITING {
             let size = (self.len - offset).min(DATA_LEN as u32);
-            let is_asked = self.waiting.iter().any(|request| request.offset == offset);
-            if !is_asked && !self.ahead.contains_key(&offset) {
+            let is_requested = self.waiting.iter().any(|request| request.offset == offset);
+            if !is_requested && !self.ahead.contains_key(&offset) {
                 let request = Packet::request(self.sequence, self.session, Opcode::READ_FILE, offset, "");
                 let request = Packet { size: size as u8, ..request };
                 self.sequence = self.sequence.wrapping_add(1);
@@ -289,7 +288,7 @@ impl Download {
         packets
     }
 
-    /// The file is open, perhaps again: goes on if it is the same one.
+    /// The file is open, perhaps again: continues if it is the same one.
     fn opened(&mut self, crc: u32) -> Option<DownloadEvent> {
         self.phase = Phase::Reading;
         self.waiting.clear();
@@ -300,11 +299,11 @@ impl Download {
         self.bytes = 0;
         self.ahead.clear();
         self.rate.clear();
-        self.close_if_whole();
+        self.close_if_complete();
         Some(DownloadEvent::Opened { crc })
     }
 
-    fn close_if_whole(&mut self) {
+    fn close_if_complete(&mut self) {
         if self.bytes == self.len {
             self.phase = Phase::Closing;
         }
@@ -316,7 +315,7 @@ impl Download {
         }
         match packet.refusal() {
             Some(Refusal::InvalidSession) => {
-                self.heard_at = Some(now);
+                self.answered_at = Some(now);
                 self.phase = Phase::Opening;
                 return None;
             }
@@ -330,12 +329,11 @@ impl Download {
             request.offset == packet.offset && usize::from(request.size) == packet.data.len()
         };
         let place = self.waiting.iter().position(is_this)?;
-        // Only a new piece keeps the download alive: a vehicle that repeats itself for ever is
-        // given up.
-        self.heard_at = Some(now);
+        // Only a new piece resets the timeout: a vehicle that repeats itself forever times out.
+        self.answered_at = Some(now);
         let request = self.waiting.remove(place)?;
         if request.is_answered_by(packet) {
-            // The vehicle answers in order: what was asked for earlier is lost.
+            // The vehicle answers in order: earlier requests are lost.
             self.waiting.drain(..place);
         }
         self.ahead.insert(packet.offset, packet.data.clone());
@@ -344,7 +342,7 @@ impl Download {
             self.bytes += piece.len() as u32;
             data.extend(piece);
         }
-        self.close_if_whole();
+        self.close_if_complete();
         (!data.is_empty()).then_some(DownloadEvent::Data(data))
     }
 
@@ -391,7 +389,7 @@ mod tests {
     }
 
     #[test]
-    fn the_last_bytes_of_the_longest_possible_file_are_asked_for() {
+    fn the_last_bytes_of_the_longest_possible_file_are_requested() {
         let mut download = Download::new(Some("flight.mcap"), 0);
         for _ in 0..2 {
             for packet in download.poll(Duration::ZERO) {
@@ -399,8 +397,8 @@ mod tests {
             }
         }
         download.resume(u32::MAX - 5);
-        let asked = download.poll(Duration::ZERO);
-        assert_eq!(asked.len(), 1, "{asked:?}");
-        assert_eq!((asked[0].offset, asked[0].size), (u32::MAX - 5, 5));
+        let requests = download.poll(Duration::ZERO);
+        assert_eq!(requests.len(), 1, "{requests:?}");
+        assert_eq!((requests[0].offset, requests[0].size), (u32::MAX - 5, 5));
     }
 }

@@ -3,16 +3,16 @@
 //!
 //! * [`packet`]: the packets, and the frames that carry them;
 //! * [`server`]: the vehicle's side; everything that writes is refused;
-//! * [`download`]: the ground's side: it asks for some pieces at once, and again for those that
-//!   were lost; it continues where an earlier process was stopped;
-//! * [`crc`]: the checksum of a whole file.
+//! * [`download`]: the ground's side: it requests several pieces at once, and repeats lost
+//!   requests; it continues an interrupted download;
+//! * [`crc`]: the checksum of a complete file.
 //!
-//! A log is fetched after the flight, and recording goes on meanwhile. The recorder sets a mark;
-//! what was written up to it does not change any more, and the file is offered up to there, with
-//! the end of a log behind it. Packets are frames like any other: signed, counted, in the log
-//! (without the piece of the file that they carry). A link that reads gets a lane of its own, which
-//! takes one piece at a time when it has room. When the ground has all pieces, the checksums are
-//! compared, and the file gets its name.
+//! A log is fetched after the flight, while recording continues. The recorder sets a mark; the
+//! content up to it does not change any more, and the file is offered up to there, with the end of
+//! a log behind it. Packets are frames like any other: signed, counted, in the log (without the
+//! piece of the file that they carry). A reading link gets a separate lane, which takes one piece
+//! at a time when it has room. When the ground has all pieces, the checksums are compared, and the
+//! file gets its name.
 //!
 //! Nothing here reads a file, a clock or a link. Protocol:
 //! <https://mavlink.io/en/services/ftp.html>.

@@ -16,7 +16,7 @@ pub const PAYLOAD_LEN: usize = 254;
 const ADDRESS_LEN: usize = 3;
 const HEADER_LEN: usize = 12;
 
-/// What a packet asks for, or how it answers: a MAV_FTP_OPCODE. Any other number writes, or it is
+/// The request or answer code of a packet: a MAV_FTP_OPCODE. Any other number writes, or is
 /// unknown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Opcode(pub u8);
@@ -108,10 +108,10 @@ pub struct Packet {
     pub sequence: u16,
     pub session: u8,
     pub opcode: Opcode,
-    /// The length of `data`; a request to read has no data, and asks for this many bytes.
+    /// The length of `data`; a request to read has no data, and requests this many bytes.
     pub size: u8,
-    /// Of an answer: what was asked.
-    pub asked: Opcode,
+    /// In an answer: the opcode of the request.
+    pub request: Opcode,
     /// The last packet of a burst.
     pub burst_complete: bool,
     pub offset: u32,
@@ -127,7 +127,7 @@ impl Packet {
             session,
             opcode,
             size: data.len() as u8,
-            asked: Opcode::NONE,
+            request: Opcode::NONE,
             burst_complete: false,
             offset,
             data,
@@ -142,7 +142,7 @@ impl Packet {
             sequence: self.sequence.wrapping_add(1),
             opcode: Opcode::ACK,
             size: data.len() as u8,
-            asked: self.opcode,
+            request: self.opcode,
             burst_complete: false,
             data,
             ..*self
@@ -162,7 +162,7 @@ impl Packet {
 
     /// Whether that packet is the answer to this request.
     pub fn is_answered_by(&self, answer: &Self) -> bool {
-        answer.asked == self.opcode && answer.sequence == self.sequence.wrapping_add(1)
+        answer.request == self.opcode && answer.sequence == self.sequence.wrapping_add(1)
     }
 
     /// A path in a request, without the zeros behind it; bytes that are no UTF-8 name no file.
@@ -180,7 +180,7 @@ impl Packet {
         let (header, rest) = bytes.split_at_checked(HEADER_LEN)?;
         let opcode = Opcode(header[3]);
         let size = header[4];
-        // What a request reads is in the answer, not in the request.
+        // The data of a read is in the answer, not in the request.
         let has_data = !matches!(opcode, Opcode::READ_FILE | Opcode::BURST_READ_FILE);
         let len = if has_data { usize::from(size).min(rest.len()) } else { 0 };
         Some(Self {
@@ -188,7 +188,7 @@ impl Packet {
             session: header[2],
             opcode,
             size,
-            asked: Opcode(header[5]),
+            request: Opcode(header[5]),
             burst_complete: header[6] != 0,
             offset: u32::from_le_bytes([header[8], header[9], header[10], header[11]]),
             data: rest[..len].to_vec(),
@@ -202,7 +202,7 @@ impl Packet {
         payload[2] = self.session;
         payload[3] = self.opcode.0;
         payload[4] = self.size;
-        payload[5] = self.asked.0;
+        payload[5] = self.request.0;
         payload[6] = u8::from(self.burst_complete);
         payload[8..HEADER_LEN].copy_from_slice(&self.offset.to_le_bytes());
         let data = &self.data[..self.data.len().min(DATA_LEN)];
@@ -231,8 +231,8 @@ fn packet_in(frame: &Frame) -> Option<(Address, Packet)> {
     Some((target, Packet::from_bytes(&bytes[ADDRESS_LEN..PAYLOAD_LEN])?))
 }
 
-/// Whether a frame carries a piece of a file, and where in its payload that piece begins. A log
-/// does not keep it: a log that is downloaded would contain itself.
+/// Returns where in its payload the piece of a file begins, if a frame carries one. A log omits it:
+/// a log that is downloaded would contain itself.
 pub(crate) fn piece_begins_at(message_id: u32, payload: &[u8]) -> Option<usize> {
     let opcode = |place: usize| payload.get(ADDRESS_LEN + place).copied().map(Opcode);
     let is_piece = message_id == FILE_TRANSFER_PROTOCOL_ID
@@ -283,8 +283,8 @@ mod tests {
             data in proptest::collection::vec(any::<u8>(), 0..=DATA_LEN),
             burst_complete in any::<bool>(),
         ) {
-            let asked = Packet::request(sequence, session, Opcode::BURST_READ_FILE, offset, "");
-            let packet = Packet { burst_complete, ..asked.ack(&data) };
+            let request = Packet::request(sequence, session, Opcode::BURST_READ_FILE, offset, "");
+            let packet = Packet { burst_complete, ..request.ack(&data) };
             let frame = Encoder::new(VEHICLE).encode(&packet.message(GROUND));
             prop_assert_eq!(Packet::answer_in(&frame), Some((GROUND, packet)));
         }

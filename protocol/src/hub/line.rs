@@ -1,8 +1,8 @@
-//! A line of a known speed: what waits for it, what goes next, and when.
+//! A line of a known speed: its queue, and the choice and time of the next frame.
 //!
-//! What a driver was given cannot be taken back. So the line gets no more than it can have sent by
+//! Bytes given to a driver cannot be taken back. So the line gets no more than it can have sent by
 //! now. Everything else waits here, where the present state of a sender replaces an older one, and
-//! an abort overtakes what came before it.
+//! an abort overtakes earlier frames.
 
 use alloc::collections::VecDeque;
 use core::time::Duration;
@@ -18,8 +18,8 @@ use crate::dialect::{
 };
 use crate::frame::Frame;
 
-/// The share of the line that is used on average. The rest is for clocks that differ, and for what
-/// a radio adds.
+/// Average utilisation of the line. The rest is for clock differences, and for the overhead of a
+/// radio.
 pub const SHARE: f64 = 0.8;
 /// The line may be given a frame this long before it has sent the last one, because its owner looks
 /// only now and then.
@@ -27,11 +27,10 @@ const AHEAD: Duration = Duration::from_millis(20);
 /// Frames wait at most this long, and the average may be exceeded for this long.
 const HOLDS: Duration = Duration::from_millis(300);
 /// So many frames that are not dropped for others may wait.
-const MOST_KEPT: usize = 64;
-/// The share of its budget that a line keeps in spite of a radio's reports: anybody can forge a
-/// report.
+const MAX_UNDROPPABLE: usize = 64;
+/// Share of its budget that a line retains in spite of a radio's reports: reports can be forged.
 const LEAST: f64 = 0.25;
-/// A radio that has not reported for this long has no say any more.
+/// Validity of a radio's report.
 const REPORT_HOLDS: Duration = Duration::from_secs(10);
 
 const COMMAND_ACK_ID: u32 = 77;
@@ -40,7 +39,7 @@ const TIMESYNC_ID: u32 = 111;
 /// MAV_CMD_DO_FLIGHTTERMINATION.
 const ABORT: u16 = 185;
 
-/// Of these only the newest counts: they tell where and how the sender is.
+/// Of these only the newest counts: they carry the present state of the sender.
 const PRESENT_STATE: [u32; 17] = [
     HEARTBEAT_DATA::ID,
     TD_FLIGHT_STATUS_DATA::ID,
@@ -66,7 +65,7 @@ const PRESENT_STATE: [u32; 17] = [
 enum Rank {
     /// An abort, and the answer to a command.
     Abort,
-    /// What shows whether the sender lives, and an abort.
+    /// Signs of life, and an abort.
     Vital,
     /// Commands, texts and measurements of time.
     Crew,
@@ -91,7 +90,7 @@ fn rank(frame: &Frame) -> Rank {
     }
 }
 
-/// Whether `new` makes `old` needless: a newer state, or the same command once more.
+/// Whether `new` makes `old` obsolete: a newer state, or a repetition of the same command.
 fn replaces(new: &Frame, old: &Frame) -> bool {
     new.message_id() == old.message_id()
         && new.source() == old.source()
@@ -102,14 +101,14 @@ fn replaces(new: &Frame, old: &Frame) -> bool {
         }
 }
 
-/// A line, and what waits for it.
+/// A line, with its queue.
 #[derive(Debug)]
 pub(super) struct Line {
     bytes_s: f64,
-    /// What is added to each frame for its signature, bytes.
+    /// Signature bytes added to each frame.
     added: usize,
     waiting: VecDeque<Frame>,
-    /// When the line has sent what it was given.
+    /// Time at which the line has sent everything given to it.
     free_at: Duration,
     /// When that is paid for out of the budget.
     paid_at: Duration,
@@ -150,7 +149,7 @@ impl Line {
         if now.saturating_sub(at) > REPORT_HOLDS { 1.0 } else { left }
     }
 
-    /// Queues a frame. What it makes needless goes, and telemetry that would have to wait for too
+    /// Queues a frame. Removes frames that it makes obsolete, and telemetry that would wait too
     /// long.
     pub(super) fn push(&mut self, frame: Frame) {
         self.waiting.retain(|old| !replaces(&frame, old));
@@ -162,7 +161,7 @@ impl Line {
             let oldest = self.waiting.iter().position(|frame| rank(frame) == Rank::Telemetry);
             let place = match oldest {
                 Some(place) => place,
-                None if self.waiting.len() > MOST_KEPT => self.waiting.len() - 1,
+                None if self.waiting.len() > MAX_UNDROPPABLE => self.waiting.len() - 1,
                 None => break,
             };
             self.waiting.remove(place);
@@ -181,7 +180,7 @@ impl Line {
         if self.due_at()? > now {
             return None;
         }
-        // What is repeated takes turns with the rest: a heartbeat passes between two sendings of an
+        // Repetitions alternate with the rest: a heartbeat passes between two transmissions of an
         // abort.
         let again = |frame: &Frame| self.last.as_ref().is_some_and(|last| replaces(frame, last));
         let (place, _) =
@@ -239,7 +238,7 @@ mod tests {
         })
     }
 
-    /// What leaves within a time, looked at every millisecond, and when.
+    /// The frames sent within a time, polled every millisecond, with their times.
     fn leaving(line: &mut Line, from_ms: u64, to_ms: u64) -> Vec<(u64, Frame)> {
         let mut left = Vec::new();
         for now in from_ms..to_ms {
@@ -275,7 +274,7 @@ mod tests {
                 while let Some(frame) = line.pop(ms(now)) {
                     sent.push((now, frame.as_bytes().len() + 13));
                 }
-                // What the line still has of all it was given.
+                // Bytes in the line, of all given to it.
                 let given: usize = sent.iter().map(|(_, bytes)| bytes).sum();
                 let carried = u64::from(bytes_s) * (now + 1) / 1_000;
                 let longest = 53 + u64::from(bytes_s) * 20 / 1_000 + 1;
@@ -314,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn telemetry_is_dropped_before_it_waits_for_too_long_and_texts_and_answers_are_kept() {
+    fn telemetry_is_dropped_before_it_waits_too_long_and_texts_and_answers_are_not() {
         let mut line = Line::new(480, 0);
         let mut encoder = Encoder::new(VEHICLE);
         let text = |line: &mut Line, encoder: &mut Encoder| {

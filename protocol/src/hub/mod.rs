@@ -30,20 +30,20 @@ const MAX_STREAMS: usize = 8;
 /// Something that happened on a link.
 #[derive(Debug, Clone, PartialEq)]
 pub enum LinkEvent {
-    /// A valid frame that was not heard before.
+    /// A valid frame, received for the first time.
     Frame(Frame),
     /// A frame that had already arrived over another link.
     Copy(Frame),
     /// A frame whose signature is missing or wrong although a key is set; it must not be acted on.
     Rejected(Frame, Rejection),
     /// A frame of this sender was accepted; that frame follows. The caller must pass this on to the
-    /// link (`transport::TransportSender::believe`).
-    Believed(Origin),
-    /// The link does not answer some senders; the text says how many.
+    /// link (`transport::TransportSender::accept`).
+    Accepted(Origin),
+    /// Some senders are not answered by the link; the text gives their number.
     UnknownSenders(String),
     /// The link works; the text names the peer.
     Up(String),
-    /// The link does not work; the text says why.
+    /// The link does not work; the text gives the reason.
     Down(String),
 }
 
@@ -56,7 +56,7 @@ pub struct HubLink {
     stats: LinkStats,
     trouble: Option<String>,
     copies: u64,
-    /// What waits for a link of a known speed.
+    /// Queue of a link of a known speed.
     line: Option<Line>,
 }
 
@@ -160,7 +160,7 @@ impl Hub {
         }
     }
 
-    /// Sets what each link carries, bytes per second, where that is known. Frames wait for such a
+    /// Sets the capacity of each link, bytes per second, where available. Frames wait for such a
     /// link in the hub.
     #[must_use]
     pub fn over(mut self, carried_bytes_s: &[Option<u32>]) -> Self {
@@ -176,7 +176,7 @@ impl Hub {
         &self.links
     }
 
-    /// Takes what a link received. `clock` is the wall clock as a timestamp
+    /// Takes received data of a link. `clock` is the wall clock as a timestamp
     /// ([`crate::signing::stamp_of`]), which only signatures need. An unknown link number is
     /// ignored.
     pub fn take(&mut self, link: usize, received: Received, now: Duration, clock: u64) -> Vec<LinkEvent> {
@@ -189,7 +189,7 @@ impl Hub {
         let mut news: Vec<LinkEvent> =
             frames.into_iter().map(|frame| self.judge(link, frame, now, clock)).collect();
         if news.iter().any(|news| self.proves_its_sender(news)) {
-            news.insert(0, LinkEvent::Believed(origin));
+            news.insert(0, LinkEvent::Accepted(origin));
         }
         news
     }
@@ -205,8 +205,8 @@ impl Hub {
 
     fn judge(&mut self, link: usize, frame: Frame, now: Duration, clock: u64) -> LinkEvent {
         // A radio has no key: the report about itself is the only message that is accepted
-        // unsigned, and only on a serial line, where the radio is. Over a network anybody could say
-        // that a radio is full.
+        // unsigned, and only on a serial line, where the radio is. Over a network anyone could
+        // claim that a radio is full.
         let is_the_radio_s = frame.message_id() == RADIO_STATUS_ID && self.links[link].line.is_some();
         if let Some(signing) = &mut self.signing
             && (frame.is_signed() || !is_the_radio_s)
@@ -243,8 +243,8 @@ impl Hub {
         }
     }
 
-    /// Takes a frame for a link. Without a known speed it leaves at once, and otherwise when the
-    /// line is free for it: [`Hub::leaving`].
+    /// Takes a frame for a link. Without a known speed it leaves at once, otherwise when the line
+    /// is free for it: [`Hub::leaving`].
     pub fn send(&mut self, link: usize, frame: &Frame, clock: u64) -> Option<Vec<u8>> {
         match &mut self.links.get_mut(link)?.line {
             Some(line) => {
@@ -286,20 +286,20 @@ impl Hub {
     }
 }
 
-// Defines what a transport hands to the hub.
+// Interface from a transport to the hub.
 
 /// The number of one stream of a link. A TCP server has a stream for each client. Numbers are not
 /// used twice.
 pub type StreamId = u64;
 
-/// The sender of some bytes, as a link tells its senders apart.
+/// The sender of some bytes, as distinguished by its link.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Origin {
     Datagram(SocketAddr),
     Stream(StreamId),
 }
 
-/// What a link received.
+/// Data received by a link.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Received {
     /// One datagram. A frame never continues in the next datagram.
@@ -313,12 +313,12 @@ pub enum Received {
     /// The stream has paused for longer than a frame may; an incomplete frame will stay incomplete.
     Silence(StreamId),
     Gone(StreamId),
-    /// The link does not answer some senders; the text says how many. It comes at most once in ten
-    /// seconds.
+    /// Some senders are not answered by the link; the text gives their number. Sent at most once in
+    /// ten seconds.
     UnknownSenders(String),
     /// The link works; the text names the peer.
     Up(String),
-    /// The link does not work; the text says why. The transport tries again.
+    /// The link does not work; the text gives the reason. The transport retries.
     Down(String),
 }
 

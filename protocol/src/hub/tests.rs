@@ -22,9 +22,9 @@ fn datagram_of(bytes: Vec<u8>) -> Received {
     Received::Datagram { from: ([127, 0, 0, 1], 1).into(), bytes }
 }
 
-/// The news about frames, without the news about who sent them.
-fn of_frames(news: Vec<LinkEvent>) -> Vec<LinkEvent> {
-    news.into_iter().filter(|news| !matches!(news, LinkEvent::Believed(_))).collect()
+/// The event about frames, without the event about who sent them.
+fn of_frames(event: Vec<LinkEvent>) -> Vec<LinkEvent> {
+    event.into_iter().filter(|event| !matches!(event, LinkEvent::Accepted(_))).collect()
 }
 
 fn ms(milliseconds: u64) -> Duration {
@@ -50,8 +50,8 @@ fn over_two_lossy_links_every_frame_is_passed_on_once() {
     }
     arrivals.sort_by_key(|(at, link, _)| (*at, *link));
     for (at, link, frame) in arrivals {
-        for news in hub.take(link, datagram(frame), ms(at), CLOCK) {
-            if let LinkEvent::Frame(frame) = news {
+        for event in hub.take(link, datagram(frame), ms(at), CLOCK) {
+            if let LinkEvent::Frame(frame) = event {
                 heard.push(frame.sequence());
             }
         }
@@ -85,15 +85,15 @@ fn a_forged_frame_does_not_hide_the_true_one() {
     let side = || Some(Signing::new(Key::new([7; Key::LEN]), Memory::default()));
     let (mut near, mut far) = (Hub::new(2, side()), Hub::new(2, side()));
     let frame = &beats(1)[0];
-    // The forger knows sequence number, message and checksum, but not the key.
+    // The forger has sequence number, message and checksum, but not the key.
     let rejected = far.take(0, datagram(frame), ms(0), CLOCK);
     assert_eq!(rejected, [LinkEvent::Rejected(frame.clone(), Rejection::Unsigned)]);
     let bytes: Vec<Vec<u8>> = (0..2).map(|link| near.bytes_for(link, frame, CLOCK)).collect();
     let first = far.take(0, datagram_of(bytes[0].clone()), ms(1), CLOCK);
-    assert!(matches!(&first[..], [LinkEvent::Believed(_), LinkEvent::Frame(_)]));
+    assert!(matches!(&first[..], [LinkEvent::Accepted(_), LinkEvent::Frame(_)]));
     let second = far.take(1, datagram_of(bytes[1].clone()), ms(2), CLOCK);
     assert!(
-        matches!(&second[..], [LinkEvent::Believed(_), LinkEvent::Copy(_)]),
+        matches!(&second[..], [LinkEvent::Accepted(_), LinkEvent::Copy(_)]),
         "it is signed for the other link and still the same frame"
     );
     assert_eq!(far.signing().map(|counters| (counters.accepted, counters.unsigned)), Some((2, 1)));
@@ -116,9 +116,9 @@ fn trouble_is_reported_until_the_link_works_again() {
 }
 
 /// Returns the senders that are accepted after one datagram with these bytes.
-fn believed(hub: &mut Hub, bytes: Vec<u8>) -> Vec<Origin> {
-    let origin = |news| match news {
-        LinkEvent::Believed(origin) => Some(origin),
+fn accepted(hub: &mut Hub, bytes: Vec<u8>) -> Vec<Origin> {
+    let origin = |event| match event {
+        LinkEvent::Accepted(origin) => Some(origin),
         _ => None,
     };
     hub.take(0, datagram_of(bytes), ms(0), CLOCK).into_iter().filter_map(origin).collect()
@@ -129,24 +129,24 @@ fn a_sender_is_accepted_only_for_a_valid_frame() {
     let sender = [Origin::Datagram(([127, 0, 0, 1], 1).into())];
     let plain = beats(1).remove(0);
     let mut hub = Hub::new(1, None);
-    assert_eq!(believed(&mut hub, vec![1, 2, 3]), []);
-    assert_eq!(believed(&mut hub, plain.as_bytes()[..20].to_vec()), []);
-    assert_eq!(believed(&mut hub, plain.as_bytes().to_vec()), sender);
+    assert_eq!(accepted(&mut hub, vec![1, 2, 3]), []);
+    assert_eq!(accepted(&mut hub, plain.as_bytes()[..20].to_vec()), []);
+    assert_eq!(accepted(&mut hub, plain.as_bytes().to_vec()), sender);
     let key = |fill| Some(Signing::new(Key::new([fill; Key::LEN]), Memory::default()));
     let mut hub = Hub::new(1, key(7));
     let signed_by = |fill| Hub::new(1, key(fill)).bytes_for(0, &plain, CLOCK);
     let radio = MavMessage::RADIO_STATUS(crate::dialect::RADIO_STATUS_DATA::default());
-    assert_eq!(believed(&mut hub, plain.as_bytes().to_vec()), []);
-    assert_eq!(believed(&mut hub, signed_by(8)), []);
+    assert_eq!(accepted(&mut hub, plain.as_bytes().to_vec()), []);
+    assert_eq!(accepted(&mut hub, signed_by(8)), []);
     let report = Encoder::new(RADIO).encode(&radio).as_bytes().to_vec();
     let mut serial = Hub::new(1, key(7)).over(&[Some(5_760)]);
     assert_eq!(
-        believed(&mut serial, report),
+        accepted(&mut serial, report),
         [],
         "the message that may be unsigned does not prove its sender"
     );
-    assert_eq!(believed(&mut hub, signed_by(7)), sender);
-    assert_eq!(believed(&mut hub, signed_by(7)), [], "replayed");
+    assert_eq!(accepted(&mut hub, signed_by(7)), sender);
+    assert_eq!(accepted(&mut hub, signed_by(7)), [], "replayed");
 }
 
 /// Over a network anybody could thin a signed line with it.
@@ -160,8 +160,8 @@ fn a_radio_reports_without_a_signature_on_its_serial_line_alone() {
         let signing = key.then(|| Signing::new(Key::new([7; Key::LEN]), Memory::default()));
         let mut hub = Hub::new(1, signing).over(&[carried]);
         let report = Received::Stream(0, report.as_bytes().to_vec());
-        let news = of_frames(hub.take(0, report, ms(0), CLOCK));
-        assert_eq!(matches!(news[..], [LinkEvent::Frame(_)]), is_taken, "{key} {carried:?}: {news:?}");
+        let event = of_frames(hub.take(0, report, ms(0), CLOCK));
+        assert_eq!(matches!(event[..], [LinkEvent::Frame(_)]), is_taken, "{key} {carried:?}: {event:?}");
     }
 }
 
@@ -178,7 +178,8 @@ fn nobody_turns_another_one_s_frame_into_a_copy() {
     let take = |hub: &mut Hub, link: usize, frame: Frame| {
         hub.take(link, Received::Stream(0, frame.as_bytes().to_vec()), Duration::ZERO, 6_000_000)
     };
-    let seen = |news: &[LinkEvent]| news.iter().filter(|news| matches!(news, LinkEvent::Frame(_))).count();
+    let seen =
+        |event: &[LinkEvent]| event.iter().filter(|event| matches!(event, LinkEvent::Frame(_))).count();
     let id = observer.link_id(0);
     let forged = take(&mut hub, 0, observer.sign(&abort, id, 6_000_000));
     let (first, second) = (ann.link_id(1), ann.link_id(0));

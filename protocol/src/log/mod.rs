@@ -2,9 +2,9 @@
 //! telemetry, operator actions and events.
 //!
 //! The format is MCAP (<https://mcap.dev/spec>). The schemas are those of `crate::records` and,
-//! where one fits, Foxglove's own. [`SCHEMA_VERSION`](record::SCHEMA_VERSION) is the version of a
-//! log's contents. Records are flushed so often that a killed process loses at most a fraction of a
-//! second ([`recorder`]).
+//! where one fits, those of Foxglove. [`SCHEMA_VERSION`](record::SCHEMA_VERSION) is the version of
+//! a log's contents. Records are flushed so often that a killed process loses at most a fraction of
+//! a second ([`recorder`]).
 
 pub mod reader;
 pub mod record;

@@ -2,8 +2,8 @@
 //!
 //! The reader goes from front to back with bounded memory. It needs no summary and no footer, so it
 //! reads the log of a recorder that was killed. It returns the content of a chunk only if the
-//! chunk's checksum is right. A record that is too large to be held in memory is passed over by its
-//! length, and what follows is read.
+//! chunk's checksum is right. A record too large for memory is skipped by its length, and reading
+//! continues behind it.
 
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -128,7 +128,7 @@ pub struct LogReader<R: Read> {
     is_chunked: bool,
     /// Messages so far.
     messages: u64,
-    /// The summary says how many messages the log has.
+    /// The summary contains the number of messages.
     is_counted: bool,
     damage: Option<Damage>,
     ended: bool,
@@ -180,8 +180,8 @@ impl<R: Read> LogReader<R> {
         self.damage.as_ref()
     }
 
-    /// Returns whether a summary at the end says how many messages the log has. Without one,
-    /// nothing shows that its last records are missing.
+    /// Returns whether a summary at the end contains the number of messages. Without one, missing
+    /// records at the end are not detected.
     pub fn is_counted(&self) -> bool {
         self.is_counted
     }
@@ -272,7 +272,7 @@ impl<R: Read> LogReader<R> {
         let unpacked = if opcode == op::CHUNK { unpacked_bytes(body) } else { 0 };
         let mut damage = None;
         if opcode == op::DATA_END && !self.saw_data_end {
-            // A record between two chunks, or a whole chunk, may be damaged beyond recognition;
+            // A record between two chunks, or a complete chunk, may be damaged beyond recognition;
             // only this checksum shows that.
             let told = body.first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
             if told != 0 && told != self.checksum.clone().finalize() {
@@ -327,7 +327,7 @@ impl<R: Read> LogReader<R> {
         Ok(())
     }
 
-    /// Behind the footer comes the end of the file.
+    /// The end of the file follows the footer.
     fn take_end(&mut self) -> std::io::Result<()> {
         let mut rest = [0; mcap::MAGIC.len() + 1];
         let count = fill(&mut self.input, &mut rest)?;
@@ -374,7 +374,7 @@ impl<R: Read> LogReader<R> {
         match record {
             McapRecord::Header(header) => Some(LogItem::Library(header.library)),
             McapRecord::Schema { header, data } => {
-                // Chunks may repeat a schema; the known one is kept.
+                // Chunks may repeat a schema; the first one is retained.
                 let known = self.schemas.get(&header.id);
                 if known.is_none_or(|(name, known)| *name != header.name || **known != *data) {
                     self.schemas.insert(header.id, (header.name, Arc::from(data.as_ref())));
@@ -446,14 +446,14 @@ fn fill(input: &mut impl Read, buffer: &mut [u8]) -> std::io::Result<usize> {
     Ok(filled)
 }
 
-/// What the body of a chunk says that it unpacks to.
+/// Unpacked size stated in the body of a chunk.
 fn unpacked_bytes(body: &[u8]) -> u64 {
     const UNPACKED_AT: usize = 16;
     let unpacked = body.get(UNPACKED_AT..).and_then(|rest| rest.first_chunk());
     unpacked.map_or(0, |bytes| u64::from_le_bytes(*bytes))
 }
 
-/// Joins an error and its causes: the parser's own text often names only the place.
+/// Joins an error and its causes: the parser's text often contains only the position.
 fn with_causes(error: &mcap::McapError) -> String {
     let mut words = error.to_string();
     let mut cause = std::error::Error::source(error);
@@ -470,7 +470,7 @@ fn with_causes(error: &mcap::McapError) -> String {
 /// # Errors
 /// The body does not fit the type.
 pub fn parse_record(opcode: u8, data: &[u8]) -> mcap::McapResult<McapRecord<'static>> {
-    // The parser of the crate `mcap` panics if an attachment is too short for its own fields.
+    // The parser of the crate `mcap` panics if an attachment is too short for its fields.
     if opcode == op::ATTACHMENT && !attachment_fits(data) {
         return Err(mcap::McapError::BadAttachmentLength { header: 0, available: data.len() as u64 });
     }
@@ -478,11 +478,11 @@ pub fn parse_record(opcode: u8, data: &[u8]) -> mcap::McapResult<McapRecord<'sta
 }
 
 /// Calls `keep` for every record of a chunk, from its body, if its checksum is right. It holds one
-/// record and what the chunk unpacks to, at most [`RECORD_LIMIT_BYTES`].
+/// record and the unpacked chunk, at most [`RECORD_LIMIT_BYTES`].
 ///
 /// # Errors
 /// The chunk cannot be read, or `keep` failed. Without a checksum in the chunk some records may
-/// have been kept by then.
+/// have been passed to it by then.
 pub fn records_of_chunk(
     body: &[u8],
     mut keep: impl FnMut(McapRecord<'static>) -> mcap::McapResult<()>,

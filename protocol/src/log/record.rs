@@ -19,7 +19,7 @@ pub struct RawFrame {
     pub endpoint: &'static str,
     /// The link that carried it, for example `udpin:0.0.0.0:14550`.
     pub link: String,
-    /// One whole frame.
+    /// One complete frame.
     pub bytes: Vec<u8>,
 }
 
@@ -114,7 +114,7 @@ pub const SCHEMA_VERSION_ENTRY: &str = "version";
 pub const METADATA_RUN: &str = "run";
 /// Name of the metadata record of a log that was recovered from a damaged one.
 pub const METADATA_RECOVERY: &str = "recovery";
-/// The entry that says what the damaged log lacked; empty if it was whole.
+/// The entry that describes the fault of the damaged log; empty if it was intact.
 pub const RECOVERY_FAULT_ENTRY: &str = "fault";
 /// Name of the attachment with the profile's text.
 pub const ATTACHMENT_PROFILE: &str = "profile.toml";

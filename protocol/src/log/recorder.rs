@@ -1,4 +1,4 @@
-//! Writes a log file in a thread of its own, so that neither the control loop nor the screen waits
+//! Writes a log file in a separate thread, so that neither the control loop nor the screen waits
 //! for a disk.
 //!
 //! The queue is bounded. [`Recorder::record`] waits for room (for a simulation, whose clock can
@@ -8,8 +8,8 @@
 //! slow disk does not lengthen the 200 ms.
 //!
 //! The system reports a disk error once for an open file: the sync after it succeeds although data
-//! is lost. So every failure is kept where it happens, and [`Recorder::is_whole`] and
-//! [`Recorder::finish`] read what was kept.
+//! is lost. So every failure is stored where it happens, and [`Recorder::is_intact`] and
+//! [`Recorder::finish`] read it.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Seek, Write};
@@ -29,8 +29,8 @@ use crate::text::printable;
 /// A disk may stall for 16 s at the 2,000 records a second of a flight.
 const QUEUE_RECORDS: usize = 32_768;
 const FLUSH_INTERVAL: Duration = Duration::from_millis(200);
-/// What asks to be synced soon is synced at most this often: each time ends a chunk, of which the
-/// writer keeps an entry for the index at the end.
+/// Minimum interval of requested syncs: each ends a chunk, for which the writer stores an entry of
+/// the index at the end.
 const SYNC_APART: Duration = Duration::from_millis(100);
 
 /// Why recording could not start or did not end well.
@@ -43,7 +43,7 @@ pub enum RecorderError {
         /// The system's error.
         source: std::io::Error,
     },
-    /// Writing failed; what was synced before can still be read.
+    /// Writing failed; data synced before can still be read.
     #[error("cannot write the log {}", path.display())]
     Write {
         path: PathBuf,
@@ -126,10 +126,10 @@ pub enum TlogName<'a> {
 /// It cannot be made, or no name is free. `make` fails with [`io::ErrorKind::AlreadyExists`] where
 /// something is that could be lost.
 pub fn under_free_name<T>(
-    asked: &Path,
+    requested: &Path,
     mut make: impl FnMut(&Path) -> io::Result<T>,
 ) -> io::Result<(PathBuf, T)> {
-    for name in (1..=NAMES_MAX).map(|number| numbered(asked, number)) {
+    for name in (1..=NAMES_MAX).map(|number| numbered(requested, number)) {
         match make(&name) {
             Err(taken) if taken.kind() == io::ErrorKind::AlreadyExists => {}
             made => return made.map(|made| (name, made)),
@@ -138,14 +138,14 @@ pub fn under_free_name<T>(
     Err(io::Error::new(io::ErrorKind::AlreadyExists, "it exists, and no name like it is free: give another"))
 }
 
-/// What to say if the name is not the one that was asked for.
-pub fn other_name(asked: &Path, free: &Path) -> Option<String> {
-    let words = || format!("{} exists and is kept; {} is written", asked.display(), free.display());
-    (asked != free).then(|| printable(words().as_bytes()))
+/// The message if the name differs from the requested one.
+pub fn other_name(requested: &Path, free: &Path) -> Option<String> {
+    let words = || format!("{} exists and is kept; {} is written", requested.display(), free.display());
+    (requested != free).then(|| printable(words().as_bytes()))
 }
 
-/// Whether a path is a pipe or a device: it has no content that could be lost, and no other name.
-/// So is what lies in `/dev` itself: `/dev/stdout` may be a file.
+/// Whether a path is a pipe or a device: it has no content that could be lost, and no alternative
+/// name. The same holds for files in `/dev` itself: `/dev/stdout` may be a file.
 pub fn is_device(path: &Path) -> bool {
     path.parent() == Some(Path::new("/dev"))
         || std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
@@ -164,7 +164,7 @@ impl Recorder {
     /// Creates the file and starts the writing thread, under the first free name of `flight.mcap`,
     /// `flight-2.mcap`, `flight-3.mcap` and so on: nothing is overwritten, and the same command
     /// works again after a crash. The telemetry log, of the ground's raw frames, is named after the
-    /// name that was found, or has a name of its own that gets the same number.
+    /// chosen name, or after a custom name with the same number.
     ///
     /// # Errors
     /// No name is free, a file cannot be created, or the header cannot be written.
@@ -269,7 +269,7 @@ impl Recorder {
     }
 
     /// Returns whether nothing has failed so far: neither a write nor a sync nor a thread.
-    pub fn is_whole(&self) -> bool {
+    pub fn is_intact(&self) -> bool {
         !self.shared.failed.load(Ordering::Acquire)
     }
 
@@ -434,8 +434,8 @@ fn write_until_finished(
     }
 }
 
-/// Writes everything to the operating system, which keeps it even if this process is killed, and
-/// asks the other thread to sync it to the disk, which may take longer than one flush interval.
+/// Writes everything to the operating system, which preserves it even if this process is killed,
+/// and lets the other thread sync it to the disk, which may take longer than one flush interval.
 fn hand_over(
     writer: &mut LogWriter<impl Write + Seek>,
     tlog: Option<&mut TlogWriter<BufWriter<File>>>,
@@ -457,7 +457,7 @@ mod tests {
     use super::*;
     use crate::log::record::{Event, EventLevel};
 
-    /// Fails at one sync only, as Linux reports a disk error, and says so here when it has.
+    /// Fails at one sync only, as Linux reports a disk error, and records here that it has.
     struct FailsOnce {
         failing_sync: u64,
         syncs: AtomicU64,
@@ -511,7 +511,7 @@ mod tests {
     }
 
     #[test]
-    fn a_disk_error_at_one_sync_of_many_is_kept_until_the_end() {
+    fn a_disk_error_at_one_sync_of_many_persists_to_the_end() {
         let (happened, seen) = sync_channel(1);
         let disk = FailsOnce { failing_sync: 0, syncs: AtomicU64::new(0), happened };
         let recorder = started(Cursor::new(Vec::new()), disk);
@@ -520,7 +520,7 @@ mod tests {
         seen.recv().unwrap();
         let ended = recorder.finish();
         assert!(matches!(ended, Err(RecorderError::Write { .. })), "{ended:?}");
-        assert!(!recorder.is_whole());
+        assert!(!recorder.is_intact());
     }
 
     #[test]
@@ -535,17 +535,17 @@ mod tests {
         }
         let ended = recorder.finish();
         assert!(matches!(ended, Err(RecorderError::Gone { .. })), "{ended:?}");
-        assert!(!recorder.is_whole());
+        assert!(!recorder.is_intact());
     }
 
     #[test]
-    fn without_an_error_a_log_stays_whole() {
+    fn without_an_error_a_log_stays_intact() {
         let (happened, _) = sync_channel(1);
         let disk = FailsOnce { failing_sync: u64::MAX, syncs: AtomicU64::new(0), happened };
         let recorder = started(Cursor::new(Vec::new()), disk);
         recorder.record(event(), 0);
         recorder.sync_soon();
         assert!(recorder.finish().is_ok());
-        assert!(recorder.is_whole());
+        assert!(recorder.is_intact());
     }
 }

@@ -18,11 +18,11 @@ const MAGIC_1: u8 = 0xfe;
 const SIGNED: u8 = 0x01;
 /// Length of the longest frame: 10 + 255 + 2 + 13.
 const FRAME_MAX_BYTES: usize = 280;
-/// Times after the year 2100 are treated as garbage. A clock that nobody has set begins in 1970.
+/// Times after the year 2100 are treated as garbage. An unset clock begins in 1970.
 const PLAUSIBLE_US: std::ops::Range<u64> = 0..4_102_444_800_000_000;
 
-/// Two frames without a byte between them stand in the first bytes of any `.tlog`, also of one
-/// whose beginning is damaged.
+/// Two frames without a byte between them are in the first bytes of any `.tlog`, also of one whose
+/// beginning is damaged.
 const RECOGNISED_WITHIN_BYTES: u64 = 1 << 16;
 
 /// Whether a file has the content of a `.tlog`, whatever its name is; reads its first bytes.
@@ -57,11 +57,12 @@ pub fn is_tlog(input: impl Read) -> io::Result<bool> {
 pub struct TlogFrame {
     /// Microseconds since the Unix epoch.
     pub time_us: u64,
-    /// One whole MAVLink 2 frame, as long as its header says; its checksum has not been checked.
+    /// One complete MAVLink 2 frame with the length of its header; its checksum has not been
+    /// checked.
     pub bytes: Vec<u8>,
 }
 
-/// Reads frames and their times, and counts the bytes between them. It keeps one frame in memory at
+/// Reads frames and their times, and counts the bytes between them. It holds one frame in memory at
 /// a time.
 pub struct TlogReader<R> {
     input: BufReader<R>,
@@ -140,7 +141,8 @@ impl<R: Read> TlogReader<R> {
     }
 }
 
-/// Returns the length of the MAVLink 1 or 2 frame that these bytes begin with, as its header says.
+/// Returns the length of the MAVLink 1 or 2 frame that these bytes begin with, according to its
+/// header.
 fn frame_length(frame: &[u8]) -> Option<usize> {
     let payload = usize::from(*frame.get(1)?);
     match *frame.first()? {

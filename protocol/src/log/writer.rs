@@ -28,7 +28,7 @@ pub struct LogHeader {
     pub start_unix_ns: u64,
     /// Facts about the run: profile, seed, start and so on.
     pub run: BTreeMap<String, String>,
-    /// The profile's text, if the program knows it.
+    /// The profile's text, if available.
     pub profile_toml: Option<String>,
     /// The scenario's text, which the random draws are made from, if there is one.
     pub scenario_toml: Option<String>,
@@ -143,7 +143,7 @@ impl<W: Write + Seek> LogWriter<W> {
         Ok(self.writer.flush()?)
     }
 
-    /// Writes an entry of metadata that is known only now.
+    /// Writes an entry of metadata that becomes available only now.
     ///
     /// # Errors
     /// The underlying writer failed.
@@ -262,7 +262,7 @@ impl<W: Write + Seek> LogWriter<W> {
     }
 }
 
-/// The end of a log without a summary: it makes a whole log of the records up to a mark
+/// The end of a log without a summary: it completes a log of the records up to a mark
 /// ([`super::recorder::Recorder::mark_soon`]).
 pub fn ending() -> Vec<u8> {
     // The lengths of the two records, and zeros: no checksum, no summary.

@@ -21,7 +21,7 @@ use crate::hub::{Origin, Received};
 const QUEUE_LEN: usize = 1024;
 /// This many notices of accepted senders may wait for the link. If the queue is full, a notice is
 /// dropped, and the sender's next frame repeats it.
-const BELIEVED_QUEUE_LEN: usize = 256;
+const ACCEPTED_QUEUE_LEN: usize = 256;
 
 /// Bytes to send. With an origin, a link that answers several senders sends them to that one alone.
 type Outgoing = (Vec<u8>, Option<Origin>);
@@ -37,7 +37,7 @@ pub struct Transport {
 #[derive(Debug, Clone)]
 pub struct TransportSender {
     queue: mpsc::Sender<Outgoing>,
-    believed: mpsc::Sender<Origin>,
+    accepted: mpsc::Sender<Origin>,
     dropped: Arc<AtomicU64>,
 }
 
@@ -49,7 +49,7 @@ impl TransportSender {
     }
 
     /// As [`TransportSender::send`]. On a link that listens, only this origin gets the bytes;
-    /// `None` stands for all that are answered.
+    /// `None` stands for all answered ones.
     pub fn send_to(&self, bytes: Vec<u8>, to: Option<Origin>) -> bool {
         let queued = self.queue.try_send((bytes, to)).is_ok();
         if !queued {
@@ -58,12 +58,12 @@ impl TransportSender {
         queued
     }
 
-    /// Tells the link that a frame of this sender was accepted
-    /// ([`crate::hub::LinkEvent::Believed`]). Only then is the sender answered and protected from
+    /// Notifies the link that a frame of this sender was accepted
+    /// ([`crate::hub::LinkEvent::Accepted`]). Only then is the sender answered and protected from
     /// being displaced by other senders.
-    pub fn believe(&self, origin: Origin) {
+    pub fn accept(&self, origin: Origin) {
         // When the queue is full, the sender's next frame repeats this.
-        let _ = self.believed.try_send(origin);
+        let _ = self.accepted.try_send(origin);
     }
 
     /// Returns how many writes were dropped because the queue was full.
@@ -83,10 +83,10 @@ impl Transport {
         let is_udp = matches!(address, LinkAddress::UdpIn(_) | LinkAddress::UdpOut(_));
         let (inbox, received) = mpsc::channel(if is_udp { udp::INBOX_LEN } else { QUEUE_LEN });
         let (queue, outbox) = mpsc::channel(QUEUE_LEN);
-        let (believed, believed_by_owner) = mpsc::channel(BELIEVED_QUEUE_LEN);
+        let (accepted, accepted_by_owner) = mpsc::channel(ACCEPTED_QUEUE_LEN);
         match &mut address {
             LinkAddress::UdpIn(local) => {
-                let queues = udp::Queues { inbox, outbox, believed: believed_by_owner };
+                let queues = udp::Queues { inbox, outbox, accepted: accepted_by_owner };
                 let bound = udp::listen(local, queues).await?;
                 // With port 0 the system chooses a port, and the address then names it.
                 if local.ends_with(":0") {
@@ -94,11 +94,11 @@ impl Transport {
                 }
             }
             LinkAddress::UdpOut(remote) => {
-                let queues = udp::Queues { inbox, outbox, believed: believed_by_owner };
+                let queues = udp::Queues { inbox, outbox, accepted: accepted_by_owner };
                 udp::connect(remote, queues).await?;
             }
             LinkAddress::TcpIn(local) => {
-                let bound = stream::listen_tcp(local, inbox, outbox, believed_by_owner).await?;
+                let bound = stream::listen_tcp(local, inbox, outbox, accepted_by_owner).await?;
                 if local.ends_with(":0") {
                     *local = bound.to_string();
                 }
@@ -106,7 +106,7 @@ impl Transport {
             LinkAddress::TcpOut(remote) => stream::connect_tcp(remote.clone(), inbox, outbox),
             LinkAddress::Serial { path, baud } => stream::open_serial(path.clone(), *baud, inbox, outbox),
         }
-        let sender = TransportSender { queue, believed, dropped: Arc::new(AtomicU64::new(0)) };
+        let sender = TransportSender { queue, accepted, dropped: Arc::new(AtomicU64::new(0)) };
         Ok(Self { address, received, sender })
     }
 
@@ -116,7 +116,7 @@ impl Transport {
         &self.address
     }
 
-    /// Waits for what the link brings next; `None` once its task has ended.
+    /// Waits for the next data of the link; `None` once its task has ended.
     pub async fn receive(&mut self) -> Option<Received> {
         self.received.recv().await
     }
@@ -129,7 +129,7 @@ impl Transport {
         self.received.poll_recv(context)
     }
 
-    /// Returns what has arrived already, without waiting.
+    /// Returns data that has arrived already, without waiting.
     pub fn try_receive(&mut self) -> Option<Received> {
         self.received.try_recv().ok()
     }
@@ -144,11 +144,11 @@ impl Transport {
 /// The address of a link.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum LinkAddress {
-    /// `udpin:ADDRESS:PORT` binds the address and answers whoever sends to it.
+    /// `udpin:ADDRESS:PORT` binds the address and answers its senders.
     UdpIn(String),
     /// `udpout:HOST:PORT` sends to the host first.
     UdpOut(String),
-    /// `tcpin:ADDRESS:PORT` serves whoever connects.
+    /// `tcpin:ADDRESS:PORT` serves its clients.
     TcpIn(String),
     /// `tcpout:HOST:PORT` connects to the host.
     TcpOut(String),
@@ -161,7 +161,7 @@ pub enum LinkAddress {
 }
 
 impl LinkAddress {
-    /// Returns how many bytes per second the link can carry; `None` if no limit is known.
+    /// Returns the capacity of the link, bytes per second; `None` if unlimited.
     pub fn capacity_bytes_s(&self) -> Option<u32> {
         match self {
             // A byte takes ten bits: a start bit, eight data bits, a stop bit.
@@ -237,7 +237,7 @@ mod tests {
 
     use super::*;
 
-    /// The next sender of which bytes arrive, believed as its owner does with an accepted frame.
+    /// The next sender of which bytes arrive, accepted as its owner does with an accepted frame.
     async fn next_origin(link: &mut Transport) -> Origin {
         loop {
             let origin = match link.receive().await.unwrap() {
@@ -245,7 +245,7 @@ mod tests {
                 Received::Stream(id, _) => Origin::Stream(id),
                 _ => continue,
             };
-            link.sender().believe(origin);
+            link.sender().accept(origin);
             return origin;
         }
     }
@@ -302,7 +302,7 @@ mod tests {
     }
 
     #[test]
-    fn four_silent_tcp_connections_do_not_keep_the_station_out() {
+    fn four_silent_tcp_connections_do_not_lock_the_station_out() {
         run(async {
             let mut link = Transport::open(LinkAddress::TcpIn("127.0.0.1:0".to_owned())).await.unwrap();
             let LinkAddress::TcpIn(address) = link.address().clone() else { unreachable!() };

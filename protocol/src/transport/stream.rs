@@ -32,12 +32,12 @@ pub(super) trait Line: Send + 'static {
     /// Its name in messages to the crew.
     fn name(&self) -> &str;
 
-    /// Opens the stream; the error says why that failed.
+    /// Opens the stream; the error gives the reason of a failure.
     fn open(&self) -> impl Future<Output = Result<Self::Io, String>> + Send;
 }
 
 /// Keeps a stream open and carries bytes over it until the owner drops the link.
-pub(super) async fn keep_open<L: Line>(line: L, inbox: Sender<Received>, mut outbox: Receiver<Outgoing>) {
+pub(super) async fn run<L: Line>(line: L, inbox: Sender<Received>, mut outbox: Receiver<Outgoing>) {
     let mut last_trouble = String::new();
     for opening in 0.. {
         let stream_id: StreamId = if L::BEGINS_ANEW { opening } else { 0 };
@@ -130,7 +130,7 @@ pub(super) async fn read_all(
 // Serial lines: opened again when the device comes back.
 
 pub(super) fn open_serial(path: String, baud: u32, inbox: Sender<Received>, outbox: Receiver<Outgoing>) {
-    tokio::spawn(keep_open(Port { path, baud }, inbox, outbox));
+    tokio::spawn(run(Port { path, baud }, inbox, outbox));
 }
 
 struct Port {
@@ -161,12 +161,12 @@ impl Line for Port {
 
 // TCP links: `tcpin` serves a few clients; `tcpout` connects, and reconnects after a failure.
 
-/// This many clients are served at the same time. A further one takes the place of the one that has
-/// said nothing valid for longest; if all have spoken lately, it is disconnected.
+/// Most clients served at the same time. A further one replaces the one without a valid frame for
+/// the longest time; if all have sent one recently, it is disconnected.
 const MAX_CLIENTS: usize = 4;
-/// Whoever was accepted keeps the place for this long without another accepted frame: ten
-/// heartbeats of a station.
-const KEEPS_PLACE_FOR: Duration = Duration::from_secs(10);
+/// Time for which an accepted client is protected without another accepted frame: ten heartbeats of
+/// a station.
+const PROTECTED_FOR: Duration = Duration::from_secs(10);
 /// This many writes wait for each client; a slow client loses the oldest ones.
 const CLIENT_QUEUE: usize = 256;
 /// A connection attempt fails after this time.
@@ -180,11 +180,11 @@ pub(super) async fn listen_tcp(
     address: &str,
     inbox: Sender<Received>,
     outbox: Receiver<Outgoing>,
-    believed: Receiver<Origin>,
+    accepted: Receiver<Origin>,
 ) -> io::Result<SocketAddr> {
     let listener = TcpListener::bind(address).await?;
     let bound = listener.local_addr()?;
-    tokio::spawn(serve(listener, inbox, outbox, believed));
+    tokio::spawn(serve(listener, inbox, outbox, accepted));
     Ok(bound)
 }
 
@@ -192,20 +192,20 @@ pub(super) async fn listen_tcp(
 struct Client {
     stream_id: StreamId,
     /// When its last frame was accepted, if one was.
-    believed_at: Option<Instant>,
+    accepted_at: Option<Instant>,
     leave: oneshot::Sender<()>,
 }
 
-/// Makes room for one more client if there is any; the clients are in the order in which they came.
+/// Makes room for one more client if possible; the clients are in order of arrival.
 fn make_room(clients: &mut Vec<Client>, now: Instant) -> bool {
     clients.retain(|client| !client.leave.is_closed());
     if clients.len() < MAX_CLIENTS {
         return true;
     }
     // One that was never accepted sorts before every time.
-    let quietest = clients.iter().enumerate().min_by_key(|(_, client)| client.believed_at);
+    let quietest = clients.iter().enumerate().min_by_key(|(_, client)| client.accepted_at);
     let leaves = quietest.filter(|(_, client)| {
-        client.believed_at.is_none_or(|at| now.saturating_duration_since(at) >= KEEPS_PLACE_FOR)
+        client.accepted_at.is_none_or(|at| now.saturating_duration_since(at) >= PROTECTED_FOR)
     });
     let Some((place, _)) = leaves else { return false };
     clients.remove(place);
@@ -216,18 +216,18 @@ async fn serve(
     listener: TcpListener,
     inbox: Sender<Received>,
     mut outbox: Receiver<Outgoing>,
-    mut believed: Receiver<Origin>,
+    mut accepted: Receiver<Origin>,
 ) {
     let (all, _) = broadcast::channel::<Outgoing>(CLIENT_QUEUE);
     let mut clients: Vec<Client> = Vec::new();
     let mut stream_id: StreamId = 0;
     loop {
         tokio::select! {
-            accepted = listener.accept() => match accepted {
+            connected = listener.accept() => match connected {
                 Ok((stream, from)) => {
-                    // The notices of the queue come before the choice of who leaves.
-                    while let Ok(origin) = believed.try_recv() {
-                        note_believed(&mut clients, origin);
+                    // The queued notices are processed before a client is selected to leave.
+                    while let Ok(origin) = accepted.try_recv() {
+                        note_accepted(&mut clients, origin);
                     }
                     if !make_room(&mut clients, Instant::now()) {
                         // Dropping the stream closes its connection.
@@ -237,15 +237,15 @@ async fn serve(
                         return;
                     }
                     let (leave, left) = oneshot::channel();
-                    clients.push(Client { stream_id, believed_at: None, leave });
+                    clients.push(Client { stream_id, accepted_at: None, leave });
                     tokio::spawn(serve_client(stream, stream_id, inbox.clone(), (all.subscribe(), left)));
                     stream_id += 1;
                 }
-                // This happens when no file descriptor is left, for instance. Trying again at once
-                // would use a whole core.
+                // This happens when no file descriptor is left, for instance. Retrying at once
+                // would use a complete core.
                 Err(_) => tokio::time::sleep(REOPEN_AFTER).await,
             },
-            Some(origin) = believed.recv() => note_believed(&mut clients, origin),
+            Some(origin) = accepted.recv() => note_accepted(&mut clients, origin),
             outgoing = outbox.recv() => {
                 let Some(outgoing) = outgoing else { return };
                 // It fails when no client is connected, which is no error.
@@ -255,9 +255,9 @@ async fn serve(
     }
 }
 
-fn note_believed(clients: &mut [Client], origin: Origin) {
+fn note_accepted(clients: &mut [Client], origin: Origin) {
     for client in clients.iter_mut().filter(|client| Origin::Stream(client.stream_id) == origin) {
-        client.believed_at = Some(Instant::now());
+        client.accepted_at = Some(Instant::now());
     }
 }
 
@@ -281,7 +281,7 @@ async fn serve_client(
                         return;
                     }
                 }
-                // A slow client has lost frames; the sequence numbers tell it how many.
+                // A slow client has lost frames; it can count them by the sequence numbers.
                 Err(broadcast::error::RecvError::Lagged(_)) => {}
                 Err(broadcast::error::RecvError::Closed) => return,
             }
@@ -297,7 +297,7 @@ async fn serve_client(
 }
 
 pub(super) fn connect_tcp(address: String, inbox: Sender<Received>, outbox: Receiver<Outgoing>) {
-    tokio::spawn(keep_open(Connection { address }, inbox, outbox));
+    tokio::spawn(run(Connection { address }, inbox, outbox));
 }
 
 struct Connection {
@@ -335,15 +335,14 @@ mod tests {
     fn clients(ages_s: &[Option<u64>], now: Instant) -> (Vec<Client>, Vec<oneshot::Receiver<()>>) {
         let client = |(stream_id, age_s): (usize, &Option<u64>)| {
             let (leave, left) = oneshot::channel();
-            let believed_at = age_s.map(|age_s| now - Duration::from_secs(age_s));
-            (Client { stream_id: stream_id as StreamId, believed_at, leave }, left)
+            let accepted_at = age_s.map(|age_s| now - Duration::from_secs(age_s));
+            (Client { stream_id: stream_id as StreamId, accepted_at, leave }, left)
         };
         ages_s.iter().enumerate().map(client).unzip()
     }
 
     #[test]
-    fn a_new_client_takes_the_place_of_the_oldest_that_said_nothing_valid_and_never_of_a_station_that_speaks()
-    {
+    fn a_new_client_replaces_the_oldest_without_a_valid_frame_and_never_an_active_station() {
         let now = Instant::now() + Duration::from_hours(1);
         for (ages_s, leaves) in [
             ([None, None, None, None], Some(0)),

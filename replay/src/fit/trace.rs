@@ -5,7 +5,7 @@ use std::path::Path;
 
 use avionics::log::frame::{commands_from_log, input_from_log, phase_of};
 use avionics::log::logged::{At, Logged, RecordError};
-use flight::computer::{Commands, KeptInput};
+use flight::computer::{Commands, SensedInput};
 use flight::estimation::estimator::{Estimate, Measurements};
 use flight::rules::outputs::PyroOutput;
 use flight::rules::phase::Phase;
@@ -102,8 +102,8 @@ impl Trace {
     }
 
     /// Adds a frame; one with numbers that are not finite is left out.
-    pub fn push(&mut self, input: &KeptInput, commands: &Commands, phase: Phase, estimate: &Estimate) {
-        let KeptInput { time_s, measured, gimbal_rad, fins_rad, .. } = *input;
+    pub fn push(&mut self, input: &SensedInput, commands: &Commands, phase: Phase, estimate: &Estimate) {
+        let SensedInput { time_s, measured, gimbal_rad, fins_rad, .. } = *input;
         let fix = measured.gnss.as_ref().map(|fix| [&fix.position_m, &fix.velocity_m_s]);
         let vectors = [measured.imu.gyro_rad_s, measured.imu.specific_force_m_s2];
         let numbers = vectors.iter().chain(fix.into_iter().flatten()).flat_map(|vector| vector.iter());

@@ -63,7 +63,7 @@ impl WorldAgain {
         let Some(number) = number.filter(|_| !self.over) else { return };
         let recorded = felt(&frame.record.input).encode_to_vec();
         let again = self.flight.follow(number, computer);
-        let again = again.map(|kept| felt(&kept.to_log()).encode_to_vec());
+        let again = again.map(|sensed| felt(&sensed.to_log()).encode_to_vec());
         if again != Some(recorded) {
             self.first_different.get_or_insert(frame.record.input.frame);
         }

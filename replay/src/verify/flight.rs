@@ -2,7 +2,7 @@
 
 use std::io::Read;
 
-use avionics::log::frame::thought_to_log;
+use avionics::log::frame::estimate_to_log;
 use protocol::log::computer_v1::ComputerStart;
 use protocol::log::record::{
     TOPIC_ESTIMATE, TOPIC_EVENTS, TOPIC_PILOT_TIMING, TOPIC_TRANSFORM, TOPIC_TRUTH_SAMPLE,
@@ -208,7 +208,7 @@ impl FlightVerifier {
                         encode_into(&computer.as_start(), &mut self.awaited.release);
                     }
                     if frame.since_release.is_some()
-                        && let Some(thought) = thought_to_log(computer.pilot())
+                        && let Some(thought) = estimate_to_log(computer.pilot())
                     {
                         self.parts.thoughts.recorded += 1;
                         encode_into(&thought, &mut self.awaited.thought);

@@ -43,7 +43,7 @@ pub(crate) static FLIGHT: LazyLock<Flight> = LazyLock::new(|| {
     while frames.len() < FRAMES {
         flight.step_with(&Outside::NOBODY, &mut last);
         frames.push(*last.take().unwrap());
-        let beside = record::thought_and_truth(&flight).into_iter();
+        let beside = record::estimate_and_truth(&flight).into_iter();
         thoughts.extend(beside.filter(|record| matches!(record, Record::Estimate(_))));
     }
     let limit = |name: &str| v1::LimitResult {

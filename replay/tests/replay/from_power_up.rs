@@ -4,8 +4,8 @@
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use flight::computer::crew::{Asked, People, Request};
-use flight::computer::news::Severity;
+use flight::computer::crew::{CrewCommand, People, Request};
+use flight::computer::messages::Severity;
 use flight::computer::{Commander, LogState};
 use flight::rules::arming::Uplink;
 use flight::rules::operator::{Name, Operator, Role};
@@ -38,16 +38,16 @@ pub(crate) struct Reached {
     pin_out: bool,
 }
 
-fn asked(frame: u64, asked: Asked) -> Reached {
-    let request = Some(Request::of_the_programme(asked));
+fn commanded(frame: u64, command: CrewCommand) -> Reached {
+    let request = Some(Request::of_the_programme(command));
     Reached { frame, request, uplink: Uplink::NotNeeded, commander_age_s: None, pin_out: true }
 }
 
 /// A request of one of two operators.
-fn of(frame: u64, role: Role, asked: Asked, confirms: Option<u16>) -> Reached {
+fn of(frame: u64, role: Role, command: CrewCommand, confirms: Option<u16>) -> Reached {
     let by = Some(Operator { number: role as u8, role, name: Name::new("Ann") });
-    let request = Request { asked, uplink: Uplink::NotNeeded, station: Some(STATION), by, confirms };
-    Reached { request: Some(request), ..self::asked(frame, asked) }
+    let request = Request { command, uplink: Uplink::NotNeeded, station: Some(STATION), by, confirms };
+    Reached { request: Some(request), ..commanded(frame, command) }
 }
 
 /// The frame in which the second one confirms the arming.
@@ -57,22 +57,26 @@ const CONFIRMED: u64 = 1_210;
 fn two_people(taps: u64) -> Vec<Reached> {
     let (flight, range) = (Role::Flight, Role::RangeSafety);
     let mut crew = vec![
-        of(1_200, flight, Asked::Arm, None),
+        of(1_200, flight, CrewCommand::Arm, None),
         // The same role, and the number of another ask.
-        of(1_205, flight, Asked::Arm, Some(65_535)),
-        of(1_206, range, Asked::Arm, Some(7)),
-        of(CONFIRMED, range, Asked::Arm, Some(65_535)),
-        of(1_220, flight, Asked::Start, None),
+        of(1_205, flight, CrewCommand::Arm, Some(65_535)),
+        of(1_206, range, CrewCommand::Arm, Some(7)),
+        of(CONFIRMED, range, CrewCommand::Arm, Some(65_535)),
+        of(1_220, flight, CrewCommand::Start, None),
         // The numbers have begun again.
-        of(1_230, range, Asked::Start, Some(1)),
+        of(1_230, range, CrewCommand::Start, Some(1)),
     ];
-    crew.extend((1..=taps).map(|nth| of(1_230 + 200 * nth, range, Asked::Tap, None)));
+    crew.extend((1..=taps).map(|nth| of(1_230 + 200 * nth, range, CrewCommand::Tap, None)));
     crew
 }
 
 /// A crew that arms, starts, and does nothing else.
 pub(crate) fn armed_and_started(at: u64) -> Vec<Reached> {
-    vec![asked(0, Asked::Hold), asked(at, Asked::Arm), asked(at + 1, Asked::Start)]
+    vec![
+        commanded(0, CrewCommand::Hold),
+        commanded(at, CrewCommand::Arm),
+        commanded(at + 1, CrewCommand::Start),
+    ]
 }
 
 /// A vehicle, and the header of its log. Of those on a rail the one whose crew places the rail
@@ -97,7 +101,7 @@ impl Flown {
     /// Of a vehicle that two people arm and start.
     fn by_two(crew: &[Reached]) -> Self {
         let (vehicle, header) = vehicle(StartPoint::Apogee, &[]);
-        Self::fly(vehicle.with_crew(People::Two { first_ask: 65_534 }, Vec::new()), header, crew)
+        Self::fly(vehicle.with_crew(People::Two { first: 65_534 }, Vec::new()), header, crew)
     }
 
     fn in_space(crew: &[Reached], faults: &[&str]) -> Self {
@@ -249,7 +253,7 @@ fn what_two_people_do_verifies() {
 fn flights_from_the_pad_and_from_a_drone_verify() {
     let started = armed_and_started(2_600);
     let mut aborted = started.clone();
-    aborted.push(asked(5_000, Asked::Abort));
+    aborted.push(commanded(5_000, CrewCommand::Abort));
     for (start, crew, faults, passed) in [
         (StartPoint::Pad, &started, &[][..], Phase::Powered),
         (StartPoint::Pad, &aborted, &[], Phase::Chute),
@@ -317,7 +321,7 @@ fn a_frame_missing_in_the_log_is_no_identical_flight() {
 
 #[test]
 fn a_vehicle_that_never_left_its_pad_verifies_and_counts_as_cut() {
-    let flown = Flown::in_space(&[asked(0, Asked::Hold)], &[]);
+    let flown = Flown::in_space(&[commanded(0, CrewCommand::Hold)], &[]);
     let report = flown.verified();
     assert_eq!(report.outcome, Verification::IdenticalReadablePart);
     let cut = report.cut.unwrap();
@@ -331,32 +335,32 @@ fn a_vehicle_that_never_left_its_pad_verifies_and_counts_as_cut() {
 fn any_uplink() -> impl Strategy<Value = Uplink> {
     prop_oneof![
         3 => Just(Uplink::NotNeeded),
-        1 => Just(Uplink::NeverHeard),
-        3 => (0.0..2.0).prop_map(|age_s| Uplink::Heard { age_s }),
+        1 => Just(Uplink::NeverReceived),
+        3 => (0.0..2.0).prop_map(|age_s| Uplink::Received { age_s }),
     ]
 }
 
 fn any_crew() -> impl Strategy<Value = Vec<Reached>> {
-    let asked = prop_oneof![
-        4 => Just(Asked::Arm),
-        4 => Just(Asked::Start),
-        1 => Just(Asked::Disarm),
-        1 => Just(Asked::Hold),
-        1 => Just(Asked::Abort),
+    let command = prop_oneof![
+        4 => Just(CrewCommand::Arm),
+        4 => Just(CrewCommand::Start),
+        1 => Just(CrewCommand::Disarm),
+        1 => Just(CrewCommand::Hold),
+        1 => Just(CrewCommand::Abort),
     ];
     let one = (
         0_u64..1_500,
-        prop::option::of(asked),
+        prop::option::of(command),
         any_uplink(),
         prop::option::of(0.0..4.0),
         prop::bool::weighted(0.9),
         prop::option::of((any::<u8>(), any::<u8>(), any::<u32>())),
     );
-    let one = one.prop_map(|(frame, asked, uplink, commander_age_s, pin_out, ids)| Reached {
+    let one = one.prop_map(|(frame, command, uplink, commander_age_s, pin_out, ids)| Reached {
         frame,
-        request: asked.map(|asked| {
+        request: command.map(|command| {
             let station = ids.map(|(system, component, number)| Station { system, component, number });
-            Request { asked, uplink, station, by: None, confirms: None }
+            Request { command, uplink, station, by: None, confirms: None }
         }),
         uplink,
         commander_age_s,
@@ -383,7 +387,7 @@ proptest! {
         at in 0_usize..3_000,
         frame in prop_oneof![Just(u64::MAX), any::<u64>(), 0_u64..2_000],
         number in prop_oneof![any::<u64>().prop_map(f64::from_bits), Just(f64::NAN), Just(f64::INFINITY)],
-        asked: u32,
+        number_of_command: u32,
     ) {
         let nonsense = |record: &mut Record| {
             if let Record::ComputerFrame(found) = record
@@ -393,7 +397,7 @@ proptest! {
                 found.input.time_s = number;
                 found.input.fins_rad[0] = number;
                 for request in &mut found.input.requests {
-                    request.asked = asked;
+                    request.asked = number_of_command;
                 }
                 found.input.measured.imu.gyro_rad_s.x = number;
             }

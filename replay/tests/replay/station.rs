@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use protocol::frame::Framer;
 use protocol::log::record::{Direction, Event, EventLevel, RawFrame, Record};
 use protocol::log::writer::{LogHeader, LogWriter};
-use protocol::told::Told;
+use protocol::reported::ReportedState;
 use replay::log::{Entry, FlightLog};
 
 /// The station was started this long before the first frame, records the vehicle's state so often,
@@ -25,7 +25,7 @@ pub(crate) fn station_log(own: &Path, name: &str) -> PathBuf {
         ..LogHeader::default()
     };
     let mut log = LogWriter::new(File::create(&path).unwrap(), &header).unwrap();
-    let (mut told, mut due_ns, mut noted, mut first_ns) = (Told::default(), 0, false, None);
+    let (mut told, mut due_ns, mut noted, mut first_ns) = (ReportedState::default(), 0, false, None);
     while let Some(stamped) = from.next_entry().unwrap() {
         if stamped.entry != Entry::RawFrame {
             continue;
@@ -41,7 +41,7 @@ pub(crate) fn station_log(own: &Path, name: &str) -> PathBuf {
             bytes: stamped.data,
         };
         log.write(&Record::RawFrame(raw), at_ns).unwrap();
-        if told.hear(&message) && at_ns >= due_ns {
+        if told.update(&message) && at_ns >= due_ns {
             due_ns = at_ns + PERIOD_NS;
             log.write(&Record::Telemetry(Box::new(told.record(at_ns as f64 / 1e9))), at_ns).unwrap();
         }

@@ -44,8 +44,8 @@ impl Barometer {
         Ok(Self { prom, converts: None, frames: 0, temperature_raw: 0 })
     }
 
-    /// Called once a frame. The pressure, Pa, in the frame in which one is ready. A bus that has
-    /// failed gives none, and is asked anew.
+    /// Called once a frame. Returns the pressure, Pa, in the frame in which one is ready. After a
+    /// bus failure it returns none, and restarts the conversion.
     pub(crate) fn poll(&mut self, bus: &mut impl I2c) -> Option<f64> {
         self.frames += 1;
         if self.converts.is_some() && self.frames < CONVERSION_FRAMES {
@@ -55,7 +55,7 @@ impl Barometer {
         let mut bytes = [0; 4];
         let ended = self.converts.take();
         let read = ended.and_then(|_| bus.write_read(ADDRESS, &[READ_ADC], &mut bytes[1..]).ok());
-        // A sensor that was asked too early says 0.
+        // A sensor queried too early returns 0.
         let raw = read.map(|()| u32::from_be_bytes(bytes)).filter(|raw| *raw > 0);
         let pressure_next = ended == Some(CONVERT_TEMPERATURE) && raw.is_some();
         let next = if pressure_next { CONVERT_PRESSURE } else { CONVERT_TEMPERATURE };
@@ -83,7 +83,7 @@ pub(crate) fn compensated(prom: &[u16; 8], pressure_raw: u32, temperature_raw: u
         sensitivity -= 5 * cold / 4 + 11 * very_cold / 2;
     }
     let pressure = ((i64::from(pressure_raw) * sensitivity) >> 21) - offset;
-    // The data sheet's integer is 1 Pa, which is 8 cm: the rest is kept.
+    // The data sheet's integer is 1 Pa, which is 8 cm: the fraction is retained.
     (temperature, pressure as f64 / f64::from(1 << 15))
 }
 

@@ -10,10 +10,10 @@ const READ: u8 = 0x80;
 const DEVICE_CONFIG: u8 = 0x11;
 const ACCEL_DATA_X1: u8 = 0x1F;
 const WHO_AM_I: u8 = 0x75;
-/// What [`WHO_AM_I`] says.
+/// Value of [`WHO_AM_I`].
 const NAME: u8 = 0x47;
 /// Gyro and accelerometer in low noise; 2,000 deg/s and 16 g, both at 1 kHz; both filtered to 100
-/// Hz, a tenth of that, because a frame takes one sample of five and wants their mean.
+/// Hz, a tenth of that, because a frame takes one sample of five and needs their mean.
 const SETTINGS: [[u8; 2]; 4] = [[0x4E, 0x0F], [0x4F, 0x06], [0x50, 0x06], [0x52, 0x44]];
 const LSB_PER_G: f64 = 2048.0;
 const LSB_PER_DEG_S: f64 = 16.4;
@@ -37,8 +37,8 @@ pub(crate) fn start(bus: &mut impl SpiDevice, delay: &mut impl DelayNs) -> Resul
     Ok(())
 }
 
-/// The newest sample in the unit's own axes: specific force, m/s^2, and rate, rad/s; `None` if the
-/// bus has failed.
+/// The newest sample in the unit's axes: specific force, m/s^2, and rate, rad/s; `None` if the bus
+/// has failed.
 pub(crate) fn read(bus: &mut impl SpiDevice) -> Option<[[f64; 3]; 2]> {
     let mut bytes = [0; 13];
     bytes[0] = READ | ACCEL_DATA_X1;

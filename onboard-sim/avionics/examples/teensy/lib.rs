@@ -31,10 +31,10 @@ use embedded_hal::i2c::I2c;
 use embedded_hal::pwm::SetDutyCycle;
 use embedded_hal::spi::SpiDevice;
 use embedded_io::{Read, ReadReady};
-use flight::computer::news::CrewMessage;
+use flight::computer::messages::CrewMessage;
 use flight::computer::pad_check::surfaces_rad;
 use flight::computer::pilot::planner::Planner;
-use flight::computer::{Commands, Computer, FRAME_S, KeptInput, LogState, flight_time_s};
+use flight::computer::{Commands, Computer, FRAME_S, LogState, SensedInput, flight_time_s};
 use flight::estimation::estimator::{GnssFix, ImuSample, Measurements};
 use flight::rules::outputs::PyroOutput;
 use flight::vehicle::atmosphere::{Air, pressure_altitude_m};
@@ -45,7 +45,7 @@ use protocol::records::computer_v1::ComputerFrame;
 
 pub use self::barometer::Barometer;
 pub use self::saved::MOST_BYTES;
-use self::saved::{Kept, Zero};
+use self::saved::{Record, Zero};
 pub use self::servo::Surface;
 use self::uart::Framer;
 
@@ -61,20 +61,19 @@ pub trait Wiring {
     type Chip: Chip;
 }
 
-/// What the chip offers besides its buses and pins. Nothing of it waits.
+/// Services of the chip besides its buses and pins. None of them waits.
 pub trait Chip {
-    /// Sends to the main context what it has to solve.
-    fn pose(&mut self, posed: Box<Planner>);
+    /// Submits a request to the main context.
+    fn submit(&mut self, planner: Box<Planner>);
 
-    /// What the main context has solved, once.
+    /// Returns the result of the main context, once.
     fn solved(&mut self) -> Option<Box<Planner>>;
 
-    /// What the radio has heard since the last frame: an endpoint's answer, as in
-    /// `avionics::board::radio`.
-    fn heard(&mut self) -> UplinkState;
+    /// Radio data since the last frame: an endpoint's uplink state, as in `avionics::board::radio`.
+    fn uplink_state(&mut self) -> UplinkState;
 
-    /// Tells the crew.
-    fn tell(&mut self, news: &[CrewMessage]);
+    /// Sends messages to the crew.
+    fn send(&mut self, messages: &[CrewMessage]);
 
     /// Puts a record into the ring from which the main context writes the log.
     fn append(&mut self, record: &[u8]);
@@ -117,8 +116,8 @@ pub struct Parts<W: Wiring> {
     pub chip: W::Chip,
 }
 
-/// What each output switches: both igniters of the landing motor, that of the ascent motor,
-/// separation and parachute.
+/// The outputs: both igniters of the landing motor, that of the ascent motor, separation and
+/// parachute.
 pub const LINES: [PyroOutput; 5] = [
     PyroOutput::LandingIgniter,
     PyroOutput::LandingIgniter,
@@ -164,8 +163,8 @@ const ZERO_FIXES: u32 = 10;
 
 /// The board.
 pub struct TeensyBoard<W: Wiring> {
-    /// What did not start is silent: the flight computer arms nothing without it, and behind a
-    /// reset in the air it does what is left.
+    /// A device that did not start is silent: the flight computer arms nothing without it, and
+    /// after a reset in the air it flies without it.
     pub imu: Result<(), Trouble>,
     pub barometer: Result<Barometer, Trouble>,
     parts: Parts<W>,
@@ -176,7 +175,7 @@ pub struct TeensyBoard<W: Wiring> {
     /// Air temperature at the pad, in the shade, K: warm air is taller. An error of 3 K makes every
     /// height wrong by one per cent.
     air_k: f64,
-    /// Where the centre of gravity is while the vehicle stands, world, m.
+    /// Position of the centre of gravity of the vehicle on its pad, world, m.
     stands_m: Vector3<f64>,
     height: Zero,
     place: Zero,
@@ -184,7 +183,7 @@ pub struct TeensyBoard<W: Wiring> {
     released_at: u64,
 }
 
-/// Starts board and frames at power-up, and goes on behind a reset. `computer` is one at power-up.
+/// Starts board and frames at power-up, and resumes after a reset. `computer` is one at power-up.
 ///
 /// # Errors
 /// The vehicle is built otherwise than this board needs it.
@@ -208,15 +207,15 @@ pub fn start<W: Wiring>(
     let records = [0, 1].into_iter().filter_map(|slot| {
         let mut bytes = [0; MOST_BYTES];
         let read = chip.load(slot, &mut bytes);
-        Kept::read(bytes.get(..read)?)
+        Record::read(bytes.get(..read)?)
     });
-    if let Some(kept) = records.max_by_key(|kept| kept.saved.frame()) {
-        let lost_s = (chip.clock_s() - kept.clock_s).max(0.0);
-        let back = kept.saved.frame() + libm::round(lost_s / FRAME_S) as u64;
-        computer.resume(&kept.saved, flight_time_s(back));
+    if let Some(record) = records.max_by_key(|record| record.saved.frame()) {
+        let lost_s = (chip.clock_s() - record.clock_s).max(0.0);
+        let back = record.saved.frame() + libm::round(lost_s / FRAME_S) as u64;
+        computer.resume(&record.saved, flight_time_s(back));
         // It is not resumed after too long a time.
         if computer.frame() > 0 {
-            (height, place, frame) = (kept.height, kept.place, back);
+            (height, place, frame) = (record.height, record.place, back);
         }
     }
     let released_at = computer.released_at_s().map_or(0, |at_s| libm::round(at_s / FRAME_S) as u64);
@@ -239,13 +238,13 @@ pub fn start<W: Wiring>(
     Ok((Frames::new(computer, frame), board))
 }
 
-/// What the timer calls every 5 ms. Returns `false` if the flight is over.
+/// Called by the timer every 5 ms. Returns `false` if the flight is over.
 pub fn tick<W: Wiring>(frames: &mut Frames, board: &mut TeensyBoard<W>) -> bool {
     let Ok(goes_on) = frames.fly(board);
     let (saved, clock_s) = (frames.computer().saved(), board.parts.chip.clock_s());
-    let kept = Kept { clock_s, height: board.height, place: board.place, saved };
-    if let Some(bytes) = kept.write(&mut [0; MOST_BYTES]) {
-        board.parts.chip.save((kept.saved.frame() % 2) as usize, bytes);
+    let record = Record { clock_s, height: board.height, place: board.place, saved };
+    if let Some(bytes) = record.write(&mut [0; MOST_BYTES]) {
+        board.parts.chip.save((record.saved.frame() % 2) as usize, bytes);
     }
     goes_on
 }
@@ -253,7 +252,7 @@ pub fn tick<W: Wiring>(frames: &mut Frames, board: &mut TeensyBoard<W>) -> bool 
 impl<W: Wiring> TeensyBoard<W> {
     fn measured(&mut self) -> Measurements {
         let (parts, axes) = (&mut self.parts, &self.build.body_from_imu);
-        // The sensor watch takes what is no number for silence.
+        // The sensor monitor treats NaN as silence.
         let felt = self.imu.as_ref().ok().and_then(|()| imu::read(&mut parts.imu));
         let [force_m_s2, rate_rad_s] = felt.unwrap_or([[f64::NAN; 3]; 2]);
         let imu =
@@ -270,8 +269,8 @@ impl<W: Wiring> TeensyBoard<W> {
         Measurements { imu, pressure_altitude_m, gnss, lidar_range_m }
     }
 
-    /// A fix on the flight computer's clock, relative to the pad: the vehicle stands where its
-    /// mission says.
+    /// A fix on the flight computer's clock, relative to the pad: the vehicle is at its mission's
+    /// site.
     fn located(&mut self, fix: &gnss::Fix) -> Option<GnssFix> {
         let (north_m, east_m) =
             self.pad.to(Degrees { latitude: fix.latitude_deg, longitude: fix.longitude_deg });
@@ -286,20 +285,20 @@ impl<W: Wiring> TeensyBoard<W> {
 }
 
 impl<W: Wiring> Board for TeensyBoard<W> {
-    /// A sensor that has failed is silent, which the flight computer knows how to fly with; ending
-    /// the frames would help nobody.
+    /// A failed sensor is silent, which the flight computer handles; ending the frames would be
+    /// worse.
     type Error = Infallible;
 
     fn sense(&mut self) -> Result<Option<LoggedInput>, Infallible> {
-        let UplinkState { uplink, commander, requests } = self.parts.chip.heard();
-        // What cannot be read is: no contact, no igniter, no booster, pin in.
+        let UplinkState { uplink, commander, requests } = self.parts.chip.uplink_state();
+        // A switch that cannot be read counts as: no contact, no igniter, no booster, pin in.
         let high = |switch: &mut W::Switch| switch.is_high().unwrap_or(false);
         let low = |switch: &mut W::Switch| switch.is_low().unwrap_or(false);
-        let kept = KeptInput {
+        let sensed = SensedInput {
             frame: 0,
             time_s: 0.0,
             measured: self.measured(),
-            // Not read: the flight computer knows how fast these servos are.
+            // Not read: the flight computer models these servos.
             gimbal_rad: [0.0; 2],
             fins_rad: [0.0; 4],
             contact: low(&mut self.parts.foot),
@@ -310,10 +309,10 @@ impl<W: Wiring> Board for TeensyBoard<W> {
             log: self.parts.chip.log(),
             uplink,
             commander,
-            // `avionics::board::radio` knows no operators yet.
+            // `avionics::board::radio` does not support operators yet.
             people: None,
         };
-        Ok(Some(LoggedInput { kept, requests, rehearsed: None, plan_ready: false }))
+        Ok(Some(LoggedInput { sensed, requests, rehearsed: None, plan_ready: false }))
     }
 
     fn act(&mut self, commands: &Commands) -> Result<(), Infallible> {
@@ -321,7 +320,7 @@ impl<W: Wiring> Board for TeensyBoard<W> {
         let angles_rad = surfaces_rad(gimbal_rad, fins_rad);
         let surfaces = self.parts.servos.iter_mut().zip(&self.build.surfaces);
         for ((servo, surface), angle_rad) in surfaces.zip(angles_rad) {
-            // What fails is told again in the next frame.
+            // A failed command is repeated in the next frame.
             let _ = servo.set_duty_cycle(surface.duty(angle_rad, servo.max_duty_cycle()));
         }
         for (output, line) in self.parts.outputs.iter_mut().zip(LINES) {
@@ -330,19 +329,19 @@ impl<W: Wiring> Board for TeensyBoard<W> {
         Ok(())
     }
 
-    fn pose(&mut self, posed: Box<Planner>) {
-        self.parts.chip.pose(posed);
+    fn submit(&mut self, planner: Box<Planner>) {
+        self.parts.chip.submit(planner);
     }
 
     fn solved(&mut self) -> Option<Box<Planner>> {
         self.parts.chip.solved()
     }
 
-    fn tell(&mut self, news: &[CrewMessage]) {
-        self.parts.chip.tell(news);
+    fn send(&mut self, messages: &[CrewMessage]) {
+        self.parts.chip.send(messages);
     }
 
-    fn keep(&mut self, frame: &ComputerFrame) {
+    fn log(&mut self, frame: &ComputerFrame) {
         self.frame = frame.input.frame;
         if frame.output.released {
             self.released_at = self.frame;

@@ -1,13 +1,13 @@
-//! What outlasts a reset: the flight computer's record, and where this board's sensors have their
-//! zero.
+//! State that survives a reset: the flight computer's record, and the zeros of this board's
+//! sensors.
 //!
-//! Without the zeros a barometer that starts again in the air would say that the ground is there.
+//! Without the zeros a barometer that restarts in the air would report the ground there.
 
 use flight::computer::saved::Saved;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-/// What a sensor says where the vehicle stands: the mean of its first samples after power-up.
+/// Zero of a sensor on the pad: the mean of its first samples after power-up.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct Zero {
     samples: u32,
@@ -15,7 +15,7 @@ pub(crate) struct Zero {
 }
 
 impl Zero {
-    /// How far a sample is from the zero, once that has so many samples.
+    /// Deviation of a sample from the zero, once that has this many samples.
     pub(crate) fn from(&mut self, needed: u32, sample: Vector3<f64>) -> Option<Vector3<f64>> {
         if self.samples >= needed {
             return Some(sample - self.mean);
@@ -32,7 +32,7 @@ pub const MOST_BYTES: usize = 4 + 66 + Saved::MOST_BYTES;
 
 /// A record.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Kept {
+pub(crate) struct Record {
     /// The clock at its writing, s.
     pub(crate) clock_s: f64,
     pub(crate) height: Zero,
@@ -40,7 +40,7 @@ pub(crate) struct Kept {
     pub(crate) saved: Saved,
 }
 
-impl Kept {
+impl Record {
     /// Its bytes; `None` if they do not fit, which their lengths exclude.
     pub(crate) fn write<'a>(&self, into: &'a mut [u8; MOST_BYTES]) -> Option<&'a [u8]> {
         let (sum, record) = into.split_first_chunk_mut()?;
@@ -50,7 +50,7 @@ impl Kept {
         into.get(..bytes)
     }
 
-    /// A record that is whole.
+    /// A complete record.
     pub(crate) fn read(bytes: &[u8]) -> Option<Self> {
         let (sum, record) = bytes.split_first_chunk()?;
         let whole = u32::from_le_bytes(*sum) == crc32fast::hash(record);

@@ -1,8 +1,8 @@
-//! Servos that are told where to go by the width of a pulse, and tell nothing.
+//! Servos commanded by the width of a pulse, without feedback.
 
 /// Time between pulses, us: 333 Hz, which digital servos take.
 pub(crate) const PERIOD_US: f64 = 1e6 / 333.0;
-/// What no pulse leaves, us.
+/// Limits of a pulse, us.
 const SHORTEST_US: f64 = 900.0;
 const LONGEST_US: f64 = 2100.0;
 

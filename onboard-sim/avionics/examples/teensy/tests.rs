@@ -1,5 +1,5 @@
-//! The drivers against their data sheets, and the whole board flown: simulated devices with the
-//! real ones' registers, frames and pulses stand between it and a simulated world.
+//! The drivers against their data sheets, and the complete board flown: simulated devices with the
+//! registers, frames and pulses of the real ones connect it to a simulated world.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -10,7 +10,7 @@ use avionics::log::again::RecordedComputer;
 use avionics::log::frame::start_to_log;
 use embedded_hal::{digital, i2c, pwm, spi};
 use flight::computer::FRAME_MS;
-use flight::computer::crew::{Asked, Request};
+use flight::computer::crew::{CrewCommand, Request};
 use flight::computer::pad_check::CheckState;
 use flight::estimation::estimator::{FixQuality, GRAVITY_M_S2};
 use flight::rules::arming::Uplink;
@@ -157,7 +157,7 @@ fn val_datasheet_tf_luna() {
     assert_eq!(ranges(&[luna(300, 99), luna(300, 0xFFFF)].concat()), [0.0; 0], "a weak echo, a blinded one");
 }
 
-/// Where a servo goes with a duty of 65,535, rad.
+/// Position of a servo at a duty of 65,535, rad.
 fn angle_rad(surface: &Surface, duty: u16) -> f64 {
     (f64::from(duty) / 65_535.0 * servo::PERIOD_US - surface.zero_us) / surface.us_per_rad
 }
@@ -173,18 +173,18 @@ fn val_hand_a_servo_s_pulse() {
 }
 
 #[test]
-fn a_record_comes_back_whole_or_not_at_all() {
+fn a_record_is_read_complete_or_not_at_all() {
     let (saved, mut place, mut room) = (at_power_up(&mission()).saved(), Zero::default(), [0; MOST_BYTES]);
     assert_eq!(place.from(1, Vector3::new(1.0, -2.0, 3.5)), None);
     assert_eq!(place.from(1, Vector3::new(3.0, -2.0, 3.5)), Some(Vector3::new(2.0, 0.0, 0.0)));
-    let kept = Kept { clock_s: 12.5, height: Zero::default(), place, saved };
-    let bytes = kept.write(&mut room).unwrap();
-    assert_eq!(Kept::read(bytes), Some(kept));
+    let record = Record { clock_s: 12.5, height: Zero::default(), place, saved };
+    let bytes = record.write(&mut room).unwrap();
+    assert_eq!(Record::read(bytes), Some(record));
     for place in 0..bytes.len() {
-        assert_eq!(Kept::read(&bytes[..place]), None);
+        assert_eq!(Record::read(&bytes[..place]), None);
         let mut broken = bytes.to_vec();
         broken[place] ^= 1;
-        assert_eq!(Kept::read(&broken), None, "byte {place}");
+        assert_eq!(Record::read(&broken), None, "byte {place}");
     }
 }
 
@@ -216,20 +216,20 @@ fn mission() -> Mission {
     mission
 }
 
-/// It believes that its rail stands as the drawing says.
+/// It assumes that its rail is as in the drawing.
 fn at_power_up(mission: &Mission) -> Computer {
     let cg_station_m = mission.airframe.mass.loaded_cg_station_m;
     Computer::at_power_up(mission, &mission.launched().unwrap().standing(cg_station_m))
 }
 
-/// A world, and what the devices on the board's wires know of it.
+/// A world, and its data for the devices on the board's wires.
 struct Bench {
     world: World,
     sensors: Sensors,
     pad: Degrees,
     frame: u64,
     measured: Option<Measurements>,
-    /// In the place of what the world gives: accelerometer and gyro, counts.
+    /// Replaces the world's values: accelerometer and gyro, counts.
     imu: Option<[i16; 6]>,
     imu_name: u8,
     igniters: [bool; 2],
@@ -240,7 +240,7 @@ struct Bench {
     outputs: [bool; 5],
     pin_out: bool,
     requests: Vec<Request>,
-    posed: Option<(u64, Box<Planner>)>,
+    submitted: Option<(u64, Box<Planner>)>,
     log: Vec<u8>,
     slots: [Vec<u8>; 2],
 }
@@ -281,7 +281,7 @@ impl Bench {
             outputs: [false; 5],
             pin_out: false,
             requests: Vec::new(),
-            posed: None,
+            submitted: None,
             log: Vec::new(),
             slots: [Vec::new(), Vec::new()],
         };
@@ -314,7 +314,7 @@ impl Bench {
         }
     }
 
-    /// Counts of accelerometer and gyro, in the unit's own axes.
+    /// Counts of accelerometer and gyro, in the unit's axes.
     fn imu_counts(&self) -> [i16; 6] {
         let imu = self.measured.unwrap().imu;
         let mut counts = [0; 6];
@@ -327,7 +327,7 @@ impl Bench {
         counts
     }
 
-    /// What the barometer's converter says now.
+    /// Present value of the barometer's converter.
     fn barometer_raw(&self) -> u32 {
         let (command, since) = self.barometer;
         // 9.04 ms: two frames.
@@ -474,25 +474,25 @@ impl DelayNs for Device {
 
 impl Chip for Device {
     /// Solved as late as by a Cortex-M7.
-    fn pose(&mut self, mut posed: Box<Planner>) {
-        posed.solve();
+    fn submit(&mut self, mut planner: Box<Planner>) {
+        planner.solve();
         let mut bench = self.bench.borrow_mut();
-        bench.posed = Some((bench.frame + posed.frames_on_a_board(), posed));
+        bench.submitted = Some((bench.frame + planner.frames_on_a_board(), planner));
     }
 
     fn solved(&mut self) -> Option<Box<Planner>> {
         let mut bench = self.bench.borrow_mut();
         let now = bench.frame;
-        bench.posed.take_if(|(at, _)| now >= *at).map(|(_, planner)| planner)
+        bench.submitted.take_if(|(at, _)| now >= *at).map(|(_, planner)| planner)
     }
 
-    fn heard(&mut self) -> UplinkState {
+    fn uplink_state(&mut self) -> UplinkState {
         let mut bench = self.bench.borrow_mut();
         let requests = core::mem::take(&mut bench.requests);
         UplinkState { uplink: Uplink::NotNeeded, commander: None, requests }
     }
 
-    fn tell(&mut self, _: &[CrewMessage]) {}
+    fn send(&mut self, _: &[CrewMessage]) {}
 
     fn append(&mut self, record: &[u8]) {
         self.bench.borrow_mut().log.extend_from_slice(record);
@@ -507,7 +507,7 @@ impl Chip for Device {
     }
 
     fn clock_s(&mut self) -> f64 {
-        // Nobody sets it to zero at power-up.
+        // It is not zeroed at power-up.
         1e6 + flight_time_s(self.bench.borrow().frame)
     }
 
@@ -557,9 +557,10 @@ fn switched_on(bench: &Rc<RefCell<Bench>>, computer: Computer) -> (Frames, Teens
     start(parts(bench), build(), computer, &mut delay).unwrap()
 }
 
-/// What the crew does, one after the other.
-const CREW: [Asked; 5] = [Asked::Check, Asked::Seen, Asked::Seen, Asked::Arm, Asked::Start];
-/// Frames between what it does, and before.
+/// The crew's actions, in order.
+const CREW: [CrewCommand; 5] =
+    [CrewCommand::Check, CrewCommand::Seen, CrewCommand::Seen, CrewCommand::Arm, CrewCommand::Start];
+/// Frames before and between them.
 const CREW_WAITS: u64 = 20;
 const CREW_COMES: u64 = 1_000;
 
@@ -585,7 +586,7 @@ fn fly(resets_in: Option<Phase>) -> (Bench, ComputerStart) {
         if resets == Some(mode.phase) && flight_time_s(now) > mode.entered_at_s + 0.5 {
             resets = None;
             let mut dead = bench.borrow_mut();
-            (dead.outputs, dead.posed) = ([false; 5], None);
+            (dead.outputs, dead.submitted) = ([false; 5], None);
             (0..20).for_each(|_| dead.advance());
             dead.uarts = [VecDeque::new(), VecDeque::new()];
             drop(dead);
@@ -597,8 +598,8 @@ fn fly(resets_in: Option<Phase>) -> (Bench, ComputerStart) {
     (Rc::into_inner(bench).unwrap().into_inner(), begun)
 }
 
-/// The log is that of the flight computer: another one that gets its inputs, and hears what the
-/// crew has asked, decides and remembers the same. Returns the plans.
+/// The log is that of the flight computer: another one with its inputs and the crew's requests
+/// decides and remembers the same. Returns the plans.
 fn verified(bench: &Bench, begun: &ComputerStart) -> usize {
     let (mut log, mut again, mut plans) =
         (bench.log.as_slice(), RecordedComputer::started(&mission(), begun), 0);
@@ -647,7 +648,7 @@ fn what_is_built_otherwise_does_not_start() {
 
 /// Either of the two that is open counts.
 #[test]
-fn an_open_igniter_is_told() {
+fn an_open_igniter_is_reported() {
     for igniters in [[true, true], [true, false], [false, true]] {
         let (bench, computer) = Bench::standing(&mission());
         let bench = Rc::new(RefCell::new(Bench { igniters, ..bench }));

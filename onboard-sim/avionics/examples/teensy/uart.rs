@@ -27,8 +27,7 @@ impl<const N: usize> Framer<N> {
         (self.have == 0).then_some(&self.frame)
     }
 
-    /// Takes what has arrived, and does not wait; returns what the last frame says that says
-    /// anything.
+    /// Reads received bytes, without waiting; returns the last frame with content.
     pub(crate) fn newest<T>(
         &mut self,
         uart: &mut (impl Read + ReadReady),

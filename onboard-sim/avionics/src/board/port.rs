@@ -1,54 +1,53 @@
-//! What a board must offer to fly the flight computer, and the frames that fly it.
+//! The interface that a board implements to fly the flight computer, and the frames that fly it.
 //!
 //! A board has two contexts. A timer calls [`Frames::fly`] every 5 ms, which never waits. The main
-//! context computes what a frame has [posed](Board::pose), which takes up to 20 frames, and is
+//! context computes the [request](Board::submit) of a frame, which takes up to 20 frames, and is
 //! interrupted by them: it receives a [`Planner`], calls [`Planner::solve`], and sends it back. The
-//! planner is a box that moves through the board's own channels, such as two queues of
+//! planner is a box that moves through the board's channels, such as two queues of
 //! `heapless::spsc`: nothing is shared.
 
 use alloc::boxed::Box;
 
 use crate::log::frame::{LoggedInput, frame_to_log};
-use flight::computer::news::CrewMessage;
+use flight::computer::messages::CrewMessage;
 use flight::computer::pilot::planner::Planner;
-use flight::computer::{Commands, Computer, Input, KeptInput, Output, Rehearsed, flight_time_s};
+use flight::computer::{Commands, Computer, Input, Output, Rehearsed, SensedInput, flight_time_s};
 use protocol::records::computer_v1::ComputerFrame;
 
 /// A board: a crate for one board implements this with its drivers.
 pub trait Board {
     type Error;
 
-    /// Reads everything at the end of a frame, 5 ms after the last one, and does not wait: gyro and
-    /// accelerometer in every frame, barometer, satellites and lidar if they have something new;
-    /// gimbal and fins, which are not read if the airframe says that their servos do not tell where
-    /// they are. [`Input`] says what each value is; its number, its time, the rehearsal and whether
-    /// a plan is ready are set by [`Frames`]. `None`: the flight is over.
+    /// Reads everything at the end of a frame, 5 ms after the last one, without waiting: gyro and
+    /// accelerometer in every frame, barometer, satellites and lidar if they have new data; gimbal
+    /// and fins, unless the airframe's servos have no feedback. [`Input`] describes each value; its
+    /// number, its time, the rehearsal and `plan_ready` are set by [`Frames`]. `None`: the flight
+    /// is over.
     ///
     /// # Errors
     /// A device without which nothing can be decided has failed.
     fn sense(&mut self) -> Result<Option<LoggedInput>, Self::Error>;
 
-    /// Moves servos and switches currents: gimbal, fins, both igniters, separation, parachute. It
-    /// acts on every command of the last frame at once, and keeps a current only as long as it is
-    /// commanded.
+    /// Moves servos and switches outputs: gimbal, fins, both igniters, separation, parachute. It
+    /// acts on every command of the last frame at once, and an output stays on only as long as it
+    /// is commanded.
     ///
     /// # Errors
     /// As [`sense`](Self::sense).
     fn act(&mut self, commands: &Commands) -> Result<(), Self::Error>;
 
-    /// Sends to the main context what it has to compute. It does not wait: there is never more than
-    /// one.
-    fn pose(&mut self, posed: Box<Planner>);
+    /// Submits a request to the main context, without waiting: there is never more than one.
+    fn submit(&mut self, planner: Box<Planner>);
 
-    /// Receives what the main context has computed, once.
+    /// Receives the result of the main context, once.
     fn solved(&mut self) -> Option<Box<Planner>>;
 
-    /// Tells the crew.
-    fn tell(&mut self, news: &[CrewMessage]);
+    /// Sends messages to the crew.
+    fn send(&mut self, messages: &[CrewMessage]);
 
-    /// Appends a frame to the log. It must not wait: a log that cannot follow says so in the next
+    /// Appends a frame to the log, without waiting: a log that falls behind reports so in the next
     /// frame's `log`.
-    fn keep(&mut self, frame: &ComputerFrame);
+    fn log(&mut self, frame: &ComputerFrame);
 }
 
 /// The frames of a flight.
@@ -56,7 +55,7 @@ pub trait Board {
 pub struct Frames {
     computer: Computer,
     frame: u64,
-    /// For the next frame, which keeps it.
+    /// For the next frame, which stores it.
     rehearsed: Option<Rehearsed>,
 }
 
@@ -82,19 +81,19 @@ impl Frames {
         let Some(read) = board.sense()? else { return Ok(false) };
         self.frame += 1;
         let (solved, rehearsed) = (board.solved(), self.rehearsed.take());
-        let kept = KeptInput { frame: self.frame, time_s: flight_time_s(self.frame), ..read.kept };
+        let sensed = SensedInput { frame: self.frame, time_s: flight_time_s(self.frame), ..read.sensed };
         let (requests, plan_ready) = (&*read.requests, solved.is_some());
-        let input = Input { kept, requests, rehearsed: rehearsed.as_ref(), plan_ready };
+        let input = Input { sensed, requests, rehearsed: rehearsed.as_ref(), plan_ready };
         if let Some(planner) = solved {
             self.computer.give_back(planner);
         }
         let output: Output = self.computer.step(&input);
         board.act(&output.commands)?;
-        if let Some(posed) = self.computer.take_posed() {
-            board.pose(posed);
+        if let Some(planner) = self.computer.take_request() {
+            board.submit(planner);
         }
-        board.tell(&output.news);
-        board.keep(&frame_to_log(&input, &output, &self.computer, false));
+        board.send(&output.messages);
+        board.log(&frame_to_log(&input, &output, &self.computer, false));
         Ok(true)
     }
 }

@@ -1,4 +1,4 @@
-//! The crew on a board's own radio: MAVLink in and out, between the frames of the flight computer.
+//! The crew on a board's radio: MAVLink in and out, between the frames of the flight computer.
 
 use alloc::vec::Vec;
 
@@ -7,8 +7,8 @@ use crate::link::vehicle::{BatteryFacts, MissionName, VehicleKind, VehicleState}
 use crate::log::frame::LoggedInput;
 use crate::log::logged::Logged;
 use flight::computer::findings::Findings;
-use flight::computer::news::CrewMessage;
-use flight::computer::{Computer, Input, KeptInput, Output};
+use flight::computer::messages::CrewMessage;
+use flight::computer::{Computer, Input, Output, SensedInput};
 use flight::rules::outputs::PyroOutput;
 use flight::vehicle::mission::Mission;
 use protocol::frame::Framer;
@@ -17,14 +17,14 @@ use crate::board::stream::{self, OnTheAir};
 
 /// The line to a radio: a UART, a serial device.
 pub trait Radio {
-    /// Takes what has arrived, and returns how much; 0 if nothing. It does not wait.
+    /// Reads received bytes and returns their number; 0 if none. It does not wait.
     fn read(&mut self, into: &mut [u8]) -> usize;
 
-    /// Sends. It does not wait: what has no room is lost, as in the air.
+    /// Sends, without waiting: bytes without room are lost, as in the air.
     fn write(&mut self, bytes: &[u8]);
 }
 
-/// Nobody is there.
+/// No radio.
 impl Radio for () {
     fn read(&mut self, _: &mut [u8]) -> usize {
         0
@@ -46,7 +46,7 @@ pub(crate) struct Crewed {
     findings: Findings,
     parachute_ejected: bool,
     /// For the next frame.
-    heard: UplinkState,
+    uplink_state: UplinkState,
 }
 
 impl Crewed {
@@ -56,12 +56,12 @@ impl Crewed {
         let system_id = u8::try_from(on_the_air.system_id).unwrap_or(u8::MAX);
         let endpoint = VehicleEndpoint::new(kind)
             .booted(on_the_air.boot_number)
-            .known_as(u16::try_from(on_the_air.uid).unwrap_or(0))
+            .with_uid(u16::try_from(on_the_air.uid).unwrap_or(0))
             .over_links(&[on_the_air.budget_bytes_s])
             .of_system(system_id);
         let name = MissionName::of(&on_the_air.mission, toml, mission);
         Self {
-            heard: endpoint.heard(0.0),
+            uplink_state: endpoint.uplink_state(0.0),
             endpoint,
             framer: Framer::new(),
             silent_frames: 0,
@@ -71,15 +71,14 @@ impl Crewed {
         }
     }
 
-    /// A frame's input, with what the crew has asked for.
-    pub(crate) fn hear(&self, input: LoggedInput) -> LoggedInput {
-        let UplinkState { uplink, commander, requests } = self.heard.clone();
-        LoggedInput { kept: KeptInput { uplink, commander, ..input.kept }, requests, ..input }
+    /// A frame's input with the uplink state and the crew's requests.
+    pub(crate) fn with_uplink(&self, input: LoggedInput) -> LoggedInput {
+        let UplinkState { uplink, commander, requests } = self.uplink_state.clone();
+        LoggedInput { sensed: SensedInput { uplink, commander, ..input.sensed }, requests, ..input }
     }
 
-    /// Speaks with the ground after a frame; returns what the next one is told and asked. Never
-    /// inline: what it keeps on the stack would lie below the flight computer's, whose own is the
-    /// largest.
+    /// Communicates with the ground after a frame; returns the radio input of the next one. Never
+    /// inline: its stack frame would lie below the flight computer's, which is the largest.
     #[inline(never)]
     pub(crate) fn flown(
         &mut self,
@@ -87,7 +86,7 @@ impl Crewed {
         output: &Output,
         computer: &Computer,
         radio: &mut impl Radio,
-    ) -> stream::Heard {
+    ) -> stream::RadioInput {
         self.findings.note(computer);
         self.parachute_ejected |= output.commands.outputs.is_on(PyroOutput::Parachute);
         let flown = VehicleState {
@@ -102,9 +101,9 @@ impl Crewed {
             judged: None,
         };
         self.endpoint.on_answers(&output.answers, &flown);
-        for news in &output.news {
-            match news {
-                CrewMessage::Said { severity, words } => self.endpoint.say(*severity, words),
+        for message in &output.messages {
+            match message {
+                CrewMessage::Text { severity, text } => self.endpoint.send_text(*severity, text),
                 // Seen by the endpoint itself.
                 CrewMessage::PhaseChanged { .. } => {}
             }
@@ -128,11 +127,11 @@ impl Crewed {
         if !bytes.is_empty() {
             radio.write(&bytes);
         }
-        self.heard = self.endpoint.heard(input.time_s);
-        stream::Heard {
-            uplink: self.heard.uplink.to_log(),
-            commander: self.heard.commander.to_log(),
-            requests: self.heard.requests.iter().map(Logged::to_log).collect(),
+        self.uplink_state = self.endpoint.uplink_state(input.time_s);
+        stream::RadioInput {
+            uplink: self.uplink_state.uplink.to_log(),
+            commander: self.uplink_state.commander.to_log(),
+            requests: self.uplink_state.requests.iter().map(Logged::to_log).collect(),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Flies the frames that arrive, and answers each with what this machine decided.
+//! Flies received frames, and answers each with this machine's decisions.
 
 use alloc::boxed::Box;
 use alloc::string::{String, ToString as _};
@@ -14,20 +14,20 @@ pub use crate::link::vehicle::VehicleKind;
 use crate::board::radio::{Crewed, Radio};
 use crate::board::stream::{Answer, Begin, Frame, Reader, put};
 
-/// What looks at the computer while it flies, without changing anything. A machine that counts its
+/// Observes the computer while it flies, without changing anything. A machine that counts its
 /// instructions counts between `begins` and `ended`.
 pub trait Watch {
     /// The computer is built: from here on it flies.
     fn is_set_up(&mut self) {}
-    /// The next frame is flown now, or what the last one has posed is computed.
+    /// The next frame is about to be flown, or the last one's request is about to be computed.
     fn begins(&mut self) {}
-    /// The frame of this number was flown, or what it has `posed` was computed.
+    /// The frame of this number was flown, or its request was computed (`posed`).
     fn ended(&mut self, _frame: u64, _posed: bool) {}
-    /// What was saved before the machine was reset; `None` at power-up.
+    /// The state saved before the machine was reset; `None` at power-up.
     fn saved(&mut self) -> Option<Saved> {
         None
     }
-    /// Saves what is kept through a reset, after each frame.
+    /// Saves the state that survives a reset, after each frame.
     fn save(&mut self, _saved: &Saved) {}
     /// The computer was dead in the frames before this one: the machine is reset. Where this
     /// returns, the computer is restarted in place.
@@ -52,7 +52,7 @@ pub enum FlyError {
 pub struct Board {
     kind: VehicleKind,
     reader: Reader,
-    /// Apart: a large thing that is moved stands on the stack twice.
+    /// Boxed: a large value that is moved is on the stack twice.
     flying: Option<Box<Flying>>,
     frames: u64,
 }
@@ -62,14 +62,14 @@ struct Flying {
     computer: RecordedComputer,
     /// If the board has a radio.
     crewed: Option<Crewed>,
-    /// What was saved before a reset, until the frames behind it come.
+    /// State saved before a reset, until the frames behind it arrive.
     saved: Option<Saved>,
-    /// The number of the last frame and its answer, for who asks again.
+    /// The number of the last frame and its answer, for a repeated request.
     answered: Option<(u64, Vec<u8>)>,
 }
 
 impl Board {
-    /// Before its first frame. `kind` is what it tells its crew that it is.
+    /// Before its first frame. `kind` is the kind that it reports to its crew.
     pub fn new(kind: VehicleKind) -> Self {
         Self { kind, reader: Reader::default(), flying: None, frames: 0 }
     }
@@ -79,14 +79,14 @@ impl Board {
         self.frames
     }
 
-    /// What has arrived so far.
+    /// Data received so far.
     pub fn reader(&self) -> &Reader {
         &self.reader
     }
 
-    /// Takes bytes that have arrived, flies the frames in them, and gives each answer to `answer`
-    /// before the next frame, which may reset the machine. If the flight's first frame says who the
-    /// board is on the air, the crew is heard over the radio.
+    /// Takes received bytes, flies the frames in them, and gives each answer to `answer` before the
+    /// next frame, which may reset the machine. If the flight's first frame identifies the board on
+    /// the air, the crew's commands come by radio.
     ///
     /// # Errors
     /// See [`FlyError`]; every frame before the error was answered.
@@ -140,7 +140,7 @@ impl Flying {
         let computer = &mut self.computer;
         let read = computer.read(input)?;
         let read = match &self.crewed {
-            Some(crewed) => crewed.hear(read),
+            Some(crewed) => crewed.with_uplink(read),
             None => read,
         };
         watch.begins();
@@ -152,17 +152,17 @@ impl Flying {
             frame: number,
             output: output_to_log(&output, computer),
             state_digest: computer.digest(),
-            heard: self.crewed.as_mut().map(speak),
+            radio: self.crewed.as_mut().map(speak),
         };
         watch.save(&self.computer.computer().saved());
         let mut bytes = Vec::new();
         put(&decided, &mut bytes);
         answer(&bytes);
         self.answered = Some((number, bytes));
-        // A frame on its own timer would go on meanwhile. The frame that takes it over is said by
-        // the world.
+        // With a timer, frames would continue meanwhile. The simulator decides which frame takes
+        // the result over.
         watch.begins();
-        if self.computer.computer_mut().solve_posed().is_some() {
+        if self.computer.computer_mut().solve_requested().is_some() {
             watch.ended(number, true);
         }
         Ok(true)

@@ -1,14 +1,14 @@
 //! A flight as bytes for a board, and the board's answers.
 //!
-//! Either way it is a sequence of records: a protocol buffer and its CRC-32 (the lowest byte
-//! first), in Consistent Overhead Byte Stuffing, ended by a zero byte. So whoever joins in, or has
-//! lost a byte, is in step again behind the next zero, and a record that has changed on its way is
-//! known. To the board: one [`Frame`] for each frame; the first one says what to fly. From the
-//! board: one [`Answer`] for each frame. Who asks again gets the same answer again.
+//! Each direction is a sequence of records: a protocol buffer and its CRC-32 (the lowest byte
+//! first), in Consistent Overhead Byte Stuffing, ended by a zero byte. So a receiver that joins
+//! late, or has lost a byte, is synchronised again behind the next zero, and a corrupted record is
+//! detected. To the board: one [`Frame`] for each frame; the first one contains the flight. From
+//! the board: one [`Answer`] for each frame. A repeated request gets the same answer again.
 //!
-//! A board with a radio (`on_the_air`) hears its crew itself: it does not look at uplink, commander
-//! and requests in a frame, and its answer has them for the next one, so that a world that flies
-//! the same computer beside it can compare.
+//! A board with a radio (`on_the_air`) receives its crew's commands itself: it ignores uplink,
+//! commander and requests in a frame, and its answer contains them for the next one, so that a
+//! world that flies the same computer beside it can compare.
 //!
 //! Inputs and answers are the records of the flight log, byte for byte.
 
@@ -24,7 +24,7 @@ use protocol::records::computer_v1::{
 /// longest there is.
 pub const LONGEST_BYTES: usize = 128 * 1024;
 
-/// What a computer is built from.
+/// The data that a computer is built from.
 #[derive(Clone, PartialEq, Message)]
 pub struct Begin {
     /// The mission's text, from the log.
@@ -33,8 +33,8 @@ pub struct Begin {
     /// The start in the log: at power-up, or at the release.
     #[prost(message, required, tag = "2")]
     pub start: ComputerStart,
-    /// Who the board is on its own radio. Without it nobody is heard, and the crew's requests are
-    /// in the frames.
+    /// Identity of the board on its radio. Without it no station is received, and the crew's
+    /// requests are in the frames.
     #[prost(message, optional, tag = "3")]
     pub on_the_air: Option<OnTheAir>,
     /// Another one for each flight: a board that flies this one already does not begin it again.
@@ -62,10 +62,10 @@ pub struct OnTheAir {
     pub uid: u32,
 }
 
-/// What a board has heard over its radio for its next frame.
+/// Uplink data received by a board's radio for its next frame.
 #[derive(Clone, PartialEq, Message)]
-pub struct Heard {
-    /// `None`: nobody has to be heard.
+pub struct RadioInput {
+    /// `None`: no uplink is required.
     #[prost(message, optional, tag = "1")]
     pub uplink: Option<Uplink>,
     /// The station that armed the vehicle, if one did.
@@ -81,12 +81,12 @@ pub struct Heard {
 pub struct Frame {
     #[prost(message, required, tag = "1")]
     pub input: ComputerInput,
-    /// In a flight's first frame, in the first one behind a reset, and in one that is asked again.
+    /// In a flight's first frame, in the first one behind a reset, and in a repeated request.
     #[prost(message, optional, tag = "2")]
     pub begin: Option<Begin>,
 }
 
-/// What a frame decided, as its record in the log has it.
+/// Decisions of a frame, as in its record in the log.
 #[derive(Clone, PartialEq, Message)]
 pub struct Answer {
     /// The number of the frame.
@@ -97,21 +97,21 @@ pub struct Answer {
     /// The digest of the memory after the frame.
     #[prost(fixed64, required, tag = "3")]
     pub state_digest: u64,
-    /// What the next frame is told and asked, of a board with a radio.
+    /// Radio input of the next frame, for a board with a radio.
     #[prost(message, optional, tag = "4")]
-    pub heard: Option<Heard>,
+    pub radio: Option<RadioInput>,
 }
 
 impl Answer {
     /// Whether both have decided the same in every bit. Compared as bytes: a NaN never equals
     /// itself, and 0.0 equals -0.0.
     pub fn is_same_as(&self, other: &Self) -> bool {
-        let decided = |answer: &Self| Self { heard: None, ..answer.clone() }.encode_to_vec();
+        let decided = |answer: &Self| Self { radio: None, ..answer.clone() }.encode_to_vec();
         decided(self) == decided(other)
     }
 }
 
-/// Puts a record behind the bytes that are on their way.
+/// Appends a record to the bytes to send.
 pub fn put(record: &impl Message, into: &mut Vec<u8>) {
     let mut bytes = record.encode_to_vec();
     bytes.extend(crc32fast::hash(&bytes).to_le_bytes());
@@ -123,7 +123,7 @@ pub fn put(record: &impl Message, into: &mut Vec<u8>) {
 #[derive(Debug, Clone, Default)]
 pub struct Reader {
     pending: Vec<u8>,
-    /// As many bytes of it were looked at, and are no end of a record.
+    /// Bytes already searched without finding the end of a record.
     looked_at: usize,
     broken: u64,
 }
@@ -139,7 +139,7 @@ impl Reader {
         self.pending.extend(bytes);
     }
 
-    /// The next whole record; broken ones before it are counted.
+    /// Returns the next complete record; broken ones before it are counted.
     pub fn next_record<R: Message + Default>(&mut self) -> Option<R> {
         loop {
             let end = self.pending[self.looked_at..].iter().position(|byte| *byte == 0);
@@ -157,7 +157,7 @@ impl Reader {
         }
     }
 
-    /// How many records were broken on their way.
+    /// Number of corrupted records.
     pub fn broken(&self) -> u64 {
         self.broken
     }

@@ -2,8 +2,8 @@
 //!
 //! Semantics: <https://mavlink.io/en/messages/common.html#mav_commands>. Numbers are taken exactly:
 //! an arm that is neither 0 nor 1 is refused rather than guessed, and no force code opens an
-//! interlock. A forced *disarm* is what other ground stations call an emergency stop: it always
-//! stops what can still be stopped.
+//! interlock. A forced *disarm* is the emergency stop of other ground stations: it always stops
+//! everything that can still be stopped.
 
 use alloc::borrow::ToOwned as _;
 use alloc::format;
@@ -14,13 +14,13 @@ use protocol::dialect::{
     AUTOPILOT_VERSION_DATA, HOME_POSITION_DATA, MESSAGE_INTERVAL_DATA, MavCmd, MavResult,
 };
 
-use flight::computer::crew::{Asked, Ending};
+use flight::computer::crew::{CrewCommand, Ending};
 
-/// What a command asks for.
+/// The parsed command.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Command {
     /// A request that the vehicle decides.
-    Vehicle(Asked),
+    Vehicle(CrewCommand),
     /// A forced disarm: a disarm on the ground, an abort in the air.
     ForcedDisarm,
     /// MAV_CMD_SET_MESSAGE_INTERVAL: message id, interval in microseconds (-1 off, 0 default).
@@ -52,11 +52,11 @@ pub fn parse(request: &CommandRequest) -> Result<Command, Unfit> {
     if request.is(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM) {
         // A force code does not change an arm: every check still applies.
         if param1.to_bits() == 1.0f32.to_bits() {
-            Ok(Command::Vehicle(Asked::Arm))
+            Ok(Command::Vehicle(CrewCommand::Arm))
         } else if param1 == 0.0 && FORCE_CODES.contains(&param2) {
             Ok(Command::ForcedDisarm)
         } else if param1 == 0.0 {
-            Ok(Command::Vehicle(Asked::Disarm))
+            Ok(Command::Vehicle(CrewCommand::Disarm))
         } else {
             unfit(
                 MavResult::MAV_RESULT_DENIED,
@@ -64,10 +64,10 @@ pub fn parse(request: &CommandRequest) -> Result<Command, Unfit> {
             )
         }
     } else if request.is(MavCmd::MAV_CMD_MISSION_START) {
-        Ok(Command::Vehicle(Asked::Start))
+        Ok(Command::Vehicle(CrewCommand::Start))
     } else if request.is(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE) {
         if param1 == 0.0 {
-            Ok(Command::Vehicle(Asked::Hold))
+            Ok(Command::Vehicle(CrewCommand::Hold))
         } else {
             unfit(
                 MavResult::MAV_RESULT_DENIED,
@@ -76,19 +76,19 @@ pub fn parse(request: &CommandRequest) -> Result<Command, Unfit> {
         }
     } else if request.is(MavCmd::MAV_CMD_DO_FLIGHTTERMINATION) {
         if param1 > 0.5 {
-            Ok(Command::Vehicle(Asked::Abort))
+            Ok(Command::Vehicle(CrewCommand::Abort))
         } else {
             unfit(MavResult::MAV_RESULT_FAILED, format!("termination: param1 = {param1}, must be above 0.5"))
         }
     } else if request.is(MavCmd::MAV_CMD_TD_TAP) {
-        Ok(Command::Vehicle(Asked::Tap))
+        Ok(Command::Vehicle(CrewCommand::Tap))
     } else if request.is(MavCmd::MAV_CMD_TD_TAKE_COMMAND) {
-        Ok(Command::Vehicle(Asked::TakeCommand))
+        Ok(Command::Vehicle(CrewCommand::TakeCommand))
     } else if request.is(MavCmd::MAV_CMD_TD_PAD_CHECK) {
-        let kinds = [Asked::EndCheck, Asked::Check, Asked::CheckStill, Asked::Seen];
-        let asked = (0_u8..).zip(kinds).find(|(number, _)| f32::from(*number).to_bits() == param1.to_bits());
-        match asked {
-            Some((_, asked)) => Ok(Command::Vehicle(asked)),
+        let kinds = [CrewCommand::EndCheck, CrewCommand::Check, CrewCommand::CheckStill, CrewCommand::Seen];
+        let kind = (0_u8..).zip(kinds).find(|(number, _)| f32::from(*number).to_bits() == param1.to_bits());
+        match kind {
+            Some((_, kind)) => Ok(Command::Vehicle(kind)),
             None => unfit(
                 MavResult::MAV_RESULT_DENIED,
                 format!("check: param1 = {param1}, must be 0 (end), 1 (all), 2 (without motion) or 3 (seen)"),
@@ -102,8 +102,8 @@ pub fn parse(request: &CommandRequest) -> Result<Command, Unfit> {
     } else if let Some((_, message_id)) =
         LEGACY_REQUESTS.iter().find(|(command, _)| *command == request.command)
     {
-        // Parameter 1 says whether it is wanted; old clients leave it at 0 or 1 and want it either
-        // way.
+        // Parameter 1 states whether it is wanted; old clients leave it at 0 or 1 and expect it
+        // either way.
         Ok(Command::SendMessage { message_id: *message_id, of: 0 })
     } else if request.command == GET_MESSAGE_INTERVAL {
         Ok(Command::SendMessage { message_id: MESSAGE_INTERVAL_DATA::ID, of: message_id(param1)? })
@@ -112,9 +112,9 @@ pub fn parse(request: &CommandRequest) -> Result<Command, Unfit> {
     }
 }
 
-/// The number of the ask that an arm or a start confirms, in parameter 3. Other ground stations
-/// leave it at 0 or NaN: their command is an ask.
-pub fn confirmed_ask(request: &CommandRequest) -> Option<u16> {
+/// The number of the proposal that an arm or a start confirms, in parameter 3. Other ground
+/// stations leave it at 0 or NaN: their command is a proposal.
+pub fn confirmed_proposal(request: &CommandRequest) -> Option<u16> {
     let param3 = request.params[2];
     let confirms =
         (1.0..=f32::from(u16::MAX)).contains(&param3) && libm::truncf(param3).to_bits() == param3.to_bits();
@@ -137,7 +137,7 @@ pub fn mav_result(ending: Ending) -> MavResult {
     match ending {
         Ending::Accepted => MavResult::MAV_RESULT_ACCEPTED,
         // Other ground stations take it for the refusal that it is for them.
-        Ending::NotNow | Ending::Asked => MavResult::MAV_RESULT_TEMPORARILY_REJECTED,
+        Ending::NotNow | Ending::ToConfirm => MavResult::MAV_RESULT_TEMPORARILY_REJECTED,
         Ending::Denied => MavResult::MAV_RESULT_DENIED,
         Ending::Failed => MavResult::MAV_RESULT_FAILED,
     }
@@ -174,8 +174,8 @@ mod tests {
 
     #[test]
     fn arm_takes_exactly_one_and_disarm_exactly_zero() {
-        assert_eq!(parse(&command(400, 1.0, f32::NAN)), Ok(Command::Vehicle(Asked::Arm)));
-        assert_eq!(parse(&command(400, 0.0, 0.0)), Ok(Command::Vehicle(Asked::Disarm)));
+        assert_eq!(parse(&command(400, 1.0, f32::NAN)), Ok(Command::Vehicle(CrewCommand::Arm)));
+        assert_eq!(parse(&command(400, 0.0, 0.0)), Ok(Command::Vehicle(CrewCommand::Disarm)));
         for param1 in [0.5, 2.0, -1.0, f32::NAN, f32::INFINITY, 1.000_000_1] {
             assert_eq!(result_of(&command(400, param1, 0.0)), MavResult::MAV_RESULT_DENIED, "{param1}");
         }
@@ -183,7 +183,7 @@ mod tests {
 
     #[test]
     fn a_pause_holds_and_nothing_continues() {
-        assert_eq!(parse(&command(193, 0.0, f32::NAN)), Ok(Command::Vehicle(Asked::Hold)));
+        assert_eq!(parse(&command(193, 0.0, f32::NAN)), Ok(Command::Vehicle(CrewCommand::Hold)));
         for param1 in [1.0, 0.5, -1.0, f32::NAN] {
             assert_eq!(result_of(&command(193, param1, 0.0)), MavResult::MAV_RESULT_DENIED, "{param1}");
         }
@@ -191,9 +191,9 @@ mod tests {
 
     #[test]
     fn a_check_is_begun_and_ended_by_exact_numbers() {
-        let kinds = [Asked::EndCheck, Asked::Check, Asked::CheckStill, Asked::Seen];
-        for (param1, asked) in [0.0, 1.0, 2.0, 3.0].into_iter().zip(kinds) {
-            assert_eq!(parse(&command(54002, param1, f32::NAN)), Ok(Command::Vehicle(asked)));
+        let kinds = [CrewCommand::EndCheck, CrewCommand::Check, CrewCommand::CheckStill, CrewCommand::Seen];
+        for (param1, kind) in [0.0, 1.0, 2.0, 3.0].into_iter().zip(kinds) {
+            assert_eq!(parse(&command(54002, param1, f32::NAN)), Ok(Command::Vehicle(kind)));
         }
         for param1 in [0.5, 4.0, -1.0, f32::NAN, f32::INFINITY] {
             assert_eq!(result_of(&command(54002, param1, 0.0)), MavResult::MAV_RESULT_DENIED, "{param1}");
@@ -201,9 +201,9 @@ mod tests {
     }
 
     #[test]
-    fn force_codes_ask_for_no_more_than_an_arm() {
+    fn force_codes_request_no_more_than_an_arm() {
         for code in [21196.0, 2989.0] {
-            assert_eq!(parse(&command(400, 1.0, code)), Ok(Command::Vehicle(Asked::Arm)));
+            assert_eq!(parse(&command(400, 1.0, code)), Ok(Command::Vehicle(CrewCommand::Arm)));
         }
     }
 
@@ -213,20 +213,20 @@ mod tests {
             assert_eq!(parse(&command(400, 0.0, code)), Ok(Command::ForcedDisarm));
         }
         for code in [0.0, 1.0, 21195.0, 2989.5, f32::NAN, f32::INFINITY] {
-            assert_eq!(parse(&command(400, 0.0, code)), Ok(Command::Vehicle(Asked::Disarm)), "{code}");
+            assert_eq!(parse(&command(400, 0.0, code)), Ok(Command::Vehicle(CrewCommand::Disarm)), "{code}");
         }
     }
 
     #[test]
     fn termination_needs_more_than_half() {
-        assert_eq!(parse(&command(185, 1.0, 0.0)), Ok(Command::Vehicle(Asked::Abort)));
+        assert_eq!(parse(&command(185, 1.0, 0.0)), Ok(Command::Vehicle(CrewCommand::Abort)));
         for param1 in [0.0, 0.5, f32::NAN, -1.0] {
             assert_eq!(result_of(&command(185, param1, 0.0)), MavResult::MAV_RESULT_FAILED, "{param1}");
         }
     }
 
     #[test]
-    fn a_message_id_is_a_whole_number_and_nan_is_none() {
+    fn a_message_id_is_an_integer_and_nan_is_none() {
         for bad in [f32::NAN, -1.0, 0.5, f32::INFINITY, 2e7] {
             assert_eq!(result_of(&command(511, bad, -1.0)), MavResult::MAV_RESULT_DENIED, "{bad}");
             assert_eq!(result_of(&command(512, bad, 0.0)), MavResult::MAV_RESULT_DENIED, "{bad}");
@@ -238,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn older_ways_to_ask_for_a_message_are_understood() {
+    fn legacy_message_requests_are_accepted() {
         for (number, param1, message_id, of) in
             [(410, 0.0, 242, 0), (519, 1.0, 300, 0), (520, 1.0, 148, 0), (510, 30.0, 244, 30)]
         {

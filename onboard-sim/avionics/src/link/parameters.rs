@@ -2,7 +2,7 @@
 //! set.
 //!
 //! The station in command may set the rate of each message, in hertz, at any time, as with
-//! MAV_CMD_SET_MESSAGE_INTERVAL: on the link that asked, within its budget. The weights of the
+//! MAV_CMD_SET_MESSAGE_INTERVAL: on the requesting link, within its budget. The weights of the
 //! landing cost are read-only: they come from the mission, which the log holds, so that a replay
 //! uses the same ones. Safety limits are not parameters. The list of names never changes.
 
@@ -32,7 +32,7 @@ const WEIGHTS: [Weight; 5] = [
 /// Number of parameters; their indices are 0 to this number minus one. Rates first, then weights.
 pub const COUNT: u16 = (STANDARD.len() + WEIGHTS.len()) as u16;
 
-/// Why a parameter keeps its value.
+/// Why a parameter is unchanged.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Refusal {
     /// For PARAM_ERROR, if there is no value to answer with.
@@ -66,9 +66,9 @@ pub fn value(place: u16, streams: &Streams, weights: &PlanWeights) -> MavMessage
     value_message(name(place), found as f32, place, COUNT)
 }
 
-/// Sets a parameter; `forbidden` says why this station may set none now. Returns the index of the
-/// parameter, whose value is to be sent in any case, and the refusal if it was not changed as
-/// requested.
+/// Sets a parameter; `forbidden` is the reason why this station may set none now. Returns the index
+/// of the parameter, whose value is to be sent in any case, and the refusal if it was not changed
+/// as requested.
 ///
 /// # Errors
 /// No parameter of that name.

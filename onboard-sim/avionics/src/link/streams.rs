@@ -1,5 +1,5 @@
-//! The messages that are sent periodically, and their rates; and the values of a check on the pad
-//! and what went wrong in the flight, one after the other.
+//! The periodic messages and their rates; also the values of a check on the pad and the findings of
+//! the flight, in turn.
 
 use alloc::format;
 use alloc::string::String;
@@ -33,7 +33,7 @@ const FRAME_OVERHEAD: usize = 12;
 /// Time, mask and six of the 32 outputs; the others are zero and therefore truncated.
 const ACTUATOR_PAYLOAD_LEN: usize = 12 + 6 * 4;
 /// Highest default rates, Hz; the first one that fits the link is used. Signed frames need it on a
-/// radio, because a signature is as long as a short message, and what a client asks for. Vital
+/// radio, because a signature is as long as a short message, and so do clients' requests. Vital
 /// messages are not slowed down.
 const RATES_MAX_HZ: [f64; 12] = [f64::INFINITY, 9.0, 8.0, 7.0, 6.0, 5.5, 5.0, 4.5, 4.0, 3.5, 3.25, 3.0];
 /// A line slower than a radio: a frame that takes longer than this is not sent, s.
@@ -42,7 +42,7 @@ const LINE_HOLDS_S: f64 = 0.3;
 /// texts and requests.
 const VITAL_SHARE: f64 = 0.3;
 const PERIODIC_SHARE: f64 = 0.85;
-/// What is stretched to fit such a line still comes this often, Hz, if it came as often before.
+/// Lowest rate of a message stretched to fit such a line, Hz, if its rate was as high before.
 const STRETCHED_HZ: f64 = 0.04;
 /// Longest interval that can be requested, s.
 const MAX_INTERVAL_S: f64 = 60.0;
@@ -62,9 +62,9 @@ const SPARED_S: f64 = 10.0;
 /// Shortest interval of a message that is sent early, s.
 const HURRIED_S: f64 = 0.1;
 
-/// Bytes kept free for vital messages: a heartbeat, a flight status and the answer to an abort, all
+/// Bytes reserved for vital messages: a heartbeat, a flight status and the answer to an abort, all
 /// in one instant. They never wait for telemetry.
-pub(crate) fn kept_free_bytes(signature_len: usize) -> usize {
+pub(crate) fn reserved_bytes(signature_len: usize) -> usize {
     let payload = HEARTBEAT_DATA::ENCODED_LEN + TD_FLIGHT_STATUS_DATA::ENCODED_LEN + ACK_PAYLOAD_LEN;
     payload + 3 * (FRAME_OVERHEAD + signature_len)
 }
@@ -75,8 +75,8 @@ pub(crate) fn share_bytes_s(capacity_bytes_s: u32) -> usize {
     (capacity_bytes_s as usize / 5).max(TEXT_FRAME_LEN)
 }
 
-/// Whether a budget is that of a line slower than a radio: four fifths of what its baud rate
-/// carries.
+/// Whether a budget is that of a line slower than a radio: four fifths of the capacity of its baud
+/// rate.
 pub(crate) fn is_slow(capacity_bytes_s: u32) -> bool {
     capacity_bytes_s < RADIO_BUDGET_BYTES_S
 }
@@ -123,7 +123,7 @@ impl Standard {
     }
 }
 
-/// Without its extensions, which have nothing to say here.
+/// Without its extensions, which are not used here.
 const STORAGE: Standard = standard::<STORAGE_INFORMATION_DATA>("RATE_STORAGE", 0.1).cut_to(27);
 
 /// The periodic messages. If the budget runs short, the last ones are dropped first.
@@ -137,8 +137,8 @@ pub const STANDARD: &[Standard] = &[
     // Without its optional offset quaternion.
     standard::<ATTITUDE_QUATERNION_DATA>("RATE_ATTITUDE", 8.0).cut_to(32),
     standard::<LOCAL_POSITION_NED_DATA>("RATE_POSITION", 8.0),
-    // Without its extensions, which are zero from apogee on. On the way up there is no plan to be
-    // sent.
+    // Without its extensions, which are zero from apogee on. On the way up there is no plan to
+    // send.
     standard::<TD_DESCENT_DATA>("RATE_DESCENT", 4.0).cut_to(61),
     standard::<TD_GIMBAL_DATA>("RATE_GIMBAL", 3.0),
     standard::<TD_CONTROLLER_DATA>("RATE_CONTROLLER", 3.0),
@@ -148,8 +148,8 @@ pub const STANDARD: &[Standard] = &[
     standard::<SYS_STATUS_DATA>("RATE_SYS_STATUS", 1.0),
     standard::<EXTENDED_SYS_STATE_DATA>("RATE_EXT_STATE", 1.0),
     standard::<ESTIMATOR_STATUS_DATA>("RATE_ESTIMATOR", 0.5),
-    // The vehicle's place and the pad's on the Earth: where people look for it, over any link. At
-    // 20 m/s its place is known to 40 m when the link falls silent.
+    // The positions of vehicle and pad on the Earth, for the search, over any link. At 20 m/s the
+    // last position is within 40 m when the link falls silent.
     standard::<GLOBAL_POSITION_INT_DATA>("RATE_GLOBAL", 0.5).on_network(4.0),
     standard::<HOME_POSITION_DATA>("RATE_HOME", 0.1).on_network(1.0),
     standard::<TD_TOUCHDOWN_LIMITS_DATA>("RATE_LIMITS", 0.2),
@@ -163,7 +163,7 @@ pub const STANDARD: &[Standard] = &[
     standard::<VFR_HUD_DATA>("RATE_VFR_HUD", 0.0).on_network(1.0),
     standard::<CURRENT_MODE_DATA>("RATE_MODE", 0.0).on_network(1.0),
     standard::<ATTITUDE_DATA>("RATE_EULER", 0.0).on_network(4.0),
-    // Without its extensions, which are not known here.
+    // Without its extensions, which are not available here.
     standard::<GPS_RAW_INT_DATA>("RATE_GPS", 0.0).cut_to(30).on_network(1.0),
     standard::<SYSTEM_TIME_DATA>("RATE_TIME", 0.0).on_network(1.0),
     standard::<TD_MISSION_DATA>("RATE_MISSION", 0.1),
@@ -178,8 +178,8 @@ struct Stream {
     default_interval_s: Option<f64>,
     /// `None`: switched off.
     interval_s: Option<f64>,
-    /// Somebody has asked for this interval.
-    asked: bool,
+    /// The interval was requested by a client.
+    requested: bool,
     due_s: f64,
     sent_s: f64,
 }
@@ -190,7 +190,7 @@ impl Stream {
     }
 }
 
-/// A message whose time has come.
+/// A message that is due.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Due {
     pub(crate) message_id: u32,
@@ -238,7 +238,7 @@ impl Streams {
                 frame_len: standard.payload_len + FRAME_OVERHEAD + signature_len,
                 default_interval_s: None,
                 interval_s: None,
-                asked: false,
+                requested: false,
                 due_s,
                 sent_s: f64::NEG_INFINITY,
             }
@@ -299,10 +299,10 @@ impl Streams {
         rates
     }
 
-    /// What these rates take, bytes per second, beside the intervals that somebody has asked for.
+    /// Load of these rates, bytes per second, besides the requested intervals.
     fn load_bytes_s(&self, rates_hz: &[f64]) -> f64 {
         let load = |(stream, rate_hz): (&Stream, &f64)| match stream {
-            Stream { asked: true, interval_s, .. } => stream.bytes_s(*interval_s),
+            Stream { requested: true, interval_s, .. } => stream.bytes_s(*interval_s),
             Stream { frame_len, .. } => *frame_len as f64 * rate_hz,
         };
         self.each.iter().zip(rates_hz).map(load).sum()
@@ -313,8 +313,8 @@ impl Streams {
         self.capacity_bytes_s
     }
 
-    /// Gives the link another budget. The intervals that nobody has asked for are those of this
-    /// budget from now on.
+    /// Sets another budget of the link. Intervals that were not requested are those of this budget
+    /// from now on.
     pub fn set_capacity(&mut self, capacity_bytes_s: u32) {
         if capacity_bytes_s == self.capacity_bytes_s {
             return;
@@ -323,12 +323,13 @@ impl Streams {
         self.give_way();
     }
 
-    /// Slows down what nobody has asked for as far as the rest needs the room, and no further.
+    /// Slows down messages without a requested interval as far as the rest needs the room, and no
+    /// further.
     fn give_way(&mut self) {
         let rates_hz = self.default_rates_hz();
         for (stream, rate_hz) in self.each.iter_mut().zip(rates_hz) {
             stream.default_interval_s = (rate_hz > 0.0).then(|| 1.0 / rate_hz);
-            if !stream.asked {
+            if !stream.requested {
                 stream.interval_s = stream.default_interval_s;
             }
         }
@@ -340,19 +341,18 @@ impl Streams {
     }
 
     /// The part of the link's budget for telemetry, bytes per second: without the reserve for vital
-    /// messages and the uplink reports. A slow line has its reserve in what its budget leaves of
-    /// its baud rate.
+    /// messages and the uplink reports. The reserve of a slow line is the unused part of its baud
+    /// rate.
     fn for_telemetry_bytes_s(&self) -> f64 {
         let uplink_len = (TD_UPLINK_DATA::ENCODED_LEN + FRAME_OVERHEAD + self.signature_len) as f64;
         let capacity_bytes_s = f64::from(self.capacity_bytes_s);
         if is_slow(self.capacity_bytes_s) {
             return capacity_bytes_s / WINDOW_S - SLOW_UPLINK_HZ * uplink_len;
         }
-        (capacity_bytes_s - kept_free_bytes(self.signature_len) as f64) / WINDOW_S - UPLINK_HZ * uplink_len
+        (capacity_bytes_s - reserved_bytes(self.signature_len) as f64) / WINDOW_S - UPLINK_HZ * uplink_len
     }
 
-    /// The messages whose time has come, most important first; fewer if the link is spared for
-    /// files.
+    /// The messages that are due, most important first; fewer if the link is reserved for files.
     pub(crate) fn due(&self, now_s: f64, spared: bool) -> Vec<Due> {
         let due = |stream: &&Stream| {
             let least_s = if is_vital(stream.message_id) { SPARED_VITAL_S } else { SPARED_S };
@@ -443,7 +443,7 @@ impl Streams {
         }
         let all_before = self.each.clone();
         self.each[place].interval_s = wanted;
-        self.each[place].asked = interval_us != 0.0;
+        self.each[place].requested = interval_us != 0.0;
         self.give_way();
         let (total, free) = (self.bytes_s(), self.for_telemetry_bytes_s());
         if before.bytes_s(wanted) > before.bytes_s(before.interval_s) && total > free {
@@ -487,30 +487,30 @@ fn is_vital(message_id: u32) -> bool {
     matches!(message_id, HEARTBEAT_DATA::ID | TD_FLIGHT_STATUS_DATA::ID)
 }
 
-// Tells the stations what the check on the pad finds, and what went wrong in the flight: one value
-// after the other, again and again.
+// Reports the values of the check on the pad, and the findings of the flight, to the stations: one
+// value after the other, repeatedly.
 //
 // The values are requested messages, after all telemetry: there is room for them on the pad within
 // a radio's budget, and in flight they wait.
 
-/// While a check runs, and until every value has been told twice after it, a value is told each so
-/// many seconds: 250 B/s when signed.
+/// Interval of the values during a check, and until every value has been sent twice after it, s:
+/// 250 B/s when signed.
 const OFTEN_S: f64 = 0.2;
-/// Later, and for what went wrong: for a station that comes late.
+/// Interval later, and for findings, s: for a station that joins late.
 const SELDOM_S: f64 = 1.0;
 
 /// Whose turn it is.
 #[derive(Debug, Default)]
 struct Turn {
     place: usize,
-    /// How many values there were when the last one was told.
+    /// Number of values when the last one was sent.
     found: usize,
-    /// How often every value has been told.
+    /// Number of times that every value has been sent.
     rounds: u32,
 }
 
 impl Turn {
-    /// The place of the next of so many values: new ones first.
+    /// Index of the next of this many values: new ones first.
     fn next(&mut self, found: usize) -> usize {
         let is_new = found > self.found;
         if is_new {
@@ -525,7 +525,7 @@ impl Turn {
     }
 }
 
-/// Tells the values of a check.
+/// Reports the values of a check.
 #[derive(Debug, Default)]
 pub(super) struct CheckReporter {
     last_state: Option<(u16, CheckState)>,
@@ -556,7 +556,7 @@ impl CheckReporter {
     }
 }
 
-/// Tells what went wrong in the flight.
+/// Reports the findings of the flight.
 #[derive(Debug, Default)]
 pub(super) struct FindingReporter {
     turn: Turn,
@@ -586,7 +586,7 @@ mod tests {
 
     /// The dialect of a board has these messages and ours alone.
     #[test]
-    fn every_standard_message_is_one_that_a_board_knows() {
+    fn every_standard_message_is_in_the_dialect_of_a_board() {
         let known: Vec<&str> =
             include_str!("../../../../protocol/dialect/of_a_vehicle.txt").split_whitespace().collect();
         for standard in STANDARD {

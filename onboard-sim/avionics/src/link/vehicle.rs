@@ -1,11 +1,10 @@
-//! A vehicle as its links see it: its flight computer with the input that it keeps, and what stands
-//! beside them.
+//! A vehicle as seen by its links: its flight computer with its stored input, and additional data.
 
 use alloc::string::String;
 
 use flight::computer::findings::Findings;
 use flight::computer::pilot::{touchdown_from_below_m, touchdown_m};
-use flight::computer::{Computer, KeptInput};
+use flight::computer::{Computer, SensedInput};
 use flight::estimation::estimator::Estimate;
 use flight::guidance::powered::{ControlLevel, Plan, PoweredReport};
 use flight::rules::operator::Operator;
@@ -21,9 +20,9 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector2, Vector3};
 use protocol::mission::MissionHash;
 use protocol::motion::Degrees;
 
-/// Under a parachute that carries the fall is slower than this, m/s (canopies are sized for 6, an
-/// open fall is 20 to 40), and more than this share of the weight is felt: right after apogee the
-/// fall is slow, too, but free.
+/// Largest descent rate under an open parachute, m/s (canopies are sized for 6, an open fall is 20
+/// to 40), and smallest specific force as a share of the weight: right after apogee the fall is
+/// slow, too, but free.
 const CARRIED_M_S: f64 = 10.0;
 const CARRIED_WEIGHTS: f64 = 0.5;
 
@@ -34,12 +33,12 @@ pub enum VehicleKind {
     Simulated,
 }
 
-/// Which vehicle speaks, and since which power-up.
+/// Identity of the vehicle, and its power-up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Identity {
     pub kind: VehicleKind,
     pub boot_number: u32,
-    /// A random number of the vehicle, the same after each power-up; 0: not told.
+    /// A random number of the vehicle, the same after each power-up; 0: not reported.
     pub uid: u16,
 }
 
@@ -74,16 +73,16 @@ pub struct BatteryFacts {
     pub volts: f64,
     /// `None` where it is not measured.
     pub current_a: Option<f64>,
-    /// What is left of its charge, 0 to 1; `None` where it is not known.
+    /// Remaining charge, 0 to 1; `None` if not available.
     pub left: Option<f64>,
 }
 
-/// A touchdown and its judgement, which only a simulation knows.
+/// A touchdown and its verdict, available only in a simulation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Judged {
     /// The first contact, s since power-up.
     pub time_s: f64,
-    /// What the legs felt of it.
+    /// The touchdown at the legs.
     pub touchdown: Touchdown,
     pub landing: Landing,
 }
@@ -91,22 +90,22 @@ pub struct Judged {
 /// A vehicle's state at one instant.
 #[derive(Debug, Clone, Copy)]
 pub struct VehicleState<'a> {
-    /// It keeps the input of its last frame.
+    /// It stores the input of its last frame.
     pub computer: &'a Computer,
     /// Time since power-up, s.
     pub time_s: f64,
     pub name: &'a MissionName,
     /// Who may command; empty without operators.
     pub operators: &'a [Operator],
-    /// What went wrong so far.
+    /// Findings so far.
     pub findings: &'a Findings,
     /// `None` where its voltage is not measured.
     pub battery: Option<BatteryFacts>,
-    /// What the rehearsal found, where there was one.
+    /// Report of the rehearsal, if there was one.
     pub rehearsed: Option<&'a PoweredReport>,
     /// The parachute was thrown out, in this phase or before it.
     pub parachute_ejected: bool,
-    /// `None` before the landing is judged, and on a vehicle that nobody simulates.
+    /// `None` before the landing is judged, and on a real vehicle.
     pub judged: Option<Judged>,
 }
 
@@ -125,7 +124,7 @@ impl<'a> VehicleState<'a> {
     }
 
     /// The input of the computer's last frame.
-    pub fn input(&self) -> &'a KeptInput {
+    pub fn input(&self) -> &'a SensedInput {
         self.computer.input()
     }
 
@@ -161,8 +160,8 @@ impl<'a> VehicleState<'a> {
         airframe.above_feet_m(MassModel::new(&airframe.mass, propellant_kg).at(burnt_kg).cg_station_m)
     }
 
-    /// Time since T+0, s; stands still after touchdown. As in the log: since the release, which
-    /// lights the ascent motor on a pad and lets the vehicle fall elsewhere (see
+    /// Time since T+0, s; stops at touchdown. As in the log: since the release, which ignites the
+    /// ascent motor on a pad and lets the vehicle fall elsewhere (see
     /// [`flight::computer::flight_time_s`]).
     pub fn since_zero_s(&self) -> Option<f64> {
         let air = self.airborne()?;
@@ -177,7 +176,7 @@ impl<'a> VehicleState<'a> {
         let cg_m = self.feet_below_cg_m(0.0);
         let hanging_m = self.computer.stance().hanging_m.filter(|height_m| height_m.is_finite());
         let position_m = Vector3::z() * hanging_m.unwrap_or(cg_m);
-        let believed = RigidState { position_m, ..self.computer.believed_on_the_pad() };
+        let believed = RigidState { position_m, ..self.computer.estimated_on_pad() };
         Motion::of(&believed, cg_m, &Vector2::zeros())
     }
 
@@ -197,7 +196,7 @@ impl<'a> VehicleState<'a> {
         Degrees { latitude, longitude }
     }
 
-    /// Level and report of what the controller did last.
+    /// Level and last report of the controller.
     pub fn controller(&self) -> Option<(ControlLevel, &'a PoweredReport)> {
         match self.airborne() {
             Some(_) => Some((self.computer.level(), self.computer.pilot().report())),
@@ -213,8 +212,8 @@ impl<'a> VehicleState<'a> {
         Some(Planned { plan, time_to_go_s: plan.left_s(air.flown.time_s) })
     }
 
-    /// Where the present velocity leads to on the ground, in the world's axes, m; NaN where a
-    /// parachute will take it there. Where that leads is known once it drifts with the wind.
+    /// Ground position that the present velocity leads to, in the world's axes, m; NaN under a
+    /// parachute until it drifts with the wind.
     pub fn touchdown_m(&self, air: &Airborne<'_>) -> Vector2<f64> {
         let (place, velocity) = (&air.estimate.state.position_m, &air.estimate.state.velocity_m_s);
         if self.phase().before_apogee() {
@@ -243,7 +242,7 @@ impl<'a> VehicleState<'a> {
 pub struct Airborne<'a> {
     pub released_at_s: f64,
     /// The last input, its frame and time counted from the release.
-    pub flown: KeptInput,
+    pub flown: SensedInput,
     pub estimate: &'a Estimate,
     burn: Burn<'a>,
     burning_s: Option<f64>,
@@ -275,8 +274,8 @@ impl Planned<'_> {
         Touchdown { height_m: if on_ground { 0.0 } else { end.height_m }, ..end }
     }
 
-    /// Up to `N` points of its path, evenly spread, both ends kept, and how many: north and up, m,
-    /// as it looks from the east, where the path that is flown is seen from too.
+    /// Up to `N` points of its path, evenly spread, including both ends, and their number: north
+    /// and up, m, as seen from the east, like the flown path.
     pub fn path_from_the_east<const N: usize>(&self) -> ([(f64, f64); N], usize) {
         let states = self.plan.states();
         let count = states.len().min(N);

@@ -12,7 +12,7 @@ use crate::log::logged::{RecordError, calibration_from_log, state_from_log};
 /// Why a frame was not run again.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum FrameError {
-    /// This build does not know some value of its input.
+    /// Its input has a value that is unknown to this build.
     #[error(transparent)]
     Input(#[from] RecordError),
     /// It is a repetition, or it is out of order.
@@ -113,7 +113,7 @@ impl RecordedComputer {
         Ok(())
     }
 
-    /// The whole frame as a record, after its [step](Self::step).
+    /// The complete frame as a record, after its [step](Self::step).
     pub fn record(&mut self, read: &LoggedInput, output: &Output) -> ComputerFrame {
         let input = read.input();
         let frame = frame_to_log(&input, output, &self.computer, self.rehearsed);
@@ -121,8 +121,8 @@ impl RecordedComputer {
         frame
     }
 
-    /// This computer at power-up, after a reset behind which frame `number` is next: it goes on
-    /// from what was saved.
+    /// Resumes this computer at power-up, after a reset, from the saved state; frame `number` is
+    /// next.
     pub fn resume(&mut self, saved: &Saved, number: u64) {
         self.computer.resume(saved, flight_time_s(number.saturating_sub(1)));
         (self.next, self.rehearsed) = (Some(number), false);
@@ -142,7 +142,7 @@ impl RecordedComputer {
         &mut self.computer
     }
 
-    /// The number of the frame that must come next, if any must.
+    /// The number of the only frame that may come next, if there is one.
     pub fn next(&self) -> Option<u64> {
         self.next
     }

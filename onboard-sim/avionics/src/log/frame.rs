@@ -3,9 +3,9 @@
 use alloc::borrow::ToOwned as _;
 use alloc::vec::Vec;
 
-use flight::computer::crew::{Asked, Ending, Request};
+use flight::computer::crew::{CrewCommand, Ending, Request};
 use flight::computer::pilot::Pilot;
-use flight::computer::{Commands, Computer, Input, KeptInput, Output, Rehearsed};
+use flight::computer::{Commands, Computer, Input, Output, Rehearsed, SensedInput};
 use flight::estimation::estimator::AidStatus;
 use flight::guidance::powered::ControlLevel;
 use flight::rules::outputs::{Outputs, PyroOutput};
@@ -18,7 +18,7 @@ use crate::log::logged::{At, Logged, RecordError};
 /// A frame's input that owns its lists: read from a log, or by a board.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LoggedInput {
-    pub kept: KeptInput,
+    pub sensed: SensedInput,
     pub requests: Vec<Request>,
     pub rehearsed: Option<Rehearsed>,
     pub plan_ready: bool,
@@ -27,8 +27,8 @@ pub struct LoggedInput {
 impl LoggedInput {
     /// The input, as the flight computer takes it.
     pub fn input(&self) -> Input<'_> {
-        let &Self { kept, ref requests, ref rehearsed, plan_ready } = self;
-        Input { kept, requests, rehearsed: rehearsed.as_ref(), plan_ready }
+        let &Self { sensed, ref requests, ref rehearsed, plan_ready } = self;
+        Input { sensed, requests, rehearsed: rehearsed.as_ref(), plan_ready }
     }
 }
 
@@ -48,8 +48,8 @@ pub fn start_to_log(computer: &Computer) -> v1::ComputerStart {
     }
 }
 
-/// A whole frame as a record; `computer` has just flown it. The result of the rehearsal is recorded
-/// in one frame only: `rehearsed_before` says that an earlier frame has it.
+/// A complete frame as a record; `computer` has just flown it. The result of the rehearsal is
+/// recorded in one frame only: with `rehearsed_before` an earlier frame has it.
 pub fn frame_to_log(
     input: &Input<'_>,
     output: &Output,
@@ -64,24 +64,24 @@ pub fn frame_to_log(
 }
 
 fn input_to_log(input: &Input<'_>) -> v1::ComputerInput {
-    let &Input { ref kept, requests, rehearsed, plan_ready } = input;
+    let &Input { ref sensed, requests, rehearsed, plan_ready } = input;
     v1::ComputerInput {
         requests: requests.iter().map(Logged::to_log).collect(),
         rehearsed: rehearsed.map(Logged::to_log),
         plan_ready,
-        ..kept.to_log()
+        ..sensed.to_log()
     }
 }
 
 /// A recorded input.
 ///
 /// # Errors
-/// This build does not know some value of it.
+/// It has a value that is unknown to this build.
 pub fn input_from_log(input: &v1::ComputerInput) -> Result<LoggedInput, RecordError> {
     let at = At { frame: input.frame, field: "input" };
     let requests = input.requests.iter().map(|request| Logged::from_log(request, at));
     Ok(LoggedInput {
-        kept: Logged::from_log(input, at)?,
+        sensed: Logged::from_log(input, at)?,
         requests: requests.collect::<Result<_, _>>()?,
         rehearsed: Logged::from_log(&input.rehearsed, at)?,
         plan_ready: input.plan_ready,
@@ -90,14 +90,14 @@ pub fn input_from_log(input: &v1::ComputerInput) -> Result<LoggedInput, RecordEr
 
 /// Whether a frame accepted an abort.
 pub fn accepts_abort(frame: &v1::ComputerFrame) -> bool {
-    let (abort, accepted) = (Asked::Abort.to_log(), Ending::Accepted.to_log());
+    let (abort, accepted) = (CrewCommand::Abort.to_log(), Ending::Accepted.to_log());
     let mut answered = frame.input.requests.iter().zip(&frame.output.answers);
     answered.any(|(request, answer)| request.asked == abort && *answer == accepted)
 }
 
 /// A frame's output as a record; `computer` has just flown it.
 pub fn output_to_log(output: &Output, computer: &Computer) -> v1::ComputerOutput {
-    let Output { commands, released, answers, news: _, planned } = output;
+    let Output { commands, released, answers, messages: _, planned } = output;
     let &Commands { gimbal_rad, fins_rad, outputs } = commands;
     v1::ComputerOutput {
         gimbal_rad: gimbal_rad.to_vec(),
@@ -132,18 +132,18 @@ pub fn commands_from_log(output: &v1::ComputerOutput, frame: u64) -> Result<Comm
     })
 }
 
-/// The control level of a recorded frame; `None` if this build does not know it.
+/// The control level of a recorded frame; `None` if unknown to this build.
 pub fn level_of(output: &v1::ComputerOutput) -> Option<ControlLevel> {
     u8::try_from(output.level).ok().and_then(ControlLevel::from_index)
 }
 
-/// The phase after a recorded frame; `None` if this build does not know it.
+/// The phase after a recorded frame; `None` if unknown to this build.
 pub fn phase_of(output: &v1::ComputerOutput) -> Option<Phase> {
     u8::try_from(output.phase).ok().and_then(Phase::from_index)
 }
 
-/// What the pilot thought after a frame: its estimate, with the motor's. `None` before it has one.
-pub fn thought_to_log(pilot: &Pilot) -> Option<flight_v1::Estimate> {
+/// The estimate after a frame, with the motor's; `None` before there is one.
+pub fn estimate_to_log(pilot: &Pilot) -> Option<flight_v1::Estimate> {
     let estimate = pilot.estimate()?;
     let aids = pilot.estimator().aids();
     Some(flight_v1::Estimate {
@@ -187,7 +187,7 @@ fn motor_to_log(pilot: &Pilot) -> Option<flight_v1::MotorEstimate> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use flight::computer::crew::{Asked, People};
+    use flight::computer::crew::{CrewCommand, People};
     use flight::computer::{Commander, LogState};
     use flight::estimation::estimator::{ImuSample, Measurements};
     use flight::rules::arming::{PredictedLanding, Uplink};
@@ -202,8 +202,8 @@ mod tests {
     fn any_uplink() -> impl Strategy<Value = Uplink> {
         prop_oneof![
             Just(Uplink::NotNeeded),
-            Just(Uplink::NeverHeard),
-            any_bits().prop_map(|age_s| Uplink::Heard { age_s }),
+            Just(Uplink::NeverReceived),
+            any_bits().prop_map(|age_s| Uplink::Received { age_s }),
         ]
     }
 
@@ -222,10 +222,15 @@ mod tests {
 
     fn any_request() -> impl Strategy<Value = Request> {
         let by = prop::option::of(any_operator());
-        let any =
-            (0..Asked::ALL.len(), any_uplink(), prop::option::of(any_station()), by, any::<Option<u16>>());
-        any.prop_map(|(asked, uplink, station, by, confirms)| Request {
-            asked: Asked::ALL[asked],
+        let any = (
+            0..CrewCommand::ALL.len(),
+            any_uplink(),
+            prop::option::of(any_station()),
+            by,
+            any::<Option<u16>>(),
+        );
+        any.prop_map(|(command, uplink, station, by, confirms)| Request {
+            command: CrewCommand::ALL[command],
             uplink,
             station,
             by,
@@ -233,21 +238,21 @@ mod tests {
         })
     }
 
-    /// A new request has to be added to the list before this compiles and passes.
+    /// A new command must be added to the list before this compiles and passes.
     #[test]
     fn every_request_has_its_number() {
-        let numbers = Asked::ALL.map(|asked| match asked {
-            Asked::Arm => 0,
-            Asked::Disarm => 1,
-            Asked::Start => 2,
-            Asked::Hold => 3,
-            Asked::Abort => 4,
-            Asked::Tap => 5,
-            Asked::TakeCommand => 6,
-            Asked::Check => 7,
-            Asked::CheckStill => 8,
-            Asked::EndCheck => 9,
-            Asked::Seen => 10,
+        let numbers = CrewCommand::ALL.map(|command| match command {
+            CrewCommand::Arm => 0,
+            CrewCommand::Disarm => 1,
+            CrewCommand::Start => 2,
+            CrewCommand::Hold => 3,
+            CrewCommand::Abort => 4,
+            CrewCommand::Tap => 5,
+            CrewCommand::TakeCommand => 6,
+            CrewCommand::Check => 7,
+            CrewCommand::CheckStill => 8,
+            CrewCommand::EndCheck => 9,
+            CrewCommand::Seen => 10,
         });
         assert_eq!(numbers, core::array::from_fn(|number| number));
     }
@@ -256,7 +261,7 @@ mod tests {
         prop_oneof![
             Just(None),
             Just(Some(People::One)),
-            any::<u16>().prop_map(|first_ask| Some(People::Two { first_ask })),
+            any::<u16>().prop_map(|first| Some(People::Two { first })),
         ]
     }
 
@@ -288,7 +293,7 @@ mod tests {
                 found,
                 landing: landing.map(|(lands, found)| PredictedLanding { lands, found }),
             });
-            let kept = KeptInput {
+            let sensed = SensedInput {
                 frame,
                 time_s: number(9),
                 measured,
@@ -310,18 +315,18 @@ mod tests {
                 booster_attached: flags[6],
             };
             let input =
-                Input { kept, requests: &requests, rehearsed: rehearsed.as_ref(), plan_ready: flags[8] };
+                Input { sensed, requests: &requests, rehearsed: rehearsed.as_ref(), plan_ready: flags[8] };
             let bytes = input_to_log(&input).encode_to_vec();
             let read = input_from_log(&v1::ComputerInput::decode(bytes.as_slice()).unwrap()).unwrap();
             // Compared as bytes as well, because a NaN never equals itself.
             prop_assert_eq!(input_to_log(&read.input()).encode_to_vec(), bytes);
             prop_assert_eq!(read.rehearsed, rehearsed);
             prop_assert_eq!(read.requests.len(), requests.len());
-            let asked = |requests: &[Request]| {
-                let asked = |request: &Request| (request.asked, request.station, request.by, request.confirms);
-                requests.iter().map(asked).collect::<Vec<_>>()
+            let fields = |requests: &[Request]| {
+                let fields = |request: &Request| (request.command, request.station, request.by, request.confirms);
+                requests.iter().map(fields).collect::<Vec<_>>()
             };
-            prop_assert_eq!(asked(&read.requests), asked(&requests));
+            prop_assert_eq!(fields(&read.requests), fields(&requests));
         }
     }
 

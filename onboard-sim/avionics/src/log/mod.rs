@@ -1,6 +1,6 @@
 //! Converts flights into log records and back, bit for bit.
 //!
-//! The flight code does not know the log, and the log does not know the flight code. Programs that
+//! The flight code is independent of the log format, and the log of the flight code. Programs that
 //! write or replay a log use this.
 //!
 //! * [`frame`]: the flight computer's frames.

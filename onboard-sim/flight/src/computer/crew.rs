@@ -1,12 +1,12 @@
-//! What the crew may ask for by radio, what the flight computer decides, and how it answers.
+//! Crew requests by radio: the decision on each, and its answer.
 
 use alloc::format;
 use alloc::string::{String, ToString as _};
 use serde::Serialize;
 
-use super::news::Severity;
+use super::messages::Severity;
 use super::table::PhaseTable;
-use super::{Commander, Computer, KeptInput};
+use super::{Commander, Computer, SensedInput};
 use crate::rules::arming;
 use crate::rules::arming::{Check, Uplink};
 use crate::rules::operator::Operator;
@@ -14,13 +14,13 @@ use crate::rules::phase::{
     Event, HoldCause, Mode, Phase, Refusal, StartPoint, UPLINK_PROVEN_S, UPLINK_SILENT_S, transition,
 };
 use crate::rules::two_person::{
-    Act, Ask, CONFIRM_WITHIN_S, NoAgreement, Reply, Station, TAP_WITHIN_S, TwoPerson,
+    Act, CONFIRM_WITHIN_S, NoAgreement, Proposal, Reply, Station, TAP_WITHIN_S, TwoPerson,
 };
 
 numbered_enum! {
-/// A request, by its number in the log, and its name as in `abort refused`.
+/// A crew command, by its number in the log. Its name is used in messages such as `abort refused`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Asked {
+pub enum CrewCommand {
     Arm = "arm",
     /// Disarm; cancels a countdown.
     Disarm = "disarm",
@@ -30,72 +30,71 @@ pub enum Asked {
     Hold = "hold",
     /// Abort, irreversibly.
     Abort = "abort",
-    /// A tap in the countdown: whoever confirmed the start is still there.
+    /// Dead-man confirmation in the countdown by the operator who confirmed the start.
     Tap = "tap",
-    /// Take the command from a station that is silent.
+    /// Take command from a silent station.
     TakeCommand = "take-over",
     /// Check the vehicle on its pad: surfaces, sensors, switches, battery and storage.
     Check = "check",
-    /// The same, but nothing moves.
+    /// The same check without motion.
     CheckStill = "check",
     /// End the running check.
     EndCheck = "end of the check",
-    /// One person has seen every surface of the last check move as the crew's page says.
+    /// A person has seen every surface of the last check move as shown on the crew's page.
     Seen = "seen motion",
 }
 }
 
-/// How many people an arming and a start take. Without one of these there are no operators, and
-/// whoever is heard commands.
+/// Number of people who must agree to arm and start. Without operators, any received station
+/// commands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum People {
-    /// Every operator alone.
+    /// Any operator alone.
     One,
     /// Two of different roles.
     Two {
-        /// Number of the first ask since power-up, another one at each boot: a confirmation from
-        /// before it names none.
-        first_ask: u16,
+        /// Number of the first proposal since power-up, different at each boot: a confirmation from
+        /// an earlier boot matches no proposal.
+        first: u16,
     },
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Request {
-    pub asked: Asked,
-    /// How well the requesting station is heard. [`Uplink::NotNeeded`] for the vehicle's own
-    /// programme.
+    pub command: CrewCommand,
+    /// Uplink of the requesting station; [`Uplink::NotNeeded`] for the vehicle's programme.
     pub uplink: Uplink,
-    /// `None` for the vehicle's own programme.
+    /// `None` for the vehicle's programme.
     pub station: Option<Station>,
-    /// Whose key has signed it; `None` for the key that all stations share, or none.
+    /// Operator whose key signed the request; `None` for the shared key, or no key.
     pub by: Option<Operator>,
-    /// The number of the ask that it confirms.
+    /// Number of the proposal that it confirms.
     pub confirms: Option<u16>,
 }
 
 impl Request {
-    /// A request of the vehicle's own programme.
-    pub fn of_the_programme(asked: Asked) -> Self {
-        Self { asked, uplink: Uplink::NotNeeded, station: None, by: None, confirms: None }
+    /// A request of the vehicle's programme.
+    pub fn of_the_programme(command: CrewCommand) -> Self {
+        Self { command, uplink: Uplink::NotNeeded, station: None, by: None, confirms: None }
     }
 }
 
-/// How a request ended.
+/// Outcome of a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ending {
-    /// Done, or already in that state.
+    /// Done, or the vehicle is already in that state.
     Accepted,
-    /// Not now: the cause can be fixed.
+    /// Refused for now: the cause can be fixed.
     NotNow,
-    /// Not in this phase or state.
+    /// Refused in this phase or state.
     Denied,
-    /// Understood, but impossible.
+    /// Valid, but impossible.
     Failed,
-    /// Noted: a second person has to confirm it.
-    Asked,
+    /// Pending: a second person must confirm it.
+    ToConfirm,
 }
 
-/// The answer to a request, with the reason if it was not accepted.
+/// Answer to a request, with the reason if it was not accepted.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Answer {
     pub ending: Ending,
@@ -106,52 +105,48 @@ impl Answer {
     pub(super) const ACCEPTED: Self = Self { ending: Ending::Accepted, reason: None };
 }
 
-/// Whether the vehicle is already in the requested state. A repeated request is accepted: a refusal
-/// would alarm the crew.
-pub(super) fn is_so_already(mode: &Mode, asked: Asked) -> bool {
+/// Whether the vehicle is already in the requested state. A repeated request is accepted, because a
+/// refusal would alarm the crew.
+pub(super) fn is_so_already(mode: &Mode, command: CrewCommand) -> bool {
     let locks = mode.interlocks;
-    match asked {
-        Asked::Arm => locks.armed && mode.phase == Phase::PadArmed,
-        Asked::Disarm => {
+    match command {
+        CrewCommand::Arm => locks.armed && mode.phase == Phase::PadArmed,
+        CrewCommand::Disarm => {
             !locks.armed && matches!(mode.phase, Phase::PadIdle | Phase::Touchdown | Phase::Safed)
         }
-        Asked::Start => locks.armed && mode.countdown_end_s.is_some(),
-        Asked::Hold => mode.hold.is_some(),
-        // A second abort may do more than the first: the phase table decides.
+        CrewCommand::Start => locks.armed && mode.countdown_end_s.is_some(),
+        CrewCommand::Hold => mode.hold.is_some(),
+        // A second abort may have more effect than the first: the phase table decides.
         _ => false,
     }
 }
 
-/// The event for a request; `None` for one that is no matter of the phase table. A countdown is of
-/// this length, before a flight that starts there, and `abort` is the event that an abort would be
-/// now; `lifted_off`: the vehicle has left its rail.
+/// The event for a command; `None` if the phase table does not handle it. `countdown_s` and `start`
+/// describe the countdown, `abort` is the event of an abort at this moment, and `lifted_off` is set
+/// once the vehicle has left its rail.
 pub(super) fn event_of(
-    asked: Asked,
+    command: CrewCommand,
     checks: &[Check],
     (countdown_s, start): (f64, StartPoint),
     abort: Event,
     lifted_off: bool,
 ) -> Option<Event> {
-    Some(match asked {
-        Asked::Arm => Event::ArmRequested { checks_passed: arming::all_passed(checks) },
-        Asked::Disarm => Event::DisarmRequested { lifted_off },
-        Asked::Start => Event::StartRequested { countdown_s, checks_passed: arming::all_passed(checks) },
-        Asked::Hold => Event::Hold { cause: HoldCause::Commanded, start },
-        Asked::Abort => abort,
-        Asked::Tap
-        | Asked::TakeCommand
-        | Asked::Check
-        | Asked::CheckStill
-        | Asked::EndCheck
-        | Asked::Seen => return None,
+    use CrewCommand as C;
+    Some(match command {
+        C::Arm => Event::ArmRequested { checks_passed: arming::all_passed(checks) },
+        C::Disarm => Event::DisarmRequested { lifted_off },
+        C::Start => Event::StartRequested { countdown_s, checks_passed: arming::all_passed(checks) },
+        C::Hold => Event::Hold { cause: HoldCause::Commanded, start },
+        C::Abort => abort,
+        C::Tap | C::TakeCommand | C::Check | C::CheckStill | C::EndCheck | C::Seen => return None,
     })
 }
 
-/// The answer to a request whose event the table has refused; the crew is told the reason.
-pub(super) fn refused(table: &mut PhaseTable, asked: Asked, refusal: Refusal, checks: &[Check]) -> Answer {
+/// The answer to a request whose event the phase table has refused; reports the reason to the crew.
+fn refused(table: &mut PhaseTable, command: CrewCommand, refusal: Refusal, checks: &[Check]) -> Answer {
     // The first answer may have been lost: a latched abort is accepted again, also under the
     // parachute and on the ground.
-    let latched = asked == Asked::Abort && table.mode().interlocks.abort_latched;
+    let latched = command == CrewCommand::Abort && table.mode().interlocks.abort_latched;
     if latched || refusal == Refusal::AlreadyAborted {
         return Answer::ACCEPTED;
     }
@@ -159,53 +154,54 @@ pub(super) fn refused(table: &mut PhaseTable, asked: Asked, refusal: Refusal, ch
         Refusal::ChecksFailed => arming::first_refusal(checks).unwrap_or_else(|| refusal.to_string()),
         other => other.to_string(),
     };
-    let ending = match (asked, refusal) {
-        (Asked::Abort, _) => Ending::Failed,
+    let ending = match (command, refusal) {
+        (CrewCommand::Abort, _) => Ending::Failed,
         (_, Refusal::ChecksFailed | Refusal::PinIn) => Ending::NotNow,
         _ => Ending::Denied,
     };
-    table.say(Severity::Warning, format!("{} refused: {reason}", asked.name()));
+    table.report(Severity::Warning, format!("{} refused: {reason}", command.name()));
     Answer { ending, reason: Some(reason) }
 }
 
-// Decides the crew's requests, and holds the countdown when the commanding station falls silent or
-// a tap is overdue.
+// Decides the crew's requests, and holds the countdown when the commanding station is silent or a
+// dead-man confirmation is overdue.
 
-/// What the computer remembers of its crew.
+/// State of the crew in the computer's memory.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct CrewMemory {
     pub two_person: TwoPerson,
-    /// Who has held the last countdown, or whose silence has.
+    /// The operator who held the last countdown, or whose silence held it.
     pub held_by: Option<Operator>,
 }
 
-/// An ask, and who has confirmed it.
-type Agreed = (Ask, Operator);
+/// A proposal and the operator who confirmed it.
+type Agreed = (Proposal, Operator);
 
 impl Computer {
     /// Decides a request.
     pub(super) fn answer(&mut self, request: &Request) -> Answer {
         let mode = *self.table.mode();
         let time_s = self.table.time_s();
-        let Request { asked, uplink, station, by, .. } = *request;
+        let Request { command, uplink, station, by, .. } = *request;
         if let Some(reason) = self.why_not_of(request) {
-            return self.deny(asked, reason);
+            return self.deny(command, reason);
         }
-        // Whatever else the crew wants, the check is over first.
-        let check_ended = !matches!(asked, Asked::Check | Asked::CheckStill) && self.end_check(asked.name());
-        if check_ended && matches!(asked, Asked::Arm | Asked::Start) {
+        // Any other command ends a running check first.
+        let check_ended = !matches!(command, CrewCommand::Check | CrewCommand::CheckStill)
+            && self.end_check(command.name());
+        if check_ended && matches!(command, CrewCommand::Arm | CrewCommand::Start) {
             let reason = "a check of the vehicle ran, and has ended now; ask again";
-            return Answer { ending: Ending::NotNow, ..self.deny(asked, reason.into()) };
+            return Answer { ending: Ending::NotNow, ..self.deny(command, reason.into()) };
         }
-        if asked == Asked::Start
+        if command == CrewCommand::Start
             && let Some(reason) = self.why_not_start(request)
         {
-            return self.deny(asked, reason);
+            return self.deny(command, reason);
         }
-        if is_so_already(&mode, asked) {
+        if is_so_already(&mode, command) {
             return Answer::ACCEPTED;
         }
-        if asked == Asked::Abort && !mode.interlocks.abort_latched {
+        if command == CrewCommand::Abort && !mode.interlocks.abort_latched {
             let who = match (by, station) {
                 (Some(by), _) => Some(format!("{by}")),
                 (None, Some(station)) if self.input.people.is_some() => {
@@ -214,53 +210,52 @@ impl Computer {
                 _ => None,
             };
             if let Some(who) = who {
-                self.table.say(Severity::Warning, format!("{who} aborts"));
+                self.table.report(Severity::Warning, format!("{who} aborts"));
             }
         }
         let checks = self.arming_checks_by(uplink);
         let start = self.start_point();
         let lifted_off = self.pilot.ascent.has_lifted_off();
         let abort = self.abort_event();
-        let Some(event) = event_of(asked, &checks, (self.countdown_s, start), abort, lifted_off) else {
-            return match asked {
-                Asked::Tap => self.tap(by),
-                Asked::TakeCommand => self.take_command(request),
-                Asked::Check | Asked::CheckStill => self.begin_check(asked, by),
-                Asked::Seen => self.see_check(asked, by),
+        let Some(event) = event_of(command, &checks, (self.countdown_s, start), abort, lifted_off) else {
+            return match command {
+                CrewCommand::Tap => self.tap(by),
+                CrewCommand::TakeCommand => self.take_command(request),
+                CrewCommand::Check | CrewCommand::CheckStill => self.begin_check(command, by),
+                CrewCommand::Seen => self.see_check(command, by),
                 _ => Answer::ACCEPTED,
             };
         };
         let may_hold = mode.may_hold_for(HoldCause::Commanded, start, time_s);
-        if let (Asked::Hold, true, Some(station)) = (asked, may_hold, station) {
+        if let (CrewCommand::Hold, true, Some(station)) = (command, may_hold, station) {
             let who = by.map_or_else(String::new, |by| format!("{by}, "));
-            self.table.say(Severity::Notice, format!("{who}station {station} asks for a hold"));
+            self.table.report(Severity::Notice, format!("{who}station {station} asks for a hold"));
         }
-        // What the phase table would refuse is not worth a second person's confirmation.
+        // A request that the phase table would refuse needs no second person's confirmation.
         let refusal = transition(&mode, event, time_s).refusal;
         let agreed = match refusal.map_or_else(|| self.agree(request), |_| Ok(None)) {
             Ok(agreed) => agreed,
             Err(answer) => return answer,
         };
-        match self.happen(event) {
+        match self.apply(event) {
             Ok(_) => {
-                self.note_done(asked, by, agreed);
+                self.note_done(command, by, agreed);
                 Answer::ACCEPTED
             }
-            Err(refusal) => refused(&mut self.table, asked, refusal, &checks),
+            Err(refusal) => refused(&mut self.table, command, refusal, &checks),
         }
     }
 
-    /// Why this sender may ask for nothing of the kind.
+    /// Why this sender may not give this command; `None` if it may.
     fn why_not_of(&self, request: &Request) -> Option<String> {
         let people = self.input.people?;
-        let Request { asked, station, by, .. } = *request;
+        let Request { command, station, by, .. } = *request;
         if station.is_none() {
-            let shared = act_of(asked).is_some() && people != People::One;
+            let shared = act_of(command).is_some() && people != People::One;
             return shared.then(|| "two people arm and start, not the vehicle by itself".into());
         }
-        // Whoever holds any key of this crew may stop the launch: the links let nobody else
-        // through.
-        if matches!(asked, Asked::Abort | Asked::Hold) {
+        // Any holder of a key may stop the launch; the links drop all others.
+        if matches!(command, CrewCommand::Abort | CrewCommand::Hold) {
             return None;
         }
         match by {
@@ -270,9 +265,9 @@ impl Computer {
         }
     }
 
-    /// Why nobody starts from there now. Who starts is who armed: the station whose silence holds
-    /// the countdown. Of two people one taps, too, and they may start from any two of their
-    /// stations.
+    /// Why the countdown cannot be started from this station; `None` if it can. With one person,
+    /// the station that armed must start, because its silence holds the countdown. With two, one
+    /// gives dead-man confirmations, and they may start from any two stations.
     fn why_not_start(&self, request: &Request) -> Option<String> {
         let station = request.station.filter(|_| !matches!(self.input.people, Some(People::Two { .. })));
         let armed_by = self.input.commander.filter(|_| self.table.mode().interlocks.armed);
@@ -285,64 +280,64 @@ impl Computer {
         None
     }
 
-    /// Asks or confirms, if this takes two people; the answer to an ask, and to a wrong
-    /// confirmation, is an error.
+    /// Proposes or confirms, if two people must agree. A new proposal and a wrong confirmation
+    /// return an error.
     fn agree(&mut self, request: &Request) -> Result<Option<Agreed>, Answer> {
-        let Request { asked, station, by, confirms, .. } = *request;
-        let (first_ask, act) = match (self.input.people, act_of(asked)) {
-            (Some(People::Two { first_ask }), Some(act)) => (first_ask, act),
+        let Request { command, station, by, confirms, .. } = *request;
+        let (first, act) = match (self.input.people, act_of(command)) {
+            (Some(People::Two { first }), Some(act)) => (first, act),
             (None | Some(People::One), _) | (Some(People::Two { .. }), None) => return Ok(None),
         };
         let (Some(by), Some(station)) = (by, station) else {
             let reason = "two people with a key each, at a station, must agree".into();
-            return Err(self.deny(asked, reason));
+            return Err(self.deny(command, reason));
         };
         let time_s = self.table.time_s();
         let waited = self.crew.two_person.waiting(time_s);
-        match self.crew.two_person.request(act, confirms, (by, station), first_ask, time_s) {
-            Reply::Agreed { ask, confirmed_by } => Ok(Some((ask, confirmed_by))),
-            Reply::Asked(ask) => {
-                let reason = ask_in_words(&ask, time_s);
-                if waited != Some(ask) {
-                    self.table.say(Severity::Notice, reason.clone());
+        match self.crew.two_person.request(act, confirms, (by, station), first, time_s) {
+            Reply::Agreed { proposal, confirmed_by } => Ok(Some((proposal, confirmed_by))),
+            Reply::Proposed(proposal) => {
+                let reason = proposal_text(&proposal, time_s);
+                if waited != Some(proposal) {
+                    self.table.report(Severity::Notice, reason.clone());
                 }
-                Err(Answer { ending: Ending::Asked, reason: Some(reason) })
+                Err(Answer { ending: Ending::ToConfirm, reason: Some(reason) })
             }
-            Reply::Refused(refusal) => Err(self.deny(asked, why_no_agreement(refusal, act, time_s))),
+            Reply::Refused(refusal) => Err(self.deny(command, why_no_agreement(refusal, act, time_s))),
         }
     }
 
-    /// Notes what an accepted request means for the crew.
-    fn note_done(&mut self, asked: Asked, by: Option<Operator>, agreed: Option<Agreed>) {
+    /// Records the effect of an accepted request on the crew state.
+    fn note_done(&mut self, command: CrewCommand, by: Option<Operator>, agreed: Option<Agreed>) {
         let time_s = self.table.time_s();
         let commander = self.input.commander.and_then(|commander| commander.by);
         let commands = |by: Operator| commander.is_some_and(|commander| commander.number == by.number);
         let two_person = &mut self.crew.two_person;
-        match (asked, agreed) {
-            (Asked::Arm, Some((ask, _))) => two_person.armed(ask),
-            // Whose station commands is watched by its silence already: the other one of the two
-            // taps.
-            (Asked::Start, Some((ask, confirmed_by))) if commands(confirmed_by) => {
-                two_person.begin_taps(ask.by, time_s);
+        match (command, agreed) {
+            (CrewCommand::Arm, Some((proposal, _))) => two_person.armed(proposal),
+            // The commanding station is already supervised by its heartbeats: the other operator
+            // gives the dead-man confirmations.
+            (CrewCommand::Start, Some((proposal, confirmed_by))) if commands(confirmed_by) => {
+                two_person.begin_taps(proposal.by, time_s);
             }
-            (Asked::Start, Some((_, confirmed_by))) => two_person.begin_taps(confirmed_by, time_s),
-            (Asked::Disarm | Asked::Hold | Asked::Abort, _) => {
+            (CrewCommand::Start, Some((_, confirmed_by))) => two_person.begin_taps(confirmed_by, time_s),
+            (CrewCommand::Disarm | CrewCommand::Hold | CrewCommand::Abort, _) => {
                 two_person.withdraw();
                 two_person.end_taps();
             }
             _ => {}
         }
-        if asked == Asked::Hold {
+        if command == CrewCommand::Hold {
             self.crew.held_by = by;
         }
-        if let Some((ask, confirmed_by)) = agreed {
-            let words = format!("{}: asked by {}, confirmed by {confirmed_by}", ask.act.name(), ask.by);
-            self.table.say(Severity::Notice, words);
+        if let Some((Proposal { act, by, .. }, confirmed_by)) = agreed {
+            let words = format!("{}: asked by {by}, confirmed by {confirmed_by}", act.name());
+            self.table.report(Severity::Notice, words);
         }
     }
 
-    pub(super) fn deny(&mut self, asked: Asked, reason: String) -> Answer {
-        self.table.say(Severity::Warning, format!("{} refused: {reason}", asked.name()));
+    pub(super) fn deny(&mut self, command: CrewCommand, reason: String) -> Answer {
+        self.table.report(Severity::Warning, format!("{} refused: {reason}", command.name()));
         Answer { ending: Ending::Denied, reason: Some(reason) }
     }
 
@@ -355,52 +350,52 @@ impl Computer {
             Some(tapping) => format!("{} taps", tapping.by),
             None => "no countdown that two people have started".into(),
         };
-        self.deny(Asked::Tap, reason)
+        self.deny(CrewCommand::Tap, reason)
     }
 
-    /// A station takes the command from one that is silent.
+    /// A station takes command from a silent one.
     fn take_command(&mut self, request: &Request) -> Answer {
         let Some(station) = request.station else {
-            return self.deny(Asked::TakeCommand, "no station".into());
+            return self.deny(CrewCommand::TakeCommand, "no station".into());
         };
         let armed = self.table.mode().interlocks.armed;
         let Some(Commander { station: before, age_s, by: before_by, .. }) =
             self.input.commander.filter(|_| armed)
         else {
-            return self.deny(Asked::TakeCommand, "no station has armed the vehicle".into());
+            return self.deny(CrewCommand::TakeCommand, "no station has armed the vehicle".into());
         };
         if before == station {
             return Answer::ACCEPTED;
         }
         let (old, new) = (named(before, before_by), named(station, request.by));
         if age_s <= UPLINK_PROVEN_S {
-            return self.deny(Asked::TakeCommand, format!("{old} is heard, {age_s:.1} s ago"));
+            return self.deny(CrewCommand::TakeCommand, format!("{old} is heard, {age_s:.1} s ago"));
         }
-        // Nobody commands and taps: that takes two.
+        // One person cannot both command and give the dead-man confirmations.
         if let (Some(tapping), Some(by)) = (self.crew.two_person.tapping(), request.by)
             && tapping.by.number == by.number
         {
-            return self.deny(Asked::TakeCommand, format!("{by} taps: hold the countdown first"));
+            return self.deny(CrewCommand::TakeCommand, format!("{by} taps: hold the countdown first"));
         }
-        // A role hands over to its like; range safety may always take over.
+        // A role hands over to the same role; range safety may always take over.
         if let (Some(before_by), Some(by)) = (before_by, request.by)
             && by.role != before_by.role
             && by.role != crate::rules::operator::Role::RangeSafety
         {
             let wanted = before_by.role.name();
-            return self
-                .deny(Asked::TakeCommand, format!("only {wanted} or RANGE SAFETY takes over from {old}"));
+            let reason = format!("only {wanted} or RANGE SAFETY takes over from {old}");
+            return self.deny(CrewCommand::TakeCommand, reason);
         }
         let silence = if age_s.is_finite() { format!("silent for {age_s:.0} s") } else { "not heard".into() };
-        self.table.say(Severity::Critical, format!("{new} takes command from {old}, {silence}"));
+        self.table.report(Severity::Critical, format!("{new} takes command from {old}, {silence}"));
         Answer::ACCEPTED
     }
 
-    /// Holds the countdown if the station that armed the vehicle has fallen silent, or hears
-    /// nothing of the vehicle.
-    pub(super) fn watch_the_commander(&mut self, input: &KeptInput) {
+    /// Holds the countdown if the station that armed the vehicle is silent, or receives nothing
+    /// from the vehicle.
+    pub(super) fn check_the_commander(&mut self, input: &SensedInput) {
         let Some(Commander { station, age_s, by, deaf }) = input.commander else { return };
-        // An age that is not a number is no sign of life.
+        // NaN is no sign of life.
         let is_heard = age_s <= UPLINK_SILENT_S;
         let held = if is_heard {
             deaf && self.hold(HoldCause::StationDeaf, || format!("{station} hears nothing of this vehicle"))
@@ -413,19 +408,20 @@ impl Computer {
         }
     }
 
-    /// Holds a running countdown, and says why; not when this cause comes too late for it.
+    /// Holds a running countdown and reports the reason, unless this cause comes too late to hold
+    /// it.
     pub(super) fn hold(&mut self, cause: HoldCause, why: impl FnOnce() -> String) -> bool {
         let start = self.start_point();
         if !self.table.mode().may_hold_for(cause, start, self.table.time_s()) {
             return false;
         }
-        self.table.say(Severity::Critical, why());
-        self.table.happen(Event::Hold { cause, start }).is_ok()
+        self.table.report(Severity::Critical, why());
+        self.table.apply(Event::Hold { cause, start }).is_ok()
     }
 
-    /// Holds the countdown if the tap of whoever confirmed the start is overdue. After the release
-    /// taps mean nothing.
-    pub(super) fn watch_the_taps(&mut self) {
+    /// Holds the countdown if the dead-man confirmation is overdue. After the release it is not
+    /// required.
+    pub(super) fn check_dead_man_timeout(&mut self) {
         if self.table.mode().countdown_end_s.is_none() {
             self.crew.two_person.end_taps();
             return;
@@ -438,45 +434,46 @@ impl Computer {
     }
 }
 
-/// A station by its operator, if it has one, and its ids.
+/// Formats a station with its operator, if any, and its ids.
 fn named(station: Station, by: Option<Operator>) -> String {
     by.map_or_else(|| format!("{station}"), |by| format!("{by} ({station})"))
 }
 
-/// What takes two people.
-fn act_of(asked: Asked) -> Option<Act> {
-    match asked {
-        Asked::Arm => Some(Act::Arm),
-        Asked::Start => Some(Act::Start),
-        Asked::Disarm
-        | Asked::Hold
-        | Asked::Abort
-        | Asked::Tap
-        | Asked::TakeCommand
-        | Asked::Check
-        | Asked::CheckStill
-        | Asked::EndCheck
-        | Asked::Seen => None,
+/// The act that needs two people; `None` if one is enough.
+fn act_of(command: CrewCommand) -> Option<Act> {
+    match command {
+        CrewCommand::Arm => Some(Act::Arm),
+        CrewCommand::Start => Some(Act::Start),
+        CrewCommand::Disarm
+        | CrewCommand::Hold
+        | CrewCommand::Abort
+        | CrewCommand::Tap
+        | CrewCommand::TakeCommand
+        | CrewCommand::Check
+        | CrewCommand::CheckStill
+        | CrewCommand::EndCheck
+        | CrewCommand::Seen => None,
     }
 }
 
-fn ask_in_words(ask: &Ask, time_s: f64) -> String {
-    let mut others = ask.by.role.others();
+fn proposal_text(proposal: &Proposal, time_s: f64) -> String {
+    let mut others = proposal.by.role.others();
     let [one, other] = [others.next(), others.next()].map(|role| role.map_or("", |role| role.name()));
-    let left_s = ask.left_s(time_s).clamp(0.0, CONFIRM_WITHIN_S);
-    format!("{} asks to {}: {one} or {other} must confirm within {left_s:.0} s", ask.by, ask.act.name())
+    let left_s = proposal.left_s(time_s).clamp(0.0, CONFIRM_WITHIN_S);
+    let Proposal { act, by, .. } = proposal;
+    format!("{by} asks to {}: {one} or {other} must confirm within {left_s:.0} s", act.name())
 }
 
 fn why_no_agreement(refusal: NoAgreement, act: Act, time_s: f64) -> String {
     match refusal {
         NoAgreement::Observer => "observers command nothing".to_string(),
-        NoAgreement::AnotherAsks(ask) => ask_in_words(&ask, time_s),
+        NoAgreement::Pending(proposal) => proposal_text(&proposal, time_s),
         NoAgreement::NothingToConfirm => {
-            format!("nobody asks to {}, or not by that number any more", act.name())
+            format!("no pending proposal to {} has that number", act.name())
         }
-        NoAgreement::OwnAsk(ask) => format!("{} asked: another role must confirm", ask.by),
-        NoAgreement::SameRole(ask) => {
-            format!("{} asked: another role than {} must confirm", ask.by, ask.by.role.name())
+        NoAgreement::SamePerson(proposal) => format!("{} asked: another role must confirm", proposal.by),
+        NoAgreement::SameRole(proposal) => {
+            format!("{} asked: another role than {} must confirm", proposal.by, proposal.by.role.name())
         }
     }
 }

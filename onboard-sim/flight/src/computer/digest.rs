@@ -1,9 +1,8 @@
-//! One number for everything that the flight computer remembers.
+//! Hash of the flight computer's complete memory.
 //!
-//! What is hashed is what `serde` writes of [`Computer`]. A field that cannot decide the future (a
-//! constant of the mission, workspace that is written before it is read, the last input) has
-//! `#[serde(skip)]` and its reason where it is declared, so a new field counts unless somebody says
-//! otherwise.
+//! The hash covers the `serde` serialisation of [`Computer`]. A field that cannot affect the future
+//! (a mission constant, workspace written before it is read, the last input) has `#[serde(skip)]`
+//! and its reason at its declaration. A new field therefore counts unless it is explicitly skipped.
 
 use core::hash::Hasher as _;
 
@@ -13,14 +12,14 @@ use twox_hash::XxHash64;
 
 use super::Computer;
 
-/// Bytes that are given to the hash at once. Word by word, the hash took a third of the time of
-/// `replay verify`.
+/// Bytes passed to the hash at once. Word by word, hashing took a third of the time of `replay
+/// verify`.
 const BLOCK: usize = 1024;
 
-/// The hash being computed, XXH64, as a place that postcard writes to.
+/// The running hash, XXH64, as an output of postcard.
 struct Digest {
     hash: XxHash64,
-    /// What the hash has not taken yet, in the first `waiting` bytes.
+    /// Bytes not yet hashed: the first `waiting` of the block.
     block: [u8; BLOCK],
     waiting: usize,
 }
@@ -28,7 +27,7 @@ struct Digest {
 impl Digest {
     fn of(remembered: &impl Serialize) -> u64 {
         let empty = Self { hash: XxHash64::with_seed(0), block: [0; BLOCK], waiting: 0 };
-        // It cannot fail: nothing here refuses a byte, and every list of the computer knows its
+        // It cannot fail: this flavour accepts every byte, and every list of the computer has a
         // length.
         postcard::serialize_with_flavor(remembered, empty).unwrap_or_default()
     }
@@ -70,14 +69,13 @@ impl Flavor for Digest {
     }
 }
 
-/// The checksum of what is kept through a reset: XXH64.
+/// Checksum of the state saved through a reset: XXH64.
 pub(super) fn checksum(bytes: &[u8]) -> u64 {
     XxHash64::oneshot(0, bytes)
 }
 
 impl Computer {
-    /// A number that changes with anything that the computer remembers, to compare a replay with a
-    /// log.
+    /// A hash that changes with any part of the computer's memory, to compare a replay with a log.
     pub fn digest(&self) -> u64 {
         Digest::of(self)
     }
@@ -119,8 +117,7 @@ mod tests {
         }
     }
 
-    /// The digest does not depend on how the bytes are divided into blocks, and it is never the
-    /// number of a failure.
+    /// The digest does not depend on the division into blocks, and is never the value of a failure.
     #[test]
     fn the_digest_is_the_hash_of_all_that_postcard_writes() {
         let long = "x".repeat(3 * BLOCK);

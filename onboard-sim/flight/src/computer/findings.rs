@@ -1,9 +1,9 @@
-//! What went wrong in a flight, from what its computer knows: first in time, each with the numbers
-//! that it rests on.
+//! Faults detected in flight from the computer's data, in order of time, each with the numbers that
+//! support it.
 //!
-//! [`Findings::note`] looks at the computer after each of its frames. Nothing on board depends on
-//! it: the vehicle sends what was found, and a report begins with it. The truth of a simulation is
-//! not used, because a real flight has none.
+//! [`Findings::note`] examines the computer after each frame. Nothing on board depends on it: the
+//! vehicle sends the findings, and a report begins with them. Simulated truth is not used, because
+//! a real flight has none.
 //!
 //! Each [`Sign`] has one rule, in [`Watcher::seen`] and [`RULES`].
 
@@ -12,7 +12,7 @@ use alloc::string::{String, ToString as _};
 use alloc::vec::Vec;
 
 use super::pad_check::{SURFACE_NAMES, SURFACES, surfaces_rad};
-use super::{Computer, FRAME_S, KeptInput};
+use super::{Computer, FRAME_S, SensedInput};
 use crate::control::servo::{GIMBALS, ServoModel};
 use crate::estimation::estimator::{Estimate, Health};
 use crate::estimation::motor_estimate::MotorStage;
@@ -21,49 +21,49 @@ use crate::guidance::powered::ControlLevel;
 use crate::rules::outputs::PyroOutput;
 use crate::rules::phase::{Latch, Phase};
 
-/// Something that no flight shows as long as its vehicle does what it should.
+/// A sign that no flight shows while its vehicle works correctly.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Sign {
-    /// The computer was away for a while.
+    /// The computer was down for a while.
     Restart,
     Gnss,
     Barometer,
     Lidar,
     /// The accelerometer repeats one sample.
     Accelerometer,
-    /// The barometer does not fit the other heights.
+    /// The barometer disagrees with the other heights.
     HeightsDisagree,
-    /// The flight computer doubts its own estimate.
+    /// The estimate was unhealthy.
     Estimate,
-    /// Gimbal pitch and yaw, then the fins: it is not where its commands take it.
+    /// Gimbal pitch and yaw, then the fins: the surface does not follow its commands.
     Surface(u8),
-    /// The gimbal turns more slowly than its servo's data say.
+    /// The gimbal turns more slowly than its servo's data.
     SlowGimbal,
     Battery,
-    /// The ascent motor gave less than its curve.
+    /// The ascent motor delivered less than its curve.
     AscentMotor,
-    /// The booster is still there after its charge was fired.
+    /// The booster is still attached after its charge was fired.
     Separation,
-    /// The vehicle falls fast although the parachute was thrown out.
+    /// The vehicle falls fast although the parachute was ejected.
     Parachute,
-    /// The landing motor lit later than any that is known.
+    /// The landing motor ignited later than any recorded delay.
     LateLight,
     /// The landing motor is weaker or stronger than the mission's.
     Impulse,
-    /// The landing motor went out before its time.
+    /// The landing motor burned out early.
     BurntOutEarly,
-    /// No plan lands, and none is left.
+    /// No plan lands, and no plan is left to fly.
     NoPlan,
     /// The nose points below the horizon while the motor burns.
     Tumbles,
-    /// The ignition gate stayed shut.
+    /// Ignition stayed inhibited.
     Gate,
-    /// Something else has latched an abort or inhibited the landing motor.
+    /// Another cause has latched an abort or inhibited the landing motor.
     Latched,
 }
 
-/// Every sign, and how long it must last to be a finding, s. A moment of it is noise, a dropped
-/// sample or a gust.
+/// Every sign, and the time for which it must last to become a finding, s. Shorter signs are noise,
+/// a dropped sample or a gust.
 const RULES: [(Sign, f64); 25] = [
     (Sign::Restart, 0.0),
     (Sign::Gnss, 0.0),
@@ -92,19 +92,19 @@ const RULES: [(Sign, f64); 25] = [
     (Sign::Latched, 0.0),
 ];
 
-/// Something that went wrong.
+/// A detected fault.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Finding {
     pub sign: Sign,
     /// When it began, s since the release.
     pub since_s: f64,
-    /// How long it has been so altogether, s.
+    /// Total time for which it held, s.
     pub held_s: f64,
-    /// What was measured at its worst, in the words' unit.
+    /// The worst measured value, in the unit of the text.
     pub value: f64,
-    /// What it stands against, or a second number.
+    /// The value it is compared with, or a second number.
     pub beside: f64,
-    /// Words that belong to it.
+    /// Additional text.
     pub detail: String,
 }
 
@@ -119,7 +119,7 @@ impl Finding {
             Sign::Lidar => format!("lidar silent from {beside:.0} m down"),
             Sign::Accelerometer => format!("accelerometer repeats one sample for {value:.1} s"),
             Sign::HeightsDisagree => format!("barometer {value:.1} m from the other heights"),
-            Sign::Estimate => format!("estimate doubted for {held_s:.1} s: {detail}"),
+            Sign::Estimate => format!("estimate unhealthy for {held_s:.1} s: {detail}"),
             Sign::Surface(surface) => {
                 let name = SURFACE_NAMES.get(usize::from(surface)).unwrap_or(&"surface");
                 format!("{name} {value:.1} deg from where its commands take it, at {beside:.1} deg")
@@ -129,7 +129,9 @@ impl Finding {
             Sign::AscentMotor => format!("ascent motor gave {value:.2} of its impulse"),
             Sign::Separation => "booster did not separate".to_string(),
             Sign::Parachute => format!("falls at {value:.0} m/s under its parachute"),
-            Sign::LateLight => format!("landing motor lit {value:.2} s after its command, not {beside:.2} s"),
+            Sign::LateLight => {
+                format!("landing ignition {value:.2} s after its command, not {beside:.2} s")
+            }
             Sign::Impulse => format!("landing motor's impulse {value:.3} of the mission's"),
             Sign::BurntOutEarly => format!("landing motor went out {value:.1} s early"),
             Sign::NoPlan => format!("no plan that lands for {held_s:.1} s"),
@@ -141,11 +143,11 @@ impl Finding {
     }
 }
 
-/// What holds in a frame: since when, s, and the finding's numbers.
+/// A sign in one frame: since when, s, and the numbers of the finding.
 #[derive(Debug, Clone, Copy)]
-struct Seen {
+struct Hit {
     since_s: f64,
-    /// How bad it is: the worst is kept.
+    /// Severity: the worst is stored.
     size: f64,
     value: f64,
     beside: f64,
@@ -156,7 +158,7 @@ struct Seen {
 #[derive(Debug, Clone, Copy, Default)]
 struct SignWatch {
     since_s: Option<f64>,
-    /// The place of its finding.
+    /// Index of its finding.
     found: Option<usize>,
     worst: f64,
 }
@@ -196,7 +198,7 @@ impl Findings {
                 continue;
             }
             let &mut place = watch.found.get_or_insert_with(|| {
-                let Seen { value, beside, detail, .. } = seen;
+                let Hit { value, beside, detail, .. } = seen;
                 let gave_up = computer.pilot().gave_up().filter(|_| sign == Sign::Gate);
                 let detail = gave_up.unwrap_or(detail).to_string();
                 self.found.push(Finding {
@@ -218,12 +220,12 @@ impl Findings {
         }
     }
 
-    /// What was found so far, in the order in which it was found: a finding keeps its place.
+    /// The findings so far, in order of detection: an index stays valid.
     pub fn as_found(&self) -> &[Finding] {
         &self.found
     }
 
-    /// What was found so far, first in time.
+    /// The findings so far, in order of time.
     pub fn found(&self) -> Vec<Finding> {
         let mut found = self.found.clone();
         found.sort_by(|a, b| a.since_s.total_cmp(&b.since_s).then(a.sign.cmp(&b.sign)));
@@ -231,77 +233,76 @@ impl Findings {
     }
 }
 
-/// The same where its last fix came before the boost was over, s: none of three receivers keeps its
-/// fix in a boost.
+/// The same time if the last fix came before the end of the boost, s: none of three receivers holds
+/// its fix in a boost.
 const GNSS_LOST_IN_BOOST_S: f64 = 6.0;
-/// Where the lidar must see the ground: from this slant range, m, down to the dust, and while its
-/// beam leans less than this (40 deg).
+/// Range in which the lidar must measure: from this slant range, m, down to the dust, with its beam
+/// leaning less than 40 deg.
 const LIDAR_SEES_M: [f64; 2] = [3.0, 7.0];
 const LIDAR_COS_TILT: f64 = 0.766;
-/// Beyond this tilt (60 deg) the nose is astray: no plan leans so far.
+/// Tilt beyond which the attitude is off-nominal (60 deg): no plan leans so far.
 const ASTRAY_COS_TILT: f64 = 0.5;
-/// A gimbal and a fin this far from where their servo's data take them do not follow, rad.
-/// Feedback, play and an unknown half frame of delay make 1 deg of it for a gimbal; the fins'
-/// feedback is coarser.
+/// Deviation of a gimbal and of a fin from their modelled positions beyond which they do not
+/// follow, rad. Feedback, play and half a frame of unknown delay amount to 1 deg for a gimbal; the
+/// fin feedback is coarser.
 const AWAY_RAD: [f64; 2] = [0.035, 0.14];
-/// A gimbal that never turned by this share of its servo's rate, in so many frames that asked for
-/// more, is slow. One that is as its data say turns by 0.6 of it at least (388 flights of mk2 and
-/// mk3 in `real`).
+/// Share of its servo's rate that a slow gimbal never reaches in the frames that demand more. A
+/// healthy one reaches at least 0.6 (388 flights of mk2 and mk3 in `real`).
 const SLOW: f64 = 0.55;
 const SLOW_FRAMES: u32 = 40;
-/// Common regulators of 5 V give up here, V.
+/// Voltage at which common 5 V regulators drop out, V.
 const BATTERY_LOW_V: f64 = 6.6;
-/// Less than this share of the ascent motor's certified impulse was felt.
+/// Share of the ascent motor's certified impulse below which it is weak.
 const ASCENT_WEAK: f64 = 0.8;
-/// A parachute fills within this time, s, and carries more slowly than this, m/s.
+/// Time in which a parachute fills, s, and the largest descent rate under it, m/s.
 const CHUTE_FILLS_S: f64 = 4.0;
 const CHUTE_CARRIES_M_S: f64 = 15.0;
-/// A delay beyond the mission's by more than this is not known, s.
+/// Ignition delay beyond the mission's that no recorded motor has exceeded, s.
 const LATE_S: f64 = 0.3;
-/// An impact is felt for less time than this, s.
+/// Longest duration of an impact in the accelerometer, s.
 const SHOCK_S: f64 = 0.1;
-/// So many standard deviations of the prior is no motor of this kind.
+/// Deviation of the impulse that no motor of this type shows, standard deviations of the prior.
 const IMPULSE_SIGMAS: f64 = 3.0;
-/// A tail-off is not known better, s.
+/// Uncertainty of the end of a tail-off, s.
 const EARLY_S: f64 = 0.3;
-/// The barometer and the other heights differ by less, m: 3 m of the pressure of the own exhaust,
-/// and a slow offset.
+/// Largest normal difference between the barometer and the other heights, m: 3 m from exhaust
+/// pressure, and a slow offset.
 const HEIGHTS_APART_M: f64 = 6.0;
-/// Below this height a plan ends, m.
+/// Height below which a plan ends, m.
 const PLANS_ABOVE_M: f64 = 2.0;
 
-/// What the rules need of the frames before.
+/// Memory of the rules from earlier frames.
 #[derive(Debug, Clone)]
 struct Watcher {
     frame: u64,
     /// Frames that are missing before this one.
     missing: u64,
-    /// Satellites were seen after the boost.
+    /// Satellites were received after the boost.
     gnss_since_boost: bool,
     /// The barometer's last altitude, m.
     pressure_m: Option<f64>,
     surfaces: [ServoModel; SURFACES],
-    /// Where the gimbal was in the frame before, rad.
+    /// Gimbal angles in the frame before, rad.
     gimbal_rad: [f64; 2],
-    /// In the burn: the frames in which each axis had to turn fast, and how far it turned in one at
-    /// most, rad.
+    /// In the burn: the number of frames in which each axis had to turn fast, and the largest turn
+    /// in one frame, rad.
     turns: [(u32, f64); 2],
     /// Specific force along the nose over the boost, m/s.
     boost_m_s: f64,
     ejected_s: Option<f64>,
-    /// When the separation charge was fired.
+    /// Time at which the separation charge was fired.
     parted_s: Option<f64>,
-    /// Since when the lidar must see the ground, s.
+    /// Time since when the lidar must measure, s.
     must_see_s: Option<f64>,
-    /// The nose was astray in the burn: what is felt along it tells little of the motor from then
-    /// on.
+    /// The attitude was off-nominal in the burn: from then on the axial force says little about the
+    /// motor.
     astray: bool,
-    /// A foot has touched the ground: nothing after it was the flight's.
+    /// A foot has touched the ground: later signs are not part of the flight.
     down: bool,
 }
 
 impl Watcher {
-    fn new(computer: &Computer, flown: &KeptInput) -> Self {
+    fn new(computer: &Computer, flown: &SensedInput) -> Self {
         let airframe = &computer.pilot().mission().airframe;
         Self {
             frame: flown.frame.saturating_sub(1),
@@ -320,12 +321,12 @@ impl Watcher {
         }
     }
 
-    fn take(&mut self, computer: &Computer, flown: &KeptInput, estimate: &Estimate) {
+    fn take(&mut self, computer: &Computer, flown: &SensedInput, estimate: &Estimate) {
         self.missing = flown.frame.saturating_sub(self.frame + 1);
         self.frame = flown.frame;
         let (time_s, phase) = (flown.time_s, computer.mode().phase);
         if self.missing > 0 {
-            // Nobody knows what was commanded or measured meanwhile.
+            // Commands and measurements of missing frames are not available.
             let at_rad = surfaces_rad(flown.gimbal_rad, flown.fins_rad);
             self.surfaces = ServoModel::of_each(&computer.pilot().mission().airframe, at_rad);
             self.gimbal_rad = flown.gimbal_rad;
@@ -366,21 +367,21 @@ impl Watcher {
     }
 
     /// Whether a sign shows in this frame.
-    fn seen(&self, sign: Sign, computer: &Computer, flown: &KeptInput, estimate: &Estimate) -> Option<Seen> {
-        let (phase, time_s) = (computer.mode().phase, flown.time_s);
+    fn seen(&self, sign: Sign, computer: &Computer, last: &SensedInput, estimate: &Estimate) -> Option<Hit> {
+        let (phase, time_s) = (computer.mode().phase, last.time_s);
         let pilot = computer.pilot();
         let mission = pilot.mission();
         let in_air = !phase.on_pad() && !matches!(phase, Phase::Touchdown | Phase::Safed) && !self.down;
-        let now = |value: f64, beside| Seen { since_s: time_s, size: value, value, beside, detail: "" };
+        let now = |value: f64, beside| Hit { since_s: time_s, size: value, value, beside, detail: "" };
         let [barometer_s, gnss_s, _] = computer.sensors().silent_s();
         let silent = |silent_s: f64, longest_s: f64| {
             (in_air && silent_s > longest_s)
-                .then_some(Seen { since_s: time_s - silent_s, ..now(silent_s, 0.0) })
+                .then_some(Hit { since_s: time_s - silent_s, ..now(silent_s, 0.0) })
         };
         match sign {
             Sign::Restart => {
                 let away_s = self.missing as f64 * FRAME_S;
-                (in_air && self.missing > 1).then(|| Seen { since_s: time_s - away_s, ..now(away_s, 0.0) })
+                (in_air && self.missing > 1).then(|| Hit { since_s: time_s - away_s, ..now(away_s, 0.0) })
             }
             Sign::Gnss => {
                 let climbs = phase == Phase::Boost || !self.gnss_since_boost && mission.launch.is_some();
@@ -389,9 +390,9 @@ impl Watcher {
             Sign::Barometer => silent(barometer_s, BAROMETER_LOST_S),
             Sign::Gate | Sign::Latched => {
                 let detail = latched(computer.latch()?, sign)?;
-                Some(Seen { detail, ..now(0.0, 0.0) })
+                Some(Hit { detail, ..now(0.0, 0.0) })
             }
-            _ if in_air => seen_in_flight(self, sign, computer, flown, estimate),
+            _ if in_air => seen_in_flight(self, sign, computer, last, estimate),
             _ => None,
         }
     }
@@ -402,15 +403,15 @@ fn seen_in_flight(
     watcher: &Watcher,
     sign: Sign,
     computer: &Computer,
-    flown: &KeptInput,
+    flown: &SensedInput,
     estimate: &Estimate,
-) -> Option<Seen> {
+) -> Option<Hit> {
     let (pilot, mode, time_s) = (computer.pilot(), computer.mode(), flown.time_s);
     let (mission, motor) = (pilot.mission(), pilot.motor());
     let burns = mode.phase == Phase::Powered;
     let tilt_rad = libm::acos(estimate.state.nose_in_world().z.clamp(-1.0, 1.0));
     let height_m = estimate.state.position_m.z;
-    let seen = |since_s, value: f64, beside, detail| Seen { since_s, size: value, value, beside, detail };
+    let seen = |since_s, value: f64, beside, detail| Hit { since_s, size: value, value, beside, detail };
     let now = |value, beside| seen(time_s, value, beside, "");
     match sign {
         Sign::Lidar => {
@@ -427,14 +428,14 @@ fn seen_in_flight(
         }
         Sign::HeightsDisagree => {
             let falls = mode.phase.in_descent() || mode.phase.in_landing_burn();
-            // One that was outvoted is no source of heights any more.
+            // A rejected barometer is no longer a source of heights.
             let apart_m = (estimate.heights.disagreement_m())
                 .or_else(|| Some((watcher.pressure_m? - height_m).abs()))
                 .filter(|_| falls)?;
             (apart_m > HEIGHTS_APART_M).then(|| now(apart_m, 0.0))
         }
         Sign::Estimate => match estimate.health {
-            Health::Doubtful(doubt) if mode.phase.is_landing() => Some(seen(time_s, 0.0, 0.0, doubt.name())),
+            Health::Unhealthy(issue) if mode.phase.is_landing() => Some(seen(time_s, 0.0, 0.0, issue.name())),
             _ => None,
         },
         Sign::Surface(surface) => {
@@ -452,15 +453,15 @@ fn seen_in_flight(
         }
         Sign::Battery => {
             let volts = flown.battery_v.filter(|volts| *volts < BATTERY_LOW_V)?;
-            Some(Seen { size: BATTERY_LOW_V - volts, ..now(volts, BATTERY_LOW_V) })
+            Some(Hit { size: BATTERY_LOW_V - volts, ..now(volts, BATTERY_LOW_V) })
         }
         Sign::AscentMotor => {
             let booster = &mission.launch.as_ref()?.booster;
             let burnt_kg = 0.5 * booster.motor_curve.propellant_mass_kg();
             let mass_kg = mission.airframe.mass.loaded_kg + booster.dry_kg + burnt_kg;
             let share = watcher.boost_m_s * mass_kg / booster.motor_curve.total_impulse_n_s();
-            let felt = mode.phase == Phase::Coast;
-            (felt && share < ASCENT_WEAK).then(|| now(share, 1.0))
+            let sensed = mode.phase == Phase::Coast;
+            (sensed && share < ASCENT_WEAK).then(|| now(share, 1.0))
         }
         Sign::Separation => (flown.booster_attached && watcher.parted_s.is_some()).then(|| now(1.0, 0.0)),
         Sign::Parachute => {
@@ -485,7 +486,7 @@ fn seen_in_flight(
                 && off > IMPULSE_SIGMAS * mission.motor.impulse_sigma
                 && off > 2.0 * sigma;
             let lit_s = motor.ignition_s().unwrap_or(time_s);
-            known.then(|| Seen { size: off, ..seen(lit_s, impulse, 1.0, "") })
+            known.then(|| Hit { size: off, ..seen(lit_s, impulse, 1.0, "") })
         }
         Sign::BurntOutEarly => {
             let MotorStage::EndedEarly { at_s } = motor.stage() else { return None };
@@ -503,13 +504,13 @@ fn seen_in_flight(
     }
 }
 
-/// What latched, in words; the pilot knows why a gate was given up.
+/// The latch as text; the pilot has the reason for an abandoned landing.
 fn latched(latch: Latch, sign: Sign) -> Option<&'static str> {
     let words = match latch {
         Latch::Gate => "",
         Latch::Commanded => "abort of the crew",
-        Latch::UncommandedLiftOff => "lifted off although nobody had armed it",
-        Latch::UncommandedRelease => "released although nobody had cleared it",
+        Latch::UncommandedLiftOff => "lifted off unarmed",
+        Latch::UncommandedRelease => "released without clearance",
         Latch::NoSeparation => "abort: the booster stayed on",
         Latch::NoLight => "landing motor did not light in time",
         Latch::Other => "ascent motor did not lift the vehicle off",

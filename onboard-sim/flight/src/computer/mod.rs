@@ -1,25 +1,24 @@
-//! The flight computer: everything that decides on board, from power-up to safed.
+//! The flight computer: every decision on board, from power-up to safed.
 //!
-//! [`Computer::step`] is the only way to advance it: one [`Input`] a frame, one [`Output`] back,
-//! and the same inputs give the same outputs, bit for bit. Self-test, pin, arming, countdown,
+//! [`Computer::step`] is the only way to advance it: one [`Input`] in, one [`Output`] out per
+//! frame. The same inputs give the same outputs, bit for bit. Self-test, pin, arming, countdown,
 //! release, descent, landing, abort and safing are all decided here, through one [phase
 //! table](crate::rules::phase).
 //!
-//! * [`table`]: the phase table as the computer uses it: each event goes through it once; what an
-//!   abort would do now.
-//! * [`crew`]: the crew's requests, and the decision about each.
-//! * [`findings`]: what went wrong in a flight.
-//! * [`news`]: the computer's messages to the crew.
-//! * [`pad_check`]: the check that the crew asks for on the pad.
+//! * [`table`]: applies each event to the phase table once, and predicts the effect of an abort.
+//! * [`crew`]: the crew's requests and the decision on each.
+//! * [`findings`]: faults detected in flight.
+//! * [`messages`]: messages to the crew.
+//! * [`pad_check`]: the vehicle check that the crew runs on the pad.
 //! * [`pad`]: from power-up to the release.
-//! * [`pilot`]: flies the rocket from its release.
-//! * [`saved`]: power-up; what is kept through a reset, and going on from it.
-//! * `digest`: one number for the whole memory, to compare a replay with a log.
+//! * [`pilot`]: flies the rocket after its release.
+//! * [`saved`]: power-up, the state saved through a reset, and resuming from it.
+//! * `digest`: a hash of the complete memory, to compare a replay with a log.
 
 pub mod crew;
 mod digest;
 pub mod findings;
-pub mod news;
+pub mod messages;
 pub mod pad;
 pub mod pad_check;
 pub mod pilot;
@@ -37,7 +36,7 @@ use serde::{Deserialize, Serialize};
 
 pub use self::crew::CrewMemory;
 use self::crew::{Answer, People, Request};
-use self::news::{CrewMessage, MotorWatch, Readiness, Severity};
+use self::messages::{CrewMessage, MotorWatch, Readiness, Severity};
 use self::pad::{ANSWERING_RAD, PadWatch, SelfTest};
 use self::pad_check::{PadCheck, SURFACES, surfaces_rad};
 use self::pilot::{Pilot, Pointed};
@@ -64,8 +63,8 @@ pub const FRAME_S: f64 = FRAME_MS as f64 * 1e-3;
 /// Time on the ground after which the flight is over, s.
 const AT_REST_S: f64 = 1.0;
 
-/// From this sine of its opening on a fin is out of the way of what leaves the hatch: mk3's end
-/// then stands 8 cm off the skin.
+/// Sine of a fin's opening angle above which the fin is clear of the parachute hatch. At this angle
+/// the tip of mk3's fin is 8 cm off the skin.
 const HATCH_FREE_SINE: f64 = 0.7;
 
 /// When the vehicle was released.
@@ -75,25 +74,25 @@ struct Release {
     time_s: f64,
 }
 
-/// The flight computer and everything that it remembers.
+/// The flight computer with its complete memory.
 #[derive(Debug, Clone, Serialize)]
 pub struct Computer {
     table: PhaseTable,
     pressure: SpikeFilter,
-    /// Which sensors speak.
+    /// Health of each sensor.
     sensors: SensorWatch,
-    /// The wait on the pad.
+    /// State on the pad.
     pad: PadWatch,
-    /// Flies from the release on.
+    /// Flight control after the release.
     pilot: Box<Pilot>,
-    /// The state at power-up, to power up again.
+    /// State at power-up, used again by [`Computer::restart`].
     #[serde(skip)]
-    believed: RigidState,
-    /// What is kept of the last frame's input. What of it decides later is in the next one, too.
+    initial_state: RigidState,
+    /// The last frame's input. Anything still relevant is repeated in the next one.
     #[serde(skip)]
-    input: KeptInput,
-    /// The gate check that the crew was last told of.
-    gate_told: Option<&'static str>,
+    input: SensedInput,
+    /// The gate check last reported to the crew.
+    reported_gate_check: Option<&'static str>,
     #[serde(skip)]
     arming: ArmingLimits,
     #[serde(skip)]
@@ -105,28 +104,27 @@ pub struct Computer {
     motor_watch: MotorWatch,
     crew: CrewMemory,
     fins_answering: [bool; 4],
-    /// What the fins' feedback said of the closed fins before the self-test moved them, less the
-    /// angle of closed fins, rad.
+    /// Feedback of the closed fins before the self-test moved them, less the closed angle, rad.
     fins_zero_rad: [f64; 4],
     pad_check: PadCheck,
-    /// The servos of a vehicle that tell nothing, from the first frame on.
+    /// Servo models of a vehicle without servo feedback, from the first frame on.
     silent: Option<[ServoModel; SURFACES]>,
     release: Option<Release>,
     level: ControlLevel,
 }
 
 impl Computer {
-    /// One frame. In the air: take over a plan that is ready, estimate, answer the crew, decide,
-    /// pose the next plan, point. On the pad: answer the crew, and wait. At the end, and nowhere
-    /// else, the outputs follow from the mode that the frame ends in.
+    /// Executes one frame. In the air: take over a finished plan, estimate, answer the crew,
+    /// decide, request the next plan, steer. On the pad: answer the crew and wait. The outputs
+    /// follow from the mode at the end of the frame, and from nothing else.
     pub fn step(&mut self, input: &Input<'_>) -> Output {
         let mut input = self.with_silent_servos(input);
-        let measured = &mut input.kept.measured;
-        measured.pressure_altitude_m = self.pressure.take(measured.pressure_altitude_m, input.kept.time_s);
+        let measured = &mut input.sensed.measured;
+        measured.pressure_altitude_m = self.pressure.take(measured.pressure_altitude_m, input.sensed.time_s);
         let input = &input;
         self.table.begin(input.time_s);
         self.report_changes(input);
-        self.input = input.kept;
+        self.input = input.sensed;
         let Self { commands: Commands { fins_rad: commanded_rad, .. }, fins_zero_rad: zero_rad, .. } = self;
         self.fins_answering = core::array::from_fn(|fin| {
             (commanded_rad[fin] + zero_rad[fin] - input.fins_rad[fin]).abs() <= ANSWERING_RAD
@@ -138,7 +136,7 @@ impl Computer {
         if self.table.mode().phase.on_pad() {
             self.pad.update_stillness(&input.measured);
             if self.rehearsed.is_some() {
-                self.ask_the_checks_again();
+                self.repeat_the_checks();
             }
         }
         let flown = self.flown();
@@ -149,8 +147,8 @@ impl Computer {
             self.pilot.predict(&mut self.table, flown);
         }
         let answers = input.requests.iter().map(|request| self.answer(request)).collect();
-        self.watch_the_commander(input);
-        self.watch_the_taps();
+        self.check_the_commander(input);
+        self.check_dead_man_timeout();
         if let Some(flown) = &flown {
             self.pilot.decide(&mut self.table, flown, &self.sensors);
             self.pilot.plan(self.table.mode(), flown, input.plan_ready);
@@ -159,7 +157,7 @@ impl Computer {
         } else {
             self.wait_on_the_pad(input);
         }
-        self.keep_time();
+        self.apply_timeouts();
         let progress = FlightProgress {
             flying: flown.is_some(),
             lifted_off: self.pilot.ascent.has_lifted_off(),
@@ -171,31 +169,31 @@ impl Computer {
             commands: self.commands,
             released: flown.is_none() && self.release.is_some(),
             answers,
-            news: self.table.take_news(),
+            messages: self.table.take_messages(),
             planned,
         }
     }
 
-    /// The input with the positions that servos should have which tell none.
+    /// Returns the input with modelled servo positions if the vehicle has no servo feedback.
     fn with_silent_servos<'a>(&mut self, input: &Input<'a>) -> Input<'a> {
         let airframe = &self.pilot.mission().airframe;
         if airframe.servos_tell {
             return *input;
         }
-        let told_rad = surfaces_rad(self.commands.gimbal_rad, self.commands.fins_rad);
-        let servos = self.silent.get_or_insert_with(|| ServoModel::of_each(airframe, told_rad));
-        for (servo, command_rad) in servos.iter_mut().zip(told_rad) {
+        let command_rad = surfaces_rad(self.commands.gimbal_rad, self.commands.fins_rad);
+        let servos = self.silent.get_or_insert_with(|| ServoModel::of_each(airframe, command_rad));
+        for (servo, command_rad) in servos.iter_mut().zip(command_rad) {
             servo.take(command_rad);
             servo.advance();
         }
-        let [pitch, yaw, one, two, three, four] = servos.each_ref().map(|servo| servo.at_rad);
-        let kept = KeptInput { gimbal_rad: [pitch, yaw], fins_rad: [one, two, three, four], ..input.kept };
-        Input { kept, ..*input }
+        let [pitch, yaw, fins_rad @ ..] = servos.each_ref().map(|servo| servo.at_rad);
+        let sensed = SensedInput { gimbal_rad: [pitch, yaw], fins_rad, ..input.sensed };
+        Input { sensed, ..*input }
     }
 
-    /// Whether no fin is over the parachute's hatch: they stand open, or have had the time of their
-    /// servos since they were told to. One that is stuck keeps no parachute in.
-    fn hatch_is_free(&self, input: &KeptInput) -> bool {
+    /// Returns whether no fin covers the parachute hatch: all fins are open, or have had time to
+    /// open since they were commanded. A stuck fin does not hold back the parachute.
+    fn hatch_is_free(&self, input: &SensedInput) -> bool {
         let airframe = &self.pilot.mission().airframe;
         let fins = &airframe.fins;
         let opening_s = fins.servo.delay_s + (fins.open_rad() - fins.closed_rad()) / fins.servo.rate_rad_s();
@@ -204,62 +202,61 @@ impl Computer {
             || self.table.time_s() - self.table.mode().entered_at_s >= opening_s
     }
 
-    /// Reports what the input changes: the pin, and a log that has stopped.
-    fn report_changes(&mut self, input: &KeptInput) {
+    /// Reports changes in the input: the pin, and a log that has stopped.
+    fn report_changes(&mut self, input: &SensedInput) {
         let pin_out = self.table.mode().interlocks.pin_out;
         if input.pin_out != pin_out {
-            // Refused in the air, where nobody can move it.
-            let _ = self.table.happen(if input.pin_out { Event::PinPulled } else { Event::PinInserted });
+            // Refused in the air, where the pin is out of reach.
+            let _ = self.table.apply(if input.pin_out { Event::PinPulled } else { Event::PinInserted });
         }
         if self.input.log.running && !input.log.running {
             let words = "the log has stopped: this flight is no longer recorded whole";
-            self.table.say(Severity::Error, words.into());
+            self.table.report(Severity::Error, words.into());
         }
     }
 
-    /// Commands fins and gimbal as the pilot points them, and reports a shut gate and another
+    /// Sets the fin and gimbal commands from the pilot; reports an inhibited ignition and a changed
     /// control level.
     fn take_over(&mut self, pointed: Pointed) {
         let Pointed { gimbal_rad, fins_rad, level } = pointed;
         let phase = self.table.mode().phase;
         let refusal = self.pilot.gate_refusal().filter(|_| phase == Phase::LandArmed);
-        if let Some(check) = refusal.filter(|_| refusal != self.gate_told) {
-            self.table.say(Severity::Critical, format!("ignition gate closed: {check}"));
+        if let Some(check) = refusal.filter(|_| refusal != self.reported_gate_check) {
+            self.table.report(Severity::Critical, format!("ignition gate closed: {check}"));
         }
-        self.gate_told = refusal;
+        self.reported_gate_check = refusal;
         self.commands = Commands { gimbal_rad, fins_rad, ..self.commands };
-        // A new plan, converged or nearly, is what is expected: it is told after one that was
-        // missed.
+        // A new plan, converged or nearly, is the normal case: it is reported only after a missed
+        // one.
         let misses = |level| matches!(level, ControlLevel::ShiftedPlan | ControlLevel::Stabiliser);
         if phase.in_landing_burn() && level != self.level && (misses(level) || misses(self.level)) {
-            self.table.say(Severity::Notice, format!("controller level {}", level.name()));
+            self.table.report(Severity::Notice, format!("controller level {}", level.name()));
         }
         self.level = level;
     }
 
-    /// Changes that come with time alone, in every frame: a hold ends, a motor cools, the vehicle
-    /// is SAFED.
-    fn keep_time(&mut self) {
+    /// Applies changes that depend on time alone: the end of a hold, a cooled motor, safing.
+    fn apply_timeouts(&mut self) {
         let (mode, time_s) = (*self.table.mode(), self.table.time_s());
         if mode.held(time_s).is_some_and(|(_, left_s)| left_s <= 0.0) {
             let words = format!("held for {HOLD_LIMIT_S} s without a new start");
-            self.table.say(Severity::Warning, words);
-            let _ = self.table.happen(Event::HoldElapsed);
+            self.table.report(Severity::Warning, words);
+            let _ = self.table.apply(Event::HoldElapsed);
         }
         if mode.phase == Phase::Touchdown && self.is_over() {
             if mode.interlocks.armed {
-                let _ = self.table.happen(Event::DisarmRequested { lifted_off: true });
+                let _ = self.table.apply(Event::DisarmRequested { lifted_off: true });
             }
             if mode.may_be_safed(time_s).is_ok() {
-                let _ = self.table.happen(Event::SafingDone);
+                let _ = self.table.apply(Event::SafingDone);
             }
         }
-        if let Some((severity, words)) = self.motor_watch.news(&mode, time_s) {
-            self.table.say(severity, words);
+        if let Some((severity, words)) = self.motor_watch.update(&mode, time_s) {
+            self.table.report(severity, words);
         }
     }
 
-    /// What it remembers of its crew: an ask that waits, the taps, who held.
+    /// Crew state: the pending proposal, the dead-man confirmations, and the operator who held.
     pub fn crew(&self) -> &CrewMemory {
         &self.crew
     }
@@ -270,7 +267,7 @@ impl Computer {
     }
 
     /// The input of the last frame.
-    pub fn input(&self) -> &KeptInput {
+    pub fn input(&self) -> &SensedInput {
         &self.input
     }
 
@@ -279,26 +276,26 @@ impl Computer {
         self.table.mode()
     }
 
-    /// Why the landing motor is inhibited for good, by what came first.
+    /// Why the landing motor is permanently inhibited; the first cause if there are several.
     pub fn latch(&self) -> Option<Latch> {
         self.table.latch()
     }
 
-    /// Time before the release from which on nothing holds the countdown, s; `None` if a hold comes
-    /// in time until then.
+    /// Time before the release after which no hold can stop the countdown, s; `None` if a hold can
+    /// still stop it at the release.
     pub fn last_hold_s(&self) -> Option<f64> {
         self.start_point().last_hold_s()
     }
 
-    /// Whether the flight is over: the vehicle lies on the ground, or was aborted on the pad. SAFED
-    /// depends on the motor: it may come much later, or never.
+    /// Whether the flight is over: the vehicle is at rest on the ground, or was aborted on the pad.
+    /// Safing depends on the motor and may follow much later, or never.
     pub fn is_over(&self) -> bool {
         let mode = self.table.mode();
         let in_phase_s = self.table.time_s() - mode.entered_at_s;
         match mode.phase {
             Phase::Touchdown => in_phase_s >= AT_REST_S && mode.motor != Motor::Burning,
             Phase::Safed => true,
-            // A motor whose igniter had current may still light.
+            // A motor whose igniter has carried current may still ignite.
             phase => {
                 let stays = self.release.is_none() || in_phase_s >= AT_REST_S;
                 phase.on_pad() && mode.interlocks.abort_latched && stays
@@ -306,23 +303,23 @@ impl Computer {
         }
     }
 
-    /// Which sensors speak, and what is wrong with them.
+    /// Health of each sensor.
     pub fn sensors(&self) -> &SensorWatch {
         &self.sensors
     }
 
-    /// Flies the rocket from its release on.
+    /// Flight control after the release.
     pub fn pilot(&self) -> &Pilot {
         &self.pilot
     }
 
     /// The input of the last frame in the air, its frame and time counted from the release.
-    pub fn flown(&self) -> Option<KeptInput> {
+    pub fn flown(&self) -> Option<SensedInput> {
         let release = self.release?;
         (self.input.frame > release.frame).then(|| self.input.since(release.frame))
     }
 
-    /// What decided where the nose points in the last frame.
+    /// The control level that set the attitude command in the last frame.
     pub fn level(&self) -> ControlLevel {
         self.level
     }
@@ -337,7 +334,7 @@ impl Computer {
         &self.commands
     }
 
-    /// Result of the rehearsal, once it is over.
+    /// Result of the rehearsal, once it is complete.
     pub fn rehearsed(&self) -> Option<&Rehearsed> {
         self.rehearsed.as_ref()
     }
@@ -347,21 +344,21 @@ impl Computer {
     }
 }
 
-/// Time since its release at the end of a frame, s: what crews and logs call T+. A flight from a
-/// pad is released when its ascent motor is lit; a flight from apogee or below a drone, when it
+/// Time since the release at the end of a frame, s: T+ on screens and in logs. A flight from a pad
+/// is released at ignition of the ascent motor; a flight from apogee or below a drone, when it
 /// begins to fall.
 pub fn flight_time_s(frame: u64) -> f64 {
     // Saturating, because a recorded frame may have any number.
     frame.saturating_mul(u64::from(FRAME_MS)) as f64 * 1e-3
 }
 
-// The input of one frame of the flight computer: everything it depends on besides its memory.
+// The input of one frame: everything a frame depends on besides the computer's memory.
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LogState {
-    /// The log is being written, or the operator chose to fly without one.
+    /// The log is being written, or the operator has chosen to fly without one.
     pub running: bool,
-    /// Free space for it, bytes.
+    /// Free space for the log, bytes.
     pub space_bytes: u64,
 }
 
@@ -370,20 +367,20 @@ impl LogState {
     pub const NONE: Self = Self { running: false, space_bytes: 0 };
 }
 
-/// Result of a rehearsal of the landing: of a [planned](Computer::rehearse) one, or of one in a
-/// simulated world.
+/// Result of a rehearsed landing, [planned](Computer::rehearse) or flown in a simulated world.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Rehearsed {
-    /// It found plans, and landed on its legs.
+    /// The planner found plans, and the vehicle landed on its legs.
     pub warm: bool,
-    /// The result in words.
+    /// The result as text.
     pub found: String,
-    /// Its touchdown; `None` if it did not come down.
+    /// The rehearsed touchdown; `None` if the vehicle did not reach the ground.
     pub landing: Option<PredictedLanding>,
 }
 
 impl Rehearsed {
-    /// It did not land, and motor and weight do not go together: it says that instead.
+    /// Replaces the result by an explanation if the vehicle did not land and its weight does not
+    /// match its motor.
     #[must_use]
     pub fn explained(self, mission: &Mission) -> Self {
         let misfit = if self.warm { None } else { EvenLanding::of(mission).misfit() };
@@ -391,68 +388,68 @@ impl Rehearsed {
     }
 }
 
-/// The station that armed the vehicle, and how long ago it was last heard, s.
+/// The station that armed the vehicle, and the age of its last heartbeat, s.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Commander {
     pub station: Station,
     pub age_s: f64,
-    /// Whose key it armed with.
+    /// Operator whose key signed the arming.
     pub by: Option<Operator>,
-    /// It says that it hears nothing of the vehicle.
+    /// Its heartbeat reports that it receives nothing from the vehicle.
     pub deaf: bool,
 }
 
 /// Everything that a frame depends on besides the computer's memory.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Input<'a> {
-    pub kept: KeptInput,
+    pub sensed: SensedInput,
     /// Requests since the last frame, in order.
     pub requests: &'a [Request],
     /// Result of the rehearsal, once it is over.
     pub rehearsed: Option<&'a Rehearsed>,
-    /// What was posed last is computed: this frame takes it over.
+    /// The requested plan is computed: this frame takes it over.
     pub plan_ready: bool,
 }
 
 impl Deref for Input<'_> {
-    type Target = KeptInput;
+    type Target = SensedInput;
 
-    fn deref(&self) -> &KeptInput {
-        &self.kept
+    fn deref(&self) -> &SensedInput {
+        &self.sensed
     }
 }
 
-/// What the computer keeps of a frame's input until the next one.
+/// The part of a frame's input that is stored until the next frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct KeptInput {
+pub struct SensedInput {
     /// Number of the frame since power-up.
     pub frame: u64,
     /// Vehicle time at its end, s.
     pub time_s: f64,
     pub measured: Measurements,
-    /// Where the gimbal is (pitch, yaw), rad.
+    /// Measured gimbal angles (pitch, yaw), rad.
     pub gimbal_rad: [f64; 2],
-    /// Where the fins are, rad.
+    /// Measured fin openings, rad.
     pub fins_rad: [f64; 4],
-    /// A foot touches the ground.
+    /// A foot contacts the ground.
     pub contact: bool,
     pub igniter_continuity: bool,
-    /// The wire between booster and vehicle is whole.
+    /// The wire between booster and vehicle is intact.
     pub booster_attached: bool,
     pub pin_out: bool,
     /// Voltage of the battery, V; `None` if it is not measured.
     pub battery_v: Option<f64>,
     pub log: LogState,
-    /// The uplink of the station that is heard best.
+    /// The uplink of the station with the newest heartbeat.
     pub uplink: Uplink,
     /// The station that armed the vehicle, if one did.
     pub commander: Option<Commander>,
-    /// How many people an arming and a start take; `None` without operators.
+    /// Number of people who must agree to arm and start; `None` without operators.
     pub people: Option<People>,
 }
 
-impl KeptInput {
-    /// Before the first frame: nothing is known, and nothing answers.
+impl SensedInput {
+    /// Input before the first frame: no sensor data, no feedback.
     pub const NONE: Self = Self {
         frame: 0,
         time_s: 0.0,
@@ -465,7 +462,7 @@ impl KeptInput {
         pin_out: false,
         battery_v: None,
         log: LogState::NONE,
-        uplink: Uplink::NeverHeard,
+        uplink: Uplink::NeverReceived,
         commander: None,
         people: None,
     };
@@ -487,7 +484,7 @@ pub struct Commands {
     pub gimbal_rad: [f64; 2],
     /// Opening angles of the fins, rad.
     pub fins_rad: [f64; 4],
-    /// What lights, parts and ejects.
+    /// Igniters, separation charge and parachute.
     pub outputs: Outputs,
 }
 
@@ -495,13 +492,13 @@ pub struct Commands {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Output {
     pub commands: Commands,
-    /// The countdown has ended in this frame: the simulation releases the vehicle where its flight
-    /// begins.
+    /// The countdown has ended in this frame: the simulation releases the vehicle at the start of
+    /// its flight.
     pub released: bool,
     /// An answer to each request, in order.
     pub answers: Vec<Answer>,
-    /// Reports, in order.
-    pub news: Vec<CrewMessage>,
+    /// Messages, in order.
+    pub messages: Vec<CrewMessage>,
     /// A plan of a landing was taken over.
     pub planned: bool,
 }

@@ -1,14 +1,14 @@
-//! Finds from the sensors whether the vehicle stands still on its pad, or how it hangs below its
-//! drone, and in which attitude; the self-test, the arming checks, and all that happens from
-//! power-up to the release.
+//! Determines from the sensors whether the vehicle is at rest on its pad, or how it hangs below its
+//! drone, and its attitude. Also the self-test, the arming checks, and the sequence from power-up
+//! to the release.
 
 use alloc::format;
 use alloc::vec::Vec;
 use nalgebra::Vector3;
 use serde::Serialize;
 
-use super::news::Severity;
-use super::{Computer, KeptInput, Release};
+use super::messages::Severity;
+use super::{Computer, Release, SensedInput};
 use crate::estimation::estimator::Measurements;
 use crate::estimation::estimator::alignment::{PadAlignment, PadRecord, PadStart};
 use crate::estimation::sensor_watch::Rests;
@@ -18,25 +18,26 @@ use crate::rules::phase::{Event, HoldCause, Phase, StartPoint};
 use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use crate::vehicle::rigid::{RigidState, upright};
 
-/// The stance is evaluated every so many frames: once a second.
+/// Interval at which the stance is evaluated, frames: once a second.
 const WINDOW_FRAMES: u32 = 200;
 
-/// A hanging vehicle that feels less than this, m/s^2, for [`FALLING_FRAMES`] has been let go. A
-/// swing of 30 degrees takes at most a quarter of its weight away.
+/// Specific force below which a hanging vehicle has been released, m/s^2, for [`FALLING_FRAMES`]. A
+/// swing of 30 degrees reduces the force by at most a quarter.
 const FALLING_M_S2: f64 = 3.0;
 /// 0.1 s, in which it falls by 5 cm.
 const FALLING_FRAMES: u32 = 20;
 
-/// Attitude and motion on the pad, as last measured. An unknown value is NaN and passes no check.
+/// Attitude and motion on the pad, as last measured. An unavailable value is NaN and passes no
+/// check.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stance {
     /// Tilt of the nose from the vertical, rad.
     pub tilt_rad: f64,
     pub rotation_rad_s: f64,
     pub speed_m_s: f64,
-    /// The attitude is known.
+    /// The attitude is available.
     pub settled: bool,
-    /// Height of a hanging vehicle, m; NaN if it is not known. `None` on a pad.
+    /// Height of a hanging vehicle, m; NaN if not available. `None` on a pad.
     pub hanging_m: Option<f64>,
 }
 
@@ -56,8 +57,8 @@ struct PadSecond {
     /// Attitude with the heading of the pad, and the gyro's bias, rad/s; `None` if the vehicle was
     /// not at rest.
     at_rest: Option<PadStart>,
-    /// Mean angle between the axis and what is felt, rad: the tilt of a vehicle that hangs still in
-    /// the mean.
+    /// Mean angle between the axis and the specific force, rad: the tilt of a vehicle whose swing
+    /// averages out.
     lean_rad: f64,
     /// Mean pressure altitude, m; NaN without a sample.
     pressure_altitude_m: f64,
@@ -84,9 +85,9 @@ impl PadWatch {
     /// Adds a frame.
     pub(super) fn update_stillness(&mut self, measurements: &Measurements) {
         self.alignment.take(&measurements.imu);
-        let felt_m_s2 = measurements.imu.specific_force_m_s2;
-        self.force_sum_m_s2 += felt_m_s2;
-        self.falling_frames = if felt_m_s2.norm() < FALLING_M_S2 { self.falling_frames + 1 } else { 0 };
+        let sensed_m_s2 = measurements.imu.specific_force_m_s2;
+        self.force_sum_m_s2 += sensed_m_s2;
+        self.falling_frames = if sensed_m_s2.norm() < FALLING_M_S2 { self.falling_frames + 1 } else { 0 };
         if let Some(altitude_m) = measurements.pressure_altitude_m {
             self.pressures += 1;
             self.altitude_sum_m += altitude_m;
@@ -106,8 +107,8 @@ impl PadWatch {
             at_rest: self.record.take(&over.alignment, 0.0).ok(),
             lean_rad: libm::atan2(across_m_s2, over.force_sum_m_s2.x),
             pressure_altitude_m: over.altitude_sum_m / f64::from(over.pressures),
-            // A second without a fix tells no speed; that there is none is a check of its own.
-            // Before the first fix this is zero by zero: NaN, which passes no check.
+            // Without a fix in this second the velocity is that of the second before; a missing fix
+            // is a separate check. Before the first fix this is 0 / 0 = NaN, which passes no check.
             velocity_m_s: match over.found.filter(|_| over.fixes == 0) {
                 Some(before) => before.velocity_m_s,
                 None => over.velocity_sum_m_s / f64::from(over.fixes),
@@ -115,8 +116,7 @@ impl PadWatch {
         });
     }
 
-    /// Attitude and motion on the pad, or below a drone, of a vehicle whose gyro shows a rate,
-    /// body, rad/s.
+    /// Attitude and motion on the pad, or below a drone, with the measured body rate, rad/s.
     pub(super) fn stance(&self, hangs: bool, measured_rad_s: Vector3<f64>) -> Stance {
         let Some(found) = &self.found else { return Stance::UNKNOWN };
         let bias_rad_s =
@@ -132,7 +132,7 @@ impl PadWatch {
             };
         }
         Stance {
-            tilt_rad: found.at_rest.map_or(f64::NAN, |_| self.believed().tilt_rad()),
+            tilt_rad: found.at_rest.map_or(f64::NAN, |_| self.estimate().tilt_rad()),
             rotation_rad_s,
             speed_m_s: found.velocity_m_s.norm(),
             settled: found.at_rest.is_some(),
@@ -140,7 +140,7 @@ impl PadWatch {
         }
     }
 
-    /// A hanging vehicle feels no weight any more.
+    /// Whether a hanging vehicle has been released: it senses no weight.
     pub(super) fn falls(&self) -> bool {
         self.falling_frames >= FALLING_FRAMES
     }
@@ -151,7 +151,7 @@ impl PadWatch {
     }
 
     /// The last measured attitude, at rest at the origin.
-    pub(super) fn believed(&self) -> RigidState {
+    pub(super) fn estimate(&self) -> RigidState {
         let found = self.found.as_ref();
         RigidState {
             world_from_body: self.at_rest().map_or_else(upright, |start| start.world_from_body),
@@ -161,19 +161,19 @@ impl PadWatch {
     }
 }
 
-// The self-test at power-up: every actuator is moved and brought back.
+// The self-test at power-up: every actuator moves and returns.
 
-/// Fins and gimbal are moved by this much, rad.
+/// Angle by which the self-test moves fins and gimbal, rad.
 const MOVED_RAD: f64 = 0.05;
-/// An actuator farther than this from its command counts as not answering, rad; one that has moved
-/// by this much answers. It is more than the play of a linkage.
+/// Largest deviation of an actuator from its command, rad; beyond it the actuator does not answer.
+/// It is larger than the play of a linkage.
 pub(super) const ANSWERING_RAD: f64 = 0.02;
-/// The feedback of a closed fin may be off by this much, rad: fins are set by eye, their
-/// potentiometers glued. One tooth of a servo's spline is 0.25 rad (25 teeth).
+/// Largest offset of a closed fin's feedback, rad: fins are set by eye, and their potentiometers
+/// are glued. One tooth of a servo spline is 0.25 rad (25 teeth).
 const ZERO_MAX_RAD: f64 = 0.06;
-/// Servos have reached their rest so long after power-up, s.
+/// Time after power-up at which the servos have reached their rest, s.
 const REST_S: f64 = 0.5;
-/// The self-test has failed if it has not passed this long after power-up, s.
+/// Time limit of the self-test after power-up, s.
 const LIMIT_S: f64 = 3.0;
 
 /// Progress of the self-test.
@@ -194,13 +194,13 @@ pub(super) enum TestStep {
     Passed,
     /// It has failed just now.
     Failed,
-    /// Nothing yet.
+    /// No action in this frame.
     Wait,
 }
 
 impl SelfTest {
-    /// Called until the test has passed, with the time since power-up. `answering`: every actuator
-    /// has reached its commanded angle.
+    /// Advances the self-test until it has passed. `since_s` is the time since power-up;
+    /// `answering`: every actuator has reached its commanded angle.
     pub(super) fn step(&mut self, answering: bool, since_s: f64) -> TestStep {
         match self {
             Self::NotBegun if since_s >= REST_S => {
@@ -221,7 +221,7 @@ impl SelfTest {
     }
 }
 
-// Whether the vehicle may be armed, from its checks of itself on the pad.
+// Arming checks on the pad.
 
 impl Computer {
     /// Attitude and motion on the pad.
@@ -229,7 +229,7 @@ impl Computer {
         self.pad.stance(self.start_point() == StartPoint::Drone, self.sensors.turns_rad_s())
     }
 
-    /// Where it stands while it waits.
+    /// The resting place of the vehicle while it waits.
     fn rests(&self) -> Rests {
         let mission = self.pilot.mission();
         let cg_station_m = mission.airframe.mass.loaded_cg_station_m;
@@ -244,11 +244,11 @@ impl Computer {
     }
 
     /// The estimated state on the pad, at rest at the origin.
-    pub fn believed_on_the_pad(&self) -> RigidState {
-        self.pad.believed()
+    pub fn estimated_on_pad(&self) -> RigidState {
+        self.pad.estimate()
     }
 
-    /// The arming checks with the present values; the uplink is that of the station heard best.
+    /// The arming checks with the present values and the best uplink.
     pub fn arming_checks(&self) -> Vec<Check> {
         self.arming_checks_by(self.input.uplink)
     }
@@ -286,9 +286,9 @@ impl Computer {
         arming_checks(&self.arming, &input)
     }
 
-    /// Asks every arming check again: while the vehicle waits the crew is told, and a check that
-    /// fails in the countdown holds it, until the igniter has its current.
-    pub(super) fn ask_the_checks_again(&mut self) {
+    /// Evaluates every arming check again. While the vehicle waits, a failure is reported; in the
+    /// countdown it holds, until the igniter is energised.
+    pub(super) fn repeat_the_checks(&mut self) {
         let checks = self.arming_checks();
         let armed = match self.table.mode().phase {
             Phase::PadIdle => false,
@@ -300,21 +300,21 @@ impl Computer {
         if untold && !held {
             let (severity, state) =
                 if armed { (Severity::Critical, "armed, and ") } else { (Severity::Warning, "not ready: ") };
-            self.table.say(severity, format!("{state}{why}"));
+            self.table.report(severity, format!("{state}{why}"));
         }
     }
 }
 
-// From power-up to the release: self-test, readiness, countdown.
+// The sequence from power-up to the release: self-test, readiness, countdown.
 
 impl Computer {
     /// One frame on the pad.
-    pub(super) fn wait_on_the_pad(&mut self, input: &KeptInput) {
+    pub(super) fn wait_on_the_pad(&mut self, input: &SensedInput) {
         if self.table.mode().phase == Phase::Safe {
             self.test_itself(input);
         }
         match self.start_point() {
-            // A drone's pilot lets go, and the fall is felt.
+            // The drone's pilot releases the vehicle, and the fall is sensed.
             StartPoint::Drone => self.wait_below_the_drone(),
             _ if self.countdown_is_over() => self.release(),
             StartPoint::Pad => self.wait_on_the_rail(input),
@@ -323,11 +323,11 @@ impl Computer {
         self.check_itself(input);
     }
 
-    /// A motor may light that nobody lit.
-    fn wait_on_the_rail(&mut self, input: &KeptInput) {
+    /// A motor may ignite without a command.
+    fn wait_on_the_rail(&mut self, input: &SensedInput) {
         if self.pilot.detects_lift_off(&input.measured) {
-            self.table.say(Severity::Critical, "LIFT-OFF without a countdown".into());
-            if self.table.happen(Event::LiftOff).is_ok() {
+            self.table.report(Severity::Critical, "LIFT-OFF without a countdown".into());
+            if self.table.apply(Event::LiftOff).is_ok() {
                 self.begin_flight();
             }
         }
@@ -338,11 +338,11 @@ impl Computer {
             return;
         }
         let released = if self.countdown_is_over() {
-            self.table.happen(Event::ReleasedAt(StartPoint::Drone))
+            self.table.apply(Event::ReleasedAt(StartPoint::Drone))
         } else {
-            self.table.say(Severity::Critical, "RELEASED before it was cleared".into());
+            self.table.report(Severity::Critical, "RELEASED before it was cleared".into());
             let parachute_fills = self.parachute_fills_below_the_drone();
-            self.table.happen(Event::ReleasedEarly { parachute_fills })
+            self.table.apply(Event::ReleasedEarly { parachute_fills })
         };
         if released.is_ok() {
             self.begin_flight();
@@ -353,20 +353,19 @@ impl Computer {
         self.pilot.mission().start.at
     }
 
-    /// Moves every actuator and brings it back. The test is not passed before the sensors were felt
-    /// for a second.
-    fn test_itself(&mut self, input: &KeptInput) {
+    /// Moves every actuator and returns it. The test passes only after one second of sensor data.
+    fn test_itself(&mut self, input: &SensedInput) {
         let gimbal = self.commands.gimbal_rad.iter().zip(&input.gimbal_rad);
         let answering = gimbal.clone().all(|(told, found)| (told - found).abs() <= ANSWERING_RAD)
             && self.fins_answering == [true; 4];
-        // A computer that restarts begins its test late on the vehicle's clock.
+        // A restarted computer begins its test late on the vehicle's clock.
         let since_s = input.time_s - self.table.mode().entered_at_s;
         match self.self_test.step(answering, since_s) {
             TestStep::Command(angle_rad) => {
                 let closed_rad = self.closed_rad();
                 if self.self_test == SelfTest::Moved {
-                    // An actuator answers if it moves as it is told: its feedback may have a zero
-                    // of its own.
+                    // An actuator answers if it follows its command; its feedback may have an
+                    // offset.
                     let off_rad = input.fins_rad.map(|fin_rad| fin_rad - closed_rad);
                     self.fins_zero_rad =
                         off_rad.map(|off_rad| if off_rad.abs() <= ZERO_MAX_RAD { off_rad } else { 0.0 });
@@ -375,12 +374,12 @@ impl Computer {
                 self.commands.fins_rad = [closed_rad + angle_rad; 4];
             }
             TestStep::Passed if self.pad.found.is_some() => {
-                let _ = self.table.happen(Event::SelfTestPassed);
+                let _ = self.table.apply(Event::SelfTestPassed);
             }
             TestStep::Failed => {
                 let fins = self.fins_answering.iter().filter(|answers| **answers).count();
                 let words = format!("self-test failed: an actuator does not answer ({fins} of 4 fins do)");
-                self.table.say(Severity::Error, words);
+                self.table.report(Severity::Error, words);
             }
             TestStep::Passed | TestStep::Wait => {}
         }
@@ -400,32 +399,32 @@ impl Computer {
             StartPoint::Pad => Event::CountdownElapsed,
             at => Event::ReleasedAt(at),
         };
-        if self.table.happen(event).is_ok() {
+        if self.table.apply(event).is_ok() {
             self.begin_flight();
         }
     }
 
-    /// A vehicle that stood on its rail knows its attitude and the bias of its gyro from there.
+    /// A vehicle from a rail takes its attitude and gyro bias from there.
     fn begin_flight(&mut self) {
         self.release = Some(Release { frame: self.input.frame, time_s: self.table.time_s() });
-        // A flight that is simulated from apogee is suddenly there.
+        // A flight simulated from apogee starts with a step in pressure.
         self.pressure = SpikeFilter::default();
         let mission = self.pilot.mission();
         if let (Some(launch), Some(start)) = (mission.launched(), self.pad.at_rest()) {
-            let mut believed = RigidState {
+            let mut estimate = RigidState {
                 world_from_body: start.world_from_body,
                 ..launch.standing(mission.airframe.mass.loaded_cg_station_m)
             };
-            // A lift-off that nobody commanded is felt a moment after it began.
-            believed.velocity_m_s = believed.nose_in_world() * self.pilot.ascent.gained_m_s;
-            self.pilot.stand(&believed, &start.calibration);
+            // An uncommanded lift-off is detected a moment after it began.
+            estimate.velocity_m_s = estimate.nose_in_world() * self.pilot.ascent.gained_m_s;
+            self.pilot.stand(&estimate, &start.calibration);
         }
     }
 
-    /// Whether the parachute fills before a vehicle that falls from its drone meets the ground.
+    /// Whether the parachute fills before a vehicle dropped by its drone reaches the ground.
     fn parachute_fills_below_the_drone(&self) -> bool {
         let parachute = &self.pilot.mission().airframe.parachute;
-        // From rest it falls faster and faster: the speed when the lines are taut.
+        // The fall accelerates from rest: the speed when the lines are taut.
         let delay_s = parachute.ejection_delay_s;
         let fall_m = 0.5 * STANDARD_GRAVITY_M_S2 * delay_s * delay_s + parachute.inflation_distance_m;
         self.pad.stance(true, Vector3::zeros()).hanging_m.is_some_and(|height_m| height_m > fall_m)

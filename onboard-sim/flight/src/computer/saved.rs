@@ -1,27 +1,27 @@
-//! How a computer starts; what it saves in every frame, in a memory that keeps it through a reset,
-//! and how it goes on from that.
+//! Power-up of the computer, the state that it saves in every frame in memory that survives a
+//! reset, and resuming from it.
 //!
-//! A reset (a watchdog, a dip of the voltage) takes everything else. A computer that comes back
+//! A reset (a watchdog, a voltage dip) erases everything else. A computer that restarts
 //!
-//! * on the pad, not released, is as after power-up, and says so: not armed, no countdown. Only an
-//!   abort stays latched;
-//! * in the air flies on: phase, latches, motor and the last commands are as they were, the last
-//!   estimate is carried over the lost time, and estimator, plan and gimbal loop start afresh. So
-//!   under power it holds the nose upright until its next plan.
+//! * on the pad, not released, behaves as after power-up and reports so: not armed, no countdown.
+//!   Only an abort stays latched;
+//! * in the air flies on: phase, latches, motor and the last commands are restored, and the last
+//!   estimate is extrapolated over the lost time. Estimator, plan and gimbal loop start again.
+//!   Under power it therefore holds the nose upright until its next plan.
 //!
-//! [`Saved::read`] refuses bytes that are not whole, so a board keeps two records and writes them
-//! in turn: a reset while one is written leaves the other.
+//! [`Saved::read`] rejects incomplete bytes. A board stores two records and writes them
+//! alternately: a reset during one write leaves the other intact.
 
 use alloc::boxed::Box;
 use serde::{Deserialize, Serialize};
 
 use super::digest::checksum;
-use super::news::{MotorWatch, Readiness};
+use super::messages::{MotorWatch, Readiness, Severity};
 use super::pad::{PadWatch, SelfTest};
 use super::pad_check::PadCheck;
 use super::pilot::{Pilot, SavedPilot};
 use super::table::PhaseTable;
-use super::{Commands, Computer, CrewMemory, FRAME_S, KeptInput, LogState, Release, Severity, flight_time_s};
+use super::{Commands, Computer, CrewMemory, FRAME_S, LogState, Release, SensedInput, flight_time_s};
 use crate::estimation::estimator::StartUncertainty;
 use crate::estimation::estimator::alignment::ImuCalibration;
 use crate::estimation::sensor_watch::SensorWatch;
@@ -32,14 +32,14 @@ use crate::rules::phase::{Event, Interlocks, Latch, Mode};
 use crate::vehicle::mission::{ArmingLimits, Mission, StartPoint};
 use crate::vehicle::rigid::RigidState;
 
-/// After a longer time without power, s, nothing is taken up: whoever switches a computer off and
-/// on again later has a computer at power-up. No fall that is lost for so long can be saved.
+/// Longest outage after which the saved state is restored, s. After a longer one the computer
+/// powers up normally: it was switched off by a person, and no fall of this length can be saved.
 pub const LONGEST_RESET_S: f64 = 10.0;
 
 /// Bytes of the checksum before the record.
 const CHECKSUM_BYTES: usize = 8;
 
-/// What a computer keeps through a reset.
+/// State that survives a reset.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Saved {
     frame: u64,
@@ -47,12 +47,12 @@ pub struct Saved {
     time_s: f64,
     mode: Mode,
     latch: Option<Latch>,
-    /// From its release on; it may still stand on its rail under the first current of its ascent
-    /// motor.
+    /// Present after the release; the vehicle may still be on its rail with its ascent igniter
+    /// energised.
     in_the_air: Option<InTheAir>,
 }
 
-/// The part of a computer that was released.
+/// The additional state of a released computer.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct InTheAir {
     release: Release,
@@ -61,7 +61,7 @@ struct InTheAir {
     pilot: SavedPilot,
 }
 
-/// Why bytes are no saved record.
+/// Why the bytes are not a valid saved state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum SavedError {
     #[error("{found} bytes; a record has at least {CHECKSUM_BYTES} and at most {}", Saved::MOST_BYTES)]
@@ -73,18 +73,18 @@ pub enum SavedError {
 }
 
 impl Saved {
-    /// Longest record, bytes. A test measures it.
+    /// Maximum length of a record, bytes. A test measures it.
     pub const MOST_BYTES: usize = 1536;
 
-    /// Number of the frame after which it was saved.
+    /// Number of the frame after which the state was saved.
     pub fn frame(&self) -> u64 {
         self.frame
     }
 
-    /// Writes the record, and returns its bytes.
+    /// Writes the record; returns its bytes.
     ///
     /// # Errors
-    /// It does not fit, which a test excludes.
+    /// The record does not fit, which a test excludes.
     pub fn write<'a>(&self, into: &'a mut [u8; Self::MOST_BYTES]) -> Result<&'a [u8], SavedError> {
         let (sum, record) = into.split_at_mut(CHECKSUM_BYTES);
         let room = record.len();
@@ -101,7 +101,7 @@ impl Saved {
     /// Reads a record.
     ///
     /// # Errors
-    /// The bytes are not a whole record of this build.
+    /// The bytes are not a complete record of this build.
     pub fn read(bytes: &[u8]) -> Result<Self, SavedError> {
         let found = bytes.len();
         let (sum, record) = bytes
@@ -116,7 +116,7 @@ impl Saved {
 }
 
 impl Computer {
-    /// What it keeps through a reset, after a frame.
+    /// The state to save after a frame.
     pub fn saved(&self) -> Saved {
         let mode = *self.table.mode();
         let in_the_air = self.release.map(|release| InTheAir {
@@ -129,9 +129,8 @@ impl Computer {
         Saved { frame: self.input.frame, time_s: self.table.time_s(), mode, latch, in_the_air }
     }
 
-    /// A computer that was just powered up, after a reset: it goes on from what was saved. `time_s`
-    /// is the vehicle time at which it comes back, so a board needs a clock that runs through the
-    /// reset.
+    /// Resumes a computer that has just powered up after a reset. `time_s` is the vehicle time at
+    /// which it resumes, so a board needs a clock that runs through the reset.
     pub fn resume(&mut self, saved: &Saved, time_s: f64) {
         let lost_s = time_s - saved.time_s;
         if !(0.0..=LONGEST_RESET_S).contains(&lost_s) {
@@ -141,12 +140,12 @@ impl Computer {
         match &saved.in_the_air {
             Some(flown) => {
                 self.table.go_on(saved.mode, saved.latch);
-                // The crew has been told of it.
-                let _ = self.motor_watch.news(&saved.mode, saved.time_s);
+                // This state was already reported.
+                let _ = self.motor_watch.update(&saved.mode, saved.time_s);
                 self.release = Some(flown.release);
                 self.commands = flown.commands;
                 self.level = flown.level;
-                // Counted in frames: T+ has the same bits after a pad and without one.
+                // Counted in frames, so that T+ has the same bits with and without a pad.
                 let frame = libm::round(time_s / FRAME_S) as u64;
                 let since_s = flight_time_s(frame.saturating_sub(flown.release.frame));
                 *self.pilot = self.pilot.resumed(&flown.pilot, since_s);
@@ -155,8 +154,8 @@ impl Computer {
         }
     }
 
-    /// Not armed, and without a countdown. The wait after an abort begins again: whoever walks to
-    /// the pad must not be told less.
+    /// Not armed, and without a countdown. The wait after an abort starts again: a shorter wait
+    /// would be unsafe for people who approach.
     fn wake_on_the_pad(&mut self, saved: &Saved, time_s: f64) {
         let Interlocks { armed, abort_latched, landing_motor_inhibited, .. } = saved.mode.interlocks;
         let mut mode = Mode::power_up(time_s);
@@ -168,23 +167,23 @@ impl Computer {
         } else {
             (Severity::Notice, "the flight computer has restarted")
         };
-        self.table.say(severity, words.into());
+        self.table.report(severity, words.into());
     }
 
-    /// Restarts the computer: only what was saved in the last frame is kept.
+    /// Restarts the computer with the state saved in the last frame.
     pub fn restart(&mut self, time_s: f64) {
         let saved = self.saved();
-        *self = Self::at_power_up(self.pilot.mission(), &self.believed);
+        *self = Self::at_power_up(self.pilot.mission(), &self.initial_state);
         self.resume(&saved, time_s);
     }
 }
 
-// Starts of a flight computer: at power-up and at its release; and changes of its settings.
+// Initial states of a flight computer, at power-up and at its release, and changes of its settings.
 
 impl Computer {
-    /// The computer at power-up. `believed` is its estimate of the state at the start of the
-    /// flight; one that stands on its rail finds its attitude there by itself.
-    pub fn at_power_up(mission: &Mission, believed: &RigidState) -> Self {
+    /// The computer at power-up. `initial_state` is the estimated state at the start of the flight;
+    /// on a rail the computer finds its attitude itself.
+    pub fn at_power_up(mission: &Mission, initial_state: &RigidState) -> Self {
         let arming = match (mission.start.at, &mission.drop) {
             (StartPoint::Drone, Some(drop)) => ArmingLimits {
                 tilt_max_deg: drop.tilt_max_deg,
@@ -200,10 +199,10 @@ impl Computer {
             pressure: SpikeFilter::default(),
             sensors: SensorWatch::default(),
             pad: PadWatch::default(),
-            pilot: Box::new(Pilot::starting(mission, 0.0, believed, &uncertainty)),
-            believed: *believed,
-            input: KeptInput::NONE,
-            gate_told: None,
+            pilot: Box::new(Pilot::starting(mission, 0.0, initial_state, &uncertainty)),
+            initial_state: *initial_state,
+            input: SensedInput::NONE,
+            reported_gate_check: None,
             arming,
             countdown_s: mission.start.countdown_s,
             commands: Commands {
@@ -225,8 +224,8 @@ impl Computer {
         }
     }
 
-    /// The same computer if the vehicle was aborted on its pad in an earlier power-up, at this
-    /// vehicle time, s: before zero.
+    /// The same computer after an abort on the pad in an earlier power-up, at this vehicle time, s
+    /// (negative).
     #[must_use]
     pub fn aborted_before(mut self, at_s: f64) -> Self {
         let mode = Mode { aborted_before_s: Some(at_s), ..*self.table.mode() };
@@ -235,15 +234,15 @@ impl Computer {
     }
 
     /// The same computer after it has found its state and the calibration of its inertial unit on
-    /// its rail.
+    /// the rail.
     #[must_use]
-    pub fn standing(mut self, believed: &RigidState, calibration: &ImuCalibration) -> Self {
-        self.pilot.stand(believed, calibration);
+    pub fn standing(mut self, initial_state: &RigidState, calibration: &ImuCalibration) -> Self {
+        self.pilot.stand(initial_state, calibration);
         self
     }
 
-    /// The same computer, released in a frame: for flights that begin without a pad, and for a
-    /// replay that begins at the release.
+    /// The same computer, released in a frame: for flights without a pad, and for replays from the
+    /// release.
     #[must_use]
     pub fn released(mut self, frame: u64) -> Self {
         self.input.frame = frame;
@@ -255,16 +254,16 @@ impl Computer {
             Event::StartRequested { countdown_s: 0.0, checks_passed: true },
         ] {
             // The table accepts these events in this order; a test checks that.
-            let _ = self.table.happen(event);
+            let _ = self.table.apply(event);
         }
         self.release();
-        self.table.take_news();
-        self.motor_watch.news(self.table.mode(), self.table.time_s());
+        self.table.take_messages();
+        self.motor_watch.update(self.table.mode(), self.table.time_s());
         self.input.log = LogState { running: true, space_bytes: u64::MAX };
         self
     }
 
-    /// Changes the mission from now on; the memory stays.
+    /// Changes the mission from now on; the memory is unchanged.
     pub fn reconfigure(&mut self, mission: &Mission) {
         *self.pilot = self.pilot.reconfigured(mission);
     }
@@ -310,12 +309,12 @@ mod tests {
         let computer = falling();
         let record = bytes(&computer);
         assert_eq!(Saved::read(&record), Ok(computer.saved()));
-        // Room for the values that are not there yet: ignition, ascent.
+        // Room for values that are not present here: ignition, ascent.
         assert!(record.len() < Saved::MOST_BYTES - 100, "{}", record.len());
     }
 
     #[test]
-    fn a_record_that_was_not_written_whole_is_refused() {
+    fn an_incomplete_record_is_rejected() {
         let record = bytes(&falling());
         for length in 0..record.len() {
             assert!(Saved::read(&record[..length]).is_err(), "{length}");
@@ -357,8 +356,7 @@ mod tests {
         assert_ne!(resumed(&saved, 0.2 + LONGEST_RESET_S).digest(), powered_up().digest());
     }
 
-    /// In every phase: on the pad nothing but an abort is taken up, in the air everything of the
-    /// mode.
+    /// In every phase: on the pad only an abort is restored, in the air the complete mode.
     #[test]
     fn every_phase_comes_back_as_stated() {
         for phase in Phase::ALL {
@@ -373,8 +371,8 @@ mod tests {
                     assert_eq!(*computer.mode(), mode);
                 } else {
                     assert_eq!(*computer.mode(), Mode::power_up(0.25));
-                    let news = computer.table.take_news();
-                    assert!(format!("{news:?}").contains("DISARMED"), "{phase:?}: {news:?}");
+                    let messages = computer.table.take_messages();
+                    assert!(format!("{messages:?}").contains("DISARMED"), "{phase:?}: {messages:?}");
                 }
             }
         }

@@ -1,5 +1,5 @@
-//! The phase table as the flight computer uses it: every event of a vehicle goes through here once.
-//! Also what an abort would do now.
+//! The phase table in the flight computer: every event is applied here, once. Also predicts the
+//! effect of an abort.
 
 use alloc::borrow::ToOwned as _;
 use alloc::string::String;
@@ -7,31 +7,32 @@ use alloc::vec::Vec;
 use serde::Serialize;
 
 use super::Computer;
-use super::news::{CrewMessage, Severity, words_of, words_of_landing_here};
+use super::messages::{CrewMessage, Severity, words_of, words_of_landing_here};
 use crate::guidance::powered::ControlLevel;
 use crate::rules::phase::{Effect, Effects, Event, Latch, Mode, Phase, Refusal, transition};
 
-/// Phase and latches, and the reports of this frame.
+/// Phase, latches, and the messages of this frame.
 #[derive(Debug, Clone, Serialize)]
 pub struct PhaseTable {
     mode: Mode,
-    /// What latched first. It follows from the events and decides nothing, so no digest holds it.
+    /// The first latch. It follows from the events and decides nothing, so it is not part of the
+    /// digest.
     #[serde(skip)]
     latch: Option<Latch>,
     /// Vehicle time of this frame, s.
     #[serde(skip)]
     time_s: f64,
     #[serde(skip)]
-    news: Vec<CrewMessage>,
+    messages: Vec<CrewMessage>,
 }
 
 impl PhaseTable {
     /// The table at power-up.
     pub(super) fn new(time_s: f64) -> Self {
-        Self { mode: Mode::power_up(time_s), latch: None, time_s, news: Vec::new() }
+        Self { mode: Mode::power_up(time_s), latch: None, time_s, messages: Vec::new() }
     }
 
-    /// Takes up a mode after a reset. Nothing happens: its effects were carried out before.
+    /// Restores a mode after a reset. Its effects were carried out before, and are not repeated.
     pub(super) fn go_on(&mut self, mode: Mode, latch: Option<Latch>) {
         (self.mode, self.latch) = (mode, latch);
     }
@@ -46,7 +47,7 @@ impl PhaseTable {
         &self.mode
     }
 
-    /// Why the landing motor is inhibited for good.
+    /// Why the landing motor is permanently inhibited.
     pub fn latch(&self) -> Option<Latch> {
         self.latch
     }
@@ -56,11 +57,11 @@ impl PhaseTable {
         self.time_s
     }
 
-    /// Applies an event. The caller carries out its effects; the crew is told of them here.
+    /// Applies an event and reports its effects to the crew. The caller carries the effects out.
     ///
     /// # Errors
-    /// The table refuses the event, and nothing has changed.
-    pub(crate) fn happen(&mut self, event: Event) -> Result<Effects, Refusal> {
+    /// The table refuses the event; the mode is unchanged.
+    pub(crate) fn apply(&mut self, event: Event) -> Result<Effects, Refusal> {
         let before = self.mode;
         let next = transition(&before, event, self.time_s);
         if let Some(refusal) = next.refusal {
@@ -71,39 +72,38 @@ impl PhaseTable {
         let countdown_s =
             if let Event::StartRequested { countdown_s, .. } = event { countdown_s } else { 0.0 };
         for effect in next.effects.iter() {
-            // At touchdown, the motor may have been inhibited long before: it is not reported
-            // again.
+            // The motor may have been inhibited long before touchdown: that is not reported again.
             let known = effect == Effect::InhibitLandingMotor && before.interlocks.landing_motor_inhibited;
             if let Some((severity, words)) = words_of(effect, countdown_s).filter(|_| !known) {
-                self.say(severity, words);
+                self.report(severity, words);
             }
         }
         if let Some((severity, words)) = words_of_landing_here(before.interlocks, &self.mode) {
-            self.say(severity, words.to_owned());
+            self.report(severity, words.to_owned());
         }
         if self.mode.phase != before.phase {
-            self.news.push(CrewMessage::PhaseChanged { from: before.phase, to: self.mode.phase });
+            self.messages.push(CrewMessage::PhaseChanged { from: before.phase, to: self.mode.phase });
         }
         Ok(next.effects)
     }
 
     /// Sends a message to the crew.
-    pub(crate) fn say(&mut self, severity: Severity, words: String) {
-        self.news.push(CrewMessage::Said { severity, words });
+    pub(crate) fn report(&mut self, severity: Severity, text: String) {
+        self.messages.push(CrewMessage::Text { severity, text });
     }
 
-    /// Takes the reports of this frame, in order.
-    pub(super) fn take_news(&mut self) -> Vec<CrewMessage> {
-        core::mem::take(&mut self.news)
+    /// Takes the messages of this frame, in order.
+    pub(super) fn take_messages(&mut self) -> Vec<CrewMessage> {
+        core::mem::take(&mut self.messages)
     }
 }
 
-// The consequence for the vehicle if the crew aborted now.
+// The effect of an abort at this moment.
 
-/// What an abort would do now.
+/// Effect of an abort at this moment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AbortEffect {
-    /// Nothing is left to abort.
+    /// Nothing left to abort.
     None,
     /// Disarm and inhibit on the pad.
     SafeOnPad,
@@ -111,40 +111,40 @@ pub enum AbortEffect {
     ChuteAtApogee,
     /// Inhibit the landing motor, parachute now.
     ChuteNow,
-    /// Too low for a parachute, and the gate is open: light the landing motor at its height and
-    /// land on the ground below.
+    /// Too low for a parachute, and ignition is permitted: ignite the landing motor at its height
+    /// and land on the ground below.
     Burn,
-    /// Too low for a parachute, and the gate is shut or the motor has not lit: inhibit the landing
-    /// motor.
+    /// Too low for a parachute, and ignition is inhibited or the motor has not ignited: inhibit the
+    /// landing motor.
     Impact {
         /// Speed at the ground, rounded up, m/s.
         m_s: u8,
     },
-    /// The motor burns and has no cut-off: land on the ground below instead of at the pad.
+    /// The motor burns and cannot be cut off: land on the ground below instead of at the pad.
     LandInPlace,
     /// As `LandInPlace`, but no plan is available: hold upright.
     LandUpright,
 }
 
 impl Computer {
-    /// Applies an event of the crew. In the air the pilot takes note of what it does.
+    /// Applies a crew event. In the air it goes through the pilot, which records its effects.
     ///
     /// # Errors
-    /// The table refuses it, and nothing has changed.
-    pub(super) fn happen(&mut self, event: Event) -> Result<Effects, Refusal> {
+    /// The table refuses the event; the mode is unchanged.
+    pub(super) fn apply(&mut self, event: Event) -> Result<Effects, Refusal> {
         let before = self.table.mode().phase;
         let effects = match self.flown() {
             Some(input) => self.pilot.apply(&mut self.table, event, input.time_s),
-            None => self.table.happen(event),
+            None => self.table.apply(event),
         }?;
         if before == Phase::Boost && self.table.mode().phase.on_pad() {
             let words = "the ascent motor's igniter is off; it had current: the motor may still light";
-            self.table.say(Severity::Critical, words.into());
+            self.table.report(Severity::Critical, words.into());
         }
         Ok(effects)
     }
 
-    /// The event that an abort would be now, from the findings of the last frame.
+    /// The event of an abort at this moment, from the findings of the last frame.
     pub(super) fn abort_event(&self) -> Event {
         if self.release.is_none() {
             return Event::AbortRequested { lifted_off: false, above_commit_height: false, gate_open: false };
@@ -152,17 +152,17 @@ impl Computer {
         self.pilot.abort_event(self.table.mode(), self.flown().as_ref(), &self.sensors)
     }
 
-    /// What an abort would do now. The phase table itself is asked, so the text beside the abort
-    /// key cannot differ from it.
+    /// Predicts the effect of an abort at this moment. It evaluates the phase table itself, so the
+    /// text beside the abort key cannot differ from the effect.
     pub fn abort_effect(&self) -> AbortEffect {
         let mode = self.table.mode();
         let next = transition(mode, self.abort_event(), self.table.time_s());
         let does = |effect| next.effects.contains(effect);
-        // Rounded up to be on the safe side; 254 is the largest value reported, 255 would mean
+        // Rounded up to be conservative; 254 is the largest reported value, 255 would mean
         // "unknown".
         let fallen_m_s = self.pilot.impact_m_s().unwrap_or(0.0);
         let impact = || AbortEffect::Impact { m_s: libm::ceil(fallen_m_s).clamp(0.0, 254.0) as u8 };
-        // The motor was commanded to light and has not.
+        // Ignition was commanded, and the motor has not ignited.
         let unlit = mode.phase == Phase::Ignition && mode.interlocks.no_light_latched;
         if next.refusal.is_some() {
             AbortEffect::None
@@ -179,7 +179,7 @@ impl Computer {
         } else if unlit {
             impact()
         } else if self.pilot.report().level != ControlLevel::Stabiliser {
-            // It can be planned, or was not tried yet.
+            // A plan exists, or none was tried yet.
             AbortEffect::LandInPlace
         } else {
             AbortEffect::LandUpright

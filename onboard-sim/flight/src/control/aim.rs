@@ -1,4 +1,4 @@
-//! The wanted direction of the nose, and the loop that turns the nose there with the gimbal.
+//! The commanded direction of the nose, and the loop that turns the nose there with the gimbal.
 //!
 //! The landing planner runs every tenth of a second; this loop runs at every frame. It is a
 //! second-order law on the angle between the nose and its aim, in body axes, so roll does not
@@ -20,11 +20,11 @@ use serde::{Deserialize, Serialize};
 /// Most frames of latency that are predicted.
 const MAX_LATENCY_FRAMES: usize = 24;
 
-/// A change of the wanted nozzle angle below this is not a reversal, rad: it is noise, and much
-/// smaller than the play.
+/// Change of the commanded nozzle angle below which it is not a reversal, rad: it is noise, and
+/// much smaller than the play.
 const REVERSAL_RAD: f64 = 2e-4;
 
-/// The wanted direction and rotation of the nose.
+/// Commanded direction and rotation of the nose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Aim {
     /// The nose's direction in the world, of length 1.
@@ -96,10 +96,10 @@ pub struct AimGains {
     pub play_deg: f64,
 }
 
-/// The loop and what it remembers.
+/// The loop with its memory.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AimLoop {
-    // What is skipped is a constant of the mission.
+    // Skipped fields are constants of the mission.
     #[serde(skip)]
     gains: AimGains,
     #[serde(skip)]
@@ -113,7 +113,7 @@ pub struct AimLoop {
     /// The angular acceleration about body y and z that the model does not explain, rad/s^2: the
     /// sum of the effects of a crooked nozzle, a centre of gravity off the axis and the air.
     disturbance_rad_s2: [f64; 2],
-    /// The wanted nozzle angle, and the side of the play on which the horn is.
+    /// The commanded nozzle angle, and the side of the play on which the horn is.
     nozzle_rad: [f64; 2],
     side: [f64; 2],
 }
@@ -136,7 +136,7 @@ impl AimLoop {
         }
     }
 
-    /// The same memory with other gains. Pending commands are kept up to the new latency.
+    /// The same memory with other gains. Pending commands are retained up to the new latency.
     #[must_use]
     pub fn reconfigured(&self, gains: AimGains) -> Self {
         let other = Self::new(gains, self.frame_s);
@@ -161,8 +161,8 @@ impl AimLoop {
         limit_rad: f64,
     ) -> [f64; 2] {
         let rate = [rate_rad_s.y, rate_rad_s.z];
-        let felt_rad_s2 = if self.latency_frames == 0 { [0.0; 2] } else { self.under_way_rad_s2[0] };
-        self.observe(rate, felt_rad_s2);
+        let sensed_rad_s2 = if self.latency_frames == 0 { [0.0; 2] } else { self.under_way_rad_s2[0] };
+        self.observe(rate, sensed_rad_s2);
 
         let error = turn_to_aim_rad(world_from_body, &aim.nose_in_world);
         let wanted_rate = world_from_body.inverse_transform_vector(&aim.rate_in_world_rad_s);
@@ -211,12 +211,12 @@ impl AimLoop {
     }
 
     /// Compares the measured acceleration with the one commanded for that time.
-    fn observe(&mut self, rate_rad_s: [f64; 2], felt_rad_s2: [f64; 2]) {
+    fn observe(&mut self, rate_rad_s: [f64; 2], sensed_rad_s2: [f64; 2]) {
         if let Some(before) = self.rate_before_rad_s {
             let share = self.frame_s / (self.frame_s + self.gains.disturbance_time_s);
             let most = self.gains.disturbance_max_rad_s2;
             for axis in 0..2 {
-                let unexplained = (rate_rad_s[axis] - before[axis]) / self.frame_s - felt_rad_s2[axis];
+                let unexplained = (rate_rad_s[axis] - before[axis]) / self.frame_s - sensed_rad_s2[axis];
                 let disturbance = &mut self.disturbance_rad_s2[axis];
                 *disturbance = (*disturbance + share * (unexplained - *disturbance)).clamp(-most, most);
             }
@@ -247,7 +247,7 @@ mod tests {
     };
 
     #[test]
-    fn a_limited_lean_keeps_its_side() {
+    fn a_limited_lean_stays_on_its_side() {
         let leaning = |lean_deg: f64| {
             let (sin, cos) = libm::sincos(lean_deg.to_radians());
             Vector3::new(0.6 * sin, -0.8 * sin, cos)

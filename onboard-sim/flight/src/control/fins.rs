@@ -1,4 +1,4 @@
-//! Finds the four opening angles for wanted moments and drag.
+//! Finds the four opening angles for commanded moments and drag.
 //!
 //! The sines of the openings are written as a mean and one amplitude for each of the patterns
 //! pitch, yaw and roll, which are orthogonal. The effect of the patterns follows Eq. 13-17, with
@@ -13,8 +13,8 @@
 //! yaw   = sum YAW[i]   (C_d cos h g(s_i) + a C_l sin h s_i)
 //! ```
 //!
-//! If a command does not fit between the stops, first drag is given up, then roll, then pitch and
-//! yaw together, so that a wanted tilt keeps its direction.
+//! If a command does not fit between the stops, first drag is sacrificed, then roll, then pitch and
+//! yaw together, so that a commanded tilt preserves its direction.
 
 use crate::vehicle::fins::{FinModel, Moments, PITCH, ROLL, YAW};
 
@@ -25,15 +25,15 @@ const ROUNDS: usize = 8;
 /// almost closed fins have a weak effect, and their lift can cancel the moment of their drag.
 const SLOPE_FLOOR: f64 = 0.2;
 
-/// The share of the room between the stops that pitch and yaw may fill. The rest is kept for the
-/// roll: with all of it a tilt that saturates let mk2 below its drone roll at 1.3 rad/s, which the
-/// ignition gate forbids.
+/// Share of the range between the stops available to pitch and yaw. The rest is reserved for roll:
+/// without it a saturated tilt let mk2 roll below its drone at 1.3 rad/s, which the ignition gate
+/// forbids.
 const FOR_TILT: f64 = 0.85;
 
 /// Less dynamic pressure counts as no air, Pa, because the results would overflow.
 const LEAST_PRESSURE_PA: f64 = 1e-6;
 
-/// The wanted moments and drag of the fins.
+/// Commanded moments and drag of the fins.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FinCommand {
     /// Moments about the centre of gravity, N m.
@@ -51,7 +51,7 @@ pub struct OpeningRange {
     pub max_rad: f64,
 }
 
-/// Allocation of wanted moments and drag to the four fins.
+/// Allocation of commanded moments and drag to the four fins.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Allocation {
     /// The fins.

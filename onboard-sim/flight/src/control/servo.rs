@@ -77,7 +77,7 @@ mod tests {
             model.advance();
             model.at_rad
         };
-        assert!((step(0.1) - 0.1).abs() < 1e-15, "it begins where it is told to be");
+        assert!((step(0.1) - 0.1).abs() < 1e-15, "it begins at its command");
         let found: Vec<f64> = (0..7).map(|_| (step(0.1 + 3.0_f64.to_radians()) - 0.1).to_degrees()).collect();
         for (found, expected) in found.into_iter().zip([0.0, 0.0, 0.0, 0.0, 1.5, 3.0, 3.0]) {
             assert!((found - expected).abs() < 1e-9, "{found} {expected}");

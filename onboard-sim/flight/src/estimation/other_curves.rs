@@ -1,9 +1,9 @@
-//! Which thrust curve a burning motor has, of those that are known of it.
+//! Identifies the thrust curve of a burning motor among its certified curves.
 //!
-//! Two motors can bear one name, and the certified curves of one motor can differ by more than its
-//! scatter. The scales of a wrong curve fit the thrust of the moment, and promise what the motor
-//! does not have. So one filter for each other curve of the mission follows the same samples, and
-//! [`CHOSEN_AFTER_S`] after the ignition the likeliest goes on.
+//! Two motors can share one name, and the certified curves of one motor can differ by more than its
+//! scatter. The scales of a wrong curve fit the present thrust, and mispredict the rest. So one
+//! filter for each other curve of the mission processes the same samples, and [`CHOSEN_AFTER_S`]
+//! after ignition the most likely one continues.
 
 use alloc::vec::Vec;
 
@@ -13,15 +13,15 @@ use super::motor_estimate::{MotorEstimate, MotorPrior, MotorSample, MotorStage};
 use crate::vehicle::mission::Mission;
 use crate::vehicle::thrust_curve::ThrustCurve;
 
-/// When the curve is chosen, s since the thrust began: the landing then has to waste, or to save,
-/// all that the curves differ by.
+/// Time of the decision, s after thrust onset: the landing then has to waste, or to save, the
+/// difference of the curves.
 const CHOSEN_AFTER_S: f64 = 0.5;
-/// Another curve is chosen only if its misfit is smaller by this: over the 88 frames that are
-/// compared it is then 80 times as likely as the expected one, so a motor of the expected curve is
-/// hardly ever mistaken.
+/// Smallest advantage in misfit for which another curve is chosen. Over the 88 compared frames it
+/// makes that curve 80 times as likely as the expected one, so a motor of the expected curve is
+/// hardly ever misidentified.
 const CLEARLY: f64 = 0.1;
 
-/// The filters of the other curves until one is chosen, and the chosen one.
+/// The filters of the other curves until the decision, and the chosen curve.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct OtherCurves {
     filters: Vec<MotorEstimate>,
@@ -29,22 +29,22 @@ pub struct OtherCurves {
 }
 
 impl OtherCurves {
-    /// Before the ignition, with so many other curves.
+    /// Before the ignition, with this number of other curves.
     pub fn new(curves: usize, prior: &MotorPrior) -> Self {
         Self { filters: alloc::vec![MotorEstimate::new(prior); curves], chosen: None }
     }
 
-    /// After a restart with that choice: nothing is compared any more.
+    /// After a restart with an earlier decision: no more comparison.
     pub fn chosen_before(chosen: Option<usize>) -> Self {
         Self { filters: Vec::new(), chosen }
     }
 
-    /// Which of the other curves the motor has; `None` for the expected one.
+    /// Index of the motor's curve among the others; `None` for the expected one.
     pub fn chosen(&self) -> Option<usize> {
         self.chosen
     }
 
-    /// The curve that the motor is taken to have.
+    /// The curve assumed for the motor.
     pub fn flown<'a>(&self, mission: &'a Mission) -> &'a ThrustCurve {
         let other = self.chosen.and_then(|index| mission.other_curves.get(index));
         other.unwrap_or(&mission.motor_curve)
@@ -83,10 +83,10 @@ mod tests {
     use crate::vehicle::burn::Burn;
     use crate::vehicles::mission::builtin;
 
-    const LIT_S: f64 = 2.0;
+    const IGNITED_S: f64 = 2.0;
 
-    /// What a motor of this curve and these scales, in a vehicle of 3.3 kg, is taken for, and the
-    /// estimate after a second.
+    /// The identified curve for a motor of this curve and these scales, in a vehicle of 3.3 kg, and
+    /// the estimate after a second.
     fn taken_for(curve: &ThrustCurve, impulse_scale: f64, time_scale: f64) -> (Option<usize>, MotorEstimate) {
         let mission = builtin("mk3").unwrap().unwrap();
         let mut motor = MotorEstimate::new(&mission.motor);
@@ -96,8 +96,8 @@ mod tests {
         for frame in 1..=600 {
             let time_s = f64::from(frame) * frame_s;
             let (mass_kg, axial_air_force_n) = (3.3, 20.0);
-            let thrust_n = burn.mean_thrust_n(time_s - frame_s - LIT_S, frame_s);
-            // It shakes by a twentieth of gravity, with a period of three frames.
+            let thrust_n = burn.mean_thrust_n(time_s - frame_s - IGNITED_S, frame_s);
+            // Vibration of a twentieth of gravity, with a period of three frames.
             let shaken_m_s2 = if thrust_n > 0.0 { [0.6, -0.6, 0.0][frame as usize % 3] } else { 0.0 };
             let sample = MotorSample {
                 time_s,
@@ -105,11 +105,11 @@ mod tests {
                 mass_kg,
                 axial_air_force_n,
                 gimbal_rad: [0.0; 2],
-                may_burn: time_s > LIT_S - 0.2,
+                may_burn: time_s > IGNITED_S - 0.2,
             };
             motor.update(others.flown(&mission), &sample);
             others.update(&mut motor, &mission.other_curves, &sample);
-            let since_s = time_s - LIT_S;
+            let since_s = time_s - IGNITED_S;
             assert!(since_s > CHOSEN_AFTER_S - 0.02 || others.filters.len() == 2, "{since_s}");
             assert!(since_s < CHOSEN_AFTER_S + 0.02 || others.filters.is_empty(), "{since_s}");
         }

@@ -1,5 +1,5 @@
-//! Which sensors speak, and what each says that cannot be true: one set of rules, asked before an
-//! arming, until the igniter has its current, in flight, and of a log.
+//! Sensor health: which sensors are silent, and which report implausible values. One set of rules,
+//! used before arming, until the igniter is energised, in flight, and on a log.
 
 use alloc::format;
 use alloc::string::String;
@@ -7,52 +7,50 @@ use nalgebra::{SVector, Vector3};
 use serde::Serialize;
 
 use super::estimator::Measurements;
-use super::estimator::alignment::FELT_AT_REST_M_S2;
+use super::estimator::alignment::AT_REST_M_S2;
 
 /// The sensors, as their arming checks name them.
 pub const SENSORS: [&str; 5] = ["accelerometer", "gyro", "barometer", "GNSS", "lidar"];
 
-/// So many equal inertial samples in a row do not happen to noise.
+/// Consecutive equal inertial samples that noise does not produce.
 pub(super) const FROZEN_IMU: u32 = 4;
-/// The same of a barometer, half a second, and of a lidar, a second: both round more coarsely. A
+/// The same for a barometer, half a second, and for a lidar, a second: both round more coarsely. A
 /// receiver at rest may repeat one fix (static hold).
 const FROZEN_BAROMETER: u32 = 25;
 const FROZEN_RANGES: u32 = 100;
-/// Below this range a lidar need not see the ground, m (TF-Luna, Benewake).
+/// Range below which a lidar may miss the ground, m (TF-Luna, Benewake).
 pub const LIDAR_BLIND_M: f64 = 0.2;
-/// Difference of a range from the one where the vehicle stands, m: noise, grass and slope are
-/// smaller.
+/// Permitted deviation of a range at rest, m: noise, grass and slope are smaller.
 const LIDAR_OFF_M: f64 = 0.35;
-/// Ranges in a row that have to be off, 0.2 s: outliers are single.
+/// Consecutive deviating ranges that count, 0.2 s: outliers are single.
 const RANGES: usize = 20;
 
-/// The barometer speaks 50 times a second.
+/// The barometer samples at 50 Hz.
 pub const BAROMETER_LOST_S: f64 = 0.25;
-/// A satellite receiver that has had no fix for this long has lost it, s: it speaks five times a
+/// Time without a fix after which a satellite receiver has lost it, s: it reports five times a
 /// second and drops one sample in 50.
 pub const GNSS_LOST_S: f64 = 1.5;
-/// A lidar that says nothing for this long where it must see the ground, s.
+/// Time after which a silent lidar that must see the ground is lost, s.
 pub const LIDAR_LOST_S: f64 = 0.25;
-/// An inertial unit speaks in every frame; its samples are bridged for as long, s.
+/// An inertial unit reports in every frame; its samples are bridged for this time, s.
 const IMU_LOST_S: f64 = 0.05;
 
-/// Time over which a resting vehicle's inertial samples are averaged, s: a shudder of the rail in a
-/// gust is shorter, and the noise of one sample (0.5 deg/s, 0.1 m/s^2) goes down to a seventh.
+/// Averaging time of a resting vehicle's inertial samples, s: a shudder of the rail in a gust is
+/// shorter, and the noise of one sample (0.5 deg/s, 0.1 m/s^2) drops to a seventh.
 const RESTS_OVER_S: f64 = 0.25;
-/// A barometer that was zeroed at power-up and stands farther from its pad than this is wrong, m:
-/// in a day the weather moves it by 15 m.
+/// Deviation from the pad beyond which a barometer zeroed at power-up is wrong, m: over a day the
+/// weather changes it by 15 m.
 const BAROMETER_OFF_M: f64 = 20.0;
-/// Fixes of a vehicle on its pad lie within this of it, m: four times the wander of a
-/// single-frequency receiver.
+/// Largest distance of fixes from the pad, m: four times the wander of a single-frequency receiver.
 const GNSS_OFF_M: f64 = 20.0;
-/// Weight of the newest fix in the place that fixes show: an outlier of 50 m moves it by 10.
+/// Weight of the newest fix in the mean position: an outlier of 50 m moves it by 10.
 const NEWEST_FIX: f64 = 0.2;
 
-/// When one sensor spoke, and for how long it has said the same.
+/// Time of a sensor's last sample, and the duration of its repetition.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Voice<const N: usize> {
     last: SVector<f64, N>,
-    /// When it spoke last; before that, since when it is listened to. NaN: not yet.
+    /// Time of the last sample; before the first, the start of the observation. NaN: not started.
     spoke_at_s: f64,
     spoke: bool,
     same: u32,
@@ -72,7 +70,7 @@ impl<const N: usize> Default for Voice<N> {
 }
 
 impl<const N: usize> Voice<N> {
-    /// Takes a frame's sample, if there is one. What is not a number was not said.
+    /// Takes a frame's sample, if there is one. NaN counts as no sample.
     fn take(&mut self, said: Option<[f64; N]>, time_s: f64) {
         if self.spoke_at_s.is_nan() {
             self.spoke_at_s = time_s;
@@ -91,7 +89,7 @@ impl<const N: usize> Voice<N> {
         (self.spoke && self.silent_s(time_s) <= within_s).then(|| self.last.into())
     }
 
-    /// For how long it has said nothing, s.
+    /// Time without a sample, s.
     pub fn silent_s(&self, time_s: f64) -> f64 {
         time_s - self.spoke_at_s
     }
@@ -101,7 +99,7 @@ impl<const N: usize> Voice<N> {
     }
 }
 
-/// The watch over all sensors.
+/// The monitor of all sensors.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct SensorWatch {
     time_s: f64,
@@ -115,18 +113,18 @@ pub struct SensorWatch {
     lidar: Voice<1>,
     /// Means over [`RESTS_OVER_S`], body, rad/s and m/s^2.
     turns_rad_s: Vector3<f64>,
-    felt_m_s2: Vector3<f64>,
-    /// Where the fixes lie in the mean, world, m.
+    sensed_m_s2: Vector3<f64>,
+    /// Mean position of the fixes, world, m.
     fixed_m: Vector3<f64>,
     /// Ranges of the lidar, the newest first, m.
     ranges_m: [f64; RANGES],
 }
 
-/// Where a vehicle stands while its sensors are asked.
+/// Resting place of the vehicle while its sensors are checked.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Rests {
-    /// On its rail or its legs, with its centre of gravity there, m, and its lidar this far from
-    /// the ground, m.
+    /// On its rail or its legs, with its centre of gravity at this position, m, and its lidar this
+    /// far from the ground, m.
     Standing { at_m: Vector3<f64>, range_m: f64 },
     /// Below a drone, which moves.
     Hanging,
@@ -161,11 +159,11 @@ impl SensorWatch {
         if imu.is_plausible() {
             let share = (frame_s / RESTS_OVER_S).clamp(0.0, 1.0);
             self.turns_rad_s += (imu.gyro_rad_s - self.turns_rad_s) * share;
-            self.felt_m_s2 += (imu.specific_force_m_s2 - self.felt_m_s2) * share;
+            self.sensed_m_s2 += (imu.specific_force_m_s2 - self.sensed_m_s2) * share;
         }
     }
 
-    /// The satellite receiver has a fix.
+    /// Whether the satellite receiver has a fix.
     pub fn gnss_speaks(&self) -> bool {
         self.gnss.fresh(self.time_s, GNSS_LOST_S).is_some()
     }
@@ -175,46 +173,46 @@ impl SensorWatch {
         self.barometer.fresh(self.time_s, BAROMETER_LOST_S).map(|[height_m]| height_m)
     }
 
-    /// The lidar's range, m, unless it sees nothing.
+    /// The lidar's range, m, unless it receives no echo.
     pub fn lidar_range_m(&self) -> Option<f64> {
         self.lidar.fresh(self.time_s, LIDAR_LOST_S).map(|[range_m]| range_m)
     }
 
-    /// For how long each of them has said nothing, s: barometer, satellites, lidar.
+    /// Time without a sample, s: barometer, satellites, lidar.
     pub fn silent_s(&self) -> [f64; 3] {
         let time_s = self.time_s;
         [self.barometer.silent_s(time_s), self.gnss.silent_s(time_s), self.lidar.silent_s(time_s)]
     }
 
-    /// For how long the accelerometer has repeated one sample, s; `None` if it does not.
+    /// Time for which the accelerometer has repeated one sample, s; `None` if it does not.
     pub fn accelerometer_frozen_s(&self) -> Option<f64> {
         self.accelerometer.repeats_for_s(FROZEN_IMU, self.time_s)
     }
 
-    /// The accelerometer repeats itself, or says nothing that can be.
+    /// Whether the accelerometer is frozen or implausible.
     pub fn accelerometer_is_lost(&self) -> bool {
         self.accelerometer_frozen_s().is_some() || self.accelerometer.silent_s(self.time_s) > 0.0
     }
 
-    /// For how long nothing was felt, s: accelerometer or gyro repeat one sample, or say nothing
-    /// that can be.
-    pub fn feels_nothing_for_s(&self) -> f64 {
+    /// Time without inertial data, s: accelerometer or gyro repeat one sample, or report
+    /// implausible values.
+    pub fn no_inertial_data_for_s(&self) -> f64 {
         let gyro_s = self.gyro.repeats_for_s(FROZEN_IMU, self.time_s).unwrap_or(0.0);
         self.accelerometer_lost_s().max(gyro_s).max(self.gyro.silent_s(self.time_s))
     }
 
-    /// For how long the accelerometer has repeated one sample, or sent none, s.
+    /// Time for which the accelerometer has repeated one sample, or sent none, s.
     pub fn accelerometer_lost_s(&self) -> f64 {
         let frozen_s = self.accelerometer_frozen_s().unwrap_or(0.0);
         frozen_s.max(self.accelerometer.silent_s(self.time_s))
     }
 
-    /// Mean of the gyro over the last moment, body, rad/s.
+    /// Recent mean of the gyro, body, rad/s.
     pub fn turns_rad_s(&self) -> Vector3<f64> {
         self.turns_rad_s
     }
 
-    /// What is wrong with each of the [`SENSORS`] of a vehicle at rest, in the crew's words.
+    /// The defect of each of the [`SENSORS`] of a vehicle at rest, as text for the crew.
     pub fn defects(&self, rests: Rests) -> [Option<String>; SENSORS.len()] {
         let time_s = self.time_s;
         let silent = |name: &str, silent_s: f64, longest_s: f64| {
@@ -223,12 +221,12 @@ impl SensorWatch {
         let repeats = |name: &str, for_s: Option<f64>| {
             for_s.map(|for_s| format!("{name} repeats one value for {for_s:.1} s"))
         };
-        let felt_m_s2 = self.felt_m_s2.norm();
+        let sensed_m_s2 = self.sensed_m_s2.norm();
         let accelerometer = silent("accelerometer", self.accelerometer.silent_s(time_s), IMU_LOST_S)
             .or_else(|| repeats("accelerometer", self.accelerometer_frozen_s()))
             .or_else(|| {
-                let wrong = !FELT_AT_REST_M_S2.contains(&felt_m_s2) && rests != Rests::Hanging;
-                wrong.then(|| format!("accelerometer feels {felt_m_s2:.1} m/s2 at rest, not 9.8"))
+                let wrong = !AT_REST_M_S2.contains(&sensed_m_s2) && rests != Rests::Hanging;
+                wrong.then(|| format!("accelerometer reads {sensed_m_s2:.1} m/s2 at rest, not 9.8"))
             });
         let gyro = silent("gyro", self.gyro.silent_s(time_s), IMU_LOST_S)
             .or_else(|| repeats("gyro", self.gyro.repeats_for_s(FROZEN_IMU, time_s)));

@@ -1,8 +1,8 @@
-//! Removal of pressure spikes, in front of everything that reads the barometer.
+//! Removes pressure spikes before any use of the barometer.
 //!
 //! Recorded barometers show single samples that are off by up to kilometres. A sample that the
 //! vehicle cannot have reached since the last one is held back until [`AGREEING`] in a row agree
-//! with each other: then the pressure has really changed, as it does when a charge fires.
+//! with each other: then the pressure has really changed, as after the firing of a charge.
 
 use serde::Serialize;
 

@@ -37,9 +37,9 @@ pub struct DescentGains {
     pub lean_fades_s: f64,
     /// Least natural frequency of the attitude loop, rad/s.
     pub natural_frequency_rad_s: f64,
-    /// Stiffness of the attitude loop over the dynamic pressure, m^3. It decides where it makes the
-    /// loop stiffer than the least natural frequency. An error in the air's moment grows with the
-    /// dynamic pressure, and so does what the fins can do.
+    /// Stiffness of the attitude loop over the dynamic pressure, m^3. It applies where it exceeds
+    /// the stiffness of the least natural frequency. An error of the aerodynamic moment grows with
+    /// the dynamic pressure, and so does the authority of the fins.
     #[serde(default)]
     pub stiffness_m3: f64,
     pub damping: f64,
@@ -70,7 +70,7 @@ pub struct DescentSituation {
     /// Distance of the body's middle behind the centre of gravity, m. The crossflow acts there and
     /// turns the nose away from the wind.
     pub body_behind_cg_m: f64,
-    /// Time until the vehicle should be at rest over the pad, s; `None` while it is not known.
+    /// Time until the vehicle should be at rest over the pad, s; `None` while not available.
     pub time_to_go_s: Option<f64>,
 }
 
@@ -80,7 +80,7 @@ pub struct DescentDemand {
     /// Moments about body x, y, z, N m.
     pub moment_n_m: Vector3<f64>,
     pub dynamic_pressure_pa: f64,
-    /// The nose's wanted direction in the world.
+    /// Commanded direction of the nose, world.
     pub nose_in_world: Vector3<f64>,
 }
 
@@ -90,7 +90,7 @@ impl DescentGains {
         self.stiffness_m3 > 0.0
     }
 
-    /// The horizontal acceleration wanted, m/s^2, in the world.
+    /// The commanded horizontal acceleration, m/s^2, in the world.
     fn steering_m_s2(&self, state: &RigidState, situation: &DescentSituation) -> Vector3<f64> {
         let time_s = situation.time_to_go_s.unwrap_or(0.0).max(self.time_to_go_min_s);
         let wanted = state.position_m * (-6.0 / (time_s * time_s)) + state.velocity_m_s * (-4.0 / time_s);
@@ -118,7 +118,7 @@ impl DescentGains {
         let nose_in_world = (upstream - lean).normalize();
 
         let error = turn_to_aim_rad(&state.world_from_body, &nose_in_world);
-        // The moment that holds the wanted lean against the air: the attitude loop alone is much
+        // The moment that holds the commanded lean against the air: the attitude loop alone is much
         // softer than the weathercock effect.
         let wanted_lean = error - turn_to_aim_rad(&state.world_from_body, &upstream);
         let held_n_m = dynamic_pressure_pa
@@ -139,8 +139,8 @@ impl DescentGains {
         libm::sqrt((least * least).max(self.stiffness_m3 * dynamic_pressure_pa / inertia_kg_m2))
     }
 
-    /// The lean of the nose out of the wind: the tangent of the angle of attack, along the wanted
-    /// push.
+    /// The lean of the nose out of the wind: the tangent of the angle of attack, along the
+    /// commanded force.
     fn lean(
         &self,
         state: &RigidState,
@@ -215,8 +215,7 @@ mod tests {
     }
 
     /// Least phase margin, degrees, and gain margins upwards and downwards, dB, of the attitude
-    /// loop in a plant whose air turns the vehicle back by this more than the data say, 1/s^2, with
-    /// a delay, s.
+    /// loop in a plant with this additional aerodynamic stiffness, 1/s^2, and a delay, s.
     fn margins(natural: f64, damping: f64, stiffness_per_s2: f64, delay_s: f64) -> [f64; 3] {
         use nalgebra::Complex;
         let open_loop = |rad_s: f64| {
@@ -228,7 +227,7 @@ mod tests {
         let size = |number: Complex<f64>| libm::hypot(number.re, number.im);
         let decibels = |ratio: f64| 20.0 * libm::log10(ratio);
         let (mut phase_deg, mut upwards_db) = (f64::INFINITY, f64::INFINITY);
-        // From above the plant's own frequency: below it a stiffer plant turns back by itself.
+        // From above the plant's natural frequency: below it a stiffer plant returns by itself.
         let first = 1.0 + libm::sqrt(stiffness_per_s2.max(0.0));
         for step in 0..40_000 {
             let rad_s = first + 0.002 * f64::from(step);
@@ -241,13 +240,13 @@ mod tests {
                 upwards_db = upwards_db.min(-decibels(size(here)));
             }
         }
-        // A plant that turns away needs more than its own stiffness from the loop.
+        // An unstable plant needs more than its instability from the loop.
         let downwards_db = decibels(natural * natural / stiffness_per_s2.abs());
         [phase_deg, upwards_db, downwards_db]
     }
 
-    /// Legs of 0.010 m2 that the data do not have, or that they have and that are not there: 45
-    /// degrees and 6 dB at 36 m/s, and as much where the air is slower and weaker in proportion.
+    /// Legs of 0.010 m2 missing from the data, or missing from the vehicle: 45 degrees and 6 dB at
+    /// 36 m/s, and as much at lower speeds, where the aerodynamic moment is weaker in proportion.
     #[test]
     fn the_attitude_loop_has_margins_for_legs_that_nobody_measured() {
         for name in ["mk2", "mk3"] {
@@ -321,7 +320,7 @@ mod tests {
 
     #[test]
     fn the_wanted_lean_is_held_against_the_weathercock_effect() {
-        // At the wanted lean and at rest, the demand only balances the moment of the air.
+        // At the commanded lean and at rest, the demand only balances the aerodynamic moment.
         let mut state = falling();
         state.position_m.x = 60.0;
         let nose = gains().demand(&state, &situation()).nose_in_world;

@@ -1,10 +1,10 @@
 //! When to light the landing motor.
 //!
-//! The motor lights only once, and its strength is known only afterwards. Every tick computes the
-//! heights from which a landing exists ([`crate::guidance::vertical`]) for the certified motor, a
-//! weak motor and a strong motor. The chosen height lies at a set place in the band that all three
-//! have in common, so the landing exists for any of them. The command is sent early by the delay of
-//! the igniter.
+//! The motor ignites only once, and its strength is estimated only afterwards. Every tick computes
+//! the heights from which a landing exists ([`crate::guidance::vertical`]) for the certified motor,
+//! a weak motor and a strong motor. The chosen height lies at a fixed position in the band that all
+//! three have in common, so the landing exists for any of them. The command is sent early by the
+//! delay of the igniter.
 
 use serde::{Deserialize, Serialize};
 
@@ -26,7 +26,7 @@ pub struct IgnitionSettings {
     pub burn_time_scales: [f64; 2],
     /// Chosen place in the common band: 0 at its low end, 1 at its high end.
     pub place: f64,
-    /// How much later than expected an igniter may light, s. None lights much earlier, so the
+    /// Largest delay of an igniter beyond the expected one, s. None ignites much earlier, so the
     /// height is chosen for the middle of the two.
     #[serde(default)]
     pub late_s: f64,
@@ -38,7 +38,7 @@ pub struct IgnitionSettings {
     pub fixed_height_m: Option<f64>,
 }
 
-/// What a tick computes for the choice of the ignition.
+/// Result of a tick for the choice of the ignition height.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct IgnitionPrediction {
     /// Heights from which the certified motor lands if its thrust begins there at the expected
@@ -69,9 +69,9 @@ impl IgnitionPrediction {
     }
 }
 
-/// Below the height from which the strongest motor lands a fall has at least this long, s: a late
-/// igniter is not prepared for at the cost of one that is in time. mk2-h53 has 0.1 s; higher by 2
-/// m, 128 of 150 stand instead of 142 (`field`, seed 7001).
+/// Shortest time that a fall from the strongest motor's lowest height may last, s: a late igniter
+/// is not prepared for at the cost of a punctual one. mk2-h53 has 0.1 s; higher by 2 m, 128 of 150
+/// stand instead of 142 (`field`, seed 7001).
 const HIGH_ROOM_S: f64 = 0.13;
 
 /// Step and number of steps of the look along a fall that still gains speed: 4 s, after which an
@@ -81,8 +81,7 @@ const AHEAD_STEPS: u32 = 16;
 
 impl IgnitionSettings {
     /// Whether the certified motor lands from some point of the fall that begins at this height and
-    /// vertical velocity. A motor that is too strong for the present speed may suit the speed that
-    /// is still to come.
+    /// vertical velocity. A motor that is too strong for the present speed may suit a later speed.
     pub fn lands_ahead(
         &self,
         column: &Column,
@@ -100,8 +99,8 @@ impl IgnitionSettings {
     }
 
     /// The prediction from a height and a vertical velocity (up positive), with the fins open at
-    /// `fin_drag_area_m2`. Each end of a band moves one way with impulse and with burn time, so the
-    /// motors at the ends of their ranges bound what suits all between.
+    /// `fin_drag_area_m2`. Each end of a band is monotonic in impulse and in burn time, so the
+    /// motors at the ends of their ranges bound all others.
     pub fn prediction(
         &self,
         column: &Column,

@@ -1,4 +1,4 @@
-//! The checks before arming on the pad, and what a check is.
+//! The arming checks on the pad, and the type of a check.
 
 use alloc::borrow::ToOwned as _;
 use alloc::string::String;
@@ -12,23 +12,23 @@ use crate::rules::verdict::LandingVerdict;
 use crate::vehicle::drop::LOWEST_ARMED_M;
 use crate::vehicle::mission::ArmingLimits;
 
-/// The radio link to the station that asks for arming.
+/// The radio link to the station that requests arming.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Uplink {
     /// The vehicle starts by itself: there is no station.
     NotNeeded,
     /// No heartbeat of the station was ever accepted.
-    NeverHeard,
+    NeverReceived,
     /// Time since its last accepted heartbeat.
-    Heard { age_s: f64 },
+    Received { age_s: f64 },
 }
 
-/// Where a rehearsed landing ends.
+/// The end of a rehearsed landing.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PredictedLanding {
     /// Inside every touchdown limit.
     pub lands: bool,
-    /// The broken limits with their values, in words.
+    /// The broken limits with their values, as text.
     pub found: String,
 }
 
@@ -38,7 +38,7 @@ impl From<&LandingVerdict> for PredictedLanding {
     }
 }
 
-/// So many people must have seen the surfaces of a vehicle move whose servos tell nothing.
+/// Number of people who must have seen the surfaces move on a vehicle without servo feedback.
 pub const SEERS: usize = 2;
 
 /// The inputs of the arming checks.
@@ -55,9 +55,9 @@ pub struct ArmingInput {
     pub rotation_rad_s: f64,
     pub speed_m_s: f64,
     pub self_test_passed: bool,
-    /// A check of the vehicle moves its surfaces, or watches its sensors.
+    /// A vehicle check moves the surfaces, or observes the sensors.
     pub is_checking: bool,
-    /// What is wrong with each of the [`SENSORS`], in words.
+    /// The defect of each of the [`SENSORS`], as text.
     pub sensor_defects: [Option<String>; SENSORS.len()],
     /// Height of a vehicle that hangs below a drone, m; `None` on a pad.
     pub hanging_m: Option<f64>,
@@ -65,8 +65,8 @@ pub struct ArmingInput {
     pub estimator_converged: bool,
     /// Number of fins that reached their commanded angle.
     pub fins_answering: [bool; 4],
-    /// How many people have seen the surfaces of a vehicle move whose servos tell nothing; `None`:
-    /// they tell.
+    /// Number of people who have seen the surfaces move on a vehicle without servo feedback; `None`
+    /// with feedback.
     pub seers: Option<usize>,
     /// The landing motor's igniter has continuity.
     pub igniter_continuity: bool,
@@ -78,15 +78,15 @@ pub struct ArmingInput {
     pub battery_v: Option<f64>,
     /// The rehearsal of the landing found plans and landed.
     pub controller_warm: bool,
-    /// The rehearsal's outcome in words.
+    /// The rehearsal's outcome as text.
     pub controller_found: String,
     /// The verdict on the rehearsal's end by the touchdown limits; `None` without a rehearsal.
     pub predicted_landing: Option<PredictedLanding>,
-    /// The radio link to the station that asks.
+    /// The radio link to the requesting station.
     pub uplink: Uplink,
 }
 
-/// Every arming check with the value found, in the order an operator fixes them.
+/// Every arming check with its value, in the order in which an operator resolves them.
 pub fn arming_checks(limits: &ArmingLimits, input: &ArmingInput) -> Vec<Check> {
     let mib = |bytes: u64| format!("{} MiB", bytes >> 20);
     let mut checks = vec![
@@ -107,7 +107,8 @@ pub fn arming_checks(limits: &ArmingLimits, input: &ArmingInput) -> Vec<Check> {
             if input.is_checking { "a check of the vehicle runs" } else { "not passed" },
         ),
     ];
-    // Before what is computed from them: the sensor is named, and not the number that it spoils.
+    // Before the checks of derived values: the faulty sensor is named, not the value that it
+    // spoils.
     checks.extend(
         SENSORS
             .into_iter()
@@ -155,8 +156,8 @@ pub const UPLINK_CHECK: &str = "uplink";
 fn uplink(uplink: Uplink) -> Check {
     let (passed, found) = match uplink {
         Uplink::NotNeeded => (true, "not needed: the vehicle starts by itself".to_owned()),
-        Uplink::NeverHeard => (false, "no heartbeat of this station".to_owned()),
-        Uplink::Heard { age_s } => (age_s <= UPLINK_PROVEN_S, format!("heartbeat {age_s:.1} s old")),
+        Uplink::NeverReceived => (false, "no heartbeat of this station".to_owned()),
+        Uplink::Received { age_s } => (age_s <= UPLINK_PROVEN_S, format!("heartbeat {age_s:.1} s old")),
     };
     Check {
         name: UPLINK_CHECK,
@@ -166,8 +167,7 @@ fn uplink(uplink: Uplink) -> Check {
     }
 }
 
-/// A servo that tells nothing is where it was commanded, whatever it does: then people have to have
-/// seen it.
+/// Without feedback a servo is assumed to follow its command: then people must have seen it move.
 fn fins_answering(input: &ArmingInput) -> Check {
     let answering = input.fins_answering.iter().filter(|answers| **answers).count();
     let (passed, found, required) = match input.seers {
@@ -199,7 +199,7 @@ fn predicted_landing(predicted: Option<&PredictedLanding>) -> Check {
     }
 }
 
-// One line of a checklist: what was required, what was found.
+// One line of a checklist: what is required, and what was found.
 
 /// A check with its result.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -221,7 +221,7 @@ impl Check {
         Self { name, passed, found: found.to_owned(), required: yes.to_owned() }
     }
 
-    /// A check of a magnitude against a limit. A value that is not a number fails.
+    /// A check of a magnitude against a limit. NaN fails.
     pub(crate) fn at_most(name: &'static str, value: f64, limit: f64, unit: &str) -> Self {
         Self {
             name,
@@ -231,13 +231,13 @@ impl Check {
         }
     }
 
-    /// A check of a sensor, which names itself in its defect.
+    /// A check of a sensor; the defect contains the sensor's name.
     fn sensor(name: &'static str, defect: Option<&String>) -> Self {
         let found = defect.cloned().unwrap_or_else(|| "speaks".to_owned());
         Self { name, passed: defect.is_none(), found, required: String::new() }
     }
 
-    /// The refusal in words, or `None` if passed.
+    /// The refusal as text, or `None` if passed.
     pub fn refusal(&self) -> Option<String> {
         let Self { name, found, required, .. } = self;
         let words = || {
@@ -256,7 +256,7 @@ pub fn all_passed(checks: &[Check]) -> bool {
     checks.iter().all(|check| check.passed)
 }
 
-/// The first failed check in words, or `None` if all passed.
+/// The first failed check as text, or `None` if all passed.
 pub fn first_refusal(checks: &[Check]) -> Option<String> {
     checks.iter().find_map(Check::refusal)
 }
@@ -287,7 +287,7 @@ mod tests {
             controller_warm: true,
             controller_found: "converged".to_owned(),
             predicted_landing: Some(PredictedLanding { lands: true, found: String::new() }),
-            uplink: Uplink::Heard { age_s: UPLINK_PROVEN_S },
+            uplink: Uplink::Received { age_s: UPLINK_PROVEN_S },
         }
     }
 
@@ -301,7 +301,7 @@ mod tests {
         assert!(all_passed(&arming_checks(&ArmingLimits::default(), &alone)));
     }
 
-    /// A wrong input, and the check that must refuse it.
+    /// A faulty input, and the check that must refuse it.
     type Spoiling = (&'static str, fn(&mut ArmingInput));
 
     #[test]
@@ -371,13 +371,13 @@ mod tests {
                 input.predicted_landing = None;
             }),
             ("uplink: found no heartbeat", |input| {
-                input.uplink = Uplink::NeverHeard;
+                input.uplink = Uplink::NeverReceived;
             }),
             ("uplink: found heartbeat 2.1 s old", |input| {
-                input.uplink = Uplink::Heard { age_s: 2.1 };
+                input.uplink = Uplink::Received { age_s: 2.1 };
             }),
             ("uplink: found heartbeat NaN s old", |input| {
-                input.uplink = Uplink::Heard { age_s: f64::NAN };
+                input.uplink = Uplink::Received { age_s: f64::NAN };
             }),
         ];
         for (expected, spoil) in spoilings {

@@ -1,11 +1,11 @@
-//! The checks before the landing motor is lit.
+//! The checks before ignition of the landing motor.
 //!
 //! They use measured and predicted values of this moment. The latches (armed, not inhibited, no
 //! abort) are in the [phase table](crate::rules::phase). Loss of the radio link neither fires nor
 //! blocks the motor, so it is not checked here.
 //!
-//! One list serves all: what keeps the gate shut now, what gives the landing up because it will not
-//! go away, and what the crew is told of both.
+//! One list serves three uses: which checks inhibit ignition now, which ones abandon the landing
+//! because they will not recover, and what is reported to the crew about both.
 
 use alloc::format;
 use alloc::string::String;
@@ -26,47 +26,47 @@ pub struct GateInput {
     pub height_disagreement_m: f64,
     /// The height at the onset of thrust is inside the feasible band.
     pub landing_feasible: bool,
-    /// The certified motor lands from here or from farther down.
+    /// The certified motor lands from here or from lower.
     pub lands_ahead: bool,
     /// Horizontal distance of the predicted touchdown under the motor from the pad, m.
     pub predicted_touchdown_x_m: f64,
     /// All fins have reached their deployed angle.
     pub fins_confirmed: bool,
-    /// The gyro feels the motor swing about both axes, or too little to tell.
+    /// The gyro shows the motor swing about both axes, or would show too little to decide.
     pub gimbal_moves: bool,
     pub parachute_stowed: bool,
     /// The igniter has continuity.
     pub igniter_continuity: bool,
     pub estimator_healthy: bool,
-    /// The inertial unit speaks, and of the three vertical speeds no two contradict the estimate.
+    /// The inertial unit is alive, and no two of the three vertical speeds contradict the estimate.
     pub sensors_agree: bool,
 }
 
-/// One check of the gate, with what it has found.
+/// One check of the gate with its result.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GateCheck {
     pub name: &'static str,
     /// In the unit; NaN for a condition.
     pub found: f64,
-    /// At most this; NaN for a condition.
+    /// Upper limit; NaN for a condition.
     pub limit: f64,
     pub unit: &'static str,
-    /// It keeps the gate shut now. A value that is not a number does.
+    /// It inhibits ignition now. NaN does.
     pub shut: bool,
-    /// It will keep it shut: it seldom goes away again.
+    /// It is lasting: it seldom recovers.
     pub lasts: bool,
 }
 
-/// Tilt, pitch rate, speed and heights often come back inside the gate's limits, but not from
-/// beyond this multiple of them: such a vehicle tumbles, or does not know where it is.
+/// Factor on a limit beyond which a check is lasting. Tilt, pitch rate, speed and heights often
+/// recover from less; beyond it the vehicle tumbles, or its position is lost.
 const FAR_BEYOND: f64 = 2.0;
 
-/// How many checks the gate has.
+/// Number of checks of the gate.
 pub const GATE_CHECKS: usize = 14;
 
-/// The checks of the gate, in the order in which they are told.
+/// The checks of the gate, in the order in which they are reported.
 ///
-/// The fence needs no margin beside the prediction's: steering does not bring the vehicle back.
+/// The fence needs no margin besides the prediction's: steering does not bring the vehicle back.
 /// From the commit height to ignition it has a second.
 pub fn checks(limits: &GateLimits, input: &GateInput) -> [GateCheck; GATE_CHECKS] {
     let value = |name, found: f64, limit: f64, unit, beyond: f64| GateCheck {
@@ -117,7 +117,7 @@ pub fn checks(limits: &GateLimits, input: &GateInput) -> [GateCheck; GATE_CHECKS
 }
 
 impl GateCheck {
-    /// The check with what it has found, in words.
+    /// The check with its result, as text.
     pub fn words(&self) -> String {
         let Self { name, found, limit, unit, .. } = self;
         if limit.is_nan() { (*name).into() } else { format!("{name} {found:.0} {unit}, limit {limit:.0}") }
@@ -149,7 +149,7 @@ mod tests {
         }
     }
 
-    /// The checks that keep the gate shut.
+    /// The checks that inhibit ignition.
     fn shut_after(spoil: impl FnOnce(&mut GateInput)) -> Vec<GateCheck> {
         let limits = crate::vehicles::mission::builtin("mk2").unwrap().unwrap().gate;
         let mut input = good();
@@ -162,7 +162,7 @@ mod tests {
         assert_eq!(shut_after(|_| {}), []);
     }
 
-    /// A wrong input, and the check that must close the gate.
+    /// A faulty input, and the check that must inhibit ignition.
     type Spoiling = (&'static str, fn(&mut GateInput));
 
     #[test]
@@ -220,10 +220,10 @@ mod tests {
         }
     }
 
-    /// What is a little beyond its limit comes back; what is far beyond it, or out of the fence,
-    /// does not.
+    /// A value slightly beyond its limit recovers; one far beyond it, or outside the fence, does
+    /// not.
     #[test]
-    fn what_lasts_is_far_beyond_its_limit_and_is_told_with_values() {
+    fn a_lasting_refusal_is_far_beyond_its_limit_and_is_reported_with_values() {
         for (tilt_deg, lasts) in [(25.0_f64, false), (41.0, true)] {
             let shut = shut_after(|input| input.tilt_rad = tilt_deg.to_radians());
             assert_eq!(shut[0].lasts, lasts);

@@ -1,14 +1,13 @@
-//! The people who may command: their names and their roles. Which key belongs to whom is not known
-//! here.
+//! Operators: their names and roles. Their keys are handled elsewhere.
 
 use core::fmt;
 use serde::Serialize;
 
 numbered_enum! {
-/// What an operator is there for.
+/// The role of an operator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum Role {
-    /// Looks on, and commands nothing.
+    /// May observe, but not command.
     Observer = "OBSERVER",
     RangeSafety = "RANGE SAFETY",
     Flight = "FLIGHT",
@@ -52,7 +51,7 @@ impl Name {
 
     pub fn as_str(&self) -> &str {
         let end = self.0.iter().position(|byte| *byte == 0).unwrap_or(Self::LEN);
-        // Made from whole characters only.
+        // It consists of complete characters only.
         core::str::from_utf8(&self.0[..end]).unwrap_or("")
     }
 
@@ -68,10 +67,10 @@ impl fmt::Debug for Name {
     }
 }
 
-/// A person with a key of their own.
+/// A person with a signing key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Operator {
-    /// The number of their key, 1 to 15: no other operator has it.
+    /// Number of the operator's key, 1 to 15, unique.
     pub number: u8,
     pub role: Role,
     pub name: Name,

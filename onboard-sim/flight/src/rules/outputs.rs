@@ -1,16 +1,16 @@
-//! What lights, parts and ejects: both igniters, the separation charge and the parachute.
+//! The pyrotechnic outputs: both igniters, the separation charge and the parachute.
 //!
 //! [`Outputs::decided`] is the only function that switches one of them on. The flight computer
 //! calls it once, at the end of a frame, when the crew has been answered and the phase is settled.
-//! An output has current unless [something speaks against it](why_not), so each names every reason
-//! for which it is off. The reasons repeat latches that the [phase table](crate::rules::phase) has
-//! checked already: a mistake there lights nothing by itself.
+//! An output is energised unless [an inhibit](why_not) applies, so each lists all of its inhibits.
+//! They repeat latches that the [phase table](crate::rules::phase) has checked already: an error
+//! there alone ignites nothing.
 
 use serde::{Deserialize, Serialize};
 
 use crate::rules::phase::{Mode, Motor, Phase};
 
-/// Something that gets current.
+/// A pyrotechnic output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PyroOutput {
     LandingIgniter,
@@ -21,25 +21,25 @@ pub enum PyroOutput {
 }
 
 impl PyroOutput {
-    /// Each at the place of its number, which is its place in [`Outputs`] and in the digest.
+    /// Ordered by number, which is the index in [`Outputs`] and in the digest.
     pub const ALL: [Self; 4] = [Self::LandingIgniter, Self::Parachute, Self::AscentIgniter, Self::Separation];
 }
 
 /// What the outputs depend on besides the mode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FlightProgress {
-    /// The frame belongs to a flight; the one in which the countdown ends does not yet.
+    /// The frame is part of a flight; the frame in which the countdown ends is not.
     pub flying: bool,
     /// The vehicle has left its rail.
     pub lifted_off: bool,
-    /// Apogee is near, or was: the booster goes.
+    /// Apogee is near, or has passed: the booster is to be separated.
     pub separation_due: bool,
-    /// The fins, which close over the parachute's hatch, are out of its way, or had the time for
-    /// it.
+    /// The fins, which close over the parachute hatch, are clear of it, or have had the time to
+    /// open.
     pub hatch_free: bool,
 }
 
-/// Every reason for which an output has no current now; none of them: it has.
+/// All inhibits of an output; with none it is energised.
 pub fn why_not(
     output: PyroOutput,
     mode: &Mode,
@@ -60,8 +60,8 @@ pub fn why_not(
             locks.landing_motor_inhibited.then_some("the landing motor is inhibited"),
             (!locks.armed).then_some("not armed"),
             (!locks.pin_out).then_some("the pin is in"),
-            // An abort too low for the parachute lands on the motor, and so does one after the
-            // command to light.
+            // An abort too low for the parachute lands on the motor, as does one after the ignition
+            // command.
             (locks.abort_latched && !locks.lands_in_place).then_some("an abort is latched"),
             None,
         ],
@@ -85,13 +85,12 @@ pub fn why_not(
     reasons.into_iter().flatten()
 }
 
-/// Which outputs have current. Nothing else in the flight computer can set one: the field is
-/// private.
+/// The energised outputs. Nothing else in the flight computer can set one: the field is private.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Outputs([bool; 4]);
 
 impl Outputs {
-    /// No current anywhere.
+    /// All off.
     pub const NONE: Self = Self([false; 4]);
 
     /// The outputs at the end of a frame.
@@ -99,17 +98,17 @@ impl Outputs {
         Self::of(|output| why_not(output, mode, progress).next().is_none())
     }
 
-    /// The outputs that a log or a board tells of.
+    /// The outputs recorded in a log or reported by a board.
     pub fn of(is_on: impl Fn(PyroOutput) -> bool) -> Self {
         Self(PyroOutput::ALL.map(is_on))
     }
 
-    /// Whether an output has current.
+    /// Whether an output is energised.
     pub fn is_on(&self, output: PyroOutput) -> bool {
         self.0[output as usize]
     }
 
-    /// Whether an igniter has current.
+    /// Whether an igniter is energised.
     pub fn lights(&self) -> bool {
         self.is_on(PyroOutput::AscentIgniter) || self.is_on(PyroOutput::LandingIgniter)
     }
@@ -172,7 +171,7 @@ mod tests {
         assert_eq!(Outputs::decided(&at_power_up, SEEN), Outputs::NONE);
     }
 
-    /// An event of any kind; most of them are those that lead on.
+    /// An event of any kind; most of them advance the flight.
     fn event(dice: u32, lifted_off: bool) -> Event {
         let flag = |bit: u32| dice >> bit & 1 == 1;
         let (above_commit_height, gate_open) = (flag(29), flag(30));
@@ -205,10 +204,10 @@ mod tests {
         }
     }
 
-    /// The bar: in a million random sequences no igniter has current after an abort, a disarm or a
-    /// hold was accepted, but for the landing motor of a vehicle that was aborted too low for its
-    /// parachute or after the command to light. A motor is lit armed and with its pin out, at most
-    /// once, and never with the parachute.
+    /// The requirement: in a million random sequences no igniter is energised after an accepted
+    /// abort, disarm or hold, except the landing motor's of a vehicle aborted too low for its
+    /// parachute or after the ignition command. A motor is ignited armed and with its pin out, at
+    /// most once, and never together with the parachute.
     #[test]
     fn in_a_million_random_sequences_no_igniter_is_on_after_an_abort_a_disarm_or_a_hold() {
         let mut random = ChaCha8Rng::seed_from_u64(48);
@@ -221,40 +220,40 @@ mod tests {
             let (mut progress, mut time_s) = (FlightProgress { flying: false, ..SEEN }, 0.0);
             let (mut ascent_began, mut landing_began) = (false, false);
             let mut before = Outputs::NONE;
-            // What stays off until somebody starts anew, or for ever.
+            // Outputs that stay off until a new start, or permanently.
             let mut stopped = false;
             for _ in 0..24 {
                 let dice = random.next_u32();
                 time_s += [0.005, 0.5, 1.0, 1.1][(dice >> 5 & 3) as usize];
-                let asked = event(dice, progress.lifted_off);
-                let answer = transition(&mode, asked, time_s);
+                let requested = event(dice, progress.lifted_off);
+                let answer = transition(&mode, requested, time_s);
                 let accepted = answer.refusal.is_none();
                 mode = answer.mode;
                 progress.flying |= !mode.phase.on_pad();
-                progress.lifted_off |= accepted && asked == Event::LiftOff;
-                progress.separation_due |= accepted && asked == Event::SeparationDue;
+                progress.lifted_off |= accepted && requested == Event::LiftOff;
+                progress.separation_due |= accepted && requested == Event::SeparationDue;
                 let outputs = Outputs::decided(&mode, progress);
                 let stops = matches!(
-                    asked,
+                    requested,
                     Event::AbortRequested { .. } | Event::DisarmRequested { .. } | Event::Hold { .. }
                 );
                 if accepted && stops {
                     stopped = true;
                     ended += 1;
                     lit_before += u64::from(before.is_on(PyroOutput::AscentIgniter));
-                } else if accepted && matches!(asked, Event::StartRequested { .. } | Event::LiftOff) {
+                } else if accepted && matches!(requested, Event::StartRequested { .. } | Event::LiftOff) {
                     // An armed vehicle that lifts off by itself flies its mission.
                     stopped = false;
                 }
                 let (ascent, landing) =
                     (outputs.is_on(PyroOutput::AscentIgniter), outputs.is_on(PyroOutput::LandingIgniter));
                 let locks = mode.interlocks;
-                assert!(!(ascent && (stopped || locks.abort_latched)), "{asked:?}: {mode:?}");
+                assert!(!(ascent && (stopped || locks.abort_latched)), "{requested:?}: {mode:?}");
                 assert!(!(landing && (stopped || locks.abort_latched) && !locks.lands_in_place), "{mode:?}");
                 assert!(!outputs.lights() || (locks.armed && locks.pin_out), "{mode:?}");
                 assert!(!(ascent && landing), "{mode:?}");
                 assert!(!outputs.is_on(PyroOutput::Parachute) || !outputs.lights(), "{mode:?}");
-                // What was switched off does not come on again.
+                // An output that was switched off stays off.
                 assert!(!(ascent && ascent_began && !before.is_on(PyroOutput::AscentIgniter)), "{mode:?}");
                 assert!(!(landing && landing_began && !before.is_on(PyroOutput::LandingIgniter)), "{mode:?}");
                 (ascent_began, landing_began) = (ascent_began | ascent, landing_began | landing);

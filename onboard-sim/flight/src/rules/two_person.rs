@@ -1,22 +1,22 @@
-//! Arming and start by two people of different roles: one asks, another confirms.
+//! Arming and start by two people of different roles: one proposes, another confirms.
 //!
-//! A state machine of its own: it takes who asks for what and when, and answers. Nothing is armed
-//! or started here; the phase table still decides what an agreed request does.
+//! A separate state machine: it takes who proposes or confirms what and when, and answers. It arms
+//! and starts nothing itself; the phase table still decides the effect of an agreed request.
 //!
-//! An ask has a number, and a confirmation names it: two people who ask at the same moment have not
-//! confirmed each other, and a confirmation that was meant for an earlier ask, or is sent again
-//! later, confirms nothing. From the agreed start to the release the one who confirmed it taps a
-//! key (or the one who asked, if the other is in command: it takes two in the countdown, too);
-//! without a tap for [`TAP_WITHIN_S`] the countdown is held. A terminal reports no release of a
-//! key, so the taps stand for the hand on a dead-man's switch, which amateur launch sites ask of a
-//! second person.
+//! A proposal has a number, and a confirmation names it. Two people who propose at the same moment
+//! have therefore not confirmed each other, and a confirmation of an earlier proposal, or a late
+//! repetition, confirms nothing. From the agreed start to the release the confirming operator taps
+//! a key (or the proposing one, if the other is in command: the countdown, too, takes two). Without
+//! a tap for [`TAP_WITHIN_S`] the countdown is held. A terminal does not report the release of a
+//! key, so the taps replace the hand on a dead-man's switch, which amateur launch sites require of
+//! a second person.
 //!
-//! The way of an ask: a station sends the command, signed with its operator's own key.
-//! `protocol::signing` checks the frame with the key that its link id names, and the vehicle's
-//! endpoint takes the operator from there; it refuses what names another boot, what is for
-//! everybody, and what comes from ids under which two stations are heard. `computer::crew` asks
-//! here; the number goes back in the answer and in TD_CREW, and the other operator's command names
-//! it. How many people it takes is in every frame's input, so a replay decides the same.
+//! Path of a proposal: a station sends the command, signed with its operator's key.
+//! `protocol::signing` checks the frame with the key named by its link id, and the vehicle's
+//! endpoint takes the operator from there. It refuses commands for another boot, for all vehicles,
+//! and from ids used by two stations. `computer::crew` proposes here; the number is returned in the
+//! answer and in TD_CREW, and the other operator's command names it. The number of people required
+//! is in every frame's input, so a replay decides the same.
 
 use core::fmt;
 use serde::Serialize;
@@ -24,25 +24,25 @@ use serde::Serialize;
 use super::operator::Operator;
 use super::phase::UPLINK_SILENT_S;
 
-/// How long an ask waits for its confirmation, s.
+/// Time limit of a confirmation, s.
 pub const CONFIRM_WITHIN_S: f64 = 10.0;
 
-/// The longest time between two taps, s. As long as the silence of a station that holds the
-/// countdown, so that one sum holds for all that can be lost. Whoever taps twice a second may have
-/// one tap lost.
+/// Longest interval between two taps, s. It equals the silence of a station that holds the
+/// countdown, so that the same limit applies to every loss. At two taps a second one tap may be
+/// lost.
 pub const TAP_WITHIN_S: f64 = UPLINK_SILENT_S;
 
-/// The first tap may come so much later, s: whoever has just confirmed the start has to see the
+/// Extra time for the first tap, s: the operator who has just confirmed the start must see the
 /// countdown first.
 const FIRST_TAP_LATER_S: f64 = 1.0;
 
-/// The number of the n-th ask from 0, never 0: a command without a number confirms nothing.
-fn ask_number(first: u16, nth: u16) -> u16 {
+/// Number of the n-th proposal from 0, never 0: a command without a number confirms nothing.
+fn proposal_number(first: u16, nth: u16) -> u16 {
     let place = (u32::from(first) + u32::from(nth)) % u32::from(u16::MAX);
     place as u16 + 1
 }
 
-/// What takes two people.
+/// An act that takes two people.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[repr(u8)]
 pub enum Act {
@@ -59,14 +59,14 @@ impl Act {
     }
 }
 
-/// A ground station, as the vehicle tells it apart from others.
+/// A ground station, as the vehicle distinguishes it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Station {
     /// MAVLink system.
     pub system: u8,
     /// MAVLink component.
     pub component: u8,
-    /// Which of those that were heard under these ids: every station has another number.
+    /// Distinguishes stations under the same ids: every station has another number.
     pub number: u32,
 }
 
@@ -76,30 +76,30 @@ impl fmt::Display for Station {
     }
 }
 
-/// An ask that waits for its confirmation.
+/// A proposal waiting for its confirmation.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Ask {
+pub struct Proposal {
     pub act: Act,
-    /// A confirmation names it: 1 to 65,535, another one for each ask.
+    /// Named by a confirmation: 1 to 65,535, different for each proposal.
     pub number: u16,
     pub by: Operator,
     pub station: Station,
     pub at_s: f64,
 }
 
-impl Ask {
-    /// Time left to confirm it, s; not positive once it has lapsed.
+impl Proposal {
+    /// Time left to confirm it, s; not positive once it has expired.
     pub fn left_s(&self, time_s: f64) -> f64 {
         self.at_s + CONFIRM_WITHIN_S - time_s
     }
 
-    /// Also false for a time that is not a number.
+    /// Also false for NaN.
     fn waits(&self, time_s: f64) -> bool {
         self.left_s(time_s) >= 0.0 && time_s >= self.at_s
     }
 }
 
-/// Whose taps keep the countdown running.
+/// The operator whose taps keep the countdown running.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Tapping {
     pub by: Operator,
@@ -117,45 +117,45 @@ impl Tapping {
 /// Why a request is not an agreement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum NoAgreement {
-    /// Observers command nothing.
+    /// Observers may not command.
     Observer,
-    /// Another person's ask already waits: it is to be confirmed.
-    AnotherAsks(Ask),
-    /// Nothing waits for a confirmation, or another number or act does.
+    /// Another person's proposal is already waiting for confirmation.
+    Pending(Proposal),
+    /// No proposal is waiting, or one with another number or act.
     NothingToConfirm,
-    /// Nobody confirms their own ask.
-    OwnAsk(Ask),
+    /// The proposing operator may not confirm.
+    SamePerson(Proposal),
     /// The same role may not confirm.
-    SameRole(Ask),
+    SameRole(Proposal),
 }
 
 /// The answer to a request.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Reply {
-    /// Noted: now somebody of another role has to confirm.
-    Asked(Ask),
+    /// Recorded: an operator of another role must confirm.
+    Proposed(Proposal),
     /// Two people of different roles have agreed.
     Agreed {
-        ask: Ask,
+        proposal: Proposal,
         confirmed_by: Operator,
     },
     Refused(NoAgreement),
 }
 
-/// What is asked, and whose taps are waited for.
+/// State of the proposal and of the taps.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct TwoPerson {
-    /// How many asks there were.
-    asks: u16,
-    ask: Option<Ask>,
-    /// The agreed ask that armed the vehicle.
-    armed: Option<Ask>,
+    /// Number of proposals so far.
+    proposals: u16,
+    proposal: Option<Proposal>,
+    /// The agreed proposal that armed the vehicle.
+    armed: Option<Proposal>,
     tapping: Option<Tapping>,
 }
 
 impl TwoPerson {
-    /// Asks for an act, or confirms the ask of this number. `first` is where the numbers of the
-    /// asks begin.
+    /// Proposes an act, or confirms the proposal of this number. `first` is the number of the first
+    /// proposal.
     pub fn request(
         &mut self,
         act: Act,
@@ -170,54 +170,54 @@ impl TwoPerson {
         let waiting = self.waiting(time_s);
         let Some(number) = confirms else {
             return match waiting {
-                Some(ask) if ask.by.number != by.number => Reply::Refused(NoAgreement::AnotherAsks(ask)),
-                // A repeated ask does not wait longer.
-                Some(ask) if ask.act == act => Reply::Asked(ask),
-                _ => self.ask(act, (by, station), first, time_s),
+                Some(other) if other.by.number != by.number => Reply::Refused(NoAgreement::Pending(other)),
+                // A repeated proposal does not extend the time limit.
+                Some(proposal) if proposal.act == act => Reply::Proposed(proposal),
+                _ => self.propose(act, (by, station), first, time_s),
             };
         };
-        let Some(ask) = waiting.filter(|ask| ask.act == act && ask.number == number) else {
+        let Some(proposal) = waiting.filter(|one| one.act == act && one.number == number) else {
             return Reply::Refused(NoAgreement::NothingToConfirm);
         };
-        if ask.by.number == by.number {
-            return Reply::Refused(NoAgreement::OwnAsk(ask));
+        if proposal.by.number == by.number {
+            return Reply::Refused(NoAgreement::SamePerson(proposal));
         }
-        if ask.by.role == by.role {
-            return Reply::Refused(NoAgreement::SameRole(ask));
+        if proposal.by.role == by.role {
+            return Reply::Refused(NoAgreement::SameRole(proposal));
         }
-        self.ask = None;
-        Reply::Agreed { ask, confirmed_by: by }
+        self.proposal = None;
+        Reply::Agreed { proposal, confirmed_by: by }
     }
 
-    fn ask(&mut self, act: Act, (by, station): (Operator, Station), first: u16, time_s: f64) -> Reply {
-        let number = ask_number(first, self.asks);
-        let ask = Ask { act, number, by, station, at_s: time_s };
-        self.asks = self.asks.wrapping_add(1);
-        self.ask = Some(ask);
-        Reply::Asked(ask)
+    fn propose(&mut self, act: Act, (by, station): (Operator, Station), first: u16, time_s: f64) -> Reply {
+        let number = proposal_number(first, self.proposals);
+        let proposal = Proposal { act, number, by, station, at_s: time_s };
+        self.proposals = self.proposals.wrapping_add(1);
+        self.proposal = Some(proposal);
+        Reply::Proposed(proposal)
     }
 
-    /// The ask that waits for its confirmation.
-    pub fn waiting(&self, time_s: f64) -> Option<Ask> {
-        self.ask.filter(|ask| ask.waits(time_s))
+    /// The proposal waiting for its confirmation.
+    pub fn waiting(&self, time_s: f64) -> Option<Proposal> {
+        self.proposal.filter(|proposal| proposal.waits(time_s))
     }
 
-    /// Takes back what is asked: an abort, a disarm or a hold came.
+    /// Withdraws the proposal after an abort, a disarm or a hold.
     pub fn withdraw(&mut self) {
-        self.ask = None;
+        self.proposal = None;
     }
 
-    /// Notes that the agreed ask has armed the vehicle.
-    pub fn armed(&mut self, ask: Ask) {
-        self.armed = Some(ask);
+    /// Records that the agreed proposal has armed the vehicle.
+    pub fn armed(&mut self, proposal: Proposal) {
+        self.armed = Some(proposal);
     }
 
-    /// The ask that armed the vehicle: the one who asked is in command.
-    pub fn armed_by(&self) -> Option<Ask> {
+    /// The proposal that armed the vehicle: its operator is in command.
+    pub fn armed_by(&self) -> Option<Proposal> {
         self.armed
     }
 
-    /// The countdown has begun: from now on this operator taps, who is not in command.
+    /// Begins the countdown's taps by this operator, who is not in command.
     pub fn begin_taps(&mut self, by: Operator, time_s: f64) {
         self.tapping = Some(Tapping { by, at_s: time_s + FIRST_TAP_LATER_S });
     }
@@ -231,19 +231,19 @@ impl TwoPerson {
         true
     }
 
-    /// The countdown has ended or is held: no taps are waited for.
+    /// Ends the taps: the countdown has ended or is held.
     pub fn end_taps(&mut self) {
         self.tapping = None;
     }
 
-    /// Whose taps keep the countdown running.
+    /// The operator whose taps keep the countdown running.
     pub fn tapping(&self) -> Option<Tapping> {
         self.tapping
     }
 
     /// The operator whose taps are overdue.
     pub fn lapsed(&self, time_s: f64) -> Option<Operator> {
-        // A time that is not a number has lapsed, too.
+        // NaN counts as overdue.
         let in_time = |tapping: &Tapping| tapping.left_s(time_s) >= 0.0;
         self.tapping.filter(|tapping| !in_time(tapping)).map(|tapping| tapping.by)
     }
@@ -251,7 +251,7 @@ impl TwoPerson {
 
 #[cfg(test)]
 mod tests {
-    //! The ladder against a plain second account of it, over a million random sequences.
+    //! The state machine against an independent account, over a million random sequences.
 
     use rand::{Rng as _, SeedableRng as _};
     use rand_chacha::ChaCha8Rng;
@@ -276,7 +276,7 @@ mod tests {
         ]
     }
 
-    fn asks(two: &mut TwoPerson, act: Act, by: Operator, time_s: f64) -> Reply {
+    fn propose(two: &mut TwoPerson, act: Act, by: Operator, time_s: f64) -> Reply {
         two.request(act, None, (by, STATION), 99, time_s)
     }
 
@@ -285,21 +285,26 @@ mod tests {
     }
 
     #[test]
-    fn one_asks_and_another_role_confirms_within_ten_seconds() {
+    fn a_proposal_is_confirmed_by_another_role_within_ten_seconds() {
         let [range, flight, other_flight, pad, observer] = people();
         let mut two = TwoPerson::default();
-        let Reply::Asked(ask) = asks(&mut two, Act::Arm, flight, 1.0) else { panic!("not asked") };
-        assert_eq!((ask.number, ask.by, ask.act), (100, flight, Act::Arm));
-        // A repeated ask neither confirms itself nor waits longer.
-        assert_eq!(asks(&mut two, Act::Arm, flight, 5.0), Reply::Asked(ask));
+        let Reply::Proposed(proposal) = propose(&mut two, Act::Arm, flight, 1.0) else {
+            panic!("not proposed")
+        };
+        assert_eq!((proposal.number, proposal.by, proposal.act), (100, flight, Act::Arm));
+        // A repeated proposal neither confirms itself nor extends the time limit.
+        assert_eq!(propose(&mut two, Act::Arm, flight, 5.0), Reply::Proposed(proposal));
         let no = |refusal| Reply::Refused(refusal);
-        assert_eq!(confirms(&mut two, Act::Arm, 100, flight, 2.0), no(NoAgreement::OwnAsk(ask)));
-        assert_eq!(confirms(&mut two, Act::Arm, 100, other_flight, 2.0), no(NoAgreement::SameRole(ask)));
+        assert_eq!(confirms(&mut two, Act::Arm, 100, flight, 2.0), no(NoAgreement::SamePerson(proposal)));
+        assert_eq!(confirms(&mut two, Act::Arm, 100, other_flight, 2.0), no(NoAgreement::SameRole(proposal)));
         assert_eq!(confirms(&mut two, Act::Arm, 100, observer, 2.0), no(NoAgreement::Observer));
         assert_eq!(confirms(&mut two, Act::Arm, 101, range, 2.0), no(NoAgreement::NothingToConfirm));
         assert_eq!(confirms(&mut two, Act::Start, 100, range, 2.0), no(NoAgreement::NothingToConfirm));
-        assert_eq!(asks(&mut two, Act::Arm, range, 2.0), no(NoAgreement::AnotherAsks(ask)));
-        assert_eq!(confirms(&mut two, Act::Arm, 100, pad, 11.0), Reply::Agreed { ask, confirmed_by: pad });
+        assert_eq!(propose(&mut two, Act::Arm, range, 2.0), no(NoAgreement::Pending(proposal)));
+        assert_eq!(
+            confirms(&mut two, Act::Arm, 100, pad, 11.0),
+            Reply::Agreed { proposal, confirmed_by: pad }
+        );
         assert_eq!(
             confirms(&mut two, Act::Arm, 100, pad, 11.0),
             no(NoAgreement::NothingToConfirm),
@@ -308,19 +313,21 @@ mod tests {
     }
 
     #[test]
-    fn an_ask_lapses_and_the_next_one_has_another_number() {
+    fn a_proposal_expires_and_the_next_one_has_another_number() {
         let [range, flight, ..] = people();
         let mut two = TwoPerson::default();
-        asks(&mut two, Act::Arm, flight, 1.0);
+        propose(&mut two, Act::Arm, flight, 1.0);
         let late = confirms(&mut two, Act::Arm, 100, range, 11.001);
         assert_eq!(late, Reply::Refused(NoAgreement::NothingToConfirm));
-        let Reply::Asked(ask) = asks(&mut two, Act::Arm, range, 12.0) else { panic!("not asked") };
-        assert_eq!(ask.number, 101);
+        let Reply::Proposed(proposal) = propose(&mut two, Act::Arm, range, 12.0) else {
+            panic!("not proposed")
+        };
+        assert_eq!(proposal.number, 101);
         let old = confirms(&mut two, Act::Arm, 100, flight, 12.0);
         assert_eq!(old, Reply::Refused(NoAgreement::NothingToConfirm));
         two.withdraw();
-        let gone = confirms(&mut two, Act::Arm, 101, flight, 12.0);
-        assert_eq!(gone, Reply::Refused(NoAgreement::NothingToConfirm));
+        let withdrawn = confirms(&mut two, Act::Arm, 101, flight, 12.0);
+        assert_eq!(withdrawn, Reply::Refused(NoAgreement::NothingToConfirm));
     }
 
     #[test]
@@ -342,32 +349,31 @@ mod tests {
         assert_eq!(two.lapsed(100.0), None);
     }
 
-    /// What an outsider remembers of all requests: every one with its time, to look up afterwards
-    /// who had really asked.
+    /// Independent record of all requests with their times, to look up the proposals afterwards.
     struct Account {
-        asked: Vec<(Act, u16, Operator, f64)>,
+        proposed: Vec<(Act, u16, Operator, f64)>,
         used: Vec<u16>,
     }
 
     impl Account {
-        /// Whether the log of requests holds an unused ask of this number by another role in the
-        /// last ten seconds.
+        /// Whether the record has an unused proposal of this number by another role in the last ten
+        /// seconds.
         fn backs(&self, act: Act, number: u16, by: Operator, time_s: f64) -> bool {
             !self.used.contains(&number)
-                && self.asked.iter().any(|(asked, of, asker, at_s)| {
-                    (*asked, *of) == (act, number)
-                        && asker.role != by.role
-                        && asker.number != by.number
-                        && asker.role.may_command()
+                && self.proposed.iter().any(|(proposed, of, proposer, at_s)| {
+                    (*proposed, *of) == (act, number)
+                        && proposer.role != by.role
+                        && proposer.number != by.number
+                        && proposer.role.may_command()
                         && by.role.may_command()
                         && (*at_s..=at_s + CONFIRM_WITHIN_S).contains(&time_s)
                 })
         }
     }
 
-    /// The bar: a million random sequences of asks, confirmations (right, wrong, replayed),
-    /// withdrawals and pauses agree to nothing that two different roles had not asked and
-    /// confirmed. Sequences with one person only never agree.
+    /// The requirement: a million random sequences of proposals, confirmations (right, wrong,
+    /// replayed), withdrawals and pauses agree to nothing that two different roles had not proposed
+    /// and confirmed. Sequences with one person only never agree.
     #[test]
     fn a_million_random_sequences_arm_nothing_without_two_keys() {
         let mut random = ChaCha8Rng::seed_from_u64(2);
@@ -376,7 +382,7 @@ mod tests {
         for sequence in 0..1_000_000_u64 {
             let mut two = TwoPerson::default();
             let first = random.next_u32() as u16;
-            let mut account = Account { asked: Vec::new(), used: Vec::new() };
+            let mut account = Account { proposed: Vec::new(), used: Vec::new() };
             // Every fourth sequence has a single key: one person, with every message of theirs also
             // replayed.
             let alone = (sequence % 4 == 0).then(|| people[(random.next_u32() % 5) as usize]);
@@ -390,25 +396,25 @@ mod tests {
                 let confirms = match dice >> 13 & 7 {
                     0..=2 => None,
                     // The latest number, an earlier one, the next one, any.
-                    3..=5 => Some(ask_number(first, account.asked.len().max(1) as u16 - 1)),
-                    6 => Some(ask_number(first, (dice >> 16 & 3) as u16)),
+                    3..=5 => Some(proposal_number(first, account.proposed.len().max(1) as u16 - 1)),
+                    6 => Some(proposal_number(first, (dice >> 16 & 3) as u16)),
                     _ => Some((dice >> 16) as u16),
                 };
                 if dice >> 29 == 0 {
                     two.withdraw();
-                    account.used.extend(account.asked.iter().map(|(_, number, ..)| *number));
+                    account.used.extend(account.proposed.iter().map(|(_, number, ..)| *number));
                 }
                 match two.request(act, confirms, (by, STATION), first, time_s) {
-                    Reply::Asked(ask) => {
+                    Reply::Proposed(proposal) => {
                         assert_eq!(confirms, None);
-                        if !account.asked.iter().any(|(_, number, ..)| *number == ask.number) {
-                            account.asked.push((act, ask.number, by, time_s));
+                        if !account.proposed.iter().any(|(_, number, ..)| *number == proposal.number) {
+                            account.proposed.push((act, proposal.number, by, time_s));
                         }
                     }
-                    Reply::Agreed { ask, confirmed_by } => {
+                    Reply::Agreed { proposal, confirmed_by } => {
                         assert!(confirms.is_some_and(|number| account.backs(act, number, by, time_s)));
-                        assert_eq!((confirmed_by, confirms), (by, Some(ask.number)));
-                        account.used.push(ask.number);
+                        assert_eq!((confirmed_by, confirms), (by, Some(proposal.number)));
+                        account.used.push(proposal.number);
                         agreed += 1;
                         agreed_alone += u64::from(alone.is_some());
                     }

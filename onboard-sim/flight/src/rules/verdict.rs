@@ -1,5 +1,4 @@
-//! How a landing ended, in four words that every program says alike, and the limits that two of
-//! them are judged by.
+//! Outcome of a landing, in four words that all programs use, with the limits behind two of them.
 
 use alloc::borrow::ToOwned as _;
 use alloc::string::{String, ToString as _};
@@ -32,7 +31,7 @@ pub struct Touchdown {
 }
 
 impl Touchdown {
-    /// What legs feel: velocities over the ground, and every rotation.
+    /// Loads on the legs: velocities over the ground, and the full rotation.
     pub fn over_ground(state: &RigidState, height_m: f64) -> Self {
         let (place_m, velocity_m_s) = (&state.position_m, &state.velocity_m_s);
         Self {
@@ -45,7 +44,8 @@ impl Touchdown {
         }
     }
 
-    /// What [`TABLE_2`] limits: velocities along and across the axis, and the rotation across it.
+    /// Quantities limited by [`TABLE_2`]: velocities along and across the axis, and the rotation
+    /// across it.
     pub fn along_axis(state: &RigidState, height_m: f64) -> Self {
         let (velocity_m_s, rate_rad_s) = (state.velocity_in_body_m_s(), &state.rate_rad_s);
         Self {
@@ -115,7 +115,7 @@ pub struct LimitResult {
     pub highest: f64,
     /// The unit of the three; angles are in degrees, for people.
     pub unit: &'static str,
-    /// Whether the value lies inside; a value that is not a number does not.
+    /// Whether the value lies inside; NaN does not.
     pub passed: bool,
 }
 
@@ -170,8 +170,8 @@ impl LandingVerdict {
         }
     }
 
-    /// Judges the end of a plan, which has to be on the ground. A plan meets it only within its
-    /// solver's tolerance, so an end that is within a millimetre below counts as on it.
+    /// Judges the end of a plan, which must be on the ground. A plan meets it only within its
+    /// solver's tolerance, so an end within a millimetre below counts as on it.
     pub fn judge_plan(limits: &Limits, end: &Touchdown) -> Self {
         let limits = Limits { height_m: limits.height_m.min(TABLE_2.height_m), ..*limits };
         let on_ground = (-PLAN_HEIGHT_TOLERANCE_M..0.0).contains(&end.height_m);
@@ -179,17 +179,17 @@ impl LandingVerdict {
         Self::judge(&limits, &Touchdown { height_m, ..*end })
     }
 
-    /// Whether every limit was kept.
+    /// Whether every limit was met.
     pub fn is_inside(&self) -> bool {
         self.failures().next().is_none()
     }
 
-    /// The limits that were not kept.
+    /// The limits that were not met.
     pub fn failures(&self) -> impl Iterator<Item = &LimitResult> {
         self.results.iter().filter(|result| !result.passed)
     }
 
-    /// The limit that was broken by the largest share of itself; of equal ones the first.
+    /// The limit exceeded by the largest share of itself; the first of equal ones.
     pub fn worst(&self) -> Option<&LimitResult> {
         let share = |limit: &LimitResult| share_of_limit(limit.value, limit.lowest, limit.highest);
         self.failures().min_by(|a, b| share(b).total_cmp(&share(a)))
@@ -202,13 +202,14 @@ impl LandingVerdict {
     }
 }
 
-/// How a landing ended. No word implies another, but what stands undamaged is upright.
+/// Outcome of a landing. No word implies another, except that a vehicle that stands undamaged is
+/// upright.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Landing {
-    /// It came to rest upright on its legs, and nothing broke. Legs that crush tell it by what they
-    /// bore; others have kept their limits at contact.
+    /// It came to rest upright on its legs, undamaged. For crushable legs this follows from their
+    /// loads; other legs were inside their limits at contact.
     pub stands: bool,
-    /// It came to rest upright, whatever it touched down with.
+    /// It came to rest upright, whatever its touchdown.
     pub upright: bool,
     /// Inside the mission's `[leg_limits]` at contact, all at once.
     pub envelope: bool,
@@ -219,11 +220,11 @@ pub struct Landing {
 impl Landing {
     /// The names of the four in tables.
     pub const COLUMNS: [&str; 4] = ["stands", "upright", "envelope", "table_2"];
-    /// The four in words.
+    /// The four as text.
     pub const WORDS: [&str; 4] =
         ["stands undamaged", "upright", "inside the design envelope of its legs", "inside Table 2"];
 
-    /// The first of them that holds, where there is no place for more.
+    /// The first that holds, where there is room for one only.
     pub fn word(self) -> &'static str {
         match self {
             Self { stands: true, .. } => "stands undamaged",
@@ -238,7 +239,7 @@ impl Landing {
     }
 }
 
-/// How a flight that touched the ground ended; it is displayed as one sentence.
+/// Outcome of a flight that touched the ground; it is displayed as one sentence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct FlightEnding<'a> {
     /// An abort was latched.
@@ -257,7 +258,7 @@ impl fmt::Display for FlightEnding<'_> {
         if self.aborted {
             out.write_str("ABORTED, then ")?;
         }
-        let failure = self.failure.unwrap_or("reason not told");
+        let failure = self.failure.unwrap_or("reason unknown");
         match failure {
             _ if stands => out.write_str("STANDS UNDAMAGED")?,
             UNDER_PARACHUTE => return out.write_str("DOWN UNDER THE PARACHUTE, not landed"),
@@ -338,7 +339,7 @@ mod tests {
     }
 
     #[test]
-    fn an_ending_says_whether_legs_were_inside_their_envelope() {
+    fn an_ending_reports_whether_legs_were_inside_their_envelope() {
         let said = |[stands, upright, envelope, table_2]: [bool; 4], failure| {
             let landing = Landing { stands, upright, envelope, table_2 };
             FlightEnding { aborted: false, landing, failure }.to_string()

@@ -384,14 +384,13 @@ pub struct Legs {
     /// Station at which it acts, m above the nozzle.
     #[serde(default)]
     pub drag_station_m: f64,
-    /// What gives way in each leg; without it the spring takes any load and has no end.
+    /// The crushable element of each leg; without it the spring takes any load without a stop.
     pub crush: Option<Crush>,
 }
 
-/// A block above each foot that crushes at a nearly constant force, as foam does, and does not come
-/// back. The foot slides along the body's axis in a guide, which a force across jams a little: the
-/// foot gives way when the force along the axis exceeds `force_n` and `guide_share` times the force
-/// across.
+/// A block above each foot that crushes at a nearly constant force, like foam, without recovery.
+/// The foot slides along the body's axis in a guide, which a transverse force jams a little: the
+/// foot moves when the axial force exceeds `force_n` plus `guide_share` times the transverse force.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Crush {
@@ -399,7 +398,7 @@ pub struct Crush {
     pub force_n: f64,
     /// Friction along the axis that the guide adds, over the force across it.
     pub guide_share: f64,
-    /// How far the foot can give way, m.
+    /// Crush stroke of the foot, m.
     pub stroke_m: f64,
     /// Largest force at the foot that the leg bears in the plane of leg and axis, N.
     pub strength_n: f64,
@@ -430,7 +429,7 @@ const DELAY_MAX_S: f64 = 0.1;
 const POSITIVE: &str = "a finite number above 0";
 const NOT_NEGATIVE: &str = "a finite number, 0 or more,";
 
-/// A key, its value, whether it is accepted, and what is.
+/// A key, its value, whether it is accepted, and the accepted range.
 type RangeCheck = (&'static str, f64, bool, &'static str);
 
 #[rustfmt::skip]

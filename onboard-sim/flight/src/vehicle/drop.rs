@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Below this height a hanging vehicle is never armed, m: a motor that is lit there has no room to
+/// Height below which a hanging vehicle is never armed, m: a motor ignited there has no room to
 /// brake a fall, and people may stand under it.
 pub const LOWEST_ARMED_M: f64 = 10.0;
 
@@ -20,8 +20,8 @@ pub struct Drop {
     pub swing_deg: f64,
     /// Time from the end of the countdown until the drone's pilot lets go, s.
     pub release_after_s: f64,
-    /// What arming allows a hanging vehicle, in the mean over a second: tilt, degrees, rotation
-    /// rate, degrees per second, and speed, m/s. On a pad it has to stand still.
+    /// Arming limits of a hanging vehicle, as means over a second: tilt, degrees, rotation rate,
+    /// degrees per second, and speed, m/s. On a pad it must be at rest.
     #[serde(default = "tilt_max_deg")]
     pub tilt_max_deg: f64,
     #[serde(default = "rotation_max_deg_s")]
@@ -30,7 +30,7 @@ pub struct Drop {
     pub speed_max_m_s: f64,
 }
 
-/// Half of what the ignition gate allows.
+/// Half of the ignition gate's limit.
 fn tilt_max_deg() -> f64 {
     10.0
 }

@@ -328,7 +328,7 @@ mod tests {
 
     /// The moment of a tilt far beyond the fins' ability keeps its direction, within a degree.
     #[test]
-    fn a_tilt_that_saturates_keeps_its_direction() {
+    fn a_saturated_tilt_preserves_its_direction() {
         let allocation = allocation();
         for wanted_n_m in [1.0, 10.0, 1000.0] {
             for step in 0..36 {

@@ -33,7 +33,7 @@ pub struct Rail {
     pub tilt_deg: f64,
     /// Direction of the tilt in the world, from x towards y, degrees.
     pub towards_deg: f64,
-    /// Where its foot stands, from the middle of the landing pad, to the north, m.
+    /// Position of its foot from the middle of the landing pad, to the north, m.
     #[serde(default)]
     pub x_m: f64,
     /// To the west, m.
@@ -47,7 +47,7 @@ pub struct Rail {
 }
 
 impl Rail {
-    /// Where its foot stands, world, m.
+    /// Position of its foot, world, m.
     pub fn foot_m(&self) -> Vector3<f64> {
         Vector3::new(self.x_m, self.y_m, 0.0)
     }
@@ -150,7 +150,7 @@ impl Launch {
         }
     }
 
-    /// Checks what depends on the booster's length, and what is computed.
+    /// Checks the values that depend on the booster's length, and the computed values.
     ///
     /// # Errors
     /// [`BadValue`] names the first key with a wrong value.
@@ -177,7 +177,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn val_hand_the_rail_leans_where_it_says() {
+    fn val_hand_the_rail_leans_in_its_direction() {
         let mission = crate::vehicles::mission::builtin("mk2").unwrap().unwrap();
         let mut launch = mission.launch.unwrap();
         (launch.rail.tilt_deg, launch.rail.towards_deg) = (30.0, 90.0);

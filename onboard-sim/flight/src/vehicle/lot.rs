@@ -1,10 +1,9 @@
-//! What a club knows of the lot that its landing motor is of, and what a mission expects of the
-//! motor because of it.
+//! Measured burns of the landing motor's lot, and the resulting expectation of the motor.
 //!
-//! A certified curve was measured on motors of another lot. A club that has burnt some of its own
-//! on a stand says so in the section `[lot]` of its mission: how they differed, at which
-//! temperature, and what motor and vehicle weigh on the day. [`Lot::expectation`] is the one place
-//! where that becomes a mean and a width.
+//! A certified curve was measured on motors of another lot. A club that has burnt some of its lot
+//! on a stand states the results in the section `[lot]` of its mission: their deviations, their
+//! temperature, and the weights of motor and vehicle on the day. [`Lot::expectation`] is the one
+//! place where these become a mean and a width.
 
 use alloc::string::String;
 
@@ -36,7 +35,7 @@ pub struct Lot {
 }
 
 with_defaults! {
-    /// What the burns of a lot had, over the curve's value.
+    /// A measured quantity of the lot's burns, relative to the curve's value.
     #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
     #[serde(deny_unknown_fields)]
     pub struct Burnt {
@@ -44,8 +43,8 @@ with_defaults! {
         /// Sample standard deviation; 0 of a single burn.
         #[serde(default)]
         pub scatter: f64 = 0.0,
-        /// Standard deviation of what every burn may be wrong by in the same direction, such as the
-        /// load cell's calibration.
+        /// Standard deviation of the common error of all burns, such as the load cell's
+        /// calibration.
         #[serde(default)]
         pub common: f64 = 0.0,
     }
@@ -77,7 +76,7 @@ pub struct Weighed {
 /// together.)
 const PRIOR_BURNS: f64 = 1.0;
 /// Half the degrees of freedom of the prior's scatter: the fewest with which the next value has a
-/// variance, so that the lot's own burns count soon.
+/// variance, so that the lot's burns soon dominate.
 const PRIOR_ALPHA: u32 = 2;
 /// Standard deviation of the mass of a vehicle that was not weighed on the day: the 1 % that
 /// [`MotorPrior`] has in its impulse.
@@ -92,8 +91,8 @@ const PRESSURE_PER_K: f64 = 0.001_725;
 /// Its standard deviation, that of an even distribution between these two, 1/K.
 const PRESSURE_PER_K_SIGMA: f64 = 0.000_609;
 
-/// What is known of a normal distribution: the conjugate normal-inverse-gamma (A. Gelman et al.,
-/// Bayesian Data Analysis, 3rd edition, section 3.3), and what all values have in common.
+/// Posterior of a normal distribution: the conjugate normal-inverse-gamma (A. Gelman et al.,
+/// Bayesian Data Analysis, 3rd edition, section 3.3), with a common error of all values.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Posterior {
     /// Expected mean.
@@ -104,7 +103,7 @@ pub struct Posterior {
     pub freedom: u32,
     /// Sum of squares that belongs to the degrees of freedom.
     pub squares: f64,
-    /// Standard deviation of what all values have in common. No number of values makes it smaller.
+    /// Standard deviation of the common error of all values. No number of values reduces it.
     pub common: f64,
 }
 
@@ -157,7 +156,7 @@ pub struct Scale {
     pub share: f64,
 }
 
-/// What a mission expects of the motor on its pad.
+/// Expectation of the motor on its pad.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Expectation {
     pub impulse: Scale,
@@ -167,17 +166,16 @@ pub struct Expectation {
 }
 
 impl Expectation {
-    /// Standard deviation of the impulse per mass, as a fraction: an accelerometer cannot tell the
-    /// two apart.
+    /// Standard deviation of the impulse per mass, as a fraction: an accelerometer cannot
+    /// distinguish the two.
     pub fn impulse_per_mass_share(&self) -> f64 {
         libm::hypot(self.impulse.share, self.mass_share)
     }
 }
 
 impl Lot {
-    /// What this lot lets expect, where nothing was known but `prior`; the vehicle has this mass.
-    /// Mean and scatter are those of [`Posterior`]; the variances of causes that know nothing of
-    /// each other add up.
+    /// The expectation from this lot and `prior`, for a vehicle of this mass. Mean and scatter are
+    /// those of [`Posterior`]; the variances of independent causes add up.
     pub fn expectation(&self, prior: &MotorPrior, loaded_kg: f64) -> Expectation {
         let impulse_sigma = libm::sqrt(
             (prior.impulse_sigma * prior.impulse_sigma - UNWEIGHED_SHARE * UNWEIGHED_SHARE).max(0.0),
@@ -198,8 +196,8 @@ impl Lot {
         }
     }
 
-    /// Checks the weights against what motor and vehicle are by their data, kg: another one was
-    /// weighed, or in grams.
+    /// Checks the weights against the data of motor and vehicle, kg: a wrong one was weighed, or in
+    /// grams.
     ///
     /// # Errors
     /// [`BadValue`] names the key.
@@ -272,7 +270,8 @@ mod tests {
         assert!((weighed.mass_share - 0.005 / 3.3).abs() < 1e-15 && weighed.impulse == few.impulse);
     }
 
-    /// 15 K colder, 0.1725 % a kelvin: the burn is longer by 2.6 %, in doubt by 0.91 % more.
+    /// 15 K colder, 0.1725 % a kelvin: the burn is longer by 2.6 %, with an additional uncertainty
+    /// of 0.91 %.
     #[test]
     fn val_sutton_a_cold_motor_burns_longer_with_the_same_impulse() {
         let prior = MotorPrior { burn_time_sigma: 0.0, ..MotorPrior::default() };

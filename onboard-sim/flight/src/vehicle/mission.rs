@@ -27,7 +27,7 @@ numbered_enum! {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum StartPoint {
-    /// On the pad, under its own ascent motor.
+    /// On the pad, under its ascent motor.
     Pad = "pad",
     /// Released at apogee.
     Apogee = "apogee",
@@ -113,7 +113,7 @@ impl SensorPlaces {
     }
 }
 
-/// What the exhaust is expected to take away of the drag while the motor burns, as fractions.
+/// Expected reduction of the drag by the exhaust while the motor burns, as fractions.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Exhaust {
@@ -209,8 +209,8 @@ pub struct GateLimits {
     pub fence_radius_m: f64,
 }
 
-/// Everything that defines a flight, except random differences. A club's file has what it measures
-/// or decides; the reader of the mission adds the controller.
+/// Everything that defines a flight, except random differences. A club's file has its measurements
+/// and decisions; the reader of the mission adds the controller.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Mission {
@@ -225,22 +225,22 @@ pub struct Mission {
     /// The vehicle.
     pub airframe: Airframe,
     /// The expected thrust curve of the landing motor: the certified one of the motor that the
-    /// airframe names, or what the lot tells instead. It is not in the mission's file; the reader
-    /// of the mission looks the motor up.
+    /// airframe names, or that of the lot. It is not in the mission's file; the reader of the
+    /// mission looks the motor up.
     #[serde(skip)]
     pub motor_curve: ThrustCurve,
     /// Other curves that the landing motor may turn out to have: names of built-in motors, or texts
     /// of motor files.
     #[serde(default)]
     pub other_motors: Vec<String>,
-    /// These curves, and before each the one half way to it. The reader of the mission looks them
-    /// up.
+    /// The other certified curves, and before each the one half way to it. The reader of the
+    /// mission looks them up.
     #[serde(skip)]
     pub other_curves: Vec<ThrustCurve>,
-    /// What burns of the motor's lot tell. The reader of the mission puts it into the motor's curve
-    /// and prior, the ignition and the mass.
+    /// Measured burns of the motor's lot. The reader of the mission applies them to the motor's
+    /// curve and prior, the ignition and the mass.
     pub lot: Option<Box<Lot>>,
-    /// What comes of the lot; `None` without one.
+    /// The resulting expectation; `None` without a lot.
     #[serde(skip)]
     pub expected: Option<Box<Expectation>>,
     pub site: Site,
@@ -290,8 +290,8 @@ pub struct Mission {
     pub arming: ArmingLimits,
     /// Limits of the checks before ignition.
     pub gate: GateLimits,
-    /// What the legs were designed for, all at once. Whether a landing counts is decided by what
-    /// they bear.
+    /// The design limits of the legs, all at once. The verdict on a landing follows from the leg
+    /// loads.
     #[serde(default)]
     pub leg_limits: LegLimits,
 }
@@ -315,15 +315,14 @@ impl Mission {
         dropped.map_or(self.start.height_m, |drop| drop.height_m)
     }
 
-    /// The prior of a motor with another curve than the expected one: nobody has burnt any of its
-    /// lot.
+    /// The prior of a motor with another curve than the expected one: its lot has no measured
+    /// burns.
     pub(crate) fn unknown_motor(&self) -> MotorPrior {
         let MotorPrior { impulse_sigma, burn_time_sigma, .. } = MotorPrior::default();
         MotorPrior { impulse_sigma, burn_time_sigma, ..self.motor }
     }
 
-    /// Puts in what the lot tells, where `curve` is the one that the lot's scales are over; without
-    /// a lot, that curve.
+    /// Applies the lot, whose scales are relative to `curve`; without a lot, that curve.
     pub(crate) fn expect(&mut self, curve: ThrustCurve) {
         let Some(lot) = &self.lot else {
             self.motor_curve = curve;

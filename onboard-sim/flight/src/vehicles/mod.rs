@@ -1,7 +1,7 @@
 //! Reads mission and motor files into the plain types of this crate.
 //!
-//! Each module reads one kind of file and knows the built-in files by name. Its errors name the
-//! wrong key or line and the accepted values.
+//! Each module reads one kind of file and has the built-in files by name. Its errors name the wrong
+//! key or line and the accepted values.
 //!
 //! * [`mission`]: missions, from TOML.
 //! * [`motors`]: the built-in motors, by name.

@@ -28,12 +28,12 @@ pub const BUILTIN: &[(&str, &str)] = &[
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MotorError {
     /// No motor has this name.
-    #[error("no motor is named '{name}'; these are built in: {known}")]
+    #[error("no motor is named '{name}'; these are built in: {available}")]
     Unknown {
-        /// The name asked for.
+        /// The requested name.
         name: String,
         /// The names there are.
-        known: String,
+        available: String,
     },
     /// The file does not parse.
     #[error("motor '{name}'")]
@@ -50,10 +50,10 @@ pub fn names() -> impl Iterator<Item = &'static str> {
     BUILTIN.iter().map(|(name, _)| *name)
 }
 
-/// Whether a built-in motor is produced, and the day on which that was so (YYYY-MM-DD): its file
-/// says it.
+/// Production status of a built-in motor, and the day of that information (YYYY-MM-DD), from its
+/// file.
 pub fn status(name: &str) -> Option<(bool, &'static str)> {
-    let (_, text) = BUILTIN.iter().find(|(known, _)| *known == name)?;
+    let (_, text) = BUILTIN.iter().find(|(available, _)| *available == name)?;
     let line = text.lines().find_map(|line| line.strip_prefix("; status: "))?;
     let (state, dated) = line.split_once(" production on ")?;
     Some((state == "in", dated.get(..10)?))
@@ -65,9 +65,9 @@ pub fn status(name: &str) -> Option<(bool, &'static str)> {
 ///
 /// [`MotorError::Unknown`] lists the names there are.
 pub fn builtin(name: &str) -> Result<ThrustCurve, MotorError> {
-    let Some((name, text)) = BUILTIN.iter().find(|(known, _)| *known == name) else {
-        let known = names().collect::<Vec<_>>().join(", ");
-        return Err(MotorError::Unknown { name: name.to_owned(), known });
+    let Some((name, text)) = BUILTIN.iter().find(|(available, _)| *available == name) else {
+        let available = names().collect::<Vec<_>>().join(", ");
+        return Err(MotorError::Unknown { name: name.to_owned(), available });
     };
     thrust_curve::from_rasp(text).map_err(|source| MotorError::Unusable { name, source })
 }

@@ -11,14 +11,14 @@ pub struct Simulated {
     /// About a cross axis through that centre of gravity.
     pub pitch_inertia_kg_m2: Option<f64>,
     pub roll_inertia_kg_m2: Option<f64>,
-    /// The body's cross section where it is widest, unless the design says otherwise.
+    /// The body's largest cross section, unless the design states another.
     pub reference_area_m2: Option<f64>,
 }
 
 /// Reads the first row of an exported flight, in whatever units and order its columns are.
 ///
 /// # Errors
-/// It has no row with time and mass, a unit is not known, or a stage of it separates.
+/// It has no row with time and mass, a unit is unknown, or one of its stages separates.
 pub fn read(text: &str) -> Result<Simulated, TableError> {
     let wanted = [
         ("time", "s"),

@@ -1,6 +1,7 @@
-//! Tables of numbers whose columns say their units, as programs export and test stands record them.
+//! Tables of numbers with units in their column names, as programs export and test stands record
+//! them.
 //!
-//! The first line that names the wanted columns is the header, also behind a comment sign: `# Time
+//! The first line with the required column names is the header, also behind a comment sign: `# Time
 //! (s),Mass (g)`, `time_ms;thrust_lbf`. Its separator is a semicolon, a tab or a comma. Other
 //! columns, blank lines and comments are ignored.
 
@@ -9,7 +10,7 @@ use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
 
-/// Units by what they measure, each with its factor to the first of them, which is that of the SI.
+/// Units by quantity, each with its factor to the SI unit, which is first.
 #[rustfmt::skip]
 const UNITS: [&[(&str, f64)]; 6] = [
     &[("s", 1.0), ("ms", 1e-3), ("min", 60.0)],
@@ -52,9 +53,9 @@ pub fn factor(si: &str, unit: &str) -> Result<f64, String> {
     if si == unit || si.is_empty() {
         return Ok(1.0);
     }
-    let known = UNITS.iter().find(|kind| kind[0].0 == si).copied().unwrap_or_default();
-    known.iter().find(|(name, _)| *name == unit).map(|(_, factor)| *factor).ok_or_else(|| {
-        let names = known.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
+    let available = UNITS.iter().find(|kind| kind[0].0 == si).copied().unwrap_or_default();
+    available.iter().find(|(name, _)| *name == unit).map(|(_, factor)| *factor).ok_or_else(|| {
+        let names = available.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
         format!("{} is accepted", if names.is_empty() { si } else { format!("a unit of {names}") })
     })
 }
@@ -62,12 +63,11 @@ pub fn factor(si: &str, unit: &str) -> Result<f64, String> {
 /// A line, and the numbers in it.
 pub type Row<const N: usize> = (usize, [Option<f64>; N]);
 
-/// The rows of a table, each with its line: of every wanted column (its name in small letters, its
-/// unit of the SI) the number in that unit, if there is one. The first `needed` columns must be
-/// there.
+/// The rows of a table with their line numbers: for every required column (its name in lower case,
+/// its SI unit) the number in that unit, if present. The first `needed` columns must be present.
 ///
 /// # Errors
-/// A needed column is missing, or a unit is not known; a row's: a needed number is missing.
+/// A needed column is missing, or a unit is unknown; in a row: a needed number is missing.
 pub fn rows<'a, const N: usize>(
     text: &'a str,
     wanted: &'a [(&'static str, &str); N],

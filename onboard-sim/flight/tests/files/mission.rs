@@ -22,8 +22,8 @@ fn with(name: &str, path: &str, value: impl Into<toml_edit::Value>) -> Result<Mi
     from_toml(&document.to_string(), name)
 }
 
-/// What is wrong with a mission, with the causes.
-fn told(mission: Result<Mission, MissionError>) -> String {
+/// The error of a mission, with its causes.
+fn message(mission: Result<Mission, MissionError>) -> String {
     full(&mission.unwrap_err())
 }
 
@@ -56,7 +56,8 @@ fn a_stated_key_of_the_controller_is_flown_and_named_and_what_is_measured_is_not
     expected.powered.weights.x = 0.25;
     assert_eq!(Mission { changed: Vec::new(), ..formula }, expected);
 
-    // Not the controller's: a default, a formula of the airframe, and what only this file has.
+    // Not the controller's: a default, a formula of the airframe, and values that only this file
+    // has.
     for (path, value) in [
         ("airframe.legs.damping_n_s_m", 30.0),
         ("airframe.gimbal.pivot_station_m", 0.1),
@@ -94,14 +95,14 @@ fn a_mission_without_a_launch_or_a_drop_gets_none() {
 }
 
 #[test]
-fn the_countdown_is_range_checked_and_ten_seconds_in_a_text_that_does_not_say() {
+fn the_countdown_is_range_checked_and_defaults_to_ten_seconds() {
     for (name, _) in BUILTIN {
         assert!((read(name).start.countdown_s - 10.0).abs() < 1e-12, "{name}");
     }
     let of = |countdown_s: f64| with("mk2", "start.countdown_s", countdown_s);
     assert!(of(0.0).unwrap().start.countdown_s.abs() < 1e-12);
     for wrong in [-1.0, f64::NAN, 601.0] {
-        let message = told(of(wrong));
+        let message = message(of(wrong));
         assert!(message.contains("start.countdown_s") && message.contains("must be 0 to 600"), "{message}");
     }
 }
@@ -112,7 +113,7 @@ fn the_site_is_required_and_range_checked() {
         let Site { altitude_m, temperature_c, ground_slope_deg, .. } = read(name).site;
         assert_eq!((altitude_m, temperature_c, ground_slope_deg), (625.0, None, 0.5), "{name}: Mojave");
     }
-    for (key, value, message) in [
+    for (key, value, words) in [
         ("site.latitude_deg", 89.0, "site.latitude_deg = 89: must be -85 to 85"),
         ("site.latitude_deg", f64::NAN, "site.latitude_deg = NaN: must be -85 to 85"),
         ("site.longitude_deg", 181.0, "site.longitude_deg = 181: must be -180 to 180"),
@@ -121,13 +122,13 @@ fn the_site_is_required_and_range_checked() {
         ("site.ground_slope_deg", 20.0, "site.ground_slope_deg = 20: must be 0 to 15"),
         ("estimator.gravity_m_s2", 9.81, "estimator.gravity_m_s2 = 9.81: must be 9.80665"),
     ] {
-        let refused = told(with("mk2", key, value));
-        assert!(refused.contains(message), "{refused}");
+        let refused = message(with("mk2", key, value));
+        assert!(refused.contains(words), "{refused}");
     }
     for key in ["latitude_deg", "longitude_deg", "altitude_m"] {
         let without: String =
             text_of("mk2").split_inclusive('\n').filter(|line| !line.starts_with(key)).collect();
-        let refused = told(from_toml(&without, "mk2"));
+        let refused = message(from_toml(&without, "mk2"));
         assert!(refused.contains(&format!("missing field `{key}`")), "{refused}");
     }
     let allowed_deg = with("mk2", "site.ground_slope_deg", 2.0).unwrap().estimator.ground_slope_deg;
@@ -142,7 +143,7 @@ fn place(text: &str, part: &str) -> String {
 }
 
 #[test]
-fn a_missing_key_an_unknown_key_and_a_wrong_type_are_told_with_their_place() {
+fn a_missing_key_an_unknown_key_and_a_wrong_type_are_reported_with_their_position() {
     let text = text_of("mk3");
     for (is, becomes, at, said) in [
         ("loaded_kg = 3.7\n", "", "[airframe.mass]", "missing field `loaded_kg`"),
@@ -153,11 +154,11 @@ fn a_missing_key_an_unknown_key_and_a_wrong_type_are_told_with_their_place() {
     ] {
         assert!(text.contains(is), "{is}");
         let wrong = text.replacen(is, becomes, 1);
-        let message = told(from_toml(&wrong, "club.toml"));
+        let message = message(from_toml(&wrong, "club.toml"));
         assert!(message.starts_with("club.toml: TOML parse error "), "{message}");
         assert!(message.contains(&place(&wrong, at)) && message.contains(said), "{message}");
     }
-    let message = told(from_toml("airframe = \"mk3\"", "club.toml"));
+    let message = message(from_toml("airframe = \"mk3\"", "club.toml"));
     assert!(
         message.contains("at line 1, column 12\n") && message.contains("invalid type: string"),
         "{message}"
@@ -166,7 +167,7 @@ fn a_missing_key_an_unknown_key_and_a_wrong_type_are_told_with_their_place() {
 
 /// Its place would be one in the text of the defaults.
 #[test]
-fn what_a_missing_section_should_have_is_told_with_the_name_of_the_section() {
+fn a_missing_section_is_reported_with_its_name_and_contents() {
     for (section, said) in [
         ("airframe.parachute", "club.toml: missing field `area_m2`\nin `airframe.parachute`\n"),
         ("airframe.fins", "club.toml: missing field `station_m`\nin `airframe.fins`\n"),
@@ -180,13 +181,13 @@ fn what_a_missing_section_should_have_is_told_with_the_name_of_the_section() {
             item = &mut item[key];
         }
         *item = toml_edit::Item::None;
-        assert_eq!(told(from_toml(&mission.to_string(), "club.toml")), said);
+        assert_eq!(message(from_toml(&mission.to_string(), "club.toml")), said);
     }
     // Nothing fills it in.
     let text = text_of("mk3");
     let (before, rest) = text.split_once("[airframe.mass]").unwrap();
     let without = format!("{before}[airframe.body]{}", rest.split_once("[airframe.body]").unwrap().1);
-    let message = told(from_toml(&without, "club.toml"));
+    let message = message(from_toml(&without, "club.toml"));
     assert!(
         message.contains(&place(&without, "[airframe]")) && message.contains("missing field `mass`"),
         "{message}"
@@ -221,7 +222,7 @@ fn val_hand_what_follows_from_a_builders_measures() {
     let booster = mk3.launch.unwrap().booster;
     assert!((booster.motor_curve.length_m() - 0.365).abs() < 1e-12);
     assert!((booster.propellant_station_m + 0.4175).abs() < 1e-12);
-    // What the file says is flown.
+    // Stated values are flown.
     let stated = with("mk3", "airframe.body.reference_area_m2", 0.0043).unwrap();
     assert!((stated.airframe.body.reference_area_m2 - 0.0043).abs() < 1e-15);
 }
@@ -256,7 +257,7 @@ fn other_motors_and_the_curves_half_way_to_them_are_looked_up() {
     let mk3 = read("mk3");
     let names: Vec<&str> = mk3.other_curves.iter().map(ThrustCurve::name).collect();
     assert_eq!(names, ["HP-H45W towards H45W", "H45W"]);
-    let wrong = told(from_toml(&text_of("mk3").replace("[\"H45W\"]", "[\"HP-H46W\"]"), "mk3"));
+    let wrong = message(from_toml(&text_of("mk3").replace("[\"H45W\"]", "[\"HP-H46W\"]"), "mk3"));
     assert!(wrong.starts_with("no motor is named 'HP-H46W'; these are built in: F10"), "{wrong}");
 }
 
@@ -301,7 +302,7 @@ fn a_lot_of_another_vehicle_or_with_a_slip_is_refused_by_its_key() {
         ("name = \"a\"\nburns = 4\nweighed = { motor_kg = 0.2 }", "lot.weighed.motor_kg = 0.2"),
         ("name = \"a\"\nburns = 4\ncurve = \"H45X\"", "no motor is named 'H45X'"),
     ] {
-        let message = told(from_toml(&format!("{text}\n[lot]\n{lot}"), "mk3"));
+        let message = message(from_toml(&format!("{text}\n[lot]\n{lot}"), "mk3"));
         assert!(message.contains(words), "{message}");
     }
 }
@@ -320,7 +321,7 @@ fn a_value_out_of_range_is_named_in_the_error() {
         ("estimator.frame_s", 0.0, "mk2: estimator.frame_s = 0: must be 0.001 to 0.02"),
         ("estimator.lidar_m", f64::NAN, "mk2: estimator.lidar_m = NaN: must be a finite number above 0"),
     ] {
-        assert_eq!(told(with("mk2", path, wrong)), said);
+        assert_eq!(message(with("mk2", path, wrong)), said);
     }
 }
 
@@ -367,14 +368,14 @@ fn no_number_of_a_mission_may_be_nan_or_absurd() {
         let text = effective(&read(name));
         for value in [f64::NAN, f64::INFINITY, -1e9] {
             with_each_number(&text, value, |path, changed| {
-                let told = from_toml(&changed, "changed").err().map(|error| full(&error));
+                let found = from_toml(&changed, "changed").err().map(|error| full(&error));
                 // Of the booster's fins it is the force that has a range.
                 let key = match path.strip_prefix("launch.booster.fins.") {
                     Some(_) => "launch.booster.fins",
                     None => path.split('.').rfind(|key| key.parse::<usize>().is_err()).unwrap(),
                 };
-                if !told.as_ref().is_some_and(|told| told.contains(key)) {
-                    wrong.push(format!("{path} = {value}: {told:?}"));
+                if !found.as_ref().is_some_and(|found| found.contains(key)) {
+                    wrong.push(format!("{path} = {value}: {found:?}"));
                 }
             });
         }

@@ -34,7 +34,7 @@ fn every_builtin_motor_parses_and_states_its_origin() {
 }
 
 #[test]
-fn the_error_for_an_unknown_name_lists_the_known_names() {
+fn the_error_for_an_unknown_name_lists_the_available_names() {
     let error = builtin("Z99").unwrap_err().to_string();
     assert_eq!(
         error,

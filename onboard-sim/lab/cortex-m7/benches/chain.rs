@@ -22,7 +22,7 @@ const SIZE: (u16, u16) = (100, 40);
 /// is hot for another one. A machine without a free processor core takes several times as long.
 const FLIGHT_LIMIT: Duration = Duration::from_mins(10);
 /// A key is answered within this time.
-const ASKS_WITHIN: Duration = Duration::from_secs(5);
+const ANSWERS_WITHIN: Duration = Duration::from_secs(5);
 
 /// The status of `emulate ready` when something that `emulate chain` needs is not there.
 const NOT_HERE: i32 = 2;
@@ -32,7 +32,7 @@ fn main() -> Result<(), Failure> {
     let ready = emulate(root, &["ready"]).output()?;
     if ready.status.code() == Some(NOT_HERE) {
         let why = String::from_utf8_lossy(&ready.stderr);
-        return say(&format!("NOT RUN: {}", why.trim()));
+        return print_line(&format!("NOT RUN: {}", why.trim()));
     }
     if !ready.status.success() {
         return Err(String::from_utf8_lossy(&ready.stderr).into());
@@ -68,8 +68,8 @@ fn land(root: &Path) -> Result<(), Failure> {
     // A chip sends no verdict on its landing.
     let report = end(&mut terminal, Exit::NotSeen)?;
     expect(&report, "LANDED")?;
-    say("armed, started and landed from the screen:")?;
-    say(&report)
+    print_line("armed, started and landed from the screen:")?;
+    print_line(&report)
 }
 
 /// With room for the parachute an abort opens it, and the landing motor is inhibited.
@@ -87,8 +87,8 @@ fn abort(root: &Path) -> Result<(), Failure> {
     wait(&terminal, "On the ground")?;
     let report = end(&mut terminal, Exit::RefusedOrAborted)?;
     expect(&report, "ABORTED")?;
-    say("aborted in the descent, down under the parachute:")?;
-    say(&report)
+    print_line("aborted in the descent, down under the parachute:")?;
+    print_line(&report)
 }
 
 fn wait(terminal: &Terminal, words: &str) -> Result<(), Failure> {
@@ -108,7 +108,7 @@ fn end(terminal: &mut Terminal, expected: Exit) -> Result<String, Failure> {
     terminal.type_bytes(b"q");
     // While people must keep away the station goes on without its screen, and Ctrl-C ends it.
     let asks = |window: &Window| window.shows("QUIT too early").then_some(());
-    if terminal.wait_within(ASKS_WITHIN, asks).is_some() {
+    if terminal.wait_within(ANSWERS_WITHIN, asks).is_some() {
         terminal.type_by_hand(b"quit\r");
         wait(terminal, "so the station continues")?;
         terminal.type_bytes(b"\x03");
@@ -127,7 +127,7 @@ fn expect(report: &str, words: &str) -> Result<(), Failure> {
     if report.contains(words) { Ok(()) } else { Err(format!("no {words} in:\n{report}").into()) }
 }
 
-fn say(line: &str) -> Result<(), Failure> {
+fn print_line(line: &str) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     writeln!(out, "{line}")?;
     Ok(out.flush()?)

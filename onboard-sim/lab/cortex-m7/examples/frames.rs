@@ -32,7 +32,7 @@ fn main() -> anyhow::Result<()> {
                 let ComputerFrame { input, output, state_digest } = frame.record;
                 let frame = input.frame;
                 put(&Frame { input, begin: begin.take() }, &mut frames);
-                put(&Answer { frame, output, state_digest, heard: None }, &mut recorded);
+                put(&Answer { frame, output, state_digest, radio: None }, &mut recorded);
                 written += 1;
             }
             Entry::Unreadable { .. } => bail!("{} has a record that this build cannot read", log.name()),

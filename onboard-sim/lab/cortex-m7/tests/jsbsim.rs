@@ -17,7 +17,7 @@ use sim::dispersion::Dispersion;
 use sim::draw::{Draw, draw};
 use sim::outcome::{Ending, Failure, Outcome, judge};
 use sim::sortie::Sortie;
-use sim::world::sensors::believed_start;
+use sim::world::sensors::start_with_errors;
 use sim::world::{FirstContact, Rest, RestOutcome};
 
 /// Flights of one run of the bridge.
@@ -48,7 +48,7 @@ fn order(mission: &Mission, airframe: &Path, first: usize, draws: &[Draw]) -> Va
         .enumerate()
         .map(|(number, drawn)| {
             let uncertainty = StartUncertainty::at_start(StartPoint::Apogee);
-            let believed = believed_start(&drawn.apogee, &uncertainty, drawn.flight_seed);
+            let believed = start_with_errors(&drawn.apogee, &uncertainty, drawn.flight_seed);
             json!({
                 "number": first + number,
                 "truth": serde_json::to_value(drawn.truth).unwrap(),
@@ -71,10 +71,10 @@ fn order(mission: &Mission, airframe: &Path, first: usize, draws: &[Draw]) -> Va
     })
 }
 
-/// What JSBSim tells of a flight, judged as our own flights are.
-fn judged(mission: &Mission, told: &Value) -> Outcome {
-    let number = |key: &str| told[key].as_f64().unwrap_or_else(|| panic!("{key}: {told}"));
-    let touchdown = told.get("vertical_m_s").map(|_| {
+/// Verdict on a flight in JSBSim, judged like our flights.
+fn judged(mission: &Mission, result: &Value) -> Outcome {
+    let number = |key: &str| result[key].as_f64().unwrap_or_else(|| panic!("{key}: {result}"));
+    let touchdown = result.get("vertical_m_s").map(|_| {
         // The heading does not count.
         let mut state = RigidState::upright(0.0);
         state.position_m.x = number("place_m");
@@ -93,13 +93,13 @@ fn judged(mission: &Mission, told: &Value) -> Outcome {
             weight_n: 1.0,
         }
     });
-    let rest = match told["ending"].as_str().unwrap() {
+    let rest = match result["ending"].as_str().unwrap() {
         "upright" => Some(RestOutcome::Upright),
         "tipped over" => Some(RestOutcome::TippedOver),
         "body strike" => Some(RestOutcome::BodyStrike),
         _ => None,
     };
-    let ignited = told["ignited_m"].is_number();
+    let ignited = result["ignited_m"].is_number();
     judge(
         mission,
         &Ending {
@@ -107,8 +107,8 @@ fn judged(mission: &Mission, told: &Value) -> Outcome {
             rest: rest.map(|outcome| Rest { time_s: number("time_s"), outcome, tilt_rad: 0.0, strain: None }),
             phase: flight::rules::phase::Phase::Touchdown,
             ignited,
-            lit: ignited,
-            parachute: told["parachute"].as_bool().unwrap(),
+            motor_started: ignited,
+            parachute: result["parachute"].as_bool().unwrap(),
             finite: true,
         },
     )
@@ -161,8 +161,8 @@ fn fly(mission: &Mission, wind_m_s: f64, flights: u64) -> Flown {
         bridge.arg(env!("CARGO_BIN_EXE_board")).arg(&path);
         let Ended { code, output } = Running::to_end(&mut bridge);
         assert_eq!(code, Some(0), "{output}");
-        let told = output.lines().filter(|line| line.starts_with('{'));
-        theirs.extend(told.map(|line| judged(mission, &serde_json::from_str(line).unwrap())));
+        let results = output.lines().filter(|line| line.starts_with('{'));
+        theirs.extend(results.map(|line| judged(mission, &serde_json::from_str(line).unwrap())));
     }
     assert_eq!(theirs.len(), draws.len());
     let in_our_world = |drawn: &Draw| Sortie::drawn_as(mission, &dispersion, drawn).unwrap().run();

@@ -50,7 +50,7 @@ impl Chain {
 }
 
 #[test]
-fn a_board_with_a_radio_of_its_own_is_armed_started_and_lands() {
+fn a_board_with_a_radio_is_armed_started_and_lands() {
     let folder = tempfile::tempdir().unwrap();
     let chain = Chain::start(folder.path());
     let mut ground = Running::start(&mut auto_ground(folder.path(), &[&chain.radio.far_link()]));

@@ -11,7 +11,7 @@ use crate::add_multiple;
 use super::stage::{ACCELERATIONS, Bend, DIRECTIONS, LandingInterval};
 use super::{Drag, INPUTS, Nose, Problem, Push, State, Vector, dot, plus, times};
 
-/// What an interval is computed from: nose, rates and air at their means.
+/// Inputs of an interval: nose, rates and air at their means.
 struct Middle<'a> {
     problem: &'a Problem,
     push: &'a Push,
@@ -286,7 +286,7 @@ pub(super) fn evaluated(
 /// Smooths the size of a velocity, m^2/s^2.
 const SMOOTH: f64 = 1e-4;
 
-/// The air's acceleration times the mass, N, and what its derivatives need.
+/// The aerodynamic acceleration times the mass, N, and the terms of its derivatives.
 pub(super) struct Air {
     pub(super) force: Vector,
     pub(super) v: Vector,

@@ -1,14 +1,14 @@
 //! The landing as an optimal-control problem in space, and its solver: the nose may lean in any
 //! direction.
 //!
-//! [`solve`] takes a [`Problem`] and, if there is one, a [`Start`]; its [`Outcome`] says how the
-//! solve ended, and the [`Workspace`] has the path. The crate's page has the solver's formulation
-//! and its references. Exact second derivatives are needed: the multiplier of the end height is
-//! large, so the curvature of the dynamics counts.
+//! [`solve`] takes a [`Problem`] and, if there is one, a [`Start`]; its [`Outcome`] has the status
+//! of the solve, and the [`Workspace`] the path. The crate's page has the solver's formulation and
+//! its references. Exact second derivatives are needed: the multiplier of the end height is large,
+//! so the curvature of the dynamics counts.
 //!
 //! A surplus of impulse is best wasted with a lean of constant size whose direction turns once
-//! around: the vehicle then never passes through upright on the way, as it must in a plane, and
-//! comes to rest sideways by itself.
+//! around: the vehicle then never passes through upright on the way, as it must in a plane, and its
+//! sideways motion ends by itself.
 //!
 //! Ground frame: `x`, `y` level, `z` up. The nose is `n = (sin p, cos p sin r, cos p cos r)`, so
 //! `p` is the lean towards `x` and `r` the lean towards `y`, both zero upright. States are the
@@ -49,10 +49,11 @@ pub type State = [f64; STATES];
 pub const LANDING_MISS: f64 = 1e-3;
 
 /// Barrier of a cold solve's first iteration. A cold solve takes 62 iterations (geometric mean of
-/// 200 starts) with 1000 and 51 with 30: of 175 landings eight are then cheaper and two dearer.
+/// 200 starts) with 1000 and 51 with 30: of 175 landings eight then have a lower and two a higher
+/// cost.
 const FIRST_BARRIER: f64 = 30.0;
 
-/// When a solve ends, and what a broken condition costs.
+/// Termination limits of a solve, and the cost of a broken condition.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct SolverLimits {
@@ -67,8 +68,8 @@ pub struct SolverLimits {
 /// The buffers of a solve, and its result.
 pub type Workspace = crate::Workspace<Problem, STATES, INPUTS>;
 
-/// [`crate::Workspace::solve`], compiled here with the solver's settings: a program may compile
-/// what calls it for size.
+/// [`crate::Workspace::solve`], compiled here with the solver's settings: a program may compile its
+/// callers for size.
 pub fn solve(
     workspace: &mut Workspace,
     problem: &Problem,
@@ -82,7 +83,7 @@ pub fn lagrangian(workspace: &mut Workspace, problem: &Problem, solution: &Start
     workspace.lagrangian(problem, solution)
 }
 
-/// What an interval has of its own.
+/// Data of one interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Push {
     /// Thrust over mass, m/s^2.
@@ -211,27 +212,27 @@ const BOX: usize = 12;
 const END: usize = 2;
 const LEAN: usize = 4;
 
-/// Turns of the cold guesses' lean: once around, once the other way. Upright is only tried if
+/// Turns of the cold guesses' lean: once around in either direction. Upright is only tried if
 /// neither lands.
 const TURNS: [f64; 3] = [1.0, -1.0, 0.0];
 const TURNING: usize = 2;
 
-/// Writes the conditions' multipliers of the last `kept` of a solution's `intervals`; see
+/// Writes the conditions' multipliers of the last `remaining` of a solution's `intervals`; see
 /// `append_conditions` for their order.
 pub fn last_multipliers(
     all: &[f64],
     settled_nodes: usize,
     intervals: usize,
-    kept: usize,
+    remaining: usize,
     into: &mut Vec<f64>,
 ) {
-    let gone = intervals - kept;
+    let flown = intervals - remaining;
     let lean = BOX * settled_nodes + END;
     let floor = lean + LEAN * (intervals - 1);
     into.clear();
     into.extend_from_slice(&all[..lean]);
-    into.extend_from_slice(&all[lean + LEAN * gone..floor]);
-    into.extend_from_slice(&all[floor + gone..]);
+    into.extend_from_slice(&all[lean + LEAN * flown..floor]);
+    into.extend_from_slice(&all[floor + flown..]);
 }
 
 impl Problem {

@@ -10,7 +10,7 @@
 //! (A, B)' P (A, B) = E' P E + Y' D + D' Y,   Y = G' P E + (G' P G) D / 2
 //! ```
 //!
-//! which is half the arithmetic of whole matrices, in half of their memory.
+//! which is half the arithmetic of full matrices, in half of their memory.
 #![expect(clippy::inline_always, reason = "inlined into the sweeps, to be compiled for their vectors")]
 
 use crate::intervals::add_times;
@@ -22,8 +22,7 @@ use super::{INPUTS, STATES, State};
 /// Places: nothing depends on them.
 const PLACES: usize = 3;
 
-/// What the accelerations depend on: velocity, leans and rates, in the states' order, and the
-/// inputs.
+/// Variables of the accelerations: velocity, leans and rates, in the states' order, and the inputs.
 pub(super) const DIRECTIONS: usize = MOVING + INPUTS;
 const MOVING: usize = STATES - PLACES;
 

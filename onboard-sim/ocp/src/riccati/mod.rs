@@ -10,7 +10,7 @@
 //! only the curvature along them is needed. The costates come from their own recursion, which does
 //! not use `P`.
 //!
-//! The system has the right inertia exactly if `B' P B` plus the inputs' own curvature is positive
+//! The system has the right inertia exactly if `B' P B` plus the inputs' curvature is positive
 //! definite at every stage ([`Factor`](crate::Factor)).
 #![expect(clippy::inline_always, reason = "what is to be compiled for wide vectors must be inlined there")]
 

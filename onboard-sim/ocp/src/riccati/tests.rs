@@ -1,4 +1,4 @@
-//! What the tests of the solver ask of a step.
+//! Interface of a step to the solver's tests.
 
 use core::array::from_fn;
 

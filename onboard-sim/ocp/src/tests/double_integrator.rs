@@ -2,7 +2,7 @@
 //! several solves.
 
 use super::polynomial::{Polynomial, Term, at_least, equals, within};
-use super::{Kept, Optimality, solved};
+use super::{Optimality, Solution, solved};
 use crate::{Status, Workspace};
 
 pub(super) const INTERVALS: usize = 40;
@@ -82,8 +82,8 @@ fn a_target_out_of_reach_costs_its_penalty() {
 
 // A bound on the work of several solves together.
 
-/// With one pass a cold solve evaluates its guess and ends there; with many it finds what it finds
-/// without a bound, bit for bit.
+/// With one pass a cold solve evaluates its guess and ends there; with many it has the same result
+/// as without a bound, bit for bit.
 #[test]
 fn a_solve_ends_when_its_passes_are_spent() {
     let model = problem(0.27);
@@ -99,10 +99,10 @@ fn a_solve_ends_when_its_passes_are_spent() {
     }
     assert_eq!(done[0], 0, "the guess is evaluated, and that is more than a pass");
     assert!(done.is_sorted() && done.last() == Some(&whole.iterations), "{done:?}");
-    assert_eq!(Kept::of(&bounded).farthest_input(&Kept::of(&free)).to_bits(), 0.0_f64.to_bits());
+    assert_eq!(Solution::of(&bounded).farthest_input(&Solution::of(&free)).to_bits(), 0.0_f64.to_bits());
 }
 
-/// What a solve has spent is missing in the next one.
+/// Passes used by a solve are missing in the next one.
 #[test]
 fn solves_share_their_passes() {
     let model = problem(0.27);

@@ -1,4 +1,4 @@
-//! Random linear dynamics with random costs of whole matrices, against a dense solve.
+//! Random linear dynamics with random costs of full matrices, against a dense solve.
 
 use core::array::from_fn;
 
@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
 
 use super::polynomial::{Polynomial, Term, at_least, equals, within};
-use super::{Kept, Optimality, solved};
+use super::{Optimality, Solution, solved};
 use crate::{Model, Status};
 
 const INTERVALS: usize = 12;
@@ -130,11 +130,11 @@ fn limited<const NX: usize, const NU: usize>(seed: u64) -> usize {
     found.assert_within(1e-5);
 
     // A little further away, the warm solve finds the optimum, too, which is the only one.
-    let kept = Kept::of(&workspace);
+    let solution = Solution::of(&workspace);
     model.initial[0] += 0.02;
     let (mut workspace, _) = solved(&model);
-    let (cold, cold_errors) = (Kept::of(&workspace), Optimality::of(&model, &workspace));
-    let outcome = workspace.solve(&model, Some(&kept.start()));
+    let (cold, cold_errors) = (Solution::of(&workspace), Optimality::of(&model, &workspace));
+    let outcome = workspace.solve(&model, Some(&solution.start()));
     assert_eq!(outcome.status, Status::Converged, "{outcome:?}");
     let warm_errors = Optimality::of(&model, &workspace);
     warm_errors.assert_within(1e-5);
@@ -146,7 +146,7 @@ fn limited<const NX: usize, const NU: usize>(seed: u64) -> usize {
     let gradient = cold_errors.gradient + warm_errors.gradient;
     let bound = ((cold_errors.gap + warm_errors.gap) / LEAST_WEIGHT).sqrt()
         + gradient * components.sqrt() / LEAST_WEIGHT;
-    let apart = Kept::of(&workspace).farthest_input(&cold);
+    let apart = Solution::of(&workspace).farthest_input(&cold);
     assert!(apart < bound, "{apart} {bound}");
     assert!(bound < 0.01, "the bound says something: {bound}");
     found.at_limit + found.held

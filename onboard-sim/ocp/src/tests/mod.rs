@@ -1,5 +1,5 @@
 //! The solver on problems of several sizes: 2 states and 1 input, 4 and 2, 5 and 3, 13 and 3; and
-//! the optimality conditions, evaluated without the solver's own code.
+//! the optimality conditions, evaluated without the solver's code.
 
 mod double_integrator;
 mod linear_quadratic;
@@ -17,8 +17,8 @@ fn solved<M: Model<NX, NU>, const NX: usize, const NU: usize>(model: &M) -> (Wor
     (workspace, outcome)
 }
 
-/// A solution, kept.
-struct Kept<const NX: usize, const NU: usize> {
+/// A stored solution.
+struct Solution<const NX: usize, const NU: usize> {
     states: Vec<[f64; NX]>,
     inputs: Vec<[f64; NU]>,
     costates: Vec<[f64; NX]>,
@@ -26,7 +26,7 @@ struct Kept<const NX: usize, const NU: usize> {
     condition_multipliers: Vec<f64>,
 }
 
-impl<const NX: usize, const NU: usize> Kept<NX, NU> {
+impl<const NX: usize, const NU: usize> Solution<NX, NU> {
     fn of<M: Model<NX, NU>>(workspace: &Workspace<M, NX, NU>) -> Self {
         Self {
             states: workspace.states().to_vec(),
@@ -49,9 +49,9 @@ impl<const NX: usize, const NU: usize> Kept<NX, NU> {
     }
 }
 
-// The optimality conditions of a solution, evaluated without the solver's own code.
+// The optimality conditions of a solution, evaluated without the solver's code.
 
-/// The largest errors of the optimality conditions, and what they hold for.
+/// The largest errors of the optimality conditions.
 #[derive(Debug, Default)]
 struct Optimality {
     /// Gradient of the Lagrangian.

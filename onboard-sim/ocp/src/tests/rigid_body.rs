@@ -1,8 +1,8 @@
-//! A rigid body under a constant thrust along its own axis, turned by three torques: 13 states, 3
+//! A rigid body under a constant thrust along its axis, turned by three torques: 13 states, 3
 //! inputs. Also the sweeps alone.
 
 use super::polynomial::{Polynomial, Term, diagonal, equals, within};
-use super::{Kept, Optimality, solved};
+use super::{Optimality, Solution, solved};
 use crate::{Status, Workspace};
 
 /// Positions, velocities, the quaternion (scalar first) from body to ground, and the rates of the
@@ -85,7 +85,7 @@ fn a_turning_flight_meets_the_optimality_conditions() {
 fn inputs_alone_are_a_start() {
     let model = problem(0.2);
     let (mut workspace, _) = solved(&model);
-    let cold = Kept::of(&workspace);
+    let cold = Solution::of(&workspace);
     let start = crate::Start {
         states: &[],
         costates: &[],
@@ -95,14 +95,14 @@ fn inputs_alone_are_a_start() {
     };
     let outcome = workspace.solve(&model, Some(&start));
     assert_eq!(outcome.status, Status::Converged, "{outcome:?}");
-    assert!(Kept::of(&workspace).farthest_input(&cold) < 1e-4);
+    assert!(Solution::of(&workspace).farthest_input(&cold) < 1e-4);
 }
 
 #[test]
 fn a_used_workspace_gives_the_same_bits_and_does_not_allocate() {
     let model = problem(0.2);
     let (fresh, _) = solved(&model);
-    let plan = Kept::of(&fresh);
+    let plan = Solution::of(&fresh);
     let mut other = model.clone();
     other.initial[V] = 0.3;
     let mut used = Workspace::default();
@@ -130,11 +130,11 @@ fn numbers_that_are_not_finite_give_a_status_and_not_a_panic() {
 // The sweeps alone.
 
 /// States and costates satisfy their equations by construction of the sweeps. If the inputs satisfy
-/// theirs, too, the step solves the whole Newton system.
+/// theirs, too, the step solves the complete Newton system.
 #[test]
 fn the_sweeps_solve_the_newton_system() {
     let mut model = problem(0.2);
-    let plan = Kept::of(&solved(&model).0);
+    let plan = Solution::of(&solved(&model).0);
     for kick in [0.0, 0.3, -0.5] {
         model.initial[3] = kick;
         let mut workspace = Workspace::default();
@@ -153,7 +153,7 @@ fn the_sweeps_solve_the_newton_system() {
 #[test]
 fn the_width_of_the_vectors_does_not_change_any_bit() {
     let model = problem(0.2);
-    let plan = Kept::of(&solved(&model).0);
+    let plan = Solution::of(&solved(&model).0);
     let mut workspace = Workspace::default();
     workspace.load(&model, &plan.start());
     workspace.evaluate_intervals(&model);

@@ -1,5 +1,5 @@
-//! A simulated flight as log records: the flight computer's frames, what it thought, and the truth.
-//! A replay runs the flight computer again from the frames.
+//! A simulated flight as log records: the flight computer's frames, its estimates, and the truth. A
+//! replay runs the flight computer again from the frames.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use crate::outside::Watch;
 use crate::recipe::Recipe;
 use crate::sortie::Sortie;
 use crate::world::Strain;
-use flight::computer::news::Severity;
+use flight::computer::messages::Severity;
 use flight::computer::pilot::Pilot;
 use flight::computer::{Computer, Input, Output};
 use flight::rules::phase::Phase;
@@ -20,7 +20,7 @@ use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::v1;
 use protocol::log::writer::LogHeader;
 
-use avionics::log::frame::{frame_to_log, start_to_log, thought_to_log};
+use avionics::log::frame::{estimate_to_log, frame_to_log, start_to_log};
 use avionics::log::logged::Logged as _;
 
 /// The header of the log of a simulated flight.
@@ -77,11 +77,11 @@ impl Watch for LastFrame {
 
 /// The pilot's estimate after the frame that was just flown.
 pub fn estimate(pilot: &Pilot) -> Option<Record> {
-    thought_to_log(pilot).map(|estimate| Record::Estimate(Box::new(estimate)))
+    estimate_to_log(pilot).map(|estimate| Record::Estimate(Box::new(estimate)))
 }
 
-/// What the flight computer thought in the frame that was just flown, and the truth.
-pub fn thought_and_truth(flight: &Sortie) -> Vec<Record> {
+/// The flight computer's estimate in the frame just flown, and the truth.
+pub fn estimate_and_truth(flight: &Sortie) -> Vec<Record> {
     let thought = estimate(flight.pilot()).filter(|_| !flight.computer_is_dead());
     thought.into_iter().chain([Record::TruthSample(Box::new(truth(flight)))]).collect()
 }
@@ -137,7 +137,7 @@ pub fn time_ns(flight: &Sortie) -> u64 {
 /// The last frame's records, and a change of phase since `phase`.
 pub fn frame_and_phase(flight: &Sortie, last: &mut LastFrame, phase: Phase) -> Vec<Record> {
     let mut records: Vec<Record> = last.take().map(Record::ComputerFrame).into_iter().collect();
-    records.extend(thought_and_truth(flight));
+    records.extend(estimate_and_truth(flight));
     let now = flight.computer().mode().phase;
     if now != phase {
         records.push(phase_event(phase, now));
@@ -161,7 +161,7 @@ pub fn phase_event(from: Phase, to: Phase) -> Record {
     text_event(Severity::Info, &format!("phase {} to {}", from.name(), to.name()))
 }
 
-/// The verdict on a finished flight; `None` if it did not come down.
+/// The verdict on a finished flight; `None` if the vehicle did not reach the ground.
 pub fn verdict(flight: &Sortie) -> Option<v1::LandingVerdict> {
     let outcome = flight.outcome();
     let touchdown = outcome.touchdown.as_ref()?;
@@ -193,7 +193,7 @@ pub fn verdict(flight: &Sortie) -> Option<v1::LandingVerdict> {
     })
 }
 
-/// Each limit with its result, as records; what is not limited has none.
+/// Each limit with its result, as records; unlimited quantities have none.
 pub fn limits_to_log(verdict: &LandingVerdict) -> Vec<v1::LimitResult> {
     let limits = verdict.results.iter().filter(|result| !result.highest.is_infinite());
     let limits = limits.map(|result| v1::LimitResult {

@@ -83,7 +83,7 @@ pub(crate) struct Flow {
 pub(crate) struct Configuration {
     /// Sines of the fins' opening angles.
     pub(crate) fin_sines: [f64; 4],
-    /// The legs stand out: on the booster they are folded.
+    /// The legs are deployed: on the booster they are folded.
     pub(crate) legs_out: bool,
     /// Parachute's drag area, m^2.
     pub(crate) parachute_area_m2: f64,
@@ -127,7 +127,7 @@ impl WithSimd for Blown<'_> {
 }
 
 impl Shape {
-    /// The shape of an airframe, its forces scaled as the truth says.
+    /// The shape of an airframe, with its forces scaled by the truth.
     pub(crate) fn new(airframe: &Airframe, truth: &Truth) -> Self {
         let (body, fins) = (&airframe.body, airframe.fin_model());
         let strip_m = body.length_m / STRIPS as f64;
@@ -208,9 +208,9 @@ impl Shape {
         load.moment_n_m += Vector3::new(roll_n_m, turning_n_m[0], turning_n_m[1]);
     }
 
-    /// Legs and fins, each in the wind where it is. The drag is along it: legs are tubes and struts
-    /// in every direction. The lift of a fin is across both the wind and the fin's own direction
-    /// from the axis.
+    /// Legs and fins, each in the wind at its position. The drag is along the wind: legs are tubes
+    /// and struts in every direction. The lift of a fin is across both the wind and the fin's
+    /// direction from the axis.
     #[inline(always)]
     fn add_points(&self, load: &mut Load, flow: &Flow, half_density: f64, configuration: &Configuration) {
         let Configuration { fin_sines, legs_out, plume, cg_m, .. } = configuration;
@@ -313,7 +313,8 @@ impl Parachute {
 mod tests {
     use super::*;
 
-    /// What legs of 0.01 m2 add at 30 m/s from the tail, 20 degrees from the side, and in a roll.
+    /// Contribution of legs of 0.01 m2 at 30 m/s from the tail, 20 degrees from the side, and in a
+    /// roll.
     #[test]
     fn val_hand_air_on_the_legs() {
         let mut airframe = flight::vehicles::mission::builtin_airframe("mk2").unwrap();

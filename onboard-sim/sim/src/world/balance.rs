@@ -26,7 +26,8 @@ pub struct AcrossForce {
     /// Force over dynamic pressure, m^2; positive if it pushes the vehicle away from the wind, as
     /// it always does.
     pub area_m2: f64,
-    /// The station at which this force alone has the whole moment of the air, m above the nozzle.
+    /// The station at which this force alone has the complete aerodynamic moment, m above the
+    /// nozzle.
     pub centre_of_pressure_m: f64,
 }
 

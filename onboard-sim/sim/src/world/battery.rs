@@ -1,4 +1,4 @@
-//! The battery of the vehicle: charge, voltage under load, and what the vehicle draws.
+//! The battery of the vehicle: charge, voltage under load, and the vehicle's consumption.
 //!
 //! Two lithium-polymer cells of 1 Ah. Nothing of it was measured on this vehicle.
 //!
@@ -31,7 +31,7 @@ const STEADY_A: f64 = 0.35;
 const SERVO_HOLDS_A: f64 = 0.02;
 /// A small servo in motion, A.
 const SERVO_MOVES_A: f64 = 0.7;
-/// Current through a lit igniter, A.
+/// Current through an ignited igniter, A.
 const IGNITER_A: f64 = 5.0;
 /// A surface that turned by more than this in a frame, rad, is moved by its servo: 2 deg/s.
 const MOVES_RAD: f64 = 1.7e-4;
@@ -46,13 +46,13 @@ pub struct Battery {
 }
 
 impl Battery {
-    /// A battery with this charge, 0 to 1, in a vehicle whose surfaces stand at these angles, rad.
+    /// A battery with this charge, 0 to 1, in a vehicle with its surfaces at these angles, rad.
     pub fn new(charge: f64, surfaces_rad: [f64; 6]) -> Self {
         let current_a = STEADY_A + 6.0 * SERVO_HOLDS_A;
         Self { charge: charge.clamp(0.0, 1.0), current_a, surfaces_rad }
     }
 
-    /// Lets a frame of this length, s, pass, at whose end the surfaces stand at these angles, rad.
+    /// Advances by a frame of this length, s, at whose end the surfaces are at these angles, rad.
     pub fn step(&mut self, surfaces_rad: [f64; 6], igniters: usize, step_s: f64) {
         let before = core::mem::replace(&mut self.surfaces_rad, surfaces_rad);
         let moving =
@@ -69,12 +69,12 @@ impl Battery {
         CELLS * cell_at_rest_v(self.charge) - RESISTANCE_OHM * self.current_a
     }
 
-    /// What is drawn, A.
+    /// Current drawn, A.
     pub fn current_a(&self) -> f64 {
         self.current_a
     }
 
-    /// What is left of the full charge, 0 to 1, as a gauge that counts it would know.
+    /// Remaining share of the full charge, 0 to 1, as a coulomb counter measures it.
     pub fn charge(&self) -> f64 {
         self.charge
     }

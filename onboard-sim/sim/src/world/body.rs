@@ -143,7 +143,7 @@ mod tests {
 
     /// The same top, built in askew: it turns as one that is aligned and seen from axes askew.
     #[test]
-    fn val_euler_a_body_askew_keeps_its_momentum_and_its_energy() {
+    fn val_euler_a_skewed_body_conserves_momentum_and_energy() {
         let askew = [0.05, -0.03];
         let inertia =
             Inertia { mass_kg: 2.0, across_kg_m2: [0.12; 2], roll_kg_m2: 0.02, principal_rad: askew };
@@ -165,10 +165,10 @@ mod tests {
         assert!((state.rate_rad_s.x - 6.0).abs() > 1e-3, "{}", state.rate_rad_s);
     }
 
-    /// A body with three inertias that spins about the middle one turns over and back, and keeps
-    /// momentum and energy.
+    /// A body with three inertias that spins about the middle one turns over and back, and
+    /// conserves momentum and energy.
     #[test]
-    fn val_euler_three_inertias_keep_momentum_and_energy() {
+    fn val_euler_three_inertias_conserve_momentum_and_energy() {
         let inertia =
             Inertia { mass_kg: 2.0, across_kg_m2: [0.13, 0.11], roll_kg_m2: 0.02, principal_rad: [0.0; 2] };
         let diagonal = Vector3::new(0.02, 0.13, 0.11);

@@ -2,12 +2,12 @@
 //! dampers, and their feet have friction. The vehicle is broken if any other part touches the
 //! ground.
 //!
-//! A leg may have a block that crushes in series with its spring and damper. Its foot then slides
-//! in a guide along the body's axis and stays where it was pushed. The block gives way when the
-//! force along the axis exceeds its own and what the guide adds: a share of the force across, which
-//! friction on the ground and a tilt bring about. A foot has no mass of its own: the body carries
-//! it, and the block stops a little more than it has to. Its friction on the ground is that of a
-//! foot which moves with the body, also while it slides in its guide. Legs do not bend across.
+//! A leg may have a crushable block in series with its spring and damper. Its foot then slides in a
+//! guide along the body's axis and stays where it was pushed. The block crushes when the axial
+//! force exceeds its crush force plus the guide's contribution: a share of the transverse force,
+//! which friction on the ground and a tilt cause. A foot has no mass: the body carries it, and the
+//! block absorbs slightly more than necessary. Its friction on the ground is that of a foot which
+//! moves with the body, also while it slides in its guide. Legs do not bend.
 //!
 //! Contact by springs, dampers and Coulomb's friction: G. Gilardi and I. Sharf, "Literature survey
 //! of contact dynamics modelling", Mechanism and Machine Theory 37, 2002.
@@ -22,8 +22,8 @@ use crate::world::aero::Load;
 /// Sliding speed below which friction fades out, m/s: the friction of a foot at rest has no
 /// direction.
 const SLIDING_M_S: f64 = 0.05;
-/// A part of a step may last so many time constants of the feet's friction; Runge-Kutta's fourth
-/// order is stable to 2.78.
+/// Length of a part of a step, in time constants of the feet's friction; Runge-Kutta's fourth order
+/// is stable to 2.78.
 const STIFFEST: f64 = 1.5;
 /// Most parts of a step. Legs that crush press mk3's feet with 470 N, and turn its slim body 34,000
 /// times per second.
@@ -43,7 +43,7 @@ pub struct FirstContact {
     pub time_s: f64,
     /// The last state before contact, at most a quarter of a millisecond earlier.
     pub state: RigidState,
-    /// What the legs feel of it.
+    /// The touchdown at the legs.
     pub over_ground: Touchdown,
     pub thrust_n: f64,
     pub weight_n: f64,
@@ -58,14 +58,14 @@ pub struct Rest {
     pub outcome: RestOutcome,
     /// Angle between nose and vertical, rad.
     pub tilt_rad: f64,
-    /// What its legs have borne, if they can give way.
+    /// Loads of its legs, if they are crushable.
     pub strain: Option<Strain>,
 }
 
-/// What legs that can give way have borne since the first contact.
+/// Loads of crushable legs since the first contact.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Strain {
-    /// Largest share of its stroke that a leg has given way; at 1 the block has become solid.
+    /// Largest share of its stroke that a leg has crushed; at 1 the block is solid.
     pub stroke_used: f64,
     /// Largest force at a foot over the leg's strength in that direction.
     pub strength_used: f64,
@@ -93,10 +93,9 @@ pub(crate) struct Ground {
     damping_n_s_m: f64,
     friction: f64,
     crush: Option<Crush>,
-    /// Positions of the feet relative to the nozzle exit, m; a leg that has given way has a higher
-    /// foot.
+    /// Positions of the feet relative to the nozzle exit, m; a crushed leg has a higher foot.
     feet_m: [Vector3<f64>; 4],
-    /// How far each leg has given way, m.
+    /// Crushed length of each leg, m.
     pub(crate) given_m: [f64; 4],
     strain: Strain,
     /// Positions of the rims at nozzle and nose relative to the nozzle exit, m.
@@ -105,12 +104,12 @@ pub(crate) struct Ground {
     upwards: Vector3<f64>,
     /// The same direction, of length 1.
     normal: Vector3<f64>,
-    /// Sum of the forces on the feet when they were last looked at, N.
+    /// Sum of the forces on the feet at their last evaluation, N.
     pressed_n: f64,
     still_s: f64,
 }
 
-/// What touches the ground.
+/// The parts that touch the ground.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Contact {
     pub(crate) feet: usize,
@@ -155,7 +154,7 @@ impl Ground {
         state.position_m.dot(&self.upwards) + below_cg
     }
 
-    /// What touches the ground.
+    /// The parts that touch the ground.
     pub(crate) fn contact(&self, state: &RigidState, cg_m: &Vector3<f64>) -> Contact {
         let up_in_body = state.world_from_body.inverse_transform_vector(&self.upwards);
         let cg_height_m = state.position_m.dot(&self.upwards);
@@ -182,8 +181,8 @@ impl Ground {
         }
     }
 
-    /// How far the ground has pushed a foot in, m, the force on it in the world, N, and along the
-    /// normal the force at which its leg gives way, N; `None` in the air.
+    /// Penetration of a foot, m, the force on it in the world, N, and the normal force at which its
+    /// leg crushes, N; `None` in the air.
     fn on_foot(
         &self,
         foot: usize,
@@ -215,8 +214,8 @@ impl Ground {
         Some((depth_m, sliding * (-self.friction * normal_n / fading) + normal * normal_n, yields_n))
     }
 
-    /// Notes how hard the feet press. Legs that are pushed in further than their springs reach at
-    /// the force that crushes them give way.
+    /// Records the forces on the feet. Legs that are compressed beyond their springs' travel at the
+    /// crush force crush.
     pub(crate) fn give_way(&mut self, state: &RigidState, cg_m: &Vector3<f64>) {
         let world_from_body = state.world_from_body.to_rotation_matrix();
         self.pressed_n = 0.0;
@@ -262,7 +261,7 @@ impl Ground {
         (libm::ceil(damping_per_s * step_s / STIFFEST) as usize).clamp(1, MOST_PARTS)
     }
 
-    /// What the legs have borne so far, if they can give way and have met the ground.
+    /// Loads of the legs so far, if they are crushable and have touched the ground.
     pub(crate) fn strain(&self) -> Option<Strain> {
         self.strain.clearance_m.is_finite().then_some(self.strain)
     }
@@ -353,7 +352,7 @@ mod tests {
         }
     }
 
-    /// What a landing loses in energy went into the blocks, their guides, friction and bent legs.
+    /// The energy lost in a landing is in the blocks, their guides, friction and bent legs.
     #[test]
     fn val_hand_blocks_guides_friction_and_springs_take_the_energy_of_a_landing() {
         const STEP_S: f64 = 2e-5;

@@ -2,8 +2,8 @@
 //! place.
 //!
 //! Rope and vehicle are one line. The swing is that of a mathematical pendulum with small angles
-//! (L. D. Landau and E. M. Lifshitz, Mechanics, 3rd edition, section 21), and nothing damps it: the
-//! vehicle moves as told here until the drone lets it go.
+//! (L. D. Landau and E. M. Lifshitz, Mechanics, 3rd edition, section 21), without damping: the
+//! vehicle follows it until the drone releases it.
 
 use core::f64::consts::TAU;
 
@@ -90,8 +90,8 @@ mod tests {
             assert!((acceleration - felt).norm() < 1e-6);
             let turned = (before.0.world_from_body.inverse() * after.0.world_from_body).scaled_axis();
             assert!((turned / (2.0 * step_s) - now.0.rate_rad_s).norm() < 1e-6);
-            // Of the weight the rope carries only the part along itself, and what the swing adds:
-            // nothing pulls sideways but the drone's own acceleration.
+            // The rope carries only the weight's component along itself, and the swing's force:
+            // nothing pulls sideways but the drone's acceleration.
             let sideways = now.1 - Vector3::x() * now.1.x;
             assert!(sideways.norm() < 0.36, "{}", now.1);
         }

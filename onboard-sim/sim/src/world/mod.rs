@@ -4,17 +4,17 @@
 //! same arguments give the same bits on any machine. The flight code sees only what `sensors`
 //! measures. Frames are those of [`flight::vehicle::rigid`].
 //!
-//! * [`whole`]: all parts together, one millisecond at a time.
+//! * [`plant`]: all parts together, one millisecond at a time.
 //! * `body`, `aero`, `motor`, `servo`, [`ground`]: the parts, one model each; the parachute is in
 //!   `aero`.
-//! * `battery`: its voltage under what the vehicle draws.
-//! * [`hanging`]: the vehicle below a drone; on its booster it is a part of [`whole`].
+//! * `battery`: its voltage under the vehicle's load.
+//! * [`hanging`]: the vehicle below a drone; on its booster it is a part of [`plant`].
 //! * [`wind`]: the mean wind over height, and gusts.
 //! * [`sensors`]: the measurements that the flight computer gets.
 //! * [`balance`]: the centre of pressure of a tail-first fall, which decides whether it is stable.
 //! * `normal`: the random numbers of sensors and gusts.
-//! * [`truth`]: how the true vehicle and the weather of one flight differ from the nominal data,
-//!   and what can break.
+//! * [`truth`]: deviations of the true vehicle and weather of one flight from the nominal data, and
+//!   their faults.
 
 mod aero;
 pub mod balance;
@@ -24,10 +24,10 @@ pub mod ground;
 pub mod hanging;
 mod motor;
 pub(crate) mod normal;
+pub mod plant;
 pub mod sensors;
 mod servo;
 pub mod truth;
-pub mod whole;
 pub mod wind;
 
 use serde::Serialize;
@@ -37,8 +37,8 @@ pub use battery::Battery;
 pub use ground::{FirstContact, Rest, RestOutcome, Strain};
 pub use hanging::Hanging;
 pub use motor::TrueBurn;
+pub use plant::{Actuators, World};
 pub use truth::{AscentTruth, Fault, Truth};
-pub use whole::{Actuators, World};
 
 /// Length of one step, s.
 pub const STEP_S: f64 = 1e-3;

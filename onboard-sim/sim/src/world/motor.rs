@@ -1,6 +1,6 @@
 //! The true landing motor: `T(t) = s/b T0(t/b) (1 + sum of a_k cos(k pi i))` for impulse scale s,
-//! burn-time scale b and the fraction i of the impulse that `T0` has given by then. The cosines
-//! have no mean over the impulse, so a shape keeps it.
+//! burn-time scale b and the fraction i of the impulse that `T0` has delivered by then. The cosines
+//! have no mean over the impulse, so a shape preserves it.
 //!
 //! Burn rate and pressure change thrust and time against each other at the same impulse (G. P.
 //! Sutton and O. Biblarz, Rocket Propulsion Elements, 9th edition, chapter 12).
@@ -64,8 +64,8 @@ impl TrueBurn {
         self.curve.propellant_mass_kg() / (self.curve.total_impulse_n_s() * self.impulse_scale)
     }
 
-    /// Factor of the shape on the thrust at a time on the file's curve, and the fraction of the
-    /// impulse by which the shape has changed what was given until then.
+    /// Factor of the shape on the thrust at a time on the file's curve, and the resulting change of
+    /// the delivered impulse, as a fraction.
     fn shape_at(&self, curve_s: f64) -> (f64, f64) {
         if self.shape.iter().all(|amplitude| *amplitude == 0.0) {
             return (1.0, 0.0);
@@ -117,7 +117,7 @@ impl Motor {
     /// This motor with the curve and scales of `after`; `before` is the truth that it was built
     /// from. Faults stay, with the same factor and delay.
     pub(crate) fn changed(&self, after: &Self, before: &Truth) -> Self {
-        // Unchanged values keep their bits.
+        // Unchanged values are bit-identical.
         let (own_scale, new_scale) = (self.burn.impulse_scale, after.burn.impulse_scale);
         let impulse_scale = if new_scale.to_bits() == before.impulse_scale.to_bits() {
             own_scale
@@ -167,8 +167,8 @@ impl Motor {
         rate * self.burn.thrust_n(curve_s)
     }
 
-    /// A chuff and a slow rise burn the propellant later, and none is lost: how far the burn has
-    /// come along its curve, s, and how fast it goes along it.
+    /// A chuff and a slow rise burn the propellant later, without loss: the position of the burn on
+    /// its curve, s, and its rate.
     fn on_the_curve(&self, burning_s: f64) -> (f64, f64) {
         let [burns_s, out_s] = self.chuff_s;
         if (burns_s..burns_s + out_s).contains(&burning_s) {
@@ -270,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn val_hand_a_shape_changes_the_thrust_and_keeps_the_impulse() {
+    fn val_hand_a_shape_changes_the_thrust_and_not_the_impulse() {
         let truth =
             Truth { thrust_shape: [0.1, -0.05, 0.0, 0.02, 0.0], ignition_delay_s: 0.0, ..Truth::default() };
         let motor = motor(&truth);
@@ -286,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_switched_off_before_it_has_lit_does_not_light() {
+    fn a_motor_switched_off_before_ignition_does_not_light() {
         let mut lit = motor(&Truth::default());
         lit.current(true, 11.0);
         assert_eq!(lit.thrust_begins_s(), Some(10.15));
@@ -297,9 +297,9 @@ mod tests {
         off.current(false, 10.149);
         assert!(off.thrust_begins_s().is_none() && off.thrust_n(12.0).abs() < 1e-15);
         off.current(true, 20.0);
-        assert_eq!(off.thrust_begins_s(), Some(20.15), "the delay begins anew");
+        assert_eq!(off.thrust_begins_s(), Some(20.15), "the delay restarts");
 
-        // A motor that hangs fire lights late, with or without current.
+        // A motor that hangs fire ignites late, with or without current.
         let mut hangs = motor(&Truth::default());
         hangs.break_down(&Fault::LateLight { delay_s: 1.0 });
         hangs.current(false, 10.5);

@@ -1,5 +1,5 @@
-//! A servo: a pure delay, a rate limit, stops, and play between horn and load. A linkage is what
-//! lies between it and the surface that it moves.
+//! A servo: a pure delay, a rate limit, stops, and play between horn and load. A linkage connects
+//! it to the surface that it moves.
 //!
 //! Play: G. Tao and P. V. Kokotovic, "Adaptive control of systems with backlash", Automatica
 //! 29, 1993.
@@ -50,7 +50,7 @@ impl Servo {
     /// built from. A stuck servo stays stuck, and a slow one stays slow by the same factor.
     pub(crate) fn changed(&self, before: &ServoData, after: &Self) -> Self {
         let was_rad = before.rate_rad_s() * STEP_S;
-        // Unchanged values keep their bits.
+        // Unchanged values are bit-identical.
         let step_max_rad = if after.step_max_rad.to_bits() == was_rad.to_bits() {
             self.step_max_rad
         } else {
@@ -65,7 +65,7 @@ impl Servo {
         }
     }
 
-    /// Takes a command and moves for one step. A command that is not a number is ignored.
+    /// Takes a command and moves for one step. NaN is ignored.
     pub(crate) fn step(&mut self, command_rad: f64) {
         let last_rad = self.line_rad[(self.next + LINE_STEPS - 1) % LINE_STEPS];
         self.line_rad[self.next] = if command_rad.is_nan() { last_rad } else { command_rad };
@@ -103,8 +103,8 @@ impl Servo {
     }
 }
 
-// What lies between a servo and what it moves: a gain, a misalignment, and play that the servo's
-// data do not know. The servo's feedback sees none of it.
+// Linkage between a servo and its surface: a gain, a misalignment, and play that is not in the
+// servo's data. The servo's feedback does not include it.
 
 /// One linkage. Angles in rad.
 #[derive(Debug, Clone)]
@@ -129,7 +129,7 @@ impl Linkage {
         Self { gain, offset_rad, half_slop_rad: 0.5 * slop_rad, stops_rad, moved_rad: gain * servo_rad }
     }
 
-    /// This linkage with the data of `after`; what it moves stays where it is.
+    /// This linkage with the data of `after`; its surface does not move.
     pub(crate) fn changed(&self, after: &Self) -> Self {
         Self { moved_rad: self.moved_rad, ..after.clone() }
     }
@@ -141,7 +141,7 @@ impl Linkage {
             self.moved_rad.clamp(driven_rad - self.half_slop_rad, driven_rad + self.half_slop_rad);
     }
 
-    /// Angle of what it moves, rad.
+    /// Angle of its surface, rad.
     pub(crate) fn rad(&self) -> f64 {
         (self.moved_rad + self.offset_rad).clamp(self.stops_rad.0, self.stops_rad.1)
     }
@@ -192,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn a_jammed_servo_runs_to_its_angle_at_its_own_rate() {
+    fn a_jammed_servo_runs_to_its_angle_at_its_rate() {
         let mut servo = servo(0.0, 1.0_f64.to_degrees(), 0.0);
         servo.jam(0.05);
         assert!((after(&mut servo, -0.1, 10) - 0.010).abs() < 1e-12);

@@ -1,5 +1,5 @@
-//! How the true vehicle and the weather of one flight differ from the nominal data, and what can
-//! break. A campaign draws these values for each flight.
+//! Deviations of the true vehicle and weather of one flight from the nominal data, and their
+//! faults. A campaign draws these values for each flight.
 
 use std::borrow::Cow;
 
@@ -8,7 +8,7 @@ use flight::vehicle::thrust_curve::ThrustCurve;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::whole::WorldError;
+use super::plant::WorldError;
 
 flight::with_defaults! {
     /// The true parameters of one flight. [`Truth::default`] is the nominal data in still air.
@@ -19,13 +19,13 @@ flight::with_defaults! {
         pub impulse_scale: f64 = 1.0,
         /// True burn time over the motor file's.
         pub burn_time_scale: f64 = 1.0,
-        /// The motor's curve lies this share of the way from the mission's to the last of its other
-        /// curves.
+        /// Position of the motor's curve between the mission's and the last of its other curves, 0
+        /// to 1.
         pub other_curve: f64 = 0.0,
         /// Time from the ignition command to the first thrust, s.
         pub ignition_delay_s: f64 = 0.15,
-        /// The motor chuffs: it burns for the first time, goes out for the second, and then burns
-        /// on, s.
+        /// The motor chuffs: it burns for the first time, goes out for the second, and then
+        /// reignites, s.
         pub chuff_s: [f64; 2] = [0.0; 2],
         /// Time in which the thrust rises to the curve's, s.
         pub thrust_rise_s: f64 = 0.0,
@@ -51,8 +51,8 @@ flight::with_defaults! {
         /// Turn of the mean wind's direction with height, from world x towards world y, rad/m.
         pub wind_veer_rad_m: f64 = 0.0,
         /// Shape of the thrust curve: the file's thrust is multiplied by `1 + sum over k of a_k
-        /// cos(k pi s)`, k from 1, where `s` is the fraction of the impulse already given. The
-        /// impulse stays the same: over a whole burn each term's integral is zero.
+        /// cos(k pi s)`, k from 1, where `s` is the fraction of the impulse already delivered. The
+        /// impulse stays the same: over a complete burn each term's integral is zero.
         pub thrust_shape: [f64; SHAPE_TERMS] = [0.0; SHAPE_TERMS],
         /// Fractions of drag that the exhaust takes away while the motor burns: of the body along
         /// its axis, and of the fins.
@@ -73,11 +73,11 @@ flight::with_defaults! {
         pub principal_axis_rad: [f64; 2] = [0.0; 2],
         /// Turn of the nozzle over the turn of its servo.
         pub gimbal_gain: f64 = 1.0,
-        /// Play between the gimbal's servos and the nozzle that the data do not know, rad.
+        /// Play between the gimbal's servos and the nozzle that is not in the data, rad.
         pub gimbal_slop_rad: f64 = 0.0,
         /// Misalignment of each fin against its servo, rad.
         pub fin_offset_rad: [f64; 4] = [0.0; 4],
-        /// Play between the fins' servos and the fins that the data do not know, rad.
+        /// Play between the fins' servos and the fins that is not in the data, rad.
         pub fin_slop_rad: f64 = 0.0,
         /// Rise of the ground, metre per metre along world x and y; its height at their origin,
         /// where the vehicle is to land, is 0.
@@ -153,9 +153,9 @@ impl Truth {
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Fault {
-    /// The motor never lights.
+    /// The motor never ignites.
     NoLight,
-    /// The motor lights late.
+    /// The motor ignites late.
     LateLight {
         /// Added to the ignition delay, s.
         delay_s: f64,
@@ -165,14 +165,14 @@ pub enum Fault {
         /// Thrust, as a fraction of the thrust without the fault.
         scale: f64,
     },
-    /// The motor goes out.
+    /// The motor burns out early.
     EarlyBurnout {
         /// Time since the first thrust, s.
         after_s: f64,
     },
-    /// The ascent motor never lights.
+    /// The ascent motor never ignites.
     AscentNoLight,
-    /// The ascent motor lights without a command.
+    /// The ascent motor ignites without a command.
     AscentSelfLights,
     /// The ascent motor has less impulse, in the same time.
     AscentWeak {
@@ -199,7 +199,7 @@ pub enum Fault {
         /// The fin, 0 to 3; another number has no effect.
         fin: usize,
     },
-    /// A surface moves the wrong way. Gimbal pitch and yaw are 0 and 1, the fins 2 to 5.
+    /// A surface moves in reverse. Gimbal pitch and yaw are 0 and 1, the fins 2 to 5.
     Reversed { surface: usize },
     /// Two surfaces hang on each other's wires.
     Swapped { surfaces: [usize; 2] },

@@ -10,7 +10,7 @@ use flight::estimation::estimator::{
 use flight::vehicle::mission::{LeverArms, SensorPlaces};
 use flight::vehicle::rigid::{RigidState, upright};
 use nalgebra::{UnitQuaternion, Vector2, Vector3};
-use sim::world::sensors::{SensorParams, SensorTruth, Sensors, believed_start};
+use sim::world::sensors::{SensorParams, SensorTruth, Sensors, start_with_errors};
 
 const MS_S: f64 = 1e-3;
 const CG_OVER_FEET_M: f64 = 0.6;
@@ -81,7 +81,7 @@ impl Scene {
 
     pub(crate) fn estimator(&self) -> Estimator {
         let uncertainty = StartUncertainty::at_apogee();
-        let believed = believed_start(&Self::start(), &uncertainty, self.seed);
+        let believed = start_with_errors(&Self::start(), &uncertainty, self.seed);
         Estimator::new(&EstimatorConfig::default(), &uncertainty, 0.0, &believed)
     }
 

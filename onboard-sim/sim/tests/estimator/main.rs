@@ -7,7 +7,7 @@ mod plant;
 
 use std::sync::LazyLock;
 
-use ::flight::estimation::estimator::{Doubt, Health, Measurements};
+use ::flight::estimation::estimator::{Health, HealthIssue, Measurements};
 
 use self::flight::{Frame, Scene};
 
@@ -87,7 +87,7 @@ fn the_estimate_is_accurate_enough_for_landing() {
 }
 
 #[test]
-fn the_wind_is_known_at_ignition_despite_a_wrong_drag_coefficient() {
+fn the_wind_is_estimated_at_ignition_despite_a_wrong_drag_coefficient() {
     let flights = &*HEALTHY;
     let lit: Vec<&Frame> = flights
         .iter()
@@ -166,7 +166,7 @@ fn after_a_jump_of_the_inertial_unit_the_estimate_is_unhealthy_and_then_recovers
         let doubted = flights
             .iter()
             .filter(|frames| {
-                frames.iter().any(|frame| frame.estimate.health == Health::Doubtful(Doubt::Surprised))
+                frames.iter().any(|frame| frame.estimate.health == Health::Unhealthy(HealthIssue::Surprised))
             })
             .count();
         assert!(doubted >= 49, "doubted in {doubted} of 50");

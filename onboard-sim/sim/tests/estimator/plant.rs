@@ -13,7 +13,7 @@ use flight::vehicle::site::Site;
 use flight::vehicle::thrust_curve::ThrustCurve;
 use flight::vehicles::motors;
 use nalgebra::{Vector2, Vector3};
-use sim::world::sensors::{SensorParams, SensorTruth, Sensors, believed_start};
+use sim::world::sensors::{SensorParams, SensorTruth, Sensors, start_with_errors};
 use sim::world::wind::Wind;
 use sim::world::{Actuators, Truth, World};
 
@@ -91,7 +91,7 @@ fn fly(seed: u64) -> Vec<Frame> {
     let places = mission.expect("a valid mission").sensors;
     let mut sensors = Sensors::new(&params, &places, seed, 1.0).expect("valid sensor parameters");
     let uncertainty = StartUncertainty::at_apogee();
-    let believed = believed_start(&start(&truth), &uncertainty, seed);
+    let believed = start_with_errors(&start(&truth), &uncertainty, seed);
     let mut estimator = Estimator::new(&EstimatorConfig::default(), &uncertainty, 0.0, &believed);
     let mut motor = MotorEstimate::new(&MotorPrior::default());
     let allocation = Allocation {
@@ -190,7 +190,7 @@ fn val_chi_square_of_the_error_in_the_simulated_truth() {
 }
 
 #[test]
-fn wind_and_air_are_known_at_ignition() {
+fn wind_and_air_are_estimated_at_ignition() {
     let lit = burning_for(0.0);
     let wind_m_s = [0, 1].map(|axis| rms(&lit, |_, frame| (frame.estimate.wind_m_s - frame.wind_m_s)[axis]));
     let air = rms(&lit, |truth, frame| frame.motor.air_scale() - truth.drag_scale / truth.mass_scale);
@@ -208,7 +208,7 @@ fn wind_and_air_are_known_at_ignition() {
 }
 
 #[test]
-fn the_motor_is_known_half_a_second_into_its_burn() {
+fn the_motor_is_estimated_half_a_second_into_its_burn() {
     for (since_s, thrust_n) in [(0.5, 1.0), (1.0, 1.0), (1.5, 1.0)] {
         let burning = burning_for(since_s);
         // The accelerometer measures thrust over mass, so an error of the mass goes into the

@@ -141,8 +141,7 @@ pub fn read(
             vertical_m: reported(vertical_m),
             speed_m_s: reported(speed_m_s),
         };
-        // A fix without a velocity has one that is not a number, which passes no check and corrects
-        // nothing.
+        // A fix without a velocity has a NaN velocity, which passes no check and corrects nothing.
         let fix = vector(&cells[9..12]).map(|position_m| GnssFix {
             position_m,
             velocity_m_s: vector(&cells[12..15]).unwrap_or(Vector3::repeat(f64::NAN)),
@@ -224,7 +223,7 @@ impl Resampler {
     }
 }
 
-/// The sample this share of the way from one to the other.
+/// The sample at this share of the distance from one to the other.
 fn towards(from: &ImuSample, to: &ImuSample, share: f64) -> ImuSample {
     ImuSample {
         gyro_rad_s: from.gyro_rad_s.lerp(&to.gyro_rad_s, share),

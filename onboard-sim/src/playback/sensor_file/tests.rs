@@ -41,13 +41,13 @@ fn val_hand_a_ramp_is_resampled_from_every_accepted_rate() {
 }
 
 #[test]
-fn rows_of_the_frames_own_rate_are_its_frames() {
+fn rows_at_the_frame_rate_are_frames() {
     let recorded = read_text(&rows(even(200.0, 1.0), |time_s| (200.0 * (time_s - 1_000.0)).round())).unwrap();
     let found: Vec<f64> = recorded.frames.iter().skip(1).map(|frame| frame.imu.gyro_rad_s.x).collect();
     assert_eq!(found, (2..=200).map(f64::from).collect::<Vec<_>>());
 }
 
-/// Time stamps that are late by up to 2 ms keep every sample at its recorded time.
+/// Time stamps that are late by up to 2 ms leave every sample at its recorded time.
 #[test]
 fn the_recorded_time_stamps_decide_and_not_the_number_of_the_row() {
     let late =

@@ -2,7 +2,7 @@
 //!
 //! Requests go in with [`Server::take`]; answers come out of [`Server::next_answer`], and the
 //! pieces of files out of [`Server::next_piece`], one at a time, whenever the link has room for
-//! one. So the caller sets the pace: nothing is sent that the link cannot carry.
+//! one. So the caller sets the pace: nothing exceeds the capacity of the link.
 
 use alloc::borrow::ToOwned as _;
 use alloc::collections::VecDeque;
@@ -16,21 +16,21 @@ use super::{LOG_DIRECTORY, crc};
 use crate::dialect::MavMessage;
 use crate::identity::Address;
 
-/// Most open files; of one client at most [`MAX_SESSIONS_OF_ONE`], so that nobody keeps the others
-/// out.
+/// Most open files; of one client at most [`MAX_SESSIONS_OF_ONE`], so that none locks out the
+/// others.
 const MAX_SESSIONS: usize = 8;
 const MAX_SESSIONS_OF_ONE: usize = 4;
-/// A file that nobody has read for this long is closed.
+/// Idle time after which a file is closed.
 const IDLE: Duration = Duration::from_mins(1);
-/// The link belongs to files for this long after a client has asked for one.
+/// Time for which the link serves files after a client's request.
 const BUSY: Duration = Duration::from_secs(5);
-/// Most answers that may wait; a client that needs another asks again.
+/// Most answers that may wait; beyond it a client must repeat its request.
 const MAX_READY: usize = 32;
 /// Most checksums that may wait.
 const MAX_SUMS: usize = 4;
 /// Bytes of a file that one call of [`Server::work`] adds to a checksum.
 const SUMMED_AT_ONCE: usize = 64 * 1024;
-/// Most clients whose last answer is kept.
+/// Most clients whose last answer is stored.
 const MAX_REMEMBERED: usize = 8;
 
 /// A file that can be read.
@@ -65,7 +65,7 @@ impl Files for NoFiles {
     }
 }
 
-/// Files that are in memory whole.
+/// Files that are completely in memory.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct InMemory {
     entries: Vec<FileEntry>,
@@ -96,7 +96,7 @@ impl Files for InMemory {
     }
 }
 
-/// What became of a request.
+/// Outcome of a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Taken {
     Answered,
@@ -144,7 +144,7 @@ pub struct Server {
 }
 
 impl Server {
-    /// Takes a request from a link. `open` says whether this client may read files now.
+    /// Takes a request from a link. `open`: this client may read files now.
     pub fn take(
         &mut self,
         request: &FileRequest,
@@ -180,13 +180,13 @@ impl Server {
                 }
                 Some(_) => {
                     if let Some(session) = self.session_of(*client, packet.session) {
-                        session.ask(packet);
+                        session.queue(packet);
                     }
                 }
             }
             return Taken::Answered;
         }
-        // A request that comes again has lost its answer.
+        // A repeated request has lost its answer.
         let before = self.remembered.iter().find(|last| last.client == *client && last.request == *packet);
         if let Some(answer) = before.map(|last| last.answer.clone())
             && !self.is_void(*client, &answer)
@@ -232,7 +232,7 @@ impl Server {
         Taken::Answered
     }
 
-    /// Closes every file: nobody may read now.
+    /// Closes every file: reading is not permitted now.
     pub fn close_all(&mut self) {
         self.sessions.clear();
         self.sums.clear();
@@ -290,7 +290,7 @@ impl Server {
             }
             let mut piece = [0; DATA_LEN];
             if let Some(packet) = session.next(&mut piece, files) {
-                // A burst counts as use: nobody asks for anything while it lasts.
+                // A burst counts as use: a client sends no requests during it.
                 session.used_at = now;
                 let to = session.client;
                 self.turn = place;
@@ -321,7 +321,7 @@ impl Server {
     /// Whether an answer that is remembered does not hold any more: its session is closed, or there
     /// are files now.
     fn is_void(&self, client: Address, answer: &Packet) -> bool {
-        match answer.asked {
+        match answer.request {
             Opcode::OPEN_FILE_RO => {
                 answer.opcode == Opcode::NAK
                     || !self.sessions.iter().any(|session| session.is(client, answer.session))
@@ -362,7 +362,7 @@ impl Server {
             return request.nak(Refusal::NoSessionsAvailable);
         }
         // Some clients expect the number that they have named. A number that was just closed may
-        // have packets on their way.
+        // still have packets under way.
         let is_free = |number: &u8| {
             !closed.contains(number) && !self.sessions.iter().any(|session| session.number == *number)
         };
@@ -390,8 +390,7 @@ fn parts(path: &str) -> Vec<&str> {
     path.split('/').filter(|part| !part.is_empty()).collect()
 }
 
-/// Whether a part of a path names the directory of the log. `@MAV_LOG` is the name that clients
-/// know for it.
+/// Whether a part of a path names the directory of the log. `@MAV_LOG` is its standard name.
 fn names_log(part: &str) -> bool {
     part == "@MAV_LOG" || parts(LOG_DIRECTORY) == [part]
 }
@@ -426,11 +425,11 @@ fn list(request: &Packet, files: &dyn Files) -> Packet {
     if data.is_empty() { request.nak(Refusal::EndOfFile) } else { request.ack(&data) }
 }
 
-// One open file of one client: what it has asked for and was not yet sent.
+// One open file of one client: its requests that are not yet served.
 
-/// Most pieces of one burst: a client that is gone is not sent more.
+/// Most pieces of one burst: a client that has left is not sent more.
 const BURST_PIECES: u32 = 256;
-/// Most single pieces that may wait; a client that needs another asks again.
+/// Most single pieces that may wait; beyond it a client must repeat its request.
 const MAX_READS: usize = 64;
 
 #[derive(Debug, Clone)]
@@ -442,7 +441,7 @@ struct Burst {
 }
 
 impl Burst {
-    /// Whether it will come to this offset.
+    /// Whether it will reach this offset.
     fn is_ahead(&self, offset: u32) -> bool {
         let end = u64::from(self.offset) + u64::from(self.pieces_left) * u64::from(self.request.size);
         offset > self.offset && u64::from(offset) <= end
@@ -460,7 +459,7 @@ struct Session {
     used_at: Duration,
     reads: VecDeque<Packet>,
     burst: Option<Burst>,
-    /// A piece of the burst comes next, because a single one came before it.
+    /// The next piece is from the burst, because a single one came before it.
     burst_next: bool,
 }
 
@@ -470,11 +469,11 @@ impl Session {
     }
 
     /// Takes a request to read inside the file.
-    fn ask(&mut self, request: &Packet) {
+    fn queue(&mut self, request: &Packet) {
         if request.opcode == Opcode::BURST_READ_FILE {
-            // A request that comes again does not begin again what is under way, and one for pieces
-            // farther ahead in it prolongs it. So a client need not wait for the end of a burst,
-            // nor for its last packet if that is lost.
+            // A repeated request does not restart a burst, and one for pieces farther ahead
+            // prolongs it. So a client need not wait for the end of a burst, nor for its last
+            // packet if that is lost.
             if let Some(burst) = &mut self.burst
                 && burst.request.size == request.size
                 && (burst.request == *request || burst.is_ahead(request.offset))

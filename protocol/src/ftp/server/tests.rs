@@ -13,13 +13,13 @@ fn content(len: usize) -> Vec<u8> {
     (0..len).map(|n| (n % 251) as u8).collect()
 }
 
-fn asked(packet: Packet) -> FileRequest {
+fn request(packet: Packet) -> FileRequest {
     FileRequest { source: GROUND, target: VEHICLE, packet }
 }
 
 /// Everything that the server sends to one request.
 fn answers(server: &mut Server, files: &mut InMemory, packet: Packet) -> Vec<Packet> {
-    server.take(&asked(packet), 0, true, files, NOW);
+    server.take(&request(packet), 0, true, files, NOW);
     let mut sent = Vec::new();
     for _ in 0..2000 {
         server.work(files);
@@ -49,7 +49,7 @@ fn directories_are_listed_until_their_end() {
     };
     assert_eq!(list("/", 0).data, b"Dlog\0");
     let told = list("/log", 0);
-    assert_eq!((told.sequence, told.session, told.asked), (8, 3, Opcode::LIST_DIRECTORY));
+    assert_eq!((told.sequence, told.session, told.request), (8, 3, Opcode::LIST_DIRECTORY));
     assert_eq!(told.data, b"Fold.mcap\t3\0Fflight.mcap\t1000\0");
     assert_eq!(list("@MAV_LOG", 1).data, b"Fflight.mcap\t1000\0");
     assert_eq!(list("log/", 2).refusal(), Some(Refusal::EndOfFile));
@@ -125,7 +125,7 @@ fn a_client_that_starts_again_ends_its_old_burst_and_gets_another_session() {
     let (mut server, mut files) = (Server::default(), log(100_000));
     let open = |sequence| Packet::request(sequence, 0, Opcode::OPEN_FILE_RO, 0, "/log/flight.mcap");
     let first = answer(&mut server, &mut files, open(0));
-    server.take(&asked(reading(1, first.session, Opcode::BURST_READ_FILE, 0, 239)), 0, true, &files, NOW);
+    server.take(&request(reading(1, first.session, Opcode::BURST_READ_FILE, 0, 239)), 0, true, &files, NOW);
     let second = answer(&mut server, &mut files, open(77));
     assert_ne!(first.session, second.session);
     assert_eq!(server.sessions.len(), 1);
@@ -137,7 +137,7 @@ fn nothing_is_read_while_it_is_not_allowed_and_other_paths_are_not_found() {
     let open = Packet::request(5, 0, Opcode::OPEN_FILE_RO, 0, "/log/flight.mcap");
     let session = answer(&mut server, &mut files, open.clone()).session;
     let refused = |server: &mut Server, files: &mut InMemory, packet: Packet| {
-        let taken = server.take(&asked(packet), 0, false, files, NOW);
+        let taken = server.take(&request(packet), 0, false, files, NOW);
         let frame = Encoder::new(VEHICLE).encode(&server.next(0, files, NOW).unwrap());
         assert_eq!(server.next(0, files, NOW), None);
         (taken, Packet::answer_in(&frame).unwrap().1.refusal())
@@ -151,10 +151,10 @@ fn nothing_is_read_while_it_is_not_allowed_and_other_paths_are_not_found() {
     ] {
         assert_eq!(refused(&mut server, &mut files, packet), (Taken::NotNow, Some(Refusal::Busy)));
     }
-    // MAVProxy asks for it, and waits where it gets another answer.
+    // MAVProxy requests it, and waits if it gets another answer.
     let parameters = Packet::request(10, 0, Opcode::OPEN_FILE_RO, 0, "@PARAM/param.pck");
     assert_eq!(refused(&mut server, &mut files, parameters), (Taken::Answered, Some(Refusal::FileNotFound)));
-    // Who may not read does not close what others read.
+    // A client without permission does not close the files of others.
     assert_eq!(server.sessions.len(), 1);
     server.close_all();
     let read = reading(11, session, Opcode::READ_FILE, 0, 239);
@@ -176,12 +176,12 @@ fn sessions_are_bounded_and_end_when_nobody_reads() {
     }
     assert_eq!(server.sessions.len(), MAX_SESSIONS);
     let late = NOW + IDLE;
-    server.take(&asked(Packet::request(1, 0, Opcode::NONE, 0, "")), 0, true, &files, late);
+    server.take(&request(Packet::request(1, 0, Opcode::NONE, 0, "")), 0, true, &files, late);
     assert!(server.sessions.is_empty() && !server.is_busy(0, late));
 }
 
 proptest! {
-    /// Whatever arrives, the server answers with what a packet can hold, keeps its bounds and never
+    /// For any input the server answers with a valid packet, stays within its bounds and never
     /// panics.
     #[test]
     fn hostile_requests_are_answered_within_bounds(
@@ -192,7 +192,7 @@ proptest! {
             let opcode = Opcode(opcode % 18);
             let path = if size % 3 == 0 { "/log/flight.mcap" } else { &path };
             let packet = Packet { size, ..Packet::request(sequence, session % 4, opcode, offset % 4000, path) };
-            server.take(&asked(packet), usize::from(session % 2), size % 7 != 0, &files, NOW);
+            server.take(&request(packet), usize::from(session % 2), size % 7 != 0, &files, NOW);
             server.work(&mut files);
             if size % 2 == 0 {
                 server.next(0, &mut files, NOW);

@@ -21,7 +21,7 @@ const MAX_DATAGRAM: usize = 2048;
 /// This many datagrams may lie in the owner's queue, where senders no longer take turns. At fifty
 /// polls a second, as the vehicle makes, that is enough for 12,800 datagrams a second.
 pub(super) const INBOX_LEN: usize = 256;
-/// The link keeps this many unread reports about itself.
+/// The link stores this many unread reports about itself.
 const MAX_REPORTS: usize = 8;
 /// The link pauses for this long after an error.
 const PAUSE: Duration = Duration::from_millis(10);
@@ -31,7 +31,7 @@ pub(super) struct Queues {
     pub(super) inbox: Sender<Received>,
     pub(super) outbox: Receiver<Outgoing>,
     /// Senders of which the owner accepted a frame.
-    pub(super) believed: Receiver<Origin>,
+    pub(super) accepted: Receiver<Origin>,
 }
 
 /// Binds and listens. Returns the bound address, which names the port that the system chose if
@@ -58,7 +58,7 @@ pub(super) async fn connect(address: &str, queues: Queues) -> io::Result<()> {
 }
 
 async fn run(socket: UdpSocket, mut peers: Peers, queues: Queues) {
-    let Queues { inbox, mut outbox, mut believed } = queues;
+    let Queues { inbox, mut outbox, mut accepted } = queues;
     let mut buffer = [0; MAX_DATAGRAM];
     let mut queue = DatagramQueue::new();
     // Reports of the link about itself go before the datagrams it carries.
@@ -75,7 +75,7 @@ async fn run(socket: UdpSocket, mut peers: Peers, queues: Queues) {
                     }
                 }
                 // The error is about an earlier datagram of ours. If it persists, it must not use a
-                // whole core.
+                // complete core.
                 Err(_) => tokio::time::sleep(PAUSE).await,
             },
             place = inbox.reserve(), if !reports.is_empty() || !queue.is_empty() => {
@@ -93,10 +93,10 @@ async fn run(socket: UdpSocket, mut peers: Peers, queues: Queues) {
                     let _ = socket.send_to(&bytes, peer).await;
                 }
             }
-            origin = believed.recv() => {
+            origin = accepted.recv() => {
                 let Some(origin) = origin else { return };
                 let Origin::Datagram(from) = origin else { continue };
-                if let Some(newcomer) = peers.on_believed(from, opened_at.elapsed()) {
+                if let Some(newcomer) = peers.on_accepted(from, opened_at.elapsed()) {
                     queue.prove(from);
                     if newcomer == Newcomer::Named && reports.len() < MAX_REPORTS {
                         reports.push_back(Received::Up(from.to_string()));
@@ -110,8 +110,8 @@ async fn run(socket: UdpSocket, mut peers: Peers, queues: Queues) {
     }
 }
 
-// Queues datagrams fairly: each sender has its own queue and the senders take turns, so that a
-// flood loses only its own datagrams.
+// Queues datagrams fairly: each sender has a separate queue and the senders take turns, so that a
+// flood loses only its datagrams.
 
 /// This many datagrams of proven senders may wait; the senders share the places equally. It holds a
 /// fifth of a second of the fastest simulated telemetry, 5,000 datagrams a second.
@@ -195,7 +195,7 @@ impl DatagramQueue {
         }
     }
 
-    /// Marks a sender as proven; its waiting datagrams keep their order.
+    /// Marks a sender as proven; its waiting datagrams stay in order.
     fn prove(&mut self, sender: SocketAddr) {
         let Some(queue) = self.unproven.queues.remove(&sender) else { return };
         self.unproven.turns.retain(|other| *other != sender);
@@ -272,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn the_order_of_one_sender_is_kept_when_it_is_proven() {
+    fn the_order_of_one_sender_is_preserved_when_it_is_accepted() {
         let mut waiting = DatagramQueue::new();
         for number in 0..3 {
             waiting.push(at(1), Standing::Unproven, &[number]);

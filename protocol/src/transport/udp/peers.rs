@@ -9,15 +9,15 @@ use std::time::Duration;
 
 use super::Standing;
 
-/// This many proven senders are answered at the same time; each one costs the vehicle's whole
-/// telemetry, 2,000 bytes a second. Without a key anybody's frame is valid, so there must be more
-/// places than strangers usually take.
+/// Most proven senders answered at the same time; each costs the vehicle's complete telemetry,
+/// 2,000 bytes a second. Without a key every frame is valid, so there must be more entries than
+/// strangers usually take.
 const MAX_PROVEN: usize = 64;
 /// When all places are taken, a newcomer displaces a proven sender that has been silent for this
 /// long. A sender that still sends is never displaced.
 const SILENT_AFTER: Duration = Duration::from_secs(10);
 /// While no sender is proven, one stranger (the guest) is answered, so that a ground with the wrong
-/// key can see why it is refused. It keeps that place until it has been silent for this long.
+/// key can see why it is refused. It is replaced once it has been silent for this long.
 const GUEST_SILENT_AFTER: Duration = Duration::from_secs(5);
 
 /// Unknown senders are reported at most this often.
@@ -35,7 +35,7 @@ const MAX_COUNTED_SENDERS: usize = 1024;
 struct Proven {
     address: SocketAddr,
     /// When a frame of this sender was last accepted.
-    believed_at: Duration,
+    accepted_at: Duration,
 }
 
 /// Senders that were not accepted since the last report.
@@ -75,7 +75,7 @@ impl Peers {
         }
     }
 
-    /// A link that knows only this peer.
+    /// A link with only this peer.
     pub(super) fn only(peer: SocketAddr) -> Self {
         Self { fixed: Some(peer), ..Self::any() }
     }
@@ -107,22 +107,22 @@ impl Peers {
     }
 
     /// Notes that a frame of this sender was accepted. Returns a value if the sender is answered
-    /// from now on and was not before; the value says whether it is to be named.
-    pub(super) fn on_believed(&mut self, from: SocketAddr, now: Duration) -> Option<Newcomer> {
+    /// from now on and was not before; the value states whether it is to be named.
+    pub(super) fn on_accepted(&mut self, from: SocketAddr, now: Duration) -> Option<Newcomer> {
         if self.fixed.is_some() {
             return None;
         }
         if let Some(peer) = self.proven.iter_mut().find(|peer| peer.address == from) {
-            peer.believed_at = now;
+            peer.accepted_at = now;
             return None;
         }
         if self.proven.len() >= MAX_PROVEN {
-            let silent = self.proven.iter().enumerate().min_by_key(|(_, peer)| peer.believed_at);
+            let silent = self.proven.iter().enumerate().min_by_key(|(_, peer)| peer.accepted_at);
             let (place, _) =
-                silent.filter(|(_, peer)| now.saturating_sub(peer.believed_at) >= SILENT_AFTER)?;
+                silent.filter(|(_, peer)| now.saturating_sub(peer.accepted_at) >= SILENT_AFTER)?;
             self.proven.swap_remove(place);
         }
-        self.proven.push(Proven { address: from, believed_at: now });
+        self.proven.push(Proven { address: from, accepted_at: now });
         self.guest = None;
         self.strangers.datagrams.remove(&from);
         self.named_at.retain(|at| now.saturating_sub(*at) < REPORT_INTERVAL);
@@ -203,7 +203,7 @@ mod tests {
     fn strangers_never_displace_an_accepted_sender() {
         let mut peers = Peers::any();
         assert_eq!(peers.on_datagram(at(1), s(0)), Some(Standing::Unproven));
-        assert_eq!(peers.on_believed(at(1), s(0)), Some(Newcomer::Named));
+        assert_eq!(peers.on_accepted(at(1), s(0)), Some(Newcomer::Named));
         for second in 1..1_000 {
             for port in 100..140 {
                 assert_eq!(peers.on_datagram(at(port), s(second)), Some(Standing::Unproven));
@@ -225,7 +225,7 @@ mod tests {
             peers.on_datagram(at(101), s(second));
         }
         assert_eq!(answered(&peers), [at(101)]);
-        peers.on_believed(at(7), s(30));
+        peers.on_accepted(at(7), s(30));
         assert_eq!(answered(&peers), [at(7)]);
     }
 
@@ -233,8 +233,8 @@ mod tests {
     fn another_port_and_a_second_station_are_answered_beside_the_first() {
         let mut peers = Peers::any();
         for port in 1..=3 {
-            assert!(peers.on_believed(at(port), s(0)).is_some());
-            assert!(peers.on_believed(at(port), s(1)).is_none(), "it is named only once");
+            assert!(peers.on_accepted(at(port), s(0)).is_some());
+            assert!(peers.on_accepted(at(port), s(1)).is_none(), "it is named only once");
         }
         assert_eq!(answered(&peers), [at(1), at(2), at(3)]);
     }
@@ -243,18 +243,18 @@ mod tests {
     #[test]
     fn many_accepted_senders_do_not_displace_one_that_still_sends() {
         let mut peers = Peers::any();
-        peers.on_believed(at(1), s(0));
+        peers.on_accepted(at(1), s(0));
         for second in 0..100 {
             for port in 1_000..2_000 {
-                peers.on_believed(at(port), s(second));
+                peers.on_accepted(at(port), s(second));
             }
-            peers.on_believed(at(1), s(second));
+            peers.on_accepted(at(1), s(second));
             assert!(answered(&peers).contains(&at(1)));
             assert!(peers.proven.len() <= MAX_PROVEN);
         }
         // Silent senders make room.
-        assert_eq!(peers.on_believed(at(2), s(108)), None);
-        assert!(peers.on_believed(at(2), s(109)).is_some());
+        assert_eq!(peers.on_accepted(at(2), s(108)), None);
+        assert!(peers.on_accepted(at(2), s(109)).is_some());
     }
 
     #[test]
@@ -262,7 +262,7 @@ mod tests {
         let mut peers = Peers::only(at(1));
         assert_eq!(peers.on_datagram(at(1), s(0)), Some(Standing::Proven));
         assert_eq!(peers.on_datagram(at(2), s(0)), None);
-        assert_eq!(peers.on_believed(at(2), s(0)), None);
+        assert_eq!(peers.on_accepted(at(2), s(0)), None);
         assert_eq!(answered(&peers), [at(1)]);
         assert!(
             peers.report(s(1)).unwrap().contains("1 unknown senders: 1 datagrams"),
@@ -274,15 +274,15 @@ mod tests {
     fn many_strangers_are_reported_in_one_line_every_ten_seconds() {
         let mut peers = Peers::any();
         let mut lines = Vec::new();
-        let (mut named, mut believed) = (0, 0);
+        let (mut named, mut accepted) = (0, 0);
         for tenth in 0..600 {
             let now = Duration::from_millis(100 * tenth);
             for port in 0..3_000 {
                 peers.on_datagram(at(1_000 + port), now);
             }
             // In addition an accepted sender appears on a new port each time.
-            believed += 1;
-            named += u32::from(peers.on_believed(at(10_000 + tenth as u16), now) == Some(Newcomer::Named));
+            accepted += 1;
+            named += u32::from(peers.on_accepted(at(10_000 + tenth as u16), now) == Some(Newcomer::Named));
             if peers.report_due_at().is_some_and(|due| now >= due) {
                 lines.extend(peers.report(now));
             }
@@ -292,14 +292,14 @@ mod tests {
             lines[0].contains("1024 unknown senders and more") && lines[0].contains("further peers"),
             "{lines:?}"
         );
-        assert!(named <= 28 && believed == 600, "{named}");
+        assert!(named <= 28 && accepted == 600, "{named}");
     }
 
     #[test]
     fn a_newcomer_accepted_at_once_is_not_reported_as_a_stranger() {
         let mut peers = Peers::any();
         peers.on_datagram(at(1), s(0));
-        peers.on_believed(at(1), Duration::from_millis(20));
+        peers.on_accepted(at(1), Duration::from_millis(20));
         assert_eq!(peers.report_due_at(), Some(s(1)));
         assert_eq!(peers.report(s(1)), None);
     }

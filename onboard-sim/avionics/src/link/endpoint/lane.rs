@@ -1,9 +1,9 @@
-//! A lane: links that carry the same frames, their budget, and the queue of what waits for room on
-//! them.
+//! A lane: links that carry the same frames, their budget, and the queues of messages that wait for
+//! room on them.
 //!
-//! All links begin in one lane, so that a ground station that hears several of them can recognise
-//! copies by their sequence numbers. A link with different message intervals gets its own lane with
-//! its own sequence numbers.
+//! All links begin in one lane, so that a ground station on several of them can recognise copies by
+//! their sequence numbers. A link with different message intervals gets a separate lane with
+//! separate sequence numbers.
 
 use alloc::boxed::Box;
 use alloc::collections::VecDeque;
@@ -19,12 +19,12 @@ use protocol::identity::NETWORK_BUDGET_BYTES_S;
 use super::questions::FileService;
 use super::{Context, MAX_REQUESTED, Outgoing};
 use crate::link::stations::MAX_STATIONS;
-use crate::link::streams::{Due, SLOW_UPLINK_HZ, Streams, WINDOW_S, is_slow, kept_free_bytes, share_bytes_s};
+use crate::link::streams::{Due, SLOW_UPLINK_HZ, Streams, WINDOW_S, is_slow, reserved_bytes, share_bytes_s};
 use crate::link::vehicle::VehicleState;
 use crate::link::{parameters, telemetry};
 
 /// Most answers that may wait, and most texts. More are dropped; a station that needs an answer
-/// asks again.
+/// must repeat its request.
 const MAX_WAITING: usize = 32;
 /// The longest frame with a piece of a file, without its signature.
 const PIECE_FRAME_LEN: usize = protocol::ftp::packet::PAYLOAD_LEN + 12;
@@ -34,7 +34,7 @@ const ABORT_ANSWERED_S: f64 = 0.09;
 const SLOW_ABORT_ANSWERED_S: f64 = 0.3;
 /// Bytes per second of files over a link that carries at least a network's telemetry: 15 % of the
 /// slowest Wi-Fi (802.11b, 11 Mbit/s). A smaller budget may be that of a radio somewhere on the
-/// way; files then use what telemetry leaves of it.
+/// way; files then use the budget that telemetry leaves.
 const NETWORK_FILES_BYTES_S: f64 = 200_000.0;
 /// A piece of a file that would hold a line for longer than this is not sent, s.
 const LINE_HOLDS_S: f64 = 0.3;
@@ -66,7 +66,7 @@ pub(super) struct Lane {
     answers_briefly: Window,
     answered: Window,
     /// Texts of the last second.
-    said: Window,
+    texts_briefly: Window,
     /// Uplink reports (TD_UPLINK) that are not yet sent.
     uplinks: VecDeque<MavMessage>,
     /// Answers to aborts, at most one for each station.
@@ -83,8 +83,8 @@ pub(super) struct Lane {
     /// The budget that the lane was given, bytes per second; a radio may leave less of it.
     granted_bytes_s: u32,
     radio: RadioShare,
-    /// When a line slower than a radio has sent what it was given. What is not vital waits for
-    /// that, so that nothing queues behind it.
+    /// Time at which a line slower than a radio has sent everything given to it. All but vital
+    /// messages wait for that, so that nothing queues behind them.
     line_free_at_s: f64,
     /// When the next uplink reports go over such a line.
     uplinks_at_s: f64,
@@ -101,7 +101,7 @@ impl Lane {
             telemetry_briefly: Window::of(BRIEFLY_S),
             answers_briefly: Window::of(BRIEFLY_S),
             answered: Window::of(WINDOW_S),
-            said: Window::of(WINDOW_S),
+            texts_briefly: Window::of(WINDOW_S),
             uplinks: VecDeque::new(),
             aborts: VecDeque::new(),
             abort_answered_s: f64::NEG_INFINITY,
@@ -127,27 +127,27 @@ impl Lane {
 
     /// Takes a radio's report about its buffer.
     pub(super) fn on_radio(&mut self, free_percent: u8, now_s: f64) {
-        self.radio.hear(free_percent, now_s);
+        self.radio.take_report(free_percent, now_s);
         self.share_with_the_radio();
     }
 
-    /// Uses what the radio leaves of the budget.
+    /// Uses the share of the budget that the radio reports as free.
     fn share_with_the_radio(&mut self) {
         let capacity_bytes_s = (self.radio.share() * f64::from(self.granted_bytes_s)) as u32;
         self.streams.set_capacity(capacity_bytes_s);
-        // The reserve of a slow line is in what its budget leaves of its baud rate.
-        let reserve = if is_slow(capacity_bytes_s) { kept_free_bytes(self.signature_len) } else { 0 };
+        // The reserve of a slow line is the unused part of its baud rate.
+        let reserve = if is_slow(capacity_bytes_s) { reserved_bytes(self.signature_len) } else { 0 };
         self.sent.set_limit(capacity_bytes_s as usize + reserve);
         // Over a slow line frames go one by one, so that there are no bursts.
         let briefly = |bytes| if is_slow(capacity_bytes_s) { usize::MAX } else { bytes };
         self.telemetry_briefly.set_limit(briefly(capacity_bytes_s as usize * 22 / 100));
         self.answers_briefly.set_limit(briefly(capacity_bytes_s as usize / 6));
         self.answered.set_limit(share_bytes_s(capacity_bytes_s));
-        self.said.set_limit(share_bytes_s(capacity_bytes_s));
+        self.texts_briefly.set_limit(share_bytes_s(capacity_bytes_s));
     }
 
     /// A copy of this lane for one of its links, with its history and queue.
-    pub(super) fn of_its_own(&mut self, link: usize) -> Self {
+    pub(super) fn split_off(&mut self, link: usize) -> Self {
         self.links.retain(|other| *other != link);
         Self { links: vec![link], ..self.clone() }
     }
@@ -160,7 +160,7 @@ impl Lane {
     }
 
     /// Queues an uplink report; it replaces an older one that is not yet sent.
-    pub(super) fn tell_of_uplink(&mut self, message: MavMessage) {
+    pub(super) fn queue_uplink_report(&mut self, message: MavMessage) {
         self.uplinks.truncate(MAX_STATIONS - 1);
         self.uplinks.push_front(message);
     }
@@ -171,14 +171,14 @@ impl Lane {
         }
     }
 
-    pub(super) fn say(&mut self, chunk: MavMessage) {
+    pub(super) fn queue_text(&mut self, chunk: MavMessage) {
         if self.texts.len() < MAX_WAITING {
             self.texts.push_back(chunk.into());
         }
     }
 
     /// Queues requested messages; returns whether there was room in the queue. Otherwise they are
-    /// dropped, and the station has to ask again.
+    /// dropped, and the station must repeat its request.
     pub(super) fn request(&mut self, messages: Vec<MavMessage>) -> bool {
         let fits = self.requested.len() + messages.len() <= MAX_REQUESTED;
         if fits {
@@ -202,8 +202,8 @@ impl Lane {
             self.share_with_the_radio();
         }
         let slow = is_slow(self.streams.capacity_bytes_s());
-        let Self { sent, telemetry_briefly, answers_briefly, answered, said, .. } = self;
-        for window in [sent, telemetry_briefly, answers_briefly, answered, said] {
+        let Self { sent, telemetry_briefly, answers_briefly, answered, texts_briefly, .. } = self;
+        for window in [sent, telemetry_briefly, answers_briefly, answered, texts_briefly] {
             window.move_to(now_s);
         }
         let mut frames = Vec::new();
@@ -269,7 +269,7 @@ impl Lane {
         while self.is_line_free(now_s)
             && let Some(message) = self.next_requested(vehicle)
         {
-            // Some room is also kept free for telemetry that falls due in the meantime.
+            // Some room is also reserved for telemetry that falls due in the meantime.
             let room = self.room_for_telemetry().saturating_sub(longest);
             let Some(frame) = self.encode(&message.into(), room) else { break };
             self.telemetry_briefly.take(self.len_of(&frame), now_s);
@@ -287,9 +287,9 @@ impl Lane {
         while self.is_line_free(now_s)
             && let Some(chunk) = self.texts.front().cloned()
         {
-            let room = self.room_for_answers().min(self.said.room());
+            let room = self.room_for_answers().min(self.texts_briefly.room());
             let Some(frame) = self.encode(&chunk, room) else { break };
-            self.said.take(self.len_of(&frame), now_s);
+            self.texts_briefly.take(self.len_of(&frame), now_s);
             self.answers_briefly.take(self.len_of(&frame), now_s);
             self.put(frame, now_s, frames);
             self.texts.pop_front();
@@ -306,7 +306,7 @@ impl Lane {
         if self.line_takes_s(longest) > LINE_HOLDS_S {
             return;
         }
-        // A poll that comes late is caught up with, a pause is not.
+        // A late poll is caught up with, a pause is not.
         self.piece_due_s = self.piece_due_s.max(now_s - spacing_s);
         while now_s >= self.piece_due_s
             && self.is_line_free(now_s)
@@ -319,10 +319,10 @@ impl Lane {
         }
     }
 
-    /// Room for messages that are not vital. Some of the budget is kept free so that vital messages
+    /// Room for messages that are not vital. Some of the budget is reserved so that vital messages
     /// never wait.
     fn room(&self) -> usize {
-        self.sent.room().saturating_sub(kept_free_bytes(self.signature_len))
+        self.sent.room().saturating_sub(reserved_bytes(self.signature_len))
     }
 
     fn room_for_answers(&self) -> usize {
@@ -400,11 +400,11 @@ impl Lane {
 /// would wait.
 pub(super) const BRIEFLY_S: f64 = 0.2;
 
-/// A radio that has not reported for this long has no say any more, s.
+/// Validity of a radio's report, s.
 const RADIO_REPORT_HOLDS_S: f64 = 10.0;
 
 flight::with_defaults! {
-    /// What a radio leaves of the budget: less while its buffer is full (RADIO_STATUS).
+    /// Share of the budget that a radio leaves: less while its buffer is full (RADIO_STATUS).
     #[derive(Debug, Clone, Copy)]
     pub(super) struct RadioShare {
         share: f64 = 1.0,
@@ -418,7 +418,7 @@ impl RadioShare {
     }
 
     /// Takes a report: how much of its buffer is free, percent.
-    pub(super) fn hear(&mut self, free_percent: u8, now_s: f64) {
+    pub(super) fn take_report(&mut self, free_percent: u8, now_s: f64) {
         *self = Self { share: slowed(self.share, free_percent), reported_s: Some(now_s) };
     }
 
@@ -449,7 +449,7 @@ impl Window {
 
     /// Drops bytes that were sent before the window.
     pub(super) fn move_to(&mut self, now_s: f64) {
-        // Times are multiples of a frame; rounding must not keep an entry one frame too long.
+        // Times are multiples of a frame; rounding must not retain an entry one frame too long.
         while let Some((sent_s, bytes)) = self.sent.front()
             && now_s - sent_s >= self.span_s - 1e-9
         {

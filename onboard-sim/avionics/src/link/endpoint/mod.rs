@@ -1,11 +1,11 @@
 //! The vehicle's end of MAVLink, without sockets: frames in, frames out.
 //!
 //! In every second each link carries at most its budget, whatever is requested. Vital messages go
-//! first, then answers and texts within their own shares, then telemetry, then requested messages.
-//! In the fall texts follow telemetry.
+//! first, then answers and texts within their shares, then telemetry, then requested messages. In
+//! the fall texts follow telemetry.
 
+pub mod addressing;
 mod lane;
-pub mod meant;
 mod questions;
 mod requests;
 
@@ -15,8 +15,8 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use alloc::{format, vec};
 
-use flight::computer::crew::Asked;
-use flight::computer::news::Severity;
+use flight::computer::crew::CrewCommand;
+use flight::computer::messages::Severity;
 use flight::rules::operator::Operator;
 use flight::rules::phase::{Interlocks, Mode, Phase};
 use flight::rules::two_person::{Station, TwoPerson};
@@ -49,13 +49,13 @@ use crate::link::{commands, telemetry};
 /// Most requested messages that may wait; more are refused for the moment.
 const MAX_REQUESTED: usize = 32;
 /// Most sources that are remembered, so that a flood of forged ids cannot grow memory.
-const MAX_KNOWN: usize = 16;
+const MAX_SOURCES: usize = 16;
 /// After an abort: interval of heartbeats, s, and for how long, s. The crew soon sees the latched
 /// abort, even over a bad link.
 const ABORTED_BEAT_S: f64 = 0.2;
 const ABORTED_BEATS_FOR_S: f64 = 3.0;
 /// In a countdown: the longest interval of flight statuses, s; on a slow line they take half of it.
-const COUNTDOWN_TOLD_S: f64 = 0.2;
+const COUNTDOWN_STATUS_S: f64 = 0.2;
 
 /// The vehicle's end of its links.
 pub struct VehicleEndpoint {
@@ -66,18 +66,18 @@ pub struct VehicleEndpoint {
     capacities_bytes_s: Vec<u32>,
     text_id: u16,
     now_s: f64,
-    /// When another vehicle under our ids was last heard.
-    twin_heard_at_s: Option<f64>,
-    /// The known stations, and how well each is heard.
+    /// Time at which another vehicle under our ids was last received.
+    twin_received_at_s: Option<f64>,
+    /// The stations, with the uplink quality of each.
     stations: Stations,
-    /// Whether the vehicle starts by itself, so that no station has to be heard.
+    /// Whether the vehicle starts by itself, so that no station is required.
     starts_by_itself: bool,
     /// Commands that the vehicle decides in its next frame.
     waiting: Vec<Waiting>,
     /// The newest first.
     answered: VecDeque<Answered>,
     /// Sources that have sent anything; a new one gets the constant data at once.
-    known: BTreeSet<Address>,
+    sources: BTreeSet<Address>,
     refusals: Refusals,
     warnings: Warnings,
     last_reported: Option<LastReported>,
@@ -132,7 +132,7 @@ impl VehicleEndpoint {
 
     /// The same for a vehicle with operators. A frame's signature must have been checked with the
     /// key that its link id names ([`protocol::signing::Signing::with_operators`]): here it only
-    /// says whose it is.
+    /// identifies the operator.
     pub fn sending_to_crew(kind: VehicleKind) -> Self {
         let endpoint = Self::over(kind, Streams::with_crew(), SIGNATURE_LEN);
         Self { stations: Stations::of_a_crew(), ..endpoint }
@@ -146,8 +146,8 @@ impl VehicleEndpoint {
             capacities_bytes_s: vec![RADIO_BUDGET_BYTES_S],
             text_id: 0,
             now_s: 0.0,
-            twin_heard_at_s: None,
-            known: BTreeSet::new(),
+            twin_received_at_s: None,
+            sources: BTreeSet::new(),
             stations: Stations::default(),
             starts_by_itself: false,
             waiting: Vec::new(),
@@ -169,14 +169,14 @@ impl VehicleEndpoint {
         Self { identity: Identity { boot_number, ..self.identity }, ..self }
     }
 
-    /// Sets the unique id of the vehicle, which it keeps from one power-up to the next.
+    /// Sets the unique id of the vehicle, which is the same at each power-up.
     #[must_use]
-    pub fn known_as(self, uid: u16) -> Self {
+    pub fn with_uid(self, uid: u16) -> Self {
         Self { identity: Identity { uid, ..self.identity }, ..self }
     }
 
     /// Sets the links by their budgets in bytes per second. All carry the same frames, limited by
-    /// the slowest link, until a station asks one link for something else.
+    /// the slowest link, until a station requests something else on one link.
     #[must_use]
     pub fn over_links(mut self, capacities_bytes_s: &[u32]) -> Self {
         self.capacities_bytes_s = capacities_bytes_s.to_vec();
@@ -199,8 +199,8 @@ impl VehicleEndpoint {
         Self { us, lanes, ..self }
     }
 
-    /// Takes a frame that came in this way. The vehicle decides requests in its next frame
-    /// ([`VehicleEndpoint::heard`], [`VehicleEndpoint::on_answers`]); answers come out of
+    /// Takes a frame from this path. The vehicle decides requests in its next frame
+    /// ([`VehicleEndpoint::uplink_state`], [`VehicleEndpoint::on_answers`]); answers come out of
     /// [`VehicleEndpoint::poll`].
     pub fn on_frame(&mut self, path: impl Into<Path>, frame: &Frame, vehicle: &VehicleState<'_>) {
         if frame.source() == self.us {
@@ -216,7 +216,7 @@ impl VehicleEndpoint {
             return;
         }
         self.stations.accepted(frame, &sender_of(frame, path, vehicle), vehicle.time_s);
-        if self.known.len() < MAX_KNOWN && self.known.insert(frame.source()) {
+        if self.sources.len() < MAX_SOURCES && self.sources.insert(frame.source()) {
             let streams = &mut self.lane(link).streams;
             streams.hurry(TD_FLIGHT_STATUS_DATA::ID);
             streams.hurry(TD_TOUCHDOWN_LIMITS_DATA::ID);
@@ -273,7 +273,7 @@ impl VehicleEndpoint {
         }
     }
 
-    /// Takes a copy of a frame, which had come in another way before.
+    /// Takes a copy of a frame that was received before on another path.
     pub fn on_copy(&mut self, path: impl Into<Path>, frame: &Frame, vehicle: &VehicleState<'_>) {
         self.stations.copied(frame, &sender_of(frame, path.into(), vehicle));
     }
@@ -282,17 +282,17 @@ impl VehicleEndpoint {
     /// a forger could cause an answer that the real ground station takes for its own.
     pub fn on_rejected(&mut self, frame: &Frame, why: Rejection) {
         self.stations.refused(frame.source(), why, self.now_s);
-        let Some(request) = CommandRequest::from_frame(frame).filter(|asked| self.us.accepts(asked.target))
+        let Some(request) = CommandRequest::from_frame(frame).filter(|one| self.us.accepts(one.target))
         else {
             return;
         };
         let Address { system_id, component_id } = request.source;
         let words = format!("command {} from {system_id}/{component_id} refused: {why}", request.command);
-        self.say(Severity::Warning, &words);
+        self.send_text(Severity::Warning, &words);
     }
 
-    /// The landing has been judged: every station is told at once.
-    pub fn tell_of_verdict(&mut self) {
+    /// Sends the verdict on the landing to every station at once.
+    pub fn announce_verdict(&mut self) {
         self.hurry(TD_LANDING_VERDICT_DATA::ID);
     }
 
@@ -302,13 +302,13 @@ impl VehicleEndpoint {
         self.watch(vehicle.mode());
         self.watch_the_crew(vehicle);
         for words in self.warnings.counted(self.now_s) {
-            self.say_aloud(Severity::Warning, &words);
+            self.queue_text(Severity::Warning, &words);
         }
         let context = Context { now_s: self.now_s, identity: self.identity };
         let boot = self.identity.boot_number;
         for message in self.stations.due(boot, self.now_s) {
             for lane in &mut self.lanes {
-                lane.tell_of_uplink(message.clone());
+                lane.queue_uplink_report(message.clone());
             }
         }
         let in_turn = [
@@ -317,7 +317,7 @@ impl VehicleEndpoint {
         ];
         for message in in_turn.into_iter().flatten() {
             for lane in &mut self.lanes {
-                // A lane without room loses this one: every value comes again.
+                // A lane without room loses this one: every value is repeated.
                 lane.request(vec![message.clone()]);
             }
         }
@@ -341,11 +341,11 @@ impl VehicleEndpoint {
                 lane.streams.at_least_every(TD_FLIGHT_STATUS_DATA::ID, 0.0);
             }
         }
-        // A station that hears nothing of the countdown for 1 s says so, and holds it: also over
-        // the slowest line it hears several of these in that time.
+        // A station without a downlink in the countdown for 1 s reports so, and holds it: even the
+        // slowest line carries several of these in that time.
         if mode.countdown_end_s.is_some() {
             for lane in &mut self.lanes {
-                lane.streams.at_least_every(TD_FLIGHT_STATUS_DATA::ID, COUNTDOWN_TOLD_S);
+                lane.streams.at_least_every(TD_FLIGHT_STATUS_DATA::ID, COUNTDOWN_STATUS_S);
             }
         }
         if !now.interlocks.armed {
@@ -361,14 +361,14 @@ impl VehicleEndpoint {
         }
     }
 
-    /// Reports an ask, a confirmation, a tap and a take-over at once.
+    /// Reports a proposal, a confirmation, a tap and a take-over at once.
     fn watch_the_crew(&mut self, vehicle: &VehicleState<'_>) {
         if vehicle.operators.is_empty() {
             return;
         }
         let memory = vehicle.computer.crew();
-        let told = (memory.two_person, memory.held_by, self.stations.armed_by());
-        if self.last_crew.replace(told) != Some(told) {
+        let crew = (memory.two_person, memory.held_by, self.stations.armed_by());
+        if self.last_crew.replace(crew) != Some(crew) {
             self.hurry(TD_CREW_DATA::ID);
         }
     }
@@ -384,7 +384,7 @@ impl VehicleEndpoint {
         &mut self.lanes[place]
     }
 
-    /// Takes a command, which may be for everybody. `by` is the operator whose key has signed it.
+    /// Takes a command, which may be a broadcast. `by` is the operator whose key has signed it.
     pub fn on_command(
         &mut self,
         path: impl Into<Path>,
@@ -396,14 +396,14 @@ impl VehicleEndpoint {
         let key = by.map_or(0, |by| by.number);
         let station = self.stations.of(&Sender { address: request.source, key, path });
         let (result, reason) = match commands::parse(request) {
-            Ok(asked) if let Some(unfit) = self.why_not_meant(request, &asked, station, vehicle) => {
+            Ok(command) if let Some(unfit) = self.address_refusal(request, &command, station, vehicle) => {
                 (unfit.result, unfit.reason)
             }
             Err(unfit) => (unfit.result, unfit.reason),
-            Ok(Command::Vehicle(asked)) => return self.put(link, (request, by, station), asked, vehicle),
+            Ok(Command::Vehicle(command)) => return self.put(link, (request, by, station), command, vehicle),
             Ok(Command::ForcedDisarm) => {
-                let asked = if means_abort(vehicle) { Asked::Abort } else { Asked::Disarm };
-                return self.put(link, (request, by, station), asked, vehicle);
+                let command = if means_abort(vehicle) { CrewCommand::Abort } else { CrewCommand::Disarm };
+                return self.put(link, (request, by, station), command, vehicle);
             }
             Ok(Command::SetInterval { message_id, interval_us }) => {
                 let now_s = self.now_s;
@@ -417,12 +417,12 @@ impl VehicleEndpoint {
         };
         self.acknowledge(link, request, (result, None));
         if let Some(reason) = reason {
-            self.say(Severity::Warning, &reason);
+            self.send_text(Severity::Warning, &reason);
         }
     }
 
-    /// Takes back a command that is being carried out: only a check takes a while. Any other is
-    /// done or refused at once, and the answer says that it cannot be cancelled.
+    /// Cancels a running command: only a check takes a while. Any other is done or refused at once,
+    /// and the answer states that it cannot be cancelled.
     fn on_cancel(
         &mut self,
         path: Path,
@@ -432,19 +432,19 @@ impl VehicleEndpoint {
         if cancelled.is(MavCmd::MAV_CMD_TD_PAD_CHECK) && vehicle.computer.pad_check().is_running() {
             let key = by.map_or(0, |by| by.number);
             let station = self.stations.of(&Sender { address: cancelled.source, key, path });
-            self.put(path.link, (cancelled, by, station), Asked::EndCheck, vehicle);
+            self.put(path.link, (cancelled, by, station), CrewCommand::EndCheck, vehicle);
         } else {
             self.acknowledge(path.link, cancelled, (MavResult::MAV_RESULT_DENIED, None));
         }
     }
 
-    /// Answers a command. Repeated refusals to one station are not answered every time.
-    /// `ask` is the number of the ask that a second person has to confirm.
+    /// Answers a command. Repeated refusals to one station are not answered every time. `proposal`
+    /// is the number of the proposal that a second person must confirm.
     fn acknowledge(
         &mut self,
         link: usize,
         request: &CommandRequest,
-        (result, ask): (MavResult, Option<u16>),
+        (result, proposal): (MavResult, Option<u16>),
     ) {
         let refused = result != MavResult::MAV_RESULT_ACCEPTED;
         if !refused
@@ -455,7 +455,7 @@ impl VehicleEndpoint {
             )
         {
             let answer = CommandAnswer::to(request, result);
-            let answer = ask.map_or(answer, |ask| answer.asking(ask));
+            let answer = proposal.map_or(answer, |number| answer.for_confirmation(number));
             self.lane(link).answer(QueuedAnswer::Command(answer));
         }
     }
@@ -476,8 +476,8 @@ impl VehicleEndpoint {
         Some(format!("while armed, only {armed_by}, which armed, sets rates"))
     }
 
-    /// Changes the rates of one link: an interval applies to the link that asked. A link that
-    /// shared a lane with others gets its own lane if anything changes.
+    /// Changes the rates of one link: an interval applies to the requesting link. A link that
+    /// shared a lane with others gets a separate lane if anything changes.
     fn with_rates_of<T>(&mut self, link: usize, change: impl FnOnce(&mut Streams) -> T) -> T {
         let capacity_bytes_s = self.capacities_bytes_s.get(link).copied().unwrap_or(RADIO_BUDGET_BYTES_S);
         let lane = self.lane(link);
@@ -489,22 +489,22 @@ impl VehicleEndpoint {
         let before = streams.intervals();
         let done = change(&mut streams);
         if streams.intervals() != before {
-            let mut own = lane.of_its_own(link);
-            own.streams = streams;
-            own.set_capacity(capacity_bytes_s);
-            self.lanes.push(own);
+            let mut new_lane = lane.split_off(link);
+            new_lane.streams = streams;
+            new_lane.set_capacity(capacity_bytes_s);
+            self.lanes.push(new_lane);
         }
         done
     }
 
-    /// Gives a link a lane of its own, if it shared one.
+    /// Gives a link a separate lane, if it shared one.
     fn separate(&mut self, link: usize) {
         let capacity_bytes_s = self.capacities_bytes_s.get(link).copied().unwrap_or(RADIO_BUDGET_BYTES_S);
         let lane = self.lane(link);
         if lane.links.len() > 1 {
-            let mut own = lane.of_its_own(link);
-            own.set_capacity(capacity_bytes_s);
-            self.lanes.push(own);
+            let mut new_lane = lane.split_off(link);
+            new_lane.set_capacity(capacity_bytes_s);
+            self.lanes.push(new_lane);
         }
     }
 
@@ -518,7 +518,7 @@ impl VehicleEndpoint {
         let identity = self.identity;
         let lane = self.lane(link);
         let messages: Vec<MavMessage> = match message_id {
-            // 0 asks for all modes, k for the k-th.
+            // 0 requests all modes, k the k-th.
             AVAILABLE_MODES_DATA::ID if of as usize > Phase::ALL.len() => {
                 let reason = format!("mode {of}: there are {}", Phase::ALL.len());
                 return (MavResult::MAV_RESULT_DENIED, Some(reason));
@@ -556,13 +556,13 @@ impl VehicleEndpoint {
     }
 
     /// Sends a text to the crew. A warning that was sent just before is counted instead.
-    pub fn say(&mut self, severity: Severity, words: &str) {
-        if severity != Severity::Warning || self.warnings.is_news(words, self.now_s) {
-            self.say_aloud(severity, words);
+    pub fn send_text(&mut self, severity: Severity, words: &str) {
+        if severity != Severity::Warning || self.warnings.is_new(words, self.now_s) {
+            self.queue_text(severity, words);
         }
     }
 
-    fn say_aloud(&mut self, severity: Severity, words: &str) {
+    fn queue_text(&mut self, severity: Severity, words: &str) {
         self.text_id = self.text_id.wrapping_add(1).max(1);
         let severity = match severity {
             Severity::Info => MavSeverity::MAV_SEVERITY_INFO,
@@ -573,7 +573,7 @@ impl VehicleEndpoint {
         };
         for chunk in text::chunks(severity, words, self.text_id) {
             for lane in &mut self.lanes {
-                lane.say(MavMessage::STATUSTEXT(chunk.clone()));
+                lane.queue_text(MavMessage::STATUSTEXT(chunk.clone()));
             }
         }
     }
@@ -596,7 +596,7 @@ fn means_abort(vehicle: &VehicleState<'_>) -> bool {
     !(vehicle.phase().on_pad() || matches!(vehicle.phase(), Phase::Touchdown | Phase::Safed))
 }
 
-/// The answer to a PING that asks for one. PING is deprecated, but older ground stations still
+/// The answer to a PING that requests one. PING is deprecated, but older ground stations still
 /// measure with it.
 #[expect(deprecated, reason = "the standard has replaced PING by TIMESYNC; older ground stations have not")]
 fn pong(message: &MavMessage, asker: Address) -> Option<MavMessage> {

@@ -7,7 +7,7 @@ use alloc::string::String;
 use alloc::{format, vec};
 use core::time::Duration;
 
-use flight::computer::news::Severity;
+use flight::computer::messages::Severity;
 use flight::rules::operator::Operator;
 use flight::rules::phase::Phase;
 use mavlink::types::CharArray;
@@ -76,7 +76,7 @@ impl VehicleEndpoint {
                 };
                 lane.answer(answer.into());
                 if let Some(refusal) = refusal {
-                    self.say(Severity::Warning, &refusal.reason);
+                    self.send_text(Severity::Warning, &refusal.reason);
                 }
             }
         }
@@ -84,14 +84,14 @@ impl VehicleEndpoint {
     }
 }
 
-// Answers for lists that this vehicle does not keep: missions, fences, rally points, logs on board,
+// Answers for lists that this vehicle does not have: missions, fences, rally points, logs on board,
 // extended parameters.
 //
-// Other ground stations ask for them whatever the capabilities say, and report a failure to their
-// user if there is no answer. So every question is answered: the lists are empty, and nothing can
-// be put into them. Protocols: <https://mavlink.io/en/services/mission.html> and LOG_REQUEST_LIST
-// of common.xml. Questions are parsed from raw bytes, because a mission type that the dialect does
-// not know must be answered, too.
+// Other ground stations request them whatever the capabilities state, and report a failure to their
+// user if there is no answer. So every request is answered: the lists are empty, and nothing can be
+// put into them. Protocols: <https://mavlink.io/en/services/mission.html> and LOG_REQUEST_LIST of
+// common.xml. Requests are parsed from raw bytes, because an unknown mission type must be answered,
+// too.
 
 /// A question about a list, with its answer.
 pub(super) struct ListQuestion {
@@ -196,11 +196,11 @@ fn acknowledged(asker: Address, kind: u8, result: MavMissionResult) -> MavMessag
     })
 }
 
-// Gives out the vehicle's log (MAVLink FTP), while nobody can be harmed by a thinner telemetry: on
-// the ground, disarmed.
+// Serves the vehicle's log (MAVLink FTP) while a reduced telemetry is safe: on the ground,
+// disarmed.
 
 flight::with_defaults! {
-    /// The log's files, and what clients have asked for.
+    /// The log's files, and the clients' requests.
     pub(super) struct FileService {
         server: Server = Server::default(),
         files: Box<dyn Files + Send> = Box::new(NoFiles),
@@ -233,12 +233,12 @@ pub fn gives_out_its_log(vehicle: &VehicleState<'_>) -> bool {
 impl VehicleEndpoint {
     /// Offers these files from now on. They must not change any more.
     pub fn offer(&mut self, files: Box<dyn Files + Send>) {
-        // What was asked of other files is void.
+        // Requests for other files are void.
         self.files = FileService { server: Server::default(), files };
     }
 
-    /// Takes a request for a file. A link that reads gets a lane of its own: its files and its
-    /// thinner telemetry concern no other link.
+    /// Takes a request for a file. A reading link gets a separate lane: its files and its reduced
+    /// telemetry affect no other link.
     pub(super) fn on_file_request(
         &mut self,
         link: usize,
@@ -254,12 +254,12 @@ impl VehicleEndpoint {
         let now = Duration::from_secs_f64(vehicle.time_s);
         let taken = server.take(request, link, forbidden.is_none(), &**files, now);
         if let (Taken::NotNow, Some(why)) = (taken, forbidden) {
-            self.say(Severity::Warning, &why);
+            self.send_text(Severity::Warning, &why);
         }
     }
 
-    /// Continues with what takes long, and closes every file when the vehicle must not give them
-    /// out any more.
+    /// Continues long operations, and closes every file when the vehicle must not serve them any
+    /// more.
     pub(super) fn serve_files(&mut self, vehicle: &VehicleState<'_>) {
         let FileService { server, files } = &mut self.files;
         if gives_out_its_log(vehicle) {

@@ -8,7 +8,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 
 use flight::computer::Commander;
-use flight::computer::crew::{Answer, Asked, Ending, People, Request};
+use flight::computer::crew::{Answer, CrewCommand, Ending, People, Request};
 use flight::rules::arming::Uplink;
 use flight::rules::operator::Operator;
 use flight::rules::phase::Phase;
@@ -18,7 +18,7 @@ use protocol::dialect::MavResult;
 use protocol::identity::Address;
 
 use super::VehicleEndpoint;
-use super::meant::can_move;
+use super::addressing::can_move;
 use crate::link::commands;
 use crate::link::vehicle::VehicleState;
 
@@ -28,10 +28,10 @@ const MAX_WAITING: usize = 64;
 /// How many answers are remembered, in case their commands are repeated.
 const MAX_ANSWERED: usize = 16;
 
-/// What a frame of the vehicle is told of its links, and asked by its crew.
+/// Uplink state for a frame of the vehicle, with the crew's requests.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UplinkState {
-    /// How well the best station is heard.
+    /// Uplink of the best station.
     pub uplink: Uplink,
     /// The station that armed the vehicle, if one did.
     pub commander: Option<Commander>,
@@ -67,7 +67,7 @@ fn is_repeated(
 }
 
 impl VehicleEndpoint {
-    /// Configures a vehicle that starts by itself: no station has to be heard, and the silence of a
+    /// Configures a vehicle that starts by itself: no station is required, and the silence of a
     /// station does not hold it.
     #[must_use]
     pub fn starting_by_itself(self) -> Self {
@@ -79,11 +79,12 @@ impl VehicleEndpoint {
         &mut self,
         link: usize,
         (command, by, station): (&CommandRequest, Option<Operator>, Station),
-        asked: Asked,
+        crew_command: CrewCommand,
         vehicle: &VehicleState<'_>,
     ) {
-        // What moves something is done once, whatever arrives late; what stops is done every time.
-        if can_move(asked) {
+        // A command that moves something is executed once, however late a repetition arrives; one
+        // that stops is executed every time.
+        if can_move(crew_command) {
             if self
                 .waiting
                 .iter()
@@ -97,11 +98,12 @@ impl VehicleEndpoint {
                 return self.acknowledge(link, command, answer);
             }
         }
-        // Other commands never displace an abort, and nobody's aborts that of an operator.
-        let is_abort = |waiting: &&Waiting| waiting.request.asked == Asked::Abort;
+        // Other commands never displace an abort, and an abort without an operator never displaces
+        // an operator's.
+        let is_abort = |waiting: &&Waiting| waiting.request.command == CrewCommand::Abort;
         let aborts = self.waiting.iter().filter(is_abort).count();
-        let is_full = match asked {
-            Asked::Abort => by.is_none() && aborts >= MAX_WAITING,
+        let is_full = match crew_command {
+            CrewCommand::Abort => by.is_none() && aborts >= MAX_WAITING,
             _ => self.waiting.len() - aborts >= MAX_WAITING,
         };
         if is_full {
@@ -112,46 +114,46 @@ impl VehicleEndpoint {
         } else {
             self.stations.uplink(station, vehicle.time_s)
         };
-        let confirms = commands::confirmed_ask(command);
-        let request = Request { asked, uplink, station: Some(station), by, confirms };
-        // A station that repeats an abort before the decision is answered once. Nobody else's abort
+        let confirms = commands::confirmed_proposal(command);
+        let request = Request { command: crew_command, uplink, station: Some(station), by, confirms };
+        // A station that repeats an abort before the decision is answered once. Another sender's abort
         // makes it a repetition: an observer may name the same address.
         let repeats =
             |waiting: &Waiting| waiting.command.source == command.source && waiting.request.by == by;
-        if asked == Asked::Abort
-            && self.waiting.iter().any(|waiting| repeats(waiting) && waiting.request.asked == asked)
+        if crew_command == CrewCommand::Abort
+            && self.waiting.iter().any(|waiting| repeats(waiting) && waiting.request.command == crew_command)
         {
             return;
         }
         self.waiting.push(Waiting { link, command: *command, request });
     }
 
-    /// What the vehicle's next frame is told of its links and asked by its crew.
-    pub fn heard(&self, time_s: f64) -> UplinkState {
+    /// Uplink state for the vehicle's next frame, with the crew's requests.
+    pub fn uplink_state(&self, time_s: f64) -> UplinkState {
         let (uplink, commander) = self.uplink(time_s);
         let requests = self.waiting.iter().map(|waiting| waiting.request).collect();
         UplinkState { uplink, commander, requests }
     }
 
-    /// Takes the vehicle's answers to the requests that it has [heard](Self::heard); `vehicle` has
-    /// just decided. A dead flight computer gives no answers, and its requests are dropped.
+    /// Takes the vehicle's answers to the requests of the last [uplink state](Self::uplink_state);
+    /// `vehicle` is its state after the decision. A dead flight computer gives no answers, and its requests are dropped.
     pub fn on_answers(&mut self, answers: &[Answer], vehicle: &VehicleState<'_>) {
         let waiting = core::mem::take(&mut self.waiting);
         for (Waiting { link, command, request }, answer) in waiting.into_iter().zip(answers) {
             self.note_commander(&request, answer, vehicle);
             // A COMMAND_CANCEL has no parameters.
-            let is_cancelled = request.asked == Asked::EndCheck && command.params[0].is_nan();
+            let is_cancelled = request.command == CrewCommand::EndCheck && command.params[0].is_nan();
             let result = match commands::mav_result(answer.ending) {
                 MavResult::MAV_RESULT_ACCEPTED if is_cancelled => MavResult::MAV_RESULT_CANCELLED,
                 result => result,
             };
-            if request.asked == Asked::Abort {
+            if request.command == CrewCommand::Abort {
                 self.lane(link).answer_abort(CommandAnswer::to(&command, result));
             } else {
-                let asked = vehicle.computer.crew().two_person.waiting(vehicle.time_s);
-                let asked = asked.filter(|_| answer.ending == Ending::Asked);
-                let answer = (result, asked.map(|ask| ask.number));
-                if can_move(request.asked) && command.number().is_some() {
+                let proposal = vehicle.computer.crew().two_person.waiting(vehicle.time_s);
+                let proposal = proposal.filter(|_| answer.ending == Ending::ToConfirm);
+                let answer = (result, proposal.map(|proposal| proposal.number));
+                if can_move(request.command) && command.number().is_some() {
                     self.answered.truncate(MAX_ANSWERED - 1);
                     self.answered.push_front(Answered { command, by: request.by, answer });
                 }
@@ -160,27 +162,26 @@ impl VehicleEndpoint {
         }
     }
 
-    /// The first station that armed it is in command: of two people the one who asked. A station
-    /// that takes over is next.
+    /// The first station that armed it is in command; of two people, the proposer's. A station that
+    /// takes over is next.
     fn note_commander(&mut self, request: &Request, answer: &Answer, vehicle: &VehicleState<'_>) {
         let Some(station) = request.station.filter(|_| answer.ending == Ending::Accepted) else { return };
         let here = (station, request.by);
-        match request.asked {
-            Asked::Arm if vehicle.phase() == Phase::PadArmed && self.stations.armed_by().is_none() => {
-                let asked = vehicle.computer.crew().two_person.armed_by();
-                let asked = asked
-                    .filter(|_| matches!(vehicle.input().people, Some(People::Two { .. })))
-                    .map(|ask| (ask.station, Some(ask.by)));
-                self.stations.set_commander(Some(asked.unwrap_or(here)));
+        match request.command {
+            CrewCommand::Arm if vehicle.phase() == Phase::PadArmed && self.stations.armed_by().is_none() => {
+                let proposal = vehicle.computer.crew().two_person.armed_by();
+                let two = matches!(vehicle.input().people, Some(People::Two { .. }));
+                let proposer = proposal.filter(|_| two).map(|one| (one.station, Some(one.by)));
+                self.stations.set_commander(Some(proposer.unwrap_or(here)));
             }
             // Disarmed and armed again before the next frame: the next one is in command.
-            Asked::Disarm => self.stations.set_commander(None),
-            Asked::TakeCommand => self.stations.set_commander(Some(here)),
+            CrewCommand::Disarm => self.stations.set_commander(None),
+            CrewCommand::TakeCommand => self.stations.set_commander(Some(here)),
             _ => {}
         }
     }
 
-    /// How well the best station and the station that armed the vehicle are heard now.
+    /// Uplink of the best station and of the station that armed the vehicle.
     fn uplink(&self, time_s: f64) -> (Uplink, Option<Commander>) {
         if self.starts_by_itself {
             return (Uplink::NotNeeded, None);
@@ -198,14 +199,13 @@ impl VehicleEndpoint {
 // Limits how often refusals are explained: the reason is sent once and then counted, so that a
 // flood of refused requests fills neither the radio nor the crew's screen.
 
-/// Number of refused commands of one station that are answered at once. No known client sends more
+/// Number of refused commands of one station that are answered at once. No client in use sends more
 /// before it waits.
 const AT_ONCE: f64 = 8.0;
 /// After those, answers per second to one station's refused commands: each repetition waits 0.5 s.
 const PER_S: f64 = 2.0;
-/// A command that the vehicle does not know costs this much of an answer: clients try out many in a
-/// row, and wait for each. It has no text. Twenty at ten a second are all answered, and five a
-/// second for as long as they like.
+/// Cost of an unsupported command, in answers: clients try many in a row, and wait for each. It has
+/// no text. Twenty at ten a second are all answered, and five a second permanently.
 const COST_OF_UNSUPPORTED: f64 = 0.4;
 /// Number of stations tracked separately. A flood of forged addresses shares the last entry.
 const MAX_STATIONS: usize = 16;
@@ -242,20 +242,20 @@ impl Refusals {
 
 /// Shortest time before the same warning is sent again, s, with the number of times it was held
 /// back.
-const SAID_FOR_S: f64 = 5.0;
+const REPEATED_AFTER_S: f64 = 5.0;
 /// Most different warnings in that time; only the number of further ones is sent.
 const MAX_DIFFERENT: usize = 8;
 
 /// Recently sent warnings.
 #[derive(Debug, Default)]
 pub(super) struct Warnings {
-    said: Vec<Said>,
+    recent: Vec<RecentWarning>,
     others: u32,
     others_since_s: f64,
 }
 
 #[derive(Debug)]
-struct Said {
+struct RecentWarning {
     words: String,
     at_s: f64,
     more: u32,
@@ -264,38 +264,38 @@ struct Said {
 impl Warnings {
     /// Whether to send a warning now. Texts that differ only in their digits are the same warning,
     /// because a newly measured value is no news.
-    pub(super) fn is_news(&mut self, words: &str, now_s: f64) -> bool {
-        if let Some(said) = self.said.iter_mut().find(|said| same_but_for_figures(&said.words, words)) {
-            said.more += 1;
-            words.clone_into(&mut said.words);
+    pub(super) fn is_new(&mut self, words: &str, now_s: f64) -> bool {
+        if let Some(recent) = self.recent.iter_mut().find(|one| same_but_for_figures(&one.words, words)) {
+            recent.more += 1;
+            words.clone_into(&mut recent.words);
             return false;
         }
-        if self.said.len() >= MAX_DIFFERENT {
+        if self.recent.len() >= MAX_DIFFERENT {
             if self.others == 0 {
                 self.others_since_s = now_s;
             }
             self.others += 1;
             return false;
         }
-        self.said.push(Said { words: words.to_owned(), at_s: now_s, more: 0 });
+        self.recent.push(RecentWarning { words: words.to_owned(), at_s: now_s, more: 0 });
         true
     }
 
     /// Texts with the counts that are due.
     pub(super) fn counted(&mut self, now_s: f64) -> Vec<String> {
         let mut words = Vec::new();
-        self.said.retain_mut(|said| {
-            if now_s - said.at_s < SAID_FOR_S {
+        self.recent.retain_mut(|recent| {
+            if now_s - recent.at_s < REPEATED_AFTER_S {
                 return true;
             }
-            let more = core::mem::take(&mut said.more);
+            let more = core::mem::take(&mut recent.more);
             if more > 0 {
-                said.at_s = now_s;
-                words.push(format!("{} ({more} more)", said.words));
+                recent.at_s = now_s;
+                words.push(format!("{} ({more} more)", recent.words));
             }
             more > 0
         });
-        if self.others > 0 && now_s - self.others_since_s >= SAID_FOR_S {
+        if self.others > 0 && now_s - self.others_since_s >= REPEATED_AFTER_S {
             words.push(format!("{} other warnings", core::mem::take(&mut self.others)));
         }
         words
@@ -323,7 +323,7 @@ mod tests {
         // 10 s at 20 Hz.
         assert!((26..=28).contains(&answered(&mut refusals, 0.0)));
         assert!((18..=20).contains(&answered(&mut refusals, 10.0)));
-        // Another station does not have to wait because of this one.
+        // Another station is not delayed by this one.
         assert!(refusals.may_answer(Address { system_id: 254, component_id: 190 }, true, 20.0));
     }
 
@@ -339,22 +339,22 @@ mod tests {
     #[test]
     fn a_warning_is_sent_once_and_then_counted() {
         let mut warnings = Warnings::default();
-        assert!(warnings.is_news("arm refused: tilt: found 5.21 deg, required at most 5 deg", 0.0));
+        assert!(warnings.is_new("arm refused: tilt: found 5.21 deg, required at most 5 deg", 0.0));
         for n in 1..=40 {
             assert!(
                 !warnings
-                    .is_news("arm refused: tilt: found 5.4 deg, required at most 5 deg", 0.1 * f64::from(n))
+                    .is_new("arm refused: tilt: found 5.4 deg, required at most 5 deg", 0.1 * f64::from(n))
             );
         }
         assert!(warnings.counted(4.9).is_empty());
         let words = warnings.counted(5.0);
         assert_eq!(words, ["arm refused: tilt: found 5.4 deg, required at most 5 deg (40 more)"]);
-        assert!(!warnings.is_news("arm refused: tilt: found 5.4 deg, required at most 5 deg", 6.0));
-        assert!(warnings.is_news("arm refused: pin: found in, required out", 6.0), "another reason");
+        assert!(!warnings.is_new("arm refused: tilt: found 5.4 deg, required at most 5 deg", 6.0));
+        assert!(warnings.is_new("arm refused: pin: found in, required out", 6.0), "another reason");
         assert_eq!(warnings.counted(11.0).len(), 1);
         assert!(warnings.counted(17.0).is_empty());
         assert!(
-            warnings.is_news("arm refused: pin: found in, required out", 17.0),
+            warnings.is_new("arm refused: pin: found in, required out", 17.0),
             "after a pause it is news again"
         );
     }
@@ -363,7 +363,7 @@ mod tests {
     fn only_the_number_of_many_different_warnings_is_sent() {
         let mut warnings = Warnings::default();
         let mut words = (0..26u8).map(|n| format!("no {}", char::from(b'a' + n)));
-        assert_eq!(words.by_ref().filter(|words| warnings.is_news(words, 0.0)).count(), MAX_DIFFERENT);
+        assert_eq!(words.by_ref().filter(|words| warnings.is_new(words, 0.0)).count(), MAX_DIFFERENT);
         assert_eq!(warnings.counted(5.0), ["18 other warnings"]);
     }
 }

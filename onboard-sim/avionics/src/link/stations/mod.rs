@@ -1,15 +1,13 @@
-//! Tracks how well the vehicle hears each ground station: whose frames were accepted, how long ago,
-//! and whose were refused.
+//! Tracks the uplink of each ground station: accepted frames, their age, and refused frames.
 //!
-//! A working downlink does not prove a working uplink. So the vehicle tells every station the age
-//! of the last frame it accepted from that station, and why the last frame from anybody was
-//! refused. Pure: times are vehicle times, s.
+//! A working downlink does not prove a working uplink. So the vehicle reports to every station the
+//! age of the last frame accepted from it, and why the last frame of any sender was refused. Pure:
+//! times are vehicle times, s.
 //!
-//! Two programs may speak under the same ids: both have the default ones, or one was started again.
-//! They are told apart by the key that signs, by the session in their heartbeats (drawn at a
-//! program's start), and without a session, as other people's clients have none, by the
-//! [path](Path) that their frames take. A frame that is no heartbeat belongs to the station whose
-//! heartbeats take its path.
+//! Two programs may use the same ids: both have the default ones, or one was restarted. They are
+//! distinguished by their signing key, by the session in their heartbeats (drawn at a program's
+//! start), and without a session, as for other clients, by the [path](Path) of their frames. A
+//! frame other than a heartbeat belongs to the station whose heartbeats take its path.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -28,14 +26,15 @@ use protocol::signing::Rejection;
 /// Most stations remembered: the crew's, a spare one and an observer's. Each costs a message twice
 /// a second.
 pub const MAX_STATIONS: usize = 3;
-/// The same with operators. No more than [`MAX_STATIONS`] are told at once: of more, each in turn.
+/// The same with operators. No more than [`MAX_STATIONS`] get reports at once: of more, each in
+/// turn.
 const MAX_STATIONS_OF_A_CREW: usize = 6;
 
-/// Interval of the uplink report to every known station, s.
-const TELL_EVERY_S: f64 = 0.5;
+/// Interval of the uplink report to every station, s.
+const REPORT_INTERVAL_S: f64 = 0.5;
 
-/// A station keeps its entry for this long after its last heartbeat, s; frames of others do not
-/// push it out.
+/// Time after its last heartbeat for which a station retains its entry, s; frames of others do not
+/// displace it.
 const PROVEN_FOR_S: f64 = 60.0;
 
 /// Two stations with the same ids are there as long as a heartbeat of each is no older than this,
@@ -46,11 +45,11 @@ pub const SAME_IDS_FOR_S: f64 = 5.0;
 const MAX_PATHS: usize = 4;
 const MAX_BEATS: usize = 4;
 
-/// Addressee while no frame was ever accepted: everybody.
+/// Addressee while no frame was ever accepted: broadcast.
 const EVERYBODY: Address = Address { system_id: 0, component_id: 0 };
 
-/// How a frame came in: the number of its link, and who sent it, as that link tells its senders
-/// apart (`None`: it does not).
+/// Path of a frame: the number of its link, and its sender, if the link distinguishes senders
+/// (`None`: it does not).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Path {
     pub link: usize,
@@ -77,7 +76,7 @@ pub struct Sender {
 struct Peer {
     address: Address,
     key: u8,
-    /// 0: it tells none.
+    /// 0: it reports none.
     session: u32,
     number: u32,
     /// The paths of its frames, the latest first.
@@ -87,9 +86,9 @@ struct Peer {
     beats: Vec<(u8, u16)>,
     accepted_at_s: f64,
     heartbeat_at_s: Option<f64>,
-    /// Its last heartbeat says that it hears nothing of the vehicle.
+    /// Its last heartbeat reports that it receives nothing from the vehicle.
     deaf: bool,
-    /// When the heartbeat of another one under these ids found no place among the known stations.
+    /// Time at which the heartbeat of another station under these ids found no free entry.
     crowded_at_s: Option<f64>,
 }
 
@@ -103,7 +102,7 @@ impl Peer {
     }
 
     fn learn(&mut self, path: Path) {
-        self.paths.retain(|known| *known != path);
+        self.paths.retain(|other| *other != path);
         self.paths.insert(0, path);
         self.paths.truncate(MAX_PATHS);
     }
@@ -112,7 +111,7 @@ impl Peer {
         station_of(self.address, self.number)
     }
 
-    /// A heartbeat came not long ago.
+    /// Whether a heartbeat was received recently.
     fn is_there(&self, time_s: f64) -> bool {
         self.heartbeat_at_s.is_some_and(|at_s| time_s - at_s <= SAME_IDS_FOR_S)
     }
@@ -131,19 +130,19 @@ struct Refused {
 }
 
 flight::with_defaults! {
-    /// All known stations.
+    /// All stations with an entry.
     #[derive(Debug, Clone)]
     pub struct Stations {
         most: usize = MAX_STATIONS,
-        known: Vec<Peer> = Vec::new(),
+        peers: Vec<Peer> = Vec::new(),
         /// How many there were.
         numbered: u32 = 0,
-        /// The known station that is told next.
+        /// Index of the station that gets the next report.
         next: usize = 0,
         refused: Option<Refused> = None,
         refused_count: u16 = 0,
         commander: Option<(Station, Option<Operator>)> = None,
-        tell_at_s: f64 = 0.0,
+        report_at_s: f64 = 0.0,
     }
 }
 
@@ -155,7 +154,8 @@ impl Stations {
 
     /// Notes an accepted frame.
     pub fn accepted(&mut self, frame: &Frame, sender: &Sender, time_s: f64) {
-        // A radio's own report is accepted unsigned, from any address: it does not prove a station.
+        // A radio's report about itself is accepted unsigned, from any address: it does not prove a
+        // station.
         if frame.message_id() == RADIO_STATUS_DATA::ID {
             return;
         }
@@ -165,77 +165,77 @@ impl Stations {
             None => self.place_of(sender),
         };
         let Some(place) = place.or_else(|| self.add(sender, session.unwrap_or(0), time_s)) else {
-            let same = |known: &&mut Peer| session.is_some() && known.address == sender.address;
-            self.known.iter_mut().filter(same).for_each(|known| known.crowded_at_s = Some(time_s));
+            let same = |peer: &&mut Peer| session.is_some() && peer.address == sender.address;
+            self.peers.iter_mut().filter(same).for_each(|peer| peer.crowded_at_s = Some(time_s));
             return;
         };
-        let known = &mut self.known[place];
-        known.accepted_at_s = time_s;
+        let peer = &mut self.peers[place];
+        peer.accepted_at_s = time_s;
         let Some(session) = session else { return };
-        known.session = session;
-        known.heartbeat_at_s = Some(time_s);
-        known.deaf = is_deaf(frame);
-        known.learn(sender.path);
-        known.beats.insert(0, (frame.sequence(), frame.crc()));
-        known.beats.truncate(MAX_BEATS);
+        peer.session = session;
+        peer.heartbeat_at_s = Some(time_s);
+        peer.deaf = is_deaf(frame);
+        peer.learn(sender.path);
+        peer.beats.insert(0, (frame.sequence(), frame.crc()));
+        peer.beats.truncate(MAX_BEATS);
         // One that was started again leaves no trace: only the one in command is still waited for.
-        let (number, commander) = (known.number, self.commander.map(|(station, _)| station.number));
-        self.known.retain(|known| {
-            known.address != sender.address
-                || known.number == number
-                || Some(known.number) == commander
-                || time_s - known.accepted_at_s <= SAME_IDS_FOR_S
+        let (number, commander) = (peer.number, self.commander.map(|(station, _)| station.number));
+        self.peers.retain(|peer| {
+            peer.address != sender.address
+                || peer.number == number
+                || Some(peer.number) == commander
+                || time_s - peer.accepted_at_s <= SAME_IDS_FOR_S
         });
     }
 
-    /// Notes a copy of an accepted frame: the same station speaks over this path, too.
+    /// Notes a copy of an accepted frame: the same station uses this path, too.
     pub fn copied(&mut self, frame: &Frame, sender: &Sender) {
         if frame.message_id() != HEARTBEAT_DATA::ID {
             return;
         }
         let (session, beat) = (session_of(frame), (frame.sequence(), frame.crc()));
-        let original = self.known.iter().position(|known| {
-            known.is_of(sender) && known.session == session && (session != 0 || known.beats.contains(&beat))
+        let original = self.peers.iter().position(|peer| {
+            peer.is_of(sender) && peer.session == session && (session != 0 || peer.beats.contains(&beat))
         });
         let Some(original) = original else { return };
         // Without a session, heartbeats that the first path has lost looked like another station's.
-        let twin = self.known.iter().enumerate().position(|(place, known)| {
+        let twin = self.peers.iter().enumerate().position(|(place, peer)| {
             place != original
                 && session == 0
-                && known.session == 0
-                && known.is_of(sender)
-                && known.takes(sender.path)
+                && peer.session == 0
+                && peer.is_of(sender)
+                && peer.takes(sender.path)
         });
-        let Some(twin) = twin else { return self.known[original].learn(sender.path) };
-        let commands = |known: &Peer| self.commander.is_some_and(|(station, _)| station == known.station());
-        let (stays, goes) = if commands(&self.known[twin]) { (twin, original) } else { (original, twin) };
-        let Peer { paths, heartbeat_at_s, accepted_at_s, .. } = self.known[goes].clone();
-        let one = &mut self.known[stays];
+        let Some(twin) = twin else { return self.peers[original].learn(sender.path) };
+        let commands = |peer: &Peer| self.commander.is_some_and(|(station, _)| station == peer.station());
+        let (left, removed) = if commands(&self.peers[twin]) { (twin, original) } else { (original, twin) };
+        let Peer { paths, heartbeat_at_s, accepted_at_s, .. } = self.peers[removed].clone();
+        let one = &mut self.peers[left];
         paths.into_iter().rev().for_each(|path| one.learn(path));
         one.heartbeat_at_s = [one.heartbeat_at_s, heartbeat_at_s].into_iter().flatten().reduce(f64::max);
         one.accepted_at_s = one.accepted_at_s.max(accepted_at_s);
-        self.known.remove(goes);
+        self.peers.remove(removed);
     }
 
     /// The station that a heartbeat belongs to. One that spoke before its first heartbeat has it
     /// now.
     fn place_of_session(&self, sender: &Sender, session: u32) -> Option<usize> {
         let of = |same: &dyn Fn(&Peer) -> bool| {
-            self.known.iter().position(|known| known.is_of(sender) && same(known))
+            self.peers.iter().position(|peer| peer.is_of(sender) && same(peer))
         };
-        of(&|known| {
-            known.session == session
-                && known.heartbeat_at_s.is_some()
-                && (session != 0 || known.takes(sender.path))
+        of(&|peer| {
+            peer.session == session
+                && peer.heartbeat_at_s.is_some()
+                && (session != 0 || peer.takes(sender.path))
         })
-        .or_else(|| of(&|known| known.heartbeat_at_s.is_none() && known.takes(sender.path)))
+        .or_else(|| of(&|peer| peer.heartbeat_at_s.is_none() && peer.takes(sender.path)))
     }
 
     /// The station that any other frame belongs to: the last one whose heartbeat took this path.
     fn place_of(&self, sender: &Sender) -> Option<usize> {
-        let candidates = self.known.iter().enumerate();
-        let candidates = candidates.filter(|(_, known)| known.is_of(sender) && known.takes(sender.path));
-        let beat_at_s = |known: &Peer| known.heartbeat_at_s.unwrap_or(f64::NEG_INFINITY);
+        let candidates = self.peers.iter().enumerate();
+        let candidates = candidates.filter(|(_, peer)| peer.is_of(sender) && peer.takes(sender.path));
+        let beat_at_s = |peer: &Peer| peer.heartbeat_at_s.unwrap_or(f64::NEG_INFINITY);
         candidates
             .max_by(|(_, one), (_, other)| beat_at_s(one).total_cmp(&beat_at_s(other)))
             .map(|(place, _)| place)
@@ -243,12 +243,12 @@ impl Stations {
 
     /// Adds a station, if there is room.
     fn add(&mut self, sender: &Sender, session: u32, time_s: f64) -> Option<usize> {
-        if self.known.len() >= self.most {
+        if self.peers.len() >= self.most {
             let leaving = self.replaceable(sender.address, time_s)?;
-            self.known.remove(leaving);
+            self.peers.remove(leaving);
         }
         self.numbered += 1;
-        self.known.push(Peer {
+        self.peers.push(Peer {
             address: sender.address,
             key: sender.key,
             session,
@@ -260,18 +260,18 @@ impl Stations {
             deaf: false,
             crowded_at_s: None,
         });
-        Some(self.known.len() - 1)
+        Some(self.peers.len() - 1)
     }
 
-    /// The entry of a station that never proved itself or has been gone for a long time; under the
-    /// same ids for a short one, as when a station was started again.
+    /// The entry of a station that never proved itself or has been silent for a long time; under
+    /// the same ids for a short one, as after a restart of the station.
     fn replaceable(&self, address: Address, time_s: f64) -> Option<usize> {
-        let proven = |known: &Peer| {
-            let for_s = if known.address == address { SAME_IDS_FOR_S } else { PROVEN_FOR_S };
-            known.heartbeat_at_s.is_some_and(|at_s| time_s - at_s <= for_s)
-                || self.commander.is_some_and(|(station, _)| station == known.station())
+        let proven = |peer: &Peer| {
+            let for_s = if peer.address == address { SAME_IDS_FOR_S } else { PROVEN_FOR_S };
+            peer.heartbeat_at_s.is_some_and(|at_s| time_s - at_s <= for_s)
+                || self.commander.is_some_and(|(station, _)| station == peer.station())
         };
-        self.known.iter().position(|known| !proven(known))
+        self.peers.iter().position(|peer| !proven(peer))
     }
 
     /// Notes a refused frame.
@@ -280,52 +280,52 @@ impl Stations {
         self.refused_count = self.refused_count.saturating_add(1);
     }
 
-    /// The station that a frame belongs to, other than a heartbeat; with number 0 if it is not
-    /// known.
+    /// The station that a frame other than a heartbeat belongs to; with number 0 if it has no
+    /// entry.
     pub fn of(&self, sender: &Sender) -> Station {
-        let number = self.place_of(sender).map_or(0, |place| self.known[place].number);
+        let number = self.place_of(sender).map_or(0, |place| self.peers[place].number);
         station_of(sender.address, number)
     }
 
-    fn known(&self, station: Station) -> Option<&Peer> {
-        self.known.iter().find(|known| known.station() == station)
+    fn peer(&self, station: Station) -> Option<&Peer> {
+        self.peers.iter().find(|peer| peer.station() == station)
     }
 
     /// How many other stations are there under the same ids; those that found no place count as
     /// one.
     pub fn same_ids(&self, station: Station, time_s: f64) -> usize {
-        let same = |known: &&Peer| {
-            (known.address.system_id, known.address.component_id) == (station.system, station.component)
+        let same = |peer: &&Peer| {
+            (peer.address.system_id, peer.address.component_id) == (station.system, station.component)
         };
-        let same: Vec<&Peer> = self.known.iter().filter(same).collect();
-        let crowded = |known: &&Peer| known.crowded_at_s.is_some_and(|at_s| time_s - at_s <= SAME_IDS_FOR_S);
-        let others = same.iter().filter(|known| known.station() != station && known.is_there(time_s));
+        let same: Vec<&Peer> = self.peers.iter().filter(same).collect();
+        let crowded = |peer: &&Peer| peer.crowded_at_s.is_some_and(|at_s| time_s - at_s <= SAME_IDS_FOR_S);
+        let others = same.iter().filter(|peer| peer.station() != station && peer.is_there(time_s));
         others.count() + usize::from(station.number != 0 && same.iter().any(crowded))
     }
 
-    /// Age of the last sign of life of a station, s; `None` if there is none. One that tells its
-    /// session lives as long as its heartbeats do: its other frames might be another one's.
+    /// Age of the last sign of life of a station, s; `None` if there is none. A station with a
+    /// session lives by its heartbeats: its other frames might be another one's.
     pub fn age_s(&self, station: Station, time_s: f64) -> Option<f64> {
-        let known = self.known(station)?;
-        let at_s = if known.session == 0 { Some(known.accepted_at_s) } else { known.heartbeat_at_s };
+        let peer = self.peer(station)?;
+        let at_s = if peer.session == 0 { Some(peer.accepted_at_s) } else { peer.heartbeat_at_s };
         at_s.map(|at_s| time_s - at_s)
     }
 
-    /// Whether a station says that it hears nothing of the vehicle.
+    /// Whether a station reports that it receives nothing from the vehicle.
     pub fn is_deaf(&self, station: Station) -> bool {
-        self.known(station).is_some_and(|known| known.deaf)
+        self.peer(station).is_some_and(|peer| peer.deaf)
     }
 
-    /// How well a station's heartbeat is heard.
+    /// Uplink of a station, by its heartbeats.
     pub fn uplink(&self, station: Station, time_s: f64) -> Uplink {
-        let heard = self.known(station).and_then(|known| known.heartbeat_at_s);
-        heard.map_or(Uplink::NeverHeard, |at_s| Uplink::Heard { age_s: time_s - at_s })
+        let heartbeat_at_s = self.peer(station).and_then(|peer| peer.heartbeat_at_s);
+        heartbeat_at_s.map_or(Uplink::NeverReceived, |at_s| Uplink::Received { age_s: time_s - at_s })
     }
 
-    /// How well the best station is heard.
+    /// Uplink of the best station.
     pub fn best_uplink(&self, time_s: f64) -> Uplink {
-        let latest_s = self.known.iter().filter_map(|known| known.heartbeat_at_s).reduce(f64::max);
-        latest_s.map_or(Uplink::NeverHeard, |at_s| Uplink::Heard { age_s: time_s - at_s })
+        let latest_s = self.peers.iter().filter_map(|peer| peer.heartbeat_at_s).reduce(f64::max);
+        latest_s.map_or(Uplink::NeverReceived, |at_s| Uplink::Received { age_s: time_s - at_s })
     }
 
     /// Sets the station that armed the vehicle or has taken command, if any, and its operator.
@@ -343,22 +343,22 @@ impl Stations {
         self.commander.map(|(station, _)| station)
     }
 
-    /// The uplink reports that are due: one for each known station, but at most [`MAX_STATIONS`],
-    /// or one for everybody while there is none.
+    /// The uplink reports that are due: one for each station, but at most [`MAX_STATIONS`], or one
+    /// broadcast while there is none.
     pub fn due(&mut self, boot_number: u32, time_s: f64) -> Vec<MavMessage> {
-        if time_s < self.tell_at_s {
+        if time_s < self.report_at_s {
             return Vec::new();
         }
-        let next_s = self.tell_at_s + TELL_EVERY_S;
-        self.tell_at_s = if next_s > time_s { next_s } else { time_s + TELL_EVERY_S };
-        if self.known.is_empty() {
+        let next_s = self.report_at_s + REPORT_INTERVAL_S;
+        self.report_at_s = if next_s > time_s { next_s } else { time_s + REPORT_INTERVAL_S };
+        if self.peers.is_empty() {
             return vec![self.message(None, boot_number, time_s)];
         }
-        let told = self.known.len().min(MAX_STATIONS);
-        let first = self.next % self.known.len();
-        self.next = first + told;
-        let known = self.known.iter().cycle().skip(first).take(told);
-        known.map(|known| self.message(Some(known), boot_number, time_s)).collect()
+        let reported = self.peers.len().min(MAX_STATIONS);
+        let first = self.next % self.peers.len();
+        self.next = first + reported;
+        let peers = self.peers.iter().cycle().skip(first).take(reported);
+        peers.map(|peer| self.message(Some(peer), boot_number, time_s)).collect()
     }
 
     fn message(&self, to: Option<&Peer>, boot_number: u32, time_s: f64) -> MavMessage {
@@ -367,12 +367,12 @@ impl Stations {
         };
         let refused = self.refused;
         let from = refused.map_or(EVERYBODY, |refused| refused.from);
-        let address = to.map_or(EVERYBODY, |known| known.address);
+        let address = to.map_or(EVERYBODY, |peer| peer.address);
         let station = to.map(Peer::station);
         let same_ids = station.map_or(0, |station| self.same_ids(station, time_s));
         MavMessage::TD_UPLINK(TD_UPLINK_DATA {
             boot_number,
-            accepted_age_ms: age_ms(to.map(|known| known.accepted_at_s)),
+            accepted_age_ms: age_ms(to.map(|peer| peer.accepted_at_s)),
             refused_age_ms: age_ms(refused.map(|refused| refused.at_s)),
             refused_count: self.refused_count,
             target_system: address.system_id,
@@ -381,14 +381,14 @@ impl Stations {
             refusal: refused.map_or(TdFrameRefusal::TD_FRAME_REFUSAL_NONE, |refused| refusal(refused.why)),
             refused_system: from.system_id,
             refused_component: from.component_id,
-            session: to.map_or(0, |known| known.session),
+            session: to.map_or(0, |peer| peer.session),
             same_id: u8::try_from(same_ids).unwrap_or(u8::MAX),
         })
     }
 }
 
-/// The session that a ground station's heartbeat tells; 0 if it tells none. In anybody else's the
-/// field is a mode.
+/// The session in a ground station's heartbeat; 0 if there is none. In other heartbeats the field
+/// is a mode.
 fn session_of(frame: &Frame) -> u32 {
     match frame.decode() {
         Ok(MavMessage::HEARTBEAT(beat)) if beat.mavtype == MavType::MAV_TYPE_GCS => beat.custom_mode,
@@ -396,7 +396,7 @@ fn session_of(frame: &Frame) -> u32 {
     }
 }
 
-/// Whether a ground station's heartbeat says that it hears nothing of the vehicle.
+/// Whether a ground station's heartbeat reports that it receives nothing from the vehicle.
 fn is_deaf(beat: &Frame) -> bool {
     matches!(beat.decode(), Ok(MavMessage::HEARTBEAT(beat))
         if beat.mavtype == MavType::MAV_TYPE_GCS && beat.system_status == MavState::MAV_STATE_CRITICAL)

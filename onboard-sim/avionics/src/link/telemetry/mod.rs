@@ -1,9 +1,9 @@
 //! A vehicle's state as MAVLink messages.
 //!
 //! Frames: north-east-down, as in [`Motion`]; an upright rocket has 90 degrees of pitch. Values are
-//! narrowed to the fields' types here and only here; what does not fit saturates.
+//! narrowed to the fields' types here and only here; values out of range saturate.
 //!
-//! What is not modelled is sent as MAVLink's "unknown" and never invented.
+//! Quantities that are not modelled are sent as MAVLink's "unknown" and never invented.
 //!
 //! [`Motion`]: crate::link::vehicle::Motion
 
@@ -220,7 +220,7 @@ fn current_mode(state: &VehicleState<'_>, boot: u32) -> MavMessage {
     })
 }
 
-/// The unique id stands below two letters, so that it is never zero.
+/// The unique id is below two letters, so that it is never zero.
 fn autopilot_version(uid: u16) -> MavMessage {
     let version = env!("CARGO_PKG_VERSION").split('.').map(|part| part.parse::<u32>().unwrap_or(0));
     MavMessage::AUTOPILOT_VERSION(AUTOPILOT_VERSION_DATA {
@@ -298,14 +298,14 @@ fn characters<const N: usize>(text: &str) -> CharArray<N> {
 
 // Battery and storage.
 
-/// What SYS_STATUS says to be there.
+/// Sensors present in SYS_STATUS.
 fn present(state: &VehicleState<'_>) -> MavSysStatusSensor {
     let mut present = MavSysStatusSensor::MAV_SYS_STATUS_LOGGING;
     present.set(MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_BATTERY, state.battery.is_some());
     present
 }
 
-/// What of it fails: a log that does not run, and on the pad a battery below its limit.
+/// Failing sensors: a log that does not run, and on the pad a battery below its limit.
 fn failing(state: &VehicleState<'_>) -> MavSysStatusSensor {
     let mut failing = MavSysStatusSensor::empty();
     failing.set(MavSysStatusSensor::MAV_SYS_STATUS_LOGGING, !state.input().log.running);
@@ -315,7 +315,7 @@ fn failing(state: &VehicleState<'_>) -> MavSysStatusSensor {
     failing
 }
 
-/// mV, cA and percent of the battery; `UINT16_MAX`, -1 and -1: not known.
+/// mV, cA and percent of the battery; `UINT16_MAX`, -1 and -1: not available.
 fn figures(state: &VehicleState<'_>) -> (u16, i16, i8) {
     let Some(BatteryFacts { volts, current_a, left }) = state.battery else { return (u16::MAX, -1, -1) };
     let hundred = |value: Option<f64>| value.map_or(-1.0, |value| libm::round(100.0 * value));
@@ -339,8 +339,8 @@ fn battery(state: &VehicleState<'_>) -> MavMessage {
     })
 }
 
-/// `None` if the operator chose to fly without a log. How large the storage is, and how fast, is
-/// not known: 0.
+/// `None` if the operator chose to fly without a log. Size and speed of the storage are not
+/// available: 0.
 fn storage(state: &VehicleState<'_>) -> Option<MavMessage> {
     let log = state.input().log;
     let has_storage = log.space_bytes != u64::MAX;

@@ -3,7 +3,7 @@
 //! space.
 
 use flight::computer::pilot::ApogeeAhead;
-use flight::estimation::estimator::{Doubt, Health};
+use flight::estimation::estimator::{Health, HealthIssue};
 use flight::rules::outputs::PyroOutput;
 use flight::rules::phase::Phase;
 use flight::vehicle::mission::StartPoint;
@@ -120,7 +120,7 @@ pub(super) fn home(state: &VehicleState<'_>) -> MavMessage {
 }
 
 /// GPS_RAW_INT: whether the satellite receiver reports. Its position is the estimated one, because
-/// single fixes are not kept.
+/// single fixes are not stored.
 pub(super) fn gps(state: &VehicleState<'_>) -> MavMessage {
     let motion = state.motion();
     let [north_m, east_m, down_m] = motion.position_m;
@@ -155,7 +155,7 @@ pub(super) fn gps(state: &VehicleState<'_>) -> MavMessage {
     })
 }
 
-/// No clock on board knows the time of day, so the field is zero, as the standard requires.
+/// No clock on board has the time of day, so the field is zero, as the standard requires.
 pub(super) fn system_time(state: &VehicleState<'_>) -> MavMessage {
     MavMessage::SYSTEM_TIME(SYSTEM_TIME_DATA { time_unix_usec: 0, time_boot_ms: boot_ms(state.time_s) })
 }
@@ -236,8 +236,8 @@ fn booster(state: &VehicleState<'_>, air: &Airborne<'_>) -> TdBooster {
     }
 }
 
-/// The outputs that are valid, by the estimator's own doubts, and by how much of its gate each
-/// sensor's last measurement was off.
+/// The valid outputs, by the estimator's health, and the innovation of each sensor's last
+/// measurement relative to its gate.
 pub(super) fn estimator(state: &VehicleState<'_>) -> Option<MavMessage> {
     use EstimatorStatusFlags as F;
     let estimate = state.airborne()?.estimate;
@@ -251,13 +251,13 @@ pub(super) fn estimator(state: &VehicleState<'_>) -> Option<MavMessage> {
     let mut flags = F::ESTIMATOR_ATTITUDE | velocity | horizontal | vertical;
     match estimate.health {
         Health::Good => {}
-        Health::Doubtful(Doubt::Restarted) => flags = F::empty(),
-        Health::Doubtful(Doubt::Imu) => flags = F::ESTIMATOR_ACCEL_ERROR,
-        Health::Doubtful(Doubt::Surprised) => flags = (flags - velocity) | F::ESTIMATOR_GPS_GLITCH,
-        Health::Doubtful(Doubt::Velocity) => flags -= velocity,
-        Health::Doubtful(Doubt::Height) => flags -= vertical,
-        Health::Doubtful(Doubt::Horizontal) => flags -= horizontal,
-        Health::Doubtful(Doubt::Tilt) => flags -= F::ESTIMATOR_ATTITUDE,
+        Health::Unhealthy(HealthIssue::Restarted) => flags = F::empty(),
+        Health::Unhealthy(HealthIssue::Imu) => flags = F::ESTIMATOR_ACCEL_ERROR,
+        Health::Unhealthy(HealthIssue::Surprised) => flags = (flags - velocity) | F::ESTIMATOR_GPS_GLITCH,
+        Health::Unhealthy(HealthIssue::Velocity) => flags -= velocity,
+        Health::Unhealthy(HealthIssue::Height) => flags -= vertical,
+        Health::Unhealthy(HealthIssue::Horizontal) => flags -= horizontal,
+        Health::Unhealthy(HealthIssue::Tilt) => flags -= F::ESTIMATOR_ATTITUDE,
     }
     let lidar = state.computer.sensors().lidar_range_m().is_some();
     flags.set(F::ESTIMATOR_POS_VERT_AGL, lidar && flags.contains(vertical));

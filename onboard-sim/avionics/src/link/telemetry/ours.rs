@@ -1,5 +1,5 @@
 //! The messages of our dialect that every vehicle sends: flight status, controller, verdict, crew,
-//! check on the pad, and what went wrong.
+//! check on the pad, and findings.
 
 use flight::computer::AbortEffect;
 use flight::computer::crew::People;
@@ -52,7 +52,7 @@ pub(super) fn flight_status(state: &VehicleState<'_>, identity: Identity) -> Mav
     })
 }
 
-/// What an abort would do, and the speed of the impact it leads to, m/s, or zero.
+/// Effect of an abort, and the impact speed it leads to, m/s, or zero.
 fn td_abort_effect(effect: AbortEffect) -> (TdAbortEffect, u8) {
     match effect {
         AbortEffect::None => (TdAbortEffect::TD_ABORT_EFFECT_NONE, 0),
@@ -78,7 +78,7 @@ fn interlocks(mode: &Mode) -> TdInterlock {
     bits
 }
 
-/// A value of the dialect whose number is that of our own.
+/// A value of the dialect with the same number as ours.
 fn numbered<T: FromPrimitive + Default>(number: u8) -> T {
     T::from_u8(number).unwrap_or_default()
 }
@@ -180,7 +180,7 @@ pub(super) fn touchdown_limits(state: &VehicleState<'_>, boot_number: u32) -> Ma
     })
 }
 
-// Who commands, what is asked, and which mission flies.
+// Commander, pending proposal, and the flown mission.
 
 pub(super) fn mission(state: &VehicleState<'_>, boot_number: u32) -> MavMessage {
     let name = characters(&state.name.name);
@@ -236,7 +236,7 @@ pub(super) fn operator(state: &VehicleState<'_>, boot_number: u32) -> Option<Mav
     }))
 }
 
-/// What went wrong in the flight: the finding at this place, or that there is none.
+/// The finding at this index, or that there is none.
 pub(crate) fn finding(findings: &Findings, place: usize, time_s: f64, boot_number: u32) -> MavMessage {
     let found = findings.as_found();
     let mut data = TD_FINDING_DATA {
@@ -255,7 +255,7 @@ pub(crate) fn finding(findings: &Findings, place: usize, time_s: f64, boot_numbe
 
 // The last check of the vehicle on its pad, value by value.
 
-/// The value at this place, or how the check stands while nothing has been found.
+/// The value at this index, or the state of the check while there are no values.
 pub(crate) fn pad_check(check: &PadCheck, place: usize, time_s: f64, boot_number: u32) -> MavMessage {
     let findings = check.findings();
     let mut data = TD_PAD_CHECK_DATA {

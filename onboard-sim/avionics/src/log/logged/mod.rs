@@ -4,11 +4,11 @@
 use alloc::string::String;
 use alloc::vec::Vec;
 
-use flight::computer::crew::{Asked, Ending, People, Request};
-use flight::computer::{Commander, KeptInput, LogState, Rehearsed};
+use flight::computer::crew::{CrewCommand, Ending, People, Request};
+use flight::computer::{Commander, LogState, Rehearsed, SensedInput};
 use flight::estimation::estimator::alignment::ImuCalibration;
 use flight::estimation::estimator::{
-    Doubt, Estimate, FixQuality, GnssFix, Health, HeightSources, ImuSample, Measurements, Sigmas,
+    Estimate, FixQuality, GnssFix, Health, HealthIssue, HeightSources, ImuSample, Measurements, Sigmas,
 };
 use flight::rules::arming::{PredictedLanding, Uplink};
 use flight::rules::operator::{Name, Operator, Role};
@@ -27,7 +27,7 @@ pub enum RecordError {
         field: &'static str,
         /// The number.
         found: u32,
-        /// The largest known number.
+        /// The largest number that this build supports.
         most: usize,
     },
     /// A list has the wrong length.
@@ -58,30 +58,31 @@ impl At {
 /// A type of the flight computer that has a record in the log. No bit is lost on the way there and
 /// back.
 pub trait Logged: Sized {
-    /// What the log holds of it.
+    /// Its representation in the log.
     type Record;
 
     fn to_log(&self) -> Self::Record;
 
     /// # Errors
-    /// This build does not know some value of the record.
+    /// The record has a value that is unknown to this build.
     fn from_log(record: &Self::Record, at: At) -> Result<Self, RecordError>;
 }
 
-/// A structure whose record has the same fields. After `;` come fields of the record alone, which
-/// begin empty.
+/// A structure whose record has the same fields; `record = field` for a field with another name.
+/// After `;` come fields of the record alone, which begin empty.
 macro_rules! record {
-    ($logged:ident as $record:path { $($field:ident),+ $(; $($beside:ident),+)? }) => {
+    ($logged:ident as $record:path { $($field:ident $(= $name:ident)?),+ $(; $($beside:ident),+)? }) => {
         impl Logged for $logged {
             type Record = $record;
 
             fn to_log(&self) -> Self::Record {
-                let Self { $($field),+ } = self;
+                let Self { $($($name:)? $field),+ } = self;
                 $record { $($field: $field.to_log(),)+ $($($beside: Default::default()),+)? }
             }
 
             fn from_log(record: &Self::Record, at: At) -> Result<Self, RecordError> {
-                Ok(Self { $($field: Logged::from_log(&record.$field, At { field: stringify!($field), ..at })?),+ })
+                $(let $field = Logged::from_log(&record.$field, At { field: stringify!($field), ..at })?;)+
+                Ok(Self { $($($name:)? $field),+ })
             }
         }
     };
@@ -101,7 +102,7 @@ record!(Estimate as flight_v1::Estimate {
     time_s, state, specific_force_m_s2, wind_m_s, gyro_bias_rad_s, accelerometer_bias_m_s2, sigmas, heights, health;
     motor, barometer, gnss_velocity, gnss_position, lidar, wind
 });
-record!(KeptInput as computer_v1::ComputerInput {
+record!(SensedInput as computer_v1::ComputerInput {
     frame, time_s, measured, gimbal_rad, fins_rad, contact, igniter_continuity, booster_attached, pin_out, battery_v, log,
     uplink, commander, people;
     requests, rehearsed, plan_ready
@@ -110,7 +111,7 @@ record!(LogState as computer_v1::LogState { running, space_bytes });
 record!(Station as computer_v1::Station { system, component, number });
 record!(Operator as computer_v1::Operator { number, role, name });
 record!(Commander as computer_v1::Commander { station, age_s, by, deaf });
-record!(Request as computer_v1::Request { asked, uplink, station, by, confirms });
+record!(Request as computer_v1::Request { asked = command, uplink, station, by, confirms });
 record!(PredictedLanding as computer_v1::PredictedLanding { lands, found });
 record!(Rehearsed as computer_v1::Rehearsed { warm, found, landing });
 
@@ -133,23 +134,23 @@ macro_rules! numbered {
 }
 
 const ENDINGS: [Ending; 5] =
-    [Ending::Accepted, Ending::NotNow, Ending::Denied, Ending::Failed, Ending::Asked];
+    [Ending::Accepted, Ending::NotNow, Ending::Denied, Ending::Failed, Ending::ToConfirm];
 pub(crate) const HEALTHS: [Health; 8] = [
     Health::Good,
-    Health::Doubtful(Doubt::Restarted),
-    Health::Doubtful(Doubt::Imu),
-    Health::Doubtful(Doubt::Surprised),
-    Health::Doubtful(Doubt::Velocity),
-    Health::Doubtful(Doubt::Height),
-    Health::Doubtful(Doubt::Horizontal),
-    Health::Doubtful(Doubt::Tilt),
+    Health::Unhealthy(HealthIssue::Restarted),
+    Health::Unhealthy(HealthIssue::Imu),
+    Health::Unhealthy(HealthIssue::Surprised),
+    Health::Unhealthy(HealthIssue::Velocity),
+    Health::Unhealthy(HealthIssue::Height),
+    Health::Unhealthy(HealthIssue::Horizontal),
+    Health::Unhealthy(HealthIssue::Tilt),
 ];
-numbered!(Asked: Asked::ALL);
+numbered!(CrewCommand: CrewCommand::ALL);
 numbered!(Ending: ENDINGS);
 numbered!(Health: HEALTHS);
 numbered!(Role: Role::ALL);
 
-/// What the log holds as it is.
+/// Types stored in the log unchanged.
 macro_rules! plain {
     ($($logged:ident),+) => {$(
         impl Logged for $logged {
@@ -248,23 +249,23 @@ impl Logged for UnitQuaternion<f64> {
     }
 }
 
-/// How well a station is heard; `None` where nobody has to be heard.
+/// Uplink of a station; `None` where none is required.
 impl Logged for Uplink {
     type Record = Option<computer_v1::Uplink>;
 
     fn to_log(&self) -> Self::Record {
         match *self {
             Self::NotNeeded => None,
-            Self::NeverHeard => Some(computer_v1::Uplink { age_s: None }),
-            Self::Heard { age_s } => Some(computer_v1::Uplink { age_s: Some(age_s) }),
+            Self::NeverReceived => Some(computer_v1::Uplink { age_s: None }),
+            Self::Received { age_s } => Some(computer_v1::Uplink { age_s: Some(age_s) }),
         }
     }
 
     fn from_log(record: &Self::Record, _: At) -> Result<Self, RecordError> {
         Ok(match record {
             None => Self::NotNeeded,
-            Some(computer_v1::Uplink { age_s: None }) => Self::NeverHeard,
-            Some(computer_v1::Uplink { age_s: Some(age_s) }) => Self::Heard { age_s: *age_s },
+            Some(computer_v1::Uplink { age_s: None }) => Self::NeverReceived,
+            Some(computer_v1::Uplink { age_s: Some(age_s) }) => Self::Received { age_s: *age_s },
         })
     }
 }
@@ -275,14 +276,14 @@ impl Logged for People {
     fn to_log(&self) -> Self::Record {
         match self {
             Self::One => computer_v1::People { count: 1, first_ask: None },
-            Self::Two { first_ask } => computer_v1::People { count: 2, first_ask: Some(first_ask.to_log()) },
+            Self::Two { first } => computer_v1::People { count: 2, first_ask: Some(first.to_log()) },
         }
     }
 
     fn from_log(record: &Self::Record, at: At) -> Result<Self, RecordError> {
         match (record.count, record.first_ask) {
             (1, _) => Ok(Self::One),
-            (2, Some(first_ask)) => Ok(Self::Two { first_ask: Logged::from_log(&first_ask, at)? }),
+            (2, Some(first_ask)) => Ok(Self::Two { first: Logged::from_log(&first_ask, at)? }),
             (found, _) => Err(at.unknown(found, 2)),
         }
     }

@@ -1,11 +1,11 @@
-//! The check that a crew asks for on the pad: every surface goes through its range, the sensors
-//! stand still, and what they find is compared with limits.
+//! The vehicle check on the pad: every surface moves through its range, the sensors are observed at
+//! rest, and the results are compared with limits.
 //!
-//! It moves actuators only while the vehicle is disarmed and unreleased: [`PadCheck::step`] is
-//! called nowhere else, and whatever else the crew asks for ends it first.
+//! It moves actuators only while the vehicle is disarmed and unreleased: [`PadCheck::step`] is the
+//! only place that commands them, and any other crew command ends the check first.
 //!
-//! The gyro is not calibrated here: [the watch on the pad](super::pad) finds its bias in every
-//! second at rest, and the flight begins with the last one. The check shows that bias.
+//! The gyro is not calibrated here: the [pad monitor](super::pad) finds its bias in every second at
+//! rest, and the flight begins with the last one. The check shows that bias.
 
 mod sweep;
 #[cfg(test)]
@@ -17,36 +17,36 @@ use alloc::vec::Vec;
 use serde::Serialize;
 
 use self::sweep::{Still, Sweep};
-use super::crew::{Answer, Asked, Ending, People};
-use super::news::Severity;
+use super::crew::{Answer, CrewCommand, Ending, People};
+use super::messages::Severity;
 use super::pad::SelfTest;
-use super::{Computer, KeptInput};
+use super::{Computer, SensedInput};
 use crate::rules::arming::SEERS;
 use crate::rules::operator::Operator;
 use crate::rules::phase::Phase;
 use crate::vehicle::airframe::Airframe;
 use crate::vehicle::mission::{ArmingLimits, Mission, StartPoint};
 
-/// How the last check stands.
+/// State of the last check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[repr(u8)]
 pub enum CheckState {
-    /// There was none since power-up.
+    /// None since power-up.
     #[default]
     NotRun = 0,
     Running = 1,
-    /// Nothing was found outside a limit.
+    /// No value was outside a limit.
     Passed = 2,
     Failed = 3,
-    /// It was ended before it had seen everything.
+    /// Ended before it was complete.
     Stopped = 4,
 }
 
-/// After an early end the surfaces return to rest: frames in which the vehicle is not ready to be
-/// armed, 1 s. A servo at a third of mk2's rate returns in that time from anywhere.
+/// Time for the surfaces to return to rest after an early end, frames (1 s), in which the vehicle
+/// cannot be armed. A servo at a third of mk2's rate returns within this time from any position.
 const RETURN_FRAMES: u64 = 200;
 
-/// What is being done.
+/// Stage of the running check.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 enum Stage {
     #[default]
@@ -62,16 +62,16 @@ pub struct PadCheck {
     state: CheckState,
     stage: Stage,
     by: Option<Operator>,
-    /// Frames that the sweep has taken, before the sensors are watched.
+    /// Frames of the sweep, before the sensors are observed.
     swept_frames: u64,
-    /// The surfaces return to rest until this frame.
+    /// Frame until which the surfaces return to rest.
     returns_until: u64,
     findings: Vec<CheckedValue>,
-    /// Who has seen every surface move as the crew's page says.
+    /// The people who have seen every surface move as shown on the crew's page.
     seen_by: Vec<Option<Operator>>,
 }
 
-/// Where a surface is told to go: its number, and its angle, rad. All others rest.
+/// A surface command: its number, and its angle, rad. All other surfaces rest.
 pub(super) type SurfaceCommand = (usize, f64);
 
 impl PadCheck {
@@ -95,10 +95,10 @@ impl PadCheck {
         ran
     }
 
-    /// One frame of a running check: where a surface is told to go, if one moves.
+    /// Executes one frame of a running check; returns the surface command, if one moves.
     pub(super) fn step(
         &mut self,
-        input: &KeptInput,
+        input: &SensedInput,
         mission: &Mission,
         arming: &ArmingLimits,
     ) -> Option<SurfaceCommand> {
@@ -130,8 +130,8 @@ impl PadCheck {
         None
     }
 
-    /// Somebody has seen every surface move as the crew's page says; `two`: people are told apart.
-    /// An error says why it does not count.
+    /// Records that a person has seen every surface move as shown on the crew's page; `two`: people
+    /// are distinguished. An error gives the reason why it does not count.
     fn see(&mut self, by: Option<Operator>, two: bool) -> Result<(), &'static str> {
         if self.state != CheckState::Passed || self.swept_frames == 0 {
             return Err("no check with motion has passed");
@@ -143,7 +143,7 @@ impl PadCheck {
         Ok(())
     }
 
-    /// How many people have seen every surface of the last check move.
+    /// Number of people who have seen every surface of the last check move.
     pub fn seers(&self) -> usize {
         self.seen_by.len()
     }
@@ -152,7 +152,7 @@ impl PadCheck {
         self.state == CheckState::Running
     }
 
-    /// Whether surfaces move, or will.
+    /// Whether surfaces move, or are about to.
     pub(super) fn is_busy(&self, frame: u64) -> bool {
         self.is_running() || frame < self.returns_until
     }
@@ -161,22 +161,22 @@ impl PadCheck {
         self.state
     }
 
-    /// Counts the checks since power-up; 0 before the first.
+    /// Number of checks since power-up; 0 before the first.
     pub fn run(&self) -> u16 {
         self.run
     }
 
-    /// Who asked for it; `None` without operators.
+    /// The operator who requested it; `None` without operators.
     pub fn by(&self) -> Option<Operator> {
         self.by
     }
 
-    /// What has been found so far, in the order in which it was found.
+    /// Findings so far, in order of detection.
     pub fn findings(&self) -> &[CheckedValue] {
         &self.findings
     }
 
-    /// How much of the running check is done, percent.
+    /// Progress of the running check, percent.
     pub fn progress_percent(&self) -> u8 {
         let still_frames = u64::from(sweep::STILL_FRAMES);
         let (done, all) = match &self.stage {
@@ -190,7 +190,7 @@ impl PadCheck {
         u8::try_from(100 * done / all.max(1)).unwrap_or(100).min(99)
     }
 
-    /// Its end in words, for the crew.
+    /// The result as text for the crew.
     pub(super) fn words(&self) -> String {
         words_of_findings(&self.findings)
     }
@@ -210,29 +210,28 @@ pub fn surfaces_rad([pitch, yaw]: [f64; 2], [one, two, three, four]: [f64; 4]) -
     [pitch, yaw, one, two, three, four]
 }
 
-/// What was looked at. Values are SI: rad, s, rad/s, m/s^2, m, m/s, V, bytes; a switch is 1 or 0.
+/// The checked quantity. Values are SI: rad, s, rad/s, m/s^2, m, m/s, V, bytes; a switch is 1 or 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum Item {
-    /// How far a surface went, from end to end.
+    /// Measured range of a surface, from end to end.
     Range(usize),
-    /// How far a surface stood from its command, at most.
+    /// Largest deviation of a surface from its command.
     Error(usize),
-    /// How much later a surface arrived than one that turns at once at its airframe's rate.
+    /// Arrival delay of a surface relative to a servo without delay at the airframe's rate.
     Lag(usize),
-    /// Mean rotation rate at rest: what the estimator starts with.
+    /// Mean rotation rate at rest, the initial gyro bias of the estimator.
     GyroBias,
     GyroNoise,
     /// Mean length of the specific force.
     Gravity,
     AccelerometerNoise,
     BarometerNoise,
-    /// Satellite fixes in the time that the sensors were watched.
+    /// Satellite fixes during the observation of the sensors.
     GnssFixes,
     GnssSpeed,
-    /// The last range; on a pad it may be too near to be measured.
+    /// The last range; on a pad it may be too short to be measured.
     LidarRange,
-    /// On a rail: angle between the vertical as the inertial unit feels it and as the mission's
-    /// rail has it.
+    /// On a rail: angle between the measured vertical and the vertical of the mission's rail.
     RailLean,
     IgniterContinuity,
     BoosterWire,
@@ -243,8 +242,8 @@ pub enum Item {
 }
 
 impl Item {
-    /// Its number on the wire, as in the dialect's TD_PAD_CHECK_ITEM: three for each surface, then
-    /// the others.
+    /// Number on the wire, as in the dialect's TD_PAD_CHECK_ITEM: three for each surface, then the
+    /// others.
     pub fn number(self) -> u8 {
         self.row().0
     }
@@ -253,7 +252,7 @@ impl Item {
         self.row().1
     }
 
-    /// Its number and its name.
+    /// Its number and name.
     fn row(self) -> (u8, String) {
         let of = |surface: usize, which: u8, words: &str| {
             let number = 3 * u8::try_from(surface).unwrap_or(u8::MAX / 4) + which;
@@ -283,11 +282,11 @@ impl Item {
     }
 }
 
-/// What a value means.
+/// Verdict on a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[repr(u8)]
 pub enum Verdict {
-    /// Shown only: here nothing is wrong with any value.
+    /// Shown only: no value is a fault.
     NotJudged = 0,
     Ok = 1,
     NotOk = 2,
@@ -297,7 +296,7 @@ pub enum Verdict {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CheckedValue {
     pub item: Item,
-    /// NaN: there was none.
+    /// NaN if not available.
     pub value: f64,
     pub least: f64,
     pub most: f64,
@@ -305,12 +304,12 @@ pub struct CheckedValue {
 }
 
 impl CheckedValue {
-    /// A value that must not be less. One that is not a number fails.
+    /// A value with a minimum. NaN fails.
     fn at_least(item: Item, value: f64, least: f64) -> Self {
         Self { item, value, least, most: f64::NAN, verdict: judged(value >= least) }
     }
 
-    /// A value that must not be more. One that is not a number fails.
+    /// A value with a maximum. NaN fails.
     fn at_most(item: Item, value: f64, most: f64) -> Self {
         Self { item, value, least: f64::NAN, most, verdict: judged(value <= most) }
     }
@@ -324,7 +323,7 @@ impl CheckedValue {
     }
 }
 
-/// The larger of two; not a number, unlike with `max`, if one of them is not.
+/// The larger of two; NaN if either is NaN, unlike `max`.
 fn larger(one: f64, other: f64) -> f64 {
     if one.is_nan() || one >= other { one } else { other }
 }
@@ -335,7 +334,7 @@ fn judged(ok: bool) -> Verdict {
 
 /// Switches, battery and log.
 fn findings_of_switches(
-    input: &KeptInput,
+    input: &SensedInput,
     mission: &Mission,
     arming: &ArmingLimits,
 ) -> impl Iterator<Item = CheckedValue> {
@@ -344,8 +343,7 @@ fn findings_of_switches(
     [
         Some(closed(Item::IgniterContinuity, input.igniter_continuity)),
         on_a_rail.then(|| closed(Item::BoosterWire, input.booster_attached)),
-        // In while people work at the vehicle, out before it is armed: both are right in their
-        // time.
+        // In while people work at the vehicle, out before arming: both states are correct.
         Some(CheckedValue::only_shown(Item::PinOut, f64::from(u8::from(input.pin_out)))),
         input
             .battery_v
@@ -361,7 +359,7 @@ fn findings_of_switches(
     .flatten()
 }
 
-/// How many values are outside their limits, and which is the first.
+/// Number of values outside their limits, with the first of them.
 fn words_of_findings(findings: &[CheckedValue]) -> String {
     let mut failed = findings.iter().filter(|found| found.verdict == Verdict::NotOk);
     match (failed.next(), failed.count()) {
@@ -371,7 +369,7 @@ fn words_of_findings(findings: &[CheckedValue]) -> String {
     }
 }
 
-// The check that the crew asks for on the pad: when it may run, and what ends it.
+// Permission to run the check, and its end.
 
 impl Computer {
     /// The last check on the pad.
@@ -379,7 +377,7 @@ impl Computer {
         &self.pad_check
     }
 
-    /// Why no check may run now.
+    /// Why no check may run now; `None` if it may.
     fn why_no_check(&self) -> Option<String> {
         let mode = self.table.mode();
         let locks = mode.interlocks;
@@ -387,48 +385,48 @@ impl Computer {
             _ if locks.abort_latched => "an abort is latched: restart to clear it",
             _ if self.release.is_some() || !mode.phase.on_pad() => "not on the pad",
             _ if locks.armed || mode.countdown_end_s.is_some() => "armed: disarm first",
-            // A self-test that has failed is a reason to look closer.
+            // A failed self-test is a reason to run the check.
             Phase::Safe if self.self_test != SelfTest::Failed => "the self-test is not over",
             _ => return None,
         };
         Some(reason.into())
     }
 
-    /// Begins a check. One that runs goes on: a repeated request is no other one.
-    pub(super) fn begin_check(&mut self, asked: Asked, by: Option<Operator>) -> Answer {
+    /// Begins a check. A running one continues: a repeated request does not restart it.
+    pub(super) fn begin_check(&mut self, command: CrewCommand, by: Option<Operator>) -> Answer {
         if let Some(reason) = self.why_no_check() {
-            return Answer { ending: Ending::NotNow, ..self.deny(asked, reason) };
+            return Answer { ending: Ending::NotNow, ..self.deny(command, reason) };
         }
         if self.pad_check.is_running() {
             return Answer::ACCEPTED;
         }
-        let moves = asked == Asked::Check;
+        let moves = command == CrewCommand::Check;
         self.pad_check.begin(&self.pilot.mission().airframe, moves, by);
         let who = by.map_or_else(String::new, |by| format!("{by}: "));
         let what = if moves { "gimbal and fins MOVE" } else { "nothing moves" };
-        self.table.say(Severity::Notice, format!("{who}check of the vehicle begins: {what}"));
+        self.table.report(Severity::Notice, format!("{who}check of the vehicle begins: {what}"));
         Answer::ACCEPTED
     }
 
-    /// Takes the word of one person that every surface of the last check moved as it should.
-    pub(super) fn see_check(&mut self, asked: Asked, by: Option<Operator>) -> Answer {
+    /// Records one person's confirmation that every surface of the last check moved correctly.
+    pub(super) fn see_check(&mut self, command: CrewCommand, by: Option<Operator>) -> Answer {
         let two = matches!(self.input.people, Some(People::Two { .. }));
         if let Err(reason) = self.pad_check.see(by, two) {
-            return Answer { ending: Ending::NotNow, ..self.deny(asked, reason.into()) };
+            return Answer { ending: Ending::NotNow, ..self.deny(command, reason.into()) };
         }
         let who = by.map_or_else(|| "one person".into(), |by| format!("{by}"));
         let words =
             format!("{who} saw all surfaces move as they should: {} of {SEERS}", self.pad_check.seers());
-        self.table.say(Severity::Notice, words);
+        self.table.report(Severity::Notice, words);
         Answer::ACCEPTED
     }
 
-    /// Ends a running check, and brings the surfaces to rest. Returns whether one ran.
+    /// Ends a running check and returns the surfaces to rest. Returns whether one ran.
     pub(super) fn end_check(&mut self, why: &str) -> bool {
         let ran = self.pad_check.stop(self.input.frame);
         if ran {
             self.rest_surfaces();
-            self.table.say(Severity::Warning, format!("check of the vehicle ended early: {why}"));
+            self.table.report(Severity::Warning, format!("check of the vehicle ended early: {why}"));
         }
         ran
     }
@@ -437,14 +435,14 @@ impl Computer {
         (self.commands.gimbal_rad, self.commands.fins_rad) = ([0.0; 2], [self.closed_rad(); 4]);
     }
 
-    /// One frame of a running check. It ends here at the latest, whatever has happened in this
-    /// frame.
-    pub(super) fn check_itself(&mut self, input: &KeptInput) {
+    /// Executes one frame of a running check. It ends here at the latest, whatever has happened in
+    /// this frame.
+    pub(super) fn check_itself(&mut self, input: &SensedInput) {
         if !self.pad_check.is_running() {
             return;
         }
         if let Some(reason) = self.why_no_check() {
-            // In the air the pilot commands from the next frame on.
+            // In the air the pilot commands the surfaces from the next frame on.
             self.end_check(&reason);
             return;
         }
@@ -456,8 +454,8 @@ impl Computer {
             None => {}
         }
         match self.pad_check.state() {
-            CheckState::Passed => self.table.say(Severity::Notice, self.pad_check.words()),
-            CheckState::Failed => self.table.say(Severity::Warning, self.pad_check.words()),
+            CheckState::Passed => self.table.report(Severity::Notice, self.pad_check.words()),
+            CheckState::Failed => self.table.report(Severity::Warning, self.pad_check.words()),
             CheckState::NotRun | CheckState::Running | CheckState::Stopped => {}
         }
     }

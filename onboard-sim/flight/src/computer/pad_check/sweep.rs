@@ -1,5 +1,5 @@
-//! One surface after the other is told to go to both ends of its range, and its feedback is
-//! watched. Then the sensors are read while the vehicle stands still.
+//! Moves one surface after another to both ends of its range and observes its feedback. Then reads
+//! the sensors with the vehicle at rest.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -10,24 +10,24 @@ use super::{CheckedValue, Item, SURFACES, SurfaceCommand, larger};
 use crate::computer::pad::ANSWERING_RAD;
 use crate::computer::{FRAME_MS, FRAME_S};
 use crate::estimation::estimator::Measurements;
-use crate::estimation::estimator::alignment::{BIAS_MAX_RAD_S, FELT_AT_REST_M_S2};
+use crate::estimation::estimator::alignment::{AT_REST_M_S2, BIAS_MAX_RAD_S};
 use crate::vehicle::airframe::{Airframe, Servo};
 use crate::vehicle::mission::{ArmingLimits, Mission};
 
-/// A surface stays at an end for this long after it should have arrived, s: a servo at half its
-/// rate arrives late, and yet is seen to arrive. mk2's longest way takes 0.3 s.
+/// Dwell time at an end after the expected arrival, s. A servo at half its rate arrives late and is
+/// still observed to arrive. mk2's longest travel takes 0.3 s.
 const STAYS_S: f64 = 0.4;
-/// The feedback counts as that of a surface at its end in the last part of the stay, s.
+/// Last part of the dwell in which the feedback counts as settled, s.
 const SETTLED_S: f64 = 0.1;
-/// A surface that tells nothing stays at an end for people to see it, s.
+/// Dwell time of a surface without feedback, so that people can see it, s.
 const SEEN_S: f64 = 2.0;
-/// A surface may arrive this much later than its airframe says, s: one more of the delays of 20 ms
-/// that the missions were flown with, in simulation.
+/// Permitted extra delay of a surface beyond its airframe's data, s: one more of the 20 ms delays
+/// that the missions were simulated with.
 const LATER_S: f64 = 0.020;
-/// A command leaves at the end of its frame, and the feedback is from the end of another one.
+/// A command takes effect at the end of its frame, and the feedback is from the end of another one.
 const FRAMES_LATER: f64 = 2.0;
 
-/// How far one surface goes, and how it is moved.
+/// Range of one surface, and its motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Reach {
     low_rad: f64,
@@ -51,7 +51,7 @@ impl Reach {
         [of_gimbal, of_gimbal, of_fin, of_fin, of_fin, of_fin]
     }
 
-    /// Where it is told to go, in order; back to its rest at last.
+    /// Target angles, in order; the last is its rest.
     fn targets_rad(&self) -> Vec<f64> {
         if self.low_rad < self.rest_rad {
             vec![self.high_rad, self.low_rad, self.rest_rad]
@@ -60,7 +60,7 @@ impl Reach {
         }
     }
 
-    /// Time of a servo that turns at once at its rate until the surface counts as arrived, s.
+    /// Time until a servo without delay, at its rate, counts as arrived, s.
     fn ideal_s(&self, way_rad: f64) -> f64 {
         (way_rad - ANSWERING_RAD).max(0.0) / self.servo.rate_rad_s()
     }
@@ -70,7 +70,7 @@ impl Reach {
         libm::ceil((self.servo.delay_s + way_rad / self.servo.rate_rad_s() + stays_s) / FRAME_S) as u32
     }
 
-    /// The latest arrival after the ideal one, s: its delay, its play, the frames, and a margin.
+    /// Largest permitted delay after the ideal arrival, s: servo delay, play, frames, and a margin.
     fn lag_most_s(&self) -> f64 {
         self.servo.delay_s
             + self.servo.slop_rad() / self.servo.rate_rad_s()
@@ -79,13 +79,13 @@ impl Reach {
     }
 }
 
-/// What one surface has shown so far.
+/// Results of one surface so far.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 struct SurfaceShown {
     least_rad: f64,
     most_rad: f64,
     error_rad: f64,
-    /// NaN once it has not arrived anywhere.
+    /// NaN if it has missed an arrival.
     lag_s: f64,
 }
 
@@ -95,16 +95,16 @@ const NOTHING_SHOWN: SurfaceShown =
 /// The sweep of all surfaces.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Sweep {
-    // What is skipped is a constant of the mission.
+    // Skipped fields are constants of the mission.
     #[serde(skip)]
     reaches: [Reach; SURFACES],
-    /// The servos report where they are.
+    /// The servos report their positions.
     #[serde(skip)]
-    tell: bool,
+    feedback: bool,
     surface: usize,
-    /// The place of the present target among the surface's.
+    /// Index of the present target of the surface.
     target: usize,
-    /// Frames since the surface was told to go there.
+    /// Frames since the surface was commanded there.
     frames: u32,
     frames_before: u64,
     arrived_s: Option<f64>,
@@ -115,7 +115,7 @@ impl Sweep {
     pub(super) fn new(airframe: &Airframe) -> Self {
         Self {
             reaches: Reach::of_each(airframe),
-            tell: airframe.servos_tell,
+            feedback: airframe.servos_tell,
             surface: 0,
             target: 0,
             frames: 0,
@@ -125,17 +125,18 @@ impl Sweep {
         }
     }
 
-    /// Frames done, and all of them.
+    /// Completed frames, and all frames.
     pub(super) fn frames(&self) -> (u64, u64) {
         let all = self.reaches.iter().map(|reach| {
             let targets = reach.targets_rad();
             let ways = (0..targets.len()).map(|place| way_rad(reach, &targets, place));
-            ways.map(|way_rad| u64::from(reach.stay_frames(way_rad, self.tell))).sum::<u64>()
+            ways.map(|way_rad| u64::from(reach.stay_frames(way_rad, self.feedback))).sum::<u64>()
         });
         (self.frames_before + u64::from(self.frames), all.sum())
     }
 
-    /// One frame: what to command, `None` at the end; and what was found of a surface that is done.
+    /// Executes one frame; returns the command, `None` at the end, and the findings of a completed
+    /// surface.
     pub(super) fn step(
         &mut self,
         surfaces_rad: &[f64; SURFACES],
@@ -143,7 +144,7 @@ impl Sweep {
         let Some(reach) = self.reaches.get(self.surface).copied() else { return (None, None) };
         let targets = reach.targets_rad();
         let (target_rad, way_rad) = (targets[self.target], way_rad(&reach, &targets, self.target));
-        let stay_frames = reach.stay_frames(way_rad, self.tell);
+        let stay_frames = reach.stay_frames(way_rad, self.feedback);
         if self.frames > 0 {
             self.watch(surfaces_rad[self.surface], target_rad, reach.ideal_s(way_rad), stay_frames);
         }
@@ -180,7 +181,7 @@ impl Sweep {
     }
 
     fn findings(&self, reach: &Reach) -> [CheckedValue; 3] {
-        if !self.tell {
+        if !self.feedback {
             return [Item::Range, Item::Error, Item::Lag]
                 .map(|item| CheckedValue::only_shown(item(self.surface), f64::NAN));
         }
@@ -204,22 +205,22 @@ fn way_rad(reach: &Reach, targets_rad: &[f64], place: usize) -> f64 {
     (targets_rad[place] - from_rad).abs()
 }
 
-// The sensors of a vehicle that stands still: means and spreads over some seconds.
+// Sensors of a vehicle at rest: means and spreads over some seconds.
 
-/// Frames watched: 5 s, in which a spread is known to 2 % (1 / sqrt(2 * 1000)).
+/// Observed frames: 5 s, which determines a spread to 2 % (1 / sqrt(2 * 1000)).
 pub(super) const STILL_FRAMES: u32 = 1000;
 /// The surfaces have come to rest after this many frames.
 const SKIPPED: u32 = 100;
-/// A spread may be this many times what the filter assumes of the sensor. At twice the spread the
-/// filter trusts a sample four times as much as it should.
+/// Permitted spread as a multiple of the filter's assumption. At twice the spread the filter
+/// weights a sample four times too high.
 const SPREAD_MOST: f64 = 2.0;
-/// One fix a second: without one in its second the pad's watch knows no speed, and arming is
+/// One fix a second: without a fix in its second the pad monitor has no velocity, and arming is
 /// refused.
 const FIXES_LEAST: f64 = STILL_FRAMES as f64 * FRAME_S;
 
-/// A rail is levelled with a bubble, degrees, about each axis.
+/// Levelling error of a rail with a spirit level, degrees, about each axis.
 const RAIL_LEVEL_DEG: f64 = 1.0;
-/// A rail and a mount as they should be pass in 99 of 100 checks (Rayleigh: 1 - exp(-3^2 / 2)).
+/// A correct rail and mount pass 99 of 100 checks (Rayleigh: 1 - exp(-3^2 / 2)).
 const LEAN_SIGMAS: f64 = 3.0;
 
 /// Mean and sum of squared differences from it (Welford 1962), of one number.
@@ -286,7 +287,7 @@ impl Still {
         u64::from(self.frames.saturating_sub(SKIPPED))
     }
 
-    /// A vehicle that hangs below a drone swings, and climbs: then only the fixes are judged.
+    /// Below a drone the vehicle swings and climbs: then only the fixes are judged.
     pub(super) fn findings(
         &self,
         mission: &Mission,
@@ -312,8 +313,8 @@ impl Still {
             CheckedValue::between(
                 Item::Gravity,
                 mean(&self.force_m_s2),
-                *FELT_AT_REST_M_S2.start(),
-                *FELT_AT_REST_M_S2.end(),
+                *AT_REST_M_S2.start(),
+                *AT_REST_M_S2.end(),
             ),
             CheckedValue::at_most(
                 Item::AccelerometerNoise,
@@ -338,14 +339,15 @@ impl Still {
         })
     }
 
-    /// What the rail's level and the inertial unit's mount lean together, on a rail. The filter
-    /// doubts its attitude by the mount's stated misalignment, and no sensor shows it in flight.
+    /// On a rail: the combined lean of rail level and inertial-unit mount. The filter's initial
+    /// attitude uncertainty includes the stated misalignment of the mount, which no sensor shows in
+    /// flight.
     pub(super) fn lean_from_the_rail(&self, mission: &Mission) -> Option<CheckedValue> {
         let launch = mission.launched()?;
         let rail = launch.standing(mission.airframe.mass.loaded_cg_station_m).world_from_body;
         let up = rail.inverse_transform_vector(&Vector3::z());
-        let felt = Vector3::from(self.force_m_s2.map(|spread| spread.mean));
-        let lean_rad = libm::atan2(felt.cross(&up).norm(), felt.dot(&up));
+        let sensed = Vector3::from(self.force_m_s2.map(|spread| spread.mean));
+        let lean_rad = libm::atan2(sensed.cross(&up).norm(), sensed.dot(&up));
         let stated_rad = libm::hypot(RAIL_LEVEL_DEG, mission.estimator.mounting_deg).to_radians();
         Some(CheckedValue::at_most(Item::RailLean, lean_rad, LEAN_SIGMAS * stated_rad))
     }

@@ -14,12 +14,12 @@ fn mission() -> Mission {
     mission
 }
 
-/// What is wrong with the vehicle.
+/// The fault of the vehicle.
 #[derive(Debug, Clone, Copy)]
 struct Wrong {
-    /// The surface that is wrong.
+    /// The faulty surface.
     surface: usize,
-    /// It does not leave its place.
+    /// It does not move.
     stuck: bool,
     /// Its rate, of its airframe's.
     rate_share: f64,
@@ -31,7 +31,7 @@ struct Wrong {
 
 const NOTHING_WRONG: Wrong = Wrong { surface: 0, stuck: false, rate_share: 1.0, later_s: 0.0, off_rad: 0.0 };
 
-/// Surfaces with a delay and a rate, as simple as they can be.
+/// Surfaces with a delay and a rate, as simple as possible.
 struct Bench {
     servos: [Servo; SURFACES],
     lines_rad: [VecDeque<f64>; SURFACES],
@@ -70,7 +70,7 @@ impl Bench {
     }
 }
 
-/// Samples of a vehicle at rest with this much noise, of what the filter assumes.
+/// Samples of a vehicle at rest, with this multiple of the assumed noise.
 fn at_rest(frame: u32, noise: f64) -> Measurements {
     // Plus and minus one in turn: a spread of one.
     let sign = if frame.is_multiple_of(2) { noise } else { -noise };
@@ -95,24 +95,24 @@ fn at_rest(frame: u32, noise: f64) -> Measurements {
     }
 }
 
-/// Switches, battery and log as they should be.
-const SOUND: KeptInput = KeptInput {
+/// Switches, battery and log without faults.
+const SOUND: SensedInput = SensedInput {
     igniter_continuity: true,
     booster_attached: true,
     battery_v: Some(8.1),
     log: LogState { running: true, space_bytes: 1 << 30 },
-    ..KeptInput::NONE
+    ..SensedInput::NONE
 };
 
 fn reading(
     [pitch, yaw, one, two, three, four]: [f64; SURFACES],
     measured: Measurements,
-    switches: &KeptInput,
-) -> KeptInput {
-    KeptInput { gimbal_rad: [pitch, yaw], fins_rad: [one, two, three, four], measured, ..*switches }
+    switches: &SensedInput,
+) -> SensedInput {
+    SensedInput { gimbal_rad: [pitch, yaw], fins_rad: [one, two, three, four], measured, ..*switches }
 }
 
-fn checked(wrong: Wrong, noise: f64, switches: &KeptInput, moves: bool) -> PadCheck {
+fn checked(wrong: Wrong, noise: f64, switches: &SensedInput, moves: bool) -> PadCheck {
     let mission = mission();
     let mut bench = Bench::new(&mission.airframe, wrong);
     let mut check = PadCheck::default();
@@ -171,26 +171,26 @@ fn each_wrong_surface_is_named_with_what_is_wrong() {
 
 #[test]
 fn each_sensor_and_switch_is_judged() {
-    let still = |noise, switches: KeptInput| failing(&checked(NOTHING_WRONG, noise, &switches, false));
+    let still = |noise, switches: SensedInput| failing(&checked(NOTHING_WRONG, noise, &switches, false));
     assert_eq!(still(3.0, SOUND), [Item::GyroNoise, Item::AccelerometerNoise, Item::BarometerNoise]);
-    assert_eq!(still(1.0, KeptInput { igniter_continuity: false, ..SOUND }), [Item::IgniterContinuity]);
-    assert_eq!(still(1.0, KeptInput { battery_v: Some(7.3), ..SOUND }), [Item::BatteryVoltage]);
-    assert_eq!(still(1.0, KeptInput { battery_v: Some(f64::NAN), ..SOUND }), [Item::BatteryVoltage]);
-    assert_eq!(still(1.0, KeptInput { battery_v: None, ..SOUND }), []);
+    assert_eq!(still(1.0, SensedInput { igniter_continuity: false, ..SOUND }), [Item::IgniterContinuity]);
+    assert_eq!(still(1.0, SensedInput { battery_v: Some(7.3), ..SOUND }), [Item::BatteryVoltage]);
+    assert_eq!(still(1.0, SensedInput { battery_v: Some(f64::NAN), ..SOUND }), [Item::BatteryVoltage]);
+    assert_eq!(still(1.0, SensedInput { battery_v: None, ..SOUND }), []);
     assert_eq!(
-        still(1.0, KeptInput { log: LogState { running: false, ..SOUND.log }, ..SOUND }),
+        still(1.0, SensedInput { log: LogState { running: false, ..SOUND.log }, ..SOUND }),
         [Item::LogRunning]
     );
     assert_eq!(
-        still(1.0, KeptInput { log: LogState { space_bytes: 1 << 20, ..SOUND.log }, ..SOUND }),
+        still(1.0, SensedInput { log: LogState { space_bytes: 1 << 20, ..SOUND.log }, ..SOUND }),
         [Item::LogSpace]
     );
-    assert_eq!(still(1.0, KeptInput { pin_out: true, ..SOUND }), [], "the pin is only shown");
+    assert_eq!(still(1.0, SensedInput { pin_out: true, ..SOUND }), [], "the pin is only shown");
     assert_eq!(still(f64::NAN, SOUND).len(), 7, "no number passes");
 }
 
-/// A mount that is 4 degrees askew looks like a rail that leans by 4 degrees: the crew looks at
-/// both.
+/// A mount skewed by 4 degrees is indistinguishable from a rail that leans by 4 degrees: the crew
+/// inspects both.
 #[test]
 fn a_mount_that_leans_further_than_stated_fails() {
     let lean = |deg: f64, mounting_deg: f64, at: StartPoint| {
@@ -227,7 +227,7 @@ fn no_two_items_have_the_same_number() {
 }
 
 proptest! {
-    /// Whatever the feedback says, a command stays inside the airframe's range.
+    /// For any feedback, a command stays inside the airframe's range.
     #[test]
     fn no_command_leaves_the_range(feedback in prop::collection::vec(prop::num::f64::ANY, 64)) {
         let mission = mission();

@@ -1,67 +1,67 @@
-//! Detects lift-off, burn-out, the moment to separate the booster, and apogee, from what the
-//! sensors show; and a fin that does not move.
+//! Detects lift-off, burnout, the time to separate the booster, and apogee from the sensors; also a
+//! stuck fin.
 
 use alloc::format;
 use alloc::string::String;
 use serde::{Deserialize, Serialize};
 
 use super::vertical_speed::{APART_OF_TWO_M_S, RATE_OVER_S, VerticalSpeeds};
-use crate::computer::news::Severity;
+use crate::computer::messages::Severity;
 use crate::computer::pad::ANSWERING_RAD;
 use crate::estimation::estimator::Estimate;
 use crate::rules::phase::{Event, Phase};
 use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 
-/// Specific force along the axis above which the vehicle is being pushed, m/s^2. At rest it is 9.8;
-/// the slowest lift-off that the rail guides well has 5 times the weight.
+/// Axial specific force above which the vehicle is under thrust, m/s^2. At rest it is 9.8; the
+/// slowest lift-off that the rail guides well has 5 times the weight.
 const PUSHED_M_S2: f64 = 1.5 * STANDARD_GRAVITY_M_S2;
-/// Speed gained without a break that counts as lift-off, m/s. A knock of 20 g that lasts 10 ms
-/// gives 2 m/s.
+/// Speed gained without interruption that counts as lift-off, m/s. A knock of 20 g for 10 ms gives
+/// 2 m/s.
 const LIFTED_OFF_M_S: f64 = 3.0;
 /// Longest time from the ignition command to lift-off, s. Igniters of ascent motors need up to 2 s.
 const LIFT_OFF_WITHIN_S: f64 = 3.0;
-/// How long the vehicle must brake before the motor counts as burnt out, s. Drag alone brakes at
-/// once; a dip of the thrust below the drag is shorter.
+/// Deceleration time after which the motor counts as burned out, s. Drag alone decelerates at once;
+/// a dip of the thrust below the drag is shorter.
 const BRAKING_S: f64 = 0.1;
-/// A burn-out counts from this share of the motor's burn time on, and comes by itself at that one:
-/// burn times scatter by 4 %, and an accelerometer that lies ends no boost.
+/// Shares of the motor's burn time between which burnout is detected; it is assumed at the second.
+/// Burn times scatter by 4 %, and a failed accelerometer cannot end the boost.
 const BURNS_FOR: [f64; 2] = [0.6, 1.5];
-/// Frames with a falling vehicle that make an apogee: 15 ms, in which the vehicle falls by 1 mm.
+/// Consecutive falling frames that make an apogee: 15 ms, in which the vehicle falls by 1 mm.
 const FALLING_FRAMES: u32 = 3;
-/// A vehicle this far below its highest pressure altitude, m, for [`SUNK_S`] has passed apogee, if
-/// nothing else says that it rises. It is six times the noise of a barometer in its own exhaust or
+/// Drop below the highest pressure altitude, m, that for [`SUNK_S`] indicates a passed apogee, if
+/// no other source shows a climb. It is six times the noise of a barometer in its own exhaust or
 /// wake.
 const SUNK_M: f64 = 6.0;
 const SUNK_S: f64 = 0.2;
-/// A vehicle this far above its first pressure altitude, m, for [`RISEN_S`] has lifted off,
-/// whatever it feels. Gusts over the static ports show a metre or two.
+/// Rise above the first pressure altitude, m, that for [`RISEN_S`] indicates a lift-off, whatever
+/// the accelerometer shows. Gusts over the static ports show a metre or two.
 const RISEN_M: f64 = 15.0;
 const RISEN_S: f64 = 0.1;
-/// A barometer that shows this much, m/s, climbs, and has not sunk.
+/// Pressure climb rate, m/s, above which the vehicle climbs and has not sunk.
 const CLIMBS_M_S: f64 = 10.0;
-/// After the separation charge the pressure in the vehicle is not that of the air, s: three times
-/// its time of 0.3 s.
+/// Time after the separation charge in which the internal pressure is not that of the air, s: three
+/// times its time constant of 0.3 s.
 const CHARGE_LASTS_S: f64 = 1.0;
-/// What was felt as a lift-off is looked at for so long, s: the weakest motor that leaves the rail
+/// Time in which a sensed lift-off must be confirmed, s: the weakest motor that leaves the rail
 /// rises by 10 m in it.
-const DOUBTED_S: f64 = 2.0;
-/// Within this of its first pressure altitude, m, a vehicle stands, and a fix that shows less than
-/// that speed, m/s, is one of a vehicle that stands.
+const CONFIRMED_WITHIN_S: f64 = 2.0;
+/// Limits within which a vehicle is at rest: distance from its first pressure altitude, m, and
+/// speed in a fix, m/s.
 const STANDS_M: f64 = 5.0;
 const STANDS_M_S: f64 = 3.0;
-/// What the watch sees of a frame.
+/// Sensor data of a frame.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct AscentReadings {
     pub(super) time_s: f64,
     pub(super) frame_s: f64,
     pub(super) phase: Phase,
-    /// Along the axis, as measured, m/s^2.
+    /// Along the axis, measured, m/s^2.
     pub(super) axial_specific_force_m_s2: f64,
     pub(super) pressure_altitude_m: Option<f64>,
     pub(super) speeds: VerticalSpeeds,
-    /// As estimated, up, m/s.
+    /// Estimated, upwards, m/s.
     pub(super) vertical_m_s: f64,
-    /// The wire between booster and vehicle is whole.
+    /// The wire between booster and vehicle is intact.
     pub(super) booster_attached: bool,
     pub(super) separate_before_apogee_s: f64,
     /// Burn time of the ascent motor, s.
@@ -69,16 +69,16 @@ pub(super) struct AscentReadings {
 }
 
 with_defaults! {
-    /// The watch's memory.
+    /// State of the ascent monitor.
     #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
     pub(crate) struct AscentWatch {
-        /// Speed that it was pushed to on its rail, m/s; zero while nothing pushes.
+        /// Speed gained on the rail, m/s; zero while there is no thrust.
         pub(crate) gained_m_s: f64 = 0.0,
         lifted_off: bool = false,
         lifted_off_at_s: f64 = 0.0,
-        /// More than the accelerometer says that it has lifted off.
+        /// Lift-off is confirmed by a second source.
         confirmed: bool = false,
-        /// What was felt was no lift-off: the accelerometer is not believed alone any more.
+        /// The sensed lift-off was rejected: the accelerometer alone is not accepted any more.
         denied: bool = false,
         braking_s: f64 = 0.0,
         separating_since_s: Option<f64> = None,
@@ -86,7 +86,7 @@ with_defaults! {
         falling_frames: u32 = 0,
         highest_m: f64 = f64::NEG_INFINITY,
         sunk_s: f64 = 0.0,
-        /// The estimate's largest speed since the pressure shows a fall, m/s.
+        /// Largest estimated speed since the pressure shows a fall, m/s.
         sunk_from_m_s: f64 = 0.0,
         /// The first pressure altitude.
         ground_m: Option<f64> = None,
@@ -100,12 +100,12 @@ impl AscentWatch {
         self.lifted_off
     }
 
-    /// Apogee is near, or was: the booster goes.
+    /// Whether the booster is to be separated: apogee is near, or has passed.
     pub(crate) fn separates(&self) -> bool {
         self.separating_since_s.is_some()
     }
 
-    /// Whether the booster parts in this frame, of which its wire tells.
+    /// Returns whether the booster separates in this frame, as its wire shows.
     pub(super) fn parts(&mut self, booster_attached: bool) -> bool {
         let parts = self.separates() && !booster_attached && !self.parted;
         self.parted |= parts;
@@ -119,7 +119,7 @@ impl AscentWatch {
             return self.wait_for_lift_off(seen);
         }
         if !self.confirmed {
-            return self.doubt_the_lift_off(seen);
+            return self.confirm_the_lift_off(seen);
         }
         match seen.phase {
             Phase::Boost if self.has_burnt_out(seen) => Some(Event::Burnout),
@@ -134,7 +134,7 @@ impl AscentWatch {
         }
     }
 
-    /// Whether the vehicle lifts off in this frame, in which it feels this along its axis, m/s^2.
+    /// Detects lift-off from the axial specific force of this frame, m/s^2.
     pub(super) fn detects_lift_off(&mut self, axial_m_s2: f64, frame_s: f64) -> bool {
         let gain_m_s = (axial_m_s2 - STANDARD_GRAVITY_M_S2) * frame_s;
         self.gained_m_s = if axial_m_s2 > PUSHED_M_S2 { self.gained_m_s + gain_m_s } else { 0.0 };
@@ -147,8 +147,8 @@ impl AscentWatch {
             self.lifted_off_at_s = seen.time_s;
             return Some(Event::LiftOff);
         }
-        // The second opinion counts while a lift-off is expected, also after an abort of the
-        // ignition: in a day on the pad the weather moves by 15 m.
+        // The barometer is used only while a lift-off is expected, also after an abort of the
+        // ignition: over a day on the pad the weather changes it by 15 m.
         let expected = seen.phase == Phase::Boost || seen.time_s < LIFT_OFF_WITHIN_S;
         if expected && self.risen_s >= RISEN_S {
             (self.lifted_off, self.lifted_off_at_s) = (true, seen.time_s);
@@ -157,10 +157,10 @@ impl AscentWatch {
         (seen.phase == Phase::Boost && seen.time_s >= LIFT_OFF_WITHIN_S).then_some(Event::NoLiftOff)
     }
 
-    /// A push alone is no lift-off. Whoever says that the vehicle moves confirms it; if barometer
-    /// or satellites say that it stands, there was none. In doubt it flies: a barometer that has
-    /// failed does not stand still on its pad.
-    fn doubt_the_lift_off(&mut self, seen: &AscentReadings) -> Option<Event> {
+    /// Confirms a lift-off: thrust in the accelerometer alone is not enough. Any second source that
+    /// shows motion confirms it; barometer or satellites at rest reject it. Without a decision the
+    /// vehicle flies: a failed barometer does not read a constant altitude on the pad.
+    fn confirm_the_lift_off(&mut self, seen: &AscentReadings) -> Option<Event> {
         let (time_s, speeds) = (seen.time_s, &seen.speeds);
         let fix_m_s = speeds.gnss_m_s(time_s);
         let off_m =
@@ -169,12 +169,12 @@ impl AscentWatch {
         let moves = self.risen_s >= RISEN_S
             || off_m.is_some_and(|off_m| off_m.abs() > STANDS_M && pressure_m_s.abs() > STANDS_M_S)
             || fix_m_s.is_some_and(|m_s| m_s.abs() > STANDS_M_S);
-        // A barometer needs a moment before it tells a speed.
+        // A barometer needs some time before it gives a speed.
         let since_s = time_s - self.lifted_off_at_s;
-        let nobody_says = off_m.is_none() && fix_m_s.is_none() && since_s > 2.0 * RATE_OVER_S;
-        if moves || nobody_says {
+        let no_other_source = off_m.is_none() && fix_m_s.is_none() && since_s > 2.0 * RATE_OVER_S;
+        if moves || no_other_source {
             self.confirmed = true;
-        } else if since_s >= DOUBTED_S {
+        } else if since_s >= CONFIRMED_WITHIN_S {
             self.confirmed = off_m.is_some_and(|off_m| off_m.abs() > STANDS_M);
             if !self.confirmed {
                 (self.lifted_off, self.denied) = (false, true);
@@ -193,7 +193,7 @@ impl AscentWatch {
     }
 
     fn separation_is_due(&self, seen: &AscentReadings) -> bool {
-        // The pressure may only delay it: nothing is parted on the way up.
+        // The pressure may only delay separation: nothing separates while the vehicle climbs.
         let rises_m_s = self.rises_m_s(seen);
         let pressure_m_s = (seen.speeds.pressure_m_s(seen.time_s, None))
             .filter(|m_s| (m_s - rises_m_s).abs() <= APART_OF_TWO_M_S);
@@ -203,9 +203,9 @@ impl AscentWatch {
 
     fn has_passed_apogee(&mut self, seen: &AscentReadings) -> bool {
         self.falling_frames = if self.rises_m_s(seen) < 0.0 { self.falling_frames + 1 } else { 0 };
-        // The pressure shows a fall, and satellites do; without them the pressure is believed when
-        // the estimate rises slowly, or after the time in which a vehicle as fast as the estimate
-        // has fallen, too.
+        // Apogee by pressure needs satellites that confirm it. Without satellites it is accepted if
+        // the estimate climbs slowly, or after the time in which a vehicle as fast as the estimate
+        // would have fallen too.
         let sunk = match seen.speeds.gnss_m_s(seen.time_s) {
             Some(gnss_m_s) => gnss_m_s < 0.0 && self.sunk_s >= SUNK_S,
             None if seen.vertical_m_s <= APART_OF_TWO_M_S => self.sunk_s >= SUNK_S,
@@ -218,12 +218,12 @@ impl AscentWatch {
         seen.speeds.rises_m_s(seen.vertical_m_s, seen.time_s, self.through_gas_s())
     }
 
-    /// For how long a speed by the pressure before the separation charge counts, s.
+    /// Time for which a pressure speed from before the separation charge stays valid, s.
     pub(super) fn through_gas_s(&self) -> Option<f64> {
         self.separating_since_s.is_some().then_some(CHARGE_LASTS_S + 3.0 * RATE_OVER_S)
     }
 
-    /// The gas of the separation charge is still in the vehicle.
+    /// Whether gas of the separation charge is still in the vehicle.
     pub(super) fn is_charged(&self, time_s: f64) -> bool {
         self.separating_since_s.is_some_and(|since_s| time_s - since_s < CHARGE_LASTS_S)
     }
@@ -233,7 +233,8 @@ impl AscentWatch {
         let sample_m = seen.pressure_altitude_m.filter(|altitude_m| altitude_m.is_finite());
         if let Some(altitude_m) = sample_m.filter(|_| !disturbed) {
             self.ground_m.get_or_insert(altitude_m);
-            // What climbs has not sunk: a pressure that has jumped down climbs on from there.
+            // A climbing vehicle has not sunk: after a downward jump the pressure climbs on from
+            // there.
             let climbs = seen.speeds.pressure_m_s(seen.time_s, None).is_some_and(|m_s| m_s >= CLIMBS_M_S);
             self.highest_m = if climbs { altitude_m } else { self.highest_m.max(altitude_m) };
         }
@@ -249,16 +250,16 @@ impl AscentWatch {
     }
 }
 
-/// For how long something has been so, s, after one more frame. Samples come in some frames only;
-/// between them the last one counts.
+/// Duration of a condition after one more frame, s. Samples arrive in some frames only; in between,
+/// the last one holds.
 fn lasts_s(before_s: f64, is_now: Option<bool>, frame_s: f64) -> f64 {
     if is_now.unwrap_or(before_s > 0.0) { before_s + frame_s } else { 0.0 }
 }
 
-/// What the crew is told of an event.
+/// The crew message for an event.
 pub(super) fn words_of_ascent(event: Event, estimate: &Estimate) -> Option<(Severity, String)> {
     let state = &estimate.state;
-    let told = match event {
+    let message = match event {
         Event::LiftOff => (Severity::Notice, "LIFT-OFF".into()),
         Event::NoLiftOff => (
             Severity::Critical,
@@ -279,32 +280,32 @@ pub(super) fn words_of_ascent(event: Event, estimate: &Estimate) -> Option<(Seve
         }
         _ => return None,
     };
-    Some(told)
+    Some(message)
 }
 
-// Finds a fin that does not move when commanded.
+// Detects a fin that does not move when commanded.
 //
-// A command that sweeps to and fro passes a stuck fin again and again, so a fin at its commanded
-// angle may still be stuck. A fin is stuck if its command has been far away for longer than a servo
-// needs and the fin has not moved.
+// A sweeping command passes a stuck fin again and again, so a fin at its commanded angle may still
+// be stuck. A fin is stuck if its command has been far away for longer than a servo needs and the
+// fin has not moved.
 
-/// A working fin moves at once if its command is farther away than this, rad: the tolerance of the
+/// Distance of the command, rad, at which a working fin moves at once: the tolerance of the
 /// ignition gate.
 const FAR_RAD: f64 = super::gate::FIN_THERE_RAD;
-/// A fin is stuck if its command has been far away for this long in total and it has not moved, s:
-/// more than ten times the delay of a servo.
+/// Total time with a distant command and no motion after which a fin is stuck, s: more than ten
+/// times a servo's delay.
 const STUCK_AFTER_S: f64 = 0.25;
 
-/// State of the watch over one fin.
+/// State of the monitor of one fin.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct Watched {
     /// Angle after its last movement, rad.
     rests_at_rad: f64,
-    /// Total time since then with a command far from the fin, s.
+    /// Total time since then with a distant command, s.
     called_for_s: f64,
 }
 
-/// The watch over all fins.
+/// The monitor of all fins.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct FinWatch {
     fins: [Watched; 4],
@@ -351,9 +352,9 @@ mod tests {
         }
     }
 
-    /// The same with what the three speeds make of it, of a vehicle that feels such an
-    /// acceleration, m/s^2, and gets such a fix.
-    fn heard(
+    /// The same with the three vertical speeds, for a vehicle with this acceleration, m/s^2, and
+    /// this fix.
+    fn with_speeds(
         speeds: &mut VerticalSpeeds,
         seen: AscentReadings,
         vertical_m_s2: f64,
@@ -393,7 +394,7 @@ mod tests {
         let mut watch = AscentWatch::default();
         assert_eq!(watch.update(&seen(2.995, Phase::Boost, 9.81, 0.0)), None);
         assert_eq!(watch.update(&seen(3.0, Phase::Boost, 9.81, 0.0)), Some(Event::NoLiftOff));
-        // Nobody waits for a lift-off after an abort, but it is still noticed.
+        // After an abort no lift-off is expected, but it is still detected.
         assert_eq!(watch.update(&seen(9.0, Phase::PadIdle, 9.81, 0.0)), None);
         let late = (0..15).filter_map(|_| watch.update(&seen(9.1, Phase::PadIdle, 49.81, 0.0)));
         assert_eq!(late.collect::<Vec<_>>(), [Event::LiftOff]);
@@ -412,7 +413,7 @@ mod tests {
     }
 
     #[test]
-    fn the_booster_is_separated_once_and_apogee_says_whether_it_went() {
+    fn the_booster_is_separated_once_and_apogee_reports_whether_it_left() {
         let mut watch = lifted_off();
         assert_eq!(watch.update(&seen(5.0, Phase::Coast, -2.0, 20.0)), None);
         assert_eq!(watch.update(&seen(5.1, Phase::Coast, -2.0, 19.6)), Some(Event::SeparationDue));
@@ -423,8 +424,8 @@ mod tests {
         assert_eq!(events, [Event::Apogee { booster_attached: true }]);
     }
 
-    /// An accelerometer that reads nothing, so that the estimate falls from the first frame on: the
-    /// barometer alone sees the lift-off, and no apogee is believed while it climbs.
+    /// An accelerometer that reads zero, so that the estimate falls from the first frame on: the
+    /// barometer alone detects the lift-off, and no apogee is accepted while it climbs.
     #[test]
     fn with_a_dead_accelerometer_the_barometer_sees_lift_off_and_apogee() {
         let (mut watch, mut speeds) = (AscentWatch::default(), VerticalSpeeds::default());
@@ -439,21 +440,21 @@ mod tests {
                 ..seen(time_s, Phase::Boost, 0.0, -9.81 * time_s)
             };
             let phase = if events.len() < 2 { Phase::Boost } else { Phase::Coast };
-            // The separation charge's gas is no pressure of the air.
+            // The gas of the separation charge is not air pressure.
             let gas = watch.is_charged(time_s);
             let dead = AscentReadings {
                 phase,
                 pressure_altitude_m: dead.pressure_altitude_m.filter(|_| !gas),
                 ..dead
             };
-            let dead = heard(&mut speeds, dead, -9.81, None);
+            let dead = with_speeds(&mut speeds, dead, -9.81, None);
             events.extend(watch.update(&dead).map(|event| (time_s, event)));
         }
         assert_eq!(events[0].1, Event::LiftOff);
         // 15 m at 0.26 s, and the 0.1 s for which it has to stay so.
         assert!((0.3..0.5).contains(&events[0].0), "{events:?}");
-        // Nothing brakes: the motor's time is over, and the booster goes two seconds before the
-        // apogee of the pressure.
+        // Nothing decelerates: the motor's time is over, and the booster separates two seconds
+        // before the apogee of the pressure.
         assert_eq!((events[1].1, events[2].1), (Event::Burnout, Event::SeparationDue));
         assert!((1.2..1.8).contains(&events[1].0) && (4.0..4.5).contains(&events[2].0), "{events:?}");
         assert_eq!(events[3].1, Event::Apogee { booster_attached: true });
@@ -471,7 +472,7 @@ mod tests {
                 pressure_altitude_m: Some(100.0 + 40.0 * time_s + jump_m),
                 ..seen(time_s, Phase::Coast, -2.0, 40.0)
             };
-            assert_eq!(watch.update(&heard(&mut speeds, climbing, 0.0, None)), None, "{time_s}");
+            assert_eq!(watch.update(&with_speeds(&mut speeds, climbing, 0.0, None)), None, "{time_s}");
         }
     }
 
@@ -491,7 +492,7 @@ mod tests {
                         burn_time_s: 10.0,
                         ..seen(time_s, Phase::Coast, 9.81, 50.0)
                     };
-                    let lying = heard(&mut speeds, lying, 0.0, fix_m_s);
+                    let lying = with_speeds(&mut speeds, lying, 0.0, fix_m_s);
                     matches!(watch.update(&lying), Some(Event::Apogee { .. }))
                 });
                 assert_eq!(apogee, ends, "fix {fix_m_s:?}, ramp {ramp_m_s}");
@@ -499,10 +500,10 @@ mod tests {
         }
     }
 
-    /// An accelerometer that pushes while barometer and satellites stand is denied; one whose
-    /// others are silent is believed.
+    /// Thrust in the accelerometer is rejected while barometer and satellites are at rest, and
+    /// accepted while they are silent.
     #[test]
-    fn a_push_that_only_the_accelerometer_feels_is_no_lift_off() {
+    fn a_push_in_the_accelerometer_alone_is_no_lift_off() {
         for (pressure, fix, denied) in
             [(true, true, true), (true, false, true), (false, true, true), (false, false, false)]
         {
@@ -514,7 +515,7 @@ mod tests {
                         .then_some(0.1 * libm::sin(f64::from(frame))),
                     ..seen(0.005 * f64::from(frame), Phase::Boost, 49.81, 40.0)
                 };
-                let pushed = heard(&mut speeds, pushed, 40.0, fix.then_some(0.05));
+                let pushed = with_speeds(&mut speeds, pushed, 40.0, fix.then_some(0.05));
                 events.extend(watch.update(&pushed));
             }
             assert_eq!(events[0], Event::LiftOff);

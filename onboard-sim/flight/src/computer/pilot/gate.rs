@@ -1,54 +1,54 @@
-//! Moves through the phases of the descent and the landing: the ignition behind its gate, and the
-//! parachute while there is height for it, if the gate will not open.
+//! Phase changes of descent and landing: the ignition behind its gate, and the parachute while
+//! there is height for it, if the landing is abandoned.
 
 use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
 
 use super::Pilot;
-use crate::computer::KeptInput;
-use crate::computer::news::Severity;
+use crate::computer::SensedInput;
+use crate::computer::messages::Severity;
 use crate::computer::table::PhaseTable;
-use crate::estimation::estimator::{Doubt, Estimate, Health};
+use crate::estimation::estimator::{Estimate, Health, HealthIssue};
 use crate::estimation::sensor_watch::SensorWatch;
 use crate::rules::gate::{self, GATE_CHECKS, GateCheck, GateInput};
 use crate::rules::phase::{Effect, Effects, Event, Mode, Motor, NO_THRUST_TIMEOUT_S, Phase, Refusal};
 use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 
-/// A fin farther than this from its command has not reached it, rad.
+/// Distance of a fin from its command beyond which it has not arrived, rad.
 pub(super) const FIN_THERE_RAD: f64 = 0.1;
-/// Heights of a landing, m: a field's slope, the pressure's errors and the weather of a day.
+/// Largest height of a landing, m: slope of the field, pressure errors and the weather of a day.
 const NEAR_GROUND_M: f64 = 15.0;
-/// A reason that has kept the gate shut for this long, s, will not go away before ignition.
+/// Duration after which a failing gate check is lasting, s: it will not recover before ignition.
 const LASTS_S: f64 = 0.5;
-/// The decision is taken this long before the room for the parachute ends, s. As long may a due
-/// ignition be refused: a fin that is still moving has kept the gate shut for up to 45 ms in 1500
-/// simulated flights.
+/// Time before the end of the parachute's height at which the decision is taken, s. A due ignition
+/// may be refused for as long: a moving fin has inhibited it for up to 45 ms in 1500 simulated
+/// flights.
 const BEFORE_S: f64 = 0.1;
-/// A pressure altitude that is lower than the estimate by more, m, is not only its ram error and a
-/// slow offset.
+/// Difference below the estimate, m, at which a pressure altitude is wrong by more than its ram
+/// error and a slow offset.
 const HEIGHTS_APART_M: f64 = 8.0;
-/// The fence holds for a place that is farther out by so many of its standard deviations.
+/// Margin of the position against the fence, standard deviations.
 const PLACE_SIGMAS: f64 = 2.0;
 
-/// What a frame shows, beside the pilot.
+/// Inputs of a frame besides the pilot.
 #[derive(Clone, Copy)]
 struct Seen<'a> {
-    input: &'a KeptInput,
+    input: &'a SensedInput,
     estimate: &'a Estimate,
     sensors: &'a SensorWatch,
 }
 
 impl Pilot {
     /// Moves through the phases of the descent and the landing.
-    pub(crate) fn decide(&mut self, table: &mut PhaseTable, input: &KeptInput, sensors: &SensorWatch) {
+    pub(crate) fn decide(&mut self, table: &mut PhaseTable, input: &SensedInput, sensors: &SensorWatch) {
         let Some(estimate) = self.estimate else { return };
         let seen = Seen { input, estimate: &estimate, sensors };
         let time_s = input.time_s;
         if let Some((hopeless, why)) = self.gate_will_not_open(table.mode(), seen)
             && self.apply(table, hopeless, time_s).is_ok()
         {
-            table.say(Severity::Critical, format!("no landing: {why}"));
+            table.report(Severity::Critical, format!("no landing: {why}"));
             self.gave_up = Some(why);
         }
         match table.mode().phase {
@@ -91,7 +91,7 @@ impl Pilot {
         }
     }
 
-    /// Whether any height is that of a landing: a foot's switch alone ends no flight.
+    /// Whether any height is that of a landing: a foot switch alone ends no flight.
     fn is_near_the_ground(&self, Seen { input, estimate, sensors }: Seen<'_>) -> bool {
         let time_s = input.time_s;
         let below_cg_m = estimate.state.position_m.z - self.feet_height_m(estimate);
@@ -100,7 +100,7 @@ impl Pilot {
             || sensors.lidar_range_m().is_some_and(|range_m| range_m <= NEAR_GROUND_M)
     }
 
-    /// The motor's thrust as estimated, and the weight, N.
+    /// Estimated thrust of the motor, and the weight, N.
     pub(crate) fn thrust_and_weight_n(&self, time_s: f64) -> (f64, f64) {
         let burning_s = self.model.burning_s(time_s);
         let thrust_n = burning_s.map_or(0.0, |burning_s| self.model.burn().thrust_n(burning_s));
@@ -121,7 +121,7 @@ impl Pilot {
         estimate.state.position_m.z - self.model.feet_below_cg_m(&self.model.mass.at(0.0))
     }
 
-    /// Height at which thrust, commanded at the next frame, would begin, m.
+    /// Height at which thrust would begin if ignition were commanded in the next frame, m.
     fn onset_m(&self, estimate: &Estimate) -> f64 {
         self.prediction.ignition.onset_height_m - (self.prediction.height_m - self.feet_height_m(estimate))
     }
@@ -130,11 +130,11 @@ impl Pilot {
         self.prediction.ignition.overdue_s(self.onset_m(estimate))
     }
 
-    /// The event that an abort is now, from the findings of the last frame, if there was one.
-    pub(crate) fn abort_event(&self, mode: &Mode, last: Option<&KeptInput>, sensors: &SensorWatch) -> Event {
+    /// The event of an abort at this moment, from the findings of the last frame, if there was one.
+    pub(crate) fn abort_event(&self, mode: &Mode, last: Option<&SensedInput>, watch: &SensorWatch) -> Event {
         let found = last.zip(self.estimate.as_ref());
         let gate_open = found.is_some_and(|(input, estimate)| {
-            !self.gate_checks(mode, Seen { input, estimate, sensors }).iter().any(|check| check.shut)
+            !self.gate_checks(mode, Seen { input, estimate, sensors: watch }).iter().any(|check| check.shut)
         });
         Event::AbortRequested {
             lifted_off: self.ascent.has_lifted_off(),
@@ -143,14 +143,14 @@ impl Pilot {
         }
     }
 
-    /// Room to spare where the motor is another way down, and just enough where it is not.
+    /// With margin where the motor is an alternative, without it otherwise.
     fn parachute_has_room(&self, gate_open: bool) -> bool {
         let prediction = &self.prediction;
         let enough_m = if gate_open { prediction.commit_height_m } else { prediction.filling_height_m() };
         prediction.height_m > enough_m
     }
 
-    /// The checks of the gate with what they find now.
+    /// The checks of the gate with their present values.
     fn gate_checks(
         &self,
         mode: &Mode,
@@ -158,10 +158,10 @@ impl Pilot {
     ) -> [GateCheck; GATE_CHECKS] {
         let state = &estimate.state;
         let onset_m = self.onset_m(estimate);
-        // With no room for the parachute, a landing by what is not known well ends better than a
-        // fall, while the vehicle knows which way is up.
+        // With no height left for the parachute, a landing on uncertain estimates is better than a
+        // fall, as long as the attitude is available.
         let low = self.feet_height_m(estimate) < self.prediction.filling_height_m();
-        let unknown = matches!(estimate.health, Health::Doubtful(Doubt::Restarted | Doubt::Imu))
+        let unknown = matches!(estimate.health, Health::Unhealthy(HealthIssue::Restarted | HealthIssue::Imu))
             || estimate.sigmas.attitude_rad.xy().max()
                 > self.model.mission.estimator.health.tilt_deg.to_radians();
         let found = GateInput {
@@ -170,8 +170,8 @@ impl Pilot {
             pitch_rate_rad_s: libm::hypot(state.rate_rad_s.y, state.rate_rad_s.z),
             speed_m_s: state.velocity_m_s.norm(),
             predicted_speed_m_s: self.prediction.predicted_speed_m_s,
-            // With one source left there is no disagreement; the estimator's health says whether
-            // that source is reliable.
+            // With one source left there is no disagreement; the estimator's health covers that
+            // source.
             height_disagreement_m: estimate.heights.contradiction_m().unwrap_or(0.0),
             landing_feasible: self.prediction.ignition.band.is_some_and(|band| band.contains(onset_m)),
             predicted_touchdown_x_m: self.prediction.touchdown_distance_m
@@ -187,8 +187,8 @@ impl Pilot {
         gate::checks(&self.model.mission.gate, &found)
     }
 
-    /// The fins have left their closed stop and stand where they are commanded to. In the frame
-    /// that enters DEPLOY they still stand where the ascent had them, and that says nothing.
+    /// The fins have left their closed stop and are at their commands. In the frame that enters
+    /// DEPLOY they are still where the ascent had them, which proves nothing.
     fn fins_are_out(&self, fins_rad: &[f64; 4]) -> bool {
         let least_rad = self.model.airframe().fins.control_min_rad() - FIN_THERE_RAD;
         fins_rad.iter().all(|fin_rad| *fin_rad >= least_rad) && self.fins_there(fins_rad)
@@ -198,33 +198,33 @@ impl Pilot {
         fins_rad.iter().zip(&self.fins_rad).all(|(there, wanted)| (there - wanted).abs() < FIN_THERE_RAD)
     }
 
-    /// Applies an event. If the table refuses it, nothing changes.
+    /// Applies an event. If the table refuses it, the mode is unchanged.
     pub(super) fn try_apply(&mut self, table: &mut PhaseTable, event: Event, time_s: f64) {
         let _ = self.apply(table, event, time_s);
     }
 
-    /// Applies an event, from whomever it comes.
+    /// Applies an event from any source.
     ///
     /// # Errors
-    /// The table refuses it, and nothing has changed.
+    /// The table refuses the event; the mode is unchanged.
     pub(crate) fn apply(
         &mut self,
         table: &mut PhaseTable,
         event: Event,
         time_s: f64,
     ) -> Result<Effects, Refusal> {
-        let effects = table.happen(event)?;
+        let effects = table.apply(event)?;
         if effects.contains(Effect::IgniteLandingMotor) {
             self.ignited_at_s = Some(time_s);
         }
         Ok(effects)
     }
 
-    /// The event that the gate will not open any more, as soon as waiting gains nothing, and why.
+    /// The event that abandons the landing, with its reason, as soon as waiting gains nothing.
     ///
-    /// Above the commit height: the gate has been shut for a lasting reason, and this is the last
-    /// chance for the parachute with its margin. Below: ignition is due and refused, or no landing
-    /// is possible from here any more. The motor must never be lit outside the gate, so only the
+    /// Above the commit height: ignition has been inhibited for a lasting reason, and this is the
+    /// last chance for the parachute with its margin. Below: ignition is due and refused, or no
+    /// landing is possible any more. The motor must never be ignited outside the gate, so only the
     /// parachute is left, without the margin.
     fn gate_will_not_open(&mut self, mode: &Mode, seen: Seen<'_>) -> Option<(Event, String)> {
         let checks = self.gate_checks(mode, seen);
@@ -241,10 +241,10 @@ impl Pilot {
             return None;
         }
         let lasts = self.gate_shut_since_s.is_some_and(|since_s| {
-            // A stuck surface has already been watched for long enough.
+            // A stuck surface has already been observed long enough.
             self.fin_watch.any_stuck() || self.swing_watch.found_stuck() || input.time_s - since_s >= LASTS_S
         });
-        // The parachute comes anyway: of two heights the lower one says when.
+        // The parachute is deployed in any case: the lower of the two heights sets the time.
         let estimated_m = self.feet_height_m(estimate);
         let below_cg_m = estimate.state.position_m.z - estimated_m;
         let pressure_m = self.speeds.altitude_m(input.time_s).map(|altitude_m| altitude_m - below_cg_m);
@@ -269,12 +269,11 @@ impl Pilot {
                     && (outside || overdue_s.is_some_and(|overdue_s| overdue_s >= BEFORE_S)))
                 || too_low
         };
-        // Any lower, the parachute reaches the ground before it is ejected.
+        // From any lower, the parachute reaches the ground before it is ejected.
         let ejected =
             feet_m.max(estimated_m) > filling_m - self.model.airframe().parachute.inflation_distance_m;
         if self.is_astray(sensors) {
-            // Nobody knows the attitude, and the pressure alone knows the height: nothing is gained
-            // by waiting.
+            // The attitude is lost, and only the pressure gives a height: waiting gains nothing.
             let parachute_fills = pressure_m.is_none_or(|pressure_m| pressure_m > filling_m);
             return Some((
                 Event::GateShutForGood { parachute_fills },
@@ -287,24 +286,23 @@ impl Pilot {
         })
     }
 
-    /// Without what is felt, or with an estimate that two of three speeds contradict, no landing is
-    /// tried.
+    /// Without inertial data, or with an estimate that two of three speeds contradict, no landing
+    /// is attempted.
     fn is_astray(&self, sensors: &SensorWatch) -> bool {
-        sensors.feels_nothing_for_s() >= LASTS_S || self.speeds.contradict_the_estimate()
+        sensors.no_inertial_data_for_s() >= LASTS_S || self.speeds.contradict_the_estimate()
     }
 
-    /// All that decided, with values, and for how long: what lasts, or else what keeps the gate
-    /// shut now.
+    /// All causes, with values and durations: the lasting ones, or else the checks that fail now.
     fn why_given_up(&self, checks: &[GateCheck; GATE_CHECKS], time_s: f64) -> String {
         let for_s = |since_s: &Option<f64>| since_s.map_or(0.0, |since_s| time_s - since_s);
-        // A fin on its way fails for a moment and decides nothing beside what has lasted.
+        // A moving fin fails for a moment and is left out beside a lasting cause.
         let keeps: [fn(&GateCheck, f64) -> bool; 3] =
             [|check, for_s| check.lasts && for_s >= LASTS_S, |check, _| check.lasts, |check, _| check.shut];
         let told = keeps.iter().map(|keep| {
-            let kept =
+            let lasting =
                 checks.iter().zip(&self.shut_since_s).filter(|(check, since_s)| keep(check, for_s(since_s)));
             let words =
-                kept.map(|(check, since_s)| format!("{}, for {:.1} s", check.words(), for_s(since_s)));
+                lasting.map(|(check, since_s)| format!("{}, for {:.1} s", check.words(), for_s(since_s)));
             words.collect::<Vec<_>>().join("; ")
         });
         told.into_iter()
@@ -327,13 +325,13 @@ mod tests {
     use crate::vehicle::rigid::RigidState;
 
     /// One frame, in which the crew may abort.
-    fn frame_with(pilot: &mut Pilot, table: &mut PhaseTable, input: &KeptInput, abort: bool) -> Pointed {
+    fn frame_with(pilot: &mut Pilot, table: &mut PhaseTable, input: &SensedInput, abort: bool) -> Pointed {
         pilot.estimate_state(table.mode().phase, input, &SensorWatch::default());
         fly_on(pilot, table, input, abort)
     }
 
     /// The same after the estimate.
-    fn fly_on(pilot: &mut Pilot, table: &mut PhaseTable, input: &KeptInput, abort: bool) -> Pointed {
+    fn fly_on(pilot: &mut Pilot, table: &mut PhaseTable, input: &SensedInput, abort: bool) -> Pointed {
         pilot.take_over(input.time_s);
         pilot.predict(table, input);
         if abort {
@@ -353,7 +351,7 @@ mod tests {
     }
 
     #[test]
-    fn an_abort_in_the_first_frame_knows_the_height() {
+    fn an_abort_in_the_first_frame_has_the_height() {
         let pilot = sample::falling();
         assert!(abort_releases(&mut pilot.clone(), 1));
         assert!(abort_releases(&mut sample::falling().resumed(&pilot.saved(), 0.1), 21));
@@ -365,21 +363,21 @@ mod tests {
         Estimate::exact(time_s, state, Vector3::new(9.8, 0.0, 0.0), Vector2::zeros())
     }
 
-    /// What is wrong in a fall, at the height of the centre of gravity, m.
-    type Wrong = fn(f64, &mut Estimate, &mut KeptInput);
+    /// The fault in a fall, at the height of the centre of gravity, m.
+    type Wrong = fn(f64, &mut Estimate, &mut SensedInput);
 
     const NO_ABORT_M: f64 = 0.0;
 
     const NOTHING: Wrong = |_, _, _| {};
 
-    /// How a fall at 38 m/s ended.
+    /// Outcome of a fall at 38 m/s.
     #[derive(Debug, Clone, Copy, PartialEq)]
     enum Ended {
-        /// With the parachute, released at a height, m; whether the loss was recorded.
+        /// Parachute, released at a height, m; whether the loss was recorded.
         Parachute(f64, bool),
-        /// With the ignition, commanded at a height, m.
+        /// Ignition, commanded at a height, m.
         Ignition(f64),
-        /// With neither.
+        /// Neither.
         Unbraked,
     }
 
@@ -396,8 +394,8 @@ mod tests {
             let time_s = frame as f64 * 0.005;
             let mut estimate = falling(time_s);
             let height_m = estimate.state.position_m.z;
-            let mut input = KeptInput { fins_rad, ..sample::input(frame, 0.0) };
-            let [pitch_rad_s, yaw_rad_s] = reaction.felt_rad_s(gimbal_rad);
+            let mut input = SensedInput { fins_rad, ..sample::input(frame, 0.0) };
+            let [pitch_rad_s, yaw_rad_s] = reaction.sensed_rad_s(gimbal_rad);
             input.measured.imu.gyro_rad_s = Vector3::new(0.0, pitch_rad_s, yaw_rad_s);
             wrong(height_m, &mut estimate, &mut input);
             let aborts = height_m < abort_below_m && !table.mode().interlocks.abort_latched;
@@ -405,7 +403,8 @@ mod tests {
             pilot.update_models(table.mode().phase, &input, &estimate);
             Pointed { fins_rad, gimbal_rad, .. } = fly_on(&mut pilot, &mut table, &input, aborts);
             let phase = table.mode().phase;
-            let lost = table.take_news().iter().any(|news| format!("{news:?}").contains("will be lost"));
+            let lost =
+                table.take_messages().iter().any(|message| format!("{message:?}").contains("will be lost"));
             match phase {
                 Phase::Chute => Some(Ended::Parachute(height_m, lost)),
                 Phase::Ignition => Some(Ended::Ignition(height_m)),
@@ -445,7 +444,7 @@ mod tests {
     fn what_lasts_brings_the_parachute_above_the_commit_height() {
         assert_parachute(|_, _, input| input.fins_rad = [0.0; 4], AT_COMMIT_HEIGHT_M);
         assert_parachute(|_, _, input| input.igniter_continuity = false, AT_COMMIT_HEIGHT_M);
-        // The gyro feels no swing.
+        // The gyro senses no swing.
         assert_parachute(|_, _, input| input.measured.imu.gyro_rad_s.z = 0.0, AT_COMMIT_HEIGHT_M);
         // The fence is at 120 m, and the motor brings the vehicle back by 15 m.
         assert_parachute(|_, estimate, _| estimate.state.position_m.x = 140.0, AT_COMMIT_HEIGHT_M);
@@ -483,8 +482,8 @@ mod tests {
         assert_parachute(turning, filling_m);
     }
 
-    /// A fin on its way keeps the gate shut for up to 45 ms, a gust that turns the vehicle for
-    /// somewhat longer.
+    /// A moving fin inhibits ignition for up to 45 ms, a gust that turns the vehicle for somewhat
+    /// longer.
     #[test]
     fn a_gate_shut_for_a_moment_delays_the_ignition_only() {
         let Ended::Ignition(due_m) = fall(NOTHING, NO_ABORT_M) else { panic!("no ignition") };

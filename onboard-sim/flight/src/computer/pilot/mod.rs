@@ -1,9 +1,8 @@
-//! The pilot flies a rocket in space from its release to touchdown: one frame in, one set of
-//! commands out.
+//! The pilot: flies a rocket from its release to touchdown, one frame in, one set of commands out.
 //!
-//! It is a part of the [flight computer](crate::computer) and deterministic like it. A frame is 5
-//! ms: estimate, watch the motor, move through the phases, point fins and gimbal. Every tenth frame
-//! poses the prediction, or a plan of the landing, to the [`planner`].
+//! It is part of the [flight computer](crate::computer) and deterministic like it. A frame is 5 ms:
+//! estimate, identify the motor, change phases, point fins and gimbal. Every tenth frame requests
+//! the prediction, or a plan of the landing, from the [`planner`].
 
 mod ascent;
 mod gate;
@@ -40,10 +39,10 @@ use crate::vehicle::mission::{Mission, StartPoint};
 use crate::vehicle::rigid::RigidState;
 use crate::vehicle::thrust_curve::ThrustCurve;
 
-/// Frames between plans, if none takes longer.
+/// Minimum number of frames between plans.
 pub const FRAMES_PER_PLAN: u64 = 10;
 
-/// Where a frame points the vehicle. What lights and ejects is decided [at the end of the
+/// Surface commands of a frame. Igniters and ejection charges are decided [at the end of the
 /// frame](crate::rules::outputs).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Pointed {
@@ -51,31 +50,31 @@ pub(crate) struct Pointed {
     pub gimbal_rad: [f64; 2],
     /// Fin openings, rad.
     pub fins_rad: [f64; 4],
-    /// What decided where the nose points.
+    /// The control level that set the attitude command.
     pub level: ControlLevel,
 }
 
-/// The pilot and everything that it remembers.
+/// The pilot with its complete memory.
 #[derive(Debug, Clone, Serialize)]
 pub struct Pilot {
     model: VehicleModel,
-    /// Apart: a pilot is moved when it is made, and its memory on a board's stack is short.
+    /// Boxed: a pilot is moved when it is constructed, and a board's stack is small.
     estimator: Box<Estimator>,
     estimate: Option<Estimate>,
     speeds: VerticalSpeeds,
     pub(super) ascent: AscentWatch,
-    /// Height at which the fall begins or began, m.
+    /// Apogee height, expected or passed, m.
     apogee_m: f64,
     ignited_at_s: Option<f64>,
     prediction: Prediction,
     powered: PoweredGuidance,
-    /// What it was posed was remembered in the frame in which it was posed. `None` while it
-    /// computes in another context.
+    /// Its request is part of the memory from the frame of the request on. `None` while it computes
+    /// in another context.
     #[serde(skip)]
     planner: Option<Box<Planner>>,
-    /// When something was posed that was not taken over yet, s.
-    posed_at_s: Option<f64>,
-    /// The frame from which on the next landing is posed.
+    /// Time of the request whose result is not taken over yet, s.
+    request_s: Option<f64>,
+    /// Frame from which on the next landing plan is requested.
     plan_due: u64,
     aim_loop: AimLoop,
     fin_share: f64,
@@ -84,21 +83,21 @@ pub struct Pilot {
     swing_watch: SwingWatch,
     gimbal_rad: [f64; 2],
     gate_refusal: Option<&'static str>,
-    /// Since when a lasting reason has kept the gate shut, s, and each of its checks.
+    /// Time since when a lasting reason inhibits ignition, s, and of each of its checks.
     gate_shut_since_s: Option<f64>,
     shut_since_s: [Option<f64>; GATE_CHECKS],
-    /// Why no landing is tried any more. It decides nothing.
+    /// Why the landing was abandoned. It decides nothing.
     #[serde(skip)]
     gave_up: Option<String>,
 }
 
 impl Pilot {
-    /// A pilot at the start of its flight, with its estimate of its state and the uncertainty of
-    /// that estimate.
+    /// A pilot at the start of its flight, with its estimated state and the uncertainty of that
+    /// estimate.
     pub fn starting(
         mission: &Mission,
         time_s: f64,
-        believed: &RigidState,
+        initial: &RigidState,
         uncertainty: &StartUncertainty,
     ) -> Self {
         let airframe = &mission.airframe;
@@ -114,22 +113,22 @@ impl Pilot {
         };
         let (powered, search) = model.guidance();
         Self {
-            estimator: Box::new(Estimator::new(&mission.estimator, uncertainty, time_s, believed)),
+            estimator: Box::new(Estimator::new(&mission.estimator, uncertainty, time_s, initial)),
             estimate: None,
             speeds: VerticalSpeeds::default(),
             ascent: AscentWatch::default(),
             apogee_m: match mission.start.at {
-                // The fall is felt a moment after it began.
+                // The fall is sensed a moment after it began.
                 StartPoint::Drone => {
-                    let falls_m_s = believed.velocity_m_s.z;
-                    believed.position_m.z + 0.5 * falls_m_s * falls_m_s / STANDARD_GRAVITY_M_S2
+                    let falls_m_s = initial.velocity_m_s.z;
+                    initial.position_m.z + 0.5 * falls_m_s * falls_m_s / STANDARD_GRAVITY_M_S2
                 }
                 _ => mission.start.height_m,
             },
             ignited_at_s: None,
             prediction: Prediction::default(),
             planner: Some(Self::planner(&model, search)),
-            posed_at_s: None,
+            request_s: None,
             plan_due: 0,
             powered,
             aim_loop: AimLoop::new(mission.aim, frame_s),
@@ -147,13 +146,13 @@ impl Pilot {
     }
 
     /// Takes over the state on the rail, and the inertial unit's calibration there.
-    pub(super) fn stand(&mut self, believed: &RigidState, calibration: &ImuCalibration) {
+    pub(super) fn stand(&mut self, initial: &RigidState, calibration: &ImuCalibration) {
         let config = &self.model.mission.estimator;
-        let estimator = Estimator::new(config, &StartUncertainty::on_pad(), 0.0, believed);
+        let estimator = Estimator::new(config, &StartUncertainty::on_pad(), 0.0, initial);
         *self.estimator = estimator.calibrated(calibration);
     }
 
-    /// Whether a vehicle that nobody has started lifts off from its rail in this frame.
+    /// Detects an uncommanded lift-off from the rail in this frame.
     pub(super) fn detects_lift_off(&mut self, measured: &Measurements) -> bool {
         self.ascent.detects_lift_off(measured.imu.specific_force_m_s2.x, self.model.mission.estimator.frame_s)
     }
@@ -178,23 +177,22 @@ impl Pilot {
         self.powered.report()
     }
 
-    /// The prediction on ignition and abort.
+    /// The prediction for ignition and abort.
     pub fn prediction(&self) -> &Prediction {
         &self.prediction
     }
 
-    /// The landing motor's curve: the expected one, or another that its burn has turned out to
-    /// have.
+    /// The landing motor's curve: the expected one, or another identified in its burn.
     pub fn curve(&self) -> &ThrustCurve {
         self.model.curve()
     }
 
-    /// The motor's name if its burn has turned out to have another curve than the expected one.
+    /// The motor's name if another curve than the expected one was identified in its burn.
     pub fn other_curve(&self) -> Option<&str> {
         self.model.others.chosen().map(|_| self.curve().name())
     }
 
-    /// Impulse and burn time of the motor as estimated over those of the expected curve.
+    /// Estimated impulse and burn time of the motor, relative to the expected curve.
     pub fn scales(&self) -> [f64; 2] {
         let (motor, curve, expected) = (self.motor(), self.curve(), &self.mission().motor_curve);
         [
@@ -203,7 +201,7 @@ impl Pilot {
         ]
     }
 
-    /// The motor as estimated in flight, and the scale of the aerodynamic forces.
+    /// The motor estimate of this flight, and the scale of the aerodynamic forces.
     pub fn motor(&self) -> &MotorEstimate {
         &self.model.motor
     }
@@ -213,12 +211,12 @@ impl Pilot {
         self.model.burning_s(time_s)
     }
 
-    /// When the landing motor was commanded to light, s.
+    /// Time of the landing motor's ignition command, s.
     pub fn ignited_at_s(&self) -> Option<f64> {
         self.ignited_at_s
     }
 
-    /// Why no landing is tried any more, with the values found.
+    /// Why the landing was abandoned, with the values found.
     pub fn gave_up(&self) -> Option<&str> {
         self.gave_up.as_deref()
     }
@@ -232,8 +230,8 @@ impl Pilot {
 // For replay: reads the pilot's state and changes its settings from outside the flight.
 
 impl Pilot {
-    /// The same memory with another mission: other vehicle data, gains, limits and settings. The
-    /// frame length, the estimator's configuration and the start stay as they were.
+    /// The same memory with another mission: other vehicle data, gains, limits and settings. Frame
+    /// length, estimator configuration and start are unchanged.
     #[must_use]
     pub fn reconfigured(&self, mission: &Mission) -> Self {
         let mass = MassModel::new(&mission.airframe.mass, mission.motor_curve.propellant_mass_kg());
@@ -245,17 +243,17 @@ impl Pilot {
         }
     }
 
-    /// The mission it flies.
+    /// The mission.
     pub fn mission(&self) -> &Mission {
         &self.model.mission
     }
 }
 
-// What a pilot saves for a restart in the air, and how it goes on.
+// State of a pilot saved for a restart in the air, and its restoration.
 
-/// What a pilot keeps through a reset: the knowledge of motor and drag, the last commands, the last
-/// estimate, and what it has seen of its ascent, its fins and its gimbal. Covariances of the
-/// estimator, prediction, plan and gimbal loop are not kept.
+/// State of a pilot saved through a reset: motor and drag estimates, the last commands, the last
+/// estimate, and the monitors of ascent, fins and gimbal. Covariances of the estimator, prediction,
+/// plan and gimbal loop are not saved.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SavedPilot {
     motor: MotorEstimate,
@@ -292,9 +290,9 @@ impl Pilot {
         }
     }
 
-    /// This pilot, which was just powered up, from what was saved before a reset that ended at
-    /// `time_s`. The saved estimate is extrapolated over the lost time with the last measured rates
-    /// and forces, and gets the same uncertainty as at apogee.
+    /// This newly powered-up pilot with the state saved before a reset that ended at `time_s`. The
+    /// saved estimate is extrapolated over the lost time with the last measured rates and forces,
+    /// and gets the same uncertainty as at apogee.
     #[must_use]
     pub(super) fn resumed(&self, saved: &SavedPilot, time_s: f64) -> Self {
         let mission = &self.model.mission;
@@ -303,18 +301,18 @@ impl Pilot {
             || self.estimator.clone(),
             |estimate| {
                 let lost_s = (time_s - estimate.time_s).max(0.0);
-                let mut believed = estimate.state;
-                // It keeps its last rotation rate; the force has the direction at half of the lost
-                // time.
-                let half = nalgebra::UnitQuaternion::from_scaled_axis(believed.rate_rad_s * (0.5 * lost_s));
-                believed.world_from_body *= half;
-                let force = believed.world_from_body * estimate.specific_force_m_s2;
-                believed.world_from_body *= half;
+                let mut initial = estimate.state;
+                // The rotation rate is held constant; the force has its direction at half of the
+                // lost time.
+                let half = nalgebra::UnitQuaternion::from_scaled_axis(initial.rate_rad_s * (0.5 * lost_s));
+                initial.world_from_body *= half;
+                let force = initial.world_from_body * estimate.specific_force_m_s2;
+                initial.world_from_body *= half;
                 let acceleration_m_s2 = force - nalgebra::Vector3::z() * STANDARD_GRAVITY_M_S2;
-                believed.position_m +=
-                    believed.velocity_m_s * lost_s + acceleration_m_s2 * (0.5 * lost_s * lost_s);
-                believed.velocity_m_s += acceleration_m_s2 * lost_s;
-                let estimator = Estimator::new(&mission.estimator, &uncertainty, time_s, &believed);
+                initial.position_m +=
+                    initial.velocity_m_s * lost_s + acceleration_m_s2 * (0.5 * lost_s * lost_s);
+                initial.velocity_m_s += acceleration_m_s2 * lost_s;
+                let estimator = Estimator::new(&mission.estimator, &uncertainty, time_s, &initial);
                 let calibration = ImuCalibration {
                     gyro_bias_rad_s: estimate.gyro_bias_rad_s,
                     accelerometer_scale: saved.accelerometer_scale,
@@ -377,10 +375,9 @@ mod tests {
         assert!(found.angle_to(&expected) < 1e-6, "{}", found.angle_to(&expected));
     }
 
-    /// A restart in the burn keeps the curve that the motor was found to have; one in the fall
-    /// leaves the choice open.
+    /// A restart in the burn restores the identified curve; one in the fall leaves the choice open.
     #[test]
-    fn a_restart_keeps_the_choice_of_the_curve() {
+    fn a_restart_preserves_the_choice_of_the_curve() {
         let mission = crate::vehicles::mission::builtin("mk3").unwrap().unwrap();
         let powered_up = || {
             let uncertainty = StartUncertainty::at_apogee();

@@ -1,9 +1,9 @@
-//! What takes longer than a frame: the landing under thrust, and the prediction in the fall.
+//! Computations longer than a frame: the landing under thrust, and the prediction in the fall.
 //!
-//! A frame poses one of them, and goes on; a later frame, whose input says that it is ready, takes
-//! it over. What is posed is a copy of all that it depends on, so that whoever computes it, at
-//! whatever time, finds the same. A board computes it in its main context, while a timer flies the
-//! frames; a simulator or a replay computes it at once and holds it back.
+//! A frame requests one of them and goes on; a later frame, whose input marks it as ready, takes
+//! over the result. The request is a copy of all its inputs, so the result does not depend on where
+//! and when it is computed. A board computes it in its main context while a timer executes the
+//! frames; a simulator or a replay computes it at once and delays its result.
 
 use alloc::boxed::Box;
 
@@ -18,29 +18,29 @@ use crate::guidance::powered::{LandingSolved, Plan, Search};
 use crate::rules::verdict::Touchdown;
 use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 
-/// Within this time after it was posed a plan is ready, s: a board that needs longer is too slow.
-/// Twice the period of plans; the bound on a plan's work (`powered.max_passes`) is made for it.
+/// Time after its request within which a plan must be ready, s; a slower board is not supported.
+/// Twice the period of plans; the bound on a plan's work (`powered.max_passes`) is chosen for it.
 pub const PLAN_WITHIN_S: f64 = 0.1;
 
-/// A plan is expected to be ready after this time, s, and is made for the vehicle as it will be
-/// then: the median of mk2's plans. Of 300 `real` flights of mk2 (seed 7001) 268 land, 242 if plans
-/// are made for the present, and 261 with 40 ms and 60 ms for the first; chosen on that seed,
-/// before their instructions were measured.
+/// Expected time from request to result, s: a plan is made for the vehicle as it will be then. It
+/// is the median of mk2's plans. Of 300 `real` flights of mk2 (seed 7001) 268 land, 242 with plans
+/// for the present, and 261 with 40 ms and 60 ms for the first; chosen on that seed, before their
+/// instructions were measured.
 const EXPECTED_S: f64 = 0.025;
 
-/// Instructions that a Cortex-M7 executes in a frame: 600 MHz, and 0.67 instructions a cycle, which
-/// is assumed.
+/// Instructions that a Cortex-M7 executes in a frame: 600 MHz, with an assumed 0.67 instructions
+/// per cycle.
 const INSTRUCTIONS_PER_FRAME: u64 = 400_000 * FRAME_MS as u64;
-/// Instructions on an emulated Cortex-M7 (onboard-sim/lab/cortex-m7/README.md): of 3,347
-/// predictions the dearest, and of a landing the line in the passes of its search above which 39 of
-/// 3,994 plans lie.
+/// Instructions on an emulated Cortex-M7 (onboard-sim/lab/cortex-m7/README.md): the most expensive
+/// of 3,347 predictions, and for a landing the line in the passes of its search that 39 of 3,994
+/// plans exceed.
 const PREDICTION: u64 = 13_600_000;
 const LANDING: u64 = 5_170_000;
 const PASS: u64 = 12_050;
 
-/// What is asked.
+/// The problem to solve.
 #[derive(Debug, Clone)]
-pub(super) enum Posed {
+pub(super) enum Problem {
     Landing(Burning),
     /// With the fins' openings, rad, and the height from which it falls, m.
     Prediction {
@@ -49,12 +49,12 @@ pub(super) enum Posed {
     },
 }
 
-/// What was found.
+/// The result.
 #[derive(Debug, Clone)]
 enum Solved {
-    /// The search's outcome (none if the thrust never carries the vehicle), unless the flown plan
+    /// The search's outcome (`None` if the thrust never carries the vehicle), unless the flown plan
     /// is flown to its end; whether the vehicle was high; and the share of the fins' drag area if
-    /// no plan says it.
+    /// no plan has it.
     Landing {
         searched: Option<(Option<Outcome>, bool)>,
         fin_share: Option<f64>,
@@ -62,27 +62,27 @@ enum Solved {
     Prediction(Prediction),
 }
 
-/// What was posed, and what computes it. It may be moved to another context, and has to come back.
+/// A request and its solver. It may be moved to another context, and must be given back.
 #[derive(Debug, Clone)]
 pub struct Planner {
     model: VehicleModel,
-    /// Its time is that of its frame since the release.
-    posed: Option<(Estimate, Posed)>,
+    /// With the estimate's time since the release.
+    requested: Option<(Estimate, Problem)>,
     search: Search,
     found: Option<Solved>,
 }
 
 impl Planner {
-    /// Computes what was posed, once.
+    /// Solves the requested problem, once.
     pub fn solve(&mut self) {
-        let Self { model, posed: Some((estimate, asked)), search, found: found @ None } = self else {
+        let Self { model, requested: Some((estimate, problem)), search, found: found @ None } = self else {
             return;
         };
-        *found = Some(match asked {
-            Posed::Prediction { fins_rad, apogee_m } => {
+        *found = Some(match problem {
+            Problem::Prediction { fins_rad, apogee_m } => {
                 Solved::Prediction(model.prediction(estimate, fins_rad, *apogee_m))
             }
-            Posed::Landing(burning) => {
+            Problem::Landing(burning) => {
                 let (settings, time_s) = (&model.mission.powered, estimate.time_s);
                 let searched = (!search.is_flown_out(settings, time_s)).then(|| {
                     let (later, burning) = model.later(search.from(), estimate, burning);
@@ -90,22 +90,22 @@ impl Planner {
                     (search.search(settings, later.time_s, &later.state, &situation), situation.high)
                 });
                 let outcome = searched.as_ref().and_then(|(outcome, _)| outcome.as_ref());
-                let says_none = search.to_be_flown(outcome).fin_share(time_s).is_none();
-                let fin_share = says_none.then(|| model.fin_share(estimate, burning));
+                let plan_has_no_fin_share = search.to_be_flown(outcome).fin_share(time_s).is_none();
+                let fin_share = plan_has_no_fin_share.then(|| model.fin_share(estimate, burning));
                 Solved::Landing { fin_share, searched }
             }
         });
     }
 
-    /// Asks it.
-    pub(super) fn ask(&mut self, time_s: f64, estimate: &Estimate, asked: Posed) {
-        self.posed = Some((Estimate { time_s, ..*estimate }, asked));
+    /// Sets the problem to solve.
+    pub(super) fn request(&mut self, time_s: f64, estimate: &Estimate, problem: Problem) {
+        self.requested = Some((Estimate { time_s, ..*estimate }, problem));
         self.found = None;
     }
 
-    /// The next landing starts from the plan that was found, or goes on with the last one. Returns
-    /// whether the search converged on a landing; `None` if there was none, because the last plan
-    /// is flown to its end or the thrust never carries the vehicle.
+    /// Starts the next landing from the plan found, or continues with the last one. Returns whether
+    /// the search converged on a landing; `None` if there was no search, because the last plan is
+    /// flown to its end or the thrust never carries the vehicle.
     pub(super) fn fly_on(&mut self) -> Option<bool> {
         let Some(Solved::Landing { searched: Some((Some(outcome), _)), .. }) = &self.found else {
             return None;
@@ -123,12 +123,12 @@ impl Planner {
         &self.model
     }
 
-    /// The vehicle of an estimate when its plan is expected to be ready.
+    /// The estimate extrapolated to the time at which its plan is expected.
     pub(super) fn later(&self, estimate: &Estimate, burning: &Burning) -> (Estimate, Burning) {
         self.model.later(self.search.from(), estimate, burning)
     }
 
-    /// In how many frames a Cortex-M7 has computed what was found.
+    /// Number of frames in which a Cortex-M7 computes this result.
     pub fn frames_on_a_board(&self) -> u64 {
         let instructions = match &self.found {
             Some(Solved::Landing { searched: Some((Some(_), _)), .. }) => {
@@ -143,8 +143,8 @@ impl Planner {
 }
 
 impl VehicleModel {
-    /// The vehicle when its plan is expected to be ready: until then it moves as the flown plan
-    /// does, or without one keeps its force and its rates.
+    /// The vehicle when its plan is expected to be ready: until then it moves as in the flown plan,
+    /// or without one with constant force and rates.
     fn later(&self, flown: &Plan, estimate: &Estimate, burning: &Burning) -> (Estimate, Burning) {
         let time_s = estimate.time_s;
         let later_s = time_s + EXPECTED_S;
@@ -152,7 +152,7 @@ impl VehicleModel {
         let gained_m_s =
             if let Some(((from_m_s, from), (to_m_s, to))) = flown.at(time_s).zip(flown.at(later_s)) {
                 let rate = state.world_from_body * state.rate_rad_s;
-                // What it turns otherwise than planned, it goes on to turn.
+                // A deviation from the planned rate persists.
                 let astray = UnitQuaternion::from_scaled_axis((rate - from.rate_in_world_rad_s) * EXPECTED_S);
                 let turned = UnitQuaternion::rotation_between(&from.nose_in_world, &to.nose_in_world);
                 state.world_from_body = astray * turned.unwrap_or_default() * state.world_from_body;
@@ -175,33 +175,33 @@ impl VehicleModel {
 }
 
 impl Pilot {
-    /// A planner with a copy of what the pilot knows, before it is asked.
+    /// A planner with a copy of the pilot's model, without a request.
     pub(super) fn planner(model: &VehicleModel, search: Search) -> Box<Planner> {
-        Box::new(Planner { model: model.without_filters(), posed: None, search, found: None })
+        Box::new(Planner { model: model.without_filters(), requested: None, search, found: None })
     }
 
-    /// Poses a prediction or a landing. Returns whether it could: nothing is posed before the last
-    /// has been taken over.
-    pub(super) fn pose(&mut self, time_s: f64, estimate: &Estimate, asked: Posed) -> bool {
-        let Some(planner) = self.planner.as_mut().filter(|_| self.posed_at_s.is_none()) else { return false };
-        self.posed_at_s = Some(time_s);
+    /// Requests a prediction or a landing. Returns whether it could: a new request waits until the
+    /// last result is taken over.
+    pub(super) fn request(&mut self, time_s: f64, estimate: &Estimate, problem: Problem) -> bool {
+        let Some(planner) = self.planner.as_mut().filter(|_| self.request_s.is_none()) else { return false };
+        self.request_s = Some(time_s);
         self.powered.begin(&mut planner.search);
         planner.model = self.model.without_filters();
-        planner.ask(time_s, estimate, asked);
+        planner.request(time_s, estimate, problem);
         true
     }
 
-    /// Takes over what was posed; computes it now, if nobody has. Returns whether it is a plan of a
-    /// landing.
+    /// Takes over the result; computes it now if it is not computed yet. Returns whether it is a
+    /// landing plan.
     pub(crate) fn take_over(&mut self, time_s: f64) -> bool {
-        let Some((posed_at_s, planner)) = self.posed_at_s.zip(self.planner.as_mut()) else { return false };
-        self.posed_at_s = None;
+        let Some((request_s, planner)) = self.request_s.zip(self.planner.as_mut()) else { return false };
+        self.request_s = None;
         planner.solve();
         match &planner.found {
             Some(Solved::Landing { searched, fin_share }) => {
                 self.fin_share = fin_share.unwrap_or(self.fin_share);
                 if let Some((outcome, high)) = searched {
-                    let times_s = [posed_at_s, time_s];
+                    let times_s = [request_s, time_s];
                     self.powered.take_over(&mut planner.search, outcome.as_ref(), *high, times_s);
                 }
                 searched.is_some()
@@ -214,17 +214,17 @@ impl Pilot {
         }
     }
 
-    /// What is posed and not computed yet.
-    fn posed(&mut self) -> Option<&mut Box<Planner>> {
-        self.posed_at_s?;
+    /// The planner if its request is not computed yet.
+    fn requested(&mut self) -> Option<&mut Box<Planner>> {
+        self.request_s?;
         self.planner.as_mut().filter(|planner| planner.found.is_none())
     }
 
-    /// The landing that was taken over last, and its problem; none before the first, and once the
-    /// next one is posed.
+    /// The landing taken over last, with its problem; `None` before the first, and after the next
+    /// request.
     pub fn landing_solved(&self) -> Option<LandingSolved> {
         let planner = self.planner.as_ref()?;
-        let (estimate, Posed::Landing(burning)) = planner.posed.as_ref()? else { return None };
+        let (estimate, Problem::Landing(burning)) = planner.requested.as_ref()? else { return None };
         let Some(Solved::Landing { searched: Some((Some(outcome), _)), .. }) = &planner.found else {
             return None;
         };
@@ -236,35 +236,35 @@ impl Pilot {
 }
 
 impl Computer {
-    /// Computes what the pilot has posed, in this context, if it was not done yet; returns in how
-    /// many frames a Cortex-M7 does.
-    pub fn solve_posed(&mut self) -> Option<u64> {
-        let planner = self.pilot.posed()?;
+    /// Computes the pilot's request in this context, if that was not done yet; returns the number
+    /// of frames that a Cortex-M7 takes.
+    pub fn solve_requested(&mut self) -> Option<u64> {
+        let planner = self.pilot.requested()?;
         planner.solve();
         Some(planner.frames_on_a_board())
     }
 
-    /// What the pilot has posed, to be computed in another context; once. It has to be [given
+    /// Takes the pilot's request, once, to compute it in another context. It must be [given
     /// back](Self::give_back).
-    pub fn take_posed(&mut self) -> Option<Box<Planner>> {
-        self.pilot.posed()?;
+    pub fn take_request(&mut self) -> Option<Box<Planner>> {
+        self.pilot.requested()?;
         self.pilot.planner.take()
     }
 
-    /// Gives back what was [computed](Planner::solve) in another context. The frame that is told so
-    /// takes it over.
+    /// Returns a request [computed](Planner::solve) in another context. The frame whose input marks
+    /// it as ready takes it over.
     pub fn give_back(&mut self, planner: Box<Planner>) {
-        // One of a computer that has restarted meanwhile has its own.
+        // A computer that has restarted meanwhile has a new planner.
         self.pilot.planner.get_or_insert(planner);
     }
 
-    /// Rehearses the landing at power-up, without a simulated world: what a board puts into its
-    /// inputs. `None` once it is released, and while something is posed. It takes some seconds on a
-    /// board, and leaves no memory.
+    /// Rehearses the landing at power-up, without a simulated world, for the inputs of a board.
+    /// `None` once released, and while a request is pending. It takes some seconds on a board and
+    /// leaves the memory unchanged.
     pub fn rehearse(&mut self) -> Option<Rehearsed> {
         let pilot = &mut *self.pilot;
         let planner =
-            pilot.planner.as_mut().filter(|_| self.release.is_none() && pilot.posed_at_s.is_none())?;
+            pilot.planner.as_mut().filter(|_| self.release.is_none() && pilot.request_s.is_none())?;
         pilot.powered.begin(&mut planner.search);
         Some(planner.rehearse())
     }

@@ -1,4 +1,4 @@
-//! The pilot's forecast for the next seconds.
+//! Prediction of the next seconds.
 
 use nalgebra::{Vector2, Vector3};
 use serde::Serialize;
@@ -13,73 +13,72 @@ use crate::rules::phase::Phase;
 use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use crate::vehicle::rigid::RigidState;
 
-/// The commit height is the height that the parachute needs, times this: half as much again,
-/// because ejection and filling scatter.
+/// Factor from the height that the parachute needs to the commit height: ejection and filling
+/// scatter.
 const COMMIT_MARGIN: f64 = 1.5;
 
-/// Share of the burn's reach towards the pad that it is sure of: with it, of 33 `harsh` flights
-/// (seed 7001) a second before their ignition, 30 touched down nearer than predicted or within 2 m,
-/// and the others by up to 14 m farther.
+/// Certain share of the burn's reach towards the pad: with it, of 33 `harsh` flights (seed 7001) a
+/// second before their ignition, 30 touched down nearer than predicted or within 2 m, and the
+/// others by up to 14 m farther.
 const SURE_REACH: f64 = 0.5;
 
-/// A fall is taken to be at least this fast, m/s, so that the time to the ground is finite at
-/// apogee.
+/// Lowest assumed fall speed, m/s, so that the time to the ground is finite at apogee.
 const FALL_MIN_M_S: f64 = 5.0;
 
-/// The forecast before ignition, renewed five or twenty times a second.
+/// The prediction before ignition, updated five or twenty times a second.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Prediction {
     pub ignition: IgnitionPrediction,
-    /// Height of the feet below which the parachute has no room to spare, m.
+    /// Height of the feet below which the parachute has no margin, m.
     pub commit_height_m: f64,
     /// Height of the feet, m.
     pub height_m: f64,
     /// Speed predicted for this moment from the fall alone, m/s.
     pub predicted_speed_m_s: f64,
-    /// The certified motor lands from here or from farther down.
+    /// The certified motor lands from here or from lower.
     pub lands_ahead: bool,
-    /// Distance from the pad at which the vehicle would touch down under the motor, or without a
-    /// height for its ignition by falling on, m.
+    /// Predicted distance of the touchdown from the pad, m: under the motor, or in a continued fall
+    /// if no ignition height exists.
     pub touchdown_distance_m: f64,
 }
 
 impl Prediction {
-    /// Height of the feet below which the parachute does not fill before it reaches the ground, m.
+    /// Height of the feet below which the parachute does not fill before the ground, m.
     pub(super) fn filling_height_m(&self) -> f64 {
         self.commit_height_m / COMMIT_MARGIN
     }
 }
 
-/// Height that a parachute needs at a speed, with a margin: the fall until it is ejected, plus the
-/// distance over which it inflates (T. W. Knacke, Parachute Recovery Systems Design Manual, NWC TP
-/// 6575, 1991, chapter 5).
+/// Height that a parachute needs at a speed, with a margin: the fall until ejection, plus the
+/// inflation distance (T. W. Knacke, Parachute Recovery Systems Design Manual, NWC TP 6575, 1991,
+/// chapter 5).
 pub(super) fn commit_height_m(speed_m_s: f64, ejection_delay_s: f64, inflation_distance_m: f64) -> f64 {
     COMMIT_MARGIN * (speed_m_s * ejection_delay_s + inflation_distance_m)
 }
 
-/// Where a vehicle would touch down without further steering, m, in the world's horizontal axes:
-/// from a place, m, with a velocity, m/s, and its feet at a height, m.
+/// Touchdown position without further steering, m, in the world's horizontal axes, from a position,
+/// m, a velocity, m/s, and a height of the feet, m.
 pub fn touchdown_m(place_m: &Vector3<f64>, velocity_m_s: &Vector3<f64>, height_m: f64) -> Vector2<f64> {
     let to_ground_s = height_m.max(0.0) / (-velocity_m_s.z).max(FALL_MIN_M_S);
     (place_m + velocity_m_s * to_ground_s).xy()
 }
 
-/// Time in which a vehicle on its open fins takes on the wind's speed, s: a terminal speed of 40
-/// m/s over g, and half as much again while it is slower.
+/// Time in which a vehicle with open fins takes on the wind's speed, s: a terminal speed of 40 m/s
+/// over g, and half as much again while it is slower.
 const TAKES_THE_WIND_S: f64 = 6.0;
 
-/// The apogee ahead of a coasting vehicle.
+/// The predicted apogee of a coasting vehicle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ApogeeAhead {
     /// Its height, m.
     pub height_m: f64,
-    /// Time until then, s.
+    /// Time to apogee, s.
     pub in_s: f64,
 }
 
-/// The apogee of a vehicle that coasts up from a height, m, at a vertical speed, m/s, while the air
-/// brakes it by so much, m/s^2: the drag falls with the square of the speed, so in the mean over
-/// the height half of it acts.
+/// Apogee of a vehicle that coasts up from a height, m, at a vertical speed, m/s, with a drag
+/// deceleration, m/s^2. Drag falls with the square of the speed, so on average over the height half
+/// of it acts.
 fn apogee_ahead(height_m: f64, vertical_m_s: f64, braking_m_s2: f64) -> ApogeeAhead {
     let slowing_m_s2 = STANDARD_GRAVITY_M_S2 + 0.5 * braking_m_s2.max(0.0);
     let rising_m_s = vertical_m_s.max(0.0);
@@ -89,23 +88,23 @@ fn apogee_ahead(height_m: f64, vertical_m_s: f64, braking_m_s2: f64) -> ApogeeAh
     }
 }
 
-/// Where a rising vehicle would touch down in still air without steering, m: it drifts to its
-/// apogee and until the air has stopped it.
+/// Touchdown position of a rising vehicle in still air without steering, m: it drifts to its apogee
+/// and until drag has stopped it.
 pub fn touchdown_from_below_m(place_m: &Vector3<f64>, velocity_m_s: &Vector3<f64>) -> Vector2<f64> {
     let in_s = apogee_ahead(place_m.z, velocity_m_s.z, 0.0).in_s;
     (place_m + velocity_m_s * (in_s + TAKES_THE_WIND_S)).xy()
 }
 
 impl VehicleModel {
-    /// The prediction without the ignition, for a moment: with the fins at these openings, rad,
-    /// after a fall from this height, m.
+    /// The prediction without the ignition, with the fins at these openings, rad, after a fall from
+    /// this height, m.
     pub(super) fn fall(&self, estimate: &Estimate, fins_rad: &[f64; 4], apogee_m: f64) -> Prediction {
         let column = self.column(self.density_kg_m3(estimate), self.mission.soft_tilt_deg);
         let state = &estimate.state;
         let height_m = state.position_m.z - self.feet_below_cg_m(&self.mass.at(0.0));
         let parachute = &self.airframe().parachute;
         let touchdown = touchdown_m(&state.position_m, &state.velocity_m_s, height_m);
-        // The speed after the fall from apogee so far, with drag as certified.
+        // Speed after the fall from apogee so far, with certified drag.
         let terminal_m_s = column.terminal_speed_m_s(self.fins_m2(fins_rad));
         let fallen_m = (apogee_m - state.position_m.z).max(0.0);
         let shed = libm::exp(-2.0 * STANDARD_GRAVITY_M_S2 * fallen_m / (terminal_m_s * terminal_m_s));
@@ -116,7 +115,7 @@ impl VehicleModel {
                 parachute.inflation_distance_m,
             ),
             height_m,
-            // Until it is known.
+            // Until it is computed.
             lands_ahead: true,
             predicted_speed_m_s: terminal_m_s * libm::sqrt((1.0 - shed).max(0.0)),
             touchdown_distance_m: libm::hypot(touchdown.x, touchdown.y),
@@ -124,7 +123,7 @@ impl VehicleModel {
         }
     }
 
-    /// The whole prediction.
+    /// The complete prediction.
     pub(super) fn prediction(&self, estimate: &Estimate, fins_rad: &[f64; 4], apogee_m: f64) -> Prediction {
         let fall = self.fall(estimate, fins_rad, apogee_m);
         let (settings, curve, fins_m2) =
@@ -140,8 +139,8 @@ impl VehicleModel {
         Prediction { ignition, lands_ahead, touchdown_distance_m, ..fall }
     }
 
-    /// Where the motor lets the vehicle down, m, in the world's horizontal axes: it falls to its
-    /// ignition, brakes evenly, and diverts towards the pad.
+    /// Landing position under the motor, m, in the world's horizontal axes: the vehicle falls to
+    /// its ignition, decelerates evenly, and diverts towards the pad.
     fn landing_m(&self, estimate: &Estimate, ignition: &IgnitionPrediction) -> Option<Vector2<f64>> {
         let settings = &self.mission.powered.homing;
         let homing = Homing { reach_m_s2: SURE_REACH * settings.reach_m_s2, ..*settings };
@@ -159,15 +158,15 @@ impl VehicleModel {
 }
 
 impl Pilot {
-    /// The apogee as it is expected on the way up; `None` under the ascent motor, and after apogee.
+    /// The apogee predicted on the way up; `None` under the ascent motor, and after apogee.
     pub fn apogee_ahead(&self, phase: Phase) -> Option<ApogeeAhead> {
         let estimate = self.estimate.as_ref().filter(|_| phase == Phase::Coast)?;
         let braking_m_s2 = -estimate.specific_force_m_s2.x;
         Some(apogee_ahead(estimate.state.position_m.z, estimate.state.velocity_m_s.z, braking_m_s2))
     }
 
-    /// Speed at the ground after a fall from here with the fins fully open and without thrust, m/s,
-    /// positive downwards; `None` before the first frame.
+    /// Impact speed after a fall from here with fully open fins and no thrust, m/s, positive
+    /// downwards; `None` before the first frame.
     pub fn impact_m_s(&self) -> Option<f64> {
         let estimate = self.estimate.as_ref()?;
         let (known, state) = (&self.model, &estimate.state);

@@ -1,5 +1,5 @@
-//! The rehearsal of the landing at power-up, on a board: no world is simulated there, so the
-//! vehicle falls as its model does, and then moves as it plans.
+//! Rehearsal of the landing at power-up, on a board: without a simulated world, the vehicle falls
+//! as in its model, and then moves as planned.
 //!
 //! It shows whether the planner works on this machine, and whether a landing is possible with this
 //! vehicle, motor and mission.
@@ -8,7 +8,7 @@ use alloc::format;
 
 use nalgebra::{Vector2, Vector3};
 
-use super::planner::{Planner, Posed};
+use super::planner::{Planner, Problem};
 use super::vehicle_model::{Burning, VehicleModel};
 use crate::computer::Rehearsed;
 use crate::estimation::estimator::Estimate;
@@ -16,21 +16,21 @@ use crate::rules::arming::PredictedLanding;
 use crate::rules::verdict::{LandingVerdict, Limits};
 use crate::vehicle::rigid::RigidState;
 
-/// Time between looks for the ignition in the fall, s, and how many.
+/// Interval of the search for the ignition in the fall, s, and number of steps.
 const LOOK_S: f64 = 0.1;
 const LOOKS: u32 = 200;
-/// More plans than the longest burn has.
+/// Upper bound of the plans of a burn.
 const MOST_PLANS: u32 = 200;
 
 impl Planner {
     /// Rehearses the landing, with no plan flown. It takes some seconds on a board.
     pub(super) fn rehearse(&mut self) -> Rehearsed {
         let (mut plans, mut converged) = (0, 0);
-        let mut flown = self.model().lit();
+        let mut flown = self.model().at_thrust_onset();
         while let Some((estimate, burning)) = flown.take().filter(|_| plans < MOST_PLANS) {
-            self.ask(estimate.time_s, &estimate, Posed::Landing(burning.clone()));
+            self.request(estimate.time_s, &estimate, Problem::Landing(burning.clone()));
             self.solve();
-            // It moves as planned before, until the plan is ready.
+            // The vehicle moves as planned before, until the plan is ready.
             let (estimate, burning) = self.later(&estimate, &burning);
             let Some(lands) = self.fly_on() else { break };
             plans += 1;
@@ -50,16 +50,16 @@ impl Planner {
 }
 
 impl VehicleModel {
-    /// The vehicle as its motor takes thrust, at time zero, after a fall with open fins in still
-    /// air; `None` if no height suits the motor.
-    fn lit(&self) -> Option<(Estimate, Burning)> {
+    /// The vehicle at thrust onset, at time zero, after a fall with open fins in still air; `None`
+    /// if no height suits the motor.
+    fn at_thrust_onset(&self) -> Option<(Estimate, Burning)> {
         let (mission, mass, fins_m2) =
             (&self.mission, self.mass.at(0.0), self.airframe().open_fin_drag_area_m2());
         let feet_m = self.feet_below_cg_m(&mass);
         let exact = |state| Estimate::exact(0.0, state, Vector3::zeros(), Vector2::zeros());
         let density_kg_m3 = self.density_kg_m3(&exact(RigidState::upright(0.0)));
         let column = self.column(density_kg_m3, mission.soft_tilt_deg);
-        let lit = (0..LOOKS).find_map(|look| {
+        let at_onset = (0..LOOKS).find_map(|look| {
             let after_s = f64::from(look) * LOOK_S;
             let (height_m, vertical_m_s) =
                 column.fallen(mission.start_height_m() - feet_m, 0.0, fins_m2, after_s);
@@ -67,9 +67,9 @@ impl VehicleModel {
             let looked = mission.ignition.prediction(&column, curve, height_m, vertical_m_s, fins_m2);
             looked.overdue_s(looked.onset_height_m).map(|_| looked)
         })?;
-        let mut estimate = exact(RigidState::upright(lit.onset_height_m + feet_m));
-        estimate.state.velocity_m_s.z = lit.onset_vertical_m_s;
-        // As without air.
+        let mut estimate = exact(RigidState::upright(at_onset.onset_height_m + feet_m));
+        estimate.state.velocity_m_s.z = at_onset.onset_vertical_m_s;
+        // Drag is neglected.
         estimate.specific_force_m_s2.x = self.burn().mean_thrust_n(0.0, 0.05) / mass.mass_kg;
         Some((estimate, Burning { burning_s: 0.0, mass, density_kg_m3, lands_in_place: false }))
     }
@@ -81,9 +81,9 @@ mod tests {
     use crate::computer::Computer;
     use crate::vehicles::mission::{BUILTIN, builtin};
 
-    /// The parachute of a vehicle that no height lands is no answer for a builder.
+    /// For a vehicle that no height lands, the builder needs the cause, not the parachute.
     #[test]
-    fn a_vehicle_that_does_not_go_with_its_motor_is_told_so() {
+    fn a_vehicle_that_does_not_match_its_motor_is_reported() {
         let (name, text) = BUILTIN[1];
         for (kg, words) in [("5.0", "too heavy for its motor"), ("2.2", "too light for its motor")] {
             let text = text.replace("loaded_kg = 3.7", &format!("loaded_kg = {kg}"));
@@ -97,13 +97,14 @@ mod tests {
         }
     }
 
-    /// Every mission that can be flown can be armed on a board, and the rehearsal leaves no memory.
+    /// Every mission that can be flown can be armed on a board, and the rehearsal leaves the memory
+    /// unchanged.
     #[test]
     fn every_built_in_mission_rehearses_a_landing() {
         for (name, _) in BUILTIN {
             let mission = builtin(name).unwrap().unwrap();
-            let believed = RigidState::upright(mission.start.height_m);
-            let mut computer = Computer::at_power_up(&mission, &believed);
+            let initial = RigidState::upright(mission.start.height_m);
+            let mut computer = Computer::at_power_up(&mission, &initial);
             let before = computer.digest();
             let rehearsed = computer.rehearse().unwrap();
             assert!(

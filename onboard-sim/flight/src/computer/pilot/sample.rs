@@ -1,15 +1,15 @@
-//! A pilot about to fall, and inputs for it: for the tests of these modules.
+//! A pilot about to fall, with inputs for it, for the tests of these modules.
 
 use nalgebra::Vector3;
 
 use super::Pilot;
 use crate::computer::table::PhaseTable;
-use crate::computer::{Computer, Input, KeptInput, LogState};
+use crate::computer::{Computer, Input, LogState, SensedInput};
 use crate::estimation::estimator::{ImuSample, Measurements, StartUncertainty};
 use crate::rules::arming::Uplink;
 use crate::vehicle::rigid::RigidState;
 
-/// A phase table as it is right after the release.
+/// A phase table right after the release.
 pub(super) fn released() -> PhaseTable {
     let mission = crate::vehicles::mission::builtin("mk2").unwrap().unwrap();
     let computer = Computer::at_power_up(&mission, &RigidState::upright(300.0));
@@ -23,18 +23,18 @@ pub(super) fn falling() -> Pilot {
 }
 
 /// A frame's input without requests, rehearsal and plan.
-pub(crate) fn alone(kept: &KeptInput) -> Input<'static> {
-    Input { kept: *kept, requests: &[], rehearsed: None, plan_ready: false }
+pub(crate) fn alone(sensed: &SensedInput) -> Input<'static> {
+    Input { sensed: *sensed, requests: &[], rehearsed: None, plan_ready: false }
 }
 
 /// The input of a frame with almost no specific force, turning at a rate, of a computer that was
 /// released at once.
-pub(crate) fn input(frame: u64, gyro_rad_s: f64) -> KeptInput {
+pub(crate) fn input(frame: u64, gyro_rad_s: f64) -> SensedInput {
     let imu = ImuSample {
         gyro_rad_s: Vector3::new(0.0, gyro_rad_s, 0.0),
         specific_force_m_s2: Vector3::new(0.1, 0.0, 0.0),
     };
-    KeptInput {
+    SensedInput {
         frame,
         time_s: 0.005 * frame as f64,
         measured: Measurements::of_imu(imu),
@@ -42,6 +42,6 @@ pub(crate) fn input(frame: u64, gyro_rad_s: f64) -> KeptInput {
         pin_out: true,
         log: LogState { running: true, space_bytes: u64::MAX },
         uplink: Uplink::NotNeeded,
-        ..KeptInput::NONE
+        ..SensedInput::NONE
     }
 }

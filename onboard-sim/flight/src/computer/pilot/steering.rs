@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::swing::Swing;
 use super::vehicle_model::Burning;
 use super::{Pilot, Pointed};
-use crate::computer::KeptInput;
+use crate::computer::SensedInput;
 use crate::control::aim::Aim;
 use crate::control::fins::{Allocation, FinCommand, OpeningRange};
 use crate::estimation::estimator::Estimate;
@@ -15,14 +15,14 @@ use crate::rules::phase::{Mode, Phase};
 use crate::vehicle::airframe::MassProperties;
 use crate::vehicle::fins::Moments;
 
-/// Below this thrust the gimbal cannot turn the vehicle, N.
+/// Thrust below which the gimbal cannot turn the vehicle, N.
 const STEERING_THRUST_N: f64 = 3.0;
 
-/// Beyond this angle between nose and airflow, rad, the moment of the body is larger than the
-/// moment that partly closed fins can set against it: all fins are opened then.
+/// Angle between nose and airflow, rad, beyond which the body's moment exceeds that of partly
+/// closed fins: all fins are opened then.
 const ACROSS_THE_AIR_RAD: f64 = 0.65;
 
-/// Whether the air comes so far from the side that only fully open fins turn the vehicle back.
+/// Whether the sideslip is so large that only fully open fins turn the vehicle back.
 fn lies_across_the_air(estimate: &Estimate) -> bool {
     let through_air = estimate.velocity_through_air_m_s();
     let airspeed_m_s = through_air.norm();
@@ -32,14 +32,14 @@ fn lies_across_the_air(estimate: &Estimate) -> bool {
 
 impl Pilot {
     /// Points fins and gimbal.
-    pub(crate) fn point(&mut self, mode: &Mode, input: &KeptInput) -> Pointed {
+    pub(crate) fn point(&mut self, mode: &Mode, input: &SensedInput) -> Pointed {
         let flying = mode.phase.in_landing_burn();
         if let Some(estimate) = self.estimate {
             let estimate = &estimate;
             let thrusting = self.burning(mode, input.time_s);
             let burning = thrusting.as_ref().filter(|_| flying);
-            // The thrust still carries a vehicle that stands: the legs then carry little, and the
-            // wind tips it over. So the gimbal holds it upright until the thrust ends.
+            // Thrust still carries a landed vehicle: the legs then carry little, and wind could tip
+            // it over. The gimbal therefore holds it upright until the thrust ends.
             let balances = self.model.mission.upright_after_contact && mode.phase == Phase::Touchdown;
             let (gimbal_rad, added_rad_s) = match (burning, thrusting.as_ref().filter(|_| balances)) {
                 (Some(burning), _) => {
@@ -51,7 +51,7 @@ impl Pilot {
             };
             self.gimbal_rad = gimbal_rad;
             let mass = self.model.mass_now(self.model.burning_s(input.time_s));
-            // What a swing adds is gone before a fin has moved.
+            // The rate added by a swing has ended before a fin has moved.
             let mut calm = *estimate;
             calm.state.rate_rad_s -= Vector3::new(0.0, added_rad_s[0], added_rad_s[1]);
             self.fins_rad =
@@ -61,9 +61,9 @@ impl Pilot {
         Pointed { gimbal_rad: self.gimbal_rad, fins_rad: self.fins_rad, level }
     }
 
-    /// Swings the gimbal of a vehicle that does not burn while the motor may still be lit: its
-    /// command, rad, and what that has added to the cross rates, rad/s.
-    fn swing(&mut self, mode: &Mode, input: &KeptInput) -> ([f64; 2], [f64; 2]) {
+    /// Swings the gimbal before ignition: returns its command, rad, and the cross rates that it has
+    /// added, rad/s.
+    fn swing(&mut self, mode: &Mode, input: &SensedInput) -> ([f64; 2], [f64; 2]) {
         let may_light = matches!(mode.phase, Phase::AeroDescent | Phase::LandArmed)
             && !mode.interlocks.landing_motor_inhibited;
         let swing = Swing::of(&self.model.mission, &self.model.mass_now(None)).filter(|_| may_light);
@@ -89,7 +89,7 @@ impl Pilot {
         self.turned_towards(&aim, estimate, situation)
     }
 
-    /// The gimbal's command that turns the nose as an aim wants.
+    /// The gimbal command that turns the nose towards an aim.
     fn turned_towards(&mut self, aim: &Aim, estimate: &Estimate, situation: &Burning) -> [f64; 2] {
         let thrust_n = self.model.burn().thrust_n(situation.burning_s);
         let turning_rad_s2 = if thrust_n > STEERING_THRUST_N {
@@ -117,13 +117,13 @@ impl Pilot {
         burning: bool,
     ) -> [f64; 4] {
         let fins = &self.model.airframe().fins;
-        // If no landing is steered for, the fins brake, fully open.
+        // Without a landing to steer for, the fins brake, fully open.
         let steering = matches!(mode.phase, Phase::AeroDescent | Phase::LandArmed | Phase::Ignition)
             && !mode.interlocks.landing_motor_inhibited;
         if !(steering || burning) {
             return match mode.phase {
                 phase if phase.before_apogee() => [fins.closed_rad(); 4],
-                // On the ground they stay where they are: no servo needs to move there.
+                // On the ground the fins hold their position: no servo needs to move there.
                 Phase::Touchdown | Phase::Safed => self.fins_rad,
                 Phase::Deploy if !self.model.mission.descent.opens_fins => [fins.control_min_rad(); 4],
                 _ => [fins.open_rad(); 4],
@@ -144,8 +144,8 @@ impl Pilot {
         };
         let demand = self.model.mission.descent.demand(&estimate.state, &situation);
         let (moments, drag_area_m2, min_rad) = if burning {
-            // During the burn the gimbal turns the vehicle; the fins brake and stop it from
-            // rolling.
+            // During the burn the gimbal turns the vehicle; the fins brake and cancel the roll
+            // rate.
             (Vector3::new(demand.moment_n_m.x, 0.0, 0.0), self.fin_share * largest_m2, fins.closed_rad())
         } else if !self.model.mission.descent.opens_fins {
             return [fins.control_min_rad(); 4];

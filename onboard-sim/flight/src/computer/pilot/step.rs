@@ -1,13 +1,13 @@
-//! One frame of the flight: estimates, follows the ascent, and poses what is planned and predicted.
+//! One frame of the flight: estimates, follows the ascent, and requests plans and predictions.
 
 use nalgebra::Vector3;
 
 use super::ascent::{AscentReadings, words_of_ascent};
-use super::planner::Posed;
+use super::planner::Problem;
 use super::vehicle_model::Burning;
 use super::vertical_speed::SpeedReadings;
 use super::{FRAMES_PER_PLAN, Pilot, Prediction};
-use crate::computer::KeptInput;
+use crate::computer::SensedInput;
 use crate::computer::table::PhaseTable;
 use crate::estimation::estimator::{Estimate, Measurements, VehicleNow};
 use crate::estimation::motor_estimate::{MotorSample, MotorStage};
@@ -16,20 +16,19 @@ use crate::rules::phase::{Event, Mode, Phase};
 use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use crate::vehicle::mission::StartPoint;
 
-/// Frames between outlooks while the ignition is seconds away.
+/// Frames between predictions while ignition is still seconds away.
 const FRAMES_PER_FAR_LOOK: u64 = 4 * FRAMES_PER_PLAN;
 
-/// An estimate outlives a pause of the accelerometer of this length, s.
+/// Longest outage of the accelerometer that the estimate tolerates, s.
 const ACCELEROMETER_LOST_S: f64 = 0.5;
 
-/// What a frame adds to the doubt about the velocity when the force is not felt but expected, m/s:
-/// it is off by some 0.3 m/s^2 for half a second.
+/// Velocity uncertainty added per frame while the force is expected instead of measured, m/s: it is
+/// off by some 0.3 m/s^2 for half a second.
 const EXPECTED_FORCE_M_S: f64 = 0.02;
 
-/// What the estimator may use before apogee. The booster's drag and masses are not those of the
-/// vehicle, so the air shows no wind. The barometer's ram error belongs to a flow from the nose,
-/// not from the tail, and its static ports lie in the booster's wake and in the charge's gas; the
-/// lidar looks into the booster.
+/// Measurements usable before apogee. The booster changes drag and masses, so the specific force
+/// shows no wind. The barometer's ram error is for flow from the tail, and its static ports are in
+/// the booster's wake and in the charge's gas; the lidar faces the booster.
 fn on_the_way_up(
     measurements: &Measurements,
     vehicle: &VehicleNow,
@@ -42,53 +41,53 @@ fn on_the_way_up(
 
 impl Pilot {
     /// Estimates the vehicle's state, and its motor and drag.
-    pub(crate) fn estimate_state(&mut self, phase: Phase, input: &KeptInput, sensors: &SensorWatch) {
-        // Also on the ground, where the gimbal goes on to balance.
+    pub(crate) fn estimate_state(&mut self, phase: Phase, input: &SensedInput, sensors: &SensorWatch) {
+        // Also on the ground, where the gimbal continues to balance.
         let burns = self.model.motor.stage() == MotorStage::Burning;
         self.speeds.watch_accelerometer(sensors.accelerometer_lost_s() >= ACCELEROMETER_LOST_S);
-        let thrust_felt = !(burns && sensors.accelerometer_is_lost());
-        let estimate = self.estimated(phase, input, thrust_felt);
+        let thrust_sensed = !(burns && sensors.accelerometer_is_lost());
+        let estimate = self.estimated(phase, input, thrust_sensed);
         self.estimate = Some(estimate);
-        if thrust_felt {
+        if thrust_sensed {
             self.update_models(phase, input, &estimate);
         }
     }
 
-    /// Follows the ascent, predicts ignition and abort, and watches the fins. Every event goes
+    /// Follows the ascent, predicts ignition and abort, and monitors the fins. Every event goes
     /// through the `table`.
-    pub(crate) fn predict(&mut self, table: &mut PhaseTable, input: &KeptInput) {
+    pub(crate) fn predict(&mut self, table: &mut PhaseTable, input: &SensedInput) {
         let Some(estimate) = self.estimate else { return };
         self.watch_the_speeds(input, &estimate);
-        // Before the prediction: at apogee an abort has to know at once whether the parachute has
-        // room.
+        // Before the prediction: at apogee an abort needs to know at once whether the parachute has
+        // height.
         self.watch_the_ascent(table, input, &estimate);
         // A drop lasts 2 to 3 s, so it is predicted in every planning frame.
         let dropped = self.model.mission.start.at == StartPoint::Drone;
         let far = table.mode().phase == Phase::AeroDescent && !dropped;
         let due = input.frame.is_multiple_of(if far { FRAMES_PER_FAR_LOOK } else { FRAMES_PER_PLAN });
         if table.mode().phase.in_descent() {
-            // Right after apogee and after a restart an abort would not know whether the parachute
-            // has room.
+            // Right after apogee and after a restart the parachute height for an abort is not yet
+            // computed.
             let unknown = self.prediction == Prediction::default();
             if unknown {
                 self.prediction = self.model.fall(&estimate, &self.fins_rad, self.apogee_m);
             }
             if due || unknown {
                 let (fins_rad, apogee_m) = (self.fins_rad, self.apogee_m);
-                self.pose(input.time_s, &estimate, Posed::Prediction { fins_rad, apogee_m });
+                self.request(input.time_s, &estimate, Problem::Prediction { fins_rad, apogee_m });
             }
         }
         self.fin_watch.update(&input.fins_rad, &self.fins_rad, self.model.mission.estimator.frame_s);
     }
 
-    /// Poses a landing in the first frame of the burn, and again ten frames after the last, or
-    /// later if that one takes longer: not in the frame that took it over, so that it can be looked
-    /// at behind it.
-    pub(crate) fn plan(&mut self, mode: &Mode, input: &KeptInput, took_over: bool) {
+    /// Requests a landing in the first frame of the burn, and again ten frames after the last, or
+    /// later if that one takes longer. Never in the frame that took one over, so that it can be
+    /// inspected after that frame.
+    pub(crate) fn plan(&mut self, mode: &Mode, input: &SensedInput, took_over: bool) {
         let due = !took_over && input.frame >= self.plan_due && mode.phase.in_landing_burn();
         let burning = self.burning(mode, input.time_s).filter(|_| due);
         if let Some((burning, estimate)) = burning.zip(self.estimate)
-            && self.pose(input.time_s, &estimate, Posed::Landing(burning))
+            && self.request(input.time_s, &estimate, Problem::Landing(burning))
         {
             self.plan_due = input.frame + FRAMES_PER_PLAN;
         }
@@ -105,12 +104,12 @@ impl Pilot {
         })
     }
 
-    fn estimated(&mut self, phase: Phase, input: &KeptInput, thrust_felt: bool) -> Estimate {
+    fn estimated(&mut self, phase: Phase, input: &SensedInput, thrust_sensed: bool) -> Estimate {
         let mut measurements = input.measured;
         self.silence_what_is_wrong(&mut measurements, input.time_s);
-        if let Some(estimate) = self.estimate.filter(|_| !thrust_felt) {
+        if let Some(estimate) = self.estimate.filter(|_| !thrust_sensed) {
             measurements.imu.specific_force_m_s2 = self.expected_force_m_s2(phase, input, &estimate);
-            self.estimator.doubt_velocity(&Vector3::repeat(EXPECTED_FORCE_M_S));
+            self.estimator.inflate_velocity(&Vector3::repeat(EXPECTED_FORCE_M_S));
         }
         let burning_s = self.model.burning_s(input.time_s);
         let mass = self.model.mass_now(burning_s);
@@ -126,7 +125,7 @@ impl Pilot {
         self.estimator.step(&measurements, &vehicle)
     }
 
-    /// Removes a pressure that repeats itself, and a fix that estimate and pressure outvote.
+    /// Removes a frozen pressure, and a fix that estimate and pressure outvote.
     fn silence_what_is_wrong(&mut self, measurements: &mut Measurements, time_s: f64) {
         let outvoted = measurements.gnss.zip(self.estimate).is_some_and(|(fix, estimate)| {
             self.speeds.outvote(fix.velocity_m_s.z, estimate.state.velocity_m_s.z, time_s)
@@ -136,9 +135,9 @@ impl Pilot {
             measurements.pressure_altitude_m.filter(|altitude_m| !self.speeds.repeats(*altitude_m));
     }
 
-    /// Estimates motor and drag from the specific force along the axis; not on the way up, on the
-    /// ground or under the parachute.
-    pub(super) fn update_models(&mut self, phase: Phase, input: &KeptInput, estimate: &Estimate) {
+    /// Estimates motor and drag from the axial specific force; not on the way up, on the ground or
+    /// under the parachute.
+    pub(super) fn update_models(&mut self, phase: Phase, input: &SensedInput, estimate: &Estimate) {
         if input.contact || phase == Phase::Chute || phase.before_apogee() {
             return;
         }
@@ -154,8 +153,8 @@ impl Pilot {
         self.model.learn(&sample);
     }
 
-    /// The certified force of the air, body axes, N, and the mass, kg.
-    fn air_force_n(&self, phase: Phase, input: &KeptInput, estimate: &Estimate) -> (Vector3<f64>, f64) {
+    /// The certified aerodynamic force, body axes, N, and the mass, kg.
+    fn air_force_n(&self, phase: Phase, input: &SensedInput, estimate: &Estimate) -> (Vector3<f64>, f64) {
         let mass = self.model.mass_now(self.model.burning_s(input.time_s));
         let density_kg_m3 = self.model.density_kg_m3(estimate);
         let vehicle = self.model.now(&mass, density_kg_m3, input.fins_rad, phase.in_landing_burn());
@@ -166,8 +165,8 @@ impl Pilot {
         (vehicle.air_force_n(&through_air_m_s, &estimate.state.rate_rad_s), mass.mass_kg)
     }
 
-    /// What an accelerometer would say of the motor and the air as they are known, body, m/s^2.
-    fn expected_force_m_s2(&self, phase: Phase, input: &KeptInput, estimate: &Estimate) -> Vector3<f64> {
+    /// The expected accelerometer reading from the motor and drag estimates, body, m/s^2.
+    fn expected_force_m_s2(&self, phase: Phase, input: &SensedInput, estimate: &Estimate) -> Vector3<f64> {
         let (thrust_n, _) = self.thrust_and_weight_n(input.time_s);
         let [(sin_pitch, cos_pitch), (sin_yaw, cos_yaw)] = input.gimbal_rad.map(libm::sincos);
         let thrust_n = Vector3::new(cos_pitch * cos_yaw, sin_yaw, -sin_pitch * cos_yaw) * thrust_n;
@@ -175,9 +174,9 @@ impl Pilot {
         (thrust_n + air_force_n * self.model.motor.air_scale()) / mass_kg + estimate.accelerometer_bias_m_s2
     }
 
-    fn watch_the_speeds(&mut self, input: &KeptInput, estimate: &Estimate) {
+    fn watch_the_speeds(&mut self, input: &SensedInput, estimate: &Estimate) {
         let Measurements { imu, pressure_altitude_m, gnss, .. } = input.measured;
-        // No fix follows the motion that a wrong inertial unit measures: the pressure confirms it
+        // A fix does not follow the motion of a faulty inertial unit: the pressure confirms it
         // instead.
         let confirmed_m_s = gnss
             .map(|fix| fix.velocity_m_s.z)
@@ -194,8 +193,8 @@ impl Pilot {
         });
     }
 
-    /// Moves through the phases up to apogee.
-    fn watch_the_ascent(&mut self, table: &mut PhaseTable, input: &KeptInput, estimate: &Estimate) {
+    /// Phase changes up to apogee.
+    fn watch_the_ascent(&mut self, table: &mut PhaseTable, input: &SensedInput, estimate: &Estimate) {
         let phase = table.mode().phase;
         let Some(launch) = self.model.mission.launch.as_ref().filter(|_| phase.before_apogee()) else {
             return;
@@ -221,7 +220,7 @@ impl Pilot {
             self.apogee_m = estimate.state.position_m.z;
         }
         if let Some((severity, words)) = words_of_ascent(event, estimate) {
-            table.say(severity, words);
+            table.report(severity, words);
         }
         self.try_apply(table, event, input.time_s);
     }

@@ -1,5 +1,5 @@
-//! The pilot's knowledge of its vehicle: the mission's data, and what it has learnt about motor and
-//! drag. From that, the motor that a plan assumes.
+//! The pilot's model of its vehicle: the mission's data with the motor and drag estimates. From
+//! these, the motor that a plan assumes.
 
 use alloc::sync::Arc;
 
@@ -17,18 +17,18 @@ use crate::vehicle::mission::Mission;
 use crate::vehicle::rigid::RigidState;
 use crate::vehicle::thrust_curve::ThrustCurve;
 
-/// The vehicle as the pilot knows it.
+/// The vehicle model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct VehicleModel {
-    // What is skipped is a constant of the mission.
+    // Skipped fields are constants of the mission.
     #[serde(skip)]
-    /// Shared, as a board's memory is small.
+    /// Shared, because a board's memory is small.
     pub(super) mission: Arc<Mission>,
     #[serde(skip)]
     pub(super) mass: MassModel,
     /// Estimated motor and scale of the aerodynamic forces.
     pub(super) motor: MotorEstimate,
-    /// Whether the motor has another curve than the expected one.
+    /// Whether another curve than the expected one was identified.
     pub(super) others: OtherCurves,
 }
 
@@ -44,19 +44,19 @@ pub(super) struct Burning {
 }
 
 impl VehicleModel {
-    /// A copy for a plan: which curve the motor has, and not what decides it.
+    /// A copy for a plan: the identified curve, without the filters that identify it.
     pub(super) fn without_filters(&self) -> Self {
         let others = OtherCurves::chosen_before(self.others.chosen());
         Self { mission: Arc::clone(&self.mission), others, ..*self }
     }
 
-    /// Of the air at the estimated height, kg/m3.
+    /// Air density at the estimated height, kg/m3.
     pub(super) fn density_kg_m3(&self, estimate: &Estimate) -> f64 {
         self.mission.site.air_at_m(estimate.state.position_m.z).density_kg_m3
     }
 
-    /// The vehicle as the estimator takes it, at this mass, air density and fin openings, rad, and
-    /// with its motor burning or not.
+    /// The vehicle data for the estimator, at this mass, air density and fin openings, rad, with
+    /// the motor burning or not.
     pub(super) fn now(
         &self,
         mass: &MassProperties,
@@ -68,12 +68,12 @@ impl VehicleModel {
         VehicleNow::of(self.airframe(), mass, density_kg_m3, fins_rad, burns, levers)
     }
 
-    /// The motor's curve: the expected one, or another that its burn has turned out to have.
+    /// The motor's curve: the expected one, or another identified in its burn.
     pub(super) fn curve(&self) -> &ThrustCurve {
         self.others.flown(&self.mission)
     }
 
-    /// Learns motor and drag from a frame.
+    /// Updates the motor and drag estimates with a frame.
     pub(super) fn learn(&mut self, sample: &MotorSample) {
         self.motor.update(self.others.flown(&self.mission), sample);
         self.others.update(&mut self.motor, &self.mission.other_curves, sample);
@@ -88,8 +88,8 @@ impl VehicleModel {
         self.motor.ignition_s().map(|ignition_s| (time_s - ignition_s).max(0.0))
     }
 
-    /// Whether the whole burn time has passed. A motor that went out early is not called burnt out
-    /// before that either.
+    /// Whether the complete burn time has passed. A motor that stopped early does not count as
+    /// burned out before that.
     pub(super) fn burn_is_over(&self, time_s: f64) -> bool {
         let whole_s = self.motor.burn_time_stretch() * self.curve().burn_time_s();
         self.burning_s(time_s).is_some_and(|burning_s| burning_s >= whole_s)
@@ -103,10 +103,10 @@ impl VehicleModel {
         self.motor.burn(self.curve())
     }
 
-    /// The motor with `sigmas` standard deviations less (below zero) or more impulse than expected
-    /// from now until its thrust falls below the weight. Measurements show the thrust, not how long
-    /// it lasts; as long as that holds, the weaker motor burns out sooner.
-    pub(super) fn doubted_burn(&self, burning_s: f64, sigmas: f64) -> Burn<'_> {
+    /// The motor with `sigmas` standard deviations more (positive) or less impulse than expected
+    /// from now until its thrust falls below the weight. Measurements show the thrust, not its
+    /// duration; at equal thrust the weaker motor burns out sooner.
+    pub(super) fn dispersed_burn(&self, burning_s: f64, sigmas: f64) -> Burn<'_> {
         let burn = self.burn();
         let carried_until_s = burn.falls_through_weight_s(self.mass.at(0.0).mass_kg);
         let Some(until_s) = carried_until_s.filter(|until_s| *until_s > burning_s) else { return burn };
@@ -116,7 +116,7 @@ impl VehicleModel {
             (burning_s * burn.thrust_n(burning_s) - until_s * burn.thrust_n(until_s)) / burn.time_scale,
             burn.fading_n_s(burning_s, until_s),
         ];
-        self.motor.doubted(self.curve(), derivatives, sigmas)
+        self.motor.dispersed(self.curve(), derivatives, sigmas)
     }
 
     pub(super) fn column(&self, density_kg_m3: f64, soft_tilt_deg: f64) -> Column {
@@ -128,8 +128,8 @@ impl VehicleModel {
         self.airframe().above_feet_m(mass.cg_station_m)
     }
 
-    /// The guidance of the landing burn before its first plan, and the search of its plans, with
-    /// room for every plan.
+    /// The guidance of the landing burn before its first plan, and the search of its plans with
+    /// buffers for every plan.
     pub(super) fn guidance(&self) -> (PoweredGuidance, Search) {
         let state = RigidState::upright(self.mission.start.height_m);
         let estimate = Estimate::exact(0.0, state, Vector3::zeros(), Vector2::zeros());
@@ -172,31 +172,31 @@ impl VehicleModel {
     }
 }
 
-/// Without a plan the fins leave room for a motor that is weaker or stronger by one deviation, and
-/// keep the vehicle in the middle of that band.
+/// Without a plan the fins leave margin for a motor that is weaker or stronger by one deviation,
+/// and hold the vehicle in the middle of that band.
 const FIN_SIGMAS: f64 = 1.0;
 const FIN_PLACE: f64 = 0.5;
 
 // The motor that a plan assumes.
 //
-// Surplus thrust can be wasted late in the burn, missing thrust cannot be made up. A plan is
-// therefore made for a motor that is weaker than estimated, by the number of standard deviations
-// that the mission sets as its caution. The motor must not be so weak that no landing is possible:
-// such a plan would turn the vehicle across the air to brake, and spoil the landing for every
-// stronger motor. So the plan takes the weakest of these motors that can still land from here.
+// Surplus thrust can be wasted late in the burn; missing thrust cannot be recovered. A plan is
+// therefore made for a motor weaker than estimated, by the number of standard deviations that the
+// mission sets as its caution. The motor must not be so weak that no landing is possible: such a
+// plan would turn the vehicle broadside to brake, and spoil the landing for every stronger motor.
+// So the plan takes the weakest of these motors that can still land from here.
 //
 // High in the band of feasible heights, a hard landing in a plan has another cause: the plan has
 // not found a way to sink faster. There the guidance flies a hard plan rather than braking upright,
-// which helps a vehicle that is too low and makes this vehicle hover.
+// which helps a vehicle that is too low but makes this one hover.
 
 /// Number of steps from full caution to none.
 const CAUTION_STEPS: u32 = 3;
 
-/// Above this place in the band, its middle, a vehicle is high.
+/// Position in the band (its middle) above which a vehicle is high.
 const HIGH_PLACE: f64 = 0.5;
 
 impl VehicleModel {
-    /// The situation to plan with.
+    /// The situation to plan for.
     pub(super) fn situation_to_plan<'a>(
         &'a self,
         estimate: &Estimate,
@@ -215,7 +215,7 @@ impl VehicleModel {
         let steps = if caution_sigmas > 0.0 { CAUTION_STEPS } else { 0 };
         let weaker = (0..steps).find_map(|step| {
             let share = 1.0 - f64::from(step) / f64::from(CAUTION_STEPS);
-            let burn = self.doubted_burn(burning.burning_s, -caution_sigmas * share);
+            let burn = self.dispersed_burn(burning.burning_s, -caution_sigmas * share);
             band(&burn).is_some_and(|band| band.place(height_m) >= 0.0).then_some(burn)
         });
         let fins_m2 = self.airframe().open_fin_drag_area_m2();
@@ -225,20 +225,19 @@ impl VehicleModel {
         }
     }
 
-    /// By how many standard deviations a plan takes the motor to be weaker than estimated: the
-    /// mission's full caution early, none in the last moments, when no thrust can be wasted any
-    /// more.
+    /// Standard deviations by which a plan assumes a weaker motor than estimated: the mission's
+    /// full caution early, none at the end, when no thrust can be wasted any more.
     fn caution_sigmas(&self, burning_s: f64) -> f64 {
         let carried_until_s = self.burn().falls_through_weight_s(self.mass.at(0.0).mass_kg);
         let left_s = carried_until_s.unwrap_or(0.0) - burning_s;
         self.mission.caution_sigmas * (left_s / self.mission.caution_fades_s).clamp(0.0, 1.0)
     }
 
-    /// Share of the fins' drag area for the vehicle's place in the band, if no plan says it.
+    /// Share of the fins' drag area from the vehicle's position in the band, if no plan has it.
     pub(super) fn fin_share(&self, estimate: &Estimate, burning: &Burning) -> f64 {
         let column = self.column(burning.density_kg_m3, self.mission.fin_soft_tilt_deg);
         let [weak, strong] =
-            [-FIN_SIGMAS, FIN_SIGMAS].map(|sigmas| self.doubted_burn(burning.burning_s, sigmas));
+            [-FIN_SIGMAS, FIN_SIGMAS].map(|sigmas| self.dispersed_burn(burning.burning_s, sigmas));
         column.fin_share(
             [&weak, &strong],
             burning.burning_s,

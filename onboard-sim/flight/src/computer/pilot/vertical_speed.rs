@@ -1,39 +1,39 @@
-//! How fast the vehicle rises or falls, by three that know nothing of each other: what was felt
-//! since the start, the pressure, and the satellites. One of them alone decides nothing.
+//! Vertical speed from three independent sources: inertial since the start, pressure, and
+//! satellites. No single one decides.
 
 use serde::{Deserialize, Serialize};
 
 use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 
-/// The pressure altitude gives a speed once in this time, s: with the noise of a barometer to 0.6
-/// m/s.
+/// Interval of the speed from pressure altitude, s: with a barometer's noise it is good to 0.6 m/s.
 pub(super) const RATE_OVER_S: f64 = 0.2;
-/// A fix this old still tells the speed, s: three fixes are missing.
-const FIX_KEEPS_S: f64 = 0.6;
-/// A barometer that says the same for so many samples, a tenth of a second, says nothing.
+/// Maximum age of a fix, s: three missing fixes.
+const FIX_MAX_AGE_S: f64 = 0.6;
+/// Identical samples (a tenth of a second) after which a barometer counts as frozen.
 const FROZEN_SAMPLES: u32 = 5;
-/// Speeds that differ by more, m/s, cannot both be right: a late fix and the pressure of the last
-/// window make 3 of it while the vehicle coasts, 15 under the ascent motor, where there are no
-/// fixes.
+/// Differences between speeds, m/s, that exclude both being right: a late fix and the pressure of
+/// the last window differ by 3 while the vehicle coasts, and by 15 under the ascent motor, where
+/// there are no fixes.
 const APART_OF_THREE_M_S: f64 = 8.0;
 pub(super) const APART_OF_TWO_M_S: f64 = 15.0;
-/// For how long the middle one of three contradicts an estimate that is given up, s.
+/// Time for which the middle of three must contradict an estimate before the estimate is rejected,
+/// s.
 const CONTRADICTED_S: f64 = 0.5;
-/// Change of the fixes' speed that the pressure has to confirm, m/s: half a second of coasting.
+/// Change of the fixes' speed that the pressure must confirm, m/s: half a second of coasting.
 const CONFIRMED_M_S: f64 = 5.0;
 
-/// What is new in a frame.
+/// New data of a frame.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SpeedReadings {
     pub(super) time_s: f64,
     pub(super) frame_s: f64,
-    /// Upwards, from what was felt and the attitude, m/s^2.
+    /// Upwards, from the specific force and the attitude, m/s^2.
     pub(super) vertical_m_s2: f64,
-    /// `None` also while the gas of a charge is in the vehicle.
+    /// `None` also while charge gas is in the vehicle.
     pub(super) pressure_altitude_m: Option<f64>,
-    /// Of a fix, up, m/s.
+    /// From a fix, up, m/s.
     pub(super) gnss_m_s: Option<f64>,
-    /// As estimated, up, m/s.
+    /// Estimated, up, m/s.
     pub(super) estimated_m_s: f64,
 }
 
@@ -41,23 +41,23 @@ with_defaults! {
     /// The three speeds, up, m/s.
     #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
     pub(super) struct VerticalSpeeds {
-        /// It begins with the estimate.
-        felt_m_s: Option<f64> = None,
+        /// Initialised from the estimate.
+        inertial_m_s: Option<f64> = None,
         gnss_m_s: f64 = 0.0,
         gnss_at_s: f64 = f64::NEG_INFINITY,
         /// The last pressure altitude.
         altitude_m: f64 = f64::INFINITY,
         same_samples: u32 = 0,
-        /// Where and when the present window of [`RATE_OVER_S`] began, m and s.
+        /// Altitude and time at the start of the present window of [`RATE_OVER_S`], m and s.
         mark_m: f64 = 0.0,
         marked_at_s: f64 = f64::NEG_INFINITY,
-        /// What the last one gave, m/s, and when, s.
+        /// Result of the last window, m/s, and its time, s.
         pressure_m_s: f64 = 0.0,
         pressure_at_s: f64 = f64::NEG_INFINITY,
         contradicted_s: f64 = 0.0,
-        /// The accelerometer repeats itself or is silent: the estimate follows it.
+        /// The accelerometer is frozen or silent, and the estimate with it.
         accelerometer_lost: bool = false,
-        /// Speed of the first of the fixes that the pressure has confirmed in a row, m/s.
+        /// Speed of the first in the present run of confirmed fixes, m/s.
         confirmed_from_m_s: Option<f64> = None,
     }
 }
@@ -67,15 +67,15 @@ impl VerticalSpeeds {
         self.accelerometer_lost = lost;
     }
 
-    /// After a reset what was felt meanwhile is in the estimate alone.
+    /// After a reset only the estimate contains the meantime.
     pub(super) fn resumed(self) -> Self {
-        Self { felt_m_s: None, ..self }
+        Self { inertial_m_s: None, ..self }
     }
 
     pub(super) fn take(&mut self, seen: &SpeedReadings) {
-        let felt_m_s = self.felt_m_s.get_or_insert(seen.estimated_m_s);
+        let inertial_m_s = self.inertial_m_s.get_or_insert(seen.estimated_m_s);
         if seen.vertical_m_s2.is_finite() {
-            *felt_m_s += seen.vertical_m_s2 * seen.frame_s;
+            *inertial_m_s += seen.vertical_m_s2 * seen.frame_s;
         }
         if let Some(gnss_m_s) = seen.gnss_m_s.filter(|m_s| m_s.is_finite()) {
             (self.gnss_m_s, self.gnss_at_s) = (gnss_m_s, seen.time_s);
@@ -84,7 +84,7 @@ impl VerticalSpeeds {
             self.take_pressure(altitude_m, seen.time_s);
         }
         let middle_m_s = self.middle_m_s(seen.time_s, None).filter(|m_s| {
-            // An estimate that is not a number is contradicted by anything.
+            // A NaN estimate is contradicted by anything.
             let near = (m_s - seen.estimated_m_s).abs() <= APART_OF_TWO_M_S;
             !near
         });
@@ -105,12 +105,12 @@ impl VerticalSpeeds {
         }
     }
 
-    /// A barometer that repeats this sample has stopped.
+    /// Whether a barometer that repeats this sample is frozen.
     pub(super) fn repeats(&self, altitude_m: f64) -> bool {
         self.same_samples >= FROZEN_SAMPLES && altitude_m.to_bits() == self.altitude_m.to_bits()
     }
 
-    /// A fix that contradicts both the estimate and the pressure is outvoted.
+    /// Whether a fix contradicts both the estimate and the pressure.
     pub(super) fn outvote(&self, gnss_m_s: f64, estimated_m_s: f64, time_s: f64) -> bool {
         self.pressure_m_s(time_s, None).is_some_and(|pressure_m_s| {
             let near = |m_s: f64| (m_s - pressure_m_s).abs() <= APART_OF_THREE_M_S;
@@ -118,8 +118,8 @@ impl VerticalSpeeds {
         })
     }
 
-    /// Whether the pressure has shown about the speed of the fixes, m/s, while that changed: a
-    /// spike, or the flow at Mach 1, agrees by chance with a receiver that keeps reporting its last
+    /// Whether the pressure has agreed with the speed of the fixes, m/s, while that changed. A
+    /// spike, or the flow at Mach 1, may agree by chance with a receiver that repeats its last
     /// speed.
     pub(super) fn pressure_confirms(
         &mut self,
@@ -133,14 +133,14 @@ impl VerticalSpeeds {
         self.confirmed_from_m_s.is_some_and(|from_m_s| (gnss_m_s - from_m_s).abs() >= CONFIRMED_M_S)
     }
 
-    /// The last pressure altitude, m, of a barometer that is heard and does not repeat itself.
+    /// The last pressure altitude, m, of a barometer that is neither silent nor frozen.
     pub(super) fn altitude_m(&self, time_s: f64) -> Option<f64> {
         (time_s - self.pressure_at_s <= 2.0 * RATE_OVER_S && self.same_samples < FROZEN_SAMPLES)
             .then_some(self.altitude_m)
     }
 
-    /// What the pressure shows. `through_gas_s`: for so long after the last window the vehicle
-    /// coasts, and the pressure is that of a charge's gas.
+    /// Speed by pressure. `through_gas_s`: for this time after the last window the vehicle coasts,
+    /// and the pressure is that of charge gas.
     pub(super) fn pressure_m_s(&self, time_s: f64, through_gas_s: Option<f64>) -> Option<f64> {
         let age_s = time_s - self.pressure_at_s;
         if self.altitude_m(time_s).is_some() {
@@ -152,22 +152,21 @@ impl VerticalSpeeds {
         }
     }
 
-    /// That of the last fix, if it is not too old.
+    /// Speed of the last fix, unless it is too old.
     pub(super) fn gnss_m_s(&self, time_s: f64) -> Option<f64> {
-        (time_s - self.gnss_at_s <= FIX_KEEPS_S).then_some(self.gnss_m_s)
+        (time_s - self.gnss_at_s <= FIX_MAX_AGE_S).then_some(self.gnss_m_s)
     }
 
-    /// The middle one, if all three speak: if one is wrong it is right.
+    /// The middle of the three, if all are available: it is right if one is wrong.
     fn middle_m_s(&self, time_s: f64, through_gas_s: Option<f64>) -> Option<f64> {
         let mut three_m_s =
-            [self.felt_m_s?, self.pressure_m_s(time_s, through_gas_s)?, self.gnss_m_s(time_s)?];
+            [self.inertial_m_s?, self.pressure_m_s(time_s, through_gas_s)?, self.gnss_m_s(time_s)?];
         three_m_s.sort_by(f64::total_cmp);
         Some(three_m_s[1])
     }
 
-    /// How fast the vehicle rises: as estimated, unless the three say otherwise. Of two that
-    /// contradict each other the one that rises faster counts: nothing is parted or opened on the
-    /// way up.
+    /// Vertical speed: the estimate, unless the three contradict it. Of two that disagree the
+    /// faster climb counts: nothing separates or deploys on the way up.
     pub(super) fn rises_m_s(&self, estimated_m_s: f64, time_s: f64, through_gas_s: Option<f64>) -> f64 {
         let others = [self.pressure_m_s(time_s, through_gas_s), self.gnss_m_s(time_s)];
         if let Some(fastest_m_s) =
@@ -185,7 +184,7 @@ impl VerticalSpeeds {
         }
     }
 
-    /// Two of the three have contradicted the estimate for long enough to give it up.
+    /// Whether two of the three have contradicted the estimate for long enough to reject it.
     pub(super) fn contradict_the_estimate(&self) -> bool {
         self.contradicted_s >= CONTRADICTED_S
     }

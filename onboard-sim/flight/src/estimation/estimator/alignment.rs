@@ -1,5 +1,5 @@
 //! Finds the initial attitude on the pad: at rest the accelerometer shows the vertical and the gyro
-//! shows its own bias.
+//! shows its bias.
 //!
 //! This is the levelling of a strapdown unit (Groves 2013, section 5.6).
 
@@ -12,11 +12,11 @@ use crate::vehicle::rigid::upright;
 
 /// Fewest samples for an alignment: one second at 200 Hz.
 const FEWEST: u32 = 200;
-/// Largest turn-on bias of a gyro that is calibrated, rad/s: 10 deg/s. Hobby gyros show up to 7.2.
+/// Largest turn-on bias of a calibrated gyro, rad/s: 10 deg/s. Hobby gyros show up to 7.2.
 pub(crate) const BIAS_MAX_RAD_S: f64 = 0.175;
-/// Length of the specific force of a vehicle at rest, m/s^2: gravity, with 7 % for scale and bias.
-/// Hobby accelerometers show 9.7 to 10.44.
-pub(crate) const FELT_AT_REST_M_S2: core::ops::RangeInclusive<f64> = 9.12..=10.5;
+/// Specific force of a vehicle at rest, m/s^2: gravity, with 7 % for scale and bias. Hobby
+/// accelerometers show 9.7 to 10.44.
+pub(crate) const AT_REST_M_S2: core::ops::RangeInclusive<f64> = 9.12..=10.5;
 /// Largest difference between the two halves of the record of a vehicle at rest: of the gyro, rad/s
 /// (0.3 deg/s, five standard deviations of two seconds' noise), and of the specific force, m/s^2.
 const GYRO_DRIFT_RAD_S: f64 = 0.005;
@@ -50,7 +50,7 @@ pub struct PadRecord {
     begun: bool,
 }
 
-/// Why there is no alignment yet.
+/// Why no alignment is available yet.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum AlignmentError {
     /// Too few samples.
@@ -74,7 +74,7 @@ pub enum AlignmentError {
         found_m_s2: f64,
     },
     /// The mean specific force is not gravity's.
-    #[error("feels {found_m_s2:.2} m/s^2, at rest is 9.12 to 10.5 m/s^2")]
+    #[error("measured {found_m_s2:.2} m/s^2, at rest is 9.12 to 10.5 m/s^2")]
     NotAtRest {
         /// Its length, m/s^2.
         found_m_s2: f64,
@@ -98,13 +98,13 @@ pub struct ImuCalibration {
     pub accelerometer_scale: f64,
 }
 
-/// Largest deviation of the scale from 1 that is taken for a bias: 25 mg, half of what data sheets
-/// allow. One position cannot tell them apart, but in a boost they differ.
+/// Largest deviation of the scale from 1 that is treated as a bias: 25 mg, half of what data sheets
+/// allow. One position cannot distinguish them, but in a boost they differ.
 const BIAS_MAX_SHARE: f64 = 0.025;
 
 impl ImuCalibration {
-    /// The divisor of the measured specific force, and the standard deviation of the bias that is
-    /// left, m/s^2.
+    /// The divisor of the measured specific force, and the standard deviation of the remaining
+    /// bias, m/s^2.
     pub(super) fn scale_and_bias(&self) -> (f64, f64) {
         let off = (self.accelerometer_scale - 1.0).abs();
         if off > BIAS_MAX_SHARE {
@@ -191,9 +191,9 @@ impl PadAlignment {
         if rate > BIAS_MAX_RAD_S {
             return Err(AlignmentError::Turning { found_deg_s: rate.to_degrees() });
         }
-        let felt = self.specific_force_m_s2.norm();
-        if !FELT_AT_REST_M_S2.contains(&felt) {
-            return Err(AlignmentError::NotAtRest { found_m_s2: felt });
+        let sensed = self.specific_force_m_s2.norm();
+        if !AT_REST_M_S2.contains(&sensed) {
+            return Err(AlignmentError::NotAtRest { found_m_s2: sensed });
         }
         let headed = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), heading_rad) * upright();
         let up_in_world = headed * self.specific_force_m_s2;
@@ -203,7 +203,7 @@ impl PadAlignment {
             .unwrap_or_else(UnitQuaternion::identity);
         let calibration = ImuCalibration {
             gyro_bias_rad_s: self.gyro_rad_s,
-            accelerometer_scale: felt / STANDARD_GRAVITY_M_S2,
+            accelerometer_scale: sensed / STANDARD_GRAVITY_M_S2,
         };
         Ok(PadStart { world_from_body: lean * headed, calibration })
     }
@@ -221,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn the_lean_of_the_pad_is_found_and_the_heading_kept() {
+    fn the_lean_of_the_pad_is_found_and_the_heading_unchanged() {
         let heading = 0.4;
         let lean = UnitQuaternion::from_scaled_axis(Vector3::new(0.05, -0.03, 0.0));
         let truth = lean * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), heading) * upright();
@@ -251,7 +251,7 @@ mod tests {
         );
         assert_eq!(
             of(ImuSample { specific_force_m_s2: Vector3::new(12.0, 0.0, 0.0), ..good }, 300),
-            "feels 12.00 m/s^2, at rest is 9.12 to 10.5 m/s^2"
+            "measured 12.00 m/s^2, at rest is 9.12 to 10.5 m/s^2"
         );
         assert!(
             of(ImuSample { gyro_rad_s: Vector3::new(f64::NAN, 0.0, 0.0), ..good }, 300)

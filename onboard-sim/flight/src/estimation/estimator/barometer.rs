@@ -1,27 +1,26 @@
-//! The barometer: height by the static pressure, with its own offset and the errors of the flow
-//! around it.
+//! The barometer: height by static pressure, with its offset and the errors of the flow around it.
 //!
 //! The error of a static port is in proportion to the dynamic pressure (W. Gracey, Measurement of
 //! Aircraft Speed and Altitude, NASA Reference Publication 1046, 1980).
 
-use super::correction::{DOUBT_POSITION_M, shown_by_height, without_last_if};
+use super::correction::{INFLATION_POSITION_M, shown_by_height, without_last_if};
 use super::covariance::{
     BAROMETER_LATE, BAROMETER_OFFSET, BAROMETER_RAM, BAROMETER_SCALE, BAROMETER_SUCTION, POSITION, VELOCITY,
     WIND,
 };
 use super::{Estimator, HeightSources};
 
-/// After this many rejections in a row, half a second, the filter assumes that the barometer has a
-/// new offset.
+/// Consecutive rejections, half a second, after which the filter assumes a new offset of the
+/// barometer.
 const BAROMETER_REJECTIONS: u32 = 25;
 
-/// After so many, three tenths of a second, what was felt and the fixes that came meanwhile outvote
+/// Consecutive rejections, three tenths of a second, after which inertial height and fixes outvote
 /// it: before heights that disagree end the landing.
 const OUTVOTED_REJECTIONS: u32 = 15;
 
 impl Estimator {
-    /// The barometer measures the height of its ports by its scale, plus its own offset, plus the
-    /// ram error `-k V^2 / 2 g`, plus the suction `c v^2 / 2 g` of the flow across the axis.
+    /// The barometer measures the height of its ports by its scale, plus its offset, plus the ram
+    /// error `-k V^2 / 2 g`, plus the suction `c v^2 / 2 g` of the flow across the axis.
     pub(super) fn take_barometer(&mut self, altitude_m: f64, lever_m: &nalgebra::Vector3<f64>) {
         // Zeroed on the pad, where the vehicle stands upright.
         let altitude_m = altitude_m - (self.nominal.world_from_body * lever_m).z + lever_m.x;
@@ -84,10 +83,10 @@ impl Estimator {
             let HeightSources { inertial_m, barometric_m, .. } = self.heights.sources();
             let off_m = (self.nominal.position_m.z - inertial_m).abs();
             if barometric_m.is_some_and(|height_m| (height_m - inertial_m).abs() < 0.5 * off_m) {
-                // It and the inertial height outvote the estimate, which fixes have drawn away.
+                // It and the inertial height outvote the estimate, which fixes have pulled away.
                 self.covariance.widen(POSITION + 2, off_m * off_m);
             } else {
-                self.covariance.widen(BAROMETER_OFFSET, DOUBT_POSITION_M * DOUBT_POSITION_M);
+                self.covariance.widen(BAROMETER_OFFSET, INFLATION_POSITION_M * INFLATION_POSITION_M);
             }
         }
     }

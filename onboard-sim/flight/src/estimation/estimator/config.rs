@@ -26,8 +26,7 @@ with_defaults! {
         pub accelerometer_noise_mg_sqrt_hz: f64 = 0.65,
         /// Noise density that the motor's vibration adds to the gyro, deg/s/sqrt(Hz).
         pub burning_gyro_deg_s_sqrt_hz: f64 = 0.0,
-        /// How far the motor's vibration may shift the gyro's bias when it lights, each axis,
-        /// deg/s.
+        /// Shift of the gyro bias by the motor's vibration at ignition, each axis, deg/s.
         pub burning_gyro_bias_deg_s: f64 = 0.0,
         /// Noise density that the motor's vibration adds to the accelerometer, mg/sqrt(Hz).
         pub burning_accelerometer_mg_sqrt_hz: f64 = 0.0,
@@ -42,9 +41,9 @@ with_defaults! {
         pub barometer_offset_walk_m_sqrt_s: f64 = 0.03,
         /// Wander of the ram coefficient, in one second.
         pub barometer_ram_walk_sqrt_s: f64 = 0.001,
-        /// Suction of the flow across the axis, divided by its dynamic pressure; 0 rules it out. A
-        /// port on a cylinder feels +1 to -1.1 of it, by its place; the mean over a ring of ports
-        /// is about -0.5 (Hoerner, "Fluid-Dynamic Drag", 1965).
+        /// Suction of the flow across the axis, divided by its dynamic pressure; 0 excludes it. A
+        /// port on a cylinder sees +1 to -1.1 of it, depending on its position; the mean over a
+        /// ring of ports is about -0.5 (Hoerner, "Fluid-Dynamic Drag", 1965).
         pub barometer_suction: f64 = 0.0,
         /// Scale error of the barometric height: a day 15 K from the standard atmosphere's
         /// temperature.
@@ -55,11 +54,10 @@ with_defaults! {
         pub gnss_vertical_m: f64 = 0.3,
         /// Noise of a satellite velocity, m/s.
         pub gnss_velocity_m_s: f64 = 0.05,
-        /// Error of the satellite fixes' time tags, the same for all of a flight, s; 0 trusts the
-        /// tags.
+        /// Error of the satellite fixes' time tags, constant over a flight, s; 0 trusts the tags.
         pub gnss_time_tag_s: f64 = 0.0,
-        /// Error of each time tag beside that, s; 0 rules it out. This is what the filter believes
-        /// before the flight: from then on the fixes show it.
+        /// Additional error of each time tag, s; 0 excludes it. This is the prior before the
+        /// flight: from then on it is estimated from the fixes.
         pub gnss_age_jitter_s: f64 = 0.0,
         /// Wander of the satellite position's offset, horizontal, m in one second.
         pub gnss_horizontal_walk_m_sqrt_s: f64 = 0.15,
@@ -81,14 +79,14 @@ with_defaults! {
         pub wind_shear_exponent: f64 = 1.0 / 7.0,
         /// Uncertainty of the sideways aerodynamic force, as a fraction of it.
         pub sideways_force_share: f64 = 0.1,
-        /// How often the sideways force is linearised for one correction of the wind. Once is
-        /// enough where the fins feel most of the wind; a body without large fins, which feels the
-        /// square of it, needs about five.
+        /// Number of linearisations of the sideways force for one correction of the wind. One is
+        /// enough where the fins dominate; a body without large fins, whose force is quadratic,
+        /// needs about five.
         pub wind_passes: u32 = 1,
         /// A measurement that differs from its prediction by more than this many standard
         /// deviations is rejected.
         pub gate_sigmas: f64 = 5.0,
-        /// Beyond these limits the estimate is unhealthy.
+        /// Limits beyond which the estimate is unhealthy.
         pub health: HealthLimits = HealthLimits::default(),
     }
 }
@@ -100,7 +98,7 @@ with_defaults! {
     pub struct HealthLimits {
         /// Vertical velocity, m/s.
         pub velocity_m_s: f64 = 0.5,
-        /// Horizontal velocity, either axis, m/s: legs that crush stand on at 2 m/s.
+        /// Horizontal velocity, either axis, m/s: crushable legs survive 2 m/s.
         pub lateral_m_s: f64 = 1.2,
         pub height_m: f64 = 2.5,
         /// Horizontal position, either axis, m.
@@ -136,7 +134,7 @@ pub struct StartUncertainty {
     pub gnss_horizontal_offset_m: f64,
     /// Offset of the satellite position since it was zeroed on the pad, vertical, m.
     pub gnss_vertical_offset_m: f64,
-    /// The lean was found by the accelerometer at rest: it is off by what that errs.
+    /// The lean was measured by the accelerometer at rest, so it has the accelerometer's error.
     pub levelled: bool,
 }
 
@@ -156,7 +154,7 @@ impl StartUncertainty {
         }
     }
 
-    /// Where a flight begins. A vehicle below a drone has been carried up, with its estimator
+    /// Initial uncertainty at a start. A vehicle below a drone was carried up with its estimator
     /// running.
     pub fn at_start(start: StartPoint) -> Self {
         match start {

@@ -1,4 +1,4 @@
-//! A correction by one scalar, and the status record of everything that corrects.
+//! The scalar correction, and the status of each aiding measurement.
 //!
 //! The gate is that of the normalised innovation (Y. Bar-Shalom, X. R. Li and T. Kirubarajan,
 //! Estimation with Applications to Tracking and Navigation, 2001, section 5.4).
@@ -13,7 +13,7 @@ use super::covariance::{ACCELEROMETER_BIAS, ATTITUDE, POSITION, VELOCITY};
 pub(super) const POSITION_REJECTIONS: u32 = 10;
 /// Standard deviation that the filter adds to a position or an offset that it assumes to be wrong,
 /// m.
-pub(super) const DOUBT_POSITION_M: f64 = 3.0;
+pub(super) const INFLATION_POSITION_M: f64 = 3.0;
 
 /// The result of a scalar correction.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,23 +29,22 @@ pub(super) struct Correction {
     pub(super) accepted: bool,
 }
 
-/// The status of one aid, the same for every one. A measurement that does not fit is refused and
-/// counted. If an aid is refused many times in a row, the filter is wrong.
+/// Status of one aid, the same for all. A rejected measurement is counted; many rejections in a row
+/// mean that the filter is wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct AidStatus {
-    /// The last measurement less its prediction, in the aid's unit; of a fix, that of its worst
-    /// number. 0 if it was no number.
+    /// The last measurement less its prediction, in the aid's unit; for a fix, that of its worst
+    /// component. 0 for NaN.
     pub innovation: f64,
-    /// Its size over the largest that is used: above 1 it was refused. Infinite if it was no
-    /// number.
+    /// Innovation over the gate: above 1 the measurement was rejected. Infinite for NaN.
     pub test_ratio: f64,
     /// Measurements used.
     pub used: u32,
-    /// Measurements refused, because they did not fit or were not numbers.
+    /// Measurements rejected by the gate, or NaN.
     pub refused: u32,
-    /// Measurements refused since the last one that was used.
+    /// Measurements rejected since the last one used.
     pub refused_in_a_row: u32,
-    /// It measured in the last frame.
+    /// Measured in the last frame.
     pub fresh: bool,
 }
 
@@ -65,7 +64,7 @@ pub struct Aids {
 }
 
 impl Aids {
-    /// Another frame begins.
+    /// Begins a frame.
     pub(super) fn begin_frame(&mut self) {
         let Self { imu, barometer, gnss_velocity, gnss_position, lidar, wind } = self;
         for aid in [imu, barometer, gnss_velocity, gnss_position, lidar, wind] {
@@ -80,10 +79,10 @@ impl AidStatus {
         self.take_next(0, correction);
     }
 
-    /// Takes the correction by one number of a fix; number 0 begins a fix.
+    /// Takes the correction by one component of a fix; component 0 begins a fix.
     pub(super) fn take_next(&mut self, number: usize, correction: &Correction) {
         let &Correction { innovation, normalised_squared, gate, accepted, .. } = correction;
-        // No NaN is kept: its bits are not the same on every processor.
+        // No NaN is stored: its bits differ between processors.
         let (innovation, test_ratio) = if normalised_squared.is_finite() {
             (innovation, libm::sqrt(normalised_squared / gate))
         } else {
@@ -95,18 +94,18 @@ impl AidStatus {
         self.count(accepted);
     }
 
-    /// Refuses a measurement that cannot be predicted.
+    /// Rejects a measurement that cannot be predicted.
     pub(super) fn refuse(&mut self) {
         self.count(false);
     }
 
-    /// Discards the three numbers of a fix that says nothing about the estimate.
+    /// Discards the three components of a fix without information on the estimate.
     pub(super) fn discard(&mut self) {
         self.fresh = true;
         self.refused = self.refused.saturating_add(3);
     }
 
-    /// Counts a verdict and returns it.
+    /// Counts a decision and returns it.
     pub(super) fn count(&mut self, accepted: bool) -> bool {
         self.fresh = true;
         if accepted {
@@ -120,15 +119,15 @@ impl AidStatus {
     }
 }
 
-/// Whether a height shows an error: not the attitude, nor the motion along the ground. They depend
-/// on each other by the force of a leaning vehicle, but the flow around static ports and a field
-/// that is not level err for seconds.
+/// Whether a height measurement may correct this error: not the attitude, nor the motion along the
+/// ground. They are coupled by the force of a leaning vehicle, but the flow around static ports and
+/// a sloping field cause errors that last for seconds.
 pub(super) fn shown_by_height(index: usize) -> bool {
     ![POSITION, POSITION + 1, VELOCITY, VELOCITY + 1].contains(&index)
         && !(ATTITUDE..ACCELEROMETER_BIAS).contains(&index)
 }
 
-/// A sensitivity whose last entry is that of an error which the configuration may rule out.
+/// A sensitivity whose last entry belongs to an error that the configuration may exclude.
 pub(super) fn without_last_if(ruled_out: bool, sensitivity: &[(usize, f64)]) -> &[(usize, f64)] {
     &sensitivity[..sensitivity.len() - usize::from(ruled_out)]
 }

@@ -44,7 +44,7 @@ pub(super) struct Covariance {
     rows: [Row; N],
 }
 
-/// All there is to know of a symmetric matrix, in half of the numbers.
+/// Serialises the upper half: it determines a symmetric matrix.
 fn upper_half<S: Serializer>(rows: &[Row; N], serializer: S) -> Result<S::Ok, S::Error> {
     let mut half = serializer.serialize_tuple(N * (N + 1) / 2)?;
     for (i, row) in rows.iter().enumerate() {
@@ -59,8 +59,8 @@ fn upper_half<S: Serializer>(rows: &[Row; N], serializer: S) -> Result<S::Ok, S:
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Transition {
     pub(super) interval_s: f64,
-    /// Velocity gained from the specific force, world, m/s: `dv -= [felt]x dphi`.
-    pub(super) felt_m_s: Vector3<f64>,
+    /// Velocity gained from the specific force, world, m/s: `dv -= [sensed]x dphi`.
+    pub(super) sensed_m_s: Vector3<f64>,
     /// Integral of the body-to-world rotation over the interval, s: `dphi -= it dbg`, `dv -= it
     /// dba`.
     pub(super) world_from_body_s: Matrix3<f64>,
@@ -101,8 +101,8 @@ impl Covariance {
         self.rows.iter().flatten().all(|value| value.is_finite())
     }
 
-    /// Correlates the lean with the accelerometer's bias, of this variance, (m/s^2)^2, which was
-    /// taken for a part of the gravity, m/s^2, as the vehicle was levelled.
+    /// Correlates the lean with the accelerometer's bias, of this variance, (m/s^2)^2: levelling
+    /// has attributed the bias to gravity, m/s^2.
     pub(super) fn level(&mut self, world_from_body: &Matrix3<f64>, bias_m2_s4: f64, gravity_m_s2: f64) {
         for axis in 0..3 {
             let column = ACCELEROMETER_BIAS + axis;
@@ -121,9 +121,9 @@ impl Covariance {
     /// `P <- F P F' + Q`. Only position, velocity and attitude have rows in `F` beyond the unit
     /// matrix's, so only their rows change; the rest is their mirror image.
     pub(super) fn propagate(&mut self, step: &Transition) {
-        let (dt, felt, turn) = (step.interval_s, step.felt_m_s, step.world_from_body_s);
-        // -[felt]x
-        let lever = [[0.0, felt.z, -felt.y], [-felt.z, 0.0, felt.x], [felt.y, -felt.x, 0.0]];
+        let (dt, sensed, turn) = (step.interval_s, step.sensed_m_s, step.world_from_body_s);
+        // -[sensed]x
+        let lever = [[0.0, sensed.z, -sensed.y], [-sensed.z, 0.0, sensed.x], [sensed.y, -sensed.x, 0.0]];
         for axis in 0..3 {
             let velocity = self.rows[VELOCITY + axis];
             add(&mut self.rows[POSITION + axis], dt, &velocity);
@@ -248,13 +248,13 @@ mod tests {
 
     #[test]
     fn blocks_propagate_like_the_full_matrices() {
-        let felt = Vector3::new(0.03, -0.02, 0.1);
+        let sensed = Vector3::new(0.03, -0.02, 0.1);
         let turn = Matrix3::new(1.0, 0.2, -0.3, 0.4, 0.9, 0.1, -0.2, 0.3, 0.8) * 0.01;
         let mut noise = [0.0; N];
         noise.iter_mut().enumerate().for_each(|(i, q)| *q = 1e-3 * i as f64);
         let step = Transition {
             interval_s: 0.01,
-            felt_m_s: felt,
+            sensed_m_s: sensed,
             world_from_body_s: turn,
             wind_factor: 0.98,
             noise,
@@ -263,7 +263,7 @@ mod tests {
         for axis in 0..3 {
             full[(POSITION + axis, VELOCITY + axis)] = 0.01;
         }
-        full.fixed_view_mut::<3, 3>(VELOCITY, ATTITUDE).copy_from(&-felt.cross_matrix());
+        full.fixed_view_mut::<3, 3>(VELOCITY, ATTITUDE).copy_from(&-sensed.cross_matrix());
         full.fixed_view_mut::<3, 3>(VELOCITY, ACCELEROMETER_BIAS).copy_from(&-turn);
         full.fixed_view_mut::<3, 3>(ATTITUDE, GYRO_BIAS).copy_from(&-turn);
         full[(WIND, WIND)] = 0.98;
@@ -288,8 +288,8 @@ mod tests {
         let (seen, with) = covariance.project(&sensitivity);
         assert!((seen - h.dot(&(before * h))).abs() < 1e-12);
         let variance = seen + noise;
-        // Half the optimal gain, and some errors held: a filter that considers errors without
-        // estimating them does this.
+        // Half the optimal gain, and some errors held, as in a filter that considers errors without
+        // estimating them.
         let mut gain = with.map(|value| 0.5 * value / variance);
         gain[4] = 0.0;
         gain[20] = 0.0;

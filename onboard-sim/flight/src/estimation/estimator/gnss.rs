@@ -4,7 +4,7 @@
 
 use serde::Serialize;
 
-use super::correction::{DOUBT_POSITION_M, POSITION_REJECTIONS, without_last_if};
+use super::correction::{INFLATION_POSITION_M, POSITION_REJECTIONS, without_last_if};
 use super::covariance::{
     ACCELEROMETER_BIAS, ATTITUDE, GNSS_OFFSET, GNSS_TIME_TAG, GYRO_BIAS, POSITION, VELOCITY,
 };
@@ -12,38 +12,38 @@ use super::gnss_gate::REPORTED_M;
 use super::strapdown::Since;
 use super::{Estimator, EstimatorConfig, GnssFix, health};
 
-/// Standard deviations that the filter adds when satellite velocities do not fit on average: of the
-/// velocity. All four make room for what a fault of the inertial unit has done.
-const DOUBT_VELOCITY_M_S: f64 = 0.5;
-/// A velocity that surprises while it is off by less, m/s, has crept away: a gyro that is off by 2
-/// deg/s has moved it by 0.3 when that is noticed, one by 20 deg/s by more than 0.45.
+/// Inflation of the standard deviations when satellite velocities do not fit on average: velocity.
+/// All four cover the effect of a fault of the inertial unit.
+const INFLATION_VELOCITY_M_S: f64 = 0.5;
+/// Velocity deviation, m/s, below which a surprise counts as creeping: a gyro error of 2 deg/s has
+/// moved the velocity by 0.3 when it is detected, one of 20 deg/s by more than 0.45.
 const CREEPS_M_S: f64 = 0.4;
-/// Of the attitude.
-const DOUBT_ATTITUDE_RAD: f64 = 0.04;
-/// Of the gyro's bias.
-const DOUBT_GYRO_BIAS_RAD_S: f64 = 0.05;
-/// Of the accelerometer's bias.
-const DOUBT_ACCELEROMETER_BIAS_M_S2: f64 = 0.5;
-/// Beyond this lean, rad, an antenna along the nose loses satellites, and a fix is believed to be
-/// off by so many times what it is upright. With 1, 1.5 and 2 a receiver with threefold noise
-/// there, which loses half of its fixes, lands mk3 in 31, 55 and 59 of 60 flights; a gyro that
-/// jumps by 2 deg/s 3 s into the fall in 24, 24 and 19 of 24.
+/// Inflation of the attitude.
+const INFLATION_ATTITUDE_RAD: f64 = 0.04;
+/// Inflation of the gyro bias.
+const INFLATION_GYRO_BIAS_RAD_S: f64 = 0.05;
+/// Inflation of the accelerometer bias.
+const INFLATION_ACCELEROMETER_BIAS_M_S2: f64 = 0.5;
+/// Lean, rad, beyond which an antenna along the nose loses satellites, and the factor on the
+/// assumed error of a fix there. With 1, 1.5 and 2 a receiver with threefold noise there, which
+/// loses half of its fixes, lands mk3 in 31, 55 and 59 of 60 flights; a gyro that jumps by 2 deg/s
+/// 3 s into the fall in 24, 24 and 19 of 24.
 const LEANS_RAD: f64 = 0.35;
 const LEANING_NOISE: f64 = 1.5;
-/// Below this speed along an axis its satellite position does not show how old the fix is, m/s: 10
+/// Speed along an axis, m/s, below which a satellite position does not show the age of its fix: 10
 /// ms are 0.15 m.
 const SHOWS_AGE_M_S: f64 = 15.0;
-/// The filter's belief before the flight counts as much as this many fixes.
-const BELIEVED_FIXES: f64 = 10.0;
-/// What the fixes have shown is forgotten after as many, 8 s.
+/// Weight of the prior, in fixes.
+const PRIOR_FIXES: f64 = 10.0;
+/// Memory length, in fixes: 8 s.
 const REMEMBERED_FIXES: f64 = 40.0;
-/// One fix counts as at most this many standard deviations: an outlier says nothing of the age.
+/// Limit of one fix, standard deviations: an outlier carries no information on the age.
 const AGE_SIGMAS: f64 = 3.0;
-/// Numbers of positions, of ten fixes in two seconds, that must fit after a surprise before the
+/// Position components, of ten fixes in two seconds, that must fit after a surprise before the
 /// fixes outvote the barometer.
 const FITS_AGAIN: u32 = 30;
 
-/// How much the ages of the fixes vary, from how far their positions are off along the motion:
+/// Jitter of the ages of the fixes, estimated from their position errors along the motion:
 /// innovation-based adaptive estimation (Mehra, "Approaches to adaptive filtering", IEEE Trans.
 /// Automatic Control 17, 1972), of this one number.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -57,11 +57,11 @@ pub(super) struct FixAge {
 impl FixAge {
     pub(super) fn new(config: &EstimatorConfig) -> Self {
         let variance_s2 = config.gnss_age_jitter_s * config.gnss_age_jitter_s;
-        Self { variance_s2, fixes: BELIEVED_FIXES, smallest_s2: 0.1 * variance_s2 }
+        Self { variance_s2, fixes: PRIOR_FIXES, smallest_s2: 0.1 * variance_s2 }
     }
 
-    /// Takes how far a position was off, m, the variance that is expected of a fix of exact age,
-    /// m^2, and the speed, m/s.
+    /// Takes a position innovation, m, its expected variance for a fix of exact age, m^2, and the
+    /// speed, m/s.
     fn take(&mut self, innovation_m: f64, exact_m2: f64, speed_m_s: f64) {
         if self.smallest_s2 <= 0.0 || speed_m_s.abs() < SHOWS_AGE_M_S || !innovation_m.is_finite() {
             return;
@@ -97,10 +97,10 @@ impl Estimator {
                 continue;
             };
             // The past velocity is the present one minus the gain since. The gain depends on the
-            // attitude and the accelerometer bias, which have errors of their own.
-            let felt = since.gained_m_s - lever_m_s
+            // attitude and the accelerometer bias, which have errors.
+            let sensed = since.gained_m_s - lever_m_s
                 + nalgebra::Vector3::z() * (self.config.gravity_m_s2 * since.age_s);
-            let by_attitude = felt.cross_matrix();
+            let by_attitude = sensed.cross_matrix();
             let by_bias = self.nominal.world_from_body.to_rotation_matrix().into_inner() * since.age_s;
             let sensitivity = [
                 (VELOCITY + axis, 1.0),
@@ -120,7 +120,7 @@ impl Estimator {
             self.aids.gnss_velocity.take_next(axis, &correction);
             if correction.normalised_squared.is_finite() && self.surprise.take(correction.normalised_squared)
             {
-                self.doubt_motion(off_m_s < CREEPS_M_S);
+                self.inflate_motion(off_m_s < CREEPS_M_S);
             }
         }
         for axis in 0..3 {
@@ -153,11 +153,11 @@ impl Estimator {
         }
         if self.aids.gnss_position.refused_in_a_row >= POSITION_REJECTIONS {
             self.aids.gnss_position.refused_in_a_row = 0;
-            // Until the barometer agrees with what becomes of this.
+            // Until the barometer agrees with the result.
             self.outvoted_from = u32::MAX;
             for axis in 0..3 {
-                self.covariance.widen(POSITION + axis, DOUBT_POSITION_M * DOUBT_POSITION_M);
-                self.covariance.widen(GNSS_OFFSET + axis, DOUBT_POSITION_M * DOUBT_POSITION_M);
+                self.covariance.widen(POSITION + axis, INFLATION_POSITION_M * INFLATION_POSITION_M);
+                self.covariance.widen(GNSS_OFFSET + axis, INFLATION_POSITION_M * INFLATION_POSITION_M);
             }
         }
     }
@@ -171,16 +171,16 @@ impl Estimator {
 
     /// Increases the uncertainty of motion and inertial biases: satellite velocities do not fit on
     /// average, so an error of the inertial unit must have changed. `creeping`: by little so far.
-    fn doubt_motion(&mut self, creeping: bool) {
-        self.doubted_until_s = self.time_s()
-            + if creeping { health::DOUBT_AFTER_SURPRISE_S } else { health::DOUBT_AFTER_RESTART_S };
+    fn inflate_motion(&mut self, creeping: bool) {
+        self.unhealthy_until_s = self.time_s()
+            + if creeping { health::UNHEALTHY_AFTER_SURPRISE_S } else { health::UNHEALTHY_AFTER_RESTART_S };
         self.outvoted_from = self.aids.gnss_position.used.saturating_add(FITS_AGAIN);
         for axis in 0..3 {
             let widen = [
-                (VELOCITY, DOUBT_VELOCITY_M_S),
-                (ATTITUDE, DOUBT_ATTITUDE_RAD),
-                (GYRO_BIAS, DOUBT_GYRO_BIAS_RAD_S),
-                (ACCELEROMETER_BIAS, DOUBT_ACCELEROMETER_BIAS_M_S2),
+                (VELOCITY, INFLATION_VELOCITY_M_S),
+                (ATTITUDE, INFLATION_ATTITUDE_RAD),
+                (GYRO_BIAS, INFLATION_GYRO_BIAS_RAD_S),
+                (ACCELEROMETER_BIAS, INFLATION_ACCELEROMETER_BIAS_M_S2),
             ];
             for (first, sigma) in widen {
                 self.covariance.widen(first + axis, sigma * sigma);
@@ -214,12 +214,12 @@ mod tests {
         assert!((shown(0.01, 200) - 0.01).abs() < 1e-9, "{}", shown(0.01, 200));
         // A fall has about 40 fixes.
         assert!(shown(0.03, 40) > 0.02, "{}", shown(0.03, 40));
-        // Exact ages: a third of what was believed is left, which an offset of the clock needs.
+        // Exact ages: a third of the prior is left, as an offset of the clock requires.
         assert!((shown(0.0, 200) - 0.01 * libm::sqrt(0.1)).abs() < 1e-9, "{}", shown(0.0, 200));
     }
 
     #[test]
-    fn an_outlier_a_slow_fix_and_no_number_say_little_or_nothing() {
+    fn an_outlier_a_slow_fix_and_nan_have_little_or_no_effect() {
         let mut once = age();
         once.take(500.0, 0.16, -40.0);
         assert!(libm::sqrt(once.variance_s2) < 0.02, "{once:?}");

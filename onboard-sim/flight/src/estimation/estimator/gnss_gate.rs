@@ -1,8 +1,8 @@
-//! Admission of satellite fixes: a fix must change as the integrated specific force does.
+//! Admission of satellite fixes: the change between fixes must match the integrated specific force.
 //!
 //! Receivers that lose track under boost may keep reporting their last state as valid fixes. From
-//! one fix to the next the inertial unit is far more accurate than over a flight, so the change
-//! between two fixes shows a receiver that does not follow the motion, whatever the estimate is.
+//! one fix to the next the inertial unit is far more accurate than over a flight. So the change
+//! between two fixes shows a receiver that does not follow the motion, whatever the estimate.
 
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -26,21 +26,22 @@ const AGE_ERROR_S: f64 = 0.02;
 /// Difference between the change of position and the two velocities, m, and as a share of it.
 const UNEXPLAINED_M: f64 = 4.0;
 const MOVED_SHARE: f64 = 0.2;
-/// A receiver in doubt has to follow the motion, and to come this close to the estimate: its
-/// velocity, m/s, and its position, m, and in standard deviations of the estimate. After an outage
-/// of the whole ascent the estimated velocity is off by 0.3 m/s.
+/// Conditions that end the quarantine: the receiver follows the motion, and is this close to the
+/// estimate, in velocity, m/s, position, m, and standard deviations of the estimate. After an
+/// outage of the complete ascent the estimated velocity is off by 0.3 m/s.
 const NEAR_M_S: f64 = 2.0;
 const NEAR_M: f64 = 30.0;
 const NEAR_SIGMAS: f64 = 5.0;
-/// A receiver in doubt after an outage of this length, s, that is this far from the estimate, m/s,
-/// has to follow this change of velocity instead, m/s: one that stands still cannot.
+/// Conditions after an outage: a receiver quarantined after an outage of this length, s, and this
+/// far from the estimate, m/s, must instead follow this change of velocity, m/s, which a frozen one
+/// cannot.
 const OUTAGE_S: f64 = 1.0;
 const FAR_M_S: f64 = 5.0;
 const FOLLOWED_M_S: f64 = 4.0;
-/// Position error, horizontal or vertical, from which a receiver's own statement counts, m: below,
-/// it is mostly the slow offset that the filter estimates.
+/// Position error, horizontal or vertical, from which a receiver's accuracy report counts, m.
+/// Below, it is mostly the slow offset that the filter estimates.
 pub(super) const REPORTED_M: f64 = 5.0;
-/// Satellites that a fix in space needs.
+/// Satellites needed for a three-dimensional fix.
 const SATELLITES: u32 = 4;
 
 /// The last fix, whether it was admitted or not.
@@ -60,23 +61,23 @@ impl Reference {
     }
 }
 
-/// What the gate remembers of the receiver.
+/// State of the gate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(super) struct GnssGate {
     last: Reference,
     /// Whether the last reference is a fix, and not the start.
     has_fix: bool,
-    in_doubt: bool,
-    /// The doubt began with the first fix after an outage.
-    doubted_after_outage: bool,
+    quarantined: bool,
+    /// The quarantine began with the first fix after an outage.
+    after_outage: bool,
     /// Change of velocity that the last fixes have followed in a row, m/s.
     followed_m_s: f64,
     /// Integral of the specific force's magnitude since the last fix, m/s.
     force_m_s: f64,
-    /// Frames without a usable inertial sample since then, and with the same one in a row.
+    /// Frames without a usable inertial sample since then, and with repeated samples.
     blind_frames: u32,
     repeated_frames: u32,
-    /// Velocity by unmeasured shocks since then, m/s.
+    /// Velocity gained in unmeasured shocks since then, m/s.
     shock_m_s: f64,
     /// Velocity of the fix admitted in this frame, m/s.
     admitted_m_s: Option<Vector3<f64>>,
@@ -89,8 +90,8 @@ impl GnssGate {
         Self {
             last: Reference { position_m: zero, velocity_m_s, valid_at_s: 0.0, gained_m_s: zero },
             has_fix: false,
-            in_doubt: false,
-            doubted_after_outage: false,
+            quarantined: false,
+            after_outage: false,
             followed_m_s: 0.0,
             force_m_s: 0.0,
             blind_frames: 0,
@@ -100,14 +101,14 @@ impl GnssGate {
         }
     }
 
-    /// Notes a change of velocity that no inertial unit measures, m/s.
+    /// Announces a change of velocity that no inertial unit measures, m/s.
     pub(super) fn expect_shock(&mut self, gained_m_s: f64) {
         self.shock_m_s += gained_m_s;
     }
 
-    /// Ends the doubt: another sensor confirms the receiver.
+    /// Ends the quarantine: another sensor confirms the receiver.
     pub(super) fn trust(&mut self) {
-        self.in_doubt = false;
+        self.quarantined = false;
     }
 
     /// Begins a frame with the velocity gained by the specific force, m/s, whether it was measured,
@@ -173,19 +174,19 @@ impl Estimator {
                 gate.followed_m_s += gained_m_s.norm();
             } else {
                 gate.followed_m_s = 0.0;
-                gate.doubted_after_outage = !gate.in_doubt && now.valid_at_s - before.valid_at_s > OUTAGE_S;
-                gate.in_doubt = true;
+                gate.after_outage = !gate.quarantined && now.valid_at_s - before.valid_at_s > OUTAGE_S;
+                gate.quarantined = true;
             }
         }
         let off_m_s = (fix.velocity_m_s - velocity_m_s + since.gained_m_s).norm();
         let off_m = (fix.position_m - self.nominal.position_m - lever_m + since.moved_m).norm();
         let near_m = NEAR_M + NEAR_SIGMAS * self.covariance.sigmas(POSITION).norm();
-        // After an outage the estimate may be far off, but hardly ever a receiver that follows the
-        // motion.
-        let returns = gate.doubted_after_outage && gate.followed_m_s >= FOLLOWED_M_S && off_m_s > FAR_M_S;
+        // After an outage the estimate may be far off, but a receiver that follows the motion
+        // hardly ever is.
+        let returns = gate.after_outage && gate.followed_m_s >= FOLLOWED_M_S && off_m_s > FAR_M_S;
         if gate.followed_m_s > 0.0 && (off_m_s <= NEAR_M_S || returns) && off_m <= near_m {
-            gate.in_doubt = false;
+            gate.quarantined = false;
         }
-        !gate.in_doubt && !repeated
+        !gate.quarantined && !repeated
     }
 }

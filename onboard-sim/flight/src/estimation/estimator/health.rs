@@ -1,5 +1,5 @@
-//! Whether the estimate is good enough to light a motor, and if not, why; with the two heights that
-//! show it.
+//! Health of the estimate: whether it is good enough to ignite a motor, and if not, why. Also the
+//! two independent heights behind that decision.
 
 use core::fmt;
 use serde::{Deserialize, Serialize};
@@ -9,27 +9,27 @@ use super::{Aids, EstimatorConfig, Sigmas};
 /// Number of frames without a usable inertial sample that the last sample bridges.
 pub(super) const BRIDGED_FRAMES: u32 = 4;
 /// Shortest time that the estimate stays unhealthy after a restart, s.
-pub(super) const DOUBT_AFTER_RESTART_S: f64 = 1.0;
-/// The same after a surprise by velocities that are off by little, s: two fixes, from where on the
-/// standard deviations tell. No longer, as half a second of doubt ends a landing.
-pub(super) const DOUBT_AFTER_SURPRISE_S: f64 = 0.45;
+pub(super) const UNHEALTHY_AFTER_RESTART_S: f64 = 1.0;
+/// The same after a small velocity surprise, s: two fixes, after which the standard deviations show
+/// the uncertainty. Longer would abandon a landing: half a second of bad health ends it.
+pub(super) const UNHEALTHY_AFTER_SURPRISE_S: f64 = 0.45;
 
-/// The estimator's own verdict.
+/// Verdict of the estimator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Health {
-    /// Every standard deviation is inside its limit and the sensors agree with it.
+    /// Every standard deviation is inside its limit, and the sensors agree with the estimate.
     Good,
     /// The estimate must not be used.
-    Doubtful(Doubt),
+    Unhealthy(HealthIssue),
 }
 
 numbered_enum! {
 /// Why an estimate must not be used; the worst reason comes first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Doubt {
+pub enum HealthIssue {
     /// The state was not a number, and the filter restarted.
     Restarted = "estimate diverged and started afresh",
-    /// The inertial unit has sent nothing usable for several frames.
+    /// The inertial unit has sent no usable sample for several frames.
     Imu = "no usable inertial samples",
     /// The filter had to increase its uncertainty, because satellite velocities differed too much
     /// from their predictions on average.
@@ -56,7 +56,7 @@ impl fmt::Display for Health {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Good => out.write_str("good"),
-            Self::Doubtful(doubt) => out.write_str(doubt.name()),
+            Self::Unhealthy(reason) => out.write_str(reason.name()),
         }
     }
 }
@@ -70,9 +70,9 @@ pub(super) fn judge(
     surprised: bool,
 ) -> Health {
     let limits = &config.health;
-    // In the order of the doubts.
+    // In the order of the reasons.
     let applies = [
-        restart_age_s < DOUBT_AFTER_RESTART_S,
+        restart_age_s < UNHEALTHY_AFTER_RESTART_S,
         aids.imu.refused_in_a_row > BRIDGED_FRAMES,
         surprised,
         sigmas.velocity_m_s.z > limits.velocity_m_s || sigmas.velocity_m_s.xy().max() > limits.lateral_m_s,
@@ -80,15 +80,15 @@ pub(super) fn judge(
         sigmas.position_m.xy().max() > limits.horizontal_m,
         sigmas.attitude_rad.xy().max() > limits.tilt_deg.to_radians(),
     ];
-    let doubt = Doubt::ALL.into_iter().zip(applies).find_map(|(doubt, applies)| applies.then_some(doubt));
-    doubt.map_or(Health::Good, Health::Doubtful)
+    let issue = HealthIssue::ALL.into_iter().zip(applies).find_map(|(issue, holds)| holds.then_some(issue));
+    issue.map_or(Health::Good, Health::Unhealthy)
 }
 
 with_defaults! {
-    /// Whether satellite velocities still fit on average. Each of them may pass its gate although
-    /// together they differ too much from their predictions: the test of the normalised innovation
-    /// squared over time (Y. Bar-Shalom, X. R. Li and T. Kirubarajan, Estimation with Applications
-    /// to Tracking and Navigation, 2001, section 5.4), with a memory that fades.
+    /// Consistency of satellite velocities over time. Each may pass its gate although together they
+    /// differ too much from their predictions: the test of the normalised innovation squared over
+    /// time (Y. Bar-Shalom, X. R. Li and T. Kirubarajan, Estimation with Applications to Tracking
+    /// and Navigation, 2001, section 5.4), with a fading memory.
     #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
     pub(super) struct Surprise {
         mean: f64 = 1.0,
@@ -121,17 +121,17 @@ impl Surprise {
 // satellite heights with their slow offset, and the lidar. The second is the barometer's last
 // sample without its estimated errors.
 
-/// An older barometer sample is not used, s: a dozen samples are missing.
-const BAROMETER_KEEPS_S: f64 = 0.25;
+/// Maximum age of a barometer sample, s: a dozen missing samples.
+const BAROMETER_MAX_AGE_S: f64 = 0.25;
 /// Correlation time of the vertical velocity's errors, s: satellite velocities correct them in
 /// about that time.
 const VELOCITY_ERROR_LASTS_S: f64 = 1.0;
 
-/// Growth of the height's variance with each measurement that does not fit; below 1 the variance
-/// would shrink.
-const DOUBT_FACTOR: f64 = 1.1;
+/// Growth of the height's variance with each rejected measurement; below 1 the variance would
+/// shrink.
+const INFLATION_FACTOR: f64 = 1.1;
 
-/// A difference of fewer standard deviations is no contradiction.
+/// Smallest contradiction, standard deviations.
 const CONTRADICTS_SIGMAS: f64 = 3.0;
 
 /// Heights of the centre of gravity above the pad, from two sources.
@@ -151,8 +151,8 @@ impl HeightSources {
         self.barometric_m.map(|height_m| (height_m - self.inertial_m).abs())
     }
 
-    /// The same, if the inertial height is known well enough to contradict, m; without fixes it is
-    /// not for long.
+    /// The same, m, if the inertial height is accurate enough to contradict; without fixes it soon
+    /// is not.
     pub fn contradiction_m(&self) -> Option<f64> {
         self.disagreement_m()
             .filter(|off_m| off_m.is_nan() || *off_m > CONTRADICTS_SIGMAS * self.inertial_sigma_m)
@@ -247,9 +247,9 @@ impl HeightChannel {
         let variance = height * with_height + offset * with_offset + noise;
         let gate = config.gate_sigmas * config.gate_sigmas * variance;
         if innovation_m.is_nan() || innovation_m * innovation_m > gate {
-            // Each rejected measurement increases the variance a little, so that the channel cannot
+            // Each rejected measurement inflates the variance a little, so that the channel cannot
             // reject a sensor forever.
-            self.height_m2 *= DOUBT_FACTOR;
+            self.height_m2 *= INFLATION_FACTOR;
             return;
         }
         let (gain_height, gain_offset) = (with_height / variance, with_offset / variance);
@@ -264,7 +264,7 @@ impl HeightChannel {
         HeightSources {
             inertial_m: self.height_m,
             inertial_sigma_m: libm::sqrt(self.height_m2.max(0.0)),
-            barometric_m: (self.barometer_age_s <= BAROMETER_KEEPS_S).then_some(self.barometric_m),
+            barometric_m: (self.barometer_age_s <= BAROMETER_MAX_AGE_S).then_some(self.barometric_m),
         }
     }
 

@@ -1,35 +1,35 @@
 //! The lidar: the slant range to the ground behind the vehicle.
 
-use super::correction::{DOUBT_POSITION_M, POSITION_REJECTIONS, shown_by_height};
+use super::correction::{INFLATION_POSITION_M, POSITION_REJECTIONS, shown_by_height};
 use super::covariance::{ATTITUDE, LIDAR_LATE, POSITION, SLOPE};
 use super::{Estimator, HeightSources};
 use crate::estimation::sensor_watch::LIDAR_BLIND_M;
 
-/// A beam that leans wrongly is wrong in the same way in as many samples as come while the vehicle
-/// leans the same way: 20 in 0.2 s.
+/// Number of correlated samples: a beam misalignment causes the same error in all samples taken at
+/// the same lean, 20 in 0.2 s.
 const ASKEW_SAMPLES: f64 = 20.0;
-/// Ranges that do not fit the estimate must agree with each other by this before they are believed
-/// instead of it, m: two hundredths of a second apart the estimate's error changes by centimetres,
-/// and an outlier by metres.
+/// Agreement of ranges that contradict the estimate, m, before they are accepted instead of it: in
+/// two hundredths of a second the estimate's error changes by centimetres, and an outlier by
+/// metres.
 const AGREES_M: f64 = 0.5;
-/// A height that is farther from that of the barometer, m, is not believed instead of the estimate,
-/// whatever agrees: the own exhaust is worth 3 m of pressure, a slow offset some more.
+/// Distance from the barometer's height, m, beyond which such ranges are not accepted: the
+/// vehicle's exhaust causes 3 m of pressure error, a slow offset some more.
 const ASTRAY_M: f64 = 8.0;
 /// Cosine of the tilt (49 degrees) beyond which a lidar range is not used for the height: the beam
 /// meets the ground too far away.
 const LIDAR_COS_TILT: f64 = 0.65;
 
-/// At this vertical speed no range repeats the one before it to the centimetre, m/s.
+/// Vertical speed, m/s, at which no range repeats the one before it to the centimetre.
 const MOVES_M_S: f64 = 1.0;
-/// A height by the lidar that is off by more, m, and standard deviations, loses to two others that
-/// agree.
+/// Deviation of a lidar height, m and standard deviations, that loses against two other heights
+/// that agree.
 const CONTRADICTS_M: f64 = 1.0;
 const CONTRADICTS_SIGMAS: f64 = 2.0;
-/// They agree if they are apart by less than this share of the farther one's distance from it.
+/// Two heights agree if they differ by less than this share of the farther one's distance from it.
 const AGREE_SHARE: f64 = 0.7;
 
 impl Estimator {
-    /// Whether barometer and inertial height, which know nothing of the lidar, agree against its
+    /// Whether barometer and inertial height, both independent of the lidar, agree against its
     /// height, m.
     fn others_contradict_m(&self, height_m: f64) -> bool {
         let HeightSources { inertial_m, inertial_sigma_m, barometric_m } =
@@ -53,7 +53,7 @@ impl Estimator {
         }
         let state = &self.nominal;
         let climb_m_s = state.velocity_m_s.z;
-        // Where the beam meets the ground, from the pad.
+        // The point where the beam meets the ground, from the pad.
         let reach = state.position_m.z / nose.z;
         let hit_m = state.position_m.xy() - nose.xy() * reach;
         let height_m = state.position_m.z - state.lidar_late_s * climb_m_s - state.slope.dot(&hit_m);
@@ -73,8 +73,8 @@ impl Estimator {
         }
         let aside_m = self.nominal.world_from_body * nalgebra::Vector3::new(0.0, lever_m.y, lever_m.z);
         let measured_m = range_m - lever_m.x - aside_m.z / nose.z;
-        // The beam leans as the airframe does, not as the inertial unit does: the same error in
-        // many samples.
+        // The beam leans with the airframe, not with the inertial unit: the same error in many
+        // samples.
         let askew_m = slant_m * nose.xy().norm() / nose.z * self.config.mounting_deg.to_radians();
         let noise = self.config.lidar_m * self.config.lidar_m + askew_m * askew_m * ASKEW_SAMPLES;
         let take = |estimator: &mut Self| {
@@ -94,9 +94,9 @@ impl Estimator {
         let astray = barometric_m.is_some_and(|height_m| (measured_m * nose.z - height_m).abs() > ASTRAY_M);
         if agrees && !astray && self.aids.lidar.refused_in_a_row >= POSITION_REJECTIONS {
             self.aids.lidar.refused_in_a_row = 0;
-            self.covariance.widen(POSITION + 2, DOUBT_POSITION_M * DOUBT_POSITION_M);
-            // At once: the barometer's next sample would end the doubt at the height that no range
-            // fits.
+            self.covariance.widen(POSITION + 2, INFLATION_POSITION_M * INFLATION_POSITION_M);
+            // At once: the barometer's next sample would end the rejection at a height that fits no
+            // range.
             take(self);
         }
         if measured_m.is_finite() {

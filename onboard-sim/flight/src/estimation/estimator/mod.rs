@@ -45,7 +45,7 @@ use self::covariance::{
 };
 use self::gnss::FixAge;
 use self::gnss_gate::GnssGate;
-pub use self::health::{Doubt, Health, HeightSources};
+pub use self::health::{Health, HealthIssue, HeightSources};
 use self::health::{HeightChannel, Surprise};
 use self::recovery::Contradiction;
 use self::strapdown::{History, Noise, Nominal, Pending};
@@ -131,7 +131,7 @@ impl Estimate {
 /// The filter. Only `step` advances it. A clone continues with exactly the same bits.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Estimator {
-    // What is skipped is a constant of the mission.
+    // Skipped fields are constants of the mission.
     #[serde(skip)]
     config: EstimatorConfig,
     #[serde(skip)]
@@ -147,13 +147,13 @@ pub struct Estimator {
     /// The last range of the lidar, m.
     last_range_m: f64,
     heights: HeightChannel,
-    /// The same without the lidar, which they may contradict.
+    /// The same without the lidar, to check the lidar against.
     heights_without_lidar: HeightChannel,
     sideways: Sideways,
     aids: Aids,
-    /// What was felt and the fixes agree on another height than the barometer's.
+    /// Inertial height and fixes agree on another height than the barometer's.
     barometer_outvoted: bool,
-    /// They can as soon as more numbers of satellite positions were used than these.
+    /// Number of used satellite position components from which on they may outvote it.
     outvoted_from: u32,
     surprise: Surprise,
     fix_age: FixAge,
@@ -162,15 +162,15 @@ pub struct Estimator {
     /// Measured specific force over the true one, at rest on the pad.
     accelerometer_scale: f64,
     last_imu: ImuSample,
-    /// The landing motor has shaken the gyro.
+    /// The landing motor's vibration has shifted the gyro.
     is_shaken: bool,
     rate_rad_s: Vector3<f64>,
     specific_force_m_s2: Vector3<f64>,
     last_good: Nominal,
     restarts: u32,
     restarted_at_s: f64,
-    /// After a surprise, s.
-    doubted_until_s: f64,
+    /// Unhealthy until this time after a surprise, s.
+    unhealthy_until_s: f64,
 }
 
 // Configuration, noise and the initial uncertainty come from the mission.
@@ -207,7 +207,7 @@ impl Estimator {
             last_good: nominal,
             restarts: 0,
             restarted_at_s: f64::NEG_INFINITY,
-            doubted_until_s: f64::NEG_INFINITY,
+            unhealthy_until_s: f64::NEG_INFINITY,
         }
     }
 
@@ -266,17 +266,17 @@ impl Estimator {
     }
 
     /// Adds to the standard deviation of the velocity, world, m/s.
-    pub(crate) fn doubt_velocity(&mut self, sigma_m_s: &Vector3<f64>) {
+    pub(crate) fn inflate_velocity(&mut self, sigma_m_s: &Vector3<f64>) {
         self.catch_up();
         for axis in 0..3 {
             self.covariance.widen(VELOCITY + axis, sigma_m_s[axis] * sigma_m_s[axis]);
         }
     }
 
-    /// Takes a shock along the nose that no inertial unit measures: it changes the velocity by
-    /// about so much, m/s, and a fix from before it does not show the velocity after it.
+    /// Accounts for a shock along the nose that no inertial unit measures: it changes the velocity
+    /// by about this much, m/s, and a fix from before it does not show the velocity after it.
     pub(crate) fn take_shock(&mut self, gained_m_s: f64) {
-        self.doubt_velocity(&(self.nominal.world_from_body * Vector3::x() * gained_m_s));
+        self.inflate_velocity(&(self.nominal.world_from_body * Vector3::x() * gained_m_s));
         self.history.restart();
         self.gnss_gate.expect_shock(gained_m_s);
     }
@@ -312,14 +312,14 @@ impl Estimator {
                 &self.aids,
                 &sigmas,
                 time_s - self.restarted_at_s,
-                time_s < self.doubted_until_s,
+                time_s < self.unhealthy_until_s,
             ),
             sigmas,
             heights: self.heights.sources(),
         }
     }
 
-    /// The status of what corrects it.
+    /// The status of each aiding measurement.
     pub fn aids(&self) -> &Aids {
         &self.aids
     }
@@ -347,7 +347,7 @@ impl Estimator {
         Some(error.dot(&covariance.cholesky()?.solve(&error)))
     }
 
-    /// Position with the height over the ground below the vehicle, which a landing needs.
+    /// Position with the height over the ground below the vehicle, as needed for a landing.
     fn over_ground_m(&self) -> Vector3<f64> {
         let position_m = self.nominal.position_m;
         position_m - Vector3::z() * self.nominal.slope.dot(&position_m.xy())
@@ -367,7 +367,7 @@ impl Estimator {
         self.nominal.velocity_m_s - self.nominal.wind_m_s.push(0.0)
     }
 
-    /// Keeps the last good state, and returns to it when the present state is not a number.
+    /// Stores the last good state, and restores it when the present state is NaN.
     fn guard(&mut self) {
         if self.nominal.is_finite() && self.covariance.is_finite() && self.heights.is_finite() {
             self.last_good = self.nominal;
@@ -439,7 +439,7 @@ impl ImuSample {
     pub(crate) const NONE: Self =
         Self { gyro_rad_s: Vector3::new(0.0, 0.0, 0.0), specific_force_m_s2: Vector3::new(0.0, 0.0, 0.0) };
 
-    /// Whether an inertial unit can send these numbers: they are below [`LARGEST_RATE_RAD_S`] and
+    /// Whether an inertial unit can produce these values: they are below [`LARGEST_RATE_RAD_S`] and
     /// [`LARGEST_SPECIFIC_FORCE_M_S2`] in each axis.
     pub fn is_plausible(&self) -> bool {
         self.gyro_is_plausible() && self.accelerometer_is_plausible()
@@ -454,7 +454,7 @@ impl ImuSample {
     }
 }
 
-/// One fix of the satellite receiver, of the antenna. It arrives late: it holds for the time
+/// One fix of the satellite receiver, for the antenna. It arrives late and is valid at
 /// `valid_at_s`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GnssFix {
@@ -464,11 +464,11 @@ pub struct GnssFix {
     /// Time of validity on the flight computer's clock, s: from power-up on the pad, and T+ (from
     /// the release) in flight. A fix older than the estimator's history is rejected.
     pub valid_at_s: f64,
-    /// The receiver's own statement about the fix.
+    /// The receiver's accuracy report for the fix.
     pub quality: FixQuality,
 }
 
-/// The quality that a satellite receiver reports of its fix; zero where it reports none.
+/// Quality reported by a satellite receiver; zero where it reports none.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct FixQuality {
     /// Number of satellites used.
@@ -494,7 +494,7 @@ pub struct Measurements {
 }
 
 impl Measurements {
-    /// Of a frame in which no other sensor reported.
+    /// Measurements of a frame in which no other sensor reported.
     pub const fn of_imu(imu: ImuSample) -> Self {
         Self { imu, pressure_altitude_m: None, gnss: None, lidar_range_m: None }
     }

@@ -1,7 +1,7 @@
-//! Recovery of a lost estimate: barometer and satellite receiver agree with each other, and not
-//! with it.
+//! Recovery of a lost estimate: barometer and satellite receiver agree with each other, and
+//! contradict it.
 //!
-//! After an inertial failure every good measurement is rejected, because the filter is sure of its
+//! After an inertial failure every good measurement is rejected, because the filter trusts its
 //! state. Two sensors that fail in the same way for a second are less likely than one filter.
 
 use nalgebra::Vector3;
@@ -10,21 +10,21 @@ use serde::Serialize;
 use super::covariance::{ATTITUDE, POSITION, VELOCITY};
 use super::{Estimator, GnssFix, Measurements, health, start_heights};
 
-/// The two heights agree within this, m, and within this share: the barometer's scale.
+/// Agreement of the two heights: within this, m, and within this share, the barometer's scale.
 const AGREE_M: f64 = 5.0;
 const AGREE_SHARE: f64 = 0.07;
-/// The estimate is off by at least this, m, and by so many times what the two are apart.
+/// Smallest error of a lost estimate, m, and as a multiple of the difference of the two.
 const LOST_M: f64 = 20.0;
 const LOST_TIMES: f64 = 3.0;
-/// For so long, s.
+/// Time for which it must last, s.
 const LOST_S: f64 = 1.0;
-/// A fix older than this shows no height, s.
+/// Maximum age of a fix, s.
 const FIX_LASTS_S: f64 = 0.6;
-/// Lean of an attitude that was lost, rad.
+/// Assumed lean uncertainty of a lost attitude, rad.
 const LOST_RAD: f64 = 0.3;
 
 with_defaults! {
-    /// The last fix, admitted or not, and for how long the estimate has been contradicted, s.
+    /// The last fix, admitted or not, and the time for which the estimate has been contradicted, s.
     #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
     pub(super) struct Contradiction {
         fix_m: Vector3<f64> = Vector3::zeros(),
@@ -36,7 +36,7 @@ with_defaults! {
 }
 
 impl Estimator {
-    /// Takes a frame's measurements, and gives the estimate up when both have contradicted it for
+    /// Takes a frame's measurements, and restarts the estimate once both have contradicted it for
     /// long enough.
     pub(super) fn recover_if_lost(&mut self, measurements: &Measurements) {
         let seen = &mut self.contradiction;
@@ -70,6 +70,6 @@ impl Estimator {
         self.heights = start_heights(&self.start, altitude_m);
         self.heights_without_lidar = self.heights;
         self.gnss_gate.trust();
-        self.doubted_until_s = self.time_s() + health::DOUBT_AFTER_RESTART_S;
+        self.unhealthy_until_s = self.time_s() + health::UNHEALTHY_AFTER_RESTART_S;
     }
 }

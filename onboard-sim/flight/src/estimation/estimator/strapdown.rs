@@ -1,4 +1,4 @@
-//! Propagates the state and its error with the inertial unit, and keeps the recent motion for late
+//! Propagates the state and its error with the inertial unit, and stores the recent motion for late
 //! measurements.
 //!
 //! The motion follows the navigation equations of a world at rest (Groves 2013, chapter 5); its
@@ -16,9 +16,9 @@ use super::{Estimator, EstimatorConfig, GRAVITY_M_S2, ImuSample};
 use crate::vehicle::mission::LeverArms;
 use crate::vehicle::rigid::RigidState;
 
-/// The covariance is propagated once in this many frames, and before every correction.
+/// Frames between propagations of the covariance; it is also propagated before every correction.
 const FRAMES_BETWEEN: u32 = 2;
-/// Below this height the wind's power law is not used, m: it does not hold so near to the ground.
+/// Height below which the wind's power law is not used, m: it does not hold near the ground.
 const LOWEST_SHEAR_M: f64 = 2.0;
 
 /// The estimated state; its error is in the filter.
@@ -100,8 +100,8 @@ impl Nominal {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Noise {
     pub(super) accelerometer_m_s2_sqrt_hz: f64,
-    /// Variance that each error gains in a second: in the fall, and while the motor shakes the
-    /// inertial unit.
+    /// Variance that each error gains in a second: in the fall, and while the motor's vibration
+    /// affects the inertial unit.
     per_second: Row,
     burning_per_second: Row,
 }
@@ -137,11 +137,11 @@ impl Noise {
 }
 
 with_defaults! {
-    /// The motion over the frames that the covariance does not contain yet.
+    /// The motion in the frames not yet propagated in the covariance.
     #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
     pub(super) struct Pending {
         frames: u32 = 0,
-        felt_m_s: Vector3<f64> = Vector3::zeros(),
+        sensed_m_s: Vector3<f64> = Vector3::zeros(),
         world_from_body_s: Matrix3<f64> = Matrix3::zeros(),
         wind_factor: f64 = 1.0,
         burning: bool = false,
@@ -150,7 +150,7 @@ with_defaults! {
 
 impl Estimator {
     /// Integrates one frame: the attitude by the mean rate, the velocity by the mean specific force
-    /// turned by the attitude in the middle of the frame.
+    /// rotated by the attitude in the middle of the frame.
     pub(super) fn carry_forward(&mut self, imu: &ImuSample, burning: bool, levers: &LeverArms) {
         let interval_s = self.config.frame_s;
         let measured = self.aids.imu.count(imu.is_plausible());
@@ -177,9 +177,9 @@ impl Estimator {
         // Products of unit quaternions drift from unit length by rounding.
         state.world_from_body.renormalize_fast();
         let middle = middle.to_rotation_matrix();
-        let felt_m_s = middle * self.specific_force_m_s2 * interval_s;
-        self.gnss_gate.begin_frame(felt_m_s.norm(), measured, repeated);
-        let gained_m_s = felt_m_s - Vector3::z() * (self.config.gravity_m_s2 * interval_s);
+        let sensed_m_s = middle * self.specific_force_m_s2 * interval_s;
+        self.gnss_gate.begin_frame(sensed_m_s.norm(), measured, repeated);
+        let gained_m_s = sensed_m_s - Vector3::z() * (self.config.gravity_m_s2 * interval_s);
         let moved_m = (state.velocity_m_s + gained_m_s * 0.5) * interval_s;
         state.position_m += moved_m;
         state.velocity_m_s += gained_m_s;
@@ -193,7 +193,7 @@ impl Estimator {
         state.wind_m_s *= wind_factor;
 
         self.pending.frames += 1;
-        self.pending.felt_m_s += felt_m_s;
+        self.pending.sensed_m_s += sensed_m_s;
         self.pending.world_from_body_s += middle.matrix() * interval_s;
         self.pending.wind_factor *= wind_factor;
         self.pending.burning = burning;
@@ -210,7 +210,7 @@ impl Estimator {
         }
     }
 
-    /// Propagates the covariance over the frames that it does not contain yet.
+    /// Propagates the covariance over the pending frames.
     pub(super) fn catch_up(&mut self) {
         if self.pending.frames == 0 {
             return;
@@ -220,7 +220,7 @@ impl Estimator {
         let per_second = if self.pending.burning { &noise.burning_per_second } else { &noise.per_second };
         self.covariance.propagate(&Transition {
             interval_s,
-            felt_m_s: self.pending.felt_m_s,
+            sensed_m_s: self.pending.sensed_m_s,
             world_from_body_s: self.pending.world_from_body_s,
             wind_factor: self.pending.wind_factor,
             noise: per_second.map(|variance| variance * interval_s),
@@ -229,15 +229,15 @@ impl Estimator {
     }
 }
 
-// The antenna's recent motion, for fixes that arrive late.
+// The antenna's recent motion, for late fixes.
 //
 // The history holds the velocity gained and its integral, not past estimates. The past state is the
 // present estimate run backwards, so it contains every correction made since. (This is the
 // recalculation of Larsen and others, "Incorporation of time delayed measurements in a
-// discrete-time Kalman filter", CDC 1998, for a system whose motion in between is known better than
-// the measurement.)
+// discrete-time Kalman filter", CDC 1998, for a system whose motion in between is more accurate
+// than the measurement.)
 
-/// Frames kept: 320 ms at 200 Hz.
+/// Stored frames: 320 ms at 200 Hz.
 const LENGTH: usize = 64;
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -263,7 +263,7 @@ pub(super) struct Since {
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(super) struct History {
-    // A slice, because serde knows arrays of up to 32 elements.
+    // A slice, because serde supports arrays of up to 32 elements.
     #[serde(serialize_with = "<[Sums]>::serialize")]
     ring: [Sums; LENGTH],
     filled: usize,
@@ -278,7 +278,7 @@ impl History {
         Self { ring: [start; LENGTH], filled: 1, newest: 0, lever: [Vector3::zeros(); 2] }
     }
 
-    /// Forgets the motion before the newest frame.
+    /// Discards the motion before the newest frame.
     pub(super) fn restart(&mut self) {
         self.filled = 1;
     }

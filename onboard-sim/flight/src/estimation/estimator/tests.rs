@@ -105,7 +105,7 @@ fn a_silent_inertial_unit_is_bridged_and_then_makes_the_estimate_unhealthy() {
         health.push(estimator.step(&measurements, &VEHICLE).health);
     }
     assert!(health[..14].iter().all(|health| health.is_good()));
-    assert!(health[14..].iter().all(|health| *health == Health::Doubtful(Doubt::Imu)));
+    assert!(health[14..].iter().all(|health| *health == Health::Unhealthy(HealthIssue::Imu)));
     assert_eq!(health[19].to_string(), "no usable inertial samples");
     assert!(estimator.estimate().state.is_finite());
 }
@@ -156,11 +156,11 @@ fn a_state_that_is_not_a_number_restarts_from_the_last_good_one() {
     for frame in 1..=100 {
         estimator.step(&hovering(frame), &VEHICLE);
     }
-    // Bad input does not get this far; a bug in the filter itself would.
+    // Bad input is rejected before this point; a bug in the filter itself would not be.
     estimator.nominal.velocity_m_s.x = f64::NAN;
     let after = estimator.step(&hovering(101), &VEHICLE);
     assert!(after.state.is_finite());
-    assert_eq!(after.health, Health::Doubtful(Doubt::Restarted));
+    assert_eq!(after.health, Health::Unhealthy(HealthIssue::Restarted));
     assert_eq!(estimator.restarts(), 1);
     let mut health = after.health;
     for frame in 102..=600 {
@@ -235,7 +235,7 @@ fn height_error_with_a_late_lidar(lidar_late_s: f64) -> (f64, f64) {
 }
 
 #[test]
-fn a_filter_that_expects_a_late_lidar_doubts_its_ranges() {
+fn a_filter_that_expects_a_late_lidar_inflates_the_variance_of_its_ranges() {
     let (expecting_m, expecting_sigma_m) = height_error_with_a_late_lidar(0.01);
     assert!(expecting_m.abs() < 2.0 * expecting_sigma_m, "{expecting_m} m with {expecting_sigma_m} m");
     let (trusting_m, trusting_sigma_m) = height_error_with_a_late_lidar(0.0);
@@ -267,12 +267,12 @@ fn heights_with_ranges_from(first: u64, tenth_m: f64, has_barometer: bool) -> Ve
 
 /// Against one other height.
 #[test]
-fn ranges_that_agree_for_a_tenth_of_a_second_are_believed_at_once() {
+fn ranges_that_agree_for_a_tenth_of_a_second_are_accepted() {
     for first in [402, 404] {
         // An outlier as the tenth: the next two decide.
-        for (tenth_m, believed_after) in [(4.6, 18), (30.0, 22)] {
+        for (tenth_m, accepted_after) in [(4.6, 18), (30.0, 22)] {
             let heights_m = heights_with_ranges_from(first, tenth_m, false);
-            let (before_m, after_m) = heights_m.split_at(believed_after);
+            let (before_m, after_m) = heights_m.split_at(accepted_after);
             assert!(before_m.iter().all(|height_m| (height_m - 8.0).abs() < 0.1), "{first}: {heights_m:?}");
             assert!(after_m.iter().all(|height_m| (height_m - 5.0).abs() < 0.3), "{first}: {heights_m:?}");
         }
@@ -315,17 +315,17 @@ fn two_heights_outvote_the_third() {
         let fixes_off = hover_with_heights_off(0.0, off_m);
         assert!((fixes_off.state.position_m.z - 5.0).abs() < 0.5, "{fixes_off:?}");
         assert!(fixes_off.heights.barometric_m.is_some(), "{fixes_off:?}");
-        // Which of two that are off together is right, nothing shows.
+        // Nothing shows which of two deviating sources is right.
         let both_off = hover_with_heights_off(-off_m, off_m);
         assert!(both_off.heights.contradiction_m() != Some(0.0), "{both_off:?}");
     }
 }
 
-/// A charge changes the velocity by what no inertial unit feels. The fixes show it, and nothing
-/// else is doubted.
+/// A charge changes the velocity without a trace in the inertial unit. The fixes show it, and no
+/// other state is inflated.
 #[test]
 fn an_expected_shock_does_not_spoil_the_attitude() {
-    let doubts = [true, false].map(|expected| {
+    let deviations = [true, false].map(|expected| {
         let mut estimator = at(5.0);
         let mut estimate = estimator.estimate();
         for frame in 1..=1400 {
@@ -343,10 +343,10 @@ fn an_expected_shock_does_not_spoil_the_attitude() {
         assert!((estimate.state.velocity_m_s.z - 0.5).abs() < 0.1, "{estimate:?}");
         estimate.sigmas.attitude_rad.x.to_degrees()
     });
-    assert!(doubts[0] < 1.0 && doubts[1] > 2.0, "{doubts:?}");
+    assert!(deviations[0] < 1.0 && deviations[1] > 2.0, "{deviations:?}");
 }
 
-/// The doubt of the gyro's bias grows once, when the motor lights.
+/// The gyro bias is inflated once, at ignition of the motor.
 #[test]
 fn the_landing_motor_may_shift_the_gyros_bias() {
     let config = EstimatorConfig { burning_gyro_bias_deg_s: 0.1, ..EstimatorConfig::default() };
@@ -354,10 +354,10 @@ fn the_landing_motor_may_shift_the_gyros_bias() {
         Estimator::new(&config, &StartUncertainty::at_apogee(), 0.0, &RigidState::upright(20.0));
     let rest = ImuSample { gyro_rad_s: Vector3::zeros(), specific_force_m_s2: Vector3::x() * 9.8 };
     let burning = VehicleNow { motor_burning: true, ..VEHICLE };
-    let mut doubt = |vehicle: &VehicleNow| {
+    let mut deviation = |vehicle: &VehicleNow| {
         estimator.step(&Measurements::of_imu(rest), vehicle).sigmas.gyro_bias_rad_s.y.to_degrees()
     };
-    let [falls, lights, burns] = [&VEHICLE, &burning, &burning].map(&mut doubt);
+    let [falls, lights, burns] = [&VEHICLE, &burning, &burning].map(&mut deviation);
     assert!((libm::hypot(falls, 0.1) - lights).abs() < 1e-4, "{falls} {lights}");
     assert!((burns - lights).abs() < 1e-4, "{lights} {burns}");
 }

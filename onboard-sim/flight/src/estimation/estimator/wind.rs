@@ -2,7 +2,7 @@
 //!
 //! In free fall only the air exerts a force: the sideways specific force is the fins' drag along
 //! the relative wind plus the body's cross-flow drag (Hoerner, "Fluid-Dynamic Drag", 1965,
-//! cross-flow principle). It corrects only the estimated wind, because a wrong drag coefficient
+//! cross-flow principle). It corrects the estimated wind alone, because a wrong drag coefficient
 //! must not tilt the attitude.
 
 use nalgebra::{Matrix2, Matrix2x3, Rotation3, Vector2, Vector3};
@@ -14,9 +14,9 @@ use crate::vehicle::airframe::{Airframe, MassProperties};
 use crate::vehicle::fins::ROLL;
 use crate::vehicle::mission::{Exhaust, LeverArms};
 
-/// Frames whose sideways force is averaged for one update: 20 ms, in which a gust hardly changes.
+/// Frames averaged for one update: 20 ms, in which a gust hardly changes.
 const FRAMES: u32 = 4;
-/// Below this dynamic pressure the force is not used, Pa: at 6 m/s it is small beside the
+/// Dynamic pressure below which the force is not used, Pa: at 6 m/s it is small beside the
 /// accelerometer's errors.
 const SMALLEST_DYNAMIC_PRESSURE_PA: f64 = 20.0;
 /// An error of the drag coefficients does not average out. It counts as noise with this correlation
@@ -49,12 +49,12 @@ impl Sideways {
 
 /// Sideways specific force of the air, body y and z, m/s^2, and its derivative by the sideways
 /// relative wind, 1/s.
-fn felt_sideways(
+fn sensed_sideways(
     vehicle: &VehicleNow,
     through_air_m_s: &Vector3<f64>,
     rate_rad_s: &Vector3<f64>,
 ) -> (Vector2<f64>, Matrix2<f64>) {
-    let felt = vehicle.air_force_n(through_air_m_s, rate_rad_s).yz() / vehicle.mass_kg;
+    let sensed = vehicle.air_force_n(through_air_m_s, rate_rad_s).yz() / vehicle.mass_kg;
     let sideways = through_air_m_s.yz();
     let speed_sideways = sideways.norm();
     let body = vehicle.crossflow_area_m2;
@@ -62,7 +62,7 @@ fn felt_sideways(
     // Without sideways wind its direction is undefined, and this term is zero.
     let along = sideways * sideways.transpose() / speed_sideways.max(1e-6);
     let slope = Matrix2::identity() * (fins + body * speed_sideways) + along * body;
-    (felt, slope * (-0.5 * vehicle.air_density_kg_m3 / vehicle.mass_kg))
+    (sensed, slope * (-0.5 * vehicle.air_density_kg_m3 / vehicle.mass_kg))
 }
 
 impl Estimator {
@@ -70,8 +70,8 @@ impl Estimator {
     pub(super) fn update_wind(&mut self, vehicle: &VehicleNow) {
         let through_air = self.velocity_through_air_m_s();
         let dynamic_pressure_pa = 0.5 * vehicle.air_density_kg_m3 * through_air.norm_squared();
-        let felt = dynamic_pressure_pa > SMALLEST_DYNAMIC_PRESSURE_PA;
-        if vehicle.motor_burning || !felt {
+        let sensed = dynamic_pressure_pa > SMALLEST_DYNAMIC_PRESSURE_PA;
+        if vehicle.motor_burning || !sensed {
             self.sideways.clear();
             return;
         }
@@ -81,12 +81,12 @@ impl Estimator {
         let at_m_s = self.linearised_at_m_s(vehicle, &mean, &body_from_world, mean_over_s);
         let through_air = self.nominal.velocity_m_s - at_m_s.push(0.0);
         let in_body = body_from_world * through_air;
-        let (felt, slope) = felt_sideways(vehicle, &in_body, &self.rate_rad_s);
+        let (sensed, slope) = sensed_sideways(vehicle, &in_body, &self.rate_rad_s);
         let by_velocity: Matrix2x3<f64> = slope * body_from_world.matrix().fixed_rows::<2>(1);
         let by_attitude = by_velocity * through_air.cross_matrix();
-        let noise = self.sideways_variance(&felt, mean_over_s);
+        let noise = self.sideways_variance(&sensed, mean_over_s);
         // At the estimated wind, on the line through the point where the force was linearised.
-        let felt = felt - by_velocity.fixed_columns::<2>(0) * (self.nominal.wind_m_s - at_m_s);
+        let sensed = sensed - by_velocity.fixed_columns::<2>(0) * (self.nominal.wind_m_s - at_m_s);
         for axis in 0..2 {
             let sensitivity = [
                 (VELOCITY, by_velocity[(axis, 0)]),
@@ -99,27 +99,26 @@ impl Estimator {
                 (WIND, -by_velocity[(axis, 0)]),
                 (WIND + 1, -by_velocity[(axis, 1)]),
             ];
-            let correction = self.correct(&sensitivity, mean[axis] - felt[axis], noise, |index| {
+            let correction = self.correct(&sensitivity, mean[axis] - sensed[axis], noise, |index| {
                 (WIND..WIND + 2).contains(&index)
             });
             self.aids.wind.take(&correction);
         }
     }
 
-    /// Variance of the mean sideways force, felt as such, (m/s^2)^2.
-    fn sideways_variance(&self, felt_m_s2: &Vector2<f64>, mean_over_s: f64) -> f64 {
+    /// Variance of the mean sideways specific force, (m/s^2)^2.
+    fn sideways_variance(&self, sensed_m_s2: &Vector2<f64>, mean_over_s: f64) -> f64 {
         let noise_m_s2_sqrt_hz = self.noise.accelerometer_m_s2_sqrt_hz;
         let white = noise_m_s2_sqrt_hz * noise_m_s2_sqrt_hz / mean_over_s;
-        let share = self.config.sideways_force_share * felt_m_s2.norm();
+        let share = self.config.sideways_force_share * sensed_m_s2.norm();
         white + share * share * COEFFICIENT_ERROR_LASTS_S / mean_over_s
     }
 
     /// The wind at which the sideways force is linearised: the estimated wind, or with more passes
-    /// the most likely wind by the steps of Gauss and Newton (the iterated filter; Bell and Cathey,
-    /// IEEE Trans. Automatic Control 38, 1993). The body's cross-flow force grows with the square
-    /// of the wind and has no slope in still air. Linearised there, all of a first force counts as
-    /// the fins', and the wind comes out as much as three times too strong, or the force is
-    /// rejected.
+    /// the most likely wind by Gauss-Newton steps (the iterated filter; Bell and Cathey, IEEE
+    /// Trans. Automatic Control 38, 1993). The body's cross-flow force grows with the square of the
+    /// wind and has no slope in still air. Linearised there, a first force is attributed to the
+    /// fins alone, and the wind comes out up to three times too strong, or the force is rejected.
     fn linearised_at_m_s(
         &mut self,
         vehicle: &VehicleNow,
@@ -138,11 +137,11 @@ impl Estimator {
         let mut at_m_s = estimated_m_s;
         for _ in 1..self.config.wind_passes {
             let in_body = body_from_world * (self.nominal.velocity_m_s - at_m_s.push(0.0));
-            let (felt, slope) = felt_sideways(vehicle, &in_body, &self.rate_rad_s);
+            let (sensed, slope) = sensed_sideways(vehicle, &in_body, &self.rate_rad_s);
             let by_wind = -slope * body_from_world.matrix().fixed_view::<2, 2>(1, 0);
-            let noise = Matrix2::identity() * self.sideways_variance(&felt, mean_over_s);
+            let noise = Matrix2::identity() * self.sideways_variance(&sensed, mean_over_s);
             let seen = by_wind * prior * by_wind.transpose() + noise;
-            let missed = mean_m_s2 - felt - by_wind * (estimated_m_s - at_m_s);
+            let missed = mean_m_s2 - sensed - by_wind * (estimated_m_s - at_m_s);
             let Some(inverse) = seen.try_inverse() else { break };
             at_m_s = estimated_m_s + prior * by_wind.transpose() * inverse * missed;
         }
@@ -150,7 +149,7 @@ impl Estimator {
     }
 }
 
-// The known data of the vehicle in one frame, and the force of the air that follows from them.
+// Vehicle data of one frame, and the aerodynamic force that follows from them.
 
 /// The data of the vehicle that the estimator needs in this frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -159,8 +158,8 @@ pub struct VehicleNow {
     pub air_density_kg_m3: f64,
     /// Axial drag coefficient of the body times its area, m^2.
     pub body_drag_area_m2: f64,
-    /// Drag area of the legs, m^2. Their drag is along the relative wind, too; what turning adds to
-    /// it is left out.
+    /// Drag area of the legs, m^2. Their drag is along the relative wind, too; the contribution of
+    /// rotation is neglected.
     pub leg_drag_area_m2: f64,
     /// Sum over the fins of drag coefficient times area at their present openings, m^2. Their drag
     /// is along the relative wind, so this counts sideways as well.
@@ -175,7 +174,7 @@ pub struct VehicleNow {
     /// times the dynamic pressure of the sideways wind alone.
     pub crossflow_area_m2: f64,
     /// The igniter has been fired, so the landing motor may burn. The wind is then not estimated
-    /// from the sideways force, because the motor's own sideways force is not known well enough.
+    /// from the sideways force, because the motor's sideways force is too uncertain.
     pub motor_burning: bool,
     /// Lever arms of the sensors.
     pub levers: LeverArms,
@@ -215,7 +214,7 @@ impl VehicleNow {
         }
     }
 
-    /// The vehicle with what its exhaust leaves of the drag of body and fins.
+    /// The vehicle with the drag of body and fins reduced by the exhaust.
     #[must_use]
     pub fn in_exhaust(self, exhaust: &Exhaust) -> Self {
         let fins = 1.0 - exhaust.fin_loss;
@@ -227,7 +226,7 @@ impl VehicleNow {
         }
     }
 
-    /// Force of the air in body axes, N, for a velocity through the air in body axes, m/s, and a
+    /// Aerodynamic force in body axes, N, for a velocity through the air in body axes, m/s, and a
     /// rotation rate, rad/s: drag of the body along its axis (Eq. 8 of the landing paper) and
     /// across it, drag and lift of the fins.
     pub fn air_force_n(&self, through_air_m_s: &Vector3<f64>, rate_rad_s: &Vector3<f64>) -> Vector3<f64> {
@@ -252,9 +251,9 @@ mod tests {
     use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
     use crate::vehicle::rigid::RigidState;
 
-    /// The wind that a body with small fins feels after a fifth of a second of a fall through a
+    /// The wind estimated for a body with small fins after a fifth of a second of a fall through a
     /// wind of 8 m/s.
-    fn felt_of_8_m_s(wind_passes: u32) -> Vector2<f64> {
+    fn sensed_wind_of_8_m_s(wind_passes: u32) -> Vector2<f64> {
         const FRAME_S: f64 = 0.005;
         let vehicle = VehicleNow { mass_kg: 1.2, fin_drag_area_m2: 0.003, ..VEHICLE };
         let mut state = RigidState::upright(25.0);
@@ -264,10 +263,10 @@ mod tests {
         for _ in 0..40 {
             let through_air = state.velocity_m_s - Vector3::new(8.0, 0.0, 0.0);
             let in_body = state.world_from_body.inverse_transform_vector(&through_air);
-            let felt_m_s2 = vehicle.air_force_n(&in_body, &Vector3::zeros()) / vehicle.mass_kg;
+            let sensed_m_s2 = vehicle.air_force_n(&in_body, &Vector3::zeros()) / vehicle.mass_kg;
             state.velocity_m_s +=
-                FRAME_S * (state.world_from_body * felt_m_s2 - Vector3::z() * STANDARD_GRAVITY_M_S2);
-            let imu = ImuSample { gyro_rad_s: Vector3::zeros(), specific_force_m_s2: felt_m_s2 };
+                FRAME_S * (state.world_from_body * sensed_m_s2 - Vector3::z() * STANDARD_GRAVITY_M_S2);
+            let imu = ImuSample { gyro_rad_s: Vector3::zeros(), specific_force_m_s2: sensed_m_s2 };
             estimator.step(&Measurements::of_imu(imu), &vehicle);
         }
         estimator.estimate().wind_m_s
@@ -275,10 +274,10 @@ mod tests {
 
     #[test]
     fn a_body_with_small_fins_needs_several_passes() {
-        let once = felt_of_8_m_s(1);
+        let once = sensed_wind_of_8_m_s(1);
         assert!((once.x - 8.0).abs() > 3.0, "{once}");
-        let often = felt_of_8_m_s(6);
-        // The prior of still air still counts a little.
+        let often = sensed_wind_of_8_m_s(6);
+        // The prior of still air still has some weight.
         assert!((often - Vector2::new(8.0, 0.0)).norm() < 1.0, "{often}");
     }
 
@@ -286,15 +285,15 @@ mod tests {
     fn the_slope_is_the_difference_quotient() {
         let rate = Vector3::zeros();
         let at = Vector3::new(-40.0, 2.0, -1.5);
-        let (_, slope) = felt_sideways(&VEHICLE, &at, &rate);
+        let (_, slope) = sensed_sideways(&VEHICLE, &at, &rate);
         let step = 1e-6;
         for axis in 0..2 {
             let mut ahead = at;
             ahead[axis + 1] += step;
             let mut behind = at;
             behind[axis + 1] -= step;
-            let quotient = (felt_sideways(&VEHICLE, &ahead, &rate).0
-                - felt_sideways(&VEHICLE, &behind, &rate).0)
+            let quotient = (sensed_sideways(&VEHICLE, &ahead, &rate).0
+                - sensed_sideways(&VEHICLE, &behind, &rate).0)
                 / (2.0 * step);
             // The change of the speed is neglected: it is of the order of (sideways wind / speed)
             // squared.

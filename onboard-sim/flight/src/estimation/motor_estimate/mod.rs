@@ -1,15 +1,15 @@
 //! Estimates the impulse, the burn time and the instant of ignition of the motor from the specific
 //! force along the nose.
 //!
-//! A solid motor's impulse differs from its data sheet by about 2.5 %, its burn time by about 4
-//! %. With the nominal curve `T0(t)`, the impulse scale `s`, the burn-time stretch `b` and the
-//! instant of ignition `t0`, the thrust is `T(t) = (1 + n) s / b T0((t - t0) / b)`. The
-//! deviation `n` from the certified shape wanders: it is a first-order Gauss-Markov process
-//! with mean zero. Without it a shape error would pass for an error of impulse and burn time
-//! that the filter is ever surer of. The specific force along the nose contains the thrust and
-//! the air force: `m f_x = T cos p cos y + d A`, with the gimbal angles `p` and `y`, the
-//! modelled air force `A` and its scale `d`. An extended Kalman filter over `(s, b, t0, d, n)`
-//! finds all five; it finds `d` before ignition, while the vehicle falls.
+//! A solid motor's impulse differs from its data sheet by about 2.5 %, its burn time by about 4 %.
+//! With the nominal curve `T0(t)`, the impulse scale `s`, the burn-time stretch `b` and the instant
+//! of ignition `t0`, the thrust is `T(t) = (1 + n) s / b T0((t - t0) / b)`. The deviation `n` from
+//! the certified shape wanders: it is a first-order Gauss-Markov process with mean zero. Without it
+//! a shape error would be taken for an error of impulse and burn time, with ever-growing
+//! confidence. The specific force along the nose contains the thrust and the air force: `m f_x = T
+//! cos p cos y + d A`, with the gimbal angles `p` and `y`, the modelled air force `A` and its scale
+//! `d`. An extended Kalman filter over `(s, b, t0, d, n)` estimates all five; it estimates `d`
+//! before ignition, while the vehicle falls.
 //!
 //! The process and the filter are those of A. Gelb (editor), Applied Optimal Estimation, 1974,
 //! chapters 3 and 6.
@@ -35,7 +35,7 @@ pub struct MotorSample {
     pub axial_air_force_n: f64,
     /// Gimbal angles, pitch and yaw, rad.
     pub gimbal_rad: [f64; 2],
-    /// The igniter has been fired; ignition is only searched for after that.
+    /// The igniter has been fired; ignition is searched for only after that.
     pub may_burn: bool,
 }
 
@@ -63,19 +63,19 @@ with_defaults! {
         pub shape_sigma: f64 = 0.0,
         /// Correlation time of that deviation, s.
         pub shape_lasts_s: f64 = 1.0,
-        /// What the exhaust may change of the air force beyond what is assumed, as a fraction of
-        /// the air force.
+        /// Change of the air force by the exhaust beyond the assumed one, as a fraction of the air
+        /// force.
         pub exhaust_sigma: f64 = 0.0,
     }
 }
 
-/// State of the motor, as far as the accelerometer shows it.
+/// State of the motor according to the accelerometer.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum MotorStage {
-    /// Not lit.
+    /// Not ignited.
     Waiting,
     Burning,
-    /// The thrust fell far below the curve at this time, s: the motor burnt out early.
+    /// The thrust fell far below the curve at this time, s: the motor burned out early.
     EndedEarly {
         at_s: f64,
     },
@@ -98,11 +98,11 @@ pub struct MotorEstimate {
     /// Impulse scale, burn-time stretch, ignition, s, air scale, deviation from the shape.
     mean: Vector5<f64>,
     covariance: Matrix5<f64>,
-    /// When the deviation from the shape was last brought forward, s.
-    felt_at_s: f64,
+    /// Time of the last update of the deviation from the shape, s.
+    updated_at_s: f64,
     /// Frames in a row with far too little thrust.
     starved_frames: u32,
-    /// How long the motor had burnt when it chuffed, s; 0 if it did not.
+    /// Burn time before a chuff, s; 0 without one.
     chuffed_s: f64,
     /// Sum of the misfits of the burn's frames, and how many were compared.
     misfit: f64,
@@ -127,19 +127,19 @@ const GUST_SHARE: f64 = 0.03;
 const GUST_LASTS_S: f64 = 0.5;
 /// Wander of the air scale in one second: the flow changes with speed, lean and exhaust.
 const AIR_WALK_SQRT_S: f64 = 0.01;
-/// Below this air force the air scale is not estimated, N: the accelerometer's noise is as large.
+/// Air force below which its scale is not estimated, N: the accelerometer's noise is as large.
 const SMALLEST_AIR_N: f64 = 2.0;
-/// Below this fraction of the peak, in the tail-off, samples are not used.
+/// Fraction of the peak below which samples of the tail-off are not used.
 const TAIL_SHARE: f64 = 0.08;
 /// A sample that differs from its prediction by more than this many standard deviations is
 /// rejected.
 const GATE_SIGMAS: f64 = 5.0;
-/// Below this fraction of the predicted thrust, for [`STARVED_FRAMES`] in a row, the motor has
-/// burnt out: no motor is so weak.
+/// Fraction of the predicted thrust below which, for [`STARVED_FRAMES`] in a row, the motor has
+/// burned out: no motor is so weak.
 const STARVED_SHARE: f64 = 0.3;
 /// 80 ms: a dip of the thrust is shorter.
 const STARVED_FRAMES: u32 = 16;
-/// A motor that goes out within this time of its first thrust has chuffed, and lights again, s: its
+/// A motor that stops within this time of its first thrust has chuffed, and reignites, s: its
 /// propellant did not burn yet where the igniter did not reach.
 const CHUFF_S: f64 = 0.4;
 /// Half the span over which the curve's slope is taken, s.
@@ -164,7 +164,7 @@ impl MotorEstimate {
             stage: MotorStage::Waiting,
             mean: Vector5::new(1.0, 1.0, 0.0, 1.0, 0.0),
             covariance: Matrix5::from_diagonal(&sigmas.component_mul(&sigmas)),
-            felt_at_s: 0.0,
+            updated_at_s: 0.0,
             starved_frames: 0,
             chuffed_s: 0.0,
             misfit: 0.0,
@@ -227,13 +227,13 @@ impl MotorEstimate {
         if self.stage == MotorStage::Waiting {
             return Deviation::NONE;
         }
-        Deviation { share, at_s: self.felt_at_s - self.mean[IGNITION], lasts_s: self.prior.shape_lasts_s }
+        Deviation { share, at_s: self.updated_at_s - self.mean[IGNITION], lasts_s: self.prior.shape_lasts_s }
     }
 
     /// The worst burn at this many standard deviations: the one that changes a quantity most, given
     /// the quantity's derivatives by impulse scale, burn-time stretch and deviation from the shape.
     /// A positive number of deviations raises the quantity.
-    pub fn doubted<'a>(&self, curve: &'a ThrustCurve, derivatives: [f64; 3], sigmas: f64) -> Burn<'a> {
+    pub fn dispersed<'a>(&self, curve: &'a ThrustCurve, derivatives: [f64; 3], sigmas: f64) -> Burn<'a> {
         let [by_impulse, by_stretch, by_shape] = derivatives;
         let by_scales = Vector2::new(by_impulse, by_stretch);
         let covariance = &self.covariance;
@@ -276,13 +276,13 @@ impl MotorEstimate {
             let mark_n = CAUGHT_SHARE * curve.peak_thrust_n();
             if let Some(crossed_s) = self.detector.take(mark_n, middle_s, thrust_n) {
                 self.stage = MotorStage::Burning;
-                // A motor that chuffed goes on along its curve.
+                // A motor that chuffed continues along its curve.
                 let begun_s = if self.chuffed_s > 0.0 { self.chuffed_s } else { rise_s(curve, mark_n) };
                 self.mean[IGNITION] = crossed_s - begun_s;
                 self.covariance[(AIR, AIR)] += self.prior.exhaust_sigma * self.prior.exhaust_sigma;
             }
         }
-        // Rising thrust must not be mistaken for air force.
+        // Rising thrust must not be taken for air force.
         if self.detector.crossed_s.is_none() && air_n.abs() > SMALLEST_AIR_N {
             self.learn(sample, Vector5::new(0.0, 0.0, 0.0, air_n, 0.0), thrust_n, 0.0);
         }
@@ -298,10 +298,10 @@ impl MotorEstimate {
             }
             MotorStage::Burning | MotorStage::EndedEarly { .. } => self.mean[IGNITION],
         };
-        // From the last sample on the deviation from the shape wanders.
+        // After the last sample the deviation from the shape decays.
         let kept = match self.stage {
             MotorStage::Waiting => 0.0,
-            _ => libm::exp(-(time_s - self.felt_at_s).max(0.0) / self.prior.shape_lasts_s),
+            _ => libm::exp(-(time_s - self.updated_at_s).max(0.0) / self.prior.shape_lasts_s),
         };
         let then = Self { mean: self.mean.component_mul(&Vector5::new(1.0, 1.0, 1.0, 1.0, kept)), ..*self };
         let (thrust_n, mut sensitivity) = then.thrust(curve, time_s - ignition_s);
@@ -350,7 +350,7 @@ impl MotorEstimate {
 
     fn follow(&mut self, curve: &ThrustCurve, sample: &MotorSample, force_n: f64, cosine: f64) {
         self.wander();
-        self.felt_at_s = sample.time_s;
+        self.updated_at_s = sample.time_s;
         let since_s = sample.time_s - 0.5 * self.prior.frame_s - self.mean[IGNITION];
         let (thrust_n, by_motor) = self.thrust(curve, since_s);
         if since_s < SPIKE_S || thrust_n < TAIL_SHARE * curve.peak_thrust_n() {

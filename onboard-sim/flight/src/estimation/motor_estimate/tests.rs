@@ -37,9 +37,9 @@ struct Motor {
     air: f64,
     /// Thrust divided by the curve's in the first 50 ms.
     spike: f64,
-    /// The motor goes out, s after ignition.
+    /// The motor stops, s after ignition.
     out_s: f64,
-    /// It burns for 0.1 s and is out for 0.2 s before it burns on.
+    /// It burns for 0.1 s and is out for 0.2 s before it reignites.
     chuffs: bool,
     /// Deviation from the curve's shape: its size and its period, s.
     wave: (f64, f64),
@@ -100,12 +100,12 @@ impl Motor {
                 .sum::<f64>()
                 / 5.0;
             let force_n = mean_n * cosine + self.air * axial_air_force_n;
-            let felt = force_n / mass_kg + prior.accelerometer_m_s2 * normal.next();
+            let sensed = force_n / mass_kg + prior.accelerometer_m_s2 * normal.next();
             estimate.update(
                 &CURVE,
                 &MotorSample {
                     time_s,
-                    axial_specific_force_m_s2: felt,
+                    axial_specific_force_m_s2: sensed,
                     mass_kg,
                     axial_air_force_n,
                     gimbal_rad,
@@ -118,7 +118,7 @@ impl Motor {
 }
 
 #[test]
-fn ignition_is_timed_within_a_frame_and_the_air_scale_is_known_before_it() {
+fn ignition_is_timed_within_a_frame_and_the_air_scale_is_estimated_before_it() {
     let mut normal = Normal(1);
     let (n, mut squares_s2) = (50, 0.0);
     for _ in 0..n {
@@ -164,12 +164,12 @@ fn future_thrust_is_predicted_within_its_stated_uncertainty() {
     }
 }
 
-/// Thrust that waves by 2 % around the curve. A filter that trusts the shape is far too sure of
-/// impulse and burn time; one that does not knows how little it knows.
+/// Thrust that oscillates by 2 % around the curve. A filter that trusts the shape is far too
+/// confident in impulse and burn time; one with a shape error is consistent.
 #[test]
 fn a_wrong_shape_is_no_surprise_to_a_filter_that_expects_one() {
     let trusting = MotorPrior { roughness_share: 0.003, ..MotorPrior::default() };
-    let doubting = MotorPrior { shape_sigma: 0.015, shape_lasts_s: 0.7, ..trusting };
+    let cautious = MotorPrior { shape_sigma: 0.015, shape_lasts_s: 0.7, ..trusting };
     let mut normal = Normal(6);
     let n = 100;
     let outside = |prior: &MotorPrior, normal: &mut Normal| {
@@ -183,11 +183,11 @@ fn a_wrong_shape_is_no_surprise_to_a_filter_that_expects_one() {
             })
             .count()
     };
-    let (trusting, doubting) = (outside(&trusting, &mut normal), outside(&doubting, &mut normal));
-    println!("truth outside the 95 % ellipse: {trusting} and {doubting} of {n}");
+    let (trusting, cautious) = (outside(&trusting, &mut normal), outside(&cautious, &mut normal));
+    println!("truth outside the 95 % ellipse: {trusting} and {cautious} of {n}");
     assert!(trusting > 50, "{trusting}");
     // 5 expected; four standard deviations more are 14.
-    assert!(doubting <= 14, "{doubting}");
+    assert!(cautious <= 14, "{cautious}");
 }
 
 #[test]
@@ -197,20 +197,20 @@ fn an_ignition_spike_does_not_change_the_estimate() {
     assert!((predicted_n / CURVE.thrust_at_n(1.5) - 1.0).abs() < 0.015, "{predicted_n} {spiked:?}");
 }
 
-/// It burns on from where it went out, and is then known as well as a motor that burnt on at once.
+/// It reignites where it stopped, and is then estimated as well as a motor without a chuff.
 #[test]
-fn a_motor_that_chuffs_is_waited_for_and_known_like_another() {
+fn a_motor_that_chuffs_is_estimated_like_another() {
     let (mut normal, mut chuffed, mut at_once) = (Normal(12), 0.0, 0.0);
     for _ in 0..100 {
         let good = Motor::drawn(&mut normal);
         let motor = Motor { chuffs: true, ..good };
         let out = motor.found_after(0.25, &mut normal);
         assert_eq!((out.stage(), out.ignition_s()), (MotorStage::Waiting, None), "{motor:?}");
-        let lit = motor.found_after(1.5, &mut normal);
-        assert_eq!(lit.stage(), MotorStage::Burning, "{motor:?}");
-        let late_s = lit.ignition_s().unwrap() - motor.ignition_s;
+        let ignited = motor.found_after(1.5, &mut normal);
+        assert_eq!(ignited.stage(), MotorStage::Burning, "{motor:?}");
+        let late_s = ignited.ignition_s().unwrap() - motor.ignition_s;
         assert!((late_s - 0.2).abs() < 0.03, "{late_s} {motor:?}");
-        chuffed += (lit.impulse_scale() - motor.impulse).powi(2);
+        chuffed += (ignited.impulse_scale() - motor.impulse).powi(2);
         at_once += (good.found_after(1.3, &mut normal).impulse_scale() - good.impulse).powi(2);
     }
     // The variances of 100 estimates each: four standard errors of their ratio are 0.57.

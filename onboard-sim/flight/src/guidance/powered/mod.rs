@@ -1,12 +1,12 @@
 //! Phase 2: from ignition to touchdown on a motor that cannot be throttled.
 //!
-//! A tick poses a landing for the [NMPC](ocp::landing): gimbal, fins and final time at once, from
-//! the plan that is flown. It is [searched](Search) apart from the frames, and flown from the frame
-//! on in which it is ready. The nose may lean in any direction. The plan contains the thrust curve
-//! as estimated by [`Burn`](crate::vehicle::burn::Burn), the burning mass, the drag of body and
-//! fins, a floor above the ground, and a free final time that is not before the thrust falls
-//! through the weight. In each frame the plan says where the nose points and how far the fins are
-//! open.
+//! A tick requests a landing from the [NMPC](ocp::landing): gimbal, fins and final time at once,
+//! starting from the flown plan. It is [searched](Search) outside the frames, and flown from the
+//! frame on in which it is ready. The nose may lean in any direction. The plan contains the thrust
+//! curve as estimated by [`Burn`](crate::vehicle::burn::Burn), the burning mass, the drag of body
+//! and fins, a floor above the ground, and a free final time that is not before the thrust falls
+//! through the weight. In each frame the plan gives the direction of the nose and the opening of
+//! the fins.
 //!
 //! Without a plan the guidance degrades in reported steps, the [`ControlLevel`]s.
 
@@ -28,12 +28,12 @@ pub use self::situation::PoweredSituation;
 use crate::control::aim::Aim;
 use crate::vehicle::rigid::RigidState;
 
-/// Largest lean that corrects the velocity when a plan is flown to its end, rad: 3 degrees,
-/// well within what the legs take.
+/// Largest lean that corrects the velocity when a plan is flown to its end, rad: 3 degrees, well
+/// within the limits of the legs.
 const END_LEAN_MAX_RAD: f64 = 0.05;
 
-/// Largest lean with which a vehicle is brought to rest before contact, rad: 5 degrees, half of
-/// what the legs take.
+/// Largest lean with which a vehicle is brought to rest before contact, rad: 5 degrees, half of the
+/// legs' limit.
 const CONTACT_LEAN_RAD: f64 = 0.0873;
 
 /// A plan that touches down faster than this is not flown unless the vehicle is high, m/s: the
@@ -71,7 +71,7 @@ impl PoweredGuidance {
         // Cold, warm, and cold again: the search swaps its buffers, and a warm plan is shorter.
         planned.plan(&mut search, state, situation);
         planned.plan(&mut search, state, situation);
-        search.keep_room(&planned.flown);
+        search.reserve(&planned.flown);
         planned.flown.clear();
         planned.plan(&mut search, state, situation);
         planned.flown.clear();
@@ -111,25 +111,25 @@ impl PoweredGuidance {
         self.planned().map(|plan| plan.left_s(time_s))
     }
 
-    /// The next search starts from what is flown now.
+    /// Starts the next search from the flown plan.
     pub(crate) fn begin(&self, search: &mut Search) {
         search.begin(&self.flown);
     }
 
-    /// Takes over what was searched, if it is finite; there is no outcome if the thrust never
-    /// carries the vehicle. `high`: as in its situation; `posed_and_now_s`: when it was posed, and
-    /// the time now.
+    /// Takes over the search result, if it is finite; there is no outcome if the thrust never
+    /// carries the vehicle. `high`: as in its situation; `posed_and_now_s`: the time of the
+    /// request, and the present time.
     pub(crate) fn take_over(
         &mut self,
         search: &mut Search,
         outcome: Option<&Outcome>,
         high: bool,
-        [posed_at_s, time_s]: [f64; 2],
+        [requested_at_s, time_s]: [f64; 2],
     ) {
-        let took_s = time_s - posed_at_s;
+        let took_s = time_s - requested_at_s;
         let Some(outcome) = outcome else {
             let level = ControlLevel::Stabiliser;
-            self.report = PoweredReport { level, posed_at_s, took_s, ..PoweredReport::default() };
+            self.report = PoweredReport { level, requested_at_s, took_s, ..PoweredReport::default() };
             return;
         };
         let found = &mut search.found;
@@ -146,7 +146,7 @@ impl PoweredGuidance {
             status: outcome.status,
             iterations: outcome.iterations,
             passes: search.workspace.passes(),
-            posed_at_s,
+            requested_at_s,
             took_s,
             kkt_stationarity: one_nan(outcome.stationarity),
             kkt_feasibility: one_nan(outcome.feasibility),
@@ -168,7 +168,7 @@ impl PoweredGuidance {
         Some(if self.report.level == ControlLevel::Stabiliser { 1.0 } else { planned })
     }
 
-    /// The wanted direction of the nose at a time.
+    /// The commanded direction of the nose at a time.
     ///
     /// A vehicle whose foot is about to touch is only brought to rest, because it may touch before
     /// its plan ends: a lean of 10 degrees lowers a foot of mk2 by 7 cm, which it sinks in 0.15 s.
@@ -198,8 +198,8 @@ impl PoweredGuidance {
         Aim::at(nose / nose.norm())
     }
 
-    /// The direction that a plan wants at a time; `None` after its end. `push` makes a lean, as a
-    /// tangent, from a velocity to be lost.
+    /// The direction in a plan at a time; `None` after its end. `push` makes a lean, as a tangent,
+    /// from a velocity to be lost.
     fn planned_aim(
         &self,
         plan: &Plan,
@@ -264,10 +264,10 @@ mod tests {
     use crate::vehicle::burn::Burn;
     use crate::vehicles::mission::builtin;
 
-    // What the guidance flies when no plan is good.
+    // Guidance without a good plan.
 
     /// A vehicle in the middle of its burn, 7 m above the ground at 5 m/s and moving sideways at 3
-    /// m/s: it has to turn away more thrust than it can without hovering.
+    /// m/s: it must waste more thrust than it can without hovering.
     fn too_high(mission: &str, high: bool) -> PoweredGuidance {
         let mission = builtin(mission).unwrap().unwrap();
         let feet_below_cg_m = 0.44;

@@ -1,4 +1,4 @@
-//! A plan of a landing, and what is read from it.
+//! A plan of a landing, and its evaluation.
 
 use alloc::vec::Vec;
 use serde::Serialize;
@@ -123,8 +123,8 @@ impl Plan {
         (self.begins_s, self.step_s, self.settled_nodes) = (from.begins_s, from.step_s, from.settled_nodes);
     }
 
-    /// The last `intervals` intervals of an earlier plan. The conditions' multipliers are kept if
-    /// their order is known.
+    /// The last `intervals` intervals of an earlier plan. The conditions' multipliers are retained
+    /// if their order is available.
     pub(super) fn take_last(&mut self, from: &Self, intervals: usize, settled_nodes: usize) -> bool {
         let Some(gone) = from.inputs.len().checked_sub(intervals) else { return false };
         let refill = |into: &mut Vec<State>, all: &[State]| {
@@ -182,7 +182,7 @@ impl Plan {
         Some((Vector3::new(between(3), between(4), between(5)), self.aim(time_s)?))
     }
 
-    /// The wanted direction of the nose at a time; `None` after the end.
+    /// The commanded direction of the nose at a time; `None` after the end.
     pub(super) fn aim(&self, time_s: f64) -> Option<Aim> {
         let since_s = (time_s - self.begins_s).max(0.0);
         let k = (since_s / self.step_s) as usize;

@@ -1,5 +1,4 @@
-//! What the landing burn is set to and what it reports: its settings in a mission, and the report
-//! of a tick.
+//! Settings of the landing burn in a mission, and the report of a tick.
 
 use ocp::Status;
 use ocp::landing::SolverLimits;
@@ -9,7 +8,7 @@ use super::Homing;
 use crate::vehicle::mission::{FinalBox, PlanWeights};
 
 numbered_enum! {
-/// What decides where the nose points; the levels in flight are ordered from best to worst.
+/// Source of the attitude command; the levels in flight are ordered from best to worst.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
 pub enum ControlLevel {
     /// Nothing to control; the gimbal is centred.
@@ -21,7 +20,7 @@ pub enum ControlLevel {
     Converged = "CONVERGED",
     /// The best plan found: not converged, or missing its end conditions by a little.
     BestFeasible = "BEST_FEASIBLE",
-    /// The previous plan goes on: this tick found none that is good enough.
+    /// The previous plan continues: this tick found none that is good enough.
     ShiftedPlan = "SHIFTED_PLAN",
     /// Upright, with a lean against the sideways velocity.
     Stabiliser = "STABILISER",
@@ -57,8 +56,8 @@ pub struct PoweredReport {
     /// Work of the tick: the solver's passes over an interval, as in
     /// [`PoweredSettings::max_passes`].
     pub passes: usize,
-    /// When the landing was posed, s since the release.
-    pub posed_at_s: f64,
+    /// Time of the landing's request, s since the release.
+    pub requested_at_s: f64,
     /// From then until the plan was taken over, s. The next one waits for that, if it is longer
     /// than a period.
     pub took_s: f64,
@@ -113,15 +112,15 @@ pub struct PoweredSettings {
     pub flown_out_s: f64,
     /// During this time before the plan's end the nose is not turned any more, only held, s.
     pub quiet_s: f64,
-    /// The same during this time before the lowest foot is expected to touch, whatever the plan
-    /// says, s.
+    /// The same during this time before the expected contact of the lowest foot, whatever the plan,
+    /// s.
     #[serde(default)]
     pub contact_quiet_s: f64,
     /// Largest number of final times tried in a tick.
     pub max_solves: u32,
-    /// Largest number of passes of the solver over an interval in a tick, over all its guesses and
-    /// final times (`ocp::Workspace::allow`): the best plan until then stands, and the next tick
-    /// goes on from it. Without it there is no bound.
+    /// Largest number of solver passes over an interval in a tick, over all its guesses and final
+    /// times (`ocp::Workspace::allow`): the best plan until then is used, and the next tick
+    /// continues from it. Unbounded if absent.
     pub max_passes: Option<usize>,
     /// Largest miss of a plan's end (m, rad, m/s or rad/s) that still counts as a landing.
     pub landing_miss: f64,

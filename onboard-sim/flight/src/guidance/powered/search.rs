@@ -12,7 +12,7 @@ use crate::vehicle::rigid::RigidState;
 
 /// Longest horizon, intervals: it sets the memory.
 pub(super) const MOST_INTERVALS: usize = 60;
-/// Shortest horizon, intervals: with fewer a plan cannot lean and come upright again.
+/// Shortest horizon, intervals: with fewer a plan cannot lean and return to vertical.
 const LEAST_INTERVALS: usize = 6;
 
 /// First change of the final time that is tried, s, the factor after one that was no better, and
@@ -27,7 +27,7 @@ const DIFFERENCE_S: f64 = 1e-4;
 /// The solver and the plans between which it searches.
 #[derive(Debug, Clone, Default)]
 pub struct Search {
-    /// The plan that was flown when the landing was posed.
+    /// The plan flown at the time of the request.
     from: Plan,
     pub(super) found: Plan,
     // The search writes these before it reads them.
@@ -57,7 +57,7 @@ impl Search {
     }
 
     /// No plan will have more intervals than this one.
-    pub(super) fn keep_room(&mut self, longest: &Plan) {
+    pub(super) fn reserve(&mut self, longest: &Plan) {
         self.room = Some(longest.intervals());
         self.trial = longest.clone();
     }
@@ -72,12 +72,12 @@ impl Search {
         self.from.is_flown_out(settings, time_s)
     }
 
-    /// The plan that was flown when the landing was posed; without intervals if there was none.
+    /// The plan flown at the time of the request; without intervals if there was none.
     pub(crate) fn from(&self) -> &Plan {
         &self.from
     }
 
-    /// The next search starts from what was found, if it is finite.
+    /// Starts the next search from the result, if it is finite.
     pub(crate) fn fly_on(&mut self) {
         if self.found.is_finite() {
             self.from.copy(&self.found);
@@ -92,8 +92,8 @@ impl Search {
     /// Searches the path and the final time of a landing into `found`. The outcome has the
     /// iterations of all solves; there is none if the thrust never carries the vehicle.
     ///
-    /// By the envelope theorem the derivative of the Lagrangian by the final time says on which
-    /// side a better one lies.
+    /// By the envelope theorem the derivative of the Lagrangian by the final time gives the side on
+    /// which a better one lies.
     pub(crate) fn search(
         &mut self,
         settings: &PoweredSettings,
@@ -194,7 +194,7 @@ fn initial(state: &RigidState, feet_below_cg_m: f64) -> State {
     ]
 }
 
-/// The landing of a tick, except what follows from its final time.
+/// The landing problem of a tick, except the parts that depend on its final time.
 fn posed(situation: &PoweredSituation<'_>, settings: &PoweredSettings, state: &RigidState) -> Problem {
     let per_m = 0.5 * situation.air_density_kg_m3;
     let end = &settings.final_box;
@@ -235,8 +235,8 @@ fn posed(situation: &PoweredSituation<'_>, settings: &PoweredSettings, state: &R
     }
 }
 
-/// Fills in what follows from the final time, s from now, and the number of intervals. It allocates
-/// only if there never were as many.
+/// Fills in the parts that depend on the final time, s from now, and the number of intervals. It
+/// allocates only for a new largest number.
 fn stretch(
     problem: &mut Problem,
     situation: &PoweredSituation<'_>,

@@ -35,8 +35,8 @@ pub struct PoweredSituation<'a> {
     pub gimbal_limit_rad: f64,
     /// After an abort: the vehicle lands on the ground below, not on the pad.
     pub lands_in_place: bool,
-    /// High in the band of feasible heights or above it: more thrust has to be turned away than is
-    /// easy.
+    /// High in the band of feasible heights or above it: more thrust must be wasted than is easily
+    /// possible.
     pub high: bool,
 }
 

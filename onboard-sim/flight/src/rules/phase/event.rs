@@ -2,7 +2,7 @@
 
 use super::{HoldCause, LAST_HOLD_S, Phase, StartPoint};
 
-/// Something that happened or was asked for.
+/// A detected occurrence or a request.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Event {
     SelfTestPassed,
@@ -28,11 +28,11 @@ pub enum Event {
         /// Length of the countdown, s.
         countdown_s: f64,
     },
-    /// Hold the countdown: the station that armed the vehicle is silent, or a station asks for a
+    /// Hold the countdown: the station that armed the vehicle is silent, or a station requests a
     /// hold.
     Hold {
         cause: HoldCause,
-        /// Where the flight starts, which decides until when a hold comes in time.
+        /// Start of the flight, which sets the time of the last possible hold.
         start: StartPoint,
     },
     /// A hold has lasted for [`HOLD_LIMIT_S`](super::HOLD_LIMIT_S).
@@ -216,7 +216,7 @@ pub enum Refusal {
     /// Contact with thrust above the weight: the vehicle will not stay down yet.
     #[error("contact with thrust above weight: not down yet")]
     ThrustAboveWeight,
-    /// The landing motor was not lit, and its pin is out.
+    /// The landing motor has not ignited, and its pin is out.
     #[error("the landing motor is live: put the pin in")]
     MotorLive,
     /// The landing motor burns.

@@ -1,9 +1,9 @@
 //! The flight phases, the events that change them, and the one table of all transitions.
 //!
 //! [`transition()`] is a pure function: it takes a mode and an event, and returns a mode and
-//! effects, or a [`Refusal`] in words. The vehicle lights a motor on the way down, which staging
-//! electronics forbid for good reason. So the table is explicit and conservative: only one line of
-//! it lights the landing motor, once, and only if every interlock allows it.
+//! effects, or a [`Refusal`] as text. The vehicle ignites a motor on the way down, which staging
+//! electronics forbid for good reason. So the table is explicit and conservative: only one row
+//! ignites the landing motor, once, and only if every interlock permits it.
 
 mod event;
 #[cfg(test)]
@@ -16,7 +16,7 @@ pub use self::event::{Effect, Effects, Event, Refusal};
 pub use self::transition::{Transition, transition};
 pub use crate::vehicle::mission::StartPoint;
 
-/// How long nobody may approach the pad after an abort there, s.
+/// Time for which the pad must not be approached after an abort there, s.
 pub const PAD_ABORT_WAIT_S: f64 = 60.0;
 
 /// Time after the ignition command at which missing thrust counts as "no light", s.
@@ -90,18 +90,18 @@ pub struct Interlocks {
     pub pin_out: bool,
     /// Armed by radio after the checks passed.
     pub armed: bool,
-    /// The landing motor must not be lit any more.
+    /// Ignition of the landing motor is permanently inhibited.
     pub landing_motor_inhibited: bool,
     /// An abort was accepted; nothing arms again until a restart.
     pub abort_latched: bool,
     /// The landing motor was commanded and gave no thrust in time.
     pub no_light_latched: bool,
-    /// Aborted too low for the parachute, or with the landing motor lit, which has no cut-off: the
-    /// vehicle lands on the ground below.
+    /// Aborted too low for the parachute, or with the landing motor ignited, which has no cut-off:
+    /// the vehicle lands on the ground below.
     pub lands_in_place: bool,
 }
 
-/// Phase, latches, countdown and motor: the whole state of the table.
+/// Phase, latches, countdown and motor: the complete state of the table.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Mode {
     /// The phase of the flight.
@@ -156,7 +156,7 @@ impl Mode {
 
     /// The abort that a power cycle must not wipe out: until its wait is over and the pin is in.
     /// When it was, vehicle time, s.
-    pub fn abort_to_keep_s(&self, time_s: f64) -> Option<f64> {
+    pub fn abort_to_save_s(&self, time_s: f64) -> Option<f64> {
         let is_over = self.pad_wait_remaining_s(time_s).is_none() && !self.interlocks.pin_out;
         self.aborted_on_the_pad_s().filter(|_| !is_over)
     }
@@ -164,23 +164,23 @@ impl Mode {
 
 // The hold of a countdown.
 
-/// A station that arms, or commands an armed vehicle, was heard in this time, s: two of its
-/// heartbeats outside a countdown.
+/// Maximum age of the last heartbeat of a station that arms, or commands an armed vehicle, s: two
+/// of its heartbeats outside a countdown.
 pub const UPLINK_PROVEN_S: f64 = 2.0;
 
-/// In a countdown the station that armed the vehicle counts as silent when no frame of it was
-/// accepted for this long, s. With ten heartbeats a second nine in a row have to be lost by chance.
-/// What is lost is noticed so much later, so with [`LAST_HOLD_S`] it is the time before the release
-/// until which every loss holds.
+/// Time without an accepted frame after which the station that armed the vehicle counts as silent
+/// in a countdown, s. At ten heartbeats a second, nine in a row would have to be lost by chance. A
+/// loss is detected after this time, so together with [`LAST_HOLD_S`] it gives the time before the
+/// release until which every loss holds.
 pub const UPLINK_SILENT_S: f64 = 1.0;
 
 /// A held vehicle disarms after this long without a new start, s.
 pub const HOLD_LIMIT_S: f64 = 60.0;
 
-/// So long before the release, s, and later no key and no silence holds the countdown any more: a
-/// hold that comes as late as the release itself must not leave the crew in doubt whether the motor
-/// lights. An abort and a disarm still end it, and so does an arming check that fails: it is the
-/// vehicle that finds it, and nothing has current before the release.
+/// Time before the release, s, from which no key and no silence holds the countdown any more: a
+/// hold as late as the release itself must not leave the crew uncertain whether the motor ignites.
+/// An abort and a disarm still end the countdown, and so does a failing arming check: the vehicle
+/// detects it itself, and nothing is energised before the release.
 pub const LAST_HOLD_S: f64 = 2.0;
 
 /// Why a countdown was held.
@@ -189,11 +189,11 @@ pub const LAST_HOLD_S: f64 = 2.0;
 pub enum HoldCause {
     /// No frame of the station that armed the vehicle was accepted for [`UPLINK_SILENT_S`].
     UplinkSilent = 1,
-    /// A station asked for a hold.
+    /// A station requested a hold.
     Commanded = 2,
     /// Whoever confirmed the start has not tapped in time.
     TapOverdue = 3,
-    /// The station that armed the vehicle says that it hears nothing of it.
+    /// The station that armed the vehicle reports that it receives nothing from it.
     StationDeaf = 4,
     /// An arming check fails.
     CheckFailed = 5,
@@ -209,8 +209,8 @@ pub struct Hold {
 }
 
 impl StartPoint {
-    /// From when on nothing holds, s before the release. `None` below a drone: its pilot lets go at
-    /// no set time after the countdown, so a hold comes in time until then.
+    /// Time before the release from which nothing holds, s. `None` below a drone: its pilot
+    /// releases the vehicle at no fixed time after the countdown, so a hold is possible until then.
     pub fn last_hold_s(self) -> Option<f64> {
         (self != Self::Drone).then_some(LAST_HOLD_S)
     }
@@ -232,17 +232,17 @@ impl Mode {
     }
 }
 
-// Why the landing motor is inhibited for good.
+// Why the landing motor is permanently inhibited.
 
-/// What has latched an abort, or the inhibition of a landing motor that gave no thrust.
+/// Cause of a latched abort, or of the inhibition of a landing motor without thrust.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(u8)]
 pub enum Latch {
-    /// An abort of the crew, or a disarm while the ascent motor was being lit.
+    /// An abort by the crew, or a disarm during the ignition of the ascent motor.
     Commanded = 1,
-    /// The vehicle lifted off although nobody had armed it.
+    /// The vehicle lifted off unarmed.
     UncommandedLiftOff = 2,
-    /// It was released although nobody had cleared the release.
+    /// The vehicle was released without clearance.
     UncommandedRelease = 3,
     /// The booster stayed on.
     NoSeparation = 4,
@@ -255,7 +255,7 @@ pub enum Latch {
 }
 
 impl Latch {
-    /// What an accepted event has latched; `None` if it has latched nothing.
+    /// The latch set by an accepted event, if any.
     pub fn of(event: &Event, before: Interlocks, after: Interlocks) -> Option<Self> {
         let latches = |of: fn(&Interlocks) -> bool| of(&after) && !of(&before);
         if !(latches(|locks| locks.abort_latched) || latches(|locks| locks.no_light_latched)) {
@@ -275,17 +275,18 @@ impl Latch {
 
 // The state of the landing motor, for a person who approaches the vehicle.
 //
-// A motor that was not lit stays dangerous on the ground: only software keeps it from lighting, and
-// after an ignition command it may light late. A burnt motor is hot. The vehicle is not SAFED in
+// An unignited motor stays dangerous on the ground: only software inhibits it, and after an
+// ignition command it may ignite late. A burned-out motor is hot. The vehicle is not SAFED in
 // either case.
 
-/// How long nobody may approach a motor that was not lit or did not light on command, s. The safety
-/// codes of the National Association of Rocketry ask for 60 s after the last launch attempt. Here
-/// the time counts from the touchdown, because that was the last shock to the igniter line.
+/// Time for which a motor that was not ignited, or did not ignite on command, must not be
+/// approached, s. The safety codes of the National Association of Rocketry require 60 s after the
+/// last launch attempt. Here the time counts from touchdown, because that was the last shock to the
+/// igniter line.
 pub const MISFIRE_WAIT_S: f64 = 60.0;
 
-/// How long a burnt motor counts as hot, s. The value was chosen, not measured. It equals the
-/// misfire wait, so that a crew has to remember only one number.
+/// Time for which a burned-out motor counts as hot, s. The value was chosen, not measured. It
+/// equals the misfire wait, so that a crew has to remember only one number.
 pub const MOTOR_HOT_S: f64 = 60.0;
 
 /// The state of the landing motor.
@@ -305,9 +306,9 @@ pub enum Motor {
 /// The motor's state for a person near the vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum MotorStatus {
-    /// Not lit, and the pin is in: the igniter line is cut by hand.
+    /// Not ignited, with the pin in: the igniter line is cut by hand.
     PinIn,
-    /// Not lit, and only software keeps it from lighting.
+    /// Not ignited, and inhibited by software only.
     Live,
     /// Commanded to light, or burning.
     Burning,

@@ -25,7 +25,7 @@ enum Row {
 pub fn transition(mode: &Mode, event: Event, time_s: f64) -> Transition {
     match row(mode, event, time_s) {
         Row::Go(mut next, phase, effects) => {
-            // This holds for every row that lights the motor.
+            // For every row that ignites the motor.
             if effects.contains(Effect::IgniteLandingMotor) {
                 next.motor = Motor::Commanded;
             }
@@ -74,8 +74,8 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
             Row::Go(latch(Interlocks { pin_out: false, ..locks }), phase, Effects::NONE)
         }
         (P::PadArmed, E::PinInserted) => disarmed(&latch(Interlocks { pin_out: false, ..locks })),
-        // After the flight a person may put the pin back and pull it again. Without the pin, a
-        // motor that was not lit is live.
+        // After the flight a person may insert the pin and pull it again. Without the pin, an
+        // unignited motor is live.
         (P::Touchdown | P::Safed, E::PinInserted) => {
             Row::Go(latch(Interlocks { pin_out: false, ..locks }), phase, Effects::NONE)
         }
@@ -95,11 +95,11 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
         (_, E::ArmRequested { .. }) => wrong("arm", "only PAD_IDLE arms"),
 
         (P::PadArmed, E::DisarmRequested { .. }) => disarmed(mode),
-        // On the ground nothing is lit any more, but that does not make the motor safe.
+        // On the ground nothing is ignited any more, but that does not make the motor safe.
         (P::Touchdown, E::DisarmRequested { .. }) => {
             Row::Go(latch(Interlocks { armed: false, ..locks }), phase, Effects::of(&[Effect::Disarm]))
         }
-        // The igniter had current: what an abort does is the least.
+        // The igniter was energised: an abort's effects are the minimum.
         (P::Boost, E::DisarmRequested { lifted_off: false }) if !locks.abort_latched => {
             stays_on_its_pad(mode)
         }
@@ -137,7 +137,7 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
         },
         (_, E::HoldElapsed) => wrong("end a hold", "only PAD_ARMED is held"),
 
-        // From here on nobody may approach the vehicle, because the motor may light late.
+        // From here on the vehicle must not be approached, because the motor may ignite late.
         (P::PadArmed, E::CountdownElapsed) if countdown_over(mode, time_s) => Row::Go(
             Mode { countdown_end_s: None, ..*mode },
             P::Boost,
@@ -156,8 +156,8 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
         (_, E::CountdownElapsed) => wrong("end a countdown", "only PAD_ARMED counts down"),
         (_, E::ReleasedAt(StartPoint::Pad)) => wrong("release at the pad", "a pad start lifts off by itself"),
         (_, E::ReleasedAt(_)) => wrong("release", "only PAD_ARMED is released"),
-        // It falls, whatever the crew meant: without its motor, under the parachute if that still
-        // helps.
+        // It falls, whatever the crew intended: without its motor, under the parachute if that
+        // still helps.
         (P::Safe | P::PadIdle | P::PadArmed, E::ReleasedEarly { parachute_fills }) => {
             Row::Go(inhibited(mode), P::Chute, down_without_the_motor(parachute_fills))
         }
@@ -168,8 +168,8 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
         (P::PadArmed, E::LiftOff) => {
             Row::Go(Mode { countdown_end_s: None, ..*mode }, P::Boost, Effects::NONE)
         }
-        // Nobody armed it, or its motor lit late after an abort: it rises, and comes down under the
-        // parachute.
+        // An uncommanded lift-off, or a late ignition after an abort: the vehicle rises, and
+        // descends under the parachute.
         (P::Safe | P::PadIdle, E::LiftOff) => {
             Row::Go(inhibited(mode), P::Boost, Effects::of(&[Effect::InhibitLandingMotor]))
         }
@@ -178,8 +178,7 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
         (P::Boost, E::NoLiftOff) => stays_on_its_pad(mode),
         (_, E::NoLiftOff) => wrong("miss the lift-off", "only BOOST waits for it"),
         (P::Boost, E::Burnout) => go(P::Coast),
-        // The landing motor burnt out, which happens once; the contact with the ground decides what
-        // follows.
+        // Burnout of the landing motor, which occurs once; ground contact decides what follows.
         (P::Powered | P::Touchdown, E::Burnout) if mode.motor == Motor::Burning => {
             Row::Go(Mode { motor: Motor::BurntOut { at_s: time_s }, ..*mode }, phase, Effects::NONE)
         }
@@ -254,7 +253,7 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
     }
 }
 
-/// What leads from a descent to the parachute.
+/// Effects of changing from a descent to the parachute.
 const TO_THE_PARACHUTE: [Effect; 3] = [Effect::InhibitLandingMotor, Effect::FinsOpen, Effect::DeployChute];
 
 /// Without the motor only the parachute brakes: too low to fill, it still takes off some of the
@@ -264,7 +263,7 @@ fn down_without_the_motor(parachute_fills: bool) -> Effects {
     if parachute_fills { effects } else { effects.with(Effect::RecordLoss) }
 }
 
-/// The landing motor will not be lit any more.
+/// Permanently inhibits the landing motor.
 fn inhibited(mode: &Mode) -> Mode {
     Mode {
         interlocks: Interlocks { landing_motor_inhibited: true, abort_latched: true, ..mode.interlocks },
@@ -273,8 +272,8 @@ fn inhibited(mode: &Mode) -> Mode {
     }
 }
 
-/// The ascent motor's igniter had current and has none any more. The motor may still light: as
-/// after an abort on the pad. If it does, the vehicle rises as one that nobody armed.
+/// The ascent motor's igniter was energised and is off. As after an abort on the pad, the motor may
+/// still ignite. If it does, the vehicle rises as if unarmed.
 fn stays_on_its_pad(mode: &Mode) -> Row {
     let inhibited = inhibited(mode);
     let interlocks = Interlocks { armed: false, ..inhibited.interlocks };
@@ -300,7 +299,7 @@ fn abort(mode: &Mode, lifted_off: bool, above_commit_height: bool, gate_open: bo
         P::Chute => {
             Row::Refuse(Refusal::WrongPhase { action: "abort", phase, only: "the parachute is out already" })
         }
-        // The lit motor cannot be stopped, and a parachute under thrust would burn or tangle. So
+        // An ignited motor cannot be stopped, and a parachute under thrust would burn or tangle. So
         // the vehicle lands.
         P::Ignition | P::Powered if locks.lands_in_place => Row::Refuse(Refusal::AlreadyAborted),
         P::Ignition | P::Powered => {
@@ -325,10 +324,10 @@ fn abort(mode: &Mode, lifted_off: bool, above_commit_height: bool, gate_open: bo
         P::Deploy | P::AeroDescent | P::LandArmed if locks.abort_latched => {
             Row::Refuse(Refusal::AlreadyAborted)
         }
-        // Too low for the parachute: a landing on the motor is the safest way down, and the chosen
-        // height the safest one to light it at. Of mk2 flights aborted here at a random moment 992
-        // of 1,000 (`field`) and 903 of 999 (`real`) land; lit at once, 852 and 737 of them (seed
-        // 2001).
+        // Too low for the parachute: a landing on the motor is the safest option, and the chosen
+        // height the safest one for ignition. Of mk2 flights aborted here at a random moment 992 of
+        // 1,000 (`field`) and 903 of 999 (`real`) land; with immediate ignition, 852 and 737 of
+        // them (seed 2001).
         P::Deploy | P::AeroDescent | P::LandArmed if may_burn => {
             let interlocks = Interlocks { abort_latched: true, lands_in_place: true, ..locks };
             Row::Go(Mode { interlocks, ..*mode }, phase, Effects::NONE)

@@ -1,10 +1,10 @@
-//! The one controller: what depends on the vehicle, as formulas. What is the same for every vehicle
-//! is in `controller.toml`.
+//! The controller settings that depend on the vehicle, as formulas. Settings common to all vehicles
+//! are in `controller.toml`.
 //!
-//! Three numbers of a vehicle decide ([`EvenLanding`]): how long its thrust carries it, how fast it
-//! falls into the ignition, and how far it must lean to throw away what is too much. The factors
-//! are mk3's values where the formula only scales them. They were chosen on seeds from 7001 on
-//! seven vehicles, and each says what it is for.
+//! Three numbers of a vehicle decide ([`EvenLanding`]): how long its thrust carries it, its fall
+//! speed at ignition, and the lean needed to waste the surplus thrust. The factors are mk3's values
+//! where the formula only scales them. They were chosen on seeds from 7001 on seven vehicles, and
+//! each states its purpose.
 
 use alloc::borrow::ToOwned as _;
 use alloc::string::String;
@@ -46,7 +46,7 @@ impl Formulas<'_> {
         }
     }
 
-    /// Shape and balance as they follow from what a builder measures.
+    /// Shape and balance derived from a builder's measurements.
     pub(super) fn airframe(&self, airframe: &mut Airframe, motor: &ThrustCurve) {
         /// Coefficients of a fin on its own area: the paper's 1.55 and 1.28 on a body of 0.0043 m2,
         /// for a fin of 58 by 100 mm.
@@ -54,7 +54,7 @@ impl Formulas<'_> {
         const FIN_LIFT: f64 = 0.949;
         /// A saw's cut between two fins, m.
         const CUT_M: f64 = 1e-4;
-        /// Over the root of its area, what a canopy takes to fill: mk3's 20 m of 2.05 m2.
+        /// Inflation distance of a canopy over the root of its area: mk3's 20 m of 2.05 m2.
         const FILLS_PER_ROOT: f64 = 14.0;
         let of = |key: &str, place: &mut f64, value: f64| self.of_vehicle(key, place, value);
         let (mass, body, fins) = (&mut airframe.mass, &mut airframe.body, &mut airframe.fins);
@@ -81,7 +81,7 @@ impl Formulas<'_> {
         let booster = &mut launch.booster;
         let (diameter_m, radius_m) = (airframe.body.diameter_m, 0.5 * airframe.body.diameter_m);
         let of = |key: &str, place: &mut f64, value: f64| self.of_vehicle(key, place, value);
-        // Half in its skin, half within: 0.63 of what a tube has.
+        // Half in its skin, half within: 0.63 of a tube's.
         let roll_kg_m2 = 0.63 * booster.dry_kg * radius_m * radius_m;
         of("launch.booster.roll_inertia_kg_m2", &mut booster.roll_inertia_kg_m2, roll_kg_m2);
         let middle_m = 0.5 * booster.motor_curve.length_m() - booster.length_m;
@@ -170,7 +170,7 @@ impl Formulas<'_> {
         // into a wind that is as fast.
         let opens_fins = speed_m_s > SHORT_FALL_M_S || arm_m < 0.03 * airframe.body.length_m;
         self.of_controller("descent.opens_fins", &mut mission.descent.opens_fins, opens_fins);
-        // Motors within so many deviations of what is expected of them.
+        // Motors within this many deviations of the expectation.
         let around = |sigmas: f64, sigma: f64| [1.0 - sigmas * sigma, 1.0 + sigmas * sigma];
         let ignition = &mut mission.ignition;
         let scales = around(1.67, motor.impulse_sigma);
@@ -185,15 +185,15 @@ impl Formulas<'_> {
         let passes = (1_230.0 - 5.0 * intervals) as usize;
         self.of_controller("powered.max_passes", &mut powered.max_passes, Some(passes));
 
-        // What legs are designed for, if their file does not say it: those with blocks bear more.
+        // Default design limits of legs: crushable ones bear more.
         let designed = match legs.crush {
             Some(_) => LegLimits { vertical_m_s: 1.5, lateral_m_s: 0.7, tilt_deg: 10.0, rate_deg_s: 60.0 },
             None => LegLimits { vertical_m_s: 1.0, lateral_m_s: 0.7, tilt_deg: 10.0, rate_deg_s: 30.0 },
         };
         self.of_vehicle("leg_limits.vertical_m_s", &mut mission.leg_limits, designed);
         if let Some(launch) = &mut mission.launch {
-            // Half the way that the fall drifts in 1 m/s of wind: the stack that turns into the
-            // wind gives the rest back.
+            // Half the drift of the fall in 1 m/s of wind: the stack that turns into the wind makes
+            // up for the rest.
             let falls_s = mission.start.height_m / speed_m_s;
             self.of_vehicle("launch.rail.upwind_s", &mut launch.rail.upwind_s, libm::round(falls_s));
         }

@@ -1,8 +1,8 @@
 //! Missions, from TOML. Unknown keys are errors.
 //!
-//! A file says what a club measures or decides. `controller.toml` has what is the same for every
-//! vehicle, [`controller`] what follows from it, and `defaults.toml` what a file may leave out. A
-//! file may state any of it.
+//! A file contains a club's measurements and decisions. `controller.toml` has the values common to
+//! all vehicles, [`controller`] the derived values, and `defaults.toml` the values that a file may
+//! omit. A file may state any of them.
 
 mod controller;
 mod validate;
@@ -36,8 +36,7 @@ pub const BUILTIN: &[(&str, &str)] = &[
     ("vlr-f16", include_str!("../../../vehicles/missions/vlr-f16.toml")),
 ];
 
-/// The built-in mission that is flown if no other is asked for: the vehicle that a club should
-/// build.
+/// The default built-in mission: the vehicle that a club should build.
 pub const DEFAULT: &str = "mk3";
 
 /// Why a mission cannot be flown.
@@ -59,9 +58,9 @@ pub enum MissionError {
     Motor(#[from] MotorError),
 }
 
-/// What is the same for every vehicle.
+/// Values common to all vehicles.
 const CONTROLLER: &str = include_str!("../../../vehicles/controller.toml");
-/// What a mission may leave out.
+/// Values that a mission may omit.
 const DEFAULTS: &str = include_str!("../../../vehicles/defaults.toml");
 
 /// Reads a mission and its motors, and gives its vehicle the controller; `origin` names the text in
@@ -71,7 +70,7 @@ const DEFAULTS: &str = include_str!("../../../vehicles/defaults.toml");
 /// [`MissionError`] names the key and what would be accepted.
 pub fn from_toml(text: &str, origin: &str) -> Result<Mission, MissionError> {
     let not_a_mission = |mut error: toml::de::Error| {
-        // What such a section lacks is told by its name.
+        // A missing section is reported by its name.
         error.set_input(Some(text).filter(|_| error.span() != Some(NOWHERE)));
         FileError::not_toml(origin, &error)
     };
@@ -131,8 +130,8 @@ fn leaves(prefix: &str, table: &DeTable<'_>, found: &mut dyn FnMut(String)) {
 /// Where in a text a section is that the text does not have.
 const NOWHERE: Range<usize> = usize::MAX..usize::MAX;
 
-/// Puts what a table does not have into it. How a vehicle is launched or dropped is only filled in
-/// if it is.
+/// Adds the defaults that are missing from a table. Launch and drop sections are completed only if
+/// present.
 fn fill<'a>(table: &mut DeTable<'a>, defaults: DeTable<'a>) {
     for (key, default) in defaults {
         if matches!(key.get_ref().as_ref(), "launch" | "drop") && !table.contains_key(&key) {
@@ -150,7 +149,7 @@ fn fill<'a>(table: &mut DeTable<'a>, defaults: DeTable<'a>) {
     }
 }
 
-/// Checks that the mission has what its start needs.
+/// Checks that the mission has the sections of its start.
 fn check_start(mission: &Mission, origin: &str) -> Result<(), MissionError> {
     let refuse = |at, problem| Err(MissionError::StartAt { origin: origin.to_owned(), at, problem });
     match mission.start.at {
@@ -164,7 +163,7 @@ fn check_start(mission: &Mission, origin: &str) -> Result<(), MissionError> {
 
 /// The built-in mission of that name.
 pub fn builtin(name: &str) -> Option<Result<Mission, MissionError>> {
-    BUILTIN.iter().find(|(known, _)| *known == name).map(|(name, text)| from_toml(text, name))
+    BUILTIN.iter().find(|(available, _)| *available == name).map(|(name, text)| from_toml(text, name))
 }
 
 /// The airframe of the built-in mission of that name, if there is one.

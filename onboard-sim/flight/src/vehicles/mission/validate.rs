@@ -29,8 +29,8 @@ impl From<BadAirframe> for BadValue {
 
 type Check = Result<(), BadValue>;
 
-/// A range in words, its ends, and the keys that lie in it; a key of a section stands for all
-/// numbers of it that no row before names.
+/// A range as text, its ends, and the keys it applies to; the key of a section stands for all its
+/// numbers that no earlier row names.
 type Range = (&'static str, f64, f64, &'static [&'static str]);
 
 /// Above 0.
@@ -60,10 +60,10 @@ const RANGES: [Range; 41] = [
     ("0 to 45", 0.0, 45.0, &["drop.tilt_max_deg"]),
     ("0 to 360", 0.0, 360.0, &["drop.rotation_max_deg_s"]),
     ("0 to 60", 0.0, 60.0, &["drop.release_after_s"]),
-    // The filter of the motor knows scales from 0.7 to 1.3; a motor further off is another motor.
+    // The motor filter covers scales from 0.7 to 1.3; a motor beyond is another motor.
     ("0.7 to 1.3", 0.7, 1.3, &["lot.impulse.mean", "lot.burn_time.mean"]),
     ("0 to 0.2", 0.0, 0.2, &["lot.impulse", "lot.burn_time"]),
-    // Kelvin or Fahrenheit are not meant; propellants are sold for -30 to 55 degrees.
+    // Neither Kelvin nor Fahrenheit; propellants are sold for -30 to 55 degrees.
     ("degrees Celsius, -40 to 60", -40.0, 60.0, &["lot.temperature", "site.temperature_c"]),
     // The simulated world and the guidance have the standard's.
     ("9.80665", STANDARD_GRAVITY_M_S2, STANDARD_GRAVITY_M_S2, &["estimator.gravity_m_s2"]),
@@ -103,7 +103,7 @@ const RANGES: [Range; 41] = [
         "arming", "estimator"]),
 ];
 
-/// The vehicle and its start: what the controller follows from.
+/// The vehicle and its start, from which the controller is derived.
 pub(super) fn vehicle(mission: &Mission) -> Check {
     if mission.name.trim().is_empty() {
         return Err(BadValue { key: "name".to_owned(), found: "\"\"".to_owned(), required: "a name" });

@@ -25,7 +25,7 @@ pub enum ThrustCurveError {
     BadField {
         /// Line, from 1.
         line: usize,
-        /// What the format has there.
+        /// The expected content of the field.
         field: &'static str,
         found: String,
         required: &'static str,
@@ -33,11 +33,11 @@ pub enum ThrustCurveError {
     /// The file ends before it holds a motor.
     #[error("{what} is missing; {required}")]
     Missing {
-        /// What is missing.
+        /// The missing item.
         what: &'static str,
         required: &'static str,
     },
-    /// The file name has no known ending.
+    /// The file name has an unknown extension.
     #[error("motor file '{file_name}': names that end in .eng (RASP) and .rse (RockSim) are accepted")]
     UnknownFormat { file_name: String },
     /// The table of a test stand is wrong.

@@ -87,7 +87,7 @@ fn parse_header(line: &str, number: usize) -> Result<MotorData, ThrustCurveError
     let diameter_m = not_negative(number, "diameter", word()?)? / 1000.0;
     let length_m = not_negative(number, "length", word()?)? / 1000.0;
     let delays = word()?;
-    // Without them the masses stand one place too far to the left.
+    // Without them the masses are one column too far to the left.
     if delays.parse().is_ok_and(|number: f64| number > 0.0 && number < 1.0) {
         return Err(bad(number, "delays", delays, "whole seconds as in 6-10-14, P or 0 are accepted"));
     }

@@ -30,9 +30,9 @@ pub fn read_stand(text: &str) -> Result<Vec<(f64, f64)>, TableError> {
     Ok(rows)
 }
 
-/// The motor that burnt on a stand. The head is that of a RASP file: name, diameter in mm, length
-/// in mm, delays, propellant in kg, total mass in kg, maker. The rows before the burn tell the zero
-/// of the load cell.
+/// A motor burnt on a stand. The head is that of a RASP file: name, diameter in mm, length in mm,
+/// delays, propellant in kg, total mass in kg, maker. The rows before the burn give the zero of the
+/// load cell.
 ///
 /// # Errors
 /// [`ThrustCurveError`] names the line, the field and what would be accepted.
@@ -43,7 +43,7 @@ pub fn from_stand(head: &str, text: &str) -> Result<ThrustCurve, ThrustCurveErro
     let burns = |row: &(f64, f64)| row.1 > BURNS * peak_n;
     if let (Some(first), Some(last)) = (rows.iter().position(burns), rows.iter().rposition(burns)) {
         let Some((begins_s, _)) = first.checked_sub(1).and_then(|before| rows.get(before)).copied() else {
-            let required = "the first row must be from before the burn: it tells the zero of the load cell";
+            let required = "the first row must be from before the burn: it gives the zero of the load cell";
             return Err(TableError::bad(1, "thrust", &format!("{} N at once", rows[0].1), required).into());
         };
         // Just before, the thrust rises already.

@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn half_a_percent_of_thrust_known_to_the_controller_lands() {
+    fn half_a_percent_of_thrust_within_the_controller_model_lands() {
         for scale in [0.995, 1.005] {
             let mut problem = settled(start(), HORIZON);
             problem.thrust_n *= scale;

@@ -20,7 +20,7 @@ mod text;
 
 use flight::vehicles::motors::MotorError;
 use paper::plane::dynamics::PlanarState;
-use sim::world::whole::WorldError;
+use sim::world::plant::WorldError;
 
 pub(crate) use cases::{Case, Table};
 use figure::FigureError;

@@ -35,7 +35,7 @@ fn a_surplus_of_thrust_is_wasted_with_a_lean_that_turns_around() {
 }
 
 /// The inputs of a plan, flown in small steps with the equations of a slender body written with
-/// vectors instead of leans. The intervals come nearer with shorter steps.
+/// vectors instead of leans. The intervals converge to it with shorter steps.
 #[test]
 fn intervals_lead_where_the_equations_of_motion_do() {
     let model = problem(1.6);
@@ -112,27 +112,27 @@ fn cross(a: &[f64; 3], b: &[f64; 3]) -> [f64; 3] {
 
 #[test]
 fn the_rest_of_a_plan_is_optimal_and_a_disturbed_one_soon_is() {
-    const GONE: usize = 4;
+    const FLOWN: usize = 4;
     let mut model = problem(1.6);
     let mut workspace = Workspace::default();
     let cold = workspace.solve(&model, None);
     let limits: Vec<_> = workspace.limit_multipliers().collect();
     let all: Vec<f64> = workspace.condition_multipliers().collect();
     let (states, inputs, costates) = (
-        workspace.states()[GONE..].to_vec(),
-        workspace.inputs()[GONE..].to_vec(),
-        workspace.costates()[GONE..].to_vec(),
+        workspace.states()[FLOWN..].to_vec(),
+        workspace.inputs()[FLOWN..].to_vec(),
+        workspace.costates()[FLOWN..].to_vec(),
     );
-    let kept = model.pushes.len() - GONE;
+    let remaining = model.pushes.len() - FLOWN;
     let mut conditions = Vec::new();
-    super::last_multipliers(&all, model.end.settled_nodes, model.pushes.len(), kept, &mut conditions);
-    model.pushes.drain(..GONE);
+    super::last_multipliers(&all, model.end.settled_nodes, model.pushes.len(), remaining, &mut conditions);
+    model.pushes.drain(..FLOWN);
     model.initial = states[0];
     let start = Start {
         states: &states,
         inputs: &inputs,
         costates: &costates,
-        limit_multipliers: &limits[GONE..],
+        limit_multipliers: &limits[FLOWN..],
         condition_multipliers: &conditions,
     };
     let rest = workspace.solve(&model, Some(&start));
@@ -196,9 +196,9 @@ fn derivatives_are_those_of_differences() {
     }
 }
 
-/// The sweep's elimination, and that of the whole matrices which the interval stands for.
+/// The sweep's elimination, and that of the equivalent full matrices of the interval.
 #[test]
-fn an_interval_is_eliminated_like_its_whole_matrices() {
+fn an_interval_is_eliminated_like_its_full_matrices() {
     let interval = evaluated(&problem(1.6), &SOMEWHERE);
     let mut whole = DenseIntervals::default();
     whole.resize(1);

@@ -12,26 +12,26 @@ use crate::wire::vehicle::{Vehicle, VehicleEvent, VehicleStep};
 pub fn step(
     endpoint: &mut VehicleEndpoint,
     vehicle: &mut Vehicle,
-    own: &[Request],
+    local: &[Request],
 ) -> (Vec<VehicleEvent>, Vec<Answer>) {
-    let UplinkState { uplink, commander, mut requests } = endpoint.heard(vehicle.time_s());
+    let UplinkState { uplink, commander, mut requests } = endpoint.uplink_state(vehicle.time_s());
     vehicle.set_uplink(uplink, commander);
-    requests.extend_from_slice(own);
+    requests.extend_from_slice(local);
     let VehicleStep { events, mut answers } = vehicle.step(&requests);
-    let to_itself = answers.split_off((requests.len() - own.len()).min(answers.len()));
+    let to_itself = answers.split_off((requests.len() - local.len()).min(answers.len()));
     endpoint.on_answers(&answers, &vehicle.state());
     for event in &events {
-        tell(endpoint, event);
+        forward(endpoint, event);
     }
     (events, to_itself)
 }
 
-/// Tells the stations what the vehicle reports. A new phase is seen by [`VehicleEndpoint::poll`],
+/// Forwards the vehicle's messages to the stations. A new phase is seen by [`VehicleEndpoint::poll`],
 /// like every other change of the vehicle's mode.
-fn tell(endpoint: &mut VehicleEndpoint, event: &VehicleEvent) {
+fn forward(endpoint: &mut VehicleEndpoint, event: &VehicleEvent) {
     match event {
-        VehicleEvent::Text { severity, text } => endpoint.say(*severity, text),
-        VehicleEvent::Verdict => endpoint.tell_of_verdict(),
+        VehicleEvent::Text { severity, text } => endpoint.send_text(*severity, text),
+        VehicleEvent::Verdict => endpoint.announce_verdict(),
         VehicleEvent::PhaseChanged { .. } | VehicleEvent::Planned { .. } => {}
     }
 }

@@ -1,16 +1,16 @@
-//! A flight computer on a board that decides every frame of a flight beside the one in this
-//! process, and hears the crew on a radio of its own.
+//! A flight computer on a board that decides every frame of a flight in parallel with the one in
+//! this process, and receives the crew's commands by radio.
 //!
-//! What the crew asks for comes from the board with its answer to the frame before. The vehicle's
-//! frame is over when the board has answered it with the same output and the same digest of its
-//! memory, bit for bit; otherwise the flight ends with an error. So what moves the vehicle is what
-//! the board has decided, from what the board has heard.
+//! The crew's requests come from the board with its answer to the frame before. The vehicle's frame
+//! is complete when the board has answered it with the same output and the same digest of its
+//! memory, bit for bit; otherwise the flight ends with an error. So the vehicle moves by the
+//! board's decisions, from the board's received data.
 //!
 //! The board is at the other end of two pipes in a folder, `frames` and `answers`, and reads a
-//! flight as [`avionics::board::stream`] describes it; what is behind the pipes (a process, an
-//! emulator, `socat` and a cable) may lose bytes. A frame that is not answered is sent again, with
-//! the flight's beginning. A board that was dead in some frames finds that out from the number of
-//! the next one, and resets itself; so behind missing frames that frame is sent twice.
+//! flight as described in [`avionics::board::stream`]; the connection behind the pipes (a process,
+//! an emulator, `socat` and a cable) may lose bytes. An unanswered frame is sent again, with the
+//! flight's beginning. A board that was down in some frames detects that from the number of the
+//! next one, and resets itself; so after missing frames that frame is sent twice.
 
 use std::fs::{File, OpenOptions};
 use std::hash::{BuildHasher as _, Hasher as _, RandomState};
@@ -55,7 +55,7 @@ pub enum BoardError {
     Gone { frame: u64 },
     #[error("frame {frame}: the board has decided something else than the computer in this process")]
     Differs { frame: u64 },
-    #[error("what the board has heard: {0}")]
+    #[error("input from the board's radio: {0}")]
     Uplink(#[from] RecordError),
 }
 
@@ -66,9 +66,9 @@ pub(super) struct OnBoard {
     begin: Begin,
     /// The number of the last frame.
     last: Option<u64>,
-    /// For the next frame; `None` of a board that has not answered the last one: it has heard
-    /// nobody yet.
-    heard: Option<stream::Heard>,
+    /// For the next frame; `None` for a board that has not answered the last one: it has received
+    /// nothing yet.
+    radio: Option<stream::RadioInput>,
 }
 
 impl OnBoard {
@@ -107,24 +107,24 @@ impl OnBoard {
             on_the_air: Some(on_the_air),
             ..Begin::default()
         };
-        Ok(Self { frames, answers, begin, last: None, heard: None })
+        Ok(Self { frames, answers, begin, last: None, radio: None })
     }
 
-    /// Steps the vehicle by one frame with what the board has heard; the board decides it, too.
+    /// Steps the vehicle by one frame with the board's radio input; the board decides it, too.
     pub(super) fn step(&mut self, vehicle: &mut Vehicle) -> Result<Vec<VehicleEvent>, BoardError> {
-        let UplinkState { uplink, commander, requests } = self.heard()?;
+        let UplinkState { uplink, commander, requests } = self.uplink_state()?;
         vehicle.set_uplink(uplink, commander);
         let events = vehicle.step(&requests).events;
-        self.heard = None;
+        self.radio = None;
         self.decide(vehicle)?;
         Ok(events)
     }
 
-    fn heard(&self) -> Result<UplinkState, RecordError> {
-        let Some(stream::Heard { uplink, commander, requests }) = &self.heard else {
-            return Ok(UplinkState { uplink: Uplink::NeverHeard, commander: None, requests: Vec::new() });
+    fn uplink_state(&self) -> Result<UplinkState, RecordError> {
+        let Some(stream::RadioInput { uplink, commander, requests }) = &self.radio else {
+            return Ok(UplinkState { uplink: Uplink::NeverReceived, commander: None, requests: Vec::new() });
         };
-        let at = At { frame: self.last.map_or(0, |last| last + 1), field: "heard" };
+        let at = At { frame: self.last.map_or(0, |last| last + 1), field: "radio" };
         let requests = requests.iter().map(|request| Logged::from_log(request, at));
         Ok(UplinkState {
             uplink: Logged::from_log(uplink, at)?,
@@ -147,7 +147,7 @@ impl OnBoard {
 
     fn compare(&mut self, frame: &ComputerFrame) -> Result<(), BoardError> {
         let number = frame.input.frame;
-        // The board knows itself what it has heard.
+        // The board has its own radio input.
         let input =
             ComputerInput { uplink: None, commander: None, requests: Vec::new(), ..frame.input.clone() };
         let sent = Frame { input, begin: None };
@@ -169,12 +169,12 @@ impl OnBoard {
             frame: number,
             output: frame.output.clone(),
             state_digest: frame.state_digest,
-            heard: None,
+            radio: None,
         };
         if !answer.is_same_as(&expected) {
             return Err(BoardError::Differs { frame: number });
         }
-        self.heard = answer.heard;
+        self.radio = answer.radio;
         Ok(())
     }
 
@@ -207,12 +207,12 @@ impl OnBoard {
 pub struct OnTheWire {
     /// Random number drawn once at each power-up: a different number means a different boot.
     pub boot_number: NonZeroU32,
-    /// Random number of the vehicle, the same after each power-up if it is kept.
+    /// Random number of the vehicle, the same after each power-up if it is stored.
     pub uid: NonZeroU16,
     /// Budget of each network link, bytes per second.
     pub network_bytes_s: u32,
-    /// Budget of each serial link, bytes per second, as far as four fifths of its baud rate go:
-    /// what a radio behind it carries.
+    /// Budget of each serial link, bytes per second, up to four fifths of its baud rate: the
+    /// capacity of a radio behind it.
     pub serial_bytes_s: u32,
 }
 
@@ -250,7 +250,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_boot_draws_a_number_of_its_own() {
+    fn every_boot_draws_another_number() {
         let mut numbers: Vec<_> = (0..50).map(|_| OnTheWire::drawn().boot_number).collect();
         numbers.sort_unstable();
         numbers.dedup();

@@ -77,9 +77,9 @@ impl Intake {
 
 /// A frame from a link.
 pub(super) enum Received {
-    /// A frame to act on, and how it came in.
+    /// A frame to act on, and its path.
     Frame(Path, Frame),
-    /// A frame that had come in another way before.
+    /// A frame that was received before on another path.
     Copy(Path, Frame),
     /// A frame to ignore: its signature is missing or wrong.
     Rejected(Frame, Rejection),
@@ -108,26 +108,26 @@ impl Links {
         let now = self.now(time_s);
         let Self { open: links, intake, recorder, .. } = self;
         let recorder = recorder.as_ref();
-        let mut heard = Vec::new();
-        let mut believed = false;
+        let mut received = Vec::new();
+        let mut accepted = false;
         for number in 0..links.count() {
             let name = links.name(number).to_owned();
             for _ in 0..MAX_AT_ONCE {
-                let Some(received) = links.try_receive(number) else { break };
-                let path = Path { link: number, origin: received.origin() };
-                for event in links.take(number, received, now) {
+                let Some(data) = links.try_receive(number) else { break };
+                let path = Path { link: number, origin: data.origin() };
+                for event in links.take(number, data, now) {
                     match event {
-                        LinkEvent::Believed(_) => believed = true,
+                        LinkEvent::Accepted(_) => accepted = true,
                         LinkEvent::Frame(frame) => {
                             intake.record(&name, &frame, time_s);
-                            heard.push(Received::Frame(path, frame));
+                            received.push(Received::Frame(path, frame));
                         }
                         LinkEvent::Copy(frame) => {
                             intake.record(&name, &frame, time_s);
-                            heard.push(Received::Copy(path, frame));
+                            received.push(Received::Copy(path, frame));
                         }
                         // Counted but not recorded: a flood of forgeries must not fill the log.
-                        LinkEvent::Rejected(frame, why) => heard.push(Received::Rejected(frame, why)),
+                        LinkEvent::Rejected(frame, why) => received.push(Received::Rejected(frame, why)),
                         LinkEvent::UnknownSenders(words) => {
                             note(recorder, time_s, &format!("link {name}: {words}"));
                         }
@@ -139,10 +139,10 @@ impl Links {
         }
         // Save the timestamp before acting on the frame, so that it cannot be replayed after a
         // restart.
-        if self.open.saves_timestamps_at(now.stamp) || believed {
+        if self.open.saves_timestamps_at(now.stamp) || accepted {
             self.save_timestamps(time_s);
         }
-        heard
+        received
     }
 
     /// Sends a frame. For a slow line it may wait until [`Links::send_what_waits`].
@@ -158,7 +158,7 @@ impl Links {
         }
     }
 
-    /// Gives each slow line what it can carry by now.
+    /// Sends over each slow line as much as it can carry by now.
     pub(super) fn send_what_waits(&mut self, time_s: f64) {
         let now = self.now(time_s);
         let Self { open: links, recorder, tx_bytes, .. } = self;
@@ -180,7 +180,7 @@ impl Links {
         for (name, link) in self.open.each() {
             let (figures, framing) = (link.stats().figures(now), link.framing());
             let words = format!(
-                "link {name}: {} frames heard, {} copies, loss {:.1} %, {} bad checksums, {} unknown ids",
+                "link {name}: {} frames received, {} copies, loss {:.1} %, {} bad checksums, {} unknown ids",
                 framing.frames,
                 link.copies(),
                 100.0 * figures.loss,
@@ -233,7 +233,7 @@ impl Stamps {
     }
 }
 
-// The people who may command, from a crew file into the vehicle's own types.
+// Conversion of a crew file's operators into the vehicle's types.
 
 /// The operators with keys, in the order of the file.
 pub(super) fn operators_of(crew: &CrewFile) -> Vec<Operator> {
@@ -250,12 +250,12 @@ pub(super) fn operators_of(crew: &CrewFile) -> Vec<Operator> {
     crew.members.iter().filter_map(operator).collect()
 }
 
-/// How many people an arming and a start take. The numbers of the asks begin elsewhere at each
+/// Number of people who must agree to arm and start. The proposal numbers begin elsewhere at each
 /// boot.
 pub(super) fn people_of(crew: &CrewFile, boot_number: u32) -> People {
     match crew.mode {
         Mode::OnePerson => People::One,
-        Mode::TwoPerson => People::Two { first_ask: boot_number as u16 },
+        Mode::TwoPerson => People::Two { first: boot_number as u16 },
     }
 }
 
@@ -263,7 +263,7 @@ pub(super) fn people_of(crew: &CrewFile, boot_number: u32) -> People {
 
 /// One direction of the radio.
 pub(crate) struct Delayed<T> {
-    /// Frames on their way with their arrival times, s, in the order they were sent.
+    /// Frames under way with their arrival times, s, in the order they were sent.
     on_its_way: VecDeque<(f64, T)>,
 }
 
@@ -290,30 +290,30 @@ impl<T> Delayed<T> {
 mod tests {
     use super::*;
 
-    const WHOLE: Radio = Radio { silent: false, delay_s: 0.0 };
+    const PERFECT: Radio = Radio { silent: false, delay_s: 0.0 };
 
     #[test]
     fn a_working_radio_delays_nothing() {
         let mut radio = Delayed::default();
-        assert_eq!(radio.pass(vec![1, 2], 0.0, WHOLE), [1, 2]);
-        assert!(radio.pass(Vec::new(), 0.1, WHOLE).is_empty());
+        assert_eq!(radio.pass(vec![1, 2], 0.0, PERFECT), [1, 2]);
+        assert!(radio.pass(Vec::new(), 0.1, PERFECT).is_empty());
     }
 
     #[test]
     fn late_frames_arrive_in_order_and_none_is_lost() {
-        let late = Radio { delay_s: 0.5, ..WHOLE };
+        let late = Radio { delay_s: 0.5, ..PERFECT };
         let mut radio = Delayed::default();
         assert!(radio.pass(vec!['a'], 0.0, late).is_empty());
         assert!(radio.pass(vec!['b'], 0.25, late).is_empty());
         assert_eq!(radio.pass(Vec::new(), 0.5, late), ['a']);
         // The radio works again: frames sent earlier still arrive first.
-        assert!(radio.pass(vec!['c'], 0.625, WHOLE).is_empty());
-        assert_eq!(radio.pass(Vec::new(), 0.75, WHOLE), ['b', 'c']);
+        assert!(radio.pass(vec!['c'], 0.625, PERFECT).is_empty());
+        assert_eq!(radio.pass(Vec::new(), 0.75, PERFECT), ['b', 'c']);
     }
 
     #[test]
     fn a_silent_radio_also_loses_frames_on_their_way() {
-        let late = Radio { delay_s: 0.5, ..WHOLE };
+        let late = Radio { delay_s: 0.5, ..PERFECT };
         let silent = Radio { silent: true, ..late };
         let mut radio = Delayed::default();
         radio.pass(vec!['a'], 0.0, late);

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::dispersion::Dispersion;
 use crate::recipe::Recipe;
-use flight::computer::crew::{Answer, Asked, Request};
+use flight::computer::crew::{Answer, CrewCommand, Request};
 use flight::rules::arming;
 use flight::rules::phase::Phase;
 use flight::vehicle::mission::StartPoint;
@@ -74,20 +74,20 @@ pub fn load_flight(name_or_path: &str) -> Result<RocketFlight, FlyError> {
 const READY_WITHIN_S: f64 = 10.0;
 
 /// Arms and starts once the checks pass.
-pub(super) struct OwnStart {
+pub(super) struct AutoStart {
     pub(super) wanted: bool,
     pub(super) refused: Option<String>,
-    /// It has asked for arming and start.
-    pub(super) asked: bool,
-    /// What has held the countdown.
+    /// Arming and start were requested.
+    pub(super) requested: bool,
+    /// Why the countdown was held.
     pub(super) held: Option<String>,
 }
 
-impl OwnStart {
+impl AutoStart {
     /// The request for this frame.
     pub(super) fn requests(&mut self, vehicle: &Vehicle) -> Vec<Request> {
         let mode = vehicle.mode();
-        if self.asked && mode.phase.on_pad() && !mode.interlocks.armed && !vehicle.aborted() {
+        if self.requested && mode.phase.on_pad() && !mode.interlocks.armed && !vehicle.aborted() {
             // A reset has disarmed it. Only a person arms it again.
             let why = self.held.as_ref().map(|held| format!(": {held}")).unwrap_or_default();
             self.refused.get_or_insert_with(|| format!("disarmed on the pad after it was started{why}"));
@@ -103,8 +103,8 @@ impl OwnStart {
             Some(reason) if vehicle.time_s() > READY_WITHIN_S => self.refused = Some(reason),
             Some(_) => {}
             None => {
-                (self.wanted, self.asked) = (false, true);
-                return [Asked::Arm, Asked::Start].map(Request::of_the_programme).to_vec();
+                (self.wanted, self.requested) = (false, true);
+                return [CrewCommand::Arm, CrewCommand::Start].map(Request::of_the_programme).to_vec();
             }
         }
         Vec::new()
@@ -136,13 +136,13 @@ mod tests {
 
     /// A station that is prepared for a mission arms it wherever the flight begins.
     #[test]
-    fn the_vehicle_tells_the_same_mission_from_every_start() {
+    fn the_vehicle_reports_the_same_mission_from_every_start() {
         use protocol::mission::MissionHash;
         for (name, text) in flight::vehicles::mission::BUILTIN {
             for start in [StartPoint::Apogee, StartPoint::Pad, StartPoint::Drone] {
                 let Ok(flight) = load_flight(name).unwrap().starting_at(Some(start)) else { continue };
-                let told = flight.vehicle().unwrap().mission().hash;
-                assert_eq!(told, MissionHash::of(text), "{name} from {}", start.name());
+                let hash = flight.vehicle().unwrap().mission().hash;
+                assert_eq!(hash, MissionHash::of(text), "{name} from {}", start.name());
             }
         }
     }

@@ -1,11 +1,11 @@
 //! The run loop: a vehicle, its clock, its links and its log.
 
 mod board;
-mod kept_abort;
 mod links;
 mod load;
 mod pace;
 mod recording;
+mod saved_abort;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use crate::recipe::RecipeError;
 use avionics::board::stream::OnTheAir;
 use flight::computer::FRAME_S;
-use flight::computer::news::Severity;
+use flight::computer::messages::Severity;
 use flight::rules::phase::Phase;
 pub use flight::vehicle::mission::StartPoint;
 pub use flight::vehicles::mission::DEFAULT as DEFAULT_MISSION;
@@ -27,14 +27,14 @@ use tokio::sync::watch;
 
 use self::board::OnBoard;
 pub use self::board::{BoardError, OnTheWire};
-use self::kept_abort::KeptAbort;
 pub(crate) use self::links::Delayed;
 use self::links::{Links, Received, operators_of, people_of};
-use self::load::OwnStart;
+use self::load::AutoStart;
 pub use self::load::load_flight;
 pub use self::pace::Lateness;
 use self::pace::{Pace, Waiting};
 use self::recording::{Offer, log_state, nanoseconds, note, record};
+use self::saved_abort::SavedAbort;
 use crate::wire::endpoint::{self, VehicleEndpoint, VehicleKind};
 use crate::wire::solve_times::SolveTimes;
 use crate::wire::vehicle::{Judged, RocketFlight, Vehicle, VehicleEvent};
@@ -83,14 +83,14 @@ pub struct FlyOptions {
     pub speed: Speed,
     /// Arm and start without waiting for a ground station.
     pub auto_start: bool,
-    /// End once the flight is over, SAFED or not; otherwise keep serving the links until told to
-    /// stop. After an abort on the pad the links are always served: the crew has to see the
-    /// countdown of the waiting time.
+    /// End once the flight is over, SAFED or not; otherwise serve the links until stopped. After an
+    /// abort on the pad the links are always served: the crew must see the countdown of the waiting
+    /// time.
     pub exit_when_safed: bool,
-    /// Folder with the pipes of a board whose flight computer decides every frame, too, and that
-    /// hears the crew on its own radio; then there are no links and no start by itself.
+    /// Folder with the pipes of a board whose flight computer decides every frame, too, and
+    /// receives the crew's commands by radio; then there are no links and no automatic start.
     pub board: Option<PathBuf>,
-    /// Where the pin is, each time that somebody moves it; it is out at first.
+    /// Position of the pin, at each change; it is out at first.
     pub pin_out: Option<watch::Receiver<bool>>,
     /// Keeps an abort on the pad through a power cycle.
     pub abort_file: Option<PathBuf>,
@@ -131,7 +131,7 @@ pub enum FlyError {
     #[error("cannot read the mission {path}")]
     ReadMission {
         path: String,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
     /// The mission is wrong.
@@ -153,7 +153,7 @@ pub enum FlyError {
     /// Two people cannot be replaced by a program.
     #[error("a two-person crew arms and starts by hand: without --auto, and with --mavlink")]
     CrewWithoutHands,
-    /// The board, or what it has decided.
+    /// The board failed, or decided differently.
     #[error(transparent)]
     Board(#[from] BoardError),
     /// A link cannot be opened.
@@ -217,7 +217,7 @@ fn endpoint_of(options: &FlyOptions) -> VehicleEndpoint {
     let endpoint = endpoint
         .of_system(options.system_id)
         .booted(options.on_the_wire.boot_number.get())
-        .known_as(options.on_the_wire.uid.get())
+        .with_uid(options.on_the_wire.uid.get())
         .over_links(&capacities_bytes_s);
     if options.auto_start { endpoint.starting_by_itself() } else { endpoint }
 }
@@ -243,15 +243,15 @@ fn vehicle_of(options: &FlyOptions, was_aborted: bool) -> Result<Vehicle, FlyErr
     Ok(vehicle)
 }
 
-fn hear(endpoint: &mut VehicleEndpoint, heard: Received, vehicle: &Vehicle) {
-    match heard {
+fn receive(endpoint: &mut VehicleEndpoint, received: Received, vehicle: &Vehicle) {
+    match received {
         Received::Frame(path, frame) => endpoint.on_frame(path, &frame, &vehicle.state()),
         Received::Copy(path, frame) => endpoint.on_copy(path, &frame, &vehicle.state()),
         Received::Rejected(frame, why) => endpoint.on_rejected(&frame, why),
     }
 }
 
-/// Moves the pin as it was asked, and says why not: nobody reaches it in flight.
+/// Moves the pin as requested; in flight, where it is out of reach, returns the reason why not.
 fn move_pin(pin_out: Option<&mut watch::Receiver<bool>>, vehicle: &mut Vehicle) -> Option<String> {
     let pin_out = pin_out.filter(|pin| pin.has_changed().unwrap_or(false))?;
     let out = *pin_out.borrow_and_update();
@@ -260,7 +260,7 @@ fn move_pin(pin_out: Option<&mut watch::Receiver<bool>>, vehicle: &mut Vehicle) 
     if on_the_ground {
         vehicle.set_pin_out(out);
     }
-    (!on_the_ground).then(|| "the pin was not moved: nobody reaches it in flight".to_owned())
+    (!on_the_ground).then(|| "the pin was not moved: out of reach in flight".to_owned())
 }
 
 fn on_board(folder: &Path, options: &FlyOptions) -> Result<OnBoard, FlyError> {
@@ -278,20 +278,19 @@ fn on_board(folder: &Path, options: &FlyOptions) -> Result<OnBoard, FlyError> {
 /// How a flight has ended.
 fn outcome_of(vehicle: &Vehicle, refused: Option<String>, stopped: bool) -> FlightEnd {
     match (vehicle.judged().map(|judged| judged.landing.stands), refused) {
-        // An abort stays an abort, however the vehicle came down; the verdict is reported
-        // separately.
+        // An abort stays an abort, whatever the landing; the verdict is reported separately.
         _ if vehicle.aborted() => FlightEnd::Aborted,
         (Some(true), _) => FlightEnd::Landed,
         (None, Some(reason)) => FlightEnd::Refused(reason),
         (None, None) if stopped => FlightEnd::Stopped,
-        // It is damaged, or the vehicle never came down.
+        // It is damaged, or the vehicle never landed.
         (Some(false) | None, _) => FlightEnd::NotLanded,
     }
 }
 
 /// Flies; `observe` is called with the simulated time and each thing the vehicle reports.
 ///
-/// The outcome depends only on the flight, an abort before it, and what arrives on the links and at
+/// The outcome depends only on the flight, an abort before it, and the inputs on the links and at
 /// the pin, not on the speed, the machine or the clock.
 ///
 /// # Errors
@@ -301,7 +300,7 @@ pub async fn fly_observed(
     mut stop: watch::Receiver<bool>,
     mut observe: impl FnMut(f64, &VehicleEvent) + Send,
 ) -> Result<FlightSummary, FlyError> {
-    let (mut kept_abort, was_aborted) = KeptAbort::open(options.abort_file.take());
+    let (mut saved_abort, was_aborted) = SavedAbort::open(options.abort_file.take());
     let mut vehicle = vehicle_of(&options, was_aborted)?;
     let mut links = Links::open(
         &options.links,
@@ -312,12 +311,12 @@ pub async fn fly_observed(
     .await?;
     let mut endpoint = endpoint_of(&options);
     let mut on_board = options.board.as_deref().map(|folder| on_board(folder, &options)).transpose()?;
-    // Somebody may be heard: here, or on the board's own radio.
+    // A crew may be received here, or on the board's radio.
     let served = !options.links.is_empty() || on_board.is_some();
     let crewed = served && !options.auto_start;
-    let (mut heard, mut sent) = (Delayed::default(), Delayed::default());
+    let (mut uplink_radio, mut sent) = (Delayed::default(), Delayed::default());
     let mut solve_times = SolveTimes::default();
-    let mut own_start = OwnStart { wanted: options.auto_start, refused: None, asked: false, held: None };
+    let mut starter = AutoStart { wanted: options.auto_start, refused: None, requested: false, held: None };
     let mut pace = Pace::new(options.speed, FRAME_S);
     let mut log_state_due_s = 0.0;
     let (mut dropped, mut offer) = (0, Offer::default());
@@ -327,20 +326,20 @@ pub async fn fly_observed(
             vehicle.set_log_state(log_state(options.recorder.as_ref()));
             log_state_due_s += 1.0;
         }
-        let told = [move_pin(options.pin_out.as_mut(), &mut vehicle), kept_abort.keep(&vehicle)];
-        for text in told.into_iter().flatten() {
+        let warnings = [move_pin(options.pin_out.as_mut(), &mut vehicle), saved_abort.save(&vehicle)];
+        for text in warnings.into_iter().flatten() {
             observe(vehicle.time_s(), &VehicleEvent::Text { severity: Severity::Warning, text });
         }
         let arrived = links.receive(vehicle.time_s());
-        for heard in heard.pass(arrived, vehicle.time_s(), vehicle.radio()) {
-            hear(&mut endpoint, heard, &vehicle);
+        for received in uplink_radio.pass(arrived, vehicle.time_s(), vehicle.radio()) {
+            receive(&mut endpoint, received, &vehicle);
         }
-        let own = own_start.requests(&vehicle);
+        let requests = starter.requests(&vehicle);
         let (events, answers) = match &mut on_board {
             Some(on_board) => (on_board.step(&mut vehicle)?, Vec::new()),
-            None => endpoint::step(&mut endpoint, &mut vehicle, &own),
+            None => endpoint::step(&mut endpoint, &mut vehicle, &requests),
         };
-        own_start.on_answers(&answers);
+        starter.on_answers(&answers);
         let time_s = vehicle.time_s();
         if let Some(clock) = &options.log_clock {
             clock.set(nanoseconds(time_s));
@@ -364,7 +363,7 @@ pub async fn fly_observed(
             dropped = links.dropped();
             note(options.recorder.as_ref(), time_s, &format!("{dropped} frames found no room on their link"));
         }
-        let over = vehicle.is_over() || own_start.refused.is_some();
+        let over = vehicle.is_over() || starter.refused.is_some();
         let aborted_on_the_pad = vehicle.phase().on_pad() && vehicle.aborted() && served;
         if over && !aborted_on_the_pad && options.exit_when_safed && pace.has_lingered(served) {
             break false;
@@ -379,16 +378,16 @@ pub async fn fly_observed(
         tokio::select! {
             () = pace.wait(waiting) => {}
             changed = stop.changed() => {
-                // If the sender of the stop signal is gone, the flight ends.
+                // If the sender of the stop signal is dropped, the flight ends.
                 if changed.is_err() || *stop.borrow() { break true; }
             }
         }
     };
     links.close(vehicle.time_s());
-    if let Some(reason) = &own_start.refused {
+    if let Some(reason) = &starter.refused {
         note(options.recorder.as_ref(), vehicle.time_s(), &format!("REFUSED: {reason}"));
     }
-    let outcome = outcome_of(&vehicle, own_start.refused, stopped);
+    let outcome = outcome_of(&vehicle, starter.refused, stopped);
     Ok(FlightSummary {
         outcome,
         judged: vehicle.judged(),

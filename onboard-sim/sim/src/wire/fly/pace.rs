@@ -7,7 +7,7 @@ use super::Speed;
 /// Who is waiting for the vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Waiting {
-    /// Nobody: as fast as requested.
+    /// Unlimited: as fast as requested.
     Nobody,
     /// A crew at the pad: never faster than real time, because its station works in real time.
     Crew,

@@ -1,12 +1,11 @@
-//! Chooses what is recorded in the log of a flight, and gives out that log once the vehicle is
-//! down.
+//! Selects the records in the log of a flight, and serves that log after landing.
 
 use std::fs::File;
 use std::os::unix::fs::FileExt as _;
 use std::path::Path;
 
 use flight::computer::LogState;
-use flight::computer::news::Severity;
+use flight::computer::messages::Severity;
 use protocol::frame::Frame;
 use protocol::ftp::server::{FileEntry, Files};
 use protocol::log::flight_v1::PilotTiming;
@@ -80,14 +79,14 @@ pub(super) fn log_state(recorder: Option<&Recorder>) -> LogState {
     };
     let directory = recorder.path().parent().filter(|path| !path.as_os_str().is_empty());
     let space_bytes = fs4::available_space(directory.unwrap_or(Path::new("."))).unwrap_or(0);
-    let running = recorder.is_whole() && recorder.dropped() == 0 && !recorder.is_removed();
+    let running = recorder.is_intact() && recorder.dropped() == 0 && !recorder.is_removed();
     LogState { running, space_bytes }
 }
 
-// The vehicle's own log as a file that it gives out once it is down: the part up to a mark, which
-// does not change any more while recording goes on, with the end of a log behind it.
+// The vehicle's log as a file that it serves after landing: the part up to a mark, which does not
+// change any more while recording continues, with the end of a log behind it.
 
-/// How far the log is on its way to being offered.
+/// Progress of offering the log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum Offer {
     #[default]
@@ -99,7 +98,7 @@ pub(super) enum Offer {
 }
 
 impl Offer {
-    /// Goes on with it. If the log cannot be offered, it says why.
+    /// Advances it. If the log cannot be offered, returns the reason.
     pub(super) fn step(&mut self, recorder: &Recorder, vehicle: &Vehicle, endpoint: &mut VehicleEndpoint) {
         match self {
             Self::NotYet if vehicle.is_over() && gives_out_its_log(&vehicle.state()) => {
@@ -189,10 +188,10 @@ mod tests {
         (messages, reader.damage().is_none())
     }
 
-    /// Recording goes on behind the mark; what is offered is a whole log, the same in pieces of any
-    /// length.
+    /// Recording continues behind the mark; the offered part is a complete log, the same in pieces
+    /// of any length.
     #[test]
-    fn a_log_up_to_its_mark_is_whole_and_does_not_change() {
+    fn a_log_up_to_its_mark_is_complete_and_does_not_change() {
         let folder = tempfile::tempdir().unwrap();
         let recorder =
             Recorder::create(&folder.path().join("flight.mcap"), None, &LogHeader::default()).unwrap();
@@ -221,10 +220,10 @@ mod tests {
         assert_eq!(read(&std::fs::read(path).unwrap()), (2000, true));
     }
 
-    /// A storage that loses power keeps a part of the log: all whole chunks before the cut are
+    /// A storage that loses power retains a part of the log: all complete chunks before the cut are
     /// read, wherever it is.
     #[test]
-    fn a_log_that_is_cut_at_any_byte_is_read_up_to_its_last_whole_chunk() {
+    fn a_log_cut_at_any_byte_is_read_up_to_its_last_complete_chunk() {
         let folder = tempfile::tempdir().unwrap();
         let recorder =
             Recorder::create(&folder.path().join("flight.mcap"), None, &LogHeader::default()).unwrap();
@@ -243,7 +242,7 @@ mod tests {
         let bytes = std::fs::read(recorder.finish().unwrap()).unwrap();
         let first = ends[0].0.saturating_sub(3000);
         for cut in first..=bytes.len() {
-            // Behind a chunk comes its index, which a reader from front to back does not need.
+            // A chunk is followed by its index, which a reader from front to back does not need.
             let before = ends.iter().rev().find(|(end, _)| *end <= cut).map_or(0, |(_, records)| *records);
             let next = ends.iter().find(|(end, _)| *end > cut).map_or(40, |(_, records)| *records);
             let found = read(&bytes[..cut]).0;

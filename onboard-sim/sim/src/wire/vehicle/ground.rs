@@ -1,10 +1,10 @@
-//! Contact with the ground, the verdict on it, and the end of the flight: what only the simulation
-//! knows.
+//! Ground contact, the verdict on it, and the end of the flight, all of which only the simulation
+//! has.
 
 use crate::outcome::Outcome;
 use crate::sortie::Sortie;
 use flight::computer::Computer;
-use flight::computer::news::Severity;
+use flight::computer::messages::Severity;
 use flight::rules::phase::Phase;
 
 use super::{Judged, VehicleEvent};
@@ -13,7 +13,7 @@ use super::{Judged, VehicleEvent};
 /// no longer, s.
 const UNNOTICED_S: f64 = 15.0;
 
-/// What has become of the flight.
+/// State of the flight's end.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct GroundWatch {
     contacts: usize,
@@ -69,7 +69,7 @@ fn contact(vertical_m_s: f64) -> VehicleEvent {
     VehicleEvent::Text { severity: Severity::Notice, text }
 }
 
-/// How the flight ended, and what legs that can give way bore.
+/// The outcome of the flight, and the loads of crushable legs, as text.
 fn in_words(outcome: &Outcome, aborted: bool) -> String {
     let strain = outcome.rest.and_then(|rest| rest.strain).map_or_else(String::new, |strain| {
         let [stroke, load] = [strain.stroke_used, strain.strength_used].map(|share| 100.0 * share);

@@ -15,9 +15,9 @@ use crate::wire::record::LastFrame;
 pub use avionics::link::vehicle::{BatteryFacts, Judged, MissionName, VehicleState};
 use flight::computer::crew::{Answer, People, Request};
 use flight::computer::findings::Findings;
-use flight::computer::news::{CrewMessage, Severity};
+use flight::computer::messages::{CrewMessage, Severity};
 use flight::computer::pilot::planner::PLAN_WITHIN_S;
-use flight::computer::{Commander, Computer, KeptInput, LogState};
+use flight::computer::{Commander, Computer, LogState, SensedInput};
 use flight::rules::arming::{Check, Uplink};
 use flight::rules::operator::Operator;
 use flight::rules::phase::{Mode, Phase};
@@ -42,7 +42,7 @@ pub struct Vehicle {
     findings: Findings,
     /// A frame of the flight computer was flown in the air just now.
     flown: bool,
-    /// What the next frame is told, but for its requests.
+    /// External inputs of the next frame, except its requests.
     outside: Outside<'static>,
     operators: Vec<Operator>,
     mission: MissionName,
@@ -88,12 +88,12 @@ impl Vehicle {
         self.outside.pin_out = pin_out;
     }
 
-    /// Tells the vehicle the state of its log.
+    /// Sets the state of the vehicle's log.
     pub fn set_log_state(&mut self, log: LogState) {
         self.outside.log = log;
     }
 
-    /// Tells the vehicle the quality of its uplink, and the station that armed it, if one did.
+    /// Sets the quality of the vehicle's uplink, and the station that armed it, if one did.
     pub fn set_uplink(&mut self, uplink: Uplink, commander: Option<Commander>) {
         (self.outside.uplink, self.outside.commander) = (uplink, commander);
     }
@@ -132,7 +132,7 @@ impl Vehicle {
         let mut events = Vec::new();
         let (mut released, mut answers) = (false, Vec::new());
         if let Some(output) = output {
-            events.extend(output.news.into_iter().map(VehicleEvent::from));
+            events.extend(output.messages.into_iter().map(VehicleEvent::from));
             if output.planned {
                 events.extend(self.planned());
             }
@@ -147,12 +147,12 @@ impl Vehicle {
 
     /// The event for a frame in which the pilot took over a plan.
     fn planned(&self) -> Option<VehicleEvent> {
-        let KeptInput { frame, time_s, .. } = self.computer().flown()?;
+        let SensedInput { frame, time_s, .. } = self.computer().flown()?;
         let took_s = self.computer().pilot().report().took_s;
         Some(VehicleEvent::Planned { frame, time_s, took_s, deadline_s: PLAN_WITHIN_S })
     }
 
-    /// Events that only the simulation knows: the start of the flight, contact with the ground, the
+    /// Events available only in the simulation: the start of the flight, ground contact, the
     /// verdict.
     fn events_of_the_simulation(&mut self, released: bool) -> Vec<VehicleEvent> {
         if !released {
@@ -253,7 +253,7 @@ pub enum VehicleEvent {
         frame: u64,
         /// Its time since the release, s.
         time_s: f64,
-        /// From the frame that posed the plan, s.
+        /// From the frame of the request, s.
         took_s: f64,
         /// Allowed, s.
         deadline_s: f64,
@@ -263,20 +263,20 @@ pub enum VehicleEvent {
 }
 
 impl From<CrewMessage> for VehicleEvent {
-    fn from(news: CrewMessage) -> Self {
-        match news {
-            CrewMessage::Said { severity, words } => Self::Text { severity, text: words },
+    fn from(message: CrewMessage) -> Self {
+        match message {
+            CrewMessage::Text { severity, text } => Self::Text { severity, text },
             CrewMessage::PhaseChanged { from, to } => Self::PhaseChanged { from, to },
         }
     }
 }
 
-// What of a flight goes into its log beside its events.
+// Records of a flight in its log besides its events.
 
 impl Vehicle {
-    /// The last frame of the flight computer, and what it starts from: before its first frame and
-    /// behind its release. They come before all others, so that a flight begins with the power-up
-    /// of its computer.
+    /// The last frame of the flight computer, and its start records: before its first frame and
+    /// after its release. They precede all others, so that a flight begins with the power-up of its
+    /// computer.
     pub fn computer_records(&self) -> Vec<Record> {
         let Some(frame) = &self.computer_frame else { return Vec::new() };
         let started = || Record::ComputerStart(Box::new(crate::wire::record::start(self.computer())));
@@ -285,9 +285,9 @@ impl Vehicle {
         powered_up.into_iter().chain([Record::ComputerFrame(frame.clone())]).chain(released).collect()
     }
 
-    /// The other records of the last frame: in flight what the computer thought, and the truth.
+    /// The other records of the last frame: in flight the estimate, and the truth.
     pub fn records(&self) -> Vec<Record> {
-        if self.flown { crate::wire::record::thought_and_truth(&self.sortie) } else { Vec::new() }
+        if self.flown { crate::wire::record::estimate_and_truth(&self.sortie) } else { Vec::new() }
     }
 
     /// The landing as a log's record, once it is judged. Its time counts from the release, as that

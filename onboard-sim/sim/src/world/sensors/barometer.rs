@@ -26,8 +26,7 @@ flight::with_defaults! {
         /// Suction of the flow across the axis, divided by its dynamic pressure: lowest and
         /// highest.
         pub crossflow: [f64; 2] = [0.0; 2],
-        /// Age of a sample beyond what the flight computer assumes, the same for all of a flight,
-        /// s.
+        /// Age of a sample beyond the flight computer's assumption, constant over a flight, s.
         pub late_s: f64 = 0.0,
         /// Offset while the motor burns, m: the exhaust changes the pressure around the vehicle.
         pub plume_m: f64 = 0.0,

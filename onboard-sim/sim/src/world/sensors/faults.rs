@@ -1,4 +1,4 @@
-//! What a broken sensor says, in the place of what it has measured.
+//! Output of a broken sensor, in place of its measurement.
 
 use flight::computer::FRAME_S;
 use flight::estimation::estimator::{GRAVITY_M_S2, GnssFix, Measurements};
@@ -30,15 +30,15 @@ impl Sensor {
 /// How it breaks. Values are in the sensor's unit: deg/s, thousandths of gravity, m; on every axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Defect {
-    /// It says nothing.
+    /// No output.
     Out,
-    /// It says zero.
+    /// Zero.
     Dead,
-    /// It repeats what it said last.
+    /// Repeats the last output.
     Stuck,
-    /// It says what is no number.
+    /// NaN.
     NotANumber,
-    /// It says this, and in every frame.
+    /// This value in every frame.
     Blocked(f64),
     /// It is off by this.
     Step(f64),
@@ -46,11 +46,11 @@ pub enum Defect {
     Ramp(f64),
     /// It is off by this for a tenth of a second.
     Spike(f64),
-    /// Noise of this standard deviation comes on top.
+    /// Additional noise of this standard deviation.
     Noise(f64),
     /// Its values are multiplied by this.
     Scale(f64),
-    /// A receiver keeps reporting its last motion for so long, s, as valid fixes.
+    /// A receiver repeats its last motion as valid fixes for this time, s.
     Stale(f64),
 }
 
@@ -71,7 +71,7 @@ struct Broken {
     sensor: Sensor,
     defect: Defect,
     since_frames: u32,
-    /// What a stuck sensor repeats, or a satellite fix with its velocity.
+    /// The repeated output of a stuck sensor, or a satellite fix with its velocity.
     held: Option<(Vector3<f64>, Vector3<f64>)>,
 }
 
@@ -81,36 +81,36 @@ impl SensorFaults {
         self.broken.push(Broken { sensor, defect, since_frames: 0, held: None });
     }
 
-    /// What the computer hears of a frame's measurements.
-    pub fn heard(&mut self, measured: &Measurements) -> Measurements {
-        let mut heard = *measured;
+    /// The measurements of a frame as received by the computer.
+    pub fn distort(&mut self, measured: &Measurements) -> Measurements {
+        let mut distorted = *measured;
         let Self { broken, noise } = self;
         for broken in broken {
-            broken.distort(&mut heard, noise);
+            broken.distort(&mut distorted, noise);
             broken.since_frames += 1;
         }
-        heard
+        distorted
     }
 }
 
 impl Broken {
-    fn distort(&mut self, heard: &mut Measurements, noise: &mut Normal) {
+    fn distort(&mut self, sample: &mut Measurements, noise: &mut Normal) {
         let none = Vector3::zeros();
         match self.sensor {
             Sensor::Gyro => {
-                let said = self.says((heard.imu.gyro_rad_s, none), 1f64.to_radians(), noise);
-                heard.imu.gyro_rad_s = said.map_or(NOT_SAID, |(rate_rad_s, _)| rate_rad_s);
+                let output = self.output((sample.imu.gyro_rad_s, none), 1f64.to_radians(), noise);
+                sample.imu.gyro_rad_s = output.map_or(SILENT_VALUE, |(rate_rad_s, _)| rate_rad_s);
             }
             Sensor::Accelerometer => {
-                let said = self.says((heard.imu.specific_force_m_s2, none), 1e-3 * GRAVITY_M_S2, noise);
-                heard.imu.specific_force_m_s2 = said.map_or(NOT_SAID, |(force_m_s2, _)| force_m_s2);
+                let output = self.output((sample.imu.specific_force_m_s2, none), 1e-3 * GRAVITY_M_S2, noise);
+                sample.imu.specific_force_m_s2 = output.map_or(SILENT_VALUE, |(force_m_s2, _)| force_m_s2);
             }
-            Sensor::Barometer => self.distort_one(&mut heard.pressure_altitude_m, noise),
-            Sensor::Lidar => self.distort_one(&mut heard.lidar_range_m, noise),
+            Sensor::Barometer => self.distort_one(&mut sample.pressure_altitude_m, noise),
+            Sensor::Lidar => self.distort_one(&mut sample.lidar_range_m, noise),
             Sensor::Gnss => {
-                heard.gnss = heard.gnss.and_then(|fix| {
+                sample.gnss = sample.gnss.and_then(|fix| {
                     let (position_m, velocity_m_s) =
-                        self.says((fix.position_m, fix.velocity_m_s), 1.0, noise)?;
+                        self.output((fix.position_m, fix.velocity_m_s), 1.0, noise)?;
                     Some(GnssFix { position_m, velocity_m_s, ..fix })
                 });
             }
@@ -120,13 +120,13 @@ impl Broken {
     fn distort_one(&mut self, value: &mut Option<f64>, noise: &mut Normal) {
         let blocked = matches!(self.defect, Defect::Blocked(_)).then_some(0.0);
         *value = value.or(blocked).and_then(|value| {
-            self.says((Vector3::from_element(value), Vector3::zeros()), 1.0, noise).map(|(said, _)| said.x)
+            self.output((Vector3::from_element(value), Vector3::zeros()), 1.0, noise).map(|(one, _)| one.x)
         });
     }
 
-    /// What it says, and how that changes a second, in the place of what was measured; the defect's
+    /// The output, and its rate of change per second, in place of the measurement; the defect's
     /// values are in this unit.
-    fn says(
+    fn output(
         &mut self,
         measured: (Vector3<f64>, Vector3<f64>),
         unit: f64,
@@ -153,5 +153,5 @@ impl Broken {
     }
 }
 
-/// What an inertial unit that is silent leaves in its place.
-const NOT_SAID: Vector3<f64> = Vector3::new(f64::NAN, f64::NAN, f64::NAN);
+/// Output of a silent inertial unit.
+const SILENT_VALUE: Vector3<f64> = Vector3::new(f64::NAN, f64::NAN, f64::NAN);

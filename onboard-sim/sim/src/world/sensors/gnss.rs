@@ -1,5 +1,4 @@
-//! The satellite receiver, whose fixes come late: white and wandering errors (Groves 2013, chapter
-//! 9).
+//! The satellite receiver with its late fixes: white and wandering errors (Groves 2013, chapter 9).
 
 use flight::estimation::estimator::{FixQuality, GRAVITY_M_S2, GnssFix};
 use flight::vehicle::rigid::RigidState;
@@ -49,7 +48,7 @@ flight::with_defaults! {
         /// How much of the sky a lean takes from an antenna that looks along the nose: at 1 beyond
         /// 20 degrees of tilt the noise is threefold, and beyond 30 half of the fixes are lost.
         pub shadow_share: f64 = 0.0,
-        /// Time for which the receiver keeps reporting the motion at lift-off, as valid fixes, s.
+        /// Time for which the receiver repeats the motion at lift-off as valid fixes, s.
         pub stale_s: f64 = 0.0,
     }
 }
@@ -119,8 +118,8 @@ impl Sensors {
 }
 
 impl Flaws {
-    /// What is wrong with one more fix: how much older it is than its time tag says, s, and its
-    /// wandering velocity error, m/s.
+    /// Errors of the next fix: its age beyond the time tag, s, and its wandering velocity error,
+    /// m/s.
     fn of_satellites(&mut self, params: &SensorParams) -> (f64, Vector3<f64>) {
         let gnss = &params.gnss;
         for axis in &mut self.velocity_wander {
@@ -130,7 +129,7 @@ impl Flaws {
         (older_s, Vector3::from_fn(|axis, _| self.velocity_wander[axis].value))
     }
 
-    /// What becomes of a fix, of which a lean takes so many, and how far an outlier is off, m.
+    /// Fate of a fix, at this loss rate in a lean, and the error of an outlier, m.
     fn of_fix(&mut self, params: &SensorParams, shadowed_share: f64) -> (Fate, Vector3<f64>) {
         let lost_share = params.gnss.dropout_share + shadowed_share;
         let fate = fate(self.gnss.unit(), lost_share, params.gnss.outlier_share);

@@ -31,7 +31,7 @@ flight::with_defaults! {
         pub accelerometer_bias_mg: f64 = 3.0,
         /// Scale error of each accelerometer axis, as a fraction.
         pub accelerometer_scale_share: f64 = 0.001,
-        /// What each accelerometer axis feels of each other axis, as a fraction.
+        /// Cross-axis sensitivity of the accelerometer, as a fraction.
         pub accelerometer_cross_axis_share: f64 = 0.0,
         /// Largest specific force measured, g.
         pub accelerometer_range_g: f64 = 16.0,
@@ -52,8 +52,8 @@ flight::with_defaults! {
 }
 
 impl Sensors {
-    /// Specific force where the inertial unit sits: that of the centre of gravity, and what turning
-    /// adds (Stevens and Lewis, chapter 1).
+    /// Specific force at the inertial unit: that of the centre of gravity, plus the effect of
+    /// rotation (Stevens and Lewis, chapter 1).
     pub(super) fn force_at_unit_m_s2(&self, truth: &SensorTruth) -> Vector3<f64> {
         let (lever_m, rate) =
             (self.places.lever_arms(&truth.cg_m).imu_m + self.flaws.unit_m, &truth.state.rate_rad_s);

@@ -25,10 +25,10 @@ flight::with_defaults! {
         pub blind_below_m: f64 = 0.0,
         /// Lean of the beam against the axis, each way, degrees.
         pub beam_deg: f64 = 0.0,
-        /// Height of the grass whose tops the beam meets, lowest and highest, m; the feet stand on
+        /// Height of the grass tops that reflect the beam, lowest and highest, m; the feet are on
         /// the ground.
         pub grass_m: [f64; 2] = [0.0; 2],
-        /// Age of a range beyond what the flight computer assumes, the same for all of a flight, s.
+        /// Age of a range beyond the flight computer's assumption, constant over a flight, s.
         pub late_s: f64 = 0.0,
         /// Probability that a range is lost.
         pub dropout_share: f64 = 0.0,
@@ -71,7 +71,7 @@ impl Sensors {
 }
 
 impl Flaws {
-    /// What becomes of a range, and where an outlier lies between the sensor's limits, 0 to 1.
+    /// Fate of a range, and the position of an outlier between the sensor's limits, 0 to 1.
     fn of_range(&mut self, params: &SensorParams) -> (Fate, f64) {
         let fate = fate(self.lidar.unit(), params.lidar.dropout_share, params.lidar.outlier_share);
         (fate, self.lidar.unit())

@@ -2,9 +2,9 @@
 //! fixes, and a lidar.
 //!
 //! [`Sensors::observe`] is called after every millisecond of truth. After every fifth it returns
-//! the measurements of one frame of the flight computer. Each sensor has its own stream of random
-//! numbers and keeps drawing while it is out, so a fault in one sensor does not change the noise of
-//! another.
+//! the measurements of one frame of the flight computer. Each sensor has a separate stream of
+//! random numbers and continues to draw while it is out, so a fault in one sensor does not change
+//! the noise of another.
 
 mod barometer;
 mod faults;
@@ -26,16 +26,16 @@ pub use self::faults::{Defect, Sensor, SensorFaults};
 pub use self::gnss::GnssParams;
 pub use self::imu::ImuParams;
 pub use self::lidar::LidarParams;
-pub use self::noise::believed_start;
+pub use self::noise::start_with_errors;
 use self::noise::{Flaws, Wander};
 pub use self::params::{SensorParamError, SensorParams};
 pub use self::switches::SwitchParams;
 use crate::world::normal::Normal;
-use crate::world::whole::World;
+use crate::world::plant::World;
 
 const MS_S: f64 = 1e-3;
-/// Errors of sensors for a flight whose state is known, as a multiple of real ones. They are not
-/// zero, because a sensor that repeats one value counts as broken.
+/// Factor on the sensor errors for a flight with nearly exact sensors. It is not zero, because a
+/// sensor that repeats one value counts as broken.
 pub const NEARLY_EXACT: f64 = 1e-3;
 /// A hobby receiver loses its satellites under the acceleration of the ascent motor (its tracking
 /// loops follow 4 g) and finds them again this long after it, ms: a hot start takes 1 to 2 s.
@@ -144,7 +144,7 @@ pub struct Sensors {
     wander: [Wander; 3],
     /// The wandering error at the time when the position was zeroed on the pad, m.
     zero_m: Vector3<f64>,
-    /// Time of the first fix after the start, ms: receivers keep their own time.
+    /// Time of the first fix after the start, ms: receivers have their own time base.
     gnss_phase_ms: u32,
     on_its_way: Option<(u32, GnssFix)>,
     rate_sum_rad_s: Vector3<f64>,
@@ -154,7 +154,7 @@ pub struct Sensors {
     contact_ms: Option<u32>,
     /// The last millisecond under the ascent motor.
     boosted_ms: Option<u32>,
-    /// The motion that the receiver keeps reporting, and until when, ms.
+    /// The motion repeated by the receiver, and the end of the repetition, ms.
     stale: Option<(RigidState, u32)>,
 }
 
@@ -164,7 +164,7 @@ impl Sensors {
         self.start_s -= time_s;
     }
 
-    /// Draws one flight's sensors. Their errors are this share of what the parameters say: 1, or
+    /// Draws one flight's sensors. Their errors are this share of the parameters: 1, or
     /// [`NEARLY_EXACT`].
     ///
     /// # Errors

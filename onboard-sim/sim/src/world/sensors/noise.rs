@@ -1,5 +1,5 @@
-//! What is random about the sensors of one flight: white noise and slow wander, flaws, and the
-//! state in which the estimator begins. All from a seed.
+//! The random part of one flight's sensors: white noise and slow wander, flaws, and the initial
+//! state of the estimator. All from a seed.
 
 use flight::estimation::estimator::{GRAVITY_M_S2, StartUncertainty};
 use flight::vehicle::rigid::RigidState;
@@ -23,17 +23,17 @@ impl Wander {
         Self { value: sigma * normal.next(), sigma, correlation_s }
     }
 
-    /// Advances over an interval of any length, exactly: what is kept of the variance, `k^2`, and
-    /// what is new, `1 - k^2`, are one.
+    /// Advances over an interval of any length, exactly: the retained share of the variance, `k^2`,
+    /// and the new share, `1 - k^2`, add up to one.
     pub(super) fn advance(&mut self, interval_s: f64, normal: &mut Normal) {
         let kept = libm::exp(-interval_s / self.correlation_s);
         self.value = self.value * kept + self.sigma * libm::sqrt(1.0 - kept * kept) * normal.next();
     }
 }
 
-// What is wrong with one flight's sensors beyond noise and bias: mounting, vibration, time errors,
-// dropouts, outliers, and feedback that is off. The numbers come from random streams of their own,
-// so the noise of a flight stays the same whether there are flaws or not.
+// Errors of one flight's sensors beyond noise and bias: mounting, vibration, time errors, dropouts,
+// outliers, and feedback offsets. The numbers come from separate random streams, so the noise of a
+// flight is the same with and without flaws.
 
 /// The random streams after those of the sensors and of the start.
 const DRAWN_STREAM: u64 = 5;
@@ -45,7 +45,7 @@ const SATELLITE_STREAM: u64 = 9;
 /// How fast the pressure of the ejection charge leaks out through the vents, s.
 pub(super) const EJECTION_LASTS_S: f64 = 0.3;
 
-/// What a measurement goes through on its way.
+/// Fate of a measurement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Fate {
     Arrives,
@@ -72,7 +72,7 @@ pub(super) struct Flaws {
     pub(super) lidar_late_s: f64,
     pub(super) continuity_lost: bool,
     pub(super) fin_feedback_rad: [f64; 4],
-    /// What each accelerometer axis feels of each other axis.
+    /// Cross-axis sensitivity of the accelerometer.
     pub(super) cross_axis: Matrix3<f64>,
     /// Suction of the flow across the axis, divided by its dynamic pressure.
     pub(super) barometer_crossflow: f64,
@@ -148,7 +148,7 @@ const STREAM: u64 = 4;
 
 /// The true state with errors drawn from the stated uncertainty. The rotation rate has no error,
 /// because the gyro replaces it in the first frame.
-pub fn believed_start(truth: &RigidState, uncertainty: &StartUncertainty, seed: u64) -> RigidState {
+pub fn start_with_errors(truth: &RigidState, uncertainty: &StartUncertainty, seed: u64) -> RigidState {
     let mut normal = Normal::new(seed, STREAM, 1.0);
     let position_m = Vector3::new(uncertainty.horizontal_m, uncertainty.horizontal_m, uncertainty.height_m);
     let turn_rad = Vector3::new(uncertainty.tilt_deg, uncertainty.tilt_deg, uncertainty.heading_deg)
@@ -164,8 +164,7 @@ pub fn believed_start(truth: &RigidState, uncertainty: &StartUncertainty, seed: 
 
 impl Sensors {
     /// The estimate of a vehicle that has levelled itself on its pad: the attitude is that of the
-    /// inertial unit, off by what its accelerometer errs at rest, and has the heading of
-    /// `believed`.
+    /// inertial unit, with its accelerometer's error at rest, and has the heading of `believed`.
     pub(crate) fn levelled(&self, truth: &RigidState, believed: &RigidState) -> RigidState {
         let unit_from_body = UnitQuaternion::from_rotation_matrix(&self.flaws.unit_from_body);
         let world_from_unit = truth.world_from_body * unit_from_body.inverse();

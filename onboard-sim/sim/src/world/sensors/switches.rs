@@ -4,8 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Sensors;
 
-/// Switches and feedback: what tells the flight computer of contact, of the igniter and of the
-/// fins.
+/// Switches and feedback: contact, igniter continuity and fin positions.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SwitchParams {
@@ -18,7 +17,7 @@ pub struct SwitchParams {
 }
 
 impl Sensors {
-    /// Fin openings as the feedback tells them, rad.
+    /// Fin openings in the feedback, rad.
     pub fn fins_rad(&self, fins_rad: &[f64; 4]) -> [f64; 4] {
         core::array::from_fn(|fin| fins_rad[fin] + self.flaws.fin_feedback_rad[fin])
     }

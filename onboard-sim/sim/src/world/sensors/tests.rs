@@ -1,4 +1,4 @@
-//! The sensors against their own parameters.
+//! The sensors against their parameters.
 
 use super::*;
 
@@ -36,11 +36,11 @@ fn frames_with(
         faults.break_down(*sensor, *defect);
     }
     let steps = frames * FRAME_MS as usize;
-    (0..steps).filter_map(|_| sensors.observe(truth)).map(|measured| faults.heard(&measured)).collect()
+    (0..steps).filter_map(|_| sensors.observe(truth)).map(|measured| faults.distort(&measured)).collect()
 }
 
 #[test]
-fn each_sensor_reports_at_its_own_rate() {
+fn each_sensor_reports_at_its_rate() {
     let seen = frames(1, &falling(10.0, 5.0), 400);
     assert_eq!(seen.len(), 400);
     assert_eq!(seen.iter().filter(|m| m.pressure_altitude_m.is_some()).count(), 100);
@@ -101,10 +101,10 @@ fn a_fault_silences_its_sensor_and_does_not_change_the_noise_of_others() {
     assert!(silent.iter().all(|m| m.pressure_altitude_m.is_none() && m.lidar_range_m.is_none()));
 }
 
-/// By the definition of each defect, on a barometer that is 10 m up and speaks in every fourth
+/// By the definition of each defect, on a barometer that is 10 m up and samples in every fourth
 /// frame.
 #[test]
-fn each_defect_says_what_it_is() {
+fn each_defect_has_its_effect() {
     let said = |defect| {
         let frames = frames_with(4, &falling(0.0, 10.0), &[(Sensor::Barometer, defect)], 400);
         frames.iter().filter_map(|m| m.pressure_altitude_m).collect::<Vec<_>>()
@@ -189,7 +189,7 @@ fn one_frame(sensors: &mut Sensors, truth: &SensorTruth) -> Measurements {
 }
 
 #[test]
-fn val_hand_a_unit_beside_the_centre_of_gravity_feels_the_turning_and_a_turned_one_mixes_the_axes() {
+fn val_hand_an_offset_unit_senses_the_rotation_and_a_rotated_one_mixes_the_axes() {
     let mut sensors = flawed(&quiet());
     sensors.flaws.unit_m = Vector3::new(0.1, 0.0, 0.0);
     let mut truth = falling(10.0, 50.0);
@@ -322,7 +322,7 @@ fn val_hand_a_flow_across_the_axis_raises_the_barometers_height() {
     assert!((raised_m - 2.804_219).abs() < 1e-6, "{raised_m}");
 }
 
-/// A fix that is older than its tag says is off by the motion since: in the fall by 40 m/s, and its
+/// A fix that is older than its tag is off by the motion since: in the fall by 40 m/s, and its
 /// velocity by gravity less drag.
 #[test]
 fn a_fix_of_unknown_age_is_off_along_the_motion() {

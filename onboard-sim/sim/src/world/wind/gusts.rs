@@ -204,7 +204,7 @@ mod tests {
 
     /// Many short steps equal one long step: the same decay, and the same variance at the end.
     #[test]
-    fn standing_air_keeps_its_gust() {
+    fn in_still_air_a_gust_persists() {
         let mut gusts = Gusts::new(10.0, 3);
         let before = gusts.step(50.0, 0.0);
         for _ in 0..1000 {

@@ -1,13 +1,14 @@
-//! Finds, in the fall, a gimbal that does not move, before the motor is lit.
+//! Detects a stuck gimbal in the fall, before ignition.
 //!
-//! The landing motor has some per cent of the body's inertia. When it swings, the body turns back
-//! ([`Airframe::swinging_kg_m2`]), and the gyro feels that, whatever a servo tells. So the gimbal
-//! swings to and fro from fins out to ignition, pitch and yaw in turn, and the gyro is compared
-//! with what should be felt.
+//! The landing motor has some per cent of the body's inertia. When it swings, the body turns the
+//! other way ([`Airframe::swinging_kg_m2`]), and the gyro measures that independently of the servo
+//! feedback. So the gimbal swings to and fro from fin deployment to ignition, pitch and yaw
+//! alternately, and the gyro is compared with the expected rate.
 //!
-//! Air and fins turn the body more, but more slowly. The swing's rate has the signs of a Thue-Morse
-//! sequence, and the sum of any parabola over it with these signs is zero (E. Prouhet, 1851; J.-P.
-//! Allouche and J. Shallit, "The ubiquitous Prouhet-Thue-Morse sequence", 1999).
+//! Aerodynamic and fin moments turn the body more, but more slowly. The signs of the swing's rate
+//! are a Thue-Morse sequence, and the sum of any parabola over it with these signs is zero (E.
+//! Prouhet, 1851; J.-P. Allouche and J. Shallit, "The ubiquitous Prouhet-Thue-Morse sequence",
+//! 1999).
 
 use serde::{Deserialize, Serialize};
 
@@ -15,37 +16,35 @@ use crate::computer::FRAME_S;
 use crate::vehicle::airframe::MassProperties;
 use crate::vehicle::mission::Mission;
 
-/// The signs of the gimbal's rate in the legs of a swing: it is at the centre again after every
-/// second one.
+/// Signs of the gimbal rate in the legs of a swing: it is centred again after every second one.
 const SIGNS: [f64; 8] = [1.0, -1.0, -1.0, 1.0, -1.0, 1.0, 1.0, -1.0];
-/// A swing must show this multiple of the gyro's noise, by as many repetitions as it needs, at most
-/// so many.
+/// Ratio of a swing to the gyro's noise, reached by as many repetitions as needed, up to a maximum.
 const SIGMAS: f64 = 10.0;
 const REPEATS_MAX: f64 = 4.0;
-/// A swing that shows less than this share of what is expected speaks against the gimbal. One that
-/// is stuck shows nothing, with a scatter of 0.05; one at 0.3 of its rate with 1.5 degrees of play,
-/// which lands, shows 0.17, and a sound one 0.5 at least (4,800 swings of mk3 in `real`, `wild` and
-/// `harsh`). Longer legs would show more of a slow one, and more of the fins.
+/// Share of the expected swing below which it counts against the gimbal. A stuck one shows zero,
+/// with a scatter of 0.05; one at 0.3 of its rate with 1.5 degrees of play, which lands, shows
+/// 0.17, and a sound one at least 0.5 (4,800 swings of mk3 in `real`, `wild` and `harsh`). Longer
+/// legs would show more of a slow gimbal, and more of the fins.
 const MOVES: f64 = 0.09;
-/// What is missing to that adds up, swing by swing, and more takes it away again (E. S. Page,
-/// "Continuous inspection schemes", Biometrika 41, 1954). At this the gimbal is stuck: three or
-/// four swings of a stuck one, one of a reversed one.
+/// The deficit is accumulated swing by swing, and a surplus reduces it (E. S. Page, "Continuous
+/// inspection schemes", Biometrika 41, 1954). At this sum the gimbal is stuck: three or four swings
+/// of a stuck one, one of a reversed one.
 const STUCK: f64 = 0.25;
 
-/// What a swing is, and what it should show.
+/// Definition of a swing and its expected response.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Swing {
     limit_rad: f64,
     leg_frames: u32,
-    /// From a command to the frame in which the gyro shows it.
+    /// Delay from a command to the frame in which the gyro shows it.
     late_frames: u32,
     legs: u32,
-    /// How far a leg turns the body, over a frame, rad/s.
+    /// Change of the body rate per frame by a leg, rad/s.
     leg_rad_s: f64,
 }
 
 impl Swing {
-    /// That of a mission's vehicle; `None` if its gyro shows too little.
+    /// The swing for a mission's vehicle; `None` if its gyro would show too little.
     pub(super) fn of(mission: &Mission, mass: &MassProperties) -> Option<Self> {
         let (airframe, curve) = (&mission.airframe, &mission.motor_curve);
         let servo = &airframe.gimbal.servo;
@@ -67,30 +66,30 @@ impl Swing {
     }
 }
 
-/// The watch over both axes.
+/// The monitor of both axes.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct SwingWatch {
-    /// The axis that swings, pitch or yaw, and the frame of its swing.
+    /// The swinging axis, pitch or yaw, and the frame of its swing.
     axis: usize,
     frame: u32,
     sum_rad_s: f64,
-    /// What is missing, as a share of a swing.
+    /// Accumulated deficit, as a share of a swing.
     missing: f64,
 }
 
 impl SwingWatch {
-    /// The same before the swing that was interrupted.
+    /// The state before the interrupted swing.
     pub(super) fn interrupted(self) -> Self {
         Self { axis: self.axis, missing: self.missing, ..Self::default() }
     }
 
-    /// An axis does not move: that stays so.
+    /// Whether an axis is stuck; permanent.
     pub(super) fn found_stuck(&self) -> bool {
         self.missing >= STUCK
     }
 
-    /// Takes a frame's cross rates, rad/s. Gives the gimbal's command (pitch, yaw), rad, and what
-    /// the swing should have added to the rates, rad/s.
+    /// Takes a frame's cross rates, rad/s. Returns the gimbal command (pitch, yaw), rad, and the
+    /// rates that the swing should have added, rad/s.
     pub(super) fn update(&mut self, swing: &Swing, rates_rad_s: [f64; 2]) -> ([f64; 2], [f64; 2]) {
         let (mut command_rad, mut added_rad_s) = ([0.0; 2], [0.0; 2]);
         if self.found_stuck() {
@@ -112,7 +111,7 @@ impl SwingWatch {
         if self.frame == swing.legs * leg_frames + swing.late_frames {
             let shown = self.sum_rad_s / (swing.leg_rad_s * f64::from(swing.legs));
             let missing = (self.missing + MOVES - shown).max(0.0);
-            // An axis that has not shown is asked again at once.
+            // An axis with a deficit swings again at once.
             *self = Self { axis: if missing > 0.0 { axis } else { 1 - axis }, missing, ..Self::default() };
         }
         (command_rad, added_rad_s)
@@ -139,26 +138,26 @@ mod tests {
         (mission, swing)
     }
 
-    /// When the gimbal of mk3, whose axes turn by shares of their commands, is found stuck, s;
-    /// within 20 s. The vehicle sways by 40 degrees/s, 0.8 times a second, and the gyro has the
-    /// mission's noise.
+    /// Time at which the gimbal of mk3 is found stuck, s, with its axes turning by shares of their
+    /// commands; within 20 s. The vehicle sways by 40 degrees/s, 0.8 times a second, and the gyro
+    /// has the mission's noise.
     fn found_s(shares: [f64; 2], seed: u64) -> Option<f64> {
         let (mission, swing) = swing_of("mk3");
         let swing = swing.unwrap();
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut reaction = Reaction::of(&mission, swing);
         reaction.shares = shares;
-        let (mut watch, mut told_rad) = (SwingWatch::default(), [0.0; 2]);
+        let (mut watch, mut command_rad) = (SwingWatch::default(), [0.0; 2]);
         (0..4000).find_map(|frame| {
             let time_s = f64::from(frame) * FRAME_S;
             let sway_rad_s = 0.7 * libm::sin(5.0 * time_s);
-            let rates_rad_s = reaction.felt_rad_s(told_rad).map(|felt_rad_s| {
+            let rates_rad_s = reaction.sensed_rad_s(command_rad).map(|sensed_rad_s| {
                 // Twelve even numbers have the spread of one normal one.
                 let normal: f64 =
                     (0..12).map(|_| f64::from(random.next_u32()) / f64::from(u32::MAX) - 0.5).sum();
-                felt_rad_s + sway_rad_s + 0.0125 * normal
+                sensed_rad_s + sway_rad_s + 0.0125 * normal
             });
-            (told_rad, _) = watch.update(&swing, rates_rad_s);
+            (command_rad, _) = watch.update(&swing, rates_rad_s);
             watch.found_stuck().then_some(time_s)
         })
     }
@@ -182,13 +181,13 @@ mod tests {
     fn the_swing_stays_between_the_stops_and_one_axis_moves_at_a_time() {
         let (mission, swing) = swing_of("mk3");
         let mut reaction = Reaction::of(&mission, swing.unwrap());
-        let (mut watch, mut told_rad, mut moved) = (SwingWatch::default(), [0.0; 2], [false; 2]);
+        let (mut watch, mut command_rad, mut moved) = (SwingWatch::default(), [0.0; 2], [false; 2]);
         for _ in 0..200 {
-            let rates_rad_s = reaction.felt_rad_s(told_rad);
-            (told_rad, _) = watch.update(&swing.unwrap(), rates_rad_s);
-            assert!(told_rad.iter().all(|rad| rad.abs() <= mission.airframe.gimbal.limit_rad()));
-            assert!(told_rad.contains(&0.0), "{told_rad:?}");
-            moved = [0, 1].map(|axis: usize| moved[axis] || told_rad[axis] != 0.0);
+            let rates_rad_s = reaction.sensed_rad_s(command_rad);
+            (command_rad, _) = watch.update(&swing.unwrap(), rates_rad_s);
+            assert!(command_rad.iter().all(|rad| rad.abs() <= mission.airframe.gimbal.limit_rad()));
+            assert!(command_rad.contains(&0.0), "{command_rad:?}");
+            moved = [0, 1].map(|axis: usize| moved[axis] || command_rad[axis] != 0.0);
         }
         assert_eq!(moved, [true; 2]);
     }
@@ -208,7 +207,7 @@ mod tests {
         }
     }
 
-    /// What was found is kept through a restart, and a swing that was cut is swung again.
+    /// A restart preserves the result, and an interrupted swing is repeated.
     #[test]
     fn a_restart_forgets_the_swing_and_nothing_else() {
         let swing = swing_of("mk3").1.unwrap();

@@ -148,7 +148,7 @@ fn held() -> Mode {
 }
 
 #[test]
-fn a_hold_clears_the_countdown_and_keeps_the_vehicle_armed() {
+fn a_hold_clears_the_countdown_and_leaves_the_vehicle_armed() {
     let counting = after(&with_arm(&[START]));
     for cause in CAUSES {
         let answer = transition(&counting, hold(cause, StartPoint::Pad), 4.0);
@@ -248,11 +248,11 @@ fn no_event_leaves_an_armed_vehicle_with_both_a_hold_and_a_countdown() {
             let context = format!("{mode:?} + {event:?}");
             assert!(next.hold.is_none() || next.countdown_end_s.is_none(), "{context}");
             assert!(next.hold.is_none() || next.phase == Phase::PadArmed, "{context}");
-            // During a hold nothing is released or lit, except for a vehicle that already rises or
-            // falls.
+            // During a hold nothing is released or ignited, except for a vehicle that already rises
+            // or falls.
             if mode.hold.is_some() {
-                let lit = [Effect::IgniteAscentMotor, Effect::IgniteLandingMotor];
-                assert!(!lit.into_iter().any(|effect| answer.effects.contains(effect)), "{context}");
+                let ignition = [Effect::IgniteAscentMotor, Effect::IgniteLandingMotor];
+                assert!(!ignition.into_iter().any(|effect| answer.effects.contains(effect)), "{context}");
                 let moves = matches!(event, Event::LiftOff | Event::ReleasedEarly { .. });
                 assert!(next.phase.on_pad() || moves, "{context}");
                 let restarted = next.countdown_end_s.is_some();
@@ -293,13 +293,13 @@ proptest! {
 
 /// An abort 20 s before a power-up with the pin out, and in.
 #[test]
-fn an_abort_before_the_power_up_keeps_people_away_and_the_pin_due_until_it_was_put_in() {
+fn after_an_abort_before_power_up_the_wait_and_the_pin_are_still_due() {
     let mut mode = Mode { aborted_before_s: Some(-20.0), ..Mode::power_up(0.0) };
     let mut happen = |event, time_s| {
         let answer = transition(&mode, event, time_s);
         assert_eq!(answer.refusal, None, "{event:?}");
         mode = answer.mode;
-        (mode.approach_wait_s(time_s), mode.abort_to_keep_s(time_s), mode.aborted_before_s)
+        (mode.approach_wait_s(time_s), mode.abort_to_save_s(time_s), mode.aborted_before_s)
     };
     let (kept, due) = (Some(-20.0), Some(-20.0));
     assert_eq!(happen(Event::PinPulled, 0.0), (Some(40.0), kept, due), "it was out at power-up");
@@ -312,10 +312,10 @@ fn an_abort_before_the_power_up_keeps_people_away_and_the_pin_due_until_it_was_p
 }
 
 #[test]
-fn an_abort_on_the_pad_is_kept_until_its_wait_is_over_and_the_pin_is_in() {
+fn an_abort_on_the_pad_is_saved_until_its_wait_is_over_and_the_pin_is_in() {
     let aborted = transition(&in_order(Phase::PadArmed), ABORT, 100.0).mode;
-    assert_eq!(aborted.abort_to_keep_s(500.0), Some(100.0));
+    assert_eq!(aborted.abort_to_save_s(500.0), Some(100.0));
     let pinned = transition(&aborted, Event::PinInserted, 120.0).mode;
-    assert_eq!((pinned.abort_to_keep_s(159.0), pinned.abort_to_keep_s(160.0)), (Some(100.0), None));
-    assert_eq!(in_order(Phase::PadIdle).abort_to_keep_s(1.0), None);
+    assert_eq!((pinned.abort_to_save_s(159.0), pinned.abort_to_save_s(160.0)), (Some(100.0), None));
+    assert_eq!(in_order(Phase::PadIdle).abort_to_save_s(1.0), None);
 }

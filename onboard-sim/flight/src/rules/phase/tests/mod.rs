@@ -234,7 +234,7 @@ fn a_pad_abort_latches_and_shows_the_wait() {
 }
 
 #[test]
-fn refused_arming_says_why() {
+fn a_refused_arming_gives_the_reason() {
     let reason = |mode: &Mode, checks_passed| {
         transition(mode, Event::ArmRequested { checks_passed }, 9.0)
             .refusal
@@ -255,9 +255,9 @@ fn after_an_abort_under_thrust_the_vehicle_lands_in_place_and_the_phase_stays() 
     let burns = Event::AbortRequested { lifted_off: false, above_commit_height: false, gate_open: true };
     let falls = transition(&in_order(Phase::LandArmed), burns, 1.0).mode;
     assert!(falls.phase == Phase::LandArmed && falls.interlocks.lands_in_place);
-    let lit = transition(&falls, Event::IgnitionGate { open: true }, 2.0);
-    assert!(lit.mode.phase == Phase::Ignition && lit.mode.interlocks.lands_in_place);
-    assert_eq!(lit.effects, Effects::of(&[Effect::IgniteLandingMotor]));
+    let ignition = transition(&falls, Event::IgnitionGate { open: true }, 2.0);
+    assert!(ignition.mode.phase == Phase::Ignition && ignition.mode.interlocks.lands_in_place);
+    assert_eq!(ignition.effects, Effects::of(&[Effect::IgniteLandingMotor]));
     let room = Event::AbortRequested { lifted_off: false, above_commit_height: true, gate_open: true };
     let chute = transition(&falls, room, 2.0).mode;
     assert!(chute.phase == Phase::Chute && chute.interlocks.landing_motor_inhibited, "a gust lifted it");
@@ -337,11 +337,11 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 2000, ..ProptestConfig::default() })]
 
     #[test]
-    fn in_any_sequence_of_events_the_landing_motor_is_lit_at_most_once_and_after_every_gate(
+    fn in_any_sequence_of_events_the_landing_motor_is_ignited_at_most_once_and_after_every_gate(
         events in prop::collection::vec(likely_event(), 0..60),
     ) {
         let mut mode = Mode::power_up(0.0);
-        let (mut lit, mut ascents, mut latch) = (0, 0, None);
+        let (mut ignitions, mut ascents, mut latch) = (0, 0, None);
         for (second, event) in events.into_iter().enumerate() {
             let answer = transition(&mode, event, second as f64);
             if answer.effects.contains(Effect::IgniteAscentMotor) {
@@ -349,7 +349,7 @@ proptest! {
                 prop_assert!(ascents == 1 && mode.interlocks.armed && answer.mode.phase == Phase::Boost);
             }
             if answer.effects.contains(Effect::IgniteLandingMotor) {
-                lit += 1;
+                ignitions += 1;
                 let locks = mode.interlocks;
                 prop_assert!(locks.armed && locks.pin_out);
                 prop_assert!(!locks.landing_motor_inhibited && (!locks.abort_latched || locks.lands_in_place));
@@ -373,6 +373,6 @@ proptest! {
             }
             mode = answer.mode;
         }
-        prop_assert!(lit <= 1);
+        prop_assert!(ignitions <= 1);
     }
 }

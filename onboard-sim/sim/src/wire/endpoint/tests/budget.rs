@@ -1,11 +1,11 @@
-//! Tests that the downlink stays within its budget in any one second, whatever is requested, and
-//! that every link has its own.
+//! Tests that the downlink stays within its budget in any one second, for any requests, and that
+//! every link has a budget.
 
 use protocol::dialect::{LOCAL_POSITION_NED_DATA, MavModeFlag, MavState, STATUSTEXT_DATA};
 
 use super::*;
 
-/// The most bytes in any one second of what was sent at which time.
+/// The most bytes in any one second of frames with their times.
 pub(super) fn worst_second(sent: &[(f64, usize)]) -> usize {
     let mut worst = 0;
     for (first, (began_s, _)) in sent.iter().enumerate() {
@@ -15,7 +15,7 @@ pub(super) fn worst_second(sent: &[(f64, usize)]) -> usize {
     worst
 }
 
-/// What was sent, and when.
+/// Sent frames with their times.
 struct Sent(Vec<(f64, Frame)>);
 
 impl Sent {
@@ -49,12 +49,16 @@ impl Wire {
         wire
     }
 
-    /// Runs for this long, with the requests of `ask` in each frame.
-    fn run_asked(&mut self, duration_s: f64, mut ask: impl FnMut(u64) -> Vec<CommandRequest>) -> Sent {
+    /// Runs for this long, with these requests in each frame.
+    fn run_with_requests(
+        &mut self,
+        duration_s: f64,
+        mut requests: impl FnMut(u64) -> Vec<CommandRequest>,
+    ) -> Sent {
         let end_s = self.vehicle.time_s() + duration_s;
         let mut sent = Vec::new();
         for frame in 0.. {
-            for request in ask(frame) {
+            for request in requests(frame) {
                 self.endpoint.on_command(0, (&request, None), &self.vehicle.state());
             }
             sent.extend(self.run(0.001).into_iter().map(|frame| (self.vehicle.time_s(), frame)));
@@ -82,8 +86,9 @@ fn twenty_refused_commands_a_second_cost_no_position_and_are_counted() {
     let mut wire = Wire::new();
     wire.run(2.0);
     // A start without arming: the vehicle refuses it with a text.
-    let sent = wire
-        .run_asked(10.0, |frame| if twenty_hz(frame) { vec![from(255, 300, 0.0, 0.0)] } else { Vec::new() });
+    let sent = wire.run_with_requests(10.0, |frame| {
+        if twenty_hz(frame) { vec![from(255, 300, 0.0, 0.0)] } else { Vec::new() }
+    });
     let worst = sent.worst_second(0);
     assert!(worst <= RADIO_BUDGET_BYTES_S as usize, "{worst} B in one second");
     let positions = sent.count(LOCAL_POSITION_NED_DATA::ID);
@@ -112,10 +117,10 @@ fn flood(frame: u64) -> Vec<CommandRequest> {
 }
 
 #[test]
-fn no_second_carries_more_than_the_budget_whatever_is_asked_and_the_vital_messages_come() {
+fn no_second_carries_more_than_the_budget_for_any_request_and_vital_messages_are_sent() {
     for (new, signature_len) in [(Wire::new as fn() -> Wire, 0), (Wire::signed, SIGNATURE_LEN)] {
         let mut wire = new();
-        let sent = wire.run_asked(12.0, flood);
+        let sent = wire.run_with_requests(12.0, flood);
         let worst = sent.worst_second(signature_len);
         assert!(worst <= RADIO_BUDGET_BYTES_S as usize, "{worst} B in one second");
         assert!(worst > 1_500, "the flood was large enough: {worst} B");
@@ -130,16 +135,16 @@ fn no_second_carries_more_than_the_budget_whatever_is_asked_and_the_vital_messag
 fn an_abort_in_a_flood_is_answered_at_once_and_seen_in_hurried_heartbeats() {
     for new in [Wire::new, Wire::signed] {
         let mut wire = new();
-        assert_eq!(wire.ask(400, 1.0, 0.0).0, 0);
-        wire.run_asked(5.0, flood);
+        assert_eq!(wire.request(400, 1.0, 0.0).0, 0);
+        wire.run_with_requests(5.0, flood);
         wire.endpoint.on_command(0, (&from(255, 185, 1.0, 0.0), None), &wire.vehicle.state());
         let aborted_at_s = wire.vehicle.time_s();
-        let sent = wire.run_asked(3.0, |frame| {
-            let mut asked = flood(frame);
+        let sent = wire.run_with_requests(3.0, |frame| {
+            let mut requests = flood(frame);
             if frame.is_multiple_of(3) {
-                asked.push(from(255, 185, 1.0, 0.0));
+                requests.push(from(255, 185, 1.0, 0.0));
             }
-            asked
+            requests
         });
         let answers: Vec<f64> = sent
             .0
@@ -166,13 +171,13 @@ fn an_abort_in_a_flood_is_answered_at_once_and_seen_in_hurried_heartbeats() {
 }
 
 #[test]
-fn every_heartbeat_and_flight_status_says_from_the_boot_on_what_the_vehicle_is_and_which_boot_it_is() {
+fn every_heartbeat_and_flight_status_identifies_the_vehicle_and_its_boot_from_power_up() {
     for kind in [VehicleKind::Simulated, VehicleKind::Real] {
-        says_what_it_is_and_which_boot_it_is(kind);
+        identifies_vehicle_and_boot(kind);
     }
 }
 
-fn says_what_it_is_and_which_boot_it_is(kind: VehicleKind) {
+fn identifies_vehicle_and_boot(kind: VehicleKind) {
     let marked = kind == VehicleKind::Simulated;
     let mut wire = Wire { endpoint: VehicleEndpoint::new(kind).booted(0xB007_0001), ..Wire::new() };
     let first = wire.run(0.001);
@@ -180,7 +185,7 @@ fn says_what_it_is_and_which_boot_it_is(kind: VehicleKind) {
         count(&first, HEARTBEAT_DATA::ID) == 1 && count(&first, TD_FLIGHT_STATUS_DATA::ID) == 1,
         "at once"
     );
-    assert_eq!(wire.ask(400, 1.0, 0.0).0, 0);
+    assert_eq!(wire.request(400, 1.0, 0.0).0, 0);
     let sent = first.into_iter().chain(wire.run(5.0));
     let (mut beats, mut statuses) = (0, 0);
     for frame in sent {
@@ -212,7 +217,7 @@ fn two_links() -> Wire {
 }
 
 impl Wire {
-    /// What each of two links carried.
+    /// Frames carried by each of two links.
     fn run_links(&mut self, duration_s: f64) -> [Vec<Frame>; 2] {
         let end_s = self.vehicle.time_s() + duration_s;
         let mut sent = [Vec::new(), Vec::new()];
@@ -227,41 +232,44 @@ impl Wire {
         sent
     }
 
-    fn ask_over(&mut self, link: usize, message_id: u32, interval_us: f32) -> u8 {
+    fn request_over(&mut self, link: usize, message_id: u32, interval_us: f32) -> u8 {
         let request = asking(511, [message_id as f32, interval_us, 0.0, 0.0, 0.0, 0.0, 0.0]);
         self.endpoint.on_command(link, (&request, None), &self.vehicle.state());
         self.run_links(0.1)[link].iter().find_map(CommandAnswer::from_frame).unwrap().result
     }
 }
 
-fn numbers_are_whole(frames: &[Frame]) -> bool {
+fn numbers_are_consecutive(frames: &[Frame]) -> bool {
     frames.windows(2).all(|pair| pair[1].sequence() == pair[0].sequence().wrapping_add(1))
 }
 
 #[test]
-fn all_links_carry_copies_until_one_is_asked_for_something_else() {
+fn all_links_carry_copies_until_one_gets_another_request() {
     let mut wire = two_links();
     let [slow, fast] = wire.run_links(3.0);
     assert_eq!(slow, fast);
     // A request that changes nothing does not split the lane.
-    assert_eq!(wire.ask_over(1, ATTITUDE_QUATERNION_DATA::ID, 0.0), 0);
+    assert_eq!(wire.request_over(1, ATTITUDE_QUATERNION_DATA::ID, 0.0), 0);
     let [slow, fast] = wire.run_links(1.0);
     assert_eq!(slow, fast);
 }
 
 #[test]
-fn an_interval_is_for_the_link_that_asked_and_a_fast_link_carries_more() {
+fn an_interval_applies_to_the_requesting_link_and_a_fast_link_carries_more() {
     let mut wire = two_links();
     wire.run_links(1.0);
-    assert_eq!(wire.ask_over(0, ATTITUDE_QUATERNION_DATA::ID, 20_000.0), DENIED);
-    assert_eq!(wire.ask_over(1, ATTITUDE_QUATERNION_DATA::ID, 20_000.0), 0);
+    assert_eq!(wire.request_over(0, ATTITUDE_QUATERNION_DATA::ID, 20_000.0), DENIED);
+    assert_eq!(wire.request_over(1, ATTITUDE_QUATERNION_DATA::ID, 20_000.0), 0);
     let [slow, fast] = wire.run_links(5.0);
-    assert!(numbers_are_whole(&slow) && numbers_are_whole(&fast), "a gap would be counted as loss");
+    assert!(
+        numbers_are_consecutive(&slow) && numbers_are_consecutive(&fast),
+        "a gap would be counted as loss"
+    );
     let of = |frames: &[Frame]| count(frames, ATTITUDE_QUATERNION_DATA::ID);
     assert!((39..=41).contains(&of(&slow)), "{} in 5 s at 8 Hz", of(&slow));
     assert!((245..=251).contains(&of(&fast)), "{} in 5 s at 50 Hz", of(&fast));
-    // The slow one switches its own off.
-    assert_eq!(wire.ask_over(0, ATTITUDE_QUATERNION_DATA::ID, -1.0), 0);
+    // The slow one switches the message off.
+    assert_eq!(wire.request_over(0, ATTITUDE_QUATERNION_DATA::ID, -1.0), 0);
     let [slow, fast] = wire.run_links(1.0);
     assert_eq!((of(&slow), of(&fast) >= 49), (0, true));
 }
@@ -269,8 +277,8 @@ fn an_interval_is_for_the_link_that_asked_and_a_fast_link_carries_more() {
 #[test]
 fn texts_of_the_vehicle_go_over_every_link() {
     let mut wire = two_links();
-    assert_eq!(wire.ask_over(1, ATTITUDE_QUATERNION_DATA::ID, 20_000.0), 0);
-    wire.endpoint.say(Severity::Notice, "a word");
+    assert_eq!(wire.request_over(1, ATTITUDE_QUATERNION_DATA::ID, 20_000.0), 0);
+    wire.endpoint.send_text(Severity::Notice, "a word");
     let sent = wire.run_links(0.1);
     assert!(sent.iter().all(|frames| texts(frames) == ["a word"]));
 }

@@ -28,7 +28,7 @@ struct Station {
     signing: Signing,
 }
 
-/// A vehicle with a crew, and all who speak to it.
+/// A vehicle with a crew, and all stations.
 struct Launch {
     vehicle: Vehicle,
     endpoint: VehicleEndpoint,
@@ -73,7 +73,7 @@ impl Launch {
     }
 
     fn two() -> Self {
-        Self::new(People::Two { first_ask: FIRST_ASK })
+        Self::new(People::Two { first: FIRST_PROPOSAL })
     }
 
     fn clock(&self) -> u64 {
@@ -120,8 +120,8 @@ impl Launch {
     fn deliver(&mut self, frame: &Frame) {
         let clock = self.clock();
         let received = Received::Stream(0, frame.as_bytes().to_vec());
-        for news in self.hub.take(0, received, Duration::ZERO, clock) {
-            match news {
+        for event in self.hub.take(0, received, Duration::ZERO, clock) {
+            match event {
                 LinkEvent::Frame(frame) => self.endpoint.on_frame(0, &frame, &self.vehicle.state()),
                 LinkEvent::Rejected(frame, why) => self.endpoint.on_rejected(&frame, why),
                 _ => {}
@@ -134,8 +134,8 @@ impl Launch {
         self.signed_for(station, &frame)
     }
 
-    /// Sends a command; returns the answer to this station, if any, and what the vehicle said.
-    fn says(&mut self, station: usize, command: u16, param1: f32, param3: f32) -> (Option<u8>, String) {
+    /// Sends a command; returns the answer to this station, if any, and the vehicle's texts.
+    fn send(&mut self, station: usize, command: u16, param1: f32, param3: f32) -> (Option<u8>, String) {
         let frame = self.command(station, command, param1, param3);
         self.sent.clear();
         self.deliver(&frame);
@@ -146,13 +146,13 @@ impl Launch {
         (answer.map(|answer| answer.result), texts(&self.sent).join("; "))
     }
 
-    fn asks(&mut self, station: usize, command: u16) -> (Option<u8>, String) {
-        self.says(station, command, 1.0, 0.0)
+    fn propose(&mut self, station: usize, command: u16) -> (Option<u8>, String) {
+        self.send(station, command, 1.0, 0.0)
     }
 
     fn confirms(&mut self, station: usize, command: u16) -> (Option<u8>, String) {
         let number = self.crew.as_ref().map_or(0, |crew| crew.ask_number);
-        self.says(station, command, 1.0, f32::from(number))
+        self.send(station, command, 1.0, f32::from(number))
     }
 
     fn armed(&self) -> bool {
@@ -166,7 +166,7 @@ impl Launch {
     /// Ready to be started.
     fn armed_by_two() -> Self {
         let mut launch = Self::two();
-        launch.asks(FLIGHT, ARM);
+        launch.propose(FLIGHT, ARM);
         assert_eq!(launch.confirms(RANGE, ARM).0, ACCEPTED);
         launch
     }
@@ -177,12 +177,13 @@ const NOT_NOW: Option<u8> = Some(super::NOT_NOW);
 const DENIED: Option<u8> = Some(super::DENIED);
 
 #[test]
-fn one_asks_another_confirms_and_both_are_named() {
+fn one_proposes_another_confirms_and_both_are_named() {
     let mut launch = Launch::two();
     launch.speaking.push(FLIGHT_TOO);
     launch.run(0.2);
-    // What any other client sends with one of the keys is an ask, and is refused with its reason.
-    let (answer, words) = launch.asks(FLIGHT, ARM);
+    // A command of any other client with one of the keys is a proposal, and is refused with its
+    // reason.
+    let (answer, words) = launch.propose(FLIGHT, ARM);
     assert_eq!(answer, NOT_NOW);
     assert!(
         words.contains("FLIGHT Bob asks to arm: RANGE SAFETY or PAD must confirm within 10 s"),
@@ -190,7 +191,7 @@ fn one_asks_another_confirms_and_both_are_named() {
     );
     let crew = launch.crew.clone().unwrap();
     assert_eq!((crew.people, crew.act, crew.asked_by), (2, TdAct::TD_ACT_ARM, 2));
-    assert_eq!(crew.ask_number, FIRST_ASK + 1);
+    assert_eq!(crew.ask_number, FIRST_PROPOSAL + 1);
     for (station, reason) in [
         (FLIGHT, "FLIGHT Bob asked: another role must confirm"),
         (FLIGHT_TOO, "another role than FLIGHT must confirm"),
@@ -205,7 +206,7 @@ fn one_asks_another_confirms_and_both_are_named() {
     assert_eq!(answer, ACCEPTED);
     assert!(words.contains("arm: asked by FLIGHT Bob, confirmed by RANGE SAFETY Ann"), "{words}");
     assert!(launch.armed());
-    // The one who asked is in command.
+    // The proposer is in command.
     let crew = launch.crew.clone().unwrap();
     assert_eq!((crew.commanded_by, crew.commanding_system), (2, 254));
 }
@@ -213,13 +214,13 @@ fn one_asks_another_confirms_and_both_are_named() {
 #[test]
 fn the_start_goes_on_while_the_confirmer_taps() {
     let mut launch = Launch::armed_by_two();
-    launch.asks(FLIGHT, START);
+    launch.propose(FLIGHT, START);
     assert!(!launch.counts_down());
     assert_eq!(launch.confirms(PAD, START).0, ACCEPTED);
     assert!(launch.counts_down());
-    assert_eq!(launch.says(FLIGHT, TAP, 0.0, 0.0).0, DENIED);
+    assert_eq!(launch.send(FLIGHT, TAP, 0.0, 0.0).0, DENIED);
     for _ in 0..2 {
-        assert_eq!(launch.says(PAD, TAP, 0.0, 0.0).0, ACCEPTED);
+        assert_eq!(launch.send(PAD, TAP, 0.0, 0.0).0, ACCEPTED);
         launch.run(0.4);
     }
     assert_eq!(launch.crew.clone().unwrap().tapped_by, 4);
@@ -234,34 +235,34 @@ fn the_start_goes_on_while_the_confirmer_taps() {
 /// The silence of the station that commands is watched already.
 #[test]
 fn of_the_two_who_start_the_one_who_does_not_command_taps() {
-    // Bob asked for the arming, and commands.
+    // Bob proposed the arming, and commands.
     let mut launch = Launch::armed_by_two();
-    launch.asks(RANGE, START);
+    launch.propose(RANGE, START);
     assert_eq!(launch.confirms(FLIGHT, START).0, ACCEPTED);
-    assert_eq!(launch.says(FLIGHT, TAP, 0.0, 0.0).0, DENIED);
-    assert_eq!(launch.says(RANGE, TAP, 0.0, 0.0).0, ACCEPTED);
+    assert_eq!(launch.send(FLIGHT, TAP, 0.0, 0.0).0, DENIED);
+    assert_eq!(launch.send(RANGE, TAP, 0.0, 0.0).0, ACCEPTED);
     let crew = launch.crew.clone().unwrap();
     assert_eq!((crew.commanded_by, crew.tapped_by), (2, 1));
     // Nor does she take command while she taps: in the last moment nothing holds, and he may be
     // silent.
     while launch.vehicle.mode().countdown_remaining_s(launch.vehicle.time_s()).unwrap() > 3.0 {
-        launch.says(RANGE, TAP, 0.0, 0.0);
+        launch.send(RANGE, TAP, 0.0, 0.0);
     }
     launch.speaking = vec![RANGE];
     for _ in 0..5 {
-        launch.says(RANGE, TAP, 0.0, 0.0);
+        launch.send(RANGE, TAP, 0.0, 0.0);
     }
     launch.run(0.15);
     assert!(launch.counts_down());
-    assert_eq!(launch.says(RANGE, TAKE_COMMAND, 0.0, 0.0).0, DENIED);
+    assert_eq!(launch.send(RANGE, TAKE_COMMAND, 0.0, 0.0).0, DENIED);
 }
 
-/// What is lost before T-3 s holds; in the last 2 s nothing does.
+/// A loss before T-3 s holds; in the last 2 s none does.
 #[test]
 fn taps_that_end_before_t_minus_three_seconds_hold_the_countdown() {
     for tenths in 15..=60 {
         let mut launch = Launch::armed_by_two();
-        launch.asks(FLIGHT, START);
+        launch.propose(FLIGHT, START);
         launch.confirms(RANGE, START);
         let left_s = |launch: &Launch| launch.vehicle.mode().countdown_remaining_s(launch.vehicle.time_s());
         while left_s(&launch).is_some_and(|left_s| left_s > 0.1 * f64::from(tenths)) {
@@ -282,27 +283,27 @@ fn taps_that_end_before_t_minus_three_seconds_hold_the_countdown() {
 #[test]
 fn whoever_holds_a_key_of_this_crew_holds_and_aborts_and_nobody_else() {
     let mut launch = Launch::armed_by_two();
-    launch.asks(FLIGHT, START);
+    launch.propose(FLIGHT, START);
     launch.confirms(RANGE, START);
-    assert_ne!(launch.says(STRANGER, HOLD, 0.0, 0.0).0, ACCEPTED);
-    assert_ne!(launch.says(STRANGER, ABORT, 1.0, 0.0).0, ACCEPTED);
-    launch.says(RANGE, TAP, 0.0, 0.0);
+    assert_ne!(launch.send(STRANGER, HOLD, 0.0, 0.0).0, ACCEPTED);
+    assert_ne!(launch.send(STRANGER, ABORT, 1.0, 0.0).0, ACCEPTED);
+    launch.send(RANGE, TAP, 0.0, 0.0);
     // An observer has the key that all share.
-    assert_eq!(launch.says(OBSERVER, ARM, 0.0, 0.0).0, DENIED, "a disarm");
+    assert_eq!(launch.send(OBSERVER, ARM, 0.0, 0.0).0, DENIED, "a disarm");
     assert!(launch.counts_down() && !launch.vehicle.aborted());
-    assert_eq!(launch.says(OBSERVER, HOLD, 0.0, 0.0).0, ACCEPTED);
+    assert_eq!(launch.send(OBSERVER, HOLD, 0.0, 0.0).0, ACCEPTED);
     assert!(!launch.counts_down());
     let mut aborted = Launch::armed_by_two();
-    let (answer, words) = aborted.says(OBSERVER, ABORT, 1.0, 0.0);
+    let (answer, words) = aborted.send(OBSERVER, ABORT, 1.0, 0.0);
     assert_eq!(answer, ACCEPTED);
     assert!(words.contains("station 251/190, with the key that all share, aborts"), "{words}");
     assert!(aborted.vehicle.aborted());
-    launch.asks(FLIGHT, START);
+    launch.propose(FLIGHT, START);
     assert_eq!(launch.confirms(RANGE, START).0, ACCEPTED);
-    assert_eq!(launch.says(FLIGHT_TOO, HOLD, 0.0, 0.0).0, ACCEPTED);
+    assert_eq!(launch.send(FLIGHT_TOO, HOLD, 0.0, 0.0).0, ACCEPTED);
     assert!(!launch.counts_down());
     assert_eq!(launch.crew.clone().unwrap().held_by, 3);
-    assert_eq!(launch.says(PAD, ABORT, 1.0, 0.0).0, ACCEPTED);
+    assert_eq!(launch.send(PAD, ABORT, 1.0, 0.0).0, ACCEPTED);
     assert!(launch.vehicle.aborted());
 }
 
@@ -326,29 +327,29 @@ fn an_abort_takes_as_many_frames_with_a_crew_as_without() {
         }
         frames
     };
-    assert_eq!(frames_to_latch(Some(People::Two { first_ask: 1 })), 1);
+    assert_eq!(frames_to_latch(Some(People::Two { first: 1 })), 1);
     assert_eq!(frames_to_latch(None), 1);
 }
 
-/// Whoever may command may check, alone; nobody else may.
+/// Every operator who may command may check, alone; others may not.
 #[test]
 fn a_check_takes_one_operator_with_a_key() {
     let mut launch = Launch::two();
     for (station, answer) in [(OBSERVER, DENIED), (PAD, ACCEPTED)] {
-        assert_eq!(launch.says(station, CHECK, 1.0, 0.0).0, answer);
+        assert_eq!(launch.send(station, CHECK, 1.0, 0.0).0, answer);
     }
 }
 
 #[test]
 fn one_person_mode_needs_one_key() {
     let mut launch = Launch::new(People::One);
-    assert_eq!(launch.asks(OBSERVER, ARM).0, DENIED);
-    assert_eq!(launch.asks(PAD, ARM).0, ACCEPTED);
+    assert_eq!(launch.propose(OBSERVER, ARM).0, DENIED);
+    assert_eq!(launch.propose(PAD, ARM).0, ACCEPTED);
     assert!(launch.armed());
     launch.run(1.0);
     let crew = launch.crew.clone().unwrap();
     assert_eq!((crew.people, crew.commanded_by), (1, 4));
-    assert_eq!(launch.asks(PAD, START).0, ACCEPTED);
+    assert_eq!(launch.propose(PAD, START).0, ACCEPTED);
     launch.run(3.0);
     assert!(launch.counts_down(), "no taps");
 }
@@ -357,14 +358,14 @@ fn one_person_mode_needs_one_key() {
 fn the_command_passes_only_from_a_silent_station_to_the_same_role_or_range_safety() {
     let mut launch = Launch::armed_by_two();
     launch.speaking = vec![RANGE, FLIGHT, FLIGHT_TOO, PAD];
-    assert_eq!(launch.says(FLIGHT_TOO, TAKE_COMMAND, 0.0, 0.0).0, DENIED);
+    assert_eq!(launch.send(FLIGHT_TOO, TAKE_COMMAND, 0.0, 0.0).0, DENIED);
     launch.speaking = vec![RANGE, FLIGHT_TOO, PAD];
     launch.run(3.0);
-    let (answer, words) = launch.says(PAD, TAKE_COMMAND, 0.0, 0.0);
+    let (answer, words) = launch.send(PAD, TAKE_COMMAND, 0.0, 0.0);
     assert_eq!(answer, DENIED);
     assert!(words.contains("only FLIGHT or RANGE SAFETY takes over from FLIGHT Bob"), "{words}");
-    assert_eq!(launch.says(OBSERVER, TAKE_COMMAND, 0.0, 0.0).0, DENIED);
-    let (answer, words) = launch.says(FLIGHT_TOO, TAKE_COMMAND, 0.0, 0.0);
+    assert_eq!(launch.send(OBSERVER, TAKE_COMMAND, 0.0, 0.0).0, DENIED);
+    let (answer, words) = launch.send(FLIGHT_TOO, TAKE_COMMAND, 0.0, 0.0);
     assert_eq!(answer, ACCEPTED);
     assert!(
         words.contains("FLIGHT Cat (253/190) takes command from FLIGHT Bob (254/190), silent for"),
@@ -374,20 +375,20 @@ fn the_command_passes_only_from_a_silent_station_to_the_same_role_or_range_safet
     assert_eq!((crew.commanded_by, crew.commanding_system), (3, 253));
     assert!(launch.armed());
     // A start needs two people again, and the new commander's silence holds it.
-    launch.asks(FLIGHT_TOO, START);
+    launch.propose(FLIGHT_TOO, START);
     launch.confirms(RANGE, START);
     assert!(launch.counts_down());
     launch.speaking = vec![RANGE, PAD];
     for _ in 0..3 {
-        launch.says(RANGE, TAP, 0.0, 0.0);
+        launch.send(RANGE, TAP, 0.0, 0.0);
         launch.run(0.5);
     }
     assert!(!launch.counts_down());
 }
 
-/// Random frames of everybody, with replays, wrong keys, forged numbers and races, at a vehicle
+/// Random frames of all stations, with replays, wrong keys, forged numbers and races, at a vehicle
 /// that is disarmed again whenever it was armed. It is armed only in a frame in which the
-/// confirmation of another role arrived, of an ask that had been made in the ten seconds before.
+/// confirmation of another role arrived, of a proposal from the ten seconds before.
 #[test]
 fn random_signed_frames_arm_nothing_without_two_keys() {
     let mut random = ChaCha8Rng::seed_from_u64(7);
@@ -404,11 +405,11 @@ fn random_signed_frames_arm_nothing_without_two_keys() {
             let station = (dice & 0xFF) as usize % 6;
             let number = match dice >> 8 & 3 {
                 0 => 0,
-                1 | 2 => waits.map_or(FIRST_ASK, |ask| ask.number),
+                1 | 2 => waits.map_or(FIRST_PROPOSAL, |proposal| proposal.number),
                 _ => (dice >> 16) as u16,
             };
             if (dice >> 10).is_multiple_of(8) && !recorded.is_empty() {
-                // Heard before, or stolen and never heard.
+                // Used before, or stolen and never used.
                 let old = recorded[(dice >> 13) as usize % recorded.len()].clone();
                 launch.deliver(&old);
                 continue;
@@ -426,7 +427,7 @@ fn random_signed_frames_arm_nothing_without_two_keys() {
                 continue;
             }
             recorded.push(frame.clone());
-            if waits.is_some_and(|ask| ask.number == number) && station <= PAD {
+            if waits.is_some_and(|proposal| proposal.number == number) && station <= PAD {
                 confirmed_by = confirmed_by.or(Some(()));
             }
             launch.deliver(&frame);
@@ -434,8 +435,8 @@ fn random_signed_frames_arm_nothing_without_two_keys() {
         launch.frame();
         if launch.armed() {
             armed += 1;
-            let ask = waits.expect("an ask was waiting before this frame");
-            assert!(confirmed_by.is_some(), "armed without a confirmation of ask {}", ask.number);
+            let proposal = waits.expect("a proposal was waiting before this frame");
+            assert!(confirmed_by.is_some(), "armed without a confirmation of proposal {}", proposal.number);
             let disarm = launch.command(RANGE, ARM, 0.0, 0.0);
             launch.deliver(&disarm);
             launch.frame();

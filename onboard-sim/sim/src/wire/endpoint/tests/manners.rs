@@ -1,5 +1,5 @@
-//! Tests what other ground stations ask every vehicle, what they get without asking, and what
-//! stations tell the vehicle.
+//! Tests requests of other ground stations, unrequested messages, and reports of stations to the
+//! vehicle.
 
 use protocol::dialect::{
     ATTITUDE_DATA, AUTOPILOT_VERSION_DATA, BATTERY_STATUS_DATA, CURRENT_MODE_DATA, GLOBAL_POSITION_INT_DATA,
@@ -36,7 +36,7 @@ fn mission_fence_and_rally_lists_are_empty_and_other_types_are_unsupported() {
     }
     let sent = wire.question(43, &[1, 1, 77]);
     assert_eq!((count(&sent, MISSION_COUNT_DATA::ID), count(&sent, MISSION_ACK_DATA::ID)), (0, 1));
-    // For somebody else.
+    // For another vehicle.
     let sent = wire.question(43, &[2, 1, 0]);
     assert_eq!((count(&sent, MISSION_COUNT_DATA::ID), count(&sent, MISSION_ACK_DATA::ID)), (0, 0));
 }
@@ -107,22 +107,22 @@ fn home_is_the_pad_and_the_compass_shows_where_the_belly_points() {
 fn a_forced_disarm_disarms_on_the_pad_and_in_the_countdown_and_aborts_in_flight() {
     for code in [21196.0, 2989.0] {
         let mut wire = Wire::new();
-        assert_eq!(wire.ask(400, 1.0, 0.0).0, 0);
-        assert_eq!(wire.ask(400, 0.0, code).0, 0);
+        assert_eq!(wire.request(400, 1.0, 0.0).0, 0);
+        assert_eq!(wire.request(400, 0.0, code).0, 0);
         assert!(!wire.vehicle.mode().interlocks.armed && !wire.vehicle.aborted(), "on the pad");
-        assert_eq!(wire.ask(400, 1.0, 0.0).0, 0, "nothing is latched");
-        assert_eq!(wire.ask(300, 0.0, 0.0).0, 0);
+        assert_eq!(wire.request(400, 1.0, 0.0).0, 0, "nothing is latched");
+        assert_eq!(wire.request(300, 0.0, 0.0).0, 0);
         wire.run(1.0);
-        assert_eq!(wire.ask(400, 0.0, code).0, 0);
+        assert_eq!(wire.request(400, 0.0, code).0, 0);
         let mode = wire.vehicle.mode();
         assert!(!mode.interlocks.armed && mode.countdown_end_s.is_none() && !wire.vehicle.aborted());
-        assert_eq!(wire.ask(400, 1.0, 0.0).0, 0);
-        assert_eq!(wire.ask(300, 0.0, 0.0).0, 0);
+        assert_eq!(wire.request(400, 1.0, 0.0).0, 0);
+        assert_eq!(wire.request(300, 0.0, 0.0).0, 0);
         wire.run(wire.vehicle.computer().countdown_s() + 1.0);
         assert!(!wire.vehicle.phase().on_pad());
-        assert_eq!(wire.ask(400, 0.0, 0.0).0, DENIED, "unforced it stays refused");
+        assert_eq!(wire.request(400, 0.0, 0.0).0, DENIED, "unforced it stays refused");
         assert!(!wire.vehicle.aborted());
-        assert_eq!(wire.ask(400, 0.0, code).0, 0);
+        assert_eq!(wire.request(400, 0.0, code).0, 0);
         assert!(wire.vehicle.aborted(), "in flight it is an abort");
     }
 }
@@ -131,7 +131,7 @@ impl Wire {
     /// A command of the station with this number; returns the answers.
     fn numbered(&mut self, param1: f32, number: u32) -> Vec<CommandAnswer> {
         let command = command(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, param1);
-        self.tell(&MavMessage::COMMAND_LONG(COMMAND_LONG_DATA { param2: number as f32, ..command }));
+        self.transmit(&MavMessage::COMMAND_LONG(COMMAND_LONG_DATA { param2: number as f32, ..command }));
         self.run(0.1).iter().filter_map(CommandAnswer::from_frame).collect()
     }
 }
@@ -152,7 +152,7 @@ fn a_repeated_arming_is_answered_again_and_arms_nothing_that_was_disarmed_or_abo
     assert!(!wire.vehicle.mode().interlocks.armed);
     assert_eq!(told(wire.numbered(1.0, 70_002)), [(0, 70_002)], "another one");
     assert!(wire.vehicle.mode().interlocks.armed);
-    assert_eq!(wire.ask(185, 1.0, 0.0).0, 0);
+    assert_eq!(wire.request(185, 1.0, 0.0).0, 0);
     for number in [70_000, 70_002] {
         wire.numbered(1.0, number);
         assert!(!wire.vehicle.mode().interlocks.armed);
@@ -166,7 +166,7 @@ fn a_radio_s_report_from_another_address_thins_nothing() {
     let before = wire.run(10.0).len();
     let mut sent = 0;
     for _ in 0..10 {
-        wire.tell(&report);
+        wire.transmit(&report);
         sent += wire.run(1.0).len();
     }
     assert!(sent + 5 > before, "{sent} of {before} frames");
@@ -187,8 +187,8 @@ fn every_command_of_a_flood_is_answered_or_refused_and_no_flood_of_aborts_grows_
             wire.endpoint.on_frame(0, &frame, &wire.vehicle.state());
         }
     }
-    let heard = wire.endpoint.heard(wire.vehicle.time_s());
-    assert_eq!(heard.requests.len(), 64);
+    let state = wire.endpoint.uplink_state(wire.vehicle.time_s());
+    assert_eq!(state.requests.len(), 64);
     wire.run(0.1);
     assert!(wire.vehicle.mode().interlocks.abort_latched);
 }
@@ -220,7 +220,7 @@ fn what_cannot_be_cancelled_is_answered() {
     }
 }
 
-/// A verdict before the landing, a message of crews without a crew, one that nobody knows.
+/// A verdict before the landing, a message of crews without a crew, an unknown one.
 #[test]
 fn a_message_without_content_is_refused_for_now_and_an_unknown_one_for_ever() {
     let mut wire = Wire::new();
@@ -229,18 +229,18 @@ fn a_message_without_content_is_refused_for_now_and_an_unknown_one_for_ever() {
         (protocol::dialect::TD_CREW_DATA::ID, MavResult::MAV_RESULT_UNSUPPORTED),
         (9_999, MavResult::MAV_RESULT_UNSUPPORTED),
     ] {
-        assert_eq!(wire.ask(512, message_id as f32, 0.0).0, result as u8, "message {message_id}");
+        assert_eq!(wire.request(512, message_id as f32, 0.0).0, result as u8, "message {message_id}");
     }
 }
 
 #[test]
 fn the_version_announces_files_and_has_an_id_and_a_hash() {
     let mut wire = Wire::new();
-    wire.endpoint = VehicleEndpoint::new(VehicleKind::Simulated).known_as(77);
-    assert_eq!(wire.ask(520, 1.0, 0.0).0, 0);
+    wire.endpoint = VehicleEndpoint::new(VehicleKind::Simulated).with_uid(77);
+    assert_eq!(wire.request(520, 1.0, 0.0).0, 0);
     let sent = wire.run(1.0);
     let version = decoded!(sent, AUTOPILOT_VERSION).next();
-    // It may have come with the answer.
+    // It may have arrived with the answer.
     let now = avionics::link::telemetry::message(
         AUTOPILOT_VERSION_DATA::ID,
         &wire.vehicle.state(),
@@ -276,7 +276,7 @@ fn there_are_no_extended_parameters_and_every_question_is_answered() {
     assert!(texts(&wire.run(1.0)).is_empty(), "no words about it");
 }
 
-// Tests what a standard ground station gets without asking.
+// Tests the messages that a standard ground station gets without a request.
 
 const OF_EVERY_VEHICLE: [u32; 7] = [
     ATTITUDE_DATA::ID,
@@ -289,7 +289,7 @@ const OF_EVERY_VEHICLE: [u32; 7] = [
 ];
 
 #[test]
-fn over_a_radio_a_standard_station_gets_what_it_asks_for_and_the_fast_messages_give_way() {
+fn over_a_radio_a_standard_station_gets_its_requests_and_fast_messages_slow_down() {
     for (endpoint, signature_len) in [
         (VehicleEndpoint::new(VehicleKind::Simulated), 0),
         (VehicleEndpoint::sending_signed(VehicleKind::Simulated), SIGNATURE_LEN),
@@ -297,7 +297,7 @@ fn over_a_radio_a_standard_station_gets_what_it_asks_for_and_the_fast_messages_g
         let mut wire = Wire { endpoint, ..Wire::new() };
         let before = count(&wire.run(10.0), ATTITUDE_QUATERNION_DATA::ID);
         for message_id in OF_EVERY_VEHICLE {
-            let result = wire.ask(511, message_id as f32, 1e6).0;
+            let result = wire.request(511, message_id as f32, 1e6).0;
             assert_eq!(result, ACCEPTED, "message {message_id}");
         }
         wire.run(2.0);
@@ -310,7 +310,7 @@ fn over_a_radio_a_standard_station_gets_what_it_asks_for_and_the_fast_messages_g
         let bytes: usize = sent.iter().map(|frame| frame.as_bytes().len() + signature_len).sum();
         assert!(bytes <= 10 * RADIO_BUDGET_BYTES_S as usize, "{bytes} B in 10 s");
         for message_id in OF_EVERY_VEHICLE {
-            assert_eq!(wire.ask(511, message_id as f32, 0.0).0, 0);
+            assert_eq!(wire.request(511, message_id as f32, 0.0).0, 0);
         }
         let again = count(&wire.run(10.0), ATTITUDE_QUATERNION_DATA::ID);
         assert!(again.abs_diff(before) <= 1, "{again} again, {before} before");
@@ -339,11 +339,10 @@ fn the_rates_of_every_kind_of_link_fit_it() {
     }
 }
 
-// What stations tell the vehicle about themselves: the end of their book, and the mission that they
-// expect.
+// Reports of stations about themselves: the end of their book, and their expected mission.
 
-fn tell(wire: &mut Wire, head: TD_BOOK_HEAD_DATA) -> Vec<TD_BOOK_KEPT_DATA> {
-    wire.tell(&MavMessage::TD_BOOK_HEAD(head));
+fn send_head(wire: &mut Wire, head: TD_BOOK_HEAD_DATA) -> Vec<TD_BOOK_KEPT_DATA> {
+    wire.transmit(&MavMessage::TD_BOOK_HEAD(head));
     let sent = wire.run(0.5);
     let kept = decoded!(sent, TD_BOOK_KEPT);
     kept.collect()
@@ -359,12 +358,12 @@ fn the_end_of_a_book_is_confirmed_to_the_station_that_sent_it() {
         target_component: 1,
         ..TD_BOOK_HEAD_DATA::default()
     };
-    let kept = tell(&mut wire, head.clone());
+    let kept = send_head(&mut wire, head.clone());
     let [kept] = &kept[..] else { panic!("{kept:?}") };
     assert_eq!((kept.book, kept.entries), (77, 5));
     assert_eq!((kept.target_system, kept.target_component), (GROUND.system_id, GROUND.component_id));
     assert!(
-        tell(&mut wire, TD_BOOK_HEAD_DATA { target_system: 2, ..head }).is_empty(),
+        send_head(&mut wire, TD_BOOK_HEAD_DATA { target_system: 2, ..head }).is_empty(),
         "for another vehicle"
     );
 }
@@ -380,7 +379,7 @@ fn a_flood_of_ends_is_answered_within_the_budget() {
             target_component: 1,
             ..TD_BOOK_HEAD_DATA::default()
         };
-        wire.tell(&MavMessage::TD_BOOK_HEAD(head));
+        wire.transmit(&MavMessage::TD_BOOK_HEAD(head));
     }
     let sent = wire.run(1.0);
     let bytes: usize = sent.iter().map(|frame| frame.as_bytes().len()).sum();
@@ -394,7 +393,7 @@ fn arm_for(wire: &mut Wire, params: [f32; 3]) -> (u8, String) {
     wire.run(0.5);
     let [param4, param5, param6] = params;
     let arm = command(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, 1.0);
-    wire.tell(&MavMessage::COMMAND_LONG(COMMAND_LONG_DATA { param4, param5, param6, ..arm }));
+    wire.transmit(&MavMessage::COMMAND_LONG(COMMAND_LONG_DATA { param4, param5, param6, ..arm }));
     let sent = wire.run(0.5);
     let answers: Vec<_> = sent.iter().filter_map(CommandAnswer::from_frame).collect();
     assert_eq!((answers.len(), answers[0].command), (1, ARM));

@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use avionics::link::streams::{STANDARD, Streams};
 use flight::computer::LogState;
-use flight::computer::crew::{Asked, Request};
-use flight::computer::news::Severity;
+use flight::computer::crew::{CrewCommand, Request};
+use flight::computer::messages::Severity;
 use flight::rules::arming::all_passed;
 use flight::rules::operator::{Name, Operator, Role};
 use flight::rules::phase::Phase;
@@ -58,8 +58,8 @@ const ACCEPTED: u8 = MavResult::MAV_RESULT_ACCEPTED as u8;
 const NOT_NOW: u8 = MavResult::MAV_RESULT_TEMPORARILY_REJECTED as u8;
 const DENIED: u8 = MavResult::MAV_RESULT_DENIED as u8;
 
-/// The number of a crew's first ask.
-const FIRST_ASK: u16 = 40_000;
+/// The number of a crew's first proposal.
+const FIRST_PROPOSAL: u16 = 40_000;
 
 /// A crew's people: two of one role, and one each of two others.
 fn operators() -> Vec<Operator> {
@@ -74,7 +74,7 @@ fn key(number: u8) -> Key {
     Key::new([number; Key::LEN])
 }
 
-/// What has nothing to say on the pad.
+/// Messages without content on the pad.
 const IN_FLIGHT: [u32; 5] = [
     TD_DESCENT_DATA::ID,
     TD_TOUCHDOWN_PREDICTION_DATA::ID,
@@ -104,7 +104,7 @@ fn command(command: MavCmd, param1: f32) -> COMMAND_LONG_DATA {
     COMMAND_LONG_DATA { param1, command, target_system, target_component, ..COMMAND_LONG_DATA::default() }
 }
 
-/// A command to this vehicle, also one that the dialect does not know.
+/// A command to this vehicle, also one outside the dialect.
 fn any_command(encoder: &mut Encoder, command: u16, [param1, param2, param3]: [f32; 3]) -> Frame {
     let payload = COMMAND_LONG_DATA { param2, param3, ..self::command(MavCmd::default(), param1) };
     let mut bytes = [0; 255];
@@ -113,14 +113,14 @@ fn any_command(encoder: &mut Encoder, command: u16, [param1, param2, param3]: [f
     encoder.encode_payload(COMMAND_LONG_DATA::ID, &bytes[..len]).unwrap()
 }
 
-/// One frame as in the run loop, with the requests of the vehicle's own programme.
+/// One frame as in the run loop, with the requests of the vehicle's programme.
 fn frame(
     vehicle: &mut Vehicle,
     endpoint: &mut VehicleEndpoint,
-    own: &[Asked],
+    commands: &[CrewCommand],
 ) -> (Vec<VehicleEvent>, Vec<Outgoing>) {
-    let own: Vec<Request> = own.iter().copied().map(Request::of_the_programme).collect();
-    let (events, _) = step(endpoint, vehicle, &own);
+    let requests: Vec<Request> = commands.iter().copied().map(Request::of_the_programme).collect();
+    let (events, _) = step(endpoint, vehicle, &requests);
     (events, endpoint.poll(&vehicle.state()))
 }
 
@@ -137,7 +137,7 @@ impl Wire {
         let mut wire = Self {
             vehicle: rocket(),
             // Every field has a value: no frame is shorter than it is in use.
-            endpoint: VehicleEndpoint::new(VehicleKind::Simulated).booted(0x00AB_CDEF).known_as(0xABCD),
+            endpoint: VehicleEndpoint::new(VehicleKind::Simulated).booted(0x00AB_CDEF).with_uid(0xABCD),
             ground: Encoder::new(GROUND),
             beats: false,
         };
@@ -145,7 +145,7 @@ impl Wire {
         wire
     }
 
-    /// Runs for this long; returns what was sent.
+    /// Runs for this long; returns the sent frames.
     fn run(&mut self, duration_s: f64) -> Vec<Frame> {
         let end_s = self.vehicle.time_s() + duration_s;
         let mut sent = Vec::new();
@@ -161,23 +161,23 @@ impl Wire {
     }
 
     /// The ground station sends a message.
-    fn tell(&mut self, message: &MavMessage) {
+    fn transmit(&mut self, message: &MavMessage) {
         let frame = self.ground.encode(message);
         self.endpoint.on_frame(0, &frame, &self.vehicle.state());
     }
 
     fn beat(&mut self) {
-        self.tell(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
+        self.transmit(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
     }
 
-    /// Sends a command from a ground station that is heard.
-    fn ask(&mut self, command: u16, param1: f32, param2: f32) -> (u8, String) {
+    /// Sends a command from a ground station with an uplink.
+    fn request(&mut self, command: u16, param1: f32, param2: f32) -> (u8, String) {
         self.beats = true;
         self.beat();
-        self.ask_once(command, param1, param2)
+        self.request_once(command, param1, param2)
     }
 
-    fn ask_once(&mut self, command: u16, param1: f32, param2: f32) -> (u8, String) {
+    fn request_once(&mut self, command: u16, param1: f32, param2: f32) -> (u8, String) {
         let frame = any_command(&mut self.ground, command, [param1, param2, f32::NAN]);
         self.endpoint.on_frame(0, &frame, &self.vehicle.state());
         let sent = self.run(0.5);
@@ -202,7 +202,7 @@ fn count(frames: &[Frame], message_id: u32) -> usize {
 }
 
 #[test]
-fn the_standard_rates_fit_the_radio_and_are_kept() {
+fn the_standard_rates_fit_the_radio_and_are_met() {
     let streams = Streams::new();
     assert!(streams.fit(), "{} B/s", streams.bytes_s());
     let mut wire = Wire::new();
@@ -221,19 +221,19 @@ fn the_standard_rates_fit_the_radio_and_are_kept() {
 #[test]
 fn a_refusal_is_answered_and_explained_in_words() {
     let mut wire = Wire::new();
-    let (result, words) = wire.ask(300, 0.0, 0.0);
+    let (result, words) = wire.request(300, 0.0, 0.0);
     assert_eq!(result, DENIED);
     assert!(words.contains("start refused: cannot start in PAD_IDLE"), "{words}");
     wire.vehicle.set_log_state(LogState { running: false, space_bytes: 0 });
     // Force codes have no effect. The reason is sent once.
     for (code, said) in [(0.0, true), (21196.0, false), (2989.0, false)] {
-        let (result, words) = wire.ask(400, 1.0, code);
+        let (result, words) = wire.request(400, 1.0, code);
         assert_eq!(result, NOT_NOW);
         assert_eq!(words.contains("arm refused: log"), said, "{words}");
     }
     // Texts have a share of each second.
     wire.run(1.0);
-    assert_eq!(wire.ask(400, 2.0, 0.0).0, DENIED);
+    assert_eq!(wire.request(400, 2.0, 0.0).0, DENIED);
 }
 
 #[test]
@@ -242,7 +242,7 @@ fn a_command_for_somebody_else_is_left_alone() {
     for target_system in [2, 255] {
         let arm = command(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, 1.0);
         let command = COMMAND_LONG_DATA { target_system, ..arm };
-        wire.tell(&MavMessage::COMMAND_LONG(command));
+        wire.transmit(&MavMessage::COMMAND_LONG(command));
     }
     let sent = wire.run(0.5);
     assert_eq!(count(&sent, 77), 0);
@@ -253,22 +253,22 @@ fn a_command_for_somebody_else_is_left_alone() {
 fn a_stream_that_was_slowed_comes_back_at_once_and_vital_ones_are_not_slowed() {
     let mut wire = Wire::new();
     let attitude = ATTITUDE_QUATERNION_DATA::ID as f32;
-    assert_eq!(wire.ask(511, attitude, 60e6).0, 0);
+    assert_eq!(wire.request(511, attitude, 60e6).0, 0);
     assert!(count(&wire.run(5.0), ATTITUDE_QUATERNION_DATA::ID) <= 1);
-    assert_eq!(wire.ask(511, attitude, 0.0).0, 0);
+    assert_eq!(wire.request(511, attitude, 0.0).0, 0);
     assert!(count(&wire.run(2.0), ATTITUDE_QUATERNION_DATA::ID) >= 15, "8 Hz");
     for (vital, interval_us) in [(HEARTBEAT_DATA::ID, -1.0), (TD_FLIGHT_STATUS_DATA::ID, 2e6)] {
-        assert_eq!(wire.ask(511, vital as f32, interval_us).0, DENIED);
+        assert_eq!(wire.request(511, vital as f32, interval_us).0, DENIED);
     }
-    assert_eq!(wire.ask(511, attitude, f32::INFINITY).0, DENIED);
-    assert_eq!(wire.ask(511, f32::NAN, -1.0).0, DENIED);
+    assert_eq!(wire.request(511, attitude, f32::INFINITY).0, DENIED);
+    assert_eq!(wire.request(511, f32::NAN, -1.0).0, DENIED);
 }
 
 #[test]
 fn a_new_phase_is_sent_at_once_and_only_once() {
     let mut wire = Wire::new();
     wire.run(1.03);
-    let (_, leaving) = frame(&mut wire.vehicle, &mut wire.endpoint, &[Asked::Arm]);
+    let (_, leaving) = frame(&mut wire.vehicle, &mut wire.endpoint, &[CrewCommand::Arm]);
     let mut sent: Vec<Frame> = leaving.into_iter().map(|outgoing| outgoing.frame).collect();
     sent.extend(wire.run(0.08));
     assert_eq!(count(&sent, HEARTBEAT_DATA::ID), 1);
@@ -286,11 +286,11 @@ fn a_new_station_gets_the_limits() {
 }
 
 #[test]
-fn time_is_told_to_those_who_ask_this_vehicle() {
+fn time_is_sent_on_request_to_this_vehicle() {
     let mut wire = Wire::new();
     for (target_system, answered) in [(0, true), (1, true), (2, false)] {
         let sync = TIMESYNC_DATA { ts1: 77, target_system, ..TIMESYNC_DATA::default() };
-        wire.tell(&MavMessage::TIMESYNC(sync));
+        wire.transmit(&MavMessage::TIMESYNC(sync));
         assert_eq!(count(&wire.run(0.1), TIMESYNC_DATA::ID) == 1, answered, "target {target_system}");
     }
 }
@@ -298,8 +298,8 @@ fn time_is_told_to_those_who_ask_this_vehicle() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Whatever frames arrive, the vehicle keeps running, and only the two proper commands arm and
-    /// start it.
+    /// For any frames, the vehicle keeps running, and only the two proper commands arm and start
+    /// it.
     #[test]
     fn hostile_payloads_never_stop_the_vehicle(
         messages in prop::collection::vec((prop::sample::select(vec![0u32, 4, 75, 76, 77, 111, 253, 54_000]), prop::collection::vec(any::<u8>(), 1..64)), 1..40)
@@ -338,10 +338,10 @@ fn the_dialect_names_the_arming_checks_in_their_order() {
     }
 }
 
+mod addressing;
 mod budget;
 mod crew;
 mod manners;
-mod meant;
 mod questions;
 mod rocket;
 mod slow_line;

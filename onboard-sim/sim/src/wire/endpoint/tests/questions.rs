@@ -1,5 +1,5 @@
-//! Tests questions about parameters, files and versions, as other clients ask them, and the
-//! vehicle's log over FTP.
+//! Tests requests of other clients about parameters, files and versions, and the vehicle's log over
+//! FTP.
 
 use avionics::link::parameters;
 use flight::computer::FRAME_S;
@@ -32,7 +32,7 @@ fn values(frames: &[Frame]) -> Vec<PARAM_VALUE_DATA> {
 
 impl Wire {
     fn set(&mut self, id: &str, value: f32, param_type: MavParamType) -> (Vec<PARAM_VALUE_DATA>, String) {
-        self.tell(&MavMessage::PARAM_SET(PARAM_SET_DATA {
+        self.transmit(&MavMessage::PARAM_SET(PARAM_SET_DATA {
             param_value: value,
             target_system: 1,
             target_component: 1,
@@ -51,9 +51,9 @@ impl Wire {
 }
 
 #[test]
-fn the_list_is_whole_in_order_and_does_not_crowd_out_telemetry() {
+fn the_list_is_complete_in_order_and_does_not_crowd_out_telemetry() {
     let mut wire = Wire::new();
-    wire.tell(&MavMessage::PARAM_REQUEST_LIST(PARAM_REQUEST_LIST_DATA {
+    wire.transmit(&MavMessage::PARAM_REQUEST_LIST(PARAM_REQUEST_LIST_DATA {
         target_system: 1,
         target_component: 0,
     }));
@@ -77,12 +77,12 @@ fn a_parameter_is_read_by_name_or_index_and_a_missing_one_is_reported() {
             param_id,
         })
     };
-    wire.tell(&read(name("NMPC_W_THETA"), -1));
-    wire.tell(&read(name("ignored"), 0));
+    wire.transmit(&read(name("NMPC_W_THETA"), -1));
+    wire.transmit(&read(name("ignored"), 0));
     let found: Vec<f32> = values(&wire.run(0.5)).iter().map(|value| value.param_value).collect();
     assert_eq!(found, [200.0, 1.0]);
-    wire.tell(&read(name("NO_SUCH"), -1));
-    wire.tell(&read(name(""), 999));
+    wire.transmit(&read(name("NO_SUCH"), -1));
+    wire.transmit(&read(name(""), 999));
     let errors = wire.run(0.5).into_iter().filter(|frame| {
         matches!(frame.decode(), Ok(MavMessage::PARAM_ERROR(error))
             if error.error == MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST)
@@ -96,7 +96,7 @@ fn a_rate_is_set_within_the_budget_and_every_set_is_answered_with_what_holds() {
     assert_eq!(wire.set_real("RATE_FINS", 4.0), (4.0, String::new()));
     let found = count(&wire.run(3.0), TD_FINS_DATA::ID);
     assert!((11..=13).contains(&found), "{found} in 3 s at 4 Hz");
-    for (id, asked, holds, why) in [
+    for (id, value, holds, why) in [
         ("RATE_FINS", 1000.0, 4.0, "budget is 2000"),
         ("RATE_FINS", -3.0, 4.0, "must be"),
         ("RATE_GIMBAL", f32::NAN, 3.0, "must be"),
@@ -107,9 +107,9 @@ fn a_rate_is_set_within_the_budget_and_every_set_is_answered_with_what_holds() {
     ] {
         // Texts have a share of each second.
         wire.run(1.0);
-        let (found, words) = wire.set_real(id, asked);
-        assert_eq!(found.to_bits(), f32::to_bits(holds), "{id} = {asked}");
-        assert!(words.contains(why), "{id} = {asked}: {words}");
+        let (found, words) = wire.set_real(id, value);
+        assert_eq!(found.to_bits(), f32::to_bits(holds), "{id} = {value}");
+        assert!(words.contains(why), "{id} = {value}: {words}");
     }
     let (values, _) = wire.set("RATE_FINS", 2.0, MavParamType::MAV_PARAM_TYPE_INT32);
     assert_eq!(values[0].param_value.to_bits(), 4.0f32.to_bits());
@@ -119,7 +119,7 @@ fn a_rate_is_set_within_the_budget_and_every_set_is_answered_with_what_holds() {
     assert_eq!(count(&wire.run(2.0), TD_FINS_DATA::ID), 0, "switched off");
 }
 
-/// Both ways to set a rate, asked by a station.
+/// Both methods to set a rate, used by a station.
 fn set_rates(wire: &mut Wire, station: Address) -> (u8, f32) {
     let ground = std::mem::replace(&mut wire.ground, Encoder::new(station));
     let request = CommandRequest {
@@ -142,7 +142,7 @@ fn while_armed_only_the_station_that_armed_sets_rates_in_flight_too() {
     let other = Address { system_id: 254, component_id: 190 };
     let mut wire = Wire::new();
     assert_eq!(set_rates(&mut wire, other).0, 0, "before arming every station may");
-    assert_eq!(wire.ask(400, 1.0, 0.0).0, 0);
+    assert_eq!(wire.request(400, 1.0, 0.0).0, 0);
     // A second arm is accepted, because the vehicle is armed, but it does not transfer the right to
     // set rates.
     let again = CommandRequest {
@@ -155,7 +155,7 @@ fn while_armed_only_the_station_that_armed_sets_rates_in_flight_too() {
     wire.endpoint.on_command(0, (&again, None), &wire.vehicle.state());
     wire.run(0.2);
     assert_eq!(wire.set_real("RATE_FINS", 4.0).0.to_bits(), 4.0f32.to_bits());
-    assert_eq!(wire.ask(300, 0.0, 0.0).0, 0);
+    assert_eq!(wire.request(300, 0.0, 0.0).0, 0);
     wire.run(wire.vehicle.computer().countdown_s() + 2.0);
     assert!(!wire.vehicle.phase().on_pad(), "{:?}", wire.vehicle.phase());
     let (result, rate_hz) = set_rates(&mut wire, other);
@@ -171,11 +171,11 @@ fn while_armed_only_the_station_that_armed_sets_rates_in_flight_too() {
 #[test]
 fn questions_for_another_system_are_left_alone() {
     let mut wire = Wire::new();
-    wire.tell(&MavMessage::PARAM_REQUEST_LIST(PARAM_REQUEST_LIST_DATA {
+    wire.transmit(&MavMessage::PARAM_REQUEST_LIST(PARAM_REQUEST_LIST_DATA {
         target_system: 2,
         target_component: 1,
     }));
-    wire.tell(&MavMessage::FILE_TRANSFER_PROTOCOL(FILE_TRANSFER_PROTOCOL_DATA {
+    wire.transmit(&MavMessage::FILE_TRANSFER_PROTOCOL(FILE_TRANSFER_PROTOCOL_DATA {
         target_system: 2,
         target_component: 1,
         ..FILE_TRANSFER_PROTOCOL_DATA::default()
@@ -197,27 +197,28 @@ fn content(len: usize) -> Vec<u8> {
 }
 
 impl Wire {
-    fn ask_file(&mut self, packet: &Packet) {
+    fn request_file(&mut self, packet: &Packet) {
         let frame = self.ground.encode(&packet.message(VEHICLE));
         self.endpoint.on_frame(0, &frame, &self.vehicle.state());
     }
 
-    /// The answers to one request, and what is said.
-    fn asked_file(&mut self, opcode: Opcode, path: &str) -> (Option<Refusal>, String) {
-        self.ask_file(&Packet::request(7, 0, opcode, 0, path));
+    /// The answers to one request, and the texts.
+    fn file_answers(&mut self, opcode: Opcode, path: &str) -> (Option<Refusal>, String) {
+        self.request_file(&Packet::request(7, 0, opcode, 0, path));
         let sent = self.run(0.5);
         let answer = sent.iter().find_map(Packet::answer_in).expect("an answer");
         (answer.1.refusal(), texts(&sent).join("; "))
     }
 
-    /// Fetches the file for at most this long; returns the file, and what was sent with its times.
+    /// Fetches the file for at most this long; returns the file, and the sent frames with their
+    /// times.
     fn fetch(&mut self, download: &mut Download, most_s: f64) -> (Vec<u8>, Vec<(f64, Frame)>) {
         let (mut file, mut all) = (Vec::new(), Vec::new());
         let end_s = self.vehicle.time_s() + most_s;
         while self.vehicle.time_s() < end_s && download.ended().is_none() {
             let now = Duration::from_secs_f64(self.vehicle.time_s());
             for packet in download.poll(now) {
-                self.ask_file(&packet);
+                self.request_file(&packet);
             }
             for frame in self.run(0.5 * FRAME_S) {
                 if let Some((_, packet)) = Packet::answer_in(&frame)
@@ -233,7 +234,7 @@ impl Wire {
 }
 
 #[test]
-fn a_log_fills_the_link_within_its_budget_and_the_vehicle_is_still_heard() {
+fn a_log_fills_the_link_within_its_budget_and_telemetry_continues() {
     // Of a radio's budget, six pieces fit into any second, and a seventh does not.
     for (capacity_bytes_s, signature_len, least) in [(2000, 0, 0.75), (5760, 0, 0.8), (5760, 13, 0.8)] {
         let endpoint = match signature_len {
@@ -255,7 +256,7 @@ fn a_log_fills_the_link_within_its_budget_and_the_vehicle_is_still_heard() {
             100.0 * share
         );
         assert!(share > least, "{share}");
-        // No second carries more than the budget, and the vehicle is heard in each.
+        // No second carries more than the budget, and a frame of the vehicle arrives in each.
         for (from_s, _) in &sent {
             let within = sent.iter().filter(|(at_s, _)| (*from_s..from_s + 1.0).contains(at_s));
             let bytes: usize = within.map(|(_, frame)| frame.as_bytes().len() + signature_len).sum();
@@ -273,12 +274,12 @@ fn a_log_fills_the_link_within_its_budget_and_the_vehicle_is_still_heard() {
 fn a_log_is_refused_while_armed_and_in_flight_with_a_reason() {
     let mut wire = Wire::new();
     wire.endpoint.offer(Box::new(log(1000)));
-    assert_eq!(wire.asked_file(Opcode::OPEN_FILE_RO, "/log/flight.mcap").0, None);
+    assert_eq!(wire.file_answers(Opcode::OPEN_FILE_RO, "/log/flight.mcap").0, None);
     let mut download = Download::new(None, 0);
     wire.endpoint.offer(Box::new(log(100_000)));
     wire.fetch(&mut download, 10.0);
     assert_eq!(download.ended(), None, "under way");
-    assert_eq!(wire.ask(400, 1.0, 0.0).0, ACCEPTED);
+    assert_eq!(wire.request(400, 1.0, 0.0).0, ACCEPTED);
     let (_, sent) = wire.fetch(&mut download, 60.0);
     assert_eq!(download.ended(), Some(Err(Failure::NotNow)), "armed");
     let words = texts(&sent.into_iter().map(|(_, frame)| frame).collect::<Vec<_>>()).join("; ");
@@ -288,7 +289,7 @@ fn a_log_is_refused_while_armed_and_in_flight_with_a_reason() {
         (Opcode::CALC_FILE_CRC32, "/log/flight.mcap"),
         (Opcode::LIST_DIRECTORY, "/log"),
     ] {
-        assert_eq!(wire.asked_file(opcode, path).0, Some(Refusal::Busy));
+        assert_eq!(wire.file_answers(opcode, path).0, Some(Refusal::Busy));
     }
     // Arming has ended the session, so telemetry is as in any flight.
     wire.run(2.0);
@@ -299,11 +300,14 @@ fn a_log_is_refused_while_armed_and_in_flight_with_a_reason() {
 fn a_client_that_looks_for_parameters_in_files_is_answered_at_once_also_in_flight() {
     let mut wire = Wire::new();
     for _ in 0..2 {
-        assert_eq!(wire.asked_file(Opcode::OPEN_FILE_RO, "@PARAM/param.pck").0, Some(Refusal::FileNotFound));
-        assert_eq!(wire.asked_file(Opcode(6), "/log/x").0, Some(Refusal::FileProtected));
-        wire.ask(400, 1.0, 0.0);
+        assert_eq!(
+            wire.file_answers(Opcode::OPEN_FILE_RO, "@PARAM/param.pck").0,
+            Some(Refusal::FileNotFound)
+        );
+        assert_eq!(wire.file_answers(Opcode(6), "/log/x").0, Some(Refusal::FileProtected));
+        wire.request(400, 1.0, 0.0);
     }
-    assert_eq!(wire.asked_file(Opcode::LIST_DIRECTORY, "/").1, "");
+    assert_eq!(wire.file_answers(Opcode::LIST_DIRECTORY, "/").1, "");
 }
 
 #[test]
@@ -314,9 +318,9 @@ fn a_link_that_reads_does_not_thin_the_telemetry_of_another() {
     };
     wire.endpoint.offer(Box::new(log(50_000)));
     wire.run(1.0);
-    wire.ask_file(&Packet::request(1, 0, Opcode::OPEN_FILE_RO, 0, "/log/flight.mcap"));
+    wire.request_file(&Packet::request(1, 0, Opcode::OPEN_FILE_RO, 0, "/log/flight.mcap"));
     wire.run(0.5);
-    wire.ask_file(&Packet { size: 239, ..Packet::request(2, 0, Opcode::BURST_READ_FILE, 0, "") });
+    wire.request_file(&Packet { size: 239, ..Packet::request(2, 0, Opcode::BURST_READ_FILE, 0, "") });
     let mut carried = [[0; 2]; 2];
     for _ in 0..1000 {
         let (_, leaving) = frame(&mut wire.vehicle, &mut wire.endpoint, &[]);

@@ -15,9 +15,9 @@ use crate::wire::fly::{Delayed, load_flight};
 struct Airborne {
     rocket: Vehicle,
     endpoint: VehicleEndpoint,
-    /// What the ground sends now.
+    /// Frames that the ground sends now.
     uplink: Vec<Frame>,
-    heard: Delayed<Frame>,
+    received: Delayed<Frame>,
     sent: Delayed<Frame>,
 }
 
@@ -37,10 +37,10 @@ impl Airborne {
             rocket,
             endpoint: VehicleEndpoint::new(VehicleKind::Simulated),
             uplink: Vec::new(),
-            heard: Delayed::default(),
+            received: Delayed::default(),
             sent: Delayed::default(),
         };
-        // Nobody is heard, and its own programme needs nobody.
+        // No station is received, and the vehicle's programme needs none.
         let waits = |check: &Check| !check.passed && check.name != UPLINK_CHECK;
         airborne.run_while(|rocket| rocket.arming_checks().iter().any(waits));
         airborne
@@ -52,7 +52,7 @@ impl Airborne {
 
     fn let_go_with_faults(dispersion: &str, faults: &[&str]) -> Self {
         let mut airborne = Self::with_faults(dispersion, faults);
-        frame(&mut airborne.rocket, &mut airborne.endpoint, &[Asked::Arm, Asked::Start]);
+        frame(&mut airborne.rocket, &mut airborne.endpoint, &[CrewCommand::Arm, CrewCommand::Start]);
         airborne.run_while(|rocket| rocket.phase().on_pad());
         airborne
     }
@@ -62,7 +62,7 @@ impl Airborne {
         while holds(&self.rocket) {
             let time_s = self.rocket.time_s();
             let uplink = std::mem::take(&mut self.uplink);
-            for frame in self.heard.pass(uplink, time_s, self.rocket.radio()) {
+            for frame in self.received.pass(uplink, time_s, self.rocket.radio()) {
                 self.endpoint.on_frame(0, &frame, &self.rocket.state());
             }
             let (_, leaving) = frame(&mut self.rocket, &mut self.endpoint, &[]);
@@ -92,7 +92,7 @@ impl Airborne {
 
 /// Twenty commands a second that are refused with a text, all the way from apogee to the ground.
 #[test]
-fn its_whole_flight_stays_within_the_radio_s_budget_in_every_second_and_refusals_cost_no_position() {
+fn a_flight_stays_within_the_radio_budget_in_every_second_and_refusals_delay_no_position() {
     let mut airborne = Airborne::let_go("field");
     let mut ground = Encoder::new(GROUND);
     let mut sent = Vec::new();
@@ -127,7 +127,7 @@ fn its_whole_flight_stays_within_the_radio_s_budget_in_every_second_and_refusals
 }
 
 #[test]
-fn in_the_descent_the_band_is_told_four_times_a_second() {
+fn in_the_descent_the_band_is_reported_four_times_a_second() {
     let mut airborne = Airborne::let_go("field");
     airborne.run_while(|rocket| rocket.phase() != Phase::LandArmed);
     let sent = airborne.run(2.0);
@@ -158,9 +158,9 @@ fn findings(sent: &[Frame]) -> Vec<(u8, u8, String)> {
         .collect()
 }
 
-/// The station hears what went wrong while it happens and, after the landing, again and again.
+/// The station receives findings as they occur and, after the landing, repeatedly.
 #[test]
-fn what_went_wrong_is_told() {
+fn findings_are_reported() {
     let mut airborne = Airborne::let_go_with_faults("field", &["gnss-out@1"]);
     let sent = airborne.run_while(|rocket| rocket.phase() != Phase::Touchdown);
     let lost = "GNSS lost for";
@@ -168,7 +168,7 @@ fn what_went_wrong_is_told() {
     assert!((first.0, first.1) == (0, 1) && first.2.starts_with(lost), "{first:?}");
     let after = findings(&airborne.run(10.0));
     let count = usize::from(after[0].1);
-    // One a second, and what waited for room in the second before.
+    // One a second, and those that waited for room in the second before.
     assert!((9..=12).contains(&after.len()), "{after:?}");
     assert!((0..count).all(|place| after.iter().any(|told| usize::from(told.0) == place)), "{after:?}");
 
@@ -181,7 +181,7 @@ fn what_went_wrong_is_told() {
 }
 
 #[test]
-fn the_landing_burn_tells_its_plan() {
+fn the_landing_burn_reports_its_plan() {
     let mut airborne = Airborne::let_go("none");
     airborne.run_while(|rocket| rocket.phase() != Phase::Powered);
     airborne.run(0.5);
@@ -208,7 +208,7 @@ fn messages_that_are_off_can_be_requested_and_unknown_values_are_marked() {
 }
 
 #[test]
-fn the_storage_is_told_while_there_is_one() {
+fn the_storage_is_reported_if_present() {
     let mut airborne = Airborne::on_the_pad("none");
     airborne.rocket.set_log_state(LogState { running: true, space_bytes: 3 << 30 });
     airborne.run(0.02);
@@ -222,12 +222,12 @@ fn the_storage_is_told_while_there_is_one() {
 }
 
 /// Every value of a check arrives over a radio, within its budget, and again for a station that
-/// comes late.
+/// joins late.
 #[test]
-fn a_check_is_told_value_by_value() {
+fn a_check_is_reported_value_by_value() {
     let mut airborne = Airborne::on_the_pad("field");
     assert_eq!(count(&airborne.run(3.0), TD_PAD_CHECK_DATA::ID), 0, "there was none");
-    frame(&mut airborne.rocket, &mut airborne.endpoint, &[Asked::Check]);
+    frame(&mut airborne.rocket, &mut airborne.endpoint, &[CrewCommand::Check]);
     let mut places = std::collections::BTreeSet::new();
     let mut last = None;
     let sent = airborne.run(24.0);
@@ -244,7 +244,7 @@ fn a_check_is_told_value_by_value() {
     airborne.run(40.0);
     let late = airborne.run(10.0);
     assert!((9..=11).contains(&count(&late, TD_PAD_CHECK_DATA::ID)), "once a second");
-    frame(&mut airborne.rocket, &mut airborne.endpoint, &[Asked::Arm]);
+    frame(&mut airborne.rocket, &mut airborne.endpoint, &[CrewCommand::Arm]);
     airborne.run(0.5);
     assert_eq!(count(&airborne.run(5.0), TD_PAD_CHECK_DATA::ID), 0, "not while armed");
 }
@@ -279,15 +279,15 @@ fn over_a_slow_link_an_abort_is_late_but_still_works() {
     let mut late = Airborne::let_go_with_faults("field", &["link-delay:1.5@descent"]);
     late.run_while(|rocket| rocket.phase() != Phase::AeroDescent);
     late.run(0.5);
-    let asked_at_s = late.rocket.time_s();
+    let requested_at_s = late.rocket.time_s();
     late.uplink.push(abort());
     late.run_while(|rocket| rocket.phase() != Phase::Chute);
-    let heard_after_s = late.rocket.time_s() - asked_at_s;
-    assert!((1.5..1.52).contains(&heard_after_s), "{heard_after_s}");
+    let received_after_s = late.rocket.time_s() - requested_at_s;
+    assert!((1.5..1.52).contains(&received_after_s), "{received_after_s}");
     let mut answered_after_s = None;
     while answered_after_s.is_none() {
         let answers = late.run(0.02).iter().filter_map(CommandAnswer::from_frame).count();
-        answered_after_s = (answers > 0).then(|| late.rocket.time_s() - asked_at_s);
+        answered_after_s = (answers > 0).then(|| late.rocket.time_s() - requested_at_s);
     }
     assert!((3.0..3.05).contains(&answered_after_s.unwrap()), "{answered_after_s:?}");
 }

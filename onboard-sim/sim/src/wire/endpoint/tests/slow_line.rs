@@ -15,7 +15,7 @@ const STEP_S: f64 = 0.005;
 const FRAME_STEPS: u64 = 1;
 const BAUDS: [u32; 3] = [4_800, 9_600, 57_600];
 
-/// One direction of the line: what it was given arrives in order, ten bits a byte.
+/// One direction of the line: bytes arrive in order, ten bits a byte.
 struct Way {
     bytes_s: f64,
     free_at_s: f64,
@@ -69,7 +69,7 @@ struct Line {
     /// The longest time that a frame waited before the line began to carry it, s.
     longest_wait_s: f64,
     oldest_s: f64,
-    heard: Vec<u32>,
+    received: Vec<u32>,
     latched_s: Option<f64>,
     observed_s: Option<f64>,
 }
@@ -100,7 +100,7 @@ impl Line {
             newest_s: 0.0,
             longest_wait_s: 0.0,
             oldest_s: 0.0,
-            heard: Vec::new(),
+            received: Vec::new(),
             latched_s: None,
             observed_s: None,
         }
@@ -119,13 +119,13 @@ impl Line {
         let every = |interval_s: f64| (interval_s / STEP_S).round() as u64;
         while self.step < end {
             if self.step.is_multiple_of(every(beats_every_s)) {
-                self.say(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
+                self.send(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
             }
             if self.step.is_multiple_of(every(5.0)) {
-                self.say(&MavMessage::TIMESYNC(TIMESYNC_DATA { ts1: 1, ..TIMESYNC_DATA::default() }));
+                self.send(&MavMessage::TIMESYNC(TIMESYNC_DATA { ts1: 1, ..TIMESYNC_DATA::default() }));
             }
             for message in self.sender.poll(self.clock().0) {
-                self.say(&message);
+                self.send(&message);
             }
             if self.step.is_multiple_of(FRAME_STEPS) {
                 self.vehicle_frame();
@@ -134,13 +134,13 @@ impl Line {
             while let Some((_, bytes)) = self.station_hub.leaving(0, now, clock) {
                 self.up.give(bytes, self.now_s());
             }
-            self.station_hears();
+            self.station_receives();
             self.oldest_s = self.oldest_s.max(self.now_s() - self.newest_s);
             self.step += 1;
         }
     }
 
-    fn say(&mut self, message: &MavMessage) {
+    fn send(&mut self, message: &MavMessage) {
         let frame = self.station.encode(message);
         let (_, clock) = self.clock();
         assert!(self.station_hub.send(0, &frame, clock).is_none());
@@ -149,8 +149,8 @@ impl Line {
     fn vehicle_frame(&mut self) {
         let ((now, clock), now_s) = (self.clock(), self.now_s());
         let bytes = self.up.arrived(now_s);
-        for news in self.vehicle_hub.take(0, Received::Stream(0, bytes), now, clock) {
-            if let LinkEvent::Frame(frame) = news {
+        for event in self.vehicle_hub.take(0, Received::Stream(0, bytes), now, clock) {
+            if let LinkEvent::Frame(frame) = event {
                 self.endpoint.on_frame(0, &frame, &self.vehicle.state());
             }
         }
@@ -170,14 +170,14 @@ impl Line {
         }
     }
 
-    fn station_hears(&mut self) {
+    fn station_receives(&mut self) {
         let ((now, clock), now_s) = (self.clock(), self.now_s());
         let bytes = self.down.arrived(now_s);
-        for news in self.station_hub.take(0, Received::Stream(0, bytes), now, clock) {
-            let LinkEvent::Frame(frame) = news else { continue };
-            self.sender.on_heard(now);
+        for event in self.station_hub.take(0, Received::Stream(0, bytes), now, clock) {
+            let LinkEvent::Frame(frame) = event else { continue };
+            self.sender.on_received(now);
             self.newest_s = self.newest_s.max(self.made_s[usize::from(frame.sequence())]);
-            self.heard.push(frame.message_id());
+            self.received.push(frame.message_id());
             if let Some(answer) = CommandAnswer::from_frame(&frame) {
                 self.sender.on_answer(&answer, now);
             }
@@ -202,7 +202,7 @@ fn what_a_slow_line_brings_is_at_most_a_second_old_and_waits_at_most_three_tenth
     for (baud, signed) in BAUDS.iter().flat_map(|baud| [(*baud, false), (*baud, true)]) {
         let mut line = Line::at(baud, signed);
         line.run(5.0, 1.0);
-        (line.oldest_s, line.down.carried, line.heard) = (0.0, 0, Vec::new());
+        (line.oldest_s, line.down.carried, line.received) = (0.0, 0, Vec::new());
         line.run(60.0, 1.0);
         let (oldest_s, wait_s) = (line.oldest_s, line.longest_wait_s);
         assert!(oldest_s <= 1.0, "{baud} baud, signed {signed}: {oldest_s} s old");
@@ -212,7 +212,7 @@ fn what_a_slow_line_brings_is_at_most_a_second_old_and_waits_at_most_three_tenth
         for (message_id, least) in
             [(HEARTBEAT_DATA::ID, 58), (TD_FLIGHT_STATUS_DATA::ID, 58), (ATTITUDE_QUATERNION_DATA::ID, 30)]
         {
-            let found = line.heard.iter().filter(|id| **id == message_id).count();
+            let found = line.received.iter().filter(|id| **id == message_id).count();
             assert!(found >= least, "{baud} baud, signed {signed}: {found} of message {message_id}");
         }
     }

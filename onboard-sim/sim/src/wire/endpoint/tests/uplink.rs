@@ -14,7 +14,7 @@ const ABORT: MavCmd = MavCmd::MAV_CMD_DO_FLIGHTTERMINATION;
 
 const SPARE: Address = Address { system_id: 254, component_id: 190 };
 
-/// Any vehicle on its pad, and stations that speak to it.
+/// Any vehicle on its pad, with stations.
 struct Pad {
     vehicle: Vehicle,
     endpoint: VehicleEndpoint,
@@ -27,7 +27,7 @@ struct Pad {
     beat_in: u32,
 }
 
-/// The crew's own station, the first of a [`Pad`]'s.
+/// The crew's station, the first of a [`Pad`]'s.
 const CREW: usize = 0;
 const OTHER: usize = 1;
 
@@ -90,7 +90,7 @@ impl Pad {
         }
     }
 
-    fn tell(&mut self, station: usize, command: MavCmd, param1: f32) {
+    fn transmit(&mut self, station: usize, command: MavCmd, param1: f32) {
         let message = MavMessage::COMMAND_LONG(super::command(command, param1));
         let frame = self.stations[station].encode(&message);
         self.sent.clear();
@@ -102,8 +102,8 @@ impl Pad {
     }
 
     /// Sends a command, and returns its result.
-    fn ask(&mut self, station: usize, command: MavCmd, param1: f32) -> u8 {
-        self.tell(station, command, param1);
+    fn request(&mut self, station: usize, command: MavCmd, param1: f32) -> u8 {
+        self.transmit(station, command, param1);
         // Some time after the previous answer.
         let end_s = self.vehicle.time_s() + 0.3;
         while self.answers().is_empty() && self.vehicle.time_s() < end_s {
@@ -115,8 +115,8 @@ impl Pad {
     }
 
     fn count_down(&mut self) {
-        assert_eq!(self.ask(CREW, ARM, 1.0), ACCEPTED);
-        assert_eq!(self.ask(CREW, START, 0.0), ACCEPTED);
+        assert_eq!(self.request(CREW, ARM, 1.0), ACCEPTED);
+        assert_eq!(self.request(CREW, START, 0.0), ACCEPTED);
     }
 
     fn counting(&self) -> bool {
@@ -130,7 +130,7 @@ impl Pad {
         status.expect("five a second")
     }
 
-    fn said(&self, words: &str) -> usize {
+    fn message_count(&self, words: &str) -> usize {
         let says =
             |event: &&VehicleEvent| matches!(event, VehicleEvent::Text { text, .. } if text.contains(words));
         self.events.iter().filter(says).count()
@@ -142,34 +142,34 @@ fn frames(leaving: Vec<Outgoing>) -> Vec<Frame> {
 }
 
 #[test]
-fn arming_waits_for_a_heartbeat_of_the_station_that_asks() {
+fn arming_waits_for_a_heartbeat_of_the_requesting_station() {
     for pad in [Pad::rocket, Pad::hanging] {
         let mut pad = pad();
-        // Another station is heard, but not the one that asks.
-        assert_eq!(pad.ask(OTHER, ARM, 1.0), NOT_NOW);
-        assert_eq!(pad.said("arm refused: uplink: found no heartbeat of this station"), 1);
+        // Another station has an uplink, but not the requesting one.
+        assert_eq!(pad.request(OTHER, ARM, 1.0), NOT_NOW);
+        assert_eq!(pad.message_count("arm refused: uplink: found no heartbeat of this station"), 1);
         pad.speaking = vec![OTHER];
         pad.run(UPLINK_PROVEN_S + 0.2);
-        assert_eq!(pad.ask(CREW, ARM, 1.0), NOT_NOW);
-        assert_eq!(pad.said("arm refused: uplink: found heartbeat 2."), 1);
-        assert_eq!(pad.ask(OTHER, ARM, 1.0), ACCEPTED);
+        assert_eq!(pad.request(CREW, ARM, 1.0), NOT_NOW);
+        assert_eq!(pad.message_count("arm refused: uplink: found heartbeat 2."), 1);
+        assert_eq!(pad.request(OTHER, ARM, 1.0), ACCEPTED);
     }
 }
 
 #[test]
-fn the_check_fails_on_the_wire_while_nobody_is_heard_and_a_lost_heartbeat_is_not_complained_of() {
+fn the_check_fails_without_an_uplink_and_a_lost_heartbeat_raises_no_warning() {
     let mut pad = Pad::rocket();
     assert!(pad.status().checks_failed.is_empty());
     pad.speaking.clear();
     pad.run(3.0);
     let bits: Vec<_> = pad.status().checks_failed.iter_names().map(|(name, _)| name).collect();
     assert_eq!(bits, ["TD_CHECK_UPLINK"]);
-    assert_eq!(pad.said(UPLINK_CHECK), 0);
+    assert_eq!(pad.message_count(UPLINK_CHECK), 0);
 }
 
-/// What its own hearing is worth it says in its heartbeats.
+/// It reports its downlink in its heartbeats.
 #[test]
-fn a_station_that_hears_nothing_of_the_countdown_holds_it() {
+fn a_station_without_a_downlink_in_the_countdown_holds_it() {
     let mut pad = Pad::rocket();
     pad.count_down();
     let deaf = HEARTBEAT_DATA {
@@ -185,7 +185,7 @@ fn a_station_that_hears_nothing_of_the_countdown_holds_it() {
     }
     pad.run(0.5);
     assert_eq!(pad.status().hold, TdHold::TD_HOLD_STATION_DEAF);
-    assert_eq!(pad.said("255/190 hears nothing of this vehicle"), 1);
+    assert_eq!(pad.message_count("255/190 hears nothing of this vehicle"), 1);
 }
 
 #[test]
@@ -197,9 +197,9 @@ fn a_log_that_fails_holds_the_countdown_until_the_release() {
     pad.run(0.5);
     assert!(!pad.counting());
     assert_eq!(pad.status().hold, TdHold::TD_HOLD_CHECK_FAILED);
-    assert_eq!(pad.said("log: found not running, required running"), 1);
-    assert_eq!(pad.ask(CREW, START, 0.0), NOT_NOW);
-    assert_eq!(pad.said("start refused: log: found not running"), 1);
+    assert_eq!(pad.message_count("log: found not running, required running"), 1);
+    assert_eq!(pad.request(CREW, START, 0.0), NOT_NOW);
+    assert_eq!(pad.message_count("start refused: log: found not running"), 1);
     let mut pad = Pad::rocket();
     pad.count_down();
     pad.run(pad.vehicle.computer().countdown_s() - 1.0);
@@ -214,14 +214,14 @@ fn only_the_station_that_armed_it_starts_or_the_one_that_has_taken_command() {
     let mut pad = Pad::rocket();
     pad.speaking = vec![CREW, OTHER];
     pad.run(0.5);
-    assert_eq!(pad.ask(CREW, ARM, 1.0), ACCEPTED);
-    assert_eq!(pad.ask(OTHER, START, 0.0), DENIED);
+    assert_eq!(pad.request(CREW, ARM, 1.0), ACCEPTED);
+    assert_eq!(pad.request(OTHER, START, 0.0), DENIED);
     let words = "start refused: 255/190 armed it: start there, or take command when it is silent";
-    assert_eq!((pad.said(words), pad.counting()), (1, false));
+    assert_eq!((pad.message_count(words), pad.counting()), (1, false));
     pad.speaking = vec![OTHER];
     pad.run(2.5);
-    assert_eq!(pad.ask(OTHER, MavCmd::MAV_CMD_TD_TAKE_COMMAND, 0.0), ACCEPTED);
-    assert_eq!(pad.ask(OTHER, START, 0.0), ACCEPTED);
+    assert_eq!(pad.request(OTHER, MavCmd::MAV_CMD_TD_TAKE_COMMAND, 0.0), ACCEPTED);
+    assert_eq!(pad.request(OTHER, START, 0.0), ACCEPTED);
     pad.run(1.0);
     assert!(pad.counting());
     pad.speaking = vec![CREW];
@@ -232,7 +232,7 @@ fn only_the_station_that_armed_it_starts_or_the_one_that_has_taken_command() {
 #[test]
 fn a_running_check_can_be_cancelled() {
     let mut pad = Pad::rocket();
-    assert_eq!(pad.ask(CREW, MavCmd::MAV_CMD_TD_PAD_CHECK, 1.0), ACCEPTED);
+    assert_eq!(pad.request(CREW, MavCmd::MAV_CMD_TD_PAD_CHECK, 1.0), ACCEPTED);
     pad.run(0.5);
     assert!(pad.vehicle.computer().pad_check().is_running());
     let cancel =
@@ -257,7 +257,7 @@ fn a_held_vehicle_disarms_after_a_minute() {
         assert_eq!(pad.vehicle.phase(), Phase::PadArmed);
         pad.run(1.1);
         assert_eq!(pad.vehicle.phase(), Phase::PadIdle);
-        assert!(!pad.vehicle.aborted() && pad.said("held for 60 s without a new start") == 1);
+        assert!(!pad.vehicle.aborted() && pad.message_count("held for 60 s without a new start") == 1);
         assert_eq!(pad.status().hold, TdHold::TD_HOLD_NONE);
     }
 }
@@ -266,16 +266,16 @@ fn a_held_vehicle_disarms_after_a_minute() {
 fn any_station_holds_by_command_and_repeats_it_without_a_complaint() {
     for pad in [Pad::rocket, Pad::hanging] {
         let mut pad = pad();
-        assert_eq!(pad.ask(OTHER, HOLD, 0.0), DENIED, "nothing to hold");
+        assert_eq!(pad.request(OTHER, HOLD, 0.0), DENIED, "nothing to hold");
         pad.count_down();
-        assert_eq!(pad.ask(OTHER, HOLD, 0.0), ACCEPTED);
-        assert_eq!((pad.counting(), pad.said("station 254/190 asks for a hold")), (false, 1));
+        assert_eq!(pad.request(OTHER, HOLD, 0.0), ACCEPTED);
+        assert_eq!((pad.counting(), pad.message_count("station 254/190 asks for a hold")), (false, 1));
         assert_eq!(pad.status().hold, TdHold::TD_HOLD_COMMANDED);
-        let complaints = pad.said("refused");
+        let complaints = pad.message_count("refused");
         for _ in 0..10 {
-            assert_eq!(pad.ask(OTHER, HOLD, 0.0), ACCEPTED);
+            assert_eq!(pad.request(OTHER, HOLD, 0.0), ACCEPTED);
         }
-        assert_eq!((pad.said("refused"), pad.said("HOLD: no countdown")), (complaints, 1));
+        assert_eq!((pad.message_count("refused"), pad.message_count("HOLD: no countdown")), (complaints, 1));
         assert!(pad.vehicle.mode().interlocks.armed);
     }
 }
@@ -285,7 +285,7 @@ fn a_vehicle_that_starts_by_itself_needs_no_station() {
     let mut pad = Pad::rocket();
     pad.endpoint = VehicleEndpoint::new(VehicleKind::Simulated).starting_by_itself();
     pad.speaking.clear();
-    frame(&mut pad.vehicle, &mut pad.endpoint, &[Asked::Arm, Asked::Start]);
+    frame(&mut pad.vehicle, &mut pad.endpoint, &[CrewCommand::Arm, CrewCommand::Start]);
     pad.run(pad.vehicle.computer().countdown_s() + 0.5);
     assert!(!pad.vehicle.phase().on_pad(), "{:?}", pad.vehicle.phase());
 }
@@ -296,17 +296,17 @@ fn an_abort_in_the_air_is_acknowledged_when_its_latch_is_seen() {
     pad.count_down();
     pad.run(pad.vehicle.computer().countdown_s() + 1.0);
     assert!(pad.vehicle.phase().in_descent());
-    pad.tell(CREW, ABORT, 1.0);
+    pad.transmit(CREW, ABORT, 1.0);
     // The flight computer takes it at its next frame: until then nothing is latched and nothing
     // acknowledged.
     let before = frames(pad.endpoint.poll(&pad.vehicle.state()));
     assert!(!pad.vehicle.aborted());
     assert!(before.iter().all(|frame| CommandAnswer::from_frame(frame).is_none()));
-    pad.tell(CREW, ABORT, 1.0);
+    pad.transmit(CREW, ABORT, 1.0);
     pad.frame();
     assert!(pad.vehicle.aborted());
     assert_eq!(pad.answers(), [ACCEPTED], "answered once, although it was repeated");
-    assert_eq!(pad.ask(CREW, ABORT, 1.0), ACCEPTED, "later aborts are acknowledged at once");
+    assert_eq!(pad.request(CREW, ABORT, 1.0), ACCEPTED, "later aborts are acknowledged at once");
 }
 
 #[test]

@@ -1,5 +1,4 @@
-//! The check that the crew asks for on the pad: what it finds, when it is refused, and what ends
-//! it.
+//! The vehicle check on the pad: its findings, its refusals, and its end.
 
 use crate::sortie::Sortie;
 use crate::world::Fault;
@@ -11,8 +10,8 @@ use super::space::{flight_of, in_phase, mission_of};
 use super::*;
 use crate::wire::fly::load_flight;
 
-fn on_the_pad(dispersion: &str, faults: &[&str]) -> Told {
-    Told::of(Vehicle::on_the_pad(&flight_of(dispersion, faults)).unwrap()).run_to(Phase::PadIdle)
+fn on_the_pad(dispersion: &str, faults: &[&str]) -> Rocket {
+    Rocket::of(Vehicle::on_the_pad(&flight_of(dispersion, faults)).unwrap()).run_to(Phase::PadIdle)
 }
 
 fn failing(rocket: &Vehicle) -> Vec<Item> {
@@ -25,8 +24,8 @@ fn state(rocket: &Vehicle) -> CheckState {
 }
 
 /// Asks for a check and waits for its end.
-fn checked(rocket: &mut Told) -> Vec<VehicleEvent> {
-    assert_eq!(rocket.request(Asked::Check).ending, Ending::Accepted);
+fn checked(rocket: &mut Rocket) -> Vec<VehicleEvent> {
+    assert_eq!(rocket.request(CrewCommand::Check).ending, Ending::Accepted);
     rocket.run_until(|rocket| state(rocket) != CheckState::Running)
 }
 
@@ -42,13 +41,13 @@ fn every_built_in_mission_passes_its_check() {
         for dispersion in ["none", "field", "real"] {
             let mut flight = load_flight(name).unwrap();
             flight.recipe.dispersion = crate::dispersion::Dispersion::builtin(dispersion).unwrap();
-            let mut rocket = Told::of(Vehicle::on_the_pad(&flight).unwrap());
+            let mut rocket = Rocket::of(Vehicle::on_the_pad(&flight).unwrap());
             rocket.run_until(|rocket| rocket.phase() == Phase::PadIdle);
             let events = checked(&mut rocket);
             let findings = rocket.computer().pad_check().findings();
             assert_eq!(state(&rocket), CheckState::Passed, "{name}, {dispersion}: {findings:#?}");
-            assert!(said(&events, "check of the vehicle begins: gimbal and fins MOVE"));
-            assert!(said(&events, "check passed: 3"), "{events:?}");
+            assert!(has_text(&events, "check of the vehicle begins: gimbal and fins MOVE"));
+            assert!(has_text(&events, "check passed: 3"), "{events:?}");
             assert!(rests(&rocket), "{name}");
         }
     }
@@ -62,10 +61,9 @@ fn wrong_wirings() -> Vec<Fault> {
     reversed.chain(swapped).collect()
 }
 
-/// Servos that report where their surfaces are: a surface that moves otherwise than it is told is
-/// found and named.
+/// With servo feedback, a surface that does not follow its command is found and named.
 #[test]
-fn every_wrong_wiring_is_found_where_servos_tell() {
+fn every_wrong_wiring_is_found_with_servo_feedback() {
     for wrong in wrong_wirings() {
         let mut rocket = on_the_pad("none", &[]);
         rocket.vehicle.sortie.world_mut().inject(&wrong);
@@ -82,16 +80,16 @@ fn every_wrong_wiring_is_found_where_servos_tell() {
     }
 }
 
-/// What two people see in a check: how each surface stands whenever one is told to go somewhere. A
-/// fin is open (1) or closed (0); the nozzle swings towards the fins of one side (y, z), or hangs
+/// Observations of two people in a check: the position of each surface for each command. A fin is
+/// open (1) or closed (0); the nozzle swings towards the fins of one side (y, z), or hangs
 /// straight.
-fn seen_motions(rocket: &mut Told) -> Vec<([f64; 2], [f64; 4])> {
+fn seen_motions(rocket: &mut Rocket) -> Vec<([f64; 2], [f64; 4])> {
     let mut seen: Vec<([f64; 2], [f64; 4])> = Vec::new();
-    rocket.request(Asked::Check);
+    rocket.request(CrewCommand::Check);
     rocket.run_until(|rocket| {
         let ([pitch_rad, yaw_rad], fins_rad) =
             (rocket.sortie.world().gimbal_rad(), rocket.sortie.world().fins_rad());
-        // The thrust is turned to (sin yaw, -sin pitch) in (y, z), and the nozzle's end goes the
+        // The thrust points to (sin yaw, -sin pitch) in (y, z), and the nozzle's end moves the
         // other way.
         let side = |angle_rad: f64| if angle_rad.abs() < 0.1 { 0.0 } else { angle_rad.signum() };
         let stands =
@@ -127,10 +125,10 @@ fn motions_of_the_page() -> Vec<([f64; 2], [f64; 4])> {
     seen
 }
 
-fn without_feedback() -> Told {
+fn without_feedback() -> Rocket {
     let mut flight = flight_of("none", &[]);
     flight.recipe.mission.airframe.servos_tell = false;
-    let mut rocket = Told::of(Vehicle::on_the_pad(&flight).unwrap());
+    let mut rocket = Rocket::of(Vehicle::on_the_pad(&flight).unwrap());
     // Every check passes but one.
     rocket.run_until(|rocket| {
         rocket.phase() == Phase::PadIdle && rocket.state().checks_failed().is_power_of_two()
@@ -138,26 +136,26 @@ fn without_feedback() -> Told {
     rocket
 }
 
-/// Servos that tell nothing: the positions are the commands, and pass whatever moves. Without the
-/// word of two people the vehicle is not armed, and what they see is not what the page says if any
-/// wire is wrong.
+/// Servos without feedback: the positions are the commands, and pass for any motion. Without the
+/// confirmation of two people the vehicle is not armed, and with any wrong wire their observations
+/// differ from the page.
 #[test]
 fn without_feedback_two_people_see_every_wrong_wiring_and_nobody_arms_before() {
     let mut rocket = without_feedback();
-    let refused = |rocket: &mut Told| rocket.request(Asked::Arm).reason.unwrap_or_default();
+    let refused = |rocket: &mut Rocket| rocket.request(CrewCommand::Arm).reason.unwrap_or_default();
     assert!(refused(&mut rocket).starts_with("fins answering: found servos that tell nothing, seen by 0"));
-    assert_eq!(rocket.request(Asked::Seen).reason.unwrap(), "no check with motion has passed");
+    assert_eq!(rocket.request(CrewCommand::Seen).reason.unwrap(), "no check with motion has passed");
     assert_eq!(seen_motions(&mut rocket), motions_of_the_page());
     assert_eq!(state(&rocket), CheckState::Passed);
     let shown = |item| {
         rocket.computer().pad_check().findings().iter().find(|found| found.item == item).unwrap().verdict
     };
     assert_eq!((shown(Item::Range(0)), shown(Item::Lag(5))), (Verdict::NotJudged, Verdict::NotJudged));
-    assert_eq!(rocket.request(Asked::Seen).ending, Ending::Accepted);
+    assert_eq!(rocket.request(CrewCommand::Seen).ending, Ending::Accepted);
     assert!(refused(&mut rocket).contains("seen by 1, required 2 people who saw"));
-    assert_eq!(rocket.request(Asked::Seen).ending, Ending::Accepted);
-    assert_eq!(rocket.request(Asked::Arm).ending, Ending::Accepted);
-    rocket.request(Asked::Disarm);
+    assert_eq!(rocket.request(CrewCommand::Seen).ending, Ending::Accepted);
+    assert_eq!(rocket.request(CrewCommand::Arm).ending, Ending::Accepted);
+    rocket.request(CrewCommand::Disarm);
     // Another check takes two people's words again.
     checked(&mut rocket);
     assert!(refused(&mut rocket).contains("seen by 0"));
@@ -172,9 +170,9 @@ fn without_feedback_two_people_see_every_wrong_wiring_and_nobody_arms_before() {
 
 #[test]
 fn a_failed_self_test_is_a_reason_to_look_closer() {
-    let mut rocket = Told::of(Vehicle::on_the_pad(&flight_of("none", &[])).unwrap());
+    let mut rocket = Rocket::of(Vehicle::on_the_pad(&flight_of("none", &[])).unwrap());
     rocket.vehicle.sortie.world_mut().inject(&Fault::FinStuck { fin: 2 });
-    let refused = rocket.request(Asked::Check);
+    let refused = rocket.request(CrewCommand::Check);
     assert_eq!(refused.ending, Ending::NotNow);
     assert_eq!(refused.reason.unwrap(), "the self-test is not over");
     rocket.run_until(|rocket| rocket.time_s() > 4.0);
@@ -183,21 +181,21 @@ fn a_failed_self_test_is_a_reason_to_look_closer() {
     assert_eq!(failing(&rocket), [Item::Range(4), Item::Error(4), Item::Lag(4)]);
 }
 
-/// 1.3 degrees off in flight 12 of `real`: the fins move as they are told.
+/// 1.3 degrees off in flight 12 of `real`: the fins follow their commands.
 #[test]
-fn a_feedback_with_a_zero_of_its_own_passes_the_self_test_and_a_slipped_spline_does_not() {
+fn a_feedback_with_an_offset_passes_the_self_test_and_a_slipped_spline_does_not() {
     let mut flight = flight_of("real", &[]);
     for (feedback_deg, phase) in [(1.5, Phase::PadIdle), (15.0, Phase::Safe)] {
         flight.recipe.dispersion.sensor_params.switches.fin_feedback_deg = feedback_deg;
-        let mut rocket = Told::of(Vehicle::on_the_pad(&flight).unwrap());
+        let mut rocket = Rocket::of(Vehicle::on_the_pad(&flight).unwrap());
         rocket.run_until(|rocket| rocket.time_s() > 4.0);
         let found_rad = rocket.computer().commands().fins_rad;
         assert_eq!(rocket.phase(), phase, "{feedback_deg} deg: {found_rad:?}");
     }
 }
 
-/// The world begins anew with the release, and what is broken stays broken; without a pad it is
-/// broken from the beginning on.
+/// The world restarts at the release, and faults persist; without a pad they exist from the
+/// beginning on.
 #[test]
 fn a_fin_that_sticks_on_the_pad_sticks_in_flight() {
     let flight = flight_of("none", &["fin-stuck:1@pad"]);
@@ -212,7 +210,7 @@ fn a_fin_that_sticks_on_the_pad_sticks_in_flight() {
 #[test]
 fn without_motion_everything_but_the_surfaces_is_checked() {
     let mut rocket = on_the_pad("field", &[]);
-    assert_eq!(rocket.request(Asked::CheckStill).ending, Ending::Accepted);
+    assert_eq!(rocket.request(CrewCommand::CheckStill).ending, Ending::Accepted);
     rocket.run_until(|rocket| {
         assert!(rests(rocket));
         state(rocket) != CheckState::Running
@@ -224,12 +222,12 @@ fn without_motion_everything_but_the_surfaces_is_checked() {
 }
 
 #[test]
-fn an_empty_battery_is_found_refuses_the_arming_and_is_told() {
+fn an_empty_battery_is_found_reported_and_inhibits_arming() {
     let mut rocket = on_the_pad("none", &[]);
     rocket.vehicle.sortie.set_battery(0.08);
     checked(&mut rocket);
     assert_eq!(failing(&rocket), [Item::BatteryVoltage]);
-    let refused = rocket.request(Asked::Arm);
+    let refused = rocket.request(CrewCommand::Arm);
     let reason = refused.reason.unwrap();
     assert!(reason.starts_with("battery: found 7.1") && reason.ends_with("at least 7.4 V"), "{reason}");
     let battery = rocket.state().battery.unwrap();
@@ -239,9 +237,9 @@ fn an_empty_battery_is_found_refuses_the_arming_and_is_told() {
 
 /// The answer to an arming with this fault of mk3, whose lidar is above its blind range.
 fn armed_with(fault: &str) -> Answer {
-    let mut rocket = Told::of(Vehicle::on_the_pad(&mission_of("mk3", "none", &[fault])).unwrap());
+    let mut rocket = Rocket::of(Vehicle::on_the_pad(&mission_of("mk3", "none", &[fault])).unwrap());
     rocket.run_until(|rocket| rocket.time_s() > 6.0);
-    rocket.request(Asked::Arm)
+    rocket.request(CrewCommand::Arm)
 }
 
 #[test]
@@ -271,95 +269,101 @@ fn repeated_fixes_and_a_large_gyro_bias_do_not_refuse_the_arming() {
 
 #[test]
 fn it_is_refused_with_the_reason_unless_disarmed_on_the_pad() {
-    let refused = |rocket: &mut Told| {
-        let answer = rocket.request(Asked::Check);
+    let refused = |rocket: &mut Rocket| {
+        let answer = rocket.request(CrewCommand::Check);
         assert_eq!(answer.ending, Ending::NotNow);
         assert!(rests(rocket) || !rocket.phase().on_pad());
         answer.reason.unwrap()
     };
     let mut rocket = on_the_pad("none", &[]);
-    rocket.request(Asked::Arm);
+    rocket.request(CrewCommand::Arm);
     assert_eq!(refused(&mut rocket), "armed: disarm first");
-    rocket.request(Asked::Start);
+    rocket.request(CrewCommand::Start);
     assert_eq!(refused(&mut rocket), "armed: disarm first");
     rocket.run_until(|rocket| rocket.phase() == Phase::AeroDescent);
     assert_eq!(refused(&mut rocket), "not on the pad");
     let mut rocket = on_the_pad("none", &[]);
-    rocket.request(Asked::Abort);
+    rocket.request(CrewCommand::Abort);
     assert_eq!(refused(&mut rocket), "an abort is latched: restart to clear it");
 }
 
 #[test]
 fn every_other_request_ends_it_and_an_arming_waits_for_the_surfaces() {
-    for asked in
-        [Asked::Arm, Asked::Start, Asked::Abort, Asked::Disarm, Asked::Hold, Asked::EndCheck, Asked::Seen]
-    {
+    for command in [
+        CrewCommand::Arm,
+        CrewCommand::Start,
+        CrewCommand::Abort,
+        CrewCommand::Disarm,
+        CrewCommand::Hold,
+        CrewCommand::EndCheck,
+        CrewCommand::Seen,
+    ] {
         let mut rocket = on_the_pad("none", &[]);
-        rocket.request(Asked::Check);
+        rocket.request(CrewCommand::Check);
         rocket.run_until(|rocket| rocket.computer().commands().gimbal_rad[0] > 0.1);
         assert!(rocket.state().checks_failed() != 0, "not ready meanwhile");
-        let answer = rocket.request(asked);
-        assert_eq!(state(&rocket), CheckState::Stopped, "{asked:?}");
-        assert!(rests(&rocket), "{asked:?}");
-        assert!(!rocket.mode().interlocks.armed, "{asked:?}");
-        if asked == Asked::Arm {
+        let answer = rocket.request(command);
+        assert_eq!(state(&rocket), CheckState::Stopped, "{command:?}");
+        assert!(rests(&rocket), "{command:?}");
+        assert!(!rocket.mode().interlocks.armed, "{command:?}");
+        if command == CrewCommand::Arm {
             assert_eq!(answer.ending, Ending::NotNow);
             assert!(answer.reason.unwrap().starts_with("a check of the vehicle ran"));
-            let again = rocket.request(Asked::Arm).reason.unwrap();
+            let again = rocket.request(CrewCommand::Arm).reason.unwrap();
             assert!(again.starts_with("self-test: found a check of the vehicle runs"), "{again}");
             let since_s = rocket.time_s();
             rocket.run_until(|rocket| rocket.time_s() > since_s + 1.0);
-            assert_eq!(rocket.request(Asked::Arm).ending, Ending::Accepted);
+            assert_eq!(rocket.request(CrewCommand::Arm).ending, Ending::Accepted);
         }
-        if asked == Asked::Abort {
+        if command == CrewCommand::Abort {
             assert!(rocket.aborted());
         }
     }
 }
 
 #[test]
-fn a_lift_off_that_nobody_asked_for_ends_it() {
+fn an_uncommanded_lift_off_ends_it() {
     let mut flight = flight_of("none", &[]);
     flight.recipe = flight.recipe.starting_at(StartPoint::Pad).unwrap();
     flight.recipe.faults = vec!["ascent-self-lights@pad+6".parse().unwrap()];
-    let mut rocket = Told::of(Vehicle::on_the_pad(&flight).unwrap());
+    let mut rocket = Rocket::of(Vehicle::on_the_pad(&flight).unwrap());
     rocket.run_until(|rocket| rocket.time_s() > 6.0);
-    rocket.request(Asked::Check);
+    rocket.request(CrewCommand::Check);
     rocket.run_until(|rocket| !rocket.phase().on_pad());
     assert_eq!(state(&rocket), CheckState::Stopped);
 }
 
-/// What may come, and after how many frames.
-fn requests() -> impl Strategy<Value = Vec<(Asked, u16)>> {
-    let asked = prop_oneof![
-        4 => Just(Asked::Check),
-        1 => Just(Asked::CheckStill),
-        1 => Just(Asked::EndCheck),
-        1 => Just(Asked::Seen),
-        2 => Just(Asked::Arm),
-        1 => Just(Asked::Start),
-        1 => Just(Asked::Disarm),
-        1 => Just(Asked::Hold),
-        1 => Just(Asked::Abort),
+/// Commands, each with the number of frames after it.
+fn requests() -> impl Strategy<Value = Vec<(CrewCommand, u16)>> {
+    let command = prop_oneof![
+        4 => Just(CrewCommand::Check),
+        1 => Just(CrewCommand::CheckStill),
+        1 => Just(CrewCommand::EndCheck),
+        1 => Just(CrewCommand::Seen),
+        2 => Just(CrewCommand::Arm),
+        1 => Just(CrewCommand::Start),
+        1 => Just(CrewCommand::Disarm),
+        1 => Just(CrewCommand::Hold),
+        1 => Just(CrewCommand::Abort),
     ];
-    prop::collection::vec((asked, 0..400_u16), 1..24)
+    prop::collection::vec((command, 0..400_u16), 1..24)
 }
 
 proptest! {
     #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
 
-    /// Whatever the crew asks for, and whenever: no check moves anything while the vehicle is
-    /// armed, counts down, is aborted or flies.
+    /// For any crew command at any time: no check moves anything while the vehicle is armed, counts
+    /// down, is aborted or flies.
     #[test]
     fn no_check_moves_a_surface_of_an_armed_or_a_flying_vehicle(requests in requests()) {
         let mut rocket = on_the_pad("none", &[]);
         let mut next = requests.into_iter();
-        let (mut asked, mut wait) = next.next().unwrap();
+        let (mut command, mut wait) = next.next().unwrap();
         for _ in 0..4_000 {
             if wait == 0 {
-                rocket.request(asked);
+                rocket.request(command);
                 match next.next() {
-                    Some(more) => (asked, wait) = more,
+                    Some(more) => (command, wait) = more,
                     None => break,
                 }
             } else {

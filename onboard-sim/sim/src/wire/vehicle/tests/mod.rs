@@ -9,7 +9,7 @@ mod space;
 use std::ops::{Deref, DerefMut};
 
 use flight::computer::FRAME_S;
-use flight::computer::crew::{Answer, Asked, Request};
+use flight::computer::crew::{Answer, CrewCommand, Request};
 use flight::rules::phase::Phase;
 
 use super::*;
@@ -18,7 +18,7 @@ use avionics::link::vehicle::{Identity, VehicleKind};
 use mavlink::MessageData as _;
 use protocol::dialect::{MavMessage, TD_DESCENT_DATA, TdBooster};
 
-/// What the crew is sent of the descent.
+/// Descent data sent to the crew.
 fn descent(vehicle: &Vehicle) -> TD_DESCENT_DATA {
     let identity = Identity { kind: VehicleKind::Simulated, boot_number: 1, uid: 0 };
     match telemetry::message(TD_DESCENT_DATA::ID, &vehicle.state(), identity) {
@@ -27,13 +27,13 @@ fn descent(vehicle: &Vehicle) -> TD_DESCENT_DATA {
     }
 }
 
-/// A vehicle, and what it has told that no test has read yet.
-pub(crate) struct Told {
+/// A vehicle, with its events that no test has read yet.
+pub(crate) struct Rocket {
     vehicle: Vehicle,
     unread: Vec<VehicleEvent>,
 }
 
-impl Deref for Told {
+impl Deref for Rocket {
     type Target = Vehicle;
 
     fn deref(&self) -> &Vehicle {
@@ -41,13 +41,13 @@ impl Deref for Told {
     }
 }
 
-impl DerefMut for Told {
+impl DerefMut for Rocket {
     fn deref_mut(&mut self) -> &mut Vehicle {
         &mut self.vehicle
     }
 }
 
-impl Told {
+impl Rocket {
     fn descent(&self) -> TD_DESCENT_DATA {
         descent(self)
     }
@@ -59,9 +59,9 @@ impl Told {
         Self { vehicle, unread: Vec::new() }
     }
 
-    /// A frame in which the vehicle's own programme asks for something.
-    pub(crate) fn request(&mut self, asked: Asked) -> Answer {
-        let VehicleStep { events, mut answers } = self.vehicle.step(&[Request::of_the_programme(asked)]);
+    /// A frame with a request of the vehicle's programme.
+    pub(crate) fn request(&mut self, command: CrewCommand) -> Answer {
+        let VehicleStep { events, mut answers } = self.vehicle.step(&[Request::of_the_programme(command)]);
         self.unread.extend(events);
         answers.remove(0)
     }
@@ -89,11 +89,11 @@ impl Told {
         if phase == Phase::PadIdle {
             return self;
         }
-        assert_eq!(self.request(Asked::Arm), Answer { ending: Ending::Accepted, reason: None });
+        assert_eq!(self.request(CrewCommand::Arm), Answer { ending: Ending::Accepted, reason: None });
         if phase == Phase::PadArmed {
             return self;
         }
-        assert_eq!(self.request(Asked::Start).ending, Ending::Accepted);
+        assert_eq!(self.request(CrewCommand::Start).ending, Ending::Accepted);
         self.run_until(|vehicle| vehicle.phase() == phase);
         self
     }
@@ -109,6 +109,6 @@ fn phases(events: &[VehicleEvent]) -> Vec<Phase> {
     events.iter().filter_map(to).collect()
 }
 
-fn said(events: &[VehicleEvent], words: &str) -> bool {
+fn has_text(events: &[VehicleEvent], words: &str) -> bool {
     events.iter().any(|event| matches!(event, VehicleEvent::Text { text, .. } if text.contains(words)))
 }

@@ -1,5 +1,5 @@
-//! The rocket: pad, arming, the flight from apogee, what is said of the motor behind it, and an
-//! abort in every phase.
+//! The rocket: pad, arming, the flight from apogee, reports on the motor after it, and an abort in
+//! every phase.
 
 use crate::dispersion::Dispersion;
 use flight::computer::AbortEffect;
@@ -22,17 +22,17 @@ pub(super) fn mission_of(mission: &str, dispersion: &str, faults: &[&str]) -> Ro
     flight
 }
 
-fn rocket_of(flight: &RocketFlight) -> Told {
-    Told::of(Vehicle::on_the_pad(flight).unwrap())
+fn rocket_of(flight: &RocketFlight) -> Rocket {
+    Rocket::of(Vehicle::on_the_pad(flight).unwrap())
 }
 
-pub(super) fn in_phase(flight: &RocketFlight, phase: Phase) -> Told {
+pub(super) fn in_phase(flight: &RocketFlight, phase: Phase) -> Rocket {
     rocket_of(flight).run_to(phase)
 }
 
-/// Steered with fins nearly shut, mk3 is aborted: its charge has no current before all of them
-/// stand 45 degrees open. A fin that is stuck, and servos that tell nothing, keep it waiting for as
-/// long as a servo takes, and no longer.
+/// Steered with fins nearly shut, mk3 is aborted: its charge is not energised before all of them
+/// are 45 degrees open. A stuck fin, and servos without feedback, delay it by the travel time of a
+/// servo, and no longer.
 #[test]
 fn the_charge_waits_for_the_fins_over_the_hatch_and_for_no_stuck_one() {
     for (stuck, tells) in [(false, true), (true, true), (false, false)] {
@@ -50,7 +50,7 @@ fn the_charge_waits_for_the_fins_over_the_hatch_and_for_no_stuck_one() {
             });
         }
         let since_s = rocket.time_s();
-        assert_eq!(rocket.request(Asked::Abort).ending, Ending::Accepted);
+        assert_eq!(rocket.request(CrewCommand::Abort).ending, Ending::Accepted);
         assert_eq!(rocket.phase(), Phase::Chute);
         assert_eq!(
             rocket.computer().commands().fins_rad.map(f64::to_bits),
@@ -72,8 +72,8 @@ fn with_a_crew_it_is_the_very_flight_that_a_campaign_flies() {
     for dispersion in ["none", "field"] {
         let flight = flight_of(dispersion, &[]);
         let mut rocket = in_phase(&flight, Phase::PadIdle);
-        rocket.request(Asked::Arm);
-        rocket.request(Asked::Start);
+        rocket.request(CrewCommand::Arm);
+        rocket.request(CrewCommand::Start);
         let events = rocket.run_until(Vehicle::is_over);
         let flown = Sortie::new(&flight.recipe, flight.number).unwrap().run();
         let touchdown = flown.touchdown.as_ref().unwrap();
@@ -96,8 +96,8 @@ fn with_a_crew_it_is_the_very_flight_that_a_campaign_flies() {
         ];
         assert_eq!(phases(&events), expected);
         assert!(
-            said(&events, "no ascent is flown")
-                && said(&events, "STANDS UNDAMAGED, inside the design envelope")
+            has_text(&events, "no ascent is flown")
+                && has_text(&events, "STANDS UNDAMAGED, inside the design envelope")
         );
         assert!(events.iter().any(|event| matches!(event, VehicleEvent::Verdict)));
         let recorded = rocket.verdict_record().unwrap();
@@ -106,10 +106,10 @@ fn with_a_crew_it_is_the_very_flight_that_a_campaign_flies() {
 }
 
 #[test]
-fn the_pad_is_felt_and_the_landing_rehearsed_before_anything_is_armed() {
+fn the_pad_is_levelled_and_the_landing_rehearsed_before_arming() {
     let mut rocket = rocket_of(&flight_of("field", &[]));
     rocket.run_until(|rocket| rocket.phase() == Phase::PadIdle);
-    let refused = rocket.request(Asked::Arm);
+    let refused = rocket.request(CrewCommand::Arm);
     assert_eq!(refused.ending, Ending::NotNow);
     assert!(refused.reason.unwrap().starts_with("controller warm: found no rehearsal yet"));
     rocket.run_until(|rocket| rocket.sortie.rehearsed().is_some());
@@ -120,11 +120,11 @@ fn the_pad_is_felt_and_the_landing_rehearsed_before_anything_is_armed() {
     assert!((1e-6..0.02).contains(&found.tilt_rad), "{found:?}");
     assert_eq!(rocket.state().checks_failed(), 0, "{:?}", rocket.arming_checks());
     rocket.set_log_state(LogState { running: false, space_bytes: 0 });
-    let refused = rocket.request(Asked::Arm);
+    let refused = rocket.request(CrewCommand::Arm);
     assert!(refused.reason.unwrap().starts_with("log: found not running"));
     rocket.set_log_state(LogState { running: true, space_bytes: u64::MAX });
-    assert_eq!(rocket.request(Asked::Arm).ending, Ending::Accepted);
-    assert_eq!(rocket.request(Asked::Arm).ending, Ending::Accepted, "armed already");
+    assert_eq!(rocket.request(CrewCommand::Arm).ending, Ending::Accepted);
+    assert_eq!(rocket.request(CrewCommand::Arm).ending, Ending::Accepted, "armed already");
 }
 
 #[test]
@@ -141,7 +141,7 @@ fn a_mission_that_does_not_land_is_refused_on_the_pad_in_words() {
         matches!(event, VehicleEvent::Text { severity: Severity::Warning, text } if text.starts_with("not ready: controller warm"))
     });
     assert_eq!(complaints.count(), 1, "said unasked, and once: {events:?}");
-    assert_eq!(rocket.request(Asked::Arm).ending, Ending::NotNow);
+    assert_eq!(rocket.request(CrewCommand::Arm).ending, Ending::NotNow);
 }
 
 #[test]
@@ -157,8 +157,7 @@ fn telemetry_is_the_estimate_in_north_east_down() {
     close(motion.position_m[0], estimated.position_m.x);
     close(motion.position_m[1], -estimated.position_m.y);
     close(motion.velocity_m_s[2], -estimated.velocity_m_s.z);
-    // The mass burnt is believed, not known: the centre of gravity is some tenths of a millimetre
-    // off.
+    // The burnt mass is estimated: the centre of gravity is some tenths of a millimetre off.
     let off_m = -motion.position_m[2] - world.height_m() - (estimated.position_m.z - truth.position_m.z);
     assert!(off_m.abs() < 2e-3, "{}", motion.position_m[2]);
     // The nose, turned by the quaternion of the wire.
@@ -181,8 +180,8 @@ fn telemetry_is_the_estimate_in_north_east_down() {
 
 #[test]
 fn the_countdown_to_ignition_runs_down_to_it() {
-    // In still air with everything known: what a gust or a better estimate changes in the last
-    // second is no error of the countdown.
+    // In still air without errors: an effect of a gust or a better estimate in the last second is
+    // no error of the countdown.
     let mut rocket = in_phase(&flight_of("none", &[]), Phase::LandArmed);
     let announced = rocket.descent();
     let chosen_m = announced.chosen_height_m;
@@ -196,7 +195,7 @@ fn the_countdown_to_ignition_runs_down_to_it() {
 }
 
 #[test]
-fn a_dead_flight_computer_neither_hears_nor_speaks() {
+fn a_dead_flight_computer_neither_receives_nor_sends() {
     let mut rocket = in_phase(&flight_of("field", &["reboot:0.2@descent+1"]), Phase::AeroDescent);
     let mut silent = 0;
     while rocket.phase() == Phase::AeroDescent {
@@ -209,7 +208,7 @@ fn a_dead_flight_computer_neither_hears_nor_speaks() {
 
 /// As from a board: the truth is in the log alone.
 #[test]
-fn the_crew_sees_where_the_servos_say_that_they_are() {
+fn the_crew_sees_the_servo_feedback() {
     let mut rocket = in_phase(&flight_of("real", &[]), Phase::Powered);
     let mut apart = 0;
     for _ in 0..200 {
@@ -224,8 +223,8 @@ fn the_crew_sees_where_the_servos_say_that_they_are() {
     assert!(apart > 100, "{apart} frames");
 }
 
-/// A plan is taken over as many frames after it was posed as a board needs, and the radio says how
-/// long that was.
+/// A plan is taken over after the computing time of a board in frames, and that time is reported by
+/// radio.
 #[test]
 fn plans_are_late_by_what_they_cost_on_a_board() {
     let mut rocket = in_phase(&flight_of("none", &[]), Phase::Powered);
@@ -253,16 +252,16 @@ fn plans_are_late_by_what_they_cost_on_a_board() {
     }
 }
 
-// After the flight: what is said of the motor, and when the rocket is SAFED.
+// After the flight: reports on the motor, and the time of SAFED.
 
 /// Flown to its end.
-fn flown(flight: &RocketFlight) -> (Told, Vec<VehicleEvent>) {
+fn flown(flight: &RocketFlight) -> (Rocket, Vec<VehicleEvent>) {
     let mut rocket = in_phase(flight, Phase::Deploy);
     let events = rocket.run_until(Vehicle::is_over);
     (rocket, events)
 }
 
-fn wait(rocket: &mut Told, duration_s: f64) -> Vec<VehicleEvent> {
+fn wait(rocket: &mut Rocket, duration_s: f64) -> Vec<VehicleEvent> {
     let end_s = rocket.time_s() + duration_s;
     let mut events = Vec::new();
     while rocket.time_s() < end_s {
@@ -275,7 +274,7 @@ fn wait(rocket: &mut Told, duration_s: f64) -> Vec<VehicleEvent> {
 #[test]
 fn a_burnt_motor_is_hot_and_then_the_rocket_is_safed() {
     let (mut rocket, events) = flown(&flight_of("field", &[]));
-    assert!(said(&events, "burn-out: motor hot for 60 s"), "{events:?}");
+    assert!(has_text(&events, "burn-out: motor hot for 60 s"), "{events:?}");
     let (landed, motor) = (*rocket.mode(), rocket.mode().motor_status(rocket.time_s()));
     assert_eq!((landed.phase, motor), (Phase::Touchdown, MotorStatus::Hot));
     let wait_s = landed.approach_wait_s(rocket.time_s()).unwrap();
@@ -286,19 +285,19 @@ fn a_burnt_motor_is_hot_and_then_the_rocket_is_safed() {
     assert_eq!(rocket.phase(), Phase::Touchdown);
     let events = wait(&mut rocket, 0.2);
     assert_eq!(phases(&events), [Phase::Safed]);
-    assert!(said(&events, "burnt out and cooled"), "{events:?}");
+    assert!(has_text(&events, "burnt out and cooled"), "{events:?}");
     assert_eq!((rocket.mode().motor_status(rocket.time_s()), rocket.is_over()), (MotorStatus::Burnt, true));
 }
 
 #[test]
-fn a_motor_that_was_not_lit_or_did_not_light_is_live_until_its_pin_is_back() {
+fn a_motor_not_ignited_or_with_no_light_is_live_until_its_pin_is_back() {
     for faults in [&["abort@descent+1"][..], &["no-light@apogee"]] {
         let (mut rocket, events) = flown(&flight_of("none", faults));
-        assert!(said(&events, "LIVE MOTOR: do not approach for 60 s"), "{faults:?}: {events:?}");
+        assert!(has_text(&events, "LIVE MOTOR: do not approach for 60 s"), "{faults:?}: {events:?}");
         let (landed, motor) = (*rocket.mode(), rocket.mode().motor_status(rocket.time_s()));
         assert_eq!((landed.phase, motor), (Phase::Touchdown, MotorStatus::Live), "{faults:?}");
         assert!((50.0..60.0).contains(&landed.approach_wait_s(rocket.time_s()).unwrap()), "{faults:?}");
-        // Too soon: its time has to pass all the same.
+        // Too soon: its time must pass all the same.
         rocket.set_pin_out(false);
         wait(&mut rocket, 20.0);
         assert_eq!(
@@ -306,7 +305,7 @@ fn a_motor_that_was_not_lit_or_did_not_light_is_live_until_its_pin_is_back() {
             (Phase::Touchdown, MotorStatus::PinIn)
         );
         rocket.set_pin_out(true);
-        assert!(said(&wait(&mut rocket, 200.0), "LIVE MOTOR: the wait is over"));
+        assert!(has_text(&wait(&mut rocket, 200.0), "LIVE MOTOR: the wait is over"));
         assert_eq!(
             (rocket.phase(), rocket.mode().motor_status(rocket.time_s())),
             (Phase::Touchdown, MotorStatus::Live)
@@ -325,10 +324,10 @@ fn an_abort_with_room_left_opens_the_parachute_and_lights_nothing() {
         let mut rocket = in_phase(&flight, phase);
         rocket.run_until(|rocket| rocket.computer().abort_effect() == AbortEffect::ChuteNow);
         assert_eq!(rocket.descent().chute, TdChute::TD_CHUTE_STOWED);
-        assert_eq!(rocket.request(Asked::Abort).ending, Ending::Accepted);
+        assert_eq!(rocket.request(CrewCommand::Abort).ending, Ending::Accepted);
         let events = rocket.run_until(Vehicle::is_over);
         assert_eq!(phases(&events), [Phase::Chute, Phase::Touchdown]);
-        assert!(said(&events, "parachute deployed") && said(&events, "landing motor inhibited"));
+        assert!(has_text(&events, "parachute deployed") && has_text(&events, "landing motor inhibited"));
         assert!(rocket.aborted());
         let judged = rocket.judged().unwrap();
         assert!(!judged.landing.stands, "under the parachute it is not a landing");
@@ -337,10 +336,10 @@ fn an_abort_with_room_left_opens_the_parachute_and_lights_nothing() {
     }
 }
 
-/// Below the commit height: with the gate shut the parachute still fills in time, with the gate
-/// open it burns and lands.
+/// Below the commit height: with ignition inhibited the parachute still fills in time, with
+/// ignition permitted it burns and lands.
 #[test]
-fn an_abort_below_the_commit_height_does_what_is_said_beside_the_key() {
+fn an_abort_below_the_commit_height_has_the_effect_shown_beside_the_key() {
     let flight = flight_of("none", &[]);
     let mut rocket = in_phase(&flight, Phase::LandArmed);
     let below_commit = |rocket: &Vehicle| {
@@ -350,20 +349,20 @@ fn an_abort_below_the_commit_height_does_what_is_said_beside_the_key() {
     rocket.run_until(below_commit);
     assert_eq!(rocket.computer().abort_effect(), AbortEffect::ChuteNow);
     assert_eq!(rocket.phase(), Phase::LandArmed);
-    assert_eq!(rocket.request(Asked::Abort).ending, Ending::Accepted);
+    assert_eq!(rocket.request(CrewCommand::Abort).ending, Ending::Accepted);
     let events = rocket.run_until(Vehicle::is_over);
     assert_eq!(phases(&events), [Phase::Chute, Phase::Touchdown]);
-    assert!(!said(&events, "vehicle will be lost"), "{events:?}");
+    assert!(!has_text(&events, "vehicle will be lost"), "{events:?}");
     let found_m_s = -rocket.judged().unwrap().touchdown.vertical_m_s;
     assert!(found_m_s < 10.0, "{found_m_s} m/s");
 
     let mut rocket = in_phase(&flight, Phase::LandArmed);
     rocket.run_until(|rocket| rocket.computer().abort_effect() == AbortEffect::Burn);
     assert_eq!(rocket.phase(), Phase::LandArmed);
-    assert_eq!(rocket.request(Asked::Abort).ending, Ending::Accepted);
+    assert_eq!(rocket.request(CrewCommand::Abort).ending, Ending::Accepted);
     let events = rocket.run_until(Vehicle::is_over);
     assert_eq!(phases(&events), [Phase::Ignition, Phase::Powered, Phase::Touchdown]);
-    assert!(said(&events, "landing on the ground below"), "{events:?}");
+    assert!(has_text(&events, "landing on the ground below"), "{events:?}");
     assert!(
         rocket.aborted() && rocket.judged().unwrap().landing.stands,
         "the verdict stands beside the abort"
@@ -376,24 +375,26 @@ fn an_abort_under_thrust_lands_and_never_opens_a_parachute() {
     for phase in [Phase::Ignition, Phase::Powered] {
         let mut rocket = in_phase(&flight, phase);
         assert_eq!(rocket.computer().abort_effect(), AbortEffect::LandInPlace);
-        assert_eq!(rocket.request(Asked::Abort).ending, Ending::Accepted);
+        assert_eq!(rocket.request(CrewCommand::Abort).ending, Ending::Accepted);
         let events = rocket.run_until(Vehicle::is_over);
-        assert!(said(&events, "no cut-off exists; landing on the ground below"));
+        assert!(has_text(&events, "no cut-off exists; landing on the ground below"));
         assert!(!phases(&events).contains(&Phase::Chute));
         assert!(rocket.aborted() && rocket.judged().unwrap().landing.stands, "{:?}", rocket.judged());
     }
 }
 
-/// The motor was commanded and has not lit: nothing lands then, and nothing else is claimed.
+/// Ignition was commanded, and the motor has not ignited: no landing follows, and none is claimed.
 #[test]
 fn without_light_an_abort_is_a_fall() {
     let flight = flight_of("none", &["no-light@0"]);
     let mut rocket = in_phase(&flight, Phase::Ignition);
     rocket.run_until(|rocket| rocket.mode().interlocks.no_light_latched);
     let AbortEffect::Impact { m_s } = rocket.computer().abort_effect() else { panic!("it does not burn") };
-    assert_eq!(rocket.request(Asked::Abort).ending, Ending::Accepted);
+    assert_eq!(rocket.request(CrewCommand::Abort).ending, Ending::Accepted);
     let events = rocket.run_until(Vehicle::is_over);
-    assert!(said(&events, "the landing motor has not lit") && !said(&events, "landing on the ground"));
+    assert!(
+        has_text(&events, "the landing motor has not ignited") && !has_text(&events, "landing on the ground")
+    );
     let found_m_s = -rocket.judged().unwrap().touchdown.vertical_m_s;
     assert!((f64::from(m_s) - 2.0..=f64::from(m_s)).contains(&found_m_s), "{m_s} said, {found_m_s} found");
 }

@@ -3,7 +3,7 @@
 use super::*;
 use crate::world::wind::Wind;
 
-const LIT: Actuators =
+const IGNITING: Actuators =
     Actuators { gimbal_rad: [0.0; 2], fins_rad: [FRAC_PI_2; 4], ignite: true, ..Actuators::NONE };
 
 /// Air force along the nose, N, at 30 m/s down with the fins open, without and with a burning
@@ -13,9 +13,9 @@ fn air_n(truth: &Truth, lit: bool) -> f64 {
     let mut state = RigidState::upright(100.0);
     state.velocity_m_s.z = -30.0;
     let mut world = world("mk2", &truth, &state).with_fins_at(FRAC_PI_2);
-    world.advance(if lit { &LIT } else { &OPEN }, 500);
+    world.advance(if lit { &IGNITING } else { &OPEN }, 500);
     (world.state.position_m, world.state.velocity_m_s) = (state.position_m, state.velocity_m_s);
-    world.step(if lit { &LIT } else { &OPEN });
+    world.step(if lit { &IGNITING } else { &OPEN });
     world.specific_force_m_s2().x * world.mass().mass_kg - world.thrust_n()
 }
 
@@ -51,7 +51,7 @@ fn val_hand_inertia_and_gimbal_gain_change_the_turning() {
     let turning = |truth: &Truth| {
         let truth = Truth { drag_scale: 0.0, ignition_delay_s: 0.0, ..*truth };
         let mut world = world("mk2", &truth, &RigidState::upright(100.0));
-        world.advance(&Actuators { gimbal_rad: [0.03, 0.0], ..LIT }, 400);
+        world.advance(&Actuators { gimbal_rad: [0.03, 0.0], ..IGNITING }, 400);
         let gimbal_rad = world.gimbal_rad()[0];
         (gimbal_rad, world.angular_acceleration_rad_s2().y / world.thrust_n() / libm::sin(gimbal_rad))
     };

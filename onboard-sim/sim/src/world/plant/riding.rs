@@ -1,8 +1,8 @@
-//! The way up: on the rail, under the ascent motor, and coasting until the booster is separated.
+//! The ascent: on the rail, under the ascent motor, and coasting until the booster is separated.
 //!
-//! The state of the world is always the vehicle's own. In each step the motion of the stack's
-//! centre of gravity follows from it, and it from that motion. The centre moves through the body
-//! while propellant burns; that relative motion (some cm/s) is neglected.
+//! The state of the world is always the vehicle's. In each step the motion of the stack's centre of
+//! gravity follows from it, and it from that motion. The centre moves through the body while
+//! propellant burns; that relative motion (some cm/s) is neglected.
 
 use flight::vehicle::airframe::MassProperties;
 use flight::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
@@ -44,7 +44,7 @@ fn guided(stack: &mut Stack, before: &RigidState, load: &Load, mass_kg: f64) -> 
 }
 
 impl World {
-    /// One step with the booster. `stack` is the world's own, taken out of it.
+    /// One step with the booster. `stack` is taken out of the world.
     pub(super) fn ride(&mut self, mut stack: Stack, time_s: f64) {
         let cg_m = self.cg_m();
         let mass = stack.mass(&self.mass, &cg_m, time_s + 0.5 * STEP_S);
@@ -107,7 +107,7 @@ impl World {
     }
 }
 
-// The vehicle on its booster: masses, thrust and the air on the whole stack.
+// The vehicle on its booster: masses, thrust and aerodynamics of the complete stack.
 //
 // Forces across the axis in proportion to the angle of attack act at the nose and at the booster's
 // fins (J. S. Barrowman and J. A. Barrowman, "The Theoretical Prediction of the Center of
@@ -125,7 +125,7 @@ pub(crate) struct Stack {
     motor: Motor,
     charge_fired_s: Option<f64>,
     stuck: bool,
-    /// The ascent motor lights without a command.
+    /// The ascent motor ignites without a command.
     lights_itself: bool,
     rail: Option<OnRail>,
 }
@@ -220,7 +220,7 @@ impl Stack {
         Vector3::new(-self.booster.length_m, 0.0, 0.0)
     }
 
-    /// The drag coefficient of the whole stack over that of a vehicle.
+    /// Ratio of the complete stack's drag coefficient to a vehicle's.
     pub(crate) fn drag_over(&self, vehicle_coefficient: f64) -> f64 {
         self.truth.drag_scale * self.booster.stack_drag_coefficient / vehicle_coefficient
     }
@@ -260,12 +260,13 @@ impl Stack {
             let place_m = Vector3::new(*station_m, 0.0, 0.0) - cg_m;
             let local = flow.velocity_m_s + flow.rate_rad_s.cross(&place_m);
             let speed = local.norm_squared().sqrt();
-            // Linear in the angle of attack while that is small: the sideways speed over the whole.
+            // Linear in the angle of attack while that is small: the ratio of sideways to total
+            // speed.
             let across = Vector3::new(0.0, local.y, local.z);
             load.add_at(&place_m, &(across * (-0.5 * flow.density_kg_m3 * speed * area_m2 * slope_per_rad)));
         }
-        // All fins turned the same way by the cant roll the stack, and rolling turns the wind at
-        // them back. Of n fins n/2 lift in one plane, but all n roll.
+        // Fins canted the same way roll the stack, and rolling turns their local wind back. Of n
+        // fins n/2 lift in one plane, but all n roll.
         let axial_m_s = flow.velocity_m_s.x;
         let angle_speed = self.truth.fin_cant_rad * axial_m_s - flow.rate_rad_s.x * fin_radius_m;
         load.moment_n_m.x +=

@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::world::whole::WorldError;
+use crate::world::plant::WorldError;
 
 fn actuators() -> impl Strategy<Value = Actuators> {
     let any = proptest::num::f64::ANY;
@@ -131,8 +131,8 @@ fn a_slow_gimbal_turns_at_its_reduced_rate() {
         world.advance(&Actuators { gimbal_rad: [0.1, 0.0], ..OPEN }, 35);
         world.gimbal_rad()[0] + 0.25_f64.to_radians()
     };
-    let (whole_rad, fifth_rad) = (turned_rad(None), turned_rad(Some(Fault::GimbalSlow { scale: 0.2 })));
-    assert!((fifth_rad / whole_rad - 0.2).abs() < 0.01, "{whole_rad} {fifth_rad}");
+    let (full_rad, fifth_rad) = (turned_rad(None), turned_rad(Some(Fault::GimbalSlow { scale: 0.2 })));
+    assert!((fifth_rad / full_rad - 0.2).abs() < 0.01, "{full_rad} {fifth_rad}");
 }
 
 #[test]

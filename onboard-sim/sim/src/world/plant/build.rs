@@ -11,7 +11,7 @@ use flight::vehicle::thrust_curve::ThrustCurve;
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::riding::Stack;
-use super::{AirHere, World, felt_at_rest_m_s2};
+use super::{AirHere, World, force_at_rest_m_s2};
 use crate::world::aero::{Parachute, Shape};
 use crate::world::ground::Ground;
 use crate::world::hanging::Hanging;
@@ -119,8 +119,8 @@ impl World {
         Ok(world)
     }
 
-    /// The same world with the vehicle on its booster, at rest on the rail, whose foot stands on
-    /// the ground.
+    /// The same world with the vehicle on its booster, at rest on the rail, whose foot is on the
+    /// ground.
     #[must_use]
     pub fn on_rail(mut self, launch: &Launch, truth: &AscentTruth) -> Self {
         let [about_x, about_y] = truth.rail_lean_rad;
@@ -132,7 +132,7 @@ impl World {
             world_from_body: lean * standing.world_from_body,
             ..standing
         };
-        self.specific_force_m_s2 = felt_at_rest_m_s2(&self.state);
+        self.specific_force_m_s2 = force_at_rest_m_s2(&self.state);
         self.stack = Some(Box::new(Stack::new(launch, truth)));
         self
     }
@@ -175,7 +175,7 @@ pub(super) fn check_state(state: &RigidState) -> Result<(), WorldError> {
     Ok(())
 }
 
-/// What is accepted of a truth; any finite number of what is not here.
+/// Accepted values of a truth; any finite number for the others.
 const ACCEPTED: [([f64; 2], &[&str]); 12] = [
     ([0.1, 10.0], &["impulse_scale", "burn_time_scale", "mass_scale", "inertia_scale", "gimbal_gain"]),
     ([0.0, 10.0], &["drag_scale", "gust_scale", "body_drag_scale", "fin_drag_scale", "crossflow_scale"]),

@@ -1,4 +1,4 @@
-//! What the flight computer reports: changes of phase, and messages to the crew.
+//! Messages of the flight computer: phase changes, and texts to the crew.
 
 use alloc::borrow::ToOwned as _;
 use alloc::format;
@@ -13,25 +13,25 @@ use crate::rules::phase::{
 /// Severity of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Severity {
-    /// As planned.
+    /// Nominal.
     Info,
-    /// As planned, but worth noticing.
+    /// Nominal, but worth noticing.
     Notice,
-    /// Not as planned.
+    /// Off-nominal.
     Warning,
-    /// Something failed, or was refused because of a fault.
+    /// A failure, or a refusal because of a fault.
     Error,
     /// The vehicle is in danger.
     Critical,
 }
 
-/// One report of the flight computer.
+/// One message of the flight computer.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum CrewMessage {
-    /// A message to the crew.
-    Said {
+    /// Text for the crew.
+    Text {
         severity: Severity,
-        words: String,
+        text: String,
     },
     PhaseChanged {
         from: Phase,
@@ -39,7 +39,7 @@ pub enum CrewMessage {
     },
 }
 
-/// The message for an effect; `None` if the change of phase already says it.
+/// The message for an effect; `None` if the phase change already reports it.
 pub(super) fn words_of(effect: Effect, countdown_s: f64) -> Option<(Severity, String)> {
     use Effect as E;
     let severity = match effect {
@@ -59,11 +59,12 @@ pub(super) fn words_of(effect: Effect, countdown_s: f64) -> Option<(Severity, St
     ))
 }
 
-/// The message for an abort that lands on the motor, if the abort came between these two modes.
+/// The message for an abort that lands on the motor, if the abort was applied between these two
+/// modes.
 pub(super) fn words_of_landing_here(before: Interlocks, mode: &Mode) -> Option<(Severity, &'static str)> {
     let after = mode.interlocks;
     let words = if after.no_light_latched {
-        "ABORT: the landing motor has not lit"
+        "ABORT: the landing motor has not ignited"
     } else if mode.phase.in_descent() {
         "ABORT: too low for the parachute; the motor lights at its height, landing on the ground below"
     } else {
@@ -72,11 +73,11 @@ pub(super) fn words_of_landing_here(before: Interlocks, mode: &Mode) -> Option<(
     (after.lands_in_place && !before.lands_in_place).then_some((Severity::Critical, words))
 }
 
-/// A check that fails for so long is told, and holds the countdown, s: a contact that bounces, or
-/// one lost sample, is shorter, and a sensor that dies has shown how by then.
+/// Time after which a failing check is reported and holds the countdown, s. A bouncing contact or
+/// one lost sample is shorter, and a sensor failure shows its nature within this time.
 const FAILS_FOR_S: f64 = 0.1;
 
-/// The failing arming check that the crew on the pad was last told of, and since when one fails, s.
+/// The failing arming check last reported on the pad, and the time since when one fails, s.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub(super) struct Readiness {
     last_check: Option<&'static str>,
@@ -84,9 +85,9 @@ pub(super) struct Readiness {
 }
 
 impl Readiness {
-    /// Why the vehicle may not be armed or started, and whether the crew is still to be told: the
-    /// first check that fails, once one has failed for [`FAILS_FOR_S`]. The uplink is left out: it
-    /// comes and goes with every lost heartbeat, and each station is told of its own uplink anyway.
+    /// Returns why the vehicle may not be armed or started, and whether this is still to be
+    /// reported: the first check that has failed for [`FAILS_FOR_S`]. The uplink check is left out.
+    /// It changes with every lost heartbeat, and each station gets a report of its uplink anyway.
     pub(super) fn failing(&mut self, checks: &[Check], time_s: f64) -> Option<(String, bool)> {
         let Some(check) = checks.iter().find(|check| !check.passed && check.name != UPLINK_CHECK) else {
             *self = Self::default();
@@ -95,38 +96,38 @@ impl Readiness {
         if time_s - *self.since_s.get_or_insert(time_s) < FAILS_FOR_S {
             return None;
         }
-        let untold = self.last_check.replace(check.name) != Some(check.name);
-        check.refusal().map(|reason| (reason, untold))
+        let unreported = self.last_check.replace(check.name) != Some(check.name);
+        check.refusal().map(|reason| (reason, unreported))
     }
 }
 
-// Tells the crew each change of the landing motor's state: the safety of anyone who approaches the
-// vehicle depends on it.
+// Reports each change of the landing motor's state to the crew: the safety of anyone who approaches
+// the vehicle depends on it.
 
-/// The state that the crew was last told of.
+/// The state last reported to the crew.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 struct LastReported {
     status: MotorStatus,
     /// On the ground after the flight.
     landed: bool,
-    /// The vehicle may be approached without waiting.
+    /// The vehicle is safe to approach without a wait.
     free: bool,
 }
 
-/// Watches the landing motor.
+/// Monitors the landing motor's state.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(super) struct MotorWatch(LastReported);
 
 impl Default for MotorWatch {
-    /// A vehicle with its pin in, as it is powered up.
+    /// A vehicle at power-up, with its pin in.
     fn default() -> Self {
         Self(LastReported { status: MotorStatus::PinIn, landed: false, free: true })
     }
 }
 
 impl MotorWatch {
-    /// A message if the state has changed.
-    pub(super) fn news(&mut self, mode: &Mode, time_s: f64) -> Option<(Severity, String)> {
+    /// Returns a message if the state has changed.
+    pub(super) fn update(&mut self, mode: &Mode, time_s: f64) -> Option<(Severity, String)> {
         use MotorStatus as M;
         let now = LastReported {
             status: mode.motor_status(time_s),
@@ -145,7 +146,7 @@ impl MotorWatch {
             LastReported { status: M::Live, landed: true, free: true } => {
                 (Severity::Critical, "LIVE MOTOR: the wait is over; put the pin in before anything else")
             }
-            // All other states are told once, when the status changes.
+            // Every other state is reported once, when the status changes.
             _ if now.status == before.status => return None,
             LastReported { status: M::Hot, .. } => {
                 return Some((Severity::Notice, format!("burn-out: motor hot for {MOTOR_HOT_S} s")));
@@ -158,7 +159,7 @@ impl MotorWatch {
             }
             LastReported { status: M::PinIn, .. } => (Severity::Notice, "pin in: the igniter line is cut"),
             LastReported { status: M::Burnt, .. } => (Severity::Notice, "landing motor burnt out and cooled"),
-            // The crew was told when the motor was commanded to light.
+            // Reported at the ignition command.
             LastReported { status: M::Burning, .. } => return None,
         };
         Some((severity, words.to_owned()))
@@ -176,33 +177,33 @@ mod tests {
     }
 
     #[test]
-    fn the_crew_is_told_how_long_to_wait_at_a_live_motor_and_when_the_wait_is_over() {
+    fn the_wait_at_a_live_motor_and_its_end_are_reported() {
         let mut watch = MotorWatch::default();
         let live = mode(Phase::Touchdown, Motor::Unlit, true);
-        let (severity, words) = watch.news(&live, 1.0).unwrap();
+        let (severity, words) = watch.update(&live, 1.0).unwrap();
         assert_eq!((severity, words.contains("do not approach for 60 s")), (Severity::Critical, true));
-        assert_eq!(watch.news(&live, 59.9), None, "once");
-        let (severity, words) = watch.news(&live, 60.0).unwrap();
+        assert_eq!(watch.update(&live, 59.9), None, "once");
+        let (severity, words) = watch.update(&live, 60.0).unwrap();
         assert_eq!((severity, words.contains("put the pin in")), (Severity::Critical, true));
         let pinned = mode(Phase::Touchdown, Motor::Unlit, false);
-        assert!(watch.news(&pinned, 61.0).unwrap().1.starts_with("pin in"));
-        assert_eq!(watch.news(&mode(Phase::Safed, Motor::Unlit, false), 61.1), None);
+        assert!(watch.update(&pinned, 61.0).unwrap().1.starts_with("pin in"));
+        assert_eq!(watch.update(&mode(Phase::Safed, Motor::Unlit, false), 61.1), None);
     }
 
     #[test]
-    fn each_change_of_the_motor_in_a_flight_is_told_once() {
+    fn each_change_of_the_motor_in_a_flight_is_reported_once() {
         let mut watch = MotorWatch::default();
-        let mut told = |phase, motor, time_s| {
-            watch.news(&mode(phase, motor, true), time_s).map_or_else(String::new, |(_, words)| words)
+        let mut message = |phase, motor, time_s| {
+            watch.update(&mode(phase, motor, true), time_s).map_or_else(String::new, |(_, words)| words)
         };
-        assert_eq!(told(Phase::PadIdle, Motor::Unlit, 1.0), "pin out: landing motor live");
-        assert_eq!(told(Phase::PadArmed, Motor::Unlit, 2.0), "");
-        assert_eq!(told(Phase::LandArmed, Motor::Unlit, 3.0), "");
-        assert_eq!(told(Phase::Powered, Motor::Burning, 4.0), "");
+        assert_eq!(message(Phase::PadIdle, Motor::Unlit, 1.0), "pin out: landing motor live");
+        assert_eq!(message(Phase::PadArmed, Motor::Unlit, 2.0), "");
+        assert_eq!(message(Phase::LandArmed, Motor::Unlit, 3.0), "");
+        assert_eq!(message(Phase::Powered, Motor::Burning, 4.0), "");
         let burnt_out = Motor::BurntOut { at_s: 9.0 };
-        assert_eq!(told(Phase::Powered, burnt_out, 9.0), "burn-out: motor hot for 60 s");
-        assert_eq!(told(Phase::Touchdown, burnt_out, 10.0), "");
-        assert_eq!(told(Phase::Touchdown, burnt_out, 69.0), "landing motor burnt out and cooled");
-        assert_eq!(told(Phase::Safed, burnt_out, 69.1), "");
+        assert_eq!(message(Phase::Powered, burnt_out, 9.0), "burn-out: motor hot for 60 s");
+        assert_eq!(message(Phase::Touchdown, burnt_out, 10.0), "");
+        assert_eq!(message(Phase::Touchdown, burnt_out, 69.0), "landing motor burnt out and cooled");
+        assert_eq!(message(Phase::Safed, burnt_out, 69.1), "");
     }
 }

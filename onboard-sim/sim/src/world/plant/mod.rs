@@ -32,12 +32,12 @@ use crate::world::{STEP_S, body};
 
 /// Below this clearance steps are divided, m. It is more than one step of fall at 40 m/s.
 const NEAR_M: f64 = 0.1;
-/// The wind is held for so many steps, in which a vehicle comes 0.2 m further; the shortest gusts
+/// Steps for which the wind is held constant, in which a vehicle moves by 0.2 m; the shortest gusts
 /// are 3 m long.
 const WIND_STEPS: u64 = 5;
 /// The density is taken as linear within this distance, m: it is wrong by a part in 10^9.
 const AIR_M: f64 = 0.5;
-/// Number of parts of a step near the ground: so exactly is the first contact known.
+/// Number of parts of a step near the ground, the time resolution of the first contact.
 const PARTS: usize = 4;
 
 /// The commands of the flight computer.
@@ -47,7 +47,7 @@ pub struct Actuators {
     pub gimbal_rad: [f64; 2],
     /// Opening angles of the four fins, rad.
     pub fins_rad: [f64; 4],
-    /// Current through the igniter. What is switched off before it has lit does not light.
+    /// Current through the igniter. A motor switched off before ignition does not ignite.
     pub ignite: bool,
     /// Ejects the parachute; only the first time counts.
     pub parachute: bool,
@@ -86,7 +86,7 @@ pub struct World {
     /// The landing motor as certified: its size and its full mass.
     certified: ThrustCurve,
     fin_links: [Linkage; 4],
-    /// The wire that each surface hangs on, gimbal first, and whether it moves the wrong way.
+    /// The wire of each surface, gimbal first, and whether it is reversed.
     wires: [(usize, bool); 6],
     parachute: Parachute,
     wind: Wind,
@@ -94,8 +94,8 @@ pub struct World {
     ground: Ground,
     steps: u64,
     state: RigidState,
-    /// Landing propellant burnt up to the middle of the last step, kg, and what the vehicle weighs
-    /// with the rest.
+    /// Landing propellant burnt up to the middle of the last step, kg, and the remaining weight of
+    /// the vehicle.
     burnt_kg: f64,
     mass: MassProperties,
     specific_force_m_s2: Vector3<f64>,
@@ -248,8 +248,8 @@ impl World {
         }
     }
 
-    /// What arrives at the servos, over wires that may be wrong: gimbal (pitch, yaw), fins 1 to 4,
-    /// rad.
+    /// Commands that arrive at the servos, over possibly wrong wires: gimbal (pitch, yaw), fins 1
+    /// to 4, rad.
     fn wired_rad(&self, actuators: &Actuators) -> [f64; 6] {
         let told_rad = surfaces_rad(actuators.gimbal_rad, actuators.fins_rad);
         let both_stops_rad = self.airframe.fins.closed_rad() + self.airframe.fins.open_rad();
@@ -296,8 +296,8 @@ impl World {
         self.certified.total_mass_kg() - self.burnt_kg
     }
 
-    /// The body turns back when the motor begins to swing and when it stops: their common angular
-    /// momentum is kept.
+    /// The body turns the other way when the motor begins to swing and when it stops: their common
+    /// angular momentum is conserved.
     fn turn_back(&mut self) {
         let [before_rad_s, now_rad_s] = self.gimbal_rates_rad_s;
         let swinging_kg_m2 =
@@ -407,12 +407,12 @@ impl World {
         self.state.velocity_m_s = Vector3::zeros();
         self.state.rate_rad_s = Vector3::zeros();
         self.angular_acceleration_rad_s2 = Vector3::zeros();
-        self.specific_force_m_s2 = felt_at_rest_m_s2(&self.state);
+        self.specific_force_m_s2 = force_at_rest_m_s2(&self.state);
     }
 }
 
-/// What an accelerometer feels of a vehicle that does not move, body axes, m/s^2.
-fn felt_at_rest_m_s2(state: &RigidState) -> Vector3<f64> {
+/// Accelerometer reading of a vehicle at rest, body axes, m/s^2.
+fn force_at_rest_m_s2(state: &RigidState) -> Vector3<f64> {
     state.world_from_body.inverse_transform_vector(&Vector3::new(0.0, 0.0, STANDARD_GRAVITY_M_S2))
 }
 
@@ -444,8 +444,8 @@ impl World {
         self.airframe.above_feet_m(self.cg_m().x)
     }
 
-    /// Mean specific force over the last step in body axes, m/s^2, which is what an ideal
-    /// accelerometer at the centre of gravity measures.
+    /// Mean specific force over the last step in body axes, m/s^2, as measured by an ideal
+    /// accelerometer at the centre of gravity.
     pub fn specific_force_m_s2(&self) -> &Vector3<f64> {
         &self.specific_force_m_s2
     }
@@ -470,8 +470,8 @@ impl World {
         self.motor.thrust_n(self.time_s())
     }
 
-    /// When the thrust begins or began, s; `None` without current before it has lit, and for a
-    /// motor that does not light.
+    /// Time of thrust onset, past or future, s; `None` without current before ignition, and for a
+    /// motor that does not ignite.
     pub fn thrust_begins_s(&self) -> Option<f64> {
         self.motor.thrust_begins_s()
     }
@@ -481,7 +481,7 @@ impl World {
         [0, 1].map(|axis: usize| self.gimbal_links[axis].rad())
     }
 
-    /// Gimbal angles (pitch, yaw) as the servos' feedback tells them, rad.
+    /// Gimbal angles (pitch, yaw) in the servo feedback, rad.
     pub fn gimbal_feedback_rad(&self) -> [f64; 2] {
         [0, 1].map(|axis: usize| self.gimbal[axis].load_rad())
     }
@@ -491,7 +491,7 @@ impl World {
         [0, 1, 2, 3].map(|fin: usize| self.fin_links[fin].rad())
     }
 
-    /// Opening angles of the fins as the servos' feedback tells them, rad.
+    /// Opening angles of the fins in the servo feedback, rad.
     pub fn fins_feedback_rad(&self) -> [f64; 4] {
         [0, 1, 2, 3].map(|fin: usize| self.fins[fin].load_rad())
     }
@@ -516,7 +516,7 @@ impl World {
         self.parachute.ejected_s().is_some()
     }
 
-    /// Whether the wire between booster and vehicle is whole.
+    /// Whether the wire between booster and vehicle is intact.
     pub fn booster_attached(&self) -> bool {
         self.stack.is_some()
     }
@@ -569,7 +569,7 @@ impl World {
         self.touchdown.as_ref()
     }
 
-    /// How the vehicle came to rest, if it has. From then on only time changes.
+    /// The rest state, once the vehicle is at rest. From then on only time changes.
     pub fn rest(&self) -> Option<&Rest> {
         self.rest.as_ref()
     }

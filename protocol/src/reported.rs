@@ -1,4 +1,4 @@
-//! What a vehicle has told of itself, as one record of the log: a station records it as it hears.
+//! The state that a vehicle reports, as one record of the log. A station records it on reception.
 
 use mavlink::MessageData as _;
 use num_traits::FromPrimitive as _;
@@ -28,8 +28,8 @@ pub fn phase_from_number(number: u32) -> Option<TdPhase> {
     TdPhase::from_u32(number)
 }
 
-/// The boot that a frame of a vehicle of ours names: a HEARTBEAT above the phase, our own messages
-/// in their first number. `None` if it names none.
+/// The boot named in a frame of one of our vehicles: in a HEARTBEAT above the phase, in our
+/// messages in the first number. `None` if there is none.
 pub fn boot_of(frame: &Frame) -> Option<u32> {
     let payload = frame.padded_payload();
     let number =
@@ -44,9 +44,9 @@ pub fn boot_of(frame: &Frame) -> Option<u32> {
     (boot > 0).then_some(boot)
 }
 
-/// The last of each message that goes into the record.
+/// The last of each message that is part of the record.
 #[derive(Debug, Clone, Default)]
-pub struct Told {
+pub struct ReportedState {
     phase: Option<TdPhase>,
     status: Option<TD_FLIGHT_STATUS_DATA>,
     attitude: Option<Attitude>,
@@ -58,9 +58,9 @@ pub struct Told {
     controller: Option<TD_CONTROLLER_DATA>,
 }
 
-impl Told {
-    /// Takes a message of the vehicle. Returns whether it goes into the record.
-    pub fn hear(&mut self, message: &MavMessage) -> bool {
+impl ReportedState {
+    /// Takes a message of the vehicle. Returns whether it is part of the record.
+    pub fn update(&mut self, message: &MavMessage) -> bool {
         match message {
             MavMessage::HEARTBEAT(data) => self.phase = phase_of(data).or(self.phase),
             MavMessage::TD_FLIGHT_STATUS(data) => {
@@ -71,7 +71,7 @@ impl Told {
                 self.phase = Some(data.phase);
                 self.status = Some(never_back(self.status.as_ref(), data));
             }
-            // What is no rotation says nothing.
+            // An invalid quaternion is ignored.
             MavMessage::ATTITUDE_QUATERNION(data) => self.attitude = Attitude::of(data).or(self.attitude),
             MavMessage::LOCAL_POSITION_NED(data) => self.motion = Some(Motion::of(data)),
             MavMessage::GLOBAL_POSITION_INT(data) => self.vertical = Some(Motion::of_global(data)),
@@ -83,12 +83,12 @@ impl Told {
         true
     }
 
-    /// The last status, whose time since the release never goes back.
+    /// The last status, with a time since the release that never decreases.
     pub fn status(&self) -> Option<&TD_FLIGHT_STATUS_DATA> {
         self.status.as_ref()
     }
 
-    /// Everything as one record. It says nothing of the link.
+    /// The complete state as one record, without data on the link.
     pub fn record(&self, time_s: f64) -> Telemetry {
         let motion = self.motion.or(self.vertical);
         let known = |value: f64| Some(value).filter(|value| value.is_finite());
@@ -141,7 +141,7 @@ impl Told {
     }
 }
 
-/// After the touchdown the vehicle tells the time of the contact, which it finds a second later.
+/// After touchdown the vehicle reports the time of the contact, which it determines a second later.
 fn never_back(
     before: Option<&TD_FLIGHT_STATUS_DATA>,
     status: &TD_FLIGHT_STATUS_DATA,
@@ -157,19 +157,19 @@ mod tests {
     use super::*;
     use crate::dialect::{ATTITUDE_QUATERNION_DATA, LOCAL_POSITION_NED_DATA};
 
-    /// The record of a vehicle that falls with 20 m/s, after rotations about its own axes: to its
+    /// The record of a vehicle that falls with 20 m/s, after rotations about its body axes: to its
     /// pitch, then a roll.
     fn falling(pitch_deg: f64, roll_deg: f64, sign: f64) -> Telemetry {
         let half = |angle_deg: f64| libm::sincos(angle_deg.to_radians() / 2.0);
         let ((sin_p, cos_p), (sin_r, cos_r)) = (half(pitch_deg), half(roll_deg));
         let [q1, q2, q3, q4] =
             [cos_p * cos_r, cos_p * sin_r, sin_p * cos_r, -sin_p * sin_r].map(|part| (sign * part) as f32);
-        let mut told = Told::default();
+        let mut reported = ReportedState::default();
         let attitude = ATTITUDE_QUATERNION_DATA { q1, q2, q3, q4, ..Default::default() };
-        told.hear(&MavMessage::ATTITUDE_QUATERNION(attitude));
+        reported.update(&MavMessage::ATTITUDE_QUATERNION(attitude));
         let position = LOCAL_POSITION_NED_DATA { vz: 20.0, ..Default::default() };
-        told.hear(&MavMessage::LOCAL_POSITION_NED(position));
-        told.record(0.0)
+        reported.update(&MavMessage::LOCAL_POSITION_NED(position));
+        reported.record(0.0)
     }
 
     /// A roll does not change where the nose points, and both signs of a quaternion are one

@@ -16,13 +16,13 @@ use rand_chacha::ChaCha8Rng;
 use super::super::Path;
 use super::*;
 
-/// What can move something, with its parameter 1.
+/// Commands that can move something, with their parameter 1.
 const MOVING: [(u16, f32); 6] =
     [(ARM, 1.0), (START, 0.0), (TAP, 0.0), (TAKE_COMMAND, 0.0), (CHECK, 1.0), (CHECK, 2.0)];
 
 const BOOT: u32 = 7_654_321;
 
-/// A program that speaks to the vehicle.
+/// A program connected to the vehicle.
 #[derive(Clone)]
 struct Program {
     address: Address,
@@ -31,8 +31,8 @@ struct Program {
     /// Its heartbeat, signed if it has an operator.
     beat: Frame,
     speaks: bool,
-    /// When it was last heard, s.
-    heard_at_s: f64,
+    /// Time of its last heartbeat, s.
+    received_at_s: f64,
 }
 
 impl Program {
@@ -43,13 +43,13 @@ impl Program {
             mavtype: MavType::MAV_TYPE_GCS,
             ..HEARTBEAT_DATA::default()
         }));
-        // The endpoint trusts whose signature it is: here nobody checks it.
+        // The endpoint does not check the signature itself.
         let number = by.map_or(0, |by: Operator| by.number);
         let mut signing = Signing::new(key(number), Memory::default()).as_operator(number, key(100));
         let link_id = signing.link_id(0);
         let beat = if by.is_some() { signing.sign(&beat, link_id, 37_500_000_000_000) } else { beat };
         let path = Path { link: 0, origin: Some(Origin::Stream(stream)) };
-        Self { address, path, by, beat, speaks: true, heard_at_s: f64::NEG_INFINITY }
+        Self { address, path, by, beat, speaks: true, received_at_s: f64::NEG_INFINITY }
     }
 
     fn request(&self, command: u16, param1: f32, confirms: u16, boot: f32) -> CommandRequest {
@@ -83,7 +83,7 @@ impl Range {
             let time_s = self.vehicle.time_s();
             for program in self.programs.iter_mut().filter(|program| program.speaks) {
                 self.endpoint.on_frame(program.path, &program.beat, &self.vehicle.state());
-                program.heard_at_s = time_s;
+                program.received_at_s = time_s;
             }
         }
         self.frames += 1;
@@ -104,7 +104,7 @@ impl Range {
     }
 
     /// The answer to a request.
-    fn asks(&mut self, program: usize, request: &CommandRequest) -> u8 {
+    fn request_answer(&mut self, program: usize, request: &CommandRequest) -> u8 {
         self.sent.clear();
         self.put(program, request);
         self.run(0.3);
@@ -127,16 +127,16 @@ fn what_moves_something_names_the_boot_it_is_for_and_what_stops_it_need_not() {
     let other = (BOOT + 1) as f32;
     for (command, param1) in MOVING {
         let request = range.programs[0].request(command, param1, 0, other);
-        assert_eq!(range.asks(0, &request), DENIED, "{command}");
+        assert_eq!(range.request_answer(0, &request), DENIED, "{command}");
         for nonsense in [0.75, -1.0, 16_777_216.0, f32::INFINITY] {
             let request = range.programs[0].request(command, param1, 0, nonsense);
-            assert_eq!(range.asks(0, &request), DENIED, "{nonsense}");
+            assert_eq!(range.request_answer(0, &request), DENIED, "{nonsense}");
         }
     }
     for boot in [BOOT as f32, 0.0, f32::NAN] {
         let [arm, disarm] = [1.0, 0.0].map(|param1| range.programs[0].request(ARM, param1, 0, boot));
-        assert_eq!(range.asks(0, &arm), ACCEPTED, "{boot}");
-        assert_eq!(range.asks(0, &disarm), ACCEPTED);
+        assert_eq!(range.request_answer(0, &arm), ACCEPTED, "{boot}");
+        assert_eq!(range.request_answer(0, &disarm), ACCEPTED);
     }
     let arm = range.programs[0].request(ARM, 1.0, 0, BOOT as f32);
     let start = range.programs[0].request(START, 0.0, 0, BOOT as f32);
@@ -148,25 +148,25 @@ fn what_moves_something_names_the_boot_it_is_for_and_what_stops_it_need_not() {
         assert!(range.counts_down());
         range.run(0.5);
         let request = range.programs[0].request(command, param1, 0, other);
-        assert_eq!(range.asks(0, &request), ACCEPTED, "{command}");
+        assert_eq!(range.request_answer(0, &request), ACCEPTED, "{command}");
         assert!(!range.counts_down());
     }
     assert!(range.vehicle.aborted());
 }
 
 #[test]
-fn while_another_vehicle_under_our_ids_is_heard_a_command_must_name_its_boot() {
+fn with_another_vehicle_under_our_ids_a_command_must_name_its_boot() {
     let mut range = Range::without_operators(vec![Program::new(255, 7, 1, None)]);
     let twin = Encoder::new(VEHICLE).encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
     range.endpoint.on_frame(0, &twin, &range.vehicle.state());
     let [unnamed, named] = [0.0, BOOT as f32].map(|boot| range.programs[0].request(ARM, 1.0, 0, boot));
     let disarm = range.programs[0].request(ARM, 0.0, 0, 0.0);
-    assert_eq!(range.asks(0, &unnamed), NOT_NOW);
+    assert_eq!(range.request_answer(0, &unnamed), NOT_NOW);
     assert!(!range.vehicle.mode().interlocks.armed);
     range.endpoint.on_frame(0, &twin, &range.vehicle.state());
-    assert_eq!(range.asks(0, &named), ACCEPTED);
-    assert_eq!(range.asks(0, &disarm), ACCEPTED);
-    assert_eq!(range.asks(0, &unnamed), ACCEPTED, "some seconds later");
+    assert_eq!(range.request_answer(0, &named), ACCEPTED);
+    assert_eq!(range.request_answer(0, &disarm), ACCEPTED);
+    assert_eq!(range.request_answer(0, &unnamed), ACCEPTED, "some seconds later");
 }
 
 #[test]
@@ -178,7 +178,7 @@ fn a_command_for_every_vehicle_stops_and_moves_nothing() {
             target: everybody,
             ..range.programs[0].request(command, param1, 0, BOOT as f32)
         };
-        assert_eq!(range.asks(0, &request), DENIED, "{command}");
+        assert_eq!(range.request_answer(0, &request), DENIED, "{command}");
     }
     assert!(!range.vehicle.mode().interlocks.armed);
     // Some clients name the system and every component of it.
@@ -193,7 +193,7 @@ fn a_command_for_every_vehicle_stops_and_moves_nothing() {
         range.run(0.5);
         let request =
             CommandRequest { target: everybody, ..range.programs[0].request(command, param1, 0, 0.0) };
-        assert_eq!(range.asks(0, &request), ACCEPTED, "{command}");
+        assert_eq!(range.request_answer(0, &request), ACCEPTED, "{command}");
         assert!(!range.counts_down());
     }
     assert!(range.vehicle.aborted());
@@ -216,25 +216,25 @@ fn crowd() -> Vec<Program> {
     ]
 }
 
-/// What an onlooker writes down: who asked for what and was heard, alone under their ids, for this
-/// vehicle.
-struct Heard {
+/// Independent record of accepted commands: from a station with an uplink, alone under its ids, for
+/// this vehicle.
+struct Accepted {
     program: usize,
     command: u16,
     confirms: u16,
     at_s: f64,
 }
 
-/// The rule, told a second time and checked in every frame: a vehicle is armed, and a countdown
-/// begins, only by an ask and the confirmation of another person in another role, both from
-/// stations that are heard, alone under their ids, for this boot of this vehicle. In the countdown
-/// one person commands and another one taps; without the heartbeats of the one or the taps of the
-/// other it is held, but for its last moment.
+/// The rule, stated independently and checked in every frame: a vehicle is armed, and a countdown
+/// begins, only by a proposal and the confirmation of another person in another role. Both come
+/// from stations with an uplink, alone under their ids, for this boot of this vehicle. In the
+/// countdown one person commands and another one taps; without the heartbeats of the one or the
+/// taps of the other it is held, except in its last moment.
 #[test]
 #[expect(clippy::too_many_lines, reason = "one loop: what is drawn, what is sent, and the rule that is held")]
 fn a_million_random_requests_move_nothing_but_by_the_rule() {
     let mut random = ChaCha8Rng::seed_from_u64(11);
-    let two = People::Two { first_ask: FIRST_ASK };
+    let two = People::Two { first: FIRST_PROPOSAL };
     let fresh = || {
         let vehicle = rocket().with_crew(two, operators());
         let mut range = Range::of(vehicle, VehicleEndpoint::sending_to_crew(VehicleKind::Simulated), crowd());
@@ -245,15 +245,15 @@ fn a_million_random_requests_move_nothing_but_by_the_rule() {
         range
     };
     let mut range = fresh();
-    let mut heard: Vec<Heard> = Vec::new();
+    let mut accepted: Vec<Accepted> = Vec::new();
     let (mut requests, mut armed, mut started, mut released, mut taken) = (0_u32, 0, 0, 0, 0);
     while requests < 1_000_000 {
         let time_s = range.vehicle.time_s();
         let before = *range.vehicle.mode();
         let crew = range.vehicle.computer().crew().two_person;
-        let commander_before = range.endpoint.heard(time_s).commander;
-        heard.retain(|heard| time_s - heard.at_s <= CONFIRM_WITHIN_S + 1.0);
-        // Stations fall silent and come back; most of the time the twins are silent.
+        let commander_before = range.endpoint.uplink_state(time_s).commander;
+        accepted.retain(|one| time_s - one.at_s <= CONFIRM_WITHIN_S + 1.0);
+        // Stations fall silent and return; most of the time the twins are silent.
         let dice = random.next_u32();
         if dice.is_multiple_of(256) {
             let place = (dice >> 8) as usize % range.programs.len();
@@ -275,8 +275,8 @@ fn a_million_random_requests_move_nothing_but_by_the_rule() {
             };
             let confirms = match dice >> 21 & 3 {
                 0 => 0,
-                1 | 2 => crew.waiting(time_s).map_or(0, |ask| ask.number),
-                _ => FIRST_ASK.wrapping_add((dice >> 23 & 63) as u16),
+                1 | 2 => crew.waiting(time_s).map_or(0, |proposal| proposal.number),
+                _ => FIRST_PROPOSAL.wrapping_add((dice >> 23 & 63) as u16),
             };
             let boot = [BOOT as f32, BOOT as f32, 0.0, (BOOT - 1) as f32][(dice >> 29 & 3) as usize];
             let request = range.programs[program].request(command, param1, confirms, boot);
@@ -285,34 +285,35 @@ fn a_million_random_requests_move_nothing_but_by_the_rule() {
             range.put(program, &CommandRequest { target, ..request });
             let of = &range.programs[program];
             let alone = range.programs.iter().enumerate().all(|(other, twin)| {
-                other == program || twin.address != of.address || time_s - twin.heard_at_s > 5.0
+                other == program || twin.address != of.address || time_s - twin.received_at_s > 5.0
             });
-            let is_heard = time_s - of.heard_at_s <= UPLINK_PROVEN_S;
+            let is_received = time_s - of.received_at_s <= UPLINK_PROVEN_S;
             let ours = boot as u32 != BOOT - 1 && !to_all;
-            if alone && ours && (is_heard || command != ARM) && of.by.is_some() {
-                heard.push(Heard { program, command, confirms, at_s: time_s });
+            if alone && ours && (is_received || command != ARM) && of.by.is_some() {
+                accepted.push(Accepted { program, command, confirms, at_s: time_s });
             }
         }
         range.frame();
         let now_s = range.vehicle.time_s();
         let mode = *range.vehicle.mode();
         let crew_after = range.vehicle.computer().crew().two_person;
-        // Two people of two roles have agreed in this frame: the confirmation came now, the ask
-        // some time before.
+        // Two people of two roles have agreed in this frame: the confirmation arrived now, the
+        // proposal some time before.
         let agreed = |command: u16| {
-            heard.iter().filter(|one| one.command == command && one.at_s == time_s && one.confirms != 0).any(
-                |confirmation| {
+            accepted
+                .iter()
+                .filter(|one| one.command == command && one.at_s == time_s && one.confirms != 0)
+                .any(|confirmation| {
                     let by = range.programs[confirmation.program].by.unwrap();
-                    heard.iter().any(|ask| {
-                        let asker = range.programs[ask.program].by.unwrap();
-                        ask.command == command
-                            && ask.confirms == 0
-                            && (time_s - ask.at_s) <= CONFIRM_WITHIN_S + 0.05
-                            && asker.number != by.number
-                            && asker.role != by.role
+                    accepted.iter().any(|proposal| {
+                        let proposer = range.programs[proposal.program].by.unwrap();
+                        proposal.command == command
+                            && proposal.confirms == 0
+                            && (time_s - proposal.at_s) <= CONFIRM_WITHIN_S + 0.05
+                            && proposer.number != by.number
+                            && proposer.role != by.role
                     })
-                },
-            )
+                })
         };
         if mode.interlocks.armed && !before.interlocks.armed {
             armed += 1;
@@ -322,16 +323,16 @@ fn a_million_random_requests_move_nothing_but_by_the_rule() {
             started += 1;
             assert!(agreed(START), "started at {now_s} s without two people");
         }
-        let commander = range.endpoint.heard(now_s).commander;
+        let commander = range.endpoint.uplink_state(now_s).commander;
         if let (Some(old), Some(new)) = (commander_before, commander)
             && before.interlocks.armed
             && mode.interlocks.armed
             && old.station != new.station
-            && !heard.iter().any(|one| one.command == ARM && one.at_s == time_s && one.confirms != 0)
+            && !accepted.iter().any(|one| one.command == ARM && one.at_s == time_s && one.confirms != 0)
         {
             taken += 1;
             let (old_by, new_by) = (old.by.unwrap(), new.by.unwrap());
-            assert!(old.age_s > UPLINK_PROVEN_S, "taken from a station that is heard");
+            assert!(old.age_s > UPLINK_PROVEN_S, "taken from a station with an uplink");
             assert!(new_by.role == old_by.role || new_by.role == Role::RangeSafety);
         }
         if let Some(end_s) = mode.countdown_end_s {
@@ -347,7 +348,7 @@ fn a_million_random_requests_move_nothing_but_by_the_rule() {
             released += 1;
             assert!(before.countdown_end_s.is_some_and(|end_s| now_s >= end_s - 1e-9));
             range = fresh();
-            heard.clear();
+            accepted.clear();
         }
     }
     assert!(armed > 20 && started > 20 && released > 2 && taken > 2, "{armed} {started} {released} {taken}");

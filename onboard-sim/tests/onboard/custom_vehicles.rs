@@ -155,7 +155,7 @@ fn of_verdict(first: u64, verdict: Verdict) -> impl Iterator<Item = (u64, String
 }
 
 /// Tells many vehicles of a verdict (`VERDICT=no`): `VEHICLES=60 FLIGHTS=100 cargo test --release
-/// -p onboard-sim --test onboard own_vehicles -- --ignored --nocapture`.
+/// -p onboard-sim --test onboard custom_vehicles -- --ignored --nocapture`.
 #[test]
 #[ignore = "takes minutes: the table of many vehicles"]
 fn table() {

@@ -5,7 +5,7 @@ use flight::vehicle::launch::Launch;
 use super::*;
 use crate::world::truth::AscentTruth;
 
-const LIT: Actuators = Actuators { ignite_booster: true, ..Actuators::NONE };
+const IGNITING: Actuators = Actuators { ignite_booster: true, ..Actuators::NONE };
 
 /// mk2 on its rail with this lean, degrees, in still air.
 fn on_rail(tilt_deg: f64, truth: &Truth, ascent: &AscentTruth) -> World {
@@ -24,7 +24,7 @@ fn on_rail(tilt_deg: f64, truth: &Truth, ascent: &AscentTruth) -> World {
 fn apogee(world: &mut World) -> [f64; 4] {
     let from_m = world.state().position_m;
     while world.time_s() < 1.0 || world.state().velocity_m_s.z > 0.0 {
-        world.step(&LIT);
+        world.step(&IGNITING);
     }
     let state = world.state();
     let travel_m = state.position_m - from_m;
@@ -77,12 +77,12 @@ fn val_rocketpy_rail_exit_and_burn_out() {
     let from_m = world.state().position_m;
     let travelled_m = |world: &World| (world.state().position_m - from_m).norm();
     while travelled_m(&world) < 2.5 {
-        world.step(&LIT);
+        world.step(&IGNITING);
     }
     assert!((world.time_s() - 0.15 - 0.2763).abs() < 0.003, "{}", world.time_s());
     assert!((world.state().velocity_m_s.norm() - 17.448).abs() < 0.15, "{}", world.state().velocity_m_s);
     while world.time_s() < 0.15 + 1.692 {
-        world.step(&LIT);
+        world.step(&IGNITING);
     }
     assert!((world.state().velocity_m_s.norm() - 70.242).abs() < 0.35, "{}", world.state().velocity_m_s);
     assert!((travelled_m(&world) - 76.987).abs() < 0.4, "{}", travelled_m(&world));
@@ -103,7 +103,7 @@ fn val_hand_the_stack_turns_into_the_wind() {
     let mut world = on_rail(2.0, &windy, &AscentTruth::default());
     let upright_rad = world.state().tilt_rad();
     while world.state().velocity_m_s.norm() < 17.6 {
-        world.step(&LIT);
+        world.step(&IGNITING);
     }
     let through_air = world.air_velocity_m_s();
     let nose = world.state().nose_in_world();
@@ -113,7 +113,7 @@ fn val_hand_the_stack_turns_into_the_wind() {
     assert!((libm::asin(sine).to_degrees() - 15.7).abs() < 0.3, "{sine}");
     let found_rad_s2 = world.angular_acceleration_rad_s2().norm();
     assert!((found_rad_s2 / expected_rad_s2 - 1.0).abs() < 0.02, "{found_rad_s2}, {expected_rad_s2}");
-    world.advance(&LIT, 1000);
+    world.advance(&IGNITING, 1000);
     assert!(world.state().nose_in_world().x > libm::sin(upright_rad) + 0.1, "into the wind");
 }
 
@@ -138,9 +138,9 @@ fn val_hand_masses_of_the_stack_on_its_rail() {
 fn the_charge_parts_the_stages_and_pushes_the_vehicle() {
     let ascent = AscentTruth { tip_off_rad_s: [0.1, -0.05], ..AscentTruth::default() };
     let mut world = on_rail(0.0, &Truth::default(), &ascent);
-    world.advance(&LIT, 5000);
+    world.advance(&IGNITING, 5000);
     let before = *world.state();
-    world.advance(&Actuators { separate: true, ..LIT }, 21);
+    world.advance(&Actuators { separate: true, ..IGNITING }, 21);
     assert!(!world.booster_attached() && world.charge_fired_s().is_some());
     let pushed_m_s = world.state().velocity_m_s.z - before.velocity_m_s.z + 0.021 * 9.8;
     // 2 N s on 3.1 kg, and some drag.
@@ -150,7 +150,7 @@ fn the_charge_parts_the_stages_and_pushes_the_vehicle() {
 
     let mut stuck = on_rail(0.0, &Truth::default(), &ascent);
     stuck.inject(&Fault::SeparationFails);
-    stuck.advance(&Actuators { separate: true, ..LIT }, 6000);
+    stuck.advance(&Actuators { separate: true, ..IGNITING }, 6000);
     assert!(stuck.booster_attached());
 }
 
@@ -159,7 +159,7 @@ fn a_stack_that_falls_back_ends_in_a_body_strike() {
     let mut world = on_rail(5.0, &Truth::default(), &AscentTruth::default());
     world.inject(&Fault::AscentWeak { scale: 0.4 });
     while world.rest().is_none() && world.time_s() < 60.0 {
-        world.step(&LIT);
+        world.step(&IGNITING);
     }
     assert_eq!(world.rest().map(|rest| rest.outcome), Some(RestOutcome::BodyStrike));
     assert!(world.touchdown().is_some_and(|touchdown| touchdown.over_ground.vertical_m_s < -15.0));
@@ -169,7 +169,7 @@ fn a_stack_that_falls_back_ends_in_a_body_strike() {
 fn canted_fins_roll_the_stack_until_the_wind_at_them_is_straight() {
     let ascent = AscentTruth { fin_cant_rad: 0.002, ..AscentTruth::default() };
     let mut world = on_rail(0.0, &Truth::default(), &ascent);
-    world.advance(&LIT, 4000);
+    world.advance(&IGNITING, 4000);
     let speed_m_s = world.state().velocity_m_s.norm();
     // At the fins' radius of 58 mm.
     let steady_rad_s = 0.002 * speed_m_s / 0.058;
