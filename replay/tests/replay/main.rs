@@ -7,7 +7,6 @@ mod another_build;
 mod apogee;
 mod asked;
 mod asked_well;
-mod baseline;
 mod book;
 mod clocks;
 mod command_line;
