@@ -16,9 +16,7 @@ use crate::cli::{Answer, give, warn_of_what_is_missing};
 pub use crate::controller::Decided;
 use crate::controller::{AgainError, LoggedComputer, phase_name};
 use crate::log::Recording;
-use crate::print::columns;
 use crate::settings::Setting;
-use crate::verify::explain::degrees;
 
 /// Sections that a flight computer never sees: the limits of the verdict, and the random draw.
 const NOT_THE_PILOTS: [&str; 2] = ["leg_limits.", "truth."];
@@ -192,11 +190,7 @@ fn phases(frames: &[EvaluatedFrame]) -> Vec<PhaseEntered> {
     phases
 }
 
-/// Most differing frames that are shown.
-const FRAMES_SHOWN: usize = 120;
-
 impl Answer for EvaluateReport {
-    /// The summary, then the frames that differ.
     fn sentences(&self) -> Vec<String> {
         let Self { file, kind, unchanged_different, commands_different, frames_compared, .. } = self;
         let (settings, compared) = (self.settings.join(" "), frames_compared);
@@ -234,46 +228,8 @@ impl Answer for EvaluateReport {
         if differing.is_empty() {
             return lines;
         }
-        // Thousands of frames hardly differ.
-        let stride = differing.len().div_ceil(FRAMES_SHOWN).max(1);
-        if stride > 1 {
-            lines.push(format!("one of {stride} differing frames; --json has every frame:"));
-        }
-        let head = ["frame", "time s", "phase", "gimbal deg", "cost", "iterations", "plan lands", ""];
-        let rows = differing.into_iter().step_by(stride).map(EvaluatedFrame::row);
-        let rows = std::iter::once(head.map(str::to_owned)).chain(rows);
-        lines.extend(columns(['>', '>', '<', '>', '>', '>', '>', '<'], rows));
+        lines.push(format!("{} frames differ; --json has every frame", differing.len()));
         lines
-    }
-}
-
-impl EvaluatedFrame {
-    fn row(&self) -> [String; 8] {
-        let both =
-            |of: &dyn Fn(&Decided) -> String| format!("{} -> {}", of(&self.recorded), of(&self.evaluated));
-        let level = if self.recorded.level == self.evaluated.level {
-            String::new()
-        } else {
-            both(&|decided| decided.level.to_owned())
-        };
-        [
-            self.frame.to_string(),
-            format!("{:.3}", self.time_s),
-            self.phase.to_owned(),
-            both(&|decided| degrees(&decided.gimbal_rad, 3)),
-            both(&|decided| format!("{:.2}", decided.cost)),
-            both(&|decided| decided.iterations.to_string()),
-            both(&|decided| yes_no(decided.plan_lands).to_owned()),
-            level,
-        ]
-    }
-}
-
-fn yes_no(answer: Option<bool>) -> &'static str {
-    match answer {
-        None => "-",
-        Some(true) => "yes",
-        Some(false) => "no",
     }
 }
 

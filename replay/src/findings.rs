@@ -1,12 +1,14 @@
-//! What went wrong in a flight: what its computer shows when it is run again on the log's frames,
-//! and the limits that the landing broke.
+//! Failures of a flight: the findings of its computer, which is run again on the log's frames from
+//! power-up on, and the limits that the landing broke.
 
 use flight::computer::findings::{Findings, Sign};
+use flight::rules::verdict::UNDER_PARACHUTE;
 use foxglove::messages::log::Level;
 use protocol::log::computer_v1::ComputerFrame;
+use protocol::log::v1::LimitResult;
 use serde::Serialize;
 
-use crate::controller::{FrameError, LoggedComputer};
+use crate::controller::LoggedComputer;
 use crate::log::{Clock, ClockTime, Recording, Verdict, worst_first};
 
 /// One finding.
@@ -31,12 +33,16 @@ impl Finding {
     }
 }
 
-/// The findings of a recorded flight, first in time; `None` if its computer cannot be run again, or
-/// decides otherwise than it did: what it would have commanded says nothing of surfaces that
-/// followed other commands.
-pub(crate) fn of(recording: &Recording, verdict: Option<&Verdict>) -> Option<Vec<Finding>> {
-    let again = run_again(recording, LoggedComputer::run_again);
-    facts(recording, verdict, again.and_then(|(_, findings)| findings))
+/// Findings of a recorded flight, first in time.
+///
+/// # Errors
+/// The reason why nothing was looked for.
+pub(crate) fn of(
+    recording: &Recording,
+    verdict: Option<&Verdict>,
+    see: impl FnMut(&LoggedComputer, &ComputerFrame, &ComputerFrame),
+) -> Result<Vec<Finding>, String> {
+    facts(recording, verdict, run_again(recording, see).and_then(|(_, findings)| findings))
 }
 
 /// What the vehicle itself reported before its release, each once; all it reported if it was never
@@ -57,35 +63,56 @@ fn on_the_pad(recording: &Recording) -> Vec<Finding> {
     facts
 }
 
-/// The computer of a recorded flight after all its frames, each of which `run` has run again;
-/// `None` if that cannot be. Beside it what it shows; `None` if it decides otherwise than it did.
+/// Runs the computer of a recorded flight again. `see` receives it after each frame, with the
+/// recorded frame and the new one. Returns the computer at the end, and its findings: what a
+/// computer that decides otherwise would have commanded says nothing of surfaces that followed
+/// other commands.
+///
+/// # Errors
+/// The reason why it cannot be run again.
 pub(crate) fn run_again(
     recording: &Recording,
-    mut run: impl FnMut(&mut LoggedComputer, &ComputerFrame) -> Result<ComputerFrame, FrameError>,
-) -> Option<(LoggedComputer, Option<Findings>)> {
-    let (start, frames) = recording.replayable_frames().ok()?;
-    let toml = recording.profile_toml().ok()?;
-    let mut computer = LoggedComputer::recorded(toml, start, &recording.head.run, &[]).ok()?;
-    let mut findings = Some(Findings::default());
+    mut see: impl FnMut(&LoggedComputer, &ComputerFrame, &ComputerFrame),
+) -> Result<(LoggedComputer, Result<Findings, String>), String> {
+    let (start, frames) = recording.replayable_frames().map_err(|error| error.to_string())?;
+    let mut computer = if let Some(computer) = &recording.at_release {
+        computer.as_ref().clone()
+    } else {
+        let toml = recording.profile_toml().map_err(|error| error.to_string())?;
+        LoggedComputer::recorded(toml, start, &recording.head.run, &[]).map_err(|error| error.to_string())?
+    };
+    let mut findings = Ok(Findings::default());
     for frame in frames {
-        let again = run(&mut computer, frame).ok()?;
-        findings = findings.filter(|_| again.output == frame.output);
-        if let Some(findings) = &mut findings {
+        let again = match &recording.at_release {
+            Some(_) => computer.run_again(&recording.since_power_up(frame)),
+            None => computer.run_again(frame),
+        };
+        let again = again.map_err(|error| error.to_string())?;
+        if findings.is_ok() && again.output != frame.output {
+            let number = recording.release_frame + frame.input.frame;
+            findings = Err(format!("this build decides otherwise from frame {number} on"));
+        }
+        if let Ok(findings) = &mut findings {
             findings.note(computer.computer());
         }
+        see(&computer, frame, &ComputerFrame { input: frame.input.clone(), ..again });
     }
-    Some((computer, findings))
+    Ok((computer, findings))
 }
 
-/// What the vehicle said on its pad, the findings of a computer that was run again with the
-/// recorded decisions, and the limits that were broken.
+/// The vehicle's own reports on its pad, the findings of a computer that was run again, and the
+/// limits that the landing broke.
+///
+/// # Errors
+/// `findings` has none, and the vehicle was not released, either.
 pub(crate) fn facts(
     recording: &Recording,
     verdict: Option<&Verdict>,
-    findings: Option<Findings>,
-) -> Option<Vec<Finding>> {
-    let Some(findings) = findings else {
-        return (recording.frames.is_empty() && recording.from_power_up).then(|| on_the_pad(recording));
+    findings: Result<Findings, String>,
+) -> Result<Vec<Finding>, String> {
+    let findings = match findings {
+        Err(_) if recording.frames.is_empty() && recording.from_power_up => return Ok(on_the_pad(recording)),
+        findings => findings?,
     };
     let mut facts = on_the_pad(recording);
     facts.extend(findings.found().iter().map(|finding| Finding {
@@ -99,7 +126,7 @@ pub(crate) fn facts(
         let since_s = recording.contact_s().unwrap_or(f64::NAN);
         facts.push(Finding { since_s, clock: Clock::Flight, lasted_s: 0.0, words, picture: "limits" });
     }
-    Some(facts)
+    Ok(facts)
 }
 
 /// The pictures of the fins.
@@ -123,21 +150,29 @@ fn picture(sign: Sign) -> &'static str {
     }
 }
 
-/// The limits that a landing broke, the worst first, and what the motor still pushed; `None` if it
-/// kept all.
+/// How the landing failed, the limits that it broke, the worst first, and the remaining thrust;
+/// `None` if it kept all, and of a vehicle that came down under its parachute.
 fn broken(verdict: &Verdict, findings: &Findings, nothing_else: bool) -> Option<String> {
-    // A vehicle that comes down under its parachute is judged by nothing else.
-    let judged = verdict.deciding().all(|limit| limit.maximum > limit.minimum);
-    let broken = worst_first(verdict.deciding().filter(|limit| judged && !limit.passed));
-    let ((worst, share), others) = broken.split_first()?;
-    let also: Vec<String> =
-        others.iter().map(|(limit, share)| format!("{} {}", limit.name, over(*share))).collect();
-    let mut words = vec![format!("{} {:.2} {}: {}", worst.name, worst.value.abs(), worst.unit, over(*share))];
-    if !also.is_empty() {
-        words.push(format!("also {}", also.join(", ")));
-    } else if nothing_else {
-        words.push("nothing else wrong".to_owned());
+    // A body strike or a fall is no quantity: its limit has no width.
+    let has_width = |limit: &&LimitResult| limit.maximum > limit.minimum;
+    let failure = verdict.deciding().find(|limit| !limit.passed && !has_width(limit));
+    let limits: Vec<&LimitResult> = match failure {
+        Some(failure) if failure.name == UNDER_PARACHUTE => return None,
+        Some(_) => verdict.of_the_legs().collect(),
+        None => verdict.deciding().collect(),
+    };
+    let broken = worst_first(limits.into_iter().filter(|limit| !limit.passed && has_width(limit)));
+    let mut words: Vec<String> = failure.map(|failure| failure.name.clone()).into_iter().collect();
+    if let Some(((worst, share), others)) = broken.split_first() {
+        words.push(format!("{} {:.2} {}: {}", worst.name, worst.value.abs(), worst.unit, over(*share)));
+        let also: Vec<String> =
+            others.iter().map(|(limit, share)| format!("{} {}", limit.name, over(*share))).collect();
+        words.extend((!also.is_empty()).then(|| format!("also {}", also.join(", "))));
     }
+    if words.is_empty() {
+        return None;
+    }
+    words.extend((words.len() == 1 && nothing_else).then(|| "nothing else wrong".to_owned()));
     let ratio = findings.thrust_over_weight_at_contact();
     words.extend(ratio.map(|ratio| format!("the thrust was {ratio:.2} of the weight")));
     Some(words.join("; "))

@@ -11,8 +11,7 @@
 //! * [`findings`]: what went wrong in a flight, first in time.
 //! * [`controller`]: builds the flight computer that a log's frames came from.
 //! * [`verify`]: runs every frame again on its recorded input and compares the results bit for bit;
-//!   explains one, holds a directory of logs against a baseline, and proves the books of ground
-//!   stations.
+//!   explains one, and proves the books of ground stations.
 //! * [`settings`]: other settings for a recorded flight, named as in its mission.
 //! * [`evaluate`](mod@evaluate): runs the controller alone with other settings on recorded inputs
 //!   (open loop).
@@ -30,7 +29,6 @@
 pub mod cli;
 pub mod compare;
 pub mod controller;
-mod digest;
 pub use onboard_sim::files as output;
 pub mod evaluate;
 pub mod export;
@@ -55,10 +53,9 @@ use protocol::program::{EXIT_CODES, Exit, Manual, Shown};
 /// Answers go to standard output, warnings and errors to standard error.
 ///
 /// The answer is no, and the exit code 3: of verify, if something differs or cannot be, or with
-/// --strict not all that can be compared was; with --baseline, if some flight got worse, lands no
-/// longer, diverged or is lost; with --book, if a book is broken, or its end is not proven; of
-/// compare, if the verdicts differ, signals are missing or a log is damaged; of fit, if it is
-/// NO-GO. It is 5 if verify cannot run some frame again (no frames, no profile, frames missing) and
+/// --strict not all that can be compared was; with --book, if a book is broken, or its end is not
+/// proven; of compare, if the verdicts differ, signals or samples are missing or a log is damaged, or
+/// if a second folder lands less often; of fit, if it is NO-GO. It is 5 if verify cannot run some frame again (no frames, no profile, frames missing) and
 /// all others are identical, if no log has a book, and if some of several logs could not be read
 /// and the answer of the others is not no.
 ///
@@ -95,12 +92,10 @@ enum Command {
     /// differs).
     ///
     /// With --explain the plan of a recorded frame is solved again and judged: cost, what is
-    /// broken, warm against cold start, predicted path. With --baseline a directory of flights is
-    /// held against one: every flight verified, flown again and compared; exit code 0 if none got
-    /// worse, 3 if some did. With --book the books of ground stations are proven (who did what
-    /// when), or the first broken link is named.
+    /// broken, warm against cold start, predicted path. With --book the books of ground stations
+    /// are proven (who did what when), or the first broken link is named.
     #[command(
-        after_help = "Examples:\n  replay verify flight.mcap\n  replay verify flight.mcap --explain 6400\n  replay verify logs --baseline baseline.json\n  replay verify --book ground.mcap vehicle.mcap"
+        after_help = "Examples:\n  replay verify flight.mcap\n  replay verify flight.mcap --explain 6400\n  replay verify logs\n  replay verify --book ground.mcap vehicle.mcap"
     )]
     Verify(verify::Args),
     /// Open loop: what the controller alone would have commanded with other settings, on the
@@ -116,20 +111,21 @@ enum Command {
     #[command(after_help = "Example: replay refly flight.mcap --plant truth.impulse_scale=0.99")]
     Refly(refly::Args),
     /// Compares flights: the answer in one sentence, then verdicts, signals (RMS, maximum and
-    /// when), words.
+    /// when).
     ///
     /// Signals are named as in an export. Exit code 3 if the verdicts differ, if one flight lacks a
-    /// signal or if one log is damaged. Two missions are compared setting by setting; exit code 3
-    /// if one differs.
+    /// signal or samples of a table, or if one log is damaged. Two folders are compared as sets of
+    /// flights, paired by seed and number: rates, flips and distributions; exit code 3 if the second
+    /// lands less often than chance explains, or lacks a flight.
     #[command(
-        after_help = "Examples:\n  replay compare old.mcap new.mcap\n  replay compare mk3 day/mission.toml"
+        after_help = "Examples:\n  replay compare old.mcap new.mcap\n  replay compare old-logs new-logs"
     )]
     Compare(compare::Args),
     /// Writes a flight as one HTML page with its pictures inside: no network, whole without its
     /// script.
     #[command(after_help = "Example: replay report flight.mcap")]
     Report(report::Args),
-    /// Writes a log's content as CSV or a Rerun recording.
+    /// Writes a log's content as CSV; replay-rerun writes a Rerun recording.
     #[command(after_help = "Example: replay export flight.mcap --to csv --out tables")]
     Export(export::Args),
     /// Recovers a readable log from a damaged one, and reports what was recovered and what time

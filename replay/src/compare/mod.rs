@@ -3,27 +3,28 @@
 //! Every number of both logs becomes a signal, named as in [`table`](crate::table)
 //! (`computer_frame.output.…`). The second flight is shifted so that the ignition of both
 //! coincides, if both have one. It is then read at the times of the first flight: linear between
-//! samples, whole numbers held. Measured solve times are not signals. A signal with more samples in
-//! one of the two differs, because interpolation would hide a lost record.
+//! samples, whole numbers held. Planning latencies are not signals. A table with fewer samples in one
+//! of the two, in the time that both cover, fails: interpolation would hide a lost record.
 //!
-//! Tables of words (events, limits) are compared row by row, without times.
+//! Two folders of logs are compared as sets of flights ([`compare_sets`]).
 
 mod difference;
 mod missions;
 mod print;
 mod series;
+mod sets;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use anyhow::Result;
+use anyhow::{Result, bail, ensure};
 pub use difference::SignalDifference;
 pub(crate) use missions::compared;
-pub use missions::{MissionComparison, SettingDifference};
-use missions::{compare_missions, is_mission};
 use protocol::program::Exit;
 use serde::Serialize;
 pub use series::{Align, Flown, Series};
+pub(crate) use sets::flips_in_words;
+pub use sets::{FlightSet, Flip, SetComparison, compare_sets};
 
 use crate::cli::{give, warn_of_loss};
 use crate::log::Verdict;
@@ -47,21 +48,8 @@ pub struct Comparison {
     pub missing: Vec<String>,
     /// Signals that only the other has.
     pub added: Vec<String>,
-    /// Rows of words that only one of the two has.
-    pub words: Vec<WordsOfOne>,
     /// Why the second is not like the first, in words.
     pub failures: Vec<String>,
-}
-
-/// A row of words that only one of two logs has, or has more often.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct WordsOfOne {
-    pub table: String,
-    pub row: String,
-    /// Rows of the baseline.
-    pub baseline: usize,
-    /// Rows of the other.
-    pub other: usize,
 }
 
 impl Comparison {
@@ -90,6 +78,7 @@ pub fn compare(baseline: &Flown, other: &Flown) -> Comparison {
         let failure = || format!("{} {what}", counted(signals.len() as u64, "signal"));
         failures.extend((!signals.is_empty()).then(failure));
     }
+    failures.extend(lost_samples([a, b], shift_s));
     if signals.is_empty() {
         // For example two logs with different topics. "No differences" would be misleading here.
         failures.push("the logs have no signal in common: nothing was compared".to_owned());
@@ -108,9 +97,39 @@ pub fn compare(baseline: &Flown, other: &Flown) -> Comparison {
         signals,
         missing,
         added,
-        words: words_of_one(baseline, other),
         failures,
     }
+}
+
+/// Tables that have fewer samples in one flight, in the time that both cover: interpolation hides
+/// them.
+fn lost_samples([ours, theirs]: [&BTreeMap<String, Series>; 2], shift_s: f64) -> Vec<String> {
+    /// Flights begin and end between two samples, and their restarts differ.
+    const SLACK: usize = 2;
+    const SLACK_SHARE: f64 = 0.01;
+    let mut rows: BTreeMap<&str, [usize; 2]> = BTreeMap::new();
+    for (name, ours) in ours {
+        let Some(theirs) = theirs.get(name) else { continue };
+        let ends = |series: &Series, shift_s: f64| {
+            Some([series.times_s.first()? + shift_s, series.times_s.last()? + shift_s])
+        };
+        let (Some(own), Some(other)) = (ends(ours, 0.0), ends(theirs, shift_s)) else { continue };
+        let span = [own[0].max(other[0]), own[1].min(other[1])];
+        let count = |series: &Series, shift_s: f64| {
+            let before = |time_s: f64| series.times_s.partition_point(|at_s| at_s + shift_s <= time_s);
+            before(span[1]).saturating_sub(before(span[0]))
+        };
+        // The rows of a table: some columns are empty in some of them.
+        let most = rows.entry(name.split('.').next().unwrap_or_default()).or_default();
+        *most = [most[0].max(count(ours, 0.0)), most[1].max(count(theirs, shift_s))];
+    }
+    let lost = rows.into_iter().filter(|(_, [ours, theirs])| {
+        ours.abs_diff(*theirs) > SLACK + (SLACK_SHARE * *ours.max(theirs) as f64) as usize
+    });
+    lost.map(|(table, [ours, theirs])| {
+        format!("samples of {table} are missing: {ours} and {theirs} in the time that both cover")
+    })
+    .collect()
 }
 
 /// Parts of the flights that were not compared because of damage or a missing end.
@@ -130,31 +149,11 @@ fn incomplete(flights: [&Flown; 2]) -> Vec<String> {
     failures
 }
 
-/// The rows of words that only one log has, of the tables that both have.
-fn words_of_one(baseline: &Flown, other: &Flown) -> Vec<WordsOfOne> {
-    let mut found = Vec::new();
-    for (table, ours) in &baseline.words {
-        let Some(theirs) = other.words.get(table) else { continue };
-        let rows: BTreeSet<&String> = ours.keys().chain(theirs.keys()).collect();
-        found.extend(rows.into_iter().filter_map(|row| {
-            let count = |of: &BTreeMap<String, usize>| of.get(row).copied().unwrap_or(0);
-            let (baseline, other) = (count(ours), count(theirs));
-            (baseline != other).then(|| WordsOfOne {
-                table: table.clone(),
-                row: row.clone(),
-                baseline,
-                other,
-            })
-        }));
-    }
-    found
-}
-
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// The flight to compare with, or a mission (built-in or a TOML file).
+    /// The flight to compare with, or a folder of logs.
     baseline: PathBuf,
-    /// The other flights, or missions.
+    /// The other flights, or the other folder.
     #[arg(required = true)]
     others: Vec<PathBuf>,
     /// Answer in JSON.
@@ -164,9 +163,15 @@ pub(crate) struct Args {
 
 impl Args {
     pub(crate) fn run(self) -> Result<Exit> {
-        if is_mission(&self.baseline) {
-            let others: Vec<&Path> = self.others.iter().map(PathBuf::as_path).collect();
-            return give(&compare_missions(&self.baseline, &others)?, self.json);
+        if self.baseline.is_dir() {
+            let [other] = self.others.as_slice() else { bail!("two folders are compared, not more") };
+            ensure!(
+                other.is_dir(),
+                "{}: is no folder, and {} is one",
+                other.display(),
+                self.baseline.display()
+            );
+            return give(&compare_sets(&self.baseline, other)?, self.json);
         }
         let baseline = open(&self.baseline)?;
         let mut comparisons = Vec::new();

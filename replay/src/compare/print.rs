@@ -1,6 +1,6 @@
 //! A comparison for people.
 
-use super::{Align, Comparison, SignalDifference, WordsOfOne};
+use super::{Align, Comparison, SignalDifference};
 use crate::cli::Answer;
 use crate::print::{columns, counted, limits_of_both, verdict_table, word};
 use protocol::program::Exit;
@@ -11,7 +11,7 @@ const SIGNALS_SHOWN: usize = 60;
 const SAME: f64 = 1e-4;
 /// Most limits named in which the landings differ.
 const LIMITS_SHOWN: usize = 3;
-/// Most names and rows of words listed.
+/// Most names listed.
 const NAMES_SHOWN: usize = 20;
 
 impl Answer for Comparison {
@@ -43,15 +43,6 @@ impl Answer for Comparison {
                 lines.push(format!("{what}: {}", listed.join(", ")));
                 lines.extend(more(names.len(), NAMES_SHOWN));
             }
-        }
-        if !self.words.is_empty() {
-            let head = ["row of words", "first", "second"].map(str::to_owned);
-            let row = |WordsOfOne { table, row, baseline, other }: &WordsOfOne| {
-                [format!("{table}: {row}"), baseline.to_string(), other.to_string()]
-            };
-            let rows = self.words.iter().take(NAMES_SHOWN).map(row);
-            lines.extend(columns(['<', '>', '>'], std::iter::once(head).chain(rows)));
-            lines.extend(more(self.words.len(), NAMES_SHOWN));
         }
         if self.failures.len() > 1 {
             lines.push("NOT like the first:".to_owned());

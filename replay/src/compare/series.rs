@@ -31,13 +31,10 @@ const NO_SIGNALS: [&str; 9] = [
 /// Beginnings of columns that are not signals: the crew and the log, which are others in every
 /// flight.
 const NO_SIGNALS_OF: [&str; 6] =
-    ["input.log_", "input.uplink", "input.commander", "input.people", "input.rehearsed", "output.answers"];
+    ["input.log", "input.uplink", "input.commander", "input.people", "input.rehearsed", "output.answers"];
 
-/// Tables of words.
-const WORDS: [&str; 4] = ["events", "verdict_limits", "operator", "book"];
-
-/// A table without signals.
-const NO_SIGNAL_TABLE: &str = "computer_start";
+/// Tables without signals.
+const NO_SIGNAL_TABLES: [&str; 5] = ["computer_start", "events", "verdict_limits", "operator", "book"];
 
 /// One signal.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -73,8 +70,6 @@ pub struct Flown {
     pub name: String,
     /// The signals, by name.
     pub signals: BTreeMap<String, Series>,
-    /// The rows of tables of words, without times and numbers, with how often each is there.
-    pub(super) words: BTreeMap<String, BTreeMap<String, usize>>,
     /// Ignition of the landing motor, vehicle time, s.
     pub ignition_s: Option<f64>,
     /// The landing verdict.
@@ -100,20 +95,11 @@ impl Flown {
         // By table and column; `None` of a column that is no signal.
         let mut read: Vec<Vec<Option<Series>>> = Vec::new();
         let (mut held, mut out_of_order) = (0_usize, 0_usize);
-        let mut words: BTreeMap<String, BTreeMap<String, usize>> = BTreeMap::new();
         let mut reader = TableReader::new();
         reader.read::<_, RecordingError>(&mut log, |shape, row| {
             let log_ns = row.cells.first().and_then(Cell::number).unwrap_or(0.0);
             let since_s = (log_ns - *first_ns.get_or_insert(log_ns)) / 1e9;
-            if shape.name == NO_SIGNAL_TABLE || shape.name.starts_with(MESSAGES) {
-                return Ok(());
-            }
-            if WORDS.contains(&shape.name.as_str()) {
-                *words
-                    .entry(shape.name.clone())
-                    .or_default()
-                    .entry(words_of(shape, &row.cells))
-                    .or_default() += 1;
+            if NO_SIGNAL_TABLES.contains(&shape.name.as_str()) || shape.name.starts_with(MESSAGES) {
                 return Ok(());
             }
             let time_s = if let Some(place) = shape.place_of(FLIGHT_TIME_S) {
@@ -165,7 +151,6 @@ impl Flown {
         Ok(Self {
             name,
             signals,
-            words,
             ignition_s,
             verdict: log.verdict().as_ref().map(Verdict::found),
             damage: log.damage().map(ToString::to_string),
@@ -173,15 +158,6 @@ impl Flown {
             out_of_order,
         })
     }
-}
-
-/// The words of a row.
-fn words_of(shape: &TableShape, cells: &[Cell]) -> String {
-    let texts = shape.columns.iter().zip(cells).filter_map(|(_, cell)| match cell {
-        Cell::Text(text) => Some(text.as_str()),
-        _ => None,
-    });
-    texts.collect::<Vec<_>>().join(": ")
 }
 
 fn is_signal(column: &str) -> bool {

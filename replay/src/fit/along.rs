@@ -24,6 +24,7 @@ use sim::world::wind::gusts::GustScales;
 
 use super::burn::{Burn, SHAPE_TERMS, shape_sigmas};
 use super::least_squares::{NoiseStep, Prior, Solution, Whitener, inflate, lowest, solve, solve_from};
+use super::sound;
 use super::trace::{Frame, Trace};
 
 /// The fall counts from this speed on, m/s: a slower vehicle lies across a wind that is not known
@@ -402,9 +403,13 @@ impl<'a> Series<'a> {
     }
 }
 
-/// Fits fall and burn; an error is the reason why the flight tells nothing.
-pub(super) fn fit_along(trace: &Trace, thrust_along: &dyn Fn(f64) -> f64) -> Result<Along, &'static str> {
+/// Fits fall and burn.
+///
+/// # Errors
+/// The reason why the flight determines neither drag nor thrust.
+pub(super) fn fit_along(trace: &Trace, thrust_along: &dyn Fn(f64) -> f64) -> Result<Along, String> {
     let series = Series::new(trace, thrust_along)?;
+    sound::check(trace, &series.frames[..series.fallen], false)?;
     let at_ignition = &series.frames[series.fallen - 1].estimate;
     let bias = Prior {
         mean: at_ignition.accelerometer_bias_m_s2.x,
@@ -428,7 +433,8 @@ pub(super) fn fit_along(trace: &Trace, thrust_along: &dyn Fn(f64) -> f64) -> Res
     };
     let burnt = match commanded_s {
         None => Err("the motor was not lit".to_owned()),
-        Some(at_s) => series.burn(at_s, priors.clone(), updraught_m_s),
+        Some(at_s) => sound::check(trace, &series.frames[series.fallen - 1..], true)
+            .and_then(|()| series.burn(at_s, priors.clone(), updraught_m_s)),
     };
     match burnt {
         Ok((solution, seen_s)) => Ok(found(solution, Ok(seen_s))),

@@ -28,10 +28,10 @@ use sim::world::truth::Truth;
 use statrs::distribution::{Beta, ContinuousCDF as _};
 use statrs::function::beta::beta;
 
-use super::lot::{Prediction, Trial, burnt, draw_next, predict};
+use super::lot::{Prediction, Trial, burnt, burnt_weighted, distances, draw_next, predict, weight};
 use super::{Basis, Fit, Parameter, Pooled, Z_95, pooled};
 use crate::cli::{Answer, say, text_of};
-use crate::print::counted;
+use crate::print::{columns, counted};
 use crate::settings::{Setting, mission_toml_with, mission_with};
 use onboard_sim::files::{new_folder, write_folder};
 use onboard_sim::run::threads;
@@ -55,6 +55,51 @@ pub struct LotReport {
     pub prior_sigma: f64,
 }
 
+/// A burn beside the others.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Burn {
+    /// The log or the stand's table.
+    pub source: String,
+    /// Distances of thrust, burn time and ignition delay from the median, in standard deviations of
+    /// a next burn; `None` if not found.
+    pub distances: [Option<f64>; 3],
+    /// Weight in the lot, 0 to 1.
+    pub weight: f64,
+}
+
+impl Burn {
+    /// Every fit with thrust and burn time, each beside the others: the further of the two decides
+    /// the weight.
+    fn of<'a>(fits: &'a [Fit], priors: &[Posterior; 3]) -> Vec<(&'a Fit, Self)> {
+        let is_burn = |fit: &&Fit| PROPERTIES[..2].iter().all(|(name, _)| fit.get(name).is_some());
+        let burns: Vec<&Fit> = fits.iter().filter(is_burn).collect();
+        let of_each: [Vec<Option<f64>>; 3] = std::array::from_fn(|property| {
+            let found = burns.iter().map(|fit| fit.get(PROPERTIES[property].0));
+            let found: Vec<_> = found.map(|found| found.map(|found| (found.value, found.sigma))).collect();
+            let known: Vec<_> = found.iter().flatten().copied().collect();
+            let mut distances = distances(&priors[property], &known).into_iter();
+            found.iter().map(|found| found.and_then(|_| distances.next())).collect()
+        });
+        let burn = |(place, fit): (usize, &&'a Fit)| {
+            let distances = of_each.each_ref().map(|distances| distances[place]);
+            let weight =
+                distances[..2].iter().flatten().map(|distance| weight(*distance)).fold(1.0, f64::min);
+            (*fit, Self { source: fit.source.clone(), distances, weight })
+        };
+        burns.iter().enumerate().map(burn).collect()
+    }
+
+    /// The burns by their distance, the furthest first.
+    fn listed(burns: &[Self]) -> String {
+        let furthest =
+            |burn: &Self| burn.distances.iter().flatten().fold(0.0, |most, one| one.abs().max(most));
+        let mut sorted: Vec<_> = burns.iter().map(|burn| (furthest(burn), &burn.source)).collect();
+        sorted.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let words = sorted.iter().map(|(far, source)| format!("{source} ({far:.1} deviations away)"));
+        words.collect::<Vec<_>>().join(", ")
+    }
+}
+
 /// What was learnt, and the answer for the day.
 #[derive(Debug, Clone, Serialize)]
 pub struct Learnt {
@@ -64,6 +109,8 @@ pub struct Learnt {
     pub set: String,
     pub sources: Vec<String>,
     pub lots: Vec<LotReport>,
+    /// The burns that the lot is learnt from, and their weights in it.
+    pub burns: Vec<Burn>,
     /// The same as the section `[lot]` of a mission.
     pub lot_toml: String,
     /// Drag and gimbal of the airframe, over the flights.
@@ -113,19 +160,27 @@ fn learn(fits: &[Fit], ask: &Arguments, mission_toml: &str, set_toml: &str) -> R
     ]
     // A set without scatter still has to leave room for what is measured.
     .map(|(mean, sigma)| Posterior::prior(mean, sigma.max(1e-3)));
-    // A lot counts its burns once: those of which both are known.
-    let whole = |fit: &&Fit| PROPERTIES[..2].iter().all(|(name, _)| fit.get(name).is_some());
-    let burns: Vec<&Fit> = fits.iter().filter(whole).collect();
-    ensure!(!burns.is_empty(), "no burn was found in {} fits: a lot is learnt from burns", fits.len());
-    let of = |fits: &[&Fit], name: &str| {
-        let found: Vec<_> = fits.iter().filter_map(|fit| fit.get(name)).collect();
-        let common = found.iter().filter_map(|found| found.systematic).fold(0.0, f64::max);
-        let values: Vec<f64> = found.iter().map(|found| found.value).collect();
-        (values.len(), burnt(&values, common))
+    let burns = Burn::of(fits, &priors);
+    let counted_burns: Vec<(&Fit, f64)> =
+        burns.iter().filter(|(_, burn)| burn.weight > 0.0).map(|(fit, burn)| (*fit, burn.weight)).collect();
+    // A delay may be found without a burn. A distant one counts fully: a hang fire may come again.
+    let without_burn = fits.iter().filter(|fit| burns.iter().all(|(burn, _)| !std::ptr::eq(*burn, *fit)));
+    let delays: Vec<(&Fit, f64)> =
+        counted_burns.iter().map(|(fit, _)| *fit).chain(without_burn).map(|fit| (fit, 1.0)).collect();
+    ensure!(
+        !counted_burns.is_empty(),
+        "no burn was found in {} fits: a lot is learnt from burns",
+        fits.len()
+    );
+    let of = |fits: &[(&Fit, f64)], name: &str| {
+        let found: Vec<_> = fits.iter().filter_map(|(fit, weight)| Some((fit.get(name)?, *weight))).collect();
+        let common = found.iter().filter_map(|(found, _)| found.systematic).fold(0.0, f64::max);
+        let values: Vec<_> = found.iter().map(|(found, weight)| (found.value, *weight)).collect();
+        (values.len(), burnt_weighted(&values, common))
     };
-    let all: Vec<&Fit> = fits.iter().collect();
     let [thrust, burn_time, delay] = PROPERTIES.map(|(name, _)| name);
-    let values = [of(&burns, thrust), of(&burns, burn_time), of(&all, delay)];
+    let values = [of(&counted_burns, thrust), of(&counted_burns, burn_time), of(&delays, delay)];
+    let burns: Vec<Burn> = burns.into_iter().map(|(_, burn)| burn).collect();
     let lots = priors.iter().zip(&values);
     let lots: Vec<Posterior> = lots.map(|(prior, (count, burnt))| prior.with(*count as u32, burnt)).collect();
     let airframe: Vec<Pooled> = airframe(fits);
@@ -133,10 +188,11 @@ fn learn(fits: &[Fit], ask: &Arguments, mission_toml: &str, set_toml: &str) -> R
     let wind_m_s = wind(fits, &set);
     let sources: Vec<String> = fits.iter().map(|fit| fit.source.clone()).collect();
     let motor = mission.motor_curve.name();
-    let lot = with_burns(lot, motor, burns.len(), [&values[0].1, &values[1].1])?;
+    let lot = with_burns(lot, motor, counted_burns.len(), [&values[0].1, &values[1].1])?;
     let rate_deg_s = slow_gimbal.as_ref().map(|(rate_deg_s, _)| *rate_deg_s);
     let day =
-        Day::of([&before, set_toml], &ask.prior, &lot, &lots, (&airframe, rate_deg_s), wind_m_s, &sources)?;
+        Day::of([&before, set_toml], &ask.prior, &lot, &lots, (&airframe, rate_deg_s), wind_m_s, &sources)
+            .with_context(|| format!("the lot of these burns: {}", Burn::listed(&burns)))?;
     let trials = ask.flights.map(|flights| fly(ask.seed, flights, &lots, &day)).transpose()?;
     let prediction = trials
         .as_ref()
@@ -156,12 +212,14 @@ fn learn(fits: &[Fit], ask: &Arguments, mission_toml: &str, set_toml: &str) -> R
         next_sigma: lot.next_sigma(),
         prior_sigma: prior.next_sigma(),
     });
+    let every_burn_counts = burns.iter().all(|burn| burn.weight > 0.0);
     Ok(Learnt {
         mission: mission.name.clone(),
         motor: motor.to_owned(),
         set: ask.prior.clone(),
         sources,
         lots: reports.collect(),
+        burns,
         lot_toml: lot_toml(&lot),
         airframe,
         slow_gimbal,
@@ -172,7 +230,7 @@ fn learn(fits: &[Fit], ask: &Arguments, mission_toml: &str, set_toml: &str) -> R
         expected,
         limit: ask.limit,
         risk: ask.risk,
-        go: expected.map(|expected| expected.risk <= ask.risk),
+        go: expected.map(|expected| expected.risk <= ask.risk && every_burn_counts),
         day,
     })
 }
@@ -447,6 +505,15 @@ impl Answer for Learnt {
             );
             said.push(line.trim_end().to_owned());
         }
+        let head = ["burn", "thrust", "burn time", "delay", "weight"].map(str::to_owned);
+        let row = |Burn { source, distances, weight }: &Burn| {
+            let [thrust, burn_time, delay] =
+                distances.map(|far| far.map_or_else(|| "-".to_owned(), |far| format!("{far:+.1}")));
+            [source.clone(), thrust, burn_time, delay, format!("{weight:.2}")]
+        };
+        said.push("burns, in standard deviations from their median:".to_owned());
+        let rows = std::iter::once(head).chain(self.burns.iter().map(row));
+        said.extend(columns(['<', '>', '>', '>', '>'], rows).into_iter().map(|line| format!("  {line}")));
         for Pooled { mean: Parameter { name, unit, value, low, high, .. }, .. } in &self.airframe {
             let line = format!("airframe  {name:<16} {value:.4}, {low:.4} to {high:.4} {unit}");
             said.push(line.trim_end().to_owned());
@@ -486,6 +553,10 @@ impl Answer for Learnt {
             (true, true) => format!("GO in {set} only, which may be kinder than {DEFAULT}"),
             (false, _) => "NO-GO".to_owned(),
         });
+        let without_weight = self.burns.iter().find(|burn| burn.weight <= 0.0);
+        said.extend(without_weight.map(|Burn { source, .. }| {
+            format!("NO-GO as long as {source} is here: its burn is not of this lot, or its log is faulty")
+        }));
         said
     }
 }

@@ -10,12 +10,40 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use serde::Serialize;
 use sim::draw::Chance;
 
-/// What burns with these values had, if all may be wrong by `common` in the same direction.
+/// Mean and scatter of burns with these values, if all may be wrong by `common` in the same
+/// direction.
 pub fn burnt(values: &[f64], common: f64) -> Burnt {
-    let count = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / count.max(1.0);
-    let squares: f64 = values.iter().map(|value| (value - mean) * (value - mean)).sum();
+    burnt_weighted(&values.iter().map(|value| (*value, 1.0)).collect::<Vec<_>>(), common)
+}
+
+/// The same of values with weights.
+pub(super) fn burnt_weighted(values: &[(f64, f64)], common: f64) -> Burnt {
+    let count: f64 = values.iter().map(|(_, weight)| weight).sum();
+    let mean = values.iter().map(|(value, weight)| weight * value).sum::<f64>() / count.max(1e-9);
+    let squares: f64 = values.iter().map(|(value, weight)| weight * (value - mean) * (value - mean)).sum();
     Burnt { mean, scatter: libm::sqrt(squares / (count - 1.0).max(1.0)), common }
+}
+
+/// Distance from the other burns up to which a burn has its full weight, and from which on it has
+/// none, in standard deviations of a next burn.
+const WEIGHED_WITHIN: [f64; 2] = [3.0, 5.0];
+
+/// Distances of burns (value and standard deviation of its fit) from their median, in standard
+/// deviations of a next burn. The prior's mean counts as one burn, and as all of them beside one.
+pub(super) fn distances(prior: &Posterior, burns: &[(f64, f64)]) -> Vec<f64> {
+    let mut values: Vec<f64> = burns.iter().map(|(value, _)| *value).chain([prior.mean]).collect();
+    values.sort_by(f64::total_cmp);
+    let middles = [(values.len() - 1) / 2, values.len() / 2].map(|place| values[place]);
+    let nearer = |a: &f64, b: &f64| (a - prior.mean).abs().total_cmp(&(b - prior.mean).abs());
+    let median = middles.into_iter().min_by(nearer).unwrap_or(prior.mean);
+    let distance = |(value, sigma): &(f64, f64)| (value - median) / libm::hypot(prior.next_sigma(), *sigma);
+    burns.iter().map(distance).collect()
+}
+
+/// Weight of a burn at a distance.
+pub(super) fn weight(distance: f64) -> f64 {
+    let [full, none] = WEIGHED_WITHIN;
+    ((none - distance.abs()) / (none - full)).clamp(0.0, 1.0)
 }
 
 /// A mean and a standard deviation that a lot may have.
@@ -254,6 +282,26 @@ mod tests {
         // Distances of 0.01, 0.02 and 0.01: 0.0006 over 2.
         assert!((found.mean - 1.01).abs() < 1e-12 && (found.scatter - libm::sqrt(0.0003)).abs() < 1e-12);
         assert_eq!(burnt(&[1.02], 0.005), Burnt { mean: 1.02, scatter: 0.0, common: 0.005 });
+        // A burn of half the weight: (1 + 1 + 1.3 / 2) / 2.5.
+        let found = burnt_weighted(&[(1.0, 1.0), (1.0, 1.0), (1.3, 0.5)], 0.0);
+        assert!((found.mean - 1.06).abs() < 1e-12, "{found:?}");
+    }
+
+    /// Medians 1, 1 (the prior decides a tie) and 0.8 (two burns outvote the prior), deviations of
+    /// 0.03 and 0.04 together 0.05: 1.25 is 5 of them away, and 1.2 is 4.
+    #[test]
+    fn val_hand_a_distant_burn_loses_its_weight_unless_others_agree_with_it() {
+        let prior = Posterior::prior(1.0, 0.03);
+        let distances = |values: &[f64]| {
+            distances(&prior, &values.iter().map(|value| (*value, 0.04)).collect::<Vec<_>>())
+        };
+        let close = |found: &[f64], expected: &[f64]| {
+            found.len() == expected.len() && found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9)
+        };
+        assert!(close(&distances(&[1.25]), &[5.0]) && distances(&[]).is_empty());
+        assert!(close(&distances(&[1.2, 0.9, 1.0]), &[4.0, -2.0, 0.0]));
+        assert!(close(&distances(&[0.8, 0.8]), &[0.0, 0.0]));
+        assert!(close(&[5.0, 4.0, -4.0, 3.0].map(weight), &[0.0, 0.5, 0.5, 1.0]));
     }
 
     /// Draws of a mean and a scatter, and then of a value, have the next value's variance.

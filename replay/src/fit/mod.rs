@@ -9,6 +9,7 @@
 //! * [`trace`]: a flight's frames.
 //! * [`along`]: drag and thrust along the nose. [`burn`] is the model of the thrust, and of a burn
 //!   on a test stand.
+//! * [`sound`]: whether the accelerometer's samples can be those of the vehicle.
 //! * [`turning`]: the gimbal, from the rotation while the motor burns. [`servo`] is its model.
 //! * [`wind`]: the mean wind, from the force across the nose.
 //! * [`calibration`]: by how much the intervals are wider than the noise says.
@@ -24,6 +25,7 @@ pub mod day;
 mod least_squares;
 pub mod lot;
 mod servo;
+mod sound;
 mod trace;
 mod turning;
 mod wind;
@@ -32,7 +34,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Context as _, Result, bail, ensure};
 use flight::vehicle::mission::Mission;
 use flight::vehicle::thrust_curve::ThrustCurve;
 use flight::vehicles::motors;
@@ -208,6 +210,19 @@ impl Fit {
         format!("{source}: {mission} with {motor}")
     }
 
+    /// The reasons why a burn or a fall was not found, with everything that it takes away.
+    fn lacking(&self) -> impl Iterator<Item = String> {
+        let of =
+            |wanted: &str| self.not_found.iter().find(|lack| lack.name == wanted).map(|lack| &lack.reason);
+        let reasons: BTreeSet<&String> =
+            ["thrust_scale", "drag_per_mass_scale"].into_iter().filter_map(of).collect();
+        reasons.into_iter().map(|reason| {
+            let lost = self.not_found.iter().filter(|lack| lack.reason == *reason);
+            let names: Vec<&str> = lost.map(|lack| lack.name.as_str()).collect();
+            format!("  {}: {}: {reason}", self.source, names.join(", "))
+        })
+    }
+
     fn lacks(&mut self, name: &str, reason: &str) {
         self.not_found.push(NotFound { name: name.to_owned(), reason: reason.to_owned() });
     }
@@ -248,7 +263,7 @@ pub fn uncalibrated(trace: &Trace) -> Fit {
         ..Fit::of(&trace.name, &mission.name, mission.motor_curve.name(), Basis::of(mission))
     };
     let steady = wind::is_one_wind(trace);
-    let understood = steady.clone().and_then(|()| Ok(along_and_turning(trace)?));
+    let understood = steady.and_then(|()| along_and_turning(trace));
     match understood {
         Ok((along, turning)) => {
             fit.body_share = Some(along.body_share);
@@ -278,7 +293,7 @@ pub fn uncalibrated(trace: &Trace) -> Fit {
 
 /// Both directions, each with what the other found: the thrust turns the vehicle, and the turned
 /// nozzle loses some of it.
-fn along_and_turning(trace: &Trace) -> Result<(Along, Result<Solution, String>), &'static str> {
+fn along_and_turning(trace: &Trace) -> Result<(Along, Result<Solution, String>), String> {
     let gimbal = &trace.mission.airframe.gimbal;
     let frames = &trace.frames;
     // The command that is obeyed at a time, late by the servo's delay.
@@ -486,6 +501,9 @@ impl Answer for FitReport {
         } else {
             let logs = counted(self.fits.len() as u64, "log");
             said.extend(self.fits.iter().map(Fit::head));
+            let lacking: Vec<String> = self.fits.iter().flat_map(Fit::lacking).collect();
+            said.extend((!lacking.is_empty()).then(|| "not found".to_owned()));
+            said.extend(lacking);
             said.push(String::new());
             said.push(format!(
                 "together, {logs}: mean with its 95 % interval, and scatter from one to the next"
@@ -607,6 +625,10 @@ impl Args {
         if ending(file) == "json" {
             let earlier: Earlier = serde_json::from_str(&read()?)
                 .with_context(|| format!("{name}: is no answer of `replay fit --json`"))?;
+            for Fit { source, basis, .. } in &earlier.fits {
+                let sound = basis.impulse_n_s > 0.0 && basis.burn_time_s > 0.0;
+                ensure!(sound, "{name}: {source}: basis.impulse_n_s and basis.burn_time_s must be above 0");
+            }
             return Ok(earlier.fits);
         }
         if ending(file) == "csv" {

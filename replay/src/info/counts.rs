@@ -1,5 +1,5 @@
-//! What is counted while a log is read: channels, frames, phases, solve times, and how the flight
-//! ended.
+//! Counters over the records of a log: channels, frames, phases, planning latencies, and the outcome
+//! of the flight.
 
 use std::collections::BTreeMap;
 
@@ -108,8 +108,10 @@ pub struct Frames {
     pub repeated: u64,
     /// Whether the log has the computer's start record.
     pub start: bool,
-    /// Solve times of the planning frames; `None` for a flight simulated without a clock.
-    pub solve_time: Option<SolveTimes>,
+    /// Planning latency; `None` for a flight simulated without a clock.
+    pub latency: Option<PlanningLatency>,
+    /// Solver work, of a log whose computer was run again.
+    pub solver_work: Option<SolverWork>,
 }
 
 /// Counts frames.
@@ -122,7 +124,7 @@ pub(super) struct FrameCounter {
     repeated: u64,
     lost: usize,
     first_lost: Option<Gap>,
-    solve_times: SolveTimeCounter,
+    latencies: LatencyCounter,
     /// Notes the start record of the flight computer.
     start: bool,
 }
@@ -148,14 +150,14 @@ impl FrameCounter {
     }
 
     pub(super) fn time(&mut self, timing: &PilotTiming) {
-        self.solve_times.count(timing.solve_time_s, timing.deadline_s);
+        self.latencies.count(timing.solve_time_s, timing.deadline_s);
     }
 
     pub(super) fn into_facts(self) -> Option<Frames> {
         let Self { bounds, restarts, repeated, lost, first_lost, start, .. } = self;
         let (first, last) = bounds?;
-        let solve_time = self.solve_times.into_facts();
-        Some(Frames { first, last, restarts, lost, first_lost, repeated, start, solve_time })
+        let latency = self.latencies.into_facts();
+        Some(Frames { first, last, restarts, lost, first_lost, repeated, start, latency, solver_work: None })
     }
 }
 
@@ -340,9 +342,26 @@ impl EndingTracker {
 /// Limit on the times kept for the percentiles: 8 MB, more than a day of flight at 10 Hz.
 const TIMES_KEPT: usize = 1_000_000;
 
-/// Durations of the frames that solve, as measured on board.
+/// Newton iterations of the plans of a flight.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SolverWork {
+    pub plans: usize,
+    pub median: f64,
+    pub max: f64,
+}
+
+impl SolverWork {
+    /// `None` without a plan.
+    pub(super) fn of(mut iterations: Vec<f64>) -> Option<Self> {
+        iterations.sort_by(f64::total_cmp);
+        let [median, max] = [0.5, 1.0].map(|share| quantile(&iterations, share));
+        Some(Self { plans: iterations.len(), median: median?, max: max? })
+    }
+}
+
+/// Planning latencies: from the request of a plan to its use, on the vehicle's clock.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
-pub struct SolveTimes {
+pub struct PlanningLatency {
     /// Number of measurements.
     pub count: u64,
     pub median_s: f64,
@@ -356,34 +375,34 @@ pub struct SolveTimes {
     pub over_deadline: u64,
 }
 
-/// Counts solve times.
+/// Counts planning latencies.
 #[derive(Debug, Default)]
-pub(super) struct SolveTimeCounter {
+pub(super) struct LatencyCounter {
     times_s: Vec<f64>,
     /// All but the quantiles.
-    found: Option<SolveTimes>,
+    found: Option<PlanningLatency>,
 }
 
-impl SolveTimeCounter {
+impl LatencyCounter {
     pub(super) fn count(&mut self, time_s: f64, deadline_s: f64) {
         if self.times_s.len() < TIMES_KEPT {
             self.times_s.push(time_s);
         }
-        let SolveTimes { count, deadline_s: least_s, over_deadline, .. } =
-            self.found.unwrap_or(SolveTimes { deadline_s, ..SolveTimes::default() });
-        self.found = Some(SolveTimes {
+        let PlanningLatency { count, deadline_s: least_s, over_deadline, .. } =
+            self.found.unwrap_or(PlanningLatency { deadline_s, ..PlanningLatency::default() });
+        self.found = Some(PlanningLatency {
             count: count + 1,
             deadline_s: least_s.min(deadline_s),
             over_deadline: over_deadline + u64::from(time_s > deadline_s),
-            ..SolveTimes::default()
+            ..PlanningLatency::default()
         });
     }
 
     /// `None` if nothing was measured.
-    pub(super) fn into_facts(mut self) -> Option<SolveTimes> {
+    pub(super) fn into_facts(mut self) -> Option<PlanningLatency> {
         self.times_s.sort_by(f64::total_cmp);
         let [median_s, p99_s, max_s] = [0.5, 0.99, 1.0].map(|share| quantile(&self.times_s, share));
-        Some(SolveTimes { median_s: median_s?, p99_s: p99_s?, max_s: max_s?, ..self.found? })
+        Some(PlanningLatency { median_s: median_s?, p99_s: p99_s?, max_s: max_s?, ..self.found? })
     }
 }
 

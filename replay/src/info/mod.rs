@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::io::{IsTerminal as _, Read};
 use std::path::{Path, PathBuf};
 
-pub use self::counts::{Channel, Frames, PhaseSource, PhaseSpan, PhaseTimeline, SolveTimes};
+pub use self::counts::{Channel, Frames, PhaseSource, PhaseSpan, PhaseTimeline, PlanningLatency, SolverWork};
 use self::counts::{ChannelCounter, EndingTracker, FrameCounter, PhaseTracker};
 use anyhow::{Result, ensure};
 use protocol::log::record::SCHEMA_VERSION;
@@ -18,6 +18,7 @@ use time::OffsetDateTime;
 use time::format_description::well_known::Rfc3339;
 
 use crate::cli::{Answer, answer, give, give_each, warn_of_loss};
+use crate::controller::new_plan;
 use crate::findings::{self, Finding};
 use crate::log::{
     Attachment, BuildComparison, Clocks, Cut, Entry, FlightLog, Head, LogError, Recording, StampedEntry,
@@ -31,11 +32,22 @@ use crate::print::{beyond, counted};
 /// The file is not a flight log or cannot be read. Damage is part of the description, not an error.
 pub fn info(path: &Path) -> Result<Info, LogError> {
     let mut info = described(path)?;
-    if info.grade.level == GradeLevel::BitExact
-        && let Ok(recording) = Recording::open(path)
-    {
-        info.findings = findings::of(&recording, info.verdict.as_ref());
+    if info.grade.level != GradeLevel::BitExact {
+        info.set_findings(Err(info.grade.reason.clone()));
+        return Ok(info);
     }
+    let mut work = Vec::new();
+    let recording = Recording::open_from_power_up(path).map_err(|error| error.to_string());
+    let found = recording.and_then(|recording| {
+        findings::of(&recording, info.verdict.as_ref(), |computer, _, frame| {
+            let plan = new_plan(computer.pilot(), &frame.output);
+            work.extend(plan.map(|_| computer.pilot().report().iterations as f64));
+        })
+    });
+    if let Some(frames) = info.frames.as_mut().filter(|_| found.is_ok()) {
+        frames.solver_work = SolverWork::of(work);
+    }
+    info.set_findings(found);
     Ok(info)
 }
 
@@ -148,6 +160,7 @@ impl Seen {
             verdict,
             highest_m: self.highest_m.filter(|height_m| height_m.is_finite()),
             findings: None,
+            not_looked_for: None,
             clocks: log.clocks(),
             unreadable: self.unreadable,
             attachments: head.attachments.clone(),
@@ -191,6 +204,8 @@ pub struct Info {
     /// What went wrong, first in time; `None` of a log whose flight this build does not run again
     /// as it was.
     pub findings: Option<Vec<Finding>>,
+    /// Why no findings were looked for.
+    pub not_looked_for: Option<String>,
     /// How the clocks of the log differ.
     pub clocks: Clocks,
     /// Why the first unreadable record could not be read.
@@ -201,9 +216,20 @@ pub struct Info {
 }
 
 impl Info {
-    /// That nothing was found, as far as the log goes.
-    pub(crate) fn no_findings(&self) -> &'static str {
-        if self.completeness.cut.is_some() { "none up to where the record ends" } else { "none" }
+    /// Statement that there are no findings, and how far the log allows it.
+    pub(crate) fn no_findings(&self) -> String {
+        match &self.not_looked_for {
+            Some(reason) => format!("not looked for: {reason}"),
+            None if self.completeness.cut.is_some() => "none up to where the record ends".to_owned(),
+            None => "none".to_owned(),
+        }
+    }
+
+    pub(crate) fn set_findings(&mut self, found: Result<Vec<Finding>, String>) {
+        (self.findings, self.not_looked_for) = match found {
+            Ok(findings) => (Some(findings), None),
+            Err(reason) => (None, Some(reason)),
+        };
     }
 }
 
@@ -409,14 +435,10 @@ impl Info {
         if self.grade.level != GradeLevel::BitExact {
             return rows;
         }
-        let mut found: Vec<String> = match &self.findings {
-            None => vec!["not looked for: this build decides otherwise, or cannot run it again".to_owned()],
-            Some(findings) => {
-                findings.iter().map(|found| format!("{:.2} {}", found.since(), found.words)).collect()
-            }
-        };
+        let words = |found: &Finding| format!("{:.2} {}", found.since(), found.words);
+        let mut found: Vec<String> = self.findings.iter().flatten().map(words).collect();
         if found.is_empty() {
-            found.push(self.no_findings().to_owned());
+            found.push(self.no_findings());
         }
         let names = std::iter::once("findings").chain(std::iter::repeat(""));
         rows.extend(names.zip(found));
@@ -485,7 +507,7 @@ impl Info {
 
 impl Frames {
     fn rows(&self) -> Vec<Row> {
-        let Self { first, last, restarts, lost, repeated, start, solve_time, .. } = self;
+        let Self { first, last, restarts, lost, repeated, start, latency, solver_work, .. } = self;
         let start = if *start { "" } else { ", start NOT RECORDED" };
         let lost = match lost {
             0 => "none lost".to_owned(),
@@ -496,11 +518,15 @@ impl Frames {
         if *repeated > 0 {
             rows.push(("", format!("{repeated} repeated")));
         }
-        let times = solve_time.as_ref().map_or_else(
-            || "not recorded: no plan was timed".to_owned(),
-            |times| format!("{}, of {} that planned", solve_time_text(times), counted(times.count, "frame")),
+        let times = latency.as_ref().map_or_else(
+            || "latency not recorded: no plan was timed".to_owned(),
+            |times| format!("{}, of {}", latency_text(times), counted(times.count, "plan")),
         );
-        rows.push(("solve time", times));
+        rows.push(("planning", times));
+        rows.extend(solver_work.map(|SolverWork { plans, median, max }| {
+            let plans = counted(plans as u64, "plan");
+            ("solver", format!("work median {median:.0}, worst {max:.0} Newton iterations, of {plans}; CPU time not recorded"))
+        }));
         rows
     }
 }
@@ -519,9 +545,11 @@ fn phases(timeline: &PhaseTimeline) -> String {
     format!("{began}{more} ({clock} in s, from the {})", timeline.source.name())
 }
 
-pub(crate) fn solve_time_text(times: &SolveTimes) -> String {
+/// The latency counts from the request of a plan to its use, on the vehicle's clock: of a simulated
+/// flight it is simulated, and says nothing of this machine.
+pub(crate) fn latency_text(times: &PlanningLatency) -> String {
     format!(
-        "median {:.2} ms, p99 {:.2} ms, worst {:.2} ms; deadline {:.0} ms: {} over it",
+        "latency median {:.2} ms, p99 {:.2} ms, worst {:.2} ms from request to use on the vehicle's clock; deadline {:.0} ms: {} over it",
         times.median_s * 1e3,
         times.p99_s * 1e3,
         times.max_s * 1e3,

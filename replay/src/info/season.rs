@@ -46,6 +46,7 @@ impl Flown {
             format!("{}{share}", limit.name)
         });
         let first = info.findings.iter().flatten().next().map(|found| found.words.clone());
+        let first = first.or_else(|| Some(info.no_findings()));
         let cut = info.completeness.cut.as_ref().map(|cut| format!("the flight {cut}"));
         let lost = [info.completeness.damage.clone(), cut, first];
         let vehicle = info.profile.as_ref().and_then(|profile| profile.name.clone());

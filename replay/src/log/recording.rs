@@ -6,9 +6,12 @@
 use std::path::Path;
 
 use avionics::log::logged::RecordError;
+use flight::computer::flight_time_s;
 use foxglove::messages::Log as EventRecord;
 use protocol::log::computer_v1::{ComputerFrame, ComputerStart};
 use protocol::log::{flight_v1, v1};
+
+use crate::controller::LoggedComputer;
 
 use super::{Clocks, Cut, Entry, FlightLog, FrameOrder, Gap, Head, LogError};
 
@@ -101,6 +104,9 @@ pub struct Recording {
     /// What is added to the number of a frame in flight for its number in the log, which counts
     /// from power-up and is the one that people read.
     pub release_frame: u64,
+    /// The computer at its release, run from its power-up on; see
+    /// [`open_from_power_up`](Self::open_from_power_up).
+    pub(crate) at_release: Option<Box<LoggedComputer>>,
     /// Number of frames before the first lost one.
     pub frames_unbroken: usize,
     /// Solve times of planning frames, in file order; empty for a flight simulated without a clock.
@@ -139,11 +145,27 @@ impl Recording {
         Self::read(&mut FlightLog::open(path)?)
     }
 
+    /// Reads a log file, and runs its computer from its power-up to its release: a computer that is
+    /// built at its release lacks what the pad left in the memory of the recorded one.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub(crate) fn open_from_power_up(path: &Path) -> Result<Self, RecordingError> {
+        Self::read_with(&mut FlightLog::open(path)?, true)
+    }
+
     /// Reads a log to its end.
     ///
     /// # Errors
     /// As [`open`](Self::open).
     pub fn read<R: std::io::Read>(log: &mut FlightLog<R>) -> Result<Self, RecordingError> {
+        Self::read_with(log, false)
+    }
+
+    fn read_with<R: std::io::Read>(
+        log: &mut FlightLog<R>,
+        runs_the_pad: bool,
+    ) -> Result<Self, RecordingError> {
         let mut recording = Self { name: log.name().to_owned(), ..Self::default() };
         let (mut frame_order, mut frames_lost) = (FrameOrder::default(), None);
         while let Some(stamped) = log.next_entry()? {
@@ -164,6 +186,15 @@ impl Recording {
                 Entry::ComputerFrame(frame) => {
                     let lost = frame_order.note(frame.record.input.frame, stamped.sequence).is_some();
                     let logged = frame.record.input.frame;
+                    if let Some(computer) = &mut recording.at_release
+                        && recording.frames.is_empty()
+                        && frame.since_release.is_none()
+                    {
+                        let again = computer.run_again(&frame.record).ok().filter(|_| !lost);
+                        if again.is_none_or(|again| again.output != frame.record.output) {
+                            recording.at_release = None;
+                        }
+                    }
                     if let Some(frame) = frame.in_flight() {
                         recording.release_frame = logged - frame.input.frame;
                         // What is lost before the release is not of the flight.
@@ -173,7 +204,14 @@ impl Recording {
                         recording.frames.push(frame);
                     }
                 }
-                Entry::ComputerStart(start) => recording.from_power_up |= !start.released,
+                Entry::ComputerStart(start) => {
+                    recording.from_power_up |= !start.released;
+                    let head = log.head();
+                    if let (Some(Ok(toml)), true) = (&head.profile_toml, runs_the_pad && !start.released) {
+                        let computer = LoggedComputer::recorded(toml, &start, &head.run, &[]);
+                        recording.at_release = computer.ok().map(Box::new);
+                    }
+                }
                 Entry::Estimate(estimate) => {
                     let place = recording.frames.len().checked_sub(1);
                     recording.estimates.extend(place.map(|place| (place, *estimate)));
@@ -242,6 +280,14 @@ impl Recording {
             }),
             (unbroken, _) => Ok((start, unbroken.unwrap_or(frames))),
         }
+    }
+
+    /// A frame in flight as it was logged: number and time count from power-up.
+    pub(crate) fn since_power_up(&self, frame: &ComputerFrame) -> ComputerFrame {
+        let mut logged = frame.clone();
+        logged.input.frame += self.release_frame;
+        logged.input.time_s = flight_time_s(logged.input.frame);
+        logged
     }
 
     /// Where re-execution must stop, if the log has frames after that.

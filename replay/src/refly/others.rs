@@ -8,6 +8,7 @@ use sim::sortie::{SetUpError, Sortie};
 
 use super::rerun::Rerun;
 use super::{FaultChanges, ReflyOptions};
+use crate::compare::flips_in_words;
 use crate::controller::AgainError;
 use crate::log::Recording;
 use crate::settings::{mission_toml_with, mission_with};
@@ -72,7 +73,8 @@ impl OtherFlights {
     pub(super) fn words(&self) -> String {
         let Self { flights, dispersion, stood, stand, saved, lost } = self;
         format!(
-            "{flights} other flights of {dispersion}: {stood} stand undamaged as recorded, {stand} with the change, which saves {saved} and loses {lost}"
+            "{flights} other flights of {dispersion}: {stood} stand undamaged as recorded, {stand} with the change, which {}",
+            flips_in_words(*saved, *lost)
         )
     }
 }

@@ -39,7 +39,7 @@ pub struct Report {
 /// The file is not a flight log, cannot be read or is longer than any flight. Damage is part of the
 /// page.
 pub fn report(path: &Path) -> Result<Report, RecordingError> {
-    let recording = Recording::open(path)?;
+    let recording = Recording::open_from_power_up(path)?;
     let mut info = described(path)?;
     // The date says it.
     info.run.remove("start_unix_ns");

@@ -105,19 +105,17 @@ impl Flight {
     /// is missing.
     pub(super) fn of(recording: Recording, info: &mut Info) -> Self {
         let mut thoughts = Vec::new();
-        let again = findings::run_again(&recording, |computer, recorded| {
-            let frame = computer.run_again(recorded)?;
+        let again = findings::run_again(&recording, |computer, recorded, frame| {
             let pilot = computer.pilot();
             if recorded.input.frame.is_multiple_of(FRAMES_PER_PLAN) || frame.output.planned {
-                thoughts.push(Thought::of(pilot, &frame));
+                thoughts.push(Thought::of(pilot, frame));
             }
-            Ok(frame)
         });
-        // Half a flight says nothing of the whole.
-        thoughts.retain(|_| again.is_some());
-        let pilot = again.as_ref().map(|(computer, _)| computer.pilot().clone());
+        // A part of the flight says nothing of the rest.
+        thoughts.retain(|_| again.is_ok());
+        let pilot = again.as_ref().ok().map(|(computer, _)| computer.pilot().clone());
         let found = again.and_then(|(_, findings)| findings);
-        info.findings = findings::facts(&recording, info.verdict.as_ref(), found);
+        info.set_findings(findings::facts(&recording, info.verdict.as_ref(), found));
         let (source, track) = track(&recording, &thoughts);
         let burning = |sample: &&Sample| sample.phase.is_some_and(Phase::in_landing_burn);
         let ignited = pilot.as_ref().and_then(Pilot::ignited_at_s);

@@ -241,7 +241,7 @@ impl BookFound {
 pub(super) struct Arguments {
     /// Print and prove the books of ground stations (who did what when) in logs of stations and of
     /// the vehicle: only the vehicle's log shows that a book was cut.
-    #[arg(long, conflicts_with_all = ["strict", "explain", "baseline"])]
+    #[arg(long, conflicts_with_all = ["strict", "explain"])]
     pub(super) book: bool,
     /// The station's public key, 64 hexadecimal digits, as the first entry of its book and the
     /// answer show it.

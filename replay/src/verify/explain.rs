@@ -1,4 +1,4 @@
-//! Solves the plans of a recorded flight again, and judges them.
+//! Solves the plan of a recorded frame again, and judges it.
 //!
 //! The controller first runs every earlier frame, so that it has the warm start it had in flight.
 //! The landing that a frame planned is then solved cold, and by the [`judge`], which is written
@@ -7,14 +7,12 @@
 
 use std::path::Path;
 
-use anyhow::{Context as _, Result};
+use anyhow::Result;
 use avionics::log::frame::level_of;
 use flight::guidance::powered::{ControlLevel, LandingSolved};
 use judge::{Judgement, Score};
 use ocp::Outcome as SolveOutcome;
 use ocp::landing::State;
-use onboard_sim::progress::Progress;
-use onboard_sim::run::in_parallel;
 use prost::Message as _;
 use protocol::log::computer_v1::ComputerFrame;
 use protocol::program::Exit;
@@ -23,7 +21,6 @@ use serde::Serialize;
 use crate::cli::{Answer, give, warn_of_what_is_missing};
 use crate::controller::{AgainError, LoggedComputer, phase_name};
 use crate::log::Recording;
-use crate::print::columns;
 
 /// Plans whose costs differ by less than this share, and whose first gimbal angles by less than
 /// this, are the same.
@@ -63,7 +60,7 @@ pub struct Judged {
     pub judge: CountedPlan,
     /// How much more the flown plan costs than the judge's, as a share, with the price of what it
     /// breaks; negative: less.
-    pub flown_dearer: f64,
+    pub excess_cost: f64,
     /// How far the first gimbal angles are apart, deg.
     pub first_input_deg: f64,
     /// In one sentence.
@@ -98,64 +95,6 @@ pub struct FrameReport {
     pub path: Vec<(f64, State)>,
 }
 
-/// A frame, and the landing that it planned.
-struct Explained {
-    report: FrameReport,
-    solved: Option<LandingSolved>,
-}
-
-/// Runs a recorded flight again, up to a frame or to its end, and solves what the frame, or each,
-/// planned.
-fn inspected(recording: &Recording, only: Option<u64>) -> Result<Vec<Explained>, AgainError> {
-    let (start, frames) = recording.replayable_frames()?;
-    let computer = LoggedComputer::recorded(recording.profile_toml()?, start, &recording.head.run, &[])?;
-    let mut controller = if recording.from_power_up { computer.without_digests() } else { computer };
-    let logged = |frame: &ComputerFrame| recording.release_frame + frame.input.frame;
-    let planned: Vec<u64> = frames.iter().filter(|frame| plans(frame)).map(logged).collect();
-    let mut explained = Vec::new();
-    for recorded in frames {
-        let number = logged(recorded);
-        let again = controller.run_again(recorded)?;
-        if only.is_some_and(|only| only != number) || only.is_none() && !planned.contains(&number) {
-            continue;
-        }
-        let pilot = controller.pilot();
-        let solved = pilot.landing_solved().filter(|_| plans(&again));
-        let path = |solved: &LandingSolved| {
-            let time_s = |node: usize| node as f64 * solved.plan.step_s();
-            solved.plan.states().iter().enumerate().map(|(node, state)| (time_s(node), *state)).collect()
-        };
-        explained.push(Explained {
-            report: FrameReport {
-                file: recording.name.clone(),
-                frame: number,
-                time_s: recorded.input.time_s,
-                burning_s: pilot.burning_s(recorded.input.time_s).unwrap_or(0.0),
-                phase: phase_name(&again.output),
-                level: level_of(&again.output).map_or("unknown", ControlLevel::name),
-                recorded_gimbal_rad: recorded.output.gimbal_rad.clone(),
-                gimbal_rad: again.output.gimbal_rad.clone(),
-                identical: again.encode_to_vec() == recorded.encode_to_vec(),
-                judged: None,
-                nearest_planned: planned.iter().copied().min_by_key(|frame| frame.abs_diff(number)),
-                path: solved.as_ref().map(path).unwrap_or_default(),
-            },
-            solved,
-        });
-        if only.is_some() {
-            break;
-        }
-    }
-    match only.filter(|_| explained.is_empty()) {
-        None => Ok(explained),
-        Some(frame) => {
-            let bound = |frame: Option<&ComputerFrame>| frame.map_or(0, logged);
-            let (first, last) = (bound(frames.first()), bound(frames.last()));
-            Err(AgainError::NoFrame { name: recording.name.clone(), frame, first, last })
-        }
-    }
-}
-
 /// Whether a frame took over the plan of a landing, and flies.
 pub(crate) fn plans(frame: &ComputerFrame) -> bool {
     frame.output.planned && frame.output.level != u32::from(ControlLevel::Idle.index())
@@ -166,21 +105,40 @@ pub(crate) fn plans(frame: &ComputerFrame) -> bool {
 /// # Errors
 /// See [`AgainError`].
 pub fn explain(recording: &Recording, number: u64) -> Result<FrameReport, AgainError> {
-    // Without that frame it is an error.
-    let Explained { report, solved } = inspected(recording, Some(number))?.swap_remove(0);
-    Ok(FrameReport { judged: solved.as_ref().map(judged), ..report })
-}
-
-/// Solves every frame again that planned a landing.
-///
-/// # Errors
-/// See [`AgainError`].
-pub fn explain_all(recording: &Recording) -> Result<Vec<FrameReport>, AgainError> {
-    let explained = inspected(recording, None)?;
-    let progress = Progress::start();
-    let one =
-        |frame: &Explained| FrameReport { judged: frame.solved.as_ref().map(judged), ..frame.report.clone() };
-    Ok(in_parallel(&explained, one, &|done| progress.show(done, explained.len(), "plans")))
+    let (start, frames) = recording.replayable_frames()?;
+    let computer = LoggedComputer::recorded(recording.profile_toml()?, start, &recording.head.run, &[])?;
+    let mut controller = if recording.from_power_up { computer.without_digests() } else { computer };
+    let logged = |frame: &ComputerFrame| recording.release_frame + frame.input.frame;
+    for recorded in frames {
+        let again = controller.run_again(recorded)?;
+        if logged(recorded) != number {
+            continue;
+        }
+        let pilot = controller.pilot();
+        let solved = pilot.landing_solved().filter(|_| plans(&again));
+        let path = |solved: &LandingSolved| {
+            let time_s = |node: usize| node as f64 * solved.plan.step_s();
+            solved.plan.states().iter().enumerate().map(|(node, state)| (time_s(node), *state)).collect()
+        };
+        let planned = frames.iter().filter(|frame| plans(frame)).map(logged);
+        return Ok(FrameReport {
+            file: recording.name.clone(),
+            frame: number,
+            time_s: recorded.input.time_s,
+            burning_s: pilot.burning_s(recorded.input.time_s).unwrap_or(0.0),
+            phase: phase_name(&again.output),
+            level: level_of(&again.output).map_or("unknown", ControlLevel::name),
+            recorded_gimbal_rad: recorded.output.gimbal_rad.clone(),
+            gimbal_rad: again.output.gimbal_rad.clone(),
+            identical: again.encode_to_vec() == recorded.encode_to_vec(),
+            judged: solved.as_ref().map(judged),
+            nearest_planned: planned.min_by_key(|frame| frame.abs_diff(number)),
+            path: solved.as_ref().map(path).unwrap_or_default(),
+        });
+    }
+    let bound = |frame: Option<&ComputerFrame>| frame.map_or(0, logged);
+    let (first, last) = (bound(frames.first()), bound(frames.last()));
+    Err(AgainError::NoFrame { name: recording.name.clone(), frame: number, first, last })
 }
 
 fn judged(solved: &LandingSolved) -> Judged {
@@ -200,11 +158,11 @@ fn judged(solved: &LandingSolved) -> Judged {
     let judge = facts(status, iterations, &score, (&found, &found_inputs));
     let apart = [0, 1].map(|axis| (flown.gimbal_deg[axis] - judge.gimbal_deg[axis]).abs());
     let first_input_deg = apart[0].max(apart[1]);
-    let flown_dearer = flown.merit / judge.merit - 1.0;
-    let percent = 100.0 * flown_dearer.abs();
-    let words = if flown_dearer > SAME_SHARE {
+    let excess_cost = flown.merit / judge.merit - 1.0;
+    let percent = 100.0 * excess_cost.abs();
+    let words = if excess_cost > SAME_SHARE {
         format!("the judge found a better plan: the flown one is {percent:.2} % dearer")
-    } else if flown_dearer < -SAME_SHARE {
+    } else if excess_cost < -SAME_SHARE {
         format!("the judge found none as good: the flown plan is {percent:.2} % cheaper")
     } else if first_input_deg > SAME_DEG {
         "the judge found another plan that is as good".to_owned()
@@ -217,7 +175,7 @@ fn judged(solved: &LandingSolved) -> Judged {
         cold_merit: cold.merit,
         flown,
         judge,
-        flown_dearer,
+        excess_cost,
         first_input_deg,
     }
 }
@@ -301,59 +259,12 @@ impl Answer for FrameReport {
 }
 
 /// One angle, or pitch and yaw.
-pub(crate) fn degrees(rad: &[f64], digits: usize) -> String {
+fn degrees(rad: &[f64], digits: usize) -> String {
     rad.iter().map(|rad| format!("{:.digits$}", rad.to_degrees())).collect::<Vec<_>>().join(" ")
 }
 
-/// Every plan of a flight.
-#[derive(Serialize)]
-#[serde(transparent)]
-struct Plans {
-    reports: Vec<FrameReport>,
-    #[serde(skip)]
-    file: String,
-}
-
-impl Answer for Plans {
-    fn sentences(&self) -> Vec<String> {
-        let judged = || self.reports.iter().filter_map(|report| Some((report, report.judged.as_ref()?)));
-        let count = |is: &dyn Fn(&Judged) -> bool| judged().filter(|(_, judged)| is(judged)).count();
-        let mut lines = vec![format!(
-            "{}: {} plans: the judge agrees within {:.0} % of cost in {} and within {SAME_DEG} deg of the first gimbal angles in {}; \
-             it found a better plan in {}, and none as good in {}",
-            self.file,
-            judged().count(),
-            100.0 * SAME_SHARE,
-            count(&|judged| judged.flown_dearer.abs() <= SAME_SHARE),
-            count(&|judged| judged.first_input_deg <= SAME_DEG),
-            count(&|judged| judged.flown_dearer > SAME_SHARE),
-            count(&|judged| judged.flown_dearer < -SAME_SHARE),
-        )];
-        let row = |(report, judged): (&FrameReport, &Judged)| {
-            [
-                report.frame.to_string(),
-                format!("{:.3}", report.time_s),
-                report.level.to_owned(),
-                format!("{:.3}", judged.flown.merit),
-                format!("{:.2} %", 100.0 * judged.flown_dearer),
-                format!("{:.3} deg", judged.first_input_deg),
-                judged.flown.broken_condition.clone().unwrap_or_default(),
-            ]
-        };
-        let head = ["frame", "T+, s", "level", "merit", "dearer", "first", "broken"].map(str::to_owned);
-        let rows = std::iter::once(head).chain(judged().map(row));
-        lines.extend(columns(['>', '>', '<', '>', '>', '>', '<'], rows));
-        lines
-    }
-}
-
-pub(super) fn run(file: &Path, frame: &str, json: bool) -> Result<Exit> {
+pub(super) fn run(file: &Path, frame: u64, json: bool) -> Result<Exit> {
     let recording = Recording::open(file)?;
     warn_of_what_is_missing(&recording);
-    if frame == "all" {
-        return give(&Plans { reports: explain_all(&recording)?, file: recording.name }, json);
-    }
-    let number =
-        frame.parse().with_context(|| format!("--explain {frame}: neither a frame's number nor `all`"))?;
-    give(&explain(&recording, number)?, json)
+    give(&explain(&recording, frame)?, json)
 }

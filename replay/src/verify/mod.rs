@@ -22,7 +22,6 @@
 //! for this, the flight is simulated from the first frame that differs.
 
 mod again;
-mod baseline;
 pub mod book;
 mod difference;
 pub mod explain;
@@ -465,12 +464,9 @@ pub(crate) struct Args {
     /// verdict compared.
     #[arg(long)]
     strict: bool,
-    /// Solve the plan of this frame of the only log again, and judge it; or of `all` frames, which
-    /// takes a minute.
-    #[arg(long, value_name = "FRAME|all", conflicts_with = "strict")]
-    explain: Option<String>,
-    #[command(flatten)]
-    held: baseline::Arguments,
+    /// Solve the plan of this frame of the only log again, and judge it.
+    #[arg(long, value_name = "FRAME", conflicts_with = "strict")]
+    explain: Option<u64>,
     #[command(flatten)]
     book: book::Arguments,
 }
@@ -480,13 +476,9 @@ impl Args {
         if self.book.book {
             return self.book.run(&self.files, self.json);
         }
-        if let Some(frame) = &self.explain {
+        if let Some(frame) = self.explain {
             let [file] = self.files.as_slice() else { bail!("--explain takes one log") };
             return explain::run(file, frame, self.json);
-        }
-        if let Some(baseline) = &self.held.baseline {
-            let [directory] = self.files.as_slice() else { bail!("--baseline takes one directory") };
-            return self.held.run(baseline, directory, self.json);
         }
         self.verify()
     }

@@ -182,7 +182,7 @@ fn every_plan_solved_again_is_the_flown_one() {
         plans += 1;
         warm_iterations += judged.flown.iterations;
         cold_iterations += judged.cold_iterations;
-        assert!(report.path.len() > 5 && judged.flown_dearer > -1e-3, "frame {frame}: {judged:?}");
+        assert!(report.path.len() > 5 && judged.excess_cost > -1e-3, "frame {frame}: {judged:?}");
     }
     assert!(plans > 5 && warm_iterations < cold_iterations, "{plans}: {warm_iterations}, {cold_iterations}");
     let between = explain(&recording, 3).unwrap();

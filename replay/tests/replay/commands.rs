@@ -142,8 +142,8 @@ fn val_judge_finds_no_better_plan_than_the_one_that_flew() {
             .unwrap()
             .judged
             .unwrap();
-        assert!(judged.flown_dearer < 0.01, "{frame}: {judged:?}");
-        if judged.flown_dearer.abs() < 1e-4 {
+        assert!(judged.excess_cost < 0.01, "{frame}: {judged:?}");
+        if judged.excess_cost.abs() < 1e-4 {
             same += 1;
             assert!(judged.first_input_deg < 0.1, "{frame}: {judged:?}");
             let [ours, theirs] = [&judged.flown, &judged.judge].map(|plan| plan.touchdown_m);

@@ -6,9 +6,10 @@ use std::process::Command;
 use flight::vehicle::mission::Mission;
 use flight::vehicles::mission::BUILTIN;
 use sim::dispersion::Dispersion;
+use sim::recipe::Recipe;
 
 use crate::command_line::run;
-use crate::from_apogee::LANDED;
+use crate::from_apogee::{LANDED, fly_recipe};
 
 fn learn(arguments: &[&str]) -> (i32, String, String) {
     let few = ["--flights", "6", "--jobs", "2"];
@@ -138,4 +139,68 @@ fn what_cannot_be_learnt_is_refused_with_the_reason() {
         let (code, _, stderr) = learn(arguments);
         assert!(code == 1 && stderr.contains(words), "{stderr}");
     }
+}
+
+/// A log whose accelerometer is broken, or whose computer was restarted, beside healthy ones: its
+/// burn is not found, with the reason and the log, and the lot is that of the healthy logs.
+#[test]
+fn a_burn_of_a_broken_sensor_is_not_found_and_leaves_the_lot_as_it_is() {
+    let fly = |seed, faults: &[&str]| {
+        let recipe = Recipe::built_in("mk3", "field").unwrap();
+        let faults = faults.iter().map(|fault| fault.parse().unwrap()).collect();
+        fly_recipe(&Recipe { faults, seed, ..recipe })
+    };
+    let healthy: Vec<_> = (11..15).map(|seed| fly(seed, &[])).collect();
+    let logs: Vec<&str> = healthy.iter().map(|flown| flown.log.to_str().unwrap()).collect();
+    let lot = |logs: &[&str]| {
+        let (_, stdout, stderr) = learn(&[logs, &["--prior", "field", "--json"]].concat());
+        let answer: serde_json::Value = serde_json::from_str(&stdout).unwrap_or_else(|_| panic!("{stderr}"));
+        answer["day"]["lots"].clone()
+    };
+    let expected = lot(&logs);
+    assert!(expected[0]["burns"].as_u64().unwrap() >= 3, "{expected}");
+    for (fault, reason) in [
+        ("accelerometer-stuck@powered+1", "the accelerometer repeats one sample from T+"),
+        ("accelerometer-bias:300@powered", "the accelerometer contradicts the "),
+        ("accelerometer-scale:1.2@powered", "the accelerometer contradicts the "),
+        ("reboot:0.3@powered", " s of frames are missing from T+"),
+    ] {
+        let sick = fly(15, &[fault]);
+        let logs = [logs.as_slice(), &[sick.log.to_str().unwrap()]].concat();
+        assert_eq!(lot(&logs), expected, "{fault}");
+        let (_, stdout, _) = learn(&[logs.as_slice(), &["--prior", "field"]].concat());
+        let of_log = format!("  {}: ", logs[4]);
+        let is_line = |line: &&str| line.starts_with(&of_log) && line.contains("thrust_scale");
+        let line = stdout.lines().find(is_line).unwrap_or_else(|| panic!("{stdout}"));
+        assert!(line.contains("burn_time_scale") && line.contains(reason), "{fault}: {line}");
+    }
+}
+
+/// A burn that no sensor contradicts and that is not of the lot: it has no weight, and no GO is
+/// given beside it.
+#[test]
+fn a_distant_burn_has_no_weight_and_there_is_no_go_beside_it() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("fits.json");
+    fits(&path, &[1.0, 1.01, 0.99, 1.5]);
+    let asked = [path.to_str().unwrap(), "--mission", "mk2", "--prior", "field", "--limit", "0.01"];
+    let (code, stdout, stderr) = learn(&asked);
+    assert!(
+        code == 3
+            && stdout.ends_with(
+                "\nNO-GO as long as flight 3 is here: its burn is not of this lot, or its log is faulty\n"
+            ),
+        "{stdout}{stderr}"
+    );
+    let lot = stdout.lines().rfind(|line| line.starts_with("  thrust_scale")).unwrap();
+    assert!(lot.contains("     3    1.0000"), "{lot}");
+    // What makes a mission of it impossible is named.
+    let mut all: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
+    all["fits"][0]["basis"]["impulse_n_s"] = 0.into();
+    std::fs::write(&path, all.to_string()).unwrap();
+    let (code, _, stderr) = learn(&asked);
+    assert!(
+        code == 1 && stderr.contains("flight 0: basis.impulse_n_s and basis.burn_time_s must be above 0"),
+        "{stderr}"
+    );
 }

@@ -46,7 +46,12 @@ fn a_flight_that_lost_half_its_frames_is_not_the_same() {
         assert_eq!(code, 0, "{stdout}");
         let thinned = thinned(log, &directory);
         for (one, other) in [(log, &thinned), (&thinned, log)] {
-            let (_, found) = data(replay("compare", one).arg(other));
+            let (code, found) = data(replay("compare", one).arg(other));
+            let failures = found[0]["failures"].to_string();
+            for table in [truth, "computer_frame"] {
+                let words = format!("samples of {table} are missing: ");
+                assert!(code == 3 && failures.contains(&words), "{failures}");
+            }
             let signals = found[0]["signals"].as_array().unwrap();
             let of_truth =
                 |signal: &&serde_json::Value| signal["signal"].as_str().unwrap().starts_with(truth);

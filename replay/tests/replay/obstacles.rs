@@ -140,9 +140,9 @@ fn the_whole_flight_is_described() {
     assert_eq!(info.build_comparison.differences, []);
     let frames = info.frames.unwrap();
     assert_eq!((frames.first, frames.last, frames.lost), (1, FLIGHT.frames.len() as u64, 0));
-    let solve_time = frames.solve_time.unwrap();
-    assert!((solve_time.max_s - 0.007).abs() < 1e-12);
-    assert!((solve_time.median_s - 0.004).abs() < 1e-12);
+    let latency = frames.latency.unwrap();
+    assert!((latency.max_s - 0.007).abs() < 1e-12);
+    assert!((latency.median_s - 0.004).abs() < 1e-12);
     let phases: Vec<&str> = info.phases[0].spans.iter().map(|span| span.phase.as_str()).collect();
     assert_eq!(phases, ["DEPLOY", "AERO_DESCENT"]);
     assert_eq!(info.verdict.unwrap().envelope.len(), 4);

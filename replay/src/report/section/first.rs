@@ -68,8 +68,7 @@ fn verdict(flight: &Flight, info: &Info) -> String {
 fn findings(flight: &Flight, info: &Info, drawn: &[Drawn]) -> String {
     let mut html = "<h3 id=\"findings\">Findings, first in time</h3>\n".to_owned();
     let Some(findings) = &info.findings else {
-        let none = "Nothing was looked for: the log has no frames, or this build does not make their decisions again.";
-        return html + &paragraph(none);
+        return html + &paragraph(&info.no_findings());
     };
     let of = |picture: &str| drawn.iter().find(|(_, id, svg)| id == picture && !svg.is_empty());
     let item = |finding: &Finding| {
@@ -81,7 +80,7 @@ fn findings(flight: &Flight, info: &Info, drawn: &[Drawn]) -> String {
         format!("<li><b>{:.2}</b> {words}</li>\n", finding.since())
     };
     if findings.is_empty() {
-        html += &paragraph(info.no_findings());
+        html += &paragraph(&info.no_findings());
     } else {
         let items: String = findings.iter().map(item).collect();
         html.extend([format!("<ol class=\"findings\">\n{items}</ol>\n")]);

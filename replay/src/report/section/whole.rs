@@ -46,7 +46,7 @@ pub(super) fn mission(flight: &Flight, info: &Info) -> Option<String> {
         return Some(controller + &paragraph(&format!("No mission {name} is built into this program.")));
     };
     let [built_in, flown] = [built_in, flown].map(|text| (name.to_owned(), text.to_owned()));
-    let differences = compared(built_in, flown).ok()?.differences;
+    let differences = compared(built_in, flown).ok()?;
     if differences.is_empty() {
         return Some(paragraph(&format!("As the built-in {name}.")));
     }

@@ -1,0 +1,80 @@
+//! The findings of broken flights.
+
+use flight::vehicle::mission::StartPoint;
+use replay::info::{Info, info};
+use replay::report::report;
+use sim::recipe::Recipe;
+
+use crate::command_line::{replay, run};
+use crate::from_apogee::fly_recipe;
+use crate::simulated::{Simulated, simulate_recipe};
+
+fn recipe(mission: &str, seed: u64, fault: &str) -> Recipe {
+    let recipe = Recipe::built_in(mission, "real").unwrap();
+    Recipe { seed, faults: vec![fault.parse().unwrap()], ..recipe }
+}
+
+fn from_the_pad(seed: u64, fault: &str) -> Simulated {
+    simulate_recipe(recipe("mk3", seed, fault).starting_at(StartPoint::Pad).unwrap(), &[])
+}
+
+fn words(info: &Info) -> Vec<&str> {
+    info.findings.iter().flatten().map(|finding| finding.words.as_str()).collect()
+}
+
+/// A computer that is built at the release lacks what the pad left in the recorded one's memory,
+/// and decides otherwise.
+#[test]
+fn the_computer_of_a_log_is_run_from_its_power_up() {
+    for (seed, fault, fin) in [(1, "reversed:3@0", "fin 1"), (4, "reversed:5@0", "fin 3")] {
+        let flown = from_the_pad(seed, fault);
+        let found = info(&flown.log).unwrap();
+        assert_eq!(found.not_looked_for, None);
+        assert!(words(&found)[0].starts_with(fin), "{seed} {fault}: {found:?}");
+        let page = report(&flown.log).unwrap().html;
+        assert!(page.contains(&format!("First sign: {fin}")), "{seed} {fault}");
+    }
+}
+
+/// A vehicle that falls over or strikes the ground with its body has a finding, however its limits
+/// are.
+#[test]
+fn no_crash_is_without_a_finding() {
+    let mut crashes = 0;
+    for (mission, fault) in [("mk3", "gnss-ramp:1@descent"), ("vlr", "barometer-ramp:5@apogee")] {
+        for seed in 1..=4 {
+            let flown = fly_recipe(&recipe(mission, seed, fault));
+            let found = info(&flown.log).unwrap();
+            let verdict = found.verdict.as_ref().unwrap();
+            if verdict.landing.upright {
+                continue;
+            }
+            crashes += 1;
+            let failure = verdict.ending.strip_prefix("NOT LANDED: ").unwrap();
+            let last = *words(&found).last().unwrap();
+            assert!(last.starts_with(failure), "{mission} {seed}: {failure}: {found:?}");
+        }
+    }
+    assert!(crashes >= 6, "{crashes}");
+}
+
+/// A cell that is empty would look like a healthy flight.
+#[test]
+fn a_table_of_logs_states_what_was_looked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::copy(&crate::from_apogee::LANDED.log, folder.path().join("a.mcap")).unwrap();
+    std::fs::copy(&crate::simulated::WITH_FRAMES.log, folder.path().join("b.mcap")).unwrap();
+    crate::station::station_log(&folder.path().join("b.mcap"), "c.mcap");
+    let (code, stdout, stderr) = run(replay("info", folder.path()).arg("--json"));
+    let flown: Vec<serde_json::Value> = serde_json::from_str(&stdout).unwrap();
+    let findings: Vec<&str> = flown.iter().map(|flown| flown["finding"].as_str().unwrap()).collect();
+    assert_eq!((code, findings.len()), (0, 3), "{stderr}");
+    for (flown, finding) in flown.iter().zip(findings) {
+        let expected = if flown["file"].as_str().unwrap().ends_with("c.mcap") {
+            "not looked for: it has no frames"
+        } else {
+            "none"
+        };
+        assert!(finding.starts_with(expected), "{flown}");
+    }
+}
