@@ -274,6 +274,9 @@ pub fn closing(
     if let Some(words) = headline::banner(model, now) {
         let _ = writeln!(text, "{}", words.sentence());
     }
+    if model.vehicle.reset_in_flight {
+        text.push_str("the flight computer was RESET IN FLIGHT\n");
+    }
     if model.vehicle.log_has_stopped() {
         text.push_str("the vehicle's own log has stopped: it does not have the whole flight\n");
     }

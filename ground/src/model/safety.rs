@@ -511,7 +511,7 @@ const TEXTS_SEARCHED: usize = 100;
 pub fn latch_cause(vehicle: &Vehicle) -> Option<&'static str> {
     Some(match vehicle.status.as_ref()?.value.latch {
         TdLatch::TD_LATCH_NONE | TdLatch::TD_LATCH_OTHER => return None,
-        TdLatch::TD_LATCH_COMMANDED => "commanded by the crew",
+        TdLatch::TD_LATCH_COMMANDED => COMMANDED,
         TdLatch::TD_LATCH_UNCOMMANDED_LIFTOFF => "uncommanded lift-off",
         TdLatch::TD_LATCH_UNCOMMANDED_RELEASE => "uncommanded release",
         TdLatch::TD_LATCH_NO_SEPARATION => "the booster stayed on",
@@ -540,10 +540,23 @@ pub fn latch_words(model: &Model) -> Option<String> {
         (false, Some(_)) if !no_light => "MOTOR INHIBITED",
         (false, _) => return None,
     };
-    let ours = model.commands.of(CommandKind::Abort).map(|_| "commanded from here");
-    let told = cause.or(ours).map(str::to_owned);
+    let told = match cause {
+        Some(COMMANDED) | None => abort_commanded_by(model).or(cause.map(str::to_owned)),
+        Some(cause) => Some(cause.to_owned()),
+    };
     let cause = why_gate_stayed_shut(model).or(told).or_else(|| text_of_the_latch(model));
     Some(cause.map_or_else(|| word.to_owned(), |cause| format!("{word}: {cause}")))
+}
+
+/// Cause of an abort whose sender is not known.
+const COMMANDED: &str = "commanded by another station";
+
+/// Who commanded the abort: this station, or the sender that the vehicle names.
+fn abort_commanded_by(model: &Model) -> Option<String> {
+    let ours = model.commands.of(CommandKind::Abort).map(|_| "commanded from here".to_owned());
+    let mut texts = model.events.newest(TEXTS_SEARCHED).filter(|event| event.speaker == Speaker::Vehicle);
+    let named = texts.find_map(|event| event.text.strip_suffix(" aborts"));
+    ours.or_else(|| named.map(|sender| format!("commanded by {sender}")))
 }
 
 /// Which check kept the ignition gate shut: what the vehicle has found, or has said when it gave

@@ -140,6 +140,8 @@ pub struct Vehicle {
     pub trend: Trend,
     /// The path it flew.
     pub flown: FlownPath,
+    /// Its flight computer was reset in this flight.
+    pub reset_in_flight: bool,
     pub left_pad_at: Option<Duration>,
     /// It was seen to move since then: a motor that was commanded to light may not have lit.
     pub has_lifted: bool,

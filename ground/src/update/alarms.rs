@@ -114,7 +114,8 @@ const OF_STATION: [AlarmRow; 13] = [
 /// The alarms of the vehicle.
 const OF_VEHICLE: [AlarmRow; 13] = [
     of_run(AlarmKind::Rebooted, VEHICLE, |model, now| {
-        let (did, _) = model.rebooted.filter(|(_, at)| now.saturating_sub(*at) < REBOOT_SHOWN)?;
+        let shown = |at: Duration| now.saturating_sub(at) < REBOOT_SHOWN || model.vehicle.reset_in_flight;
+        let (did, _) = model.rebooted.filter(|(_, at)| shown(*at))?;
         Some(format!("the vehicle has REBOOTED{did}"))
     }),
     of_boot(AlarmKind::LiveMotor, VEHICLE, |model, now| {

@@ -61,6 +61,8 @@ impl Announced {
 
 /// How the vehicle says that its flight computer has restarted.
 pub const RESTARTED: &str = "the flight computer has restarted";
+/// Where it happened, if it was not on the pad.
+pub(super) const IN_FLIGHT: &str = " IN FLIGHT";
 /// News of one reset come within this time.
 const ONE_RESET: Duration = Duration::from_secs(5);
 

@@ -166,7 +166,7 @@ fn no_time_is_told_before_the_canopy_carries() {
 fn a_latch_has_its_reason_beside_it() {
     use TdLatch as L;
     for (latch, words) in [
-        (L::TD_LATCH_COMMANDED, "ABORT LATCHED: commanded by the crew"),
+        (L::TD_LATCH_COMMANDED, "ABORT LATCHED: commanded by another station"),
         (L::TD_LATCH_UNCOMMANDED_LIFTOFF, "ABORT LATCHED: uncommanded lift-off"),
         (L::TD_LATCH_UNCOMMANDED_RELEASE, "ABORT LATCHED: uncommanded release"),
         (L::TD_LATCH_NO_SEPARATION, "ABORT LATCHED: the booster stayed on"),

@@ -166,6 +166,11 @@ fn refused(table: &mut PhaseTable, command: CrewCommand, refusal: Refusal, check
 // Decides the crew's requests, and holds the countdown when the commanding station is silent or a
 // dead-man confirmation is overdue.
 
+/// Silence of the commanding station after which an armed vehicle on its pad disarms itself, s: a
+/// crew that restarts its station needs some ten seconds, and nobody should stand beside an armed
+/// vehicle that nobody commands.
+const ALONE_S: f64 = 60.0;
+
 /// State of the crew in the computer's memory.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct CrewMemory {
@@ -207,7 +212,8 @@ impl Computer {
                 (None, Some(station)) if self.input.people.is_some() => {
                     Some(format!("station {station}, with the key that all share,"))
                 }
-                _ => None,
+                (None, Some(station)) => Some(format!("station {station}")),
+                (None, None) => None,
             };
             if let Some(who) = who {
                 self.table.report(Severity::Warning, format!("{who} aborts"));
@@ -405,6 +411,15 @@ impl Computer {
         };
         if held {
             self.crew.held_by = by;
+        }
+        let mode = self.table.mode();
+        let waits = mode.phase == Phase::PadArmed && mode.countdown_end_s.is_none();
+        // NaN is no sign of life.
+        let is_alone = !(age_s <= ALONE_S);
+        if waits && is_alone {
+            let words = format!("nothing heard of {station} for {ALONE_S} s: DISARMED");
+            self.table.report(Severity::Critical, words);
+            let _ = self.table.apply(Event::DisarmRequested { lifted_off: false });
         }
     }
 

@@ -51,7 +51,7 @@ use crate::guidance::vertical::EvenLanding;
 use crate::rules::arming::{PredictedLanding, Uplink};
 use crate::rules::operator::Operator;
 use crate::rules::outputs::{FlightProgress, Outputs};
-use crate::rules::phase::{Event, HOLD_LIMIT_S, Latch, Mode, Motor, Phase};
+use crate::rules::phase::{Event, HOLD_LIMIT_S, Latch, Mode, Motor, Phase, StartPoint};
 use crate::rules::two_person::Station;
 use crate::vehicle::mission::{ArmingLimits, Mission};
 use crate::vehicle::rigid::RigidState;
@@ -139,6 +139,7 @@ impl Computer {
                 self.repeat_the_checks();
             }
         }
+        self.inhibit_if_moving();
         let flown = self.flown();
         let planned =
             flown.filter(|_| input.plan_ready).is_some_and(|flown| self.pilot.take_over(flown.time_s));
@@ -189,6 +190,20 @@ impl Computer {
         let [pitch, yaw, fins_rad @ ..] = servos.each_ref().map(|servo| servo.at_rad);
         let sensed = SensedInput { gimbal_rad: [pitch, yaw], fins_rad, ..input.sensed };
         Input { sensed, ..*input }
+    }
+
+    /// Latches an abort if a computer that starts as on its pad rises or falls: it was switched on in
+    /// the air, and its motor may be live. A drone carries its vehicle up before it is armed.
+    fn inhibit_if_moving(&mut self) {
+        let Mode { phase, interlocks, .. } = *self.table.mode();
+        let waits = matches!(phase, Phase::Safe | Phase::PadIdle) && self.release.is_none();
+        let on_ground = self.start_point() != StartPoint::Drone;
+        if waits && on_ground && !interlocks.abort_latched && self.pad.moves() {
+            let words = "switched on while it moves: it cannot be armed, DO NOT APPROACH";
+            self.table.report(Severity::Critical, words.into());
+            let abort = self.abort_event();
+            let _ = self.table.apply(abort);
+        }
     }
 
     /// Returns whether no fin covers the parachute hatch: all fins are open, or have had time to

@@ -78,10 +78,24 @@ pub(super) struct PadWatch {
     pressures: u32,
     altitude_sum_m: f64,
     falling_frames: u32,
+    /// Seconds in a row in which the pressure changed as in an ascent or a fall.
+    moving_seconds: u32,
     found: Option<PadSecond>,
 }
 
+/// Change of the pressure altitude in a second that no crew causes, m: a vehicle under its parachute
+/// sinks by 6 m a second, a person climbs a ladder at less than 1 m a second.
+const MOVES_M: f64 = 5.0;
+/// A bay that closes changes the pressure in one second, and not in the next.
+const MOVING_SECONDS: u32 = 2;
+
 impl PadWatch {
+    /// Returns whether the vehicle rises or falls: a computer that was reset in the air takes
+    /// itself for one on its pad.
+    pub(super) fn moves(&self) -> bool {
+        self.moving_seconds >= MOVING_SECONDS
+    }
+
     /// Adds a frame.
     pub(super) fn update_stillness(&mut self, measurements: &Measurements) {
         self.alignment.take(&measurements.imu);
@@ -102,11 +116,14 @@ impl PadWatch {
         }
         let over = core::mem::take(self);
         (self.falling_frames, self.record) = (over.falling_frames, over.record);
+        let altitude_m = over.altitude_sum_m / f64::from(over.pressures);
+        let climbs_m = over.found.map_or(0.0, |before| altitude_m - before.pressure_altitude_m);
+        self.moving_seconds = if climbs_m.abs() > MOVES_M { over.moving_seconds + 1 } else { 0 };
         let across_m_s2 = over.force_sum_m_s2.yz().norm();
         self.found = Some(PadSecond {
             at_rest: self.record.take(&over.alignment, 0.0).ok(),
             lean_rad: libm::atan2(across_m_s2, over.force_sum_m_s2.x),
-            pressure_altitude_m: over.altitude_sum_m / f64::from(over.pressures),
+            pressure_altitude_m: altitude_m,
             // Without a fix in this second the velocity is that of the second before; a missing fix
             // is a separate check. Before the first fix this is 0 / 0 = NaN, which passes no check.
             velocity_m_s: match over.found.filter(|_| over.fixes == 0) {

@@ -140,6 +140,8 @@ impl Computer {
         match &saved.in_the_air {
             Some(flown) => {
                 self.table.go_on(saved.mode, saved.latch);
+                let words = "the flight computer has restarted IN FLIGHT";
+                self.table.report(Severity::Critical, words.into());
                 // This state was already reported.
                 let _ = self.motor_watch.update(&saved.mode, saved.time_s);
                 self.release = Some(flown.release);

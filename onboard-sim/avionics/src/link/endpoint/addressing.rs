@@ -71,7 +71,13 @@ impl VehicleEndpoint {
                 let why = "another vehicle has these ids: name the boot that it is for in parameter 7";
                 return refused(not_now, why.to_owned());
             }
-            AddressedBoot::Any => {}
+            AddressedBoot::Any => {
+                // A stranger beside the crew's station, whose screen does not show what it does.
+                if let Some(ours) = self.stations.ours_beside(station, vehicle.time_s) {
+                    let why = format!("{ours} is at the controls: name boot {us} in parameter 7");
+                    return refused(denied, why);
+                }
+            }
         }
         let others = self.stations.same_ids(station, vehicle.time_s);
         if others > 0 {

@@ -160,6 +160,10 @@ impl VehicleEndpoint {
                 self.acknowledge(link, &command, answer);
             }
         }
+        // It has disarmed itself: the next station that arms it is in command.
+        if vehicle.phase() == Phase::PadIdle {
+            self.stations.set_commander(None);
+        }
     }
 
     /// The first station that armed it is in command; of two people, the proposer's. A station that

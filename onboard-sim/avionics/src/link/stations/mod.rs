@@ -303,6 +303,13 @@ impl Stations {
         others.count() + usize::from(station.number != 0 && same.iter().any(crowded))
     }
 
+    /// A Touchdown station beside a station that is none: only ours have a session.
+    pub fn ours_beside(&self, station: Station, time_s: f64) -> Option<Station> {
+        let is_ours = |station: Station| self.peer(station).is_some_and(|peer| peer.session != 0);
+        let ours = self.peers.iter().find(|peer| peer.session != 0 && peer.is_there(time_s))?;
+        (!is_ours(station)).then(|| ours.station())
+    }
+
     /// Age of the last sign of life of a station, s; `None` if there is none. A station with a
     /// session lives by its heartbeats: its other frames might be another one's.
     pub fn age_s(&self, station: Station, time_s: f64) -> Option<f64> {
