@@ -15,6 +15,7 @@ use ratatui::backend::{Backend, ClearType, CrosstermBackend, WindowSize};
 use ratatui::buffer::{Cell, CellWidth as _};
 use ratatui::layout::{Position, Size};
 use ratatui::style::{Color, Modifier};
+use rustix::termios::tcgetwinsize;
 
 use crate::view::theme::true_colour;
 
@@ -250,7 +251,10 @@ impl<W: Write> Backend for DiffBackend<W> {
     }
 
     fn size(&self) -> io::Result<Size> {
-        let size = self.terminal.size()?;
+        // Not the size that crossterm returns: it opens /dev/tty for every frame, and opening a file
+        // may stall.
+        let size = tcgetwinsize(io::stdout())?;
+        let size = Size::new(size.ws_col, size.ws_row);
         // A terminal that does not know its size, as some serial consoles, has that of a VT100.
         Ok(if size.width == 0 || size.height == 0 { Size::new(80, 24) } else { size })
     }

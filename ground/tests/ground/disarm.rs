@@ -4,7 +4,7 @@ use crate::keys::ladder;
 use crate::rig::{Rig, is_arm};
 use ground::key::Key;
 use ground::model::{Acknowledgement, CommandKind};
-use protocol::dialect::{COMMAND_LONG_DATA, MavCmd};
+use protocol::dialect::{COMMAND_LONG_DATA, MavCmd, TdPhase};
 use protocol::identity::GROUND;
 
 const ARM: MavCmd = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM;
@@ -36,7 +36,7 @@ fn a_late_answer_to_an_arming_does_not_end_the_disarm() {
         assert_eq!(arm.acknowledged, Acknowledgement::Answered(result));
         rig.run(0.6);
         let sent = rig.take_commands();
-        assert!(sent.len() == 1 && is_disarm(&sent[0]), "the first was lost, so it is sent again: {sent:?}");
+        assert!(sent.len() >= 3 && sent.iter().all(is_disarm), "the first was lost, so it is repeated");
         rig.answer(ARM, ACCEPTED);
         rig.armed = false;
         rig.run(3.0);
@@ -47,13 +47,31 @@ fn a_late_answer_to_an_arming_does_not_end_the_disarm() {
 }
 
 #[test]
-fn a_disarm_without_an_answer_is_given_up_after_its_attempts() {
-    let mut rig = Rig::crewed();
-    rig.keys(&ladder());
-    rig.keys(&[Key::Char('D'), Key::Enter]);
+fn a_disarm_is_repeated_until_the_vehicle_shows_it_or_flies() {
+    let disarms = |rig: &mut Rig| rig.take_commands().iter().filter(|sent| is_disarm(sent)).count();
+    let unanswered = || {
+        let mut rig = Rig::crewed();
+        rig.armed = true;
+        rig.run(1.0);
+        rig.keys(&[Key::Char('D'), Key::Enter]);
+        rig.run(10.0);
+        rig.expect_screen("DISARM NOT ACKNOWLEDGED yet; repeated");
+        assert!(disarms(&mut rig) > 40);
+        rig
+    };
+    let mut rig = unanswered();
+    rig.armed = false;
+    rig.run(1.0);
+    disarms(&mut rig);
     rig.run(5.0);
-    assert_eq!(rig.take_commands().iter().filter(|command| is_disarm(command)).count(), 4);
-    rig.expect_event("DISARM not acknowledged after 4 attempts");
+    assert_eq!(disarms(&mut rig), 0, "the vehicle shows it");
+    let mut rig = unanswered();
+    rig.phase = TdPhase::TD_PHASE_BOOST;
+    rig.run(1.0);
+    rig.expect_event("DISARM TOO LATE: the vehicle flies");
+    disarms(&mut rig);
+    rig.run(5.0);
+    assert_eq!(disarms(&mut rig), 0);
 }
 
 /// After an answered arming, the next answer belongs to the disarm.
