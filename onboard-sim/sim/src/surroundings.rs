@@ -96,10 +96,8 @@ impl Surroundings {
             self.world.step(&self.actuators);
             measured = self.sensors.observe(&SensorTruth::of(&self.world)).or(measured);
         }
-        let energised = [self.actuators.ignite, self.actuators.ignite_booster]
-            .into_iter()
-            .filter(|energised| *energised)
-            .count();
+        let energised =
+            [self.actuators.ignite, self.actuators.ignite_booster].into_iter().filter(|on| *on).count();
         self.battery.step(surfaces_rad(&self.world), energised, FRAME_S);
         self.measured = measured.map(|measured| self.faults.distort(&measured));
         self.measured

@@ -26,9 +26,8 @@ impl Wander {
     /// Advances over an interval of any length, exactly: the retained share of the variance, `k^2`,
     /// and the new share, `1 - k^2`, add up to one.
     pub(super) fn advance(&mut self, interval_s: f64, normal: &mut Normal) {
-        let retained = libm::exp(-interval_s / self.correlation_s);
-        self.value =
-            self.value * retained + self.sigma * libm::sqrt(1.0 - retained * retained) * normal.next();
+        let decay = libm::exp(-interval_s / self.correlation_s);
+        self.value = self.value * decay + self.sigma * libm::sqrt(1.0 - decay * decay) * normal.next();
     }
 }
 
