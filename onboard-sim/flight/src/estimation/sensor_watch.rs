@@ -75,9 +75,7 @@ impl<const N: usize> Channel<N> {
         if self.sampled_at_s.is_nan() {
             self.sampled_at_s = time_s;
         }
-        let Some(sample) = sample.filter(|sample| sample.iter().all(|value| value.is_finite())) else {
-            return;
-        };
+        let Some(sample) = sample.filter(|axes| axes.iter().all(|value| value.is_finite())) else { return };
         let again = self.has_sample && sample.map(f64::to_bits) == self.last.data.0[0].map(f64::to_bits);
         if !again {
             self.same_since_s = time_s;
