@@ -57,7 +57,7 @@ fn regress_flights_with_an_abort_in_the_burn_land_as_often_as_without() {
 fn an_abort_before_the_ignition_with_the_gate_open_burns_at_its_height_and_lands_in_place() {
     let recipe = recipe(None);
     let burns = AbortEffect::Burn;
-    let asked = |tally: &Tally| tally.flight().computer().abort_effect();
+    let effect = |tally: &Tally| tally.flight().computer().abort_effect();
     let mut rows = Vec::new();
     for number in 0..8 {
         let mut tally = Tally::new(&recipe, number).unwrap();
@@ -65,7 +65,7 @@ fn an_abort_before_the_ignition_with_the_gate_open_burns_at_its_height_and_lands
         let mut lasted = 0;
         while lasted < 3 {
             assert!(tally.step(), "flight {number} never had an abort that burns");
-            lasted = if asked(&tally) == burns { lasted + 1 } else { 0 };
+            lasted = if effect(&tally) == burns { lasted + 1 } else { 0 };
         }
         assert_eq!(tally.flight().computer().mode().phase, Phase::LandArmed);
         tally.flight_mut().abort();

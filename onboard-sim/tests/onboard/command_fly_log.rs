@@ -15,8 +15,8 @@ fn fly(directory: &Path, log: &str) -> String {
     let output = Command::new(program).current_dir(directory).args(arguments).output().unwrap();
     assert_eq!(output.status.code(), Some(1));
     assert!(output.stdout.is_empty());
-    let said = String::from_utf8(output.stderr).unwrap();
-    said.split_inclusive('\n').filter(|line| !line.starts_with("error: ")).collect()
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    stderr.split_inclusive('\n').filter(|line| !line.starts_with("error: ")).collect()
 }
 
 #[test]
@@ -34,13 +34,13 @@ fn fly_with_the_log_none_writes_no_file() {
 fn fly_preserves_an_existing_log_and_reports_the_free_name() {
     let directory = tempfile::tempdir().unwrap();
     fs::write(directory.path().join("flight.mcap"), "a flight").unwrap();
-    let said = fly(directory.path(), "flight.mcap");
-    assert_eq!(said, "flight.mcap exists and is kept; flight-2.mcap is written\n");
+    let notes = fly(directory.path(), "flight.mcap");
+    assert_eq!(notes, "flight.mcap exists and is kept; flight-2.mcap is written\n");
     assert_eq!(fs::read_to_string(directory.path().join("flight.mcap")).unwrap(), "a flight");
     // Control characters in a name do not reach the terminal.
     fs::write(directory.path().join("\u{1b}[2J.mcap"), "a flight").unwrap();
-    let said = fly(directory.path(), "\u{1b}[2J.mcap");
-    assert_eq!(said, "\u{fffd}[2J.mcap exists and is kept; \u{fffd}[2J-2.mcap is written\n");
+    let notes = fly(directory.path(), "\u{1b}[2J.mcap");
+    assert_eq!(notes, "\u{fffd}[2J.mcap exists and is kept; \u{fffd}[2J-2.mcap is written\n");
 }
 
 /// Help for the person who types is not part of the object.
@@ -60,8 +60,8 @@ fn a_line_that_is_not_understood_is_answered_beside_the_object() {
     let pid = rustix::process::Pid::from_child(&flying);
     rustix::process::kill_process(pid, rustix::process::Signal::TERM).unwrap();
     let ended = flying.wait_with_output().unwrap();
-    let told: serde_json::Value = serde_json::from_slice(&ended.stdout).unwrap();
-    assert_eq!(told["exit_code"], 5, "{told}");
+    let result: serde_json::Value = serde_json::from_slice(&ended.stdout).unwrap();
+    assert_eq!(result["exit_code"], 5, "{result}");
 }
 
 /// A program reads one object: how the flight ended, and the path of its log.
@@ -71,8 +71,8 @@ fn the_end_of_a_flight_is_one_object() {
     let mut fly = Command::new(env!("CARGO_BIN_EXE_onboard-sim"));
     fly.current_dir(directory.path())
         .args(["fly", "--json", "--start", "apogee", "--speed", "max", "--log", "f.mcap"]);
-    let told: serde_json::Value = serde_json::from_slice(&fly.output().unwrap().stdout).unwrap();
-    assert_eq!((&told["exit_code"], &told["log"]), (&0.into(), &"f.mcap".into()), "{told}");
-    let verdict = &told["verdict"];
-    assert!(verdict["landing"]["stands"] == true && verdict["envelope"][0]["passed"] == true, "{told}");
+    let result: serde_json::Value = serde_json::from_slice(&fly.output().unwrap().stdout).unwrap();
+    assert_eq!((&result["exit_code"], &result["log"]), (&0.into(), &"f.mcap".into()), "{result}");
+    let verdict = &result["verdict"];
+    assert!(verdict["landing"]["stands"] == true && verdict["envelope"][0]["passed"] == true, "{result}");
 }
