@@ -19,8 +19,8 @@ const FLIGHTS: u64 = 200;
 const FLIGHTS_WITH_FAULT: u64 = 4;
 
 fn main() {
-    let asked = std::env::args().skip(1).find_map(|argument| argument.parse().ok());
-    let flights = asked.unwrap_or(FLIGHTS);
+    let argument = std::env::args().skip(1).find_map(|argument| argument.parse().ok());
+    let flights = argument.unwrap_or(FLIGHTS);
     for (mission, start) in [
         ("mk2", StartPoint::Apogee),
         ("mk2", StartPoint::Pad),

@@ -16,10 +16,10 @@ const SEED: u64 = 3001;
 const FLIGHTS: u64 = 200;
 
 fn main() {
-    let asked: Vec<String> = std::env::args().skip(1).collect();
+    let selected: Vec<String> = std::env::args().skip(1).collect();
     let names: Vec<&str> =
-        asked.iter().map(String::as_str).filter(|name| name.starts_with(['m', 'v'])).collect();
-    let mut numbers = asked.iter().filter_map(|argument| argument.parse().ok());
+        selected.iter().map(String::as_str).filter(|name| name.starts_with(['m', 'v'])).collect();
+    let mut numbers = selected.iter().filter_map(|argument| argument.parse().ok());
     let (flights, bound): (u64, Option<u64>) = (numbers.next().unwrap_or(FLIGHTS), numbers.next());
     println!(
         "{:24} {:>6} {:>7} {:>7} {:>7} {:>7} {:>7}",

@@ -66,20 +66,20 @@ fn main() -> anyhow::Result<()> {
             };
             in_parallel(&numbers, one, &|_| {}).into_iter().collect()
         };
-        let (told, untold) = (stand(&world)?, stand(&less)?);
+        let (given, not_given) = (stand(&world)?, stand(&less)?);
         let count = |is: fn(bool, bool) -> bool| {
-            told.iter().zip(&untold).filter(|(told, untold)| is(**told, **untold)).count() as u64
+            given.iter().zip(&not_given).filter(|(given, not_given)| is(**given, **not_given)).count() as u64
         };
         let share = |count| {
             let Share { share, low, high, .. } = Share::new(count, flights);
             format!("{:.1} % ({:.1} to {:.1})", 100.0 * share, 100.0 * low, 100.0 * high)
         };
         let [only_told, only_untold] =
-            [count(|told, untold| told && !untold), count(|told, untold| untold && !told)];
-        let (told, untold) = (share(count(|told, _| told)), share(count(|_, untold| untold)));
+            [count(|given, not_given| given && !not_given), count(|given, not_given| not_given && !given)];
+        let (given, not_given) = (share(count(|given, _| given)), share(count(|_, not_given| not_given)));
         writeln!(
             stdout,
-            "{row}: told {told}, not told {untold}, only told {only_told}, only not {only_untold}"
+            "{row}: told {given}, not told {not_given}, only told {only_told}, only not {only_untold}"
         )?;
     }
     Ok(())

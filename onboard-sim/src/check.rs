@@ -355,8 +355,8 @@ impl<'a> Vehicle<'a> {
         let settings = IgnitionSettings { delay_s: 0.0, fixed_height_m: None, ..mission.ignition };
         let speed_m_s = self.landing.speed_m_s;
         let heights = settings.prediction(&self.column, &mission.motor_curve, 0.0, -speed_m_s, 0.0);
-        let asked_m = 4.0 * IGNITER_S * mission.airframe.igniter_scatter() * speed_m_s;
-        let beside = format!("{asked_m:.1} m for the igniter");
+        let required_m = 4.0 * IGNITER_S * mission.airframe.igniter_scatter() * speed_m_s;
+        let beside = format!("{required_m:.1} m for the igniter");
         let (Some(certified), Some(nearest)) = (heights.band, heights.nearest) else {
             return Row::new("ignition", Verdict::No, "no height suits the motor".to_owned(), beside);
         };
@@ -369,7 +369,7 @@ impl<'a> Vehicle<'a> {
                 certified.high_m - certified.low_m
             )
         };
-        Row::new("ignition", BAND.judge(width_m / asked_m), found, beside)
+        Row::new("ignition", BAND.judge(width_m / required_m), found, beside)
     }
 
     /// Dynamic pressure at an airspeed, Pa.
@@ -448,10 +448,10 @@ impl<'a> Vehicle<'a> {
         );
         let lean_deg = descent.lean_max_deg;
         let fins_m2 = airframe.fin_drag_area_m2(&opened(PITCH));
-        let asked_n_m = self.air_n_m(&mass, self.terminal_m_s, lean_deg.to_radians(), fins_m2).abs();
+        let required_n_m = self.air_n_m(&mass, self.terminal_m_s, lean_deg.to_radians(), fins_m2).abs();
         let found = format!("{most_n_m:.1} N m at {:.0} m/s", self.terminal_m_s);
-        let beside = format!("{asked_n_m:.1} N m for {lean_deg:.0} deg of lean");
-        Row::new("fins", FINS.judge(most_n_m / asked_n_m), found, beside)
+        let beside = format!("{required_n_m:.1} N m for {lean_deg:.0} deg of lean");
+        Row::new("fins", FINS.judge(most_n_m / required_n_m), found, beside)
             .or(|| "longer fins, or hinges nearer to the nose".to_owned())
     }
 
@@ -624,9 +624,10 @@ mod tests {
         let narrow = feet(0.1);
         assert_eq!(narrow.verdict, Verdict::No);
         let words = narrow.change.unwrap();
-        let asked_m: f64 = words.split(' ').nth(1).unwrap().parse().unwrap();
+        let required_m: f64 = words.split(' ').nth(1).unwrap().parse().unwrap();
         assert!(
-            feet(asked_m - 0.02).verdict == Verdict::Tight && feet(asked_m + 0.01).verdict == Verdict::Ok,
+            feet(required_m - 0.02).verdict == Verdict::Tight
+                && feet(required_m + 0.01).verdict == Verdict::Ok,
             "{words}"
         );
     }

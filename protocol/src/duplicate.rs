@@ -71,8 +71,8 @@ impl Duplicates {
     }
 
     /// Notes a frame that this operator has signed (0: the shared key, or none) and returns how it
-    /// has arrived. Nobody can turn another one's frame into a copy. Over a link from the 65th on
-    /// nothing is a copy.
+    /// has arrived. No sender can turn the frame of another one into a copy. Over a link from the
+    /// 65th on nothing is a copy.
     pub fn arrival(&mut self, frame: &Frame, operator: u8, link: usize, now: Duration) -> Arrival {
         let source = frame.source();
         if !self.sources.contains_key(&source) && self.sources.len() >= MAX_SOURCES {

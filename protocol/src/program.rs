@@ -34,7 +34,7 @@ impl Exit {
     }
 
     /// How a command line ended that was not run: help and version are an answer. Prints it; if
-    /// nobody reads it, nothing is lost.
+    /// no one reads it, nothing is lost.
     pub fn unread(message: &clap::Error) -> Self {
         let _ = message.print();
         if message.use_stderr() { Self::Usage } else { Self::Yes }

@@ -33,10 +33,10 @@ fn framed(bytes: &[u8]) -> Option<Frame> {
 fn a_signed_frame_is_accepted_once() {
     let (mut ground, mut vehicle) = (side(7), side(7));
     let signed = ground.sign(&beat(), 3, NOW);
-    let heard = framed(signed.as_bytes()).unwrap();
-    assert_eq!(heard, signed);
-    assert_eq!(vehicle.check(&heard, NOW), Ok(()));
-    assert_eq!(vehicle.check(&heard, NOW), Err(Rejection::Replayed));
+    let received = framed(signed.as_bytes()).unwrap();
+    assert_eq!(received, signed);
+    assert_eq!(vehicle.check(&received, NOW), Ok(()));
+    assert_eq!(vehicle.check(&received, NOW), Err(Rejection::Replayed));
     assert_eq!(
         vehicle.check(&ground.sign(&beat(), 3, NOW - SECOND), NOW),
         Ok(()),
@@ -93,13 +93,17 @@ fn every_flipped_bit_is_detected() {
 #[test]
 fn a_restart_remembers_received_and_sent_timestamps() {
     let mut ground = side(7);
-    let heard = ground.sign(&beat(), 0, NOW);
+    let received = ground.sign(&beat(), 0, NOW);
     let mut vehicle = side(7);
-    vehicle.check(&heard, NOW).unwrap();
+    vehicle.check(&received, NOW).unwrap();
     let remembered = Memory::from_text(&vehicle.memory().to_text()).unwrap();
     assert_eq!(remembered, vehicle.memory());
     let mut restarted = Signing::new(key(7), remembered);
-    assert_eq!(restarted.check(&heard, 0), Err(Rejection::Replayed), "it is rejected even without a clock");
+    assert_eq!(
+        restarted.check(&received, 0),
+        Err(Rejection::Replayed),
+        "it is rejected even without a clock"
+    );
     // Its next timestamp is newer than any it has used, so the ground still accepts it.
     let before = vehicle.sign(&beat(), 0, NOW);
     ground.check(&before, NOW).unwrap();
@@ -168,7 +172,7 @@ fn the_stamps_of_a_run_follow_no_clock_that_is_set_while_it_runs() {
 fn a_vehicle_that_is_locked_out_by_its_stamps_is_named_with_what_to_do() {
     const DAY: u64 = 24 * 3600 * SECOND;
     let (mut vehicle, mut station, mut lockouts) = (side(7), side(7), Lockouts::default());
-    let mut hear = |vehicle: &mut Signing, station: &mut Signing, now_ms: u64, clock: u64| {
+    let mut receive = |vehicle: &mut Signing, station: &mut Signing, now_ms: u64, clock: u64| {
         let clock = clock + now_ms * SECOND / 1_000;
         let frame = vehicle.sign(&beat(), 0, clock);
         let here = NOW + now_ms * SECOND / 1_000;
@@ -182,7 +186,9 @@ fn a_vehicle_that_is_locked_out_by_its_stamps_is_named_with_what_to_do() {
     };
     let ahead = NOW + 3 * DAY;
     let said: Vec<(u64, String)> = (0..600)
-        .filter_map(|tenth| hear(&mut vehicle, &mut station, 100 * tenth, ahead).map(|words| (tenth, words)))
+        .filter_map(|tenth| {
+            receive(&mut vehicle, &mut station, 100 * tenth, ahead).map(|words| (tenth, words))
+        })
         .collect();
     assert_eq!(said.iter().map(|(tenth, _)| *tenth).collect::<Vec<_>>(), [20, 320], "not with every frame");
     let words = &said[0].1;
@@ -191,14 +197,15 @@ fn a_vehicle_that_is_locked_out_by_its_stamps_is_named_with_what_to_do() {
     }
     // Its clock is right now and its stamps are removed.
     let mut again = side(7);
-    assert_eq!(hear(&mut again, &mut station, 61_000, NOW), None);
-    assert_eq!(hear(&mut vehicle, &mut station, 61_100, ahead), None, "it was heard just now");
-    // Whoever has no key is not told of, and strange stamps among true frames are no lock-out.
+    assert_eq!(receive(&mut again, &mut station, 61_000, NOW), None);
+    assert_eq!(receive(&mut vehicle, &mut station, 61_100, ahead), None, "it was received just now");
+    // A sender without a key is not reported, and deviating stamps among valid frames are no
+    // lock-out.
     let mut stranger = side(8);
     for tenth in 700..800 {
-        assert_eq!(hear(&mut stranger, &mut station, 100 * tenth, NOW), None);
-        hear(&mut again, &mut station, 100 * tenth, NOW);
-        assert_eq!(hear(&mut vehicle, &mut station, 100 * tenth + 50, ahead), None);
+        assert_eq!(receive(&mut stranger, &mut station, 100 * tenth, NOW), None);
+        receive(&mut again, &mut station, 100 * tenth, NOW);
+        assert_eq!(receive(&mut vehicle, &mut station, 100 * tenth + 50, ahead), None);
     }
 }
 
@@ -283,7 +290,7 @@ fn the_link_id_selects_the_key_and_nothing_else() {
             assert_eq!(vehicle.check(&signed, NOW), Ok(()), "operator {number} over link {link}");
             assert_eq!(vehicle.operator_of(&signed), number);
         }
-        // With the key of one and the number of another, or of nobody.
+        // With the key of one and the number of another, or a number that is not in use.
         for other in (0..=15).filter(|other| *other != number) {
             let forged = station.sign(&beat(), other, NOW + 1_000 + u64::from(other));
             assert_eq!(vehicle.check(&forged, NOW), Err(Rejection::Wrong), "operator {number} as {other}");

@@ -182,7 +182,7 @@ impl<'a> Search<'a> {
         for (k, node) in nodes.iter().enumerate().rev() {
             let (weight, free) = cost_at(self.problem, k);
             let mut slope = weight.component_mul(&(node - free));
-            let mut whole = SMatrix::from_diagonal(&(weight + stiff[k].0));
+            let mut complete = SMatrix::from_diagonal(&(weight + stiff[k].0));
             let mut before = slope + pulls[k];
             slope += stiff[k].1;
             let (mut by, mut defect) = (SMatrix::zeros(), Column::zeros());
@@ -193,15 +193,15 @@ impl<'a> Search<'a> {
                 defect = tangent.end - next.fixed_rows::<STATES>(0);
                 before += by.transpose() * costate;
                 slope += by.transpose() * value * defect;
-                whole += tangent.bend + by.transpose() * value * by;
+                complete += tangent.bend + by.transpose() * value * by;
             }
             costate.copy_from(&before.fixed_rows::<STATES>(0));
-            let inputs = convex(&whole.fixed_view::<INPUTS, INPUTS>(STATES, STATES).into_owned())?;
-            let crossed = whole.fixed_view::<INPUTS, STATES>(STATES, 0).into_owned();
+            let inputs = convex(&complete.fixed_view::<INPUTS, INPUTS>(STATES, STATES).into_owned())?;
+            let crossed = complete.fixed_view::<INPUTS, STATES>(STATES, 0).into_owned();
             let gain = -inputs.cholesky()?.solve(&crossed);
             let least = SMatrix::<f64, STATES, STATES>::identity() * CURVATURE - crossed.transpose() * gain;
-            value = whole.fixed_view::<STATES, STATES>(0, 0) - least;
-            let mut hessian = whole;
+            value = complete.fixed_view::<STATES, STATES>(0, 0) - least;
+            let mut hessian = complete;
             hessian.fixed_view_mut::<STATES, STATES>(0, 0).copy_from(&least);
             hessian.fixed_view_mut::<INPUTS, INPUTS>(STATES, STATES).copy_from(&inputs);
             stages.push(Stage { slope, hessian, by, defect, gain });

@@ -204,8 +204,8 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
             let jammed = raises == 0
                 && barrier < RAISED_BARRIER
                 && fractions.primal.min(fractions.dual) < STEP_FRACTION_MIN;
-            let whole = fractions.primal.min(fractions.dual) >= 1.0;
-            crept = if right > 0 && whole { crept + 1 } else { 0 };
+            let full = fractions.primal.min(fractions.dual) >= 1.0;
+            crept = if right > 0 && full { crept + 1 } else { 0 };
             let creeps = crept >= CREEPS && raises < RAISES;
             let taken = if jammed || creeps {
                 None

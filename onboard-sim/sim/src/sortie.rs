@@ -154,7 +154,7 @@ impl Sortie {
     }
 
     /// The same flight of a vehicle that was aborted on its pad in an earlier power-up, at this
-    /// vehicle time, s: before zero.
+    /// vehicle time, s: at most zero.
     #[must_use]
     pub fn aborted_before(self, at_s: f64) -> Self {
         Self { computer: self.computer.aborted_before(at_s), ..self }
@@ -163,9 +163,9 @@ impl Sortie {
     /// A flight in a world at its start, with a computer at power-up.
     fn of(mission: &Mission, dispersion: &Dispersion, drawn: &Draw) -> Result<Self, SetUpError> {
         let drawn = falling_as(mission, drawn)?;
-        let (surroundings, believed) = Surroundings::at_start(mission, dispersion, &drawn)?;
+        let (surroundings, estimate) = Surroundings::at_start(mission, dispersion, &drawn)?;
         Ok(Self {
-            computer: Computer::at_power_up(mission, &believed),
+            computer: Computer::at_power_up(mission, &estimate),
             rehearsal: None,
             surroundings,
             fall: None,
@@ -419,8 +419,8 @@ impl Sortie {
     /// The same flight of a computer that has found its state and the calibration of its inertial
     /// unit on its rail.
     #[must_use]
-    pub fn standing(self, believed: &RigidState, calibration: &ImuCalibration) -> Self {
-        Self { computer: self.computer.standing(believed, calibration), ..self }
+    pub fn standing(self, estimate: &RigidState, calibration: &ImuCalibration) -> Self {
+        Self { computer: self.computer.standing(estimate, calibration), ..self }
     }
 
     /// The mission as flown.

@@ -43,17 +43,17 @@ impl Surroundings {
         let world = world(mission, drawn)?;
         let sensors = sensors(mission, dispersion, drawn)?;
         let uncertainty = StartUncertainty::at_start(mission.start.at);
-        let believed = || start_with_errors(world.state(), &uncertainty, drawn.flight_seed);
-        let believed = match mission.start.at {
+        let estimate = || start_with_errors(world.state(), &uncertainty, drawn.flight_seed);
+        let estimate = match mission.start.at {
             _ if !dispersion.sensors => *world.state(),
-            StartPoint::Pad => sensors.levelled(world.state(), &believed()),
-            StartPoint::Apogee | StartPoint::Drone => believed(),
+            StartPoint::Pad => sensors.levelled(world.state(), &estimate()),
+            StartPoint::Apogee | StartPoint::Drone => estimate(),
         };
         let actuators = at_rest(mission);
         let faults = SensorFaults::default();
         let battery = Battery::new(1.0, surfaces_rad(&world));
         let (broken, measured, finite) = (Vec::new(), None, true);
-        Ok((Self { world, sensors, faults, broken, actuators, battery, measured, finite }, believed))
+        Ok((Self { world, sensors, faults, broken, actuators, battery, measured, finite }, estimate))
     }
 
     /// Goes to the start of the flight from wherever the vehicle waited. Both were already set up
@@ -96,9 +96,9 @@ impl Surroundings {
             self.world.step(&self.actuators);
             measured = self.sensors.observe(&SensorTruth::of(&self.world)).or(measured);
         }
-        let lit =
-            [self.actuators.ignite, self.actuators.ignite_booster].into_iter().filter(|lit| *lit).count();
-        self.battery.step(surfaces_rad(&self.world), lit, FRAME_S);
+        let energised =
+            [self.actuators.ignite, self.actuators.ignite_booster].into_iter().filter(|on| *on).count();
+        self.battery.step(surfaces_rad(&self.world), energised, FRAME_S);
         self.measured = measured.map(|measured| self.faults.distort(&measured));
         self.measured
     }

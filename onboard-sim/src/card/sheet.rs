@@ -162,7 +162,7 @@ impl Card {
         let upwind_s = launch.map(|launch| launch.rail.upwind_s).filter(|upwind_s| *upwind_s > 0.0);
         let highest_m = |impact: &Impact| Some(impact.course.highest_m);
         let calm = self.flown.iter().take(1).flat_map(|(_, impacts)| impacts);
-        let whole = |value: f64| format!("{value:.0}");
+        let rounded = |value: f64| format!("{value:.0}");
         let if_so = |is_so: bool| is_so.then(String::new);
         vec![
             ("rail", if_so(launch.is_some())),
@@ -173,7 +173,7 @@ impl Card {
             ("controller", Some(mission.changed.join(", ")).filter(|changed| !changed.is_empty())),
             ("ascent", launch.map(|launch| motor(&launch.booster.motor_curve))),
             ("landing", Some(motor(&mission.motor_curve))),
-            ("both_n_s", Some(whole(self.rule.impulse_n_s))),
+            ("both_n_s", Some(rounded(self.rule.impulse_n_s))),
             ("lift_kg", launch.map(|launch| format!("{:.2}", lift_off_kg(mission, Some(launch))))),
             ("thrust_to_weight", launch.map(|launch| judged(thrust_to_weight(mission, launch), 5.0))),
             (
@@ -181,28 +181,28 @@ impl Card {
                 self.as_planned(winds, |impact| impact.course.rail_m_s).map(|[least, _]| judged(least, 15.0)),
             ),
             ("calibres", launch.map(|launch| judged(calibres(mission, launch), 1.0))),
-            ("highest_m", extremes(self.flights(winds), highest_m).map(|[_, most]| whole(most))),
+            ("highest_m", extremes(self.flights(winds), highest_m).map(|[_, most]| rounded(most))),
             ("apogee", extremes(calm.filter(|impact| impact.case == Case::AsPlanned), highest_m).map(span)),
             (
                 "canopy_s",
-                extremes(self.flights(winds), |impact| impact.course.canopy_s).map(|[_, most]| whole(most)),
+                extremes(self.flights(winds), |impact| impact.course.canopy_s).map(|[_, most]| rounded(most)),
             ),
             ("lying", Some(self.lying(winds))),
             ("lit", self.as_planned(winds, |impact| impact.course.ignition_m).map(span)),
-            ("hold_s", Some(whole(HOLD_LIMIT_S))),
-            ("pad_s", Some(whole(PAD_ABORT_WAIT_S))),
-            ("misfire_s", Some(whole(MISFIRE_WAIT_S))),
-            ("hot_s", Some(whole(MOTOR_HOT_S))),
+            ("hold_s", Some(rounded(HOLD_LIMIT_S))),
+            ("pad_s", Some(rounded(PAD_ABORT_WAIT_S))),
+            ("misfire_s", Some(rounded(MISFIRE_WAIT_S))),
+            ("hot_s", Some(rounded(MOTOR_HOT_S))),
             ("kg", Some(format!("{:.3}", mass.loaded_kg))),
             ("nine_of_ten", Some(self.nine_of_ten())),
-            ("cg_mm", Some(whole(1e3 * mass.loaded_cg_station_m))),
-            ("stroke_mm", airframe.legs.crush.map(|crush| whole(1e3 * crush.stroke_m))),
+            ("cg_mm", Some(rounded(1e3 * mass.loaded_cg_station_m))),
+            ("stroke_mm", airframe.legs.crush.map(|crush| rounded(1e3 * crush.stroke_m))),
             ("motor", Some(mission.motor_curve.name().to_owned())),
             ("confirmed", burns.map(|lot| format!("confirmed by {} burns of lot {}", lot.burns, lot.name))),
             ("unconfirmed", if_so(burns.is_none())),
             ("igniters", Some(igniters.to_owned())),
             ("chute_m_s", Some(format!("{chute_m_s:.1}"))),
-            ("upwind_s", upwind_s.map(whole)),
+            ("upwind_s", upwind_s.map(rounded)),
         ]
     }
 

@@ -131,8 +131,8 @@ impl Study<'_> {
 
     fn csv(&self) -> anyhow::Result<Vec<u8>> {
         let mut table = csv::Writer::from_writer(Vec::new());
-        let told = ["wind_m_s", "way", "flight", "x_m", "y_m", "downwind_m", "across_m"];
-        table.write_record(told.iter().chain(&Landing::COLUMNS))?;
+        let columns = ["wind_m_s", "way", "flight", "x_m", "y_m", "downwind_m", "across_m"];
+        table.write_record(columns.iter().chain(&Landing::COLUMNS))?;
         for (wind_m_s, impacts) in self.arguments.winds.iter().zip(self.impacts) {
             for impact in impacts {
                 let Impact { case, number, place_m, landing, .. } = impact;

@@ -223,9 +223,9 @@ impl Draft {
                 let text = read(Path::new(motor)).context(unknown)?;
                 let ending = motor.rsplit('.').next().unwrap_or_default();
                 let curve = if ["csv", "tsv", "txt"].iter().any(|table| ending.eq_ignore_ascii_case(table)) {
-                    let asked =
+                    let answers =
                         || DATA.map(|of| prompt(&format!("Motor on the stand, {of}"))).into_iter().collect();
-                    let data = data.cloned().map_or_else(asked, Ok).context("--motor-data is missing")?;
+                    let data = data.cloned().map_or_else(answers, Ok).context("--motor-data is missing")?;
                     let mut head: Vec<_> =
                         data.iter().map(|word| word.replace(char::is_whitespace, "_")).collect();
                     // A RASP file has the delays there.

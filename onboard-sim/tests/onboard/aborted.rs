@@ -1,5 +1,5 @@
-//! After an abort with the landing motor lit the vehicle still lands. The motor has no cut-off, so
-//! it lands on the ground below.
+//! After an abort with the landing motor burning the vehicle still lands. The motor has no cut-off,
+//! so it lands on the ground below.
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
 
 use flight::computer::AbortEffect;
@@ -26,7 +26,7 @@ fn landed(rows: &[Row]) -> usize {
     rows.iter().filter(|row| row.stands).count()
 }
 
-/// So many flights, each flown with and without an abort at a random moment of its burn.
+/// Number of flights, each with and without an abort at a random moment of its burn.
 #[test]
 fn regress_flights_with_an_abort_in_the_burn_land_as_often_as_without() {
     let fly = |fault| {
@@ -36,14 +36,14 @@ fn regress_flights_with_an_abort_in_the_burn_land_as_often_as_without() {
     let (alone, aborted) = (fly(None), fly(Some(IN_THE_BURN)));
     assert!(aborted.iter().all(|row| !row.parachute));
     for (alone, aborted) in alone.iter().zip(&aborted).filter(|(_, aborted)| aborted.faults != 1) {
-        // One that crashes may be on the ground before its abort would come.
+        // A flight that crashes may reach the ground before its abort.
         let early = aborted.burn_time_at_contact_s.is_some_and(|at_s| at_s < LATEST_S);
         assert!(early && !alone.stands, "{}", aborted.number);
         assert_eq!(aborted.touchdown_time_s, alone.touchdown_time_s, "{}", aborted.number);
     }
     assert!(aborted.iter().filter(|row| row.faults == 1).count() >= 119);
     assert!(landed(&alone) >= 3 * 38, "{} of 120 left alone", landed(&alone));
-    // One in forty is chance.
+    // A difference of one in forty may be chance.
     assert!(landed(&aborted) + 3 >= landed(&alone), "{} aborted, {}", landed(&aborted), landed(&alone));
     let otherwise = alone.iter().zip(&aborted).filter(|(alone, aborted)| {
         alone.touchdown_x_m != aborted.touchdown_x_m || alone.touchdown_y_m != aborted.touchdown_y_m
@@ -51,13 +51,13 @@ fn regress_flights_with_an_abort_in_the_burn_land_as_often_as_without() {
     assert!(otherwise.count() >= 3 * 35, "an abort ends the homing to the pad");
 }
 
-/// Too low for the parachute, at the first moment that the gate is open: the motor is lit at the
-/// height that was chosen. A fall would end at about 37 m/s.
+/// Too low for the parachute, at the first moment with the gate open: the motor ignites at the
+/// chosen height. A fall would end at about 37 m/s.
 #[test]
 fn an_abort_before_the_ignition_with_the_gate_open_burns_at_its_height_and_lands_in_place() {
     let recipe = recipe(None);
     let burns = AbortEffect::Burn;
-    let asked = |tally: &Tally| tally.flight().computer().abort_effect();
+    let effect = |tally: &Tally| tally.flight().computer().abort_effect();
     let mut rows = Vec::new();
     for number in 0..8 {
         let mut tally = Tally::new(&recipe, number).unwrap();
@@ -65,7 +65,7 @@ fn an_abort_before_the_ignition_with_the_gate_open_burns_at_its_height_and_lands
         let mut lasted = 0;
         while lasted < 3 {
             assert!(tally.step(), "flight {number} never had an abort that burns");
-            lasted = if asked(&tally) == burns { lasted + 1 } else { 0 };
+            lasted = if effect(&tally) == burns { lasted + 1 } else { 0 };
         }
         assert_eq!(tally.flight().computer().mode().phase, Phase::LandArmed);
         tally.flight_mut().abort();

@@ -1,4 +1,4 @@
-//! What a card tells the range safety officer.
+//! Content of a card for the range safety officer.
 
 use flight::rules::verdict::Landing;
 use flight::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
@@ -133,7 +133,7 @@ fn val_compass_the_line_of_a_west_wind_points_east() {
 }
 
 /// 360 of 400 in calm air: 324 is nine tenths of it, 323 is less. 100 flights give a radius without
-/// an upper end, and nobody can stand outside of that.
+/// an upper bound, and no distance is outside of that.
 #[test]
 fn val_hand_the_wind_limit_leaves_nine_tenths_of_the_landings() {
     let of = |flights: usize, landed: usize| -> Vec<Impact> {
@@ -174,7 +174,7 @@ fn val_safety_md_the_abort_table_is_the_same() {
     assert!(!shown[0].contains(&all[1]) && shown[2].contains(&all[1]), "a drone's row on its own card alone");
 }
 
-/// The mission of mk3 says 2.4 calibres; the rest by hand: 3.70 + 1.1195 + 0.2121 kg, and I243's
+/// The mission of mk3 gives 2.4 calibres; the rest by hand: 3.70 + 1.1195 + 0.2121 kg, and I243's
 /// first half second.
 #[test]
 fn val_hand_the_range_officer_values_of_mk3() {
@@ -220,7 +220,7 @@ fn a_card_lists_the_keys_that_differ_from_the_standard_controller() {
     assert!(words.iter().all(|words| row.contains(words)), "{row}");
 }
 
-/// `hazard` on the mission that is written flies the flights of the card, from the pad.
+/// `hazard` on the written mission flies the flights of the card, from the pad.
 #[test]
 fn a_card_is_reproduced_from_its_mission() {
     let recipe = Recipe { seed: 5, ..Recipe::built_in("mk3", "real").unwrap() };
@@ -232,7 +232,7 @@ fn a_card_is_reproduced_from_its_mission() {
     assert_eq!(card.flown[0].1, studies(core::slice::from_ref(&flown), flights, &|_, _| {}).unwrap()[0]);
     let text = card.text();
     let planned = card.flown[0].1.iter().find(|impact| impact.case == Case::AsPlanned).unwrap().course;
-    // The same flight, looked at by its world.
+    // The same flight, observed in its world.
     let (mut flight, mut highest_m, mut rail_m_s) = (Sortie::new(&flown, 0).unwrap(), 0.0_f64, 0.0);
     let stood_m = flight.world().state().position_m;
     let rail_m = flight.mission().launch.as_ref().unwrap().rail.length_m;
@@ -292,6 +292,6 @@ fn a_card_states_at_which_masses_nine_of_ten_land() {
     let own_kg = recipe.mission.airframe.mass.loaded_kg;
     let own = masses.iter().position(|(kg, _)| (kg - own_kg).abs() < 1e-12).unwrap();
     assert!(masses[own].1.stands.share >= 0.9, "{masses:?}");
-    // Only the ends may be masses at which fewer land.
+    // Only the ends of the range may be masses with fewer landings.
     assert!(masses[1..masses.len() - 1].iter().all(|(_, landed)| landed.stands.share >= 0.9), "{masses:?}");
 }

@@ -43,10 +43,10 @@ fn too_heavy_and_too_light_are_refused_with_the_mass_that_is_not() {
         assert_eq!(refused.verdict(), Verdict::No, "{refused}");
         let row = refused.rows.iter().find(|row| row.found.starts_with(words)).unwrap();
         let change = row.change.as_ref().unwrap();
-        let mut told = change.split([' ', ',']);
-        let by_kg: f64 = told.next().unwrap().parse().unwrap();
-        assert_eq!(told.next(), Some("kg"));
-        let sign = if told.next() == Some("less") { -1.0 } else { 1.0 };
+        let mut parts = change.split([' ', ',']);
+        let by_kg: f64 = parts.next().unwrap().parse().unwrap();
+        assert_eq!(parts.next(), Some("kg"));
+        let sign = if parts.next() == Some("less") { -1.0 } else { 1.0 };
         let at = |by_kg: f64| page(&recipe(name, Some(mass_kg + sign * by_kg))).verdict();
         assert!(at(by_kg) < Verdict::No && at(by_kg - 0.1) == Verdict::No, "{refused}");
     }

@@ -120,7 +120,7 @@ fn a_card_is_complete_shows_the_time_left_and_gives_no_rate_of_two_flights() {
     assert_eq!((names(&card).len(), fs::read_to_string(card.join("card.txt")).unwrap()), (3, text));
 }
 
-/// `--quiet` leaves what the program was asked for, and where it is.
+/// `--quiet` leaves the requested result and its path.
 #[test]
 fn a_new_mission_is_quiet_on_request() {
     let directory = tempfile::tempdir().unwrap();
@@ -140,7 +140,7 @@ fn a_command_that_there_is_not_is_wrong_usage_and_the_commands_are_listed() {
     assert_eq!((wrong.status.code(), stdout(&wrong)), (Some(2), String::new()));
     assert!(stderr(&wrong).contains("no command `land`, but: fly, campaign, check"), "{}", stderr(&wrong));
     assert_eq!(run(Path::new("."), &["man", "campaign"]).status.code(), Some(0));
-    // Nobody reads it.
+    // Nothing reads it.
     let (reader, writer) = std::io::pipe().unwrap();
     drop(reader);
     let mut unread = Command::new(env!("CARGO_BIN_EXE_onboard-sim"));
@@ -148,7 +148,8 @@ fn a_command_that_there_is_not_is_wrong_usage_and_the_commands_are_listed() {
     assert_eq!((unread.status.code(), stderr(&unread)), (Some(0), String::new()));
 }
 
-/// What a person acts on says its set, and a set that may be kinder than `real` says that.
+/// A result for decisions about people names its set, and gives a warning if the set may be milder
+/// than `real`.
 #[test]
 fn the_impact_area_is_reported_with_set_flights_interval_and_rule() {
     let directory = tempfile::tempdir().unwrap();

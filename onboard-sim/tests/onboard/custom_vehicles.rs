@@ -1,4 +1,4 @@
-//! The controller lands vehicles that nobody tuned it for. A generator draws them.
+//! The controller lands vehicles that it was not tuned for. A generator draws them.
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
 
 use flight::vehicle::thrust_curve::ThrustCurve;
@@ -14,15 +14,15 @@ use sim::recipe::Recipe;
 
 const GRAVITY_M_S2: f64 = 9.806_65;
 
-/// A number between two, evenly.
+/// A number between two, evenly distributed.
 fn between(rng: &mut ChaCha12Rng, [least, most]: [f64; 2]) -> f64 {
     least + (most - least) * rng.random::<f64>()
 }
 
-/// The mission of a vehicle as a club may build it: 0.6 to 6 kg on a real motor, 1.15 to 2.2 times
-/// as strong as its weight at ignition, which burns for 1 to 8 s. Servos of hobby class, a gimbal
-/// of 3 to 8 degrees as far as the tube has room, fins that steer or only brake, legs with blocks
-/// of mk3's proportions, let go at apogee or by a drone.
+/// The mission of a vehicle as a club may build it: 0.6 to 6 kg on a real motor with 1.15 to 2.2
+/// times its weight at ignition, which burns for 1 to 8 s; servos of hobby class, a gimbal of 3 to
+/// 8 degrees as far as the tube has room, fins that steer or only brake, legs with blocks of mk3's
+/// proportions; released at apogee or by a drone.
 fn drawn(number: u64) -> String {
     let rng = &mut ChaCha12Rng::seed_from_u64(number);
     let (motor, curve, mass_kg) = loop {
@@ -51,7 +51,7 @@ fn body(
     steers: bool,
 ) -> String {
     let mut of = |range| between(rng, range);
-    // Heavier is larger, with the same density.
+    // A heavier vehicle is larger, with the same density.
     let size = libm::cbrt(mass_kg / 3.0);
     let diameter_m = (0.08 * size * of([0.9, 1.1])).max(1.6 * curve.diameter_m());
     let length_m = (0.75 * size * of([0.9, 1.25])).max(curve.length_m() + 0.35);
@@ -136,7 +136,7 @@ fn recipe(text: &str, set: &str, seed: u64) -> Recipe {
     Recipe { seed, ..Recipe::from_texts(("drawn", text), set).unwrap() }
 }
 
-/// How many of a vehicle's flights stand in a set of dispersions.
+/// Number of a vehicle's flights that land upright in a set of dispersions.
 fn stand(text: &str, set: &str, seed: u64, flights: u64) -> u64 {
     let recipe = recipe(text, set, seed);
     let rows: Vec<Row> =
@@ -144,8 +144,8 @@ fn stand(text: &str, set: &str, seed: u64, flights: u64) -> u64 {
     rows.iter().filter(|row| row.landing().stands).count() as u64
 }
 
-/// Of the vehicles from a number on, those that the check calls so, each with its number, its text
-/// and its page.
+/// The vehicles from a number on with this verdict of the check, each with its number, its text and
+/// its page.
 fn of_verdict(first: u64, verdict: Verdict) -> impl Iterator<Item = (u64, String, Page)> {
     (first..).filter_map(move |number| {
         let text = drawn(number);
@@ -154,8 +154,8 @@ fn of_verdict(first: u64, verdict: Verdict) -> impl Iterator<Item = (u64, String
     })
 }
 
-/// Tells many vehicles of a verdict (`VERDICT=no`): `VEHICLES=60 FLIGHTS=100 cargo test --release
-/// -p onboard-sim --test onboard custom_vehicles -- --ignored --nocapture`.
+/// Prints a table of many vehicles with a verdict (`VERDICT=no`): `VEHICLES=60 FLIGHTS=100 cargo
+/// test --release -p onboard-sim --test onboard custom_vehicles -- --ignored --nocapture`.
 #[test]
 #[ignore = "takes minutes: the table of many vehicles"]
 fn table() {
@@ -181,8 +181,9 @@ fn table() {
     }
 }
 
-/// Of what the check calls ok nine tenths land. Of the whole table, of 60 vehicles with 50 flights
-/// each, 97 % of what perfect information lands do in the median of `field`.
+/// Of the flights of vehicles with the verdict ok nine tenths land. In the complete table, of 60
+/// vehicles with 50 flights each, they are in the median of `field` 97 % of the landings with
+/// perfect information.
 #[test]
 fn what_the_check_calls_ok_lands() {
     const FLIGHTS: u64 = 10;
@@ -195,7 +196,7 @@ fn what_the_check_calls_ok_lands() {
     assert!(10 * all >= 9 * 6 * FLIGHTS, "{all} of {}", 6 * FLIGHTS);
 }
 
-/// What is too heavy, or has no band of heights, does not land.
+/// A vehicle that is too heavy, or has no band of heights, does not land.
 #[test]
 fn what_the_check_calls_no_does_not_land() {
     for (vehicle, text, _) in of_verdict(5001, Verdict::No).take(6) {

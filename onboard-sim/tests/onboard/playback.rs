@@ -106,7 +106,8 @@ fn the_command_prints_the_flight_and_writes_its_log() {
     assert!(folder.path().join("hedy.mcap").exists());
 }
 
-/// On its side the nose feels no push: no lift-off, and no answer.
+/// With the board on its side the accelerometer measures no push along the nose: no lift-off, and
+/// no answer.
 #[test]
 fn wrong_axes_are_noticed() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,10 +1,11 @@
-//! A vehicle that may not light its motor comes down under the parachute.
+//! A vehicle whose motor may not be ignited descends under the parachute.
 
 use onboard_sim::tally;
 use sim::recipe::Recipe;
 
-/// In a wind of 8 m/s these flights of seed 1 would land outside the fence, where no motor may be
-/// lit. They used to fall all the way, and reached the ground at 42 to 46 m/s.
+/// In a wind of 8 m/s these flights of seed 1 would land outside the fence, where the motor must
+/// not be ignited. Before the parachute was used there they fell all the way, and reached the
+/// ground at 42 to 46 m/s.
 const OUTSIDE_THE_FENCE: [u64; 2] = [18, 22];
 
 #[test]

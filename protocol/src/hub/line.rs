@@ -343,17 +343,17 @@ mod tests {
             bytes as f64 / 8.0
         };
         let mut line = Line::new(1_000, 0);
-        let whole = rate(&mut line, 0);
+        let full = rate(&mut line, 0);
         for second in 10..20 {
             line.on_radio(5, ms(1_000 * second));
         }
         let least = rate(&mut line, 20);
-        assert!((least / whole - LEAST).abs() < 0.03, "{least} of {whole} B/s");
+        assert!((least / full - LEAST).abs() < 0.03, "{least} of {full} B/s");
         for second in 30..45 {
             line.on_radio(95, ms(1_000 * second));
         }
-        assert!(rate(&mut line, 45) > 0.95 * whole);
+        assert!(rate(&mut line, 45) > 0.95 * full);
         line.on_radio(0, ms(60_000));
-        assert!(rate(&mut line, 71) > 0.95 * whole, "a radio that says nothing any more");
+        assert!(rate(&mut line, 71) > 0.95 * full, "a radio that says nothing any more");
     }
 }

@@ -274,8 +274,8 @@ impl<R: Read> LogReader<R> {
         if opcode == op::DATA_END && !self.saw_data_end {
             // A record between two chunks, or a complete chunk, may be damaged beyond recognition;
             // only this checksum shows that.
-            let told = body.first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
-            if told != 0 && told != self.checksum.clone().finalize() {
+            let stored = body.first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
+            if stored != 0 && stored != self.checksum.clone().finalize() {
                 damage = Some("the checksum over all data does not fit");
             }
         } else {
@@ -408,11 +408,11 @@ impl<R: Read> LogReader<R> {
                 })
             }
             // A tool that cut a part out, or a disk that lost it, has not always changed the count.
-            McapRecord::Statistics(told) if self.saw_data_end => {
+            McapRecord::Statistics(stored) if self.saw_data_end => {
                 self.is_counted = true;
-                if told.message_count != self.messages {
+                if stored.message_count != self.messages {
                     let messages = |count: u64| format!("{count} messages");
-                    let (counted, read) = (messages(told.message_count), messages(self.messages));
+                    let (counted, read) = (messages(stored.message_count), messages(self.messages));
                     self.note(Damage::Miscounted { counted, read });
                 }
                 None

@@ -1,5 +1,5 @@
 //! An example: the flight computer's board as a student club would wire it, around a Teensy 4.1.
-//! Nobody has flown it.
+//! It has never flown.
 //!
 //! Everything here is written for the traits of `embedded-hal` and `embedded-io`, so that it runs
 //! on a desk, too: `tests.rs` puts simulated devices in the place of the real ones. What a program
@@ -253,8 +253,8 @@ impl<W: Wiring> TeensyBoard<W> {
     fn measured(&mut self) -> Measurements {
         let (parts, axes) = (&mut self.parts, &self.build.body_from_imu);
         // The sensor monitor treats NaN as silence.
-        let felt = self.imu.as_ref().ok().and_then(|()| imu::read(&mut parts.imu));
-        let [force_m_s2, rate_rad_s] = felt.unwrap_or([[f64::NAN; 3]; 2]);
+        let sensed = self.imu.as_ref().ok().and_then(|()| imu::read(&mut parts.imu));
+        let [force_m_s2, rate_rad_s] = sensed.unwrap_or([[f64::NAN; 3]; 2]);
         let imu =
             ImuSample { gyro_rad_s: turned(axes, rate_rad_s), specific_force_m_s2: turned(axes, force_m_s2) };
         let pressure_pa = self.barometer.as_mut().ok().and_then(|driver| driver.poll(&mut parts.barometer));

@@ -53,7 +53,7 @@ impl Record {
     /// A complete record.
     pub(crate) fn read(bytes: &[u8]) -> Option<Self> {
         let (sum, record) = bytes.split_first_chunk()?;
-        let whole = u32::from_le_bytes(*sum) == crc32fast::hash(record);
-        if whole { postcard::from_bytes(record).ok() } else { None }
+        let intact = u32::from_le_bytes(*sum) == crc32fast::hash(record);
+        if intact { postcard::from_bytes(record).ok() } else { None }
     }
 }

@@ -176,8 +176,8 @@ impl<'a> VehicleState<'a> {
         let cg_m = self.feet_below_cg_m(0.0);
         let hanging_m = self.computer.stance().hanging_m.filter(|height_m| height_m.is_finite());
         let position_m = Vector3::z() * hanging_m.unwrap_or(cg_m);
-        let believed = RigidState { position_m, ..self.computer.estimated_on_pad() };
-        Motion::of(&believed, cg_m, &Vector2::zeros())
+        let estimate = RigidState { position_m, ..self.computer.estimated_on_pad() };
+        Motion::of(&estimate, cg_m, &Vector2::zeros())
     }
 
     /// Thrust, N.
@@ -232,8 +232,8 @@ impl<'a> VehicleState<'a> {
 
     /// A parachute carries it.
     pub fn is_carried(&self, air: &Airborne<'_>) -> bool {
-        let weights_felt = air.estimate.specific_force_m_s2.norm() / STANDARD_GRAVITY_M_S2;
-        air.estimate.state.velocity_m_s.z.abs() < CARRIED_M_S && weights_felt > CARRIED_WEIGHTS
+        let weights_sensed = air.estimate.specific_force_m_s2.norm() / STANDARD_GRAVITY_M_S2;
+        air.estimate.state.velocity_m_s.z.abs() < CARRIED_M_S && weights_sensed > CARRIED_WEIGHTS
     }
 }
 

@@ -447,8 +447,8 @@ fn seen_in_flight(
         }
         Sign::SlowGimbal => {
             let servo = &mission.airframe.gimbal.servo;
-            let asked = watcher.turns.iter().filter(|(frames, _)| *frames >= SLOW_FRAMES);
-            let rate_rad_s = asked.map(|(_, turned_rad)| turned_rad / FRAME_S).reduce(f64::min)?;
+            let turns = watcher.turns.iter().filter(|(frames, _)| *frames >= SLOW_FRAMES);
+            let rate_rad_s = turns.map(|(_, turned_rad)| turned_rad / FRAME_S).reduce(f64::min)?;
             (rate_rad_s < SLOW * servo.rate_rad_s()).then(|| now(rate_rad_s.to_degrees(), servo.rate_deg_s))
         }
         Sign::Battery => {

@@ -48,50 +48,50 @@ const NEWEST_FIX: f64 = 0.2;
 
 /// Time of a sensor's last sample, and the duration of its repetition.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Voice<const N: usize> {
+pub struct Channel<const N: usize> {
     last: SVector<f64, N>,
     /// Time of the last sample; before the first, the start of the observation. NaN: not started.
-    spoke_at_s: f64,
-    spoke: bool,
+    sampled_at_s: f64,
+    has_sample: bool,
     same: u32,
     same_since_s: f64,
 }
 
-impl<const N: usize> Default for Voice<N> {
+impl<const N: usize> Default for Channel<N> {
     fn default() -> Self {
         Self {
             last: SVector::repeat(f64::NAN),
-            spoke_at_s: f64::NAN,
-            spoke: false,
+            sampled_at_s: f64::NAN,
+            has_sample: false,
             same: 0,
             same_since_s: f64::NAN,
         }
     }
 }
 
-impl<const N: usize> Voice<N> {
+impl<const N: usize> Channel<N> {
     /// Takes a frame's sample, if there is one. NaN counts as no sample.
-    fn take(&mut self, said: Option<[f64; N]>, time_s: f64) {
-        if self.spoke_at_s.is_nan() {
-            self.spoke_at_s = time_s;
+    fn take(&mut self, sample: Option<[f64; N]>, time_s: f64) {
+        if self.sampled_at_s.is_nan() {
+            self.sampled_at_s = time_s;
         }
-        let Some(said) = said.filter(|said| said.iter().all(|value| value.is_finite())) else { return };
-        let again = self.spoke && said.map(f64::to_bits) == self.last.data.0[0].map(f64::to_bits);
+        let Some(sample) = sample.filter(|axes| axes.iter().all(|value| value.is_finite())) else { return };
+        let again = self.has_sample && sample.map(f64::to_bits) == self.last.data.0[0].map(f64::to_bits);
         if !again {
             self.same_since_s = time_s;
         }
         self.same = if again { self.same.saturating_add(1) } else { 0 };
-        (self.last, self.spoke_at_s, self.spoke) = (said.into(), time_s, true);
+        (self.last, self.sampled_at_s, self.has_sample) = (sample.into(), time_s, true);
     }
 
     /// The last sample, if it is not older than this, s.
     pub fn fresh(&self, time_s: f64, within_s: f64) -> Option<[f64; N]> {
-        (self.spoke && self.silent_s(time_s) <= within_s).then(|| self.last.into())
+        (self.has_sample && self.silent_s(time_s) <= within_s).then(|| self.last.into())
     }
 
     /// Time without a sample, s.
     pub fn silent_s(&self, time_s: f64) -> f64 {
-        time_s - self.spoke_at_s
+        time_s - self.sampled_at_s
     }
 
     fn repeats_for_s(&self, frozen: u32, time_s: f64) -> Option<f64> {
@@ -103,14 +103,14 @@ impl<const N: usize> Voice<N> {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct SensorWatch {
     time_s: f64,
-    gyro: Voice<3>,
-    accelerometer: Voice<3>,
+    gyro: Channel<3>,
+    accelerometer: Channel<3>,
     /// Height, m.
-    barometer: Voice<1>,
+    barometer: Channel<1>,
     /// Position and velocity, world, m and m/s.
-    gnss: Voice<6>,
+    gnss: Channel<6>,
     /// Range, m.
-    lidar: Voice<1>,
+    lidar: Channel<1>,
     /// Means over [`RESTS_OVER_S`], body, rad/s and m/s^2.
     turns_rad_s: Vector3<f64>,
     sensed_m_s2: Vector3<f64>,
@@ -133,7 +133,7 @@ pub enum Rests {
 impl SensorWatch {
     /// Takes a frame's measurements.
     pub fn take(&mut self, measured: &Measurements, time_s: f64) {
-        let frame_s = if self.gyro.spoke { time_s - self.time_s } else { RESTS_OVER_S };
+        let frame_s = if self.gyro.has_sample { time_s - self.time_s } else { RESTS_OVER_S };
         self.time_s = time_s;
         let imu = &measured.imu;
         self.gyro.take(Some(imu.gyro_rad_s.into()).filter(|_| imu.gyro_is_plausible()), time_s);
@@ -149,7 +149,7 @@ impl SensorWatch {
             let ([x, y, z], [u, v, w]) = (fix.position_m.into(), fix.velocity_m_s.into());
             [x, y, z, u, v, w]
         });
-        let share = if self.gnss.spoke { NEWEST_FIX } else { 1.0 };
+        let share = if self.gnss.has_sample { NEWEST_FIX } else { 1.0 };
         if let Some(fix) =
             measured.gnss.filter(|fix| fix.position_m.iter().all(|place_m| place_m.is_finite()))
         {
@@ -246,7 +246,7 @@ impl SensorWatch {
             .then(|| format!("no GNSS fix for {gnss_silent_s:.1} s"))
             .or_else(|| {
                 let off_m = (self.fixed_m - place_m?).norm();
-                (self.gnss.spoke && off_m > GNSS_OFF_M).then(|| format!("GNSS {off_m:.0} m off"))
+                (self.gnss.has_sample && off_m > GNSS_OFF_M).then(|| format!("GNSS {off_m:.0} m off"))
             });
         let lidar = match rests {
             Rests::Standing { range_m, .. } if range_m >= LIDAR_BLIND_M => {

@@ -340,19 +340,19 @@ mod tests {
 
     #[test]
     fn an_ending_reports_whether_legs_were_inside_their_envelope() {
-        let said = |[stands, upright, envelope, table_2]: [bool; 4], failure| {
+        let text = |[stands, upright, envelope, table_2]: [bool; 4], failure| {
             let landing = Landing { stands, upright, envelope, table_2 };
             FlightEnding { aborted: false, landing, failure }.to_string()
         };
         assert_eq!(
-            said([true, true, false, false], None),
+            text([true, true, false, false], None),
             "STANDS UNDAMAGED, outside the design envelope of its legs, outside Table 2"
         );
         assert_eq!(
-            said([false, true, true, false], Some("leg overloaded")),
+            text([false, true, true, false], Some("leg overloaded")),
             "UPRIGHT, damaged: leg overloaded, inside the design envelope of its legs, outside Table 2"
         );
-        assert_eq!(said([false, false, true, true], Some("tipped over")), "NOT LANDED: tipped over");
+        assert_eq!(text([false, false, true, true], Some("tipped over")), "NOT LANDED: tipped over");
         let under = FlightEnding { aborted: true, failure: Some(UNDER_PARACHUTE), ..FlightEnding::default() };
         assert_eq!(under.to_string(), "ABORTED, then DOWN UNDER THE PARACHUTE, not landed");
     }

@@ -1,9 +1,9 @@
-//! The whole chain with an emulated Cortex-M7, flown from the ordinary screen: armed, started,
-//! landed; and aborted in its descent.
+//! A flight of the complete chain with an emulated Cortex-M7, controlled from the ordinary screen:
+//! arming, start and landing; and an abort in the descent.
 //!
 //! It types into `onboard-sim/lab/cortex-m7/emulate chain`, the command that a person uses. It is
-//! no test of `cargo test`: it takes QEMU, the programs of `emulate build` and some minutes of real
-//! time. Without them it says NOT RUN and why.
+//! not part of `cargo test`: it requires QEMU, the programs of `emulate build` and some minutes of
+//! real time. Without them it prints NOT RUN and the reason.
 //!
 //! `cargo bench -p board --bench chain`, or `onboard-sim/lab/cortex-m7/emulate test`.
 
@@ -19,12 +19,13 @@ type Failure = Box<dyn std::error::Error + Send + Sync>;
 
 const SIZE: (u16, u16) = (100, 40);
 /// A flight of mk2 takes a minute and a half, after up to half a minute on the pad, and its motor
-/// is hot for another one. A machine without a free processor core takes several times as long.
+/// remains hot for another minute and a half. A machine without a free processor core takes several
+/// times as long.
 const FLIGHT_LIMIT: Duration = Duration::from_mins(10);
-/// A key is answered within this time.
+/// Longest time from a key to its answer.
 const ANSWERS_WITHIN: Duration = Duration::from_secs(5);
 
-/// The status of `emulate ready` when something that `emulate chain` needs is not there.
+/// Exit status of `emulate ready` if a program that `emulate chain` needs is missing.
 const NOT_HERE: i32 = 2;
 
 fn main() -> Result<(), Failure> {
@@ -47,7 +48,7 @@ fn emulate(root: &Path, arguments: &[&str]) -> Command {
     command
 }
 
-/// A flight that is armed and started by hand.
+/// Arms and starts a flight by keys.
 fn started(root: &Path) -> Terminal {
     let settings = root.join("target/board/chain-settings");
     let mut chain = emulate(root, &["chain"]);
@@ -65,14 +66,14 @@ fn land(root: &Path) -> Result<(), Failure> {
     for phase in shown {
         wait(&terminal, phase)?;
     }
-    // A chip sends no verdict on its landing.
+    // The image for a chip sends no verdict on its landing.
     let report = end(&mut terminal, Exit::NotSeen)?;
     expect(&report, "LANDED")?;
     print_line("armed, started and landed from the screen:")?;
     print_line(&report)
 }
 
-/// With room for the parachute an abort opens it, and the landing motor is inhibited.
+/// An abort with room for the parachute opens it and inhibits the landing motor.
 fn abort(root: &Path) -> Result<(), Failure> {
     let mut terminal = started(root);
     wait(&terminal, "Falling")?;
@@ -100,13 +101,13 @@ fn missing(terminal: &Terminal, what: &str) -> String {
     format!("no {what} on:\n{}", terminal.window().rows().join("\n"))
 }
 
-/// Ends the screen, and with it the chain; what the script says then. A station does not end at one
-/// key before it has heard that its vehicle is disarmed.
+/// Ends the screen, and with it the chain; returns the output of the script. A station quits at one
+/// key only after its vehicle has reported that it is disarmed.
 fn end(terminal: &mut Terminal, expected: Exit) -> Result<String, Failure> {
     wait(terminal, "disarmed")?;
     let before = terminal.window().bytes().len();
     terminal.type_bytes(b"q");
-    // While people must keep away the station goes on without its screen, and Ctrl-C ends it.
+    // While people must keep away the station continues without its screen, and Ctrl-C ends it.
     let asks = |window: &Window| window.shows("QUIT too early").then_some(());
     if terminal.wait_within(ANSWERS_WITHIN, asks).is_some() {
         terminal.type_by_hand(b"quit\r");

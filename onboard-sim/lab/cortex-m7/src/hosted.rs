@@ -1,4 +1,4 @@
-//! The flight computer as a process, and the comparison of what several machines answered.
+//! The flight computer as a process, and a comparison of the answers of several machines.
 #![expect(clippy::print_stdout, reason = "what it found")]
 
 use std::collections::BTreeMap;
@@ -64,10 +64,10 @@ pub(super) fn main() -> ExitCode {
     })
 }
 
-/// Most bytes that may wait for the next frame: a second of a fast radio.
+/// Largest number of bytes that may wait for the next frame: a second of a fast radio.
 const MOST_WAITING_BYTES: usize = 8 * 1024;
 
-/// A serial device that a thread reads.
+/// A serial device, read by a thread.
 struct Serial {
     arrived: Receiver<u8>,
     device: File,
@@ -81,7 +81,7 @@ impl Serial {
         thread::Builder::new().name("radio".into()).spawn(move || {
             for byte in BufReader::new(reading).bytes() {
                 let Ok(byte) = byte else { return };
-                // Bytes without room are lost.
+                // Bytes without room are dropped.
                 if let Err(TrySendError::Disconnected(_)) = sender.try_send(byte) {
                     return;
                 }
@@ -97,7 +97,7 @@ impl Radio for Serial {
     }
 
     fn write(&mut self, bytes: &[u8]) {
-        // What cannot be sent is lost.
+        // Bytes that cannot be sent are dropped.
         let _ = self.device.write_all(bytes);
     }
 }
@@ -119,8 +119,8 @@ fn fly_standard_input(radio: Option<&Path>) -> Result<()> {
             None => board.take(&arrived[..read], &mut (), &mut (), &mut answer),
             Some(radio) => board.take(&arrived[..read], radio, &mut (), &mut answer),
         };
-        // A world waits for it. One that has ended its flight may have gone before an answer that
-        // it asked for again.
+        // The simulated world waits for the answers. If its flight has ended, it may have exited
+        // before an answer that it requested again.
         match to_world.write_all(&answers).and_then(|()| to_world.flush()) {
             Err(error) if error.kind() == io::ErrorKind::BrokenPipe => break,
             written => written?,
@@ -139,8 +139,8 @@ fn answers_of(path: &Path) -> Result<Vec<Answer>> {
     let mut reader = Reader::default();
     reader.push(&fs::read(path).with_context(|| path.display().to_string())?);
     let answers: Vec<Answer> = std::iter::from_fn(|| reader.next_record()).collect();
-    let whole = reader.broken() == 0 && reader.missing_its_end() == 0;
-    ensure!(whole, "{}: a record is broken or cut off", path.display());
+    let complete = reader.broken() == 0 && reader.missing_its_end() == 0;
+    ensure!(complete, "{}: a record is broken or cut off", path.display());
     Ok(answers)
 }
 

@@ -1,8 +1,8 @@
 //! The only program of a Cortex-M7. Its link is semihosting: the files `frames`, `answers` and
 //! `costs` in the folder of the emulator or debugger. Its radio is the serial device `radio` there,
-//! if a flight has a crew. The files `saved-0` and `saved-1` are its memory that outlasts a reset:
-//! where a recorded flight's computer was dead, this program resets its processor and goes on from
-//! them.
+//! if a flight has a crew. The files `saved-0` and `saved-1` are its memory that survives a reset:
+//! where a recorded flight's computer was dead, this program resets its processor and continues
+//! from them.
 
 use core::ffi::CStr;
 use core::fmt::Write as _;
@@ -20,21 +20,21 @@ use semihosting::fs::File;
 use semihosting::io::{self, Read as _, Seek as _, SeekFrom, Write as _};
 use semihosting::{eprintln, println, process};
 
-/// Heap, bytes: what the memory map leaves beside the static data.
+/// Size of the heap, bytes: the memory that the memory map leaves beside the static data.
 const HEAP_BYTES: usize = 856 * 1024;
 
 #[global_allocator]
 static HEAP: LockedHeap = LockedHeap::empty();
 
-/// How often the counter has gone through zero.
+/// Number of wraps of the counter through zero.
 static WRAPS: AtomicU32 = AtomicU32::new(0);
 
-/// Values of the counter: it has 24 bits.
+/// Number of values of the 24-bit counter.
 const COUNTS: u32 = 1 << 24;
 
-/// Instructions for one count: `qemu -icount shift=0` takes an instruction for 1 ns, and the
-/// counter of its board counts with 25 MHz. On hardware the numbers are clock cycles of that
-/// counter, and mean nothing else.
+/// Instructions for one count: `qemu -icount shift=0` takes 1 ns for an instruction, and the
+/// counter of its board counts at 25 MHz. On hardware the numbers are clock cycles of that counter,
+/// and nothing else.
 const INSTRUCTIONS_PER_COUNT: u64 = 40;
 
 #[exception]
@@ -68,7 +68,7 @@ fn fly_the_files() -> io::Result<()> {
     let written = |name: &'static CStr| match &saved {
         Some(_) => {
             let mut file = File::options().write(true).append(true).create(true).open(name)?;
-            // QEMU does not append by itself. A pipe has no end to go to, and needs none.
+            // QEMU does not append by itself. A pipe has no end and needs no seek.
             let _ = file.seek(SeekFrom::End(0));
             Ok(file)
         }
@@ -104,7 +104,7 @@ fn fly_the_files() -> io::Result<()> {
     Ok(())
 }
 
-/// Flies what comes from the world until it ends.
+/// Flies the frames of the world until they end.
 fn fly(
     board: &mut Board,
     (frames, answers): (&mut File, &mut File),
@@ -129,11 +129,11 @@ fn fly(
     }
 }
 
-/// The serial device `radio`: a pseudo-terminal that is set to return what it has, and not to wait
+/// The serial device `radio`: a pseudo-terminal that returns the bytes it has without waiting
 /// (`stty min 0 time 0`).
 #[derive(Default)]
 struct Serial {
-    /// Opened with the first byte that it is asked for; `Some(None)` if there is none.
+    /// Opened at the first byte requested; `Some(None)` if it does not exist.
     device: Option<Option<File>>,
 }
 
@@ -151,37 +151,37 @@ impl Radio for Serial {
 
     fn write(&mut self, bytes: &[u8]) {
         if let Some(device) = self.device() {
-            // What has no room is lost.
+            // Bytes without room are dropped.
             let _ = device.write_all(bytes);
         }
     }
 }
 
-/// Writes a line for each frame and for each plan: the frame's number, 1 for a plan that it has
-/// posed, the instructions, and the bytes on the heap after it.
+/// Writes a line for each frame and for each plan: the frame's number, 1 for a plan that the frame
+/// requested, the instructions, and the bytes on the heap after it.
 struct Costs {
     file: File,
     begun: u64,
     set_up_bytes: usize,
     most_bytes: usize,
-    /// From before the reset.
+    /// The record from before the reset.
     saved: Option<Saved>,
-    /// What making a record for the next reset costs, without writing it.
+    /// Cost of making a record for the next reset, without writing it.
     save: Cost,
     failed: Option<io::Error>,
 }
 
-/// Instructions and bytes, at most.
+/// Largest number of instructions and of bytes.
 #[derive(Default)]
 struct Cost {
     instructions: u64,
     bytes: usize,
 }
 
-/// The two records that are written in turn, so that a reset while one is written leaves the other.
+/// The two records, written in turn, so that a reset during a write leaves the other intact.
 const SLOTS: [&CStr; 2] = [c"saved-0", c"saved-1"];
 
-/// The newer whole record, if this is not the first start.
+/// The newer intact record, if this is not the first start.
 fn newest() -> Option<Saved> {
     let read = |slot: &CStr| {
         let mut bytes = [0; Saved::MOST_BYTES];
@@ -241,7 +241,8 @@ impl Watch for Costs {
     }
 }
 
-/// Counts since the counter was started. Only with `-icount` is the interrupt of a wrap never late.
+/// Counts since the start of the counter. Only with `-icount` is the interrupt of a wrap never
+/// late.
 fn counted() -> u64 {
     loop {
         let wraps = WRAPS.load(Ordering::Relaxed);

@@ -1,5 +1,5 @@
 //! JSBSim as the world: its equations of motion, integrator, Earth, atmosphere, motor, servos and
-//! ground instead of ours, and our flight computer as a process of its own. Each flight is also
+//! ground instead of ours, with our flight computer as a separate process. Each flight is also
 //! flown in our own world with the same draw.
 #![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 #![expect(clippy::print_stdout, reason = "the touchdowns side by side, for the page of hardware in the loop")]
@@ -20,11 +20,11 @@ use sim::sortie::Sortie;
 use sim::world::sensors::start_with_errors;
 use sim::world::{FirstContact, Rest, RestOutcome};
 
-/// Flights of one run of the bridge.
+/// Number of flights in one run of the bridge.
 const AT_ONCE: usize = 4;
 const SEED: u64 = 2002;
 
-/// A day at the field with this mean wind and without gusts, which JSBSim makes in another way.
+/// A day at the field with this mean wind and without gusts, which JSBSim models differently.
 fn day(wind_m_s: f64) -> Dispersion {
     let field = Dispersion::builtin("field").unwrap();
     Dispersion { wind_m_s: [wind_m_s; 2], gust_scale: 0.0, ..field }
@@ -40,7 +40,7 @@ fn state(state: &RigidState) -> Value {
     })
 }
 
-/// The flights that JSBSim is to fly, numbered from `first`, with a vehicle of this file.
+/// The flights for JSBSim, numbered from `first`, with the vehicle of this file.
 fn order(mission: &Mission, airframe: &Path, first: usize, draws: &[Draw]) -> Value {
     let vehicles = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../flight/vehicles");
     let flights: Vec<Value> = draws
@@ -75,7 +75,7 @@ fn order(mission: &Mission, airframe: &Path, first: usize, draws: &[Draw]) -> Va
 fn judged(mission: &Mission, result: &Value) -> Outcome {
     let number = |key: &str| result[key].as_f64().unwrap_or_else(|| panic!("{key}: {result}"));
     let touchdown = result.get("vertical_m_s").map(|_| {
-        // The heading does not count.
+        // The heading is not judged.
         let mut state = RigidState::upright(0.0);
         state.position_m.x = number("place_m");
         FirstContact {
@@ -114,7 +114,7 @@ fn judged(mission: &Mission, result: &Value) -> Outcome {
     )
 }
 
-/// Vertical speed, lateral speed, m/s, tilt, deg, rate, deg/s, distance, m, time, s.
+/// Vertical speed, m/s, lateral speed, m/s, tilt, deg, rate, deg/s, distance, m, time, s.
 fn values(outcome: &Outcome) -> [f64; 6] {
     outcome.touchdown.as_ref().map_or([f64::NAN; 6], |touchdown| {
         let place = touchdown.state.position_m;
@@ -171,7 +171,7 @@ fn fly(mission: &Mission, wind_m_s: f64, flights: u64) -> Flown {
     Flown { theirs, ours, again: draws.iter().map(anew).collect() }
 }
 
-/// Mean and standard deviation of the differences of the touchdowns' values.
+/// Mean and standard deviation of the differences of the values at touchdown.
 fn differences(some: &[Outcome], others: &[Outcome]) -> [(f64, f64); 6] {
     core::array::from_fn(|column| {
         let pairs = some.iter().zip(others);
@@ -204,7 +204,7 @@ fn compare(mission: &str, wind_m_s: f64, flights: u64) -> ([usize; 2], Flown) {
             failed(ours)
         );
     }
-    // Judged at contact, also where legs can give way: JSBSim's legs cannot.
+    // Judged at contact, also for vehicles whose legs can give way: JSBSim's legs cannot.
     let inside = |one: &&Outcome| one.landing.upright && one.landing.envelope;
     let [landed, of_ours, of_again] = [theirs, ours, again].map(|all| all.iter().filter(inside).count());
     println!(
@@ -237,8 +237,8 @@ fn val_jsbsim_in_wind_it_lands_in_a_world_that_nobody_here_wrote() {
     lands_as_often(4.0, 17);
 }
 
-/// A plan in space may end half a second later after another gust of noise, so the times are only
-/// printed.
+/// With another draw of the noise a plan in space may end half a second later, so the times are
+/// only printed.
 #[test]
 #[ignore = "200 flights of the vehicle that a club should build: six minutes"]
 fn val_jsbsim_lands_mk3_as_often_as_our_world_within_a_point() {

@@ -1,5 +1,5 @@
-//! The program of a board, as a process: it speaks MAVLink itself, over a serial radio, with the
-//! ordinary ground station, and decides every frame of a simulated world, which is another process.
+//! The program of a board, as a process: it exchanges MAVLink with the ordinary ground station over
+//! a serial radio, and decides every frame of a simulated world, which is another process.
 //! `benches/chain.rs` does the same with the image of a Cortex-M7.
 #![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
@@ -41,7 +41,8 @@ impl Chain {
         Self { world, board, radio }
     }
 
-    /// Waits for the end of the world, and of the board, which ends with it. Returns the world's.
+    /// Waits for the end of the world, and of the board, which ends with it. Returns the world's
+    /// output.
     fn wait(self) -> Ended {
         let (world, board) = (self.world.wait(), self.board.wait());
         assert_eq!(board.code, Some(0), "{}\n{}", board.output, world.output);
@@ -72,8 +73,8 @@ fn an_abort_from_the_screen_opens_the_parachute_of_a_board() {
     ground.env("XDG_RUNTIME_DIR", folder.path()).env("XDG_CONFIG_HOME", folder.path());
     let mut screen = Terminal::start(&ground, (100, 40), false);
     screen.wait_for("every arming check passes");
-    // A busy machine may leave the radio silent for a second, which holds the countdown: then the
-    // crew starts anew.
+    // On a busy machine the radio may be silent for a second, which holds the countdown: then the
+    // crew starts it again.
     let falls = |screen: &Terminal| {
         screen.wait_within(Duration::from_secs(30), |window| window.shows("Falling").then_some(())).is_some()
     };
@@ -95,8 +96,8 @@ fn an_abort_from_the_screen_opens_the_parachute_of_a_board() {
     expect_identical_replay(folder.path(), "vehicle.mcap");
 }
 
-/// What a recorded flight is written as goes into the folder that is given, beside what is there:
-/// `emulate` has the flight's words in it. A board answers as was recorded.
+/// The files of a recorded flight are written to the given folder, beside existing files: `emulate`
+/// stores the flight's text there. A board reproduces the recorded answers.
 #[test]
 fn a_recorded_flight_is_written_beside_what_is_there_and_flown_again() {
     let folder = tempfile::tempdir().unwrap();
@@ -116,7 +117,7 @@ fn a_recorded_flight_is_written_beside_what_is_there_and_flown_again() {
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 4);
 }
 
-/// What carries the frames loses bytes and changes them: nothing of the flight changes.
+/// The transport of the frames drops and changes bytes: the flight stays identical.
 #[test]
 fn a_bad_wire_to_a_board_changes_nothing() {
     let folder = tempfile::tempdir().unwrap();
@@ -147,7 +148,7 @@ fn a_bad_wire_to_a_board_changes_nothing() {
         worsened(from_world, board.stdin.take().unwrap(), 1),
         worsened(board.stdout.take().unwrap(), to_world, 2),
     ];
-    // Nobody arms it: it stands on its pad.
+    // It stays unarmed on its pad.
     world.wait_for_line("phase SAFE to PAD_IDLE");
     world.signal(Signal::SIGTERM);
     let world = world.wait();
@@ -158,7 +159,8 @@ fn a_bad_wire_to_a_board_changes_nothing() {
     expect_identical_replay(folder.path(), "log.mcap");
 }
 
-/// Carries bytes in a thread; one in ten thousand is lost, and one is changed. Returns how many.
+/// Carries bytes in a thread; one in ten thousand is lost, and one is changed. Returns the numbers
+/// of both.
 fn worsened(
     mut from: impl Read + Send + 'static,
     mut to: impl Write + Send + 'static,

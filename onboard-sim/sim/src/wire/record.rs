@@ -69,8 +69,8 @@ impl LastFrame {
 impl Watch for LastFrame {
     fn decided(&mut self, input: &Input<'_>, output: &Output, computer: &Computer) {
         // A computer that has restarted takes the rehearsal again.
-        let known = self.rehearsed && input.frame == self.next;
-        self.frame = Some(Box::new(frame_to_log(input, output, computer, known)));
+        let rehearsed_before = self.rehearsed && input.frame == self.next;
+        self.frame = Some(Box::new(frame_to_log(input, output, computer, rehearsed_before)));
         (self.rehearsed, self.next) = (computer.rehearsed().is_some(), input.frame + 1);
     }
 }
@@ -82,8 +82,8 @@ pub fn estimate(pilot: &Pilot) -> Option<Record> {
 
 /// The flight computer's estimate in the frame just flown, and the truth.
 pub fn estimate_and_truth(flight: &Sortie) -> Vec<Record> {
-    let thought = estimate(flight.pilot()).filter(|_| !flight.computer_is_dead());
-    thought.into_iter().chain([Record::TruthSample(Box::new(truth(flight)))]).collect()
+    let estimate = estimate(flight.pilot()).filter(|_| !flight.computer_is_dead());
+    estimate.into_iter().chain([Record::TruthSample(Box::new(truth(flight)))]).collect()
 }
 
 fn truth(flight: &Sortie) -> TruthSample {

@@ -392,11 +392,11 @@ mod tests {
                 let loads = OnGround(&ground, cg_m);
                 state = rk4_step(&state, &inertia, &loads, STANDARD_GRAVITY_M_S2, STEP_S).0;
                 let (world_from_body, given_m) = (state.world_from_body.to_rotation_matrix(), ground.given_m);
-                let felt = [0, 1, 2, 3].map(|foot| ground.on_foot(foot, &state, &world_from_body, &cg_m));
+                let forces = [0, 1, 2, 3].map(|foot| ground.on_foot(foot, &state, &world_from_body, &cg_m));
                 let at_m = ground.feet_m.map(|foot| foot - cg_m);
                 ground.give_way(&state, &cg_m);
-                for (foot, felt) in felt.into_iter().enumerate() {
-                    let Some((_, force_n, _)) = felt else { continue };
+                for (foot, forces) in forces.into_iter().enumerate() {
+                    let Some((_, force_n, _)) = forces else { continue };
                     let gave_m = ground.given_m[foot] - given_m[foot];
                     let nose = state.nose_in_world();
                     let across_n = (force_n - nose * force_n.dot(&nose)).norm();
@@ -414,9 +414,10 @@ mod tests {
                 depths_m.map(|(depth_m, ..)| 0.5 * ground.stiffness_n_m * depth_m * depth_m).sum();
             let (lost_j, taken_j) =
                 (before_j - energy_j(&state), blocks_j + guides_j + friction_j + springs_j);
-            let told = format!("{number}: {lost_j} J lost; {blocks_j} {guides_j} {friction_j} {springs_j}");
-            assert!((lost_j - taken_j).abs() < 0.01 * lost_j, "{told}");
-            assert!(blocks_j > 0.2 * lost_j && guides_j > 0.0 && friction_j > 0.0, "{told}");
+            let message =
+                format!("{number}: {lost_j} J lost; {blocks_j} {guides_j} {friction_j} {springs_j}");
+            assert!((lost_j - taken_j).abs() < 0.01 * lost_j, "{message}");
+            assert!(blocks_j > 0.2 * lost_j && guides_j > 0.0 && friction_j > 0.0, "{message}");
         }
     }
 }

@@ -55,14 +55,14 @@ impl Hanging {
         let world_from_body = UnitQuaternion::from_scaled_axis(axis * angle) * upright();
         let acceleration = drift * (-wander_sin * wander_rad_s)
             - (nose_by_angle * turn - nose * (rate * rate)) * self.length_m;
-        let felt = acceleration + Vector3::z() * STANDARD_GRAVITY_M_S2;
+        let specific_force = acceleration + Vector3::z() * STANDARD_GRAVITY_M_S2;
         let state = RigidState {
             position_m: hook_m - nose * self.length_m,
             velocity_m_s: drift * wander_cos - nose_by_angle * (rate * self.length_m),
             world_from_body,
             rate_rad_s: world_from_body.inverse_transform_vector(&(axis * rate)),
         };
-        (state, world_from_body.inverse_transform_vector(&felt))
+        (state, world_from_body.inverse_transform_vector(&specific_force))
     }
 }
 
@@ -86,8 +86,8 @@ mod tests {
             let velocity = (after.0.position_m - before.0.position_m) / (2.0 * step_s);
             assert!((velocity - now.0.velocity_m_s).norm() < 1e-6);
             let acceleration = (after.0.velocity_m_s - before.0.velocity_m_s) / (2.0 * step_s);
-            let felt = now.0.world_from_body * now.1 - Vector3::z() * STANDARD_GRAVITY_M_S2;
-            assert!((acceleration - felt).norm() < 1e-6);
+            let by_sensor = now.0.world_from_body * now.1 - Vector3::z() * STANDARD_GRAVITY_M_S2;
+            assert!((acceleration - by_sensor).norm() < 1e-6);
             let turned = (before.0.world_from_body.inverse() * after.0.world_from_body).scaled_axis();
             assert!((turned / (2.0 * step_s) - now.0.rate_rad_s).norm() < 1e-6);
             // The rope carries only the weight's component along itself, and the swing's force:

@@ -287,11 +287,11 @@ mod tests {
 
     #[test]
     fn a_motor_switched_off_before_ignition_does_not_light() {
-        let mut lit = motor(&Truth::default());
-        lit.current(true, 11.0);
-        assert_eq!(lit.thrust_begins_s(), Some(10.15));
-        lit.current(false, 10.151);
-        assert_eq!(lit.thrust_begins_s(), Some(10.15), "nothing stops it any more");
+        let mut burning = motor(&Truth::default());
+        burning.current(true, 11.0);
+        assert_eq!(burning.thrust_begins_s(), Some(10.15));
+        burning.current(false, 10.151);
+        assert_eq!(burning.thrust_begins_s(), Some(10.15), "nothing stops it any more");
 
         let mut off = motor(&Truth::default());
         off.current(false, 10.149);

@@ -18,7 +18,7 @@ const DENSITY_KG_M3: f64 = 1.2;
 const MASS_KG: f64 = 3.1;
 const FIN_DRAG_AREA_M2: f64 = 0.031;
 const CROSSFLOW_AREA_M2: f64 = 0.09;
-/// The motor is lit when a stop above the ground needs this deceleration, m/s^2.
+/// The motor is ignited when a stop above the ground needs this deceleration, m/s^2.
 const STOPPING_M_S2: f64 = 7.0;
 
 /// What differs between flights.

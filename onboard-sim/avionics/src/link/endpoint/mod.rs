@@ -254,14 +254,14 @@ impl VehicleEndpoint {
                 if self.is_for_us(head.target_system, head.target_component) =>
             {
                 // The frame itself is in the log already.
-                let kept = TD_BOOK_KEPT_DATA {
+                let confirmation = TD_BOOK_KEPT_DATA {
                     boot_number: self.identity.boot_number,
                     book: head.book,
                     entries: head.entries,
                     target_system: frame.source().system_id,
                     target_component: frame.source().component_id,
                 };
-                self.lane(link).request(vec![MavMessage::TD_BOOK_KEPT(kept)]);
+                self.lane(link).request(vec![MavMessage::TD_BOOK_KEPT(confirmation)]);
             }
             Ok(message) => {
                 if let Some(pong) = pong(&message, frame.source()) {

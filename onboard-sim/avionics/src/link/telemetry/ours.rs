@@ -335,7 +335,7 @@ mod tests {
 
     #[test]
     fn only_an_impact_is_sent_with_its_speed() {
-        let told = [
+        let effects = [
             (AbortEffect::None, 0, 0),
             (AbortEffect::SafeOnPad, 1, 0),
             (AbortEffect::ChuteAtApogee, 2, 0),
@@ -345,7 +345,7 @@ mod tests {
             (AbortEffect::Burn, 7, 0),
             (AbortEffect::Impact { m_s: 41 }, 8, 41),
         ];
-        for (effect, number, m_s) in told {
+        for (effect, number, m_s) in effects {
             let (td_effect, td_m_s) = td_abort_effect(effect);
             assert_eq!((td_effect as u32, td_m_s), (number, m_s), "{effect:?}");
         }

@@ -105,13 +105,13 @@ impl PadCheck {
         match &mut self.stage {
             Stage::Resting => return None,
             Stage::Sweeping(sweep) => {
-                let (told, found) = sweep.step(&surfaces_rad(input.gimbal_rad, input.fins_rad));
+                let (command, found) = sweep.step(&surfaces_rad(input.gimbal_rad, input.fins_rad));
                 self.findings.extend(found.into_iter().flatten());
-                if told.is_none() {
+                if command.is_none() {
                     self.swept_frames = sweep.frames().0;
                     self.stage = Stage::Still(Still::default());
                 }
-                return told;
+                return command;
             }
             Stage::Still(still) => {
                 still.take(&input.measured);
@@ -446,9 +446,9 @@ impl Computer {
             self.end_check(&reason);
             return;
         }
-        let told = self.pad_check.step(input, self.pilot.mission(), &self.arming);
+        let command = self.pad_check.step(input, self.pilot.mission(), &self.arming);
         self.rest_surfaces();
-        match told {
+        match command {
             Some((surface @ 0..2, angle_rad)) => self.commands.gimbal_rad[surface] = angle_rad,
             Some((surface, angle_rad)) => self.commands.fins_rad[surface - 2] = angle_rad,
             None => {}

@@ -160,8 +160,8 @@ impl Sweep {
             found = Some(self.findings(&reach));
             (self.surface, self.target, self.shown) = (self.surface + 1, 0, NOTHING_SHOWN);
         }
-        let (told, _) = self.step(surfaces_rad);
-        (told, found)
+        let (command, _) = self.step(surfaces_rad);
+        (command, found)
     }
 
     /// Takes one feedback of the moving surface.

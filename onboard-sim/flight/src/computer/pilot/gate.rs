@@ -298,16 +298,14 @@ impl Pilot {
         // A moving fin fails for a moment and is left out beside a lasting cause.
         let keeps: [fn(&GateCheck, f64) -> bool; 3] =
             [|check, for_s| check.lasts && for_s >= LASTS_S, |check, _| check.lasts, |check, _| check.shut];
-        let told = keeps.iter().map(|keep| {
+        let mut causes = keeps.iter().map(|keep| {
             let lasting =
                 checks.iter().zip(&self.shut_since_s).filter(|(check, since_s)| keep(check, for_s(since_s)));
             let words =
                 lasting.map(|(check, since_s)| format!("{}, for {:.1} s", check.words(), for_s(since_s)));
             words.collect::<Vec<_>>().join("; ")
         });
-        told.into_iter()
-            .find(|told| !told.is_empty())
-            .unwrap_or_else(|| "too low for the landing motor".into())
+        causes.find(|causes| !causes.is_empty()).unwrap_or_else(|| "too low for the landing motor".into())
     }
 }
 

@@ -299,15 +299,15 @@ impl MotorEstimate {
             MotorStage::Burning | MotorStage::EndedEarly { .. } => self.mean[IGNITION],
         };
         // After the last sample the deviation from the shape decays.
-        let kept = match self.stage {
+        let decay = match self.stage {
             MotorStage::Waiting => 0.0,
             _ => libm::exp(-(time_s - self.updated_at_s).max(0.0) / self.prior.shape_lasts_s),
         };
-        let then = Self { mean: self.mean.component_mul(&Vector5::new(1.0, 1.0, 1.0, 1.0, kept)), ..*self };
+        let then = Self { mean: self.mean.component_mul(&Vector5::new(1.0, 1.0, 1.0, 1.0, decay)), ..*self };
         let (thrust_n, mut sensitivity) = then.thrust(curve, time_s - ignition_s);
         let by_shape_n = sensitivity[SHAPE];
-        sensitivity[SHAPE] *= kept;
-        let wandered = self.prior.shape_sigma * self.prior.shape_sigma * (1.0 - kept * kept);
+        sensitivity[SHAPE] *= decay;
+        let wandered = self.prior.shape_sigma * self.prior.shape_sigma * (1.0 - decay * decay);
         let variance =
             product(&sensitivity, &(self.covariance * sensitivity)) + by_shape_n * by_shape_n * wandered;
         PredictedThrust { thrust_n, sigma_n: libm::sqrt(variance.max(0.0)) }
@@ -387,14 +387,14 @@ impl MotorEstimate {
         if sigma <= 0.0 {
             return;
         }
-        let kept = libm::exp(-self.prior.frame_s / self.prior.shape_lasts_s);
-        self.mean[SHAPE] *= kept;
+        let decay = libm::exp(-self.prior.frame_s / self.prior.shape_lasts_s);
+        self.mean[SHAPE] *= decay;
         for index in 0..SHAPE {
-            self.covariance[(SHAPE, index)] *= kept;
-            self.covariance[(index, SHAPE)] *= kept;
+            self.covariance[(SHAPE, index)] *= decay;
+            self.covariance[(index, SHAPE)] *= decay;
         }
         let variance = &mut self.covariance[(SHAPE, SHAPE)];
-        *variance = kept * kept * *variance + (1.0 - kept * kept) * sigma * sigma;
+        *variance = decay * decay * *variance + (1.0 - decay * decay) * sigma * sigma;
     }
 
     fn learn(&mut self, sample: &MotorSample, sensitivity: Vector5<f64>, innovation_n: f64, thrust_n: f64) {

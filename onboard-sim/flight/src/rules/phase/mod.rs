@@ -116,8 +116,8 @@ pub struct Mode {
     pub hold: Option<Hold>,
     /// The state of the landing motor.
     pub motor: Motor,
-    /// When an abort on the pad of an earlier power-up was, vehicle time, s: before zero. Nobody
-    /// approaches and nothing arms before its wait is over, and the pin is due until it was put in
+    /// Time of an abort on the pad in an earlier power-up, vehicle time, s: at most zero. People
+    /// keep away and nothing arms before its wait is over, and the pin is due until it was inserted
     /// and is pulled again.
     pub aborted_before_s: Option<f64>,
 }

@@ -57,8 +57,8 @@ pub(crate) fn window(mission: &Mission, drawn: &Draw, fall: &RigidState) -> Opti
     Some(Window { low_m: edge_m(first, first - 1), high_m })
 }
 
-/// Heights are found this closely, m: far below what decides a landing (a metre of height is 0.2
-/// m/s at the ground).
+/// Rounding of the heights, m: far below the difference that decides a landing (a metre of height
+/// is 0.2 m/s at the ground).
 const ROUNDING_M: f64 = 1e-3;
 
 struct Search {
@@ -117,7 +117,7 @@ pub(crate) fn best_height_m(windows: &[Window]) -> Option<(f64, u64)> {
 /// Length of a step, s. The midpoint rule is then right to a millimetre over the fall, and to a
 /// centimetre over a burn.
 const STEP_S: f64 = 0.02;
-/// A fall that takes longer is given up, s. From 300 m it takes 11 s.
+/// Longest fall that is followed, s. From 300 m it takes 11 s.
 const LONGEST_S: f64 = 120.0;
 
 /// Height of the feet, m, and vertical velocity, m/s, at equal times since apogee, past the ground
@@ -183,8 +183,8 @@ impl Fall {
     }
 }
 
-/// Time after the burn that is looked at, s. A vehicle at rest then falls to the legs' limit (1
-/// m/s) in a tenth of that.
+/// Time after the burn that is examined, s. A vehicle at rest then falls to the legs' limit (1 m/s)
+/// in a tenth of that.
 const AFTER_S: f64 = 1.0;
 /// Tilts tried for the hardest and softest braking. Between them a parabola is laid through three:
 /// with 17, heights differ by at most 0.3 mm.
@@ -482,9 +482,9 @@ fn peak(values: &[Option<f64>]) -> Option<f64> {
     Some(most + if curve > 0.0 { (right - left) * (right - left) / (8.0 * curve) } else { 0.0 })
 }
 
-/// A zero is found this closely, in the unit of the argument.
+/// Tolerance of a zero, in the unit of the argument.
 const CLOSE: f64 = 1e-4;
-/// Largest number of values asked for; about eight are usual.
+/// Largest number of evaluations; about eight are usual.
 const MOST_VALUES: usize = 60;
 
 /// Where a function that rises from below zero at `low` passes zero, by false position; the value

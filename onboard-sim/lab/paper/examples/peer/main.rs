@@ -26,7 +26,7 @@
 //! all intervals, of a Newton step, and of a warm solve that ends after one iteration. The answer
 //! to `quadratic` is the nanoseconds of a Newton step, the problem's numbers, and the answer of a
 //! solve; that to `peak` is Gflop/s and the latencies of addition, multiplication, division and
-//! root in ns. What is proved not landable is not solved.
+//! root in ns. A problem that is proved not landable is not solved.
 #![expect(clippy::print_stdout, reason = "the answers")]
 
 mod clock;
@@ -181,8 +181,8 @@ impl Peer {
     }
 }
 
-/// Solves twice, the second time with the buffers of the first; the second outcome, and the answer
-/// that tells it.
+/// Solves twice, the second time with the buffers of the first. Returns the second outcome and the
+/// line with its result.
 fn timed<M: Model<NX, NU>, const NX: usize, const NU: usize>(
     model: &M,
     workspace: &mut ocp::Workspace<M, NX, NU>,

@@ -10,14 +10,15 @@ use ocp::{DenseIntervals, Hessian, add_multiple};
 use crate::plane::Problem;
 use crate::plane::dynamics::{AHEAD, Motion, WEIGHTS, end};
 
-/// Pitch, both velocities, pitch rate, gimbal angle: what the rates of the state depend on.
+/// The variables that the rates of the state depend on: pitch, both velocities, pitch rate, gimbal
+/// angle.
 const DIRECTIONS: usize = 5;
-/// The first state among the directions.
+/// Index of the first state among the directions.
 const FIRST: usize = 2;
-/// The gimbal angle among the directions.
+/// Index of the gimbal angle among the directions.
 const GIMBAL: usize = 4;
 
-/// Evaluates every interval, with tangents and curvature if asked for.
+/// Evaluates every interval, with tangents and curvature on request.
 pub(super) fn evaluate(
     problem: &Problem,
     states: &[[f64; 6]],
@@ -33,8 +34,8 @@ pub(super) fn evaluate(
         interval.end = end(state, &stages, h);
         let jacobians = stages.each_ref().map(Motion::by_directions);
 
-        // Backwards: what a change of each stage's rates is worth, and of each direction of its
-        // state.
+        // Backwards: the derivative of the result with respect to each stage's rates, and to each
+        // direction of its state.
         let mut worth = [[0.0; 6]; 4];
         let (mut later, mut pulled) = ([0.0; DIRECTIONS], [0.0; DIRECTIONS]);
         for stage in (0..4).rev() {

@@ -34,7 +34,7 @@ const SAMPLE_STEPS: u64 = 20;
 #[derive(Debug, Clone)]
 pub(crate) struct Vehicle {
     airframe: Airframe,
-    /// It is never lit; its mass is part of the vehicle's.
+    /// It never burns; its mass is part of the vehicle's.
     motor: ThrustCurve,
 }
 

@@ -118,9 +118,9 @@ pub(crate) struct AsPrinted {
 pub(crate) fn as_printed() -> AsPrinted {
     let of_kind = |kind| PlanarModel { kind, ..model() };
     let in_truth = Problem { thrust_n: PRINTED_THRUST_N, ..problem(start(), HORIZON) };
-    let mut believed = Problem { model: of_kind(ModelKind::AsPrinted), ..in_truth.clone() };
-    believed.solver.max_iterations = MAX_ITERATIONS;
-    let promise = solve(&believed, None);
+    let mut assumed = Problem { model: of_kind(ModelKind::AsPrinted), ..in_truth.clone() };
+    assumed.solver.max_iterations = MAX_ITERATIONS;
+    let promise = solve(&assumed, None);
     let promised = promise.end();
     AsPrinted {
         thrust_n: PRINTED_THRUST_N,
@@ -130,7 +130,7 @@ pub(crate) fn as_printed() -> AsPrinted {
             .map(of_kind)
             .map(coasting_energy_error),
         promised,
-        promised_vertical_m_s: believed.model.derivative(&promised.to_array(), 0.0, 0.0)[1],
+        promised_vertical_m_s: assumed.model.derivative(&promised.to_array(), 0.0, 0.0)[1],
         promised_lowest_m: promise.states.iter().map(|[_, z_m, ..]| *z_m).fold(f64::INFINITY, f64::min),
         promise_converged: promise.converged(),
         happens: contact(model(), start(), PRINTED_THRUST_N, &promise.inputs_rad).map(|(_, state)| state),

@@ -10,7 +10,7 @@ use paper::plane::Problem;
 
 use super::{Row, Table};
 
-/// What a definition makes of one landing.
+/// The values of one definition on one landing.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Definition {
     pub(crate) name: &'static str,

@@ -61,7 +61,7 @@ fn write_in_a_thread(file: &Path) -> (SyncSender<bool>, Receiver<String>) {
     let write = move || {
         for waits in changes {
             let written = if waits { create(&file) } else { fs::remove_file(&file) };
-            // Nobody may be listening any more.
+            // The receiver may no longer exist.
             let _ = written.map_err(|why| failed.try_send(why.to_string()));
         }
     };

@@ -105,7 +105,7 @@ impl Vehicle {
         Self { outside, operators, ..self }
     }
 
-    /// Sets when it was aborted on its pad before this power-up, vehicle time, s: before zero.
+    /// Sets the time of an abort on the pad before this power-up, vehicle time, s: at most zero.
     #[must_use]
     pub fn aborted_before(self, at_s: f64) -> Self {
         Self { sortie: self.sortie.aborted_before(at_s), ..self }

@@ -26,8 +26,8 @@ impl Wander {
     /// Advances over an interval of any length, exactly: the retained share of the variance, `k^2`,
     /// and the new share, `1 - k^2`, add up to one.
     pub(super) fn advance(&mut self, interval_s: f64, normal: &mut Normal) {
-        let kept = libm::exp(-interval_s / self.correlation_s);
-        self.value = self.value * kept + self.sigma * libm::sqrt(1.0 - kept * kept) * normal.next();
+        let decay = libm::exp(-interval_s / self.correlation_s);
+        self.value = self.value * decay + self.sigma * libm::sqrt(1.0 - decay * decay) * normal.next();
     }
 }
 
@@ -165,7 +165,7 @@ pub fn start_with_errors(truth: &RigidState, uncertainty: &StartUncertainty, see
 impl Sensors {
     /// The estimate of a vehicle that has levelled itself on its pad: the attitude is that of the
     /// inertial unit, with its accelerometer's error at rest, and has the heading of `believed`.
-    pub(crate) fn levelled(&self, truth: &RigidState, believed: &RigidState) -> RigidState {
+    pub(crate) fn levelled(&self, truth: &RigidState, estimate: &RigidState) -> RigidState {
         let unit_from_body = UnitQuaternion::from_rotation_matrix(&self.flaws.unit_from_body);
         let world_from_unit = truth.world_from_body * unit_from_body.inverse();
         let up_m_s2 = world_from_unit.inverse_transform_vector(&Vector3::z()) * GRAVITY_M_S2;
@@ -173,10 +173,10 @@ impl Sensors {
             + self.flaws.cross_axis * up_m_s2
             + self.errors.accelerometer_bias_m_s2;
         let lean = UnitQuaternion::rotation_between(&(world_from_unit * measured_m_s2), &Vector3::z());
-        let turned = (believed.world_from_body * truth.world_from_body.inverse()).scaled_axis();
+        let turned = (estimate.world_from_body * truth.world_from_body.inverse()).scaled_axis();
         let heading = UnitQuaternion::from_scaled_axis(Vector3::z() * turned.z);
         let world_from_body = heading * lean.unwrap_or_default() * world_from_unit;
-        RigidState { world_from_body, ..*believed }
+        RigidState { world_from_body, ..*estimate }
     }
 }
 

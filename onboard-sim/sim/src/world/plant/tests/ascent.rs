@@ -127,7 +127,7 @@ fn val_hand_masses_of_the_stack_on_its_rail() {
     assert!((mass.cg_m.x - 0.182_888).abs() < 1e-4);
     assert!((mass.inertia.across_kg_m2[0] - 0.649_426).abs() < 2e-3);
     assert!((mass.inertia.roll_kg_m2 - 0.007_001).abs() < 2e-5);
-    // The centre of gravity stands 1 m above the booster's nozzle, and feels its weight.
+    // The centre of gravity stands 1 m above the booster's nozzle; the weight acts on it.
     assert!((world.state().position_m.z - 1.0).abs() < 1e-12);
     world.advance(&Actuators::NONE, 500);
     assert!((world.state().position_m.z - 1.0).abs() < 1e-12 && world.booster_attached());
