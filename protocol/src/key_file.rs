@@ -7,9 +7,10 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read as _, Write as _};
 use std::os::unix::fs::{OpenOptionsExt as _, PermissionsExt as _};
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
+use crate::background::Background;
 use crate::signing::{Key, Memory, MemoryError, Signing};
 
 /// Only the owner may read and write.
@@ -19,8 +20,6 @@ const APPEND_LIMIT_BYTES: usize = 64 << 10;
 /// How long a caller waits for the disk: a working one takes some 0.05 ms, and an abort may be late
 /// by 100 ms.
 const STORED_WITHIN: Duration = Duration::from_millis(5);
-/// How long the last timestamps may take at the end of the program.
-const ENDS_WITHIN: Duration = Duration::from_secs(10);
 /// The permission bits of group and others.
 const GROUP_AND_OTHERS: u32 = 0o077;
 
@@ -54,59 +53,10 @@ pub enum KeyFileError {
 /// The timestamps beside a key.
 #[derive(Debug)]
 pub struct KeyFile {
-    /// The file, until a thread writes it.
-    idle: Option<StampFile>,
     stamps_path: PathBuf,
-    shared: Arc<Shared>,
-}
-
-/// What the writing thread shares.
-#[derive(Debug, Default)]
-struct Shared {
-    state: Mutex<State>,
-    changed: Condvar,
-}
-
-#[derive(Debug, Default)]
-struct State {
-    /// The newest timestamps, not begun to be written.
-    newest: Option<Memory>,
-    writes: bool,
-    failure: Option<KeyFileError>,
-    ends: bool,
-}
-
-impl State {
-    fn is_busy(&mut self) -> bool {
-        self.newest.is_some() || self.writes
-    }
-}
-
-impl Shared {
-    fn state(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Waits until everything is written, or for so long.
-    fn wait<'a>(&'a self, state: MutexGuard<'a, State>, longest: Duration) -> MutexGuard<'a, State> {
-        let waited = self.changed.wait_timeout_while(state, longest, |state| state.is_busy());
-        waited.unwrap_or_else(PoisonError::into_inner).0
-    }
-
-    /// Writes the newest timestamps until the end.
-    fn write(&self, mut file: StampFile) {
-        loop {
-            let wait = self.changed.wait_while(self.state(), |state| state.newest.is_none() && !state.ends);
-            let mut state = wait.unwrap_or_else(PoisonError::into_inner);
-            let Some(memory) = state.newest.take() else { return };
-            state.writes = true;
-            drop(state);
-            let failure = file.remember(&memory).err();
-            let mut state = self.state();
-            (state.writes, state.failure) = (false, failure);
-            self.changed.notify_all();
-        }
-    }
+    file: Arc<Mutex<StampFile>>,
+    /// Started with the first timestamps.
+    writer: Option<Background<(), Result<(), KeyFileError>>>,
 }
 
 /// The timestamp file as the writing thread sees it.
@@ -163,9 +113,9 @@ impl KeyFile {
             Err(error) if error.kind() == io::ErrorKind::NotFound => Memory::default(),
             Err(source) => return Err(KeyFileError::Io { path: stamps_path, source }),
         };
-        let path = stamps_path.clone();
-        let idle = Some(StampFile { stamps_path, written: memory.clone(), appending: None });
-        Ok((Self { idle, stamps_path: path, shared: Arc::default() }, Signing::new(key, memory)))
+        let file = StampFile { stamps_path: stamps_path.clone(), written: memory.clone(), appending: None };
+        let file = Arc::new(Mutex::new(file));
+        Ok((Self { stamps_path, file, writer: None }, Signing::new(key, memory)))
     }
 
     /// Reads a key without timestamps.
@@ -196,33 +146,21 @@ impl KeyFile {
     /// # Errors
     /// The file cannot be written, or the disk stalls.
     pub fn remember(&mut self, memory: &Memory) -> Result<(), KeyFileError> {
-        if let Some(file) = self.idle.take() {
-            let shared = Arc::clone(&self.shared);
-            let thread = std::thread::Builder::new().name("timestamps".to_owned());
-            let spawned = thread.spawn(move || shared.write(file));
-            spawned.map_err(|source| KeyFileError::Io { path: self.stamps_path.clone(), source })?;
-        }
-        let mut state = self.shared.state();
-        let is_late = state.is_busy();
-        state.newest = Some(memory.clone());
-        self.shared.changed.notify_all();
+        let writer = match &mut self.writer {
+            Some(writer) => writer,
+            none => {
+                let failed = |source| KeyFileError::Io { path: self.stamps_path.clone(), source };
+                none.insert(Background::start("timestamps").map_err(failed)?)
+            }
+        };
+        let is_late = !writer.wait(Duration::ZERO);
+        let (file, memory) = (Arc::clone(&self.file), memory.clone());
+        writer.queue((), move || file.lock().unwrap_or_else(PoisonError::into_inner).remember(&memory));
         if is_late {
             return Err(KeyFileError::Late { path: self.stamps_path.clone() });
         }
-        state = self.shared.wait(state, STORED_WITHIN);
-        state.failure.take().map_or(Ok(()), Err)
-    }
-}
-
-impl Drop for KeyFile {
-    /// Waits for the last timestamps.
-    fn drop(&mut self) {
-        let mut state = self.shared.state();
-        if self.idle.is_none() {
-            state = self.shared.wait(state, ENDS_WITHIN);
-        }
-        state.ends = true;
-        self.shared.changed.notify_all();
+        writer.wait(STORED_WITHIN);
+        std::iter::from_fn(|| writer.outcome()).last().unwrap_or(Ok(()))
     }
 }
 

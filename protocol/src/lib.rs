@@ -76,6 +76,8 @@ extern crate alloc;
 // The generated dialect names it so.
 extern crate mavlink as mavlink_core;
 
+#[cfg(feature = "transport")]
+pub mod background;
 #[cfg(feature = "std")]
 pub mod book;
 pub mod command;

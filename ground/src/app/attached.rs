@@ -88,8 +88,7 @@ pub async fn session(
                 if matches!(msg, Msg::Terminate(_)) {
                     break;
                 }
-                let rest = output.typed(msg);
-                rest.map_or_else(Vec::new, |msg| update(&mut model, msg, times.theirs(clock.now())))
+                update(&mut model, msg, times.theirs(clock.now()))
             }
             () = clock.sleep_until(chord_at) => update(&mut model, Msg::ScreenTick, times.theirs(clock.now())),
             told = link.hear(), if look_again_at.is_none() => {
@@ -134,7 +133,7 @@ pub async fn session(
                 if output.answers(clock.now()) {
                     link.ask(&ToStation::Here).await;
                 }
-                output.pass(&mut model, clock.now(), times.theirs(clock.now()));
+                output.pass(&mut model, clock.now());
                 update(&mut model, Msg::ScreenTick, times.theirs(clock.now()))
             }
             () = clock.sleep_until(redraw_at) => Vec::new(),
@@ -203,8 +202,6 @@ async fn act(
                     model.warn(now, ended.to_string());
                 }
             }
-            Action::ReplayFlight => output.again.begin(model, now),
-            Action::Alarm(_) => output.leave_replay(),
             Action::Quit => quit = true,
             // The station itself sends, records and reports.
             _ => {}

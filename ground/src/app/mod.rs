@@ -283,7 +283,7 @@ async fn start(
         clock,
         log_time,
         recorder,
-        background: Background::start().context("starting the thread of the files")?,
+        background: Background::start("files").context("starting the thread of the files")?,
         log_watch: LogWatch::default(),
         demo,
         output,

@@ -4,17 +4,16 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
 use std::time::Duration;
 
 use anyhow::Context as _;
+use protocol::background::Background;
 use protocol::log::record::EventLevel;
 use protocol::log::recorder::RecorderError;
 use protocol::program::{Exit, is_quiet};
 use serde_json::json;
 
 use super::programs::VoiceEnded;
-use super::replaying::Again;
 use super::screen::Screen;
 use crate::config::Config;
 use crate::model::{Ending, Event, FlightSoFar, Model, Speaker, Verdict};
@@ -27,8 +26,6 @@ use crate::view::widgets::fixed;
 pub(super) struct Output {
     pub(super) screen: Option<Box<Screen>>,
     pub(super) lines: Lines,
-    /// The flight just flown, again on this screen.
-    pub(super) again: Again,
 }
 
 impl Output {
@@ -43,7 +40,7 @@ impl Output {
 
     /// Lines without a screen.
     pub(super) fn lines(lines: Lines) -> Self {
-        Self { screen: None, lines, again: Again::default() }
+        Self { screen: None, lines }
     }
 
     /// Whether the terminal distinguishes a held key's repeats from presses.
@@ -96,38 +93,13 @@ impl Output {
         None
     }
 
-    /// What was typed, for the live model: a replay takes its own keys.
-    pub(super) fn typed(&mut self, msg: Msg) -> Option<Msg> {
-        if self.again.shown().is_some() {
-            self.mark_changed();
-        }
-        let (actions, rest) = self.again.take(msg);
-        for action in actions {
-            self.act(&action);
-        }
-        rest
-    }
-
-    /// Lets time pass for a replay; `model_now` is the same moment on the model's clock.
-    pub(super) fn pass(&mut self, model: &mut Model, now: Duration, model_now: Duration) {
+    /// Lets time pass for the model's view of the terminal.
+    pub(super) fn pass(&self, model: &mut Model, now: Duration) {
         model.screen_late = self.screen.as_ref().map_or(Duration::ZERO, |screen| screen.pace.late(now));
-        match self.again.pass(model, now) {
-            Ok(true) => self.mark_changed(),
-            Ok(false) => {}
-            Err(why) => model.warn(model_now, format!("no replay: {why}")),
-        }
-    }
-
-    /// The live screen comes back.
-    pub(super) fn leave_replay(&mut self) {
-        if self.again.end() {
-            self.mark_changed();
-        }
     }
 
     /// Shows the present state; `model_now` is the same moment on the model's clock.
     pub(super) fn show(&mut self, model: &Model, now: Duration, model_now: Duration) -> anyhow::Result<()> {
-        let (model, model_now) = self.again.shown().unwrap_or((model, model_now));
         match &mut self.screen {
             Some(screen) => screen.show(model, now, model_now).context("drawing on the terminal")?,
             None => self.lines.show(model),
@@ -143,19 +115,21 @@ impl Output {
 pub struct Lines {
     seen: u64,
     closed: bool,
-    /// Started with the first line.
-    printer: Option<Printer>,
+    /// Texts that found no room since the last one that did.
+    lost: u64,
+    /// Prints in a thread: a pipe that nobody empties must delay neither the link nor the screen.
+    printer: Option<Background<u64, bool>>,
 }
 
 impl Lines {
     /// Prints only new events; the earlier ones were shown on a screen.
     pub fn new_events_only(model: &Model) -> Self {
-        Self { seen: model.events.total(), ..Self::default() }
+        Self { seen: model.events.total(), closed: false, lost: 0, printer: None }
     }
 
     /// Prints nothing: nobody reads the output.
     pub fn closed() -> Self {
-        Self { closed: true, ..Self::default() }
+        Self { seen: 0, closed: true, lost: 0, printer: None }
     }
 
     /// Prints the new events. If nobody reads the output any more, printing stops and the flight
@@ -172,61 +146,27 @@ impl Lines {
             let _ = writeln!(text, "{time_s:9.3}  {speaker:<7}  {mark}{}", event.text);
         }
         self.seen = model.events.total();
-        if self.printer.is_none() {
-            self.printer = Printer::start().ok();
+        if self.lost > 0 {
+            text.insert_str(0, &format!("{} messages were not printed: nobody read them\n", self.lost));
         }
-        self.closed = !self.printer.as_mut().is_some_and(|printer| printer.print(text));
+        if self.printer.is_none() {
+            self.printer = Background::start("lines").ok();
+        }
+        let Some(printer) = &self.printer else { return };
+        let has_room = printer.queue(self.seen, move || print(text.as_bytes()).is_ok());
+        self.lost = if has_room { 0 } else { self.lost + 1 };
+        self.closed = std::iter::from_fn(|| printer.outcome()).any(|is_read| !is_read);
     }
 }
 
-/// Maximum number of texts that wait for whoever reads the output.
-const TEXTS_MAX: usize = 256;
 /// How long the last lines may take at the end.
 const PRINTED_WITHIN: Duration = Duration::from_secs(1);
 /// Set once the output takes no more: printing to it would wait for ever.
 static STUCK: AtomicBool = AtomicBool::new(false);
 
-/// Prints in a thread: a pipe that nobody empties must delay neither the link nor the screen.
-#[derive(Debug)]
-struct Printer {
-    texts: Option<SyncSender<String>>,
-    ended: Receiver<()>,
-    /// Texts that found no room since the last one that did.
-    lost: u64,
-}
-
-impl Printer {
-    fn start() -> std::io::Result<Self> {
-        let (texts, waiting) = sync_channel::<String>(TEXTS_MAX);
-        let (end, ended) = sync_channel(1);
-        let run = move || {
-            // Without a reader there is nothing left to do.
-            let _ = waiting.iter().try_for_each(|text| print(text.as_bytes()));
-            let _ = end.send(());
-        };
-        std::thread::Builder::new().name("lines".to_owned()).spawn(run)?;
-        Ok(Self { texts: Some(texts), ended, lost: 0 })
-    }
-
-    /// Returns whether anybody may still read.
-    fn print(&mut self, text: String) -> bool {
-        let text = match self.lost {
-            0 => text,
-            lost => format!("{lost} messages were not printed, because nobody read them\n{text}"),
-        };
-        match self.texts.as_ref().map(|texts| texts.try_send(text)) {
-            Some(Ok(())) => self.lost = 0,
-            Some(Err(TrySendError::Full(_))) => self.lost += 1,
-            Some(Err(TrySendError::Disconnected(_))) | None => return false,
-        }
-        true
-    }
-}
-
-impl Drop for Printer {
+impl Drop for Lines {
     fn drop(&mut self) {
-        self.texts = None;
-        if self.ended.recv_timeout(PRINTED_WITHIN) == Err(RecvTimeoutError::Timeout) {
+        if self.printer.as_ref().is_some_and(|printer| !printer.wait(PRINTED_WITHIN)) {
             STUCK.store(true, Ordering::Release);
         }
     }

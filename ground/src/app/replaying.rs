@@ -1,25 +1,20 @@
-//! Replays on a screen: of a recording without a link, and of the flight just flown while the
-//! station goes on.
+//! Replays a recording on a screen, without a link.
 
 use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
 use anyhow::Context as _;
-use protocol::dialect::TdPhase;
 use protocol::identity::Address;
 use tokio::time::{MissedTickBehavior, interval};
 
 use super::clock::{Clock, Signals};
 use super::output::{self, Lines, Output};
-use super::programs::in_a_thread;
 use crate::cli::ReplayFrom;
 use crate::config::Config;
 use crate::exit;
 use crate::exit::Exit;
-use crate::key::Key;
-use crate::model::{Model, Role, Settings, words};
+use crate::model::{Role, Settings, words};
 use crate::replay::Player;
 use crate::replay::recording::Recording;
 use crate::update::{Action, Msg};
@@ -150,93 +145,6 @@ fn typed(player: &mut Player, msg: &Msg) -> Vec<Action> {
     actions
         .retain(|action| matches!(action, Action::Bell | Action::Redraw | Action::NextTheme | Action::Quit));
     actions
-}
-
-// The flight just flown, again on the screen of a running station. The link, the log and the alarms
-// go on; an alarm, the abort key, or a vehicle that is armed end the replay at once.
-
-/// The flight just flown is shown again from this long before its landing motor was lit; `g` goes
-/// to its begin.
-const BEFORE_IGNITION: Duration = Duration::from_secs(2);
-
-/// The replay of a screen.
-#[derive(Default)]
-pub(super) struct Again {
-    /// A log is being read.
-    loading: Option<(String, Receiver<Result<Recording, String>>)>,
-    playing: Option<Box<Player>>,
-    /// Until when the replay has been moved on.
-    then: Duration,
-}
-
-impl Again {
-    /// Reads the log in a thread of its own: a long one must not delay the link.
-    pub(super) fn begin(&mut self, model: &mut Model, now: Duration) {
-        let Some(path) = model.settings.log_path.clone() else { return };
-        let log = path.clone();
-        let load = move || Recording::load(log.as_ref(), None).map_err(|error| error.to_string());
-        match in_a_thread("replay", load) {
-            Ok(told) => self.loading = Some((path, told)),
-            Err(error) => model.warn(now, format!("no replay: {error}")),
-        }
-    }
-
-    /// Lets time pass. Returns whether the screen has to be drawn.
-    pub(super) fn pass(&mut self, model: &Model, now: Duration) -> Result<bool, String> {
-        if model.is_at_risk() {
-            return Ok(self.end());
-        }
-        let passed = now.saturating_sub(std::mem::replace(&mut self.then, now));
-        if let Some(player) = &mut self.playing {
-            let before = player.position();
-            player.pass(passed);
-            return Ok(player.position() != before);
-        }
-        let Some((name, told)) = &self.loading else { return Ok(false) };
-        let Ok(loaded) = told.try_recv() else { return Ok(false) };
-        let settings = settings(name);
-        self.loading = None;
-        let mut player = Player::new(loaded?, settings);
-        if let Some(lit) = player.recording().begin_of(TdPhase::TD_PHASE_IGNITION) {
-            player.seek(lit.saturating_sub(BEFORE_IGNITION));
-        }
-        self.playing = Some(Box::new(player));
-        Ok(true)
-    }
-
-    /// Ends the replay. Returns whether there was one.
-    pub(super) fn end(&mut self) -> bool {
-        self.loading = None;
-        self.playing.take().is_some()
-    }
-
-    /// Takes what was typed while a replay is shown. Returns what the live screen has to do, and
-    /// what of the message is for it: everything but keys, and the abort.
-    pub(super) fn take(&mut self, msg: Msg) -> (Vec<Action>, Option<Msg>) {
-        if self.playing.is_none() {
-            return (Vec::new(), Some(msg));
-        }
-        let aborts = match &msg {
-            Msg::Keys(keys) => keys.contains(&Key::CtrlX),
-            Msg::Pasted => false,
-            _ => return (Vec::new(), Some(msg)),
-        };
-        if aborts {
-            self.end();
-        }
-        let Some(player) = &mut self.playing else { return (Vec::new(), Some(msg)) };
-        let mut actions = typed(player, &msg);
-        if actions.contains(&Action::Quit) {
-            self.end();
-            actions.retain(|action| *action != Action::Quit);
-        }
-        (actions, None)
-    }
-
-    /// What is shown instead of the live model, and its time.
-    pub(super) fn shown(&self) -> Option<(&Model, Duration)> {
-        self.playing.as_ref().map(|player| (&player.model, player.position()))
-    }
 }
 
 #[cfg(test)]

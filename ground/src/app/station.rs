@@ -130,14 +130,14 @@ impl Station {
                 biased;
                 signal = signals.next() => vec![Msg::Terminate(signal)],
                 Some(news) = OptionFuture::from(server.as_mut().map(Server::next)) => self.hear(news, model),
-                msg = self.output.input() => self.output.typed(msg).into_iter().collect(),
+                msg = self.output.input() => vec![msg],
                 () = self.clock.sleep_until(wakes_at) => vec![Msg::Tick],
                 Some(failure) = OptionFuture::from(demo.as_mut().map(Demo::ended)) => {
                     vec![Msg::SimulatorEnded(failure)]
                 }
                 _ = ticks.tick() => {
                     let now = self.clock.now();
-                    self.output.pass(model, now, now);
+                    self.output.pass(model, now);
                     self.count_silence(now);
                     self.tell_crew(model, wire);
                     self.take_outcomes(model, wire);
@@ -388,11 +388,7 @@ impl Station {
                         model.warn(now, ended.to_string());
                     }
                 }
-                Action::Alarm(words) => {
-                    self.output.leave_replay();
-                    self.tell_alarm(&words);
-                }
-                Action::ReplayFlight => self.output.again.begin(model, now),
+                Action::Alarm(words) => self.tell_alarm(&words),
                 Action::WriteReport => self.write_report(model, now),
                 Action::MovePin(out) => self.demo.iter().for_each(|demo| demo.move_pin(out)),
                 Action::Request(request) => {

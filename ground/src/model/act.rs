@@ -38,7 +38,6 @@ pub enum Act {
     /// Show the checklist on the Pad page, or the arming checks again.
     Checklist,
     /// Show the flight just flown again.
-    ReplayFlight,
     /// Write the report of the flight.
     Report,
     /// Move the pin of the demonstration's vehicle.
@@ -97,7 +96,7 @@ const fn acts(act: Act, name: &'static str, key: char, words: &'static str) -> D
 }
 
 /// Every action; the most important first.
-pub const DEFINITIONS: [Definition; 36] = [
+pub const DEFINITIONS: [Definition; 35] = [
     asks(Act::Arm, "arm", 'A', "arm: then type ARM and Enter within 10 s"),
     asks(Act::Start, "start", 'S', "start the countdown: then type START and Enter within 10 s"),
     asks(Act::Disarm, "disarm", 'D', "disarm: then Enter within 5 s"),
@@ -134,7 +133,6 @@ pub const DEFINITIONS: [Definition; 36] = [
     shows(Act::Palette, "palette", ':', "list every action; type a part of its words"),
     shows(Act::Note, "note", 'n', "a note into log and book: type it, then Enter"),
     shows(Act::NextTheme, "theme", 'c', "colours: dark, light for sunlight, none"),
-    acts(Act::ReplayFlight, "replay", 'R', "the flight just flown, again on this screen; q ends it"),
     acts(Act::Report, "report", 'W', "write the report of the flight beside the log"),
     acts(Act::MovePin, "pin", 'I', "demonstration: put the vehicle's pin in, or pull it, by hand"),
     Definition { key: Key::CtrlL, ..shows(Act::Redraw, "redraw", ' ', "draw the screen again") },
@@ -170,7 +168,6 @@ impl Act {
             Self::Acknowledge => !model.alarms.list().is_empty() && model.settings.role != Role::Replaying,
             Self::Follow => model.pages.held.is_some(),
             Self::Checklist => model.checklist.is_some(),
-            Self::ReplayFlight => why_nothing_flown(model).is_none(),
             Self::Report => commands && why_nothing_flown(model).is_none(),
             Self::MovePin => {
                 let is_ours = model.settings.demonstration && model.settings.role == Role::Station;

@@ -406,8 +406,6 @@ pub enum Action {
     KeepPlace(Box<LastPlace>),
     /// Keep beside the log what must not be forgotten when the station ends.
     KeepUnfinished(Unfinished),
-    /// Show the flight just flown again, on this screen.
-    ReplayFlight,
     /// Write the report of the flight.
     WriteReport,
     /// Move the pin of the demonstration's vehicle: out, or in.

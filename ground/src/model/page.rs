@@ -93,12 +93,6 @@ pub struct Pages {
 /// A text that is being typed; the keys go to it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum TextEntry {
-    /// A time or a phase to jump to in a replay.
-    Jump {
-        typed: String,
-        /// The recording has no such time or phase.
-        refused: bool,
-    },
     /// A note for the log and the book.
     Note { typed: String },
     Palette {

@@ -10,10 +10,9 @@ use std::time::Duration;
 
 use protocol::dialect::TdPhase;
 
-use crate::cli::ReplayFrom;
 use crate::key::Key;
-use crate::model::{Model, Playback, Settings, TextEntry, is_on_pad};
-use crate::update::{Action, Msg, keys::edit, update};
+use crate::model::{Model, Playback, Settings};
+use crate::update::{Action, Msg, update};
 use recording::{Reader, RecordedEvent, Recording};
 
 // Plays a recording: pause, speed, seek. It reads no clock; the caller passes the elapsed time.
@@ -104,7 +103,6 @@ impl Player {
         let mut actions = Vec::new();
         match key {
             // A text that is being typed takes every key.
-            _ if matches!(self.model.pages.entry, Some(TextEntry::Jump { .. })) => self.on_jump_key(key),
             _ if self.model.pages.entry.is_some() => {
                 actions = update(&mut self.model, Msg::Keys(vec![key]), self.position);
             }
@@ -123,9 +121,6 @@ impl Player {
                 let begins = self.recording.phases.iter().find(|(_, at)| *at > self.position);
                 self.seek(begins.map_or(Duration::MAX, |(_, at)| *at));
             }
-            Key::Char('j') => {
-                self.model.pages.entry = Some(TextEntry::Jump { typed: String::new(), refused: false });
-            }
             Key::Char('g') => self.seek(Duration::ZERO),
             Key::Char('G') => self.seek(self.recording.length),
             // Pages and scrolling. Keys that command a vehicle have no effect in a replay.
@@ -137,39 +132,6 @@ impl Player {
         }
         self.update_playing();
         actions
-    }
-
-    /// A key while a time to jump to is typed; Esc gives up.
-    fn on_jump_key(&mut self, key: Key) {
-        let Some(TextEntry::Jump { mut typed, .. }) = self.model.pages.entry.take() else { return };
-        let refused = match key {
-            Key::Escape => return,
-            Key::Enter => match self.jump(&typed) {
-                Some(()) => return,
-                None => true,
-            },
-            _ => {
-                edit(&mut typed, key);
-                false
-            }
-        };
-        self.model.pages.entry = Some(TextEntry::Jump { typed, refused });
-    }
-
-    /// Goes to a time since the first frame, to one since the release, as in `T+12`, or to the
-    /// start of a phase.
-    fn jump(&mut self, to: &str) -> Option<()> {
-        let since_release = to.strip_prefix("T+").map(str::parse);
-        match since_release.unwrap_or_else(|| to.parse()).ok()? {
-            ReplayFrom::Time(at) => {
-                let phases = &self.recording.phases;
-                let released = phases.iter().find(|(phase, _)| !is_on_pad(*phase)).map(|(_, at)| *at);
-                let zero = if to.starts_with("T+") { released? } else { Duration::ZERO };
-                self.seek(zero + at);
-                Some(())
-            }
-            ReplayFrom::Phase(phase) => self.seek_phase(phase).then_some(()),
-        }
     }
 
     fn faster(&mut self, doublings: i32) {

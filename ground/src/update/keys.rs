@@ -368,10 +368,6 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
                 model.pages.hold(Some(Page::Pad));
             }
         }
-        Act::ReplayFlight => match why_nothing_flown(model) {
-            None => model.outbox.push(Action::ReplayFlight),
-            Some(why) => model.info(now, format!("no replay: {why}")),
-        },
         Act::Report => ask_for_report(model, now),
         Act::MovePin if act.works(model, now) => {
             let is_out = model
@@ -552,7 +548,7 @@ fn on_entry_key(model: &mut Model, key: Key, now: Duration) {
             };
         }
         // Only a replay asks where to jump, and takes those keys itself.
-        Some(TextEntry::Jump { .. }) | None => return,
+        None => return,
     };
     match key {
         Key::Escape => return,

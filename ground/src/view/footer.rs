@@ -195,7 +195,7 @@ fn timeline(model: &Model, theme: Theme, now: Duration, columns: usize, is_wide:
 // The keys that count now, and the pages.
 
 /// The keys come in this order.
-const KEYS: [Act; 15] = [
+const KEYS: [Act; 14] = [
     Act::Tap,
     Act::HoldCountdown,
     Act::Acknowledge,
@@ -204,7 +204,6 @@ const KEYS: [Act; 15] = [
     Act::Start,
     Act::Disarm,
     Act::TakeCommand,
-    Act::ReplayFlight,
     Act::Report,
     Act::SignStep,
     Act::VoidStep,
@@ -222,7 +221,7 @@ pub fn draw_keys(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
     let [left, right] = side_by_side(area, [Fill(1), Length(pages.width() as u16)]);
     draw_line(frame, right, pages);
     if let Some(playing) = &model.playing {
-        return draw_line(frame, left, replay_line(playing, model.pages.entry.as_ref(), theme));
+        return draw_line(frame, left, replay_line(playing, theme));
     }
     let rings = model.alarms.unacknowledged() > 0;
     // In flight no command but the abort does anything, and the page matters.

@@ -7,7 +7,7 @@ use ratatui::text::{Line, Span};
 use unicode_truncate::UnicodeTruncateStr as _;
 
 use super::{STALE_MARK, TextRole, Theme, fixed, shortest};
-use crate::model::{Alarm, GRAVITY_M_S2, Model, Page, Playback, Role, TextEntry, Vehicle, latch_cause};
+use crate::model::{Alarm, GRAVITY_M_S2, Model, Page, Playback, Role, Vehicle, latch_cause};
 
 /// How long until the next event is shown large, so that the line needs not say it.
 fn is_large(page: Page, phase: TdPhase) -> bool {
@@ -158,11 +158,7 @@ const KEY_FROM_COLUMNS: usize = 40;
 const TEXT_COLUMNS_MIN: usize = 12;
 
 /// The position of a replay, and its keys.
-pub fn replay_line(playing: &Playback, entry: Option<&TextEntry>, theme: Theme) -> Line<'static> {
-    if let Some(TextEntry::Jump { typed, refused }) = entry {
-        let words = if *refused { "  not in it" } else { "  seconds, T+12 or a phase" };
-        return Line::from(vec![theme.key(format!(" JUMP TO {typed}_")), theme.label(words)]);
-    }
+pub fn replay_line(playing: &Playback, theme: Theme) -> Line<'static> {
     let (at, of) = (playing.position.as_secs_f64(), playing.length.as_secs_f64());
     let state = if playing.paused { "PAUSED" } else { "plays" };
     theme.line(

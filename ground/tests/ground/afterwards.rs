@@ -36,9 +36,7 @@ fn falling(role: Role) -> Rig {
 fn asks(rig: &mut Rig, key: char) -> Vec<Action> {
     rig.actions.clear();
     rig.key(Key::Char(key));
-    let asked = |action: &Action| {
-        matches!(action, Action::ReplayFlight | Action::WriteReport | Action::Request(Request::Report))
-    };
+    let asked = |action: &Action| matches!(action, Action::WriteReport | Action::Request(Request::Report));
     rig.actions.iter().filter(|action| asked(action)).cloned().collect()
 }
 
@@ -68,33 +66,31 @@ fn the_review_says_how_much_of_the_flight_was_not_heard() {
 }
 
 #[test]
-fn replay_and_report_wait_for_the_end_of_a_flight() {
+fn the_report_waits_for_the_end_of_a_flight() {
     let mut rig = station(Role::Station);
-    assert_eq!((asks(&mut rig, 'R'), asks(&mut rig, 'W')), (vec![], vec![]));
-    rig.expect_event("no replay: no flight has been flown yet");
+    assert_eq!(asks(&mut rig, 'W'), []);
+    rig.expect_event("no report: no flight has been flown yet");
     let mut rig = falling(Role::Station);
-    assert_eq!((asks(&mut rig, 'R'), asks(&mut rig, 'W')), (vec![], vec![]));
+    assert_eq!(asks(&mut rig, 'W'), []);
     rig.expect_event("no report: the vehicle is armed or in flight");
     rig.phase = TdPhase::TD_PHASE_SAFED;
     rig.run(1.0);
-    assert_eq!(asks(&mut rig, 'R'), [Action::ReplayFlight]);
     assert_eq!(asks(&mut rig, 'W'), [Action::Request(Request::Report), Action::WriteReport]);
     rig.msg(Msg::Report(Ok("flight.html".to_owned())));
     rig.expect_event("the report is written: flight.html");
     rig.armed = true;
     rig.heartbeat();
-    assert_eq!((asks(&mut rig, 'R'), asks(&mut rig, 'W')), (vec![], vec![]));
+    assert_eq!(asks(&mut rig, 'W'), []);
 }
 
 #[test]
-fn an_attached_screen_replays_itself_and_asks_the_station_for_the_report() {
+fn an_attached_screen_asks_the_station_for_the_report() {
     for (role, report) in
         [(Role::Attached, vec![Action::Request(Request::Report)]), (Role::Watching, Vec::new())]
     {
         let mut rig = falling(role);
         rig.phase = TdPhase::TD_PHASE_SAFED;
         rig.run(1.0);
-        assert_eq!(asks(&mut rig, 'R'), [Action::ReplayFlight]);
         assert_eq!(asks(&mut rig, 'W'), report);
     }
 }

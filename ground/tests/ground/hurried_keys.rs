@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use ground::key::Key;
 use ground::model::{AGAIN_AFTER, KeyOwner, Role, Seat, Settings};
-use ground::update::{Action, Msg};
+use ground::update::Msg;
 use proptest::prelude::*;
 use protocol::dialect::{MavCmd, TdCheck};
 
@@ -229,7 +229,6 @@ fn what_is_left_of_a_word_that_this_screen_refuses_does_nothing() {
                 assert!(last.contains("this screen "), "{keys}: {last}");
             }
             assert_eq!((rig.model.page(), &rig.model.dialog), (page, &None), "{keys}");
-            assert!(!rig.actions.iter().any(|action| matches!(action, Action::ReplayFlight)), "{keys}");
         }
     }
 }

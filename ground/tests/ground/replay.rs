@@ -184,44 +184,6 @@ fn recorded_commands_are_shown() {
     assert_eq!(model.commands.tracks[0].attempts, 1);
 }
 
-fn shown(player: &Player) -> String {
-    drawn(player).backend().to_string()
-}
-
-/// The keys of a text, then Enter.
-fn types(player: &mut Player, text: &str) {
-    for key in text.chars().map(Key::Char).chain([Key::Enter]) {
-        player.on_key(key);
-    }
-}
-
-#[test]
-fn a_typed_time_or_phase_is_jumped_to() {
-    let mut player = player();
-    player.on_key(Key::Char('j'));
-    player.on_key(Key::Char('4'));
-    assert!(shown(&player).contains("JUMP TO 4_"), "{}", shown(&player));
-    types(&mut player, "5.5");
-    assert_eq!(
-        (player.position(), phase(&player)),
-        (Duration::from_millis(45_500), TdPhase::TD_PHASE_POWERED)
-    );
-    // The release is where the fall begins: second 20. No key of the page counts while a time is
-    // typed.
-    types(&mut player, "jT+12");
-    assert_eq!((player.position(), player.model.page()), (S(32), Page::Descent));
-    types(&mut player, "jtouchdown");
-    assert_eq!(phase(&player), TdPhase::TD_PHASE_TOUCHDOWN);
-    for typed in ["jsoon", "jBOOST", "jT+BOOST", "j"] {
-        let before = player.position();
-        types(&mut player, typed);
-        assert_eq!(player.position(), before);
-        assert!(shown(&player).contains("not in it"), "{typed}: {}", shown(&player));
-        player.on_key(Key::Escape);
-        assert!(!shown(&player).contains("JUMP TO"), "{typed}");
-    }
-}
-
 #[test]
 fn a_tlog_is_known_by_its_content_and_played_around_its_damage() {
     let directory = tempfile::tempdir().unwrap();

@@ -117,10 +117,9 @@ pub fn log_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static
 /// Columns of a key.
 const KEY_COLUMNS: usize = 12;
 
-const REPLAY: [(&str, &str); 5] = [
+const REPLAY: [(&str, &str); 4] = [
     ("Space", "pause, or go on"),
     ("Left Right", "5 s back or forward"),
-    ("j", "jump to a time or a phase: seconds, T+12 or POWERED, then Enter"),
     ("[ ]", "to the phase before or after; g G to the begin or end"),
     ("+ -", "faster or slower"),
 ];

@@ -24,14 +24,12 @@ pub fn draw_review(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     let ended = panels::ending_role(model, now).map(|(ending, role)| (ending.sentence(&model.vehicle), role));
     let (words, role) = ended.unwrap_or(("no verdict received yet".to_owned(), TextRole::Caution));
     let silent = unheard(model, now).map_or_else(String::new, |words| format!("; {words}"));
-    let again = Act::ReplayFlight.works(model, now).then(|| {
-        let [again, report] = [Act::ReplayFlight, Act::Report].map(Act::key_name);
-        theme.label(format!("  {again} shows it again, {report} writes the report"))
-    });
+    let report = Act::Report.works(model, now);
+    let report = report.then(|| theme.label(format!("  {} writes the report", Act::Report.key_name())));
     let mut sentence = Line::from(theme.span(format!(" {words}{silent}"), role));
     // A small screen has no room behind a long sentence.
     let room_for = usize::from(area.width.saturating_sub(sentence.width() as u16));
-    sentence.extend(again.filter(|again| again.width() <= room_for));
+    sentence.extend(report.filter(|report| report.width() <= room_for));
     let area = draw_band((&headline::verdict(model, now), sentence, &[]), theme, frame, area);
     if Room::of(frame.area()) == Room::Small {
         let [left, mut right] = columns(area, [Fill(6), Fill(5)]);
