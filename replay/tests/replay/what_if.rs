@@ -1,6 +1,7 @@
 //! Tests the margin of a flight that is flown again.
 
-use replay::refly::{ReflyOptions, margin, other_flights, refly};
+use replay::refly::{ReflyOptions, ReflyReport, margin, other_flights, refly};
+use replay::settings::Setting;
 
 use crate::asked::with;
 use crate::simulated::MK2;
@@ -60,4 +61,44 @@ fn other_flights_say_what_a_change_does() {
     assert_eq!((none.stand, none.lost), (0, none.stood));
     let refused = other_flights(&recording, &with(&["ignition.delay_s=0.5@6"]), 8).unwrap_err();
     assert!(refused.to_string().starts_with("--flights: takes --set without a time"), "{refused}");
+}
+
+/// Every number of a section, set to its own value.
+fn unchanged(prefix: &str, value: &toml::Value) -> Vec<Setting> {
+    match value {
+        toml::Value::Table(table) => {
+            table.iter().flat_map(|(key, value)| unchanged(&format!("{prefix}.{key}"), value)).collect()
+        }
+        toml::Value::Float(_) | toml::Value::Integer(_) => {
+            vec![Setting { path: prefix.to_owned(), value: value.clone(), at_s: None }]
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// Legs act on the ground: every frame before the contact has the recorded commands, also with
+/// every other key of the airframe set to the value that it has.
+#[test]
+fn a_change_that_acts_late_leaves_everything_before_it_as_it_was() {
+    let recording = MK2.recording();
+    let mission = flight::vehicles::mission::from_toml(recording.profile_toml().unwrap(), "log").unwrap();
+    let airframe = unchanged("airframe", &toml::Value::try_from(&mission.airframe).unwrap());
+    assert!(airframe.len() > 30, "{}", airframe.len());
+    let legs: Setting = "airframe.legs.friction_coefficient=0.123".parse().unwrap();
+    let settings = [vec![legs.clone()], [airframe, vec![legs]].concat()];
+    let in_the_air = |report: &ReflyReport, contact_s: f64| {
+        (contact_s / 0.005) as usize - (report.start.frame - recording.release_frame) as usize
+    };
+    let contact_s = recording.contact_s().unwrap();
+    for settings in settings {
+        for options in [
+            ReflyOptions { settings: settings.clone(), ..ReflyOptions::default() },
+            ReflyOptions { plant_settings: settings.clone(), ..ReflyOptions::default() },
+        ] {
+            let report = refly(&recording, &options).unwrap();
+            let same = report.commands_identical;
+            let air = in_the_air(&report, contact_s);
+            assert!(air > 500 && same >= air && same < report.frames, "{air} {report:?}");
+        }
+    }
 }
