@@ -87,9 +87,7 @@ enum Command {
     /// from power-up or from where the log begins. Outputs, digests of the memory, estimates and
     /// the start at the release are compared, and the inputs are judged; a table says what was
     /// compared. With --strict a simulated flight is also flown again, and its measurements and its
-    /// verdict are compared; truth, events and measured times never are. For a divergence the
-    /// report says whether the landing would end differently (simulated from the first frame that
-    /// differs).
+    /// verdict are compared; truth, events and measured times never are.
     ///
     /// With --explain the plan of a recorded frame is solved again and judged: cost, what is
     /// broken, warm against cold start, predicted path. With --book the books of ground stations

@@ -89,14 +89,12 @@ impl Burn {
         burns.iter().enumerate().map(burn).collect()
     }
 
-    /// The burns by their distance, the furthest first.
-    fn listed(burns: &[Self]) -> String {
-        let furthest =
-            |burn: &Self| burn.distances.iter().flatten().fold(0.0, |most, one| one.abs().max(most));
-        let mut sorted: Vec<_> = burns.iter().map(|burn| (furthest(burn), &burn.source)).collect();
-        sorted.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let words = sorted.iter().map(|(far, source)| format!("{source} ({far:.1} deviations away)"));
-        words.collect::<Vec<_>>().join(", ")
+    /// The burn that is furthest away, for errors.
+    fn furthest(burns: &[Self]) -> String {
+        let far =
+            |burn: &Self| burn.distances.iter().flatten().fold(0.0, |most: f64, one| most.max(one.abs()));
+        let furthest = burns.iter().max_by(|a, b| far(a).total_cmp(&far(b)));
+        furthest.map_or_else(String::new, |burn| format!("{}, {:.1} deviations away", burn.source, far(burn)))
     }
 }
 
@@ -192,7 +190,7 @@ fn learn(fits: &[Fit], ask: &Arguments, mission_toml: &str, set_toml: &str) -> R
     let rate_deg_s = slow_gimbal.as_ref().map(|(rate_deg_s, _)| *rate_deg_s);
     let day =
         Day::of([&before, set_toml], &ask.prior, &lot, &lots, (&airframe, rate_deg_s), wind_m_s, &sources)
-            .with_context(|| format!("the lot of these burns: {}", Burn::listed(&burns)))?;
+            .with_context(|| format!("the lot, whose furthest burn is {}", Burn::furthest(&burns)))?;
     let trials = ask.flights.map(|flights| fly(ask.seed, flights, &lots, &day)).transpose()?;
     let prediction = trials
         .as_ref()

@@ -55,13 +55,14 @@ impl ChannelCounter {
     pub(super) fn into_facts<'a>(
         mut self,
         channels: impl Iterator<Item = (u16, &'a LogChannel)>,
+        share_a_counter: bool,
     ) -> Vec<Channel> {
         let mut facts: Vec<Channel> = channels
             .map(|(id, channel)| {
                 let counts = self.counts.remove(&id).unwrap_or_default();
                 // Sequence numbers start at 0; a writer without numbering leaves 0 everywhere.
-                let numbered =
-                    if counts.last_sequence == 0 { 0 } else { u64::from(counts.last_sequence) + 1 };
+                let unnumbered = counts.last_sequence == 0 || share_a_counter;
+                let numbered = if unnumbered { 0 } else { u64::from(counts.last_sequence) + 1 };
                 Channel {
                     topic: channel.topic.clone(),
                     message_encoding: channel.message_encoding.clone(),
@@ -134,10 +135,10 @@ impl FrameCounter {
         self.start = true;
     }
 
-    /// Counts a frame; `record` is the sequence number of its record in the channel.
-    pub(super) fn count(&mut self, frame: u64, record: u32) {
+    /// Counts a frame and the records lost before it.
+    pub(super) fn count(&mut self, frame: u64, lost_before: u32) {
         let before = self.order.last_frame;
-        if let Some(gap) = self.order.note(frame, record) {
+        if let Some(gap) = self.order.note(frame, lost_before) {
             self.lost += 1;
             self.first_lost.get_or_insert(gap);
         } else if self.bounds.is_some() {

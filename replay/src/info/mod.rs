@@ -21,10 +21,11 @@ use crate::cli::{Answer, answer, give, give_each, warn_of_loss};
 use crate::controller::new_plan;
 use crate::findings::{self, Finding};
 use crate::log::{
-    Attachment, BuildComparison, Clocks, Cut, Entry, FlightLog, Head, LogError, Recording, StampedEntry,
-    Verdict,
+    Attachment, BuildComparison, Clocks, Cut, Entry, FlightLog, Head, Jump, LogError, Recording,
+    StampedEntry, Verdict,
 };
 use crate::print::{beyond, counted};
+use crate::recover::scan::Records;
 
 /// Describes a log file.
 ///
@@ -56,6 +57,7 @@ pub(crate) fn described(path: &Path) -> Result<Info, LogError> {
     let mut log = FlightLog::open(path)?;
     let mut info = info_of(&mut log)?;
     info.size_bytes = std::fs::metadata(path).ok().map(|metadata| metadata.len());
+    info.completeness.checksummed = Some(Records::open(path)?.is_checksummed()?);
     Ok(info)
 }
 
@@ -66,7 +68,13 @@ pub(crate) fn described(path: &Path) -> Result<Info, LogError> {
 pub fn info_of<R: Read>(log: &mut FlightLog<R>) -> Result<Info, LogError> {
     let mut seen = Seen::default();
     while let Some(stamped) = log.next_entry()? {
-        seen.take(&stamped);
+        let flights = log.flights().found().len();
+        if flights > seen.flights {
+            // The last verdict is shown: phases and outcome are of the same flight.
+            seen.vehicle_phases = PhaseTracker::default();
+            (seen.ending, seen.flights) = (EndingTracker::default(), flights);
+        }
+        seen.take(&stamped, &log.clocks());
     }
     Ok(seen.into_info(log))
 }
@@ -75,6 +83,7 @@ pub fn info_of<R: Read>(log: &mut FlightLog<R>) -> Result<Info, LogError> {
 #[derive(Default)]
 struct Seen {
     channels: ChannelCounter,
+    flights: usize,
     span: Option<(u64, u64)>,
     vehicle_phases: PhaseTracker,
     telemetry_phases: PhaseTracker,
@@ -85,7 +94,7 @@ struct Seen {
 }
 
 impl Seen {
-    fn take(&mut self, stamped: &StampedEntry) {
+    fn take(&mut self, stamped: &StampedEntry, clocks: &Clocks) {
         self.channels.count(stamped);
         let at_ns = stamped.log_time_ns;
         let (first_ns, last_ns) = self.span.unwrap_or((at_ns, at_ns));
@@ -94,7 +103,8 @@ impl Seen {
         match &stamped.entry {
             Entry::Telemetry(telemetry) => {
                 if let Some(phase) = telemetry.phase {
-                    self.telemetry_phases.note(telemetry.time_s, phase);
+                    let jumped_s = clocks.station_jump.map_or(0.0, |jump| jump.by_s);
+                    self.telemetry_phases.note(telemetry.time_s - jumped_s, phase);
                 }
                 self.rises_to(telemetry.altitude_m);
             }
@@ -108,7 +118,7 @@ impl Seen {
                 if let Some(time_s) = frame.flight_time_s() {
                     self.vehicle_phases.note(time_s, frame.record.output.phase);
                 }
-                self.frames.count(frame.record.input.frame, stamped.sequence);
+                self.frames.count(frame.record.input.frame, stamped.lost_before);
             }
             _ => {}
         }
@@ -128,7 +138,7 @@ impl Seen {
             last_ns,
             duration_s: seconds(last_ns.saturating_sub(first_ns)),
         });
-        let channels = self.channels.into_facts(log.channels());
+        let channels = self.channels.into_facts(log.channels(), log.missing_of_all().is_some());
         let verdict = log.verdict().as_ref().map(Verdict::found);
         let timelines =
             [(PhaseSource::Vehicle, self.vehicle_phases), (PhaseSource::Telemetry, self.telemetry_phases)];
@@ -336,6 +346,8 @@ pub struct Completeness {
     /// The log says how many records it has. Otherwise nothing shows that the last ones are
     /// missing.
     pub counted: bool,
+    /// A checksum covers every message; `None` of a log that was not read from a file.
+    pub checksummed: Option<bool>,
     /// The last time that could be read, s after the first record.
     pub readable_until_s: Option<f64>,
     /// Messages missing before the last of their channel.
@@ -354,11 +366,13 @@ impl Completeness {
 
     fn of<R: Read>(log: &FlightLog<R>, span: Option<&Span>, channels: &[Channel]) -> Self {
         let (damage, cut) = (log.damage(), log.flights().cut());
-        let messages_lost = channels.iter().map(|channel| channel.lost).sum();
+        let missing = u64::from(log.missing_of_all().unwrap_or(0));
+        let messages_lost = missing + channels.iter().map(|channel| channel.lost).sum::<u64>();
         Self {
             complete: damage.is_none() && messages_lost == 0 && cut.is_none(),
             damage: damage.map(ToString::to_string),
             counted: log.is_counted(),
+            checksummed: None,
             readable_until_s: span.map(|span| span.duration_s),
             messages_lost,
             flights: log.flights().flown(),
@@ -384,7 +398,8 @@ impl Answer for Info {
         rows.push(("complete", self.completeness()));
         let flights = self.completeness.flights;
         if flights > 1 {
-            rows.push(("flights", format!("{flights}; `replay verify` reports on each")));
+            let of = "phases and verdict are of the last; `replay verify` reports on each";
+            rows.push(("flights", format!("{flights}; {of}")));
         }
         rows.extend(self.frames.iter().flat_map(Frames::rows));
         rows.extend(self.origin());
@@ -396,6 +411,9 @@ impl Answer for Info {
         rows.extend(self.span.map(|span| {
             let (first, last) = (utc(span.first_ns), utc(span.last_ns));
             ("time", format!("{first} to {last}, {:.3} s", span.duration_s))
+        }));
+        rows.extend(self.clocks.station_jump.map(|Jump { at_s, by_s }| {
+            ("clock", format!("the station's clock jumps by {by_s:+.1} s at log {at_s:.1} s: its later records are dated that much off"))
         }));
         rows.push(("channels", channels(&self.channels)));
         let attached: Vec<&str> =
@@ -448,7 +466,12 @@ impl Info {
     fn completeness(&self) -> String {
         let found = &self.completeness;
         if found.complete && found.counted {
-            return "yes: ended properly, every checksum holds".to_owned();
+            let checksums = match found.checksummed {
+                Some(true) => "every checksum holds",
+                Some(false) => "but NO CHECKSUM protects all of its messages",
+                None => "no checksum fails",
+            };
+            return format!("yes: ended properly, {checksums}");
         }
         if found.complete {
             return "as far as can be known: it has no summary, which would say how many records there were"
@@ -653,6 +676,13 @@ impl Args {
 fn description(file: &std::path::Path) -> Result<Info, LogError> {
     if file.as_os_str() == STDIN {
         return info_of(&mut FlightLog::read("standard input".to_owned(), std::io::stdin().lock())?);
+    }
+    // A pipe of the shell, as in `info <(...)`, is open already, and its writer is there.
+    if file.starts_with("/dev/fd") {
+        let name = file.display().to_string();
+        let pipe = std::fs::File::open(file);
+        let pipe = pipe.map_err(|source| LogError::Read { name: name.clone(), source })?;
+        return info_of(&mut FlightLog::read(name, std::io::BufReader::new(pipe))?);
     }
     info(file)
 }

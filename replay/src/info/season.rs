@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
+use onboard_sim::run::in_parallel;
 use protocol::program::Exit;
 use serde::Serialize;
 
@@ -70,8 +71,8 @@ impl Flown {
 /// # Errors
 /// The folder cannot be read, or has no log.
 pub fn season(folder: &Path) -> Result<Vec<Flown>> {
-    let line = |path: PathBuf| {
-        info(&path).map_or_else(
+    let line = |path: &PathBuf| {
+        info(path).map_or_else(
             |error| {
                 let file = path.display().to_string();
                 let reason = format!("{:#}", anyhow::Error::from(error)).replace(&format!("{file}: "), "");
@@ -80,7 +81,7 @@ pub fn season(folder: &Path) -> Result<Vec<Flown>> {
             |info| Flown::of(&info),
         )
     };
-    let mut flown: Vec<Flown> = logs_of(folder)?.into_iter().map(line).collect();
+    let mut flown = in_parallel(&logs_of(folder)?, line, &|_| {});
     // The same minute: by name.
     flown.sort_by(|a, b| a.date.cmp(&b.date));
     Ok(flown)

@@ -34,11 +34,27 @@ pub struct Clocks {
     pub boot_zero_s: Option<f64>,
     /// What a ground station calls 0 in its telemetry records.
     pub telemetry_zero_s: Option<f64>,
+    /// The sum of the jumps of a station's clock, by the vehicle's.
+    pub station_jump: Option<Jump>,
+    /// The latest time since power-up that was received, and when that was, s.
+    #[serde(skip)]
+    last_boot_s: Option<[f64; 2]>,
     /// The release as the vehicle told it over the air, s since its power-up: what T+0 follows from
     /// where no frames are.
     #[serde(skip)]
     heard_release_s: Option<f64>,
 }
+
+/// A jump of a clock.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Jump {
+    /// When it jumped last, s after the first record.
+    pub at_s: f64,
+    pub by_s: f64,
+}
+
+/// No link delays a message by more, s.
+const DELAY_MAX_S: f64 = 60.0;
 
 /// A time on one of the clocks, as in `T+12.9`, `boot:19.8` or `log:19.7`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -123,6 +139,14 @@ impl Clocks {
             }
             Entry::RawFrame if self.flight_zero_s.is_none() || self.heard_release_s.is_some() => {
                 if let Some(boot_s) = message.and_then(boot_time_s) {
+                    let [last_boot_s, last_s] = self.last_boot_s.unwrap_or([boot_s, since_s]);
+                    let by_s = (since_s - last_s) - (boot_s - last_boot_s);
+                    // A vehicle that is powered up again begins at 0.
+                    if boot_s >= last_boot_s && by_s.abs() > DELAY_MAX_S {
+                        let before_s = self.station_jump.map_or(0.0, |jump| jump.by_s);
+                        self.station_jump = Some(Jump { at_s: since_s, by_s: before_s + by_s });
+                    }
+                    self.last_boot_s = Some([boot_s, since_s]);
                     // The message that was delayed least says best when the vehicle was powered up.
                     let zero_s = since_s - boot_s;
                     let zero_s = self.boot_zero_s.map_or(zero_s, |known| known.min(zero_s));

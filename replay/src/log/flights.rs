@@ -6,6 +6,7 @@
 //! flight computer says that the flight is over; a flight that begins at its release, until it is
 //! judged.
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use avionics::log::frame::phase_of;
@@ -135,11 +136,10 @@ impl InFlight {
             Entry::ComputerFrame(frame) => {
                 let (input, output) = (&frame.record.input, &frame.record.output);
                 let phase = phase_of(output);
-                let release = match self.started {
-                    Some(_) => self.release,
-                    // The start is lost.
-                    None => self.release.or((!phase.is_some_and(Phase::on_pad)).then_some(0)),
-                };
+                // Without a start, a flight that is under way began at power-up.
+                let flies = !phase.is_some_and(Phase::on_pad) && !output.released;
+                let lost = (self.started.is_none() && flies).then_some(0);
+                let release = self.release.or(lost);
                 let waits = output.over && self.started == Some(Started::AtPowerUp);
                 frame.since_release = release
                     .filter(|release| !waits && input.frame > *release)
@@ -162,11 +162,12 @@ pub struct Flights {
 impl Flights {
     pub(super) fn note(&mut self, stamped: &StampedEntry) {
         match &stamped.entry {
-            // If the log has the power-up of this flight computer, its release does not begin
-            // another flight.
+            // If the log has frames of the pad, or the power-up, the release begins no other flight.
             Entry::ComputerStart(start)
                 if start.released
-                    && self.found.last().is_some_and(|flight| flight.powered_up && flight.frames == 0) => {}
+                    && self.found.last().is_some_and(|flight| {
+                        flight.frames == 0 && (flight.powered_up || flight.on_the_pad.is_some())
+                    }) => {}
             Entry::ComputerStart(start) => {
                 self.found.push(LoggedFlight { powered_up: !start.released, ..LoggedFlight::default() });
             }
@@ -219,12 +220,41 @@ impl Flights {
     }
 }
 
+/// Sequence numbers of records, which show losses. MCAP leaves them to the writer: each channel has
+/// its counter, or all share one, or every number is 0.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Sequences {
+    /// By channel: the next number, and how many records of all channels were missing by then.
+    channels: BTreeMap<u16, (u32, u32)>,
+    last: Option<u32>,
+    each_has_its_counter: bool,
+    /// Records that are missing, if all share a counter.
+    missing: u32,
+}
+
+impl Sequences {
+    /// Takes a record of a channel; returns how many records are missing since the last one of the
+    /// channel: of it, or of all that share the counter.
+    pub(super) fn note(&mut self, channel: u16, sequence: u32) -> u32 {
+        self.each_has_its_counter |= self.last.is_some_and(|last| sequence <= last);
+        let of_all = self.last.map_or(0, |last| last.saturating_add(1));
+        self.missing = self.missing.saturating_add(sequence.saturating_sub(of_all));
+        self.last = Some(sequence);
+        let now = (sequence.saturating_add(1), self.missing);
+        let (of_channel, missing) = self.channels.insert(channel, now).unwrap_or_default();
+        if self.each_has_its_counter { sequence.saturating_sub(of_channel) } else { self.missing - missing }
+    }
+
+    /// The number of missing records, if all channels share a counter.
+    pub(super) fn missing_of_all(&self) -> Option<u32> {
+        (!self.each_has_its_counter && self.channels.len() > 1).then_some(self.missing)
+    }
+}
+
 /// Checks the order of frames as they are read from the file.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct FrameOrder {
     pub(crate) last_frame: u64,
-    /// The sequence number of the channel's next record if none is lost.
-    next_record: u32,
     /// Another flight comes before this one in the log. Sequence numbers may continue or start
     /// again, so the number of the flight's first frame shows whether frames are lost.
     behind_another: bool,
@@ -239,15 +269,12 @@ impl FrameOrder {
         Self { behind_another: true, ..Self::default() }
     }
 
-    /// Takes a frame and the sequence number of its record; returns the gap before it, if records
-    /// are lost there.
-    pub fn note(&mut self, frame: u64, record: u32) -> Option<Gap> {
+    /// Takes a frame and the number of records lost before it; returns the gap before it.
+    pub fn note(&mut self, frame: u64, lost_before: u32) -> Option<Gap> {
         let gap = Gap { after: self.last_frame, before: frame };
-        let lost = if self.behind_another { frame > FIRST_FRAME } else { record > self.next_record };
+        let lost = if self.behind_another { frame > FIRST_FRAME } else { lost_before > 0 };
         self.behind_another = false;
         self.last_frame = frame;
-        // A writer without sequence numbers leaves 0 everywhere, and no loss can be seen.
-        self.next_record = record.saturating_add(1);
         lost.then_some(gap)
     }
 }
@@ -266,12 +293,27 @@ mod tests {
     use super::*;
 
     fn gaps(frames: &[(u64, u32)]) -> Vec<(u64, u64)> {
-        let mut order = FrameOrder::default();
+        let (mut order, mut sequences) = (FrameOrder::default(), Sequences::default());
         frames
             .iter()
-            .filter_map(|(frame, record)| order.note(*frame, *record))
+            .filter_map(|(frame, record)| order.note(*frame, sequences.note(1, *record)))
             .map(|gap| (gap.after, gap.before))
             .collect()
+    }
+
+    /// Two channels in turn, whose records count from 0 each, then together: one is lost.
+    #[test]
+    fn a_shared_counter_is_no_loss_and_its_gaps_are() {
+        let lost = |records: &[(u16, u32)]| {
+            let mut sequences = Sequences::default();
+            let lost: Vec<u32> =
+                records.iter().map(|(channel, number)| sequences.note(*channel, *number)).collect();
+            (lost, sequences.missing_of_all())
+        };
+        assert_eq!(lost(&[(1, 0), (2, 0), (1, 1), (2, 1), (1, 3)]), (vec![0, 0, 0, 0, 1], None));
+        assert_eq!(lost(&[(1, 0), (2, 1), (2, 3), (1, 4), (2, 5)]), (vec![0, 0, 1, 1, 0], Some(1)));
+        assert_eq!(lost(&[(1, 0), (2, 0), (1, 0)]), (vec![0, 0, 0], None));
+        assert_eq!(lost(&[(1, 7), (1, 8)]), (vec![7, 0], None));
     }
 
     #[test]
@@ -281,8 +323,8 @@ mod tests {
         assert_eq!(gaps(&[(7, 6), (8, 7)]), [(0, 7)]);
         assert_eq!(gaps(&[(1, 0), (2, 0), (90, 0)]), []);
         let mut second = FrameOrder::behind_another();
-        assert_eq!((second.note(1, 600), second.note(2, 601)), (None, None));
-        assert!(second.note(5, 605).is_some() && FrameOrder::behind_another().note(601, 600).is_some());
+        assert_eq!((second.note(1, 600), second.note(2, 0)), (None, None));
+        assert!(second.note(5, 3).is_some() && FrameOrder::behind_another().note(601, 0).is_some());
         assert_eq!(gaps(&[(1, u32::MAX), (2, u32::MAX)]), [(0, 1)]);
     }
 }

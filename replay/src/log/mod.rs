@@ -14,9 +14,9 @@ use std::fs::File;
 use std::io::{BufReader, Chain, Cursor, Read};
 use std::path::Path;
 
-pub use clocks::{Clock, ClockTime, Clocks, Moment, MomentError};
-use flights::InFlight;
+pub use clocks::{Clock, ClockTime, Clocks, Jump, Moment, MomentError};
 pub use flights::{Cut, Flights, FrameOrder, Gap, LoggedFlight};
+use flights::{InFlight, Sequences};
 pub use head::{Attachment, BuildComparison, BuildDifference, Head};
 use protocol::log::reader::{Damage, LogChannel, LogItem, LogReader};
 use protocol::log::record::{
@@ -98,6 +98,7 @@ pub struct FlightLog<R: Read> {
     verdicts: Verdicts,
     order: ComputerOrder,
     in_flight: InFlight,
+    sequences: Sequences,
     /// The first verdict that contradicts itself.
     contradiction: Option<Damage>,
     /// The topics whose records are decoded; all, if `None`.
@@ -158,6 +159,7 @@ impl<R: Read> FlightLog<R> {
             verdicts: Verdicts::default(),
             order: ComputerOrder::default(),
             in_flight: InFlight::default(),
+            sequences: Sequences::default(),
             contradiction: None,
             wanted: None,
         })
@@ -207,6 +209,11 @@ impl<R: Read> FlightLog<R> {
     /// The latest time of any entry so far, ns since the Unix epoch.
     pub fn last_log_time_ns(&self) -> Option<u64> {
         self.last_log_time_ns
+    }
+
+    /// The number of missing records, if all channels so far share one sequence counter.
+    pub(crate) fn missing_of_all(&self) -> Option<u32> {
+        self.sequences.missing_of_all()
     }
 
     /// The flights so far.
@@ -270,7 +277,9 @@ impl<R: Read> FlightLog<R> {
                     self.in_flight.place(&mut entry);
                     self.last_log_time_ns = self.last_log_time_ns.max(Some(log_time_ns));
                     self.first_log_time_ns.get_or_insert(log_time_ns);
-                    let stamped = StampedEntry { channel_id, log_time_ns, sequence, data, entry };
+                    let lost_before = self.sequences.note(channel_id, sequence);
+                    let stamped =
+                        StampedEntry { channel_id, log_time_ns, sequence, lost_before, data, entry };
                     let message = heard_message(self.reader.channel(channel_id), &stamped);
                     self.flights.note(&stamped);
                     self.clocks.note(&stamped, message.as_ref(), self.since_first_s(log_time_ns));
@@ -320,9 +329,8 @@ pub enum LogError {
     },
     /// The file is of another kind.
     #[error(
-        "{name}: is not a flight log: it begins with {}, and an MCAP file with 89 4d 43 41 50 30 0d 0a; \
-        `ground --replay` shows a .tlog",
-        hex(found)
+        "{name}: is not a flight log: {}, and an MCAP file begins with 89 4d 43 41 50 30 0d 0a; `ground --replay` shows a .tlog",
+        kind_of(found)
     )]
     NotMcap {
         /// The file.
@@ -358,8 +366,23 @@ pub enum LogError {
     },
 }
 
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().join(" ")
+/// Other files that people have beside their logs, by their first bytes.
+const OTHERS: [(&[u8], &str); 8] = [
+    (b"PK\x03\x04", "it is a ZIP archive; unpack it first"),
+    (b"\x1f\x8b", "it is compressed by gzip; unpack it first"),
+    (b"\x28\xb5\x2f\xfd", "it is compressed by zstd; unpack it first"),
+    (b"ULog", "it is a log of PX4 (.ulg)"),
+    (b"\xa3\x95", "it is a log of ArduPilot (.bin)"),
+    (b"#ROSBAG", "it is a bag of ROS 1"),
+    (b"SQLite", "it is a database of SQLite, as a bag of ROS 2 (.db3)"),
+    (b"RRF2", "it is a recording of Rerun"),
+];
+
+/// What a file that is no log is, or what it begins with.
+fn kind_of(start: &[u8]) -> String {
+    let known = OTHERS.iter().find(|(magic, _)| start.starts_with(magic));
+    let hex = || start.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().join(" ");
+    known.map_or_else(|| format!("it begins with {}", hex()), |(_, kind)| (*kind).to_owned())
 }
 
 fn listed(topics: &[String]) -> String {

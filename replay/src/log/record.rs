@@ -24,8 +24,10 @@ pub struct StampedEntry {
     pub channel_id: u16,
     /// Nanoseconds since the Unix epoch.
     pub log_time_ns: u64,
-    /// Sequence number in its channel.
+    /// Sequence number in its channel, or in the log if its channels share a counter.
     pub sequence: u32,
+    /// Records lost before it, by the sequence numbers.
+    pub lost_before: u32,
     /// Its bytes.
     pub data: Vec<u8>,
     /// Its content.

@@ -184,7 +184,7 @@ impl Recording {
                     recording.start = Some(ComputerStart { frame: 0, ..*start });
                 }
                 Entry::ComputerFrame(frame) => {
-                    let lost = frame_order.note(frame.record.input.frame, stamped.sequence).is_some();
+                    let lost = frame_order.note(frame.record.input.frame, stamped.lost_before).is_some();
                     let logged = frame.record.input.frame;
                     if let Some(computer) = &mut recording.at_release
                         && recording.frames.is_empty()

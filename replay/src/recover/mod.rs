@@ -5,7 +5,7 @@
 //! lists what is lost, and so does the recovered log ([`METADATA_RECOVERY`]). Nothing is invented:
 //! a message is recovered unchanged or not at all.
 
-mod scan;
+pub(crate) mod scan;
 mod write;
 
 use std::collections::BTreeMap;
@@ -75,6 +75,8 @@ pub struct Recovery {
     pub messages_counted: Option<u64>,
     /// Messages of a channel that nothing describes.
     pub undecodable: u64,
+    /// Messages kept from between the chunks.
+    pub beside_chunks: u64,
     /// Some message comes later than one that belongs behind it.
     pub out_of_order: bool,
     /// The summary is there and its checksum is right; no message is lost without it.
@@ -115,6 +117,12 @@ impl Recovery {
         }));
         if self.undecodable > 0 {
             faults.push(format!("{} messages of an unknown channel were dropped", self.undecodable));
+        }
+        if self.beside_chunks > 0 {
+            let beside = self.beside_chunks;
+            faults.push(format!(
+                "{beside} messages stood beside the chunks, which no checksum protects; they are kept"
+            ));
         }
         if self.out_of_order {
             faults.push("it is not in order of time (`mcap sort` sorts it)".to_owned());
@@ -161,6 +169,7 @@ pub fn recover(input: &Path, output: &Path) -> Result<Recovery, RecoverError> {
         lost: contents.lost.iter().map(lost).collect(),
         messages_counted: contents.summary.statistics.as_ref().map(|statistics| statistics.message_count),
         undecodable: kept.undecodable,
+        beside_chunks: kept.beside_chunks,
         out_of_order: kept.out_of_order,
         summary_is_whole: contents.summary.is_whole,
         ended: contents.ended,

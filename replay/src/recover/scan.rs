@@ -98,6 +98,23 @@ impl Records {
         }
     }
 
+    /// Whether a checksum covers every message: that of its chunk, or that of all data.
+    pub(crate) fn is_checksummed(&mut self) -> Result<bool, LogError> {
+        let (mut at, mut every_chunk) = (mcap::MAGIC.len() as u64, true);
+        while let Some((opcode, length)) = self.head(at)?.filter(|(opcode, _)| *opcode != 0) {
+            let body = self.read(at + HEAD_BYTES as u64, 28)?;
+            let checksum = |place: usize| body.get(place..place + 4).is_some_and(|bytes| bytes != [0; 4]);
+            match opcode {
+                op::CHUNK => every_chunk &= checksum(24),
+                op::MESSAGE => every_chunk = false,
+                op::DATA_END => return Ok(every_chunk || checksum(0)),
+                _ => {}
+            }
+            at = at.saturating_add(HEAD_BYTES as u64).saturating_add(length);
+        }
+        Ok(every_chunk)
+    }
+
     /// Reads the whole file.
     pub(crate) fn contents(&mut self) -> Result<Contents, LogError> {
         let mut contents = Contents::default();

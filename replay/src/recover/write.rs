@@ -38,6 +38,7 @@ pub(crate) struct Kept {
     pub(crate) records_about: u64,
     /// Messages whose channel nothing describes.
     pub(crate) undecodable: u64,
+    pub(crate) beside_chunks: u64,
     /// Some message comes later than one that belongs behind it.
     pub(crate) out_of_order: bool,
 }
@@ -75,6 +76,7 @@ impl<'a> Rescue<'a> {
 
     /// Keeps a record, or every record of a chunk.
     fn keep(&mut self, opcode: u8, body: &[u8]) -> Result<(), WriteError> {
+        self.kept.beside_chunks += u64::from(opcode == op::MESSAGE && self.kept.chunks > 0);
         let kept = if opcode == op::CHUNK {
             self.kept.chunks += 1;
             // It was read before without an error; a file that has changed since then is lost here.

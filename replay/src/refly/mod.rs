@@ -33,7 +33,6 @@ use protocol::log::v1::{self, LimitResult};
 use protocol::log::writer::{LogHeader, LogWriter};
 use protocol::program::Exit;
 use serde::Serialize;
-use sim::draw::draw;
 use sim::sortie::SetUpError;
 use sim::wire::record;
 
@@ -69,8 +68,6 @@ pub struct ReflyOptions {
     pub settings: Vec<Setting>,
     /// Additional settings of the plant only.
     pub plant_settings: Vec<Setting>,
-    /// Seed of the plant's dispersions instead of the recorded seed.
-    pub seed: Option<u64>,
     /// Other faults than the recorded ones.
     pub faults: FaultChanges,
 }
@@ -109,8 +106,6 @@ pub struct ReflyReport {
     pub plant_settings: Vec<String>,
     /// The faults that differ from the recorded ones, from the beginning of the flight on.
     pub faults: FaultChanges,
-    /// The seed of the plant's draw, if it is not the recorded one.
-    pub seed: Option<u64>,
     pub start: StartState,
     /// How the frames before the start compare with the record.
     pub reached: Reached,
@@ -210,7 +205,6 @@ pub fn refly_flight(
         settings: listed(&options.settings),
         plant_settings: listed(&options.plant_settings),
         faults: options.faults.clone(),
-        seed: options.seed,
         start,
         reached,
         thrust_scale: rerun.flight.world().truth().impulse_scale,
@@ -296,10 +290,7 @@ fn change(
     let all: Vec<Setting> = lasting.chain(&of_mission).cloned().collect();
     let true_mission = mission_with(toml, &all)?;
     let world = rerun.flight.world();
-    let drawn = options.seed.map_or(*world.truth(), |seed| {
-        draw(&true_mission, &rerun.recipe.dispersion, seed, rerun.number).truth
-    });
-    let truth = truth_with(&drawn, &of_truth)?;
+    let truth = truth_with(world.truth(), &of_truth)?;
     if truth != *world.truth() || true_mission.airframe != *world.airframe() {
         let motor = truth.curve(&true_mission).map_err(SetUpError::from)?;
         let changed = world.changed(&true_mission.airframe, motor.as_ref(), &truth);
@@ -442,10 +433,6 @@ fn run_facts(
         .map(|(fact, value)| (fact.to_owned(), value)),
     );
     run.retain(|_, fact| !fact.is_empty());
-    if let Some(seed) = report.seed {
-        let before = run.insert("seed".to_owned(), seed.to_string());
-        run.insert("reflown_instead_of_seed".to_owned(), before.unwrap_or_else(|| "not recorded".to_owned()));
-    }
     run
 }
 
@@ -470,9 +457,6 @@ impl Answer for ReflyReport {
                 lines.push(format!("{what} {}{since}", changes.join(" ")));
             }
         }
-        lines.extend(
-            self.seed.map(|seed| format!("plant drawn with seed {seed} instead of the recorded one")),
-        );
         let Reached { frames, identical, first_different } = self.reached;
         lines.push(format!(
             "flown again from its start up to there: {identical} of {frames} recorded frames identical"
@@ -536,9 +520,6 @@ pub(crate) struct Args {
     /// By its name, or in full as it was given.
     #[arg(long, value_name = "FAULT")]
     without_fault: Vec<String>,
-    /// Seed of the plant's dispersions instead of the recorded one.
-    #[arg(long, value_name = "N", hide_short_help = true)]
-    seed: Option<u64>,
     /// Begin at T+12.9, POWERED or frame:1290.
     ///
     /// A time is in seconds, on the clock that its name says: T+12.9 or 12.9 (since the release),
@@ -566,7 +547,6 @@ impl Args {
             start: self.at,
             settings: self.settings,
             plant_settings: self.plant,
-            seed: self.seed,
             faults: FaultChanges { with: self.faults, without: self.without_fault },
         };
         let (mut report, flight) = refly_flight(&recording, &options)?;

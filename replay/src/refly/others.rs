@@ -31,7 +31,7 @@ pub struct OtherFlights {
 /// flight may be a lucky one.
 ///
 /// # Errors
-/// See [`AgainError`]; a change of the plant alone, of the seed or in flight belongs to the
+/// See [`AgainError`]; a change of the plant alone or in flight belongs to the
 /// recorded flight.
 pub fn other_flights(
     recording: &Recording,
@@ -39,7 +39,7 @@ pub fn other_flights(
     flights: u64,
 ) -> Result<OtherFlights, AgainError> {
     let timed = options.settings.iter().any(|setting| setting.at_s.is_some());
-    if timed || options.seed.is_some() || !options.plant_settings.is_empty() {
+    if timed || !options.plant_settings.is_empty() {
         let reason =
             "takes --set without a time, --fault and --without-fault; the rest belongs to one flight";
         return Err(AgainError::Refused { of: "--flights".to_owned(), reason: reason.to_owned() });

@@ -202,9 +202,6 @@ fn facts(
     }
 }
 
-/// Most nodes of the plan that are shown.
-const NODES_SHOWN: usize = 12;
-
 impl Answer for FrameReport {
     fn sentences(&self) -> Vec<String> {
         let Self { file, frame, time_s, phase, level, burning_s, .. } = self;
@@ -242,18 +239,6 @@ impl Answer for FrameReport {
         lines.push(format!(
             "cold     {cold_iterations} iterations without the plan before it, with what is broken {cold_merit:.4}"
         ));
-        let stride = self.path.len().div_ceil(NODES_SHOWN).max(1);
-        let shown = self.path.iter().enumerate();
-        let shown = shown.filter(|(node, _)| node % stride == 0 || node + 1 == self.path.len());
-        lines.extend(shown.map(|(node, (time_s, state))| {
-            let name = if node == 0 { "path" } else { "" };
-            let [north, west, up, north_m_s, west_m_s, up_m_s, p, r, ..] = state;
-            let [p_deg, r_deg] = [p, r].map(|angle| angle.to_degrees());
-            format!(
-                "{name:<8} +{time_s:.2} s  {north:>7.2} m north {west:>7.2} m west {up:>7.2} m up  {north_m_s:>6.2} {west_m_s:>6.2} \
-                 {up_m_s:>6.2} m/s  leans {p_deg:>6.2} deg north {r_deg:>6.2} deg west"
-            )
-        }));
         lines
     }
 }

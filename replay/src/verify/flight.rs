@@ -7,7 +7,6 @@ use protocol::log::computer_v1::ComputerStart;
 use protocol::log::record::{
     TOPIC_ESTIMATE, TOPIC_EVENTS, TOPIC_PILOT_TIMING, TOPIC_TRANSFORM, TOPIC_TRUTH_SAMPLE,
 };
-use serde::Serialize;
 
 use super::again::WorldAgain;
 use super::difference::{Tally, encode_into};
@@ -16,10 +15,8 @@ use super::parts::Part;
 use super::{FlightPlace, Obstacle, Verification, VerifyReport};
 use crate::controller::LoggedComputer;
 use crate::log::{
-    Cut, Entry, FlightLog, FrameOrder, Gap, Head, LogError, LoggedFrame, Recording, StampedEntry, Verdict,
-    misread_frame,
+    Cut, Entry, FlightLog, FrameOrder, Gap, Head, LogError, LoggedFrame, StampedEntry, misread_frame,
 };
-use crate::refly::{ReflyOptions, refly};
 
 /// One flight being verified.
 #[derive(Default)]
@@ -89,7 +86,7 @@ impl FlightVerifier {
     ) -> Result<(), LogError> {
         match stamped.entry {
             Entry::ComputerStart(start) => self.start(&start, &stamped.data, log, whole_head)?,
-            Entry::ComputerFrame(frame) => self.check(&frame, &stamped.data, stamped.sequence),
+            Entry::ComputerFrame(frame) => self.check(&frame, &stamped.data, stamped.lost_before),
             Entry::Verdict(_) => self.parts.verdicts += 1,
             Entry::Unreadable { reason } => {
                 self.unreadable.get_or_insert(reason);
@@ -168,9 +165,8 @@ impl FlightVerifier {
         Ok(())
     }
 
-    /// Runs a frame again and compares it; `data` and `sequence` are the bytes of its record and
-    /// its number in the channel.
-    fn check(&mut self, frame: &LoggedFrame, data: &[u8], sequence: u32) {
+    /// Runs a frame again and compares it; `data` are the bytes of its record.
+    fn check(&mut self, frame: &LoggedFrame, data: &[u8], lost_before: u32) {
         self.frames += 1;
         self.flies |= frame.since_release.is_some();
         let number = frame.record.input.frame;
@@ -182,7 +178,7 @@ impl FlightVerifier {
         if let Some(reason) = impossible {
             self.parts.inputs.why.get_or_insert_with(|| format!("frame {number}: {reason}"));
         }
-        let lost = self.order.note(number, sequence);
+        let lost = self.order.note(number, lost_before);
         // A computer that begins at its release can be run again behind a loss on the pad.
         let begins = !self.from_power_up && frame.since_release == Some(1);
         self.awaited.thought.clear();
@@ -283,7 +279,6 @@ impl FlightVerifier {
             span: first.zip(last).map(|((first, _), (last, _))| (first, last)),
             flight_s: first.zip(last).map(|((_, first_s), (_, last_s))| last_s - first_s),
             first_divergence: self.tally.divergence,
-            consequence: None,
             obstacle,
             cut,
             damage: damage.map(ToString::to_string),
@@ -339,42 +334,3 @@ impl FlightVerifier {
 
 /// What an input that nothing contradicts was held to.
 const JUDGED: &str = "judged by range and step alone: what decides nothing can be another value inside both";
-
-/// Whether this build's controller would land differently if it flew from the first frame that
-/// differs. This is closed loop, unlike the comparison itself.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Consequence {
-    /// The frame from which the flight was flown again.
-    pub from_frame: u64,
-    /// The recorded verdict.
-    pub recorded: Option<Verdict>,
-    /// The verdict with this build's controller; `None` if the vehicle does not come down.
-    pub reflown: Option<Verdict>,
-    /// Whether the verdict changed between landed and not landed; `None` if unknown.
-    pub changed: Option<bool>,
-    /// Why the flight was not flown again.
-    pub obstacle: Option<String>,
-}
-
-impl Consequence {
-    /// Flies from a frame, or from the beginning of the landing if that comes later or the
-    /// divergence lies on the pad.
-    pub(super) fn of(recording: &Recording, first_divergence: Option<u64>) -> Self {
-        match refly(recording, &ReflyOptions::default()) {
-            Ok(report) => Self {
-                from_frame: first_divergence.unwrap_or(0).max(report.start.frame),
-                recorded: report.recorded,
-                reflown: report.reflown,
-                changed: report.verdict_changed,
-                obstacle: None,
-            },
-            Err(error) => Self {
-                from_frame: first_divergence.unwrap_or(recording.release_frame + 1),
-                recorded: recording.verdict.as_ref().map(Verdict::of),
-                reflown: None,
-                changed: None,
-                obstacle: Some(error.to_string()),
-            },
-        }
-    }
-}

@@ -17,9 +17,6 @@
 //! A log joined by other tools may hold several flights; each has its own report. A flight without
 //! comparisons is never identical, and a flight whose record ends before the flight did is reported
 //! as cut.
-//!
-//! If a whole file diverges, the report also says whether the landing would end differently: only
-//! for this, the flight is simulated from the first frame that differs.
 
 mod again;
 pub mod book;
@@ -34,7 +31,6 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use self::again::WorldAgain;
-pub use self::flight::Consequence;
 use self::flight::FlightVerifier;
 use anyhow::{Result, bail};
 pub use difference::{Divergence, FieldDifference, FieldValue, differences, ulp_distance};
@@ -46,9 +42,7 @@ use serde::Serialize;
 
 use crate::cli::{Answer, give_each, logs_of, say, warn_of_loss};
 use crate::controller::FrameError;
-use crate::log::{
-    BuildComparison, Cut, Entry, FlightLog, Gap, Head, LogError, LoggedFlight, Recording, Verdict,
-};
+use crate::log::{BuildComparison, Cut, Entry, FlightLog, Gap, Head, LogError, LoggedFlight};
 use crate::print::counted;
 
 /// The topics that a verification reads.
@@ -73,20 +67,12 @@ pub fn verify_strictly(path: &Path) -> Result<Vec<VerifyReport>, LogError> {
 
 fn verify_as(path: &Path, strict: bool) -> Result<Vec<VerifyReport>, LogError> {
     let mut log = FlightLog::open(path)?.decoding(&VERIFIED);
-    let mut reports = verify_log(&mut log, strict, || {
+    verify_log(&mut log, strict, || {
         // Another tool may have moved the attachments to the end of the file, after the messages.
         let mut whole = FlightLog::open(path)?;
         while whole.next_entry()?.is_some() {}
         Ok(whole.head().clone())
-    })?;
-    // A log that is too long to be flown again, or has several flights, has still been compared.
-    if let [report] = reports.as_mut_slice()
-        && let Some(first) = &report.first_divergence
-        && let Ok(recording) = Recording::open(path)
-    {
-        report.consequence = Some(Consequence::of(&recording, first.in_flight.then_some(first.frame)));
-    }
-    Ok(reports)
+    })
 }
 
 /// Verifies a log that is being read, strictly or not. `whole_head` is called for the log's whole
@@ -232,8 +218,6 @@ pub struct VerifyReport {
     pub flight_s: Option<f64>,
     /// The first frame that differs.
     pub first_divergence: Option<Divergence>,
-    /// Whether the landing would end differently; only for whole files.
-    pub consequence: Option<Consequence>,
     /// Why not every frame was compared.
     pub obstacle: Option<Obstacle>,
     /// Where the record ends, if that is before the end of the flight.
@@ -351,7 +335,6 @@ impl Answer for VerifyReport {
         if !self.counted {
             lines.push(NOT_COUNTED.to_owned());
         }
-        lines.extend(self.consequence.as_ref().map(Consequence::words));
         let obstacle = self.obstacle.as_ref().filter(|_| self.frames_compared > 0);
         lines.extend(obstacle.map(|obstacle| format!("not every frame was compared: {obstacle}")));
         let missing = self.what_is_missing();
@@ -426,28 +409,6 @@ impl Divergence {
         let more = self.fields_different.saturating_sub(FIELDS_SHOWN) as u64;
         lines.extend((more > 0).then(|| format!("  and {} more", counted(more, "field"))));
         lines
-    }
-}
-
-impl Consequence {
-    fn words(&self) -> String {
-        if let Some(obstacle) = &self.obstacle {
-            return format!("verdict: whether it would change is not known: {obstacle}");
-        }
-        let word = |verdict: &Option<Verdict>| {
-            verdict.as_ref().map_or("no verdict", |verdict| verdict.landing.word())
-        };
-        let answer = match self.changed {
-            Some(true) => "would CHANGE",
-            Some(false) => "would not change",
-            None => "is not comparable",
-        };
-        format!(
-            "verdict: {answer}: recorded {}, flown on by this build from frame {} (closed loop) {}",
-            word(&self.recorded),
-            self.from_frame,
-            word(&self.reflown)
-        )
     }
 }
 

@@ -3,22 +3,11 @@
 use std::io::Write as _;
 use std::process::Stdio;
 
-use replay::log::Recording;
 use serde_json::Value;
 
 use crate::command_line::{data, refusal, replay, run};
 use crate::from_apogee::LANDED;
-use crate::simulated::{DISPERSED, MK2};
-
-#[test]
-fn another_seed_is_named_in_the_answer_and_in_the_log() {
-    let path = DISPERSED.beside("seed.mcap");
-    let (code, report) = data(replay("refly", &DISPERSED.log).args(["--seed", "77", "--out"]).arg(&path));
-    assert_eq!((code, &report["seed"]), (0, &77.into()));
-    let run_facts = Recording::open(&path).unwrap().head.run;
-    assert_eq!(run_facts["seed"], "77");
-    assert_eq!(run_facts["reflown_instead_of_seed"], "2");
-}
+use crate::simulated::MK2;
 
 #[test]
 fn a_setting_after_the_end_of_the_flight_is_refused() {

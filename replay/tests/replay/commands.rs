@@ -90,7 +90,6 @@ fn several_logs_are_verified_at_once_and_the_worst_decides() {
     let first = &reports[1]["first_divergence"];
     assert_eq!((&first["frame"], &first["fields"][0]["path"]), (&7.into(), &"output.gimbal_rad[1]".into()));
     // There is no landing in the log to fly on from.
-    assert!(reports[1]["consequence"]["obstacle"].is_string(), "{reports}");
     // One unreadable log is a separate error, and the others are still verified.
     let none = files.directory.path().join("none.mcap");
     let (code, reports) = data(replay("verify", &none).arg(&good));

@@ -75,18 +75,7 @@ const TABLE: [Row; 16] = [
     row("verify {log} --strict", IDENTICAL, IDENTICAL, (3, UNFLOWN.1)),
     row(
         "verify {log} --explain {planned}",
-        (
-            0,
-            &[
-                "POWERED",
-                ": the judge ",
-                "now: identical bit for bit",
-                "\nflown ",
-                "\njudge ",
-                "\npath ",
-                "m north",
-            ],
-        ),
+        (0, &["POWERED", ": the judge ", "now: identical bit for bit", "\nflown ", "\njudge ", "m north"]),
         (0, &["this frame plans no landing; no frame of this log does", "now: identical bit for bit"]),
         NO_FLIGHT,
     ),

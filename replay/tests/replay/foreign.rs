@@ -30,7 +30,7 @@ fn other_kinds_of_files_are_refused_by_their_first_bytes() {
     assert_eq!(
         refusal(b"\x89PNG\r\n\x1a\n and so on"),
         "test.mcap: is not a flight log: it begins with 89 50 4e 47 0d 0a 1a 0a, \
-         and an MCAP file with 89 4d 43 41 50 30 0d 0a; `ground --replay` shows a .tlog"
+         and an MCAP file begins with 89 4d 43 41 50 30 0d 0a; `ground --replay` shows a .tlog"
     );
     assert!(matches!(verify_bytes(b"\x89MCAP"), Err(LogError::NotMcap { .. })));
 }

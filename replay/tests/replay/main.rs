@@ -25,6 +25,7 @@ mod from_power_up;
 mod ground_log;
 mod help;
 mod in_order;
+mod lacking;
 mod layouts;
 mod limits;
 mod lost_frames;

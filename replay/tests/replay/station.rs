@@ -17,6 +17,11 @@ const NOTED_NS: u64 = 25_000_000_000;
 
 /// The station's log, beside the vehicle's own.
 pub(crate) fn station_log(own: &Path, name: &str) -> PathBuf {
+    station_log_with(own, name, |at_ns| at_ns)
+}
+
+/// The same of a station whose clock runs as `clock` says.
+pub(crate) fn station_log_with(own: &Path, name: &str, clock: impl Fn(u64) -> u64) -> PathBuf {
     let path = own.with_file_name(name);
     let mut from = FlightLog::open(own).unwrap();
     let header = LogHeader {
@@ -30,7 +35,7 @@ pub(crate) fn station_log(own: &Path, name: &str) -> PathBuf {
         if stamped.entry != Entry::RawFrame {
             continue;
         }
-        let at_ns = EARLIER_NS + stamped.log_time_ns - *first_ns.get_or_insert(stamped.log_time_ns);
+        let at_ns = clock(EARLIER_NS + stamped.log_time_ns - *first_ns.get_or_insert(stamped.log_time_ns));
         let mut framer = Framer::new();
         framer.push_datagram(&stamped.data);
         let message = framer.next_frame().unwrap().decode().unwrap();

@@ -113,8 +113,13 @@ impl Held {
 
     /// Writes it as a whole log.
     pub(crate) fn write(&self, path: &Path) {
+        self.write_with(path, mcap::WriteOptions::new());
+    }
+
+    /// Writes it with options of the format.
+    pub(crate) fn write_with(&self, path: &Path, options: mcap::WriteOptions) {
         let file = std::io::BufWriter::new(std::fs::File::create(path).unwrap());
-        let options = mcap::WriteOptions::new().library(&self.library).chunk_size(Some(64 * 1024));
+        let options = options.library(&self.library).chunk_size(Some(64 * 1024));
         let mut writer = options.create(file).unwrap();
         for item in &self.about {
             match item {

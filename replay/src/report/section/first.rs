@@ -7,7 +7,6 @@ use protocol::log::v1::LimitResult;
 use crate::findings::{Finding, over};
 use crate::info::Info;
 use crate::log::{Verdict, worst_first};
-use crate::refly::{FaultChanges, ReflyOptions, refly_flight};
 use crate::report::html::{escaped, paragraph, table};
 use crate::report::track::Flight;
 
@@ -20,7 +19,7 @@ pub(super) fn html(flight: &Flight, info: &Info, drawn: &[Drawn]) -> String {
         "{}<div class=\"first\"><div>\n<section class=\"found\">{}</section><section class=\"limits\">{}</section></div><div>\n\
          <section class=\"whole\">{height}</section><section class=\"maps\">{}</section><section class=\"moments\">{}</section></div></div>\n",
         verdict(flight, info),
-        findings(flight, info, drawn),
+        findings(info, drawn),
         limits(info),
         place::maps(flight),
         place::moments_table(flight),
@@ -65,7 +64,7 @@ fn verdict(flight: &Flight, info: &Info) -> String {
 }
 
 /// The findings, numbered as in the pictures, and below them the picture that shows the first.
-fn findings(flight: &Flight, info: &Info, drawn: &[Drawn]) -> String {
+fn findings(info: &Info, drawn: &[Drawn]) -> String {
     let mut html = "<h3 id=\"findings\">Findings, first in time</h3>\n".to_owned();
     let Some(findings) = &info.findings else {
         return html + &paragraph(&info.no_findings());
@@ -85,26 +84,11 @@ fn findings(flight: &Flight, info: &Info, drawn: &[Drawn]) -> String {
         let items: String = findings.iter().map(item).collect();
         html.extend([format!("<ol class=\"findings\">\n{items}</ol>\n")]);
     }
-    html += &without_its_faults(flight);
     // The picture of the first; the whole flight stands beside it. Of nothing wrong how it came
     // down.
     let shown = findings.iter().map(|finding| finding.picture).chain(["vertical-speed"]);
     let first = shown.filter_map(of).find(|(section, ..)| *section != "first");
     html + &first.map_or_else(String::new, |(.., svg)| svg.replacen("<figure id=", "<figure data-of=", 1))
-}
-
-/// A simulated flight flown again with nothing broken in it.
-fn without_its_faults(flight: &Flight) -> String {
-    let faults = flight.recording.head.run.get("faults").map_or("", String::as_str);
-    if faults.is_empty() {
-        return String::new();
-    }
-    let changes = FaultChanges { without: vec!["all".to_owned()], ..FaultChanges::default() };
-    let options = ReflyOptions { faults: changes, ..ReflyOptions::default() };
-    let flown = refly_flight(&flight.recording, &options).ok().and_then(|(_, flown)| flown.verdict);
-    let Some(verdict) = flown else { return String::new() };
-    let ending = verdict.ending.unwrap_or_default();
-    paragraph(&format!("Simulated: flown again without {faults}: {ending}."))
 }
 
 fn limits(info: &Info) -> String {
