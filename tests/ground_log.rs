@@ -35,8 +35,7 @@ fn fact<'a>(info: &'a Ended, word: &str) -> &'a str {
 fn what_a_station_recorded_agrees_with_the_vehicles_own_log() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    let mut station = auto_ground(folder, &["udpin:127.0.0.1:0"]);
-    let mut ground = Running::start(station.args(["--tlog", "ground.tlog"]));
+    let mut ground = Running::start(&mut auto_ground(folder, &["udpin:127.0.0.1:0"]));
     let mut fly = vehicle(folder, &[&ground.udp_link()]);
     let flight = Running::start(fly.args(["--mission", "mk2"]));
     expect_landing(flight, ground);

@@ -163,13 +163,6 @@ pub struct Flags {
     #[arg(long, value_name = "FILE|none", help_heading = "Station")]
     pub log: Option<LogChoice>,
 
-    /// Telemetry log to write beside the log (`.tlog`, for other ground stations), or `none`.
-    ///
-    /// Default: with --connect the name of the log with this extension; the demonstration writes
-    /// none.
-    #[arg(long, value_name = "FILE|none", help_heading = "Station")]
-    pub tlog: Option<LogChoice>,
-
     /// Send every frame that is heard on to udpout:HOST:PORT, for a map, an antenna tracker or an
     /// overlay; may be given more than once. One way: what comes back is never read.
     #[arg(long, value_name = "LINK", value_parser = listener, help_heading = "Station")]

@@ -148,14 +148,14 @@ fn other_files_are_reported_as_not_mcap() {
 fn a_recorder_never_overwrites_and_ends_its_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("flight.mcap");
-    let recorder = Recorder::create(&path, None, &header()).unwrap();
+    let recorder = Recorder::create(&path, false, &header()).unwrap();
     for k in 0..20_000 {
         recorder.record(operator(k), k);
     }
-    let other = Recorder::create(&path, None, &header()).unwrap();
+    let other = Recorder::create(&path, false, &header()).unwrap();
     assert_eq!(other.finish().unwrap(), folder.path().join("flight-2.mcap"));
     for device in ["/dev/null", "/dev/stdout"] {
-        let refused = Recorder::create(Path::new(device), None, &header());
+        let refused = Recorder::create(Path::new(device), false, &header());
         assert!(matches!(refused, Err(RecorderError::Create { path, .. }) if path == Path::new(device)));
     }
     assert_eq!(recorder.finish().unwrap(), path);

@@ -64,7 +64,7 @@ impl Pad {
         command.arg(r#"mount -t tmpfs -o "$1" none "$2" && shift 2 && exec "$@""#);
         command.args(["sh", DISK]).arg(&disk).arg(program(Program::Ground).get_program());
         command.args(["daemon", "--connect", &proxy.ground_link(), "--key", KEY]);
-        command.args(["--log", "disk/station.mcap", "--tlog", "none"]);
+        command.args(["--log", "disk/station.mcap"]);
         crate::at_home(&mut command, &folder);
         let clock = stepping_clock(&mut command, &folder)?;
         let mut station = Running::start(&mut command);

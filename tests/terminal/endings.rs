@@ -152,7 +152,7 @@ fn a_panic_restores_the_terminal_is_reported_and_completes_the_log() {
     if let Some(log) = std::env::var_os(PANICS_HERE) {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
         return runtime.block_on(async {
-            let recorder = Recorder::create(Path::new(&log), None, &LogHeader::default()).unwrap();
+            let recorder = Recorder::create(Path::new(&log), false, &LogHeader::default()).unwrap();
             let _guard = LogGuard::new(Some(recorder.clone()));
             let _screen = Screen::open(&Config::default()).unwrap();
             let (level, name) = (EventLevel::Info, "ground".to_owned());

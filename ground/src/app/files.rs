@@ -11,7 +11,7 @@ use std::time::Duration;
 use anyhow::Context as _;
 use protocol::book::{Book, BookKey, Head, Line, OPENED, SignedHead};
 use protocol::log::record::Record;
-use protocol::log::recorder::{self, Recorder, RecorderError, TlogName};
+use protocol::log::recorder::{self, Recorder, RecorderError};
 use protocol::log::writer::LogHeader;
 use time::OffsetDateTime;
 use time::macros::format_description;
@@ -22,31 +22,23 @@ use crate::model::{
     remembered,
 };
 
-/// Opens the chosen log and the telemetry log beside it; `Ok(None)` if no log is wanted. A log that
-/// exists is kept: the new one gets the next free name.
+/// Opens the chosen log, and with a real link a telemetry log beside it (`.tlog`, for other ground
+/// stations); `Ok(None)` if no log is wanted. A log that exists is kept: the new one gets the next
+/// free name.
 ///
 /// # Errors
-/// A file cannot be created, or a telemetry log is wanted without a log.
+/// A file cannot be created.
 pub fn open_log(
     choice: Option<&LogChoice>,
-    tlog: Option<&LogChoice>,
+    with_tlog: bool,
     header: &LogHeader,
 ) -> anyhow::Result<Option<Recorder>> {
     let path = match choice {
-        Some(LogChoice::None) => {
-            let alone = matches!(tlog, Some(LogChoice::File(_)));
-            anyhow::ensure!(!alone, "--tlog writes beside a log; do not give --log none");
-            return Ok(None);
-        }
+        Some(LogChoice::None) => return Ok(None),
         Some(LogChoice::File(path)) => path.clone(),
         None => named_by_time(header)?,
     };
-    let tlog = match tlog {
-        None => Some(TlogName::OfTheLog),
-        Some(LogChoice::None) => None,
-        Some(LogChoice::File(path)) => Some(TlogName::Own(path)),
-    };
-    Ok(Some(Recorder::create(&path, tlog, header)?))
+    Ok(Some(Recorder::create(&path, with_tlog, header)?))
 }
 
 fn named_by_time(header: &LogHeader) -> anyhow::Result<PathBuf> {
@@ -427,7 +419,7 @@ mod log_tests {
         let names: Vec<String> = (0..3)
             .map(|_| {
                 let choice = LogChoice::File(directory.path().join(named_by_time(&header).unwrap()));
-                let recorder = open_log(Some(&choice), None, &header).unwrap().unwrap();
+                let recorder = open_log(Some(&choice), true, &header).unwrap().unwrap();
                 assert!(recorder.tlog_path().unwrap().with_extension("mcap") == recorder.path());
                 recorder.finish().unwrap().file_name().unwrap().to_string_lossy().into_owned()
             })
@@ -449,7 +441,7 @@ mod log_tests {
         let header = LogHeader::default();
         let asked = directory.path().join("flight.mcap");
         let choice = Some(LogChoice::File(asked.clone()));
-        let open = || open_log(choice.as_ref(), None, &header).unwrap().unwrap().finish().unwrap();
+        let open = || open_log(choice.as_ref(), true, &header).unwrap().unwrap().finish().unwrap();
         assert_eq!(open(), asked);
         assert_eq!(other_name(choice.as_ref(), Some(&asked)), None);
         let before = fs::read(&asked).unwrap();
@@ -469,7 +461,7 @@ mod log_tests {
     fn a_panic_ends_the_log_properly() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("panic.mcap");
-        let recorder = Recorder::create(&path, None, &LogHeader::default()).unwrap();
+        let recorder = Recorder::create(&path, false, &LogHeader::default()).unwrap();
         let event =
             Event { level: EventLevel::Info, name: "ground".to_owned(), message: "before".to_owned() };
         let panicked = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {

@@ -40,7 +40,7 @@ use protocol::transport::LinkAddress;
 use sim::wire::fly::load_flight;
 
 use crate::attach::OPERATOR_MAX;
-use crate::cli::{Cli, Command, ConfigArgs, ConfigCommand, LinkArgs, LogChoice, StationArgs};
+use crate::cli::{Cli, Command, ConfigArgs, ConfigCommand, LinkArgs, StationArgs};
 use crate::config::{Config, EXAMPLE, usual_path};
 use crate::demo::{Demo, DemoOptions, LogClock};
 use crate::exit;
@@ -161,9 +161,7 @@ async fn session(args: &StationArgs, config: &Config, duty: Duty) -> anyhow::Res
             ..LogHeader::default()
         },
     };
-    let tlog = args.flags.tlog.as_ref();
-    let tlog = if tlog.is_none() && demo_options.is_some() { Some(&LogChoice::None) } else { tlog };
-    let recorder = open_log(args.flags.log.as_ref(), tlog, &header)?;
+    let recorder = open_log(args.flags.log.as_ref(), demo_options.is_none(), &header)?;
     let log_guard = LogGuard::new(recorder);
     let next_log = NextLog::new(args, header, log_guard.log());
     let (mut station, mut model, mut wire) =
@@ -241,7 +239,6 @@ async fn start(
         link_capacity_bytes_s: wire.capacity_bytes_s(),
         vehicle_name: demo.as_ref().map(|_| args.mission().to_owned()),
         log_path: recorder.as_ref().map(|recorder| recorder.path().display().to_string()),
-        tlog_path: recorder.as_ref().and_then(Recorder::tlog_path).map(|path| path.display().to_string()),
         us: link.us(),
         // The standard library's hash keys differ in every process. 0 stands for no session.
         session: (RandomState::new().build_hasher().finish() as u32).max(1),

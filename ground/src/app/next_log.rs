@@ -32,8 +32,8 @@ const AGAIN_AFTER: Duration = Duration::from_hours(1);
 
 /// What the next log needs.
 pub(super) struct NextLog {
-    /// The names that were asked for: of the log and of the telemetry log.
-    names: (Option<LogChoice>, Option<LogChoice>),
+    /// The name that was given.
+    name: Option<LogChoice>,
     /// Times of the next log count from the start of the station, too.
     header: LogHeader,
     pub(super) book_key: Option<BookKey>,
@@ -48,9 +48,8 @@ pub(super) struct NextLog {
 
 impl NextLog {
     pub(super) fn new(args: &StationArgs, header: LogHeader, guarded: GuardedLog) -> Self {
-        let names = (args.flags.log.clone(), args.flags.tlog.clone());
-        Self {
-            names,
+        let name = args.flags.log.clone();
+        Self { name,
             header,
             book_key: None,
             guarded,
@@ -107,12 +106,11 @@ impl Station {
         // The crew sees a log that has failed; a new one would hide it.
         let before = self.recorder.clone().filter(|log| log.is_intact() && !self.next_log.begins);
         let Some(before) = before else { return };
-        let NextLog { names: (log, tlog), header, .. } = &self.next_log;
-        let (log, tlog, mut header) = (log.clone(), tlog.clone(), header.clone());
+        let (name, mut header) = (self.next_log.name.clone(), self.next_log.header.clone());
         header.run.insert("after".to_owned(), file_name(before.path()));
         self.next_log.begins = self.background.queue(Target::NextLog, move || {
             before.take_names();
-            Outcome::NextLog(open_log(log.as_ref(), tlog.as_ref(), &header))
+            Outcome::NextLog(open_log(name.as_ref(), before.tlog_path().is_some(), &header))
         });
     }
 
@@ -143,8 +141,8 @@ impl Station {
         self.next_log.ending = before.and_then(end);
         self.open_book(model, &format!(", after {before_name}{end_of_book}"));
         let path = |path: &Path| absolute(&path.display().to_string());
-        let (log, tlog) = (path(next.path()), next.tlog_path().map(path));
-        self.step(model, wire, Msg::LogBegins { log, tlog });
+        let log = path(next.path());
+        self.step(model, wire, Msg::LogBegins { log });
         if let Some(server) = &mut self.server {
             server.greet_with(hello(model));
         }
@@ -214,7 +212,7 @@ mod tests {
         runtime.block_on(async {
             let clock = Clock::start();
             let header = LogHeader { start_unix_ns: clock.start_unix_ns(), ..LogHeader::default() };
-            let guard = LogGuard::new(open_log(args.flags.log.as_ref(), None, &header).unwrap());
+            let guard = LogGuard::new(open_log(args.flags.log.as_ref(), true, &header).unwrap());
             let duty = Duty { is_daemon: true, interactive: false, time_limit: None, json: false };
             let next_log = NextLog::new(&args, header, guard.log());
             let config = Config::default();

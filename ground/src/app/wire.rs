@@ -406,7 +406,7 @@ mod tests {
         const FRAMES: u64 = 3_000;
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("sent.mcap");
-        let recorder = Recorder::create(&path, None, &LogHeader::default()).unwrap();
+        let recorder = Recorder::create(&path, false, &LogHeader::default()).unwrap();
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
         let (mut told_drops, mut told_bytes) = (0, 0);
         runtime.block_on(async {

@@ -74,8 +74,6 @@ pub struct Settings {
     pub vehicle_name: Option<String>,
     /// `None` without a log.
     pub log_path: Option<String>,
-    /// The path of the `.tlog` file; `None` without one.
-    pub tlog_path: Option<String>,
     /// The station's own MAVLink address.
     pub us: Address,
     /// The session of the station: drawn at its start, so that another station with the same

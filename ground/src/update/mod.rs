@@ -99,7 +99,6 @@ pub enum Msg {
     /// The station's log goes on in these files.
     LogBegins {
         log: String,
-        tlog: Option<String>,
     },
     /// The embedded simulator has ended; the reason, if it failed.
     SimulatorEnded(Option<String>),
@@ -206,9 +205,9 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
         Msg::Log(health) => on_log_health(model, health, now),
         // The log before is complete. What was flown is in it, and not in the one that is replayed
         // and reported from now on.
-        Msg::LogBegins { log, tlog } => {
+        Msg::LogBegins { log } => {
             model.info(now, format!("the log goes on in {log}"));
-            (model.settings.log_path, model.settings.tlog_path) = (Some(log), tlog);
+            model.settings.log_path = Some(log);
             model.outcome.started = false;
         }
         Msg::SimulatorEnded(failure) => {

@@ -5,7 +5,7 @@
 //! --test ground pictures` also writes those that README.md and docs/crew.md show, the moving one
 //! included, to `ground/pictures`, from the flight that is recorded there: `onboard-sim fly --start
 //! pad --dispersion real --seed 2001 --mavlink udpin:127.0.0.1:14550` and `ground --auto --connect
-//! udpout:127.0.0.1:14550 --log flight.mcap --tlog flight.tlog`.
+//! udpout:127.0.0.1:14550 --log flight.mcap`.
 
 use std::fs;
 use std::path::Path;

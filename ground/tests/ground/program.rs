@@ -50,7 +50,7 @@ fn a_start_that_fails_leaves_no_files() {
     for arguments in [
         &["--connect", &link][..],
         &["daemon", "--connect", &link],
-        &["--connect", &link, "--log", "a.mcap", "--tlog", "b.tlog"],
+        &["--connect", &link, "--log", "a.mcap"],
         &["--connect", "udpin:127.0.0.1:0", "--key", "no-such-key"],
     ] {
         let output = ground(directory.path(), arguments);
@@ -175,26 +175,6 @@ fn completions_and_the_manual_name_the_commands() {
 }
 
 /// The log and the telemetry log of a demonstration contain the same flight.
-#[test]
-fn the_telemetry_log_contains_the_same_flight() {
-    let directory = tempfile::tempdir().unwrap();
-    let output = ground(
-        directory.path(),
-        &["--start", "apogee", "--speed", "4", "--log", "f.mcap", "--tlog", "f.tlog"],
-    );
-    assert_eq!(output.status.code(), Some(0), "{}", err(&output));
-    let verdict = |file: &str| {
-        let output = ground(directory.path(), &["--replay", file]);
-        assert_eq!(output.status.code(), Some(0), "{file}: {}", err(&output));
-        let lines = out(&output);
-        lines.lines().filter(|line| line.starts_with("  ok") || line.starts_with("STANDS UNDAMAGED")).count()
-    };
-    assert_eq!((verdict("f.mcap"), verdict("f.tlog")), (7, 7));
-    let output = ground(directory.path(), &["--log", "none", "--tlog", "g.tlog"]);
-    assert_eq!(output.status.code(), Some(1));
-    assert!(err(&output).contains("--tlog writes beside a log"));
-}
-
 /// A program reads one object: how the flight ended, and where its log is.
 #[test]
 fn the_end_of_a_run_is_one_object() {

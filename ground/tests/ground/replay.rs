@@ -227,7 +227,7 @@ fn a_log_that_is_not_in_order_of_time_is_refused() {
     let directory = tempfile::tempdir().unwrap();
     for late_ns in [1_000_000_000, 1_000_000_001] {
         let path = directory.path().join(format!("{late_ns}.mcap"));
-        let log = Recorder::create(&path, None, &LogHeader::default()).unwrap();
+        let log = Recorder::create(&path, false, &LogHeader::default()).unwrap();
         let bytes = Encoder::new(VEHICLE).encode(&MavMessage::HEARTBEAT(beat(9))).as_bytes().to_vec();
         let frame = RawFrame { direction: Direction::Rx, endpoint: "ground", link: "udp".to_owned(), bytes };
         for time_ns in [late_ns, 0] {

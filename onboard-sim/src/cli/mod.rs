@@ -62,7 +62,7 @@ fn on_threads<T: Send>(
 
 /// Begins a log, under the next free name.
 fn logging(path: &Path, header: &LogHeader) -> anyhow::Result<Recorder> {
-    let recorder = Recorder::create(path, None, header)?;
+    let recorder = Recorder::create(path, false, header)?;
     report_other_name(path, recorder.path());
     Ok(recorder)
 }

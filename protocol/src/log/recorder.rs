@@ -111,14 +111,6 @@ impl Drop for FailedByPanic {
 /// How many names are tried for a file or a folder.
 const NAMES_MAX: u32 = 100;
 
-/// How the telemetry log beside a log is named.
-#[derive(Debug, Clone, Copy)]
-pub enum TlogName<'a> {
-    /// As the log, with the extension `.tlog`.
-    OfTheLog,
-    Own(&'a Path),
-}
-
 /// Makes something under the first of `flight.mcap`, `flight-2.mcap`, `flight-3.mcap` and so on
 /// that is free, and returns it with its name.
 ///
@@ -163,25 +155,23 @@ fn numbered(path: &Path, number: u32) -> PathBuf {
 impl Recorder {
     /// Creates the file and starts the writing thread, under the first free name of `flight.mcap`,
     /// `flight-2.mcap`, `flight-3.mcap` and so on: nothing is overwritten, and the same command
-    /// works again after a crash. The telemetry log, of the ground's raw frames, is named after the
-    /// chosen name, or after a custom name with the same number.
+    /// works again after a crash. A telemetry log of the ground's raw frames beside
+    /// it has the same name and the extension `.tlog`.
     ///
     /// # Errors
     /// No name is free, a file cannot be created, or the header cannot be written.
-    pub fn create(at: &Path, tlog: Option<TlogName<'_>>, header: &LogHeader) -> Result<Self, RecorderError> {
-        let (mut number, mut tried) = (0, PathBuf::new());
+    pub fn create(at: &Path, with_tlog: bool, header: &LogHeader) -> Result<Self, RecorderError> {
+        let mut tried = PathBuf::new();
         let mut create = |path: &Path| {
             path.clone_into(&mut tried);
             File::options().write(true).read(true).create_new(true).open(path)
         };
         let created = under_free_name(at, |log| {
-            number += 1;
             let file = create(log)?;
-            let Some(name) = tlog else { return Ok((file, None)) };
-            let tlog = match name {
-                TlogName::OfTheLog => log.with_extension("tlog"),
-                TlogName::Own(own) => numbered(own, number),
-            };
+            if !with_tlog {
+                return Ok((file, None));
+            }
+            let tlog = log.with_extension("tlog");
             // The log file was created a moment ago and is empty; if it stayed, the next attempt
             // would fail.
             let made = create(&tlog).inspect_err(|_refused| _ = std::fs::remove_file(log))?;

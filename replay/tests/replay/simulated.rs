@@ -60,7 +60,7 @@ pub(crate) fn simulate_recipe(recipe: Recipe, links: &[LinkAddress]) -> Simulate
     let directory = tempfile::tempdir().unwrap();
     let log = directory.path().join("flight.mcap");
     let flight = RocketFlight { recipe, number: 0 };
-    let recorder = Recorder::create(&log, None, &flight.log_header("onboard-sim", START_UNIX_NS)).unwrap();
+    let recorder = Recorder::create(&log, false, &flight.log_header("onboard-sim", START_UNIX_NS)).unwrap();
     let options = FlyOptions {
         system_id: 1,
         flight,

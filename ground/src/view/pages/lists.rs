@@ -101,7 +101,6 @@ pub fn log_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static
     vec![
         state,
         row("log", model.settings.log_path.clone().unwrap_or_else(none), TextRole::Plain),
-        row("telemetry log", model.settings.tlog_path.clone().unwrap_or_else(none), TextRole::Plain),
         row("space", space, TextRole::Plain),
         row("running for", seconds(now), TextRole::Plain),
         row("events", model.events.total().to_string(), TextRole::Plain),

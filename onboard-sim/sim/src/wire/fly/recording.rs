@@ -194,7 +194,7 @@ mod tests {
     fn a_log_up_to_its_mark_is_complete_and_does_not_change() {
         let folder = tempfile::tempdir().unwrap();
         let recorder =
-            Recorder::create(&folder.path().join("flight.mcap"), None, &LogHeader::default()).unwrap();
+            Recorder::create(&folder.path().join("flight.mcap"), false, &LogHeader::default()).unwrap();
         for number in 0..500 {
             recorder.record(event(number), u64::from(number));
         }
@@ -226,7 +226,7 @@ mod tests {
     fn a_log_cut_at_any_byte_is_read_up_to_its_last_complete_chunk() {
         let folder = tempfile::tempdir().unwrap();
         let recorder =
-            Recorder::create(&folder.path().join("flight.mcap"), None, &LogHeader::default()).unwrap();
+            Recorder::create(&folder.path().join("flight.mcap"), false, &LogHeader::default()).unwrap();
         let mut ends = Vec::new();
         for number in 0..40 {
             recorder.record(event(number), u64::from(number));
