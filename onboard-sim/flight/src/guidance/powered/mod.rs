@@ -117,8 +117,8 @@ impl PoweredGuidance {
     }
 
     /// Takes over the search result, if it is finite; there is no outcome if the thrust never
-    /// carries the vehicle. `high`: as in its situation; `posed_and_now_s`: the time of the
-    /// request, and the present time.
+    /// carries the vehicle. `high`: as in its situation; the times are those of the request and of
+    /// the present frame.
     pub(crate) fn take_over(
         &mut self,
         search: &mut Search,
