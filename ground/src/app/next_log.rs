@@ -49,7 +49,8 @@ pub(super) struct NextLog {
 impl NextLog {
     pub(super) fn new(args: &StationArgs, header: LogHeader, guarded: GuardedLog) -> Self {
         let name = args.flags.log.clone();
-        Self { name,
+        Self {
+            name,
             header,
             book_key: None,
             guarded,

@@ -413,7 +413,8 @@ impl Computer {
             self.crew.held_by = by;
         }
         let mode = self.table.mode();
-        let waits = mode.phase == Phase::PadArmed && mode.countdown_end_s.is_none();
+        // A hold disarms by its own limit.
+        let waits = mode.phase == Phase::PadArmed && mode.countdown_end_s.is_none() && mode.hold.is_none();
         // NaN is no sign of life.
         let is_alone = !(age_s <= ALONE_S);
         if waits && is_alone {
