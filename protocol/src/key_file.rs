@@ -114,8 +114,8 @@ impl KeyFile {
             Err(source) => return Err(KeyFileError::Io { path: stamps_path, source }),
         };
         let file = StampFile { stamps_path: stamps_path.clone(), written: memory.clone(), appending: None };
-        let file = Arc::new(Mutex::new(file));
-        Ok((Self { stamps_path, file, writer: None }, Signing::new(key, memory)))
+        let file = Self { stamps_path, file: Arc::new(Mutex::new(file)), writer: None };
+        Ok((file, Signing::new(key, memory)))
     }
 
     /// Reads a key without timestamps.
@@ -146,13 +146,11 @@ impl KeyFile {
     /// # Errors
     /// The file cannot be written, or the disk stalls.
     pub fn remember(&mut self, memory: &Memory) -> Result<(), KeyFileError> {
-        let writer = match &mut self.writer {
-            Some(writer) => writer,
-            none => {
-                let failed = |source| KeyFileError::Io { path: self.stamps_path.clone(), source };
-                none.insert(Background::start("timestamps").map_err(failed)?)
-            }
-        };
+        if self.writer.is_none() {
+            let failed = |source| KeyFileError::Io { path: self.stamps_path.clone(), source };
+            self.writer = Some(Background::start("timestamps").map_err(failed)?);
+        }
+        let Some(writer) = &self.writer else { return Ok(()) };
         let is_late = !writer.wait(Duration::ZERO);
         let (file, memory) = (Arc::clone(&self.file), memory.clone());
         writer.queue((), move || file.lock().unwrap_or_else(PoisonError::into_inner).remember(&memory));

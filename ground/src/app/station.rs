@@ -300,25 +300,19 @@ impl Station {
         if let Some(error) = self.alarm_failure.as_ref().and_then(|failure| failure.try_recv().ok()) {
             self.give_up_alarm_command(&error);
         }
+        let now = self.clock.now();
         while let Some(outcome) = self.background.outcome() {
-            self.take_outcome(outcome, model, wire);
+            match outcome {
+                Outcome::Written => {}
+                Outcome::NotWritten(target, error) => self.report_not_written(target, &error, model),
+                Outcome::LogFiles(found) => {
+                    self.recorder.iter().for_each(|present| self.log_watch.take(&found, present, now));
+                }
+                Outcome::NextLog(next) => self.change_log(next, model, wire),
+            }
         }
         if let Some(log) = self.recorder.clone().filter(|_| self.log_watch.begins()) {
             self.background.queue(Target::LogFiles, move || Outcome::LogFiles(LogFiles::of(&log)));
-        }
-    }
-
-    fn take_outcome(&mut self, outcome: Outcome, model: &mut Model, wire: &mut Wire) {
-        let now = self.clock.now();
-        match outcome {
-            Outcome::Written => {}
-            Outcome::NotWritten(target, error) => self.report_not_written(target, &error, model),
-            Outcome::LogFiles(found) => {
-                if let Some(present) = &self.recorder {
-                    self.log_watch.take(&found, present, now);
-                }
-            }
-            Outcome::NextLog(next) => self.change_log(next, model, wire),
         }
     }
 
@@ -340,11 +334,8 @@ impl Station {
         });
         let health = (health != model.log).then_some(Msg::Log(health));
         let book = self.sign_book(false);
-        let written = self.report.as_ref().and_then(|report| report.try_recv().ok());
-        if written.is_some() {
-            self.report = None;
-        }
-        let written = written.map(Msg::Report);
+        let written = self.report.as_ref().and_then(|report| report.try_recv().ok()).map(Msg::Report);
+        self.report.take_if(|_| written.is_some());
         health.into_iter().chain(book).chain(written).chain([Msg::Tick]).collect()
     }
 

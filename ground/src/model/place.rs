@@ -3,6 +3,7 @@
 
 use std::time::Duration;
 
+use protocol::dialect::ESTIMATOR_STATUS_DATA;
 pub use protocol::motion::Degrees;
 use serde::{Deserialize, Serialize};
 
@@ -10,6 +11,10 @@ use super::{Model, Sample, dead_reckoning::predict_position};
 
 /// The error of a place where the vehicle was heard, m: usual for a satellite receiver.
 const HEARD_ERROR_M: f64 = 1.5;
+
+/// Radius around a position that holds it in 19 of 20 cases, in standard deviations of each axis:
+/// sqrt(-2 ln 0.05).
+const WITHIN_95: f64 = 2.45;
 
 /// A place over the ground, from the pad, and how wrong it may be.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
@@ -81,7 +86,7 @@ impl Model {
         let motion = self.vehicle.best_motion().filter(|motion| motion.received_at >= left_at);
         let (heard, height_m, at) = match (motion, self.vehicle.verdict()) {
             (Some(Sample { value, received_at }), _) => {
-                let spot = Spot { north_m: value.x_m, east_m: value.y_m, error_m: HEARD_ERROR_M };
+                let spot = Spot { north_m: value.x_m, east_m: value.y_m, error_m: self.heard_error_m() };
                 (spot, value.altitude_m, received_at)
             }
             // A verdict tells the distance from the pad, and no direction.
@@ -104,6 +109,13 @@ impl Model {
             predicted,
             pad: self.vehicle.pad,
         })
+    }
+
+    /// Error of the position that the vehicle reports, m: its own accuracy, if that is worse than
+    /// usual.
+    fn heard_error_m(&self) -> f64 {
+        let sigma_m = |status: Sample<ESTIMATOR_STATUS_DATA>| f64::from(status.value.pos_horiz_accuracy);
+        self.vehicle.last().map_or(0.0, |status| WITHIN_95 * sigma_m(status)).max(HEARD_ERROR_M)
     }
 
     /// Where a vehicle that left the pad unheard is meant to come down: at the touchdown that it

@@ -171,7 +171,9 @@ impl Theme {
     pub fn of_environment(variable: impl Fn(&str) -> Option<String>) -> Self {
         let set = |name: &str| variable(name).filter(|value| !value.is_empty());
         let term = set("TERM").unwrap_or_default();
-        let has_colours = term.contains("256color") || set("COLORTERM").is_some();
+        // Over SSH COLORTERM is not passed on; these terminals are known to have colours.
+        let known = ["256color", "kitty", "foot", "alacritty", "ghostty", "wezterm"];
+        let has_colours = known.iter().any(|name| term.contains(name)) || set("COLORTERM").is_some();
         let palette = if set("NO_COLOR").is_some() || !has_colours {
             Palette::None
         } else if set("COLORFGBG").is_some_and(|colours| colours.ends_with(";15")) {
@@ -336,6 +338,8 @@ mod theme_tests {
             (vec![("TERM", "xterm-256color"), ("LANG", "C.UTF-8")], Palette::Dark, false),
             (vec![("TERM", "tmux"), ("LC_ALL", "de_DE.utf8"), ("LANG", "C")], Palette::None, false),
             (vec![("TERM", "tmux"), ("COLORTERM", "truecolor")], Palette::Dark, true),
+            (vec![("TERM", "xterm-kitty"), ("LANG", "C.UTF-8")], Palette::Dark, false),
+            (vec![("TERM", "alacritty")], Palette::Dark, true),
             (vec![("TERM", "xterm-256color"), ("LANG", "en_US.UTF-8"), ("LC_ALL", "C")], Palette::Dark, true),
             (vec![], Palette::None, true),
             (vec![("NO_COLOR", "1"), ("TERM", "xterm-256color")], Palette::None, true),

@@ -51,6 +51,8 @@ pub(super) async fn connect(address: &str, queues: Queues) -> io::Result<()> {
     // The socket stays unconnected: otherwise an ICMP "port unreachable", from a ground that starts
     // later, would end the link.
     let socket = UdpSocket::bind(any).await?;
+    // The address may be that of a whole network.
+    socket.set_broadcast(true)?;
     if queues.inbox.send(Received::Up(peer.to_string())).await.is_ok() {
         tokio::spawn(run(socket, Peers::only(peer), queues));
     }
