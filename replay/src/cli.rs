@@ -73,7 +73,7 @@ pub(crate) fn give_each<A: Answer>(
             Ok(found) => all.extend(found),
             Err(error) if files.len() == 1 => return Err(error),
             Err(error) => {
-                say_anyway(&format!("{error:#}"));
+                print_error(&format!("{error:#}"));
                 outcome = Exit::NotSeen;
             }
         }
@@ -135,12 +135,12 @@ fn harmless(text: &[u8]) -> String {
 /// Says on standard error what is no error, unless --quiet is given.
 pub(crate) fn say(text: &str) {
     if !is_quiet() {
-        say_anyway(text);
+        print_error(text);
     }
 }
 
 /// Writes a line to standard error; a closed standard error is ignored.
-pub fn say_anyway(text: &str) {
+pub fn print_error(text: &str) {
     let _ = writeln!(io::stderr(), "replay: {}", harmless(text.as_bytes()));
 }
 

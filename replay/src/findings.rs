@@ -115,12 +115,18 @@ pub(crate) fn facts(
         findings => findings?,
     };
     let mut facts = on_the_pad(recording);
-    facts.extend(findings.found().iter().map(|finding| Finding {
-        since_s: finding.since_s,
-        clock: Clock::Flight,
-        lasted_s: finding.held_s,
-        words: finding.words(),
-        picture: picture(finding.sign),
+    let found = findings.found();
+    // A computer that was away measures a late ignition and a weak motor, of any motor.
+    let was_away = found.iter().any(|finding| finding.sign == Sign::Restart);
+    let of_motor = |sign: Sign| matches!(sign, Sign::LateLight | Sign::Impulse | Sign::BurntOutEarly);
+    facts.extend(found.iter().filter(|finding| !(was_away && of_motor(finding.sign))).map(|finding| {
+        Finding {
+            since_s: finding.since_s,
+            clock: Clock::Flight,
+            lasted_s: finding.held_s,
+            words: finding.words(),
+            picture: picture(finding.sign),
+        }
     }));
     if let Some(words) = verdict.and_then(|verdict| broken(verdict, &findings, facts.is_empty())) {
         let since_s = recording.contact_s().unwrap_or(f64::NAN);

@@ -11,7 +11,7 @@ fn main() -> ExitCode {
     let answered = read.map_or_else(|message| Ok(Exit::unread(&message)), Cli::run);
     answered
         .unwrap_or_else(|error| {
-            cli::say_anyway(&format!("{error:#}"));
+            cli::print_error(&format!("{error:#}"));
             Exit::Error
         })
         .into()

@@ -1,10 +1,10 @@
 //! Along the nose: drag of body and fins, thrust, burn time, shape of the curve, ignition, and what
 //! the exhaust takes away of the drag.
 //!
-//! The accelerometer feels `f = (T + d_b B + d_f F) / m + bias`, with the air force on the body `B`
+//! The accelerometer measures `f = (T + d_b B + d_f F) / m + bias`, with the air force on the body `B`
 //! and on the fins `F` as the airframe's data have them at the estimated speed, and the mass `m` of
 //! the data. While the vehicle falls there is no `T`, and the fins' changing openings tell `F` from
-//! `B`; then `d_b` and `d_f` are known when the motor is lit. All is fitted at once, over the fall
+//! `B`; then `d_b` and `d_f` are known when the motor is ignited. All is fitted at once, over the fall
 //! and the burn.
 //!
 //! The accelerometer cannot tell a stronger motor from a lighter vehicle: every scale is per mass
@@ -63,7 +63,7 @@ const RISE: usize = FIN_LOSS + 1;
 #[derive(Debug, Clone, Copy)]
 struct Sample {
     end_s: f64,
-    felt_m_s2: f64,
+    measured_m_s2: f64,
     /// Air force along the nose on body and fins by the airframe's data, N.
     body_n: f64,
     fins_n: f64,
@@ -131,7 +131,7 @@ fn burn_of<'a>(trace: &'a Trace, values: &[f64]) -> Burn<'a> {
 }
 
 /// The frames of the fall and the burn: from the first fast one after apogee until the contact. A
-/// vehicle that is dropped and lit soon counts from a lower speed on.
+/// vehicle that is dropped and ignited soon counts from a lower speed on.
 pub(super) fn falling(trace: &Trace) -> &[Frame] {
     let from = |speed_m_s: f64| -> &[Frame] {
         let falls = |frame: &Frame| {
@@ -191,7 +191,7 @@ fn samples(
         let in_updraught = |m_s: f64| vehicle.air_force_n(&(through_air - up * m_s), &rate).x;
         Sample {
             end_s: frame.time_s,
-            felt_m_s2: frame.measured.imu.specific_force_m_s2.x,
+            measured_m_s2: frame.measured.imu.specific_force_m_s2.x,
             body_n: body.air_force_n(&through_air, &rate).x,
             fins_n: fins.air_force_n(&through_air, &rate).x,
             by_updraught: 0.5 * (in_updraught(1.0) - in_updraught(-1.0)),
@@ -262,7 +262,7 @@ impl<'a> Series<'a> {
         if fallen < FEWEST_FRAMES {
             return Err("the flight has less than half a second of free fall");
         }
-        let felt = |samples: &[Sample]| samples.iter().map(|sample| sample.felt_m_s2).collect::<Vec<_>>();
+        let felt = |samples: &[Sample]| samples.iter().map(|sample| sample.measured_m_s2).collect::<Vec<_>>();
         let quiet =
             white_variance(&felt(&samples[..fallen])).ok_or("the accelerometer's samples do not change")?;
         let shaken = white_variance(&felt(&samples[fallen..])).unwrap_or(quiet).max(quiet);
@@ -292,7 +292,7 @@ impl<'a> Series<'a> {
     fn missed_in_fall(&self, values: &[f64]) -> Vec<f64> {
         let missed = self.fall().iter().map(|sample| {
             let air_n = values[BODY] * sample.body_n + values[FINS] * sample.fins_n;
-            sample.felt_m_s2 - values[BIAS] - air_n / self.loaded_kg
+            sample.measured_m_s2 - values[BIAS] - air_n / self.loaded_kg
         });
         missed.collect()
     }
@@ -315,7 +315,7 @@ impl<'a> Series<'a> {
             let jet = if thrust_n > 0.0 { burning } else { 0.0 };
             let [body, fins] = [BODY_LOSS, FIN_LOSS].map(|place| 1.0 - jet * values[place]);
             let air_n = values[BODY] * body * sample.body_n + values[FINS] * fins * sample.fins_n;
-            sample.felt_m_s2 - values[BIAS] - (thrust_n * sample.thrust_along + air_n) / mass_kg
+            sample.measured_m_s2 - values[BIAS] - (thrust_n * sample.thrust_along + air_n) / mass_kg
         });
         missed.collect()
     }
@@ -334,7 +334,7 @@ impl<'a> Series<'a> {
         libm::exp(lowest(libm::log(0.02), libm::log(4.0), 14, surprise))
     }
 
-    /// Fits the fall and the burn together; an error is the reason why the burn tells nothing.
+    /// Fits the fall and the burn together; an error is the reason why the burn determines nothing.
     fn burn(
         &self,
         commanded_s: f64,
@@ -349,7 +349,7 @@ impl<'a> Series<'a> {
         // after a club's own burn.
         let rms = if mission.motor.shape_sigma > 0.0 { mission.motor.shape_sigma } else { 0.02 };
         priors.extend(shape_sigmas(rms).map(|sigma| Prior { mean: 0.0, sigma }));
-        // Nobody has data for a jet against the wind, and what a mission flies by is chosen to be
+        // No data exist for a jet against the wind, and what a mission flies by is chosen to be
         // safe: the body may lose anything between nothing and all, and the fins, which sit outside
         // the jet, between -2 and 12 %.
         priors.push(Prior { mean: 0.5, sigma: 0.3 });
@@ -375,7 +375,7 @@ impl<'a> Series<'a> {
         Ok((solution, seen_s))
     }
 
-    /// Whether the model's thrust is the one that was felt; an error says where it is not.
+    /// Whether the model's thrust is the one that was measured; an error says where it is not.
     fn is_of_the_curve(&self, values: &[f64]) -> Result<(), String> {
         /// A chuff, a motor that goes out, a nozzle that is lost: the thrust is off by a tenth of
         /// the curve's highest for a tenth of a second. Shape, gusts and vibration together reach a
@@ -454,15 +454,15 @@ const WIDE: Prior = Prior { mean: 1.0, sigma: 0.5 };
 const NOT_SOLVED: &str = "the model of drag and thrust does not fit the samples";
 
 /// When the thrust is first seen, s: the samples rise by a tenth of the curve's highest thrust over
-/// what was felt when the igniter was fired, for three frames. `None` if they do not, or if the
+/// what was measured when the igniter was fired, for three frames. `None` if they do not, or if the
 /// burn is not seen for half a second.
 fn thrust_seen_s(samples: &[Sample], commanded_s: f64, mass_kg: f64, mission: &Mission) -> Option<f64> {
     const SEEN_FRAMES: usize = 100;
     let rise_m_s2 = 0.1 * mission.motor_curve.peak_thrust_n() / mass_kg;
-    let before = samples.first()?.felt_m_s2;
+    let before = samples.first()?.measured_m_s2;
     let first = samples
         .windows(3)
-        .position(|three| three.iter().all(|sample| sample.felt_m_s2 > before + rise_m_s2))?;
+        .position(|three| three.iter().all(|sample| sample.measured_m_s2 > before + rise_m_s2))?;
     let seen = samples.len() - first >= SEEN_FRAMES;
     seen.then(|| (samples[first].end_s - FRAME_S).max(commanded_s))
 }

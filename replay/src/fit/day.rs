@@ -559,7 +559,7 @@ impl Answer for Learnt {
     }
 }
 
-/// What is asked of the next day.
+/// Request for the next day.
 #[derive(Debug, Args)]
 #[group(id = "learnt")]
 pub(super) struct Arguments {
@@ -595,7 +595,7 @@ pub(super) struct Arguments {
 }
 
 impl Arguments {
-    pub(super) fn is_asked(&self) -> bool {
+    pub(super) fn is_requested(&self) -> bool {
         self.day.is_some() || self.flights.is_some()
     }
 

@@ -48,7 +48,7 @@ use self::calibration::{Calibration, Table};
 use self::day::Learnt;
 use self::least_squares::Solution;
 pub use self::trace::{Frame, Trace};
-use crate::cli::{Answer, give, say, say_anyway, text_of, warn_of_loss};
+use crate::cli::{Answer, give, print_error, say, text_of, warn_of_loss};
 use crate::info::utc;
 use crate::log::Recording;
 use crate::output::NewFile;
@@ -128,7 +128,7 @@ impl Basis {
     }
 }
 
-/// What one flight tells.
+/// Parameters of one flight.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Fit {
     /// The log.
@@ -244,7 +244,7 @@ impl Fit {
 /// A parameter: its place in a solution, which is in SI, its name, and its unit.
 type Row = (usize, &'static str, &'static str);
 
-/// Fits everything that a flight tells.
+/// Fits every parameter that a flight determines.
 pub fn fit(trace: &Trace) -> Fit {
     let fit = uncalibrated(trace);
     match Table::built_in() {
@@ -483,7 +483,7 @@ pub struct FitReport {
     pub fits: Vec<Fit>,
     /// Parameters of at least two of them.
     pub together: Vec<Pooled>,
-    /// What they tell of the next day, if that was asked.
+    /// Prediction of the next day, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub day: Option<Learnt>,
 }
@@ -600,11 +600,11 @@ impl Args {
         for file in &self.files {
             match self.one(file, &mut flown) {
                 Ok(found) => fits.extend(found),
-                Err(error) if self.files.len() == 1 || self.day.is_asked() => return Err(error),
+                Err(error) if self.files.len() == 1 || self.day.is_requested() => return Err(error),
                 // One unreadable log must not hide the others.
                 Err(error) => {
                     refused = true;
-                    say_anyway(&format!("{error:#}"));
+                    print_error(&format!("{error:#}"));
                 }
             }
         }
@@ -612,7 +612,7 @@ impl Args {
         for fit in &fits {
             warn_of_loss(&fit.source, fit.damage.as_deref(), None);
         }
-        let day = self.day.is_asked().then(|| self.day.learn(&fits, flown)).transpose()?;
+        let day = self.day.is_requested().then(|| self.day.learn(&fits, flown)).transpose()?;
         let report = FitReport { together: pooled(&fits), fits, day };
         let outcome = give(&report, self.json)?;
         Ok(if refused { Exit::NotSeen } else { outcome })

@@ -59,9 +59,9 @@ pub(super) fn play_rad(Solution { values, covariance, .. }: &Solution) -> (f64, 
 
 /// A frame of the burn.
 struct Sample {
-    felt_rad_s: [f64; 2],
+    measured_rad_s: [f64; 2],
     /// Angular acceleration about body y and z that the gimbal does not cause, rad/s^2.
-    known_rad_s2: [f64; 2],
+    other_rad_s2: [f64; 2],
     /// Angular acceleration of a unit sine of the gimbal's angle, rad/s^2.
     by_gimbal_rad_s2: f64,
     /// Rate by which the body turns back for each rad/s of the gimbal.
@@ -110,7 +110,7 @@ pub(super) fn fit_turning(trace: &Trace, along: &Along) -> Result<Solution, Stri
         rests_rad: frames[settles - 1].gimbal_reported_rad,
         limit_rad: gimbal.limit_rad(),
     };
-    let felt = |axis: usize| samples.iter().map(|sample| sample.felt_rad_s[axis]).collect::<Vec<_>>();
+    let felt = |axis: usize| samples.iter().map(|sample| sample.measured_rad_s[axis]).collect::<Vec<_>>();
     let white = [0, 1].map(|axis| white_variance(&felt(axis)).unwrap_or(1e-6));
     let white = 0.5 * (white[0] + white[1]);
     let mut values: Vec<f64> = priors.iter().map(|prior| prior.mean).collect();
@@ -247,14 +247,14 @@ impl Model<'_> {
                     } else {
                         0.0
                     };
-                    let by_rad_s = (turn + sample.known_rad_s2[axis]) * part_s;
+                    let by_rad_s = (turn + sample.other_rad_s2[axis]) * part_s;
                     rate_rad_s += by_rad_s;
                     // As the simulated unit, which adds up the rates at the end of each
                     // millisecond.
                     let turned_back_rad_s = sample.turned_back * (nozzle_rad - before_rad) / part_s;
                     mean_rad_s += (rate_rad_s - turned_back_rad_s) / PARTS as f64;
                 }
-                sample.felt_rad_s[axis] - mean_rad_s
+                sample.measured_rad_s[axis] - mean_rad_s
             });
             missed.collect()
         })
@@ -315,8 +315,8 @@ fn samples(trace: &Trace, along: &Along, first: usize, begins_s: f64) -> Vec<Sam
         let damping = thrust_n * flow_kg_n_s * (exit_m * exit_m + mass.pitch_inertia_slope_m2) / inertia;
         let coupling = (inertia - mass.roll_inertia_kg_m2) / inertia * rate.x;
         Sample {
-            felt_rad_s: [frame.measured.imu.gyro_rad_s.y, frame.measured.imu.gyro_rad_s.z],
-            known_rad_s2: [
+            measured_rad_s: [frame.measured.imu.gyro_rad_s.y, frame.measured.imu.gyro_rad_s.z],
+            other_rad_s2: [
                 air.y / inertia + coupling * rate.z - damping * rate.y,
                 air.z / inertia - coupling * rate.y - damping * rate.z,
             ],

@@ -203,7 +203,7 @@ impl Grade {
 }
 
 /// Limit on the phase changes kept; a flight has about ten.
-const SPANS_KEPT: usize = 200;
+const SPANS_MAX: usize = 200;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -257,7 +257,7 @@ impl PhaseTracker {
     pub(super) fn note(&mut self, time_s: f64, phase: u32) {
         if self.current != Some(phase) {
             self.current = Some(phase);
-            if self.spans.len() < SPANS_KEPT {
+            if self.spans.len() < SPANS_MAX {
                 self.spans.push(PhaseSpan { phase: phase_name(phase), from_s: time_s, until_s: time_s });
             } else {
                 self.further_changes += 1;
@@ -341,7 +341,7 @@ impl EndingTracker {
 }
 
 /// Limit on the times kept for the percentiles: 8 MB, more than a day of flight at 10 Hz.
-const TIMES_KEPT: usize = 1_000_000;
+const TIMES_MAX: usize = 1_000_000;
 
 /// Newton iterations of the plans of a flight.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -386,7 +386,7 @@ pub(super) struct LatencyCounter {
 
 impl LatencyCounter {
     pub(super) fn count(&mut self, time_s: f64, deadline_s: f64) {
-        if self.times_s.len() < TIMES_KEPT {
+        if self.times_s.len() < TIMES_MAX {
             self.times_s.push(time_s);
         }
         let PlanningLatency { count, deadline_s: least_s, over_deadline, .. } =
@@ -436,7 +436,7 @@ mod tests {
         let mut tracker = PhaseTracker::default();
         (0..10_000_u32).for_each(|n| tracker.note(f64::from(n), n % 2));
         let timeline = tracker.into_timeline(PhaseSource::Vehicle).unwrap();
-        assert_eq!(timeline.spans.len(), SPANS_KEPT);
-        assert_eq!(timeline.further_changes, 10_000 - SPANS_KEPT as u64);
+        assert_eq!(timeline.spans.len(), SPANS_MAX);
+        assert_eq!(timeline.further_changes, 10_000 - SPANS_MAX as u64);
     }
 }

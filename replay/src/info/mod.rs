@@ -207,7 +207,7 @@ pub struct Info {
     pub phases: Vec<PhaseTimeline>,
     /// The landing verdict.
     pub verdict: Option<Verdict>,
-    /// Greatest height that was estimated or heard, m.
+    /// Greatest height that was estimated or received, m.
     pub highest_m: Option<f64>,
     /// How the flight ended, in one sentence, if the log says so.
     pub ending: Option<String>,

@@ -42,7 +42,7 @@ pub struct Clocks {
     /// The release as the vehicle told it over the air, s since its power-up: what T+0 follows from
     /// where no frames are.
     #[serde(skip)]
-    heard_release_s: Option<f64>,
+    received_release_s: Option<f64>,
 }
 
 /// A jump of a clock.
@@ -137,7 +137,7 @@ impl Clocks {
             Entry::Telemetry(telemetry) => {
                 self.telemetry_zero_s.get_or_insert(since_s - telemetry.time_s);
             }
-            Entry::RawFrame if self.flight_zero_s.is_none() || self.heard_release_s.is_some() => {
+            Entry::RawFrame if self.flight_zero_s.is_none() || self.received_release_s.is_some() => {
                 if let Some(boot_s) = message.and_then(boot_time_s) {
                     let [last_boot_s, last_s] = self.last_boot_s.unwrap_or([boot_s, since_s]);
                     let by_s = (since_s - last_s) - (boot_s - last_boot_s);
@@ -152,8 +152,8 @@ impl Clocks {
                     let zero_s = self.boot_zero_s.map_or(zero_s, |known| known.min(zero_s));
                     self.boot_zero_s = Some(zero_s);
                     // Later ones stand still after the touchdown.
-                    self.heard_release_s = self.heard_release_s.or_else(|| release_s(message?));
-                    self.flight_zero_s = self.heard_release_s.map(|release_s| zero_s + release_s);
+                    self.received_release_s = self.received_release_s.or_else(|| release_s(message?));
+                    self.flight_zero_s = self.received_release_s.map(|release_s| zero_s + release_s);
                 }
             }
             _ => {}

@@ -27,7 +27,7 @@ pub use record::{Entry, LoggedFrame, StampedEntry};
 pub(crate) use record::{RECORD_MAX_BYTES, frame_descriptor, misread_frame};
 pub use recording::{Recording, RecordingError};
 pub(crate) use verdict::frame_of;
-use verdict::{Found, Verdicts, contradiction, heard_message};
+use verdict::{Found, Verdicts, contradiction, received_message};
 pub use verdict::{Verdict, share, worst_first};
 
 /// First bytes of every MCAP file.
@@ -226,7 +226,7 @@ impl<R: Read> FlightLog<R> {
         self.clocks
     }
 
-    /// Its landing verdict, recorded or heard, as far as it was read.
+    /// Its landing verdict, recorded or received, as far as it was read.
     pub(crate) fn verdict(&self) -> Option<Found> {
         self.verdicts.found()
     }
@@ -280,7 +280,7 @@ impl<R: Read> FlightLog<R> {
                     let lost_before = self.sequences.note(channel_id, sequence);
                     let stamped =
                         StampedEntry { channel_id, log_time_ns, sequence, lost_before, data, entry };
-                    let message = heard_message(self.reader.channel(channel_id), &stamped);
+                    let message = received_message(self.reader.channel(channel_id), &stamped);
                     self.flights.note(&stamped);
                     self.clocks.note(&stamped, message.as_ref(), self.since_first_s(log_time_ns));
                     self.verdicts.note(&stamped, message.as_ref());

@@ -119,10 +119,10 @@ pub struct Recording {
     pub telemetry: Vec<v1::Telemetry>,
     /// Events, with log time in seconds after the first record.
     pub events: Vec<(f64, EventRecord)>,
-    /// The landing verdict, recorded or heard.
+    /// The landing verdict, recorded or received.
     pub verdict: Option<v1::LandingVerdict>,
-    /// A ground station heard the verdict: its time counts from power-up.
-    pub verdict_heard: bool,
+    /// A ground station received the verdict: its time counts from power-up.
+    pub verdict_received: bool,
     /// How the clocks of the log differ.
     pub clocks: Clocks,
     /// When the log ends, ns of Unix time.
@@ -224,7 +224,7 @@ impl Recording {
         recording.cut = log.flights().cut();
         recording.clocks = log.clocks();
         if let Some(found) = log.verdict() {
-            recording.verdict_heard = found.heard;
+            recording.verdict_received = found.heard;
             recording.verdict = Some(found.verdict);
         }
         recording.head = log.head().clone();
@@ -247,7 +247,7 @@ impl Recording {
     /// Time of contact on the clock of its frames, or of its telemetry, s.
     pub fn contact_s(&self) -> Option<f64> {
         let contact_s = self.verdict.as_ref()?.time_s;
-        if !self.verdict_heard {
+        if !self.verdict_received {
             return Some(contact_s);
         }
         let Clocks { boot_zero_s, telemetry_zero_s, .. } = self.clocks;

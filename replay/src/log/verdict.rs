@@ -1,4 +1,4 @@
-//! The landing verdict of a log: recorded by the vehicle, or heard by a ground station.
+//! The landing verdict of a log: recorded by the vehicle, or received by a ground station.
 
 use flight::rules::verdict::{
     FlightEnding, Landing, LandingVerdict, Limits, Touchdown, UNDER_PARACHUTE, share_of_limit,
@@ -17,9 +17,9 @@ use serde::Serialize;
 use super::{Clock, ClockTime, Entry, StampedEntry};
 
 /// A value of the verdict whose limit no message has given.
-const NOT_TOLD: f64 = f64::NAN;
+const UNREPORTED: f64 = f64::NAN;
 
-/// The landing verdict, as recorded or heard.
+/// The landing verdict, as recorded or received.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Verdict {
     pub landing: Landing,
@@ -27,14 +27,14 @@ pub struct Verdict {
     pub ending: String,
     /// Time of contact, s.
     pub time_s: f64,
-    /// What the time counts from: T+0, or power-up if a ground station heard the verdict.
+    /// What the time counts from: T+0, or power-up if a ground station received the verdict.
     pub clock: Clock,
     /// At contact, by the design envelope of the legs.
     pub envelope: Vec<LimitResult>,
-    /// What legs that can give way have borne, and what else went wrong; a ground station hears
+    /// What legs that can give way have borne, and what else went wrong; a ground station receives
     /// nothing of it.
     pub borne: Vec<LimitResult>,
-    /// At contact, by the landing paper's Table 2; a ground station hears no limits of it.
+    /// At contact, by the landing paper's Table 2; a ground station receives no limits of it.
     pub table_2: Vec<LimitResult>,
 }
 
@@ -104,12 +104,12 @@ pub(crate) struct Verdicts {
 /// A verdict of a log.
 pub(crate) struct Found {
     pub(crate) verdict: v1::LandingVerdict,
-    /// Its time counts from power-up, because it was heard by a ground station.
+    /// Its time counts from power-up, because it was received by a ground station.
     pub(crate) heard: bool,
 }
 
 impl Verdicts {
-    /// Notes a record, and the message of the vehicle in it ([`heard_message`]).
+    /// Notes a record, and the message of the vehicle in it ([`received_message`]).
     pub(crate) fn note(&mut self, stamped: &StampedEntry, message: Option<&MavMessage>) {
         match &stamped.entry {
             Entry::Verdict(verdict) => self.recorded = Some((**verdict).clone()),
@@ -133,17 +133,17 @@ impl Verdicts {
         }
     }
 
-    /// The vehicle's own verdict; without its frames, the one that was heard.
+    /// The vehicle's own verdict; without its frames, the one that was received.
     pub(crate) fn found(&self) -> Option<Found> {
         let heard = self.heard().filter(|_| !self.has_frames).map(|verdict| Found { verdict, heard: true });
         heard.or_else(|| Some(Found { verdict: self.recorded.clone()?, heard: false }))
     }
 
-    /// The verdict that was heard, as a record; its time counts from power-up.
+    /// The verdict that was received, as a record; its time counts from power-up.
     fn heard(&self) -> Option<v1::LandingVerdict> {
         let verdict = self.heard.as_ref()?;
         let told = |limit: fn(&TD_TOUCHDOWN_LIMITS_DATA) -> f32| {
-            self.limits.as_ref().map_or(NOT_TOLD, |limits| f64::from(limit(limits)))
+            self.limits.as_ref().map_or(UNREPORTED, |limits| f64::from(limit(limits)))
         };
         let limits = Limits {
             distance_m: f64::INFINITY,
@@ -221,13 +221,13 @@ pub(super) fn contradiction(verdict: &v1::LandingVerdict) -> Option<String> {
 
 /// The message of a raw frame that a ground station has received, decoded once for everybody who
 /// wants it.
-pub(crate) fn heard_message(channel: Option<&LogChannel>, stamped: &StampedEntry) -> Option<MavMessage> {
-    let heard = stamped.entry == Entry::RawFrame && heard_by_ground(channel);
+pub(crate) fn received_message(channel: Option<&LogChannel>, stamped: &StampedEntry) -> Option<MavMessage> {
+    let heard = stamped.entry == Entry::RawFrame && received_by_ground(channel);
     if heard { frame_of(&stamped.data)?.decode().ok() } else { None }
 }
 
 /// Whether a ground station received the frames of a channel.
-fn heard_by_ground(channel: Option<&LogChannel>) -> bool {
+fn received_by_ground(channel: Option<&LogChannel>) -> bool {
     channel.is_some_and(|channel| {
         channel.topic == TOPIC_RAW_RX
             && channel.metadata.get("endpoint").is_some_and(|endpoint| endpoint == "ground")

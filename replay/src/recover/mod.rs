@@ -80,7 +80,7 @@ pub struct Recovery {
     /// Some message comes later than one that belongs behind it.
     pub out_of_order: bool,
     /// The summary is there and its checksum is right; no message is lost without it.
-    pub summary_is_whole: bool,
+    pub summary_is_intact: bool,
     /// Whether the log has its end mark, so nothing is missing at the end.
     pub ended: bool,
 }
@@ -127,7 +127,7 @@ impl Recovery {
         if self.out_of_order {
             faults.push("it is not in order of time (`mcap sort` sorts it)".to_owned());
         }
-        if self.ended && !self.summary_is_whole {
+        if self.ended && !self.summary_is_intact {
             faults.push("its summary is damaged, and no message with it".to_owned());
         }
         if !self.ended {
@@ -171,7 +171,7 @@ pub fn recover(input: &Path, output: &Path) -> Result<Recovery, RecoverError> {
         undecodable: kept.undecodable,
         beside_chunks: kept.beside_chunks,
         out_of_order: kept.out_of_order,
-        summary_is_whole: contents.summary.is_whole,
+        summary_is_intact: contents.summary.is_whole,
         ended: contents.ended,
     };
     recovery.output = rescue.finish(&recovery.about())?;

@@ -311,7 +311,7 @@ impl Records {
 }
 
 impl Contents {
-    /// Returns whether a readable record is recovered; indexes are written anew.
+    /// Returns whether a readable record is recovered; indexes are written again.
     fn check(&mut self, opcode: u8, body: &[u8]) -> Result<bool, RecordError> {
         match opcode {
             op::CHUNK => records_of_chunk(body, |_| Ok(())).map(|()| true),

@@ -126,7 +126,7 @@ pub struct ReflyReport {
     pub commands_identical: usize,
     /// Something was to be changed, and every output from the start on is the recorded one.
     pub never_acted: bool,
-    /// What the changes do to other flights, if that was asked.
+    /// What the changes do to other flights, if requested.
     pub others: Option<OtherFlights>,
 }
 
@@ -242,13 +242,13 @@ fn is_same_flight(now: &ComputerFrame, then: &ComputerFrame, same_memory: bool) 
     let compared = |frame: &ComputerFrame| {
         let output = ComputerOutput { answers: Vec::new(), released: false, ..frame.output.clone() };
         let state_digest = if same_memory { frame.state_digest } else { 0 };
-        ComputerFrame { input: felt(&frame.input), output, state_digest }.encode_to_vec()
+        ComputerFrame { input: sensed(&frame.input), output, state_digest }.encode_to_vec()
     };
     compared(now) == compared(then)
 }
 
 /// What of an input the world makes the computer feel, and not its crew, its pad or its log's disk.
-pub(crate) fn felt(input: &ComputerInput) -> ComputerInput {
+pub(crate) fn sensed(input: &ComputerInput) -> ComputerInput {
     ComputerInput {
         measured: input.measured,
         gimbal_rad: input.gimbal_rad.clone(),

@@ -51,7 +51,7 @@ pub(super) struct Sample {
 }
 
 /// What the flight computer, run again, makes of a planning frame.
-pub(super) struct Thought {
+pub(super) struct Decision {
     pub(super) time_s: f64,
     pub(super) phase: Option<Phase>,
     pub(super) estimate: Option<Estimate>,
@@ -82,7 +82,7 @@ pub(super) struct Flight {
     /// station.
     pub(super) pilot: Option<Pilot>,
     /// At the planning frames.
-    pub(super) thoughts: Vec<Thought>,
+    pub(super) decisions: Vec<Decision>,
     /// Where the track comes from, in a sentence; `None` if there is none.
     pub(super) source: Option<&'static str>,
     pub(super) track: Vec<Sample>,
@@ -104,24 +104,24 @@ impl Flight {
     /// computer decides again as it did. Without mission, start or frames the sections report what
     /// is missing.
     pub(super) fn of(recording: Recording, info: &mut Info) -> Self {
-        let mut thoughts = Vec::new();
+        let mut decisions = Vec::new();
         let again = findings::run_again(&recording, |computer, recorded, frame| {
             let pilot = computer.pilot();
             if recorded.input.frame.is_multiple_of(FRAMES_PER_PLAN) || frame.output.planned {
-                thoughts.push(Thought::of(pilot, frame));
+                decisions.push(Decision::of(pilot, frame));
             }
         });
         // A part of the flight says nothing of the rest.
-        thoughts.retain(|_| again.is_ok());
+        decisions.retain(|_| again.is_ok());
         let pilot = again.as_ref().ok().map(|(computer, _)| computer.pilot().clone());
         let found = again.and_then(|(_, findings)| findings);
         info.set_findings(findings::facts(&recording, info.verdict.as_ref(), found));
-        let (source, track) = track(&recording, &thoughts);
+        let (source, track) = track(&recording, &decisions);
         let burning = |sample: &&Sample| sample.phase.is_some_and(Phase::in_landing_burn);
         let ignited = pilot.as_ref().and_then(Pilot::ignited_at_s);
         let clocks = &recording.clocks;
         let heard_zero_s = || Some(clocks.flight_zero_s? - clocks.telemetry_zero_s?);
-        let zero_s = if source == Some(HEARD) { heard_zero_s() } else { Some(0.0) };
+        let zero_s = if source == Some(RECEIVED) { heard_zero_s() } else { Some(0.0) };
         let found = || info.findings.iter().flatten();
         Self {
             ignition_s: ignited.or_else(|| track.iter().find(burning).map(|sample| sample.time_s)),
@@ -132,7 +132,7 @@ impl Flight {
             spans: spans(info, zero_s.unwrap_or(0.0)),
             recording,
             pilot,
-            thoughts,
+            decisions,
             source,
             track,
         }
@@ -164,7 +164,7 @@ impl Flight {
     }
 
     /// Whether the landing motor gave thrust.
-    pub(super) fn is_lit(&self) -> bool {
+    pub(super) fn is_ignited(&self) -> bool {
         self.track.iter().any(|sample| sample.phase == Some(Phase::Powered))
     }
 
@@ -195,9 +195,9 @@ impl Flight {
     }
 
     /// A value of the planning frames.
-    pub(super) fn thought(&self, value: impl Fn(&Thought) -> Option<f64>) -> Series {
-        let thoughts = self.thoughts.iter();
-        thoughts.filter_map(|thought| Some((self.axis_s(thought.time_s), value(thought)?))).collect()
+    pub(super) fn decision(&self, value: impl Fn(&Decision) -> Option<f64>) -> Series {
+        let decisions = self.decisions.iter();
+        decisions.filter_map(|decision| Some((self.axis_s(decision.time_s), value(decision)?))).collect()
     }
 
     /// A value that a ground station knew.
@@ -227,12 +227,12 @@ impl Flight {
     }
 
     /// The plans, with the frames that made them.
-    pub(super) fn made(&self) -> Vec<(&Thought, &Plan)> {
-        self.thoughts.iter().filter_map(|thought| Some((thought, thought.plan.as_ref()?))).collect()
+    pub(super) fn made(&self) -> Vec<(&Decision, &Plan)> {
+        self.decisions.iter().filter_map(|decision| Some((decision, decision.plan.as_ref()?))).collect()
     }
 }
 
-impl Thought {
+impl Decision {
     fn of(pilot: &Pilot, frame: &ComputerFrame) -> Self {
         let (time_s, level) = (frame.input.time_s, frame.output.level);
         let estimate = pilot.estimate().copied();
@@ -267,11 +267,11 @@ fn spans(info: &Info, zero_s: f64) -> Vec<Span> {
     spans.iter().enumerate().map(span).collect()
 }
 
-/// What a ground station heard.
-const HEARD: &str = "From the telemetry of a ground station; the log has no frames.";
+/// Values received by a ground station.
+const RECEIVED: &str = "From the telemetry of a ground station; the log has no frames.";
 
 /// The track of the best source, and which that is.
-fn track(recording: &Recording, thoughts: &[Thought]) -> (Option<&'static str>, Vec<Sample>) {
+fn track(recording: &Recording, decisions: &[Decision]) -> (Option<&'static str>, Vec<Sample>) {
     let frames = &recording.frames;
     let truth = recording.world.iter().map(|sample| {
         let behind = frames.partition_point(|frame| frame.input.time_s <= sample.time_s + SAME_MOMENT_S);
@@ -284,10 +284,10 @@ fn track(recording: &Recording, thoughts: &[Thought]) -> (Option<&'static str>, 
             attitude: Some(state.world_from_body),
         }
     });
-    let estimated = thoughts.iter().filter_map(|thought| {
-        let &Thought { time_s, phase, .. } = thought;
-        let attitude = thought.estimate.map(|estimate| estimate.state.world_from_body);
-        Some(Sample { time_s, phase, state: thought.state?, attitude })
+    let estimated = decisions.iter().filter_map(|decision| {
+        let &Decision { time_s, phase, .. } = decision;
+        let attitude = decision.estimate.map(|estimate| estimate.state.world_from_body);
+        Some(Sample { time_s, phase, state: decision.state?, attitude })
     });
     let heard = recording.telemetry.iter().map(|told| {
         let level_m_s = told.north_m_s.zip(told.east_m_s).map(|(north, east)| libm::hypot(north, east));
@@ -307,7 +307,7 @@ fn track(recording: &Recording, thoughts: &[Thought]) -> (Option<&'static str>, 
     let sources: [(&str, Vec<Sample>); 3] = [
         ("From the simulated truth.", truth.collect()),
         ("From the flight computer's estimate; the log has no truth.", estimated.collect()),
-        (HEARD, heard.collect()),
+        (RECEIVED, heard.collect()),
     ];
     let found = sources.into_iter().find(|(_, track)| !track.is_empty());
     let Some((source, mut track)) = found else { return (None, Vec::new()) };

@@ -13,8 +13,8 @@ use sim::wire::record;
 
 use crate::controller::AgainError;
 use crate::log::{Head, LoggedFrame};
-use crate::refly::felt;
 use crate::refly::rerun::{begun, drawn_from};
+use crate::refly::sensed;
 
 /// What of the metadata no flight follows from.
 const BESIDE: &str = "what the flight is drawn from; the dispersion's name, start_unix_ns, the build and touchdown.xml are not compared";
@@ -61,9 +61,9 @@ impl WorldAgain {
     pub(super) fn follow(&mut self, frame: &LoggedFrame, computer: &Computer) {
         let number = frame.record.input.frame.checked_sub(self.released);
         let Some(number) = number.filter(|_| !self.over) else { return };
-        let recorded = felt(&frame.record.input).encode_to_vec();
+        let recorded = sensed(&frame.record.input).encode_to_vec();
         let again = self.flight.follow(number, computer);
-        let again = again.map(|sensed| felt(&sensed.to_log()).encode_to_vec());
+        let again = again.map(|input| sensed(&input.to_log()).encode_to_vec());
         if again != Some(recorded) {
             self.first_different.get_or_insert(frame.record.input.frame);
         }

@@ -116,7 +116,7 @@ fn compare_values(path: &str, a: &Value, b: &Value, found: &mut Vec<FieldDiffere
 const DIGEST: &str = "state_digest";
 
 /// Most differing fields that are kept of the first diverged frame.
-const FIELDS_KEPT: usize = 32;
+const FIELDS_MAX: usize = 32;
 
 /// A frame that differs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -196,7 +196,7 @@ impl Tally {
         self.digests_different += u64::from(recorded.state_digest != again.state_digest);
         self.fields_different += fields_different as u64;
         if self.divergence.is_none() {
-            fields.truncate(FIELDS_KEPT);
+            fields.truncate(FIELDS_MAX);
             let (in_flight, phase) = (logged.since_release.is_some(), phase_name(&again.output));
             self.divergence = Some(Divergence { frame, in_flight, time_s, phase, fields_different, fields });
         }

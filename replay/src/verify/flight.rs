@@ -22,7 +22,7 @@ use crate::log::{
 #[derive(Default)]
 pub(super) struct FlightVerifier {
     computer: Option<LoggedComputer>,
-    /// The computer has begun at its power-up, and was not built anew at its release.
+    /// The computer has begun at its power-up, and was not built again at its release.
     from_power_up: bool,
     /// The log has the power-up.
     has_power_up: bool,
@@ -82,10 +82,10 @@ impl FlightVerifier {
         &mut self,
         stamped: StampedEntry,
         log: &FlightLog<R>,
-        whole_head: &impl Fn() -> Result<Head, LogError>,
+        complete_head: &impl Fn() -> Result<Head, LogError>,
     ) -> Result<(), LogError> {
         match stamped.entry {
-            Entry::ComputerStart(start) => self.start(&start, &stamped.data, log, whole_head)?,
+            Entry::ComputerStart(start) => self.start(&start, &stamped.data, log, complete_head)?,
             Entry::ComputerFrame(frame) => self.check(&frame, &stamped.data, stamped.lost_before),
             Entry::Verdict(_) => self.parts.verdicts += 1,
             Entry::Unreadable { reason } => {
@@ -110,7 +110,7 @@ impl FlightVerifier {
         start: &ComputerStart,
         data: &[u8],
         log: &FlightLog<R>,
-        whole_head: &impl Fn() -> Result<Head, LogError>,
+        complete_head: &impl Fn() -> Result<Head, LogError>,
     ) -> Result<(), LogError> {
         let starts = &mut self.parts.starts;
         starts.recorded += u64::from(self.awaited.release.is_empty());
@@ -130,7 +130,7 @@ impl FlightVerifier {
         let head = if log.head().profile_toml.is_some() {
             log.head()
         } else {
-            later = whole_head()?;
+            later = complete_head()?;
             &later
         };
         let toml = match &head.profile_toml {

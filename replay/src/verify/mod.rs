@@ -75,7 +75,7 @@ fn verify_as(path: &Path, strict: bool) -> Result<Vec<VerifyReport>, LogError> {
     })
 }
 
-/// Verifies a log that is being read, strictly or not. `whole_head` is called for the log's whole
+/// Verifies a log that is being read, strictly or not. `complete_head` is called for the log's whole
 /// head if its first frame comes before its profile.
 ///
 /// # Errors
@@ -83,7 +83,7 @@ fn verify_as(path: &Path, strict: bool) -> Result<Vec<VerifyReport>, LogError> {
 pub fn verify_log<R: Read>(
     log: &mut FlightLog<R>,
     strict: bool,
-    whole_head: impl Fn() -> Result<Head, LogError>,
+    complete_head: impl Fn() -> Result<Head, LogError>,
 ) -> Result<Vec<VerifyReport>, LogError> {
     let mut computers: Vec<FlightVerifier> = Vec::new();
     // An unreadable record before the first flight may have been its beginning.
@@ -98,7 +98,7 @@ pub fn verify_log<R: Read>(
             }
             continue;
         };
-        computer.take(stamped, log, &whole_head)?;
+        computer.take(stamped, log, &complete_head)?;
     }
     if computers.is_empty() {
         computers.push(FlightVerifier::new(strict, false, unreadable));
@@ -458,7 +458,7 @@ impl Args {
                 warn_of_loss(&report.file, report.damage.as_deref(), report.cut.as_ref());
                 warn_of_build(report);
             }
-            say_speed(&found, took);
+            print_speed(&found, took);
             Ok(found)
         })
     }
@@ -472,7 +472,7 @@ fn warn_of_build(report: &VerifyReport) {
     }
 }
 
-fn say_speed(reports: &[VerifyReport], took: Duration) {
+fn print_speed(reports: &[VerifyReport], took: Duration) {
     let seconds = took.as_secs_f64();
     let flight_s: f64 = reports.iter().filter_map(|report| report.flight_s).sum();
     if flight_s > 0.0 && seconds > 0.0 {

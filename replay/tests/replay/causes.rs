@@ -36,6 +36,17 @@ fn the_computer_of_a_log_is_run_from_its_power_up() {
     }
 }
 
+/// A computer that was away in the burn measures a weak motor and a late ignition, of any motor.
+#[test]
+fn a_restart_in_the_burn_is_named_and_not_the_motor() {
+    for seed in 1..=6 {
+        let found = info(&fly_recipe(&recipe("mk3", seed, "reboot:0.3@powered")).log).unwrap();
+        let words = words(&found);
+        assert!(words[0].starts_with("flight computer away for 0.3"), "{seed}: {words:?}");
+        assert!(words.iter().all(|words| !words.contains("landing motor")), "{seed}: {words:?}");
+    }
+}
+
 /// A vehicle that falls over or strikes the ground with its body has a finding, however its limits
 /// are.
 #[test]

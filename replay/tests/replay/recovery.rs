@@ -59,7 +59,7 @@ fn a_changed_summary_does_not_count_what_is_lost() {
     bytes[at + 9 + 3] ^= 1;
     let (recovery, _) = recovered(&bytes, directory.path()).unwrap();
     assert_eq!((recovery.messages_counted, recovery.fault().is_some()), (None, true));
-    assert!(!recovery.summary_is_whole, "{recovery:?}");
+    assert!(!recovery.summary_is_intact, "{recovery:?}");
 }
 
 /// Messages, and the place behind the last chunk of a whole log.

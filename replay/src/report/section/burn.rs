@@ -8,7 +8,7 @@ use super::HEIGHT;
 use super::pictures::PLANNED;
 use crate::report::chart::{Chart, line};
 use crate::report::html::{charts, paragraph};
-use crate::report::track::{Flight, Part, Sample, Series, State, Thought, planned};
+use crate::report::track::{Decision, Flight, Part, Sample, Series, State, planned};
 
 /// A plan that ends this far below the ground ends on it, m.
 const GROUND_M: f64 = 0.05;
@@ -36,7 +36,7 @@ fn paths(flight: &Flight) -> String {
     let (made, flown) = (flight.made(), flight.track.iter().filter(shown).copied().collect::<Vec<_>>());
     let picture = |(title, axes, [right, up], x_name): (&str, &'static str, [usize; 2], &'static str)| {
         let see = |state: &State| (state[right], state[up]);
-        let path = |(_, plan): &(&Thought, &Plan)| -> Series {
+        let path = |(_, plan): &(&Decision, &Plan)| -> Series {
             // A plan that does not land ends below the ground.
             let above = plan.states().iter().map(planned).take_while(|state| state[HEIGHT] >= -GROUND_M);
             above.map(|state| see(&state)).chain([GAP]).collect()
@@ -115,10 +115,10 @@ fn another_curve(scales: [f64; 2], mission: &Mission, nearest: Option<&str>) -> 
 pub(super) fn plans(flight: &Flight) -> Option<String> {
     let plans = flight.made();
     let levels = ControlLevel::ALL.into_iter().filter_map(|level| {
-        let count = plans.iter().filter(|(thought, _)| thought.level == u32::from(level.index())).count();
+        let count = plans.iter().filter(|(decision, _)| decision.level == u32::from(level.index())).count();
         (count > 0).then(|| format!("{count} decided by {}", level.name()))
     });
-    let most = plans.iter().map(|(thought, _)| thought.iterations).max()?;
+    let most = plans.iter().map(|(decision, _)| decision.iterations).max()?;
     let levels: Vec<String> = levels.collect();
     let words = format!("{} plans: {}; at most {most} iterations.", plans.len(), levels.join(", "));
     Some(paragraph(&words))

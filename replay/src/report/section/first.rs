@@ -104,7 +104,7 @@ fn limits(info: &Info) -> String {
 fn limit_table<'a>(title: &str, limits: impl Iterator<Item = &'a LimitResult>) -> String {
     let row = |(limit, share): (&LimitResult, f64)| {
         let LimitResult { name, minimum, maximum, passed, .. } = limit;
-        // A station heard them as `f32`.
+        // A station received them as `f32`.
         let [minimum, maximum] = [minimum, maximum].map(|end| (end * 1e4).round() / 1e4 + 0.0);
         let limit_words = match (minimum < 0.0, (minimum + maximum).abs() < 1e-9) {
             (true, true) => format!("\u{b1}{maximum}"),

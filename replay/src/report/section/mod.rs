@@ -29,7 +29,7 @@ pub(super) fn all(flight: &Flight, info: &Info) -> Vec<Section> {
     let text = Option::unwrap_or_default;
     let sections = [
         ("first", "", first::html(flight, info, &drawn)),
-        ("burn", if flight.is_lit() { "Burn" } else { "Flight" }, burn::words(flight)),
+        ("burn", if flight.is_ignited() { "Burn" } else { "Flight" }, burn::words(flight)),
         ("fall", "Fall", String::new()),
         ("sensors", "Sensors and estimator", String::new()),
         ("solver", "Solver", text(burn::plans(flight))),

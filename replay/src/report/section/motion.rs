@@ -17,7 +17,7 @@ const EACH_S: [f64; 2] = [0.04, 0.1];
 pub(in crate::report) fn json(flight: &Flight) -> String {
     let on_booster = flight.framed(|frame| Some(f64::from(u8::from(frame.input.booster_attached))));
     let thrust_n = match flight.recording.world.as_slice() {
-        [] => flight.thought(|thought| thought.thrust_n),
+        [] => flight.decision(|decision| decision.thrust_n),
         _ => flight.truth(|sample| Some(sample.thrust_n + sample.booster_thrust_n.unwrap_or(0.0))),
     };
     let surfaces = (0..6).map(|surface| surface_deg(flight, surface)).map(|[actual, _]| actual);

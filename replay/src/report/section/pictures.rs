@@ -13,7 +13,7 @@ use crate::findings::FINS;
 use crate::log::{Clock, ClockTime};
 use crate::report::chart::{Chart, TIME, line};
 use crate::report::track::Part::{Air, Burn, Whole};
-use crate::report::track::{Flight, Part, Sample, Series, Thought, planned};
+use crate::report::track::{Decision, Flight, Part, Sample, Series, planned};
 
 /// As much of a crew's note as stands beside its mark; the events have all of it.
 const NOTE_LETTERS: usize = 40;
@@ -110,7 +110,7 @@ fn of_landing(flight: &Flight) -> Vec<Picture<'_>> {
         let limits = limit.into_iter().flat_map(|limit| [-limit, limit]);
         pictures.push(surface(over("burn", Burn, name), axis).limits(limits));
     }
-    if let Some((mission, ignition_s)) = mission.zip(flight.ignition_s.filter(|_| flight.is_lit())) {
+    if let Some((mission, ignition_s)) = mission.zip(flight.ignition_s.filter(|_| flight.is_ignited())) {
         let expected = flight.framed(|frame| {
             let since_s = frame.input.time_s - ignition_s;
             (since_s >= 0.0).then(|| mission.motor_curve.thrust_at_n(since_s - mission.ignition.delay_s))
@@ -120,14 +120,14 @@ fn of_landing(flight: &Flight) -> Vec<Picture<'_>> {
                 .limits([mission.airframe.mass.loaded_kg * STANDARD_GRAVITY_M_S2])
                 .line("actual", "c", flight.truth(|sample| Some(sample.thrust_n)))
                 .line("expected", "b", expected)
-                .line("inferred", "a", flight.thought(|thought| thought.thrust_n)),
+                .line("inferred", "a", flight.decision(|decision| decision.thrust_n)),
         );
     }
     if let Some((contact, contact_s)) = flight.contact().zip(flight.touchdown_s) {
         // After contact the ground determines the motion.
         let off = |component: usize| {
-            flight.thought(|thought| {
-                let plan = thought.plan.as_ref().filter(|_| thought.time_s < contact_s)?;
+            flight.decision(|decision| {
+                let plan = decision.plan.as_ref().filter(|_| decision.time_s < contact_s)?;
                 Some(planned(plan.states().last()?)[component] - contact[component])
             })
         };
@@ -146,22 +146,22 @@ fn surface(picture: Picture<'_>, surface: usize) -> Picture<'_> {
 /// Those of fall, sensors, solver, battery and link.
 fn of_the_rest(flight: &Flight) -> Vec<Picture<'_>> {
     let over = |section, part, title: &str| Picture::new(flight, section, part, title);
-    let iterations = |thought: &Thought| thought.plan.as_ref().map(|_| thought.iterations as f64);
+    let iterations = |decision: &Decision| decision.plan.as_ref().map(|_| decision.iterations as f64);
     let timings = &flight.recording.timings;
     let took = timings.iter().map(|timing| (flight.axis_s(timing.time_s), 1e3 * timing.solve_time_s));
     // On the way up nothing estimates the wind.
-    let wind = |thought: &Thought| {
-        let falls = thought.phase.is_some_and(|phase| !phase.before_apogee());
-        thought.estimate.filter(|_| falls).map(|estimate| estimate.wind_m_s)
+    let wind = |decision: &Decision| {
+        let falls = decision.phase.is_some_and(|phase| !phase.before_apogee());
+        decision.estimate.filter(|_| falls).map(|estimate| estimate.wind_m_s)
     };
     // East is against y.
     let wrong = |of: fn(&RigidState, &RigidState) -> f64| {
-        let truth = |thought: &Thought| Some(state_from_log(&flight.world_at(thought.time_s)?.state));
-        flight.thought(|thought| Some(of(&thought.estimate?.state, &truth(thought)?)))
+        let truth = |decision: &Decision| Some(state_from_log(&flight.world_at(decision.time_s)?.state));
+        flight.decision(|decision| Some(of(&decision.estimate?.state, &truth(decision)?)))
     };
     let ratio = |aid: Option<AidStatus>| Some(aid?.test_ratio.min(3.0));
     let estimated =
-        |value: fn(&Estimate) -> f64| flight.thought(|thought| thought.estimate.as_ref().map(value));
+        |value: fn(&Estimate) -> f64| flight.decision(|decision| decision.estimate.as_ref().map(value));
     let fin = |fin: usize| {
         let [actual, _] = surface_deg(flight, 2 + fin);
         actual
@@ -169,10 +169,10 @@ fn of_the_rest(flight: &Flight) -> Vec<Picture<'_>> {
     let mut pictures = vec![
         over("fall", Air, "Wind towards north, m/s")
             .line("true", "c", flight.truth(|sample| Some(sample.wind_m_s.x)))
-            .line("estimated", "a", flight.thought(|thought| Some(wind(thought)?.x))),
+            .line("estimated", "a", flight.decision(|decision| Some(wind(decision)?.x))),
         over("fall", Air, "Wind towards east, m/s")
             .line("true", "c", flight.truth(|sample| Some(-sample.wind_m_s.y)))
-            .line("estimated", "a", flight.thought(|thought| Some(-wind(thought)?.y))),
+            .line("estimated", "a", flight.decision(|decision| Some(-wind(decision)?.y))),
         over("fall", Air, "Fins, deg")
             .line("fin 1", "a", fin(0))
             .line("fin 2", "b", fin(1))
@@ -200,7 +200,7 @@ fn of_the_rest(flight: &Flight) -> Vec<Picture<'_>> {
             .line("north", "a", wrong(|estimate, truth| estimate.position_m.x - truth.position_m.x))
             .line("east", "b", wrong(|estimate, truth| truth.position_m.y - estimate.position_m.y))
             .line("up", "c", wrong(|estimate, truth| estimate.position_m.z - truth.position_m.z)),
-        over("solver", Burn, "Newton iterations, of each plan").only(flight.thought(iterations)),
+        over("solver", Burn, "Newton iterations, of each plan").only(flight.decision(iterations)),
         over("solver", Burn, "From posing a plan to taking it over, ms")
             .limits(timings.first().map(|timing| 1e3 * timing.deadline_s))
             .only(took.collect()),

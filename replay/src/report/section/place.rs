@@ -31,7 +31,7 @@ pub(super) fn maps(flight: &Flight) -> String {
     });
     let lit = |time_s: f64| flight.ignition_s.is_some_and(|ignition_s| time_s >= ignition_s);
     let wind =
-        flight.thoughts.iter().find(|thought| lit(thought.time_s)).and_then(|thought| thought.estimate);
+        flight.decisions.iter().find(|decision| lit(decision.time_s)).and_then(|decision| decision.estimate);
     // East is against y.
     let wind = wind.map(|estimate| (-estimate.wind_m_s.y, estimate.wind_m_s.x));
     let arrow = wind.map(|(east, north)| (east, north, format!("wind {:.1} m/s", libm::hypot(east, north))));
