@@ -168,8 +168,7 @@ impl Answer for SetComparison {
             )
         };
         let mut lines: Vec<String> = sets.iter().map(rate).collect();
-        let second = &sets[1].folder;
-        lines.push(format!("of {paired} flights of both {second} {}", flips_in_words(*saved, *lost)));
+        lines.push(format!("of {paired} flights of both the second {}", flips_in_words(*saved, *lost)));
         lines.extend(flips.iter().map(|Flip { flight, endings: [then, now], saved }| {
             let what = if *saved { "saved" } else { "LOST " };
             format!("  {what}  {flight}: {then}; now {now}")

@@ -138,8 +138,7 @@ impl InFlight {
                 let phase = phase_of(output);
                 // Without a start, a flight that is under way began at power-up.
                 let flies = !phase.is_some_and(Phase::on_pad) && !output.released;
-                let lost = (self.started.is_none() && flies).then_some(0);
-                let release = self.release.or(lost);
+                let release = self.release.or((self.started.is_none() && flies).then_some(0));
                 let waits = output.over && self.started == Some(Started::AtPowerUp);
                 frame.since_release = release
                     .filter(|release| !waits && input.frame > *release)

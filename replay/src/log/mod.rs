@@ -367,15 +367,12 @@ pub enum LogError {
 }
 
 /// Other files that people have beside their logs, by their first bytes.
-const OTHERS: [(&[u8], &str); 8] = [
+const OTHERS: [(&[u8], &str); 5] = [
     (b"PK\x03\x04", "it is a ZIP archive; unpack it first"),
     (b"\x1f\x8b", "it is compressed by gzip; unpack it first"),
-    (b"\x28\xb5\x2f\xfd", "it is compressed by zstd; unpack it first"),
     (b"ULog", "it is a log of PX4 (.ulg)"),
     (b"\xa3\x95", "it is a log of ArduPilot (.bin)"),
     (b"#ROSBAG", "it is a bag of ROS 1"),
-    (b"SQLite", "it is a database of SQLite, as a bag of ROS 2 (.db3)"),
-    (b"RRF2", "it is a recording of Rerun"),
 ];
 
 /// What a file that is no log is, or what it begins with.
