@@ -1,7 +1,7 @@
 //! Writes files outside a run loop: a disk that stalls must delay no abort.
 //!
-//! A thread runs the jobs one after the other, the most urgent first. A newer job replaces a waiting
-//! job of the same target. The run loop reads the outcomes when it comes round.
+//! A thread runs the jobs one after the other, the most urgent first. A newer job replaces a
+//! waiting job of the same target. The run loop reads the outcomes when it comes round.
 
 use std::collections::BTreeMap;
 use std::fmt;

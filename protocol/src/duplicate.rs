@@ -12,8 +12,8 @@ use crate::identity::Address;
 /// 0.3 s; an overloaded link, or all of them after the computer slept, by seconds. If a copy were
 /// not detected, its command would be executed again.
 const MAX_DELAY: Duration = Duration::from_secs(10);
-/// A source that has sent fewer frames since cannot have used all its sequence numbers again, unless
-/// half of its frames are lost.
+/// A source that has sent fewer frames since cannot have used all its sequence numbers again,
+/// unless half of its frames are lost.
 const HALF_OF_THE_NUMBERS: u64 = 128;
 /// So many frames with the same number are remembered: 4,096 of a source, more than it sends in
 /// that time.

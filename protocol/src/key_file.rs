@@ -311,8 +311,8 @@ mod tests {
         assert!(longest < 2 * APPEND_LIMIT_BYTES as u64, "{longest} bytes");
     }
 
-    /// The new file is a pipe: opening it takes until somebody reads. A caller that waited each time
-    /// would take five seconds.
+    /// The new file is a pipe: opening it takes until somebody reads. A caller that waited each
+    /// time would take five seconds.
     #[test]
     fn a_stalling_disk_is_reported_and_not_waited_for() {
         let folder = tempfile::tempdir().unwrap();

@@ -22,6 +22,7 @@
 //! * [`mission`]: identification of a mission by its hash;
 //! * [`motion`]: position and attitude of a vehicle, from its messages; `reported`: all of it as a
 //!   record of the log;
+//! * `background` (feature `transport`): files that are written beside a run loop;
 //! * [`book`]: the record of crew actions, with a signed hash over all entries;
 //! * [`records`]: the records of the flight log, generated;
 //! * [`log`]: the flight log;

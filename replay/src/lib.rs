@@ -54,10 +54,11 @@ use protocol::program::{EXIT_CODES, Exit, Manual, Shown};
 ///
 /// The answer is no, and the exit code 3: of verify, if something differs or cannot be, or with
 /// --strict not all that can be compared was; with --book, if a book is broken, or its end is not
-/// proven; of compare, if the verdicts differ, signals or samples are missing or a log is damaged, or
-/// if a second folder lands less often; of fit, if it is NO-GO. It is 5 if verify cannot run some frame again (no frames, no profile, frames missing) and
-/// all others are identical, if no log has a book, and if some of several logs could not be read
-/// and the answer of the others is not no.
+/// proven; of compare, if the verdicts differ, signals or samples are missing or a log is damaged,
+/// or if a second folder lands less often; of fit, if it is NO-GO. It is 5 if verify cannot run
+/// some frame again (no frames, no profile, frames missing) and all others are identical, if no log
+/// has a book, and if some of several logs could not be read and the answer of the others is not
+/// no.
 ///
 /// A damaged log is used up to the damage, with a warning and exit code 0, except by verify
 /// --strict and by compare.
@@ -113,8 +114,8 @@ enum Command {
     ///
     /// Signals are named as in an export. Exit code 3 if the verdicts differ, if one flight lacks a
     /// signal or samples of a table, or if one log is damaged. Two folders are compared as sets of
-    /// flights, paired by seed and number: rates, flips and distributions; exit code 3 if the second
-    /// lands less often than chance explains, or lacks a flight.
+    /// flights, paired by seed and number: rates, flips and distributions; exit code 3 if the
+    /// second lands less often than chance explains, or lacks a flight.
     #[command(
         after_help = "Examples:\n  replay compare old.mcap new.mcap\n  replay compare old-logs new-logs"
     )]

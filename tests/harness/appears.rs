@@ -1,4 +1,4 @@
-//! Waits for a file that a program writes.
+//! Waits for a file that a program writes or removes.
 
 use std::path::Path;
 use std::time::Duration;
@@ -14,6 +14,15 @@ pub fn wait_for_content(path: &Path) {
     let deadline = now() + PATIENCE;
     while !std::fs::metadata(path).is_ok_and(|file| file.len() > 0) {
         assert!(!left(deadline).is_zero(), "{} stays empty", path.display());
+        std::thread::sleep(POLL_INTERVAL);
+    }
+}
+
+/// Waits until a file is removed.
+pub fn wait_for_removal(path: &Path) {
+    let deadline = now() + PATIENCE;
+    while path.exists() {
+        assert!(!left(deadline).is_zero(), "{} is not removed", path.display());
         std::thread::sleep(POLL_INTERVAL);
     }
 }

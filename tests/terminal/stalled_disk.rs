@@ -70,22 +70,22 @@ fn sent(pad: &Pad, command: MavCmd) -> usize {
 /// The disk does not continue before the vehicle has done what was commanded.
 #[test]
 fn hold_disarm_and_abort_leave_in_the_countdown_while_the_disk_stalls() {
-    let pad = Pad::new();
+    let mut pad = Pad::new();
     let mut screen = station(&pad);
     screen.wait_for("every arming check passes");
     stall(&pad);
     screen.type_until(b"AARM\r", " ARMED ");
     screen.type_until(b"SSTART\r", "START  commanded");
-    screen.type_until(b"H", "HOLD");
-    screen.type_until(b"D\r", "disarmed");
+    screen.type_bytes(b"H\r");
+    pad.vehicle.wait_for_line("HOLD: no countdown");
+    screen.type_until(b"D\r", " disarmed ");
     screen.type_until(b"AARM\r", " ARMED ");
     screen.type_until(b"SSTART\r", "START  commanded");
     screen.type_bytes(b"\x18\r");
     screen.wait_for_fact("ABORT", "acknowledged ");
     assert!(sent(&pad, MavCmd::MAV_CMD_DO_FLIGHTTERMINATION) > 0);
     std::fs::remove_file(pad.folder.path().join("stalls")).unwrap();
-    let kept = pad.folder.path().join("touchdown-unfinished.json");
-    e2e::wait_for_content(&kept);
+    e2e::wait_for_content(&pad.folder.path().join("touchdown-unfinished.json"));
     screen.signal(Signal::SIGTERM);
 }
 

@@ -392,10 +392,12 @@ pub(super) fn write_unfinished(folder: &Path, kept: &Unfinished) -> anyhow::Resu
     write_one(folder, UNFINISHED_NAME, &serde_json::to_string(kept)?)
 }
 
-/// What an earlier run has left unfinished in this folder; `None` if no vehicle has flown from here.
+/// What an earlier run has left unfinished in this folder; `None` if no vehicle has flown from
+/// here.
 ///
 /// # Errors
-/// The file is damaged, or it is missing beside the position of a vehicle, with which it is written.
+/// The file is damaged, or it is missing beside the position of a vehicle, with which it is
+/// written.
 pub(super) fn read_unfinished(folder: Option<&Path>) -> anyhow::Result<Option<Unfinished>> {
     let Some(folder) = folder else { return Ok(None) };
     let path = folder.join(UNFINISHED_NAME);

@@ -251,8 +251,8 @@ impl<W: Write> Backend for DiffBackend<W> {
     }
 
     fn size(&self) -> io::Result<Size> {
-        // Not the size that crossterm returns: it opens /dev/tty for every frame, and opening a file
-        // may stall.
+        // Not the size that crossterm returns: it opens /dev/tty for every frame, and opening a
+        // file may stall.
         let size = tcgetwinsize(io::stdout())?;
         let size = Size::new(size.ws_col, size.ws_row);
         // A terminal that does not know its size, as some serial consoles, has that of a VT100.

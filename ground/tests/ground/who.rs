@@ -218,6 +218,23 @@ fn a_reset_in_the_countdown_is_an_alarm_and_withdraws_what_was_observed() {
 }
 
 #[test]
+fn a_reset_in_flight_is_an_alarm_until_the_end() {
+    let mut rig = counting();
+    (rig.phase, rig.countdown_ms) = (TdPhase::TD_PHASE_AERO_DESCENT, i32::MAX);
+    rig.run(2.0);
+    rig.text("the flight computer has restarted IN FLIGHT");
+    rig.run(60.0);
+    let held = |rig: &Rig| {
+        let mut alarms = rig.model.alarms.list().iter();
+        alarms.any(|alarm| alarm.is_active() && alarm.what.text == "the vehicle has REBOOTED IN FLIGHT")
+    };
+    assert!(held(&rig), "{}", rig.screen(120, 36));
+    rig.phase = TdPhase::TD_PHASE_SAFED;
+    rig.run(60.0);
+    assert!(held(&rig), "{}", rig.screen(120, 36));
+}
+
+#[test]
 fn what_was_observed_and_is_no_longer_so_is_withdrawn() {
     let mut rig = counting();
     rig.msg(Msg::command(CommandKind::Start, Seat::default()));

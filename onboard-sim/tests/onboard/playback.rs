@@ -75,6 +75,22 @@ fn arming_checks_name_what_the_recording_lacks() {
     assert_eq!(played.checks.iter().filter(|(name, _)| applies(name)).count(), 9);
 }
 
+/// A computer that is reset in the air takes itself for one on its pad.
+#[test]
+fn a_computer_that_is_switched_on_in_a_fall_cannot_be_armed() {
+    let file = zstd::Decoder::new(std::fs::File::open(HEDY).unwrap()).unwrap();
+    let recorded = sensor_file::read(file, None, "+x,+y,+z".parse().unwrap()).unwrap();
+    let coasts = &recorded.frames[(200.0 * (LIFT_OFF_S + 12.0)) as usize..];
+    let mut texts = Vec::new();
+    play(coasts, &mk3().mission, |record, _| {
+        if let Record::Event(event) = record {
+            texts.push(event.message);
+        }
+    });
+    let latched = |text: &String| text.contains("switched on while it moves: it cannot be armed");
+    assert_eq!(texts.iter().filter(|text| latched(text)).count(), 1, "{texts:?}");
+}
+
 #[test]
 fn a_mission_without_an_ascent_motor_has_no_burn_time() {
     let error = Recipe::built_in("vlr", "none").unwrap().ascending_for(3.0).unwrap_err();

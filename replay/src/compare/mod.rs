@@ -3,8 +3,8 @@
 //! Every number of both logs becomes a signal, named as in [`table`](crate::table)
 //! (`computer_frame.output.…`). The second flight is shifted so that the ignition of both
 //! coincides, if both have one. It is then read at the times of the first flight: linear between
-//! samples, whole numbers held. Planning latencies are not signals. A table with fewer samples in one
-//! of the two, in the time that both cover, fails: interpolation would hide a lost record.
+//! samples, whole numbers held. Planning latencies are not signals. A table with fewer samples in
+//! one of the two, in the time that both cover, fails: interpolation would hide a lost record.
 //!
 //! Two folders of logs are compared as sets of flights ([`compare_sets`]).
 

@@ -7,7 +7,8 @@ use protocol::program::Exit;
 
 /// Most signals listed that differ.
 const SIGNALS_SHOWN: usize = 60;
-/// Limits that are nearer, as a share of their range, are the same: a station receives them as `f32`.
+/// Limits that are nearer, as a share of their range, are the same: a station receives them as
+/// `f32`.
 const SAME: f64 = 1e-4;
 /// Most limits named in which the landings differ.
 const LIMITS_SHOWN: usize = 3;

@@ -1,11 +1,11 @@
 //! Along the nose: drag of body and fins, thrust, burn time, shape of the curve, ignition, and what
 //! the exhaust takes away of the drag.
 //!
-//! The accelerometer measures `f = (T + d_b B + d_f F) / m + bias`, with the air force on the body `B`
-//! and on the fins `F` as the airframe's data have them at the estimated speed, and the mass `m` of
-//! the data. While the vehicle falls there is no `T`, and the fins' changing openings tell `F` from
-//! `B`; then `d_b` and `d_f` are known when the motor is ignited. All is fitted at once, over the fall
-//! and the burn.
+//! The accelerometer measures `f = (T + d_b B + d_f F) / m + bias`, with the air force on the body
+//! `B` and on the fins `F` as the airframe's data have them at the estimated speed, and the mass
+//! `m` of the data. While the vehicle falls there is no `T`, and the fins' changing openings tell
+//! `F` from `B`; then `d_b` and `d_f` are known when the motor is ignited. All is fitted at once,
+//! over the fall and the burn.
 //!
 //! The accelerometer cannot tell a stronger motor from a lighter vehicle: every scale is per mass
 //! of the data.

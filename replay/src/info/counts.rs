@@ -1,5 +1,5 @@
-//! Counters over the records of a log: channels, frames, phases, planning latencies, and the outcome
-//! of the flight.
+//! Counters over the records of a log: channels, frames, phases, planning latencies, and the
+//! outcome of the flight.
 
 use std::collections::BTreeMap;
 

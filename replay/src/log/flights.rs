@@ -161,7 +161,8 @@ pub struct Flights {
 impl Flights {
     pub(super) fn note(&mut self, stamped: &StampedEntry) {
         match &stamped.entry {
-            // If the log has frames of the pad, or the power-up, the release begins no other flight.
+            // If the log has frames of the pad, or the power-up, the release begins no other
+            // flight.
             Entry::ComputerStart(start)
                 if start.released
                     && self.found.last().is_some_and(|flight| {

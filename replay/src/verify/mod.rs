@@ -75,8 +75,8 @@ fn verify_as(path: &Path, strict: bool) -> Result<Vec<VerifyReport>, LogError> {
     })
 }
 
-/// Verifies a log that is being read, strictly or not. `complete_head` is called for the log's whole
-/// head if its first frame comes before its profile.
+/// Verifies a log that is being read, strictly or not. `complete_head` is called for the log's
+/// whole head if its first frame comes before its profile.
 ///
 /// # Errors
 /// As [`verify`].

@@ -15,8 +15,8 @@ use crate::simulated::{MK2, WITH_FRAMES};
 use crate::station::{station_log, station_log_with};
 use crate::tampered::{Held, Kept};
 
-/// Answers of `info`, `verify --strict`, `compare` with itself and `recover`: whether each takes the
-/// log for complete.
+/// Answers of `info`, `verify --strict`, `compare` with itself and `recover`: whether each takes
+/// the log for complete.
 fn complete(log: &Path) -> [bool; 4] {
     let answers = |command: &str, other: &[&str]| run(replay(command, log).args(other)).0 == 0;
     let recovered = recover(log, &log.with_file_name("recovered.mcap")).unwrap();

@@ -192,8 +192,8 @@ impl Computer {
         Input { sensed, ..*input }
     }
 
-    /// Latches an abort if a computer that starts as on its pad rises or falls: it was switched on in
-    /// the air, and its motor may be live. A drone carries its vehicle up before it is armed.
+    /// Latches an abort if a computer that starts as on its pad rises or falls: it was switched on
+    /// in the air, and its motor may be live. A drone carries its vehicle up before it is armed.
     fn inhibit_if_moving(&mut self) {
         let Mode { phase, interlocks, .. } = *self.table.mode();
         let waits = matches!(phase, Phase::Safe | Phase::PadIdle) && self.release.is_none();

@@ -83,8 +83,8 @@ pub(super) struct PadWatch {
     found: Option<PadSecond>,
 }
 
-/// Change of the pressure altitude in a second that no crew causes, m: a vehicle under its parachute
-/// sinks by 6 m a second, a person climbs a ladder at less than 1 m a second.
+/// Change of the pressure altitude in a second that no crew causes, m: a vehicle under its
+/// parachute sinks by 6 m a second, a person climbs a ladder at less than 1 m a second.
 const MOVES_M: f64 = 5.0;
 /// A bay that closes changes the pressure in one second, and not in the next.
 const MOVING_SECONDS: u32 = 2;

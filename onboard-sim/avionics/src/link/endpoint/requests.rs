@@ -116,8 +116,8 @@ impl VehicleEndpoint {
         };
         let confirms = commands::confirmed_proposal(command);
         let request = Request { command: crew_command, uplink, station: Some(station), by, confirms };
-        // A station that repeats an abort before the decision is answered once. Another sender's abort
-        // makes it a repetition: an observer may name the same address.
+        // A station that repeats an abort before the decision is answered once. Another sender's
+        // abort makes it a repetition: an observer may name the same address.
         let repeats =
             |waiting: &Waiting| waiting.command.source == command.source && waiting.request.by == by;
         if crew_command == CrewCommand::Abort
@@ -136,7 +136,8 @@ impl VehicleEndpoint {
     }
 
     /// Takes the vehicle's answers to the requests of the last [uplink state](Self::uplink_state);
-    /// `vehicle` is its state after the decision. A dead flight computer gives no answers, and its requests are dropped.
+    /// `vehicle` is its state after the decision. A dead flight computer gives no answers, and its
+    /// requests are dropped.
     pub fn on_answers(&mut self, answers: &[Answer], vehicle: &VehicleState<'_>) {
         let waiting = core::mem::take(&mut self.waiting);
         for (Waiting { link, command, request }, answer) in waiting.into_iter().zip(answers) {

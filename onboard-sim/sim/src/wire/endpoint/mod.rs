@@ -26,8 +26,8 @@ pub fn step(
     (events, to_itself)
 }
 
-/// Forwards the vehicle's messages to the stations. A new phase is seen by [`VehicleEndpoint::poll`],
-/// like every other change of the vehicle's mode.
+/// Forwards the vehicle's messages to the stations. A new phase is seen by
+/// [`VehicleEndpoint::poll`], like every other change of the vehicle's mode.
 fn forward(endpoint: &mut VehicleEndpoint, event: &VehicleEvent) {
     match event {
         VehicleEvent::Text { severity, text } => endpoint.send_text(*severity, text),

@@ -169,6 +169,22 @@ fn with_another_vehicle_under_our_ids_a_command_must_name_its_boot() {
     assert_eq!(range.request_answer(0, &unnamed), ACCEPTED, "some seconds later");
 }
 
+/// Only a Touchdown station has a session in its heartbeats.
+#[test]
+fn a_stranger_beside_our_station_arms_only_the_boot_that_it_names() {
+    let programs = vec![Program::new(255, 7, 1, None), Program::new(254, 0, 2, None)];
+    let mut range = Range::without_operators(programs);
+    let [unnamed, named] = [0.0, BOOT as f32].map(|boot| range.programs[1].request(ARM, 1.0, 0, boot));
+    let disarm = range.programs[1].request(ARM, 0.0, 0, 0.0);
+    assert_eq!(range.request_answer(1, &unnamed), DENIED);
+    assert!(!range.vehicle.mode().interlocks.armed);
+    assert_eq!(range.request_answer(1, &named), ACCEPTED);
+    assert_eq!(range.request_answer(1, &disarm), ACCEPTED);
+    range.programs[0].speaks = false;
+    range.run(15.0);
+    assert_eq!(range.request_answer(1, &unnamed), ACCEPTED, "alone it may");
+}
+
 #[test]
 fn a_command_for_every_vehicle_stops_and_moves_nothing() {
     let mut range = Range::without_operators(vec![Program::new(255, 7, 1, None)]);

@@ -262,6 +262,24 @@ fn a_held_vehicle_disarms_after_a_minute() {
     }
 }
 
+/// Its station was killed, and nobody stands beside it.
+#[test]
+fn a_vehicle_that_nobody_commands_disarms_itself() {
+    let mut pad = Pad::rocket();
+    assert_eq!(pad.request(CREW, ARM, 1.0), ACCEPTED);
+    pad.speaking.clear();
+    pad.run(59.5);
+    assert!(pad.vehicle.mode().interlocks.armed);
+    pad.run(1.5);
+    assert!(!pad.vehicle.mode().interlocks.armed && !pad.vehicle.aborted());
+    assert_eq!(pad.message_count("nothing heard of 255/190 for 60 s: DISARMED"), 1);
+    // The next station that arms it is in command.
+    pad.speaking = vec![OTHER];
+    pad.run(1.0);
+    assert_eq!(pad.request(OTHER, ARM, 1.0), ACCEPTED);
+    assert_eq!(pad.request(OTHER, START, 0.0), ACCEPTED);
+}
+
 #[test]
 fn any_station_holds_by_command_and_repeats_it_without_a_complaint() {
     for pad in [Pad::rocket, Pad::hanging] {
