@@ -248,7 +248,7 @@ mod tests {
     fn remember(file: &mut KeyFile, signing: &Signing) {
         let stored = file.remember(&signing.memory());
         assert!(matches!(stored, Ok(()) | Err(KeyFileError::Late { .. })), "{stored:?}");
-        assert!(file.writer.as_ref().unwrap().wait(Duration::from_secs(60)));
+        assert!(file.writer.as_ref().unwrap().wait(Duration::from_mins(1)));
     }
 
     #[test]

@@ -246,10 +246,10 @@ impl LinkStats {
 
 /// How old the newest content of a vehicle is, with the time that it has spent in queues.
 ///
-/// The vehicle's messages carry its clock. When one arrives, the clocks differ by at most `arrival
-/// - clock`, because nothing arrives before it was sent. The answer to a TIMESYNC was given after
-/// the query left, so they differ by at least `query - clock`. The latter is used if available: the
-/// age is then overestimated at most by the travel time of the query.
+/// The vehicle's messages carry its clock. When one arrives, the clocks differ by at most
+/// `arrival - clock`, because nothing arrives before it was sent. The answer to a TIMESYNC was
+/// given after the query left, so they differ by at least `query - clock`. The latter is used if
+/// available: the age is then overestimated at most by the travel time of the query.
 #[derive(Debug, Clone, Default)]
 pub struct ContentAge {
     /// The newest time on the vehicle's clock, us, and the first one received.

@@ -162,7 +162,7 @@ pub(crate) fn key_number(link_id: u8) -> u8 {
 #[derive(Debug, Clone)]
 pub struct Signing {
     /// The key that signs, and its number.
-    signing_key: (u8, Key),
+    sender_key: (u8, Key),
     /// The key of frames whose link id names no operator.
     shared: Key,
     /// The operators' keys, by number.
@@ -178,7 +178,7 @@ impl Signing {
     pub fn new(key: Key, memory: Memory) -> Self {
         let clock_before = memory.clock;
         Self {
-            signing_key: (0, key.clone()),
+            sender_key: (0, key.clone()),
             shared: key,
             operators: BTreeMap::new(),
             memory,
@@ -191,7 +191,7 @@ impl Signing {
     /// shared key.
     #[must_use]
     pub fn as_operator(self, number: u8, shared: Key) -> Self {
-        Self { signing_key: (key_number(number), self.signing_key.1), shared, ..self }
+        Self { sender_key: (key_number(number), self.sender_key.1), shared, ..self }
     }
 
     /// Checks frames that name an operator with that operator's key. A frame that names an unknown
@@ -204,7 +204,7 @@ impl Signing {
     /// The link id of frames over a link: its number, and the number of the key. Links beyond the
     /// 16th share an id, which costs nothing but exact statistics.
     pub fn link_id(&self, link: usize) -> u8 {
-        (link as u8) << KEY_BITS | self.signing_key.0
+        (link as u8) << KEY_BITS | self.sender_key.0
     }
 
     /// The number of the operator whose key checks this frame; 0 for the shared key.
@@ -232,7 +232,7 @@ impl Signing {
         let mut signature = [0; SIGNATURE_LEN];
         signature[0] = link_id;
         signature[1..7].copy_from_slice(&self.memory.ours.to_le_bytes()[..6]);
-        let hash = self.signing_key.1.hash(&[signed.as_bytes(), &signature[..7]].concat());
+        let hash = self.sender_key.1.hash(&[signed.as_bytes(), &signature[..7]].concat());
         signature[7..].copy_from_slice(&hash);
         signed.push_signature(&signature);
         signed

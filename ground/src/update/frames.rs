@@ -198,10 +198,8 @@ pub(super) fn add_vehicle_text(model: &mut Model, text: &Text, now: Duration) {
     if text.text.starts_with(vehicle_changes::RESTARTED) {
         let in_flight = text.text.ends_with(vehicle_changes::IN_FLIGHT);
         model.vehicle.reset_in_flight |= in_flight;
-        let did = match in_flight {
-            true => vehicle_changes::IN_FLIGHT,
-            false => vehicle_changes::Announced::of(&model.vehicle).words_of_reset(),
-        };
+        let on_pad = || vehicle_changes::Announced::of(&model.vehicle).words_of_reset();
+        let did = if in_flight { vehicle_changes::IN_FLIGHT } else { on_pad() };
         vehicle_changes::note_reset(model, did, now);
     }
     model.vehicle.hear_of_check(&text.text);

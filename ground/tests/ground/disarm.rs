@@ -36,7 +36,7 @@ fn a_late_answer_to_an_arming_does_not_end_the_disarm() {
         assert_eq!(arm.acknowledged, Acknowledgement::Answered(result));
         rig.run(0.6);
         let sent = rig.take_commands();
-        assert!(sent.len() >= 3 && sent.iter().all(is_disarm), "the first was lost, so it is repeated");
+        assert!(sent.iter().all(is_disarm) && (sent.len() >= 3 || !rig.armed), "repeated until it shows");
         rig.answer(ARM, ACCEPTED);
         rig.armed = false;
         rig.run(3.0);

@@ -8,8 +8,8 @@
 //! 2. Clarabel solves the subproblem: nodes and misses are its variables, intervals and conditions
 //!    its rows.
 //! 3. The step is flown: the inputs follow it, and correct the errors of linearisation with the
-//!   recursion's gains. So every iterate is flyable, and its merit is the one of its
-//!   [`score`](crate::score). The step is halved until the merit falls.
+//!    recursion's gains. So every iterate is flyable, and its merit is the one of its
+//!    [`score`](crate::score). The step is halved until the merit falls.
 
 use std::f64::consts::TAU;
 

@@ -416,8 +416,8 @@ impl Computer {
         // A hold disarms by its own limit.
         let waits = mode.phase == Phase::PadArmed && mode.countdown_end_s.is_none() && mode.hold.is_none();
         // NaN is no sign of life.
-        let is_alone = !(age_s <= ALONE_S);
-        if waits && is_alone {
+        let is_attended = age_s <= ALONE_S;
+        if waits && !is_attended {
             let words = format!("nothing heard of {station} for {ALONE_S} s: DISARMED");
             self.table.report(Severity::Critical, words);
             let _ = self.table.apply(Event::DisarmRequested { lifted_off: false });
