@@ -311,17 +311,16 @@ pub(super) fn observe(model: &mut Model, now: Duration) {
     let Commands { sender, tracks } = &mut model.commands;
     for track in tracks {
         let (name, seen) = (track.kind.name(), track.kind.row().seen);
-        // What is repeated until its answer ends when it shows, or when it can no longer help.
+        // What is repeated until its answer ends when it can no longer help. That its effect shows
+        // is no answer: an arming may still be on its way.
         let repeats = track.kind.row().resend == Resend::UntilAnswered
             && track.acknowledged == Acknowledgement::Waiting;
-        if repeats && (flies || track.observed_at.is_some()) {
+        if repeats && flies {
             sender.withdraw_one(track.ticket, now);
-            if flies && track.observed_at.is_none() {
-                track.acknowledged = Acknowledgement::GivenUp;
-                let text = format!("{name} TOO LATE: the vehicle flies, and has not acknowledged it");
-                told.push((EventLevel::Error, track.by.clone(), text));
-                continue;
-            }
+            track.acknowledged = Acknowledgement::GivenUp;
+            let text = format!("{name} TOO LATE: the vehicle flies, and has not acknowledged it");
+            told.push((EventLevel::Error, track.by.clone(), text));
+            continue;
         }
         let answered = seen.is_none() && track.accepted();
         let shown = answered || track.kind.is_observed(&model.vehicle, track.commanded_at);
