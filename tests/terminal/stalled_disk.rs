@@ -76,7 +76,7 @@ fn hold_disarm_and_abort_leave_in_the_countdown_while_the_disk_stalls() {
     stall(&pad);
     screen.type_until(b"AARM\r", " ARMED ");
     screen.type_by_hand(b"SSTART\r");
-    pad.vehicle.wait_for_line("countdown started");
+    screen.wait_for_fact("START", "observed yes");
     screen.type_bytes(b"H\r");
     pad.vehicle.wait_for_line("HOLD: no countdown");
     screen.type_until(b"D\r", " disarmed ");
