@@ -47,8 +47,8 @@ class Sensors:
         normal = self.random.standard_normal
         if self.ms % self.GNSS_MS == self.gnss_phase_ms:
             self.advance_wander(self.GNSS_MS * 1e-3)
-            place = motion["place"] + self.wander + normal(3) * self.GNSS_WHITE_M
-            velocity = motion["velocity"] + normal(3) * self.GNSS_M_S
+            place = motion["antenna_place"] + self.wander + normal(3) * self.GNSS_WHITE_M
+            velocity = motion["antenna_velocity"] + normal(3) * self.GNSS_M_S
             self.on_its_way = (self.ms + self.GNSS_DELAY_MS, place, velocity, self.ms * 1000)
         if self.ms % FRAME_MS:
             return None
@@ -61,7 +61,7 @@ class Sensors:
         height = fix = None
         if self.ms % self.BAROMETER_MS == 0:
             ram_m = self.baro_ram * motion["airspeed"] ** 2 / (2.0 * G_M_S2)
-            height = motion["place"][2] + self.baro_offset - ram_m + normal() * self.BAROMETER_M
+            height = motion["barometer_height"] + self.baro_offset - ram_m + normal() * self.BAROMETER_M
         if self.on_its_way and self.on_its_way[0] <= self.ms:
             fix, self.on_its_way = self.on_its_way[1:], None
         distance = self.lidar(motion) if self.ms % self.LIDAR_MS == 0 else None

@@ -207,8 +207,8 @@ def contact(name, station_m, y_m, z_m, stiffness, damping, friction):
     )
 
 
-def write(folder, airframe_toml, motor_eng, truth):
-    """Writes the aircraft `vehicle` and its engine and thruster into a folder."""
+def write(folder, airframe_toml, motor_eng, truth, imu_station_m):
+    """Writes the aircraft `vehicle` and its engine and thruster into a folder. The pilot's eye is the inertial unit."""
     airframe = tomllib.loads(Path(airframe_toml).read_text())
     propellant_kg, curve = motor(motor_eng)
     mass, body, legs = airframe["mass"], airframe["body"], airframe["legs"]
@@ -261,7 +261,7 @@ def write(folder, airframe_toml, motor_eng, truth):
 <metrics>
  <wingarea unit="M2">{body["reference_area_m2"]!r}</wingarea><wingspan unit="M">1</wingspan><chord unit="M">1</chord>
  <location name="AERORP" unit="M"><x>0</x><y>0</y><z>0</z></location>
- <location name="EYEPOINT" unit="M"><x>{-mass["loaded_cg_station_m"]!r}</x><y>0</y><z>0</z></location>
+ <location name="EYEPOINT" unit="M"><x>{-imu_station_m!r}</x><y>0</y><z>0</z></location>
  <location name="VRP" unit="M"><x>0</x><y>0</y><z>0</z></location>
 </metrics>
 <mass_balance>

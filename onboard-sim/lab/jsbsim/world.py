@@ -7,6 +7,7 @@ import json
 import math
 import sys
 import tempfile
+import tomllib
 
 import jsbsim
 import numpy as np
@@ -26,7 +27,11 @@ class Plant:
 
     def __init__(self, folder, order, draw):
         truth = draw["truth"]
-        self.airframe = vehicle.write(folder, order["airframe"], order["motor"], truth)
+        # Where the sensors are, m above the nozzle exit.
+        with open(order["mission"], "rb") as mission:
+            self.sensors = tomllib.load(mission)["sensors"]
+        imu_station_m = self.sensors["imu_station_m"]
+        self.airframe = vehicle.write(folder, order["airframe"], order["motor"], truth, imu_station_m)
         self.truth, self.site = truth, order["site"]
         # JSBSim swings no mass: the body turns back by the motor's share of its inertia.
         pitch_kg_m2 = self.airframe["mass"]["loaded_pitch_inertia_kg_m2"]
@@ -98,23 +103,30 @@ class Plant:
         north, east = self.radii
         cg_station = -fdm["inertia/cg-x-in"] * 0.0254
         theta, phi = fdm["attitude/theta-rad"], fdm["attitude/phi-rad"]
-        legs = self.airframe["legs"]
+        place = np.array([
+            math.radians(fdm["position/lat-geod-deg"] - self.site["latitude_deg"]) * north,
+            math.radians(fdm["position/long-gc-deg"] - self.site["longitude_deg"]) * east,
+            self.height(),
+        ])
+        velocity = np.array([fdm["velocities/v-north-fps"], fdm["velocities/v-east-fps"],
+                             -fdm["velocities/v-down-fps"]]) * M
+        nose, right, down = body_axes(phi, theta, fdm["attitude/psi-rad"])
+        pitching, yawing = fdm["velocities/qi-rad_sec"], fdm["velocities/ri-rad_sec"]
+        ahead = {sensor: self.sensors[f"{sensor}_station_m"] - cg_station for sensor in ("gnss", "barometer", "lidar")}
         return {
             "rate": np.array([fdm[f"velocities/{axis}i-rad_sec"] for axis in "pqr"])
             - self.turns_back * np.array([0.0, *self.swing_rad_s]),
             "force": np.array([fdm[f"accelerations/a-pilot-{axis}-ft_sec2"] * M for axis in "xyz"]),
-            "place": np.array([
-                math.radians(fdm["position/lat-geod-deg"] - self.site["latitude_deg"]) * north,
-                math.radians(fdm["position/long-gc-deg"] - self.site["longitude_deg"]) * east,
-                self.height(),
-            ]),
-            "velocity": np.array([fdm["velocities/v-north-fps"], fdm["velocities/v-east-fps"],
-                                  -fdm["velocities/v-down-fps"]]) * M,
+            "place": place,
+            "velocity": velocity,
+            "antenna_place": place + ahead["gnss"] * nose,
+            "antenna_velocity": velocity + ahead["gnss"] * (yawing * right - pitching * down),
+            "barometer_height": place[2] + ahead["barometer"] * nose[2],
             "airspeed": fdm["air/speed"],
             # The nose is at theta above the horizon whatever the roll.
             "tilt": math.pi / 2 - theta,
             "roll": phi,
-            "lidar_behind_cg": cg_station - legs["foot_station_m"] - 0.15,
+            "lidar_behind_cg": -ahead["lidar"],
             "turning": math.sqrt(sum(fdm[f"velocities/{axis}-rad_sec"] ** 2 for axis in "pqr")),
         }
 
@@ -125,6 +137,15 @@ class Plant:
 
     def thrust_over_weight(self):
         return self.fdm["propulsion/engine[0]/thrust-lbs"] / self.fdm["inertia/weight-lbs"]
+
+
+def body_axes(phi, theta, psi):
+    """Nose, right and down of the body, in axes north, east, up."""
+    (sp, cp), (st, ct), (sy, cy) = ((math.sin(angle), math.cos(angle)) for angle in (phi, theta, psi))
+    nose = np.array([ct * cy, ct * sy, st])
+    right = np.array([sp * st * cy - cp * sy, sp * st * sy + cp * cy, -sp * ct])
+    down = np.array([cp * st * cy + sp * sy, cp * st * sy - sp * cy, -cp * ct])
+    return nose, right, down
 
 
 def euler(world_from_body):
