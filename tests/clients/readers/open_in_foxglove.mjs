@@ -51,6 +51,8 @@ const browser = await puppeteer.launch({
 });
 try {
   const tab = await browser.newPage();
+  // A busy machine takes longer than the usual 30 s.
+  tab.setDefaultNavigationTimeout(180_000);
   await tab.setViewport({ width: 1600, height: 1000 });
   const crashes = [];
   tab.on("pageerror", (error) => crashes.push(String(error)));
