@@ -216,8 +216,8 @@ fn compare(mission: &str, wind_m_s: f64, flights: u64) -> ([usize; 2], Flown) {
     ([landed, of_ours], flown)
 }
 
-/// One flight in ten may end on the other side of a limit: with the noise drawn again, one or two of
-/// 20 do in our world, too.
+/// One flight in ten may end on the other side of a limit: with the noise drawn again, one or two
+/// of 20 do in our world, too.
 fn lands_as_often(wind_m_s: f64) {
     let ([landed, of_ours], Flown { theirs, ours, .. }) = compare("mk2", wind_m_s, 20);
     assert!(landed + 2 >= of_ours, "{landed} of 20 land in JSBSim, {of_ours} in our world");
