@@ -13,7 +13,7 @@ use super::motor_estimate::{MotorEstimate, MotorPrior, MotorSample, MotorStage};
 use crate::vehicle::mission::Mission;
 use crate::vehicle::thrust_curve::ThrustCurve;
 
-/// Time of the decision, s after thrust onset: the landing then has to waste, or to save, the
+/// Time of the decision, s after the estimated ignition: the landing then has to waste, or to save, the
 /// difference of the curves.
 const CHOSEN_AFTER_S: f64 = 0.5;
 /// Smallest advantage in misfit for which another curve is chosen. Over the 88 compared frames it
@@ -111,7 +111,8 @@ mod tests {
             others.update(&mut motor, &mission.other_curves, &sample);
             let since_s = time_s - IGNITED_S;
             assert!(since_s > CHOSEN_AFTER_S - 0.02 || others.filters.len() == 2, "{since_s}");
-            assert!(since_s < CHOSEN_AFTER_S + 0.02 || others.filters.is_empty(), "{since_s}");
+            // The first thrust of another curve passes for a rise, which delays the estimated ignition.
+            assert!(since_s < CHOSEN_AFTER_S + 0.06 || others.filters.is_empty(), "{since_s}");
         }
         (others.chosen(), motor)
     }

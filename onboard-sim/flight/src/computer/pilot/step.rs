@@ -43,7 +43,7 @@ impl Pilot {
     /// Estimates the vehicle's state, and its motor and drag.
     pub(crate) fn estimate_state(&mut self, phase: Phase, input: &SensedInput, sensors: &SensorWatch) {
         // Also on the ground, where the gimbal continues to balance.
-        let burns = self.model.motor.stage() == MotorStage::Burning;
+        let burns = matches!(self.model.motor.stage(), MotorStage::Rising | MotorStage::Burning);
         self.speeds.watch_accelerometer(sensors.accelerometer_lost_s() >= ACCELEROMETER_LOST_S);
         let thrust_sensed = !(burns && sensors.accelerometer_is_lost());
         let estimate = self.estimated(phase, input, thrust_sensed);
@@ -158,7 +158,7 @@ impl Pilot {
         let mass = self.model.mass_now(self.model.burning_s(input.time_s));
         let density_kg_m3 = self.model.density_kg_m3(estimate);
         let vehicle = self.model.now(&mass, density_kg_m3, input.fins_rad, phase.in_landing_burn());
-        let burns = self.model.motor.stage() == MotorStage::Burning;
+        let burns = matches!(self.model.motor.stage(), MotorStage::Rising | MotorStage::Burning);
         let vehicle = if burns { vehicle.in_exhaust(&self.model.mission.exhaust) } else { vehicle };
         let through_air_m_s =
             estimate.state.world_from_body.inverse_transform_vector(&estimate.velocity_through_air_m_s());

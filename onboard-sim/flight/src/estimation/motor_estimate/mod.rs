@@ -72,13 +72,14 @@ with_defaults! {
 /// State of the motor according to the accelerometer.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum MotorStage {
-    /// Not ignited.
+    /// Not ignited, with or without current through the igniter.
     Waiting,
+    /// Ignited; the thrust has not yet reached its curve.
+    Rising,
+    /// The thrust is that of the scaled curve.
     Burning,
     /// The thrust fell far below the curve at this time, s: the motor burned out early.
-    EndedEarly {
-        at_s: f64,
-    },
+    EndedEarly { at_s: f64 },
 }
 
 /// Thrust with its uncertainty.
@@ -102,8 +103,7 @@ pub struct MotorEstimate {
     updated_at_s: f64,
     /// Frames in a row with far too little thrust.
     starved_frames: u32,
-    /// Burn time before a chuff, s; 0 without one.
-    chuffed_s: f64,
+    rise: Rise,
     /// Sum of the misfits of the burn's frames, and how many were compared.
     misfit: f64,
     compared: u32,
@@ -166,7 +166,7 @@ impl MotorEstimate {
             covariance: Matrix5::from_diagonal(&sigmas.component_mul(&sigmas)),
             updated_at_s: 0.0,
             starved_frames: 0,
-            chuffed_s: 0.0,
+            rise: Rise::default(),
             misfit: 0.0,
             compared: 0,
         }
@@ -262,7 +262,7 @@ impl MotorEstimate {
         self.covariance[(AIR, AIR)] += AIR_WALK_SQRT_S * AIR_WALK_SQRT_S * self.prior.frame_s;
         match self.stage {
             MotorStage::Waiting => self.wait(curve, sample, force_n),
-            MotorStage::Burning => self.follow(curve, sample, force_n, cosine),
+            MotorStage::Rising | MotorStage::Burning => self.follow(curve, sample, force_n, cosine),
             MotorStage::EndedEarly { .. } => {}
         }
     }
@@ -272,13 +272,17 @@ impl MotorEstimate {
         let air_n = sample.axial_air_force_n;
         let thrust_n = force_n - self.air_scale() * air_n;
         if sample.may_burn {
+            // Without thrust the noise of the accelerometer adds up to no impulse.
+            let burning_n = thrust_n - NO_THRUST_SHARE * curve.peak_thrust_n();
+            self.rise.take(curve, burning_n, self.prior.frame_s);
             let middle_s = sample.time_s - 0.5 * self.prior.frame_s;
             let mark_n = CAUGHT_SHARE * curve.peak_thrust_n();
             if let Some(crossed_s) = self.detector.take(mark_n, middle_s, thrust_n) {
-                self.stage = MotorStage::Burning;
+                self.stage = MotorStage::Rising;
                 // A motor that chuffed continues along its curve.
-                let begun_s = if self.chuffed_s > 0.0 { self.chuffed_s } else { rise_s(curve, mark_n) };
-                self.mean[IGNITION] = crossed_s - begun_s;
+                let begun_s = rise_s(curve, mark_n).max(self.rise.chuffed_s);
+                self.rise.flame_s = crossed_s - begun_s;
+                self.mean[IGNITION] = self.rise.flame_s;
                 self.covariance[(AIR, AIR)] += self.prior.exhaust_sigma * self.prior.exhaust_sigma;
             }
         }
@@ -296,7 +300,7 @@ impl MotorEstimate {
             MotorStage::EndedEarly { at_s } if time_s >= at_s => {
                 return PredictedThrust { thrust_n: 0.0, sigma_n: 0.0 };
             }
-            MotorStage::Burning | MotorStage::EndedEarly { .. } => self.mean[IGNITION],
+            _ => self.mean[IGNITION],
         };
         // After the last sample the deviation from the shape decays.
         let decay = match self.stage {
@@ -351,20 +355,24 @@ impl MotorEstimate {
     fn follow(&mut self, curve: &ThrustCurve, sample: &MotorSample, force_n: f64, cosine: f64) {
         self.wander();
         self.updated_at_s = sample.time_s;
-        let since_s = sample.time_s - 0.5 * self.prior.frame_s - self.mean[IGNITION];
+        let middle_s = sample.time_s - 0.5 * self.prior.frame_s;
+        let air_n = sample.axial_air_force_n;
+        if self.stage == MotorStage::Rising {
+            let measured_n = (force_n - self.air_scale() * air_n) / cosine;
+            if self.rise(curve, measured_n, middle_s) {
+                return;
+            }
+        }
+        let since_s = middle_s - self.mean[IGNITION];
         let (thrust_n, by_motor) = self.thrust(curve, since_s);
         if since_s < SPIKE_S || thrust_n < TAIL_SHARE * curve.peak_thrust_n() {
             self.starved_frames = 0;
             return;
         }
-        let air_n = sample.axial_air_force_n;
         let starved = force_n - self.air_scale() * air_n < STARVED_SHARE * thrust_n * cosine;
         self.starved_frames = if starved { self.starved_frames + 1 } else { 0 };
         if self.starved_frames >= STARVED_FRAMES && since_s < CHUFF_S {
-            self.chuffed_s = (since_s - f64::from(STARVED_FRAMES) * self.prior.frame_s).max(0.0);
-            self.stage = MotorStage::Waiting;
-            self.detector = Detector::default();
-            self.starved_frames = 0;
+            self.chuff((since_s - f64::from(STARVED_FRAMES) * self.prior.frame_s).max(0.0));
             return;
         }
         if self.starved_frames >= STARVED_FRAMES {
@@ -379,6 +387,51 @@ impl MotorEstimate {
         sensitivity[AIR] = air_n;
         let innovation_n = force_n - thrust_n * cosine - self.air_scale() * air_n;
         self.learn(sample, sensitivity, innovation_n, thrust_n);
+    }
+
+    /// Follows the thrust to its curve, and shifts the ignition to where the impulse so far lies on
+    /// the curve: a slow rise burns the propellant later, and loses none. Returns whether the thrust
+    /// still rises.
+    fn rise(&mut self, curve: &ThrustCurve, measured_n: f64, middle_s: f64) -> bool {
+        let share_now = self.rise.take(curve, measured_n, self.prior.frame_s);
+        let since_s = middle_s - self.rise.flame_s;
+        let Rise { share, earlier_share, .. } = self.rise;
+        if share < FLAME_SHARE && since_s >= SPIKE_S {
+            self.chuff(self.rise.along_s);
+        }
+        if since_s < SPIKE_S || share_now < 0.5 * share || self.stage == MotorStage::Waiting {
+            return true;
+        }
+        let weak = share - earlier_share < STILL_RISING || since_s > RISE_MAX_S;
+        let risen = weak || share >= RISEN_SHARE;
+        if weak && share < RISEN_SHARE {
+            self.rise.given_n_s /= share;
+            self.rise.advance(curve);
+            // A motor so weak is outside the scatter of the certified ones.
+            let excess = RISEN_SHARE - share;
+            self.covariance[(IMPULSE, IMPULSE)] += excess * excess;
+        }
+        let along_s = self.rise.along_s;
+        // A linear rise to a share r in a time t has advanced by r t / 2 along the curve, and is
+        // delayed by t (1 - r)^2 / (2 r) more.
+        let missing = if risen { 0.0 } else { (1.0 - share) / share };
+        let ignition_s = middle_s + 0.5 * self.prior.frame_s - along_s + missing * missing * along_s;
+        let slow = ignition_s - self.rise.flame_s > SLOW_RISE_S;
+        self.mean[IGNITION] = if slow { ignition_s } else { self.rise.flame_s };
+        if risen {
+            self.stage = MotorStage::Burning;
+            let sigma_s = if slow { self.prior.burn_time_sigma * along_s } else { 0.0 };
+            self.covariance[(IGNITION, IGNITION)] += sigma_s * sigma_s;
+        }
+        !risen
+    }
+
+    /// Waits for the thrust again after the motor has gone out at this time on its curve, s.
+    fn chuff(&mut self, along_s: f64) {
+        self.rise = Rise { along_s, chuffed_s: along_s, ..Rise::default() };
+        self.stage = MotorStage::Waiting;
+        self.detector = Detector::default();
+        self.starved_frames = 0;
     }
 
     /// The deviation from the shape over one frame.
@@ -438,6 +491,8 @@ fn product(one: &Vector5<f64>, other: &Vector5<f64>) -> f64 {
 
 /// The motor burns when the thrust is above this fraction of the peak in two frames in a row.
 const CAUGHT_SHARE: f64 = 0.1;
+/// Below this fraction of the peak the motor does not burn.
+const NO_THRUST_SHARE: f64 = 0.02;
 /// Standard deviation of the instant, s: about a frame.
 const IGNITION_SIGMA_S: f64 = 0.004;
 /// The curve's own rise to that fraction is searched up to this time, and in steps of this length,
@@ -472,6 +527,58 @@ impl Detector {
             _ => middle_s,
         });
         None
+    }
+}
+
+// Follows the thrust from the flame to the curve.
+
+/// Time constants of the share of the curve's thrust, s: long for the noise of the accelerometer,
+/// short for a rise.
+const SHARE_S: f64 = 0.02;
+const EARLIER_SHARE_S: f64 = 0.06;
+/// Above this share of its curve's thrust a motor has risen; a weaker motor once its share rises no
+/// more than this between the two time constants, or after this time, s.
+const RISEN_SHARE: f64 = 0.9;
+const STILL_RISING: f64 = 0.02;
+const RISE_MAX_S: f64 = 1.0;
+/// Below this share of the curve's thrust a rising motor has gone out.
+const FLAME_SHARE: f64 = 0.05;
+/// A rise that delays the burn by less than this, s, is that of the curve: the first pressure peak
+/// and the noise do as much.
+const SLOW_RISE_S: f64 = 0.01;
+
+/// The rise of the thrust.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+struct Rise {
+    /// Instant of ignition by the first thrust, s.
+    flame_s: f64,
+    /// Time on the curve at which the measured impulse is reached, s; and the impulse, N s.
+    along_s: f64,
+    given_n_s: f64,
+    /// Measured thrust over that of the curve there, with two time constants.
+    share: f64,
+    earlier_share: f64,
+    /// Time on the curve at which the motor chuffed, s; 0 if it did not.
+    chuffed_s: f64,
+}
+
+impl Rise {
+    /// Takes a frame's mean thrust, N. Returns its share of the curve's thrust.
+    fn take(&mut self, curve: &ThrustCurve, thrust_n: f64, frame_s: f64) -> f64 {
+        let peak_n = curve.peak_thrust_n();
+        self.given_n_s = (self.given_n_s + frame_s * thrust_n).max(curve.impulse_to_n_s(self.chuffed_s));
+        self.advance(curve);
+        let share = thrust_n / curve.thrust_at_n(self.along_s).max(CAUGHT_SHARE * peak_n);
+        self.share += (share - self.share) * (frame_s / SHARE_S).min(1.0);
+        self.earlier_share += (share - self.earlier_share) * (frame_s / EARLIER_SHARE_S).min(1.0);
+        share
+    }
+
+    /// Moves along the curve to the measured impulse.
+    fn advance(&mut self, curve: &ThrustCurve) {
+        while curve.impulse_to_n_s(self.along_s) < self.given_n_s && self.along_s < curve.burn_time_s() {
+            self.along_s += RISE_STEP_S;
+        }
     }
 }
 

@@ -41,6 +41,8 @@ struct Motor {
     out_s: f64,
     /// It burns for 0.1 s and is out for 0.2 s before it reignites.
     chuffs: bool,
+    /// Time in which its thrust rises to the curve's, s: the propellant burns later, and none is lost.
+    rise_s: f64,
     /// Deviation from the curve's shape: its size and its period, s.
     wave: (f64, f64),
 }
@@ -53,6 +55,7 @@ const GOOD: Motor = Motor {
     spike: 1.0,
     out_s: f64::INFINITY,
     chuffs: false,
+    rise_s: 0.0,
     wave: (0.0, 1.0),
 };
 
@@ -74,9 +77,16 @@ impl Motor {
             return 0.0;
         }
         let since_s = if self.chuffs && since_s > 0.2 { since_s - 0.2 } else { since_s };
+        let (since_s, rate) = match since_s {
+            ..0.0 => (since_s, 1.0),
+            since_s if since_s < self.rise_s => {
+                (0.5 * since_s * since_s / self.rise_s, since_s / self.rise_s)
+            }
+            _ => (since_s - 0.5 * self.rise_s, 1.0),
+        };
         let spike = if since_s < 0.05 { self.spike } else { 1.0 };
         let wave = 1.0 + self.wave.0 * libm::sin(core::f64::consts::TAU * since_s / self.wave.1);
-        spike * wave * self.impulse / self.stretch * CURVE.thrust_at_n(since_s / self.stretch)
+        rate * spike * wave * self.impulse / self.stretch * CURVE.thrust_at_n(since_s / self.stretch)
     }
 
     /// Falls for four seconds, and burns until `end_s` after ignition.
@@ -215,6 +225,48 @@ fn a_motor_that_chuffs_is_estimated_like_another() {
     }
     // The variances of 100 estimates each: four standard errors of their ratio are 0.57.
     assert!(chuffed < 1.57 * at_once, "{chuffed} {at_once}");
+}
+
+/// The igniter may have current from 3.8 s on, the flame is there from 4 s on, the thrust of the curve 0.5 s later.
+#[test]
+fn current_flame_and_thrust_are_apart() {
+    let motor = Motor { rise_s: 0.5, ..GOOD };
+    for (after_s, stage) in [
+        (-0.05, MotorStage::Waiting),
+        (0.25, MotorStage::Rising),
+        (0.4, MotorStage::Rising),
+        (0.55, MotorStage::Burning),
+    ] {
+        assert_eq!(motor.found_after(after_s, &mut Normal(7)).stage(), stage, "{after_s} s");
+    }
+    assert_eq!(GOOD.found_after(0.1, &mut Normal(7)).stage(), MotorStage::Burning);
+    // A motor that only glows is not waited for longer than the slowest.
+    let weak = Motor { impulse: 0.75, ..GOOD }.found_after(0.5, &mut Normal(7));
+    assert_eq!(weak.stage(), MotorStage::Burning);
+    assert!((weak.ignition_s().unwrap() - 4.0).abs() < 0.03, "{weak:?}");
+}
+
+/// A rise of T delays the burn by T / 2, and does not pass for a weak motor.
+#[test]
+fn a_slow_rise_delays_the_ignition_and_leaves_the_impulse() {
+    let mut normal = Normal(13);
+    for rise_s in [0.1, 0.3, 0.5, 0.7] {
+        let (n, mut slow, mut at_once) = (50, 0.0, 0.0);
+        for _ in 0..n {
+            let good = Motor::drawn(&mut normal);
+            let motor = Motor { rise_s, ..good };
+            let found = motor.found_after(1.5 + 0.5 * rise_s, &mut normal);
+            let late_s = found.ignition_s().unwrap() - motor.ignition_s;
+            assert!((late_s - 0.5 * rise_s).abs() < 0.05, "{rise_s}: {late_s} {motor:?}");
+            let off = found.impulse_scale() / motor.impulse - 1.0;
+            assert!(off.abs() < 0.06, "{rise_s}: {off} {motor:?}");
+            slow += off * off;
+            at_once += (good.found_after(1.5, &mut normal).impulse_scale() / good.impulse - 1.0).powi(2);
+        }
+        let [slow, at_once] = [slow, at_once].map(|squares| (squares / f64::from(n)).sqrt());
+        println!("rise of {rise_s} s: impulse off by {slow:.4}, {at_once:.4} without, rms");
+        assert!(slow < 1.3 * at_once, "{rise_s}: {slow} {at_once}");
+    }
 }
 
 #[test]
