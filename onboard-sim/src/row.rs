@@ -169,7 +169,7 @@ impl Row {
     pub const DRAWN: [(&'static str, Option<f64>); 15] = [
         ("impulse_scale", Some(1.0)),
         ("burn_time_scale", Some(1.0)),
-        ("ignition_delay_s", Some(0.15)),
+        ("ignition_delay_s", Some(0.24)),
         ("thrust_misalignment_pitch_deg", Some(0.0)),
         ("thrust_misalignment_yaw_deg", Some(0.0)),
         ("mass_scale", Some(1.0)),

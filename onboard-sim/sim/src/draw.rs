@@ -170,6 +170,9 @@ fn hung(mission: &Mission, sigma: &Dispersion, seed: u64, number: u64) -> Option
     })
 }
 
+/// Half of this rise of the thrust counts in the nominal ignition delay, s.
+const EXPECTED_RISE_S: f64 = 0.18;
+
 /// How long a chuffing motor burns, and how long it is out before it burns on, s.
 const CHUFF_S: [f64; 2] = [0.1, 0.2];
 
@@ -208,6 +211,9 @@ fn mismatch(truth: &mut Truth, mission: &Mission, sigma: &Mismatch, seed: u64, n
     truth.principal_axis_rad = [(); 2].map(|()| sigma.principal_axis_deg.to_radians() * chance.normal());
     truth.chuff_s = if chance.unit() < sigma.chuff_share { CHUFF_S } else { [0.0; 2] };
     truth.thrust_rise_s = chance.between(sigma.thrust_rise_s);
+    if truth.thrust_rise_s > 0.0 {
+        truth.ignition_delay_s = (truth.ignition_delay_s - 0.5 * EXPECTED_RISE_S).max(0.02);
+    }
     let legs = &mission.airframe.legs;
     truth.leg_drag_m2 = (legs.drag_area_m2 * sigma.leg_drag_share * chance.normal()
         + chance.between(sigma.leg_drag_m2))

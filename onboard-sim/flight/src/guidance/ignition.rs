@@ -30,7 +30,7 @@ pub struct IgnitionSettings {
     /// height is chosen for the middle of the two.
     #[serde(default)]
     pub late_s: f64,
-    /// Expected time from command to thrust, s.
+    /// Expected time from command to thrust, s; half of the rise of the thrust counts.
     pub delay_s: f64,
     /// How long before the expected ignition the landing controller takes over, s.
     pub arm_before_s: f64,

@@ -289,21 +289,21 @@ mod tests {
     fn a_motor_switched_off_before_ignition_does_not_light() {
         let mut burning = motor(&Truth::default());
         burning.current(true, 11.0);
-        assert_eq!(burning.thrust_begins_s(), Some(10.15));
-        burning.current(false, 10.151);
-        assert_eq!(burning.thrust_begins_s(), Some(10.15), "nothing stops it any more");
+        assert_eq!(burning.thrust_begins_s(), Some(10.24));
+        burning.current(false, 10.241);
+        assert_eq!(burning.thrust_begins_s(), Some(10.24), "nothing stops it any more");
 
         let mut off = motor(&Truth::default());
-        off.current(false, 10.149);
+        off.current(false, 10.239);
         assert!(off.thrust_begins_s().is_none() && off.thrust_n(12.0).abs() < 1e-15);
         off.current(true, 20.0);
-        assert_eq!(off.thrust_begins_s(), Some(20.15), "the delay restarts");
+        assert_eq!(off.thrust_begins_s(), Some(20.24), "the delay restarts");
 
         // A motor that hangs fire ignites late, with or without current.
         let mut hangs = motor(&Truth::default());
         hangs.break_down(&Fault::LateLight { delay_s: 1.0 });
         hangs.current(false, 10.5);
-        assert_eq!(hangs.thrust_begins_s(), Some(11.15));
+        assert_eq!(hangs.thrust_begins_s(), Some(11.24));
     }
 
     #[test]

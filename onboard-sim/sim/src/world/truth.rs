@@ -22,8 +22,9 @@ flight::with_defaults! {
         /// Position of the motor's curve between the mission's and the last of its other curves, 0
         /// to 1.
         pub other_curve: f64 = 0.0,
-        /// Time from the ignition command to the first thrust, s.
-        pub ignition_delay_s: f64 = 0.15,
+        /// Time from the ignition command to the first thrust, s. Without a rise the nominal one
+        /// contains half of it.
+        pub ignition_delay_s: f64 = 0.24,
         /// The motor chuffs: it burns for the first time, goes out for the second, and then
         /// reignites, s.
         pub chuff_s: [f64; 2] = [0.0; 2],

@@ -17,8 +17,8 @@ use crate::rules::verdict::{LandingVerdict, Limits};
 use crate::vehicle::rigid::RigidState;
 
 /// Interval of the search for the ignition in the fall, s, and number of steps.
-const LOOK_S: f64 = 0.1;
-const LOOKS: u32 = 200;
+const LOOK_S: f64 = 0.05;
+const LOOKS: u32 = 400;
 /// Upper bound of the plans of a burn.
 const MOST_PLANS: u32 = 200;
 
