@@ -67,15 +67,20 @@ fn farthest_m(impacts: &[Impact]) -> [f64; 3] {
     [most(|[along_m, _]| along_m), most(|[_, across_m]| across_m.abs()), most(|[along_m, _]| -along_m)]
 }
 
-/// The strongest of these winds up to which at least nine tenths as many flights land as in the
-/// calmest one; `None` with too few flights.
+/// Strongest wind in which the codes permit a launch, m/s: 20 mph (NAR High Power Rocket Safety
+/// Code, rule 9; NAR Model Rocket Safety Code, rule 6).
+pub const PERMITTED_M_S: f64 = 8.9;
+
+/// The strongest of these winds that is permitted, and up to which at least nine tenths as many
+/// flights land as in the calmest one; `None` with too few flights.
 pub fn limit_m_s(winds: &[InWind]) -> Option<f64> {
     const SHARE: f64 = 0.9;
     let calmest = winds.first()?.landed?;
     // A radius without an upper end has no safe outside.
     let ends = |circle: Circle| circle.keep_out_m.is_finite() && circle.radius.high_m.is_some();
     let may_fly = |wind: &&InWind| {
-        wind.circle.is_some_and(ends)
+        wind.wind_m_s <= PERMITTED_M_S
+            && wind.circle.is_some_and(ends)
             && wind.landed.is_some_and(|landed| landed.stands.share >= SHARE * calmest.stands.share)
     };
     winds.iter().take_while(may_fly).last().map(|wind| wind.wind_m_s)
@@ -127,8 +132,9 @@ pub fn aborts(start: Option<StartPoint>, height: &str) -> Vec<Vec<String>> {
 const HALF: [f64; 2] = [140.0, 98.0];
 const WIDEST: f64 = 72.0;
 const LINE: f64 = 84.0;
-/// Room of a circle's name across the wind.
-const NAME: f64 = 28.0;
+/// Where the names of the circles stand in turn, downwind and across the wind: each has its own
+/// side.
+const NAMED: [[f64; 2]; 4] = [[0.0, 1.0], [0.0, -1.0], [0.71, 0.71], [0.71, -0.71]];
 
 /// The circles of the permitted winds from above, to scale, with the line downwind. `wind_from_deg`
 /// is the direction of the wind, clockwise from north, which is up then; without it up is downwind.
@@ -152,27 +158,19 @@ pub fn plan(winds: &[InWind], wind_from_deg: Option<f64>) -> Option<String> {
         format!("<line class=\"{class}\" x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\"/>")
     };
     let (mut lines, mut names) = (String::new(), String::new());
-    // Names alternate between the sides, and are left out where one is already.
-    let mut named = [0.0; 2];
     for (place, (wind_m_s, circle)) in circles.iter().enumerate() {
         let radius = scale * circle.keep_out_m;
         let _ = write!(lines, "<circle r=\"{radius:.1}\"/>");
         let [x, y] = at(-scale * circle.crew_m() - 1.0, 0.0);
         let _ = write!(lines, "<circle class=\"crew\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"2\"/>");
-        let before = &mut named[place % 2];
-        if *before == 0.0 || radius - *before >= NAME {
-            *before = radius;
-            let right = if place % 2 == 0 { radius + 2.0 } else { -radius - 2.0 };
-            let beside = at(0.0, right);
-            let anchor = if cos.abs() < 0.5 {
-                "middle"
-            } else if beside[0] < 0.0 {
-                "end"
-            } else {
-                "start"
-            };
-            names += &text(beside, anchor, &format!("{wind_m_s} m/s"));
-        }
+        let [along, right] = NAMED[place % NAMED.len()].map(|share| (radius + 2.0) * share);
+        let beside = at(along, right);
+        let anchor = match beside[0] / radius {
+            x if x.abs() < 0.5 => "middle",
+            x if x < 0.0 => "end",
+            _ => "start",
+        };
+        names += &text(beside, anchor, &format!("{wind_m_s} m/s"));
     }
     for from in [at(0.0, 0.0), at(LINE - 6.0, -4.0), at(LINE - 6.0, 4.0)] {
         lines += &line("downwind", from, at(LINE, 0.0));

@@ -24,7 +24,7 @@ pub(crate) struct HazardArguments {
     #[arg(long, value_name = "START")]
     start: Option<StartPoint>,
     /// Mean winds 10 m above the ground, m/s.
-    #[arg(long = "wind", value_delimiter = ',', default_value = "0,3,6,10", value_name = "M/S,...")]
+    #[arg(long = "wind", value_delimiter = ',', default_value = "0,3,6,8.9", value_name = "M/S,...")]
     winds: Vec<f64>,
     /// Flights in each wind of every way, by which the ways are known that come down farthest.
     #[arg(long, default_value_t = 100, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]

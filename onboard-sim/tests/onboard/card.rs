@@ -124,6 +124,14 @@ fn val_compass_the_line_of_a_west_wind_points_east() {
         svg.split("x2=").nth(1).unwrap().split("/>").next().unwrap().replace('"', "").replace("y2=", "")
     };
     assert!(tip(&west).starts_with("84.0 ") && west.contains(">N<"), "{west}");
+    for from_deg in (0..360).step_by(45) {
+        let winds: Vec<_> =
+            [(0.0, 110.0), (3.0, 250.0), (6.0, 390.0), (8.9, 450.0)].map(|(wind, m)| circle(wind, m)).into();
+        let svg = plan(&winds, Some(f64::from(from_deg))).unwrap();
+        for name in [">0 m/s<", ">3 m/s<", ">6 m/s<", ">8.9 m/s<"] {
+            assert!(svg.contains(name), "{name} from {from_deg}: {svg}");
+        }
+    }
     let unknown = plan(&winds, None).unwrap();
     assert_eq!(tip(&unknown), "0.0 -84.0");
     assert!(
@@ -153,6 +161,16 @@ fn val_hand_the_wind_limit_leaves_nine_tenths_of_the_landings() {
         impact.place_m = None;
     }
     assert_eq!(limit_m_s(&in_winds(&[(0.0, never_down)], &rule())), None);
+}
+
+/// 20 mph are 8.94 m/s.
+#[test]
+fn val_nar_no_wind_above_20_mph_is_permitted() {
+    let flown = |wind_m_s| {
+        let impacts = (0..400).map(|number| impact(Case::AsPlanned, number, 50.0, 0.0, true));
+        (wind_m_s, impacts.collect::<Vec<_>>())
+    };
+    assert_eq!(limit_m_s(&in_winds(&[flown(0.0), flown(8.9), flown(9.0)], &rule())), Some(8.9));
 }
 
 /// The words of the card are those of the page for the range safety officer.
