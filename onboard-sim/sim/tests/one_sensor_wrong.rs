@@ -166,26 +166,24 @@ fn landed(faults: &[&str], flights: u64) -> usize {
     (0..flights).filter(|number| stands(*number)).count()
 }
 
-/// Faults that recorded flights show in receivers, barometers and lidars. Of 120 flights with each
-/// (seeds 771 and 4021; a stuck lidar also 3, 4 and 5) 106 to 119 land. The limits lie two
-/// standard deviations below: without a lidar 89 % land, which is 21.3 of 24, give or take 1.5. A
-/// blocked lidar may also pass for the ground near it: 17 of these 24 land.
+/// Faults that recorded flights show in receivers, barometers and lidars. Of 240 flights with each
+/// lidar fault (seeds 771 and 4021) 225 to 234 stand.
 #[test]
 fn faults_of_recorded_sensors_are_survived() {
-    for (fault, at_least) in [
-        ("gnss-stale:1.6@boost", 22),
-        ("gnss-stale:6@boost", 22),
-        ("barometer-scale:0.9@0", 22),
-        ("barometer-scale:1.1@0", 22),
-        ("barometer-spike:3000@descent+2", 22),
-        ("lidar-stuck@descent+2", 18),
-        ("lidar-dead@coast", 18),
-        ("lidar-blocked:0.3@descent", 16),
-        ("lidar-step:5@coast", 18),
-        ("lidar-step:-5@coast", 18),
+    for fault in [
+        "gnss-stale:1.6@boost",
+        "gnss-stale:6@boost",
+        "barometer-scale:0.9@0",
+        "barometer-scale:1.1@0",
+        "barometer-spike:3000@descent+2",
+        "lidar-stuck@descent+2",
+        "lidar-dead@coast",
+        "lidar-blocked:0.3@descent",
+        "lidar-step:5@coast",
+        "lidar-step:-5@coast",
     ] {
         let found = landed(&[fault], 24);
-        assert!(found >= at_least, "{fault}: {found} of 24");
+        assert!(found >= 22, "{fault}: {found} of 24");
     }
 }
 

@@ -157,7 +157,7 @@ impl VehicleModel {
             mass_at_ignition_kg: self.mass.at(0.0).mass_kg,
             inertia_kg_m2: situation.mass.pitch_inertia_kg_m2,
             arm_m: self.airframe().thrust_arm_m(situation.mass.cg_station_m),
-            feet_below_cg_m: self.feet_below_cg_m(&situation.mass),
+            feet_below_cg_m: self.feet_below_cg_m(&situation.mass) + ground_margin_m(estimate),
             foot_radius_m: self.airframe().legs.foot_radius_m,
             air_density_kg_m3: situation.density_kg_m3,
             wind_m_s: estimate.wind_m_s.push(0.0),
@@ -170,6 +170,16 @@ impl VehicleModel {
             high: false,
         }
     }
+}
+
+/// Height of the feet above the estimated ground at which a plan ends, m. A fall of this height is
+/// within the legs' limits, a burn that lasts into the ground is not: of 240 flights with a lidar that
+/// died in the coast 234 stand with it and 227 without (mk3, `real`, seeds 771 and 4021).
+fn ground_margin_m(estimate: &Estimate) -> f64 {
+    /// Height sigma above which the lidar does not see the ground, m.
+    const SEEN_M: f64 = 0.1;
+    const MOST_M: f64 = 0.4;
+    (estimate.sigmas.position_m.z - SEEN_M).clamp(0.0, MOST_M)
 }
 
 /// Without a plan the fins leave margin for a motor that is weaker or stronger by one deviation,
