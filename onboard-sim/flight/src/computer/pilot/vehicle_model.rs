@@ -151,13 +151,15 @@ impl VehicleModel {
         fin_drag_area_m2: f64,
     ) -> PoweredSituation<'a> {
         let exhaust = &self.mission.exhaust;
+        let feet_below_cg_m = self.feet_below_cg_m(&situation.mass);
+        let feet_m = estimate.state.position_m.z - feet_below_cg_m;
         PoweredSituation {
             burn,
             burning_s: situation.burning_s,
             mass_at_ignition_kg: self.mass.at(0.0).mass_kg,
             inertia_kg_m2: situation.mass.pitch_inertia_kg_m2,
             arm_m: self.airframe().thrust_arm_m(situation.mass.cg_station_m),
-            feet_below_cg_m: self.feet_below_cg_m(&situation.mass) + ground_margin_m(estimate),
+            feet_below_cg_m: feet_below_cg_m + ground_margin_m(feet_m, estimate.sigmas.position_m.z),
             foot_radius_m: self.airframe().legs.foot_radius_m,
             air_density_kg_m3: situation.density_kg_m3,
             wind_m_s: estimate.wind_m_s.push(0.0),
@@ -172,14 +174,17 @@ impl VehicleModel {
     }
 }
 
-/// Height of the feet above the estimated ground at which a plan ends, m. A fall of this height is
-/// within the legs' limits, a burn that lasts into the ground is not: of 240 flights with a lidar that
-/// died in the coast 234 stand with it and 227 without (mk3, `real`, seeds 771 and 4021).
-fn ground_margin_m(estimate: &Estimate) -> f64 {
-    /// Height sigma above which the lidar does not see the ground, m.
+/// Height of the feet above the estimated ground at which a plan ends, m, when they are at this height.
+/// A fall is within the legs' limits where a burn that lasts into the ground is not. Higher up the lidar
+/// has yet to see the ground: with a margin there, 267 of 300 flights without a fault touch down inside
+/// the envelope instead of 278 (mk3, `real`, seed 4021).
+fn ground_margin_m(feet_m: f64, height_sigma_m: f64) -> f64 {
+    /// Height at which a working lidar sees the ground, m.
+    const REACH_M: f64 = 6.0;
+    /// Largest height sigma with a lidar that sees the ground, m.
     const SEEN_M: f64 = 0.1;
     const MOST_M: f64 = 0.4;
-    (estimate.sigmas.position_m.z - SEEN_M).clamp(0.0, MOST_M)
+    if feet_m > REACH_M { 0.0 } else { (height_sigma_m - SEEN_M).clamp(0.0, MOST_M) }
 }
 
 /// Without a plan the fins leave margin for a motor that is weaker or stronger by one deviation,
