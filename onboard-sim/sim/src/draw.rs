@@ -170,7 +170,7 @@ fn hung(mission: &Mission, sigma: &Dispersion, seed: u64, number: u64) -> Option
     })
 }
 
-/// Half of this rise of the thrust counts in the nominal ignition delay, s.
+/// The rise of the thrust of which the nominal ignition delay contains half, s.
 const EXPECTED_RISE_S: f64 = 0.18;
 
 /// How long a chuffing motor burns, and how long it is out before it burns on, s.

@@ -2,20 +2,17 @@
 //!
 //! Two motors can share one name, and the certified curves of one motor can differ by more than its
 //! scatter. The scales of a wrong curve fit the present thrust, and mispredict the rest. So one
-//! filter for each other curve of the mission processes the same samples, and [`CHOSEN_AFTER_S`]
+//! filter for each other curve of the mission processes the same samples, and [`COMPARED_S`]
 //! after ignition the most likely one continues.
 
 use alloc::vec::Vec;
 
 use serde::Serialize;
 
-use super::motor_estimate::{MotorEstimate, MotorPrior, MotorSample, MotorStage};
+use super::motor_estimate::{COMPARED_S, MotorEstimate, MotorPrior, MotorSample, MotorStage};
 use crate::vehicle::mission::Mission;
 use crate::vehicle::thrust_curve::ThrustCurve;
 
-/// Time of the decision, s after the estimated ignition: the landing then has to waste, or to save, the
-/// difference of the curves.
-const CHOSEN_AFTER_S: f64 = 0.5;
 /// Smallest advantage in misfit for which another curve is chosen. Over the 88 compared frames it
 /// makes that curve 80 times as likely as the expected one, so a motor of the expected curve is
 /// hardly ever misidentified.
@@ -60,7 +57,7 @@ impl OtherCurves {
             filter.update(curve, sample);
         }
         let lit_s = motor.ignition_s().filter(|_| motor.stage() == MotorStage::Burning);
-        if lit_s.is_none_or(|lit_s| sample.time_s - lit_s < CHOSEN_AFTER_S) {
+        if lit_s.is_none_or(|lit_s| sample.time_s - lit_s < COMPARED_S) {
             return;
         }
         let mut least = motor.misfit() - CLEARLY;
@@ -110,9 +107,9 @@ mod tests {
             motor.update(others.flown(&mission), &sample);
             others.update(&mut motor, &mission.other_curves, &sample);
             let since_s = time_s - IGNITED_S;
-            assert!(since_s > CHOSEN_AFTER_S - 0.02 || others.filters.len() == 2, "{since_s}");
-            // The first thrust of another curve passes for a rise, which delays the estimated ignition.
-            assert!(since_s < CHOSEN_AFTER_S + 0.06 || others.filters.is_empty(), "{since_s}");
+            assert!(since_s > COMPARED_S - 0.02 || others.filters.len() == 2, "{since_s}");
+            // The first thrust of another curve looks like a rise, which delays the ignition.
+            assert!(since_s < COMPARED_S + 0.06 || others.filters.is_empty(), "{since_s}");
         }
         (others.chosen(), motor)
     }

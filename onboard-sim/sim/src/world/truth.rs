@@ -22,8 +22,8 @@ flight::with_defaults! {
         /// Position of the motor's curve between the mission's and the last of its other curves, 0
         /// to 1.
         pub other_curve: f64 = 0.0,
-        /// Time from the ignition command to the first thrust, s. Without a rise the nominal one
-        /// contains half of it.
+        /// Time from the ignition command to the first thrust, s. The nominal one is for thrust at
+        /// once, and contains half of the rise that `draw` expects.
         pub ignition_delay_s: f64 = 0.24,
         /// The motor chuffs: it burns for the first time, goes out for the second, and then
         /// reignites, s.

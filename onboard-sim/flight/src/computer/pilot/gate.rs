@@ -118,7 +118,7 @@ impl Pilot {
 
     /// Height of the feet, m.
     pub fn feet_height_m(&self, estimate: &Estimate) -> f64 {
-        estimate.state.position_m.z - self.model.feet_below_cg_m(&self.model.mass.at(0.0))
+        self.model.feet_height_m(estimate, &self.model.mass.at(0.0))
     }
 
     /// Height at which thrust would begin if ignition were commanded in the next frame, m.

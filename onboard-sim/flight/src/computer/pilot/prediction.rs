@@ -101,7 +101,7 @@ impl VehicleModel {
     pub(super) fn fall(&self, estimate: &Estimate, fins_rad: &[f64; 4], apogee_m: f64) -> Prediction {
         let column = self.column(self.density_kg_m3(estimate), self.mission.soft_tilt_deg);
         let state = &estimate.state;
-        let height_m = state.position_m.z - self.feet_below_cg_m(&self.mass.at(0.0));
+        let height_m = self.feet_height_m(estimate, &self.mass.at(0.0));
         let parachute = &self.airframe().parachute;
         let touchdown = touchdown_m(&state.position_m, &state.velocity_m_s, height_m);
         // Speed after the fall from apogee so far, with certified drag.
@@ -173,7 +173,7 @@ impl Pilot {
         let column = known.column(known.density_kg_m3(estimate), known.mission.soft_tilt_deg);
         let fins_m2 = known.motor.air_scale() * known.airframe().open_fin_drag_area_m2();
         let terminal_m_s = column.terminal_speed_m_s(fins_m2);
-        let height_m = state.position_m.z - known.feet_below_cg_m(&known.mass.at(0.0));
+        let height_m = known.feet_height_m(estimate, &known.mass.at(0.0));
         Some(fall_ends_m_s(height_m, state.velocity_m_s.z, terminal_m_s))
     }
 }

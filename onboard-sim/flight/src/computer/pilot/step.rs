@@ -10,7 +10,7 @@ use super::{FRAMES_PER_PLAN, Pilot, Prediction};
 use crate::computer::SensedInput;
 use crate::computer::table::PhaseTable;
 use crate::estimation::estimator::{Estimate, Measurements, VehicleNow};
-use crate::estimation::motor_estimate::{MotorSample, MotorStage};
+use crate::estimation::motor_estimate::MotorSample;
 use crate::estimation::sensor_watch::SensorWatch;
 use crate::rules::phase::{Event, Mode, Phase};
 use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
@@ -43,9 +43,8 @@ impl Pilot {
     /// Estimates the vehicle's state, and its motor and drag.
     pub(crate) fn estimate_state(&mut self, phase: Phase, input: &SensedInput, sensors: &SensorWatch) {
         // Also on the ground, where the gimbal continues to balance.
-        let burns = matches!(self.model.motor.stage(), MotorStage::Rising | MotorStage::Burning);
         self.speeds.watch_accelerometer(sensors.accelerometer_lost_s() >= ACCELEROMETER_LOST_S);
-        let thrust_sensed = !(burns && sensors.accelerometer_is_lost());
+        let thrust_sensed = !(self.model.motor.burns() && sensors.accelerometer_is_lost());
         let estimate = self.estimated(phase, input, thrust_sensed);
         self.estimate = Some(estimate);
         if thrust_sensed {
@@ -158,7 +157,7 @@ impl Pilot {
         let mass = self.model.mass_now(self.model.burning_s(input.time_s));
         let density_kg_m3 = self.model.density_kg_m3(estimate);
         let vehicle = self.model.now(&mass, density_kg_m3, input.fins_rad, phase.in_landing_burn());
-        let burns = matches!(self.model.motor.stage(), MotorStage::Rising | MotorStage::Burning);
+        let burns = self.model.motor.burns();
         let vehicle = if burns { vehicle.in_exhaust(&self.model.mission.exhaust) } else { vehicle };
         let through_air_m_s =
             estimate.state.world_from_body.inverse_transform_vector(&estimate.velocity_through_air_m_s());

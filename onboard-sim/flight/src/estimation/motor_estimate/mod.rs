@@ -72,9 +72,9 @@ with_defaults! {
 /// State of the motor according to the accelerometer.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum MotorStage {
-    /// Not ignited, with or without current through the igniter.
+    /// No thrust yet, with or without current through the igniter.
     Waiting,
-    /// Ignited; the thrust has not yet reached its curve.
+    /// There is thrust, but less than that of the curve.
     Rising,
     /// The thrust is that of the scaled curve.
     Burning,
@@ -183,6 +183,11 @@ impl MotorEstimate {
         self.stage
     }
 
+    /// Whether there is thrust.
+    pub fn burns(&self) -> bool {
+        matches!(self.stage, MotorStage::Rising | MotorStage::Burning)
+    }
+
     /// True impulse over nominal impulse.
     pub fn impulse_scale(&self) -> f64 {
         self.mean[IMPULSE]
@@ -273,14 +278,13 @@ impl MotorEstimate {
         let thrust_n = force_n - self.air_scale() * air_n;
         if sample.may_burn {
             // Without thrust the noise of the accelerometer adds up to no impulse.
-            let burning_n = thrust_n - NO_THRUST_SHARE * curve.peak_thrust_n();
-            self.rise.take(curve, burning_n, self.prior.frame_s);
+            self.rise.take(curve, thrust_n - NO_THRUST_SHARE * curve.peak_thrust_n(), self.prior.frame_s);
             let middle_s = sample.time_s - 0.5 * self.prior.frame_s;
             let mark_n = CAUGHT_SHARE * curve.peak_thrust_n();
             if let Some(crossed_s) = self.detector.take(mark_n, middle_s, thrust_n) {
                 self.stage = MotorStage::Rising;
                 // A motor that chuffed continues along its curve.
-                let begun_s = rise_s(curve, mark_n).max(self.rise.chuffed_s);
+                let begun_s = curve_rise_s(curve, mark_n).max(self.rise.chuffed_s);
                 self.rise.flame_s = crossed_s - begun_s;
                 self.mean[IGNITION] = self.rise.flame_s;
                 self.covariance[(AIR, AIR)] += self.prior.exhaust_sigma * self.prior.exhaust_sigma;
@@ -357,28 +361,30 @@ impl MotorEstimate {
         self.updated_at_s = sample.time_s;
         let middle_s = sample.time_s - 0.5 * self.prior.frame_s;
         let air_n = sample.axial_air_force_n;
-        if self.stage == MotorStage::Rising {
-            let measured_n = (force_n - self.air_scale() * air_n) / cosine;
-            if self.rise(curve, measured_n, middle_s) {
-                return;
-            }
+        let measured_n = force_n - self.air_scale() * air_n;
+        if self.stage == MotorStage::Rising && self.is_rising(curve, measured_n / cosine, middle_s) {
+            return;
         }
         let since_s = middle_s - self.mean[IGNITION];
+        if since_s > COMPARED_S {
+            // Certified motors do not scatter so far, so the prior of the impulse does not hold.
+            let missing_share = core::mem::take(&mut self.rise.missing_share);
+            self.covariance[(IMPULSE, IMPULSE)] += missing_share * missing_share;
+        }
         let (thrust_n, by_motor) = self.thrust(curve, since_s);
         if since_s < SPIKE_S || thrust_n < TAIL_SHARE * curve.peak_thrust_n() {
             self.starved_frames = 0;
             return;
         }
-        let starved = force_n - self.air_scale() * air_n < STARVED_SHARE * thrust_n * cosine;
+        let starved = measured_n < STARVED_SHARE * thrust_n * cosine;
         self.starved_frames = if starved { self.starved_frames + 1 } else { 0 };
-        if self.starved_frames >= STARVED_FRAMES && since_s < CHUFF_S {
-            self.chuff((since_s - f64::from(STARVED_FRAMES) * self.prior.frame_s).max(0.0));
-            return;
-        }
         if self.starved_frames >= STARVED_FRAMES {
             let lasted_s = f64::from(STARVED_FRAMES) * self.prior.frame_s;
-            self.stage = MotorStage::EndedEarly { at_s: sample.time_s - lasted_s };
-            return;
+            if since_s < CHUFF_S {
+                self.chuff((since_s - lasted_s).max(0.0));
+            } else {
+                self.stage = MotorStage::EndedEarly { at_s: sample.time_s - lasted_s };
+            }
         }
         if starved {
             return;
@@ -390,9 +396,9 @@ impl MotorEstimate {
     }
 
     /// Follows the thrust to its curve, and shifts the ignition to where the impulse so far lies on
-    /// the curve: a slow rise burns the propellant later, and loses none. Returns whether the thrust
-    /// still rises.
-    fn rise(&mut self, curve: &ThrustCurve, measured_n: f64, middle_s: f64) -> bool {
+    /// the curve: a slow rise burns the propellant later, and loses none. Returns whether the
+    /// thrust still rises.
+    fn is_rising(&mut self, curve: &ThrustCurve, measured_n: f64, middle_s: f64) -> bool {
         let share_now = self.rise.take(curve, measured_n, self.prior.frame_s);
         let since_s = middle_s - self.rise.flame_s;
         let Rise { share, earlier_share, .. } = self.rise;
@@ -407,9 +413,7 @@ impl MotorEstimate {
         if weak && share < RISEN_SHARE {
             self.rise.given_n_s /= share;
             self.rise.advance(curve);
-            // A motor so weak is outside the scatter of the certified ones.
-            let excess = RISEN_SHARE - share;
-            self.covariance[(IMPULSE, IMPULSE)] += excess * excess;
+            self.rise.missing_share = RISEN_SHARE - share;
         }
         let along_s = self.rise.along_s;
         // A linear rise to a share r in a time t has advanced by r t / 2 along the curve, and is
@@ -532,19 +536,22 @@ impl Detector {
 
 // Follows the thrust from the flame to the curve.
 
-/// Time constants of the share of the curve's thrust, s: long for the noise of the accelerometer,
-/// short for a rise.
+/// Time constants of the filters of the share of the curve's thrust, s: longer than the noise of
+/// the accelerometer, shorter than a slow rise.
 const SHARE_S: f64 = 0.02;
 const EARLIER_SHARE_S: f64 = 0.06;
-/// Above this share of its curve's thrust a motor has risen; a weaker motor once its share rises no
-/// more than this between the two time constants, or after this time, s.
+/// The rise has ended at this share of the curve's thrust; that of a weaker motor when the two
+/// filtered shares differ by less than this, or after this time, s.
 const RISEN_SHARE: f64 = 0.9;
 const STILL_RISING: f64 = 0.02;
 const RISE_MAX_S: f64 = 1.0;
+/// Time from the ignition from which the impulse of a weak motor may lie outside of its prior, s:
+/// earlier every curve would fit, and the motor's could not be identified.
+pub(super) const COMPARED_S: f64 = 0.5;
 /// Below this share of the curve's thrust a rising motor has gone out.
 const FLAME_SHARE: f64 = 0.05;
-/// A rise that delays the burn by less than this, s, is that of the curve: the first pressure peak
-/// and the noise do as much.
+/// A rise that delays the burn by less than this, s, cannot be distinguished from that of the
+/// curve: the first pressure peak and the noise shift the ignition as much.
 const SLOW_RISE_S: f64 = 0.01;
 
 /// The rise of the thrust.
@@ -558,6 +565,8 @@ struct Rise {
     /// Measured thrust over that of the curve there, with two time constants.
     share: f64,
     earlier_share: f64,
+    /// How much of the curve's thrust a weak motor lacks, until its covariance contains it.
+    missing_share: f64,
     /// Time on the curve at which the motor chuffed, s; 0 if it did not.
     chuffed_s: f64,
 }
@@ -565,10 +574,9 @@ struct Rise {
 impl Rise {
     /// Takes a frame's mean thrust, N. Returns its share of the curve's thrust.
     fn take(&mut self, curve: &ThrustCurve, thrust_n: f64, frame_s: f64) -> f64 {
-        let peak_n = curve.peak_thrust_n();
         self.given_n_s = (self.given_n_s + frame_s * thrust_n).max(curve.impulse_to_n_s(self.chuffed_s));
         self.advance(curve);
-        let share = thrust_n / curve.thrust_at_n(self.along_s).max(CAUGHT_SHARE * peak_n);
+        let share = thrust_n / curve.thrust_at_n(self.along_s).max(CAUGHT_SHARE * curve.peak_thrust_n());
         self.share += (share - self.share) * (frame_s / SHARE_S).min(1.0);
         self.earlier_share += (share - self.earlier_share) * (frame_s / EARLIER_SHARE_S).min(1.0);
         share
@@ -583,7 +591,7 @@ impl Rise {
 }
 
 /// How long the curve itself takes to rise to the threshold, s.
-fn rise_s(curve: &ThrustCurve, mark_n: f64) -> f64 {
+fn curve_rise_s(curve: &ThrustCurve, mark_n: f64) -> f64 {
     let steps = (RISE_S / RISE_STEP_S) as u32;
     (0..steps)
         .map(|step| f64::from(step) * RISE_STEP_S)

@@ -41,7 +41,7 @@ struct Motor {
     out_s: f64,
     /// It burns for 0.1 s and is out for 0.2 s before it reignites.
     chuffs: bool,
-    /// Time in which its thrust rises to the curve's, s: the propellant burns later, and none is lost.
+    /// Time in which its thrust rises to the curve's, s; no propellant is lost.
     rise_s: f64,
     /// Deviation from the curve's shape: its size and its period, s.
     wave: (f64, f64),
@@ -227,7 +227,8 @@ fn a_motor_that_chuffs_is_estimated_like_another() {
     assert!(chuffed < 1.57 * at_once, "{chuffed} {at_once}");
 }
 
-/// The igniter may have current from 3.8 s on, the flame is there from 4 s on, the thrust of the curve 0.5 s later.
+/// The igniter may have current from 3.8 s on, the flame is there from 4 s on, and the thrust of
+/// the curve 0.5 s later.
 #[test]
 fn current_flame_and_thrust_are_apart() {
     let motor = Motor { rise_s: 0.5, ..GOOD };
