@@ -67,8 +67,8 @@ fn farthest_m(impacts: &[Impact]) -> [f64; 3] {
     [most(|[along_m, _]| along_m), most(|[_, across_m]| across_m.abs()), most(|[along_m, _]| -along_m)]
 }
 
-/// Strongest wind in which the codes permit a launch, m/s: 20 mph (NAR High Power Rocket Safety
-/// Code, rule 9; NAR Model Rocket Safety Code, rule 6).
+/// Strongest wind in which the codes permit a launch, m/s: 20 mph (rule 9 of the NAR High Power
+/// Rocket Safety Code and of the NAR Model Rocket Safety Code, August 2012).
 pub const PERMITTED_M_S: f64 = 8.9;
 
 /// The strongest of these winds that is permitted, and up to which at least nine tenths as many
@@ -132,8 +132,8 @@ pub fn aborts(start: Option<StartPoint>, height: &str) -> Vec<Vec<String>> {
 const HALF: [f64; 2] = [140.0, 98.0];
 const WIDEST: f64 = 72.0;
 const LINE: f64 = 84.0;
-/// Where the names of the circles stand in turn, downwind and across the wind: each has its own
-/// side.
+/// Directions from the pad to the names of the circles in turn, downwind and across the wind: no
+/// two names of four circles overlap.
 const NAMED: [[f64; 2]; 4] = [[0.0, 1.0], [0.0, -1.0], [0.71, 0.71], [0.71, -0.71]];
 
 /// The circles of the permitted winds from above, to scale, with the line downwind. `wind_from_deg`

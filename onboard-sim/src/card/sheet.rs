@@ -9,7 +9,7 @@ use flight::vehicle::thrust_curve::ThrustCurve;
 use sim::dispersion::may_be_kinder;
 
 use super::range_safety::{
-    Circle, FEWEST, InWind, aborts, calibres, in_winds, limit_m_s, plan, thrust_to_weight,
+    Circle, FEWEST, InWind, PERMITTED_M_S, aborts, calibres, in_winds, limit_m_s, plan, thrust_to_weight,
 };
 use super::{Card, NINE_OF_TEN};
 use crate::hazard::{Case, Impact, Rule, lift_off_kg};
@@ -241,6 +241,7 @@ impl Card {
             "places",
             &[
                 ("no_limit", limit_m_s.is_none().then(String::new)),
+                ("permitted_m_s", Some(PERMITTED_M_S.to_string())),
                 ("limit_m_s", limit_m_s.map(|limit_m_s| limit_m_s.to_string())),
                 ("fewest", Some(FEWEST.to_string())),
                 ("plan", plan.as_ref().map(|_| String::new())),

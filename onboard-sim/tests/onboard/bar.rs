@@ -32,9 +32,9 @@ fn regress_flights_with_field_dispersions_land_on_their_legs() {
     assert!(landed >= 18, "{landed} of 20");
 }
 
-/// The vehicle expects the certified curve, and its motor has one half way to that of old stock: 250
-/// of 300 flights stand, and 243 where the thrust also rises slowly. The old one itself, with 10 %
-/// less impulse, lands 38 of 300 (seed 2002).
+/// The vehicle expects the certified curve, and its motor has one half way to that of old stock:
+/// 250 of 300 flights stand, and 243 where the thrust also rises slowly. The old one itself, with
+/// 10 % less impulse, lands 38 of 300 (seed 2002).
 #[test]
 fn regress_a_motor_half_way_to_the_other_of_its_name_is_landed_on() {
     let mut recipe = Recipe::built_in("mk3", "real").unwrap();
