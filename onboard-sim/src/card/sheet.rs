@@ -234,13 +234,15 @@ impl Card {
     fn places(&self, winds: &[InWind]) -> Section {
         let plan = plan(winds, self.wind_from_deg);
         let limit_m_s = limit_m_s(winds);
+        let forbidden = winds.first().is_some_and(|wind| wind.wind_m_s > PERMITTED_M_S);
         let degrees = |turned_deg: f64| {
             self.wind_from_deg.map(|from_deg| format!("{:.0}", (from_deg + turned_deg) % 360.0))
         };
         let words = words_of(
             "places",
             &[
-                ("no_limit", limit_m_s.is_none().then(String::new)),
+                ("no_limit", (limit_m_s.is_none() && !forbidden).then(String::new)),
+                ("forbidden", forbidden.then(String::new)),
                 ("permitted_m_s", Some(PERMITTED_M_S.to_string())),
                 ("limit_m_s", limit_m_s.map(|limit_m_s| limit_m_s.to_string())),
                 ("fewest", Some(FEWEST.to_string())),

@@ -107,6 +107,14 @@ fn a_card_is_complete_shows_the_time_left_and_gives_no_rate_of_two_flights() {
     let html = fs::read_to_string(card.join("card.html")).unwrap();
     assert!(html.contains("<td>3.100 kg</td>") && html.ends_with("</html>\n"), "{html}");
 
+    let stormy = [&["card", "--mission", "mk2", "--wind", "10", "--out", "stormy"], &few[..]].concat();
+    let stormy = stdout(&run(directory.path(), &stormy));
+    assert!(
+        stormy.contains("The code forbids a launch above 8.9 m/s")
+            && !stormy.contains("flights were flown in each wind"),
+        "{stormy}"
+    );
+
     let again = run(directory.path(), &arguments);
     assert_eq!(again.status.code(), Some(0), "{}", stderr(&again));
     assert_eq!(names(&directory.path().join("card-2")), names(&card));
