@@ -11,6 +11,10 @@
 //! `d`. An extended Kalman filter over `(s, b, t0, d, n)` estimates all five; it estimates `d`
 //! before ignition, while the vehicle falls.
 //!
+//! The thrust needs time to rise to its curve. A slow rise burns the propellant later and loses
+//! none, so the measured impulse gives the time on the curve, and `t0` is shifted until the thrust
+//! is that of the curve. Only then does the filter estimate impulse and burn time.
+//!
 //! The process and the filter are those of A. Gelb (editor), Applied Optimal Estimation, 1974,
 //! chapters 3 and 6.
 
