@@ -556,7 +556,22 @@ fn abort_commanded_by(model: &Model) -> Option<String> {
     let ours = model.commands.of(CommandKind::Abort).map(|_| "commanded from here".to_owned());
     let mut texts = model.events.newest(TEXTS_SEARCHED).filter(|event| event.speaker == Speaker::Vehicle);
     let named = texts.find_map(|event| event.text.strip_suffix(" aborts"));
-    ours.or_else(|| named.map(|sender| format!("commanded by {sender}")))
+    let words = |sender: &str| match sender.strip_prefix("station ") {
+        Some(ids) => format!("station {}", sender_words(model, ids)),
+        None => sender.to_owned(),
+    };
+    ours.or_else(|| named.map(|sender| format!("commanded by {}", words(sender))))
+}
+
+/// The ids of a station with the network address or link that the vehicle last reported for one of
+/// its commands.
+pub fn sender_words(model: &Model, ids: &str) -> String {
+    let mut texts = model.events.newest(TEXTS_SEARCHED).filter(|event| event.speaker == Speaker::Vehicle);
+    let from = texts.find_map(|event| {
+        let (from, _) = event.text.strip_prefix(ids)?.rsplit_once(": ")?;
+        from.starts_with(' ').then_some(from)
+    });
+    format!("{ids}{}", from.unwrap_or_default())
 }
 
 /// Which check kept the ignition gate shut: what the vehicle has found, or has said when it gave

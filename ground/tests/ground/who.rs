@@ -9,10 +9,10 @@ use ground::update::{Action, Msg, Request};
 use protocol::dialect::{
     ATTITUDE_DATA, COMMAND_LONG_DATA, GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA, MavAutopilot, MavCmd,
     MavMessage, MavModeFlag, MavType, TD_CREW_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TD_MISSION_DATA,
-    TD_OPERATOR_DATA, TD_UPLINK_DATA, TIMESYNC_DATA, TdAct, TdInterlock, TdMotor, TdPhase, TdRole,
+    TD_OPERATOR_DATA, TD_UPLINK_DATA, TIMESYNC_DATA, TdAct, TdInterlock, TdLatch, TdMotor, TdPhase, TdRole,
     VFR_HUD_DATA,
 };
-use protocol::identity::{GROUND, PHASE_BITS};
+use protocol::identity::{Address, GROUND, PHASE_BITS};
 
 use crate::keys::ladder;
 use crate::rig::{Rig, SESSION, enter, is_abort, is_arm, settings, typed};
@@ -393,6 +393,40 @@ fn what_another_session_armed_is_never_armed_here() {
     rig.take_commands();
     rig.run(5.0);
     assert_eq!(rig.take_commands(), []);
+}
+
+/// A program without a session, and a Touchdown station on a link without a key.
+#[test]
+fn an_arming_a_start_and_an_abort_by_another_station_are_alarms_with_its_address_and_id() {
+    let other = Address { system_id: 254, component_id: 190 };
+    let mut rig = Rig::crewed();
+    rig.armed_here = false;
+    let reports = |rig: &mut Rig, command: &str| {
+        rig.text(&format!("254/190 at 192.0.2.7:14550: {command}"));
+        rig.uplink_of(other, 100, true);
+        rig.run(1.2);
+    };
+    let every_page = |rig: &mut Rig, words: &str| {
+        for page in "123456789?".chars() {
+            rig.key(Key::Char(page));
+            rig.expect_screen(words);
+        }
+        rig.key(Key::Char('1'));
+    };
+    (rig.armed, rig.phase) = (true, TdPhase::TD_PHASE_PAD_ARMED);
+    reports(&mut rig, "arm");
+    every_page(&mut rig, "ALARM ARMED BY ANOTHER STATION: 254/190 at 192.0.2.7:14550");
+    rig.key(Key::Char(' '));
+    rig.countdown_ms = 60_000;
+    reports(&mut rig, "start");
+    every_page(&mut rig, "ALARM COUNTDOWN BY ANOTHER STATION: 254/190 at 192.0.2.7:14550; hold or abort");
+    rig.key(Key::Char(' '));
+    (rig.armed, rig.phase, rig.countdown_ms) = (false, TdPhase::TD_PHASE_PAD_IDLE, i32::MAX);
+    rig.interlocks |= TdInterlock::TD_INTERLOCK_ABORT_LATCHED;
+    rig.latch = TdLatch::TD_LATCH_COMMANDED;
+    rig.text("station 254/190 aborts");
+    reports(&mut rig, "abort");
+    every_page(&mut rig, "ABORT LATCHED: commanded by station 254/190 at 192.0.2.7:14550");
 }
 
 #[test]
