@@ -146,7 +146,7 @@ impl Screen {
         KEYBOARD_ENHANCED.load(Ordering::Relaxed)
     }
 
-    /// Whether the terminal has answered since the last call. Asks it again if that is due, and if
+    /// Whether the terminal has answered since the last call, and shows this screen. Asks it again if that is due, and if
     /// it has taken what was written.
     pub fn answers(&mut self, now: Duration) -> bool {
         if now >= self.ask_at && matches!(self.writer.is_busy(), Ok(false)) {
@@ -156,7 +156,7 @@ impl Screen {
         if has_answered {
             self.pace.answered(now);
         }
-        has_answered
+        has_answered && !answers::is_hidden()
     }
 
     /// Sends what was drawn, and asks behind it whether the terminal has taken it.

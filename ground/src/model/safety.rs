@@ -321,7 +321,8 @@ fn held_by(vehicle: &Vehicle) -> Option<String> {
 /// Why the countdown was held and what happens next; `None` while it is not held.
 pub fn hold_words(vehicle: &Vehicle, armed_here: bool) -> Option<String> {
     let status = &vehicle.status.as_ref()?.value;
-    let theirs = || held_by(vehicle).unwrap_or_else(|| "its station".to_owned());
+    let theirs =
+        || held_by(vehicle).map_or_else(|| "its station".to_owned(), |who| format!("the station of {who}"));
     let whom = if armed_here { "this station".to_owned() } else { theirs() };
     let why = match status.hold {
         TdHold::TD_HOLD_NONE => return None,
@@ -409,7 +410,8 @@ impl Ending {
 
     /// The word with what is known of this end.
     pub fn sentence(self, vehicle: &Vehicle) -> String {
-        format!("{}{}", self.word(), self.detail(vehicle))
+        let reset = if vehicle.reset_in_flight { ", after a RESET IN FLIGHT" } else { "" };
+        format!("{}{reset}{}", self.word(), self.detail(vehicle))
     }
 
     /// What is known of this end: what follows the word.

@@ -147,7 +147,9 @@ fn timeline(model: &Model, theme: Theme, now: Duration, columns: usize, is_wide:
         (from + Duration::from_secs_f64(steps * step_s)).max(now)
     };
     let to_come = to_come.iter().map(|(name, at)| (*name, steady(*at), *at, EXPECTED, Ink::Predicted));
-    let marks: Vec<_> = been.chain(to_come).filter(|(_, at, ..)| *at >= from).collect();
+    let reset = model.rebooted.filter(|_| model.vehicle.reset_in_flight);
+    let reset = reset.map(|(_, at)| ("RESET", at, at, EVENT, Ink::Body));
+    let marks: Vec<_> = been.chain(reset).chain(to_come).filter(|(_, at, ..)| *at >= from).collect();
     let lift_off = phases.iter().find(|(phase, _)| !is_on_pad(*phase)).map_or(from, |(_, at)| *at);
     for (_, at, _, mark, ink) in &marks {
         rows[0][column(*at)] = (*mark, *ink);

@@ -4,13 +4,13 @@
 use std::time::Duration;
 
 use ground::key::Key;
-use ground::model::{CommandKind, KeyOwner, Role, Seat, Settings};
+use ground::model::{CommandKind, Ending, KeyOwner, Role, Seat, Settings};
 use ground::update::{Action, Msg, Request};
 use protocol::dialect::{
     ATTITUDE_DATA, COMMAND_LONG_DATA, GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA, MavAutopilot, MavCmd,
     MavMessage, MavModeFlag, MavType, TD_CREW_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TD_MISSION_DATA,
-    TD_OPERATOR_DATA, TD_UPLINK_DATA, TIMESYNC_DATA, TdAct, TdInterlock, TdLatch, TdMotor, TdPhase, TdRole,
-    VFR_HUD_DATA,
+    TD_OPERATOR_DATA, TD_UPLINK_DATA, TIMESYNC_DATA, TdAct, TdInterlock, TdLatch, TdLimit, TdMotor, TdPhase,
+    TdRole, VFR_HUD_DATA,
 };
 use protocol::identity::{Address, GROUND, PHASE_BITS};
 
@@ -228,10 +228,14 @@ fn a_reset_in_flight_is_an_alarm_until_the_end() {
         let mut alarms = rig.model.alarms.list().iter();
         alarms.any(|alarm| alarm.is_active() && alarm.what.text == "the vehicle has REBOOTED IN FLIGHT")
     };
-    assert!(held(&rig), "{}", rig.screen(120, 36));
+    let screen = rig.screen(120, 36);
+    assert!(held(&rig) && screen.contains("RESET"), "{screen}");
     rig.phase = TdPhase::TD_PHASE_SAFED;
+    rig.verdict(true, TdLimit::empty());
     rig.run(60.0);
     assert!(held(&rig), "{}", rig.screen(120, 36));
+    let ending = Ending::of(&rig.model.vehicle, rig.now).unwrap().sentence(&rig.model.vehicle);
+    assert!(ending.contains(", after a RESET IN FLIGHT"), "{ending}");
 }
 
 #[test]

@@ -8,6 +8,7 @@ use anyhow::Context as _;
 use clap::Args;
 use flight::rules::verdict::Landing;
 use flight::vehicle::mission::StartPoint;
+use protocol::background::survive_file_size_limit;
 use protocol::crew_file::CrewFile;
 use protocol::identity::{LARGEST_BOOT_NUMBER, NETWORK_BUDGET_BYTES_S, RADIO_BUDGET_BYTES_S, VEHICLE};
 use protocol::log::recorder::Recorder;
@@ -129,6 +130,7 @@ impl FlyArguments {
 }
 
 async fn fly(arguments: FlyArguments) -> anyhow::Result<Exit> {
+    survive_file_size_limit().context("handling the limit of the file size")?;
     let (flight, as_json_object) = (arguments.flight()?, arguments.json);
     let crew = arguments.crew.as_deref().map(CrewFile::open).transpose()?;
     let log = arguments.log.as_ref().filter(|path| *path != Path::new("none"));

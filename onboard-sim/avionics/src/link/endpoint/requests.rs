@@ -86,6 +86,13 @@ impl VehicleEndpoint {
         vehicle: &VehicleState<'_>,
     ) {
         let link = path.link;
+        // No operator has requested a hold that the station decided by itself.
+        let reason = command.station_hold().filter(|_| crew_command == CrewCommand::Hold);
+        let by = by.filter(|_| reason.is_none());
+        if let Some(reason) = reason.filter(|_| vehicle.mode().countdown_end_s.is_some()) {
+            let words = format!("station {station} holds by itself: {}", reason.words());
+            self.send_text(Severity::Warning, &words);
+        }
         // A command that moves something is executed once, however late a repetition arrives; one
         // that stops is executed every time.
         if can_move(crew_command) {
