@@ -59,7 +59,7 @@ const OF_STATION: [AlarmRow; 15] = [
         Some(format!("NOTHING WAS SENT: {}", model.settings.role.why_not_command()?))
     }),
     of_run(AlarmKind::StationSilent, WHO, |model, now| {
-        let gone = "STATION GONE: this screen shows the past and commands nothing";
+        let gone = "STATION GONE: this screen shows the past and commands nothing (q leaves)";
         let silent = "STATION SILENT: it does not answer this screen, which shows the past";
         let silence = model.link.station_silence(now).map(|_| silent.to_owned());
         if model.link.station_gone { Some(gone.to_owned()) } else { silence }
@@ -265,7 +265,9 @@ fn battery(model: &Model) -> Option<String> {
     let battery = model.vehicle.battery()?.value;
     let refuses = fails(model, TdCheck::TD_CHECK_BATTERY);
     let empty = battery.percent.is_some_and(|percent| percent <= BATTERY_LOW_PERCENT);
-    let left = battery.percent.map_or_else(String::new, |percent| format!(", {percent} % left"));
+    // A charge above that limit is an estimate that the voltage contradicts.
+    let left = battery.percent.filter(|_| empty);
+    let left = left.map_or_else(String::new, |percent| format!(", {percent} % left"));
     (refuses || empty).then(|| format!("BATTERY LOW: {:.2} V{left}", battery.volts))
 }
 

@@ -14,7 +14,8 @@ use super::lists::said;
 use super::status_lines::{alarm_text, replay_line};
 use super::{Ink, TextRole, Theme, draw_line, side_by_side, top_lines};
 use crate::model::{
-    Act, Event, Model, Page, dead_reckoning::course, is_burning, is_flight, is_on_pad, words,
+    Act, Danger, Event, KeepAway, Model, Page, dead_reckoning::course, is_burning, is_flight, is_on_pad,
+    words,
 };
 use crate::view::pictures::seconds_since;
 
@@ -228,7 +229,14 @@ pub fn draw_keys(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
     let rings = model.alarms.unacknowledged() > 0;
     // In flight no command but the abort does anything, and the page matters.
     let holds = model.vehicle.in_flight() && model.pages.held.is_none();
-    let matters = |act: &Act| (*act != Act::Acknowledge || rings) && (*act != Act::Hold || holds);
+    let away = KeepAway::of(&model.vehicle, now).is_some_and(|away| away.danger != Danger::LiveWaited);
+    let matters = |act: &Act| match act {
+        Act::Acknowledge => rings,
+        Act::Hold => holds,
+        Act::HoldCountdown => !model.is_past_hold(now),
+        Act::Arm | Act::Start | Act::Check => !away,
+        _ => true,
+    };
     let works = |act: &Act| matters(act) && act.works(model, now);
     let mut room = usize::from(left.width);
     let spans = KEYS

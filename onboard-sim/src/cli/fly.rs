@@ -24,7 +24,7 @@ use sim::wire::fly::{FlightEnd, FlightSummary, FlyOptions, OnTheWire, Speed, fly
 use sim::wire::vehicle::{RocketFlight, VehicleEvent};
 use tokio::sync::watch;
 
-use super::{in_wind, logging, recipe};
+use super::{in_wind, logging, notify, recipe};
 
 #[derive(Args)]
 #[command(
@@ -145,6 +145,9 @@ async fn fly(arguments: FlyArguments) -> anyhow::Result<Exit> {
     };
     // People may be at it: an automatic flight gives no warning.
     let crewed = !arguments.auto && !arguments.mavlink.is_empty();
+    if crewed && !matches!(arguments.speed, Speed::Factor(factor) if factor <= 1.0) {
+        notify("--speed: on its pad, with a crew, the vehicle runs in real time");
+    }
     // Beside the first of these that the vehicle has: they make it the same vehicle when it is
     // switched on again.
     let own = arguments.uid_file.as_ref().or(arguments.key.as_ref()).or(log);
