@@ -149,8 +149,8 @@ impl Screen {
         KEYBOARD_ENHANCED.load(Ordering::Relaxed)
     }
 
-    /// Whether the terminal has answered since the last call, and shows this screen. Asks it again if that is due, and if
-    /// it has taken what was written.
+    /// Whether the terminal has answered since the last call, and shows this screen. Asks it again
+    /// if that is due, and if it has taken what was written.
     pub fn answers(&mut self, now: Duration) -> bool {
         if now >= self.ask_at && matches!(self.writer.is_busy(), Ok(false)) {
             self.ask(now);

@@ -322,6 +322,12 @@ pub(super) fn observe(model: &mut Model, now: Duration) {
             told.push((EventLevel::Error, track.by.clone(), text));
             continue;
         }
+        // Then the effect is that of another station's command.
+        let denied = Acknowledgement::Answered(MavResult::MAV_RESULT_DENIED as u8);
+        if track.kind.moves() && track.acknowledged == denied {
+            track.observed_at = None;
+            continue;
+        }
         let answered = seen.is_none() && track.accepted();
         let shown = answered || track.kind.is_observed(&model.vehicle, track.commanded_at);
         let (level, text) = if let Some(since) = track.observed_at {

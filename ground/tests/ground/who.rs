@@ -217,6 +217,28 @@ fn a_reset_in_the_countdown_is_an_alarm_and_withdraws_what_was_observed() {
     }
 }
 
+/// The countdown that the vehicle shows is another station's.
+#[test]
+fn a_start_that_was_denied_is_not_observed() {
+    for counts_first in [true, false] {
+        let mut rig = Rig::crewed();
+        (rig.armed, rig.phase, rig.armed_here) = (true, TdPhase::TD_PHASE_PAD_ARMED, false);
+        rig.run(1.0);
+        rig.msg(Msg::command(CommandKind::Start, Seat::default()));
+        for step in [counts_first, !counts_first] {
+            if step {
+                rig.countdown_ms = 8_000;
+                rig.run(0.3);
+            } else {
+                rig.answer(START, 2);
+            }
+        }
+        rig.run(1.0);
+        let track = rig.model.commands.of(CommandKind::Start).unwrap();
+        assert!(track.observed_at.is_none() && !track.accepted(), "{track:?}");
+    }
+}
+
 #[test]
 fn a_reset_in_flight_is_an_alarm_until_the_end() {
     let mut rig = counting();

@@ -132,7 +132,7 @@ pub(super) fn without_last_if(ruled_out: bool, sensitivity: &[(usize, f64)]) -> 
     &sensitivity[..sensitivity.len() - usize::from(ruled_out)]
 }
 
-/// Standard deviation of the velocity of a vehicle at rest on the ground, m/s: it rocks in the wind.
+/// Standard deviation of the velocity of a vehicle at rest on the ground, m/s: wind rocks it.
 const AT_REST_M_S: f64 = 0.02;
 
 impl Estimator {
