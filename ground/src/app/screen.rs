@@ -44,6 +44,9 @@ const QUIET_FOR: Duration = Duration::from_millis(50);
 /// The longest wait for the end of a paste.
 const QUIET_WITHIN: Duration = Duration::from_secs(2);
 
+/// The smallest screen that counts, columns and rows: it has room for an alarm and the keys.
+const LEAST: (u16, u16) = (20, 5);
+
 /// How often the terminal is asked whether it answers.
 const ASK_EVERY: Duration = Duration::from_millis(250);
 
@@ -146,8 +149,8 @@ impl Screen {
         KEYBOARD_ENHANCED.load(Ordering::Relaxed)
     }
 
-    /// Whether the terminal has answered since the last call. Asks it again if that is due, and if
-    /// it has taken what was written.
+    /// Whether the terminal has answered since the last call, and shows this screen. Asks it again
+    /// if that is due, and if it has taken what was written.
     pub fn answers(&mut self, now: Duration) -> bool {
         if now >= self.ask_at && matches!(self.writer.is_busy(), Ok(false)) {
             self.ask(now);
@@ -156,7 +159,8 @@ impl Screen {
         if has_answered {
             self.pace.answered(now);
         }
-        has_answered
+        let fits = self.terminal.size().is_ok_and(|size| size.width >= LEAST.0 && size.height >= LEAST.1);
+        has_answered && fits && !answers::is_hidden()
     }
 
     /// Sends what was drawn, and asks behind it whether the terminal has taken it.

@@ -14,7 +14,8 @@ use super::lists::said;
 use super::status_lines::{alarm_text, replay_line};
 use super::{Ink, TextRole, Theme, draw_line, side_by_side, top_lines};
 use crate::model::{
-    Act, Event, Model, Page, dead_reckoning::course, is_burning, is_flight, is_on_pad, words,
+    Act, Danger, Event, KeepAway, Model, Page, dead_reckoning::course, is_burning, is_flight, is_on_pad,
+    words,
 };
 use crate::view::pictures::seconds_since;
 
@@ -147,7 +148,9 @@ fn timeline(model: &Model, theme: Theme, now: Duration, columns: usize, is_wide:
         (from + Duration::from_secs_f64(steps * step_s)).max(now)
     };
     let to_come = to_come.iter().map(|(name, at)| (*name, steady(*at), *at, EXPECTED, Ink::Predicted));
-    let marks: Vec<_> = been.chain(to_come).filter(|(_, at, ..)| *at >= from).collect();
+    let reset = model.rebooted.filter(|_| model.vehicle.reset_in_flight);
+    let reset = reset.map(|(_, at)| ("RESET", at, at, EVENT, Ink::Body));
+    let marks: Vec<_> = been.chain(reset).chain(to_come).filter(|(_, at, ..)| *at >= from).collect();
     let lift_off = phases.iter().find(|(phase, _)| !is_on_pad(*phase)).map_or(from, |(_, at)| *at);
     for (_, at, _, mark, ink) in &marks {
         rows[0][column(*at)] = (*mark, *ink);
@@ -226,7 +229,14 @@ pub fn draw_keys(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
     let rings = model.alarms.unacknowledged() > 0;
     // In flight no command but the abort does anything, and the page matters.
     let holds = model.vehicle.in_flight() && model.pages.held.is_none();
-    let matters = |act: &Act| (*act != Act::Acknowledge || rings) && (*act != Act::Hold || holds);
+    let away = KeepAway::of(&model.vehicle, now).is_some_and(|away| away.danger != Danger::LiveWaited);
+    let matters = |act: &Act| match act {
+        Act::Acknowledge => rings,
+        Act::Hold => holds,
+        Act::HoldCountdown => !model.is_past_hold(now),
+        Act::Arm | Act::Start | Act::Check => !away,
+        _ => true,
+    };
     let works = |act: &Act| matters(act) && act.works(model, now);
     let mut room = usize::from(left.width);
     let spans = KEYS

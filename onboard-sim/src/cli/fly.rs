@@ -8,6 +8,7 @@ use anyhow::Context as _;
 use clap::Args;
 use flight::rules::verdict::Landing;
 use flight::vehicle::mission::StartPoint;
+use protocol::background::survive_file_size_limit;
 use protocol::crew_file::CrewFile;
 use protocol::identity::{LARGEST_BOOT_NUMBER, NETWORK_BUDGET_BYTES_S, RADIO_BUDGET_BYTES_S, VEHICLE};
 use protocol::log::recorder::Recorder;
@@ -23,7 +24,7 @@ use sim::wire::fly::{FlightEnd, FlightSummary, FlyOptions, OnTheWire, Speed, fly
 use sim::wire::vehicle::{RocketFlight, VehicleEvent};
 use tokio::sync::watch;
 
-use super::{in_wind, logging, recipe};
+use super::{in_wind, logging, notify, recipe};
 
 #[derive(Args)]
 #[command(
@@ -129,6 +130,7 @@ impl FlyArguments {
 }
 
 async fn fly(arguments: FlyArguments) -> anyhow::Result<Exit> {
+    survive_file_size_limit().context("handling the limit of the file size")?;
     let (flight, as_json_object) = (arguments.flight()?, arguments.json);
     let crew = arguments.crew.as_deref().map(CrewFile::open).transpose()?;
     let log = arguments.log.as_ref().filter(|path| *path != Path::new("none"));
@@ -143,6 +145,9 @@ async fn fly(arguments: FlyArguments) -> anyhow::Result<Exit> {
     };
     // People may be at it: an automatic flight gives no warning.
     let crewed = !arguments.auto && !arguments.mavlink.is_empty();
+    if crewed && !matches!(arguments.speed, Speed::Factor(factor) if factor <= 1.0) {
+        notify("--speed: on its pad, with a crew, the vehicle runs in real time");
+    }
     // Beside the first of these that the vehicle has: they make it the same vehicle when it is
     // switched on again.
     let own = arguments.uid_file.as_ref().or(arguments.key.as_ref()).or(log);
