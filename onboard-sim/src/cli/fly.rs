@@ -92,7 +92,8 @@ pub(crate) struct FlyArguments {
     /// Break something; may be repeated.
     #[arg(long = "fault", value_name = "FAULT", long_help = format!("Break something; may be given more than once. Write {}", how_to_write()))]
     faults: Vec<TimedFault>,
-    /// Speed of simulated time: a factor, or max.
+    /// Speed of simulated time: a factor, or max. On the pad with a crew, at most real time: the
+    /// vehicle judges its uplink by the age of the last heartbeat. --auto waits for no crew.
     #[arg(long, default_value = "1")]
     speed: Speed,
     /// Arm and start without a ground station, also with --mavlink.
@@ -111,6 +112,10 @@ pub(crate) struct FlyArguments {
     #[arg(long)]
     json: bool,
 }
+
+/// Note on the speed of a flight that waits for a crew.
+const PAD_SPEED: &str = "onboard-sim: on the pad a vehicle with a crew runs at real time, because it judges its uplink by the age of \
+    the last heartbeat; --auto waits for no crew";
 
 pub(crate) fn run(arguments: FlyArguments) -> anyhow::Result<Exit> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
@@ -146,7 +151,7 @@ async fn fly(arguments: FlyArguments) -> anyhow::Result<Exit> {
     // People may be at it: an automatic flight gives no warning.
     let crewed = !arguments.auto && !arguments.mavlink.is_empty();
     if crewed && !matches!(arguments.speed, Speed::Factor(factor) if factor <= 1.0) {
-        notify("--speed: on its pad, with a crew, the vehicle runs in real time");
+        notify(PAD_SPEED);
     }
     // Beside the first of these that the vehicle has: they make it the same vehicle when it is
     // switched on again.
