@@ -8,7 +8,7 @@ use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::widgets::canvas::Circle;
 
-use super::{DOTS_ACROSS, DOTS_UP, Ink, Plane, TextRole, Theme, circle};
+use super::{DOTS_ACROSS, Ink, Plane, TextRole, Theme, circle};
 use crate::model::{
     Model, Spot, dead_reckoning::predict_position, is_burning, is_on_pad, quantity::Quantity,
 };
@@ -195,14 +195,20 @@ fn words(
     let length_m = widgets::tick_step((right - left) / 5.0, 1);
     let cells = (length_m / column).round().max(2.0) as usize;
     let scale = format!("├{}┤ {} m", "─".repeat(cells.saturating_sub(2)), shortest(length_m));
+    let fence = fence_m.map(|fence_m| (fence_m, format!("fence {} m", shortest(fence_m))));
+    let limit = theme.ground().fg(theme.ink(Ink::Limit));
+    // A fence that is in the picture is a scale.
+    if let Some((_, words)) =
+        fence.as_ref().filter(|(fence_m, _)| -*fence_m > left.max(bottom) && *fence_m < right.min(top))
+    {
+        return plane.write(frame, (left, bottom), words, limit);
+    }
     plane.write(frame, (left, bottom), &scale, label);
-    if let Some(fence_m) = fence_m {
-        let words = format!("fence {} m", shortest(fence_m));
-        let style = theme.ground().fg(theme.ink(Ink::Limit));
-        // Beside the scale, or above it.
-        let apart = scale.chars().count() + words.len() < usize::from(plane.area.width);
-        let y = if apart { bottom } else { bottom + 1.5 * DOTS_UP * per_dot };
-        plane.write(frame, (right, y), &words, style);
+    // Of a part of it the name has its room where nothing else stands.
+    let nearest_m = libm::hypot(0.0_f64.clamp(left, right), 0.0_f64.clamp(bottom, top));
+    let farthest_m = libm::hypot(left.abs().max(right.abs()), bottom.abs().max(top.abs()));
+    if let Some((_, words)) = fence.filter(|(fence_m, _)| (nearest_m..farthest_m).contains(fence_m)) {
+        plane.beside(frame, (right, bottom), &[words], limit);
     }
 }
 
