@@ -28,13 +28,16 @@ const IDLE_FRAME: Duration = Duration::from_secs(1);
 /// The shortest time between two drawings of the pictures of a flight over a slow line.
 const PICTURES: Duration = Duration::from_secs(1);
 
-/// A terminal that answers within this time is fast, if it had to take so many bytes before: a line
-/// of 2 kB/s takes 200 ms for them.
+/// A terminal that answers within this time is fast, if it had to take so many bytes just before: a
+/// line of 2 kB/s takes 100 ms for them.
 const FAST: Duration = Duration::from_millis(50);
+/// A fast terminal is slow once an answer takes this long. Below it, a busy computer is more likely
+/// than a slow line.
+const SLOW: Duration = Duration::from_millis(150);
 /// The shortest time between two frames in flight on a fast terminal: no tenth of a second of the
 /// clock is left out.
 const FAST_FRAME: Duration = Duration::from_millis(90);
-const FAST_BYTES: usize = 400;
+const FAST_BYTES: usize = 200;
 
 /// While the terminal has not taken what was written so long ago, nothing new is drawn: it would be
 /// seen late.
@@ -101,8 +104,7 @@ pub struct Pace {
     /// When the terminal was asked, if it has not answered yet; and how long its last answer took.
     asked: Option<Duration>,
     took: Option<Duration>,
-    /// Bytes written since the question before, and before the open question.
-    unasked: usize,
+    /// Bytes of the frame that was written with the open question.
     asked_bytes: usize,
     /// Whether the terminal takes a frame as soon as it is written.
     is_fast: bool,
@@ -120,7 +122,7 @@ impl Pace {
 
     /// Whether the terminal is still late with its answer: then it is slow.
     pub fn check_answer(&mut self, now: Duration) {
-        self.is_fast &= self.waits(now).is_none_or(|waits| waits <= FAST);
+        self.is_fast &= self.waits(now).is_none_or(|waits| waits <= SLOW);
     }
 
     /// A person has done something and waits for the result.
@@ -217,7 +219,8 @@ impl Pace {
         let asks = self.waits(now).is_none_or(|waits| waits > LOST_AFTER);
         if asks {
             self.asked = Some(now);
-            self.asked_bytes = std::mem::take(&mut self.unasked);
+            let with_it = self.written.back().filter(|(at, _)| *at == now);
+            self.asked_bytes = with_it.map_or(0, |(_, bytes)| *bytes);
         }
         asks
     }
@@ -226,10 +229,8 @@ impl Pace {
     pub fn answered(&mut self, now: Duration) {
         let took = self.waits(now).unwrap_or(Duration::ZERO);
         // A few bytes pass any line quickly.
-        let shows_speed = took > FAST || (self.asked.is_some() && self.asked_bytes >= FAST_BYTES);
-        if shows_speed {
-            self.is_fast = took <= FAST && !self.never_fast;
-        }
+        let is_proven = self.asked.is_some() && self.asked_bytes >= FAST_BYTES && took <= FAST;
+        self.is_fast = took <= SLOW && (self.is_fast || is_proven && !self.never_fast);
         self.took = Some(took);
         self.asked = None;
     }
@@ -259,7 +260,6 @@ impl Pace {
         (self.urgent, self.whole) = (false, false);
         self.drawn = Some(Urgent::of(model));
         self.cells = cells;
-        self.unasked += bytes;
         if self.is_fast && (model.vehicle.in_flight() || model.vehicle.counts_down()) {
             self.wait = FAST_FRAME;
         }

@@ -56,23 +56,26 @@ fn shown_by(emulator: &vt100::Parser) -> Vec<String> {
 /// asked.
 struct SlowTerminal {
     bytes_per_s: fn(Duration) -> f64,
-    /// When it has taken all that was written.
-    free_at: Duration,
-    answers_at: Option<Duration>,
+    /// Bytes that it has not taken yet, at this moment, and those of them before a question.
+    waiting: f64,
+    at: Duration,
+    before_question: Option<f64>,
 }
 
 impl SlowTerminal {
     /// Takes a frame that is drawn now, and perhaps a question behind it. Returns when it will have
     /// been taken.
     fn take(&mut self, bytes: usize, asks: bool, now: Duration) -> Duration {
-        self.free_at =
-            self.free_at.max(now) + Duration::from_secs_f64(bytes as f64 / (self.bytes_per_s)(now));
-        self.answers_at = if asks { Some(self.free_at) } else { self.answers_at };
-        self.free_at
+        self.waiting += bytes as f64;
+        self.before_question = if asks { Some(self.waiting) } else { self.before_question };
+        now + Duration::from_secs_f64(self.waiting / (self.bytes_per_s)(now))
     }
 
     fn answers(&mut self, now: Duration) -> bool {
-        self.answers_at.take_if(|at| *at <= now).is_some()
+        let taken = (now - self.at).as_secs_f64() * (self.bytes_per_s)(now);
+        (self.at, self.waiting) = (now, (self.waiting - taken).max(0.0));
+        self.before_question = self.before_question.map(|before| before - taken);
+        self.before_question.take_if(|before| *before <= 0.0).is_some()
     }
 }
 
@@ -90,8 +93,9 @@ fn flight_over(
 ) -> Vec<(Duration, usize, TdPhase)> {
     let mut slow = bytes_per_s.map(|bytes_per_s| SlowTerminal {
         bytes_per_s,
-        free_at: Duration::ZERO,
-        answers_at: None,
+        waiting: 0.0,
+        at: Duration::ZERO,
+        before_question: None,
     });
     let mut vehicle = load_flight(profile).expect("built in").vehicle().expect("sound");
     vehicle.set_pin_out(true);
