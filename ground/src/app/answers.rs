@@ -17,13 +17,15 @@ use std::io::{Read as _, Write as _};
 use std::os::fd::{AsFd as _, OwnedFd};
 use std::os::unix::fs::OpenOptionsExt as _;
 use std::process::{Command, Stdio};
-use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, isatty, tcgetattr, tcsetattr};
+
+use super::clock::since_boot;
 
 /// Device status report (ECMA-48, 8.3.35), which every terminal answers.
 pub(super) const QUESTION: &[u8] = b"\x1b[5n";
@@ -42,9 +44,9 @@ const QUERY_TMUX_EVERY: Duration = Duration::from_millis(100);
 const TMUX_FORMAT: &str =
     "#{pane_in_mode} #{session_attached} #{window_active} #{&&:#{window_zoomed_flag},#{!=:#{pane_active},1}}";
 
-/// Answers that nobody has taken note of yet, and questions without an answer. There is only one
-/// terminal.
-static ANSWERS: AtomicU32 = AtomicU32::new(0);
+/// When the last answer arrived that no one has taken note of, and questions without an answer.
+/// There is only one terminal.
+static ANSWERED: Mutex<Option<Duration>> = Mutex::new(None);
 static OPEN_QUESTIONS: AtomicI32 = AtomicI32::new(0);
 /// tmux reports that it does not show the screen.
 static HIDDEN: AtomicBool = AtomicBool::new(false);
@@ -57,9 +59,10 @@ pub(super) fn note_question() {
     OPEN_QUESTIONS.fetch_add(1, Ordering::Relaxed);
 }
 
-/// Whether the terminal has answered since the last call.
-pub(super) fn has_answered() -> bool {
-    ANSWERS.swap(0, Ordering::Relaxed) > 0
+/// How long ago the terminal answered, if it has since the last call.
+pub(super) fn answered_ago() -> Option<Duration> {
+    let at = ANSWERED.lock().unwrap_or_else(PoisonError::into_inner).take()?;
+    Some(since_boot().saturating_sub(at))
 }
 
 /// Whether tmux shows another thing than this screen, or takes its keys.
@@ -178,7 +181,7 @@ impl Sieve {
             }
             if self.begun == ANSWER.len() {
                 self.begun = 0;
-                ANSWERS.fetch_add(1, Ordering::Relaxed);
+                *ANSWERED.lock().unwrap_or_else(PoisonError::into_inner) = Some(since_boot());
                 OPEN_QUESTIONS.fetch_sub(1, Ordering::Relaxed);
             }
         }
@@ -215,6 +218,6 @@ mod tests {
             keys.extend(sieve.give_up());
             assert_eq!(keys, b"a\x1b\x1b[Aq\x1b[0~\x1b\x1b[0", "{length}");
         }
-        assert!(has_answered() && !has_answered());
+        assert!(answered_ago().is_some() && answered_ago().is_none());
     }
 }

@@ -51,7 +51,7 @@ impl Clock {
 }
 
 /// A clock that goes on while the computer sleeps, as the vehicle's does.
-fn since_boot() -> Duration {
+pub(super) fn since_boot() -> Duration {
     #[cfg(target_os = "linux")]
     const CLOCK: ClockId = ClockId::Boottime;
     #[cfg(not(target_os = "linux"))]
